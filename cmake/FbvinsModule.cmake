@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+# fbvins_module(NAME DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
+# One static library fbvins_<NAME> (alias fbvins::<NAME>) and one test program fbvins_<NAME>_test beside it.
+find_package(Eigen3 3.3 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(Threads REQUIRED)
+if(FBVINS_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+endif()
+
+add_library(fbvins_flags INTERFACE)
+target_compile_options(fbvins_flags INTERFACE
+  -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wno-psabi
+  # The same bits whatever instruction set a kernel is dispatched to: no silent fused multiply-add.
+  -ffp-contract=off
+  $<$<BOOL:${FBVINS_WERROR}>:-Werror>)
+
+function(fbvins_module NAME)
+  cmake_parse_arguments(ARG "" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
+  set(target fbvins_${NAME})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fbvins_flags> ${ARG_PRIVATE_DEPS})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(fbvins::${NAME} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${NAME})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
+  list(TRANSFORM ARG_DEPS PREPEND fbvins:: OUTPUT_VARIABLE deps)
+  target_link_libraries(${target} ${scope} Eigen3::Eigen fmt::fmt Threads::Threads ${deps})
+  set_property(GLOBAL APPEND PROPERTY FBVINS_MODULE_TARGETS ${target})
+  if(FBVINS_BUILD_TESTS AND ARG_TESTS)
+    add_executable(${target}_test ${ARG_TESTS})
+    target_link_libraries(${target}_test PRIVATE ${target} fbvins_flags ${ARG_TEST_DEPS} GTest::gtest_main)
+    gtest_discover_tests(${target}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+  endif()
+endfunction()

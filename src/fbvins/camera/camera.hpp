@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Projection models. Points are in the camera's frame (z forward, x right, y down), pixels in the
+// raw image with the centre of the top-left pixel at (0, 0).
+//
+//   Camera cam = PinholeRadtan{...};
+//   std::optional<Vec2> px = cam.project(p_C);
+//   std::optional<Vec2> xy = cam.undistort(*px);   // x/z, y/z of the ray
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// Pinhole with two radial and two tangential coefficients (Brown), OpenCV's and Kalibr's "radtan".
+struct PinholeRadtan {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;
+};
+
+/// Kannala-Brandt with four coefficients, Kalibr's "equidistant", OpenCV's fisheye.
+struct KannalaBrandt {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, k3 = 0, k4 = 0;
+};
+
+class Camera {
+ public:
+  Camera() = default;
+  Camera(std::variant<PinholeRadtan, KannalaBrandt> model, int width, int height)
+      : model_(std::move(model)), width_(width), height_(height) {}
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  const std::variant<PinholeRadtan, KannalaBrandt>& model() const { return model_; }
+  std::string model_name() const;
+  /// Mean focal length, px.
+  double focal_px() const;
+
+  /// Pixel of normalised coordinates (x/z, y/z).
+  /// J_pixel_normalised, if given, receives d(pixel)/d(normalised).
+  Vec2 distort(const Vec2& normalised, Mat2* J_pixel_normalised = nullptr) const;
+  /// Normalised coordinates of a pixel, by Newton's method on distort(); nullopt where the model
+  /// cannot be inverted (beyond the monotonic part of the distortion).
+  std::optional<Vec2> undistort(const Vec2& pixel) const;
+  /// Pixel of a point in the camera's frame; nullopt behind the camera or outside the model's domain.
+  /// Does not check the image's borders.
+  std::optional<Vec2> project(const Vec3& p_C) const;
+  bool inside(const Vec2& pixel, double border_px = 0) const {
+    return pixel.x() >= border_px && pixel.y() >= border_px && pixel.x() <= width_ - 1 - border_px &&
+           pixel.y() <= height_ - 1 - border_px;
+  }
+
+ private:
+  std::variant<PinholeRadtan, KannalaBrandt> model_;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+/// Two cameras and an IMU, rigidly joined.
+struct StereoRig {
+  Camera left, right;
+  Pose<B, C0> T_BC0;
+  Pose<B, C1> T_BC1;
+  ImuNoise imu_noise;
+  double image_rate_hz = 20;
+  /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
+  double time_offset_s = 0;
+
+  Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
+};
+
+}  // namespace fbvins

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// StereoFrame -> TrackedFrame: follows features over time and across the stereo pair.
+// A plain synchronous stage: no thread, no clock; one instance is used by one thread at a time.
+//
+//   auto frontend = make_frontend(rig, options);
+//   TrackedFrame tracked = frontend->process(packet, prior);
+#pragma once
+
+#include <memory>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class Frontend {
+ public:
+  virtual ~Frontend() = default;
+
+  /// Features of the newest image. `prior` is the newest state the estimator has published
+  /// (usually one or two frames old; not valid before initialisation); the packet's IMU readings
+  /// carry it on. A missing image gives a frame without features of that camera.
+  virtual TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) = 0;
+};
+
+}  // namespace fbvins

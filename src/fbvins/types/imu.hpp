@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+
+/// One reading of the IMU, in B.
+struct ImuSample {
+  Time t;
+  Vec3 gyro_radps = Vec3::Zero();   ///< angular rate, rad/s
+  Vec3 accel_mps2 = Vec3::Zero();   ///< specific force (at rest: +g upwards), m/s^2
+};
+
+/// The readings between two images: first.t and last.t are the two image stamps (interpolated),
+/// those between are the sensor's own. Empty for the first image and where the IMU is missing.
+struct ImuSegment {
+  std::vector<ImuSample> samples;
+  Duration longest_gap;  ///< largest distance between neighbouring real readings inside
+
+  bool empty() const { return samples.size() < 2; }
+};
+
+/// Continuous-time noise of an IMU, as in calibration files.
+struct ImuNoise {
+  double gyro_noise_density_radps_rthz = 1.6968e-4;
+  double accel_noise_density_mps2_rthz = 2.0e-3;
+  double gyro_random_walk_radps2_rthz = 1.9393e-5;
+  double accel_random_walk_mps3_rthz = 3.0e-3;
+  double rate_hz = 200;
+};
+
+struct ImuBias {
+  Vec3 gyro_radps = Vec3::Zero();
+  Vec3 accel_mps2 = Vec3::Zero();
+};
+
+}  // namespace fbvins

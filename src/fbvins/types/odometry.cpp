@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+std::string_view to_string(HealthState state) {
+  switch (state) {
+    case HealthState::initialising: return "initialising";
+    case HealthState::good: return "good";
+    case HealthState::degraded: return "degraded";
+    case HealthState::lost: return "lost";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(HealthReason reason) {
+  switch (reason) {
+    case HealthReason::none: return "none";
+    case HealthReason::waiting_for_motion_or_rest: return "waiting_for_motion_or_rest";
+    case HealthReason::too_few_features: return "too_few_features";
+    case HealthReason::alignment_refused: return "alignment_refused";
+    case HealthReason::few_tracks: return "few_tracks";
+    case HealthReason::no_tracks: return "no_tracks";
+    case HealthReason::no_images: return "no_images";
+    case HealthReason::imu_gap: return "imu_gap";
+    case HealthReason::implausible_bias: return "implausible_bias";
+    case HealthReason::implausible_speed: return "implausible_speed";
+    case HealthReason::solver_failed: return "solver_failed";
+    case HealthReason::one_camera: return "one_camera";
+  }
+  return "unknown";
+}
+
+}  // namespace fbvins

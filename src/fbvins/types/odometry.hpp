@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the estimator tells the world.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "fbvins/core/ids.hpp"
+#include "fbvins/core/time.hpp"
+#include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+enum class HealthState {
+  initialising,  ///< no pose yet
+  good,
+  degraded,      ///< a pose, but worse than its sensors could give; the reason says why
+  lost,          ///< no trustworthy pose; a restart follows
+};
+
+enum class HealthReason {
+  none,
+  waiting_for_motion_or_rest,
+  too_few_features,
+  alignment_refused,      ///< the initial solution was not observable or not plausible
+  few_tracks,
+  no_tracks,
+  no_images,              ///< a gap in the images
+  imu_gap,
+  implausible_bias,
+  implausible_speed,
+  solver_failed,
+  one_camera,             ///< no stereo matches
+};
+
+std::string_view to_string(HealthState state);
+std::string_view to_string(HealthReason reason);
+
+struct Health {
+  HealthState state = HealthState::initialising;
+  HealthReason reason = HealthReason::none;
+
+  bool has_pose() const { return state == HealthState::good || state == HealthState::degraded; }
+  bool operator==(const Health&) const = default;
+};
+
+struct EstimatorStats {
+  int frames_in_window = 0;
+  int landmarks = 0;
+  int observations = 0;
+  int iterations = 0;
+  int outliers = 0;          ///< observations removed after this frame's solve
+  double initial_cost = 0;
+  double final_cost = 0;
+  bool keyframe = false;
+  bool standstill = false;
+  double prepare_ms = 0, solve_ms = 0, marginalise_ms = 0;
+  double total_ms() const { return prepare_ms + solve_ms + marginalise_ms; }
+};
+
+/// One pose of the flight, at an image's stamp.
+struct Odometry {
+  FrameId id;
+  Time t;
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero();       ///< m/s, in W
+  Vec3 w_WB_B = Vec3::Zero();     ///< rad/s, in B, bias removed
+  ImuBias bias;
+  Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
+  Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
+  Health health;
+  std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then
+  EstimatorStats stats;
+};
+
+/// A read-only picture of the sliding window.
+struct WindowSnapshot {
+  struct Frame {
+    FrameId id;
+    Time t;
+    Pose<W, B> T_WB;
+    bool keyframe = false;
+  };
+  struct Landmark {
+    LandmarkId id;
+    Vec3 p_W = Vec3::Zero();
+    int observations = 0;
+  };
+  std::vector<Frame> frames;
+  std::vector<Landmark> landmarks;
+};
+
+}  // namespace fbvins

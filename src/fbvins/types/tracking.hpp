@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the frontend tells the estimator, and the one value that comes back.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/core/ids.hpp"
+#include "fbvins/core/time.hpp"
+#include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/image.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// A stereo image with the IMU readings since the image before it.
+struct SensorPacket {
+  FrameId id;
+  StereoFrame frame;
+  ImuSegment imu;
+};
+
+/// Where a feature is seen in one camera.
+struct Observation {
+  Vec2 pixel = Vec2::Zero();        ///< in the raw (distorted) image, px
+  Vec2 normalised = Vec2::Zero();   ///< x/z, y/z of the undistorted ray in that camera's frame
+  /// d(pixel)/d(normalised) at this point, divided by the standard deviation of the pixel position:
+  /// weighs a residual in normalised coordinates so that it counts in sigmas of the raw image.
+  Mat2 sqrt_information = Mat2::Identity();
+};
+
+/// A feature in the newest frame. Features keep their id as long as they are followed.
+struct TrackedFeature {
+  TrackId id;
+  Observation left;
+  std::optional<Observation> right;  ///< present when matched in the right image
+  int age_frames = 0;                ///< 0 when detected in this frame
+};
+
+struct FrontendStats {
+  int tracked = 0;          ///< features continued from the frame before
+  int detected = 0;         ///< new features
+  int stereo = 0;           ///< features matched left-right
+  int lost_flow = 0;        ///< lost by the tracker or matcher
+  int lost_check = 0;       ///< lost by the forward-backward, ratio or mutual check
+  int lost_epipolar = 0;    ///< lost by RANSAC on the epipolar constraint
+  double mean_brightness_left = 0;
+  double mean_brightness_right = 0;
+  double median_motion_px = 0;  ///< of the features continued, in the raw left image
+  double pyramid_ms = 0, track_ms = 0, stereo_ms = 0, detect_ms = 0, geometry_ms = 0;
+  double total_ms() const { return pyramid_ms + track_ms + stereo_ms + detect_ms + geometry_ms; }
+};
+
+struct TrackedFrame {
+  FrameId id;
+  Time t;
+  std::vector<TrackedFeature> features;
+  ImuSegment imu;  ///< since the frame before
+  FrontendStats stats;
+};
+
+/// The newest estimate, fed back to the frontend for guided matching.
+struct StatePrior {
+  Time t;
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero();  ///< m/s, in W
+  ImuBias bias;
+  bool valid = false;
+};
+
+}  // namespace fbvins
