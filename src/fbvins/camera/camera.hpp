@@ -5,6 +5,8 @@
 //   Camera cam = PinholeRadtan{...};
 //   std::optional<Vec2> px = cam.project(p_C);
 //   std::optional<Vec2> xy = cam.undistort(*px);   // x/z, y/z of the ray
+//
+// Values: const members may be called from any thread.
 #pragma once
 
 #include <optional>
@@ -31,8 +33,7 @@ struct KannalaBrandt {
 class Camera {
  public:
   Camera() = default;
-  Camera(std::variant<PinholeRadtan, KannalaBrandt> model, int width, int height)
-      : model_(std::move(model)), width_(width), height_(height) {}
+  Camera(std::variant<PinholeRadtan, KannalaBrandt> model, int width, int height);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -50,6 +51,8 @@ class Camera {
   /// Pixel of a point in the camera's frame; nullopt behind the camera or outside the model's domain.
   /// Does not check the image's borders.
   std::optional<Vec2> project(const Vec3& p_C) const;
+  /// Largest |(x/z, y/z)| at which the radial distortion still grows outwards: the model's domain.
+  double max_normalised_radius() const { return max_radius_; }
   bool inside(const Vec2& pixel, double border_px = 0) const {
     return pixel.x() >= border_px && pixel.y() >= border_px && pixel.x() <= width_ - 1 - border_px &&
            pixel.y() <= height_ - 1 - border_px;
@@ -59,6 +62,7 @@ class Camera {
   std::variant<PinholeRadtan, KannalaBrandt> model_;
   int width_ = 0;
   int height_ = 0;
+  double max_radius_ = 0;
 };
 
 /// Two cameras and an IMU, rigidly joined.
