@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The readings between two instants i and j summed into one relative motion, with its covariance
+// and its derivatives by the biases (docs/derivations/preintegration.md, eq. P1-P16; paper 2.1.2).
+//
+//   Preintegration between(noise, bias);
+//   between.integrate(frame.imu);               // again for each consecutive segment
+//   NavState j = between.predict(state_i, kGravity_mps2);
+//
+// Perturbation order (p, theta, v, bg, ba); delta_p and delta_v are in B_i, theta is right (local).
+// Threads: a value; const members may fill a cache, so share one object between threads only by copy.
+#pragma once
+
+#include <vector>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// Relative motion from B_i to B_j, without gravity.
+struct ImuDeltas {
+  Quat q = Quat::Identity();  ///< R_BiBj
+  Vec3 v = Vec3::Zero();      ///< m/s, in B_i
+  Vec3 p = Vec3::Zero();      ///< m, in B_i
+};
+
+/// How far a bias may move before the first-order correction is replaced by integrating anew.
+struct RepropagationThreshold {
+  double gyro_rad = 2e-3;   ///< |d bg| * dt: the second-order error is about half its square
+  double accel_mps = 0.2;   ///< |d ba| * dt: exact on its own, crosses with the gyro's
+};
+
+/// What is assumed of the signal where readings are missing (eq. P13).
+struct ImuGapModel {
+  double longest_regular_step = 2.5;   ///< in sampling periods; a longer step is a gap
+  double gyro_sigma_radps = 0.3;       ///< error of the mean rate over a long gap
+  double accel_sigma_mps2 = 2.0;       ///< error of the mean specific force over a long gap
+  double long_gap_s = 0.1;             ///< shorter gaps: sigmas scaled by (gap / long_gap)^2
+};
+
+class Preintegration {
+ public:
+  Preintegration(const ImuNoise& noise, const ImuBias& linearisation_bias);
+
+  /// Adds readings. The first sample must be the last one of the segment before. An empty segment
+  /// adds nothing; a step longer than the sensor's period is bridged linearly and its covariance inflated.
+  void integrate(const ImuSegment& segment);
+
+  /// Joins the consecutive interval `later`, integrating its raw readings with this one's bias.
+  void append(const Preintegration& later);
+
+  /// Integrates all readings again about another bias.
+  void repropagate(const ImuBias& linearisation_bias);
+  bool needs_repropagation(const ImuBias& bias, const RepropagationThreshold& threshold = {}) const;
+
+  bool empty() const { return readings_.size() < 2; }
+  int size() const { return static_cast<int>(readings_.size()); }
+  Duration dt() const { return empty() ? Duration{} : readings_.back().t - readings_.front().t; }
+  double dt_s() const { return dt().seconds(); }
+  Time begin() const { return empty() ? Time{} : readings_.front().t; }
+  Time end() const { return empty() ? Time{} : readings_.back().t; }
+  /// The longest time without a reading that touches this interval; 0 when there was none.
+  double longest_gap_s() const { return longest_gap_s_; }
+
+  const ImuDeltas& deltas() const { return deltas_; }  ///< at the linearisation bias
+  const Quat& delta_q() const { return deltas_.q; }
+  const Vec3& delta_v() const { return deltas_.v; }
+  const Vec3& delta_p() const { return deltas_.p; }
+  const ImuBias& linearisation_bias() const { return bias_; }
+
+  /// Deltas at another bias, to first order (eq. P14).
+  ImuDeltas corrected(const ImuBias& bias) const;
+
+  const Mat3& J_theta_bg() const { return J_theta_bg_; }
+  const Mat3& J_v_bg() const { return J_v_bg_; }
+  const Mat3& J_v_ba() const { return J_v_ba_; }
+  const Mat3& J_p_bg() const { return J_p_bg_; }
+  const Mat3& J_p_ba() const { return J_p_ba_; }
+
+  /// Of (p, theta, v, bg, ba), the last two being the random walk of the biases from i to j.
+  const Mat15& covariance() const { return covariance_; }
+  /// Upper-triangular U with U^T U = covariance^-1. Zero while empty().
+  const Mat15& sqrt_information() const;
+
+  /// State at j from the state at i (eq. P1).
+  NavState predict(const NavState& i, double gravity_mps2) const;
+
+  /// Angular rate at the end of the interval, bias removed, rad/s in B_j.
+  Vec3 last_rate_radps(const ImuBias& bias) const;
+
+ private:
+  struct Reading {
+    Time t;
+    Vec3 gyro_radps;
+    Vec3 accel_mps2;
+    double gap_s;  ///< the IMU gap in which the step up to this reading lies; 0 for a regular step
+  };
+
+  void reset(const ImuBias& bias);
+  void push(const Reading& reading);
+  void step(const Reading& from, const Reading& to);
+
+  ImuNoise noise_;
+  ImuGapModel gap_model_;
+  ImuBias bias_;
+  std::vector<Reading> readings_;
+  ImuDeltas deltas_;
+  Mat3 J_theta_bg_, J_v_bg_, J_v_ba_, J_p_bg_, J_p_ba_;
+  Mat15 covariance_;
+  double longest_gap_s_ = 0;
+  mutable Mat15 sqrt_information_;
+  mutable bool sqrt_information_valid_ = false;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The state carried along a segment of readings, without covariance: for prediction between images.
+//
+//   NavState now = propagate(state, frame.imu, kGravity_mps2);
+//
+// Threads: pure functions. Same integration rule as Preintegration (eq. P5-P7).
+#pragma once
+
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// State at the segment's last stamp; an empty segment returns the state unchanged.
+NavState propagate(const NavState& state, const ImuSegment& segment, double gravity_mps2);
+
+/// Rotation R_BiBj over the segment, gyro bias (rad/s) removed.
+Quat integrate_gyro(const ImuSegment& segment, const Vec3& gyro_bias_radps);
+
+}  // namespace fbvins
