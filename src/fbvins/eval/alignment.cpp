@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/eval/alignment.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace fbvins {
+namespace {
+
+constexpr std::array<std::string_view, 4> kNames = {"none", "yaw", "se3", "sim3"};
+
+/// First and second moments of the two point sets.
+struct Moments {
+  Vec3 mean_truth = Vec3::Zero();
+  Vec3 mean_estimate = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();  ///< of truth with estimate, Umeyama's eq. 38, m^2
+  double variance_estimate = 0;    ///< eq. 37, m^2
+};
+
+Moments moments_of(const std::vector<PosePair>& pairs) {
+  const double weight = 1.0 / static_cast<double>(pairs.size());
+  Moments m;
+  for (const PosePair& pair : pairs) {
+    m.mean_truth += weight * pair.truth.T_WB.p;
+    m.mean_estimate += weight * pair.estimate.T_WB.p;
+  }
+  for (const PosePair& pair : pairs) {
+    const Vec3 estimate = pair.estimate.T_WB.p - m.mean_estimate;
+    m.covariance += weight * (pair.truth.T_WB.p - m.mean_truth) * estimate.transpose();
+    m.variance_estimate += weight * estimate.squaredNorm();
+  }
+  return m;
+}
+
+Similarity around_means(const Moments& m, const Quat& q, double scale) {
+  return {scale, q, Vec3(m.mean_truth - scale * (q * m.mean_estimate))};
+}
+
+/// The yaw that maximises the trace of Rz^T * covariance.
+Similarity align_yaw(const Moments& m) {
+  const Mat3& c = m.covariance;
+  const double yaw = std::atan2(c(1, 0) - c(0, 1), c(0, 0) + c(1, 1));
+  return around_means(m, Quat(Eigen::AngleAxisd(yaw, Vec3::UnitZ())), 1.0);
+}
+
+Result<Similarity> align_umeyama(const Moments& m, bool with_scale) {
+  const Eigen::JacobiSVD<Mat3> svd(m.covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vec3 d = svd.singularValues();
+  if (!(d(1) > std::numeric_limits<double>::epsilon()))
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("the positions do not span two directions (singular values {:.1e} {:.1e} {:.1e} m^2): "
+                             "no SE3 or Sim3 alignment; align yaw only, or not at all",
+                             d(0), d(1), d(2))};
+  Vec3 s = Vec3::Ones();  // eq. 39: a rotation, not a mirror
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) s(2) = -1;
+  const Mat3 R = svd.matrixU() * s.asDiagonal() * svd.matrixV().transpose();
+  const double scale = with_scale ? d.dot(s) / m.variance_estimate : 1.0;
+  return around_means(m, Quat(R).normalized(), scale);
+}
+
+}  // namespace
+
+std::string_view to_string(Alignment alignment) { return kNames[static_cast<std::size_t>(alignment)]; }
+
+std::optional<Alignment> alignment_from_string(std::string_view name) {
+  for (std::size_t i = 0; i < kNames.size(); ++i)
+    if (kNames[i] == name) return static_cast<Alignment>(i);
+  return std::nullopt;
+}
+
+Pose<W, B> Similarity::operator*(const Pose<W, B>& T_WB) const {
+  return {(q * T_WB.q).normalized(), Vec3(scale * (q * T_WB.p) + p)};
+}
+
+Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment) {
+  if (alignment == Alignment::none) return Similarity{};
+  if (pairs.size() < 3)
+    return Error{ErrorCode::invalid_argument, fmt::format("{} pairs of poses are too few to align", pairs.size())};
+  const Moments m = moments_of(pairs);
+  if (alignment == Alignment::yaw) return align_yaw(m);
+  return align_umeyama(m, alignment == Alignment::sim3);
+}
+
+std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs) {
+  for (PosePair& pair : pairs) pair.estimate.T_WB = similarity * pair.estimate.T_WB;
+  return pairs;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// How good a trajectory is, in one call: associate, align, absolute and relative errors.
+// Pure functions, any thread.
+//
+//   Result<Evaluation> e = evaluate(truth, estimate, {});
+//   if (e) fmt::print("ATE RMSE {} m\n", e->absolute_m.rmse);
+#pragma once
+
+#include "fbvins/eval/alignment.hpp"
+#include "fbvins/eval/relative_error.hpp"
+#include "fbvins/eval/statistics.hpp"
+
+namespace fbvins {
+
+struct EvaluationOptions {
+  AssociationOptions association;
+  Alignment alignment = Alignment::se3;
+  RelativeErrorOptions per_metre{.unit = DeltaUnit::metres};
+  RelativeErrorOptions per_second{.unit = DeltaUnit::seconds};
+};
+
+struct Evaluation {
+  int pairs = 0;
+  double truth_path_m = 0;   ///< length of the truth between the pairs
+  Similarity alignment;
+  ErrorStatistics absolute_m;
+  ErrorStatistics absolute_rotation_deg;
+  ErrorStatistics per_metre_m, per_metre_deg;
+  ErrorStatistics per_second_m, per_second_deg;
+  double largest_excursion_m = 0;  ///< of the estimate from its first pose: drift where the truth is at rest
+};
+
+/// An error when no poses belong together or they do not determine the alignment.
+Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options);
+
+/// |p_estimate - p_truth| of each pair, m.
+std::vector<double> absolute_errors_m(const std::vector<PosePair>& pairs);
+/// Angle between the two orientations of each pair, degrees.
+std::vector<double> absolute_errors_deg(const std::vector<PosePair>& pairs);
+
+}  // namespace fbvins

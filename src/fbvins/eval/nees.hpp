@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Consistency: are the errors as large as the estimator's own covariances say? The normalised
+// estimation error squared, e^T P^-1 e, has mean 3 for a position or an orientation and 6 for a
+// pose when they are; larger means too sure of itself (Bar-Shalom, Li, Kirubarajan, 2001, 5.4).
+// Pure functions, any thread.
+//
+//   NeesSummary s = nees(pairs, covariances, alignment);   // s.position near 3 is honest
+#pragma once
+
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/eval/alignment.hpp"
+
+namespace fbvins {
+
+struct PoseNees {
+  double position = 0;     ///< mean 3 when consistent
+  double orientation = 0;  ///< mean 3
+  double pose = 0;         ///< mean 6
+};
+
+struct NeesSummary {
+  int count = 0;      ///< poses that entered
+  int unusable = 0;   ///< poses whose covariance is not positive definite
+  PoseNees mean;
+  /// Share of the poses inside the two-sided 95 % bounds of chi-square with 3, 3 and 6 degrees of freedom.
+  PoseNees share_within_95;
+};
+
+/// Error of one pose against its covariance, of (dp in W [m], dtheta in B [rad]) with
+/// truth = estimate.boxplus(dp, dtheta), both in the estimate's world. An error for a covariance
+/// that is not positive definite.
+Result<PoseNees> pose_nees(const Pose<W, B>& truth, const Pose<W, B>& estimate, const Mat6& covariance);
+
+/// Over a trajectory: covariances[i] belongs to pairs[i]; `to_truth` is the alignment of the estimate,
+/// which is undone on the truth because covariances live in the estimate's world. Its scale is ignored.
+NeesSummary nees(const std::vector<PosePair>& pairs, const std::vector<Mat6>& covariances, const Similarity& to_truth);
+
+}  // namespace fbvins
