@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/config/option_fields.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+
+namespace fbvins {
+namespace {
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+/// The whole text as a number; locale-free and exact, unlike streams.
+template <class T>
+bool parse(std::string_view text, T& value) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+template <class T>
+Result<void> set_number(const OptionField& field, const std::string& text, T& target) {
+  T value{};
+  if (!parse(text, value) || !std::isfinite(static_cast<double>(value)))
+    return invalid(fmt::format("'{}' is not a {}", text, field.type_name()));
+  const auto number = static_cast<double>(value);
+  if (number < field.min || number > field.max)
+    return invalid(fmt::format("{} is outside {}{}{}", text, field.range_text(), field.unit.empty() ? "" : " ", field.unit));
+  target = value;
+  return {};
+}
+
+Result<void> set_bool(const std::string& text, bool& target) {
+  if (text != "true" && text != "false") return invalid(fmt::format("'{}' is not true or false", text));
+  target = text == "true";
+  return {};
+}
+
+Result<void> set_text(const OptionField& field, const std::string& text, std::string& target) {
+  const bool one_word = !text.empty() && text.find('|') == std::string::npos;
+  const bool allowed = one_word && fmt::format("|{}|", field.choices).find(fmt::format("|{}|", text)) != std::string::npos;
+  if (!field.choices.empty() && !allowed) return invalid(fmt::format("'{}' is none of {}", text, field.choices));
+  target = text;
+  return {};
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replace = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replace, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string_view last_part(std::string_view path) {
+  const auto dot = path.rfind('.');
+  return dot == std::string_view::npos ? path : path.substr(dot + 1);
+}
+
+}  // namespace
+
+int OptionField::depth() const { return static_cast<int>(std::count(path.begin(), path.end(), '.')); }
+
+std::string_view OptionField::name() const { return last_part(path); }
+
+std::string OptionField::type_name() const {
+  constexpr const char* kNames[] = {"group", "true or false", "whole number", "number", "text"};
+  return kNames[value.index()];
+}
+
+std::string OptionField::value_text() const {
+  if (auto* flag = std::get_if<bool*>(&value)) return **flag ? "true" : "false";
+  if (auto* whole = std::get_if<int*>(&value)) return fmt::format("{}", **whole);
+  if (auto* number = std::get_if<double*>(&value)) return fmt::format("{}", **number);
+  if (auto* text = std::get_if<std::string*>(&value)) return **text;
+  return {};
+}
+
+std::string OptionField::range_text() const {
+  if (std::holds_alternative<int*>(value) || std::holds_alternative<double*>(value))
+    return fmt::format("[{}, {}]", min, max);
+  return choices;
+}
+
+Result<void> OptionField::set_from_text(const std::string& text) const {
+  if (auto* flag = std::get_if<bool*>(&value)) return set_bool(text, **flag);
+  if (auto* whole = std::get_if<int*>(&value)) return set_number(*this, text, **whole);
+  if (auto* number = std::get_if<double*>(&value)) return set_number(*this, text, **number);
+  if (auto* target = std::get_if<std::string*>(&value)) return set_text(*this, text, **target);
+  return invalid("is a group of options, not a value");
+}
+
+std::string nearest_path(const std::vector<OptionField>& fields, std::string_view wrong) {
+  std::string best;
+  std::size_t least = std::max<std::size_t>(2, last_part(wrong).size() / 3) + 1;
+  for (const OptionField& field : fields) {
+    // A right name in the wrong group is nearer than a wrong name in the right one.
+    const std::size_t elsewhere = edit_distance(field.name(), last_part(wrong)) + 1;
+    const std::size_t distance = std::min(edit_distance(field.path, wrong), elsewhere);
+    if (distance < least) {
+      least = distance;
+      best = field.path;
+    }
+  }
+  return best;
+}
+
+Result<void> set_option(const std::vector<OptionField>& fields, const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos) return invalid(fmt::format("'{}' is not of the form name=value", assignment));
+  const std::string path = assignment.substr(0, equals);
+  const auto field = std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path == path; });
+  if (field == fields.end()) {
+    const std::string near = nearest_path(fields, path);
+    return invalid(fmt::format("unknown option '{}'{}", path, near.empty() ? "" : fmt::format("; did you mean '{}'?", near)));
+  }
+  const Result<void> set = field->set_from_text(assignment.substr(equals + 1));
+  if (!set) return invalid(fmt::format("option '{}': {}", path, set.error().message));
+  return {};
+}
+
+}  // namespace fbvins
