@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/klt.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/features/lanes.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kP = kKltPatch;
+static_assert(kP == kLanes, "one patch row is one set of lanes");
+
+/// Window: a separable bump that falls smoothly towards the edge, so that what enters or leaves
+/// the patch at its rim does not pull the result. Sum 1.
+struct Window {
+  alignas(64) float w[kP * kP];
+  constexpr Window() : w{} {
+    double side[kP] = {}, sum = 0;
+    for (int i = 0; i < kP; ++i) {
+      const double u = (i - 0.5 * (kP - 1)) / (0.5 * kP + 0.5);
+      side[i] = 1.0 - u * u * u * u;
+      sum += side[i];
+    }
+    for (int y = 0; y < kP; ++y)
+      for (int x = 0; x < kP; ++x) w[y * kP + x] = static_cast<float>(side[y] * side[x] / (sum * sum));
+  }
+};
+constexpr Window kWindow;
+
+/// Bilinear weights and the address of the patch's first sample.
+struct Place {
+  const std::uint8_t* p;
+  std::ptrdiff_t stride;
+  float fx, fy;
+};
+
+/// False when the patch (with `margin` samples around) would leave the padded level.
+bool place_patch(const PyramidLevel& level, double x, double y, int margin, Place& place) {
+  const double left = x - 0.5 * (kP - 1), top = y - 0.5 * (kP - 1);
+  const int lowest = -kPyramidBorder + margin;
+  if (!(left >= lowest && top >= lowest)) return false;
+  const double fl = std::floor(left), ft = std::floor(top);
+  if (left + kP + margin + 1 > level.width + kPyramidBorder || top + kP + margin + 1 > level.height + kPyramidBorder)
+    return false;
+  place = {level.row(static_cast<int>(ft)) + static_cast<std::ptrdiff_t>(fl), level.stride,
+           static_cast<float>(left - fl), static_cast<float>(top - ft)};
+  return true;
+}
+
+FBVINS_INLINE void blend_row(const std::uint8_t* p, float fx, F16& out) {
+  F16 a, b;
+  load_lanes(p, a);
+  load_lanes(p + 1, b);
+  out = a + (b - a) * fx;
+}
+
+struct PatchSums {
+  float gx, gy, t, one, square;
+};
+
+/// Projections of the image patch onto the template's rows, and its own first two moments.
+FBVINS_KERNEL
+void project_patch(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wgx, const float* wgy,
+                   const float* wt, const float* w, PatchSums& sums) {
+  F16 sgx = {}, sgy = {}, st = {}, s1 = {}, s2 = {}, upper, lower;
+  blend_row(p, fx, upper);
+  for (int y = 0; y < kP; ++y) {
+    blend_row(p + (y + 1) * stride, fx, lower);
+    const F16 value = upper + (lower - upper) * fy;
+    upper = lower;
+    F16 a, b, c, d;
+    load_lanes(wgx + y * kP, a);
+    load_lanes(wgy + y * kP, b);
+    load_lanes(wt + y * kP, c);
+    load_lanes(w + y * kP, d);
+    sgx += a * value;
+    sgy += b * value;
+    st += c * value;
+    const F16 weighted = d * value;
+    s1 += weighted;
+    s2 += weighted * value;
+  }
+  sums = {sum_lanes(sgx), sum_lanes(sgy), sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
+}
+
+struct TemplateMoments {
+  float t, gx, gy, tt, tgx, tgy, gxx, gxy, gyy;
+};
+
+/// Samples template and central-difference gradients (raw, stored in t, gx, gy) and their weighted moments.
+FBVINS_KERNEL
+void sample_template(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* w, float* t, float* gx,
+                     float* gy, TemplateMoments& m) {
+  F16 centre[kP + 2];
+  F16 upper, lower;
+  blend_row(p - stride, fx, upper);
+  for (int y = 0; y < kP + 2; ++y) {
+    blend_row(p + y * stride, fx, lower);
+    centre[y] = upper + (lower - upper) * fy;
+    upper = lower;
+  }
+  F16 st = {}, sgx = {}, sgy = {}, stt = {}, stgx = {}, stgy = {}, sgxx = {}, sgxy = {}, sgyy = {};
+  F16 left_upper, left_lower, right_upper, right_lower;
+  blend_row(p - 1, fx, left_upper);
+  blend_row(p + 1, fx, right_upper);
+  for (int y = 0; y < kP; ++y) {
+    blend_row(p - 1 + (y + 1) * stride, fx, left_lower);
+    blend_row(p + 1 + (y + 1) * stride, fx, right_lower);
+    const F16 left = left_upper + (left_lower - left_upper) * fy;
+    const F16 right = right_upper + (right_lower - right_upper) * fy;
+    left_upper = left_lower;
+    right_upper = right_lower;
+    const F16 value = centre[y + 1];
+    const F16 dx = (right - left) * 0.5f;
+    const F16 dy = (centre[y + 2] - centre[y]) * 0.5f;
+    store_lanes(value, t + y * kP);
+    store_lanes(dx, gx + y * kP);
+    store_lanes(dy, gy + y * kP);
+    F16 weight;
+    load_lanes(w + y * kP, weight);
+    const F16 wv = weight * value, wdx = weight * dx, wdy = weight * dy;
+    st += wv;
+    sgx += wdx;
+    sgy += wdy;
+    stt += wv * value;
+    stgx += wv * dx;
+    stgy += wv * dy;
+    sgxx += wdx * dx;
+    sgxy += wdx * dy;
+    sgyy += wdy * dy;
+  }
+  m = {sum_lanes(st),   sum_lanes(sgx),  sum_lanes(sgy),  sum_lanes(stt), sum_lanes(stgx),
+       sum_lanes(stgy), sum_lanes(sgxx), sum_lanes(sgxy), sum_lanes(sgyy)};
+}
+
+/// In place: t - mean, g - mean - c (t - mean), each times the window.
+FBVINS_KERNEL
+void orthogonalise(const float* w, float mean_t, float mean_gx, float mean_gy, float cx, float cy, float* t, float* gx,
+                   float* gy) {
+  for (int y = 0; y < kP; ++y) {
+    F16 weight, tv, gxv, gyv;
+    load_lanes(w + y * kP, weight);
+    load_lanes(t + y * kP, tv);
+    load_lanes(gx + y * kP, gxv);
+    load_lanes(gy + y * kP, gyv);
+    tv = tv - mean_t;
+    gxv = (gxv - mean_gx - tv * cx) * weight;
+    gyv = (gyv - mean_gy - tv * cy) * weight;
+    store_lanes(tv * weight, t + y * kP);
+    store_lanes(gxv, gx + y * kP);
+    store_lanes(gyv, gy + y * kP);
+  }
+}
+
+/// Smallest weighted variance of grey values, and of the gradient in any direction, of a usable patch.
+constexpr float kMinVariance = 0.05f;
+constexpr float kMinGradientVariance = 0.003f;
+
+bool finish_template(const TemplateMoments& m, KltLevelTemplate& out) {
+  const float vtt = m.tt - m.t * m.t;
+  if (!(vtt > kMinVariance)) return false;
+  const float cx = (m.tgx - m.t * m.gx) / vtt, cy = (m.tgy - m.t * m.gy) / vtt;
+  const float hxx = m.gxx - m.gx * m.gx - cx * cx * vtt;
+  const float hxy = m.gxy - m.gx * m.gy - cx * cy * vtt;
+  const float hyy = m.gyy - m.gy * m.gy - cy * cy * vtt;
+  const float half_trace = 0.5f * (hxx + hyy);
+  const float det = hxx * hyy - hxy * hxy;
+  const float smallest = half_trace - std::sqrt(std::max(0.0f, half_trace * half_trace - det));
+  if (!(smallest > kMinGradientVariance)) return false;
+  orthogonalise(kWindow.w, m.t, m.gx, m.gy, cx, cy, out.wt, out.wgx, out.wgy);
+  out.ihxx = hyy / det;
+  out.ihxy = -hxy / det;
+  out.ihyy = hxx / det;
+  out.ctx = cx;
+  out.cty = cy;
+  out.energy = vtt;
+  return true;
+}
+
+struct LevelFit {
+  Vec2 px;
+  PatchSums sums{};
+  float gain = 1;
+  int iterations = 0;
+  KltStatus status = KltStatus::ok;
+};
+
+/// A level may not carry the feature farther than this from where it started on that level.
+constexpr double kMaxTravel_px = 10;
+
+void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, double convergence_px, int max_iterations,
+                 double max_gain, LevelFit& fit) {
+  const Vec2 start = fit.px;
+  for (int i = 0; i < max_iterations; ++i) {
+    Place place;
+    if (!place_patch(image, fit.px.x(), fit.px.y(), 0, place)) {
+      fit.status = KltStatus::outside;
+      return;
+    }
+    project_patch(place.p, place.stride, place.fx, place.fy, patch.wgx, patch.wgy, patch.wt, kWindow.w, fit.sums);
+    ++fit.iterations;
+    const float asx = patch.ihxx * fit.sums.gx + patch.ihxy * fit.sums.gy;
+    const float asy = patch.ihxy * fit.sums.gx + patch.ihyy * fit.sums.gy;
+    fit.gain = fit.sums.t / patch.energy - patch.ctx * asx - patch.cty * asy;
+    if (!(fit.gain * max_gain > 1 && fit.gain < max_gain)) {
+      fit.status = KltStatus::diverged;
+      return;
+    }
+    Vec2 step(asx / fit.gain, asy / fit.gain);
+    const double length = step.norm();
+    if (length > 2) step *= 2 / length;
+    fit.px -= step;
+    if ((fit.px - start).squaredNorm() > kMaxTravel_px * kMaxTravel_px) {
+      fit.status = KltStatus::diverged;
+      return;
+    }
+    if (length < convergence_px) return;
+  }
+}
+
+float correlation_of(const PatchSums& sums, float energy) {
+  const float variance = sums.square - sums.one * sums.one;
+  if (!(variance > 1e-3f)) return 0;
+  return sums.t / std::sqrt(variance * energy);
+}
+
+}  // namespace
+
+bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest) {
+  for (int l = finest; l <= std::min(coarsest, pyramid.levels() - 1); ++l) {
+    KltLevelTemplate& out = levels[static_cast<std::size_t>(l)];
+    out.valid = false;
+    const double scale = 1.0 / (1 << l);
+    Place place;
+    if (!place_patch(pyramid.level(l), px.x() * scale, px.y() * scale, 1, place)) continue;
+    TemplateMoments moments;
+    sample_template(place.p, place.stride, place.fx, place.fy, kWindow.w, out.wt, out.wgx, out.wgy, moments);
+    out.valid = finish_template(moments, out);
+  }
+  for (int l = std::max(finest, pyramid.levels()); l <= coarsest; ++l) levels[static_cast<std::size_t>(l)].valid = false;
+  return levels[static_cast<std::size_t>(finest)].valid;
+}
+
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
+                    const KltOptions& options) {
+  KltResult result;
+  result.px = start_px;
+  LevelFit fit;
+  for (int l = std::min(coarsest, image.levels() - 1); l >= finest; --l) {
+    const KltLevelTemplate& level_patch = patch.levels[static_cast<std::size_t>(l)];
+    if (!level_patch.valid) continue;
+    const double scale = 1 << l;
+    fit = LevelFit{};
+    fit.px = result.px / scale;
+    const bool last = l == finest;
+    // Coarse levels only have to bring the next one within reach.
+    const double convergence_px = last ? options.convergence_px : std::max(options.convergence_px, 0.05);
+    align_level(level_patch, image.level(l), convergence_px, options.max_iterations, options.max_gain, fit);
+    result.iterations += fit.iterations;
+    if (fit.status == KltStatus::ok) result.px = fit.px * scale;
+    else if (last) break;
+  }
+  if (!patch.levels[static_cast<std::size_t>(finest)].valid || image.levels() <= finest) return result;
+  result.status = fit.status;
+  if (fit.status != KltStatus::ok) return result;
+  const PyramidLevel& full = image.level(0);
+  if (result.px.x() < 0 || result.px.y() < 0 || result.px.x() > full.width - 1 || result.px.y() > full.height - 1) {
+    result.status = KltStatus::outside;
+    return result;
+  }
+  const float energy = patch.levels[static_cast<std::size_t>(finest)].energy;
+  result.correlation = correlation_of(fit.sums, energy);
+  result.gain = fit.gain;
+  const float variance = std::max(0.0f, fit.sums.square - fit.sums.one * fit.sums.one);
+  result.residual = std::sqrt(std::max(0.0f, variance * (1 - result.correlation * result.correlation)));
+  if (result.correlation < options.min_correlation &&
+      !(result.correlation > 0.3f && result.residual < options.max_residual_noise))
+    result.status = KltStatus::poor_match;
+  return result;
+}
+
+float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px) {
+  Place place;
+  if (!patch.valid || !place_patch(level, px.x(), px.y(), 0, place)) return -1;
+  PatchSums sums;
+  project_patch(place.p, place.stride, place.fx, place.fy, patch.wgx, patch.wgy, patch.wt, kWindow.w, sums);
+  return correlation_of(sums, patch.energy);
+}
+
+}  // namespace fbvins

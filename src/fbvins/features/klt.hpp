@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pyramidal Lucas-Kanade with gain and offset, inverse-compositional (Baker & Matthews, IJCV 2004).
+//
+// Around the feature the image is modelled as  I(x + d) = a * (T(x) + grad T(x)^T s) + b.  This is linear in
+// (a*s, a, b), so one iteration is four weighted sums over the patch times a constant matrix: exact
+// invariance to exposure and gain costs nothing, and no residual image is formed. d <- d - s.
+// A template is cut once per feature and frame, and serves the next frame, the other camera and the
+// backward check. Thread rule: functions without state.
+//
+//   KltTemplate patch;
+//   patch.cut(pyramid_then, px, 0, 3);
+//   KltResult found = klt_align(patch, pyramid_now, predicted_px, 3, 0, options);
+//   if (found.ok()) use(found.px);
+#pragma once
+
+#include <array>
+
+#include "fbvins/features/pyramid.hpp"
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+
+/// Side of the square patch. Even, so that the feature lies between the four central samples.
+inline constexpr int kKltPatch = 16;
+/// Distance from a feature to the farthest pixel its template reads, rounded up.
+inline constexpr int kKltReach = kKltPatch / 2 + 2;
+
+struct KltOptions {
+  int max_iterations = 15;
+  double convergence_px = 0.01;
+  double min_correlation = 0.75;
+  double max_residual_noise = 2.5;
+  double max_gain = 20;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_iterations", max_iterations, "", "Gauss-Newton iterations on each pyramid level", 1, 100);
+    v("convergence_px", convergence_px, "px", "step at which the finest level has converged", 1e-4, 0.5);
+    v("min_correlation", min_correlation, "", "smallest normalised cross-correlation of an accepted patch", -1.0, 1.0);
+    v("max_residual_noise", max_residual_noise, "grey", "a residual below this is image noise and accepted whatever the correlation", 0.0, 50.0);
+    v("max_gain", max_gain, "", "largest change of contrast between two patches, either way", 1.0, 1000.0);
+  }
+};
+
+/// What one pyramid level needs of the template: the projections onto gradient and grey value.
+struct alignas(64) KltLevelTemplate {
+  static constexpr int kSamples = kKltPatch * kKltPatch;
+  float wgx[kSamples], wgy[kSamples], wt[kSamples];  ///< window weight times the part orthogonal to 1 (and to T)
+  float ihxx = 0, ihxy = 0, ihyy = 0;                ///< inverse of the 2x2 normal matrix
+  float ctx = 0, cty = 0;                            ///< regression of the gradients on T
+  float energy = 0;                                  ///< weighted sum of (T - mean T)^2
+  bool valid = false;
+};
+
+struct KltTemplate {
+  std::array<KltLevelTemplate, kMaxPyramidLevels> levels;
+
+  /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest.
+  /// False when the feature is too close to the border or the finest patch has no texture in some direction.
+  bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest);
+};
+
+enum class KltStatus { ok, outside, diverged, poor_match };
+
+struct KltResult {
+  Vec2 px = Vec2::Zero();    ///< level-0 pixels
+  float correlation = 0;     ///< weighted normalised cross-correlation at the finest level
+  float gain = 1;            ///< contrast relative to the template
+  float residual = 0;        ///< rms of I - aT - b, grey values
+  int iterations = 0;        ///< over all levels
+  KltStatus status = KltStatus::outside;
+
+  bool ok() const { return status == KltStatus::ok; }
+};
+
+/// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`.
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
+                    const KltOptions& options);
+
+/// Weighted normalised cross-correlation of a template with the image at one place of level `level`
+/// (position in pixels of that level); -1 outside the image.
+float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px);
+
+}  // namespace fbvins

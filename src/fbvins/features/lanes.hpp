@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sixteen float lanes (a GCC/Clang vector type, lowered to whatever registers the target has).
+// Explicit lanes let a reduction vectorise without -ffast-math, with the same bits on every target.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace fbvins {
+
+inline constexpr int kLanes = 16;
+using F16 = float __attribute__((vector_size(64)));
+using I16 = std::int32_t __attribute__((vector_size(64)));
+using U8x16 = std::uint8_t __attribute__((vector_size(16)));
+
+#define FBVINS_INLINE inline __attribute__((always_inline))
+
+FBVINS_INLINE void load_lanes(const std::uint8_t* p, F16& out) {
+  U8x16 bytes;
+  std::memcpy(&bytes, p, sizeof(bytes));
+  out = __builtin_convertvector(__builtin_convertvector(bytes, I16), F16);
+}
+
+FBVINS_INLINE void load_lanes(const float* p, F16& out) { std::memcpy(&out, p, sizeof(out)); }
+FBVINS_INLINE void store_lanes(const F16& v, float* p) { std::memcpy(p, &v, sizeof(v)); }
+
+/// Sum of the lanes, pairwise in a fixed order.
+FBVINS_INLINE float sum_lanes(const F16& v) {
+  float a[kLanes];
+  std::memcpy(a, &v, sizeof(v));
+  for (int half = kLanes / 2; half > 0; half /= 2)
+    for (int i = 0; i < half; ++i) a[i] += a[i + half];
+  return a[0];
+}
+
+}  // namespace fbvins

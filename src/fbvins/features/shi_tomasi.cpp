@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/shi_tomasi.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kWindow = 7;            // side of the structure tensor's window
+constexpr int kHalf = kWindow / 2;
+constexpr std::size_t kPerCell = 6;   // candidates a cell may offer
+/// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
+/// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
+constexpr double kNoiseResponse = 0.12;
+
+/// Products of the Sobel gradients of one row, count values each into xx, xy, yy.
+FBVINS_KERNEL
+void structure_row(const std::uint8_t* p, std::ptrdiff_t stride, int count, std::int32_t* xx, std::int32_t* xy,
+                   std::int32_t* yy) {
+  const std::uint8_t* a = p - stride;
+  const std::uint8_t* b = p + stride;
+  for (int x = 0; x < count; ++x) {
+    const int gx = a[x + 1] - a[x - 1] + 2 * (p[x + 1] - p[x - 1]) + b[x + 1] - b[x - 1];
+    const int gy = b[x - 1] - a[x - 1] + 2 * (b[x] - a[x]) + b[x + 1] - a[x + 1];
+    xx[x] = gx * gx;
+    xy[x] = gx * gy;
+    yy[x] = gy * gy;
+  }
+}
+
+FBVINS_KERNEL
+void add_row(const std::int32_t* row, int count, std::int32_t* sums) {
+  for (int i = 0; i < count; ++i) sums[i] += row[i];
+}
+
+FBVINS_KERNEL
+void subtract_row(const std::int32_t* row, int count, std::int32_t* sums) {
+  for (int i = 0; i < count; ++i) sums[i] -= row[i];
+}
+
+/// Smaller eigenvalue of the window-mean structure tensor; column sums start kHalf left of out[0].
+FBVINS_KERNEL
+void response_row(const std::int32_t* sxx, const std::int32_t* sxy, const std::int32_t* syy, int count, float* out) {
+  constexpr float scale = 0.5f / (64.0f * kWindow * kWindow);
+  for (int x = 0; x < count; ++x) {
+    std::int32_t a = 0, b = 0, c = 0;
+    for (int i = 0; i < kWindow; ++i) {
+      a += sxx[x + i];
+      b += sxy[x + i];
+      c += syy[x + i];
+    }
+    const float fa = static_cast<float>(a), fb = static_cast<float>(b), fc = static_cast<float>(c);
+    const float d = fa - fc;
+    const float q = d * d + 4.0f * fb * fb;
+    out[x] = scale * (fa + fc - __builtin_sqrtf(q));
+  }
+}
+
+bool stronger(const Corner& a, const Corner& b) {
+  if (a.response != b.response) return a.response > b.response;
+  return a.px.y() != b.px.y() ? a.px.y() < b.px.y() : a.px.x() < b.px.x();
+}
+
+/// Peak of the parabola through three samples, in (-0.5, 0.5).
+double parabola_peak(float before, float at, float after) {
+  const double curvature = static_cast<double>(before) - 2.0 * at + after;
+  if (!(curvature < 0)) return 0;
+  return std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5);
+}
+
+}  // namespace
+
+double estimate_noise(const PyramidLevel& image) {
+  std::array<int, 1024> histogram{};
+  int count = 0;
+  for (int y = 4; y + 4 < image.height; y += 7) {
+    const std::uint8_t* a = image.row(y - 1);
+    const std::uint8_t* p = image.row(y);
+    const std::uint8_t* b = image.row(y + 1);
+    for (int x = 4 + y % 5; x + 4 < image.width; x += 5) {
+      const int mask = a[x - 1] + a[x + 1] + b[x - 1] + b[x + 1] - 2 * (a[x] + b[x] + p[x - 1] + p[x + 1]) + 4 * p[x];
+      ++histogram[static_cast<std::size_t>(std::min(std::abs(mask), 1023))];
+      ++count;
+    }
+  }
+  // The lower quartile belongs to the smooth parts of the image: |N(0, s)| has it at 0.319 s, and
+  // the mask multiplies the noise by 6. Interpolated, because values are few in a quiet image.
+  const double quarter = 0.25 * count;
+  double below = 0;
+  for (std::size_t value = 0; value < histogram.size(); ++value) {
+    const double here = histogram[value];
+    if (below + here >= quarter && here > 0) {
+      const double magnitude = value == 0 ? 0.5 * (quarter - below) / here : value - 0.5 + (quarter - below) / here;
+      return magnitude / (0.319 * 6.0);
+    }
+    below += here;
+  }
+  return 0;
+}
+
+bool ShiTomasiDetector::far_from_all(const Vec2& px, std::span<const Vec2> existing) const {
+  const double limit = options_.min_distance_px * options_.min_distance_px;
+  for (const Vec2& other : existing)
+    if ((other - px).squaredNorm() < limit) return false;
+  for (const Corner& other : corners_)
+    if ((other.px - px).squaredNorm() < limit) return false;
+  return true;
+}
+
+void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int row, float threshold) {
+  cell_corners_.clear();
+  const int cell = options_.cell_px, border = options_.border_px;
+  const int x0 = std::max(column * cell, border), x1 = std::min((column + 1) * cell, image.width - border);
+  const int y0 = std::max(row * cell, border), y1 = std::min((row + 1) * cell, image.height - border);
+  const int width = x1 - x0, height = y1 - y0;
+  if (width <= 2 || height <= 2) return;
+
+  // Responses with one pixel around for the comparison with neighbours.
+  const int rw = width + 2, rh = height + 2;
+  const int tw = rw + 2 * kHalf;  // tensors a row
+  const auto line = static_cast<std::size_t>(3 * tw);
+  response_.resize(static_cast<std::size_t>(rw) * rh);
+  tensors_.assign(line * (kWindow + 1), 0);
+  std::int32_t* sums = tensors_.data() + line * kWindow;
+  for (int i = 0; i < rh + 2 * kHalf; ++i) {
+    // Ring of window rows: the row that leaves the window is zero until the ring is full.
+    std::int32_t* slot = tensors_.data() + line * static_cast<std::size_t>(i % kWindow);
+    subtract_row(slot, 3 * tw, sums);
+    structure_row(image.row(y0 - 1 - kHalf + i) + x0 - 1 - kHalf, image.stride, tw, slot, slot + tw, slot + 2 * tw);
+    add_row(slot, 3 * tw, sums);
+    if (i >= 2 * kHalf)
+      response_row(sums, sums + tw, sums + 2 * tw, rw, response_.data() + static_cast<std::ptrdiff_t>(i - 2 * kHalf) * rw);
+  }
+
+  for (int y = 0; y < height; ++y) {
+    const float* r = response_.data() + static_cast<std::ptrdiff_t>(y + 1) * rw + 1;
+    for (int x = 0; x < width; ++x) {
+      const float v = r[x];
+      // > before, >= after: of two equal neighbours exactly one is the maximum.
+      if (v < threshold || !(v > r[x - 1]) || v < r[x + 1] || !(v > r[x - rw]) || v < r[x + rw]) continue;
+      if (!(v > r[x - rw - 1]) || !(v > r[x - rw + 1]) || v < r[x + rw - 1] || v < r[x + rw + 1]) continue;
+      const Vec2 offset(parabola_peak(r[x - 1], v, r[x + 1]), parabola_peak(r[x - rw], v, r[x + rw]));
+      cell_corners_.push_back({Vec2(x0 + x, y0 + y) + offset, v});
+    }
+  }
+  std::sort(cell_corners_.begin(), cell_corners_.end(), stronger);
+}
+
+void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, int wanted) {
+  std::sort(candidates.begin(), candidates.end(), stronger);
+  for (const Corner& corner : candidates) {
+    if (static_cast<int>(corners_.size()) >= wanted) return;
+    if (far_from_all(corner.px, existing)) corners_.push_back(corner);
+  }
+}
+
+const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) {
+  corners_.clear();
+  if (wanted <= 0 || pyramid.empty()) return corners_;
+  const PyramidLevel& image = pyramid.level(0);
+  noise_ = estimate_noise(image);
+  const auto threshold = static_cast<float>(
+      std::max(options_.min_response, options_.noise_factor * kNoiseResponse * noise_ * noise_));
+
+  const int columns = (image.width + options_.cell_px - 1) / options_.cell_px;
+  const int rows = (image.height + options_.cell_px - 1) / options_.cell_px;
+  occupancy_.assign(static_cast<std::size_t>(columns) * rows, 0);
+  for (const Vec2& px : existing) {
+    const int column = static_cast<int>(px.x()) / options_.cell_px, row = static_cast<int>(px.y()) / options_.cell_px;
+    if (column >= 0 && row >= 0 && column < columns && row < rows) ++occupancy_[static_cast<std::size_t>(row * columns + column)];
+  }
+
+  best_.clear();
+  others_.clear();
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      if (occupancy_[static_cast<std::size_t>(row * columns + column)] > 0) continue;
+      search_cell(image, column, row, threshold);
+      std::size_t offered = 0;
+      for (const Corner& corner : cell_corners_) {
+        if (!far_from_all(corner.px, existing)) continue;
+        (offered == 0 ? best_ : others_).push_back(corner);
+        if (++offered == kPerCell) break;
+      }
+    }
+  }
+  accept(best_, existing, wanted);
+  accept(others_, existing, wanted);
+  return corners_;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/shi_tomasi.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "fbvins/features/noise_texture.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr auto kIdentity = [](const Vec2& p) { return p; };
+
+TEST(ShiTomasi, FillsTheImageAndKeepsCornersApart) {
+  const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);
+  Pyramid pyramid;
+  pyramid.build(image.view(), 1);
+  ShiTomasiOptions options;
+  ShiTomasiDetector detector(options);
+  const std::vector<Corner> corners = detector.detect(pyramid, {}, 60);
+  EXPECT_EQ(corners.size(), 60u);
+  std::set<std::pair<int, int>> cells;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    cells.insert({static_cast<int>(corners[i].px.x()) / options.cell_px, static_cast<int>(corners[i].px.y()) / options.cell_px});
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GE((corners[i].px - corners[j].px).norm(), options.min_distance_px);
+  }
+  EXPECT_GE(cells.size(), 40u);  // of 54
+}
+
+TEST(ShiTomasi, LeavesCellsAloneThatHaveFeatures) {
+  const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);
+  Pyramid pyramid;
+  pyramid.build(image.view(), 1);
+  ShiTomasiDetector detector(ShiTomasiOptions{});
+  const std::vector<Corner> first = detector.detect(pyramid, {}, 30);
+  std::vector<Vec2> existing;
+  for (const Corner& corner : first) existing.push_back(corner.px);
+  const std::vector<Corner> second = detector.detect(pyramid, existing, 30);
+  EXPECT_GT(second.size(), 5u);
+  for (const Corner& corner : second)
+    for (const Vec2& px : existing) EXPECT_GE((corner.px - px).norm(), ShiTomasiOptions{}.min_distance_px);
+  EXPECT_TRUE(detector.detect(pyramid, existing, 0).empty());
+}
+
+TEST(ShiTomasi, FindsTheCornerOfASquareBelowAPixel) {
+  Image image(120, 120, 40);
+  for (int y = 60; y < 120; ++y)
+    for (int x = 60; x < 120; ++x) image.at(x, y) = 200;
+  Pyramid pyramid;
+  pyramid.build(image.view(), 1);
+  ShiTomasiDetector detector(ShiTomasiOptions{});
+  const std::vector<Corner> corners = detector.detect(pyramid, {}, 1);
+  ASSERT_EQ(corners.size(), 1u);
+  // The edge runs between 59 and 60; the window's best place lies a little inside the corner.
+  EXPECT_NEAR(corners[0].px.x(), 59.5, 3.0);
+  EXPECT_NEAR(corners[0].px.x(), corners[0].px.y(), 0.01);
+}
+
+TEST(ShiTomasi, DimTextureDeliversAndPureNoiseDoesNot) {
+  Pyramid pyramid;
+  ShiTomasiDetector detector(ShiTomasiOptions{});
+  pyramid.build(render_texture(376, 240, NoiseTexture(6), kIdentity, 12, 6, 0.7).view(), 1);
+  EXPECT_GE(detector.detect(pyramid, {}, 60).size(), 40u);
+  pyramid.build(render_texture(376, 240, NoiseTexture(6), kIdentity, 100, 0, 3.0).view(), 1);
+  EXPECT_LE(detector.detect(pyramid, {}, 60).size(), 3u);
+  EXPECT_NEAR(detector.noise(), 3.0, 0.3);
+  pyramid.build(Image(376, 240, 0).view(), 1);
+  EXPECT_TRUE(detector.detect(pyramid, {}, 60).empty());
+}
+
+}  // namespace
+}  // namespace fbvins

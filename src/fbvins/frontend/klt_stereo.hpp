@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds a feature of the left image in the right one: from its last depth, or by a correlation search along the
+// epipolar curve on a coarse level; then Lucas-Kanade, backward check and epipolar check.
+// One instance is used by one thread at a time (it reuses a template as scratch).
+//
+//   KltStereoMatcher matcher(rig, options, klt_options);
+//   auto match = matcher.match(patch, px, normalised, inverse_depth, left, right);
+#pragma once
+
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/features/klt.hpp"
+#include "fbvins/features/pyramid.hpp"
+
+namespace fbvins {
+
+struct KltStereoOptions {
+  double forward_backward_px = 0.7;
+  double epipolar_px = 1.5;
+  double min_depth_m = 0.35;
+  double min_search_correlation = 0.6;
+
+  template <class V>
+  void visit(V&& v) {
+    v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature right and back", 0.05, 10.0);
+    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar line in the right image", 0.1, 20.0);
+    v("min_depth_m", min_depth_m, "m", "nearest point that is searched in the right image", 0.05, 10.0);
+    v("min_search_correlation", min_search_correlation, "", "correlation that the coarse search must reach", 0.0, 1.0);
+  }
+};
+
+enum class StereoFailure { none, flow, check, epipolar };
+
+struct StereoMatch {
+  Vec2 px = Vec2::Zero();          ///< in the right image
+  Vec2 normalised = Vec2::Zero();  ///< in C1
+  double inverse_depth = 0;        ///< 1/m along z of C0, not negative
+  StereoFailure failure = StereoFailure::flow;
+};
+
+class KltStereoMatcher {
+ public:
+  KltStereoMatcher(const StereoRig& rig, const KltStereoOptions& options, const KltOptions& klt);
+
+  /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure says what went wrong, if anything.
+  StereoMatch match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
+                    std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right);
+
+ private:
+  std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
+  std::optional<Vec2> search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const;
+  StereoMatch refine(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised, const Vec2& start_px,
+                     int coarsest, const Pyramid& left, const Pyramid& right);
+  /// Epipolar distance and depth of a match.
+  StereoFailure check_geometry(const Vec2& left_normalised, StereoMatch& match) const;
+
+  KltStereoOptions options_;
+  KltOptions klt_;
+  Camera camera_right_;
+  Mat3 R_rl_;  // C1 <- C0
+  Vec3 p_rl_;
+  double focal_px_;
+  KltTemplate scratch_;
+};
+
+}  // namespace fbvins
