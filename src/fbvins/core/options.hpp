@@ -38,7 +38,7 @@ class OptionsValidator {
   void operator()(std::string_view name, std::string& value, std::string_view choices, std::string_view) {
     if (choices.empty()) return;
     const std::string padded = fmt::format("|{}|", choices);
-    if (value.empty() || padded.find(fmt::format("|{}|", value)) == std::string::npos)
+    if (value.empty() || value.find('|') != std::string::npos || padded.find(fmt::format("|{}|", value)) == std::string::npos)
       fail(fmt::format("{}{} = '{}' is none of {}", prefix_, name, value, choices));
   }
   template <class Group>

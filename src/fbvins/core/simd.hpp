@@ -10,6 +10,8 @@
 #if __clang_major__ >= 14 && !__has_feature(address_sanitizer) && !__has_feature(thread_sanitizer)
 #define FBVINS_KERNEL __attribute__((target_clones("avx2", "default")))
 #endif
+#elif __GNUC__ < 12  // knows no levels of the architecture yet
+#define FBVINS_KERNEL __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define FBVINS_KERNEL __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #endif
