@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/calibration.hpp"
+
+#include "fbvins/io/calibration_fields.hpp"
+
+namespace fbvins {
+
+Result<CameraSensor> parse_euroc_camera(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);
+  CameraSensor sensor;
+  // EuRoC nests the 16 numbers under T_BS: data; other writers put them directly under T_BS.
+  sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients");
+  sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
+  if (!yaml.ok()) return yaml.error();
+  Result<Pose<B, B>> mounting = parse_euroc_mounting(text, file);
+  if (!mounting) return mounting.error();
+  sensor.T_BS = mounting->cast_frames<B, C0>();
+  return sensor;
+}
+
+Result<ImuSensor> parse_euroc_imu(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);
+  ImuSensor sensor;
+  sensor.noise = read_imu_noise(yaml, yaml.root(), "rate_hz");
+  if (!yaml.ok()) return yaml.error();
+  if (!yaml.has(yaml.root(), "T_BS")) return sensor;
+  Result<Pose<B, B>> mounting = parse_euroc_mounting(text, file);
+  if (!mounting) return mounting.error();
+  sensor.T_BS = *mounting;
+  return sensor;
+}
+
+Result<Pose<B, B>> parse_euroc_mounting(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);
+  const YAML::Node T_BS = yaml.get(yaml.root(), "T_BS");
+  const Pose<B, B> pose = yaml.has(T_BS, "data") ? read_transform(yaml, T_BS, "data") : read_transform(yaml, yaml.root(), "T_BS");
+  if (!yaml.ok()) return yaml.error();
+  return pose;
+}
+
+Result<StereoRig> join_euroc(const CameraSensor& left, const CameraSensor& right, const ImuSensor& imu, const std::string& file) {
+  StereoRig rig;
+  rig.left = left.camera;
+  rig.right = right.camera;
+  rig.T_BC0 = imu.T_BS.inverse() * left.T_BS;
+  rig.T_BC1 = (imu.T_BS.inverse() * right.T_BS).cast_frames<B, C1>();
+  rig.imu_noise = imu.noise;
+  rig.image_rate_hz = left.rate_hz;
+  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  return rig;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to io: what EuRoC's and Kalibr's calibration files have in common.
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/io/yaml_reader.hpp"
+
+namespace fbvins {
+
+inline constexpr std::uint64_t kLargestYaml_bytes = 1u << 20u;
+
+/// A 4x4 rigid transform, row by row; complains unless the rotation is orthonormal to 1e-3.
+Pose<B, B> read_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field);
+
+/// camera_model, intrinsics, resolution, distortion_model and the coefficients in `coefficients_field`.
+Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field);
+
+/// The four noise figures; rate_field is "rate_hz" or "update_rate".
+ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);
+
+/// An error where the cameras' centres coincide or lie apart by more than 10 m.
+Result<void> check_baseline(const StereoRig& rig, const std::string& file);
+
+}  // namespace fbvins

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows of numbers with a stamp, read so that damage is counted, never believed and never fatal
+// while most rows are good. Pure functions, any thread.
+//
+//   Result<StampedRows<ImuSample>> imu = read_stamped_rows<ImuSample>(text, "imu0/data.csv", parse_imu_row);
+//   imu->rows;             // strictly increasing stamps
+//   imu->counts.bad();     // how many rows were left out
+//
+// Accepted: CRLF, byte order mark, comments (#), blank lines, one header line, no newline at the end.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/core/time.hpp"
+
+namespace fbvins {
+
+/// What became of the data rows of one file.
+struct RowCounts {
+  int rows = 0;           ///< data rows in the file
+  int malformed = 0;      ///< wrong number of columns, not a number, stamp out of range
+  int not_finite = 0;     ///< NaN, infinite or absurdly large values
+  int duplicates = 0;     ///< stamp already seen
+  int backwards = 0;      ///< stamp out of order
+  std::string first_bad;  ///< "file:line: sentence" about the first row left out
+
+  int bad() const { return malformed + not_finite + duplicates + backwards; }
+};
+
+/// What a row parser says about one row.
+enum class RowVerdict { good, not_finite, malformed };
+
+template <class Row>
+struct StampedRows {
+  std::vector<Row> rows;
+  RowCounts counts;
+};
+
+/// One line of data.
+struct CsvLine {
+  int number = 0;  ///< from 1
+  std::string_view text;
+};
+
+/// The data lines of a file: no comments, blanks or header.
+std::vector<CsvLine> data_lines(std::string_view text);
+
+/// Splits at commas; outer blanks removed. The vector is reused from row to row.
+void split_at_commas(std::string_view line, std::vector<std::string_view>& fields);
+/// Splits at runs of blanks and tabs.
+void split_at_blanks(std::string_view line, std::vector<std::string_view>& fields);
+
+/// Parses fields[first, first + out_count) into out; not_finite for values above `largest` in size.
+RowVerdict parse_doubles(const std::vector<std::string_view>& fields, std::size_t first, std::size_t count, double largest,
+                         double* out);
+
+/// Marks the stamps to keep: the longest strictly increasing subsequence, so that one stamp from the
+/// far future costs one row and not all that follow. The first of equal stamps is kept.
+std::vector<bool> longest_increasing(const std::vector<Time>& stamps);
+
+/// An error if there are no rows or fewer than half of them are good.
+Result<void> judge(const RowCounts& counts, const std::string& file);
+
+/// Reads all rows with parse(fields_or_line, row, problem) -> RowVerdict, `problem` saying what is
+/// wrong in words; Row needs a member `Time t`.
+template <class Row, class Parse>
+Result<StampedRows<Row>> read_stamped_rows(std::string_view text, const std::string& file, Parse&& parse) {
+  StampedRows<Row> out;
+  RowCounts& counts = out.counts;
+  int first_bad_line = 0;
+  const auto blame = [&](int line, std::string_view problem) {
+    if (first_bad_line != 0 && first_bad_line <= line) return;
+    first_bad_line = line;
+    counts.first_bad = fmt::format("{}:{}: {}", file, line, problem);
+  };
+  std::vector<Row> rows;
+  std::vector<Time> stamps;
+  std::vector<int> lines;
+  std::string problem;
+  for (const CsvLine& line : data_lines(text)) {
+    ++counts.rows;
+    Row row{};
+    problem.clear();
+    const RowVerdict verdict = parse(line.text, row, problem);
+    if (verdict == RowVerdict::good) {
+      rows.push_back(std::move(row));
+      stamps.push_back(rows.back().t);
+      lines.push_back(line.number);
+      continue;
+    }
+    ++(verdict == RowVerdict::malformed ? counts.malformed : counts.not_finite);
+    blame(line.number, problem);
+  }
+  const std::vector<bool> keep = longest_increasing(stamps);
+  Time previous{-1};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (keep[i]) {
+      previous = stamps[i];
+      out.rows.push_back(std::move(rows[i]));
+    } else {
+      const bool duplicate = stamps[i] == previous;
+      ++(duplicate ? counts.duplicates : counts.backwards);
+      blame(lines[i], duplicate ? "the stamp was already there" : "the stamp is out of order");
+    }
+  }
+  if (Result<void> verdict = judge(counts, file); !verdict) return verdict.error();
+  return out;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/dataset.hpp"
+
+#include <fmt/format.h>
+
+#include "fbvins/core/options.hpp"
+#include "fbvins/io/euroc.hpp"
+#include "fbvins/io/frame_prefetcher.hpp"
+
+namespace fbvins {
+
+Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
+    : contents_(std::move(contents)),
+      prefetcher_(std::make_unique<FramePrefetcher>(contents_.frames, *contents_.loader, options.prefetch_frames)),
+      deliver_rest_(options.max_frames == 0) {}
+
+Dataset::~Dataset() = default;
+
+std::optional<SensorEvent> Dataset::next() {
+  while (true) {
+    if (imu_is_due()) return contents_.imu[next_imu_++];
+    if (next_frame_ == contents_.frames.size()) return std::nullopt;
+    if (auto frame = next_frame()) return *std::move(frame);
+  }
+}
+
+/// True until one sample at or after the next image, on the IMU's clock, has been handed out.
+bool Dataset::imu_is_due() const {
+  if (next_imu_ == contents_.imu.size()) return false;
+  if (next_frame_ == contents_.frames.size()) return deliver_rest_;
+  const Time image = contents_.frames[next_frame_].t + Duration::from_seconds(contents_.rig.time_offset_s);
+  return next_imu_ == 0 || contents_.imu[next_imu_ - 1].t < image;
+}
+
+/// Nullopt for a frame that lost both of its images.
+std::optional<StereoFrame> Dataset::next_frame() {
+  ++next_frame_;
+  std::optional<LoadedFrame> loaded = prefetcher_->next();
+  count(*loaded);
+  if (!loaded->frame.left && !loaded->frame.right) return std::nullopt;
+  return std::move(loaded->frame);
+}
+
+void Dataset::count(const LoadedFrame& loaded) {
+  DatasetInfo& info = contents_.info;
+  for (auto [total, here] : {std::pair{&info.left.images, &loaded.left}, std::pair{&info.right.images, &loaded.right}}) {
+    total->corrupt += here->corrupt;
+    total->wrong_size += here->wrong_size;
+  }
+  if (!loaded.frame.left && !loaded.frame.right) ++info.frames_without_image;
+  // One sentence for the first of them; the counts say how many.
+  const int failures = info.left.images.corrupt + info.left.images.wrong_size + info.right.images.corrupt + info.right.images.wrong_size;
+  const int now = loaded.left.bad() + loaded.right.bad();
+  if (now > 0 && failures == now) info.warnings.push_back(loaded.problem);
+}
+
+Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const DatasetOptions& options) {
+  if (Result<void> valid = validate(options); !valid) return valid.error();
+  if (!options.kalibr_imu.empty() && options.kalibr_camchain.empty())
+    return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
+  Result<DatasetContents> contents = open_euroc(path, options);
+  if (!contents) return contents.error();
+  return std::make_unique<Dataset>(*std::move(contents), options);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// A stereo-inertial recording as a stream of events. One thread uses a Dataset; images are decoded
+// ahead on a thread of its own, which changes nothing in what is delivered.
+//
+//   Result<std::unique_ptr<Dataset>> opened = open_dataset("MH_01_easy.zip");
+//   if (!opened) { report(opened.error().message); return 1; }
+//   Dataset& data = **opened;
+//   while (auto event = data.next()) system.push(std::move(*event));
+//
+// Order: every IMU sample up to the first one at or after an image (stamp + time offset), then the
+// image. After the last image the remaining samples, unless max_frames cut the recording short.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/io/dataset_info.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+struct DatasetOptions {
+  int skip_frames = 0;             ///< stereo frames left out at the start
+  int max_frames = 0;              ///< 0: all
+  double pair_tolerance_ms = 3.0;  ///< stamps of left and right may differ by this
+  int prefetch_frames = 8;         ///< decoded ahead; 0: decode when asked, without a thread
+  bool require_imu = true;         ///< false: a recording without imu0 is fine
+  std::string kalibr_camchain = "";     ///< replaces the recording's own calibration
+  std::string kalibr_imu = "";          ///< replaces its IMU noise; only with kalibr_camchain
+
+  template <class V>
+  void visit(V&& v) {
+    v("skip_frames", skip_frames, "", "stereo frames left out at the start", 0, 1'000'000'000);
+    v("max_frames", max_frames, "", "stereo frames delivered at most, 0 for all", 0, 1'000'000'000);
+    v("pair_tolerance_ms", pair_tolerance_ms, "ms", "largest difference of the stamps of left and right", 0.0, 1000.0);
+    v("prefetch_frames", prefetch_frames, "", "stereo frames decoded ahead on another thread", 0, 1000);
+    v("require_imu", require_imu, "", "refuse recordings without IMU");
+    v("kalibr_camchain", kalibr_camchain, "", "camchain-imucam.yaml that replaces the recording's calibration");
+    v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces the recording's IMU noise");
+  }
+};
+
+/// One stereo frame as listed, before its images are read.
+struct FrameEntry {
+  Time t;
+  std::string left_file, right_file;  ///< empty where that camera has none
+};
+
+/// One stereo frame as read.
+struct LoadedFrame {
+  StereoFrame frame;
+  ImageCounts left, right;  ///< what happened, 0 or 1 each
+  std::string problem;      ///< "file: sentence" about the first image that failed
+};
+
+/// Where a Dataset gets its images from. Called by one thread at a time, not always the same.
+class FrameLoader {
+ public:
+  virtual ~FrameLoader() = default;
+  virtual LoadedFrame load(const FrameEntry& entry) = 0;
+};
+
+/// Everything a format's reader finds out.
+struct DatasetContents {
+  StereoRig rig;
+  DatasetInfo info;
+  std::vector<TrajectoryPoint> ground_truth;
+  std::vector<ImuSample> imu;       ///< increasing stamps
+  std::vector<FrameEntry> frames;   ///< increasing stamps
+  std::unique_ptr<FrameLoader> loader;
+};
+
+class FramePrefetcher;
+
+class Dataset {
+ public:
+  Dataset(DatasetContents contents, const DatasetOptions& options);
+  ~Dataset();
+  Dataset(const Dataset&) = delete;
+  Dataset& operator=(const Dataset&) = delete;
+
+  const StereoRig& rig() const { return contents_.rig; }
+  /// Counts of image files grow while frames are delivered.
+  const DatasetInfo& info() const { return contents_.info; }
+  bool has_ground_truth() const { return !contents_.ground_truth.empty(); }
+  const std::vector<TrajectoryPoint>& ground_truth() const { return contents_.ground_truth; }
+  const std::vector<FrameEntry>& frames() const { return contents_.frames; }
+
+  /// The next event, nullopt at the end.
+  std::optional<SensorEvent> next();
+
+ private:
+  bool imu_is_due() const;
+  std::optional<StereoFrame> next_frame();
+  void count(const LoadedFrame& loaded);
+
+  DatasetContents contents_;
+  std::unique_ptr<FramePrefetcher> prefetcher_;
+  bool deliver_rest_ = true;      ///< IMU samples after the last image
+  std::size_t next_imu_ = 0;
+  std::size_t next_frame_ = 0;
+};
+
+Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const DatasetOptions& options = {});
+
+}  // namespace fbvins

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is in a recording, and what was left out of it. Values.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/io/csv.hpp"
+
+namespace fbvins {
+
+/// What one camera's image files turned out to be.
+struct ImageCounts {
+  int missing = 0;     ///< listed, but there is no such file (known when opened)
+  int corrupt = 0;     ///< cannot be decoded (known once delivered)
+  int wrong_size = 0;  ///< not the size of the calibration (known once delivered)
+
+  int bad() const { return missing + corrupt + wrong_size; }
+};
+
+struct CameraInfo {
+  RowCounts rows;      ///< of the CSV that lists the images
+  int listed = 0;      ///< good rows
+  int unpaired = 0;    ///< images without a partner in the other camera
+  ImageCounts images;  ///< among the frames that skip_frames and max_frames leave
+};
+
+struct DatasetInfo {
+  std::string name;       ///< last part of the path
+  std::string format;     ///< "EuRoC folder" or "EuRoC zip"
+  CameraInfo left, right;
+  RowCounts imu_rows, ground_truth_rows;
+  int frames = 0;         ///< frames that next() will deliver, less those found without any image
+  int imu_samples = 0;
+  int ground_truth_poses = 0;
+  Time first_image, last_image, first_imu, last_imu;
+  double image_rate_hz = 0, imu_rate_hz = 0;  ///< measured: one over the median interval
+  Duration longest_image_gap, longest_imu_gap;
+  Time longest_image_gap_start, longest_imu_gap_start;
+  int frames_without_image = 0;  ///< neither camera delivered: the frame is left out (counted once met)
+  std::vector<std::string> warnings;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/euroc.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/numbers.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::uint64_t kLargestCsv_bytes = std::uint64_t{1} << 30u;
+// IMU samples this long before the first frame delivered are of use for starting up.
+constexpr Duration kImuLeadIn = {1'000'000'000};
+
+Result<std::string> find_root(const FileSource& files, const std::string& path) {
+  std::vector<std::string> roots = files.folders_holding("cam0/data.csv");
+  if (roots.empty()) roots = files.folders_holding("cam0/sensor.yaml");  // then the CSV is what is missing
+  if (roots.empty()) {
+    std::error_code ignored;
+    const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
+    return Error{ErrorCode::not_found, fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path,
+                                                   bag ? " (ROS bags cannot be read)" : "")};
+  }
+  if (roots.size() > 1)
+    return Error{ErrorCode::unsupported, fmt::format("{}: holds {} datasets ({} ...), give one of them", path, roots.size(), roots[0])};
+  return roots.front();
+}
+
+/// Last part of the path, without mav0 and without .zip.
+std::string dataset_name(const std::string& path) {
+  std::filesystem::path p = std::filesystem::path(path).lexically_normal();
+  if (!p.has_filename()) p = p.parent_path();
+  if (p.filename() == "mav0" && p.has_parent_path()) p = p.parent_path();
+  return p.extension() == ".zip" ? p.stem().string() : p.filename().string();
+}
+
+/// Opens one recording step by step; each step leaves its findings in `out`.
+class EurocReader {
+ public:
+  EurocReader(std::unique_ptr<FileSource> files, std::string root, const DatasetOptions& options)
+      : files_(std::move(files)), root_(std::move(root)), options_(options) {}
+
+  Result<DatasetContents> read(const std::string& path) {
+    out_.info.name = dataset_name(path);
+    out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
+    for (auto step : {&EurocReader::read_calibration, &EurocReader::read_frames, &EurocReader::read_imu})
+      if (Result<void> done = (this->*step)(); !done) return done.error();
+    read_ground_truth();
+    describe_frames();
+    out_.loader = make_euroc_loader(std::move(files_), root_, out_.rig);
+    return std::move(out_);
+  }
+
+ private:
+  std::string named(const std::string& file) const { return files_->describe(root_ + file); }
+  bool exists(const std::string& file) const { return files_->exists(root_ + file); }
+  Result<std::string> text(const std::string& file, std::uint64_t max_bytes) const { return files_->read(root_ + file, max_bytes); }
+  void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
+
+  template <class Parser>
+  auto parse_yaml(const std::string& file, Parser parser) const -> decltype(parser(std::string(), std::string())) {
+    Result<std::string> yaml = text(file, kLargestYaml_bytes);
+    if (!yaml) return yaml.error();
+    return parser(*yaml, named(file));
+  }
+
+  Result<void> read_calibration() {
+    // Recordings without IMU have no imu0, those calibrated from outside may lack its sensor.yaml.
+    ImuSensor imu;
+    if (exists("imu0/sensor.yaml") || (options_.kalibr_camchain.empty() && options_.require_imu)) {
+      Result<ImuSensor> read = parse_yaml("imu0/sensor.yaml", parse_euroc_imu);
+      if (!read) return read.error();
+      imu = *read;
+    } else if (options_.kalibr_imu.empty()) {
+      warn(fmt::format("{}: no such file; IMU noise figures are the defaults", named("imu0/sensor.yaml")));
+    }
+    T_BI_ = imu.T_BS;
+    return options_.kalibr_camchain.empty() ? read_own_calibration(imu) : read_kalibr_calibration(imu);
+  }
+
+  Result<void> read_own_calibration(const ImuSensor& imu) {
+    Result<CameraSensor> left = parse_yaml("cam0/sensor.yaml", parse_euroc_camera);
+    if (!left) return left.error();
+    Result<CameraSensor> right = parse_yaml("cam1/sensor.yaml", parse_euroc_camera);
+    if (!right) return right.error();
+    Result<StereoRig> rig = join_euroc(*left, *right, imu, named("cam1/sensor.yaml"));
+    if (!rig) return rig.error();
+    out_.rig = *rig;
+    return {};
+  }
+
+  Result<void> read_kalibr_calibration(const ImuSensor& imu) {
+    const auto& path = options_.kalibr_imu;
+    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path));
+    if (!rig) return rig.error();
+    out_.rig = *rig;
+    if (path.empty()) out_.rig.imu_noise = imu.noise;
+    return {};
+  }
+
+  Result<void> read_frames() {
+    std::vector<ImageRow> lists[2];
+    CameraInfo* infos[2] = {&out_.info.left, &out_.info.right};
+    for (int i = 0; i < 2; ++i) {
+      const std::string folder = fmt::format("cam{}/", i);
+      Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
+      if (!csv) return csv.error();
+      auto rows = read_image_rows(*csv, named(folder + "data.csv"));
+      if (!rows) return rows.error();
+      warn_about_rows(rows->counts, named(folder + "data.csv"));
+      infos[i]->rows = rows->counts;
+      infos[i]->listed = static_cast<int>(rows->rows.size());
+      lists[i] = std::move(rows->rows);
+    }
+    PairedFrames paired = pair_frames(lists[0], lists[1], Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
+    out_.info.left.unpaired = paired.left_only;
+    out_.info.right.unpaired = paired.right_only;
+    if (paired.left_only == out_.info.left.listed)
+      return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam0's", named("cam1/data.csv"),
+                                                     options_.pair_tolerance_ms)};
+    if (paired.left_only + paired.right_only > 0)
+      warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
+                       options_.pair_tolerance_ms));
+    out_.frames = std::move(paired.frames);
+    cut_frames();
+    if (out_.frames.empty())
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: no frames are left after skipping {}", named("cam0/data.csv"), options_.skip_frames)};
+    return find_images();
+  }
+
+  void cut_frames() {
+    auto& frames = out_.frames;
+    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(options_.skip_frames, std::ssize(frames)));
+    if (options_.max_frames > 0 && std::ssize(frames) > options_.max_frames) frames.resize(options_.max_frames);
+  }
+
+  /// Forgets names of files that are not there, and frames of which nothing is there.
+  Result<void> find_images() {
+    std::string first_missing;
+    const auto look = [&](std::string& file, const std::string& folder, ImageCounts& counts) {
+      if (file.empty() || exists(folder + file)) return;
+      if (first_missing.empty()) first_missing = named(folder + file);
+      ++counts.missing;
+      file.clear();
+    };
+    for (FrameEntry& frame : out_.frames) {
+      look(frame.left_file, "cam0/data/", out_.info.left.images);
+      look(frame.right_file, "cam1/data/", out_.info.right.images);
+    }
+    const std::size_t emptied = std::erase_if(out_.frames, [](const FrameEntry& f) { return f.left_file.empty() && f.right_file.empty(); });
+    out_.info.frames_without_image = static_cast<int>(emptied);
+    if (out_.frames.empty())
+      return Error{ErrorCode::not_found, fmt::format("{}: no such file, nor any other of the images listed", first_missing)};
+    const int missing = out_.info.left.images.missing + out_.info.right.images.missing;
+    if (missing > 0) warn(fmt::format("{}: no such file; {} of the images listed are missing", first_missing, missing));
+    return {};
+  }
+
+  Result<void> read_imu() {
+    if (!options_.require_imu && !exists("imu0/data.csv")) return {};
+    Result<std::string> csv = text("imu0/data.csv", kLargestCsv_bytes);
+    if (!csv) return csv.error();
+    auto rows = read_stamped_rows<ImuSample>(*csv, named("imu0/data.csv"), ImuRowParser{});
+    if (!rows) return rows.error();
+    warn_about_rows(rows->counts, named("imu0/data.csv"));
+    out_.info.imu_rows = rows->counts;
+    out_.imu = std::move(rows->rows);
+    return check_overlap();
+  }
+
+  Result<void> check_overlap() {
+    const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
+    const Time first = out_.frames.front().t + offset, last = out_.frames.back().t + offset;
+    if (out_.imu.back().t < first || out_.imu.front().t > last)
+      return Error{ErrorCode::malformed, fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
+                                                     format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t),
+                                                     format_seconds(first), format_seconds(last))};
+    if (options_.skip_frames > 0) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    return {};
+  }
+
+  /// Only for judging a result: where it cannot be used, a warning is enough.
+  void read_ground_truth() {
+    const std::string folder = "state_groundtruth_estimate0/";
+    if (!exists(folder + "data.csv")) return;
+    Pose<B, B> T_BS;
+    if (exists(folder + "sensor.yaml")) {
+      Result<Pose<B, B>> mounting = parse_yaml(folder + "sensor.yaml", parse_euroc_mounting);
+      if (!mounting) return warn(fmt::format("ground truth is not used: {}", mounting.error().message));
+      T_BS = *mounting;
+    }
+    Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
+    if (!csv) return warn(fmt::format("ground truth is not used: {}", csv.error().message));
+    Result<TrajectoryFile> truth = parse_trajectory(*csv, named(folder + "data.csv"));
+    if (!truth) return warn(fmt::format("ground truth is not used: {}", truth.error().message));
+    warn_about_rows(truth->counts, named(folder + "data.csv"));
+    out_.info.ground_truth_rows = truth->counts;
+    out_.info.ground_truth_poses = static_cast<int>(truth->points.size());
+    out_.ground_truth = std::move(truth->points);
+    move_to_imu(T_BS.inverse() * T_BI_);
+  }
+
+  /// From the sensor whose pose the file gives to the IMU; the identity in EuRoC.
+  void move_to_imu(const Pose<B, B>& T_SI) {
+    if (T_SI.p.norm() < 1e-9 && T_SI.q.vec().norm() < 1e-9) return;
+    for (TrajectoryPoint& point : out_.ground_truth) {
+      point.T_WB = point.T_WB * T_SI;
+      point.v_WB.reset();  // would need the angular rate
+      point.bias.reset();
+    }
+  }
+
+  void describe_frames() {
+    DatasetInfo& info = out_.info;
+    info.frames = static_cast<int>(out_.frames.size());
+    std::vector<Time> stamps;
+    for (const FrameEntry& frame : out_.frames) stamps.push_back(frame.t);
+    info.first_image = stamps.front();
+    info.last_image = stamps.back();
+    const Intervals images = measure_intervals(stamps);
+    info.image_rate_hz = images.rate_hz;
+    info.longest_image_gap = images.longest;
+    info.longest_image_gap_start = images.longest_start;
+    if (!options_.kalibr_camchain.empty() && images.rate_hz > 0) out_.rig.image_rate_hz = images.rate_hz;
+    warn_about_gap(images, "images");
+    describe_imu();
+  }
+
+  void describe_imu() {
+    DatasetInfo& info = out_.info;
+    info.imu_samples = static_cast<int>(out_.imu.size());
+    if (out_.imu.empty()) return warn("there is no IMU in the recording");
+    std::vector<Time> stamps;
+    for (const ImuSample& sample : out_.imu) stamps.push_back(sample.t);
+    info.first_imu = stamps.front();
+    info.last_imu = stamps.back();
+    const Intervals imu = measure_intervals(stamps);
+    info.imu_rate_hz = imu.rate_hz;
+    info.longest_imu_gap = imu.longest;
+    info.longest_imu_gap_start = imu.longest_start;
+    warn_about_gap(imu, "IMU");
+  }
+
+  void warn_about_gap(const Intervals& intervals, const char* what) {
+    if (intervals.longest.ns > 3 * intervals.median.ns)
+      warn(fmt::format("{}: a gap of {:.3f} s after {} s", what, intervals.longest.seconds(), format_seconds(intervals.longest_start)));
+  }
+
+  void warn_about_rows(const RowCounts& c, const std::string& file) {
+    if (c.bad() > 0)
+      warn(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}", file,
+                       c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
+  }
+
+  std::unique_ptr<FileSource> files_;
+  std::string root_;
+  const DatasetOptions& options_;
+  Pose<B, B> T_BI_;  ///< takes IMU to the recording's body coordinates
+  DatasetContents out_;
+};
+
+}  // namespace
+
+Result<DatasetContents> open_euroc(const std::string& path, const DatasetOptions& options) {
+  Result<std::unique_ptr<FileSource>> files = open_file_source(path);
+  if (!files) return files.error();
+  Result<std::string> root = find_root(**files, path);
+  if (!root) return root.error();
+  return EurocReader(*std::move(files), *root, options).read(path);
+}
+
+}  // namespace fbvins

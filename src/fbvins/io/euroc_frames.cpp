@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/euroc_frames.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/numbers.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::uint64_t kLargestImage_bytes = std::uint64_t{64} << 20u;
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+
+/// File names stay below the camera's folder.
+bool is_harmless_name(std::string_view name) {
+  return !name.empty() && name.front() != '/' && name.find("..") == std::string_view::npos &&
+         name.find('\0') == std::string_view::npos;
+}
+
+RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
+  if (const auto stamp = parse_nanoseconds(field)) {
+    t = *stamp;
+    return RowVerdict::good;
+  }
+  problem = fmt::format("'{}' is not a stamp in nanoseconds", field.substr(0, 40));
+  return RowVerdict::malformed;
+}
+
+class EurocLoader : public FrameLoader {
+ public:
+  EurocLoader(std::unique_ptr<FileSource> files, std::string root, const StereoRig& rig)
+      : files_(std::move(files)), root_(std::move(root)), left_(rig.left), right_(rig.right) {}
+
+  LoadedFrame load(const FrameEntry& entry) override {
+    LoadedFrame out;
+    out.frame.t = entry.t;
+    out.frame.left = load_image(entry.left_file, "cam0/data/", left_, out.left, out.problem);
+    out.frame.right = load_image(entry.right_file, "cam1/data/", right_, out.right, out.problem);
+    return out;
+  }
+
+ private:
+  std::shared_ptr<const Image> load_image(const std::string& file, const char* folder, const Camera& camera, ImageCounts& counts,
+                                          std::string& problem) const {
+    if (file.empty()) return nullptr;
+    const std::string path = root_ + folder + file;
+    const auto blame = [&](const std::string& sentence) {
+      if (problem.empty()) problem = fmt::format("{}: {}", files_->describe(path), sentence);
+    };
+    Result<std::string> bytes = files_->read(path, kLargestImage_bytes);
+    Result<Image> image = bytes ? decode_image(*bytes) : Result<Image>(bytes.error());
+    if (!image) {
+      ++counts.corrupt;
+      if (bytes) blame(image.error().message);
+      else if (problem.empty()) problem = image.error().message;
+      return nullptr;
+    }
+    if (image->width() != camera.width() || image->height() != camera.height()) {
+      ++counts.wrong_size;
+      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(), image->height(), camera.width(), camera.height()));
+      return nullptr;
+    }
+    return std::make_shared<const Image>(*std::move(image));
+  }
+
+  std::unique_ptr<FileSource> files_;
+  std::string root_;
+  Camera left_, right_;
+};
+
+}  // namespace
+
+Result<StampedRows<ImageRow>> read_image_rows(std::string_view csv, const std::string& file) {
+  std::vector<std::string_view> fields;
+  return read_stamped_rows<ImageRow>(csv, file, [&](std::string_view line, ImageRow& row, std::string& problem) {
+    split_at_commas(line, fields);
+    if (fields.size() != 2) {
+      problem = fmt::format("{} columns where 2 are needed", fields.size());
+      return RowVerdict::malformed;
+    }
+    if (!is_harmless_name(fields[1])) {
+      problem = fmt::format("'{}' is not the name of an image file", fields[1].substr(0, 40));
+      return RowVerdict::malformed;
+    }
+    row.file = fields[1];
+    return parse_stamp(fields[0], row.t, problem);
+  });
+}
+
+RowVerdict ImuRowParser::operator()(std::string_view line, ImuSample& sample, std::string& problem) {
+  split_at_commas(line, fields_);
+  if (fields_.size() != 7) {
+    problem = fmt::format("{} columns where 7 are needed", fields_.size());
+    return RowVerdict::malformed;
+  }
+  if (const RowVerdict stamp = parse_stamp(fields_[0], sample.t, problem); stamp != RowVerdict::good) return stamp;
+  double v[6];
+  const RowVerdict verdict = parse_doubles(fields_, 1, 6, kLargestImuValue, v);
+  if (verdict != RowVerdict::good) problem = "a value is not a usable number";
+  sample.gyro_radps = Vec3(v[0], v[1], v[2]);
+  sample.accel_mps2 = Vec3(v[3], v[4], v[5]);
+  return verdict;
+}
+
+PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance) {
+  std::vector<Time> stamps;
+  for (const ImageRow& row : left) stamps.push_back(row.t);
+  if (const Duration median = measure_intervals(stamps).median; median.ns > 0) tolerance.ns = std::min(tolerance.ns, median.ns / 2);
+  const auto distance = [&](std::size_t l, std::size_t r) { return std::abs((left[l].t - right[r].t).ns); };
+  PairedFrames out;
+  std::size_t r = 0;
+  for (std::size_t l = 0; l < left.size(); ++l) {
+    while (r < right.size() && right[r].t < left[l].t && distance(l, r) > tolerance.ns) ++r, ++out.right_only;
+    while (r + 1 < right.size() && distance(l, r + 1) < distance(l, r)) ++r, ++out.right_only;
+    const bool paired = r < right.size() && distance(l, r) <= tolerance.ns;
+    out.frames.push_back({left[l].t, left[l].file, paired ? right[r].file : ""});
+    paired ? ++r : ++out.left_only;
+  }
+  out.right_only += static_cast<int>(right.size() - r);
+  return out;
+}
+
+Intervals measure_intervals(const std::vector<Time>& increasing) {
+  Intervals out;
+  std::vector<Duration> steps;
+  for (std::size_t i = 1; i < increasing.size(); ++i) {
+    steps.push_back(increasing[i] - increasing[i - 1]);
+    if (steps.back() > out.longest) {
+      out.longest = steps.back();
+      out.longest_start = increasing[i - 1];
+    }
+  }
+  if (steps.empty()) return out;
+  const auto middle = steps.begin() + std::ssize(steps) / 2;
+  std::nth_element(steps.begin(), middle, steps.end());
+  out.median = *middle;
+  out.rate_hz = 1.0 / out.median.seconds();
+  return out;
+}
+
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const StereoRig& rig) {
+  return std::make_unique<EurocLoader>(std::move(files), std::move(root), rig);
+}
+
+}  // namespace fbvins

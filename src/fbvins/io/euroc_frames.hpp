@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to io: rows of EuRoC's CSV files, pairing of left and right images, and loading them.
+#pragma once
+
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/io/file_source.hpp"
+
+namespace fbvins {
+
+/// A row of camN/data.csv.
+struct ImageRow {
+  Time t;
+  std::string file;  ///< below camN/data/
+};
+Result<StampedRows<ImageRow>> read_image_rows(std::string_view csv, const std::string& file);
+
+/// A row of imu0/data.csv: stamp, gyro xyz, accelerometer xyz.
+class ImuRowParser {
+ public:
+  RowVerdict operator()(std::string_view line, ImuSample& sample, std::string& problem);
+
+ private:
+  std::vector<std::string_view> fields_;
+};
+
+struct PairedFrames {
+  std::vector<FrameEntry> frames;  ///< one for each left image
+  int left_only = 0;
+  int right_only = 0;              ///< right images that are in no frame
+};
+
+/// Each left image with the nearest right one within the tolerance (at most half the median interval).
+PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance);
+
+struct Intervals {
+  Duration median, longest;
+  Time longest_start;
+  double rate_hz = 0;  ///< one over the median; 0 for fewer than two stamps
+};
+Intervals measure_intervals(const std::vector<Time>& increasing);
+
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const StereoRig& rig);
+
+}  // namespace fbvins

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/image_decode.hpp"
+
+#include <fmt/format.h>
+#include <turbojpeg.h>
+
+#include "fbvins/io/png_decode.hpp"
+
+namespace fbvins {
+namespace {
+
+Result<Image> decode_jpeg(std::string_view bytes) {
+  struct Handle {
+    tjhandle tj = tjInitDecompress();
+    ~Handle() {
+      if (tj) tjDestroy(tj);
+    }
+  } handle;
+  const auto failure = [&] { return Error{ErrorCode::malformed, fmt::format("damaged JPEG: {}", tjGetErrorStr2(handle.tj))}; };
+  if (!handle.tj) return failure();
+  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
+  int width = 0, height = 0, subsampling = 0, colours = 0;
+  if (tjDecompressHeader3(handle.tj, data, bytes.size(), &width, &height, &subsampling, &colours) != 0) return failure();
+  if (Result<void> size = check_image_size(width, height); !size) return size.error();
+  Image image(width, height);
+  // A warning means that the rest of the image is made up.
+  constexpr int kFlags = TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
+  if (tjDecompress2(handle.tj, data, bytes.size(), image.row(0), width, width, height, TJPF_GRAY, kFlags) != 0) return failure();
+  return image;
+}
+
+}  // namespace
+
+Result<void> check_image_size(std::int64_t width, std::int64_t height) {
+  if (width >= 1 && height >= 1 && width <= kLargestImageSide_px && height <= kLargestImageSide_px &&
+      width * height <= kLargestImage_px)
+    return {};
+  return Error{ErrorCode::unsupported, fmt::format("an image of {} x {} pixels", width, height)};
+}
+
+Result<Image> decode_image(std::string_view bytes) {
+  if (bytes.empty()) return Error{ErrorCode::malformed, "the file is empty"};
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return decode_png(bytes);
+  if (bytes.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes);
+  return Error{ErrorCode::malformed, "neither PNG nor JPEG"};
+}
+
+}  // namespace fbvins

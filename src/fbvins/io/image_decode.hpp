@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// PNG and JPEG to 8-bit grey, told apart by content. Pure functions, any thread.
+//
+//   Result<Image> image = decode_image(bytes);
+//
+// Colour becomes luma (ITU-R BT.601 weights), 16 bit is scaled to 8, transparency is dropped.
+// A file that is damaged or cut off anywhere is an error: half an image is no image.
+#pragma once
+
+#include <string_view>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+inline constexpr int kLargestImageSide_px = 16384;
+inline constexpr std::int64_t kLargestImage_px = std::int64_t{64} << 20;
+
+/// The message says what is wrong with the bytes, without a file name.
+Result<Image> decode_image(std::string_view bytes);
+
+}  // namespace fbvins

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Trajectory files, read and written. Readers are pure but for the file; a writer belongs to one thread.
+//
+//   Result<TrajectoryFile> truth = read_trajectory("groundtruth.csv");   // TUM or EuRoC CSV, by content
+//   Result<TumWriter> tum = TumWriter::create("trajectory.txt");
+//   tum->write(o.t, o.T_WB);
+//   Result<void> done = tum->close();                                    // the file appears here
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fbvins/io/csv.hpp"
+#include "fbvins/io/output_file.hpp"
+#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/trajectory.hpp"
+
+namespace fbvins {
+
+struct TrajectoryPoint {
+  Time t;
+  Pose<W, B> T_WB;
+  std::optional<Vec3> v_WB;     ///< m/s, in W
+  std::optional<ImuBias> bias;
+};
+
+struct TrajectoryFile {
+  std::vector<TrajectoryPoint> points;  ///< in order of time
+  RowCounts counts;                     ///< what was left out
+  int without_pose = 0;                 ///< rows of an odometry CSV whose health says that there is no pose
+
+  Trajectory poses() const;
+};
+
+/// Told apart by content: commas mean EuRoC's CSV (ns, p, q wxyz[, v, gyro bias, accelerometer bias[, ...]]),
+/// blanks mean TUM (s, p, q xyzw). `file` is only for messages.
+Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file);
+Result<TrajectoryFile> read_trajectory(const std::string& path);
+
+/// `t x y z qx qy qz qw`, seconds with nine decimals.
+class TumWriter {
+ public:
+  static Result<TumWriter> create(const std::string& path);
+  void write(Time t, const Pose<W, B>& T_WB);
+  Result<void> close() { return file_.close(); }
+
+ private:
+  explicit TumWriter(OutputFile file) : file_(std::move(file)) {}
+  OutputFile file_;
+};
+
+/// EuRoC's ground-truth columns, then the upper triangle of the 6x6 pose covariance row by row,
+/// health, reason and reset counter. One row a frame, also for frames without a pose.
+class OdometryCsvWriter {
+ public:
+  static Result<OdometryCsvWriter> create(const std::string& path);
+  void write(const Odometry& odometry);
+  Result<void> close() { return file_.close(); }
+
+ private:
+  explicit OdometryCsvWriter(OutputFile file) : file_(std::move(file)) {}
+  OutputFile file_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/yaml_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/io/numbers.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Makes the OpenCV header a comment, keeping the number of lines. YAML wants no other directives here.
+void hide_opencv_header(std::string& text) {
+  std::size_t start = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
+  if (text.compare(start, 6, "%YAML:") == 0) text[start] = '#';
+}
+
+std::string one_line(std::string text) {
+  std::replace_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32; }, ' ');
+  return text;
+}
+
+}  // namespace
+
+YamlReader::YamlReader(std::string file, std::string text) : file_(std::move(file)) {
+  hide_opencv_header(text);
+  try {
+    root_ = YAML::Load(text);
+    if (!root_.IsMap()) error_.message = fmt::format("{}: holds no fields", file_);
+  } catch (const YAML::Exception& e) {
+    error_.message = fmt::format("{}:{}: {}", file_, e.mark.line + 1, one_line(e.msg));
+  } catch (const std::exception& e) {
+    error_.message = fmt::format("{}: {}", file_, one_line(e.what()));
+  }
+  if (!ok()) root_ = YAML::Node();
+}
+
+YAML::Node YamlReader::get(const YAML::Node& map, const std::string& field) const {
+  if (!map.IsDefined() || !map.IsMap()) return YAML::Node(YAML::NodeType::Undefined);
+  for (const auto& entry : map)
+    if (entry.first.IsScalar() && entry.first.Scalar() == field) return entry.second;
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+void YamlReader::complain(const YAML::Node& map, const std::string& field, const std::string& sentence) {
+  if (!ok()) return;
+  const YAML::Node node = get(map, field);
+  const int line = node.IsDefined() ? node.Mark().line : map.IsDefined() ? map.Mark().line : -1;
+  error_.message = line >= 0 && node.IsDefined() ? fmt::format("{}:{}: {}: {}", file_, line + 1, field, sentence)
+                                                 : fmt::format("{}: {}: {}", file_, field, sentence);
+}
+
+double YamlReader::number(const YAML::Node& map, const std::string& field) {
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) return complain(map, field, "is missing"), 0.0;
+  const auto value = node.IsScalar() ? parse_double(node.Scalar()) : std::nullopt;
+  if (!value || !std::isfinite(*value)) return complain(map, field, "is not a number"), 0.0;
+  return *value;
+}
+
+double YamlReader::positive(const YAML::Node& map, const std::string& field) {
+  const double value = number(map, field);
+  if (value > 0) return value;
+  complain(map, field, fmt::format("{} is not positive", value));
+  return 1.0;
+}
+
+std::string YamlReader::word(const YAML::Node& map, const std::string& field) {
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) return complain(map, field, "is missing"), "";
+  if (!node.IsScalar()) return complain(map, field, "is not a word"), "";
+  return one_line(node.Scalar().substr(0, 80));
+}
+
+void YamlReader::flatten(const YAML::Node& node, const YAML::Node& map, const std::string& field, int depth,
+                         std::vector<double>& out) {
+  constexpr int kDeepest = 2;
+  constexpr std::size_t kMost = 64;
+  if (node.IsSequence() && depth < kDeepest) {
+    for (const auto& item : node)
+      if (out.size() <= kMost) flatten(item, map, field, depth + 1, out);
+    return;
+  }
+  const auto value = node.IsScalar() ? parse_double(node.Scalar()) : std::nullopt;
+  if (!value || !std::isfinite(*value)) complain(map, field, "holds something that is not a number");
+  out.push_back(value.value_or(0.0));
+}
+
+std::vector<double> YamlReader::numbers(const YAML::Node& map, const std::string& field) {
+  std::vector<double> out;
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) complain(map, field, "is missing");
+  else if (!node.IsSequence()) complain(map, field, "is not a list of numbers");
+  else flatten(node, map, field, 0, out);
+  return out;
+}
+
+std::vector<double> YamlReader::numbers(const YAML::Node& map, const std::string& field, std::size_t count) {
+  std::vector<double> out = numbers(map, field);
+  if (out.size() != count) complain(map, field, fmt::format("has {} numbers where {} are needed", out.size(), count));
+  out.resize(count, 0.0);
+  return out;
+}
+
+}  // namespace fbvins
