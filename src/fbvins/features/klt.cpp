@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/features/lanes.hpp"
@@ -90,37 +91,60 @@ struct TemplateMoments {
   float t, gx, gy, tt, tgx, tgy, gxx, gxy, gyy;
 };
 
-/// Samples template and central-difference gradients (raw, stored in t, gx, gy) and their weighted moments.
+/// Template samples with one more on each side, rows kGridStride apart.
+constexpr int kGrid = kP + 2;
+constexpr int kGridStride = 32;
+
+/// Bilinear samples of the image; p is the address of the grid's first sample.
 FBVINS_KERNEL
-void sample_template(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* w, float* t, float* gx,
-                     float* gy, TemplateMoments& m) {
-  F16 centre[kP + 2];
-  F16 upper, lower;
-  blend_row(p - stride, fx, upper);
-  for (int y = 0; y < kP + 2; ++y) {
-    blend_row(p + y * stride, fx, lower);
-    centre[y] = upper + (lower - upper) * fy;
+void sample_grid(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, float* grid) {
+  F16 upper, lower, upper_end, lower_end;
+  blend_row(p, fx, upper);
+  blend_row(p + 2, fx, upper_end);
+  for (int y = 0; y < kGrid; ++y) {
+    blend_row(p + (y + 1) * stride, fx, lower);
+    blend_row(p + (y + 1) * stride + 2, fx, lower_end);
+    store_lanes(upper + (lower - upper) * fy, grid + y * kGridStride);
+    store_lanes(upper_end + (lower_end - upper_end) * fy, grid + y * kGridStride + 2);
     upper = lower;
+    upper_end = lower_end;
   }
+}
+
+/// Bilinear samples of a block along a linear map: sample (x, y) lies at (u0 + x ux + y uy, v0 + x vx + y vy).
+void sample_warped(const std::uint8_t* block, int side, float u0, float v0, float ux, float uy, float vx, float vy,
+                   float* grid) {
+  for (int y = 0; y < kGrid; ++y) {
+    for (int x = 0; x < kGrid; ++x) {
+      const float u = u0 + static_cast<float>(x) * ux + static_cast<float>(y) * uy;
+      const float v = v0 + static_cast<float>(x) * vx + static_cast<float>(y) * vy;
+      const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+      const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
+      const std::uint8_t* p = block + iv * side + iu;
+      const float top = p[0] + static_cast<float>(p[1] - p[0]) * fu;
+      const float bottom = p[side] + static_cast<float>(p[side + 1] - p[side]) * fu;
+      grid[y * kGridStride + x] = top + (bottom - top) * fv;
+    }
+  }
+}
+
+/// Template and central-difference gradients of a grid, and their weighted moments.
+FBVINS_KERNEL
+void differentiate(const float* grid, const float* w, float* t, float* gx, float* gy, TemplateMoments& m) {
   F16 st = {}, sgx = {}, sgy = {}, stt = {}, stgx = {}, stgy = {}, sgxx = {}, sgxy = {}, sgyy = {};
-  F16 left_upper, left_lower, right_upper, right_lower;
-  blend_row(p - 1, fx, left_upper);
-  blend_row(p + 1, fx, right_upper);
   for (int y = 0; y < kP; ++y) {
-    blend_row(p - 1 + (y + 1) * stride, fx, left_lower);
-    blend_row(p + 1 + (y + 1) * stride, fx, right_lower);
-    const F16 left = left_upper + (left_lower - left_upper) * fy;
-    const F16 right = right_upper + (right_lower - right_upper) * fy;
-    left_upper = left_lower;
-    right_upper = right_lower;
-    const F16 value = centre[y + 1];
+    F16 value, left, right, above, below, weight;
+    load_lanes(grid + (y + 1) * kGridStride + 1, value);
+    load_lanes(grid + (y + 1) * kGridStride, left);
+    load_lanes(grid + (y + 1) * kGridStride + 2, right);
+    load_lanes(grid + y * kGridStride + 1, above);
+    load_lanes(grid + (y + 2) * kGridStride + 1, below);
+    load_lanes(w + y * kP, weight);
     const F16 dx = (right - left) * 0.5f;
-    const F16 dy = (centre[y + 2] - centre[y]) * 0.5f;
+    const F16 dy = (below - above) * 0.5f;
     store_lanes(value, t + y * kP);
     store_lanes(dx, gx + y * kP);
     store_lanes(dy, gy + y * kP);
-    F16 weight;
-    load_lanes(w + y * kP, weight);
     const F16 wv = weight * value, wdx = weight * dx, wdy = weight * dy;
     st += wv;
     sgx += wdx;
@@ -159,7 +183,9 @@ void orthogonalise(const float* w, float mean_t, float mean_gx, float mean_gy, f
 constexpr float kMinVariance = 0.05f;
 constexpr float kMinGradientVariance = 0.003f;
 
-bool finish_template(const TemplateMoments& m, KltLevelTemplate& out) {
+bool finish_template(const float* grid, KltLevelTemplate& out) {
+  TemplateMoments m;
+  differentiate(grid, kWindow.w, out.wt, out.wgx, out.wgy, m);
   const float vtt = m.tt - m.t * m.t;
   if (!(vtt > kMinVariance)) return false;
   const float cx = (m.tgx - m.t * m.gx) / vtt, cy = (m.tgy - m.t * m.gy) / vtt;
@@ -236,12 +262,48 @@ bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int co
     const double scale = 1.0 / (1 << l);
     Place place;
     if (!place_patch(pyramid.level(l), px.x() * scale, px.y() * scale, 1, place)) continue;
-    TemplateMoments moments;
-    sample_template(place.p, place.stride, place.fx, place.fy, kWindow.w, out.wt, out.wgx, out.wgy, moments);
-    out.valid = finish_template(moments, out);
+    alignas(64) float grid[kGrid * kGridStride];
+    sample_grid(place.p - place.stride - 1, place.stride, place.fx, place.fy, grid);
+    out.valid = finish_template(grid, out);
   }
   for (int l = std::max(finest, pyramid.levels()); l <= coarsest; ++l) levels[static_cast<std::size_t>(l)].valid = false;
   return levels[static_cast<std::size_t>(finest)].valid;
+}
+
+bool KltAnchor::take(const Pyramid& pyramid, const Vec2& px) {
+  const PyramidLevel& level = pyramid.level(0);
+  const double fx = std::floor(px.x()), fy = std::floor(px.y());
+  constexpr int half = kSide / 2;
+  // The first pixel of the block is half - 1 left of the feature's own; the border repeats the edge.
+  if (!(fx >= 0 && fy >= 0 && fx < level.width && fy < level.height)) return false;
+  const int x0 = static_cast<int>(fx) - half + 1, y0 = static_cast<int>(fy) - half + 1;
+  for (int y = 0; y < kSide; ++y) {
+    const std::uint8_t* row = level.row(std::clamp(y0 + y, 0, level.height - 1));
+    std::uint8_t* out = pixels.data() + y * kSide;
+    if (x0 >= -kPyramidBorder && x0 + kSide <= level.width + kPyramidBorder)
+      std::memcpy(out, row + x0, kSide);
+    else
+      for (int x = 0; x < kSide; ++x) out[x] = row[std::clamp(x0 + x, 0, level.width - 1)];
+  }
+  centre = Vec2(half - 1 + px.x() - fx, half - 1 + px.y() - fy);
+  return true;
+}
+
+bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) {
+  KltLevelTemplate& out = levels[0];
+  out.valid = false;
+  constexpr double reach = 0.5 * (kGrid - 1);
+  const Vec2 corner = anchor.centre - reach * (J_anchor_now.col(0) + J_anchor_now.col(1));
+  const Vec2 extent = reach * (J_anchor_now.col(0).cwiseAbs() + J_anchor_now.col(1).cwiseAbs());
+  const Vec2 lowest = anchor.centre - extent, highest = anchor.centre + extent;
+  constexpr double last = KltAnchor::kSide - 1.01;
+  if (!(lowest.minCoeff() >= 0.01 && highest.maxCoeff() < last)) return false;
+  alignas(64) float grid[kGrid * kGridStride];
+  const Eigen::Matrix2f J = J_anchor_now.cast<float>();
+  sample_warped(anchor.pixels.data(), KltAnchor::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()),
+                J(0, 0), J(0, 1), J(1, 0), J(1, 1), grid);
+  out.valid = finish_template(grid, out);
+  return out.valid;
 }
 
 KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,

@@ -52,12 +52,26 @@ struct alignas(64) KltLevelTemplate {
   bool valid = false;
 };
 
+/// The pixels around a feature in the frame where it was first seen well. Aligning to them in every later
+/// frame, through the warp that the motion since then predicts, keeps a long track from creeping away.
+struct KltAnchor {
+  static constexpr int kSide = 48;
+  std::array<std::uint8_t, kSide * kSide> pixels;
+  Vec2 centre = Vec2::Zero();  ///< of the feature, in the block
+
+  /// Copies the block around `px`; false when it leaves the padded image.
+  bool take(const Pyramid& pyramid, const Vec2& px);
+};
+
 struct KltTemplate {
   std::array<KltLevelTemplate, kMaxPyramidLevels> levels;
 
   /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest.
   /// False when the feature is too close to the border or the finest patch has no texture in some direction.
   bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest);
+  /// Level 0 from an anchor: an offset d from the feature in the new image shows what the anchor has at
+  /// J_anchor_now * d. False when the warp leaves the block or nothing of use is seen.
+  bool cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now);
 };
 
 enum class KltStatus { ok, outside, diverged, poor_match };

@@ -11,6 +11,7 @@ namespace fbvins {
 inline constexpr int kLanes = 16;
 using F16 = float __attribute__((vector_size(64)));
 using I16 = std::int32_t __attribute__((vector_size(64)));
+using U16x16 = std::uint16_t __attribute__((vector_size(32)));
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 
 #define FBVINS_INLINE inline __attribute__((always_inline))
@@ -18,7 +19,8 @@ using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 FBVINS_INLINE void load_lanes(const std::uint8_t* p, F16& out) {
   U8x16 bytes;
   std::memcpy(&bytes, p, sizeof(bytes));
-  out = __builtin_convertvector(__builtin_convertvector(bytes, I16), F16);
+  // Widened in steps of two: GCC 12 falls back to scalars for a step of four.
+  out = __builtin_convertvector(__builtin_convertvector(__builtin_convertvector(bytes, U16x16), I16), F16);
 }
 
 FBVINS_INLINE void load_lanes(const float* p, F16& out) { std::memcpy(&out, p, sizeof(out)); }

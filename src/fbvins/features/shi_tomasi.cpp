@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kWindow = 7;            // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
+constexpr int kFewestCells = 24;      // searched each time, if as many are empty
 constexpr std::size_t kPerCell = 6;   // candidates a cell may offer
 /// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
 /// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
@@ -177,16 +178,19 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
 
   best_.clear();
   others_.clear();
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      if (occupancy_[static_cast<std::size_t>(row * columns + column)] > 0) continue;
-      search_cell(image, column, row, threshold);
-      std::size_t offered = 0;
-      for (const Corner& corner : cell_corners_) {
-        if (!far_from_all(corner.px, existing)) continue;
-        (offered == 0 ? best_ : others_).push_back(corner);
-        if (++offered == kPerCell) break;
-      }
+  // From where the last search stopped, so that every empty cell has its turn.
+  const int cells = columns * rows, budget = std::max(kFewestCells, 2 * wanted);
+  int searched = 0;
+  for (int i = 0; i < cells && searched < budget; ++i) {
+    next_cell_ = (next_cell_ + 1) % cells;
+    if (occupancy_[static_cast<std::size_t>(next_cell_)] > 0) continue;
+    ++searched;
+    search_cell(image, next_cell_ % columns, next_cell_ / columns, threshold);
+    std::size_t offered = 0;
+    for (const Corner& corner : cell_corners_) {
+      if (!far_from_all(corner.px, existing)) continue;
+      (offered == 0 ? best_ : others_).push_back(corner);
+      if (++offered == kPerCell) break;
     }
   }
   accept(best_, existing, wanted);

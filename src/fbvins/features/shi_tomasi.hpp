@@ -47,7 +47,8 @@ class ShiTomasiDetector {
   explicit ShiTomasiDetector(const ShiTomasiOptions& options) : options_(options) {}
 
   /// At most `wanted` new corners of level 0, none nearer than min_distance_px to one another or to
-  /// `existing`: first the best of every empty cell, then the next best anywhere. Valid until the next call.
+  /// `existing`: first the best of each empty cell, then their next best.
+  /// Looks into a limited number of empty cells, in turn from call to call. Valid until the next call.
   const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted);
   /// The noise estimate of the last detect(), grey values.
   double noise() const { return noise_; }
@@ -59,6 +60,7 @@ class ShiTomasiDetector {
 
   ShiTomasiOptions options_;
   double noise_ = 0;
+  int next_cell_ = -1;
   std::vector<Corner> corners_;        // accepted
   std::vector<Corner> cell_corners_;   // of the cell being searched
   std::vector<Corner> best_, others_;  // candidates of the frame

@@ -9,6 +9,8 @@
 namespace fbvins {
 namespace {
 
+/// An anchor seen smaller than this, or larger than its inverse, gives way to a new one.
+constexpr double kSmallestScale = 0.65;
 constexpr double kBorder_px = kKltReach - 2;
 
 double median(std::vector<double>& numbers) {
@@ -24,6 +26,7 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
     : options_(options), rig_(rig), predictor_(rig.T_BC0), detector_(options.corners),
       stereo_(rig, options.stereo, options.klt), rng_(1) {
   templates_.resize(static_cast<std::size_t>(options.max_features));
+  anchors_.resize(templates_.size());
   for (std::size_t i = templates_.size(); i-- > 0;) free_slots_.push_back(i);
 }
 
@@ -87,6 +90,30 @@ Vec2 KltFrontend::predict(const Track& track, const CameraMotion& motion) const 
   return track.px + *now - *then;
 }
 
+KltResult KltFrontend::align_to_anchor(const Track& track, const Vec2& start_px) {
+  Mat2 J_pixel_normalised;
+  rig_.left.distort(track.normalised, &J_pixel_normalised);
+  // A small fronto-parallel plane at the anchor, seen from now.
+  Eigen::Matrix<double, 2, 3> project;
+  project << 1, 0, -track.normalised.x(), 0, 1, -track.normalised.y();
+  const Mat2 J_now_anchor = J_pixel_normalised * project * track.R_now_anchor.leftCols<2>() / track.depth_ratio *
+                            track.J_normalised_pixel_anchor;
+  const double scale2 = J_now_anchor.determinant();
+  if (!(scale2 > kSmallestScale * kSmallestScale && scale2 * kSmallestScale * kSmallestScale < 1)) return {};
+  if (!warped_.cut_warped(anchors_[track.slot], J_now_anchor.inverse())) return {};
+  return klt_align(warped_, left_, start_px, 0, 0, options_.klt);
+}
+
+/// From here on the feature is what the present image shows.
+void KltFrontend::drop_anchor(Track& track) {
+  anchors_[track.slot].take(left_, track.px);
+  Mat2 J_pixel_normalised;
+  rig_.left.distort(track.normalised, &J_pixel_normalised);
+  track.J_normalised_pixel_anchor = J_pixel_normalised.inverse();
+  track.R_now_anchor.setIdentity();
+  track.depth_ratio = 1;
+}
+
 bool KltFrontend::follow(Track& track, const CameraMotion& motion, FrontendStats& stats) {
   KltTemplate& patch = templates_[track.slot];
   const Vec2 start = predict(track, motion);
@@ -94,7 +121,28 @@ bool KltFrontend::follow(Track& track, const CameraMotion& motion, FrontendStats
   const bool well_predicted = motion.has_translation && track.inverse_depth;
   KltResult found = klt_align(patch, left_, start, well_predicted ? std::min(top, 2) : top, 0, options_.klt);
   if (!found.ok() && well_predicted) found = klt_align(patch, left_, start, top, 0, options_.klt);
-  if (!found.ok() || !rig_.left.inside(found.px, kBorder_px) || !patch.cut(left_, found.px, 0, top)) {
+  if (!found.ok()) {
+    ++stats.lost_flow;
+    return false;
+  }
+  Vec3 p_now = motion.R_ba * track.normalised.homogeneous() + track.inverse_depth.value_or(0) * motion.p_ba;
+  const auto flow_normalised = rig_.left.undistort(found.px);
+  if (!flow_normalised || !(p_now.z() > 0)) return false;
+  track.previous_px = track.px;
+  track.previous_normalised = track.normalised;
+  track.normalised = *flow_normalised;
+  track.R_now_anchor = motion.R_ba * track.R_now_anchor;
+  track.depth_ratio *= p_now.z();
+  if (track.inverse_depth) *track.inverse_depth /= p_now.z();
+
+  const KltResult anchored = align_to_anchor(track, found.px);
+  const bool anchor_holds = anchored.ok() && anchored.correlation > options_.min_anchor_correlation;
+  if (anchor_holds && (anchored.px - found.px).norm() > options_.max_creep_px) {
+    ++stats.lost_check;
+    return false;
+  }
+  if (anchor_holds) found.px = anchored.px;
+  if (!rig_.left.inside(found.px, kBorder_px) || !patch.cut(left_, found.px, 0, top)) {
     ++stats.lost_flow;
     return false;
   }
@@ -105,14 +153,9 @@ bool KltFrontend::follow(Track& track, const CameraMotion& motion, FrontendStats
   }
   const auto normalised = rig_.left.undistort(found.px);
   if (!normalised) return false;
-  if (track.inverse_depth) {
-    const Vec3 p_now = motion.R_ba * track.normalised.homogeneous() + *track.inverse_depth * motion.p_ba;
-    if (p_now.z() > 0) *track.inverse_depth /= p_now.z();
-  }
-  track.previous_px = track.px;
-  track.previous_normalised = track.normalised;
   track.px = found.px;
   track.normalised = *normalised;
+  if (!anchor_holds) drop_anchor(track);
   ++track.age_frames;
   return true;
 }
@@ -161,6 +204,7 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
     track.id = TrackId{next_track_++};
     track.px = corner.px;
     track.normalised = *normalised;
+    drop_anchor(track);
     tracks_.push_back(track);
     ++stats.detected;
   }

@@ -27,6 +27,8 @@ struct KltFrontendOptions {
   double sigma_px = 0.8;
   double forward_backward_px = 0.7;
   double epipolar_px = 1.5;
+  double min_anchor_correlation = 0.8;
+  double max_creep_px = 1.5;
   double max_gap_s = 0.6;
   KltOptions klt;
   KltStereoOptions stereo;
@@ -39,6 +41,8 @@ struct KltFrontendOptions {
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
+    v("min_anchor_correlation", min_anchor_correlation, "", "correlation with the anchor below which it is taken anew", -1.0, 1.0);
+    v("max_creep_px", max_creep_px, "px", "a feature farther from its anchor's match has slid and is dropped", 0.1, 20.0);
     v("max_gap_s", max_gap_s, "s", "after a longer gap without left image features start anew", 0.01, 5.0);
     v.group("klt", klt, "Lucas-Kanade alignment");
     v.group("stereo", stereo, "matching from left to right");
@@ -61,6 +65,10 @@ class KltFrontend final : public Frontend {
     std::optional<double> inverse_depth;  // 1/m along z of C0, from the last stereo match
     std::optional<StereoMatch> right;     // match in the present right image
     int age_frames = 0;
+    // since its anchor was taken:
+    Mat3 R_now_anchor = Mat3::Identity(); // rotation of the left camera
+    double depth_ratio = 1;               // depth now / depth then
+    Mat2 J_normalised_pixel_anchor = Mat2::Identity();
     // while being followed into the present image:
     Vec2 previous_px = Vec2::Zero();
     Vec2 previous_normalised = Vec2::Zero();
@@ -70,6 +78,8 @@ class KltFrontend final : public Frontend {
   void ingest(const SensorPacket& packet, FrontendStats& stats);
   void follow_tracks(const CameraMotion& motion, FrontendStats& stats);
   bool follow(Track& track, const CameraMotion& motion, FrontendStats& stats);
+  KltResult align_to_anchor(const Track& track, const Vec2& start_px);
+  void drop_anchor(Track& track);
   Vec2 predict(const Track& track, const CameraMotion& motion) const;
   void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
   void detect_corners(FrontendStats& stats);
@@ -93,7 +103,9 @@ class KltFrontend final : public Frontend {
   std::int64_t next_track_ = 0;
   std::vector<Track> tracks_;
   std::vector<KltTemplate> templates_;
+  std::vector<KltAnchor> anchors_;
   std::vector<std::size_t> free_slots_;
+  KltTemplate warped_;                       // of the anchor being used
   std::vector<Vec2> points_a_, points_b_;    // buffers
   std::vector<double> numbers_;
 };
