@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/fast.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/features/lanes.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kBlock = 32;
+using U8x32 = std::uint8_t __attribute__((vector_size(kBlock)));
+
+FBVINS_INLINE void load(const std::uint8_t* p, U8x32& v) { std::memcpy(&v, p, sizeof(v)); }
+FBVINS_INLINE void smaller(const U8x32& a, const U8x32& b, U8x32& out) { out = a < b ? a : b; }
+FBVINS_INLINE void larger(const U8x32& a, const U8x32& b, U8x32& out) { out = a > b ? a : b; }
+
+/// max over the 16 arcs of the min over their 9 members. The arcs from k and from k + 1 share the eight
+/// members k+1 .. k+8, so their minimum is built once for both.
+FBVINS_INLINE void strongest_arc(const U8x32 (&d)[16], U8x32& best) {
+  U8x32 two[8], four[8];
+  for (int i = 0; i < 8; ++i) smaller(d[2 * i + 1], d[(2 * i + 2) & 15], two[i]);
+  for (int i = 0; i < 8; ++i) smaller(two[i], two[(i + 1) & 7], four[i]);
+  best = U8x32{};
+  for (int i = 0; i < 8; ++i) {
+    U8x32 eight, end;
+    smaller(four[i], four[(i + 2) & 7], eight);
+    larger(d[2 * i], d[(2 * i + 9) & 15], end);
+    smaller(eight, end, eight);
+    larger(best, eight, best);
+  }
+}
+
+/// Keeps strengths that beat their neighbours; of equal ones the first in reading order stays.
+FBVINS_KERNEL
+void suppress_row(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int count, int floor,
+                  std::uint8_t* kept) {
+  const auto limit = static_cast<std::uint8_t>(floor);
+  for (int x = 0; x < count; ++x) {
+    const std::uint8_t s = here[x];
+    std::uint8_t before = std::max(above[x - 1], above[x]);
+    before = std::max(before, above[x + 1]);
+    before = std::max(before, here[x - 1]);
+    before = std::max(before, limit);
+    std::uint8_t after = std::max(below[x - 1], below[x]);
+    after = std::max(after, below[x + 1]);
+    after = std::max(after, here[x + 1]);
+    const bool keep = (s > before) & (s >= after);
+    kept[x] = keep ? s : std::uint8_t{0};
+  }
+}
+
+void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector<FastCorner>& out) {
+  for (int block = 0; block < count; block += 8) {
+    std::uint64_t eight;
+    std::memcpy(&eight, kept + block, sizeof(eight));
+    if (eight == 0) continue;
+    for (int x = block; x < std::min(block + 8, count); ++x)
+      if (kept[x] != 0)
+        out.push_back({static_cast<std::int16_t>(x0 + x), static_cast<std::int16_t>(y), kept[x]});
+  }
+}
+
+}  // namespace
+
+FBVINS_KERNEL
+void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength) {
+  const std::ptrdiff_t circle[16] = {-3 * stride,     -3 * stride + 1, -2 * stride + 2, -stride + 3, 3,  stride + 3,
+                                     2 * stride + 2,  3 * stride + 1,  3 * stride,      3 * stride - 1, 2 * stride - 2,
+                                     stride - 3,      -3,              -stride - 3,     -2 * stride - 2, -3 * stride - 1};
+  for (int x = 0; x < count; x += kBlock) {
+    U8x32 c, bright[16], dark[16];
+    load(centre + x, c);
+    for (int i = 0; i < 16; ++i) {
+      U8x32 p, hi, lo;
+      load(centre + x + circle[i], p);
+      larger(p, c, hi);
+      smaller(p, c, lo);
+      bright[i] = hi - c;
+      dark[i] = c - lo;
+    }
+    U8x32 best_bright, best_dark;
+    strongest_arc(bright, best_bright);
+    strongest_arc(dark, best_dark);
+    larger(best_bright, best_dark, best_bright);
+    std::memcpy(strength + x, &best_bright, sizeof(best_bright));
+  }
+}
+
+void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& buffers, std::vector<FastCorner>& out) {
+  assert(border >= 4);
+  out.clear();
+  const int count = level.width - 2 * border;
+  if (count <= 0 || level.height <= 2 * border) return;
+  // Strengths one column and one row beyond the wanted area, for the neighbours' comparison.
+  const int with_sides = count + 2;
+  const std::size_t pitch = static_cast<std::size_t>((with_sides + kBlock - 1) / kBlock * kBlock + kBlock);
+  buffers.rows.resize(4 * pitch);
+  std::uint8_t* ring[3] = {buffers.rows.data(), buffers.rows.data() + pitch, buffers.rows.data() + 2 * pitch};
+  std::uint8_t* kept = buffers.rows.data() + 3 * pitch;
+  std::memset(kept, 0, pitch);
+
+  const auto fill = [&](int y) {
+    fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, ring[y % 3]);
+  };
+  fill(border - 1);
+  fill(border);
+  for (int y = border; y < level.height - border; ++y) {
+    fill(y + 1);
+    suppress_row(ring[(y + 2) % 3] + 1, ring[y % 3] + 1, ring[(y + 1) % 3] + 1, count, floor, kept);
+    collect_row(kept, count, border, y, out);
+  }
+}
+
+}  // namespace fbvins

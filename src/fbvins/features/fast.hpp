@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// FAST-9 corners (paper eq. 1) with their exact strength: the largest threshold at which the pixel still is
+// a corner. With it at hand, lowering a cell's threshold until it has its quota is the same as taking
+// the strongest corners of the cell. Functions without state; buffers belong to the caller.
+//
+//   FastBuffers buffers;
+//   std::vector<FastCorner> corners;
+//   detect_fast(level, 12, 6, buffers, corners);
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/features/pyramid.hpp"
+
+namespace fbvins {
+
+struct FastCorner {
+  std::int16_t x = 0, y = 0;  ///< px of the level
+  std::uint8_t strength = 0;  ///< corner at every threshold below this
+};
+
+/// Working memory of detect_fast, reused from call to call.
+struct FastBuffers {
+  std::vector<std::uint8_t> rows;
+};
+
+/// Corners stronger than `floor` that are the strongest of their 3x3 neighbourhood, row by row, at least `border`
+/// (>= 4) px from the edges. The level must be readable 32 px beyond the end of each row (padding, next row).
+void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& buffers, std::vector<FastCorner>& out);
+
+/// strength[x] for `count` pixels of a row from `centre` on; writes up to the next multiple of 32.
+/// Strength: over all arcs of 9 of the 16 circle pixels, the largest smallest difference to the centre.
+void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength);
+
+}  // namespace fbvins

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/fast.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/features/scale_pyramid.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kCircle[16][2] = {{0, -3}, {1, -3}, {2, -2}, {3, -1}, {3, 0},  {3, 1},   {2, 2},   {1, 3},
+                                {0, 3},  {-1, 3}, {-2, 2}, {-3, 1}, {-3, 0}, {-3, -1}, {-2, -2}, {-1, -3}};
+
+/// The definition (paper eq. 1 with N = 9), word for word.
+bool is_corner(const Image& image, int x, int y, int threshold) {
+  for (int sign : {1, -1})
+    for (int start = 0; start < 16; ++start) {
+      bool all = true;
+      for (int k = 0; k < 9; ++k) {
+        const auto& [dx, dy] = kCircle[(start + k) % 16];
+        all = all && sign * (image.at(x + dx, y + dy) - image.at(x, y)) > threshold;
+      }
+      if (all) return true;
+    }
+  return false;
+}
+
+int naive_strength(const Image& image, int x, int y) {
+  int t = 0;
+  while (is_corner(image, x, y, t)) ++t;
+  return t;
+}
+
+Image random_image(std::uint64_t seed, int width, int height, int range) {
+  Image image(width, height);
+  Rng rng(seed);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)  // blocks, so that corners exist
+      image.at(x, y) = static_cast<std::uint8_t>(((x / 5 + y / 7 * 3) * 2654435761u >> 24) / (256 / range) + rng.below(8));
+  return image;
+}
+
+TEST(Fast, StrengthIsTheLargestThresholdOfTheDefinition) {
+  for (const int range : {8, 64, 247}) {
+    const Image image = random_image(5, 83, 41, range);
+    ScalePyramid pyramid;  // gives the padding
+    pyramid.build(image.view(), 1, 1.2);
+    std::vector<std::uint8_t> strength(128);
+    for (int y = 3; y < 38; ++y) {
+      fast_strength_row(pyramid.level(0).row(y) + 3, pyramid.level(0).stride, 77, strength.data());
+      for (int x = 3; x < 80; ++x) ASSERT_EQ(strength[x - 3], naive_strength(image, x, y)) << x << ' ' << y;
+    }
+  }
+}
+
+TEST(Fast, DetectsLocalMaximaOfTheDefinition) {
+  const Image image = random_image(6, 150, 90, 200);
+  ScalePyramid pyramid;
+  pyramid.build(image.view(), 1, 1.2);
+  FastBuffers buffers;
+  std::vector<FastCorner> corners;
+  const int border = 12, floor = 20;
+  detect_fast(pyramid.level(0), border, floor, buffers, corners);
+  std::set<std::pair<int, int>> found, expected;
+  for (const FastCorner& c : corners) {
+    found.insert({c.x, c.y});
+    EXPECT_EQ(c.strength, naive_strength(image, c.x, c.y));
+  }
+  for (int y = border; y < 90 - border; ++y)
+    for (int x = border; x < 150 - border; ++x) {
+      const int s = naive_strength(image, x, y);
+      bool best = s > floor;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+          const bool earlier = dy < 0 || (dy == 0 && dx < 0);
+          if (dx == 0 && dy == 0) continue;
+          const int other = naive_strength(image, x + dx, y + dy);
+          best = best && (earlier ? s > other : s >= other);
+        }
+      if (best) expected.insert({x, y});
+    }
+  EXPECT_GT(expected.size(), 20u);
+  EXPECT_EQ(found, expected);
+}
+
+TEST(Fast, FlatAndTinyImagesHaveNone) {
+  FastBuffers buffers;
+  std::vector<FastCorner> corners;
+  for (const Image& image : {Image(100, 80, 0), Image(100, 80, 255), Image(20, 20, 9)}) {
+    ScalePyramid pyramid;
+    pyramid.build(image.view(), 1, 1.2);
+    detect_fast(pyramid.level(0), 12, 1, buffers, corners);
+    EXPECT_TRUE(corners.empty());
+  }
+}
+
+}  // namespace
+}  // namespace fbvins

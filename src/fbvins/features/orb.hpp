@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// ORB features (paper 2.2.1): multi-scale FAST with a threshold that adapts to each grid cell, Harris score,
+// intensity-centroid orientation, steered BRIEF of 256 bits. Spread over the image by taking each cell's
+// best, then each cell's second best, and so on. Buffers are reused; one instance, one thread.
+//
+//   OrbExtractor extractor(options);
+//   OrbFeatures features;
+//   extractor.extract(image.view(), features);
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/features/fast.hpp"
+#include "fbvins/features/keypoint.hpp"
+#include "fbvins/features/scale_pyramid.hpp"
+
+namespace fbvins {
+
+struct OrbOptions {
+  int max_features = 500;
+  int levels = 5;
+  double scale_factor = 1.2;
+  int min_threshold = 6;
+  int cell_px = 32;
+  int max_per_cell = 5;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_features", max_features, "", "features of one image", 10, 10000);
+    v("levels", levels, "", "levels of the scale pyramid", 1, 12);
+    v("scale_factor", scale_factor, "", "size of a level relative to the next", 1.05, 2.0);
+    v("min_threshold", min_threshold, "grey", "FAST threshold at the noise floor: a cell goes no lower", 1, 100);
+    v("cell_px", cell_px, "px", "side of a grid cell, on each level", 8, 256);
+    v("max_per_cell", max_per_cell, "", "features of one cell at most", 1, 32);
+  }
+};
+
+/// Smallest distance of a keypoint from the edges of its level, px.
+inline constexpr int kOrbBorder = 12;
+
+class OrbExtractor {
+ public:
+  explicit OrbExtractor(const OrbOptions& options);
+
+  /// Replaces `out` by the features of the image (none for an empty one).
+  void extract(const ImageView& image, OrbFeatures& out);
+
+ private:
+  struct Candidate {
+    std::int16_t x, y;
+    std::int32_t cell;
+    std::uint8_t strength;
+    float harris;
+  };
+
+  void select(const PyramidLevel& level, int quota);
+  void keep_strongest_of_cells(const PyramidLevel& level);
+  void take_in_rounds(int quota);
+  void describe(int l, OrbFeatures& out);
+
+  OrbOptions options_;
+  std::vector<double> level_share_;
+  ScalePyramid pyramid_;
+  FastBuffers fast_;
+  std::vector<FastCorner> corners_;
+  std::vector<Candidate> candidates_, chosen_;
+  std::vector<std::int32_t> cell_count_;
+  std::vector<std::uint8_t> smooth_, scratch_;
+};
+
+/// Harris response det(M) - 0.04 trace(M)^2 (eq. 2-3) over 8x8 gradients around (x, y); needs 5 px around.
+float harris_score(const PyramidLevel& level, int x, int y);
+
+/// Direction of the intensity centroid (eq. 4) of the disc of radius 15 as a unit vector; needs 15 px around.
+Vec2 centroid_direction(const PyramidLevel& level, int x, int y);
+
+/// Steered BRIEF (eq. 5) on a smoothed level; direction is a unit vector.
+Descriptor steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction);
+
+}  // namespace fbvins

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Harris score, orientation and bits of one keypoint.
+#include <cmath>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/features/orb.hpp"
+#include "fbvins/features/orb_pattern.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kDisc = 2 * kOrbRadius + 2;  // 32 columns: -15 .. 16, the last never inside
+
+/// Half-width of each row of the disc as a mask of 0 / 0xff bytes.
+struct Disc {
+  std::uint8_t mask[2 * kOrbRadius + 1][kDisc] = {};
+  constexpr Disc() {
+    for (int y = -kOrbRadius; y <= kOrbRadius; ++y)
+      for (int x = -kOrbRadius; x <= kOrbRadius; ++x)
+        if (x * x + y * y <= kOrbRadius * kOrbRadius) mask[y + kOrbRadius][x + kOrbRadius] = 0xff;
+  }
+};
+constexpr Disc kDiscMask;
+
+FBVINS_KERNEL
+void disc_moments(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_t* m10, std::int32_t* m01) {
+  std::uint16_t column[kDisc] = {};  // at most 31 * 255
+  std::int32_t sum_y = 0;
+  for (int r = 0; r <= 2 * kOrbRadius; ++r) {
+    const std::uint8_t* p = corner + r * stride;
+    std::uint16_t row = 0;
+    for (int c = 0; c < kDisc; ++c) {
+      const std::uint16_t value = static_cast<std::uint16_t>(p[c] & kDiscMask.mask[r][c]);
+      column[c] = static_cast<std::uint16_t>(column[c] + value);
+      row = static_cast<std::uint16_t>(row + value);
+    }
+    sum_y += (r - kOrbRadius) * row;
+  }
+  std::int32_t sum_x = 0;
+  for (int c = 0; c < kDisc; ++c) sum_x += (c - kOrbRadius) * column[c];
+  *m10 = sum_x;
+  *m01 = sum_y;
+}
+
+/// Sums of squared Sobel-like central gradients over 8x8 pixels from `corner` on.
+FBVINS_KERNEL
+void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t s, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
+  std::int32_t a[8] = {}, b[8] = {}, c[8] = {};
+  for (int r = 0; r < 8; ++r) {
+    const std::uint8_t* p = corner + r * s;
+    for (int i = 0; i < 8; ++i) {
+      const std::int32_t gx = (p[i + 1 - s] - p[i - 1 - s]) + 2 * (p[i + 1] - p[i - 1]) + (p[i + 1 + s] - p[i - 1 + s]);
+      const std::int32_t gy = (p[i - 1 + s] - p[i - 1 - s]) + 2 * (p[i + s] - p[i - s]) + (p[i + 1 + s] - p[i + 1 - s]);
+      a[i] += gx * gx;
+      b[i] += gx * gy;
+      c[i] += gy * gy;
+    }
+  }
+  for (int i = 0; i < 8; ++i) *xx += a[i], *xy += b[i], *yy += c[i];
+}
+
+struct PatternLanes {
+  float ax[256], ay[256], bx[256], by[256];
+  PatternLanes() {
+    for (std::size_t i = 0; i < 256; ++i) {
+      const PointPair& p = orb_pattern()[i];
+      ax[i] = p.ax, ay[i] = p.ay, bx[i] = p.bx, by[i] = p.by;
+    }
+  }
+};
+
+/// Offsets of both points of the pairs after turning, rounded to whole pixels.
+FBVINS_KERNEL
+void turn_pattern(const PatternLanes& lanes, float c, float s, std::int32_t stride, std::int32_t* a, std::int32_t* b) {
+  constexpr float kBias = 64.5f;  // truncation of positive numbers rounds without a library call
+  for (int i = 0; i < 256; ++i) {
+    const auto xa = static_cast<std::int32_t>(c * lanes.ax[i] - s * lanes.ay[i] + kBias) - 64;
+    const auto ya = static_cast<std::int32_t>(s * lanes.ax[i] + c * lanes.ay[i] + kBias) - 64;
+    const auto xb = static_cast<std::int32_t>(c * lanes.bx[i] - s * lanes.by[i] + kBias) - 64;
+    const auto yb = static_cast<std::int32_t>(s * lanes.bx[i] + c * lanes.by[i] + kBias) - 64;
+    a[i] = ya * stride + xa;
+    b[i] = yb * stride + xb;
+  }
+}
+
+}  // namespace
+
+float harris_score(const PyramidLevel& level, int x, int y) {
+  std::int32_t xx = 0, xy = 0, yy = 0;
+  gradient_sums(level.row(y - 4) + x - 4, level.stride, &xx, &xy, &yy);
+  constexpr double kScale = 1.0 / (64.0 * 64.0);  // per pixel, grey/px with Sobel's weight 8
+  const double a = xx * kScale, b = xy * kScale, c = yy * kScale;
+  return static_cast<float>(a * c - b * b - 0.04 * (a + c) * (a + c));
+}
+
+Vec2 centroid_direction(const PyramidLevel& level, int x, int y) {
+  std::int32_t m10 = 0, m01 = 0;
+  disc_moments(level.row(y - kOrbRadius) + x - kOrbRadius, level.stride, &m10, &m01);
+  const double length = std::sqrt(static_cast<double>(m10) * m10 + static_cast<double>(m01) * m01);
+  return length > 0 ? Vec2(m10 / length, m01 / length) : Vec2(1, 0);
+}
+
+Descriptor steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction) {
+  static const PatternLanes lanes;
+  std::int32_t a[256], b[256];
+  turn_pattern(lanes, static_cast<float>(direction.x()), static_cast<float>(direction.y()),
+               static_cast<std::int32_t>(smooth.stride), a, b);
+  const std::uint8_t* centre = smooth.row(y) + x;
+  Descriptor d;
+  for (std::size_t word = 0; word < 4; ++word) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 64; ++i) {
+      const std::size_t k = 64 * word + i;
+      bits |= static_cast<std::uint64_t>(centre[a[k]] < centre[b[k]]) << i;
+    }
+    d.bits[word] = bits;
+  }
+  return d;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Image pyramid with a free scale factor (1.2 for ORB), bilinear, with replicated borders. Pixel p of level l lies on
+// (p + 0.5) * scale(l) - 0.5 of level 0. Buffers are reused; not thread-safe.
+//
+//   ScalePyramid pyramid;
+//   pyramid.build(image.view(), 5, 1.2);
+//   Vec2 px0 = pyramid.to_level0(Vec2(10, 20), 3);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/features/pyramid.hpp"
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+
+class ScalePyramid {
+ public:
+  /// Readable pixels beyond each edge.
+  static constexpr int kBorder = 16;
+
+  /// Fewer levels come out where one would be smaller than 64 px.
+  void build(const ImageView& image, int levels, double factor);
+
+  int levels() const { return static_cast<int>(levels_.size()); }
+  const PyramidLevel& level(int l) const { return levels_[static_cast<std::size_t>(l)]; }
+  double scale(int l) const { return scales_[static_cast<std::size_t>(l)]; }
+  Vec2 to_level0(const Vec2& px, int l) const { return (px.array() + 0.5) * scale(l) - 0.5; }
+
+ private:
+  void shrink(const PyramidLevel& from, double ratio, const PyramidLevel& to, std::uint8_t* origin);
+
+  std::vector<std::uint8_t> pixels_;
+  std::vector<PyramidLevel> levels_;
+  std::vector<double> scales_;
+  std::vector<std::uint32_t> pairs_;         // one row after the vertical filter: value and right neighbour
+  std::vector<std::int32_t> column_, weight_;
+};
+
+/// Smooths a level for BRIEF (7x7, about 1.6 px standard deviation), valid up to 8 px beyond the edges.
+/// `out` and `scratch` are resized as needed; the returned view points into `out`.
+PyramidLevel smooth_level(const PyramidLevel& level, std::vector<std::uint8_t>& out, std::vector<std::uint8_t>& scratch);
+
+}  // namespace fbvins
