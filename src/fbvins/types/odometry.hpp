@@ -85,6 +85,7 @@ struct WindowSnapshot {
   };
   struct Landmark {
     LandmarkId id;
+    TrackId track;
     Vec3 p_W = Vec3::Zero();
     int observations = 0;
   };

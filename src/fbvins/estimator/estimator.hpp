@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// TrackedFrame + IMU -> Odometry: initialisation, the sliding window, marginalisation (paper 2.1.2, 2.2.4).
+// A plain synchronous stage; one instance is used by one thread at a time.
+//
+//   Estimator estimator(rig, EstimatorOptions{});
+//   Odometry odometry = estimator.process(tracked_frame);
+//   if (odometry.health.has_pose()) use(odometry.T_WB);
+#pragma once
+
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/initialiser.hpp"
+#include "fbvins/estimator/keyframe_policy.hpp"
+#include "fbvins/estimator/rest_detector.hpp"
+#include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class Estimator {
+ public:
+  Estimator(const StereoRig& rig, const EstimatorOptions& options);
+
+  /// The state at the frame's stamp. Never a silent wrong pose: health says what it is worth.
+  Odometry process(const TrackedFrame& frame);
+
+  /// For the frontend: the newest state; not valid before initialisation.
+  StatePrior prior() const;
+  WindowSnapshot snapshot() const { return window_.snapshot(calibration_); }
+  const Calibration& calibration() const { return calibration_; }
+  /// Frames whose first pose came late: states of the frames the initial solution was made from.
+  const SlidingWindow& window() const { return window_; }
+
+ private:
+  Odometry initialise(const TrackedFrame& frame, Duration rest);
+  Odometry track(const TrackedFrame& frame, Duration rest);
+  Frame predict(const TrackedFrame& frame) const;
+  void solve(Odometry& out, int max_iterations);
+  void choose_keyframe(bool standstill, Odometry& out);
+  void shrink_window(Odometry& out);
+  Health judge(const TrackedFrame& frame, const Odometry& out);
+  void restart();
+  void fill(Odometry& out);
+  WindowWeights weights() const;
+
+  EstimatorOptions options_;
+  StereoRig rig_;
+  ImuNoise imu_noise_;  ///< calibrated noise times the options' factors
+  Calibration calibration_;
+  Initialiser initialiser_;
+  RestDetector rest_;
+  KeyframePolicy keyframe_policy_;
+  SlidingWindow window_;
+  WindowProblem problem_;
+  bool running_ = false;
+  std::uint32_t reset_counter_ = 0;
+  int failed_solves_ = 0;
+  std::optional<Time> previous_frame_, last_good_tracking_;
+  Vec3 last_rate_ = Vec3::Zero();
+  std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
+};
+
+}  // namespace fbvins

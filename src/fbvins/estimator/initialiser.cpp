@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/initialiser.hpp"
+
+#include <unordered_map>
+
+#include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/imu/alignment.hpp"
+#include "fbvins/imu/propagation.hpp"
+#include "fbvins/imu/static_initialiser.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kMinStructureInliers = 12;
+constexpr double kMinInlierShare = 0.6;
+
+int stereo_features(const TrackedFrame& frame) {
+  int n = 0;
+  for (const TrackedFeature& f : frame.features) n += f.right.has_value();
+  return n;
+}
+
+/// Turns and shifts W so that the first state has the origin's position and heading.
+void move_to(const Pose<W, B>& origin, InitialSolution& start) {
+  const Pose<W, B> first = start.states.front().T_WB;
+  const Quat turn(Eigen::AngleAxisd(heading_between(first.q, origin.q), Vec3::UnitZ()));
+  for (NavState& s : start.states) {
+    s.T_WB = {(turn * s.T_WB.q).normalized(), Vec3(origin.p + turn * (s.T_WB.p - first.p))};
+    s.v_WB = turn * s.v_WB;
+  }
+}
+
+}  // namespace
+
+double heading_between(const Quat& from, const Quat& to) {
+  const Mat3 E = (to * from.conjugate()).toRotationMatrix();
+  return std::atan2(E(1, 0) - E(0, 1), E(0, 0) + E(1, 1));
+}
+
+Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise)
+    : options_(options), noise_(noise), structure_(options) {}
+
+std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
+                                                    const std::optional<Pose<W, B>>& origin) {
+  // A break in images or readings makes what came before useless: frames must follow one another.
+  const bool broken = !frames_.empty() && frame.imu.empty();
+  if (stereo_features(frame) < options_.initialiser.min_features || broken) {
+    reason_ = HealthReason::too_few_features;
+    frames_.clear();
+    if (!broken) return std::nullopt;
+  }
+  frames_.push_back(frame);
+  while (static_cast<int>(frames_.size()) > options_.initialiser.frames) frames_.pop_front();
+  std::optional<InitialSolution> start;
+  if (rest.seconds() >= options_.initialiser.min_rest_s)
+    start = start_from_rest();
+  else if (static_cast<int>(frames_.size()) >= options_.initialiser.frames)
+    start = start_in_motion(calibration);
+  else
+    reason_ = HealthReason::waiting_for_motion_or_rest;
+  if (start && origin) move_to(*origin, *start);
+  return start;
+}
+
+std::optional<InitialSolution> Initialiser::start_from_rest() {
+  std::vector<ImuSample> readings;
+  for (std::size_t i = 1; i < frames_.size(); ++i) {
+    const std::vector<ImuSample>& samples = frames_[i].imu.samples;
+    readings.insert(readings.end(), samples.begin() + (i > 1), samples.end());  // neighbours share one stamp
+  }
+  const RestEstimate rest = initialise_at_rest(readings, 0, noise_, options_.initialiser.rest, options_.gravity_mps2);
+  if (!rest.at_rest) {
+    reason_ = HealthReason::waiting_for_motion_or_rest;
+    return std::nullopt;
+  }
+  InitialSolution out{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true};
+  return out;
+}
+
+std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& calibration) {
+  std::vector<Pose<W, B>> poses;
+  if (!stereo_structure(calibration, poses)) {
+    reason_ = HealthReason::too_few_features;
+    return std::nullopt;
+  }
+  std::vector<Pose<VisualWorld, B>> visual_poses;
+  std::vector<Preintegration> between;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());
+    if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_[i].imu);
+  }
+  AlignmentResult alignment = align_visual_inertial(visual_poses, between, options_.initialiser.alignment, options_.gravity_mps2);
+  if (!alignment.accepted) {
+    reason_ = HealthReason::alignment_refused;
+    return std::nullopt;
+  }
+  return InitialSolution{{frames_.begin(), frames_.end()}, std::move(alignment.states), false};
+}
+
+bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses) {
+  // Poses in a visual world whose origin is the first frame, one after the other, then all together.
+  poses.assign(1, Pose<W, B>{});
+  std::unordered_map<TrackId, Vec3> points;
+  const CameraGeometry cameras(calibration);
+  structure_.clear();
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (i > 0) {
+      std::vector<PointSighting> sightings;
+      for (const TrackedFeature& f : frames_[i].features) {
+        const auto p = points.find(f.id);
+        if (p != points.end()) sightings.push_back({p->second, &f});
+      }
+      if (static_cast<int>(sightings.size()) < kMinStructureInliers) return false;
+      Pose<W, B> guess = poses.back();
+      guess.q = guess.q * integrate_gyro(frames_[i].imu, Vec3::Zero());
+      const PoseRefinement refined = refine_pose(sightings, calibration, guess);
+      if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(sightings.size()))) return false;
+      poses.push_back(refined.T_WB);
+    }
+    Frame f;
+    f.id = frames_[i].id;
+    f.t = frames_[i].t;
+    f.state.T_WB = poses.back();
+    structure_.add_frame(std::move(f), frames_[i].features, calibration);
+    for (const auto& l : structure_.snapshot(calibration).landmarks) points[l.track] = l.p_W;
+  }
+  WindowPrior gauge;
+  gauge.frames = {0};
+  gauge.quadratic.g = Eigen::VectorXd::Zero(15);
+  gauge.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
+  structure_.set_prior(std::move(gauge));
+  for (int round = 0; round < 2; ++round) {
+    structure_.build(problem_, calibration, WindowWeights{});
+    LmOptions lm;
+    lm.max_iterations = 8;
+    if (!problem_.optimise(lm).usable) return false;
+    structure_.accept(problem_);
+    structure_.remove_outliers(problem_, options_.outlier_sigma);
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = structure_.frames()[i].state.T_WB;
+  return true;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// The first states of a flight (paper 2.2.4), from rest or in motion, whichever the data allow:
+//   rest     gravity and gyroscope bias from the IMU; the pose does not move;
+//   motion   stereo structure from motion over the last frames, then visual-inertial alignment.
+// An initial solution that is not observable or not plausible is refused, and tried again with the
+// next frame. One owner, one thread.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+/// States of neighbouring frames, the last being the newest.
+struct InitialSolution {
+  std::vector<TrackedFrame> frames;
+  std::vector<NavState> states;
+  bool from_rest = false;
+};
+
+class Initialiser {
+ public:
+  Initialiser(const EstimatorOptions& options, const ImuNoise& noise);
+
+  void reset() { frames_.clear(); }
+  /// Takes the next frame; a solution when there is one, else reason() says what is missing.
+  /// `rest`: how long the body has stood still. W is placed so that the first frame has the
+  /// position and heading of `origin`, if there is one.
+  std::optional<InitialSolution> process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
+                                         const std::optional<Pose<W, B>>& origin);
+  HealthReason reason() const { return reason_; }
+
+ private:
+  std::optional<InitialSolution> start_from_rest();
+  std::optional<InitialSolution> start_in_motion(const Calibration& calibration);
+  bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
+
+  EstimatorOptions options_;
+  ImuNoise noise_;
+  std::deque<TrackedFrame> frames_;
+  SlidingWindow structure_;
+  WindowProblem problem_;
+  HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;
+};
+
+/// The rotation about z, rad, that brings `from` closest to `to`.
+double heading_between(const Quat& from, const Quat& to);
+
+}  // namespace fbvins

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/pose_refinement.hpp"
+
+#include <Eigen/Cholesky>
+
+#include "fbvins/optim/robust_loss.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kHuberSigma = 2.0;
+constexpr double kMinDepth_m = 0.05;
+
+struct NormalEquations {
+  Mat6 H = Mat6::Zero();
+  Vec6 g = Vec6::Zero();
+  int inliers = 0;
+
+  void add(const Observation& o, const Vec3& p_B, const Mat3& R_CB, const Vec3& t_BC, const Mat3& R_BW) {
+    const Vec3 p_C = R_CB * (p_B - t_BC);
+    if (p_C.z() < kMinDepth_m) return;
+    const double iz = 1.0 / p_C.z();
+    const Vec2 r = o.sqrt_information * (iz * p_C.head<2>() - o.normalised);
+    Eigen::Matrix<double, 2, 3> A;
+    A.leftCols<2>() = iz * o.sqrt_information;
+    A.col(2) = -iz * iz * (o.sqrt_information * p_C.head<2>());
+    A = (A * R_CB).eval();
+    Eigen::Matrix<double, 2, 6> J;
+    J.leftCols<3>() = -A * R_BW;
+    J.rightCols<3>() = A * hat(p_B);
+    const double w = huber(r.squaredNorm(), kHuberSigma).weight;
+    H += w * J.transpose() * J;
+    g += w * J.transpose() * r;
+    inliers += r.norm() < 3;
+  }
+};
+
+}  // namespace
+
+PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<W, B> guess,
+                           int max_iterations) {
+  const CameraGeometry cameras(calibration);
+  PoseRefinement out{guess, 0, false};
+  for (int i = 0; i < max_iterations; ++i) {
+    NormalEquations n;
+    const Mat3 R_BW = out.T_WB.R().transpose();
+    int left_inliers = 0;
+    for (const PointSighting& s : sightings) {
+      const Vec3 p_B = R_BW * (s.p_W - out.T_WB.p);
+      n.add(s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BW);
+      left_inliers = n.inliers;
+      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[1], cameras.t_BC[1], R_BW);
+      n.inliers = left_inliers;
+    }
+    out.inliers = n.inliers;
+    const Eigen::LDLT<Mat6> ldlt(n.H);
+    if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-9)) return out;
+    const Vec6 step = -ldlt.solve(n.g);
+    out.T_WB = out.T_WB.boxplus(step.head<3>(), step.tail<3>());
+    if (step.lpNorm<Eigen::Infinity>() < 1e-6) {
+      out.converged = true;
+      break;
+    }
+  }
+  out.converged = out.converged || out.inliers > 0;
+  return out;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// The body's pose from landmarks of known position (perspective-n-point with a stereo rig), by
+// robust Gauss-Newton from a guess.
+#pragma once
+
+#include <vector>
+
+#include "fbvins/estimator/reprojection.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+struct PointSighting {
+  Vec3 p_W = Vec3::Zero();
+  const TrackedFeature* feature = nullptr;
+};
+
+struct PoseRefinement {
+  Pose<W, B> T_WB;
+  int inliers = 0;       ///< left observations within 3 sigma
+  bool converged = false;
+};
+
+PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<W, B> guess,
+                           int max_iterations = 15);
+
+}  // namespace fbvins

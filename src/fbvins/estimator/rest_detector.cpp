@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/rest_detector.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace fbvins {
+
+void RestDetector::start(const TrackedFrame& frame) {
+  anchor_.clear();
+  since_ = frame.t;
+  for (const TrackedFeature& f : frame.features) anchor_.emplace(f.id, f.left.pixel);
+}
+
+bool RestDetector::imu_is_quiet(const ImuSegment& imu) const {
+  if (imu.empty()) return false;
+  const double n = static_cast<double>(imu.samples.size());
+  Vec3 gyro = Vec3::Zero(), accel = Vec3::Zero(), gyro2 = Vec3::Zero(), accel2 = Vec3::Zero();
+  for (const ImuSample& s : imu.samples) {
+    gyro += s.gyro_radps / n;
+    accel += s.accel_mps2 / n;
+    gyro2 += s.gyro_radps.cwiseAbs2() / n;
+    accel2 += s.accel_mps2.cwiseAbs2() / n;
+  }
+  const double gyro_variance = (gyro2 - gyro.cwiseAbs2()).maxCoeff();
+  const double accel_variance = (accel2 - accel.cwiseAbs2()).maxCoeff();
+  return gyro_variance < options_.max_gyro_std_radps * options_.max_gyro_std_radps &&
+         accel_variance < options_.max_accel_std_mps2 * options_.max_accel_std_mps2;
+}
+
+Duration RestDetector::update(const TrackedFrame& frame) {
+  std::vector<double> motion;
+  for (const TrackedFeature& f : frame.features) {
+    const auto before = anchor_.find(f.id);
+    if (before != anchor_.end()) motion.push_back((f.left.pixel - before->second).norm());
+  }
+  bool at_rest = static_cast<int>(motion.size()) >= options_.min_features && imu_is_quiet(frame.imu);
+  if (at_rest) {
+    std::nth_element(motion.begin(), motion.begin() + motion.size() / 2, motion.end());
+    at_rest = motion[motion.size() / 2] < options_.max_motion_px;
+  }
+  if (!at_rest) {
+    start(frame);
+    return {};
+  }
+  return frame.t - since_;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sliding window as a least-squares problem: reprojection, IMU and prior factors over frame
+// states, landmarks and, if wanted, calibration. Numbers only; who enters and leaves is decided in
+// window.hpp. Solved by optim/levenberg_marquardt.hpp. Formulas: docs/derivations/window.md (W1-W12).
+//
+//   WindowProblem problem;
+//   problem.frames = ...; problem.landmarks = ...; problem.observations = ...;
+//   LmSummary summary = problem.optimise(LmOptions{});
+//
+// Order of the dense system: 9 of each frame (v, bg, ba), calibration if it is estimated, 6 of each
+// frame (p, theta): poses that follow one another are neighbours, which the Schur kernel likes.
+// One problem is used by one thread; it keeps its working memory from call to call.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/reprojection.hpp"
+#include "fbvins/imu/imu_residual.hpp"
+#include "fbvins/imu/preintegration.hpp"
+#include "fbvins/optim/levenberg_marquardt.hpp"
+#include "fbvins/optim/quadratic_prior.hpp"
+#include "fbvins/optim/schur.hpp"
+
+namespace fbvins {
+
+struct WindowFrame {
+  NavState state;
+  /// First estimate: Jacobians of frames the prior knows are taken here (W9).
+  NavState first_estimate;
+  bool in_prior = false;
+  /// From the frame before this one; null where the chain is broken or the prior holds it.
+  const Preintegration* imu = nullptr;
+  bool standstill = false;
+};
+
+struct WindowObservation {
+  int frame = 0;
+  bool right = false;
+  Vec2 normalised = Vec2::Zero();
+  Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by the time offset
+  Mat2 sqrt_information = Mat2::Identity();
+};
+
+/// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
+struct WindowLandmark {
+  int host = 0;
+  int first_observation = 0;  ///< its observations are neighbours, sorted by frame
+  int observation_count = 0;
+  Vec3 alpha_beta_rho = Vec3::Zero();
+};
+
+/// Terms and weights that are not measurements of a frame.
+struct WindowWeights {
+  double huber_sigma = 2.0;
+  double gravity_mps2 = 9.81;
+  double standstill_velocity_sigma_mps = 0.01;
+  double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
+  bool estimate_extrinsics = false;
+  bool estimate_time_offset = false;
+};
+
+/// A quadratic over, in this order, the calibration (if estimated) and 15 numbers (p, theta, v, bg, ba)
+/// of some frames, measured from the frames' first estimates.
+struct WindowPrior {
+  QuadraticPrior quadratic;
+  std::vector<int> frames;  ///< indices into WindowProblem::frames
+  bool with_calibration = false;
+  Calibration calibration;  ///< linearisation point of the calibration
+  bool empty() const { return quadratic.size() == 0; }
+};
+
+/// T_BC0 (dp, dtheta), T_BC1 (dp, dtheta), time offset, and padding to whole blocks of six.
+inline constexpr int kCalibrationSize = 18;
+inline constexpr int kTimeOffsetIndex = 12;
+
+class WindowProblem {
+ public:
+  std::vector<WindowFrame> frames;
+  std::vector<WindowLandmark> landmarks;
+  std::vector<WindowObservation> observations;
+  Calibration calibration;
+  WindowPrior prior;
+  WindowWeights weights;
+
+  /// Minimises over frames, landmarks and (if wanted) calibration, in place.
+  LmSummary optimise(const LmOptions& options);
+
+  /// Whitened reprojection residual of an observation at the current estimate; infinite behind the camera.
+  Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
+
+  /// Cost at the current estimate.
+  double cost() const;
+
+  // The interface minimise() wants.
+  double linearise();
+  bool solve(double lambda);
+  double predicted_decrease() const { return predicted_decrease_; }
+  double step_size() const { return step_size_; }
+  double apply_step();
+  void undo_step();
+
+  /// The dense system after linearise(), before elimination: lower triangle of H, and g.
+  const Eigen::MatrixXd& hessian() const { return H_; }
+  const Eigen::VectorXd& gradient() const { return g_; }
+  PointBlocks& points() { return points_; }
+  /// Information of frames and calibration with the landmarks eliminated, at the last linearisation;
+  /// reduced_gradient() belongs to it.
+  Eigen::MatrixXd reduced_information();
+  const Eigen::VectorXd& reduced_gradient() const { return reduced_g_; }
+  /// Current calibration minus `from`, as a perturbation of `from`.
+  Eigen::Matrix<double, kCalibrationSize, 1> calibration_displacement(const Calibration& from) const;
+  /// Covariance of the frame's (p, theta, v) after optimise(); false if it cannot be computed.
+  bool covariance(int frame, Eigen::Matrix<double, 9, 9>& out);
+
+  bool calibrating() const { return weights.estimate_extrinsics || weights.estimate_time_offset; }
+  int calibration_size() const { return calibrating() ? kCalibrationSize : 0; }
+  int system_size() const { return 15 * static_cast<int>(frames.size()) + calibration_size(); }
+  int speed_bias_row(int frame) const { return 9 * frame; }
+  int calibration_row() const { return 9 * static_cast<int>(frames.size()); }
+  int pose_row(int frame) const { return calibration_row() + calibration_size() + 6 * frame; }
+  /// Row in the dense system of element k of a frame's 15 numbers (p, theta, v, bg, ba).
+  int row_of(int frame, int k) const { return k < 6 ? pose_row(frame) + k : speed_bias_row(frame) + k - 6; }
+  const std::vector<Vec3>& landmark_steps() const { return point_steps_; }
+  const Eigen::VectorXd& step() const { return step_; }
+
+ private:
+  void prepare_pairs(bool with_first_estimates);
+  double add_prior(bool build);
+  double add_imu_terms(bool build);
+  double add_standstill_terms(bool build);
+  template <int Columns>
+  double add_landmarks();
+  double landmark_cost() const;
+  Eigen::VectorXd prior_displacement() const;
+  void fix_inactive_calibration();
+  const PairGeometry& pair(int host, int target) const { return pairs_[host * frames.size() + target]; }
+  NavState linearisation_point(int i) const { return frames[i].in_prior ? frames[i].first_estimate : frames[i].state; }
+
+  std::vector<PairGeometry> pairs_;
+  std::vector<int> prior_rows_;
+  Eigen::MatrixXd H_, reduced_;
+  Eigen::VectorXd g_, reduced_g_, step_;
+  PointBlocks points_;
+  std::vector<Vec3> point_steps_;
+  std::vector<NavState> saved_states_;
+  std::vector<Vec3> saved_landmarks_;
+  Calibration saved_calibration_;
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+  double predicted_decrease_ = 0;
+  double step_size_ = 0;
+};
+
+}  // namespace fbvins

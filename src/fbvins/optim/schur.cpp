@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/optim/schur.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "fbvins/core/simd.hpp"
+
+namespace fbvins {
+namespace {
+
+/// One run of neighbouring blocks: rows [row, row + length) of the dense system.
+/// H(rows, col) -= y0 * w0 + y1 * w1 + y2 * w2.
+FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const int* offsets, int count, const double* y,
+                                           const double* w) {
+  const int length = 6 * count;
+  const double* y0 = y;
+  const double* y1 = y + length;
+  const double* y2 = y + 2 * length;
+  for (int b = 0; b < count; ++b) {
+    for (int j = 0; j < 6; ++j) {
+      const double w0 = w[18 * b + 3 * j], w1 = w[18 * b + 3 * j + 1], w2 = w[18 * b + 3 * j + 2];
+      double* column = H + (offsets[b] + j) * ld;
+      for (int a = b; a < count;) {
+        int end = a + 1;  // blocks that follow one another in the system are one long run
+        while (end < count && offsets[end] == offsets[end - 1] + 6) ++end;
+        double* out = column + offsets[a];
+        const int begin = 6 * a, n = 6 * (end - a);
+        for (int i = 0; i < n; ++i) out[i] -= y0[begin + i] * w0 + y1[begin + i] * w1 + y2[begin + i] * w2;
+        a = end;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+PointBlock& PointBlocks::add(std::span<const int> offsets) {
+  PointBlock point;
+  point.V.setZero();
+  point.w.setZero();
+  point.V_inverse.setZero();
+  point.first = static_cast<int>(offsets_.size());
+  point.count = static_cast<int>(offsets.size());
+  offsets_.insert(offsets_.end(), offsets.begin(), offsets.end());
+  coupling_.resize(18 * offsets_.size(), 0.0);
+  points_.push_back(point);
+  return points_.back();
+}
+
+bool PointBlocks::eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g) {
+  for (PointBlock& point : points_) {
+    Eigen::Matrix3d V = point.V;
+    V.diagonal() *= 1.0 + lambda;
+    bool invertible = false;
+    double determinant = 0;
+    const double scale = V(0, 0) * V(1, 1) * V(2, 2);
+    V.computeInverseAndDetWithCheck(point.V_inverse, determinant, invertible, 1e-13 * scale);
+    if (!invertible || !(determinant > 0)) return false;
+    const int n = point.count;
+    if (n == 0) continue;
+    scratch_.resize(18 * n);
+    const double* W = coupling_.data() + 18 * point.first;
+    const int* offsets = offsets_.data() + point.first;
+    const Eigen::Vector3d v_inv_w = point.V_inverse * point.w;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3>> Y(scratch_.data(), 6 * n, 3);
+    const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>> WT(W, 3, 6 * n);
+    Y.noalias() = WT.transpose() * point.V_inverse;
+    for (int k = 0; k < n; ++k) g.segment<6>(offsets[k]).noalias() -= WT.middleCols<6>(6 * k).transpose() * v_inv_w;
+    subtract_outer_products(H.data(), H.outerStride(), offsets, n, scratch_.data(), W);
+  }
+  return true;
+}
+
+void PointBlocks::back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const {
+  point_steps.resize(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const PointBlock& point = points_[i];
+    Eigen::Vector3d rhs = point.w;
+    for (int k = 0; k < point.count; ++k) {
+      const Eigen::Map<const Eigen::Matrix<double, 3, 6>> WT(coupling_.data() + 18 * (point.first + k));
+      rhs.noalias() += WT * step.segment<6>(offsets_[point.first + k]);
+    }
+    point_steps[i].noalias() = -(point.V_inverse * rhs);
+  }
+}
+
+}  // namespace fbvins

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins {
+namespace {
+
+/// The frontend of frame k sees the state after frame k - kPriorLag, in every mode.
+constexpr std::int64_t kPriorLag = 2;
+
+}  // namespace
+
+System::System(const Config& config, const StereoRig& rig, RunMode mode)
+    : mode_(mode),
+      packets_(config.input, Duration::from_seconds(rig.time_offset_s)),
+      frontend_(make_frontend(rig, config.frontend)),
+      estimator_(rig, config.estimator) {
+  if (mode_ != RunMode::threaded) return;
+  frontend_runner_.start(
+      [this] {
+        while (auto packet = to_frontend_.pop()) track(std::move(*packet));
+        to_estimator_.close();
+      },
+      [this] { stop_waiting(); });
+  estimator_runner_.start(
+      [this] {
+        while (auto frame = to_estimator_.pop()) estimate(*frame);
+      },
+      [this] { stop_waiting(); });
+}
+
+System::~System() { (void)finish(); }
+
+void System::push(SensorEvent event) {
+  if (auto* sample = std::get_if<ImuSample>(&event))
+    packets_.push(*sample);
+  else
+    packets_.push(std::get<StereoFrame>(std::move(event)));
+  forward_packets(false);
+}
+
+void System::forward_packets(bool flush) {
+  while (auto packet = packets_.next(flush)) {
+    if (mode_ == RunMode::threaded)
+      to_frontend_.push(std::move(*packet));
+    else
+      track(std::move(*packet));
+  }
+}
+
+void System::track(SensorPacket packet) {
+  TrackedFrame frame = frontend_->process(packet, prior_for(packet.id));
+  if (mode_ == RunMode::threaded)
+    to_estimator_.push(std::move(frame));
+  else
+    estimate(frame);
+}
+
+void System::estimate(const TrackedFrame& frame) {
+  if (on_tracked_frame_) on_tracked_frame_(frame);
+  const Odometry odometry = estimator_.process(frame);
+  publish(frame.id, estimator_.prior());
+  if (on_odometry_) on_odometry_(odometry);
+}
+
+StatePrior System::prior_for(FrameId frame) {
+  const std::int64_t wanted = frame.value - kPriorLag;
+  if (wanted < 0) return {};
+  std::unique_lock lock(prior_mutex_);
+  prior_published_.wait(lock, [&] { return stopped_ || frames_estimated_ > wanted; });
+  return priors_[wanted % priors_.size()];
+}
+
+void System::publish(FrameId frame, const StatePrior& prior) {
+  const std::lock_guard lock(prior_mutex_);
+  priors_[frame.value % priors_.size()] = prior;
+  frames_estimated_ = frame.value + 1;
+  prior_published_.notify_all();
+}
+
+void System::stop_waiting() {
+  to_frontend_.close();
+  to_estimator_.close();
+  const std::lock_guard lock(prior_mutex_);
+  stopped_ = true;
+  prior_published_.notify_all();
+}
+
+Result<void> System::finish() {
+  if (finished_) return {};
+  finished_ = true;
+  forward_packets(true);
+  to_frontend_.close();
+  for (StageRunner* runner : {&frontend_runner_, &estimator_runner_}) {
+    const std::string failure = runner->join();
+    if (!failure.empty()) return Error{ErrorCode::invalid_argument, "a stage failed: " + failure};
+  }
+  return {};
+}
+
+}  // namespace fbvins

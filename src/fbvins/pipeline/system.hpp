@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole odometry: images and IMU readings in, poses out.
+//
+//   System system(config, dataset->rig(), RunMode::deterministic);
+//   system.on_odometry([&](const Odometry& o) { writer.write(o); });
+//   while (auto event = dataset->next()) system.push(std::move(*event));
+//   Result<void> end = system.finish();
+//
+// Threads: push() and finish() are called by one thread. `deterministic` runs everything on it;
+// `threaded` runs the frontend and the estimator each on a thread of their own and calls back on the
+// estimator's. Both give the same bits: the frontend of frame k always sees the estimator's state
+// after frame k - 2, so that the two can work side by side.
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/bounded_queue.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/frontend/frontend.hpp"
+#include "fbvins/pipeline/frontend_options.hpp"
+#include "fbvins/pipeline/packet_maker.hpp"
+#include "fbvins/pipeline/stage_runner.hpp"
+#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+enum class RunMode { deterministic, threaded };
+
+/// Everything that can be configured.
+struct Config {
+  FrontendOptions frontend;
+  EstimatorOptions estimator;
+  PacketMakerOptions input;
+
+  template <class V>
+  void visit(V&& v) {
+    v.group("frontend", frontend, "features and their tracks");
+    v.group("estimator", estimator, "sliding window");
+    v.group("input", input, "sensor data on its way in");
+  }
+};
+
+class System {
+ public:
+  System(const Config& config, const StereoRig& rig, RunMode mode);
+  ~System();
+  System(const System&) = delete;
+  System& operator=(const System&) = delete;
+
+  using TrackedFrameCallback = std::function<void(const TrackedFrame&)>;
+  using OdometryCallback = std::function<void(const Odometry&)>;
+  void on_tracked_frame(TrackedFrameCallback callback) { on_tracked_frame_ = std::move(callback); }
+  void on_odometry(OdometryCallback callback) { on_odometry_ = std::move(callback); }
+
+  /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded).
+  void push(SensorEvent event);
+  /// Processes what is waiting and ends. An error if a stage threw.
+  Result<void> finish();
+
+  InputCounts input_counts() const { return packets_.counts(); }
+  const Estimator& estimator() const { return estimator_; }
+
+ private:
+  void forward_packets(bool flush);
+  void track(SensorPacket packet);
+  void estimate(const TrackedFrame& frame);
+  StatePrior prior_for(FrameId frame);
+  void publish(FrameId frame, const StatePrior& prior);
+  void stop_waiting();
+
+  RunMode mode_;
+  PacketMaker packets_;
+  std::unique_ptr<Frontend> frontend_;
+  Estimator estimator_;
+  TrackedFrameCallback on_tracked_frame_;
+  OdometryCallback on_odometry_;
+
+  BoundedQueue<SensorPacket> to_frontend_{4};
+  BoundedQueue<TrackedFrame> to_estimator_{4};
+  StageRunner frontend_runner_, estimator_runner_;
+  bool finished_ = false;
+
+  // The feedback slot: the states after the last frames, and how far the estimator has come.
+  std::mutex prior_mutex_;
+  std::condition_variable prior_published_;
+  std::array<StatePrior, 4> priors_;
+  std::int64_t frames_estimated_ = 0;
+  bool stopped_ = false;
+};
+
+}  // namespace fbvins
