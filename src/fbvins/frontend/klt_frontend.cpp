@@ -11,6 +11,7 @@ namespace {
 
 /// An anchor seen smaller than this, or larger than its inverse, gives way to a new one.
 constexpr double kSmallestScale = 0.65;
+constexpr std::size_t kFewestForLongCheck = 12;
 constexpr double kBorder_px = kKltReach - 2;
 
 double median(std::vector<double>& numbers) {
@@ -168,24 +169,57 @@ void KltFrontend::follow_tracks(const CameraMotion& motion, FrontendStats& stats
   stats.median_motion_px = median(numbers_);
 }
 
+/// points_a_, points_b_ hold the matches of the tracks in indices_.
+EpipolarResult KltFrontend::drop_off_epipolar(const std::optional<Mat3>& R_ba, double threshold_px, FrontendStats& stats) {
+  EpipolarOptions ransac;
+  ransac.threshold = threshold_px / rig_.left.focal_px();
+  EpipolarResult result = ransac_epipolar(points_a_, points_b_, R_ba, ransac, rng_);
+  for (std::size_t i = 0; i < indices_.size(); ++i) {
+    if (result.inlier[i]) continue;
+    tracks_[indices_[i]].alive = false;
+    ++stats.lost_epipolar;
+  }
+  drop_dead_tracks();
+  return result;
+}
+
 void KltFrontend::reject_outliers(const CameraMotion& motion, FrontendStats& stats) {
   points_a_.clear();
   points_b_.clear();
-  for (const Track& track : tracks_) {
-    points_a_.push_back(track.previous_normalised);
-    points_b_.push_back(track.normalised);
+  indices_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    points_a_.push_back(tracks_[i].previous_normalised);
+    points_b_.push_back(tracks_[i].normalised);
+    indices_.push_back(i);
   }
-  EpipolarOptions ransac;
-  ransac.threshold = options_.epipolar_px / rig_.left.focal_px();
   std::optional<Mat3> R_ba;
   if (motion.has_rotation) R_ba = motion.R_ba;
-  const EpipolarResult result = ransac_epipolar(points_a_, points_b_, R_ba, ransac, rng_);
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    tracks_[i].alive = result.inlier[i] != 0;
-    if (!tracks_[i].alive) ++stats.lost_epipolar;
-  }
-  drop_dead_tracks();
+  const EpipolarResult result = drop_off_epipolar(R_ba, options_.epipolar_px, stats);
+  reject_slow_outliers(result.R_ba, stats);
+  for (Track& track : tracks_) track.history[static_cast<std::size_t>(track.age_frames % kHistory)] = track.normalised;
   stats.tracked = static_cast<int>(tracks_.size());
+}
+
+/// What slides along an occluding edge, or moves slowly, obeys the constraint from one frame to the
+/// next and breaks it over several.
+void KltFrontend::reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats) {
+  rotations_[static_cast<std::size_t>(next_rotation_)] = R_ba;
+  next_rotation_ = (next_rotation_ + 1) % kHistory;
+  points_a_.clear();
+  points_b_.clear();
+  indices_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& track = tracks_[i];
+    if (track.age_frames < kHistory) continue;
+    points_a_.push_back(track.history[static_cast<std::size_t>(track.age_frames % kHistory)]);
+    points_b_.push_back(track.normalised);
+    indices_.push_back(i);
+  }
+  if (indices_.size() < kFewestForLongCheck) return;
+  Mat3 R_now_then = Mat3::Identity();
+  for (int i = 0; i < kHistory; ++i)
+    R_now_then = rotations_[static_cast<std::size_t>((next_rotation_ + i) % kHistory)] * R_now_then;
+  drop_off_epipolar(R_now_then, options_.long_epipolar_px, stats);
 }
 
 void KltFrontend::detect_corners(FrontendStats& stats) {
@@ -205,6 +239,7 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
     track.px = corner.px;
     track.normalised = *normalised;
     drop_anchor(track);
+    track.history[0] = track.normalised;
     tracks_.push_back(track);
     ++stats.detected;
   }

@@ -7,6 +7,7 @@
 //   TrackedFrame tracked = frontend.process(packet, prior);
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,10 @@ struct KltFrontendOptions {
   int pyramid_levels = 4;
   double sigma_px = 0.8;
   double forward_backward_px = 0.7;
-  double epipolar_px = 1.5;
+  double epipolar_px = 0.7;
+  double long_epipolar_px = 1.0;
   double min_anchor_correlation = 0.8;
-  double max_creep_px = 1.5;
+  double max_creep_px = 0.7;
   double max_gap_s = 0.6;
   KltOptions klt;
   KltStereoOptions stereo;
@@ -41,6 +43,7 @@ struct KltFrontendOptions {
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
+    v("long_epipolar_px", long_epipolar_px, "px", "RANSAC threshold between left images six frames apart", 0.1, 10.0);
     v("min_anchor_correlation", min_anchor_correlation, "", "correlation with the anchor below which it is taken anew", -1.0, 1.0);
     v("max_creep_px", max_creep_px, "px", "a feature farther from its anchor's match has slid and is dropped", 0.1, 20.0);
     v("max_gap_s", max_gap_s, "s", "after a longer gap without left image features start anew", 0.01, 5.0);
@@ -57,6 +60,8 @@ class KltFrontend final : public Frontend {
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
 
  private:
+  static constexpr int kHistory = 6;  // frames of the long epipolar check
+
   struct Track {
     TrackId id;
     std::size_t slot = 0;                 // of its template
@@ -69,6 +74,7 @@ class KltFrontend final : public Frontend {
     Mat3 R_now_anchor = Mat3::Identity(); // rotation of the left camera
     double depth_ratio = 1;               // depth now / depth then
     Mat2 J_normalised_pixel_anchor = Mat2::Identity();
+    std::array<Vec2, kHistory> history{}; // normalised positions, that of age a at a % kHistory
     // while being followed into the present image:
     Vec2 previous_px = Vec2::Zero();
     Vec2 previous_normalised = Vec2::Zero();
@@ -82,6 +88,8 @@ class KltFrontend final : public Frontend {
   void drop_anchor(Track& track);
   Vec2 predict(const Track& track, const CameraMotion& motion) const;
   void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
+  void reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats);
+  EpipolarResult drop_off_epipolar(const std::optional<Mat3>& R_ba, double threshold_px, FrontendStats& stats);
   void detect_corners(FrontendStats& stats);
   void match_stereo(FrontendStats& stats);
   void drop_dead_tracks();
@@ -106,7 +114,10 @@ class KltFrontend final : public Frontend {
   std::vector<KltAnchor> anchors_;
   std::vector<std::size_t> free_slots_;
   KltTemplate warped_;                       // of the anchor being used
+  std::array<Mat3, kHistory> rotations_;     // of the last frames, oldest at next_rotation_
+  int next_rotation_ = 0;
   std::vector<Vec2> points_a_, points_b_;    // buffers
+  std::vector<std::size_t> indices_;
   std::vector<double> numbers_;
 };
 
