@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Visual-inertial alignment in motion (paper 2.2.4; docs/derivations/alignment.md, eq. A6-A20):
+// from metric body poses in an arbitrary visual world and the readings between them, the gyro bias,
+// the direction of gravity, the velocities and, as far as they show, the accelerometer bias.
+//
+//   std::vector<Pose<VisualWorld, B>> poses = ...;    // from stereo, n of them
+//   std::vector<Preintegration> between = ...;        // n - 1, consecutive
+//   AlignmentResult a = align_visual_inertial(poses, between, options);
+//   if (a.accepted) start(a.states);                  // else a.reason says why not
+//
+// A window without motion is fine: gravity then comes from the accelerometers alone, the accelerometer
+// bias stays at its prior (accel_bias_sigma_mps2 tells). Threads: pure function.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/imu/preintegration.hpp"
+
+namespace fbvins {
+
+/// Frame of the visual structure: metric scale, orientation and origin arbitrary.
+struct VisualWorld {};
+
+struct AlignmentOptions {
+  int min_frames = 4;
+  double min_duration_s = 0.3;
+  double pose_sigma_m = 2e-3;            ///< noise of each visual position
+  double pose_sigma_rad = 1.5e-3;        ///< noise of each visual orientation
+  double gyro_bias_prior_radps = 0.3;    ///< sigma about zero
+  double accel_bias_prior_mps2 = 0.1;    ///< sigma about zero
+  double max_gravity_error_mps2 = 0.8;   ///< of the norm, solved without constraint
+  double max_gravity_sigma_rad = 0.05;   ///< about 3 degrees
+  double max_gyro_bias_radps = 0.25;
+  double max_gyro_bias_sigma_radps = 0.03;
+  double max_accel_bias_mps2 = 1.0;
+  double max_residual_rms = 4.0;         ///< in sigmas
+  double max_gap_s = 0.05;
+
+  template <class V>
+  void visit(V&& v) {
+    v("min_frames", min_frames, "", "visual poses needed", 3, 100);
+    v("min_duration_s", min_duration_s, "s", "shortest window", 0.05, 10.0);
+    v("pose_sigma_m", pose_sigma_m, "m", "noise of each visual position", 1e-5, 1.0);
+    v("pose_sigma_rad", pose_sigma_rad, "rad", "noise of each visual orientation", 1e-5, 0.5);
+    v("gyro_bias_prior_radps", gyro_bias_prior_radps, "rad/s", "sigma of the gyro bias about zero", 1e-4, 2.0);
+    v("accel_bias_prior_mps2", accel_bias_prior_mps2, "m/s^2", "sigma of the accelerometer bias about zero", 1e-4, 2.0);
+    v("max_gravity_error_mps2", max_gravity_error_mps2, "m/s^2", "error of the magnitude of gravity", 0.01, 5.0);
+    v("max_gravity_sigma_rad", max_gravity_sigma_rad, "rad", "uncertainty of the direction of gravity", 1e-3, 0.5);
+    v("max_gyro_bias_radps", max_gyro_bias_radps, "rad/s", "largest plausible gyro bias", 1e-3, 2.0);
+    v("max_gyro_bias_sigma_radps", max_gyro_bias_sigma_radps, "rad/s", "uncertainty of the gyro bias", 1e-4, 1.0);
+    v("max_accel_bias_mps2", max_accel_bias_mps2, "m/s^2", "largest plausible accelerometer bias", 1e-3, 5.0);
+    v("max_residual_rms", max_residual_rms, "", "residual in sigmas", 1.0, 100.0);
+    v("max_gap_s", max_gap_s, "s", "longest gap in the readings", 0.005, 1.0);
+  }
+};
+
+enum class AlignmentRefusal {
+  none,
+  too_few_frames,
+  too_short,
+  bad_input,              ///< numbers not finite, empty intervals, or sizes that do not match
+  imu_gap,
+  solver_failed,
+  gyro_bias_unobservable,
+  gyro_bias_implausible,
+  rotation_inconsistent,  ///< gyro and visual rotations disagree
+  gravity_magnitude,      ///< not that of the earth: wrong scale, wrong poses, wrong readings
+  gravity_unobservable,
+  accel_bias_implausible,
+  motion_inconsistent,    ///< accelerometer and visual positions disagree
+};
+
+std::string_view to_string(AlignmentRefusal reason);
+
+struct AlignmentResult {
+  bool accepted = false;
+  AlignmentRefusal reason = AlignmentRefusal::none;
+
+  /// W: z up, origin at the first body pose, heading such that R_WB of the first pose has no rotation
+  /// about gravity (level_rotation of static_initialiser.hpp).
+  Quat R_WV = Quat::Identity();
+  ImuBias bias;
+  std::vector<NavState> states;     ///< one a pose: the visual pose in W, velocity, bias
+
+  // Diagnostics, filled as far as the computation went.
+  double gravity_norm_mps2 = 0;             ///< without constraint on its magnitude
+  double gravity_sigma_rad = 0;             ///< standard deviation of the direction, worst axis
+  double gravity_information_min = 0;       ///< smallest eigenvalue of the unconstrained 3x3 information
+  double gravity_condition = 0;             ///< its condition number
+  double gyro_bias_sigma_radps = 0;         ///< worst axis
+  double accel_bias_sigma_mps2 = 0;         ///< worst axis; the prior's where motion shows nothing
+  double velocity_sigma_mps = 0;            ///< of the last velocity, worst axis
+  double rotation_rms = 0;                  ///< in sigmas
+  double motion_rms = 0;                    ///< in sigmas
+};
+
+/// between[k] joins poses[k] and poses[k + 1]. On acceptance all intervals are repropagated at the bias
+/// found; on refusal at some bias.
+AlignmentResult align_visual_inertial(const std::vector<Pose<VisualWorld, B>>& poses,
+                                      std::vector<Preintegration>& between, const AlignmentOptions& options = {},
+                                      double gravity_mps2 = kGravity_mps2);
+
+}  // namespace fbvins
