@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features matched by Hamming distance where the predicted pose
+// expects them, left to right along the epipolar band, checked by epipolar RANSAC, and refined below a
+// pixel by patch alignment. A track that is not seen for a moment (blur, occlusion, a black image) is remembered with
+// its descriptor and patch, and continues under its old id when it is seen again.
+// Synchronous; one instance is used by one thread at a time; allocates only while it grows.
+//
+//   OrbFrontend frontend(rig, OrbFrontendOptions{});
+//   TrackedFrame tracked = frontend.process(packet, prior);
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/features/descriptor_stage.hpp"
+#include "fbvins/features/epipolar_ransac.hpp"
+#include "fbvins/features/orb.hpp"
+#include "fbvins/features/patch_refine.hpp"
+#include "fbvins/frontend/frontend.hpp"
+#include "fbvins/frontend/klt_stereo.hpp"
+#include "fbvins/frontend/orb_matching.hpp"
+#include "fbvins/frontend/orb_stereo.hpp"
+#include "fbvins/frontend/prediction.hpp"
+
+namespace fbvins {
+
+struct OrbFrontendOptions {
+  int max_features = 180;
+  double min_distance_px = 14;
+  int max_remembered = 200;
+  double memory_s = 1.0;
+  double search_px = 12;
+  double search_blind_px = 50;
+  bool subpixel = true;
+  bool fill_in = true;
+  double fill_in_correlation = 0.85;
+  double epipolar_px = 1.5;
+  double sigma_px = 0.8;
+  OrbOptions orb;
+  GuidedMatchOptions matching;
+  OrbStereoOptions stereo;
+  PatchRefineOptions refine;
+  KltOptions alignment;
+  KltStereoOptions stereo_fill_in;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_features", max_features, "", "features followed at once", 10, 2000);
+    v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
+    v("max_remembered", max_remembered, "", "features remembered while out of sight", 0, 2000);
+    v("memory_s", memory_s, "s", "how long a feature out of sight is remembered", 0.0, 1.4);
+    v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
+    v("search_blind_px", search_blind_px, "px", "search radius when only the rotation or nothing is known", 2.0, 400.0);
+    v("subpixel", subpixel, "", "refine matched positions by patch alignment");
+    v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
+    v("fill_in_correlation", fill_in_correlation, "", "correlation asked of a feature followed by alignment alone", 0.0, 1.0);
+    v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
+    v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
+    v.group("orb", orb, "feature extraction");
+    v.group("matching", matching, "matching over time");
+    v.group("stereo", stereo, "matching from left to right by descriptor");
+    v.group("refine", refine, "refinement below a pixel");
+    v.group("alignment", alignment, "Lucas-Kanade alignment");
+    v.group("stereo_fill_in", stereo_fill_in, "matching from left to right by alignment, where descriptors found nothing");
+  }
+};
+
+class OrbFrontend final : public Frontend {
+ public:
+  /// `stage` may improve the descriptors of each image; the default leaves them.
+  OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options,
+              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
+
+  TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
+
+ private:
+  struct Track {
+    TrackId id;
+    std::size_t slot = 0;                 // of its patches
+    Descriptor descriptor;                // as last seen
+    int level = 0;                        // as last seen
+    Vec2 px = Vec2::Zero();               // where it is, or is expected while out of sight
+    Vec2 normalised = Vec2::Zero();
+    std::optional<double> inverse_depth;  // 1/m along z of C0
+    std::optional<Observation> right;     // match in the present right image
+    Time last_seen;
+    int age_frames = 0;
+    bool in_sight = false;                // has an observation in the newest image
+    bool was_in_sight = false;            // had one in the image before
+    Vec2 previous_normalised = Vec2::Zero();
+    double depth_factor = 1;              // depth now / depth before
+    bool renew_reference = false;
+    bool alive = true;
+  };
+  struct Patches {
+    KltTemplate newest;        // of the last image it was seen in; only for tracks in sight
+    PatchReference reference;  // where the track began or was renewed
+  };
+
+  bool ingest(const SensorPacket& packet, FrontendStats& stats);
+  void extract_left(FrontendStats& stats);
+  void predict(const CameraMotion& motion);
+  void match_tracks(const CameraMotion& motion);
+  void locate_tracks(const CameraMotion& motion, FrontendStats& stats);
+  bool locate(Track& track, const Keypoint* keypoint, const Vec2& expected_px);
+  std::optional<Vec2> refine_match(Track& track, const Vec2& start_px, double scale);
+  std::optional<Vec2> follow_by_alignment(Track& track, const Vec2& expected_px);
+  bool settle(Track& track, const Vec2& px, const CameraMotion& motion);
+  void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
+  void thin_out();
+  void cut_patches();
+  void start_tracks(FrontendStats& stats);
+  bool start_track(const Keypoint& keypoint, const Descriptor& descriptor);
+  void match_stereo(FrontendStats& stats);
+  std::optional<Vec2> find_in_right(const Track& track);
+  void forget(Time now);
+  void drop_dead_tracks();
+  Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised) const;
+  void report(TrackedFrame& out) const;
+
+  OrbFrontendOptions options_;
+  StereoRig rig_;
+  std::unique_ptr<DescriptorStage> stage_;
+  MotionPredictor predictor_;
+  OrbExtractor extractor_;
+  GuidedMatcher matcher_;
+  OrbStereoMatcher stereo_;
+  KltStereoMatcher stereo_fill_in_;
+  PatchRefiner refiner_;
+  Rng rng_;
+
+  Pyramid left_, right_;
+  ImageView right_view_;
+  OrbFeatures left_features_, right_features_;
+  bool has_previous_ = false;
+  Time now_, previous_t_;
+  double typical_inverse_depth_ = 0;  // 1/m, median of the features matched last
+  std::int64_t next_track_ = 0;
+  std::vector<Track> tracks_;
+  std::vector<Patches> patches_;
+  std::vector<std::size_t> free_slots_;
+  // buffers
+  std::vector<GuidedQuery> queries_;
+  std::vector<int> found_;
+  std::vector<std::uint8_t> keypoint_used_;
+  std::vector<Vec2> points_a_, points_b_;
+  std::vector<double> numbers_, numbers_y_;
+  std::vector<std::size_t> order_;
+};
+
+}  // namespace fbvins

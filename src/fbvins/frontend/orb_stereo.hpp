@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Left-right matching of descriptors along the epipolar band. Rays of both cameras are turned so that the baseline
+// is the x axis; matches then differ in x only (rectified normalised coordinates; images are never rectified).
+// Buffers are reused; one instance, one thread.
+//
+//   OrbStereoMatcher stereo(rig, options);
+//   stereo.index(right_features);
+//   int keypoint = stereo.candidate(left_normalised, level, descriptor);          // -1: none
+//   auto inverse_depth = stereo.inverse_depth(left_normalised, right_normalised); // 1/m, or nothing
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/features/hamming.hpp"
+#include "fbvins/features/keypoint.hpp"
+
+namespace fbvins {
+
+struct OrbStereoOptions {
+  double band_px = 2.0;
+  double epipolar_px = 1.5;
+  double min_depth_m = 0.35;
+  int max_distance = 64;
+  double max_ratio = 0.85;
+
+  template <class V>
+  void visit(V&& v) {
+    v("band_px", band_px, "px", "half-width of the band searched, times the scale of the keypoint", 0.1, 50.0);
+    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar line after refinement", 0.05, 20.0);
+    v("min_depth_m", min_depth_m, "m", "nearest point that is matched", 0.05, 10.0);
+    v("max_distance", max_distance, "bit", "largest Hamming distance of a match", 1, 256);
+    v("max_ratio", max_ratio, "", "largest ratio of the best to the second-best distance", 0.1, 1.0);
+  }
+};
+
+class OrbStereoMatcher {
+ public:
+  OrbStereoMatcher(const StereoRig& rig, const OrbStereoOptions& options);
+
+  /// Keeps a reference to `right` until the next call.
+  void index(const OrbFeatures& right);
+  /// The right keypoint that matches, or -1.
+  int candidate(const Vec2& left_normalised, int level, const Descriptor& descriptor);
+  /// 1/m along z of C0; nothing when the rays are too far from one epipolar plane or meet too near or behind.
+  std::optional<double> inverse_depth(const Vec2& left_normalised, const Vec2& right_normalised) const;
+
+ private:
+  struct Entry {
+    Vec2 rectified;
+    std::int32_t keypoint;
+  };
+  std::optional<Vec2> rectify(const Mat3& R, const Vec2& normalised) const;
+
+  OrbStereoOptions options_;
+  Camera right_camera_;
+  Mat3 R_rect_left_, R_rect_right_;
+  double baseline_m_, focal_px_;
+  const OrbFeatures* right_ = nullptr;
+  std::vector<Entry> entries_;  // by rectified y
+  std::vector<std::int32_t> near_;
+  std::vector<std::uint16_t> distance_;
+};
+
+}  // namespace fbvins
