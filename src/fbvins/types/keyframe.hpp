@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the estimator hands to loop closure: a frame worth remembering.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/core/ids.hpp"
+#include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+/// A landmark of the sliding window as this keyframe sees it.
+struct KeyframeLandmark {
+  TrackId track;
+  Vec2 pixel = Vec2::Zero();  ///< in the raw left image, px
+  Vec3 p_B = Vec3::Zero();    ///< in the body at the keyframe, m
+};
+
+/// A keyframe as it leaves the newest frames of the window: its pose has been refined by a few later
+/// images and is final enough for the map, which corrects it further.
+struct Keyframe {
+  FrameId id;
+  Time t;
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero();
+  Mat6 pose_covariance = Mat6::Zero();  ///< of (dp in W, dtheta in B), from the start of W
+  std::uint32_t reset_counter = 0;      ///< a new value: W is a new frame, nothing joins it to the old
+  StereoFrame images;
+  std::vector<KeyframeLandmark> landmarks;
+};
+
+}  // namespace fbvins
