@@ -58,7 +58,8 @@ Mat15 covariance_at_rest(const Vec3& up_B, double window_s, const ImuNoise& nois
   P.diagonal().segment<3>(nav::v).setConstant(squared(o.velocity_sigma_mps));
   P.diagonal().segment<3>(nav::bg).setConstant(gyro_noise + squared(1e-4));
   P.diagonal().segment<3>(nav::ba).setConstant(bias);
-  return P;
+  const Mat15 symmetric = 0.5 * (P + P.transpose());  // to the last bit
+  return symmetric;
 }
 
 RestRefusal judge(const Spread& s, double image_motion_px, const ImuNoise& noise, const RestOptions& o, double g) {

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/imu/preintegration.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/geometry/jacobian_check.hpp"
+#include "fbvins/imu/imu_residual.hpp"
+#include "fbvins/imu/imu_test_motion.hpp"
+#include "fbvins/imu/propagation.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
+const ImuBias kBias{Vec3(0.02, -0.03, 0.05), Vec3(0.1, -0.2, 0.15)};
+
+Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const ImuNoise& noise = {}) {
+  Preintegration p(noise, bias);
+  p.integrate(segment);
+  return p;
+}
+
+Vec15 prediction_error(const Motion& motion, Duration period) {
+  const Preintegration p = integrated(motion.segment(kFrom, kTo, period, kBias), kBias);
+  return p.predict(motion.state(kFrom.seconds(), kBias), kGravity_mps2).boxminus(motion.state(kTo.seconds(), kBias));
+}
+
+TEST(Preintegration, FollowsAnExactMotionWithErrorOfSecondOrder) {
+  const Motion motion;
+  const Vec15 at_200hz = prediction_error(motion, Duration{5'000'000});
+  const Vec15 at_800hz = prediction_error(motion, Duration{1'250'000});
+  EXPECT_LT(at_200hz.segment<3>(nav::p).norm(), 5e-5);
+  EXPECT_LT(at_200hz.segment<3>(nav::theta).norm(), 3e-5);
+  EXPECT_LT(at_200hz.segment<3>(nav::v).norm(), 2e-4);
+  for (const int block : {nav::p, nav::theta, nav::v}) {
+    const double ratio = at_200hz.segment<3>(block).norm() / at_800hz.segment<3>(block).norm();
+    EXPECT_NEAR(ratio, 16, 1.5) << "block at " << block;  // 4^2: second order
+  }
+}
+
+TEST(Preintegration, IsExactForAConstantRateAndForce) {
+  ImuSegment segment;
+  for (int k = 0; k <= 20; ++k) segment.samples.push_back({Time{k * 5'000'000}, Vec3(0, 0, 2.0), Vec3(0, 0, 3.0)});
+  const Preintegration p = integrated(segment, {});
+  EXPECT_NEAR((so3_log(p.delta_q()) - Vec3(0, 0, 0.2)).norm(), 0, 1e-13);
+  EXPECT_NEAR((p.delta_v() - Vec3(0, 0, 0.3)).norm(), 0, 1e-13);
+  EXPECT_NEAR((p.delta_p() - Vec3(0, 0, 0.015)).norm(), 0, 1e-13);
+}
+
+TEST(Preintegration, AgreesWithPropagation) {
+  const Motion motion;
+  const ImuSegment segment = motion.segment(kFrom, kTo, Duration{5'000'000}, kBias);
+  const NavState i = motion.state(kFrom.seconds(), kBias);
+  const NavState a = integrated(segment, kBias).predict(i, kGravity_mps2), b = propagate(i, segment, kGravity_mps2);
+  EXPECT_LT(a.boxminus(b).norm(), 1e-12);
+  EXPECT_LT(so3_log(integrate_gyro(segment, kBias.gyro_radps).conjugate() * integrated(segment, kBias).delta_q()).norm(), 1e-13);
+}
+
+TEST(Preintegration, BiasJacobiansMatchNumericOnes) {
+  const ImuSegment segment = Motion().segment(kFrom, kTo, Duration{5'000'000}, kBias);
+  const Preintegration p = integrated(segment, kBias);
+  const auto deltas = [&](const Eigen::VectorXd& d) {
+    const Preintegration moved = integrated(segment, {kBias.gyro_radps + d.head<3>(), kBias.accel_mps2 + d.tail<3>()});
+    Eigen::VectorXd r(9);
+    r << moved.delta_p(), so3_log(p.delta_q().conjugate() * moved.delta_q()), moved.delta_v();
+    return r;
+  };
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(9, 6);
+  J << p.J_p_bg(), p.J_p_ba(), p.J_theta_bg(), Mat3::Zero(), p.J_v_bg(), p.J_v_ba();
+  const auto check = check_jacobian(deltas, J, {{"delta_p", 3}, {"delta_q", 3}, {"delta_v", 3}}, {{"bg", 3}, {"ba", 3}}, 1e-9);
+  EXPECT_TRUE(check.ok) << check.message;
+}
+
+TEST(Preintegration, FirstOrderCorrectionErrsQuadratically) {
+  const ImuSegment segment = Motion().segment(kFrom, kTo, Duration{5'000'000}, kBias);
+  const auto error = [&](double scale) {
+    const ImuBias moved{kBias.gyro_radps + scale * Vec3(1, -1, 0.5), kBias.accel_mps2 + scale * Vec3(-1, 2, 1)};
+    const ImuDeltas corrected = integrated(segment, kBias).corrected(moved);
+    return (corrected.p - integrated(segment, moved).delta_p()).norm();
+  };
+  EXPECT_NEAR(error(2e-2) / error(1e-2), 4, 0.2);
+}
+
+TEST(Preintegration, RepropagationEqualsIntegratingAnew) {
+  const ImuSegment segment = Motion().segment(kFrom, kTo, Duration{5'000'000}, kBias);
+  Preintegration p = integrated(segment, {});
+  EXPECT_TRUE(p.needs_repropagation(kBias));
+  p.repropagate(kBias);
+  EXPECT_FALSE(p.needs_repropagation(kBias));
+  const Preintegration fresh = integrated(segment, kBias);
+  EXPECT_EQ(p.delta_p(), fresh.delta_p());
+  EXPECT_EQ(p.delta_q().coeffs(), fresh.delta_q().coeffs());
+  EXPECT_EQ(p.covariance(), fresh.covariance());
+}
+
+TEST(Preintegration, AppendEqualsIntegratingInOneGo) {
+  const Motion motion;
+  const Time middle{1'233'000'000};
+  const Duration period{5'000'000};
+  const ImuSegment first = motion.segment(kFrom, middle, period, kBias), second = motion.segment(middle, kTo, period, kBias);
+  Preintegration together(ImuNoise{}, kBias);
+  together.integrate(first);
+  together.integrate(second);
+  Preintegration joined = integrated(first, kBias);
+  joined.append(integrated(second, ImuBias{}));  // the other's bias does not matter
+  EXPECT_EQ(joined.dt().ns, (kTo - kFrom).ns);
+  EXPECT_LT((joined.delta_p() - together.delta_p()).norm(), 1e-12);
+  EXPECT_LT((joined.delta_v() - together.delta_v()).norm(), 1e-12);
+  EXPECT_LT((joined.delta_q().coeffs() - together.delta_q().coeffs()).norm(), 1e-12);
+  EXPECT_LT((joined.covariance() - together.covariance()).norm(), 1e-12);
+  EXPECT_LT((joined.J_p_bg() - together.J_p_bg()).norm(), 1e-12);
+  EXPECT_LT((joined.sqrt_information() - together.sqrt_information()).norm() / together.sqrt_information().norm(), 1e-12);
+}
+
+TEST(Preintegration, SqrtInformationIsTheUpperRootOfTheInverse) {
+  const Preintegration p = integrated(Motion().segment(kFrom, Time{1'050'000'000}, Duration{5'000'000}), {});
+  const Mat15& U = p.sqrt_information();
+  EXPECT_LT((U.transpose() * U * p.covariance() - Mat15::Identity()).norm(), 1e-6);
+  EXPECT_EQ(Mat15(U.triangularView<Eigen::StrictlyLower>()).norm(), 0);
+}
+
+// 3000 seeded runs with white noise and bias random walk: the spread of the errors is the covariance.
+TEST(Preintegration, CovarianceMatchesMonteCarlo) {
+  ImuNoise noise;
+  noise.gyro_noise_density_radps_rthz = 2e-3;
+  noise.accel_noise_density_mps2_rthz = 2e-2;
+  noise.gyro_random_walk_radps2_rthz = 5e-3;  // strong, so that its share of the motion shows
+  noise.accel_random_walk_mps3_rthz = 8e-2;
+  const Motion motion;
+  const ImuSegment clean = motion.segment(kFrom, kTo, Duration{5'000'000});
+  const Preintegration reference = integrated(clean, {}, noise);
+  Rng rng(11);
+  constexpr int kRuns = 3000;
+  Mat15 scatter = Mat15::Zero();
+  double chi2 = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    ImuSegment noisy = clean;
+    ImuBias walk;
+    for (std::size_t k = 0; k < noisy.samples.size(); ++k) {
+      noisy.samples[k].gyro_radps += walk.gyro_radps;
+      noisy.samples[k].accel_mps2 += walk.accel_mps2;
+      if (k + 1 == noisy.samples.size()) break;
+      const double root_dt = std::sqrt((noisy.samples[k + 1].t - noisy.samples[k].t).seconds());
+      walk.gyro_radps += noise.gyro_random_walk_radps2_rthz * root_dt * test::normal3(rng);
+      walk.accel_mps2 += noise.accel_random_walk_mps3_rthz * root_dt * test::normal3(rng);
+    }
+    test::add_noise(noisy, noise, rng);
+    const Preintegration p = integrated(noisy, {}, noise);
+    Vec15 e;  // truth less measurement, as the residual has it
+    e << reference.delta_p() - p.delta_p(), so3_log(p.delta_q().conjugate() * reference.delta_q()),
+        reference.delta_v() - p.delta_v(), walk.gyro_radps, walk.accel_mps2;
+    scatter += e * e.transpose() / kRuns;
+    chi2 += e.dot(reference.covariance().llt().solve(e)) / kRuns;
+  }
+  for (int k = 0; k < 15; ++k) EXPECT_NEAR(scatter(k, k) / reference.covariance()(k, k), 1, 0.12) << "variance " << k;
+  EXPECT_NEAR(chi2, 15, 0.6);  // mean of 3000 chi-square(15): 15 +- 0.1; the rest is the ends of the trapezium
+  // the correlation of velocity and final bias, made by the random walk alone
+  for (int k = 0; k < 3; ++k) {
+    const auto correlation = [&](const Mat15& P) {
+      return P(nav::theta + k, nav::bg + k) / std::sqrt(P(nav::theta + k, nav::theta + k) * P(nav::bg + k, nav::bg + k));
+    };
+    EXPECT_NEAR(correlation(scatter), correlation(reference.covariance()), 0.06);
+  }
+}
+
+TEST(Preintegration, MissingReadingsInflateTheCovariance) {
+  const Motion motion;
+  ImuSegment whole = motion.segment(kFrom, kTo, Duration{5'000'000}), one_lost = whole, broken = whole;
+  one_lost.samples.erase(one_lost.samples.begin() + 40);
+  broken.samples.erase(broken.samples.begin() + 20, broken.samples.begin() + 80);
+  broken.longest_gap = Duration{305'000'000};
+  const Preintegration a = integrated(whole, {}), b = integrated(one_lost, {}), c = integrated(broken, {});
+  EXPECT_EQ(a.longest_gap_s(), 0);
+  EXPECT_NEAR(c.longest_gap_s(), 0.305, 1e-9);
+  EXPECT_LT(b.covariance().trace(), 1.5 * a.covariance().trace());
+  const NavState i = motion.state(kFrom.seconds()), j = motion.state(kTo.seconds());
+  const Vec15 error = c.predict(i, kGravity_mps2).boxminus(j);
+  for (int k = 0; k < 9; ++k)
+    EXPECT_LT(std::abs(error(k)), 3.5 * std::sqrt(c.covariance()(k, k))) << "the gap's error is covered, component " << k;
+  EXPECT_GT(std::sqrt(c.covariance()(nav::v, nav::v)), 0.3);
+}
+
+TEST(Preintegration, AnEmptySegmentAddsNothing) {
+  Preintegration p(ImuNoise{}, {});
+  p.integrate({});
+  EXPECT_TRUE(p.empty());
+  EXPECT_EQ(p.dt_s(), 0);
+  EXPECT_EQ(p.sqrt_information().norm(), 0);
+}
+
+const std::vector<JacobianBlock> kBlocks = {{"p", 3}, {"theta", 3}, {"v", 3}, {"bg", 3}, {"ba", 3}};
+
+struct TwoStates {
+  NavState i, j;
+  Preintegration between;
+};
+
+TwoStates two_states() {
+  const Motion motion;
+  TwoStates s{motion.state(kFrom.seconds(), kBias), motion.state(kTo.seconds(), kBias),
+              integrated(motion.segment(kFrom, kTo, Duration{5'000'000}, kBias), ImuBias{Vec3(0.01, -0.02, 0.04), Vec3(0, -0.1, 0.1)})};
+  Rng rng(5);
+  Vec15 d;
+  for (int k = 0; k < 15; ++k) d(k) = 0.05 * rng.normal();  // far from the solution, so that no term vanishes
+  s.j = s.j.boxplus(d);
+  return s;
+}
+
+TEST(ImuResidual, VanishesAtThePredictedState) {
+  TwoStates s = two_states();
+  s.j = s.between.predict(s.i, kGravity_mps2);
+  EXPECT_LT(imu_residual(s.i, s.j, s.between, kGravity_mps2).norm(), 1e-12);
+}
+
+TEST(ImuResidual, JacobiansMatchNumericOnes) {
+  const TwoStates s = two_states();
+  Mat15 J_i, J_j;
+  imu_residual(s.i, s.j, s.between, kGravity_mps2, &J_i, &J_j);
+  const auto by_i = check_jacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    return imu_residual(s.i.boxplus(d), s.j, s.between, kGravity_mps2); }, J_i, kBlocks, kBlocks, 1e-9);
+  const auto by_j = check_jacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    return imu_residual(s.i, s.j.boxplus(d), s.between, kGravity_mps2); }, J_j, kBlocks, kBlocks, 1e-9);
+  EXPECT_TRUE(by_i.ok) << by_i.message;
+  EXPECT_TRUE(by_j.ok) << by_j.message;
+}
+
+TEST(ImuResidual, WeightedIsTheRootOfTheInformationTimesTheResidual) {
+  const TwoStates s = two_states();
+  Mat15 J_i, J_j, WJ_i, WJ_j;
+  const Mat15& U = s.between.sqrt_information();
+  const Vec15 r = imu_residual(s.i, s.j, s.between, kGravity_mps2, &J_i, &J_j);
+  const Vec15 wr = weighted_imu_residual(s.i, s.j, s.between, kGravity_mps2, &WJ_i, &WJ_j);
+  EXPECT_LT((wr - U * r).norm() / wr.norm(), 1e-13);
+  EXPECT_LT((WJ_i - U * J_i).norm() / WJ_i.norm(), 1e-13);
+  EXPECT_LT((WJ_j - U * J_j).norm() / WJ_j.norm(), 1e-13);
+}
+
+TEST(ImuResidual, FirstEstimatesMoveTheJacobiansAndNotTheResidual) {
+  const TwoStates s = two_states();
+  Vec15 d = Vec15::Constant(0.02);
+  const NavState i_lin = s.i.boxplus(d), j_lin = s.j.boxplus(-d);
+  Mat15 J_i, J_j, at_lin_i, at_lin_j;
+  const Vec15 r = weighted_imu_residual(s.i, s.j, i_lin, j_lin, s.between, kGravity_mps2, &J_i, &J_j);
+  weighted_imu_residual(i_lin, j_lin, s.between, kGravity_mps2, &at_lin_i, &at_lin_j);
+  EXPECT_EQ(r, weighted_imu_residual(s.i, s.j, s.between, kGravity_mps2));
+  EXPECT_EQ(J_i, at_lin_i);
+  EXPECT_EQ(J_j, at_lin_j);
+}
+
+// Position of the world, heading: moving both states together by them changes no residual.
+TEST(ImuResidual, DoesNotSeeOriginAndHeading) {
+  const TwoStates s = two_states();
+  const Quat yaw = so3_exp(Vec3(0, 0, 0.7));
+  const auto moved = [&](NavState x) {
+    x.T_WB = {yaw * x.T_WB.q, yaw * x.T_WB.p + Vec3(3, -4, 5)};
+    x.v_WB = yaw * x.v_WB;
+    return x;
+  };
+  const Vec15 r = imu_residual(s.i, s.j, s.between, kGravity_mps2);
+  EXPECT_LT((imu_residual(moved(s.i), moved(s.j), s.between, kGravity_mps2) - r).norm(), 1e-12);
+}
+
+TEST(NavState, BoxminusUndoesBoxplus) {
+  const NavState s = Motion().state(1.0, kBias);
+  Vec15 d;
+  for (int k = 0; k < 15; ++k) d(k) = 0.1 * (k - 7);
+  EXPECT_LT((s.boxplus(d).boxminus(s) - d).norm(), 1e-13);
+}
+
+}  // namespace
+}  // namespace fbvins
