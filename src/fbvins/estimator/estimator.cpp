@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/estimator.hpp"
 
+#include <utility>
+
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/imu/propagation.hpp"
 
@@ -66,7 +68,8 @@ StatePrior Estimator::prior() const {
   return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, true};
 }
 
-Odometry Estimator::process(const TrackedFrame& frame) {
+Estimate Estimator::process(const TrackedFrame& frame) {
+  keyframes_.clear();
   const Duration rest = rest_.update(frame);
   Odometry out = running_ ? track(frame, rest) : initialise(frame, rest);
   out.id = frame.id;
@@ -75,7 +78,7 @@ Odometry Estimator::process(const TrackedFrame& frame) {
   out.reset_counter = reset_counter_;
   if (out.health.state == HealthState::lost) restart();
   previous_frame_ = frame.t;
-  return out;
+  return {std::move(out), std::exchange(keyframes_, {})};
 }
 
 Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
@@ -95,6 +98,7 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
     f.state = start->states[i];
     f.keyframe = start->from_rest ? i == 0 : i % 2 == 0;
     f.standstill = start->from_rest;
+    f.images = start->frames[i].images;
     if (i > 0) {
       f.imu.emplace(imu_noise_, f.state.bias);
       f.imu->integrate(start->frames[i].imu);
@@ -124,6 +128,7 @@ Frame Estimator::predict(const TrackedFrame& frame) const {
   Frame f;
   f.id = frame.id;
   f.t = frame.t;
+  f.images = frame.images;
   if (frame.imu.empty()) {  // no reading at all: carry on with the velocity
     f.state = last.state;
     f.state.T_WB.p += (frame.t - last.t).seconds() * last.state.v_WB;
@@ -191,6 +196,7 @@ void Estimator::choose_keyframe(bool standstill, Odometry& out) {
 
 void Estimator::shrink_window(Odometry& out) {
   const auto keyframe_zone = [&] { return static_cast<int>(window_.frames().size()) - options_.keyframes.newest_frames; };
+  hand_on_keyframes(keyframe_zone());  // while problem_ still is this window's
   for (int i = keyframe_zone() - 1; i >= 1; --i)
     if (!window_.frames()[i].keyframe) window_.drop_frame(i, problem_, calibration_, weights());
   while (keyframe_zone() > options_.keyframes.max_keyframes) {
@@ -202,6 +208,19 @@ void Estimator::shrink_window(Odometry& out) {
     window_.marginalise_keyframe(leaving, problem_, calibration_, weights());
   }
   out.stats.frames_in_window = static_cast<int>(window_.frames().size());
+}
+
+void Estimator::hand_on_keyframes(int keyframe_zone) {
+  for (int i = 0; i < keyframe_zone; ++i) {
+    const Frame& frame = window_.frames()[i];
+    if (!frame.keyframe || frame.id <= newest_handed_on_) continue;
+    newest_handed_on_ = frame.id;
+    Keyframe keyframe = window_.take_keyframe(i, calibration_);
+    Eigen::Matrix<double, 9, 9> covariance;
+    if (problem_.covariance(i, covariance)) keyframe.pose_covariance = covariance.topLeftCorner<6, 6>();
+    keyframe.reset_counter = reset_counter_;
+    keyframes_.push_back(std::move(keyframe));
+  }
 }
 
 Health Estimator::judge(const TrackedFrame& frame, const Odometry& out) {

@@ -3,8 +3,8 @@
 // A plain synchronous stage; one instance is used by one thread at a time.
 //
 //   Estimator estimator(rig, EstimatorOptions{});
-//   Odometry odometry = estimator.process(tracked_frame);
-//   if (odometry.health.has_pose()) use(odometry.T_WB);
+//   Estimate estimate = estimator.process(tracked_frame);
+//   if (estimate.odometry.health.has_pose()) use(estimate.odometry.T_WB);
 #pragma once
 
 #include <optional>
@@ -20,18 +20,24 @@
 
 namespace fbvins {
 
+/// What one frame brought: its pose, and the keyframes that have become final with it.
+struct Estimate {
+  Odometry odometry;
+  std::vector<Keyframe> keyframes;
+};
+
 class Estimator {
  public:
   Estimator(const StereoRig& rig, const EstimatorOptions& options);
 
   /// The state at the frame's stamp. Never a silent wrong pose: health says what it is worth.
-  Odometry process(const TrackedFrame& frame);
+  Estimate process(const TrackedFrame& frame);
 
   /// For the frontend: the newest state; not valid before initialisation.
   StatePrior prior() const;
   WindowSnapshot snapshot() const { return window_.snapshot(calibration_); }
   const Calibration& calibration() const { return calibration_; }
-  /// Frames whose first pose came late: states of the frames the initial solution was made from.
+  /// For tests and those who want to look inside.
   const SlidingWindow& window() const { return window_; }
 
  private:
@@ -41,6 +47,7 @@ class Estimator {
   void solve(Odometry& out, int max_iterations);
   void choose_keyframe(bool standstill, Odometry& out);
   void shrink_window(Odometry& out);
+  void hand_on_keyframes(int keyframe_zone);
   Health judge(const TrackedFrame& frame, const Odometry& out);
   void restart();
   void fill(Odometry& out);
@@ -60,6 +67,8 @@ class Estimator {
   int failed_solves_ = 0;
   std::optional<Time> previous_frame_, last_good_tracking_;
   Vec3 last_rate_ = Vec3::Zero();
+  FrameId newest_handed_on_;
+  std::vector<Keyframe> keyframes_;  ///< that became final with the present frame
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
 };
 

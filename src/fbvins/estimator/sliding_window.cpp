@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace fbvins {
 namespace {
@@ -359,6 +360,24 @@ SlidingWindow::KeyframeDistance SlidingWindow::distance_to_last_keyframe(const C
   if (!motion.empty()) {
     std::nth_element(motion.begin(), motion.begin() + motion.size() / 2, motion.end());
     out.parallax_px = motion[motion.size() / 2];
+  }
+  return out;
+}
+
+Keyframe SlidingWindow::take_keyframe(int index, const Calibration& calibration) {
+  Frame& frame = frames_[index];
+  Keyframe out;
+  out.id = frame.id;
+  out.t = frame.t;
+  out.T_WB = frame.state.T_WB;
+  out.v_WB = frame.state.v_WB;
+  out.images = std::exchange(frame.images, {});
+  for (const Landmark& l : landmarks_) {
+    if (!l.triangulated) continue;
+    const auto seen = std::find_if(l.sightings.begin(), l.sightings.end(), [&](const Sighting& s) { return s.frame == frame.id; });
+    if (seen == l.sightings.end()) continue;
+    const Vec3 p_C = scaled_point_in_camera(l, frame, calibration) / l.alpha_beta_rho.z();
+    out.landmarks.push_back({l.track, seen->left.pixel, calibration.T_BC0 * p_C});
   }
   return out;
 }

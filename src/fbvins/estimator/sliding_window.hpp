@@ -13,6 +13,7 @@
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/window_marginalisation.hpp"
 #include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/types/keyframe.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
 
@@ -28,6 +29,7 @@ struct Frame {
   bool keyframe = false;
   bool standstill = false;
   std::optional<Preintegration> imu;
+  StereoFrame images;  ///< of keyframes, until they have been handed on
 };
 
 /// A landmark seen from one frame.
@@ -92,6 +94,8 @@ class SlidingWindow {
   };
   KeyframeDistance distance_to_last_keyframe(const Calibration& calibration, double focal_px) const;
   WindowSnapshot snapshot(const Calibration& calibration) const;
+  /// The frame as a keyframe for loop closure, with what it sees; its images move out.
+  Keyframe take_keyframe(int index, const Calibration& calibration);
 
   int index_of(FrameId id) const;
 

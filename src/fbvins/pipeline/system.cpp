@@ -49,6 +49,7 @@ void System::forward_packets(bool flush) {
 
 void System::track(SensorPacket packet) {
   TrackedFrame frame = frontend_->process(packet, prior_for(packet.id));
+  if (on_keyframe_) frame.images = std::move(packet.frame);
   if (mode_ == RunMode::threaded)
     to_estimator_.push(std::move(frame));
   else
@@ -57,9 +58,11 @@ void System::track(SensorPacket packet) {
 
 void System::estimate(const TrackedFrame& frame) {
   if (on_tracked_frame_) on_tracked_frame_(frame);
-  const Odometry odometry = estimator_.process(frame);
+  const Estimate estimate = estimator_.process(frame);
   publish(frame.id, estimator_.prior());
-  if (on_odometry_) on_odometry_(odometry);
+  if (on_odometry_) on_odometry_(estimate.odometry);
+  if (on_keyframe_)
+    for (const Keyframe& keyframe : estimate.keyframes) on_keyframe_(keyframe);
 }
 
 StatePrior System::prior_for(FrameId frame) {

@@ -56,8 +56,11 @@ class System {
   System& operator=(const System&) = delete;
 
   using TrackedFrameCallback = std::function<void(const TrackedFrame&)>;
+  using KeyframeCallback = std::function<void(const Keyframe&)>;
   using OdometryCallback = std::function<void(const Odometry&)>;
   void on_tracked_frame(TrackedFrameCallback callback) { on_tracked_frame_ = std::move(callback); }
+  /// Keyframes as they become final, with their images: for loop closure.
+  void on_keyframe(KeyframeCallback callback) { on_keyframe_ = std::move(callback); }
   void on_odometry(OdometryCallback callback) { on_odometry_ = std::move(callback); }
 
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded).
@@ -81,6 +84,7 @@ class System {
   std::unique_ptr<Frontend> frontend_;
   Estimator estimator_;
   TrackedFrameCallback on_tracked_frame_;
+  KeyframeCallback on_keyframe_;
   OdometryCallback on_odometry_;
 
   BoundedQueue<SensorPacket> to_frontend_{4};

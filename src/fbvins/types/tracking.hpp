@@ -57,6 +57,7 @@ struct TrackedFrame {
   std::vector<TrackedFeature> features;
   ImuSegment imu;  ///< since the frame before
   FrontendStats stats;
+  StereoFrame images;  ///< null unless keyframes are wanted: they carry them on
 };
 
 /// The newest estimate, fed back to the frontend for guided matching.
