@@ -14,7 +14,7 @@ struct Coverage {
   int images = 0;
   int with_pose = 0;
   double share = 0;               ///< with_pose / images, in [0, 1]
-  double first_pose_after_s = 0;  ///< after the first image; 0 where there is no pose (with_pose says so)
+  double first_pose_after_s = 0;  ///< first image with a pose, after the first image; 0 where there is none
   double longest_hole_s = 0;      ///< longest time between two poses after the first
 };
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/config/config_file.hpp"
+#include "fbvins/config/option_fields.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples = R"(examples:
+  fbvins config                                  every option with unit, range, value and meaning
+  fbvins config --yaml > drone.yaml              a file to start from
+  fbvins config --config drone.yaml --set estimator.max_iterations=8
+)";
+
+struct Arguments {
+  std::string file;
+  std::vector<std::string> assignments;
+  bool defaults = false, yaml = false;
+};
+
+void print_table(Config config) {
+  for (const OptionField& field : fields_of(config)) {
+    if (field.is_group()) {
+      fmt::print("\n{}: {}\n", bold(field.path), field.meaning);
+      continue;
+    }
+    const std::string range = field.range_text();
+    fmt::print("  {} = {}{}{}{}\n      {}\n", field.path, field.value_text(), field.unit.empty() ? "" : " ", field.unit,
+               range.empty() ? "" : "   " + range, field.meaning);
+  }
+}
+
+int show(const Arguments& arguments) {
+  const auto config = arguments.defaults ? Config{} : load_config(arguments.file, arguments.assignments);
+  if (!config) return fail(config.error().message);
+  if (arguments.yaml) fmt::print("{}", to_yaml(*config));
+  else print_table(*config);
+  return kOk;
+}
+
+}  // namespace
+
+void add_config_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("config", "print every option with value, unit, range and meaning");
+  command->footer(kExamples);
+  auto* file = command->add_option("--config", arguments->file, "YAML file that changes the defaults");
+  auto* set = command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
+  command->add_flag("--defaults", arguments->defaults, "the defaults (as without any argument)")->excludes(file)->excludes(set);
+  command->add_flag("--yaml", arguments->yaml, "as a configuration file");
+  command->callback([arguments, &exit_code] { exit_code = show(*arguments); });
+}
+
+}  // namespace fbvins::app

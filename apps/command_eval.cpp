@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/evaluation_report.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples = R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV) or a recording that
+holds one, which also tells the share of images with a pose. The stamps of both are matched as evo does:
+the nearest, at most --max-diff apart.
+
+examples:
+  fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
+  fbvins eval groundtruth.csv estimate.txt --align sim3 --json
+  fbvins eval groundtruth.csv estimate.txt --align yaw --interpolate
+)";
+
+struct Arguments {
+  std::string truth, estimate, alignment = "se3", pairs = "all", path = "truth";
+  double max_difference_s = 0.01;
+  bool interpolate = false, json = false;
+};
+
+struct Truth {
+  Trajectory poses;
+  std::vector<Time> images;  ///< empty when the truth came from a file
+};
+
+Result<Trajectory> read_poses(const std::string& path) {
+  auto file = read_trajectory(path);
+  if (!file) return file.error();
+  if (file->counts.bad() > 0) warn(fmt::format("{} rows left out, the first: {}", file->counts.bad(), file->counts.first_bad));
+  return file->poses();
+}
+
+Result<Truth> read_truth(const std::string& path) {
+  if (!std::filesystem::is_directory(path) && !path.ends_with(".zip")) {
+    auto poses = read_poses(path);
+    if (!poses) return poses.error();
+    return Truth{std::move(*poses), {}};
+  }
+  DatasetOptions options;
+  options.prefetch_frames = 0;
+  options.require_imu = false;
+  const auto data = open_dataset(path, options);
+  if (!data) return data.error();
+  if (!(*data)->has_ground_truth()) return Error{ErrorCode::not_found, path + ": the recording holds no ground truth"};
+  Truth truth;
+  for (const TrajectoryPoint& point : (*data)->ground_truth()) truth.poses.push_back({point.t, point.T_WB});
+  for (const FrameEntry& frame : (*data)->frames()) truth.images.push_back(frame.t);
+  return truth;
+}
+
+EvaluationOptions options_of(const Arguments& arguments) {
+  EvaluationOptions options;
+  options.alignment = *alignment_from_string(arguments.alignment);
+  options.association.max_difference_s = arguments.max_difference_s;
+  if (arguments.interpolate) options.association.method = AssociationMethod::interpolate_truth;
+  for (RelativeErrorOptions* relative : {&options.per_metre, &options.per_second}) {
+    relative->all_pairs = arguments.pairs == "all";
+    relative->path_of_truth = arguments.path == "truth";
+  }
+  return options;
+}
+
+int evaluate_files(const Arguments& arguments) {
+  const auto truth = read_truth(arguments.truth);
+  if (!truth) return fail(truth.error().message);
+  const auto estimate = read_poses(arguments.estimate);
+  if (!estimate) return fail(estimate.error().message);
+  const EvaluationOptions options = options_of(arguments);
+  const auto evaluation = evaluate(truth->poses, *estimate, options);
+  if (!evaluation) return fail(evaluation.error().message);
+  std::optional<Coverage> coverage;
+  if (!truth->images.empty()) {
+    std::vector<Time> stamps;
+    for (const StampedPose& pose : *estimate) stamps.push_back(pose.t);
+    coverage = coverage_of(truth->images, std::move(stamps));
+  }
+  if (arguments.json) {
+    Json json = to_json(*evaluation, options.alignment);
+    if (coverage) json["coverage"] = to_json(*coverage);
+    fmt::print("{}\n", json.dump(2));
+    return kOk;
+  }
+  fmt::print("{}", to_table(*evaluation, options.alignment));
+  if (coverage) fmt::print("{}", to_line(*coverage));
+  return kOk;
+}
+
+}  // namespace
+
+void add_eval_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("eval", "say how far a trajectory is from the ground truth");
+  command->footer(kExamples);
+  command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
+  command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
+  command->add_option("--align", arguments->alignment, "how the estimate is laid over the truth first")
+      ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))->capture_default_str();
+  command->add_option("--max-diff", arguments->max_difference_s, "largest difference of matched stamps, s")
+      ->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_flag("--interpolate", arguments->interpolate, "take the truth at the estimate's very stamps instead");
+  command->add_option("--pairs", arguments->pairs, "pieces of the relative error: all, or one after the other")
+      ->check(CLI::IsMember({"all", "consecutive"}))->capture_default_str();
+  command->add_option("--path", arguments->path, "whose path is measured for pieces of a metre")
+      ->check(CLI::IsMember({"truth", "estimate"}))->capture_default_str();
+  command->add_flag("--json", arguments->json, "print JSON");
+  command->callback([arguments, &exit_code] { exit_code = evaluate_files(*arguments); });
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a long job is: a bar with the time left on a terminal, a line every 10 % elsewhere.
+// Writes to stderr only; the wall clock steers nothing but this display.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace fbvins::app {
+
+class Progress {
+ public:
+  /// total: number of steps; quiet: say nothing at all.
+  Progress(int total, bool quiet);
+  /// Takes the bar off the terminal.
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void update(int done);
+  double elapsed_s() const;
+
+ private:
+  std::string describe(int done, double elapsed) const;
+
+  int total_;
+  bool quiet_, terminal_;
+  std::chrono::steady_clock::time_point start_;
+  double last_drawn_s_ = -1;
+  int last_tenth_ = 0;
+};
+
+}  // namespace fbvins::app

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_output.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "fbvins/io/trajectory.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kStatisticsHeader =
+    "#timestamp [ns],frame,tracked,detected,stereo,lost_flow,lost_check,lost_epipolar,brightness_left,brightness_right,"
+    "median_motion [px],window_frames,landmarks,observations,iterations,outliers,initial_cost,final_cost,keyframe,standstill\n";
+constexpr const char* kTimingHeader =
+    "#timestamp [ns],frame,pyramid [ms],track [ms],stereo [ms],detect [ms],geometry [ms],prepare [ms],solve [ms],marginalise [ms]\n";
+
+std::string frontend_columns(const FrontendStats& s) {
+  return fmt::format("{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check, s.lost_epipolar,
+                     s.mean_brightness_left, s.mean_brightness_right, s.median_motion_px);
+}
+
+std::string estimator_columns(const EstimatorStats& s) {
+  return fmt::format("{},{},{},{},{},{},{},{},{}", s.frames_in_window, s.landmarks, s.observations, s.iterations, s.outliers,
+                     s.initial_cost, s.final_cost, s.keyframe ? 1 : 0, s.standstill ? 1 : 0);
+}
+
+/// Calls row(tracked, odometry or null) for every frame, joined by id; both lists are in order of id.
+template <class Row>
+void for_each_frame(const RunRecord& record, const Row& row) {
+  auto odometry = record.odometry.begin();
+  for (const TrackedRecord& tracked : record.tracked) {
+    while (odometry != record.odometry.end() && odometry->id < tracked.id) ++odometry;
+    const bool found = odometry != record.odometry.end() && odometry->id == tracked.id;
+    row(tracked, found ? &*odometry : nullptr);
+  }
+}
+
+}  // namespace
+
+Trajectory RunRecord::poses() const {
+  Trajectory trajectory;
+  for (const Odometry& o : odometry)
+    if (o.health.has_pose()) trajectory.push_back({o.t, o.T_WB});
+  return trajectory;
+}
+
+Result<void> write_text(const std::string& path, const std::string& text) {
+  auto file = OutputFile::create(path);
+  if (!file) return file.error();
+  file->write(text);
+  return file->close();
+}
+
+Result<void> write_trajectories(const RunRecord& record, const std::string& folder) {
+  auto tum = TumWriter::create(folder + "/trajectory_tum.txt");
+  if (!tum) return tum.error();
+  auto csv = OdometryCsvWriter::create(folder + "/trajectory.csv");
+  if (!csv) return csv.error();
+  for (const Odometry& o : record.odometry) {
+    if (o.health.has_pose()) tum->write(o.t, o.T_WB);
+    csv->write(o);
+  }
+  if (Result<void> done = tum->close(); !done) return done;
+  return csv->close();
+}
+
+Result<void> write_statistics(const RunRecord& record, const std::string& folder) {
+  std::string text = kStatisticsHeader;
+  for_each_frame(record, [&](const TrackedRecord& tracked, const Odometry* odometry) {
+    text += fmt::format("{},{},{},{}\n", tracked.t.ns, tracked.id.value, frontend_columns(tracked.stats),
+                        estimator_columns(odometry ? odometry->stats : EstimatorStats{}));
+  });
+  return write_text(folder + "/statistics.csv", text);
+}
+
+Result<void> write_timing(const RunRecord& record, const std::string& folder) {
+  std::string text = kTimingHeader;
+  for_each_frame(record, [&](const TrackedRecord& tracked, const Odometry* odometry) {
+    const FrontendStats& f = tracked.stats;
+    const EstimatorStats e = odometry ? odometry->stats : EstimatorStats{};
+    text += fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", tracked.t.ns, tracked.id.value,
+                        f.pyramid_ms, f.track_ms, f.stereo_ms, f.detect_ms, f.geometry_ms, e.prepare_ms, e.solve_ms,
+                        e.marginalise_ms);
+  });
+  return write_text(folder + "/timing.csv", text);
+}
+
+}  // namespace fbvins::app

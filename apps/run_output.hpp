@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run leaves behind, gathered frame by frame and written to a folder at the end.
+// trajectory_tum.txt, trajectory.csv, statistics.csv and config.yaml are the same bytes whenever
+// input and configuration are; times go to timing.csv and to their own part of the summary.
+// Frames and odometry may come from two threads: either side touches only its own vector.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/tracking.hpp"
+#include "fbvins/types/trajectory.hpp"
+
+namespace fbvins::app {
+
+struct TrackedRecord {
+  FrameId id;
+  Time t;
+  FrontendStats stats;
+};
+
+struct RunRecord {
+  std::vector<TrackedRecord> tracked;  ///< one per image the frontend saw
+  std::vector<Odometry> odometry;      ///< one per image, with or without a pose
+
+  Trajectory poses() const;
+};
+
+/// The trajectory and statistics files; the folder must exist.
+Result<void> write_trajectories(const RunRecord& record, const std::string& folder);
+Result<void> write_statistics(const RunRecord& record, const std::string& folder);
+Result<void> write_timing(const RunRecord& record, const std::string& folder);
+/// One small file in one go.
+Result<void> write_text(const std::string& path, const std::string& text);
+
+}  // namespace fbvins::app

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_summary.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <map>
+
+#include "apps/terminal.hpp"
+
+namespace fbvins::app {
+namespace {
+
+/// Counts frames by health, and restarts by jumps of the reset counter once a pose has been given.
+void count_health(const RunRecord& record, RunSummary& summary) {
+  std::map<std::string, int> counts;
+  const Odometry* last_pose = nullptr;
+  for (const Odometry& o : record.odometry) {
+    const bool plain = o.health.reason == HealthReason::none;
+    ++counts[plain ? std::string(to_string(o.health.state)) : fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
+    if (!o.health.has_pose()) continue;
+    if (last_pose && o.reset_counter != last_pose->reset_counter) ++summary.restarts;
+    last_pose = &o;
+  }
+  summary.health.assign(counts.begin(), counts.end());
+}
+
+void evaluate_against(const std::vector<TrajectoryPoint>& points, const RunRecord& record, RunSummary& summary) {
+  Trajectory truth;
+  for (const TrajectoryPoint& point : points) truth.push_back({point.t, point.T_WB});
+  auto evaluation = evaluate(truth, record.poses(), {});
+  if (evaluation) summary.evaluation = *evaluation;
+  else summary.no_evaluation = evaluation.error().message;
+
+  AssociationOptions at_the_very_stamps;
+  at_the_very_stamps.method = AssociationMethod::interpolate_truth;
+  const std::vector<PosePair> pairs = associate(std::move(truth), record.poses(), at_the_very_stamps);
+  std::vector<Mat6> covariances;  // both are in order of time; estimates beyond the truth have no pair
+  for (const Odometry& o : record.odometry)
+    if (covariances.size() < pairs.size() && o.health.has_pose() && o.t == pairs[covariances.size()].estimate.t)
+      covariances.push_back(o.pose_covariance);
+  if (const auto yaw = align(pairs, Alignment::yaw)) summary.nees = nees(pairs, covariances, *yaw);
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+Json timing_json(const std::vector<double>& ms) {
+  return Json{{"mean", statistics_of(ms).mean}, {"p50", percentile(ms, 0.5)}, {"p99", percentile(ms, 0.99)}};
+}
+
+std::string timing_line(std::string_view name, const std::vector<double>& ms) {
+  return fmt::format("{:<12}{:7.2f} ms CPU a frame, p50 {:.2f}, p99 {:.2f}\n", name, statistics_of(ms).mean, percentile(ms, 0.5),
+                     percentile(ms, 0.99));
+}
+
+std::vector<double> total_ms(const RunSummary& s) {
+  std::vector<double> total = s.frontend_ms;
+  for (std::size_t i = 0; i < std::min(total.size(), s.estimator_ms.size()); ++i) total[i] += s.estimator_ms[i];
+  return total;
+}
+
+}  // namespace
+
+RunSummary summarise(const RunRecord& record, const Dataset& data) {
+  RunSummary s;
+  s.dataset = data.info().name;
+  s.frames = static_cast<int>(record.tracked.size());
+  s.images_bad = data.info().left.images.bad() + data.info().right.images.bad();
+  std::vector<Time> images, poses;
+  for (const FrameEntry& frame : data.frames()) images.push_back(frame.t);
+  for (const StampedPose& pose : record.poses()) poses.push_back(pose.t);
+  s.coverage = coverage_of(std::move(images), std::move(poses));
+  count_health(record, s);
+  if (data.has_ground_truth()) evaluate_against(data.ground_truth(), record, s);
+  else s.no_evaluation = "the recording holds no ground truth";
+  for (const TrackedRecord& tracked : record.tracked) s.frontend_ms.push_back(tracked.stats.total_ms());
+  for (const Odometry& o : record.odometry) s.estimator_ms.push_back(o.stats.total_ms());
+  s.peak_memory_mb = peak_memory_mb();
+  return s;
+}
+
+std::string to_json_text(const RunSummary& s) {
+  Json result{{"version", FBVINS_VERSION}, {"dataset", s.dataset}, {"frontend", s.frontend}, {"frames", s.frames}};
+  result["images_bad"] = s.images_bad;
+  result["coverage"] = to_json(s.coverage);
+  result["restarts"] = s.restarts;
+  result["health"] = Json::object();
+  for (const auto& [name, frames] : s.health) result["health"][name] = frames;
+  if (s.evaluation) result["accuracy"] = to_json(*s.evaluation, Alignment::se3);
+  else result["no_accuracy"] = s.no_evaluation;
+  if (s.nees) result["nees_yaw"] = to_json(*s.nees);
+  Json timing{{"mode", s.mode}, {"wall_s", s.wall_s}};
+  timing["frontend_ms"] = timing_json(s.frontend_ms);
+  timing["estimator_ms"] = timing_json(s.estimator_ms);
+  timing["total_ms"] = timing_json(total_ms(s));
+  timing["peak_memory_mb"] = s.peak_memory_mb;
+  return Json{{"result", result}, {"timing", timing}}.dump(2) + "\n";
+}
+
+std::string to_text(const RunSummary& s) {
+  std::string text = fmt::format("{} with {} (fbvins " FBVINS_VERSION ")\n", s.dataset, s.frontend);
+  text += to_line(s.coverage);
+  text += fmt::format("restarts {}, frames by health:", s.restarts);
+  for (const auto& [name, frames] : s.health) text += fmt::format(" {} {}", name, frames);
+  text += s.images_bad > 0 ? fmt::format("\n{} image files could not be used\n", s.images_bad) : "\n";
+  text += s.evaluation ? to_table(*s.evaluation, Alignment::se3) : fmt::format("no accuracy: {}\n", s.no_evaluation);
+  if (s.nees && s.nees->count > 0)
+    text += fmt::format("NEES (yaw-aligned; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
+                        s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
+  text += "-- timing (differs from run to run) --\n";
+  text += timing_line("frontend", s.frontend_ms) + timing_line("estimator", s.estimator_ms) + timing_line("together", total_ms(s));
+  text += fmt::format("wall {:.1f} s ({}), peak memory {:.0f} MB\n", s.wall_s, s.mode, s.peak_memory_mb);
+  return text;
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// A run in a page: JSON for programs, text for people. The part `result` is the same bytes from run
+// to run; `timing` is not.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "apps/evaluation_report.hpp"
+#include "apps/run_output.hpp"
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins::app {
+
+struct RunSummary {
+  std::string frontend;
+  std::string mode;      ///< deterministic or threaded
+  std::string dataset;   ///< its name, not where it lies
+  int frames = 0;        ///< stereo frames that reached the frontend
+  int images_bad = 0;    ///< image files missing, corrupt or of the wrong size
+  Coverage coverage;
+  int restarts = 0;      ///< times the estimator started anew after its first pose
+  std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"
+  std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
+  std::string no_evaluation;                        ///< why there is none
+  std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
+  double wall_s = 0;
+  std::vector<double> frontend_ms, estimator_ms;    ///< CPU time per frame
+  double peak_memory_mb = 0;
+};
+
+RunSummary summarise(const RunRecord& record, const Dataset& data);
+std::string to_json_text(const RunSummary& summary);
+std::string to_text(const RunSummary& summary);
+
+}  // namespace fbvins::app

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The configuration of the whole system, from a file and back. One thread at a time.
+//
+//   Result<Config> config = load_config("config/euroc.yaml");
+//   if (!config) report(config.error().message);   // "config/euroc.yaml:12: unknown option ..."
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins {
+
+/// The defaults, changed by the file.
+Result<Config> load_config(const std::string& path);
+
+/// The defaults, changed by the file (none for an empty path), then by "name=value" assignments in order.
+Result<Config> load_config(const std::string& path, const std::vector<std::string>& assignments);
+
+/// Every option with its value, meaning, unit and range; load_config gives the same configuration back.
+std::string to_yaml(Config config);
+
+}  // namespace fbvins

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/config/config_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/yaml.hpp"
+#include "fbvins/core/options.hpp"
+
+namespace fbvins {
+namespace {
+
+TEST(ConfigFile, DefaultsAreValidAndRoundTrip) {
+  EXPECT_TRUE(validate(Config{}));
+  const std::string text = to_yaml(Config{});
+  Config back;
+  const auto read = read_yaml(text, "defaults", fields_of(back));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(to_yaml(back), text);
+}
+
+TEST(ConfigFile, EveryOptionCanBeSetToBothEndsOfItsRange) {
+  Config config;
+  for (const OptionField& field : fields_of(config)) {
+    EXPECT_FALSE(field.meaning.empty()) << field.path;
+    if (!std::holds_alternative<int*>(field.value) && !std::holds_alternative<double*>(field.value)) continue;
+    EXPECT_LT(field.min, field.max) << field.path;
+    EXPECT_TRUE(field.set_from_text(fmt::format("{}", field.min))) << field.path;
+    EXPECT_TRUE(field.set_from_text(fmt::format("{}", field.max))) << field.path;
+    EXPECT_FALSE(field.set_from_text(fmt::format("{}", field.max * 2 + 1))) << field.path;
+  }
+  EXPECT_TRUE(validate(config));
+}
+
+TEST(ConfigFile, NoTwoOptionsShareAName) {
+  Config config;
+  std::set<std::string> paths;
+  for (const OptionField& field : fields_of(config)) EXPECT_TRUE(paths.insert(field.path).second) << field.path;
+}
+
+TEST(ConfigFile, AssignmentsComeAfterTheFileAndInOrder) {
+  const auto config = load_config("", {"frontend.kind=orb", "estimator.max_iterations=7", "estimator.max_iterations=9"});
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->frontend.kind, "orb");
+  EXPECT_EQ(config->estimator.max_iterations, 9);
+  EXPECT_FALSE(load_config("", {"estimator.max_iteration=7"}));
+  EXPECT_FALSE(load_config("no/such/file.yaml"));
+}
+
+}  // namespace
+}  // namespace fbvins
