@@ -22,7 +22,7 @@ struct Window {
     double side[kP] = {}, sum = 0;
     for (int i = 0; i < kP; ++i) {
       const double u = (i - 0.5 * (kP - 1)) / (0.5 * kP + 0.5);
-      side[i] = 1.0 - u * u * u * u;
+      side[i] = (1.0 - u * u);
       sum += side[i];
     }
     for (int y = 0; y < kP; ++y)

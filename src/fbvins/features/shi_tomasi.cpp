@@ -14,6 +14,8 @@ namespace {
 constexpr int kWindow = 7;            // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
 constexpr int kFewestCells = 24;      // searched each time, if as many are empty
+constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
+constexpr double kCrowding = 0.65;    // of the smallest distance, where empty cells did not deliver enough
 constexpr std::size_t kPerCell = 6;   // candidates a cell may offer
 /// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
 /// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
@@ -104,8 +106,8 @@ double estimate_noise(const PyramidLevel& image) {
   return 0;
 }
 
-bool ShiTomasiDetector::far_from_all(const Vec2& px, std::span<const Vec2> existing) const {
-  const double limit = options_.min_distance_px * options_.min_distance_px;
+bool ShiTomasiDetector::far_from_all(const Vec2& px, std::span<const Vec2> existing, double distance_px) const {
+  const double limit = distance_px * distance_px;
   for (const Vec2& other : existing)
     if ((other - px).squaredNorm() < limit) return false;
   for (const Corner& other : corners_)
@@ -152,12 +154,40 @@ void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int r
   std::sort(cell_corners_.begin(), cell_corners_.end(), stronger);
 }
 
-void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, int wanted) {
+void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px,
+                               int wanted) {
   std::sort(candidates.begin(), candidates.end(), stronger);
   for (const Corner& corner : candidates) {
     if (static_cast<int>(corners_.size()) >= wanted) return;
-    if (far_from_all(corner.px, existing)) corners_.push_back(corner);
+    if (far_from_all(corner.px, existing, distance_px)) corners_.push_back(corner);
   }
+}
+
+void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, bool empty, float threshold,
+                                     std::span<const Vec2> existing, int wanted) {
+  best_.clear();
+  others_.clear();
+  // From where the last search stopped, so that every cell has its turn.
+  int& next = next_cell_[empty ? 0 : 1];
+  const int cells = static_cast<int>(occupancy_.size());
+  const int budget = existing.size() < kTooFewFeatures ? cells : std::max(kFewestCells, empty ? wanted : 0);
+  // Crowded is better than few.
+  const double distance_px = (empty ? 1.0 : kCrowding) * options_.min_distance_px;
+  int searched = 0;
+  for (int i = 0; i < cells && searched < budget; ++i) {
+    next = (next + 1) % cells;
+    if ((occupancy_[static_cast<std::size_t>(next)] == 0) != empty) continue;
+    ++searched;
+    search_cell(image, next % columns, next / columns, threshold);
+    std::size_t offered = 0;
+    for (const Corner& corner : cell_corners_) {
+      if (!far_from_all(corner.px, existing, distance_px)) continue;
+      (offered == 0 ? best_ : others_).push_back(corner);
+      if (++offered == kPerCell) break;
+    }
+  }
+  accept(best_, existing, distance_px, wanted);
+  accept(others_, existing, distance_px, wanted);
 }
 
 const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) {
@@ -176,25 +206,9 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
     if (column >= 0 && row >= 0 && column < columns && row < rows) ++occupancy_[static_cast<std::size_t>(row * columns + column)];
   }
 
-  best_.clear();
-  others_.clear();
-  // From where the last search stopped, so that every empty cell has its turn.
-  const int cells = columns * rows, budget = std::max(kFewestCells, 2 * wanted);
-  int searched = 0;
-  for (int i = 0; i < cells && searched < budget; ++i) {
-    next_cell_ = (next_cell_ + 1) % cells;
-    if (occupancy_[static_cast<std::size_t>(next_cell_)] > 0) continue;
-    ++searched;
-    search_cell(image, next_cell_ % columns, next_cell_ / columns, threshold);
-    std::size_t offered = 0;
-    for (const Corner& corner : cell_corners_) {
-      if (!far_from_all(corner.px, existing)) continue;
-      (offered == 0 ? best_ : others_).push_back(corner);
-      if (++offered == kPerCell) break;
-    }
-  }
-  accept(best_, existing, wanted);
-  accept(others_, existing, wanted);
+  search_cells(image, columns, true, threshold, existing, wanted);
+  // Walls without texture leave cells empty for good; what is missing may come from the others.
+  if (static_cast<int>(corners_.size()) < wanted) search_cells(image, columns, false, threshold, existing, wanted);
   return corners_;
 }
 

@@ -24,7 +24,7 @@ struct Corner {
 struct ShiTomasiOptions {
   int cell_px = 44;
   double min_distance_px = 22;
-  double noise_factor = 4.0;
+  double noise_factor = 5.0;
   double min_response = 0.4;
   int border_px = 10;
 
@@ -46,21 +46,24 @@ class ShiTomasiDetector {
  public:
   explicit ShiTomasiDetector(const ShiTomasiOptions& options) : options_(options) {}
 
-  /// At most `wanted` new corners of level 0, none nearer than min_distance_px to one another or to
-  /// `existing`: first the best of each empty cell, then their next best.
-  /// Looks into a limited number of empty cells, in turn from call to call. Valid until the next call.
+  /// At most `wanted` new corners of level 0: first the best of each empty cell, then their next best, then
+  /// what occupied cells have beside. None is nearer than min_distance_px (two thirds of it for the last
+  /// kind) to another or to `existing`. Looks into a limited number of cells, in turn from call to call.
+  /// Valid until the next call.
   const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted);
   /// The noise estimate of the last detect(), grey values.
   double noise() const { return noise_; }
 
  private:
   void search_cell(const PyramidLevel& image, int column, int row, float threshold);
-  bool far_from_all(const Vec2& px, std::span<const Vec2> existing) const;
-  void accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, int wanted);
+  void search_cells(const PyramidLevel& image, int columns, bool empty, float threshold, std::span<const Vec2> existing,
+                    int wanted);
+  bool far_from_all(const Vec2& px, std::span<const Vec2> existing, double distance_px) const;
+  void accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px, int wanted);
 
   ShiTomasiOptions options_;
   double noise_ = 0;
-  int next_cell_ = -1;
+  int next_cell_[2] = {-1, -1};        // where the searches of empty and of occupied cells stopped
   std::vector<Corner> corners_;        // accepted
   std::vector<Corner> cell_corners_;   // of the cell being searched
   std::vector<Corner> best_, others_;  // candidates of the frame

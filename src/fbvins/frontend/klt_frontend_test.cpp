@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/klt_frontend.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "fbvins/features/noise_texture.hpp"
+
+namespace fbvins {
+namespace {
+
+/// A stereo camera that flies past a textured wall at z = 3 m of W, looking at it and turning a little.
+class Wall {
+ public:
+  Wall() {
+    rig.left = Camera(PinholeRadtan{230, 229, 160, 118, -0.28, 0.07, 2e-4, 2e-5}, 320, 240);
+    rig.right = Camera(PinholeRadtan{229, 230, 162, 121, -0.27, 0.07, -1e-4, 3e-5}, 320, 240);
+    rig.T_BC0 = Pose<B, C0>(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
+    const Pose<C0, C1> T_C0C1(so3_exp(Vec3(0.004, -0.006, 0.003)), Vec3(0.11, 0.001, -0.002));
+    rig.T_BC1 = rig.T_BC0 * T_C0C1;
+  }
+
+  static double time_s(int k) { return 0.05 * k; }
+  Pose<W, C0> T_WC0(double s) const {
+    return {so3_exp(Vec3(0.1 * std::sin(2 * s), -0.3 * s, 0.2 * s)), Vec3(0.5 * s, 0.1 * s * s, 0.3 * s)};
+  }
+  Pose<W, B> T_WB(double s) const { return T_WC0(s) * rig.T_BC0.inverse(); }
+
+  /// Where the ray of a left pixel's normalised coordinates meets the wall.
+  template <class C>
+  static Vec3 on_wall(const Pose<W, C>& T_WC, const Vec2& normalised) {
+    const Vec3 ray = T_WC.q * normalised.homogeneous();
+    return T_WC.p + (3.0 - T_WC.p.z()) / ray.z() * ray;
+  }
+
+  static Vec2 on_texture(const Vec3& p_W) { return 70.0 * p_W.head<2>(); }  // 70 texels a metre
+
+  template <class C>
+  std::shared_ptr<const Image> render(const Camera& camera, const Pose<W, C>& T_WC, double gain) const {
+    auto image = std::make_shared<Image>(camera.width(), camera.height());
+    const auto warp = [&](const Vec2& px) { return on_texture(on_wall(T_WC, camera.undistort(px).value())); };
+    *image = render_texture(camera.width(), camera.height(), texture_, warp, gain * 100, gain * 30, 0.7,
+                            static_cast<std::uint64_t>(1e6 * gain));
+    return image;
+  }
+
+  SensorPacket packet(int k, double gain = 1) const {
+    SensorPacket packet;
+    packet.id = FrameId{k};
+    packet.frame.t = Time{} + Duration::from_seconds(time_s(k));
+    packet.frame.left = render(rig.left, T_WC0(time_s(k)), gain);
+    packet.frame.right = render(rig.right, T_WC0(time_s(k)) * rig.T_BC0.inverse() * rig.T_BC1, 1.2 * gain);
+    if (k > 0) packet.imu = imu(time_s(k - 1), time_s(k));
+    return packet;
+  }
+
+  ImuSegment imu(double from_s, double to_s) const {
+    ImuSegment segment;
+    for (double s = from_s; s < to_s + 1e-6; s += 0.005) {
+      ImuSample sample;
+      sample.t = Time{} + Duration::from_seconds(s);
+      const double h = 1e-4;
+      sample.gyro_radps = so3_log(T_WB(s - h).q.conjugate() * T_WB(s + h).q) / (2 * h);
+      const Vec3 a_W = (T_WB(s + h).p - 2 * T_WB(s).p + T_WB(s - h).p) / (h * h);
+      sample.accel_mps2 = T_WB(s).q.conjugate() * (a_W + Vec3(0, 0, 9.81));
+      segment.samples.push_back(sample);
+    }
+    return segment;
+  }
+
+  StatePrior prior(int k) const {
+    StatePrior prior;
+    prior.t = Time{} + Duration::from_seconds(time_s(k));
+    prior.T_WB = T_WB(time_s(k));
+    const double h = 1e-4;
+    prior.v_WB = (T_WB(time_s(k) + h).p - T_WB(time_s(k) - h).p) / (2 * h);
+    prior.valid = true;
+    return prior;
+  }
+
+  StereoRig rig;
+
+ private:
+  NoiseTexture texture_{21, 24};
+};
+
+KltFrontendOptions small_options() {
+  KltFrontendOptions options;
+  options.max_features = 60;
+  options.corners.cell_px = 36;
+  options.corners.min_distance_px = 16;
+  return options;
+}
+
+/// Errors in px of every left observation against the wall point of the track's first one, and of
+/// every right observation against that of the same frame's left one.
+struct Errors {
+  std::map<TrackId, Vec3> points;
+  std::vector<double> left, right;
+
+  void add(const Wall& wall, const TrackedFrame& frame) {
+    const double s = frame.t.seconds();
+    const Pose<W, C0> T_WC0 = wall.T_WC0(s);
+    const Pose<W, C1> T_WC1 = wall.T_WB(s) * wall.rig.T_BC1;
+    for (const TrackedFeature& feature : frame.features) {
+      const Vec3 here = Wall::on_wall(T_WC0, feature.left.normalised);
+      const Vec3& first = points.emplace(feature.id, here).first->second;
+      if (feature.age_frames > 0)
+        left.push_back((wall.rig.left.project(T_WC0.inverse() * first).value() - feature.left.pixel).norm());
+      if (feature.right)
+        right.push_back((wall.rig.right.project(T_WC1.inverse() * here).value() - feature.right->pixel).norm());
+    }
+  }
+  static double quantile(std::vector<double> v, double q) {
+    std::sort(v.begin(), v.end());
+    return v.empty() ? 1e9 : v[static_cast<std::size_t>(q * static_cast<double>(v.size() - 1))];
+  }
+};
+
+TEST(KltFrontend, FollowsAWallInBothCamerasBelowATenthOfAPixel) {
+  const Wall wall;
+  std::vector<SensorPacket> packets;
+  for (int k = 0; k < 10; ++k) packets.push_back(wall.packet(k));
+  for (const bool with_prior : {true, false}) {
+    KltFrontend frontend(wall.rig, small_options());
+    Errors errors;
+    for (int k = 0; k < 10; ++k) {
+      const TrackedFrame out = frontend.process(packets[static_cast<std::size_t>(k)], with_prior && k > 0 ? wall.prior(k - 1) : StatePrior{});
+      errors.add(wall, out);
+      EXPECT_GE(out.features.size(), 40u) << k;
+      EXPECT_GE(out.stats.stereo, 30) << k;
+      if (k > 0) {
+        EXPECT_GE(out.stats.tracked, 35) << k;
+        EXPECT_GT(out.stats.median_motion_px, 1.0) << k;
+      }
+    }
+    EXPECT_LT(Errors::quantile(errors.left, 0.5), 0.1);
+    EXPECT_LT(Errors::quantile(errors.left, 0.95), 0.4);
+    EXPECT_LT(Errors::quantile(errors.right, 0.5), 0.1);
+    EXPECT_LT(Errors::quantile(errors.right, 0.95), 0.4);
+  }
+}
+
+TEST(KltFrontend, ObservationsAreConsistentWithTheCamera) {
+  const Wall wall;
+  KltFrontendOptions options = small_options();
+  options.sigma_px = 0.5;
+  KltFrontend frontend(wall.rig, options);
+  const TrackedFrame out = frontend.process(wall.packet(0), StatePrior{});
+  ASSERT_FALSE(out.features.empty());
+  for (const TrackedFeature& feature : out.features) {
+    EXPECT_LT((wall.rig.left.distort(feature.left.normalised) - feature.left.pixel).norm(), 1e-6);
+    const Vec2 d(1e-5, -2e-5);
+    const Vec2 moved = (wall.rig.left.distort(feature.left.normalised + d) - feature.left.pixel) / 0.5;
+    EXPECT_LT((feature.left.sqrt_information * d - moved).norm(), 1e-2 * moved.norm());
+    EXPECT_EQ(feature.age_frames, 0);
+  }
+}
+
+TEST(KltFrontend, SurvivesATenfoldExposureJump) {
+  const Wall wall;
+  KltFrontend frontend(wall.rig, small_options());
+  frontend.process(wall.packet(0, 0.12), StatePrior{});
+  const TrackedFrame before = frontend.process(wall.packet(1, 0.12), StatePrior{});
+  const TrackedFrame after = frontend.process(wall.packet(2, 1.2), StatePrior{});
+  EXPECT_GE(after.stats.tracked, static_cast<int>(0.8 * static_cast<double>(before.features.size())));
+}
+
+TEST(KltFrontend, BlackImagesLoseFeaturesAndLightBringsThemBack) {
+  const Wall wall;
+  KltFrontend frontend(wall.rig, small_options());
+  const TrackedFrame first = frontend.process(wall.packet(0), StatePrior{});
+  SensorPacket dark = wall.packet(1);
+  dark.frame.left = std::make_shared<Image>(320, 240);
+  dark.frame.right = std::make_shared<Image>(320, 240);
+  const TrackedFrame black = frontend.process(dark, StatePrior{});
+  EXPECT_TRUE(black.features.empty());
+  EXPECT_EQ(black.stats.mean_brightness_left, 0);
+  const TrackedFrame again = frontend.process(wall.packet(2), StatePrior{});
+  EXPECT_GE(again.features.size(), 40u);
+}
+
+TEST(KltFrontend, AMissingLeftImageIsBridgedAndAMissingRightOneCostsOnlyStereo) {
+  const Wall wall;
+  KltFrontend frontend(wall.rig, small_options());
+  frontend.process(wall.packet(0), StatePrior{});
+  SensorPacket one_eyed = wall.packet(1);
+  one_eyed.frame.right = nullptr;
+  const TrackedFrame left_only = frontend.process(one_eyed, wall.prior(0));
+  EXPECT_GE(left_only.stats.tracked, 35);
+  EXPECT_EQ(left_only.stats.stereo, 0);
+  SensorPacket blind = wall.packet(2);
+  blind.frame.left = nullptr;
+  EXPECT_TRUE(frontend.process(blind, wall.prior(1)).features.empty());
+  const TrackedFrame back = frontend.process(wall.packet(3), wall.prior(1));
+  EXPECT_GE(back.stats.tracked, 25);
+  EXPECT_GE(back.stats.stereo, 30);
+}
+
+TEST(KltFrontend, StartsAnewAfterALongGapOrAStepBackInTime) {
+  const Wall wall;
+  KltFrontend frontend(wall.rig, small_options());
+  const TrackedFrame first = frontend.process(wall.packet(0), StatePrior{});
+  SensorPacket late = wall.packet(1);
+  late.frame.t = late.frame.t + Duration::from_seconds(2);
+  late.imu = {};
+  const TrackedFrame after = frontend.process(late, StatePrior{});
+  EXPECT_EQ(after.stats.tracked, 0);
+  EXPECT_GE(after.features.size(), 40u);
+  for (const TrackedFeature& feature : after.features) EXPECT_GT(feature.id, first.features.back().id);
+  EXPECT_EQ(frontend.process(wall.packet(2), StatePrior{}).stats.tracked, 0);
+}
+
+TEST(KltFrontend, ImagesOfAnotherSizeAreNotUsed) {
+  const Wall wall;
+  KltFrontend frontend(wall.rig, small_options());
+  frontend.process(wall.packet(0), StatePrior{});
+  SensorPacket odd = wall.packet(1);
+  odd.frame.left = std::make_shared<Image>(160, 120, std::uint8_t{90});
+  odd.frame.right = std::make_shared<Image>(7, 3, std::uint8_t{90});
+  EXPECT_TRUE(frontend.process(odd, StatePrior{}).features.empty());
+  EXPECT_GE(frontend.process(wall.packet(2), StatePrior{}).features.size(), 40u);
+}
+
+TEST(KltFrontend, SameInputSameBits) {
+  const Wall wall;
+  KltFrontend a(wall.rig, small_options()), b(wall.rig, small_options());
+  for (int k = 0; k < 4; ++k) {
+    const SensorPacket packet = wall.packet(k);
+    const TrackedFrame x = a.process(packet, StatePrior{}), y = b.process(packet, StatePrior{});
+    ASSERT_EQ(x.features.size(), y.features.size());
+    for (std::size_t i = 0; i < x.features.size(); ++i) {
+      EXPECT_EQ(x.features[i].id, y.features[i].id);
+      EXPECT_EQ(x.features[i].left.pixel, y.features[i].left.pixel);
+      EXPECT_EQ(x.features[i].right.has_value(), y.features[i].right.has_value());
+    }
+  }
+}
+
+TEST(MotionPredictor, CarriesThePriorToBothImages) {
+  const Wall wall;
+  MotionPredictor predictor(wall.rig.T_BC0);
+  predictor.add(wall.imu(0.0, 0.3));
+  const CameraMotion motion = predictor.between(Time{100'000'000}, Time{150'000'000}, wall.prior(1));
+  const Pose<C0, C0> truth = wall.T_WC0(0.15).inverse() * wall.T_WC0(0.10);
+  ASSERT_TRUE(motion.has_rotation && motion.has_translation);
+  EXPECT_LT(so3_log(Quat(Mat3(motion.R_ba.transpose() * truth.R()))).norm(), 1e-4);
+  EXPECT_LT((motion.p_ba - truth.p).norm(), 1e-3);
+
+  const CameraMotion gyro_only = predictor.between(Time{100'000'000}, Time{150'000'000}, StatePrior{});
+  EXPECT_TRUE(gyro_only.has_rotation);
+  EXPECT_FALSE(gyro_only.has_translation);
+  EXPECT_LT((gyro_only.R_ba - motion.R_ba).norm(), 1e-6);
+  EXPECT_FALSE(predictor.between(Time{100'000'000}, Time{900'000'000}, wall.prior(1)).has_rotation);
+  EXPECT_FALSE(MotionPredictor(wall.rig.T_BC0).between(Time{0}, Time{1}, StatePrior{}).has_rotation);
+}
+
+}  // namespace
+}  // namespace fbvins
