@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/calibration.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+namespace fbvins {
+namespace {
+
+std::string rows_of(const Mat3& R, const Vec3& p, const char* open, const char* close, const char* between) {
+  std::string out;
+  for (int i = 0; i < 3; ++i) out += fmt::format("{}{:.17g}, {:.17g}, {:.17g}, {:.17g}{}{}", open, R(i, 0), R(i, 1), R(i, 2), p(i), close, between);
+  return out + open + "0.0, 0.0, 0.0, 1.0" + close;
+}
+
+std::string euroc_camera(const Pose<B, B>& T_BS) {
+  return "%YAML:1.0\n---\nsensor_type: camera\nT_BS: !!opencv-matrix\n  rows: 4\n  cols: 4\n  dt: d\n  data: [" +
+         rows_of(T_BS.R(), T_BS.p, "", "", ",\n    ") +
+         "]\nrate_hz: 30\nresolution: [752, 480]\ncamera_model: pinhole\nintrinsics: [458.6, 457.2, 367.2, 248.3]\n"
+         "distortion_model: equidistant\ndistortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n";
+}
+
+std::string kalibr_camera(const char* extrinsic, const Pose<B, B>& T) {
+  return fmt::format("  {}:\n{}\n", extrinsic, rows_of(T.R(), T.p, "  - [", "]", "\n")) +
+         "  cam_overlaps: [1]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0.3, 0.4]\n  distortion_model: equidistant\n"
+         "  intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\n  rostopic: /cam/image_raw\n";
+}
+
+const Pose<B, B> kLeft(so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03});
+const Pose<B, B> kRight(so3_exp({0.12, -0.19, 1.49}), {0.01, 0.09, 0.03});
+
+template <class P, class Q>
+void expect_same(const P& a, const Q& b, double tolerance) {
+  EXPECT_LT((a.p - b.p).norm(), tolerance);
+  EXPECT_LT((a.R() - b.R()).norm(), tolerance);
+}
+
+TEST(Calibration, EurocMountingTakesSensorToBody) {
+  auto camera = parse_euroc_camera(euroc_camera(kLeft), "cam0");
+  ASSERT_TRUE(camera) << camera.error().message;
+  expect_same(camera->T_BS, kLeft, 1e-14);
+  EXPECT_EQ(camera->rate_hz, 30);
+  EXPECT_EQ(camera->camera.model_name(), "pinhole-equidistant");
+  EXPECT_EQ(std::get<KannalaBrandt>(camera->camera.model()).k4, 0.4);
+}
+
+TEST(Calibration, OurBodyIsTheImuEvenWhereTheFilesIsNot) {
+  const auto left = parse_euroc_camera(euroc_camera(kLeft), "cam0"), right = parse_euroc_camera(euroc_camera(kRight), "cam1");
+  ImuSensor imu;
+  imu.T_BS = Pose<B, B>(so3_exp({0.3, 0.2, 0.1}), {1, 2, 3});
+  const auto rig = join_euroc(*left, *right, imu, "x");
+  ASSERT_TRUE(rig);
+  expect_same(imu.T_BS * rig->T_BC0.cast_frames<B, B>(), kLeft, 1e-13);
+  expect_same(rig->T_C1C0(), kRight.inverse() * kLeft, 1e-13);
+}
+
+TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
+  const std::string cam0 = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "  timeshift_cam_imu: -0.004\n";
+  const std::string direct = cam0 + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
+  const std::string chained = cam0 + "cam1:\n" + kalibr_camera("T_cn_cnm1", kRight.inverse() * kLeft);
+  for (const std::string& text : {direct, chained}) {
+    const auto rig = parse_kalibr_camchain(text, "chain.yaml");
+    ASSERT_TRUE(rig) << rig.error().message;
+    expect_same(rig->T_BC0, kLeft, 1e-14);
+    expect_same(rig->T_BC1, kRight, 1e-14);
+    EXPECT_EQ(rig->time_offset_s, -0.004);
+    EXPECT_EQ(rig->right.width(), 752);
+  }
+}
+
+TEST(Calibration, KalibrSaysWhatIsWrong) {
+  const std::string good = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
+  const auto message = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    const auto rig = parse_kalibr_camchain(text, "c.yaml");
+    return rig ? std::string("accepted") : rig.error().message;
+  };
+  EXPECT_EQ(message("cam1:", "cam2:"), "c.yaml: cam1: is missing or empty");
+  EXPECT_EQ(message("T_cam_imu", "T_imu_cam"), "c.yaml: T_cam_imu: is missing");
+  EXPECT_EQ(message("distortion_model: equidistant", "distortion_model: fov"),
+            "c.yaml:10: distortion_model: 'fov' is not supported, only radial-tangential, radtan, equidistant and none");
+  EXPECT_EQ(message("[752, 480]", "[752.5, 480]"), "c.yaml:12: resolution: 752.5 is not a number of pixels");
+  EXPECT_EQ(message("458.6", "none"), "c.yaml:11: intrinsics: holds something that is not a number");
+  EXPECT_EQ(message("0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 0.5, 1.0"), "c.yaml:3: T_cam_imu: its last row is not 0 0 0 1");
+  EXPECT_EQ(message("  rostopic: /cam/image_raw\n", "  timeshift_cam_imu: 99\n"), "c.yaml:13: timeshift_cam_imu: 99 s is more than 10 s");
+  EXPECT_EQ(parse_kalibr_camchain(good + "  timeshift_cam_imu: 0.01\n", "c.yaml").error().message,
+            "c.yaml:27: timeshift_cam_imu: differs from cam0's by 10.0 ms");
+  EXPECT_EQ(parse_kalibr_camchain("cam0: 5\ncam1: 6\n", "c.yaml").error().message, "c.yaml:1: cam0: is missing or empty");
+  EXPECT_EQ(parse_kalibr_camchain("- 1\n- 2\n", "c.yaml").error().message, "c.yaml: holds no fields");
+  EXPECT_EQ(load_kalibr("/nowhere/c.yaml").error().message, "/nowhere/c.yaml: no such file");
+}
+
+TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
+  const std::string flat = "accelerometer_noise_density: 0.01\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.005\n"
+                           "gyroscope_random_walk: 4.0e-06\nrostopic: /imu0\nupdate_rate: 200.0\n";
+  std::string nested = "imu0:\n";
+  for (std::size_t start = 0; start < flat.size(); start = flat.find('\n', start) + 1) nested += "  " + flat.substr(start, flat.find('\n', start) + 1 - start);
+  for (const std::string& text : {flat, nested}) {
+    const auto noise = parse_kalibr_imu(text, "imu.yaml");
+    ASSERT_TRUE(noise) << noise.error().message;
+    EXPECT_EQ(noise->accel_noise_density_mps2_rthz, 0.01);
+    EXPECT_EQ(noise->gyro_random_walk_radps2_rthz, 4.0e-06);
+    EXPECT_EQ(noise->rate_hz, 200);
+  }
+  EXPECT_EQ(parse_kalibr_imu("imu0: {}\n", "imu.yaml").error().message, "imu.yaml: gyroscope_noise_density: is missing");
+}
+
+TEST(Calibration, DeepNestingIsAnErrorNotACrash) {
+  EXPECT_FALSE(parse_kalibr_camchain(std::string(100000, '['), "deep.yaml"));
+  EXPECT_FALSE(parse_kalibr_camchain(std::string(100000, '{'), "deep.yaml"));
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/trajectory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace fbvins {
+namespace {
+
+class TrajectoryFiles : public testing::Test {
+ protected:
+  TrajectoryFiles() {
+    std::string name = (std::filesystem::temp_directory_path() / "fbvins_io_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~TrajectoryFiles() override { std::filesystem::remove_all(folder_); }
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  static std::string content(const std::string& file) {
+    std::stringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  }
+  std::string folder_;
+};
+
+Odometry some_odometry(int i) {
+  Odometry o;
+  o.t = Time{1403636584763555584 + i * 50'000'001LL};
+  o.T_WB = Pose<W, B>(so3_exp({0.1 * i, 0.2, -0.3}), {1.0 * i, -2.5, 1e-5});
+  o.v_WB = Vec3(0.1, -0.2, 0.3 * i);
+  o.bias = {{0.001, -0.002, 0.003}, {0.01, -0.02, 0.03}};
+  for (int r = 0; r < 6; ++r)
+    for (int c = 0; c < 6; ++c) o.pose_covariance(r, c) = 1e-6 * (1 + std::min(r, c)) * (10 + std::max(r, c));
+  o.health = {HealthState::good, HealthReason::none};
+  return o;
+}
+
+TEST_F(TrajectoryFiles, TumComesBackToTheNanosecond) {
+  auto writer = TumWriter::create(path("t.txt"));
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 10; ++i) writer->write(some_odometry(i).t, some_odometry(i).T_WB);
+  EXPECT_FALSE(std::filesystem::exists(path("t.txt"))) << "it appears when closed";
+  ASSERT_TRUE(writer->close());
+  EXPECT_FALSE(writer->close()) << "once";
+  const auto read = read_trajectory(path("t.txt"));
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->points.size(), 10u);
+  EXPECT_EQ(read->counts.bad(), 0);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(read->points[i].t, some_odometry(i).t);
+    EXPECT_LT((read->points[i].T_WB.p - some_odometry(i).T_WB.p).norm(), 1e-9);
+    EXPECT_LT(so3_log(read->points[i].T_WB.q.conjugate() * some_odometry(i).T_WB.q).norm(), 1e-8);
+    EXPECT_FALSE(read->points[i].v_WB);
+  }
+  EXPECT_EQ(read->poses().size(), 10u);
+}
+
+TEST_F(TrajectoryFiles, OdometryCsvHoldsEverything) {
+  auto writer = OdometryCsvWriter::create(path("o.csv"));
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 10; ++i) {
+    Odometry o = some_odometry(i);
+    if (i < 2) o.health = {HealthState::initialising, HealthReason::waiting_for_motion_or_rest};
+    if (i == 7) o.health = {HealthState::lost, HealthReason::imu_gap}, o.reset_counter = 1;
+    if (i == 8) o.health = {HealthState::degraded, HealthReason::few_tracks};
+    writer->write(o);
+  }
+  ASSERT_TRUE(writer->close());
+  const auto read = read_trajectory(path("o.csv"));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->without_pose, 3);
+  ASSERT_EQ(read->points.size(), 7u);
+  const TrajectoryPoint& p = read->points[0];
+  EXPECT_EQ(p.t, some_odometry(2).t);
+  EXPECT_LT((*p.v_WB - Vec3(0.1, -0.2, 0.6)).norm(), 1e-9);
+  EXPECT_LT((p.bias->accel_mps2 - Vec3(0.01, -0.02, 0.03)).norm(), 1e-9);
+  const std::string text = content(path("o.csv"));
+  EXPECT_EQ(std::count(text.begin(), text.begin() + text.find('\n'), ','), 40);
+  EXPECT_NE(text.find(",cov_px_px,cov_px_py,"), std::string::npos);
+  EXPECT_NE(text.find(",lost,imu_gap,1\n"), std::string::npos);
+  EXPECT_NE(text.find(",1.000000000e-05,1.100000000e-05,"), std::string::npos);
+}
+
+TEST_F(TrajectoryFiles, WritingTwiceGivesTheSameBytes) {
+  for (const char* name : {"a.csv", "b.csv"}) {
+    auto writer = OdometryCsvWriter::create(path(name));
+    for (int i = 0; i < 10; ++i) writer->write(some_odometry(i));
+    ASSERT_TRUE(writer->close());
+  }
+  EXPECT_EQ(content(path("a.csv")), content(path("b.csv")));
+}
+
+TEST_F(TrajectoryFiles, WhatCannotBeWrittenIsSaid) {
+  EXPECT_EQ(TumWriter::create("/nowhere/t.txt").error().message, "/nowhere/t.txt: cannot be written");
+  EXPECT_EQ(TumWriter::create(folder_).error().message, folder_ + ": is a folder");
+  if (std::filesystem::exists("/dev/full")) {
+    std::filesystem::create_symlink("/dev/full", path("full.txt.part"));
+    auto writer = TumWriter::create(path("full.txt"));
+    ASSERT_TRUE(writer);
+    writer->write(Time{1}, {});
+    const auto closed = writer->close();
+    ASSERT_FALSE(closed);
+    EXPECT_EQ(closed.error().code, ErrorCode::unwritable);
+    EXPECT_FALSE(std::filesystem::exists(path("full.txt")));
+  }
+}
+
+TEST_F(TrajectoryFiles, AnAbandonedWriterLeavesNothing) {
+  {
+    auto writer = TumWriter::create(path("t.txt"));
+    writer->write(Time{1}, {});
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST(Trajectory, TumAsOtherToolsWriteIt) {
+  const auto read = parse_trajectory("# timestamp tx ty tz qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n"
+                                     "1403636584.8\t1.5  2 3 0.1 0 0 -0.99498743710662 \n", "t.txt");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->points[0].t.ns, 1403636584763555584);
+  EXPECT_EQ(read->points[1].t.ns, 1403636584800000000);
+  EXPECT_NEAR(read->points[1].T_WB.q.x(), 0.1, 1e-12);
+  EXPECT_NEAR(read->points[1].T_WB.q.w(), -0.994987, 1e-6);
+}
+
+TEST(Trajectory, EurocQuaternionsBeginWithW) {
+  const auto read = parse_trajectory("#t,p,q\n100,1,2,3,0.8,0.6,0,0\n", "gt.csv");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_DOUBLE_EQ(read->points[0].T_WB.q.w(), 0.8);
+  EXPECT_DOUBLE_EQ(read->points[0].T_WB.q.x(), 0.6);
+  EXPECT_FALSE(read->points[0].bias);
+}
+
+TEST(Trajectory, BadRowsAreCounted) {
+  const auto read = parse_trajectory("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 0\n3 0 0 nan 0 0 0 1\n4 0 0\n5 0 0 0 0 0 0 1\n5 0 0 0 0 0 0 1\n"
+                                     "4.5 0 0 0 0 0 0 1\n6 0 0 0 0 0 0 1\n7 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n", "t.txt");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->points.size(), 5u);
+  EXPECT_EQ(read->counts.malformed, 2);
+  EXPECT_EQ(read->counts.not_finite, 1);
+  EXPECT_EQ(read->counts.duplicates, 1);
+  EXPECT_EQ(read->counts.backwards, 1);
+  EXPECT_EQ(read->counts.first_bad, "t.txt:2: the quaternion's length is 0");
+}
+
+TEST(Trajectory, ErrorsNameTheLine) {
+  const auto message = [](const char* text) { return parse_trajectory(text, "t").error().message; };
+  EXPECT_EQ(message(""), "t: there are no data rows in it");
+  EXPECT_EQ(message("# only\n"), "t: there are no data rows in it");
+  EXPECT_EQ(message("\n1 2 3\n"), "t:2: 3 columns where 8 are needed (1 of 1 rows are unusable)");
+  EXPECT_EQ(message("1.5,0,0,0,1,0,0,0\n"), "t:1: '1.5' is not a stamp in nanoseconds (1 of 1 rows are unusable)");
+  EXPECT_EQ(message("1,0,0,0,1,0,0,0,5\n"), "t:1: 9 columns where 8 or at least 17 are needed (1 of 1 rows are unusable)");
+  EXPECT_EQ(read_trajectory("/nowhere").error().message, "/nowhere: no such file");
+}
+
+}  // namespace
+}  // namespace fbvins

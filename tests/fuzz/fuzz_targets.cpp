@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/fuzz/fuzz_targets.hpp"
+
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "tests/broken_datasets/toy_dataset.hpp"
+
+namespace fbvins::fuzz {
+namespace {
+
+void require(bool fact) {
+  if (!fact) __builtin_trap();
+}
+
+/// An answer is a value or one sentence.
+template <class T>
+void require_sentence(const Result<T>& result) {
+  if (result) return;
+  require(!result.error().message.empty());
+  require(result.error().message.find('\n') == std::string::npos);
+}
+
+template <class Row>
+void require_increasing(const std::vector<Row>& rows) {
+  for (std::size_t i = 1; i < rows.size(); ++i) require(rows[i - 1].t < rows[i].t);
+}
+
+template <class P>
+void require_rigid(const P& pose) {
+  require(pose.p.allFinite() && std::abs(pose.q.norm() - 1.0) < 1e-9);
+}
+
+std::vector<std::string> csv_seeds() {
+  const test::Files files = test::toy_dataset();
+  return {files.at("imu0/data.csv").substr(0, 1500), files.at("cam0/data.csv")};
+}
+
+std::vector<std::string> calibration_seeds() {
+  const test::Files files = test::toy_dataset();
+  const std::string camera =
+      "  T_cam_imu:\n  - [1, 0, 0, 0.5]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n  camera_model: pinhole\n"
+      "  distortion_coeffs: [0, 0, 0, 0]\n  distortion_model: equidistant\n  intrinsics: [41, 42, 31, 23]\n  resolution: [64, 48]\n";
+  return {files.at("cam1/sensor.yaml"), files.at("imu0/sensor.yaml"),
+          "cam0:\n" + camera + "cam1:\n  T_cn_cnm1: &a [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n" + camera.substr(80)};
+}
+
+std::vector<std::string> trajectory_seeds() {
+  return {test::toy_dataset().at("state_groundtruth_estimate0/data.csv"),
+          "# t x y z qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n1403636584.8 1.5 2 3 0.6 0 0 -0.8\n1403636585 1 1 1 0 0 0 1\n"};
+}
+
+std::vector<std::string> image_seeds() {
+  return {test::make_png(1, {.width = 16, .height = 12}), test::make_png(2, {.width = 9, .height = 7, .colour = true, .sixteen_bit = true}),
+          test::make_jpeg(3)};
+}
+
+}  // namespace
+
+void fuzz_csv(std::string_view bytes) {
+  const auto images = read_image_rows(bytes, "data.csv");
+  require_sentence(images);
+  if (images) require_increasing(images->rows);
+  const auto imu = read_stamped_rows<ImuSample>(bytes, "data.csv", ImuRowParser{});
+  require_sentence(imu);
+  if (!imu) return;
+  require_increasing(imu->rows);
+  require(imu->counts.rows == imu->counts.bad() + static_cast<int>(imu->rows.size()));
+  for (const ImuSample& sample : imu->rows) require(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite());
+}
+
+void fuzz_calibration(std::string_view bytes) {
+  const std::string text(bytes);
+  const auto camera = parse_euroc_camera(text, "sensor.yaml");
+  require_sentence(camera);
+  if (camera) {
+    require_rigid(camera->T_BS);
+    require(camera->camera.focal_px() > 0 && camera->camera.width() > 0);
+    // Whatever the coefficients: answered, and consistently.
+    if (const auto ray = camera->camera.undistort({camera->camera.width() / 3.0, 5.0}))
+      require((camera->camera.distort(*ray) - Vec2(camera->camera.width() / 3.0, 5.0)).norm() < 1.0);
+  }
+  const auto imu = parse_euroc_imu(text, "sensor.yaml");
+  require_sentence(imu);
+  if (imu) require(imu->noise.gyro_noise_density_radps_rthz > 0);
+  const auto rig = parse_kalibr_camchain(text, "camchain.yaml");
+  require_sentence(rig);
+  if (rig) require_rigid(rig->T_BC0);
+  if (rig) require_rigid(rig->T_BC1);
+  require_sentence(parse_kalibr_imu(text, "imu.yaml"));
+}
+
+void fuzz_trajectory(std::string_view bytes) {
+  const auto file = parse_trajectory(bytes, "t.txt");
+  require_sentence(file);
+  if (!file) return;
+  require_increasing(file->points);
+  for (const TrajectoryPoint& point : file->points) require_rigid(point.T_WB);
+}
+
+void fuzz_image(std::string_view bytes) {
+  const auto image = decode_image(bytes);
+  require_sentence(image);
+  if (image) require(image->width() > 0 && image->height() > 0);
+}
+
+const std::vector<Target>& targets() {
+  static const std::vector<Target> all = {{"csv", fuzz_csv, csv_seeds},
+                                          {"calibration", fuzz_calibration, calibration_seeds},
+                                          {"trajectory", fuzz_trajectory, trajectory_seeds},
+                                          {"image", fuzz_image, image_seeds}};
+  return all;
+}
+
+}  // namespace fbvins::fuzz

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every parser of bytes from outside, as functions that libFuzzer and the mutation test both call.
+// A target must return for any bytes; what it finds must fit together, or it traps.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fbvins::fuzz {
+
+void fuzz_csv(std::string_view bytes);
+void fuzz_calibration(std::string_view bytes);
+void fuzz_trajectory(std::string_view bytes);
+void fuzz_image(std::string_view bytes);
+
+struct Target {
+  const char* name;
+  void (*run)(std::string_view);
+  std::vector<std::string> (*seeds)();
+};
+const std::vector<Target>& targets();
+
+}  // namespace fbvins::fuzz
