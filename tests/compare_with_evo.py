@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """`fbvins eval` against evo (github.com/MichaelGrupp/evo) on the same files, every figure to 1e-6.
 
-usage: compare_with_evo.py FBVINS      exit 77 (skipped) where evo is not installed
+usage: compare_with_evo.py FBVINS [PYTHON]      PYTHON: an interpreter that may have evo (./dev test makes one)
+exit 77 (skipped) where evo is not installed
 """
 import json
 import math
+import os
 import pathlib
 import random
 import subprocess
@@ -17,6 +19,8 @@ try:
     from evo.core import metrics, sync
     from evo.tools import file_interface
 except ImportError as missing:
+    if len(sys.argv) > 2 and pathlib.Path(sys.argv[2]).exists():
+        os.execv(sys.argv[2], [sys.argv[2], __file__, sys.argv[1]])
     print(f"skipped: evo is not installed ({missing}); ./dev test installs it where PyPI can be reached")
     sys.exit(77)
 

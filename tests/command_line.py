@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What the `fbvins` program says and returns to the shell. Needs no recording.
+
+usage: command_line.py FBVINS
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = sys.argv[1]
+
+
+def fbvins(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
+
+
+class CommandLine(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def assert_bad_input(self, done, *words):
+        self.assertEqual(done.returncode, 2, done)
+        for word in words:
+            self.assertIn(word, done.stderr)
+        self.assertEqual(done.stdout, "")
+        self.assertNotIn("\033", done.stderr, "colour only on a terminal")
+
+    def test_help_and_version(self):
+        self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
+        for command in ([], ["run"], ["eval"], ["info"], ["config"]):
+            done = fbvins(*command, "--help")
+            self.assertEqual(done.returncode, 0)
+            self.assertIn("examples:", done.stdout)
+
+    def test_wrong_usage(self):
+        self.assertEqual(fbvins().returncode, 2)
+        for arguments in (["fly"], ["run"], ["eval", "one"], ["run", "x", "--frontend", "surf"], ["run", "x", "--max-images", "-1"],
+                          ["eval", "a", "b", "--align", "se4"], ["run", "x", "--no-such-option"]):
+            self.assert_bad_input(fbvins(*arguments))
+
+    def test_input_that_is_not_there(self):
+        self.assert_bad_input(fbvins("run", self.folder / "none"), "none")
+        self.assert_bad_input(fbvins("info", self.folder / "none"), "none")
+        self.assert_bad_input(fbvins("eval", self.folder / "none", self.folder / "none"), "none")
+        self.assert_bad_input(fbvins("info", self.folder), str(self.folder))
+
+    def test_config_round_trip(self):
+        first = fbvins("config", "--yaml").stdout
+        again = fbvins("config", "--yaml", "--config", self.write("c.yaml", first)).stdout
+        self.assertEqual(first, again)
+        changed = fbvins("config", "--yaml", "--set", "estimator.max_iterations=9").stdout
+        self.assertEqual([line for line in changed.splitlines() if line not in first.splitlines()],
+                         [line for line in changed.splitlines() if line.startswith("  max_iterations: 9 ")])
+
+    def test_config_mistakes_name_file_and_line(self):
+        path = self.write("c.yaml", "frontend:\n  kind: klt\nestimator:\n  max_iteration: 3\n")
+        self.assert_bad_input(fbvins("config", "--config", path), f"{path}:4:", "estimator.max_iterations")
+        self.assert_bad_input(fbvins("run", "x", "--set", "estimator.max_iterations=many"), "whole number")
+        self.assert_bad_input(fbvins("run", "x", "--set", "estimator.max_iterations=0"), "outside")
+        self.assert_bad_input(fbvins("config", "--defaults", "--set", "estimator.max_iterations=3"))
+
+    def test_every_option_is_explained(self):
+        text = fbvins("config").stdout
+        self.assertIn("estimator.max_iterations = ", text)
+        self.assertIn("frontend.kind = klt   klt|orb", text)
+        self.assertNotIn("\033", text)
+
+    def test_eval(self):
+        rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]
+        truth = self.write("truth.txt", "\n".join(rows) + "\n")
+        done = fbvins("eval", truth, truth, "--json")
+        self.assertEqual(done.returncode, 0, done)
+        self.assertLess(json.loads(done.stdout)["ape_m"]["rmse"], 1e-9)
+        self.assertRegex(fbvins("eval", truth, truth).stdout, r"Max\s+Mean\s+Median\s+RMSE\s+Std")
+        late = self.write("late.txt", "\n".join("16" + row[2:] for row in rows) + "\n")
+        self.assert_bad_input(fbvins("eval", truth, late), "clock")
+        self.assert_bad_input(fbvins("eval", truth, self.write("empty.txt", "")), "empty.txt")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The same recording gives the same bytes: twice, and with --threaded; and another option does not.
+
+usage: determinism.py FBVINS FRONTEND      exit 77 (skipped) where the recordings are absent
+"""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+REPRODUCIBLE = ["trajectory_tum.txt", "trajectory.csv", "statistics.csv", "config.yaml"]
+IMAGES = 150  # starts in motion, so that start, window and marginalisation all take part
+
+
+def run(program, recording, out, *arguments):
+    command = [program, "run", str(recording), "--out", str(out), "--max-images", str(IMAGES), "--quiet", *arguments]
+    subprocess.run(command, check=True)
+    files = {name: (out / name).read_bytes() for name in REPRODUCIBLE}
+    files["summary.json result"] = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]
+    return files
+
+
+def differing(a, b):
+    return [name for name in a if a[name] != b[name]]
+
+
+def main():
+    program, frontend = sys.argv[1:3]
+    repository = pathlib.Path(__file__).resolve().parents[1]
+    data = pathlib.Path(os.environ.get("FBVINS_DATA") or repository.parent / "shared" / "data")
+    recording = data / "MH_01_easy_17s"
+    if not recording.exists():
+        print(f"skipped: {recording} is not there; set FBVINS_DATA")
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        kind = ["--frontend", frontend]
+        first = run(program, recording, root / "a", *kind)
+        poses = first["trajectory_tum.txt"].count(b"\n")
+        assert poses > 0.8 * IMAGES, f"only {poses} poses of {IMAGES} images"
+        for name, arguments in {"again": [], "threaded": ["--threaded"],
+                                "from its own config.yaml": ["--config", str(root / "a" / "config.yaml")]}.items():
+            wrong = differing(first, run(program, recording, root / "b", *kind, *arguments))
+            assert not wrong, f"{name}: {wrong} differ"
+            print(f"{frontend} {name}: same bytes")
+        other = run(program, recording, root / "c", *kind, "--set", "estimator.max_iterations=1")
+        assert "trajectory.csv" in differing(first, other), "a changed option changed nothing: the comparison is blind"
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
