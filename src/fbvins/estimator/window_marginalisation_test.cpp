@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a leaving frame leaves behind: all that it knew, and nothing of the four directions that no sensor
+// sees (origin and heading of the world), also after the states moved on from their first estimates.
+#include "fbvins/estimator/window_marginalisation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/estimator/window_test_scene.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Window;
+
+/// The window whose landmarks either leave with frame 0 or are not seen from it; without a prior.
+struct Scene {
+  Window w;
+  std::vector<std::uint8_t> leaves;
+};
+
+Scene make_scene(bool with_prior) {
+  Scene s{test::make_window(false), {}};
+  WindowProblem& p = s.w.problem;
+  std::vector<WindowObservation> kept;
+  for (std::size_t k = 0; k < p.landmarks.size(); ++k) {
+    WindowLandmark& l = p.landmarks[k];
+    const bool leaves = l.host == 0 || k % 2 == 0;
+    s.leaves.push_back(leaves);
+    const int first = static_cast<int>(kept.size());
+    for (int i = 0; i < l.observation_count; ++i) {
+      const WindowObservation& o = p.observations[l.first_observation + i];
+      if (leaves || o.frame != 0) kept.push_back(o);
+    }
+    l.first_observation = first;
+    l.observation_count = static_cast<int>(kept.size()) - first;
+  }
+  p.observations = kept;
+  if (!with_prior) p.prior = {};
+  for (WindowFrame& f : p.frames) f.standstill = false;  // it knows the world's axes: velocity zero is absolute
+  return s;
+}
+
+/// The window after frame 0 and its landmarks are gone and `prior` has come.
+WindowProblem without_first_frame(const WindowProblem& p, const std::vector<std::uint8_t>& leaves, WindowPrior prior) {
+  WindowProblem out;
+  out.calibration = p.calibration;
+  out.weights = p.weights;
+  out.frames.assign(p.frames.begin() + 1, p.frames.end());
+  out.frames[0].imu = nullptr;  // its factor is in the prior
+  for (int& frame : prior.frames) {
+    WindowFrame& f = out.frames[--frame];
+    if (!f.in_prior) f.first_estimate = f.state;
+    f.in_prior = true;
+  }
+  out.prior = std::move(prior);
+  for (std::size_t k = 0; k < p.landmarks.size(); ++k) {
+    if (leaves[k]) continue;
+    WindowLandmark l = p.landmarks[k];
+    const int first = static_cast<int>(out.observations.size());
+    for (int i = 0; i < l.observation_count; ++i) {
+      WindowObservation o = p.observations[l.first_observation + i];
+      --o.frame;
+      out.observations.push_back(o);
+    }
+    l.first_observation = first;
+    --l.host;
+    out.landmarks.push_back(l);
+  }
+  return out;
+}
+
+NavState linearisation_point(const WindowFrame& f) { return f.in_prior ? f.first_estimate : f.state; }
+
+/// Moves of the whole world, as perturbations of the prior's frames: x, y, z, heading; and roll for contrast.
+Eigen::MatrixXd world_moves(const WindowProblem& p, const WindowPrior& prior) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 5);
+  for (std::size_t k = 0; k < prior.frames.size(); ++k) {
+    const NavState s = linearisation_point(p.frames[prior.frames[k]]);
+    const int at = 15 * static_cast<int>(k);
+    N.block<3, 3>(at + nav::p, 0).setIdentity();
+    for (int axis : {2, 0}) {
+      const int column = axis == 2 ? 3 : 4;
+      const Vec3 e = Vec3::Unit(axis);
+      N.block<3, 1>(at + nav::p, column) = e.cross(s.T_WB.p);
+      N.block<3, 1>(at + nav::theta, column) = s.T_WB.q.conjugate() * e;
+      N.block<3, 1>(at + nav::v, column) = e.cross(s.v_WB);
+    }
+  }
+  return N;
+}
+
+/// |H n| against what as large a move of the states one by one would cost.
+double relative_information(const Eigen::MatrixXd& H, const Eigen::VectorXd& n) {
+  return n.dot(H * n) / n.cwiseAbs2().dot(H.diagonal());
+}
+
+void expect_four_free_directions(const WindowProblem& p, const WindowPrior& prior) {
+  const Eigen::MatrixXd N = world_moves(p, prior);
+  const Eigen::MatrixXd& H = prior.quadratic.H;
+  for (int k = 0; k < 4; ++k) EXPECT_LT(std::abs(relative_information(H, N.col(k))), 1e-11) << "direction " << k;
+  EXPECT_GT(relative_information(H, N.col(4)), 1e-7) << "gravity shows roll";
+}
+
+TEST(Marginalisation, PriorIsBlindToOriginAndHeading) {
+  const Scene s = make_scene(false);
+  WindowProblem scratch;
+  const WindowPrior prior = marginalise_frame(s.w.problem, 0, s.leaves, scratch);
+  expect_four_free_directions(s.w.problem, prior);
+  const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(prior.quadratic.H).eigenvalues();
+  EXPECT_GT(eigenvalues.minCoeff(), -1e-9 * eigenvalues.maxCoeff()) << "never negative";
+}
+
+TEST(Marginalisation, StaysBlindAfterTheStatesMovedFromTheirFirstEstimates) {
+  const Scene s = make_scene(false);
+  WindowProblem scratch;
+  WindowProblem rest = without_first_frame(s.w.problem, s.leaves, marginalise_frame(s.w.problem, 0, s.leaves, scratch));
+  Rng rng(3);
+  for (WindowFrame& f : rest.frames) {
+    Vec15 d;
+    for (int k = 0; k < 15; ++k) d(k) = 0.02 * rng.normal();
+    f.state = f.state.boxplus(d);  // first estimates stay
+  }
+  const std::vector<std::uint8_t> all(rest.landmarks.size(), 1);
+  const WindowPrior prior = marginalise_frame(rest, 0, all, scratch);
+  expect_four_free_directions(rest, prior);
+
+  // The same without first estimates: heading is no longer free. The test can fail.
+  for (WindowFrame& f : rest.frames) f.first_estimate = f.state;
+  const WindowPrior naive = marginalise_frame(rest, 0, all, scratch);
+  EXPECT_GT(std::abs(relative_information(naive.quadratic.H, world_moves(rest, naive).col(3))), 1e-9);
+}
+
+TEST(Marginalisation, KeepsTheStepOfTheFramesThatStay) {
+  const Scene s = make_scene(true);
+  WindowProblem whole = s.w.problem, scratch;
+  WindowProblem rest = without_first_frame(whole, s.leaves, marginalise_frame(whole, 0, s.leaves, scratch));
+  whole.linearise();
+  ASSERT_TRUE(whole.solve(0));
+  rest.linearise();
+  ASSERT_TRUE(rest.solve(0));
+  const double size = whole.step().lpNorm<Eigen::Infinity>();
+  for (int f = 0; f + 1 < test::kFrames; ++f)
+    for (int k = 0; k < 15; ++k)
+      EXPECT_NEAR(rest.step()(rest.row_of(f, k)), whole.step()(whole.row_of(f + 1, k)), 1e-6 * size) << f << " " << k;
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests: a made-up window of six frames and fifty landmarks, noisy, off its optimum, with outliers.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/imu/imu_test_motion.hpp"
+
+namespace fbvins::test {
+
+inline constexpr int kFrames = 6, kLandmarks = 50;
+
+/// A noisy window off its optimum, with outliers; frame 0 is held by a prior.
+struct Window {
+  WindowProblem problem;
+  std::vector<std::unique_ptr<Preintegration>> imu;
+  Eigen::Matrix<double, 15, 1> frame_weight;
+  Eigen::Matrix<double, kCalibrationSize, 1> calibration_weight;
+};
+
+inline Vec3 noise3(Rng& rng, double sigma) { return sigma * normal3(rng); }
+
+inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
+  const ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.02, -0.04)};
+  const auto stamp = [](int k) { return Time{k * 100'000'000}; };
+  for (int k = 0; k < kFrames; ++k) {
+    WindowFrame frame;
+    frame.state = motion.state(stamp(k).seconds(), bias);
+    if (k > 0) {
+      ImuSegment segment = motion.segment(stamp(k - 1), stamp(k), Duration{5'000'000}, bias);
+      add_noise(segment, {}, rng);
+      w.imu.push_back(std::make_unique<Preintegration>(ImuNoise{}, ImuBias{}));
+      w.imu.back()->integrate(segment);
+      frame.imu = w.imu.back().get();
+    }
+    w.problem.frames.push_back(frame);
+  }
+}
+
+inline void add_landmark(Window& w, const Vec3& p_W, int host, Rng& rng) {
+  const Calibration& c = w.problem.calibration;
+  const auto in_camera = [&](int frame, bool right) {
+    const Vec3 p_B = w.problem.frames[frame].state.T_WB.inverse() * p_W;
+    return right ? Vec3(c.T_BC1.inverse() * p_B) : Vec3(c.T_BC0.inverse() * p_B);
+  };
+  WindowLandmark l;
+  l.host = host;
+  l.first_observation = static_cast<int>(w.problem.observations.size());
+  for (int frame = 0; frame < kFrames; ++frame) {
+    for (const bool right : {false, true}) {
+      const Vec3 p_C = in_camera(frame, right);
+      if (p_C.z() < 0.3) continue;
+      WindowObservation o;
+      o.frame = frame;
+      o.right = right;
+      o.normalised = p_C.head<2>() / p_C.z() + 1e-3 * Vec2(rng.normal(), rng.normal());
+      if (rng.below(20) == 0) o.normalised += Vec2(0.02, -0.01);  // an outlier of some ten sigmas
+      o.velocity = Vec2(rng.normal(), rng.normal());
+      o.sqrt_information << 700, 20, -10, 650;
+      w.problem.observations.push_back(o);
+      ++l.observation_count;
+    }
+  }
+  const Vec3 p_C = in_camera(host, false);
+  l.alpha_beta_rho = Vec3(p_C.x() / p_C.z() + 1e-3 * rng.normal(), p_C.y() / p_C.z() + 1e-3 * rng.normal(),
+                          (1 + 0.05 * rng.normal()) / p_C.z());
+  w.problem.landmarks.push_back(l);
+}
+
+inline Window make_window(bool calibrating) {
+  Window w;
+  Rng rng(17);
+  const Motion motion(0.4, 0.2);
+  w.problem.calibration.T_BC0 = {so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)};
+  const Pose<C0, C1> T_C0C1(so3_exp(Vec3(0.01, -0.02, 0.005)), Vec3(0.11, 0.001, -0.002));
+  w.problem.calibration.T_BC1 = w.problem.calibration.T_BC0 * T_C0C1;
+  add_frames(w, motion, rng);
+  while (static_cast<int>(w.problem.landmarks.size()) < kLandmarks) {
+    const int host = static_cast<int>(rng.below(kFrames));
+    const double depth = rng.uniform(1.5, 8);
+    const Vec3 p_C(rng.uniform(-0.6, 0.6) * depth, rng.uniform(-0.4, 0.4) * depth, depth);
+    add_landmark(w, w.problem.frames[host].state.T_WB * (w.problem.calibration.T_BC0 * p_C), host, rng);
+  }
+  for (WindowFrame& f : w.problem.frames) {
+    Vec15 d;
+    d << noise3(rng, 0.01), noise3(rng, 0.003), noise3(rng, 0.05), noise3(rng, 0.002), noise3(rng, 0.02);
+    if (&f != &w.problem.frames[0]) f.state = f.state.boxplus(d);
+    f.first_estimate = f.state;
+  }
+  w.problem.frames[3].standstill = true;  // untrue, but a term like any other
+  w.problem.weights.standstill_velocity_sigma_mps = 0.5;
+
+  w.frame_weight << Vec3::Constant(1e4), Vec3::Constant(1e4), Vec3::Constant(1e2), Vec3::Constant(1e2), Vec3::Constant(10);
+  w.calibration_weight.setZero();
+  w.calibration_weight.head<13>() << Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), 100;
+  const int calibration_size = calibrating ? kCalibrationSize : 0;
+  Eigen::VectorXd weight(calibration_size + 15);
+  if (calibrating) weight.head<kCalibrationSize>() = w.calibration_weight;
+  weight.tail<15>() = w.frame_weight;
+  w.problem.prior.quadratic.H = weight.cwiseAbs2().asDiagonal();
+  w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(weight.size());
+  w.problem.prior.frames = {0};
+  w.problem.prior.with_calibration = calibrating;
+  w.problem.prior.calibration = w.problem.calibration;
+  w.problem.weights.estimate_extrinsics = calibrating;
+  w.problem.weights.estimate_time_offset = calibrating;
+  return w;
+}
+
+}  // namespace fbvins::test
