@@ -106,7 +106,7 @@ KltResult KltFrontend::align_to_anchor(const Track& track, const Vec2& start_px)
 }
 
 /// From here on the feature is what the present image shows.
-void KltFrontend::drop_anchor(Track& track) {
+void KltFrontend::set_anchor(Track& track) {
   anchors_[track.slot].take(left_, track.px);
   Mat2 J_pixel_normalised;
   rig_.left.distort(track.normalised, &J_pixel_normalised);
@@ -156,7 +156,7 @@ bool KltFrontend::follow(Track& track, const CameraMotion& motion, FrontendStats
   if (!normalised) return false;
   track.px = found.px;
   track.normalised = *normalised;
-  if (!anchor_holds) drop_anchor(track);
+  if (!anchor_holds) set_anchor(track);
   ++track.age_frames;
   return true;
 }
@@ -238,7 +238,7 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
     track.id = TrackId{next_track_++};
     track.px = corner.px;
     track.normalised = *normalised;
-    drop_anchor(track);
+    set_anchor(track);
     track.history[0] = track.normalised;
     tracks_.push_back(track);
     ++stats.detected;

@@ -85,7 +85,7 @@ class KltFrontend final : public Frontend {
   void follow_tracks(const CameraMotion& motion, FrontendStats& stats);
   bool follow(Track& track, const CameraMotion& motion, FrontendStats& stats);
   KltResult align_to_anchor(const Track& track, const Vec2& start_px);
-  void drop_anchor(Track& track);
+  void set_anchor(Track& track);
   Vec2 predict(const Track& track, const CameraMotion& motion) const;
   void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
   void reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats);
