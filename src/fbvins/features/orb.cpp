@@ -8,7 +8,7 @@ namespace fbvins {
 namespace {
 
 /// Corners of a cell whose Harris score is computed; the rest is weaker on FAST already.
-constexpr int kScoredPerCell = 6;
+constexpr int kScoredPerCell = 4;
 
 }  // namespace
 
@@ -37,6 +37,7 @@ void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
 void OrbExtractor::select(const PyramidLevel& level, int quota) {
   keep_strongest_of_cells(level);
   for (Candidate& c : candidates_) c.harris = harris_score(level, c.x, c.y);
+  std::erase_if(candidates_, [](const Candidate& c) { return !(c.harris > 0); });  // edges
   take_in_rounds(quota);
 }
 

@@ -19,11 +19,11 @@ namespace fbvins {
 
 struct OrbOptions {
   int max_features = 500;
-  int levels = 5;
+  int levels = 4;
   double scale_factor = 1.2;
   int min_threshold = 6;
   int cell_px = 32;
-  int max_per_cell = 5;
+  int max_per_cell = 4;
 
   template <class V>
   void visit(V&& v) {
@@ -32,7 +32,7 @@ struct OrbOptions {
     v("scale_factor", scale_factor, "", "size of a level relative to the next", 1.05, 2.0);
     v("min_threshold", min_threshold, "grey", "FAST threshold at the noise floor: a cell goes no lower", 1, 100);
     v("cell_px", cell_px, "px", "side of a grid cell, on each level", 8, 256);
-    v("max_per_cell", max_per_cell, "", "features of one cell at most", 1, 32);
+    v("max_per_cell", max_per_cell, "", "features of one cell at most", 1, 4);
   }
 };
 

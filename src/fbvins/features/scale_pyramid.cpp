@@ -27,7 +27,7 @@ void blend_rows(const std::uint8_t* r0, const std::uint8_t* r1, int w1, int coun
   }
 }
 
-FBVINS_KERNEL
+/// Scalar on purpose: gathers are slower than this on the machines measured.
 void blend_columns(const std::uint32_t* pairs, const std::int32_t* column, const std::int32_t* weight, int count,
                    std::uint8_t* out) {
   for (int x = 0; x < count; ++x) {

@@ -16,6 +16,12 @@ constexpr double kFarOutside_px = 40;
 /// Descriptor distance asked of a track that was out of sight: it is searched for without its neighbours' help.
 constexpr int kStricterDistance = 45;
 
+/// Standard deviation of the position along its weakest direction for image noise of one grey value, px.
+double weakest_direction_px(const KltLevelTemplate& patch) {
+  const double mean = 0.5 * (patch.ihxx + patch.ihyy), half = 0.5 * (patch.ihxx - patch.ihyy);
+  return std::sqrt(mean + std::sqrt(half * half + static_cast<double>(patch.ihxy) * patch.ihxy));
+}
+
 double median(std::vector<double>& numbers) {
   if (numbers.empty()) return 0;
   const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
@@ -47,15 +53,16 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   // Without a left image tracks wait where they were; the next image's motion spans the gap.
   if (!has_left) return out;
 
-  extract_left(stats);
+  extract_left(packet.frame.left->view());
   stats.detect_ms = timer.lap_ms();
+  history_t_[static_cast<std::size_t>(frame_count_) % kHistory] = now_;
   if (has_previous_) {
     const CameraMotion motion = predictor_.between(previous_t_, now_, prior);
     predict(motion);
     match_tracks(motion);
-    locate_tracks(motion, stats);
+    locate_tracks(stats);
     stats.track_ms = timer.lap_ms();
-    reject_outliers(motion, stats);
+    reject_outliers(prior, stats);
     thin_out();
     forget(now_);
     stats.geometry_ms = timer.lap_ms();
@@ -66,8 +73,10 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   match_stereo(stats);
   report(out);
   stats.stereo_ms = timer.lap_ms();
+  std::swap(left_, previous_left_);
   has_previous_ = true;
   previous_t_ = now_;
+  ++frame_count_;
   return out;
 }
 
@@ -83,7 +92,6 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
   // An image of another size than the calibration's has no known geometry.
   if (left_.width() != rig_.left.width() || left_.height() != rig_.left.height()) left_.clear();
   if (right_.width() != rig_.right.width() || right_.height() != rig_.right.height()) right_.clear();
-  if (!left_.empty()) extractor_.extract(packet.frame.left->view(), left_features_);
   right_view_ = right_.empty() ? ImageView{} : packet.frame.right->view();
   // Backwards, or longer than any track is remembered: nothing carries over.
   if (has_previous_ && (now_ < previous_t_ || (now_ - previous_t_).seconds() > std::max(options_.memory_s, 0.3))) {
@@ -94,7 +102,8 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
   return !left_.empty();
 }
 
-void OrbFrontend::extract_left(FrontendStats&) {
+void OrbFrontend::extract_left(const ImageView& image) {
+  extractor_.extract(image, left_features_);
   stage_->improve(left_.width(), left_.height(), left_features_);
   matcher_.index(left_.width(), left_.height(), left_features_.keypoints);
   keypoint_used_.assign(left_features_.size(), 0);
@@ -107,6 +116,7 @@ void OrbFrontend::predict(const CameraMotion& motion) {
     track.in_sight = false;
     track.right.reset();
     track.previous_normalised = track.normalised;
+    track.previous_px = track.px;
     track.depth_factor = 1;
     if (!motion.has_rotation) continue;
     const double rho = track.inverse_depth.value_or(typical_inverse_depth_);
@@ -143,7 +153,7 @@ void OrbFrontend::match_tracks(const CameraMotion& motion) {
   matcher_.match(queries_, left_features_, found_);
 }
 
-void OrbFrontend::locate_tracks(const CameraMotion& motion, FrontendStats& stats) {
+void OrbFrontend::locate_tracks(FrontendStats& stats) {
   // What the prediction missed in common (gyro bias, unknown translation) helps those without a match.
   numbers_.clear();
   numbers_y_.clear();
@@ -169,7 +179,11 @@ void OrbFrontend::locate_tracks(const CameraMotion& motion, FrontendStats& stats
     } else if (track.was_in_sight && options_.fill_in) {
       px = follow_by_alignment(track, expected);
     }
-    if (!px || !settle(track, *px, motion)) {
+    if (px && track.was_in_sight && options_.subpixel && !returns(track, *px)) {
+      px.reset();
+      ++stats.lost_check;
+    }
+    if (!px || !settle(track, *px)) {
       if (track.was_in_sight && keypoint == nullptr) ++stats.lost_flow;
       continue;
     }
@@ -186,29 +200,42 @@ void OrbFrontend::locate_tracks(const CameraMotion& motion, FrontendStats& stats
 /// From a keypoint to the place that shows the track's reference patch.
 std::optional<Vec2> OrbFrontend::refine_match(Track& track, const Vec2& start_px, double scale) {
   const Patches& patches = patches_[track.slot];
-  const KltResult fine = refiner_.refine(patches.reference, left_, start_px, rig_.left, track.normalised);
-  track.renew_reference = false;
-  if (refiner_.accept(fine, start_px, scale)) return fine.px;
-  if (!track.was_in_sight) return std::nullopt;
-  // The reference has grown too different; the newest patch carries the position over to a new one.
+  if (!track.was_in_sight) {
+    const KltResult fine = refiner_.refine(patches.reference, left_, start_px, rig_.left, track.normalised);
+    return refiner_.accept(fine, start_px, scale) ? std::optional<Vec2>(fine.px) : std::nullopt;
+  }
   const KltResult newest = klt_align(patches.newest, left_, start_px, 1, 0, options_.alignment);
   if (!refiner_.accept(newest, start_px, scale)) return std::nullopt;
-  track.renew_reference = true;
-  return newest.px;
+  return hold_to_reference(track, newest.px);
 }
 
 std::optional<Vec2> OrbFrontend::follow_by_alignment(Track& track, const Vec2& expected_px) {
   const Patches& patches = patches_[track.slot];
-  const KltResult coarse = klt_align(patches.newest, left_, expected_px, kPyramidLevels - 1, 0, options_.alignment);
-  if (!coarse.ok() || coarse.correlation < options_.fill_in_correlation) return std::nullopt;
-  if ((coarse.px - expected_px).norm() > options_.search_blind_px) return std::nullopt;
-  const KltResult fine = refiner_.refine(patches.reference, left_, coarse.px, rig_.left, track.normalised);
-  track.renew_reference = !refiner_.accept(fine, coarse.px, 1.0);
-  return track.renew_reference ? coarse.px : fine.px;
+  const KltResult newest = klt_align(patches.newest, left_, expected_px, kPyramidLevels - 1, 0, options_.alignment);
+  if (!newest.ok() || newest.correlation < options_.fill_in_correlation) return std::nullopt;
+  if ((newest.px - expected_px).norm() > options_.search_blind_px) return std::nullopt;
+  return hold_to_reference(track, newest.px);
+}
+
+/// The position against the reference, where the reference still looks alike. The newest patch and the reference
+/// disagreeing means that one of them slid along an edge or onto something else.
+std::optional<Vec2> OrbFrontend::hold_to_reference(Track& track, const Vec2& newest_px) {
+  const KltResult fine = refiner_.refine(patches_[track.slot].reference, left_, newest_px, rig_.left, track.normalised);
+  track.renew_reference = !refiner_.accept(fine, newest_px, 1.0);
+  if (track.renew_reference) return newest_px;
+  if ((fine.px - newest_px).norm() > options_.max_creep_px) return std::nullopt;
+  return fine.px;
+}
+
+/// Following the patch found now back into the image before leads to where the track was.
+bool OrbFrontend::returns(const Track& track, const Vec2& px) {
+  if (!scratch_.cut(left_, px, 0, 1)) return false;
+  const KltResult back = klt_align(scratch_, previous_left_, track.previous_px, 1, 0, options_.alignment);
+  return back.ok() && (back.px - track.previous_px).norm() <= options_.forward_backward_px;
 }
 
 /// The track is at px in the newest image. False at the border.
-bool OrbFrontend::settle(Track& track, const Vec2& px, const CameraMotion&) {
+bool OrbFrontend::settle(Track& track, const Vec2& px) {
   if (!rig_.left.inside(px, kBorder_px)) return false;
   const auto normalised = rig_.left.undistort(px);
   if (!normalised) return false;
@@ -220,14 +247,29 @@ bool OrbFrontend::settle(Track& track, const Vec2& px, const CameraMotion&) {
   return true;
 }
 
-void OrbFrontend::reject_outliers(const CameraMotion& motion, FrontendStats& stats) {
+/// Against the image before, and against one some frames back: where two edges cross at different depths, a corner
+/// slides by less than the noise from frame to frame, but not for long.
+void OrbFrontend::reject_outliers(const StatePrior& prior, FrontendStats& stats) {
+  const std::size_t newest = static_cast<std::size_t>(frame_count_) % kHistory;
+  for (Track& track : tracks_) track.history[newest] = {track.normalised, track.in_sight ? frame_count_ : -1};
+  for (const int lag : {1, static_cast<int>(kHistory) - 1}) {
+    const std::int64_t then = frame_count_ - lag;
+    if (then < 0) continue;
+    const std::size_t place = static_cast<std::size_t>(then) % kHistory;
+    const CameraMotion motion = predictor_.between(history_t_[place], now_, prior);
+    check_epipolar(motion, then, stats);
+  }
+}
+
+void OrbFrontend::check_epipolar(const CameraMotion& motion, std::int64_t then, FrontendStats& stats) {
   points_a_.clear();
   points_b_.clear();
   order_.clear();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (!tracks_[i].in_sight || !tracks_[i].was_in_sight) continue;
+    const Sighting& sighting = tracks_[i].history[static_cast<std::size_t>(then) % kHistory];
+    if (!tracks_[i].in_sight || sighting.frame != then) continue;
     order_.push_back(i);
-    points_a_.push_back(tracks_[i].previous_normalised);
+    points_a_.push_back(sighting.normalised);
     points_b_.push_back(tracks_[i].normalised);
   }
   EpipolarOptions ransac;
@@ -337,6 +379,7 @@ bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descri
   track.slot = free_slots_.back();
   Patches& patches = patches_[track.slot];
   if (!patches.newest.cut(left_, keypoint.pixel, 0, kPyramidLevels - 1)) return false;
+  if (weakest_direction_px(patches.newest.levels[0]) > options_.max_uncertainty_px) return false;
   if (!patches.reference.take(left_, keypoint.pixel, rig_.left, *normalised)) return false;
   free_slots_.pop_back();
   track.id = TrackId{next_track_++};
@@ -346,6 +389,7 @@ bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descri
   track.normalised = *normalised;
   track.last_seen = now_;
   track.in_sight = true;
+  track.history[static_cast<std::size_t>(frame_count_) % kHistory] = {track.normalised, frame_count_};
   tracks_.push_back(track);
   return true;
 }

@@ -9,6 +9,7 @@
 //   TrackedFrame tracked = frontend.process(packet, prior);
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -36,7 +37,10 @@ struct OrbFrontendOptions {
   bool subpixel = true;
   bool fill_in = true;
   double fill_in_correlation = 0.85;
-  double epipolar_px = 1.5;
+  double max_creep_px = 0.7;
+  double max_uncertainty_px = 0.18;
+  double forward_backward_px = 0.7;
+  double epipolar_px = 1.0;
   double sigma_px = 0.8;
   OrbOptions orb;
   GuidedMatchOptions matching;
@@ -56,7 +60,10 @@ struct OrbFrontendOptions {
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
     v("fill_in_correlation", fill_in_correlation, "", "correlation asked of a feature followed by alignment alone", 0.0, 1.0);
-    v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
+    v("max_creep_px", max_creep_px, "px", "largest disagreement between the newest patch and the reference", 0.05, 10.0);
+    v("max_uncertainty_px", max_uncertainty_px, "px/grey", "uncertainty of a new feature's position along its weakest direction, for noise of one grey value", 1e-4, 10.0);
+    v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
+    v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v.group("orb", orb, "feature extraction");
     v.group("matching", matching, "matching over time");
@@ -76,6 +83,12 @@ class OrbFrontend final : public Frontend {
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
 
  private:
+  /// Frames over which outliers are looked for, the newest included.
+  static constexpr std::size_t kHistory = 6;
+  struct Sighting {
+    Vec2 normalised = Vec2::Zero();
+    std::int64_t frame = -1;
+  };
   struct Track {
     TrackId id;
     std::size_t slot = 0;                 // of its patches
@@ -89,9 +102,11 @@ class OrbFrontend final : public Frontend {
     int age_frames = 0;
     bool in_sight = false;                // has an observation in the newest image
     bool was_in_sight = false;            // had one in the image before
+    Vec2 previous_px = Vec2::Zero();
     Vec2 previous_normalised = Vec2::Zero();
     double depth_factor = 1;              // depth now / depth before
     bool renew_reference = false;
+    std::array<Sighting, kHistory> history;  // of frame f at f % kHistory
     bool alive = true;
   };
   struct Patches {
@@ -100,15 +115,17 @@ class OrbFrontend final : public Frontend {
   };
 
   bool ingest(const SensorPacket& packet, FrontendStats& stats);
-  void extract_left(FrontendStats& stats);
+  void extract_left(const ImageView& image);
   void predict(const CameraMotion& motion);
   void match_tracks(const CameraMotion& motion);
-  void locate_tracks(const CameraMotion& motion, FrontendStats& stats);
-  bool locate(Track& track, const Keypoint* keypoint, const Vec2& expected_px);
+  void locate_tracks(FrontendStats& stats);
   std::optional<Vec2> refine_match(Track& track, const Vec2& start_px, double scale);
   std::optional<Vec2> follow_by_alignment(Track& track, const Vec2& expected_px);
-  bool settle(Track& track, const Vec2& px, const CameraMotion& motion);
-  void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
+  std::optional<Vec2> hold_to_reference(Track& track, const Vec2& newest_px);
+  bool returns(const Track& track, const Vec2& px);
+  bool settle(Track& track, const Vec2& px);
+  void reject_outliers(const StatePrior& prior, FrontendStats& stats);
+  void check_epipolar(const CameraMotion& motion, std::int64_t then, FrontendStats& stats);
   void thin_out();
   void cut_patches();
   void start_tracks(FrontendStats& stats);
@@ -131,11 +148,14 @@ class OrbFrontend final : public Frontend {
   PatchRefiner refiner_;
   Rng rng_;
 
-  Pyramid left_, right_;
+  Pyramid left_, previous_left_, right_;
+  KltTemplate scratch_;
   ImageView right_view_;
   OrbFeatures left_features_, right_features_;
   bool has_previous_ = false;
   Time now_, previous_t_;
+  std::int64_t frame_count_ = 0;
+  std::array<Time, kHistory> history_t_;
   double typical_inverse_depth_ = 0;  // 1/m, median of the features matched last
   std::int64_t next_track_ = 0;
   std::vector<Track> tracks_;

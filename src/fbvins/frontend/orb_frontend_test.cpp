@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/orb_frontend.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "fbvins/core/options.hpp"
+#include "fbvins/features/noise_texture.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kWidth = 376, kHeight = 240;
+constexpr double kDepth_m = 3.0, kSpeed_mps = 0.4, kFramePeriod_s = 0.05;
+
+StereoRig make_rig() {
+  StereoRig rig;
+  PinholeRadtan model;
+  model.fx = model.fy = 230;
+  model.cx = 187.5, model.cy = 119.5;
+  model.k1 = -0.05;
+  rig.left = rig.right = Camera(model, kWidth, kHeight);
+  rig.T_BC1 = Pose<B, C1>(Quat::Identity(), Vec3(0.11, 0, 0));
+  return rig;
+}
+
+/// A textured wall 3 m ahead; the body moves along x and turns about z, seen exactly.
+class World {
+ public:
+  Vec3 position(int k) const { return {kSpeed_mps * kFramePeriod_s * k, 0.02 * k * kFramePeriod_s, 0}; }
+  double angle(int k) const { return 0.2 * kFramePeriod_s * k; }
+
+  std::shared_ptr<const Image> render(int k, double offset_x, std::uint64_t noise_seed) const {
+    const Eigen::Rotation2Dd R(angle(k));
+    const Vec2 centre = position(k).head<2>() + R * Vec2(offset_x, 0);
+    const auto warp = [&](const Vec2& px) {
+      return Vec2((centre + R * (*rig.left.undistort(px) * kDepth_m)) * 230 / kDepth_m);
+    };
+    return std::make_shared<const Image>(render_texture(kWidth, kHeight, texture, warp, 120, 35, 1.0, noise_seed));
+  }
+
+  SensorPacket packet(int k) const {
+    SensorPacket p;
+    p.id = FrameId{k};
+    p.frame.t = Time{static_cast<std::int64_t>(k * kFramePeriod_s * 1e9)};
+    p.frame.left = render(k, 0, static_cast<std::uint64_t>(2 * k));
+    p.frame.right = render(k, 0.11, static_cast<std::uint64_t>(2 * k + 1));
+    for (int i = 0; k > 0 && i <= 10; ++i)
+      p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3(0, 0, 0.2), Vec3(0, 0, 9.81)});
+    return p;
+  }
+
+  /// Where a point of the wall is seen in the left image of frame k, from normalised coordinates there.
+  Vec2 wall_point(int k, const Vec2& normalised) const {
+    return position(k).head<2>() + Eigen::Rotation2Dd(angle(k)) * Vec2(normalised * kDepth_m);
+  }
+
+  StereoRig rig = make_rig();
+
+ private:
+  NoiseTexture texture{11, 30};
+};
+
+const World& world() {
+  static const World w;
+  return w;
+}
+
+const std::vector<SensorPacket>& packets() {
+  static const std::vector<SensorPacket> all = [] {
+    std::vector<SensorPacket> p;
+    for (int k = 0; k < 10; ++k) p.push_back(world().packet(k));
+    return p;
+  }();
+  return all;
+}
+
+OrbFrontendOptions small_options() {
+  OrbFrontendOptions options;
+  options.max_features = 80;
+  options.orb.max_features = 250;
+  return options;
+}
+
+std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbFrontendOptions& options = small_options()) {
+  OrbFrontend frontend(world().rig, options);
+  std::vector<TrackedFrame> out;
+  for (const SensorPacket& p : input) out.push_back(frontend.process(p, StatePrior{}));
+  return out;
+}
+
+/// Median distance, in px, between where a track is seen and where it was first seen on the wall.
+double median_error_px(const std::vector<TrackedFrame>& frames) {
+  std::map<std::int64_t, Vec2> first;
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    for (const TrackedFeature& f : frames[k].features) {
+      const Vec2 p = world().wall_point(static_cast<int>(k), f.left.normalised);
+      const auto [it, is_new] = first.try_emplace(f.id.value, p);
+      if (!is_new) errors.push_back((p - it->second).norm() / kDepth_m * 230);
+    }
+  if (errors.size() < 50) return 1e9;
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST(OrbFrontend, FollowsAWallBelowATenthOfAPixel) {
+  const auto frames = run(packets());
+  EXPECT_GT(frames[0].stats.detected, 50);
+  EXPECT_EQ(frames[0].stats.tracked, 0);
+  for (std::size_t k = 1; k < frames.size(); ++k) EXPECT_GT(frames[k].stats.tracked, 40) << k;
+  EXPECT_LT(median_error_px(frames), 0.1);
+}
+
+TEST(OrbFrontend, SubpixelRefinementIsWhatGivesThat) {
+  OrbFrontendOptions options = small_options();
+  options.subpixel = false;
+  options.fill_in = false;
+  const double without = median_error_px(run(packets(), options));
+  EXPECT_GT(without, 0.2);
+  EXPECT_LT(without, 1.5);
+}
+
+TEST(OrbFrontend, StereoGivesTheWallsDepth) {
+  const auto frames = run(packets());
+  int stereo = 0, all = 0;
+  for (const TrackedFrame& frame : frames)
+    for (const TrackedFeature& f : frame.features) {
+      ++all;
+      if (!f.right) continue;
+      ++stereo;
+      const double disparity_px = (f.left.normalised - f.right->normalised).x() * 230;
+      EXPECT_NEAR(disparity_px, 0.11 / kDepth_m * 230, 0.6);
+      EXPECT_NEAR((f.left.normalised - f.right->normalised).y() * 230, 0, 0.6);
+    }
+  EXPECT_GT(stereo, 0.7 * all);
+}
+
+TEST(OrbFrontend, ObservationsAreConsistent) {
+  const auto frames = run({packets().begin(), packets().begin() + 3});
+  for (const TrackedFeature& f : frames.back().features) {
+    Mat2 J;
+    EXPECT_LT((world().rig.left.distort(f.left.normalised, &J) - f.left.pixel).norm(), 1e-6);
+    EXPECT_LT((f.left.sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
+  }
+}
+
+TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
+  for (const bool missing : {true, false}) {
+    std::vector<SensorPacket> input = packets();
+    for (std::size_t k = 5; k < 8; ++k) {
+      input[k].frame.left = missing ? nullptr : std::make_shared<const Image>(kWidth, kHeight);
+      input[k].frame.right = nullptr;
+    }
+    const auto frames = run(input);
+    for (std::size_t k = 5; k < 8; ++k) EXPECT_TRUE(frames[k].features.empty()) << k;
+    int old = 0;
+    for (const TrackedFeature& f : frames[8].features) old += f.age_frames > 0;
+    EXPECT_GT(old, 25) << (missing ? "missing" : "black");
+    EXPECT_LT(median_error_px(frames), 0.12);
+  }
+}
+
+TEST(OrbFrontend, WithoutRightImageThereIsNoStereo) {
+  std::vector<SensorPacket> input(packets().begin(), packets().begin() + 4);
+  for (SensorPacket& p : input) p.frame.right = nullptr;
+  const auto frames = run(input);
+  EXPECT_EQ(frames.back().stats.stereo, 0);
+  EXPECT_GT(frames.back().stats.tracked, 40);
+}
+
+TEST(OrbFrontend, WrongSizeTimeJumpsAndNoImuAreHarmless) {
+  std::vector<SensorPacket> input(packets().begin(), packets().begin() + 6);
+  input[2].frame.left = std::make_shared<const Image>(100, 80, std::uint8_t{90});
+  input[3].imu.samples.clear();
+  input[4].frame.t = input[4].frame.t + Duration::from_seconds(5);   // a gap
+  input[5].frame.t = input[0].frame.t;                               // backwards
+  const auto frames = run(input);
+  EXPECT_TRUE(frames[2].features.empty());
+  EXPECT_GT(frames[3].stats.tracked, 30);
+  for (const std::size_t k : {4u, 5u}) {
+    EXPECT_EQ(frames[k].stats.tracked, 0);
+    EXPECT_GT(frames[k].stats.detected, 40);
+  }
+}
+
+TEST(OrbFrontend, SameInputSameBits) {
+  const auto a = run(packets()), b = run(packets());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    ASSERT_EQ(a[k].features.size(), b[k].features.size());
+    for (std::size_t i = 0; i < a[k].features.size(); ++i) {
+      EXPECT_EQ(a[k].features[i].id, b[k].features[i].id);
+      EXPECT_TRUE(a[k].features[i].left.pixel == b[k].features[i].left.pixel);
+      EXPECT_EQ(a[k].features[i].right.has_value(), b[k].features[i].right.has_value());
+    }
+  }
+}
+
+TEST(OrbFrontendOptions, DefaultsAreValid) { EXPECT_TRUE(validate(OrbFrontendOptions{}).ok()); }
+
+}  // namespace
+}  // namespace fbvins
