@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "fbvins/core/simd.hpp"
+#include "fbvins/features/lanes.hpp"
 
 namespace fbvins {
 namespace {
@@ -16,25 +17,36 @@ constexpr int kSmoothMargin = 8;
 
 std::ptrdiff_t padded_stride(int width) { return (width + 2 * kBorder + 63) / 64 * 64; }
 
-/// Two rows blended (weights out of 128); each result holds its right neighbour in the upper half.
+/// Two rows blended, weights out of 128.
 FBVINS_KERNEL
-void blend_rows(const std::uint8_t* r0, const std::uint8_t* r1, int w1, int count, std::uint32_t* pairs) {
-  const auto a = static_cast<std::uint32_t>(128 - w1), b = static_cast<std::uint32_t>(w1);
-  for (int x = 0; x < count; ++x) {
-    const std::uint32_t here = r0[x] * a + r1[x] * b;
-    const std::uint32_t next = r0[x + 1] * a + r1[x + 1] * b;
-    pairs[x] = here | (next << 16);
-  }
+void blend_rows(const std::uint8_t* r0, const std::uint8_t* r1, int w1, int count, std::uint8_t* out) {
+  const auto a = static_cast<std::uint16_t>(128 - w1), b = static_cast<std::uint16_t>(w1);
+  for (int x = 0; x < count; ++x)
+    out[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>(r0[x] * a + r1[x] * b + 64) >> 7);
 }
 
-/// Scalar on purpose: gathers are slower than this on the machines measured.
-void blend_columns(const std::uint32_t* pairs, const std::int32_t* column, const std::int32_t* weight, int count,
-                   std::uint8_t* out) {
-  for (int x = 0; x < count; ++x) {
-    const std::uint32_t pair = pairs[column[x]];
-    const auto w = static_cast<std::uint32_t>(weight[x]);
-    const std::uint32_t v = (pair & 0xffffu) * (128 - w) + (pair >> 16) * w;
-    out[x] = static_cast<std::uint8_t>((v + (1u << 13)) >> 14);
+FBVINS_INLINE void pick(const U8x16& from, const U8x16& which, U8x16& out) {
+#if defined(__clang__)
+  for (int i = 0; i < kLanes; ++i) out[i] = from[which[i]];
+#else
+  out = __builtin_shuffle(from, which);
+#endif
+}
+
+/// Sixteen source pixels give one block of results by picking left and right neighbours and blending: a byte shuffle
+/// instead of a gather. The lanes beyond the block are overwritten by the next one.
+FBVINS_KERNEL
+void blend_columns(const std::uint8_t* row, const ShrinkBlock* blocks, int count, int block_px, std::uint8_t* out) {
+  using U16x16 = std::uint16_t __attribute__((vector_size(32)));
+  for (int i = 0; i < count; ++i) {
+    U8x16 source, left, right;
+    std::memcpy(&source, row + blocks[i].first, sizeof(source));
+    pick(source, blocks[i].left, left);
+    pick(source, blocks[i].right, right);
+    const U16x16 w = __builtin_convertvector(blocks[i].weight, U16x16);
+    const U16x16 sum = (__builtin_convertvector(left, U16x16) * (128 - w) + __builtin_convertvector(right, U16x16) * w + 64) >> 7;
+    const U8x16 bytes = __builtin_convertvector(sum, U8x16);
+    std::memcpy(out + i * block_px, &bytes, sizeof(bytes));
   }
 }
 
@@ -77,21 +89,27 @@ void smooth_row(const std::uint8_t* row, int count, std::uint8_t* out) {
 }  // namespace
 
 void ScalePyramid::shrink(const PyramidLevel& from, double ratio, const PyramidLevel& to, std::uint8_t* origin) {
-  column_.resize(static_cast<std::size_t>(to.width));
-  weight_.resize(static_cast<std::size_t>(to.width));
-  pairs_.resize(static_cast<std::size_t>(from.width) + 1);
-  for (int x = 0; x < to.width; ++x) {
-    const double at = std::clamp((x + 0.5) * ratio - 0.5, 0.0, from.width - 1.0);
-    const int column = static_cast<int>(at);
-    column_[static_cast<std::size_t>(x)] = column;
-    weight_[static_cast<std::size_t>(x)] = static_cast<int>((at - column) * 128.0 + 0.5);
+  const int block_px = std::min(kLanes, static_cast<int>((kLanes - 3) / ratio) + 1);
+  const int count = (to.width + block_px - 1) / block_px;
+  blocks_.assign(static_cast<std::size_t>(count), ShrinkBlock{});
+  for (int i = 0; i < count; ++i) {
+    ShrinkBlock& block = blocks_[static_cast<std::size_t>(i)];
+    for (int k = 0; k < block_px; ++k) {
+      const double at = std::clamp((i * block_px + k + 0.5) * ratio - 0.5, 0.0, from.width - 1.0);
+      const int column = static_cast<int>(at);
+      if (k == 0) block.first = column;
+      block.left[k] = static_cast<std::uint8_t>(column - block.first);
+      block.right[k] = static_cast<std::uint8_t>(column - block.first + 1);
+      block.weight[k] = static_cast<std::uint8_t>((at - column) * 128.0 + 0.5);
+    }
   }
+  row_.resize(static_cast<std::size_t>(from.width) + 2 * kLanes);
   for (int y = 0; y < to.height; ++y) {
     const double at = std::clamp((y + 0.5) * ratio - 0.5, 0.0, from.height - 1.0);
     const int row = static_cast<int>(at);
     const int w1 = static_cast<int>((at - row) * 128.0 + 0.5);
-    blend_rows(from.row(row), from.row(row + 1), w1, from.width, pairs_.data());
-    blend_columns(pairs_.data(), column_.data(), weight_.data(), to.width, origin + y * to.stride);
+    blend_rows(from.row(row), from.row(row + 1), w1, from.width + 1, row_.data());
+    blend_columns(row_.data(), blocks_.data(), count, block_px, origin + y * to.stride);
   }
 }
 

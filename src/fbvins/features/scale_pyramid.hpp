@@ -9,10 +9,17 @@
 
 #include <vector>
 
+#include "fbvins/features/lanes.hpp"
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
+
+/// How sixteen pixels of a row become the next few of a smaller one.
+struct ShrinkBlock {
+  U8x16 left{}, right{}, weight{};  // right's weight out of 128
+  int first = 0;                    // column of lane 0
+};
 
 class ScalePyramid {
  public:
@@ -33,8 +40,8 @@ class ScalePyramid {
   std::vector<std::uint8_t> pixels_;
   std::vector<PyramidLevel> levels_;
   std::vector<double> scales_;
-  std::vector<std::uint32_t> pairs_;         // one row after the vertical filter: value and right neighbour
-  std::vector<std::int32_t> column_, weight_;
+  std::vector<std::uint8_t> row_;   // after the vertical filter
+  std::vector<ShrinkBlock> blocks_; // of one row
 };
 
 /// Smooths a level for BRIEF (7x7, about 1.6 px standard deviation), valid up to 8 px beyond the edges.
