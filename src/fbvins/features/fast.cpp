@@ -2,6 +2,7 @@
 #include "fbvins/features/fast.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cstring>
 
@@ -53,14 +54,18 @@ void suppress_row(const std::uint8_t* above, const std::uint8_t* here, const std
   }
 }
 
+/// Few pixels are left: eight at a time are looked at as one number.
 void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector<FastCorner>& out) {
+  static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first pixel");
   for (int block = 0; block < count; block += 8) {
     std::uint64_t eight;
     std::memcpy(&eight, kept + block, sizeof(eight));
-    if (eight == 0) continue;
-    for (int x = block; x < std::min(block + 8, count); ++x)
-      if (kept[x] != 0)
-        out.push_back({static_cast<std::int16_t>(x0 + x), static_cast<std::int16_t>(y), kept[x]});
+    while (eight != 0) {
+      const int k = std::countr_zero(eight) / 8;
+      out.push_back({static_cast<std::int16_t>(x0 + block + k), static_cast<std::int16_t>(y),
+                     static_cast<std::uint8_t>(eight >> (8 * k))});
+      eight &= ~(std::uint64_t{0xff} << (8 * k));
+    }
   }
 }
 

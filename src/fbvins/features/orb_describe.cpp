@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "fbvins/core/simd.hpp"
+#include "fbvins/features/lanes.hpp"
 #include "fbvins/features/orb.hpp"
 #include "fbvins/features/orb_pattern.hpp"
 
@@ -43,19 +44,33 @@ void disc_moments(const std::uint8_t* corner, std::ptrdiff_t stride, std::int32_
   *m01 = sum_y;
 }
 
-/// Sums of squared Sobel-like central gradients over 8x8 pixels from `corner` on.
+using I32x8 = std::int32_t __attribute__((vector_size(32)));
+
+FBVINS_INLINE void load_eight(const std::uint8_t* p, I32x8& out) {
+  using U8x8 = std::uint8_t __attribute__((vector_size(8)));
+  U8x8 bytes;
+  std::memcpy(&bytes, p, sizeof(bytes));
+  out = __builtin_convertvector(bytes, I32x8);
+}
+
+/// Sums of squared Sobel gradients over 8x8 pixels from `corner` on, a column a lane.
 FBVINS_KERNEL
 void gradient_sums(const std::uint8_t* corner, std::ptrdiff_t s, std::int32_t* xx, std::int32_t* xy, std::int32_t* yy) {
-  std::int32_t a[8] = {}, b[8] = {}, c[8] = {};
-  for (int r = 0; r < 8; ++r) {
+  I32x8 smooth[3] = {}, slope[3] = {};  // of the last three rows: 1 2 1 and -1 0 1
+  I32x8 a{}, b{}, c{};
+  for (int r = -1; r <= 8; ++r) {
     const std::uint8_t* p = corner + r * s;
-    for (int i = 0; i < 8; ++i) {
-      const std::int32_t gx = (p[i + 1 - s] - p[i - 1 - s]) + 2 * (p[i + 1] - p[i - 1]) + (p[i + 1 + s] - p[i - 1 + s]);
-      const std::int32_t gy = (p[i - 1 + s] - p[i - 1 - s]) + 2 * (p[i + s] - p[i - s]) + (p[i + 1 + s] - p[i + 1 - s]);
-      a[i] += gx * gx;
-      b[i] += gx * gy;
-      c[i] += gy * gy;
-    }
+    I32x8 left, mid, right;
+    load_eight(p - 1, left);
+    load_eight(p, mid);
+    load_eight(p + 1, right);
+    smooth[0] = smooth[1], smooth[1] = smooth[2], smooth[2] = left + 2 * mid + right;
+    slope[0] = slope[1], slope[1] = slope[2], slope[2] = right - left;
+    if (r < 1) continue;
+    const I32x8 gx = slope[0] + 2 * slope[1] + slope[2], gy = smooth[2] - smooth[0];
+    a += gx * gx;
+    b += gx * gy;
+    c += gy * gy;
   }
   for (int i = 0; i < 8; ++i) *xx += a[i], *xy += b[i], *yy += c[i];
 }
