@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which keyframes share words with an image: for every word the keyframes that hold it. A query touches only the
+// words of the image, so it grows with the map as slowly as the words get crowded. One thread at a time.
+//
+//   InvertedIndex index(vocabulary.words());
+//   index.add(KeyframeId{0}, words);
+//   for (const IndexHit& hit : index.query(words, 10)) verify(hit.keyframe);
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "fbvins/core/ids.hpp"
+#include "fbvins/loop/vocabulary.hpp"
+
+namespace fbvins {
+
+struct IndexHit {
+  KeyframeId keyframe;
+  float similarity = 0;  ///< bow_similarity of the two
+};
+
+class InvertedIndex {
+ public:
+  explicit InvertedIndex(int words) : postings_(static_cast<std::size_t>(words)) {}
+
+  /// Ids are small and dense: memory grows with the largest.
+  void add(KeyframeId keyframe, const BowVector& bow);
+  void remove(KeyframeId keyframe, const BowVector& bow);
+  /// The most similar ones first, equal ones in order of id. `allowed`, if given, leaves some out.
+  std::vector<IndexHit> query(const BowVector& bow, int most, const std::function<bool(KeyframeId)>& allowed = {});
+
+ private:
+  struct Posting {
+    std::int32_t keyframe;
+    float weight;
+  };
+  std::vector<std::vector<Posting>> postings_;
+  std::vector<float> score_;  // by keyframe, zero between queries
+  std::vector<std::int32_t> touched_;
+};
+
+}  // namespace fbvins

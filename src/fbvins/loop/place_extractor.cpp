@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/place_extractor.hpp"
+
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+constexpr int kSearchLevel = 2;
+/// Disparities down to this are infinitely far rather than wrong.
+constexpr double kInfinity_px = 1.0;
+
+}  // namespace
+
+PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
+                               std::unique_ptr<DescriptorStage> stage)
+    : rig_(rig),
+      options_(options),
+      vocabulary_(std::move(vocabulary)),
+      stage_(std::move(stage)),
+      R_rl_(rig.T_C1C0().R()),
+      p_rl_(rig.T_C1C0().p),
+      focal_px_(rig.left.focal_px()),
+      baseline_m_(p_rl_.norm()),
+      orb_(options.orb) {}
+
+Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_WB) {
+  Place place;
+  place.focal_px = focal_px_;
+  place.up_C0 = (R_WB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
+  if (!images.left) return place;
+  orb_.extract(images.left->view(), found_);
+  stage_->improve(images.left->width(), images.left->height(), found_);
+  if (images.right) {
+    left_.build(images.left->view(), kSearchLevel + 1);
+    right_.build(images.right->view(), kSearchLevel + 1);
+  }
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    const Keypoint& keypoint = found_.keypoints[i];
+    const auto xy = rig_.left.undistort(keypoint.pixel);
+    if (!xy) continue;
+    PlaceFeature feature;
+    feature.x = static_cast<float>(xy->x());
+    feature.y = static_cast<float>(xy->y());
+    feature.sigma_xy = static_cast<float>(options_.keypoint_px * keypoint.scale / focal_px_);
+    if (images.right)
+      if (const auto depth = stereo(keypoint.pixel, *xy)) {
+        feature.inverse_depth = static_cast<float>(depth->inverse_depth);
+        feature.sigma_inverse_depth = static_cast<float>(depth->sigma);
+      }
+    place.features.push_back(feature);
+    place.descriptors.push_back(found_.descriptors[i]);
+  }
+  place.words = vocabulary_.words_of(place.descriptors);
+  return place;
+}
+
+std::optional<Vec2> PlaceExtractor::project(const Vec2& left_normalised, double inverse_depth) const {
+  return rig_.right.project(R_rl_ * left_normalised.homogeneous() + inverse_depth * p_rl_);
+}
+
+/// Best place along the epipolar curve on a coarse level. The curve is nearly straight there: projected at a few
+/// points only, straight between them.
+std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
+  constexpr int kPieces = 6;
+  const int l = std::min(kSearchLevel, right_.levels() - 1);
+  const KltLevelTemplate& patch = patch_.levels[static_cast<std::size_t>(l)];
+  if (!patch.valid) return std::nullopt;
+  const double scale = 1 << l;
+  float best = static_cast<float>(options_.min_search_correlation);
+  std::optional<Vec2> best_px, from = project(left_normalised, 0);
+  for (int piece = 1; piece <= kPieces; ++piece) {
+    const auto to = project(left_normalised, piece / (kPieces * options_.min_depth_m));
+    if (from && to) {
+      const int steps = std::clamp(static_cast<int>((*to - *from).norm() / scale) + 1, 1, 64);
+      for (int i = 0; i < steps; ++i) {
+        const Vec2 px = *from + (*to - *from) * (static_cast<double>(i) / steps);
+        const float correlation = klt_correlation(patch, right_.level(l), px / scale);
+        if (correlation > best) best = correlation, best_px = px;
+      }
+    }
+    from = to;
+  }
+  return best_px;
+}
+
+std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px, const Vec2& left_normalised) {
+  static const KltOptions klt;
+  if (!patch_.cut(left_, left_px, 0, std::min(kSearchLevel, left_.levels() - 1))) return std::nullopt;
+  const auto start = search(left_normalised);
+  if (!start) return std::nullopt;
+  const KltResult found = klt_align(patch_, right_, *start, 1, 0, klt);
+  if (!found.ok() || !rig_.right.inside(found.px, 2)) return std::nullopt;
+  const auto right = rig_.right.undistort(found.px);
+  if (!right) return std::nullopt;
+  // Distance from the epipolar line; then seen x (far + rho * p) = 0, least squares over the three rows.
+  const Vec3 far = R_rl_ * left_normalised.homogeneous(), seen = right->homogeneous();
+  const Vec3 line = p_rl_.cross(far);
+  const double across = line.head<2>().norm();
+  if (!(across > 0) || std::abs(seen.dot(line)) / across * focal_px_ > options_.epipolar_px) return std::nullopt;
+  const Vec3 a = seen.cross(p_rl_), b = seen.cross(far);
+  const double rho = -a.dot(b) / a.squaredNorm(), rho_per_px = 1 / (focal_px_ * baseline_m_);
+  if (rho < -kInfinity_px * rho_per_px || rho > 1.1 / options_.min_depth_m) return std::nullopt;
+  return Stereo{std::max(rho, 0.0), options_.disparity_px * rho_per_px};
+}
+
+}  // namespace fbvins

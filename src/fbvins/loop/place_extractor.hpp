@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keyframe images -> Place: ORB features of the left image, each searched along its epipolar curve in the right one
+// and refined by Lucas-Kanade (cheaper and finer than matching the features of two images). Buffers are reused; one
+// instance, one thread.
+//
+//   PlaceExtractor extractor(rig, {}, vocabulary);
+//   Place place = extractor.extract(keyframe.images, keyframe.T_WB.R());
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/features/descriptor_stage.hpp"
+#include "fbvins/features/klt.hpp"
+#include "fbvins/features/orb.hpp"
+#include "fbvins/loop/place.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+struct PlaceExtractorOptions {
+  OrbOptions orb{.max_features = 500, .levels = 6};
+  double min_depth_m = 0.4;
+  double min_search_correlation = 0.7;
+  double epipolar_px = 1.0;
+  double keypoint_px = 0.7;
+  double disparity_px = 0.25;
+
+  template <class V>
+  void visit(V&& v) {
+    v.group("orb", orb, "features of a keyframe");
+    v("min_depth_m", min_depth_m, "m", "nearest point searched for in the right image", 0.05, 10.0);
+    v("min_search_correlation", min_search_correlation, "", "correlation along the epipolar curve", 0.0, 1.0);
+    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar curve after refinement", 0.1, 10.0);
+    v("keypoint_px", keypoint_px, "px", "standard deviation of a keypoint, times the scale of its level", 0.05, 10.0);
+    v("disparity_px", disparity_px, "px", "standard deviation of a disparity", 0.02, 10.0);
+  }
+};
+
+class PlaceExtractor {
+ public:
+  /// `stage` may replace the descriptors (boosted ones need their own vocabulary).
+  PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
+                 std::unique_ptr<DescriptorStage> stage = make_identity_stage());
+
+  /// Empty when the left image is missing; without depth when the right one is.
+  Place extract(const StereoFrame& images, const Mat3& R_WB);
+
+ private:
+  struct Stereo {
+    double inverse_depth;
+    double sigma;
+  };
+  std::optional<Stereo> stereo(const Vec2& left_px, const Vec2& left_normalised);
+  std::optional<Vec2> search(const Vec2& left_normalised) const;
+  std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
+
+  StereoRig rig_;
+  PlaceExtractorOptions options_;
+  Vocabulary vocabulary_;
+  std::unique_ptr<DescriptorStage> stage_;
+  Mat3 R_rl_;
+  Vec3 p_rl_;
+  double focal_px_, baseline_m_;
+  OrbExtractor orb_;
+  OrbFeatures found_;
+  Pyramid left_, right_;
+  KltTemplate patch_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/place_pose.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "fbvins/loop/p3p.hpp"
+
+namespace fbvins {
+namespace {
+
+const PlaceFeature& at(const Place& place, int i) { return place.features[static_cast<std::size_t>(i)]; }
+
+/// Residual of one match in (x, y, inverse depth) of the query (L4): 3 rows, or 2 where the query has no depth.
+struct MatchTerm {
+  Vec3 r = Vec3::Zero();
+  Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
+  Mat3 information = Mat3::Zero();  ///< zero where a row does not exist
+  double chi2 = 0;
+};
+
+/// False when the point is behind the query's camera.
+bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const Vec3& t, MatchTerm& term) {
+  const Vec3 p_c = c.p_C0(), p = R * p_c + t;
+  if (!(p.z() > 0.05)) return false;
+  const double iz = 1 / p.z();
+  Mat3 J_p;  // d(x, y, inverse depth)/d(point)
+  J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz, 0, 0, -iz * iz;
+  term.r = Vec3(p.x() * iz - q.x, p.y() * iz - q.y, iz - q.inverse_depth);
+  term.J.leftCols<3>() = J_p;
+  term.J.rightCols<3>() = -J_p * R * hat(p_c);
+  // The candidate's own errors, carried into the query's view: p_c = (x, y, 1) / rho.
+  const double d = 1 / static_cast<double>(c.inverse_depth);
+  Mat3 J_c;
+  J_c << d, 0, -p_c.x() * d, 0, d, -p_c.y() * d, 0, 0, -d * d;
+  const Mat3 A = J_p * R * J_c;
+  const double sxy2 = static_cast<double>(c.sigma_xy) * c.sigma_xy, srho2 = static_cast<double>(c.sigma_inverse_depth) * c.sigma_inverse_depth;
+  Mat3 S = A * Vec3(sxy2, sxy2, srho2).asDiagonal() * A.transpose();
+  const double qxy2 = static_cast<double>(q.sigma_xy) * q.sigma_xy;
+  S(0, 0) += qxy2, S(1, 1) += qxy2;
+  term.information.setZero();
+  if (q.has_depth()) {
+    S(2, 2) += static_cast<double>(q.sigma_inverse_depth) * q.sigma_inverse_depth;
+    term.information = S.inverse();
+  } else {
+    term.r.z() = 0;
+    term.information.topLeftCorner<2, 2>() = S.topLeftCorner<2, 2>().inverse().eval();
+  }
+  term.chi2 = term.r.dot(term.information * term.r);
+  return true;
+}
+
+double chi2_gate(const PlaceFeature& q, double sigma) { return sigma * sigma * (q.has_depth() ? 1.25 : 1.0); }
+
+struct Sampler {
+  const Place& query;
+  const Place& candidate;
+  std::vector<DescriptorMatch> usable;  // the candidate's side is a point
+
+  int score(const Mat3& R, const Vec3& t, double inlier_px) const {
+    int n = 0;
+    for (const DescriptorMatch& m : usable) {
+      const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
+      const Vec3 p = R * c.p_C0() + t;
+      if (!(p.z() > 0.05)) continue;
+      const double dx = p.x() / p.z() - q.x, dy = p.y() / p.z() - q.y;
+      const double limit = inlier_px / query.focal_px * std::max(1.0, 0.5 * (1 + q.sigma_xy / (0.7 / query.focal_px)));
+      n += dx * dx + dy * dy < limit * limit;
+    }
+    return n;
+  }
+};
+
+}  // namespace
+
+double tilt_error_rad(const Place& query, const Place& candidate, const Mat3& R_qc) {
+  const Vec3 carried = R_qc * candidate.up_C0;
+  return std::atan2(carried.cross(query.up_C0).norm(), carried.dot(query.up_C0));
+}
+
+std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate,
+                                            std::span<const DescriptorMatch> matches, const PlacePoseOptions& options, Rng& rng) {
+  Sampler sampler{query, candidate, {}};
+  for (const DescriptorMatch& m : matches)
+    if (at(candidate, m.b).has_point()) sampler.usable.push_back(m);
+  const auto n = static_cast<std::uint32_t>(sampler.usable.size());
+  if (n < 6) return std::nullopt;
+  const double max_tilt = options.max_tilt_deg * std::numbers::pi / 180;
+  std::optional<CameraFromCamera> best;
+  int best_score = 5, needed = options.max_iterations;
+  for (int i = 0; i < needed; ++i) {
+    std::array<Vec3, 3> rays, points;
+    std::uint32_t pick[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      pick[k] = rng.below(n);
+      const DescriptorMatch& m = sampler.usable[pick[k]];
+      rays[k] = at(query, m.a).xy().homogeneous();
+      points[k] = at(candidate, m.b).p_C0();
+    }
+    if (pick[0] == pick[1] || pick[0] == pick[2] || pick[1] == pick[2]) continue;
+    for (const auto& [R, t] : solve_p3p(rays, points)) {
+      if (tilt_error_rad(query, candidate, R) > max_tilt) continue;  // before the costly count
+      const int score = sampler.score(R, t, options.inlier_px);
+      if (score <= best_score) continue;
+      best_score = score;
+      best = CameraFromCamera(R, t);
+      const double w = static_cast<double>(score) / n;
+      const double log_miss = std::log(std::max(1e-12, 1 - w * w * w));
+      needed = std::min(options.max_iterations, static_cast<int>(std::log(1e-4) / log_miss) + 1);
+    }
+  }
+  return best;
+}
+
+RelativePose refine_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,
+                         const CameraFromCamera& start, const PlacePoseOptions& options) {
+  constexpr int kIterations = 8;
+  constexpr double kHuber = 2.0;
+  RelativePose out;
+  out.T_qc = start;
+  MatchTerm term;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const Mat3 R = out.T_qc.R();
+    Mat6 H = Mat6::Zero();
+    Vec6 b = Vec6::Zero();
+    for (const DescriptorMatch& m : matches) {
+      const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
+      if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
+      const double s = std::sqrt(term.chi2);
+      const double weight = s <= kHuber ? 1 : (s > 10 ? 0 : kHuber / s);
+      const Eigen::Matrix<double, 6, 3> JtW = weight * term.J.transpose() * term.information;
+      H += JtW * term.J;
+      b -= JtW * term.r;
+    }
+    H.diagonal().array() += 1e-6;
+    const Vec6 step = H.ldlt().solve(b);
+    if (!step.allFinite() || step.norm() > 5) return out;
+    out.T_qc = out.T_qc.boxplus(step.head<3>(), step.tail<3>());
+    if (step.norm() < 1e-6) break;
+  }
+  const Mat3 R = out.T_qc.R();
+  for (const DescriptorMatch& m : matches) {
+    const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
+    if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
+    if (term.chi2 > chi2_gate(q, options.outlier_sigma)) continue;
+    out.inliers.push_back(m);
+    out.with_depth_both += q.has_depth();
+    out.information += term.J.transpose() * term.information * term.J;
+  }
+  return out;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/vocabulary_file.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace fbvins {
+
+std::string shipped_vocabulary() {
+  if (const char* chosen = std::getenv("FBVINS_VOCABULARY"); chosen != nullptr && *chosen != '\0') return chosen;
+  const std::string name = "/orb_vocabulary.fbv", installed = FBVINS_INSTALLED_DATA + name;
+  std::error_code ignored;
+  return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
+}
+
+}  // namespace fbvins
