@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/progress.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/yaml.hpp"
+#include "fbvins/core/options.hpp"
+#include "fbvins/io/output_file.hpp"
+#include "fbvins/sim/euroc_writer.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples = R"(Writes a EuRoC folder with images, IMU and exact truth, and simulation.yaml (the effective options).
+The same options and seed give the same bytes.
+
+examples:
+  fbvins simulate --out flight                      30 s of the preset 'normal'
+  fbvins simulate fast --seed 7 --seconds 60 --out fast7
+  fbvins simulate normal --set camera.line_delay_us=30 --set world.kind=hall --out rolling
+  fbvins simulate --trajectory MH_01.csv --imu imu0.csv --out again     a real flight and its real IMU
+  fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
+)";
+
+struct Arguments {
+  std::string preset = "normal", config, out, trajectory, imu;
+  std::vector<std::string> assignments;
+  int seed = -1, max_images = 0;
+  double seconds = 0;
+  bool options = false, depth = false, landmarks = false, quiet = false;
+};
+
+Result<SimulationOptions> options_of(const Arguments& arguments) {
+  Result<SimulationOptions> options = simulation_preset(arguments.preset);
+  if (!options) return options;
+  const std::vector<OptionField> fields = fields_of(*options);
+  if (!arguments.config.empty())
+    if (Result<void> read = read_yaml_file(arguments.config, fields); !read) return read.error();
+  if (arguments.seed >= 0) options->seed = arguments.seed;
+  if (arguments.seconds > 0) options->flight.duration_s = arguments.seconds;
+  else if (!arguments.trajectory.empty()) options->flight.duration_s = 3600;
+  if (!arguments.trajectory.empty()) options->recorded.trajectory = arguments.trajectory;
+  if (!arguments.imu.empty()) options->recorded.imu = arguments.imu;
+  for (const std::string& assignment : arguments.assignments)
+    if (Result<void> set = set_option(fields, assignment); !set) return set.error();
+  if (Result<void> valid = validate(*options); !valid) return valid.error();
+  return *options;
+}
+
+Result<void> write_options(SimulationOptions options, const std::string& folder) {
+  Result<OutputFile> file = OutputFile::create(folder + "/simulation.yaml");
+  if (!file) return file.error();
+  file->write(write_yaml(fields_of(options)));
+  return file->close();
+}
+
+int simulate_flight(const Arguments& arguments) {
+  Result<SimulationOptions> options = options_of(arguments);
+  if (!options) return fail(options.error().message);
+  if (arguments.options) {
+    fmt::print("{}", write_yaml(fields_of(*options)));
+    return kOk;
+  }
+  if (arguments.out.empty()) return fail("--out FOLDER is needed");
+  Result<Simulation> simulation = prepare_simulation(*options);
+  if (!simulation) return fail(simulation.error().message);
+
+  const EurocWriterOptions writer{arguments.depth, arguments.landmarks, arguments.max_images};
+  Progress progress(static_cast<int>(simulation->frames.size()), arguments.quiet);
+  const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
+  if (!written) return fail(written.error().message);
+  if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
+  if (!arguments.quiet) fmt::print("{} stereo frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(), bold(arguments.out));
+  return kOk;
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("simulate", "draw a made-up recording with exact truth");
+  command->footer(kExamples);
+  command->add_option("PRESET", arguments->preset, "what it is like (default normal)")->check(CLI::IsMember(simulation_presets()));
+  command->add_option("--out", arguments->out, "folder for the recording");
+  command->add_option("--seed", arguments->seed, "of world, flight and noise")->check(CLI::NonNegativeNumber);
+  command->add_option("--seconds", arguments->seconds, "length of the flight")->check(CLI::PositiveNumber);
+  command->add_option("--config", arguments->config, "YAML file that changes the preset");
+  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
+  command->add_option("--trajectory", arguments->trajectory, "fly along a recorded trajectory (TUM or EuRoC)");
+  command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU, used untouched (EuRoC CSV)");
+  command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")->check(CLI::NonNegativeNumber);
+  command->add_flag("--depth", arguments->depth, "left depth images in millimetres, too");
+  command->add_flag("--landmarks", arguments->landmarks, "corners of the world, too");
+  command->add_flag("--options", arguments->options, "print the effective options and stop");
+  command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
+  command->callback([arguments, &exit_code] { exit_code = simulate_flight(*arguments); });
+}
+
+}  // namespace fbvins::app

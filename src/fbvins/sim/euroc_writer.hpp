@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes a simulation as a EuRoC folder that any VIO program can read. One thread calls.
+//
+//   Result<void> done = write_euroc(simulation, "out/flight", {}, [](int done, int all) { ... });
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "fbvins/sim/simulation.hpp"
+
+namespace fbvins {
+
+struct EurocWriterOptions {
+  bool depth = false;      ///< left depth images, 16-bit PNG in millimetres, as mav0/depth0
+  bool landmarks = false;  ///< corners of the world's facets, as mav0/landmarks.csv
+  int max_frames = 0;      ///< 0: all
+};
+
+/// Folder/mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}; the folder is made, and must not hold a mav0.
+Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
+                         const std::function<void(int done, int all)>& progress);
+
+/// Fast PNG: one filter, lowest compression. 8-bit grey, or 16-bit where `deep` is given.
+std::string encode_png(const Image& image);
+std::string encode_png16(const std::vector<std::uint16_t>& values, int width, int height);
+
+}  // namespace fbvins

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/sim/flight_recorder.hpp"
+
+#include <future>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Van der Corput numbers to two bases: points that fill the pixel evenly, whatever their count.
+Vec2 place_in_pixel(int i) {
+  const auto radical = [](int n, int base) {
+    double value = 0, share = 1.0 / base;
+    for (; n > 0; n /= base, share /= base) value += share * (n % base);
+    return value;
+  };
+  return {radical(i + 1, 2) - 0.5, radical(i + 1, 3) - 0.5};
+}
+
+}  // namespace
+
+FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, const SplineTrajectory& flight,
+                               const Vec3& world_from_flight, std::shared_ptr<const World> world)
+    : options_(options), flight_(flight), world_from_flight_(world_from_flight), world_(std::move(world)),
+      bake_(bake_light(*world_, options.world.ambient)), left_{Renderer(rig.left, *world_), ImageSensor(options.camera, rig.left, 1.0, static_cast<std::uint64_t>(options.seed) * 2), rig.T_BC0, {}, {}, {}, false},
+      right_{Renderer(rig.right, *world_), ImageSensor(options.camera, rig.right, options.camera.right_gain, static_cast<std::uint64_t>(options.seed) * 2 + 1),
+             rig.T_BC1.cast_frames<B, C0>(), {}, {}, {}, false} {}
+
+/// Sums the radiance over an exposure that is centred at t.
+void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples) {
+  eye.renderer.begin();
+  const double ambient = options_.world.ambient, line_s = options_.camera.line_delay_us * 1e-6;
+  for (int i = 0; i < samples; ++i) {
+    // The middle line is the one that is read at t.
+    const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
+    const double first_line = t - 0.5 * line_s * 480;
+    const MotionState m = flight_.at(line_s > 0 ? first_line : t);
+    Pose<W, C0> T_WC = m.T_WB * eye.T_BC;
+    T_WC.p += world_from_flight_;
+    const LightState lamps = light_at(options_.light, *world_, t, static_cast<std::uint64_t>(options_.seed));
+    eye.facets = world_->facets;
+    for (Facet& f : eye.facets)
+      if (f.lamp_group >= 0) f.emission *= static_cast<float>(lamps.group[static_cast<std::size_t>(f.lamp_group)]);
+    append_movers(*world_, t, T_WC.p, eye.facets);
+    mix_light(bake_, *world_, eye.facets, lamps, ambient, eye.light);
+    Instant instant;
+    instant.q_WC = T_WC.q;
+    instant.p_WC = T_WC.p;
+    instant.w_WC_C = eye.T_BC.q.conjugate() * m.w_WB_B;
+    instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(eye.T_BC.p);
+    instant.line_s = line_s;
+    instant.shift_px = place_in_pixel(i);
+    eye.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
+  }
+  eye.renderer.radiance(eye.radiance);
+}
+
+Image FlightRecorder::draw_eye(Eye& eye, double t_s, std::int64_t frame) {
+  if (!eye.settled) {
+    gather(eye, t_s, 0, 1);
+    eye.sensor.settle(eye.radiance);
+    eye.settled = true;
+  }
+  gather(eye, t_s, eye.sensor.exposure_s(), options_.camera.time_samples);
+  return eye.sensor.expose(eye.radiance, frame);
+}
+
+DrawnFrame FlightRecorder::draw(double t_s, std::int64_t frame, bool with_depth) {
+  DrawnFrame drawn;
+  drawn.exposure_s = left_.sensor.exposure_s();
+  auto right = std::async(std::launch::async, [&] { return draw_eye(right_, t_s, frame); });
+  drawn.frame.left = std::make_shared<const Image>(draw_eye(left_, t_s, frame));
+  if (with_depth) left_.renderer.depth(drawn.depth_left_m);
+  drawn.frame.right = std::make_shared<const Image>(right.get());
+  return drawn;
+}
+
+Duration FlightRecorder::right_jitter(std::int64_t frame) const {
+  Rng rng(static_cast<std::uint64_t>(options_.seed), 1000 + static_cast<std::uint64_t>(frame));
+  return Duration::from_seconds(1e-6 * options_.camera.stamp_jitter_us * rng.normal());
+}
+
+}  // namespace fbvins

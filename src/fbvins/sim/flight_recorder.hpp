@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The two cameras on their flight: draws a stereo frame, left and right on a thread each.
+// One thread calls; frames in order.
+#pragma once
+
+#include "fbvins/sim/renderer.hpp"
+#include "fbvins/sim/simulation.hpp"
+
+namespace fbvins {
+
+class FlightRecorder {
+ public:
+  FlightRecorder(const SimulationOptions& options, const StereoRig& rig, const SplineTrajectory& flight,
+                 const Vec3& world_from_flight, std::shared_ptr<const World> world);
+
+  /// t_s: of the images, from the start of the flight.
+  DrawnFrame draw(double t_s, std::int64_t frame, bool with_depth);
+  /// By how much the right image's stamp is off.
+  Duration right_jitter(std::int64_t frame) const;
+
+ private:
+  struct Eye {
+    Renderer renderer;
+    ImageSensor sensor;
+    Pose<B, C0> T_BC;  ///< for both eyes: C0 stands for this eye's camera
+    std::vector<float> radiance;
+    MixedLight light;
+    std::vector<Facet> facets;
+    bool settled = false;
+  };
+  void gather(Eye& eye, double t_s, double exposure_s, int samples);
+  Image draw_eye(Eye& eye, double t_s, std::int64_t frame);
+
+  SimulationOptions options_;
+  SplineTrajectory flight_;
+  Vec3 world_from_flight_;
+  std::shared_ptr<const World> world_;
+  LightBake bake_;
+  Eye left_, right_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/sim/image_sensor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/core/simd.hpp"
+
+namespace fbvins {
+namespace {
+
+/// A number for each (pixel, seed), mixed as in "lowbias32".
+inline std::uint32_t mix(std::uint32_t x) {
+  x ^= x >> 16;
+  x *= 0x7feb352dU;
+  x ^= x >> 15;
+  x *= 0x846ca68bU;
+  return x ^ x >> 16;
+}
+
+/// Grey values with noise: the sum of eight bytes is normal enough.
+FBVINS_KERNEL void digitise(const float* light, int count, float shot, float read2, float black, std::uint32_t key, std::uint8_t* out) {
+  for (int i = 0; i < count; ++i) {
+    const std::uint32_t a = mix(static_cast<std::uint32_t>(i) * 2u + key), b = mix(static_cast<std::uint32_t>(i) * 2u + 1u + key);
+    const std::uint32_t pairs = (a & 0x00ff00ffu) + (a >> 8 & 0x00ff00ffu) + (b & 0x00ff00ffu) + (b >> 8 & 0x00ff00ffu);
+    const std::int32_t sum = static_cast<std::int32_t>((pairs & 0xffffu) + (pairs >> 16)) - 1020;
+    const float normal = static_cast<float>(sum) * (1.0f / 209.0f);  // sqrt(8 * (256^2 - 1) / 12)
+    const float value = light[i] > 0 ? light[i] : 0.0f;
+    const float noisy = value + black + normal * std::sqrt(read2 + shot * value) + 0.5f;
+    const float clamped = noisy < 0 ? 0.0f : noisy > 255.0f ? 255.0f : noisy;
+    out[i] = static_cast<std::uint8_t>(static_cast<std::int32_t>(clamped));
+  }
+}
+
+FBVINS_KERNEL void blur_row(const float* in, float* out, int count, float w0, float w1, float w2, std::ptrdiff_t step) {
+  for (int i = 0; i < count; ++i)
+    out[i] = w0 * in[i] + w1 * (in[i - step] + in[i + step]) + w2 * (in[i - 2 * step] + in[i + 2 * step]);
+}
+
+}  // namespace
+
+ImageSensor::ImageSensor(const CameraModelOptions& options, const Camera& camera, double brightness, std::uint64_t seed)
+    : options_(options), width_(camera.width()), height_(camera.height()), brightness_(brightness), seed_(seed),
+      exposure_ms_(options.max_exposure_ms), log_product_(std::log(options.max_exposure_ms)) {
+  falloff_.resize(static_cast<std::size_t>(width_) * height_);
+  for (int y = 0; y < height_; ++y)
+    for (int x = 0; x < width_; ++x) {
+      const double r2 = camera.undistort(Vec2(x, y)).value_or(Vec2::Zero()).squaredNorm();
+      // 1 on the axis, 1 - vignetting at 45 degrees.
+      falloff_[static_cast<std::size_t>(y) * width_ + x] = static_cast<float>(1 / (1 + r2 * options.vignetting / (1 - options.vignetting)));
+    }
+}
+
+void ImageSensor::follow(double mean_radiance, double share) {
+  if (!options_.auto_exposure) return;
+  const double lowest = std::log(options_.min_exposure_ms), highest = std::log(options_.max_exposure_ms * options_.max_gain);
+  const double wanted = std::log(options_.target_level / (options_.sensitivity * std::max(mean_radiance, 1e-6)));
+  log_product_ = std::clamp(log_product_ + share * (wanted - log_product_), lowest, highest);
+  const double product = std::exp(log_product_);
+  exposure_ms_ = std::min(product, options_.max_exposure_ms);
+  gain_ = product / exposure_ms_;
+}
+
+void ImageSensor::settle(const std::vector<float>& radiance) {
+  double sum = 0;
+  const double white = 3.0;  // what is much brighter saturates and counts no more
+  for (std::size_t i = 0; i < radiance.size(); ++i) sum += std::min<double>(white, radiance[i] * falloff_[i]);
+  follow(brightness_ * sum / static_cast<double>(radiance.size()), 1.0);
+}
+
+Image ImageSensor::expose(std::vector<float>& radiance, std::int64_t frame) {
+  if (options_.glare > 0) add_glare(radiance);
+  const float scale = static_cast<float>(options_.sensitivity * exposure_ms_ * gain_ * brightness_);
+  for (std::size_t i = 0; i < radiance.size(); ++i) radiance[i] *= scale * falloff_[i];
+  if (options_.blur_px > 0) blur(radiance);
+  double sum = 0;
+  for (float v : radiance) sum += std::min(v, 255.0f);
+  const double mean = std::max(1.0, sum / static_cast<double>(radiance.size()));
+
+  Image image(width_, height_);
+  const float read = static_cast<float>(options_.read_noise * gain_);
+  const std::uint32_t key = mix(static_cast<std::uint32_t>(seed_ ^ seed_ >> 32) + mix(static_cast<std::uint32_t>(frame) + 0x9e3779b9u));
+  digitise(radiance.data(), width_ * height_, static_cast<float>(options_.shot_noise * gain_), read * read, static_cast<float>(options_.black_level), key, image.row(0));
+  follow(mean / (options_.sensitivity * exposure_ms_ * gain_), 1 - std::exp(-1 / std::max(options_.exposure_lag_frames, 1e-3)));
+  return image;
+}
+
+/// Separable Gaussian of five taps.
+void ImageSensor::blur(std::vector<float>& image) {
+  const double s2 = 2 * options_.blur_px * options_.blur_px;
+  const double e1 = std::exp(-1 / s2), e2 = std::exp(-4 / s2), total = 1 + 2 * e1 + 2 * e2;
+  const float w0 = static_cast<float>(1 / total), w1 = static_cast<float>(e1 / total), w2 = static_cast<float>(e2 / total);
+  rows_.assign(static_cast<std::size_t>(width_ + 4) * static_cast<std::size_t>(height_ + 4), 0);
+  const int stride = width_ + 4;
+  std::vector<float> padded(static_cast<std::size_t>(stride));
+  for (int y = -2; y < height_ + 2; ++y) {
+    const float* row = image.data() + static_cast<std::ptrdiff_t>(std::clamp(y, 0, height_ - 1)) * width_;
+    std::copy_n(row, width_, padded.begin() + 2);
+    padded[0] = padded[1] = row[0];
+    padded[static_cast<std::size_t>(stride) - 1] = padded[static_cast<std::size_t>(stride) - 2] = row[width_ - 1];
+    blur_row(padded.data() + 2, rows_.data() + static_cast<std::ptrdiff_t>(y + 2) * stride, width_, w0, w1, w2, 1);
+  }
+  for (int y = 0; y < height_; ++y)
+    blur_row(rows_.data() + static_cast<std::ptrdiff_t>(y + 2) * stride, image.data() + static_cast<std::ptrdiff_t>(y) * width_, width_, w0, w1, w2, stride);
+}
+
+/// Scatters a share of the light widely: box means of two sizes, computed on blocks of 16 pixels.
+void ImageSensor::add_glare(std::vector<float>& image) const {
+  constexpr int kBlock = 16;
+  const int nx = (width_ + kBlock - 1) / kBlock, ny = (height_ + kBlock - 1) / kBlock;
+  std::vector<float> blocks(static_cast<std::size_t>(nx * ny), 0), counts(blocks.size(), 0);
+  double total = 0;
+  for (int y = 0; y < height_; ++y)
+    for (int x = 0; x < width_; ++x) {
+      const float v = image[static_cast<std::size_t>(y) * width_ + x];
+      blocks[static_cast<std::size_t>(y / kBlock * nx + x / kBlock)] += v;
+      counts[static_cast<std::size_t>(y / kBlock * nx + x / kBlock)] += 1;
+      total += v;
+    }
+  for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] /= counts[i];
+  for (int pass = 0; pass < 3; ++pass) {
+    const std::vector<float> old = blocks;
+    for (int y = 0; y < ny; ++y)
+      for (int x = 0; x < nx; ++x) {
+        float sum = 0;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx) sum += old[static_cast<std::size_t>(std::clamp(y + dy, 0, ny - 1) * nx + std::clamp(x + dx, 0, nx - 1))];
+        blocks[static_cast<std::size_t>(y * nx + x)] = sum / 9;
+      }
+  }
+  const float share = static_cast<float>(options_.glare), everywhere = static_cast<float>(total / static_cast<double>(image.size()));
+  for (int y = 0; y < height_; ++y)
+    for (int x = 0; x < width_; ++x) {
+      const float fx = (static_cast<float>(x) + 0.5f) / kBlock - 0.5f, fy = (static_cast<float>(y) + 0.5f) / kBlock - 0.5f;
+      const int ix = std::clamp(static_cast<int>(std::floor(fx)), 0, nx - 2), iy = std::clamp(static_cast<int>(std::floor(fy)), 0, ny - 2);
+      const float u = std::clamp(fx - static_cast<float>(ix), 0.0f, 1.0f), v = std::clamp(fy - static_cast<float>(iy), 0.0f, 1.0f);
+      const float* b = &blocks[static_cast<std::size_t>(iy * nx + ix)];
+      const float near = (1 - v) * ((1 - u) * b[0] + u * b[1]) + v * ((1 - u) * b[nx] + u * b[nx + 1]);
+      float& p = image[static_cast<std::size_t>(y) * width_ + x];
+      p = (1 - share) * p + share * (0.6f * near + 0.4f * everywhere);
+    }
+}
+
+}  // namespace fbvins

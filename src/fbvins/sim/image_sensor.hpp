@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// From light to grey values: exposure control with its lag, lens blur and vignetting, veiling glare,
+// shot and read noise, gain, saturation. One ImageSensor a camera; images in order of time.
+//
+//   ImageSensor sensor(options, camera, factor, seed);
+//   double exposure_s = sensor.exposure_s();      // draw the radiance of that long
+//   Image image = sensor.expose(radiance, frame);
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+struct CameraModelOptions {
+  int time_samples = 4;
+  double line_delay_us = 0;
+  bool auto_exposure = true;
+  double target_level = 95;
+  double exposure_lag_frames = 8;
+  double min_exposure_ms = 0.3;
+  double max_exposure_ms = 5;
+  double max_gain = 6;
+  double sensitivity = 60;
+  double shot_noise = 0.012;
+  double read_noise = 0.9;
+  double black_level = 0;
+  double blur_px = 0.6;
+  double vignetting = 0.35;
+  double glare = 0.02;
+  double right_gain = 0.94;
+  double stamp_jitter_us = 20;
+  double drop_share = 0;
+  double time_offset_ms = 0;
+
+  template <class V>
+  void visit(V&& v) {
+    v("time_samples", time_samples, "", "instants drawn and summed over the exposure; they also antialias", 1, 64);
+    v("line_delay_us", line_delay_us, "us", "rolling shutter: time from line to line, 0 for a global shutter", 0.0, 200.0);
+    v("auto_exposure", auto_exposure, "", "exposure follows the images' mean level");
+    v("target_level", target_level, "", "mean grey value that the exposure aims at", 5.0, 250.0);
+    v("exposure_lag_frames", exposure_lag_frames, "", "frames until an exposure error has fallen to 1/e", 0.0, 200.0);
+    v("min_exposure_ms", min_exposure_ms, "ms", "shortest exposure", 0.01, 50.0);
+    v("max_exposure_ms", max_exposure_ms, "ms", "longest exposure; beyond it gain goes up", 0.01, 50.0);
+    v("max_gain", max_gain, "", "largest gain; the smallest is 1", 1.0, 100.0);
+    v("sensitivity", sensitivity, "1/ms", "grey value of radiance 1 after one millisecond at gain 1", 0.1, 10000.0);
+    v("shot_noise", shot_noise, "", "variance of the grey value per grey value and gain", 0.0, 5.0);
+    v("read_noise", read_noise, "", "standard deviation in grey values at gain 1", 0.0, 50.0);
+    v("black_level", black_level, "", "grey value of darkness", 0.0, 100.0);
+    v("blur_px", blur_px, "px", "standard deviation of the lens' blur", 0.0, 5.0);
+    v("vignetting", vignetting, "", "light lost at 45 degrees from the axis", 0.0, 0.95);
+    v("glare", glare, "", "share of the light that the lens scatters over the image", 0.0, 0.9);
+    v("right_gain", right_gain, "", "the right camera's brightness, relative to the left's", 0.1, 10.0);
+    v("stamp_jitter_us", stamp_jitter_us, "us", "standard deviation of the right image's stamp", 0.0, 2000.0);
+    v("drop_share", drop_share, "", "share of stereo frames that get lost", 0.0, 0.9);
+    v("time_offset_ms", time_offset_ms, "ms", "IMU stamp less image stamp of the same instant", -100.0, 100.0);
+  }
+};
+
+class ImageSensor {
+ public:
+  ImageSensor(const CameraModelOptions& options, const Camera& camera, double brightness, std::uint64_t seed);
+
+  /// Of the next image.
+  double exposure_s() const { return exposure_ms_ * 1e-3; }
+  double gain() const { return gain_; }
+  /// Sets the exposure as it would settle on a scene that looks like this.
+  void settle(const std::vector<float>& radiance);
+  /// Radiance, row by row, is changed in place. `frame` chooses the noise.
+  Image expose(std::vector<float>& radiance, std::int64_t frame);
+
+ private:
+  void blur(std::vector<float>& image);
+  void add_glare(std::vector<float>& image) const;
+  void follow(double mean_radiance, double share);
+
+  CameraModelOptions options_;
+  int width_, height_;
+  double brightness_;
+  std::uint64_t seed_;
+  double exposure_ms_, gain_ = 1, log_product_;
+  std::vector<float> falloff_, rows_;
+};
+
+}  // namespace fbvins

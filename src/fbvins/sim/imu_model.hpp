@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an IMU on a trajectory reads: white noise, biases that walk, scale and misalignment,
+// vibration, quantisation, saturation. Pure functions, any thread.
+//
+//   SimulatedImu imu = simulate_imu(flight, rig.imu_noise, options, start, seed);
+//   imu.samples, imu.truth   // one state and bias a sample
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/sim/spline.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+struct ImuModelOptions {
+  double noise_factor = 1.0;
+  double turn_on_gyro_bias_radps = 0.03;
+  double turn_on_accel_bias_mps2 = 0.1;
+  double scale_error = 0.0;
+  double misalignment_rad = 0.0;
+  double vibration_accel_mps2 = 0.25;
+  double vibration_gyro_radps = 0.01;
+  double gyro_range_radps = 17.4;
+  double accel_range_mps2 = 176.0;
+  double gyro_step_radps = 1.745e-4;
+  double accel_step_mps2 = 8.17e-3;
+
+  template <class V>
+  void visit(V&& v) {
+    v("noise_factor", noise_factor, "", "times the calibration's noise densities and random walks; 0: no noise", 0.0, 100.0);
+    v("turn_on_gyro_bias_radps", turn_on_gyro_bias_radps, "rad/s", "standard deviation of the bias at the start", 0.0, 1.0);
+    v("turn_on_accel_bias_mps2", turn_on_accel_bias_mps2, "m/s^2", "standard deviation of the bias at the start", 0.0, 5.0);
+    v("scale_error", scale_error, "", "standard deviation of each axis' scale, 0.001 is 0.1 %", 0.0, 0.1);
+    v("misalignment_rad", misalignment_rad, "rad", "standard deviation of each axis' direction", 0.0, 0.1);
+    v("vibration_accel_mps2", vibration_accel_mps2, "m/s^2", "rotors in flight: standard deviation on each axis", 0.0, 50.0);
+    v("vibration_gyro_radps", vibration_gyro_radps, "rad/s", "rotors in flight: standard deviation on each axis", 0.0, 5.0);
+    v("gyro_range_radps", gyro_range_radps, "rad/s", "readings saturate here", 0.1, 1000.0);
+    v("accel_range_mps2", accel_range_mps2, "m/s^2", "readings saturate here", 1.0, 10000.0);
+    v("gyro_step_radps", gyro_step_radps, "rad/s", "step of the digital reading, 0 for none", 0.0, 0.1);
+    v("accel_step_mps2", accel_step_mps2, "m/s^2", "step of the digital reading, 0 for none", 0.0, 1.0);
+  }
+};
+
+/// The truth at an instant, as EuRoC's ground truth has it.
+struct TrueState {
+  Time t;
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero();
+  ImuBias bias;
+};
+
+struct SimulatedImu {
+  std::vector<ImuSample> samples;
+  std::vector<TrueState> truth;
+};
+
+/// Samples at noise.rate_hz over the whole trajectory; the first is at `start`.
+SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise, const ImuModelOptions& options,
+                          Time start, std::uint64_t seed);
+
+}  // namespace fbvins

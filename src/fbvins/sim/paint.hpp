@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Painters of textures: each draws one kind of surface from random numbers alone. Pure functions.
+#pragma once
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/texture.hpp"
+
+namespace fbvins {
+
+enum class Surface {
+  plaster,    ///< nearly plain
+  concrete,
+  wood,
+  brick,
+  tiles,
+  carpet,
+  page,       ///< text and pictures
+  poster,     ///< shapes and large letters
+  picture,    ///< like a photograph: structure at all scales
+  cardboard,
+  metal,
+  books,
+  cloth,
+  panel,      ///< switches, lamps and labels of a machine
+  count
+};
+
+Canvas paint(Surface surface, Rng& rng);
+
+}  // namespace fbvins

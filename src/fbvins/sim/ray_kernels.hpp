@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The inner loops of the renderer, over the 64 rays of a tile. Plain loops over fixed lanes; no state.
+#pragma once
+
+#include <cstdint>
+
+namespace fbvins::rays {
+
+inline constexpr int kRays = 64;
+
+/// What 64 rays hit: inverse depth, numerators of the facet's coordinates, and who.
+struct Hits {
+  alignas(64) float w[kRays];
+  alignas(64) float u[kRays];
+  alignas(64) float v[kRays];
+  alignas(64) int id[kRays];
+};
+
+/// Keeps, for each ray (x, y, 1), the nearer of the hit so far and this facet's.
+void intersect(const float* x, const float* y, const float* m, const float* a, const float* b, int id, Hits& hits);
+
+/// u and v become coordinates in [0, 1].
+void divide(Hits& hits);
+
+/// How one facet looks.
+struct Look {
+  const std::uint32_t* texture;
+  const std::uint32_t* detail;
+  const std::uint32_t* light;
+  float repeat_u, repeat_v, shift_u, shift_v;
+  float lod_constant;  ///< level of detail at w = 1
+  float detail_repeat, detail_lod, detail_strength;
+  float light_x, light_y;  ///< cells
+  float brightness;        ///< of a white texel where the light's byte is 255
+  float emission;
+};
+
+/// Adds weight times the radiance of those rays that hit `id`.
+void shade(const Hits& hits, int id, const Look& look, float weight, float* sum);
+
+}  // namespace fbvins::rays

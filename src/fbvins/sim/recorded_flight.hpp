@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recorded trajectory made into one that can be flown again, alone or with its real IMU recording.
+// With the IMU, the trajectory counts below a crossover frequency and the IMU's own integral above it, so
+// that images drawn along the result and the untouched IMU agree. Pure functions but for reading files.
+#pragma once
+
+#include <string>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/sim/imu_model.hpp"
+
+namespace fbvins {
+
+struct RecordedFlight {
+  SplineTrajectory flight;
+  Time start;         ///< where the spline's time is 0
+  SimulatedImu imu;   ///< empty without a real IMU
+};
+
+/// From a trajectory alone: smoothed below `crossover_hz` * 3, made uniform.
+Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, double crossover_hz);
+
+/// With the IMU: one knot a sample; the biases are what turns the IMU's readings into the result.
+Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, const std::vector<ImuSample>& imu,
+                                 double crossover_hz);
+
+/// x that minimises sum |x_k - y_k|^2 + lambda * sum |(x_k-1 - 2 x_k + x_k+1) - c_k|^2: y below the
+/// frequency where lambda * (2 pi f dt)^4 = 1, the double sum of c above it, without any delay.
+std::vector<Vec3> blend_second_differences(const std::vector<Vec3>& y, const std::vector<Vec3>& c, double lambda);
+
+Result<std::vector<ImuSample>> read_imu_csv(const std::string& path);
+
+}  // namespace fbvins

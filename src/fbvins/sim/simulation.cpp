@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/sim/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/core/options.hpp"
+#include "fbvins/core/rng.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/sim/flight_recorder.hpp"
+#include "fbvins/sim/recorded_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr Time kStart{1'700'000'000'000'000'000};  ///< stamp of a made-up flight's first IMU sample
+constexpr double kMargin_s = 0.05;                 ///< IMU before the first and after the last image
+
+Result<StereoRig> rig_of(const SimulationOptions& o) {
+  StereoRig rig = euroc_rig();
+  if (!o.calibration.empty()) {
+    Result<StereoRig> loaded = load_kalibr(o.calibration);
+    if (!loaded) return loaded.error();
+    rig = *loaded;
+  }
+  rig.image_rate_hz = o.image_rate_hz;
+  rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
+  return rig;
+}
+
+Result<RecordedFlight> recorded_flight(const RecordedOptions& o, double duration_s) {
+  Result<TrajectoryFile> file = read_trajectory(o.trajectory);
+  if (!file) return file.error();
+  std::vector<TrajectoryPoint>& points = file->points;
+  if (points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: holds no pose", o.trajectory)};
+  const Time from = points.front().t + Duration::from_seconds(o.start_s), to = from + Duration::from_seconds(duration_s);
+  std::erase_if(points, [&](const TrajectoryPoint& p) { return p.t < from || p.t > to; });
+  if (o.imu.empty()) return fly_again(points, o.crossover_hz);
+  Result<std::vector<ImuSample>> imu = read_imu_csv(o.imu);
+  if (!imu) return imu.error();
+  return fly_again(points, *imu, o.crossover_hz);
+}
+
+/// Stamps of the images on the IMU's clock; lost frames are left out.
+std::vector<Time> frame_times(const SimulationOptions& o, Time start, double duration_s) {
+  Rng rng(static_cast<std::uint64_t>(o.seed), 61);
+  std::vector<Time> times;
+  for (int k = 0;; ++k) {
+    const double t = kMargin_s + k / o.image_rate_hz;
+    if (t > duration_s - kMargin_s) return times;
+    if (rng.uniform() >= o.camera.drop_share) times.push_back(start + Duration::from_seconds(t));
+  }
+}
+
+FloorPlan plan_for(const SimulationOptions& o, const std::vector<Vec3>& path) {
+  if (o.world.kind == "corridors") return corridor_ring(o.flight.extent_x_m, o.flight.extent_y_m, std::max(o.world.height_m, 2.6));
+  return room_around(path, o.world.margin_m, o.world.height_m);
+}
+
+std::vector<Vec3> path_of(const SplineTrajectory& flight) {
+  std::vector<Vec3> path;
+  for (double t = 0; t < flight.duration_s(); t += 0.1) path.push_back(flight.pose(t).p);
+  return path;
+}
+
+/// Draws frames for a Dataset.
+class DrawingLoader : public FrameLoader {
+ public:
+  DrawingLoader(Simulation simulation, Duration offset) : simulation_(std::move(simulation)), offset_(offset) {}
+
+  LoadedFrame load(const FrameEntry& entry) override {
+    const auto at = std::lower_bound(simulation_.frames.begin(), simulation_.frames.end(), entry.t + offset_);
+    LoadedFrame loaded;
+    loaded.frame = draw_frame(simulation_, static_cast<std::size_t>(at - simulation_.frames.begin())).frame;
+    return loaded;
+  }
+
+ private:
+  Simulation simulation_;
+  Duration offset_;
+};
+
+}  // namespace
+
+Result<Simulation> prepare_simulation(const SimulationOptions& o) {
+  if (Result<void> valid = validate(o); !valid) return valid.error();
+  const bool is_recorded = !o.recorded.trajectory.empty();
+  if (o.world.kind == "corridors" && (is_recorded || o.flight.kind != "tour"))
+    return Error{ErrorCode::invalid_argument, "world.kind=corridors needs flight.kind=tour: other flights would pass through walls"};
+  if (!is_recorded && !o.recorded.imu.empty())
+    return Error{ErrorCode::invalid_argument, "recorded.imu is given without recorded.trajectory"};
+  Result<StereoRig> rig = rig_of(o);
+  if (!rig) return rig.error();
+
+  Simulation s;
+  s.rig = *rig;
+  s.start = kStart;
+  const auto seed = static_cast<std::uint64_t>(o.seed);
+  if (is_recorded) {
+    Result<RecordedFlight> recorded = recorded_flight(o.recorded, o.flight.duration_s);
+    if (!recorded) return recorded.error();
+    s.flight = std::move(recorded->flight);
+    s.start = recorded->start;
+    s.imu = std::move(recorded->imu);
+  } else {
+    const FloorPlan plan = plan_for(o, {Vec3::Zero()});
+    s.flight = make_flight(o.flight, body_in_vehicle(s.rig, o.flight.camera_pitch_deg), plan.tour, seed);
+  }
+  if (s.imu.samples.empty()) s.imu = simulate_imu(s.flight, s.rig.imu_noise, o.imu, s.start, seed);
+  s.frames = frame_times(o, s.start, s.flight.duration_s());
+
+  // The floor is at z = 0; a recorded flight has its origin anywhere.
+  std::vector<Vec3> path = path_of(s.flight);
+  if (is_recorded) {
+    double lowest = path.front().z();
+    for (const Vec3& p : path) lowest = std::min(lowest, p.z());
+    s.world_from_flight = Vec3(0, 0, 0.5 - lowest);
+    for (Vec3& p : path) p += s.world_from_flight;
+  }
+  s.world = std::make_shared<const World>(build_world(o.world, plan_for(o, path), path, seed));
+  s.recorder = std::make_shared<FlightRecorder>(o, s.rig, s.flight, s.world_from_flight, s.world);
+  return s;
+}
+
+DrawnFrame draw_frame(Simulation& simulation, std::size_t index, bool with_depth) {
+  const Time t = simulation.frames[index];
+  const Duration offset = Duration::from_seconds(simulation.rig.time_offset_s);
+  DrawnFrame drawn = simulation.recorder->draw((t - simulation.start).seconds(), static_cast<std::int64_t>(index), with_depth);
+  drawn.frame.t = t - offset;
+  drawn.right_stamp = drawn.frame.t + simulation.recorder->right_jitter(static_cast<std::int64_t>(index));
+  return drawn;
+}
+
+DatasetContents contents_of(Simulation simulation, const std::string& name) {
+  DatasetContents contents;
+  const Duration offset = Duration::from_seconds(simulation.rig.time_offset_s);
+  contents.rig = simulation.rig;
+  contents.imu = simulation.imu.samples;
+  for (const TrueState& s : simulation.imu.truth) contents.ground_truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
+  for (Time t : simulation.frames) contents.frames.push_back({t - offset, "left", "right"});
+  DatasetInfo& info = contents.info;
+  info.name = name;
+  info.format = "simulation";
+  info.frames = info.left.listed = info.right.listed = static_cast<int>(contents.frames.size());
+  info.imu_samples = static_cast<int>(contents.imu.size());
+  info.ground_truth_poses = static_cast<int>(contents.ground_truth.size());
+  info.image_rate_hz = simulation.rig.image_rate_hz;
+  info.imu_rate_hz = simulation.rig.imu_noise.rate_hz;
+  if (!contents.frames.empty()) info.first_image = contents.frames.front().t, info.last_image = contents.frames.back().t;
+  if (!contents.imu.empty()) info.first_imu = contents.imu.front().t, info.last_imu = contents.imu.back().t;
+  contents.loader = std::make_unique<DrawingLoader>(std::move(simulation), offset);
+  return contents;
+}
+
+Result<DatasetContents> simulate(const SimulationOptions& options, const std::string& name) {
+  Result<Simulation> simulation = prepare_simulation(options);
+  if (!simulation) return simulation.error();
+  return contents_of(*std::move(simulation), name);
+}
+
+}  // namespace fbvins

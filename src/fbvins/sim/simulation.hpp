@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// A made-up recording with exact truth. Everything follows from the options and the seed.
+//
+//   Result<SimulationOptions> options = simulation_preset("normal");
+//   Result<DatasetContents> contents = simulate(*options);
+//   Dataset data(*std::move(contents), {});       // draws images as they are asked for
+//   while (auto event = data.next()) system.push(std::move(*event));
+//
+// simulate() is a pure function, but for reading a recorded flight's files; the Dataset is used as any other.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/sim/flight.hpp"
+#include "fbvins/sim/image_sensor.hpp"
+#include "fbvins/sim/imu_model.hpp"
+#include "fbvins/sim/lighting.hpp"
+#include "fbvins/sim/world.hpp"
+
+namespace fbvins {
+
+/// A flight that somebody has flown, in place of a made-up one.
+struct RecordedOptions {
+  std::string trajectory = "";
+  std::string imu = "";
+  double start_s = 0;
+  double crossover_hz = 1.0;
+
+  template <class V>
+  void visit(V&& v) {
+    v("trajectory", trajectory, "", "TUM or EuRoC trajectory file to fly along; empty: a made-up flight");
+    v("imu", imu, "", "its real IMU recording (EuRoC CSV), then used untouched");
+    v("start_s", start_s, "s", "left out at the start", 0.0, 1e6);
+    v("crossover_hz", crossover_hz, "Hz", "below it the trajectory counts, above it the IMU", 0.05, 20.0);
+  }
+};
+
+struct SimulationOptions {
+  int seed = 1;
+  double image_rate_hz = 20;
+  std::string calibration = "";
+  FlightOptions flight;
+  RecordedOptions recorded;
+  ImuModelOptions imu;
+  CameraModelOptions camera;
+  WorldOptions world;
+  LightOptions light;
+
+  template <class V>
+  void visit(V&& v) {
+    v("seed", seed, "", "of everything random", 0, 2'000'000'000);
+    v("image_rate_hz", image_rate_hz, "Hz", "stereo frames a second", 1.0, 200.0);
+    v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
+    v.group("flight", flight, "how the rig moves");
+    v.group("recorded", recorded, "a recorded flight instead");
+    v.group("imu", imu, "errors of the IMU");
+    v.group("camera", camera, "both cameras");
+    v.group("world", world, "the place");
+    v.group("light", light, "the lamps");
+  }
+};
+
+/// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and the
+/// flights handheld, takeoff, hover, tour in normal light.
+std::vector<std::string> simulation_presets();
+Result<SimulationOptions> simulation_preset(const std::string& name);
+
+/// The rig of EuRoC's calibration (figures, not files).
+StereoRig euroc_rig();
+
+/// A stereo frame with what only a simulator knows.
+struct DrawnFrame {
+  StereoFrame frame;
+  Time right_stamp;
+  double exposure_s = 0;
+  std::vector<float> depth_left_m;  ///< row by row, 0 where nothing is; filled on request
+};
+
+class FlightRecorder;
+
+/// A recording that is drawn frame by frame.
+struct Simulation {
+  StereoRig rig;
+  SplineTrajectory flight;
+  Time start;
+  SimulatedImu imu;
+  std::vector<Time> frames;         ///< of the images, on the IMU's clock
+  Vec3 world_from_flight = Vec3::Zero();  ///< added to the flight's positions: a recorded one has its origin anywhere
+  std::shared_ptr<const World> world;
+  std::shared_ptr<FlightRecorder> recorder;
+};
+
+Result<Simulation> prepare_simulation(const SimulationOptions& options);
+/// Draws a frame; frames in order (exposure follows the image before). Stamps on the cameras' clock.
+DrawnFrame draw_frame(Simulation& simulation, std::size_t index, bool with_depth = false);
+
+DatasetContents contents_of(Simulation simulation, const std::string& name);
+
+/// prepare_simulation, then contents_of.
+Result<DatasetContents> simulate(const SimulationOptions& options, const std::string& name = "simulation");
+
+}  // namespace fbvins

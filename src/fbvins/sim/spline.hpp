@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// A trajectory as a function of time with exact derivatives: uniform B-splines of degree 5 (position
+// four times continuously differentiable, rotation likewise on its cumulative form). Immutable, any thread.
+//
+//   SplineTrajectory flight(Duration::from_seconds(0.1), positions, rotations);
+//   MotionState m = flight.at(2.5);        // seconds from the start
+//   Vec3 f_B = m.specific_force(kGravity); // what an ideal accelerometer reads
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/geometry/pose.hpp"
+
+namespace fbvins {
+
+/// Length of gravity, m/s^2 (EuRoC's convention; the estimator's default).
+inline constexpr double kSimGravity_mps2 = 9.81;
+
+/// Values of the k + 1 uniform B-splines of degree k that are not zero in an interval, u in [0, 1).
+/// Entry j belongs to the j-th oldest control point of the interval; the entries sum to 1.
+template <int k>
+std::array<double, k + 1> bspline_basis(double u) {
+  std::array<double, k + 1> b{};
+  b[0] = 1;
+  for (int degree = 1; degree <= k; ++degree)  // Cox-de Boor for unit knots, in place from the end
+    for (int j = degree; j >= 0; --j) {
+      const double from_left = j > 0 ? (u + degree - j) * b[j - 1] : 0.0;
+      const double from_right = j < degree ? (1 - u + j) * b[j] : 0.0;
+      b[j] = (from_left + from_right) / degree;
+    }
+  return b;
+}
+
+/// Everything that a rigid body does at an instant.
+struct MotionState {
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero();      ///< m/s, in W
+  Vec3 a_WB = Vec3::Zero();      ///< m/s^2, in W
+  Vec3 j_WB = Vec3::Zero();      ///< jerk, m/s^3, in W
+  Vec3 w_WB_B = Vec3::Zero();    ///< rad/s, in B
+  Vec3 dw_WB_B = Vec3::Zero();   ///< angular acceleration, rad/s^2, in B
+
+  /// Reading of an ideal accelerometer, in B.
+  Vec3 specific_force(double gravity_mps2 = kSimGravity_mps2) const {
+    return T_WB.q.conjugate() * (a_WB + Vec3(0, 0, gravity_mps2));
+  }
+};
+
+class SplineTrajectory {
+ public:
+  SplineTrajectory() = default;
+  /// Control points, one a knot; at least six. Time 0 is where the first six are in use.
+  SplineTrajectory(double knot_spacing_s, std::vector<Vec3> positions, std::vector<Quat> rotations);
+
+  double duration_s() const { return (static_cast<double>(positions_.size()) - 5) * dt_; }
+  /// Times outside of [0, duration] are clamped to it.
+  MotionState at(double t_s) const;
+  Pose<W, B> pose(double t_s) const;
+
+ private:
+  struct Place {
+    std::size_t first;  ///< control point
+    double u;           ///< in [0, 1)
+  };
+  Place place(double t_s) const;
+
+  double dt_ = 1;
+  std::vector<Vec3> positions_;
+  std::vector<Quat> rotations_;
+  std::vector<Vec3> steps_;  ///< Log(q_i^-1 q_i+1), rad
+};
+
+}  // namespace fbvins
