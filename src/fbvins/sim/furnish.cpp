@@ -151,19 +151,79 @@ void Furnisher::add_door(const Wall& wall, double at) {
   if (rng_.uniform() < 0.6) add_panel(wall, at + 0.25, at + 0.75, 1.3, 1.65, texture(Surface::page), 0.5, 0.025, 1.0f);
 }
 
+/// Bright sky behind a grid of bars, a radiator below.
+void Furnisher::add_window(const Wall& wall, double at) {
+  const double width = rng_.uniform(0.8, 1.4), high = std::min(world_.plan.height_m - 0.25, 2.3);
+  if (at + width + 0.1 > wall.length()) return;
+  add_panel(wall, at - 0.06, at + width + 0.06, 0.9, high + 0.06, texture(Surface::wood), 1.0, 0.013, 1.2f);
+  const int columns = 1 + static_cast<int>(rng_.below(2)), rows = 1 + static_cast<int>(rng_.below(2));
+  const int glass = texture(Surface::plaster);
+  for (int i = 0; i < columns; ++i)
+    for (int j = 0; j < rows; ++j) {
+      const double w = width / columns, h = (high - 0.9) / rows;
+      add_panel(wall, at + i * w + 0.03, at + (i + 1) * w - 0.03, 0.9 + j * h + 0.03, 0.9 + (j + 1) * h - 0.03, glass, 2.0, 0.02, 0.3f);
+      world_.facets.back().emission = static_cast<float>(options_.window_glow);
+      world_.facets.back().lamp_group = kAmbient;
+    }
+  for (double x = at; x + 0.05 < at + width; x += 0.065)
+    add_panel(wall, x, x + 0.04, 0.15, 0.75, glass, 2.0, 0.06, 1.2f);
+  add_panel(wall, at, at + width, 0.12, 0.78, texture(Surface::metal), 2.0, 0.03, 0.35f);
+}
+
+void Furnisher::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m, int layer) {
+  const Vec3 x(std::cos(angle), std::sin(angle), 0), y(-x.y(), x.x(), 0);
+  Facet f;
+  f.u = length * x;
+  f.v = width * y;
+  f.corner = centre - 0.5 * (f.u + f.v) + Vec3(0, 0, 0.002 + 0.0006 * layer);
+  f.texture = texture;
+  f.tint = tint();
+  f.repeat_u = static_cast<float>(length / texture_m);
+  f.repeat_v = static_cast<float>(width / texture_m);
+  f.shift_u = static_cast<float>(rng_.uniform());
+  if (std::abs(f.repeat_u - 1) < 1e-3f) f.shift_u = 0;
+  world_.facets.push_back(f);
+}
+
+void Furnisher::cover_floors() {
+  for (const FloorRect& room : world_.plan.rooms) {
+    const auto somewhere = [&] {
+      const double x = rng_.uniform(room.x0 + 0.3, room.x1 - 0.3), y = rng_.uniform(room.y0 + 0.3, room.y1 - 0.3);
+      return Vec3(x, y, 0);
+    };
+    const double amount = options_.floor_marks * room.area();
+    int layer = 0;
+    for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
+      const double size = rng_.uniform(0.8, 1.6), angle = rng_.uniform(0, kPi);
+      lay_on_floor(somewhere(), angle, size, size, texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture), size, layer++);
+    }
+    for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
+      const double length = rng_.uniform(1.0, 3.0), angle = rng_.uniform(0, kPi);
+      lay_on_floor(somewhere(), angle, length, 0.13, texture(Surface::marks), 0.45, layer++);
+    }
+    for (int i = 0; i < static_cast<int>(0.5 * amount); ++i) {
+      const double size = rng_.uniform(0.08, 0.3), angle = rng_.uniform(0, kPi), shape = rng_.uniform(0.5, 1.0);
+      const Surface kinds[] = {Surface::page, Surface::plaster, Surface::plaster, Surface::checker};
+      lay_on_floor(somewhere(), angle, size, size * shape, texture(kinds[rng_.below(4)]), size, layer++);
+    }
+  }
+}
+
 void Furnisher::hang_pictures() {
   for (const Wall& wall : walls_) {
     if (wall.length() < 0.8) continue;
     if (rng_.uniform() < options_.repeat_share) repeat_along(wall);
     if (wall.length() > 3) add_door(wall, rng_.uniform(0.3, wall.length() - 1.4));
+    for (double at = rng_.uniform(0.3, 2.5); at + 1 < wall.length(); at += rng_.uniform(1.8, 5.0))
+      if (rng_.uniform() < options_.window_share) add_window(wall, at);
     if (rng_.uniform() < 0.7) add_pipes(wall);
     const int count = static_cast<int>(options_.posters_per_m2 * wall.length() * world_.plan.height_m + rng_.uniform());
     for (int i = 0; i < count; ++i) {
       const double width = rng_.uniform(0.2, 1.1), height = width * rng_.uniform(0.6, 1.45);
       if (width + 0.1 > wall.length() || height + 0.4 > world_.plan.height_m) continue;
       const double from = rng_.uniform(0, wall.length() - width), low = rng_.uniform(0.3, world_.plan.height_m - height - 0.05);
-      const Surface kinds[] = {Surface::page, Surface::poster, Surface::picture, Surface::picture, Surface::panel, Surface::cloth};
-      const int what = texture(kinds[rng_.below(6)]);
+      const Surface kinds[] = {Surface::page, Surface::poster, Surface::picture, Surface::picture, Surface::panel, Surface::cloth, Surface::mat, Surface::checker};
+      const int what = texture(kinds[rng_.below(8)]);
       // Each a little further out than the last, so that overlapping ones do not flicker.
       const double out = 0.022 + 0.0008 * i;
       add_panel(wall, from - 0.02, from + width + 0.02, low - 0.02, low + height + 0.02, texture(Surface::wood), 1.0, out - 0.0004, 0.5f);

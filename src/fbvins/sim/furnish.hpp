@@ -28,6 +28,7 @@ class Furnisher {
   void build_shell();      ///< walls, floor, ceiling
   void hang_pictures();
   void place_furniture();
+  void cover_floors();     ///< mats, tapes, papers
   void hang_lamps();
   void add_movers();
 
@@ -49,6 +50,8 @@ class Furnisher {
   bool add_box_stack(const Vec3& floor_point);
   bool add_pillar(const Vec3& floor_point);
   void add_pipes(const Wall& wall);
+  void add_window(const Wall& wall, double at);
+  void lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m, int layer);
   float tint() { return static_cast<float>(rng_.uniform(0.75, 1.2)); }
 
   World& world_;

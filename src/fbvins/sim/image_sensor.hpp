@@ -19,7 +19,7 @@ struct CameraModelOptions {
   int time_samples = 4;
   double line_delay_us = 0;
   bool auto_exposure = true;
-  double target_level = 95;
+  double target_level = 130;
   double exposure_lag_frames = 8;
   double min_exposure_ms = 0.3;
   double max_exposure_ms = 5;
@@ -28,7 +28,7 @@ struct CameraModelOptions {
   double shot_noise = 0.012;
   double read_noise = 0.9;
   double black_level = 0;
-  double blur_px = 0.6;
+  double blur_px = 0.4;
   double vignetting = 0.35;
   double glare = 0.02;
   double right_gain = 0.94;

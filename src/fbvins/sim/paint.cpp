@@ -403,6 +403,63 @@ Canvas panel(Rng& rng) {
   return canvas;
 }
 
+Canvas marks(Rng& rng) {
+  Canvas canvas;
+  fill(canvas, 0, 0, S, S, between(rng, 0.03, 0.1));
+  for (int i = 0; i < 90; ++i) {
+    const float cx = between(rng, 0, S), cy = between(rng, 0, S), a = between(rng, 0, 6.28), w = between(rng, 8, 26), h = between(rng, 6, 16);
+    const float tone = between(rng, 0.7, 0.95), c = std::cos(a), s = std::sin(a);
+    for (int y = static_cast<int>(cy - 30); y < static_cast<int>(cy + 30); ++y)
+      for (int x = static_cast<int>(cx - 30); x < static_cast<int>(cx + 30); ++x) {
+        const float dx = static_cast<float>(x) - cx, dy = static_cast<float>(y) - cy;
+        if (std::abs(c * dx + s * dy) < w && std::abs(c * dy - s * dx) < h) canvas.at(x & (S - 1), y & (S - 1)) = tone;
+      }
+  }
+  return canvas;
+}
+
+Canvas checker(Rng& rng) {
+  Canvas canvas;
+  const int n = pick(rng, 6, 9);
+  const float dark = between(rng, 0.03, 0.1), light = between(rng, 0.8, 0.95);
+  shade(canvas, [&](int x, int y, float) { return ((x * n / S + y * n / S) & 1) ? dark : light; });
+  fill(canvas, 0, 0, S, 12, light);
+  fill(canvas, 0, S - 12, S, S, light);
+  return canvas;
+}
+
+Canvas mat(Rng& rng) {
+  Canvas canvas;
+  const LatticeNoise country(rng, 4, 4), fine(rng, 64, 64);
+  const float base = between(rng, 0.4, 0.7);
+  shade(canvas, [&](int x, int y, float) {
+    const auto fx = static_cast<float>(x), fy = static_cast<float>(y);
+    return (country(fx, fy) > 0.2f ? base * 0.75f : base) * (1 + 0.05f * fine(fx, fy));
+  });
+  for (int i = pick(rng, 3, 6); i > 0; --i) {  // roads with a dashed line
+    float x = between(rng, 0, S), y = between(rng, 0, S), a = between(rng, 0, 6.28), bend = 0;
+    for (int k = 0; k < 520; ++k) {
+      if (k % 40 == 0) bend = between(rng, -0.03, 0.03);
+      a += bend;
+      x += std::cos(a);
+      y += std::sin(a);
+      for (int o = -17; o <= 17; ++o) {
+        const float edge = std::abs(o) > 14 ? 0.9f : std::abs(o) < 2 && k % 24 < 12 ? 0.92f : 0.2f;
+        canvas.at(static_cast<int>(x - static_cast<float>(o) * std::sin(a)) & (S - 1), static_cast<int>(y + static_cast<float>(o) * std::cos(a)) & (S - 1)) = edge;
+      }
+    }
+  }
+  for (int i = pick(rng, 25, 45); i > 0; --i) {
+    const int x = pick(rng, 0, S - 30), y = pick(rng, 0, S - 30), w = pick(rng, 8, 46), h = pick(rng, 8, 46);
+    const float tone = between(rng, 0.1, 0.9);
+    fill(canvas, x, y, x + w, y + h, 0.1f);
+    fill(canvas, x + 2, y + 2, x + w - 2, y + h - 2, tone);
+    for (int wx = x + 5; wx + 5 < x + w; wx += 9)
+      for (int wy = y + 5; wy + 5 < y + h; wy += 9) fill(canvas, wx, wy, wx + 4, wy + 5, 1 - tone);
+  }
+  return canvas;
+}
+
 }  // namespace
 
 Canvas paint(Surface surface, Rng& rng) {
@@ -421,6 +478,9 @@ Canvas paint(Surface surface, Rng& rng) {
     case Surface::books: return books(rng);
     case Surface::cloth: return cloth(rng);
     case Surface::panel: return panel(rng);
+    case Surface::marks: return marks(rng);
+    case Surface::checker: return checker(rng);
+    case Surface::mat: return mat(rng);
     case Surface::count: break;
   }
   return Canvas{};

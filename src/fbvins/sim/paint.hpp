@@ -22,6 +22,9 @@ enum class Surface {
   books,
   cloth,
   panel,      ///< switches, lamps and labels of a machine
+  marks,      ///< dark tape with light scraps on it
+  checker,    ///< a calibration board
+  mat,        ///< a play mat: roads, houses, signs
   count
 };
 

@@ -27,6 +27,7 @@ constexpr Preset kPresets[] = {
        o.world.plain_share = 0.85;
        o.world.posters_per_m2 = 0.04;
        o.world.clutter_per_m2 = 0.25;
+       o.world.floor_marks = 0.1;
        o.world.repeat_share = 0.1;
      }},
     {"moving-objects", [](SimulationOptions& o) { o.world.movers = 8; }},

@@ -11,6 +11,8 @@ namespace {
 
 constexpr float kFarthest_w = 1e-3f;  ///< nothing beyond a kilometre
 constexpr double kNear_m = 0.02;
+/// Several rays a pixel, so each stands for less than a pixel.
+constexpr float kSharper = 0.7f;
 constexpr double kGrainRepeat = 7.0;  ///< copies of the grain in one copy of a texture
 
 float largest_over(const float* f, float x0, float y0, float x1, float y1) {
@@ -207,7 +209,7 @@ void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Fa
     look.light = light.words.data() + lit.first;
     // u x v points at the viewer, so u runs to the left where v runs down: mirrored, or writing would be.
     look.repeat_u = -f.repeat_u, look.shift_u = f.shift_u + f.repeat_u, look.repeat_v = f.repeat_v, look.shift_v = f.shift_v;
-    look.lod_constant = 0.5f * std::log2(static_cast<float>(texels) + 1e-20f);
+    look.lod_constant = 0.5f * std::log2(static_cast<float>(texels) + 1e-20f) - kSharper;
     look.detail_repeat = static_cast<float>(kGrainRepeat);
     look.detail_lod = std::log2(look.detail_repeat);
     look.detail_strength = f.detail;

@@ -22,6 +22,7 @@ World build_world(const WorldOptions& options, const FloorPlan& plan, const std:
   Furnisher furnisher(world, options, path, seed);
   furnisher.build_shell();
   furnisher.hang_pictures();
+  furnisher.cover_floors();
   furnisher.place_furniture();
   furnisher.hang_lamps();
   furnisher.add_movers();

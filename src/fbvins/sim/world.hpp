@@ -64,9 +64,12 @@ struct WorldOptions {
   double clearance_m = 0.55;
   double lamp_spacing_m = 2.6;
   double ambient = 0.45;
-  double detail = 0.35;
+  double detail = 0.2;
   double gloss = 0.0;
   double lamp_glow = 2.5;
+  double window_glow = 1.6;
+  double window_share = 0.4;
+  double floor_marks = 1.0;
   int movers = 0;
 
   template <class V>
@@ -84,6 +87,9 @@ struct WorldOptions {
     v("detail", detail, "", "strength of fine grain near by", 0.0, 1.0);
     v("gloss", gloss, "", "mirror images of lamps on floor and furniture", 0.0, 10.0);
     v("lamp_glow", lamp_glow, "", "brightness of a lamp's own surface", 0.0, 100.0);
+    v("window_glow", window_glow, "", "brightness of the sky in windows", 0.0, 100.0);
+    v("window_share", window_share, "", "share of the places for windows that have one", 0.0, 1.0);
+    v("floor_marks", floor_marks, "1/m^2", "mats, tapes and papers on the floor", 0.0, 10.0);
     v("movers", movers, "", "walking people and moving boxes", 0, 100);
   }
 };
