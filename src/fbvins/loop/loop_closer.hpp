@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keyframe -> MapUpdate: recognises places, verifies them by sight and against the odometry's own uncertainty,
+// corrects the map frame at once and the whole map now and then (docs/derivations/loop.md).
+// A plain synchronous stage; one instance is used by one thread at a time.
+//
+//   LoopCloser closer(rig, LoopOptions{}, *vocabulary);
+//   MapUpdate update = closer.process(keyframe);
+//   Pose<M, B> T_MB = update.T_MW * odometry.T_WB;
+//   closer.finish();
+//   Trajectory in_map = closer.corrected(trajectory_in_W);
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/loop/inverted_index.hpp"
+#include "fbvins/loop/loop_options.hpp"
+#include "fbvins/loop/place_map.hpp"
+#include "fbvins/types/keyframe.hpp"
+#include "fbvins/types/loop.hpp"
+#include "fbvins/types/trajectory.hpp"
+
+namespace fbvins {
+
+class LoopCloser {
+ public:
+  LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
+  /// Goes on in an old map: M is that map's frame, and W must first be found in it.
+  LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map);
+
+  MapUpdate process(const Keyframe& keyframe);
+  /// The same from features already extracted (joining maps, replay).
+  MapUpdate process(Place place, FrameId frame, Time t, const Pose<W, B>& T_WB, std::uint32_t reset_counter);
+
+  /// A last optimisation over everything.
+  PoseGraphReport finish();
+
+  const PlaceMap& map() const { return map_; }
+  /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Frames of a
+  /// session that never found into the map are left out.
+  Trajectory corrected(const Trajectory& in_W) const;
+
+ private:
+  /// Every keyframe that passed, hung on one that is still in the map.
+  struct Record {
+    Time t;
+    KeyframeId anchor;
+    Pose<B, B> T_anchor_B;
+    std::uint32_t session = 0;
+  };
+  struct Proposal {
+    KeyframeId candidate;
+    VerifiedPose verified;
+  };
+
+  void begin_session(std::uint32_t reset_counter);
+  std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
+  std::vector<KeyframeId> plausible(const MapKeyframe& query) const;
+  std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
+  SeenPose seen_pose(const Proposal& proposal) const;
+  MapEdge edge_to(KeyframeId query, const Proposal& proposal) const;
+  void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
+  void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
+  void join_session(const Pose<M, W>& T_MW);
+  void add(MapKeyframe query, const std::vector<MapEdge>& found, MapUpdate& update);
+  bool optimisation_due() const;
+  void optimise(MapUpdate* update);
+  void thin();
+  void take_out(KeyframeId id);
+
+  LoopOptions options_;
+  Pose<B, C0> T_BC0_;
+  Vocabulary vocabulary_;
+  PlaceExtractor extractor_;
+  PlaceVerifier verifier_;
+  PlaceMap map_;
+  InvertedIndex index_;
+  MapFrame frame_;
+  MapFrameFollower follower_;
+
+  std::uint32_t session_ = 0;
+  bool session_begun_ = false;
+  std::uint32_t reset_counter_ = 0;
+  KeyframeId previous_;  // newest keyframe of this session in the map
+  Time previous_t_;
+  double path_m_ = 0;
+  std::optional<Pose<W, B>> previous_T_WB_;
+  struct Guess {
+    Time t;
+    Pose<M, W> T_MW;
+  };
+  std::vector<Guess> guesses_;  // of a session that is not localised yet
+  std::vector<Record> records_;
+  std::vector<KeyframeId> redundant_;
+  int loops_since_optimised_ = 0;
+};
+
+}  // namespace fbvins

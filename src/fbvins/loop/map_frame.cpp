@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_frame.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace fbvins {
+namespace {
+
+constexpr double kRad = std::numbers::pi / 180;
+
+Quat about_z(double yaw) { return {std::cos(0.5 * yaw), 0, 0, std::sin(0.5 * yaw)}; }
+
+/// T_MW with this yaw that takes the body at T_WB to p_MB.
+Pose<M, W> frame_at(double yaw, const Vec3& p_MB, const Vec3& p_WB) {
+  const Quat q = about_z(yaw);
+  return {q, Vec3(p_MB - q * p_WB)};
+}
+
+double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
+
+}  // namespace
+
+DriftVariance drift_over(const DriftOptions& o, double metres, double seconds) {
+  const auto square = [](double x) { return x * x; };
+  return {square(o.position_m) * metres + square(o.standstill_m) * seconds,
+          square(o.yaw_deg * kRad) * metres + square(o.standstill_yaw_deg * kRad) * seconds};
+}
+
+double yaw_of(const Quat& q) { return wrapped(2 * std::atan2(q.z(), q.w())); }
+
+void MapFrame::reset(const Pose<M, W>& T_MW, double sigma_m, double sigma_rad) {
+  T_MW_ = {about_z(yaw_of(T_MW.q)), T_MW.p};
+  if (last_) T_MW_ = frame_at(yaw_of(T_MW.q), T_MW * last_->T_WB.p, last_->T_WB.p);
+  P_ = Vec4(sigma_m * sigma_m, sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
+  known_ = true;
+}
+
+void MapFrame::advance(const Pose<W, B>& T_WB, Time t) {
+  if (last_ && known_) {
+    const Vec3 step = T_WB.p - last_->T_WB.p;
+    const DriftVariance drift = drift_over(options_, step.norm(), std::abs((t - last_->t).seconds()));
+    Mat4 F = Mat4::Identity();  // the yaw swings the step
+    F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MW_.q * step);
+    P_ = F * P_ * F.transpose();
+    P_.diagonal() += Vec4(drift.position_m2, drift.position_m2, drift.position_m2, drift.yaw_rad2);
+  }
+  last_ = Stamped{t, T_WB};
+}
+
+Vec4 MapFrame::innovation(const SeenPose& seen) const {
+  const Pose<M, B> predicted = T_MW_ * last_->T_WB;
+  Vec4 v;
+  v << seen.T_MB.p - predicted.p, yaw_of(seen.T_MB.q * predicted.q.conjugate());
+  return v;
+}
+
+double MapFrame::mahalanobis2(const SeenPose& seen) const {
+  const Vec4 v = innovation(seen);
+  return v.dot((P_ + seen.covariance).ldlt().solve(v));
+}
+
+void MapFrame::update(const SeenPose& seen) {
+  const Vec4 v = innovation(seen);
+  const Mat4 S = P_ + seen.covariance;
+  const Mat4 K = S.ldlt().solve(P_).transpose();
+  const Vec4 d = K * v;
+  const Mat4 A = Mat4::Identity() - K;
+  P_ = A * P_ * A.transpose() + K * seen.covariance * K.transpose();
+  const Vec3 p_MB = T_MW_ * last_->T_WB.p + d.head<3>();
+  T_MW_ = frame_at(yaw_of(T_MW_.q) + d[3], p_MB, last_->T_WB.p);
+}
+
+const Pose<M, W>& MapFrameFollower::follow(const Pose<M, W>& target, const Pose<W, B>& T_WB, Time t) {
+  if (!last_) {
+    T_MW_ = target;
+  } else {
+    const double dt = std::abs((t - *last_).seconds());
+    const Vec3 here = T_MW_ * T_WB.p, gap = target * T_WB.p - here;
+    const double yaw = yaw_of(T_MW_.q), turn = wrapped(yaw_of(target.q) - yaw);
+    const double reach = max_mps_ * dt, max_turn = max_radps_ * dt;
+    const Vec3 step = gap.norm() > reach ? Vec3(gap * (reach / gap.norm())) : gap;
+    T_MW_ = frame_at(yaw + std::clamp(turn, -max_turn, max_turn), here + step, T_WB.p);
+  }
+  last_ = t;
+  return T_MW_;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/place_map.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+template <class Keyframes>
+auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
+  const auto it = std::lower_bound(keyframes.begin(), keyframes.end(), id, [](const MapKeyframe& k, KeyframeId i) { return k.id < i; });
+  return it != keyframes.end() && it->id == id ? &*it : nullptr;
+}
+
+MapEdge composed(const MapEdge& first, const MapEdge& second, MapEdge::Kind kind) {
+  const Mat6 cov = compose_covariance(first.T_from_to, first.information.inverse(), second.T_from_to, second.information.inverse());
+  const Mat6 information = cov.inverse();
+  return {first.from, second.to, first.T_from_to * second.T_from_to, 0.5 * (information + information.transpose()), kind};
+}
+
+/// The same edge from its other end.
+MapEdge reversed(const MapEdge& e) {
+  // T^-1: dp' = -R^T dp + hat(R^T p) ... with dtheta now in the old `from`.
+  const Mat3 R = e.T_from_to.R();
+  Mat6 J = Mat6::Zero();
+  const Pose<B, B> inverse = e.T_from_to.inverse();
+  J.topLeftCorner<3, 3>() = -R.transpose();
+  J.topRightCorner<3, 3>() = hat(-inverse.p).transpose();
+  J.bottomRightCorner<3, 3>() = -R;
+  const Mat6 cov = J * e.information.inverse() * J.transpose();
+  const Mat6 information = cov.inverse();
+  return {e.to, e.from, inverse, 0.5 * (information + information.transpose()), e.kind};
+}
+
+}  // namespace
+
+Mat6 compose_covariance(const Pose<B, B>& T_ab, const Mat6& cov_ab, const Pose<B, B>& T_bc, const Mat6& cov_bc) {
+  const Mat3 R_ab = T_ab.R(), R_bc = T_bc.R();
+  Mat6 J_ab = Mat6::Identity(), J_bc = Mat6::Zero();
+  J_ab.topRightCorner<3, 3>() = -R_ab * hat(T_bc.p);
+  J_ab.bottomRightCorner<3, 3>() = R_bc.transpose();
+  J_bc.topLeftCorner<3, 3>() = R_ab;
+  J_bc.bottomRightCorner<3, 3>().setIdentity();
+  return J_ab * cov_ab * J_ab.transpose() + J_bc * cov_bc * J_bc.transpose();
+}
+
+KeyframeId PlaceMap::add(MapKeyframe keyframe) {
+  if (!keyframe.id.valid()) keyframe.id = KeyframeId{next_id_};
+  next_id_ = std::max(next_id_, keyframe.id.value + 1);
+  keyframes_.push_back(std::move(keyframe));
+  return keyframes_.back().id;
+}
+
+const MapKeyframe* PlaceMap::find(KeyframeId id) const { return find_in(keyframes_, id); }
+MapKeyframe* PlaceMap::find(KeyframeId id) { return find_in(keyframes_, id); }
+
+void PlaceMap::remove(KeyframeId id) {
+  const MapKeyframe* gone = find(id);
+  if (gone == nullptr) return;
+  const auto is = [&](MapEdge::Kind kind, auto end) {
+    return std::find_if(edges.begin(), edges.end(), [&, end](const MapEdge& e) { return e.kind == kind && e.*end == id; });
+  };
+  const auto before = is(MapEdge::Kind::odometry, &MapEdge::to), after = is(MapEdge::Kind::odometry, &MapEdge::from);
+  std::vector<MapEdge> added;
+  if (before != edges.end() && after != edges.end()) added.push_back(composed(*before, *after, MapEdge::Kind::odometry));
+  // Loops move to the neighbour in time, through the odometry between the two.
+  const MapEdge* bridge = nullptr;
+  MapEdge turned;
+  if (before != edges.end()) bridge = &*before;
+  else if (after != edges.end()) turned = reversed(*after), bridge = &turned;
+  if (bridge != nullptr)
+    for (const MapEdge& e : edges) {
+      if (e.kind != MapEdge::Kind::loop || (e.from != id && e.to != id)) continue;
+      const MapEdge moved = composed(*bridge, e.from == id ? e : reversed(e), MapEdge::Kind::loop);
+      if (moved.from != moved.to) added.push_back(moved);
+    }
+  std::erase_if(edges, [&](const MapEdge& e) { return e.from == id || e.to == id; });
+  edges.insert(edges.end(), added.begin(), added.end());
+  keyframes_.erase(keyframes_.begin() + (gone - keyframes_.data()));
+}
+
+PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
+  if (keyframes_.empty()) return {};
+  PoseGraph graph;
+  const auto index_of = [&](KeyframeId id) { return static_cast<int>(find(id) - keyframes_.data()); };
+  // What hangs together with the first keyframe; another part has no place in M yet and stays as it is.
+  std::vector<std::vector<int>> neighbours(keyframes_.size());
+  for (const MapEdge& e : edges) {
+    neighbours[static_cast<std::size_t>(index_of(e.from))].push_back(index_of(e.to));
+    neighbours[static_cast<std::size_t>(index_of(e.to))].push_back(index_of(e.from));
+  }
+  std::vector<bool> joined(keyframes_.size(), false);
+  std::vector<int> open{0};
+  joined[0] = true;
+  while (!open.empty()) {
+    const int at = open.back();
+    open.pop_back();
+    for (const int n : neighbours[static_cast<std::size_t>(at)])
+      if (!joined[static_cast<std::size_t>(n)]) joined[static_cast<std::size_t>(n)] = true, open.push_back(n);
+  }
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) graph.add_node(keyframes_[i].T_MB, keyframes_[i].T_WB.q, i == 0 || !joined[i]);
+  for (const MapEdge& e : edges) {
+    const int a = index_of(e.from), b = index_of(e.to);
+    if (joined[static_cast<std::size_t>(a)]) graph.add_edge({a, b, e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1});
+  }
+  const PoseGraphReport report = graph.optimise(options);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_MB = graph.poses()[i];
+  return report;
+}
+
+}  // namespace fbvins

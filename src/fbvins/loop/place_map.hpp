@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// The map: keyframes that know what they saw, where they are in M, and the relative poses between them.
+// A value; one thread at a time.
+//
+//   PlaceMap map;
+//   KeyframeId id = map.add({.t = t, .T_MB = T_MB, .place = place});
+//   map.edges.push_back({older, id, T_ab, information, MapEdge::Kind::loop});
+#pragma once
+
+#include <vector>
+
+#include "fbvins/core/ids.hpp"
+#include "fbvins/core/time.hpp"
+#include "fbvins/loop/place.hpp"
+#include "fbvins/loop/pose_graph.hpp"
+
+namespace fbvins {
+
+struct MapKeyframe {
+  KeyframeId id;
+  Time t;
+  std::uint32_t session = 0;  ///< which odometry frame W it was taken in
+  Pose<W, B> T_WB;
+  Pose<M, B> T_MB;
+  double path_m = 0;          ///< flown in this session until here
+  int seen_again = 0;         ///< loops that ended here
+  Place place;
+};
+
+struct MapEdge {
+  enum class Kind : std::uint8_t { odometry, loop };
+  KeyframeId from, to;
+  Pose<B, B> T_from_to;
+  Mat6 information = Mat6::Identity();
+  Kind kind = Kind::odometry;
+};
+
+class PlaceMap {
+ public:
+  /// Numbers it and keeps it.
+  KeyframeId add(MapKeyframe keyframe);
+  /// Takes it out; its neighbours are joined directly: composed odometry, loops handed to the keyframe before it.
+  void remove(KeyframeId id);
+
+  bool empty() const { return keyframes_.empty(); }
+  std::size_t size() const { return keyframes_.size(); }
+  const std::vector<MapKeyframe>& keyframes() const { return keyframes_; }  ///< in order of id
+  std::vector<MapKeyframe>& keyframes() { return keyframes_; }
+  const MapKeyframe* find(KeyframeId id) const;
+  MapKeyframe* find(KeyframeId id);
+
+  /// Moves the keyframes of the sessions that hang together with the first keyframe.
+  PoseGraphReport optimise(const PoseGraphOptions& options);
+
+  std::vector<MapEdge> edges;
+  Pose<B, C0> T_BC0;  ///< of the camera that saw the places
+
+ private:
+  std::vector<MapKeyframe> keyframes_;
+  std::int64_t next_id_ = 0;
+};
+
+/// Covariance of A * B from those of A and B, each of (dp in its left frame, dtheta in its right one).
+Mat6 compose_covariance(const Pose<B, B>& T_ab, const Mat6& cov_ab, const Pose<B, B>& T_bc, const Mat6& cov_bc);
+
+}  // namespace fbvins

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/pose_graph.hpp"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+namespace fbvins {
+namespace {
+
+template <class T>
+using V3 = Eigen::Matrix<T, 3, 1>;
+
+/// Orientation of a node from its parameters: (p, yaw about M's z) or (p, dtheta in B).
+template <int Dof, class T>
+Eigen::Quaternion<T> orientation(const Quat& start, const T* x) {
+  const Eigen::Quaternion<T> q = start.cast<T>();
+  if constexpr (Dof == 4) {
+    const T half = x[3] * 0.5;
+    using std::cos, std::sin;
+    return Eigen::Quaternion<T>(cos(half), T(0), T(0), sin(half)) * q;
+  } else {
+    // Small steps about `start`, which is the pose of the solve before: 2 atan(|v|/2) differs from |v| in third order.
+    const Eigen::Quaternion<T> d(T(1), x[3] * 0.5, x[4] * 0.5, x[5] * 0.5);
+    return (q * d).normalized();
+  }
+}
+
+template <int Dof>
+struct EdgeCost {
+  Quat q_a, q_b;
+  Pose<B, B> T_ab;
+  Mat6 root;  // of the weighted information
+
+  template <class T>
+  bool operator()(const T* a, const T* b, T* out) const {
+    const Eigen::Quaternion<T> Ra = orientation<Dof>(q_a, a), Rb = orientation<Dof>(q_b, b);
+    const Eigen::Map<const V3<T>> pa(a), pb(b);
+    Eigen::Matrix<T, 6, 1> r;
+    r.template head<3>() = Ra.conjugate() * V3<T>(pb - pa) - T_ab.p.cast<T>();
+    const Eigen::Quaternion<T> e = T_ab.q.conjugate().cast<T>() * (Ra.conjugate() * Rb);
+    r.template tail<3>() = e.vec() * (e.w() < T(0) ? T(-2) : T(2));
+    Eigen::Map<Eigen::Matrix<T, 6, 1>>(out, 6) = root.cast<T>() * r;
+    return true;
+  }
+};
+
+/// The vertical of a node with six degrees of freedom against M's z.
+struct GravityCost {
+  Quat q;
+  Vec3 up_B;
+  double per_sigma;
+
+  template <class T>
+  bool operator()(const T* a, T* out) const {
+    const V3<T> up = orientation<6>(q, a) * up_B.cast<T>();
+    out[0] = up.x() * per_sigma;
+    out[1] = up.y() * per_sigma;
+    return true;
+  }
+};
+
+template <int Dof>
+void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& information, const std::vector<Pose<M, B>>& poses,
+              std::vector<std::array<double, 6>>& x) {
+  const auto a = static_cast<std::size_t>(e.a), b = static_cast<std::size_t>(e.b);
+  const Mat6 root = Eigen::LLT<Mat6>(information).matrixU();
+  auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>{poses[a].q, poses[b].q, e.T_ab, root});
+  problem.AddResidualBlock(cost, nullptr, x[a].data(), x[b].data());
+}
+
+}  // namespace
+
+Vec6 edge_residual(const Pose<M, B>& T_Ma, const Pose<M, B>& T_Mb, const Pose<B, B>& T_ab) {
+  Vec6 r;
+  const Quat e = T_ab.q.conjugate() * T_Ma.q.conjugate() * T_Mb.q;
+  r << T_Ma.q.conjugate() * (T_Mb.p - T_Ma.p) - T_ab.p, (e.w() < 0 ? -2.0 : 2.0) * e.vec();
+  return r;
+}
+
+int PoseGraph::add_node(const Pose<M, B>& T_MB, const Quat& q_WB, bool fixed) {
+  poses_.push_back(T_MB);
+  up_B_.push_back(q_WB.conjugate() * Vec3::UnitZ());
+  fixed_.push_back(fixed);
+  return static_cast<int>(poses_.size()) - 1;
+}
+
+double PoseGraph::chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const {
+  PoseGraphEdge e = edge;
+  e.weight = 1;
+  const Vec6 r = edge_residual(poses_[static_cast<std::size_t>(e.a)], poses_[static_cast<std::size_t>(e.b)], e.T_ab);
+  return r.dot(weighted_information(e, options) * r);
+}
+
+/// With four degrees of freedom a node cannot tilt: what the odometry's roll and pitch may be wrong by is added to the
+/// covariance of loops, in rotation and with the lever of their length.
+Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOptions& options) const {
+  const double weight = e.loop ? std::max(e.weight, 1e-6) : 1.0;
+  if (!e.loop || options.degrees_of_freedom == 6) return weight * e.information;
+  const double tilt = options.tilt_deg * std::numbers::pi / 180;
+  Mat6 cov = e.information.inverse();
+  const Vec3& up = up_B_[static_cast<std::size_t>(e.b)];
+  cov.topLeftCorner<3, 3>().diagonal().array() += tilt * tilt * e.T_ab.p.squaredNorm();
+  cov.bottomRightCorner<3, 3>() += 2 * tilt * tilt * (Mat3::Identity() - up * up.transpose());
+  const Mat6 information = cov.inverse();
+  return weight * 0.5 * (information + information.transpose());
+}
+
+int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
+  ceres::Problem problem;
+  std::vector<std::array<double, 6>> x(poses_.size());
+  std::vector<bool> used(poses_.size(), false);
+  for (std::size_t i = 0; i < poses_.size(); ++i) x[i] = {poses_[i].p.x(), poses_[i].p.y(), poses_[i].p.z(), 0, 0, 0};
+  for (const PoseGraphEdge& e : edges_) {
+    if (options.degrees_of_freedom == 4) add_cost<4>(problem, e, weighted_information(e, options), poses_, x);
+    else add_cost<6>(problem, e, weighted_information(e, options), poses_, x);
+    used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
+  }
+  const double per_sigma = 180 / (std::numbers::pi * options.tilt_deg);
+  for (std::size_t i = 0; i < poses_.size() && options.degrees_of_freedom == 6; ++i)
+    if (used[i] && !fixed_[i])
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<GravityCost, 2, 6>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}),
+                               nullptr, x[i].data());
+  for (std::size_t i = 0; i < poses_.size(); ++i)
+    if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  solver.num_threads = 1;
+  solver.max_num_iterations = options.max_iterations;
+  solver.function_tolerance = 1e-5;
+  solver.max_solver_time_in_seconds = 1e9;  // iterations are the budget, never the clock
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    if (!used[i] || fixed_[i]) continue;
+    poses_[i].p = Vec3(x[i][0], x[i][1], x[i][2]);
+    poses_[i].q = (options.degrees_of_freedom == 4 ? orientation<4>(poses_[i].q, x[i].data()) : orientation<6>(poses_[i].q, x[i].data())).normalized();
+  }
+  if (report.solves++ == 0) report.initial_cost = summary.initial_cost;
+  report.final_cost = summary.final_cost;
+  return summary.num_successful_steps;
+}
+
+PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
+  constexpr double kMuStep = 2.0;
+  const double c2 = options.outlier_sigma * options.outlier_sigma;
+  PoseGraphReport report;
+  double worst = 0;
+  for (PoseGraphEdge& e : edges_)
+    if (e.loop) worst = std::max(worst, chi2(e, options));
+  // mu large: nearly convex, every loop counts; mu = 1: Geman-McClure.
+  double mu = std::max(1.0, 2 * worst / c2);
+  for (;;) {
+    for (PoseGraphEdge& e : edges_) {
+      if (!e.loop) continue;
+      const double s = mu * c2 / (chi2(e, options) + mu * c2);
+      e.weight = s * s;
+    }
+    report.iterations += solve(options, report);
+    if (mu <= 1.0) break;
+    mu = std::max(1.0, mu / kMuStep);
+  }
+  for (PoseGraphEdge& e : edges_) {
+    if (!e.loop) continue;
+    const double s = c2 / (chi2(e, options) + c2);
+    e.weight = s * s;
+    report.rejected += e.weight < 0.1;
+  }
+  return report;
+}
+
+}  // namespace fbvins

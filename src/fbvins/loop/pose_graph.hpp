@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keyframes as nodes, relative poses as edges; least squares over all of them (docs/derivations/loop.md, L8-L11).
+// Four degrees of freedom a node by default: roll and pitch are known from gravity, to within a tolerance that
+// loops are told of. With six, gravity is a measurement of every node. Edges marked as loops may be
+// wrong: graduated non-convexity (H. Yang et al., RA-L 2020, with Geman-McClure) finds weights that leave false ones
+// out. One thread; the same input gives the same bits.
+//
+//   PoseGraph graph;
+//   int a = graph.add_node(T_MB_a, q_WB_a), b = graph.add_node(T_MB_b, q_WB_b);
+//   graph.add_edge({a, b, T_ab, information, true});
+//   PoseGraphReport report = graph.optimise({});
+#pragma once
+
+#include <vector>
+
+#include "fbvins/geometry/pose.hpp"
+
+namespace fbvins {
+
+struct PoseGraphOptions {
+  int degrees_of_freedom = 4;
+  double tilt_deg = 0.25;
+  int max_iterations = 12;
+  double outlier_sigma = 4.0;
+
+  template <class V>
+  void visit(V&& v) {
+    v("degrees_of_freedom", degrees_of_freedom, "", "4: position and yaw; 6: roll and pitch as well", 4, 6);
+    v("tilt_deg", tilt_deg, "deg", "standard deviation of roll and pitch as the odometry knows them", 0.001, 45.0);
+    v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations of one solve", 1, 1000);
+    v("outlier_sigma", outlier_sigma, "", "residual of a loop beyond which it counts little", 1.0, 100.0);
+  }
+};
+
+struct PoseGraphEdge {
+  int a = 0, b = 0;
+  Pose<B, B> T_ab;
+  Mat6 information = Mat6::Identity();  ///< of (dp in a, dtheta in b)
+  bool loop = false;                    ///< may be an outlier
+  double weight = 1;                    ///< found by optimise(): 0 a false loop, 1 a good one
+};
+
+struct PoseGraphReport {
+  int solves = 0;
+  int iterations = 0;
+  int rejected = 0;  ///< loops with a weight below a tenth
+  double initial_cost = 0, final_cost = 0;
+};
+
+class PoseGraph {
+ public:
+  /// R_WB: the odometry's own orientation, of which roll and pitch count.
+  int add_node(const Pose<M, B>& T_MB, const Quat& q_WB, bool fixed = false);
+  void add_edge(PoseGraphEdge edge) { edges_.push_back(edge); }
+
+  /// Fixed nodes stay; where none is, the first one of each connected part would be free to float: fix one.
+  PoseGraphReport optimise(const PoseGraphOptions& options);
+
+  const std::vector<Pose<M, B>>& poses() const { return poses_; }
+  const std::vector<PoseGraphEdge>& edges() const { return edges_; }
+  /// Squared Mahalanobis length of an edge's residual at the present poses.
+  double chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
+
+ private:
+  Mat6 weighted_information(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
+  int solve(const PoseGraphOptions& options, PoseGraphReport& report);
+
+  std::vector<Pose<M, B>> poses_;
+  std::vector<Vec3> up_B_;  ///< the vertical as the odometry knew it
+  std::vector<bool> fixed_;
+  std::vector<PoseGraphEdge> edges_;
+};
+
+/// (dp in a, dtheta in b) of an edge at two poses.
+Vec6 edge_residual(const Pose<M, B>& T_Ma, const Pose<M, B>& T_Mb, const Pose<B, B>& T_ab);
+
+}  // namespace fbvins

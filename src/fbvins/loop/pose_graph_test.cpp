@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/pose_graph.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/loop/place_map.hpp"
+
+namespace fbvins {
+namespace {
+
+struct Flight {
+  std::vector<Pose<M, B>> truth;
+  std::vector<Pose<M, B>> odometry;  // drifts in position and yaw
+  std::vector<PoseGraphEdge> edges;
+};
+
+Mat6 information(double sigma_m, double sigma_rad) {
+  Mat6 m = Mat6::Zero();
+  m.diagonal().head<3>().setConstant(1 / (sigma_m * sigma_m));
+  m.diagonal().tail<3>().setConstant(1 / (sigma_rad * sigma_rad));
+  return m;
+}
+
+Vec3 noise(Rng& rng, double sigma) { return sigma * Vec3(rng.normal(), rng.normal(), rng.normal()); }
+
+/// Rounds in a room; `loops` true ones and as many false ones as that share says.
+Flight flight(int n, int loops, double false_share, std::uint64_t seed) {
+  constexpr double kStep_m = 0.01, kStep_rad = 0.002, kLoop_m = 0.01, kLoop_rad = 0.004;
+  Rng rng(seed);
+  Flight f;
+  for (int i = 0; i < n; ++i) {
+    const double a = 0.12 * i;
+    f.truth.push_back({Quat(Eigen::AngleAxisd(a, Vec3::UnitZ())) * so3_exp(Vec3(0.1 * std::sin(a), 0.05, 0)),
+                       Vec3(3 * std::cos(a), 2 * std::sin(a), 1 + 0.3 * std::sin(0.31 * i))});
+  }
+  f.odometry.push_back(f.truth[0]);
+  for (int i = 1; i < n; ++i) {
+    const auto& a = f.truth[static_cast<std::size_t>(i) - 1];
+    const auto& b = f.truth[static_cast<std::size_t>(i)];
+    const Pose<B, B> step = a.inverse() * b;
+    // The drift turns about the vertical only: what the odometry cannot see.
+    const Quat turned = so3_exp(b.q.conjugate() * Vec3(0, 0, kStep_rad * rng.normal()));
+    const Pose<B, B> measured((step.q * turned).normalized(), Vec3(step.p + noise(rng, kStep_m)));
+    f.edges.push_back({i - 1, i, measured, information(kStep_m, kStep_rad), false, 1});
+    f.odometry.push_back(f.odometry.back() * measured);
+  }
+  const int wrong = static_cast<int>(std::lround(loops * false_share / (1 - false_share)));
+  for (int k = 0; k < loops + wrong; ++k) {
+    const int j = 60 + static_cast<int>(rng.below(static_cast<std::uint32_t>(n - 60)));
+    const int i = static_cast<int>(rng.below(static_cast<std::uint32_t>(j - 45)));
+    Pose<B, B> T = f.truth[static_cast<std::size_t>(i)].inverse() * f.truth[static_cast<std::size_t>(j)];
+    T = T.boxplus(noise(rng, kLoop_m), noise(rng, kLoop_rad));
+    if (k >= loops) T = Pose<B, B>(so3_exp(Vec3(0, 0, rng.uniform(-2, 2))), noise(rng, 1.5));
+    f.edges.push_back({i, j, T, information(kLoop_m, kLoop_rad), true, 1});
+  }
+  return f;
+}
+
+double error_after(const Flight& f, const PoseGraphOptions& options, PoseGraphReport* report = nullptr) {
+  PoseGraph graph;
+  for (std::size_t i = 0; i < f.odometry.size(); ++i) graph.add_node(f.odometry[i], f.odometry[i].q, i == 0);
+  for (const PoseGraphEdge& e : f.edges) graph.add_edge(e);
+  const PoseGraphReport r = graph.optimise(options);
+  if (report != nullptr) *report = r;
+  double sum = 0;
+  for (std::size_t i = 0; i < f.truth.size(); ++i) sum += (graph.poses()[i].p - f.truth[i].p).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(f.truth.size()));
+}
+
+double odometry_error(const Flight& f) {
+  double sum = 0;
+  for (std::size_t i = 0; i < f.truth.size(); ++i) sum += (f.odometry[i].p - f.truth[i].p).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(f.truth.size()));
+}
+
+class PoseGraphDof : public testing::TestWithParam<int> {};
+
+TEST_P(PoseGraphDof, LoopsTakeOutTheDrift) {
+  const Flight f = flight(400, 120, 0, 3);
+  const double after = error_after(f, {.degrees_of_freedom = GetParam()});
+  EXPECT_GT(odometry_error(f), 0.1);
+  EXPECT_LT(after, 0.25 * odometry_error(f));
+}
+
+TEST_P(PoseGraphDof, TenPercentFalseLoopsStayWithinTenPercentOfClean) {
+  for (const std::uint64_t seed : {3, 4, 5}) {
+    const Flight clean = flight(400, 120, 0, seed), dirty = flight(400, 120, 0.1, seed);
+    PoseGraphReport report;
+    const double with_false = error_after(dirty, {.degrees_of_freedom = GetParam()}, &report);
+    EXPECT_LT(with_false, 1.1 * error_after(clean, {.degrees_of_freedom = GetParam()}) + 1e-3) << "seed " << seed;
+    EXPECT_GE(report.rejected, 12);
+    EXPECT_LE(report.rejected, 20);
+  }
+}
+
+TEST_P(PoseGraphDof, SameInputSameBits) {
+  const Flight f = flight(150, 40, 0.1, 9);
+  EXPECT_EQ(error_after(f, {.degrees_of_freedom = GetParam()}), error_after(f, {.degrees_of_freedom = GetParam()}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Dof, PoseGraphDof, testing::Values(4, 6));
+
+TEST(PoseGraph, FourDegreesOfFreedomKeepRollAndPitch) {
+  const Flight f = flight(200, 60, 0, 5);
+  PoseGraph graph;
+  for (std::size_t i = 0; i < f.odometry.size(); ++i) graph.add_node(f.odometry[i], f.odometry[i].q, i == 0);
+  for (const PoseGraphEdge& e : f.edges) graph.add_edge(e);
+  graph.optimise({});
+  for (std::size_t i = 0; i < f.odometry.size(); ++i)
+    EXPECT_NEAR((graph.poses()[i].q.conjugate() * Vec3::UnitZ() - f.odometry[i].q.conjugate() * Vec3::UnitZ()).norm(), 0, 1e-9);
+}
+
+TEST(ComposeCovariance, AgreesWithSampling) {
+  const Pose<B, B> A(so3_exp(Vec3(0.3, -0.5, 0.8)), Vec3(1, 2, -0.5)), C(so3_exp(Vec3(-0.2, 0.1, 0.4)), Vec3(0.4, -1, 0.3));
+  const Mat6 cov_a = information(1 / 0.02, 1 / 0.01).inverse().inverse(), cov_c = information(1 / 0.01, 1 / 0.03).inverse().inverse();
+  Rng rng(4);
+  Mat6 sampled = Mat6::Zero();
+  constexpr int kSamples = 20000;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto perturb = [&](const Pose<B, B>& T, const Mat6& cov) {
+      Vec6 d;
+      for (int k = 0; k < 6; ++k) d[k] = std::sqrt(cov(k, k)) * rng.normal();
+      return T.boxplus(d.head<3>(), d.tail<3>());
+    };
+    const Pose<B, B> T = perturb(A, cov_a) * perturb(C, cov_c), mean = A * C;
+    Vec6 e;
+    e << T.p - mean.p, so3_log(mean.q.conjugate() * T.q);
+    sampled += e * e.transpose() / kSamples;
+  }
+  const Mat6 formula = compose_covariance(A, cov_a, C, cov_c);
+  EXPECT_LT((formula - sampled).norm(), 0.05 * formula.norm());
+}
+
+TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
+  const Flight f = flight(120, 40, 0, 6);
+  PlaceMap map;
+  for (std::size_t i = 0; i < f.odometry.size(); ++i) {
+    MapKeyframe k;
+    k.t = Time{static_cast<std::int64_t>(i) * 100'000'000};
+    k.T_WB = f.odometry[i].cast_frames<W, B>();
+    k.T_MB = f.odometry[i];
+    map.add(std::move(k));
+  }
+  for (const PoseGraphEdge& e : f.edges)
+    map.edges.push_back({KeyframeId{e.a}, KeyframeId{e.b}, e.T_ab, e.information, e.loop ? MapEdge::Kind::loop : MapEdge::Kind::odometry});
+  for (int i = 119; i > 0; i -= 2) map.remove(KeyframeId{i});
+  ASSERT_EQ(map.size(), 60u);
+  map.optimise({});
+  double sum = 0, before = 0;
+  for (const MapKeyframe& k : map.keyframes()) {
+    const auto i = static_cast<std::size_t>(k.id.value);
+    sum += (k.T_MB.p - f.truth[i].p).squaredNorm();
+    before += (f.odometry[i].p - f.truth[i].p).squaredNorm();
+  }
+  EXPECT_LT(std::sqrt(sum), 0.4 * std::sqrt(before));
+}
+
+}  // namespace
+}  // namespace fbvins
