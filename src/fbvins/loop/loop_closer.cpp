@@ -82,7 +82,7 @@ MapUpdate LoopCloser::process(Place place, FrameId frame, Time t, const Pose<W, 
   previous_T_WB_ = T_WB;
   frame_.advance(T_WB, t);
 
-  MapKeyframe query{{}, t, session_, T_WB, frame_.T_MW() * T_WB, path_m_, 0, std::move(place)};
+  MapKeyframe query{{}, t, session_, T_WB, frame_.T_MW() * T_WB, path_m_, 0, frame_.known(), std::move(place)};
   CpuTimer timer;
   const std::vector<KeyframeId> candidates = candidates_for(query);
   update.stats.recognise_ms = timer.lap_ms();
@@ -113,7 +113,8 @@ std::vector<KeyframeId> LoopCloser::plausible(const MapKeyframe& query) const {
   const Vec3 axis = query.T_MB.q * (T_BC0_.q * Vec3::UnitZ());
   std::vector<KeyframeId> ids;
   for (const MapKeyframe& k : map_.keyframes()) {
-    if (k.session == query.session && (query.t - k.t).seconds() < options_.min_age_s) continue;
+    if (!k.placed) continue;
+    if (k.session == query.session && std::abs((query.t - k.t).seconds()) < options_.min_age_s) continue;
     if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach) continue;
     if ((k.T_MB.q * (T_BC0_.q * Vec3::UnitZ())).dot(axis) < min_cos) continue;
     ids.push_back(k.id);
@@ -128,7 +129,7 @@ std::vector<KeyframeId> LoopCloser::candidates_for(const MapKeyframe& query) {
     const std::vector<KeyframeId> near = plausible(query);
     hits = index_.query(query.place.words, 40, [&](KeyframeId k) { return std::binary_search(near.begin(), near.end(), k); });
   } else {
-    hits = index_.query(query.place.words, 40, [&](KeyframeId k) { return map_.find(k)->session != query.session; });
+    hits = index_.query(query.place.words, 40, [&](KeyframeId k) { return map_.find(k)->placed; });
     // Several similar neighbours speak for a place.
     std::vector<IndexHit> grouped = hits;
     for (IndexHit& a : grouped)
@@ -248,6 +249,7 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
     frame_.update(seen_pose(proposal));
     join_session(frame_.T_MW());
     query.T_MB = frame_.T_MW() * query.T_WB;
+    query.placed = true;
     found.push_back(edge_to({}, proposal));
     return;
   }
@@ -256,7 +258,7 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
 /// What this session saw before it knew where it was now has a place in M.
 void LoopCloser::join_session(const Pose<M, W>& T_MW) {
   for (MapKeyframe& k : map_.keyframes())
-    if (k.session == session_) k.T_MB = T_MW * k.T_WB;
+    if (k.session == session_) k.T_MB = T_MW * k.T_WB, k.placed = true;
   guesses_.clear();
 }
 
@@ -359,7 +361,7 @@ Trajectory LoopCloser::corrected(const Trajectory& in_W) const {
   for (const Record& r : records_) {
     const MapKeyframe* anchor = map_.find(r.anchor);
     const auto at = std::lower_bound(in_W.begin(), in_W.end(), r.t, [](const StampedPose& p, Time t) { return p.t < t; });
-    if (anchor == nullptr || at == in_W.end() || at->t != r.t) continue;
+    if (anchor == nullptr || !anchor->placed || at == in_W.end() || at->t != r.t) continue;
     knots.push_back({r.t, anchor->T_MB * r.T_anchor_B, at->T_WB});
   }
   Trajectory out;

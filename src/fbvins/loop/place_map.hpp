@@ -24,6 +24,7 @@ struct MapKeyframe {
   Pose<M, B> T_MB;
   double path_m = 0;          ///< flown in this session until here
   int seen_again = 0;         ///< loops that ended here
+  bool placed = true;         ///< T_MB means something: its session has found into the map
   Place place;
 };
 

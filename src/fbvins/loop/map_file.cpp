@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <set>
+
+#include "fbvins/loop/binary_file.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr char kMagic[8] = {'F', 'B', 'V', 'P', 'L', 'A', 'C', 'E'};
+constexpr std::size_t kHeaderBytes = 32;
+constexpr std::size_t kFeatureBytes = sizeof(PlaceFeature), kDescriptorBytes = sizeof(Descriptor);
+static_assert(kFeatureBytes == 20 && kDescriptorBytes == 32);
+
+/// Little-endian, as every machine this runs on.
+class Writer {
+ public:
+  template <class T>
+  void put(const T& value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  void put(const Vec3& v) {
+    for (int i = 0; i < 3; ++i) put(v[i]);
+  }
+  void put(const Quat& q) {
+    for (const double c : {q.w(), q.x(), q.y(), q.z()}) put(c);
+  }
+  template <class A, class Z>
+  void put(const Pose<A, Z>& T) {
+    put(T.q);
+    put(T.p);
+  }
+  void raw(const void* data, std::size_t n) { bytes_.append(static_cast<const char*>(data), n); }
+  std::string take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> bytes) : rest_(bytes) {}
+
+  bool ok() const { return ok_; }
+  bool at_end() const { return rest_.empty(); }
+  std::size_t left() const { return rest_.size(); }
+  template <class T>
+  T get() {
+    T value{};
+    raw(&value, sizeof value);
+    return value;
+  }
+  void raw(void* out, std::size_t n) {
+    if (n > rest_.size()) {
+      ok_ = false;
+      return;
+    }
+    std::memcpy(out, rest_.data(), n);
+    rest_ = rest_.subspan(n);
+  }
+  Vec3 vec3() {
+    Vec3 v;
+    for (int i = 0; i < 3; ++i) v[i] = get<double>();
+    check(v.allFinite());
+    return v;
+  }
+  template <class P>
+  P pose() {
+    const double w = get<double>(), x = get<double>(), y = get<double>(), z = get<double>();
+    const Quat q(w, x, y, z);
+    check(std::abs(q.squaredNorm() - 1) < 1e-6);  // false for NaN
+    return P(q, vec3());
+  }
+  void check(bool good) { ok_ = ok_ && good; }
+
+ private:
+  std::span<const std::byte> rest_;
+  bool ok_ = true;
+};
+
+void put(Writer& w, const MapKeyframe& k) {
+  w.put(k.id.value);
+  w.put(k.t.ns);
+  w.put(k.session);
+  w.put(static_cast<std::int32_t>(k.seen_again));
+  w.put(k.T_WB);
+  w.put(k.T_MB);
+  w.put(k.path_m);
+  w.put(k.place.up_C0);
+  w.put(k.place.focal_px);
+  w.put(static_cast<std::uint32_t>(k.place.size()));
+  w.raw(k.place.features.data(), k.place.size() * kFeatureBytes);
+  w.raw(k.place.descriptors.data(), k.place.size() * kDescriptorBytes);
+}
+
+MapKeyframe get_keyframe(Reader& r) {
+  MapKeyframe k;
+  k.id.value = r.get<std::int64_t>();
+  k.t.ns = r.get<std::int64_t>();
+  k.session = r.get<std::uint32_t>();
+  k.seen_again = r.get<std::int32_t>();
+  k.T_WB = r.pose<Pose<W, B>>();
+  k.T_MB = r.pose<Pose<M, B>>();
+  k.path_m = r.get<double>();
+  k.place.up_C0 = r.vec3();
+  k.place.focal_px = r.get<double>();
+  r.check(k.place.focal_px > 1 && k.place.focal_px < 1e6);
+  const auto n = r.get<std::uint32_t>();
+  if (n > r.left() / (kFeatureBytes + kDescriptorBytes)) {
+    r.check(false);
+    return k;
+  }
+  k.place.features.resize(n);
+  k.place.descriptors.resize(n);
+  r.raw(k.place.features.data(), n * kFeatureBytes);
+  r.raw(k.place.descriptors.data(), n * kDescriptorBytes);
+  for (const PlaceFeature& f : k.place.features)
+    r.check(std::isfinite(f.x) && std::isfinite(f.y) && std::isfinite(f.inverse_depth) && f.sigma_xy > 0 && std::isfinite(f.sigma_inverse_depth));
+  return k;
+}
+
+void put(Writer& w, const MapEdge& e) {
+  w.put(e.from.value);
+  w.put(e.to.value);
+  w.put(static_cast<std::uint32_t>(e.kind));
+  w.put(e.T_from_to);
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) w.put(e.information(i, j));
+}
+
+MapEdge get_edge(Reader& r) {
+  MapEdge e;
+  e.from.value = r.get<std::int64_t>();
+  e.to.value = r.get<std::int64_t>();
+  const auto kind = r.get<std::uint32_t>();
+  r.check(kind <= 1);
+  e.kind = static_cast<MapEdge::Kind>(kind);
+  e.T_from_to = r.pose<Pose<B, B>>();
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) e.information(i, j) = e.information(j, i) = r.get<double>();
+  r.check(e.information.allFinite());
+  return e;
+}
+
+Error damaged(const std::string& name, const char* what) {
+  return {ErrorCode::malformed, fmt::format("{}: damaged map: {}", name, what)};
+}
+
+}  // namespace
+
+std::string serialise_map(const PlaceMap& map) {
+  Writer body;
+  std::set<KeyframeId> kept;
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) kept.insert(k.id);
+  std::vector<const MapEdge*> edges;
+  for (const MapEdge& e : map.edges)
+    if (kept.count(e.from) > 0 && kept.count(e.to) > 0) edges.push_back(&e);
+  body.put(static_cast<std::uint32_t>(kept.size()));
+  body.put(static_cast<std::uint32_t>(edges.size()));
+  body.put(map.T_BC0);
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) put(body, k);
+  for (const MapEdge* e : edges) put(body, *e);
+  const std::string bytes = body.take();
+  Writer head;
+  head.raw(kMagic, sizeof kMagic);
+  head.put(kMapVersion);
+  head.put(std::uint32_t{0});
+  head.put(static_cast<std::uint64_t>(bytes.size()));
+  head.put(checksum64(std::as_bytes(std::span(bytes))));
+  return head.take() + bytes;
+}
+
+Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& name) {
+  if (bytes.size() < kHeaderBytes) return damaged(name, "too short");
+  Reader head(bytes.first(kHeaderBytes));
+  char magic[8];
+  head.raw(magic, sizeof magic);
+  if (std::memcmp(magic, kMagic, sizeof magic) != 0) return Error{ErrorCode::unsupported, fmt::format("{}: not a map", name)};
+  const auto version = head.get<std::uint32_t>();
+  if (version != kMapVersion)
+    return Error{ErrorCode::unsupported, fmt::format("{}: map of version {}, this program reads {}", name, version, kMapVersion)};
+  if (head.get<std::uint32_t>() != 0) return damaged(name, "unknown flags");
+  if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
+  if (head.get<std::uint64_t>() != checksum64(bytes.subspan(kHeaderBytes))) return damaged(name, "the checksum differs");
+
+  Reader r(bytes.subspan(kHeaderBytes));
+  PlaceMap map;
+  const auto keyframes = r.get<std::uint32_t>(), edges = r.get<std::uint32_t>();
+  map.T_BC0 = r.pose<Pose<B, C0>>();
+  KeyframeId last;
+  for (std::uint32_t i = 0; i < keyframes && r.ok(); ++i) {
+    MapKeyframe k = get_keyframe(r);
+    r.check(k.id > last && k.id.value < (std::int64_t{1} << 31));
+    last = k.id;
+    if (r.ok()) map.add(std::move(k));
+  }
+  for (std::uint32_t i = 0; i < edges && r.ok(); ++i) {
+    MapEdge e = get_edge(r);
+    r.check(map.find(e.from) != nullptr && map.find(e.to) != nullptr && e.from != e.to);
+    if (r.ok()) map.edges.push_back(e);
+  }
+  if (!r.ok() || !r.at_end()) return damaged(name, "its content makes no sense");
+  return map;
+}
+
+Result<void> save_map(const PlaceMap& map, const std::string& path) { return write_file_atomically(path, serialise_map(map)); }
+
+Result<PlaceMap> load_map(const std::string& path) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  return parse_map((*file)->bytes(), path);
+}
+
+std::string map_as_ply(const PlaceMap& map) {
+  std::string points;
+  std::size_t count = 0;
+  for (const MapKeyframe& k : map.keyframes()) {
+    const Pose<M, C0> T_MC = k.T_MB * map.T_BC0;
+    for (const PlaceFeature& f : k.place.features) {
+      if (!f.has_point() || f.sigma_inverse_depth > 0.1f * f.inverse_depth) continue;
+      const Vec3 p = T_MC * f.p_C0();
+      const int grey = std::clamp(static_cast<int>(255 * std::min(1.0f, f.inverse_depth)), 40, 255);
+      fmt::format_to(std::back_inserter(points), "{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), grey, grey, grey);
+      ++count;
+    }
+  }
+  return fmt::format(
+             "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+             "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+             count) +
+         points;
+}
+
+std::string map_as_tum(const PlaceMap& map) {
+  std::string lines;
+  for (const MapKeyframe& k : map.keyframes())
+    fmt::format_to(std::back_inserter(lines), "{}.{:09} {:.6f} {:.6f} {:.6f} {:.8f} {:.8f} {:.8f} {:.8f}\n", k.t.ns / 1'000'000'000,
+                   k.t.ns % 1'000'000'000, k.T_MB.p.x(), k.T_MB.p.y(), k.T_MB.p.z(), k.T_MB.q.x(), k.T_MB.q.y(), k.T_MB.q.z(), k.T_MB.q.w());
+  return lines;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_merge.hpp"
+
+namespace fbvins {
+
+Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary) {
+  StereoRig rig;  // only the place of the left camera matters: nothing is extracted
+  rig.T_BC0 = first.T_BC0;
+  LoopOptions merging = options;
+  merging.graph.degrees_of_freedom = 6;
+  LoopCloser closer(rig, merging, vocabulary, std::move(first));
+  bool joined = false;
+  for (const MapKeyframe& k : second.keyframes()) {
+    // Its map is its odometry, already corrected; the body may sit elsewhere on the other rig.
+    const Pose<M, C0> T_MC = k.T_MB * second.T_BC0;
+    const Pose<M, B> T_MB = T_MC * rig.T_BC0.inverse();
+    joined |= closer.process(k.place, FrameId{k.id.value}, k.t, T_MB.cast_frames<W, B>(), 0).localised;
+  }
+  if (!joined) return Error{ErrorCode::invalid_argument, "the two maps have no place in common"};
+  closer.finish();
+  return closer.map();
+}
+
+}  // namespace fbvins
