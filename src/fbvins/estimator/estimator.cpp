@@ -21,11 +21,13 @@ ImuNoise scaled(ImuNoise noise, const EstimatorOptions& o) {
   return noise;
 }
 
-/// What is believed of the first frame: position and yaw are a choice of W, the rest is uncertain.
+/// What is believed of the first frame before any measurement: position and heading are a choice of W,
+/// biases are near zero, tilt and velocity are wide open. The initial solution is where the optimiser
+/// starts, not a belief: it was made from the measurements the window still holds.
 WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state) {
   constexpr double kChosenSigma = 1e-3;  // m and rad: the gauge
   Vec15 sigma;
-  sigma << Vec3::Constant(kChosenSigma), Vec3::Constant(o.gravity_sigma_rad), Vec3::Constant(o.velocity_sigma_mps),
+  sigma << Vec3::Constant(kChosenSigma), Vec3::Constant(o.tilt_sigma_rad), Vec3::Constant(o.velocity_sigma_mps),
       Vec3::Constant(o.gyro_bias_sigma_radps), Vec3::Constant(o.accel_bias_sigma_mps2);
   WindowPrior prior;
   prior.frames = {0};
@@ -33,8 +35,11 @@ WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state
   prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
   // Yaw is about the world's vertical, which in B is R^T z.
   const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
-  const double tilt = 1.0 / (o.gravity_sigma_rad * o.gravity_sigma_rad), yaw = 1.0 / (kChosenSigma * kChosenSigma);
+  const double tilt = 1.0 / (o.tilt_sigma_rad * o.tilt_sigma_rad), yaw = 1.0 / (kChosenSigma * kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = tilt * Mat3::Identity() + (yaw - tilt) * up_B * up_B.transpose();
+  Vec15 from_belief = Vec15::Zero();
+  from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
+  prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
   return prior;
 }
 
@@ -106,12 +111,14 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
     window_.add_frame(std::move(f), start->frames[i].features, calibration_);
   }
   window_.set_prior(first_frame_prior(options_.initialiser, window_.frames().front().state));
+  // Tilt, velocity and biases hardly move the cost of so short a time: do not stop on its decrease.
+  const LmOptions thorough{.max_iterations = 30, .min_decrease = 1e-9};
   running_ = true;
   last_good_tracking_ = frame.t;
-  solve(out, 20);
+  solve(out, thorough);
   // The first solve may have moved the first frame far: Jacobians of the prior follow it.
   window_.restart_first_estimates();
-  solve(out, 10);
+  solve(out, thorough);
   out.health = judge(frame, out);
   if (out.health.state != HealthState::good) {
     running_ = false;
@@ -149,7 +156,7 @@ Odometry Estimator::track(const TrackedFrame& frame, Duration rest) {
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   window_.add_frame(std::move(predicted), frame.features, calibration_);
   out.stats.prepare_ms = timer.lap_ms();
-  solve(out, options_.max_iterations);
+  solve(out, LmOptions{.max_iterations = options_.max_iterations});
   timer.lap_ms();
   out.stats.standstill = standstill;
   choose_keyframe(standstill, out);
@@ -159,11 +166,9 @@ Odometry Estimator::track(const TrackedFrame& frame, Duration rest) {
   return out;
 }
 
-void Estimator::solve(Odometry& out, int max_iterations) {
+void Estimator::solve(Odometry& out, const LmOptions& lm) {
   CpuTimer timer;
   window_.build(problem_, calibration_, weights());
-  LmOptions lm;
-  lm.max_iterations = max_iterations;
   const LmSummary summary = problem_.optimise(lm);
   if (summary.usable) {
     window_.accept(problem_);
@@ -172,11 +177,11 @@ void Estimator::solve(Odometry& out, int max_iterations) {
   } else {
     ++failed_solves_;
   }
-  Eigen::Matrix<double, 9, 9> covariance;
+  Mat15 covariance;
   const int newest = static_cast<int>(window_.frames().size()) - 1;
   if (summary.usable && problem_.covariance(newest, covariance)) {
     out.pose_covariance = covariance.topLeftCorner<6, 6>();
-    out.velocity_covariance = covariance.bottomRightCorner<3, 3>();
+    out.velocity_covariance = covariance.block<3, 3>(nav::v, nav::v);
   }
   out.stats.frames_in_window = newest + 1;
   out.stats.landmarks = static_cast<int>(problem_.landmarks.size());
@@ -216,7 +221,7 @@ void Estimator::hand_on_keyframes(int keyframe_zone) {
     if (!frame.keyframe || frame.id <= newest_handed_on_) continue;
     newest_handed_on_ = frame.id;
     Keyframe keyframe = window_.take_keyframe(i, calibration_);
-    Eigen::Matrix<double, 9, 9> covariance;
+    Mat15 covariance;
     if (problem_.covariance(i, covariance)) keyframe.pose_covariance = covariance.topLeftCorner<6, 6>();
     keyframe.reset_counter = reset_counter_;
     keyframes_.push_back(std::move(keyframe));

@@ -44,7 +44,7 @@ class Estimator {
   Odometry initialise(const TrackedFrame& frame, Duration rest);
   Odometry track(const TrackedFrame& frame, Duration rest);
   Frame predict(const TrackedFrame& frame) const;
-  void solve(Odometry& out, int max_iterations);
+  void solve(Odometry& out, const LmOptions& lm);
   void choose_keyframe(bool standstill, Odometry& out);
   void shrink_window(Odometry& out);
   void hand_on_keyframes(int keyframe_zone);

@@ -12,26 +12,26 @@ namespace fbvins {
 
 struct InitialiserOptions {
   int frames = 10;                       // images looked at
-  double min_rest_s = 0.4;
+  double min_spacing_s = 0.045;
   double max_rest_motion_px = 0.6;
   int min_features = 20;
-  double gravity_sigma_rad = 0.02;
-  double gyro_bias_sigma_radps = 0.05;
-  double accel_bias_sigma_mps2 = 0.3;
-  double velocity_sigma_mps = 0.3;
+  double tilt_sigma_rad = 0.5;
+  double gyro_bias_sigma_radps = 0.1;
+  double accel_bias_sigma_mps2 = 0.2;
+  double velocity_sigma_mps = 5;
   AlignmentOptions alignment;
   RestOptions rest;
 
   template <class V>
   void visit(V&& v) {
     v("frames", frames, "", "images an initial solution is made from", 4, 30);
-    v("min_rest_s", min_rest_s, "s", "rest needed to start from rest", 0.1, 10.0);
+    v("min_spacing_s", min_spacing_s, "s", "least time between these images", 0.001, 1.0);
     v("max_rest_motion_px", max_rest_motion_px, "px", "median image motion that still counts as rest", 0.05, 10.0);
     v("min_features", min_features, "", "stereo features needed in each of these images", 6, 500);
-    v("gravity_sigma_rad", gravity_sigma_rad, "rad", "standard deviation of the initial roll and pitch", 1e-4, 0.5);
+    v("tilt_sigma_rad", tilt_sigma_rad, "rad", "prior standard deviation of roll and pitch", 1e-4, 3.0);
     v("gyro_bias_sigma_radps", gyro_bias_sigma_radps, "rad/s", "prior standard deviation of the gyroscope bias", 1e-5, 1.0);
     v("accel_bias_sigma_mps2", accel_bias_sigma_mps2, "m/s^2", "prior standard deviation of the accelerometer bias", 1e-4, 5.0);
-    v("velocity_sigma_mps", velocity_sigma_mps, "m/s", "standard deviation of the initial velocity", 1e-3, 10.0);
+    v("velocity_sigma_mps", velocity_sigma_mps, "m/s", "prior standard deviation of the velocity", 1e-3, 100.0);
     v.group("alignment", alignment, "start in motion");
     v.group("rest", rest, "start from rest");
   }

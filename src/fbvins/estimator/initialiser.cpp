@@ -13,6 +13,16 @@ namespace {
 
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
+constexpr std::size_t kFramesPerRefinement = 3;
+
+/// All fifteen numbers of the first frame: images alone fix neither origin nor velocity.
+WindowPrior held_still() {
+  WindowPrior prior;
+  prior.frames = {0};
+  prior.quadratic.g = Eigen::VectorXd::Zero(15);
+  prior.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
+  return prior;
+}
 
 int stereo_features(const TrackedFrame& frame) {
   int n = 0;
@@ -46,13 +56,12 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   const bool broken = !frames_.empty() && frame.imu.empty();
   if (stereo_features(frame) < options_.initialiser.min_features || broken) {
     reason_ = HealthReason::too_few_features;
-    frames_.clear();
+    reset();
     if (!broken) return std::nullopt;
   }
-  frames_.push_back(frame);
-  while (static_cast<int>(frames_.size()) > options_.initialiser.frames) frames_.pop_front();
+  remember(frame);
   std::optional<InitialSolution> start;
-  if (rest.seconds() >= options_.initialiser.min_rest_s)
+  if (rest.seconds() >= options_.initialiser.rest.min_window_s)
     start = start_from_rest();
   else if (static_cast<int>(frames_.size()) >= options_.initialiser.frames)
     start = start_in_motion(calibration);
@@ -62,12 +71,28 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   return start;
 }
 
+void Initialiser::remember(const TrackedFrame& frame) {
+  if (!frame.imu.empty()) readings_.push_back(frame.imu);
+  while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= options_.initialiser.rest.min_window_s)
+    readings_.pop_front();
+  // A fast camera would fill the window in no time: the newest frame takes the place of one just before it.
+  const std::size_t n = frames_.size();
+  TrackedFrame newest = frame;
+  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < options_.initialiser.min_spacing_s) {
+    ImuSegment joined = std::move(frames_.back().imu);
+    joined.samples.insert(joined.samples.end(), frame.imu.samples.begin() + 1, frame.imu.samples.end());
+    joined.longest_gap = std::max(joined.longest_gap, frame.imu.longest_gap);
+    newest.imu = std::move(joined);
+    frames_.pop_back();
+  }
+  frames_.push_back(std::move(newest));
+  while (static_cast<int>(frames_.size()) > options_.initialiser.frames) frames_.pop_front();
+}
+
 std::optional<InitialSolution> Initialiser::start_from_rest() {
   std::vector<ImuSample> readings;
-  for (std::size_t i = 1; i < frames_.size(); ++i) {
-    const std::vector<ImuSample>& samples = frames_[i].imu.samples;
-    readings.insert(readings.end(), samples.begin() + (i > 1), samples.end());  // neighbours share one stamp
-  }
+  for (const ImuSegment& segment : readings_)
+    readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1), segment.samples.end());  // neighbours share a stamp
   const RestEstimate rest = initialise_at_rest(readings, 0, noise_, options_.initialiser.rest, options_.gravity_mps2);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
@@ -97,11 +122,20 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& c
   return InitialSolution{{frames_.begin(), frames_.end()}, std::move(alignment.states), false};
 }
 
+bool Initialiser::refine_structure(const Calibration& calibration) {
+  structure_.build(problem_, calibration, WindowWeights{});
+  LmOptions lm;
+  lm.max_iterations = 6;
+  if (!problem_.optimise(lm).usable) return false;
+  structure_.accept(problem_);
+  structure_.remove_outliers(problem_, options_.outlier_sigma);
+  return true;
+}
+
 bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses) {
   // Poses in a visual world whose origin is the first frame, one after the other, then all together.
   poses.assign(1, Pose<W, B>{});
   std::unordered_map<TrackId, Vec3> points;
-  const CameraGeometry cameras(calibration);
   structure_.clear();
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (i > 0) {
@@ -122,21 +156,17 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
     f.t = frames_[i].t;
     f.state.T_WB = poses.back();
     structure_.add_frame(std::move(f), frames_[i].features, calibration);
-    for (const auto& l : structure_.snapshot(calibration).landmarks) points[l.track] = l.p_W;
+    if (i == 0) structure_.set_prior(held_still());
+    // Stereo alone knows far points badly: the motion so far improves them before the next pose needs them.
+    if (i % kFramesPerRefinement == 0 || i + 1 == frames_.size()) {
+      if (!refine_structure(calibration)) return false;
+      for (const WindowSnapshot::Landmark& l : structure_.snapshot(calibration).landmarks) points[l.track] = l.p_W;
+    } else {
+      for (const WindowSnapshot::Landmark& l : structure_.snapshot(calibration).landmarks) points.try_emplace(l.track, l.p_W);
+    }
+    poses.back() = structure_.newest().state.T_WB;
   }
-  WindowPrior gauge;
-  gauge.frames = {0};
-  gauge.quadratic.g = Eigen::VectorXd::Zero(15);
-  gauge.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
-  structure_.set_prior(std::move(gauge));
-  for (int round = 0; round < 2; ++round) {
-    structure_.build(problem_, calibration, WindowWeights{});
-    LmOptions lm;
-    lm.max_iterations = 8;
-    if (!problem_.optimise(lm).usable) return false;
-    structure_.accept(problem_);
-    structure_.remove_outliers(problem_, options_.outlier_sigma);
-  }
+  if (!refine_structure(calibration)) return false;
   for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = structure_.frames()[i].state.T_WB;
   return true;
 }

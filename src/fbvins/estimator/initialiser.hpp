@@ -27,7 +27,10 @@ class Initialiser {
  public:
   Initialiser(const EstimatorOptions& options, const ImuNoise& noise);
 
-  void reset() { frames_.clear(); }
+  void reset() {
+    frames_.clear();
+    readings_.clear();
+  }
   /// Takes the next frame; a solution when there is one, else reason() says what is missing.
   /// `rest`: how long the body has stood still. W is placed so that the first frame has the
   /// position and heading of `origin`, if there is one.
@@ -36,13 +39,16 @@ class Initialiser {
   HealthReason reason() const { return reason_; }
 
  private:
+  void remember(const TrackedFrame& frame);
   std::optional<InitialSolution> start_from_rest();
   std::optional<InitialSolution> start_in_motion(const Calibration& calibration);
+  bool refine_structure(const Calibration& calibration);
   bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
 
   EstimatorOptions options_;
   ImuNoise noise_;
   std::deque<TrackedFrame> frames_;
+  std::deque<ImuSegment> readings_;  ///< of the last moments, for the judgement of rest
   SlidingWindow structure_;
   WindowProblem problem_;
   HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;

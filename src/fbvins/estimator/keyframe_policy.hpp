@@ -16,10 +16,10 @@ class KeyframePolicy {
   /// Is the newest frame far enough, in what it sees, from the last keyframe?
   bool is_keyframe(const SlidingWindow& window, const Calibration& calibration, bool standstill) const;
 
-  /// Index of the keyframe among the first `candidates` frames that leaves. `oldest`: 0.
-  /// `entropy`: the one whose measurements lower the entropy of the other states least
-  /// (docs/derivations/entropy.md, E1-E5). `problem` holds the window, as built.
-  int leaving(const WindowProblem& problem, int candidates);
+  /// Index of the keyframe that leaves, out of the first `keyframes` frames. `oldest`: 0.
+  /// `entropy`: the one whose images tell least about the newest state (docs/derivations/entropy.md,
+  /// E4). `problem` holds the window, as built.
+  int leaving(const WindowProblem& problem, int keyframes);
 
  private:
   KeyframeOptions options_;
@@ -27,8 +27,8 @@ class KeyframePolicy {
   WindowProblem scratch_;
 };
 
-/// Decrease of the differential entropy of the other frames' states by the visual measurements of
-/// `frame`, in nats (E4).
-double information_gain(const WindowProblem& problem, int frame, WindowProblem& scratch);
+/// Differential entropy of the newest frame's fifteen numbers without what frame `unseen` saw; with all
+/// observations for unseen = -1. In nats, up to the constant of E2.
+double entropy_of_newest(const WindowProblem& problem, int unseen, WindowProblem& scratch);
 
 }  // namespace fbvins

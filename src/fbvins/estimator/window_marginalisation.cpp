@@ -10,6 +10,7 @@ void select_factors(const WindowProblem& problem, int leaving, const std::vector
   out.frames = problem.frames;
   out.calibration = problem.calibration;
   out.weights = problem.weights;
+  out.weights.at_first_estimates = true;
   out.prior = problem.prior;
   out.landmarks.clear();
   out.observations.clear();

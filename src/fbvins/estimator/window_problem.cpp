@@ -16,6 +16,7 @@ namespace {
 constexpr double kUnprojectableSigma = 100.0;
 /// Keeps directions without any measurement solvable; far below any real information.
 constexpr double kRegularisation = 1e-8;
+constexpr double kNegligibleLambda = 1e-8;
 
 /// Columns of the stacked Jacobian of one observation.
 enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 = 16, kExtrinsic1 = 22, kTimeOffset = 28 };
@@ -327,6 +328,7 @@ double WindowProblem::linearise() {
 }
 
 bool WindowProblem::solve(double lambda) {
+  factor_lambda_ = lambda;
   reduced_ = H_;
   reduced_g_ = g_;
   reduced_.diagonal() *= 1.0 + lambda;
@@ -398,11 +400,11 @@ Eigen::MatrixXd WindowProblem::reduced_information() {
   return reduced_.selfadjointView<Eigen::Lower>();
 }
 
-bool WindowProblem::covariance(int frame, Eigen::Matrix<double, 9, 9>& out) {
-  // The factor of the last solve: damped by the last lambda, which is negligible once converged.
+bool WindowProblem::covariance(int frame, Mat15& out) {
+  if (factor_lambda_ > kNegligibleLambda && !solve(0)) return false;  // damping would feign certainty
   if (llt_.rows() != system_size() || llt_.info() != Eigen::Success) return false;
-  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(system_size(), 9);
-  for (int k = 0; k < 9; ++k) unit(row_of(frame, k), k) = 1;
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(system_size(), 15);
+  for (int k = 0; k < 15; ++k) unit(row_of(frame, k), k) = 1;
   llt_.matrixL().solveInPlace(unit);
   out.noalias() = unit.transpose() * unit;
   return out.allFinite();

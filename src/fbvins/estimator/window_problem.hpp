@@ -27,7 +27,7 @@ namespace fbvins {
 
 struct WindowFrame {
   NavState state;
-  /// First estimate: Jacobians of frames the prior knows are taken here (W9).
+  /// State when the prior first named this frame: the prior is built and measured from here (W9).
   NavState first_estimate;
   bool in_prior = false;
   /// From the frame before this one; null where the chain is broken or the prior holds it.
@@ -57,6 +57,7 @@ struct WindowWeights {
   double gravity_mps2 = 9.81;
   double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
+  bool at_first_estimates = false;  ///< Jacobians of frames in the prior are taken at their first estimates
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
 };
@@ -111,8 +112,8 @@ class WindowProblem {
   const Eigen::VectorXd& reduced_gradient() const { return reduced_g_; }
   /// Current calibration minus `from`, as a perturbation of `from`.
   Eigen::Matrix<double, kCalibrationSize, 1> calibration_displacement(const Calibration& from) const;
-  /// Covariance of the frame's (p, theta, v) after optimise(); false if it cannot be computed.
-  bool covariance(int frame, Eigen::Matrix<double, 9, 9>& out);
+  /// Covariance of a frame's (p, theta, v, bg, ba) after optimise() or solve(); false if there is none.
+  bool covariance(int frame, Mat15& out);
 
   bool calibrating() const { return weights.estimate_extrinsics || weights.estimate_time_offset; }
   int calibration_size() const { return calibrating() ? kCalibrationSize : 0; }
@@ -136,7 +137,9 @@ class WindowProblem {
   Eigen::VectorXd prior_displacement() const;
   void fix_inactive_calibration();
   const PairGeometry& pair(int host, int target) const { return pairs_[host * frames.size() + target]; }
-  NavState linearisation_point(int i) const { return frames[i].in_prior ? frames[i].first_estimate : frames[i].state; }
+  NavState linearisation_point(int i) const {
+    return weights.at_first_estimates && frames[i].in_prior ? frames[i].first_estimate : frames[i].state;
+  }
 
   std::vector<PairGeometry> pairs_;
   std::vector<int> prior_rows_;
@@ -148,6 +151,7 @@ class WindowProblem {
   std::vector<Vec3> saved_landmarks_;
   Calibration saved_calibration_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
+  double factor_lambda_ = 0;  ///< damping in llt_
   double predicted_decrease_ = 0;
   double step_size_ = 0;
 };

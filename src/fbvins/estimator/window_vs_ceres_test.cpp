@@ -291,7 +291,7 @@ TEST_P(WindowTwins, MinimumIsThatOfCeres) {
   LmOptions options;
   options.max_iterations = 100;
   options.min_step = 1e-11;
-  options.min_relative_decrease = 0;
+  options.min_decrease = 0;
   const LmSummary summary = w.problem.optimise(options);
   ASSERT_TRUE(summary.usable);
   const double theirs = twin.solve();

@@ -19,7 +19,7 @@ namespace fbvins {
 /// Spread is measured on means over blocks of block_s: an idling rotor shakes the readings by 1 m/s^2
 /// and yet goes nowhere, while a hand that holds the camera moves slowly and far.
 struct RestOptions {
-  double min_window_s = 0.5;
+  double min_window_s = 0.4;
   double block_s = 0.1;
   double max_gyro_spread_radps = 0.015;
   double max_accel_spread_mps2 = 0.2;

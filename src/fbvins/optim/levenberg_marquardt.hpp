@@ -19,10 +19,12 @@ namespace fbvins {
 
 struct LmOptions {
   int max_iterations = 5;
-  double initial_lambda = 1e-6;
-  double max_lambda = 1e6;
+  double initial_lambda = 1e-9;
+  int max_retries = 6;                  ///< steps tried at one linearisation, lambda growing tenfold
   double min_step = 1e-6;               ///< converged when the step is smaller
-  double min_relative_decrease = 1e-4;  ///< converged when the cost falls by less than this share
+  /// Converged when the cost, half a chi-square, falls by less than this. Absolute, because a prior's
+  /// cost has no meaningful zero; 0.05 is a third of a sigma along the one direction that still moves.
+  double min_decrease = 0.05;
 };
 
 struct LmSummary {
@@ -46,32 +48,30 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       summary.usable = false;
       return summary;
     }
-    bool accepted = false;
-    double decrease = 0, step = 0;
-    while (!accepted && lambda <= options.max_lambda) {
+    bool accepted = false, converged = false;
+    double decrease = 0;
+    for (int retry = 0; !accepted && !converged && retry < options.max_retries; ++retry) {
       if (problem.solve(lambda)) {
-        step = problem.step_size();
         const double trial = problem.apply_step();
-        decrease = cost - trial;
-        // A model that promises nothing measurable has converged: keep the step if it does no harm.
         const double promised = problem.predicted_decrease();
-        if (std::isfinite(trial) && (decrease > 1e-3 * promised || std::abs(decrease) <= 1e-12 * cost)) {
-          accepted = true;
+        decrease = cost - trial;
+        converged = problem.step_size() < options.min_step || promised < options.min_decrease;
+        accepted = std::isfinite(trial) && decrease > 1e-3 * promised;
+        if (accepted) {
           summary.final_cost = trial;
-          lambda = std::max(lambda / 5, 1e-10);
+          lambda = std::max(lambda / 5, options.initial_lambda);
           break;
         }
         problem.undo_step();
         ++summary.rejected;
-        if (step < options.min_step) break;
       }
-      lambda = std::max(lambda, 1e-8) * 10;
+      lambda *= 10;
     }
     if (!accepted) {
-      summary.usable = i > 0 || step < options.min_step;
+      summary.usable = i > 0 || converged;
       return summary;
     }
-    if (step < options.min_step || decrease < options.min_relative_decrease * cost) return summary;
+    if (converged || decrease < options.min_decrease) return summary;
   }
   return summary;
 }

@@ -4,9 +4,7 @@
 namespace fbvins {
 
 std::unique_ptr<Frontend> make_frontend(const StereoRig& rig, const FrontendOptions& options) {
-#ifdef FBVINS_HAS_ORB
   if (options.kind == "orb") return std::make_unique<OrbFrontend>(rig, options.orb);
-#endif
   return std::make_unique<KltFrontend>(rig, options.klt);
 }
 

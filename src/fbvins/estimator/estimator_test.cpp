@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator as a whole on simulated tracks and readings: accuracy, honesty, and what it does when
+// sensors stop or lie.
+#include "fbvins/estimator/estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "fbvins/estimator/simulated_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+EstimatorOptions exact_noise() {
+  EstimatorOptions o;  // the simulated IMU is as good as its data sheet
+  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
+  return o;
+}
+
+struct Flown {
+  std::vector<Odometry> odometry;
+  std::vector<NavState> truth;
+  int gauge_frame = -1;      ///< the frame whose position and heading W was chosen by
+  Pose<W, B> gauge_pose;
+
+  std::vector<HealthState> states() const {
+    std::vector<HealthState> out;
+    for (const Odometry& o : odometry) out.push_back(o.health.state);
+    return out;
+  }
+  int first_pose() const {
+    for (std::size_t k = 0; k < odometry.size(); ++k)
+      if (odometry[k].health.has_pose()) return static_cast<int>(k);
+    return -1;
+  }
+  /// The truth at k in W.
+  NavState truth_in_W(int k) const {
+    const Pose<W, B>& b = truth[gauge_frame].T_WB;
+    const Quat turn(Eigen::AngleAxisd(heading_between(b.q, gauge_pose.q), Vec3::UnitZ()));
+    NavState s = truth[k];
+    s.T_WB = {(turn * s.T_WB.q).normalized(), Vec3(gauge_pose.p + turn * (s.T_WB.p - b.p))};
+    s.v_WB = turn * s.v_WB;
+    return s;
+  }
+  double position_error(int k) const { return (odometry[k].T_WB.p - truth_in_W(k).T_WB.p).norm(); }
+};
+
+Flown fly(SimulatedFlight& flight, int frames, const EstimatorOptions& options = exact_noise()) {
+  Estimator estimator(flight.rig, options);
+  Flown out;
+  for (int k = 0; k < frames; ++k) {
+    out.odometry.push_back(estimator.process(flight.frame(k)).odometry);
+    out.truth.push_back(flight.truth(k));
+    if (out.gauge_frame < 0 && out.odometry.back().health.has_pose()) {
+      const Frame& oldest = estimator.window().frames().front();
+      out.gauge_frame = static_cast<int>(oldest.id.value);
+      out.gauge_pose = oldest.state.T_WB;
+    }
+  }
+  return out;
+}
+
+TEST(Estimator, FollowsAMotionThatNeverRests) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 1);
+  const Flown flown = fly(flight, 200);
+  const int first = flown.first_pose();
+  ASSERT_GE(first, 0);
+  EXPECT_LT(first, 20);
+  for (int k = first; k < 200; ++k) {
+    EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::good, HealthReason::none})) << k;
+    EXPECT_LT(flown.position_error(k), 0.04) << k;
+  }
+  const Odometry& last = flown.odometry.back();
+  EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 2e-3);
+  EXPECT_LT((last.bias.accel_mps2 - flight.bias.accel_mps2).norm(), 0.05);
+  EXPECT_LT((last.v_WB - flown.truth_in_W(199).v_WB).norm(), 0.05);
+}
+
+TEST(Estimator, TiltIsAbsolute) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 2);
+  const Flown flown = fly(flight, 120);
+  const Vec3 up_estimated = flown.odometry.back().T_WB.q.conjugate() * Vec3::UnitZ();
+  const Vec3 up_true = flown.truth.back().T_WB.q.conjugate() * Vec3::UnitZ();
+  EXPECT_LT((up_estimated - up_true).norm(), 0.006);
+}
+
+TEST(Estimator, SameInputSameBits) {
+  SimulatedFlight a(Motion(0.6, 0.3), 3), b(Motion(0.6, 0.3), 3);
+  const Flown one = fly(a, 100), two = fly(b, 100);
+  for (int k = 0; k < 100; ++k) {
+    EXPECT_EQ(one.odometry[k].T_WB.p, two.odometry[k].T_WB.p);
+    EXPECT_EQ(one.odometry[k].pose_covariance, two.odometry[k].pose_covariance);
+  }
+}
+
+/// Normalised error squared of the pose.
+double normalised_error(const Flown& flown, int k) {
+  const Odometry& o = flown.odometry[k];
+  const NavState truth = flown.truth_in_W(k);
+  Vec6 e;
+  e << o.T_WB.p - truth.T_WB.p, so3_log(truth.T_WB.q.conjugate() * o.T_WB.q);
+  return e.dot(o.pose_covariance.ldlt().solve(e));
+}
+
+TEST(Estimator, CovarianceIsHonest) {
+  // Mean over flights and times of a chi-square variable with six degrees of freedom: half to twice.
+  double sum = 0;
+  int n = 0;
+  for (int seed = 0; seed < 12; ++seed) {
+    SimulatedFlight flight(Motion(0.6, 0.3), 100 + seed);
+    const Flown flown = fly(flight, 160);
+    const int first = flown.first_pose();
+    ASSERT_GE(first, 0) << seed;
+    for (int k = first; k < 160; k += 20, ++n) sum += normalised_error(flown, k);
+  }
+  const double nees = sum / n;
+  EXPECT_GT(nees, 3.0);
+  EXPECT_LT(nees, 12.0);
+}
+
+TEST(Estimator, PriorKnowsNothingOfPositionAndHeadingBeyondTheGauge) {
+  for (const char* policy : {"oldest", "entropy"}) {
+    SimulatedFlight flight(Motion(0.6, 0.3), 5);
+    EstimatorOptions options = exact_noise();
+    options.keyframes.leaving = policy;
+    Estimator estimator(flight.rig, options);
+    for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
+    const WindowPrior& prior = estimator.window().prior();
+    ASSERT_FALSE(prior.empty());
+    // The four directions of W9 at the first estimates.
+    Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
+    for (std::size_t i = 0; i < prior.frames.size(); ++i) {
+      const NavState& s = estimator.window().frames()[prior.frames[i]].first_estimate;
+      const int row = static_cast<int>(15 * i);
+      N.block<3, 3>(row, 0).setIdentity();
+      N.block<3, 1>(row, 3) = Vec3::UnitZ().cross(s.T_WB.p);
+      N.block<3, 1>(row + 3, 3) = s.T_WB.q.conjugate() * Vec3::UnitZ();
+      N.block<3, 1>(row + 6, 3) = Vec3::UnitZ().cross(s.v_WB);
+    }
+    const Eigen::MatrixXd information = N.transpose() * prior.quadratic.H * N;
+    // The start chose position and heading with 1 mm and 1 mrad: 1e6 each. Nothing may be added, and only
+    // what linearisation rounds off may be lost.
+    for (int d = 0; d < 4; ++d) {
+      EXPECT_LT(information(d, d), 1.001e6 * (1 + N.block<3, 1>(0, d).squaredNorm())) << policy << d;
+    }
+    const double smallest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(prior.quadratic.H).eigenvalues()(0);
+    EXPECT_GT(smallest, -1e-6 * prior.quadratic.H.diagonal().maxCoeff()) << policy;
+  }
+}
+
+TEST(Estimator, StartsFromRestAndStaysThere) {
+  SimulatedFlight flight(Motion(0, 0), 6);
+  flight.pixel_sigma_px = 0.2;
+  const Flown flown = fly(flight, 200);
+  const int first = flown.first_pose();
+  ASSERT_GE(first, 0);
+  EXPECT_LT(first, 20);
+  for (int k = first; k < 200; ++k) EXPECT_LT(flown.position_error(k), 0.005) << k;
+  EXPECT_TRUE(flown.odometry.back().stats.standstill);
+  EXPECT_LT((flown.odometry.back().bias.gyro_radps - flight.bias.gyro_radps).norm(), 1e-3);
+}
+
+TEST(Estimator, BridgesASecondWithoutImages) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 7);
+  flight.images = [](int k) { return k < 80 || k >= 100; };
+  const Flown flown = fly(flight, 160);
+  for (int k = 82; k < 100; ++k) EXPECT_EQ(flown.odometry[k].health.state, HealthState::degraded) << k;
+  for (int k = 105; k < 160; ++k) {
+    EXPECT_EQ(flown.odometry[k].health.state, HealthState::good) << k;
+    EXPECT_LT(flown.position_error(k), 0.12) << k;
+  }
+  EXPECT_EQ(flown.odometry.back().reset_counter, 0u);
+  EXPECT_GT(flown.odometry[99].pose_covariance(0, 0), flown.odometry[79].pose_covariance(0, 0)) << "blindness costs certainty";
+}
+
+TEST(Estimator, BridgesHalfASecondWithoutReadings) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 8);
+  flight.readings = [](int k) { return k < 80 || k >= 90; };
+  const Flown flown = fly(flight, 160);
+  for (int k = 80; k < 90; ++k) EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::imu_gap})) << k;
+  for (int k = 95; k < 160; ++k) {
+    EXPECT_EQ(flown.odometry[k].health.state, HealthState::good) << k;
+    EXPECT_LT(flown.position_error(k), 0.06) << k;
+  }
+  EXPECT_EQ(flown.odometry.back().reset_counter, 0u);
+}
+
+TEST(Estimator, FliesOnWithOneCamera) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 9);
+  flight.right_camera = [](int k) { return k < 60 || k >= 120; };
+  const Flown flown = fly(flight, 180);
+  const int first = flown.first_pose();
+  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera}));
+  for (int k = first; k < 180; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
+}
+
+TEST(Estimator, ShrugsOffOutliers) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 10);
+  flight.outlier = [](int k, std::int64_t track) {  // a tenth of the tracks jumps about, each in its own way
+    return track % 10 == 0 ? Vec2(20 * std::sin(0.7 * k + static_cast<double>(track)), 15 * std::cos(1.1 * k)) : Vec2(0, 0);
+  };
+  const Flown flown = fly(flight, 160);
+  const int first = flown.first_pose();
+  ASSERT_GE(first, 0);
+  for (int k = first; k < 160; ++k) EXPECT_LT(flown.position_error(k), 0.05) << k;
+}
+
+TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 11);
+  flight.images = [](int k) { return k < 60 || k >= 130; };
+  const Flown flown = fly(flight, 200);
+  const auto states = flown.states();
+  EXPECT_NE(std::find(states.begin(), states.end(), HealthState::lost), states.end());
+  EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
+  EXPECT_EQ(flown.odometry.back().reset_counter, 1u);
+}
+
+TEST(Estimator, WindowIsBounded) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 12);
+  const EstimatorOptions options = exact_noise();
+  Estimator estimator(flight.rig, options);
+  for (int k = 0; k < 200; ++k) {
+    (void)estimator.process(flight.frame(k));
+    EXPECT_LE(estimator.window().frames().size(), static_cast<std::size_t>(options.keyframes.max_keyframes + options.keyframes.newest_frames));
+    EXPECT_LT(estimator.window().landmarks().size(), 1500u);
+  }
+}
+
+TEST(Estimator, HandsOnKeyframesInOrderWithWhatTheySee) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 13);
+  Estimator estimator(flight.rig, exact_noise());
+  FrameId last;
+  int keyframes = 0;
+  for (int k = 0; k < 120; ++k) {
+    for (const Keyframe& keyframe : estimator.process(flight.frame(k)).keyframes) {
+      EXPECT_GT(keyframe.id, last);
+      last = keyframe.id;
+      ++keyframes;
+      ASSERT_GT(keyframe.landmarks.size(), 20u);
+      const NavState truth = flight.truth(static_cast<int>(keyframe.id.value));
+      int near = 0;
+      for (const KeyframeLandmark& l : keyframe.landmarks) {
+        const Vec3 p_true = truth.T_WB * l.p_B;
+        for (const Vec3& p : flight.points()) near += (p - p_true).norm() < 0.35;
+      }
+      EXPECT_GT(near, static_cast<int>(keyframe.landmarks.size()) / 2);
+    }
+  }
+  EXPECT_GT(keyframes, 10);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests: tracks and readings of an exactly known motion in a room of random points, without images.
+// Sensors can be stopped or broken.
+//
+//   SimulatedFlight flight(test::Motion(0.5, 0.3), 1);
+//   TrackedFrame frame = flight.frame(k);      // k = 0, 1, 2, ... in order
+//   NavState truth = flight.truth(k);
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <unordered_map>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/rng.hpp"
+#include "fbvins/imu/imu_test_motion.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins::test {
+
+class SimulatedFlight {
+ public:
+  double pixel_sigma_px = 0.5;
+  double image_rate_hz = 20;
+  int max_features = 120;
+  ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.1, -0.08)};
+  /// What goes wrong at frame k; the defaults let everything work.
+  std::function<bool(int)> images = [](int) { return true; };
+  std::function<bool(int)> right_camera = [](int) { return true; };
+  std::function<bool(int)> readings = [](int) { return true; };
+  /// Turns an exact pixel displacement into an outlier; nullptr: none.
+  std::function<Vec2(int, std::int64_t)> outlier = nullptr;
+
+  SimulatedFlight(const Motion& motion, std::uint64_t seed) : motion_(motion), rng_(seed) {
+    rig.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
+    rig.right = rig.left;
+    const Mat3 R_BC = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();  // looks along the body's x
+    rig.T_BC0 = {R_BC, Vec3(0.02, 0.055, 0.01)};
+    rig.T_BC1 = {R_BC, Vec3(0.02, -0.055, 0.01)};
+    for (int i = 0; i < 1500; ++i) {  // on the walls, floor and ceiling of a room of 8 x 8 x 4 m
+      Vec3 p(rng_.uniform(-4, 4), rng_.uniform(-4, 4), rng_.uniform(-2, 2));
+      const int axis = static_cast<int>(rng_.below(3));
+      p(axis) = (axis == 2 ? 2 : 4) * (rng_.below(2) ? 1 : -1);
+      points_.push_back(p);
+    }
+  }
+
+  Time stamp(int k) const { return Time{1'000'000'000} + Duration::from_seconds(k / image_rate_hz); }
+  NavState truth(int k) const { return motion_.state(stamp(k).seconds(), bias); }
+  const std::vector<Vec3>& points() const { return points_; }
+
+  TrackedFrame frame(int k) {
+    TrackedFrame out;
+    out.id = FrameId{k};
+    out.t = stamp(k);
+    if (k > 0 && readings(k)) {
+      out.imu = motion_.segment(stamp(k - 1), out.t, Duration::from_seconds(1 / rig.imu_noise.rate_hz), bias);
+      add_noise(out.imu, rig.imu_noise, rng_);
+      if (last_sample_ && last_sample_->t == out.imu.samples.front().t) out.imu.samples.front() = *last_sample_;
+      last_sample_ = out.imu.samples.back();
+    }
+    std::unordered_map<int, TrackId> still;
+    if (images(k)) see(k, still, out);
+    tracks_ = std::move(still);
+    return out;
+  }
+
+  StereoRig rig;
+
+ private:
+  void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
+    const Pose<B, W> T_BW = truth(k).T_WB.inverse();
+    // Those followed so far first, then new ones up to the limit.
+    for (const bool followed : {true, false}) {
+      for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
+        const auto track = tracks_.find(i);
+        if ((track != tracks_.end()) != followed || static_cast<int>(out.features.size()) >= max_features) continue;
+        const Vec3 p_B = T_BW * points_[i];
+        const auto left = observe(rig.left, rig.T_BC0.inverse() * p_B);
+        if (!left) continue;
+        TrackedFeature f;
+        f.id = followed ? track->second : TrackId{next_track_++};
+        f.left = *left;
+        if (outlier) f.left = shifted(f.left, outlier(k, f.id.value));
+        if (right_camera(k)) f.right = observe(rig.right, rig.T_BC1.inverse() * p_B);
+        out.stats.tracked += followed;
+        out.stats.stereo += f.right.has_value();
+        still[i] = f.id;
+        out.features.push_back(f);
+      }
+    }
+  }
+
+  std::optional<Observation> observe(const Camera& camera, const Vec3& p_C) {
+    if (p_C.z() < 0.2) return std::nullopt;
+    const auto px = camera.project(p_C);
+    if (!px || !camera.inside(*px, 4)) return std::nullopt;
+    Observation o;
+    o.pixel = *px + pixel_sigma_px * Vec2(rng_.normal(), rng_.normal());
+    o.normalised = *camera.undistort(o.pixel);
+    Mat2 J;
+    (void)camera.distort(o.normalised, &J);
+    o.sqrt_information = J / pixel_sigma_px;
+    return o;
+  }
+
+  Observation shifted(Observation o, const Vec2& by_px) const {
+    o.pixel += by_px;
+    o.normalised = *rig.left.undistort(o.pixel);
+    return o;
+  }
+
+  Motion motion_;
+  Rng rng_;
+  std::vector<Vec3> points_;
+  std::unordered_map<int, TrackId> tracks_;  ///< point -> its present track
+  std::int64_t next_track_ = 0;
+  std::optional<ImuSample> last_sample_;
+};
+
+}  // namespace fbvins::test
