@@ -19,7 +19,7 @@ namespace fbvins {
 
 struct OrbOptions {
   int max_features = 500;
-  int levels = 4;
+  int levels = 3;
   double scale_factor = 1.2;
   int min_threshold = 6;
   int cell_px = 32;

@@ -42,6 +42,7 @@ struct OrbFrontendOptions {
   double forward_backward_px = 0.7;
   double epipolar_px = 1.0;
   double sigma_px = 0.8;
+  double sigma_unrefined_px = 1.5;
   OrbOptions orb;
   GuidedMatchOptions matching;
   OrbStereoOptions stereo;
@@ -65,6 +66,7 @@ struct OrbFrontendOptions {
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
+    v("sigma_unrefined_px", sigma_unrefined_px, "px", "the same without subpixel: descriptors alone are good to a pixel", 0.05, 10.0);
     v.group("orb", orb, "feature extraction");
     v.group("matching", matching, "matching over time");
     v.group("stereo", stereo, "matching from left to right by descriptor");
@@ -83,6 +85,10 @@ class OrbFrontend final : public Frontend {
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
 
  private:
+  /// Levels of the pyramid that patches are aligned on.
+  static constexpr int kAlignmentLevels = 3;
+  /// A track nearer to the image's edge than this has no whole patch.
+  static constexpr double kBorder_px = kKltReach - 2;
   /// Frames over which outliers are looked for, the newest included.
   static constexpr std::size_t kHistory = 6;
   struct Sighting {
@@ -136,6 +142,8 @@ class OrbFrontend final : public Frontend {
   void drop_dead_tracks();
   Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised) const;
   void report(TrackedFrame& out) const;
+  /// Reorders the numbers; 0 of none.
+  static double median(std::vector<double>& numbers);
 
   OrbFrontendOptions options_;
   StereoRig rig_;

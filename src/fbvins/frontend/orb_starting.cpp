@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// The orb frontend, part three: new tracks.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/frontend/orb_frontend.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Standard deviation of the position along its weakest direction for image noise of one grey value, px.
+double weakest_direction_px(const KltLevelTemplate& patch) {
+  const double mean = 0.5 * (patch.ihxx + patch.ihyy), half = 0.5 * (patch.ihxx - patch.ihyy);
+  return std::sqrt(mean + std::sqrt(half * half + static_cast<double>(patch.ihxy) * patch.ihxy));
+}
+
+}  // namespace
+
+/// New tracks where there are few: first for image cells with less than their share, then anywhere.
+void OrbFrontend::start_tracks(FrontendStats& stats) {
+  points_a_.clear();
+  for (const Track& track : tracks_)
+    if (track.in_sight) points_a_.push_back(track.px);
+  stats.tracked = static_cast<int>(points_a_.size());
+
+  constexpr int kColumns = 8, kRows = 5;
+  const auto cell = [&](const Vec2& px) {
+    const int x = std::clamp(static_cast<int>(px.x() * kColumns / left_.width()), 0, kColumns - 1);
+    const int y = std::clamp(static_cast<int>(px.y() * kRows / left_.height()), 0, kRows - 1);
+    return static_cast<std::size_t>(y * kColumns + x);
+  };
+  std::array<int, kColumns * kRows> count{};
+  for (const Vec2& px : points_a_) ++count[cell(px)];
+  const int share = options_.max_features / (kColumns * kRows) + 1;
+
+  order_.clear();
+  for (std::size_t k = 0; k < left_features_.size(); ++k)
+    if (keypoint_used_[k] == 0) order_.push_back(k);
+  const auto& keypoints = left_features_.keypoints;
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](std::size_t a, std::size_t b) { return keypoints[a].score > keypoints[b].score; });
+  const double min2 = options_.min_distance_px * options_.min_distance_px;
+  for (const bool only_poor_cells : {true, false}) {
+    for (const std::size_t k : order_) {
+      if (static_cast<int>(points_a_.size()) >= options_.max_features) return;
+      const Keypoint& keypoint = keypoints[k];
+      if (keypoint_used_[k] != 0 || (only_poor_cells && count[cell(keypoint.pixel)] >= share)) continue;
+      const bool crowded = std::any_of(points_a_.begin(), points_a_.end(), [&](const Vec2& other) {
+        return (other - keypoint.pixel).squaredNorm() < min2;
+      });
+      if (crowded || !start_track(keypoint, left_features_.descriptors[k])) continue;
+      keypoint_used_[k] = 1;
+      points_a_.push_back(keypoint.pixel);
+      ++count[cell(keypoint.pixel)];
+      ++stats.detected;
+    }
+  }
+}
+
+bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descriptor) {
+  const auto normalised = rig_.left.undistort(keypoint.pixel);
+  if (!normalised || free_slots_.empty() || !rig_.left.inside(keypoint.pixel, kBorder_px)) return false;
+  Track track;
+  track.slot = free_slots_.back();
+  Patches& patches = patches_[track.slot];
+  if (!patches.newest.cut(left_, keypoint.pixel, 0, kAlignmentLevels - 1)) return false;
+  if (weakest_direction_px(patches.newest.levels[0]) > options_.max_uncertainty_px) return false;
+  if (!patches.reference.take(left_, keypoint.pixel, rig_.left, *normalised)) return false;
+  free_slots_.pop_back();
+  track.id = TrackId{next_track_++};
+  track.descriptor = descriptor;
+  track.level = keypoint.level;
+  track.px = keypoint.pixel;
+  track.normalised = *normalised;
+  track.last_seen = now_;
+  track.in_sight = true;
+  track.history[static_cast<std::size_t>(frame_count_) % kHistory] = {track.normalised, frame_count_};
+  tracks_.push_back(track);
+  return true;
+}
+
+}  // namespace fbvins
