@@ -277,8 +277,11 @@ void LoopCloser::add(MapKeyframe query, const std::vector<MapEdge>& found, MapUp
     information.diagonal().tail<3>().setConstant(1 / (drift.yaw_rad2 + 1e-8));
     odometry = MapEdge{previous_, {}, T, information, MapEdge::Kind::odometry};
   }
+  // The fuller the map, the less is new.
+  const double scale = std::max(1.0, static_cast<double>(map_.size()) / options_.thin_above);
   const bool redundant = std::any_of(found.begin(), found.end(), [&](const MapEdge& e) {
-    return e.T_from_to.p.norm() < options_.redundant_m && angle_between(e.T_from_to.q, Quat::Identity()) < options_.redundant_deg * kRad;
+    return e.T_from_to.p.norm() < scale * options_.redundant_m &&
+           angle_between(e.T_from_to.q, Quat::Identity()) < scale * options_.redundant_deg * kRad;
   });
   const KeyframeId id = map_.add(std::move(query));
   index_.add(id, words);
@@ -296,7 +299,7 @@ void LoopCloser::add(MapKeyframe query, const std::vector<MapEdge>& found, MapUp
 }
 
 bool LoopCloser::optimisation_due() const {
-  return frame_.known() && loops_since_optimised_ >= std::max(options_.optimise_after, static_cast<int>(map_.size()) / 8);
+  return frame_.known() && loops_since_optimised_ >= std::max(options_.optimise_after, static_cast<int>(map_.size()) / 4);
 }
 
 void LoopCloser::optimise(MapUpdate* update) {

@@ -72,7 +72,8 @@ std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
   for (int piece = 1; piece <= kPieces; ++piece) {
     const auto to = project(left_normalised, piece / (kPieces * options_.min_depth_m));
     if (from && to) {
-      const int steps = std::clamp(static_cast<int>((*to - *from).norm() / scale) + 1, 1, 64);
+      // Steps of 1.4 px of the level: the patch is 16 wide, so a peak is a few steps wide.
+      const int steps = std::clamp(static_cast<int>((*to - *from).norm() / (1.4 * scale)) + 1, 1, 64);
       for (int i = 0; i < steps; ++i) {
         const Vec2 px = *from + (*to - *from) * (static_cast<double>(i) / steps);
         const float correlation = klt_correlation(patch, right_.level(l), px / scale);

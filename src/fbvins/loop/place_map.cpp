@@ -69,9 +69,14 @@ void PlaceMap::remove(KeyframeId id) {
   MapEdge turned;
   if (before != edges.end()) bridge = &*before;
   else if (after != edges.end()) turned = reversed(*after), bridge = &turned;
+  // An heir that has loops enough gets no more: the graph must not grow with every round in the same room.
+  constexpr int kEnoughLoops = 6;
+  int heirs = 0;
+  if (bridge != nullptr)
+    for (const MapEdge& e : edges) heirs += e.kind == MapEdge::Kind::loop && (e.from == bridge->from || e.to == bridge->from);
   if (bridge != nullptr)
     for (const MapEdge& e : edges) {
-      if (e.kind != MapEdge::Kind::loop || (e.from != id && e.to != id)) continue;
+      if (e.kind != MapEdge::Kind::loop || (e.from != id && e.to != id) || heirs++ >= kEnoughLoops) continue;
       const MapEdge moved = composed(*bridge, e.from == id ? e : reversed(e), MapEdge::Kind::loop);
       if (moved.from != moved.to) added.push_back(moved);
     }

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stage on flights through a synthetic room of points: drift is taken out, look-alikes are refused, maps are met
+// again, memory stays bounded, bits repeat.
+#include "fbvins/loop/loop_closer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_merge.hpp"
+#include "fbvins/loop/vocabulary_training.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kFocal = 460, kBaseline = 0.11, kPixel = 0.4;
+
+struct World {
+  std::vector<Vec3> points;
+  std::vector<Descriptor> looks;
+};
+
+Descriptor random_descriptor(Rng& rng) {
+  Descriptor d;
+  for (auto& word : d.bits) word = (static_cast<std::uint64_t>(rng.next_u32()) << 32) | rng.next_u32();
+  return d;
+}
+
+/// Points on the walls of a room of 8 x 6 m.
+World room(std::uint64_t seed, int points = 2500) {
+  Rng rng(seed);
+  World w;
+  for (int i = 0; i < points; ++i) {
+    const double s = rng.uniform(-1, 1), z = rng.uniform(0, 3), in = rng.uniform(0, 0.8);
+    switch (rng.below(4)) {
+      case 0: w.points.push_back({4 - in, 3 * s, z}); break;
+      case 1: w.points.push_back({-4 + in, 3 * s, z}); break;
+      case 2: w.points.push_back({4 * s, 3 - in, z}); break;
+      default: w.points.push_back({4 * s, -3 + in, z});
+    }
+    w.looks.push_back(random_descriptor(rng));
+  }
+  return w;
+}
+
+const Vocabulary& vocabulary() {
+  static const Vocabulary v = [] {
+    std::vector<std::vector<Descriptor>> images;
+    for (std::uint64_t s = 0; s < 4; ++s) images.push_back(room(s).looks);
+    return train_vocabulary("orb", images, {.branching = 8, .depth = 4, .min_members = 10});
+  }();
+  return v;
+}
+
+StereoRig rig() {
+  StereoRig r;
+  r.left = r.right = Camera(PinholeRadtan{kFocal, kFocal, 376, 240}, 752, 480);
+  // B: x forward, y left, z up; camera looks along x
+  Mat3 R_BC;
+  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  r.T_BC0 = {R_BC, Vec3(0.05, kBaseline / 2, 0)};
+  r.T_BC1 = {R_BC, Vec3(0.05, -kBaseline / 2, 0)};
+  return r;
+}
+
+Place seen(const World& w, const Pose<W, B>& T_WB, Rng& rng) {
+  const Pose<W, C0> T_WC = T_WB * rig().T_BC0;
+  const Pose<C0, W> T_CW = T_WC.inverse();
+  Place place;
+  place.focal_px = kFocal;
+  place.up_C0 = T_WC.q.conjugate() * Vec3::UnitZ();
+  const double rho_px = 1 / (kFocal * kBaseline);
+  for (std::size_t i = 0; i < w.points.size(); ++i) {
+    const Vec3 p = T_CW * w.points[i];
+    if (p.z() < 0.5 || std::abs(p.x() / p.z()) > 0.8 || std::abs(p.y() / p.z()) > 0.5 || rng.below(4) == 0) continue;
+    PlaceFeature f;
+    f.x = static_cast<float>(p.x() / p.z() + kPixel * rng.normal() / kFocal);
+    f.y = static_cast<float>(p.y() / p.z() + kPixel * rng.normal() / kFocal);
+    f.inverse_depth = static_cast<float>(1 / p.z() + kPixel * rng.normal() * rho_px);
+    f.sigma_xy = static_cast<float>(kPixel / kFocal);
+    f.sigma_inverse_depth = static_cast<float>(kPixel * rho_px);
+    place.features.push_back(f);
+    Descriptor d = w.looks[i];
+    for (int b = 0; b < 16; ++b) d.bits[rng.below(4)] ^= std::uint64_t{1} << rng.below(64);
+    place.descriptors.push_back(d);
+  }
+  place.words = vocabulary().words_of(place.descriptors);
+  return place;
+}
+
+struct Frame {
+  Time t;
+  Pose<W, B> truth, odometry;
+  Place place;
+};
+
+/// Rounds through the room looking outwards, five keyframes a second; the odometry drifts in position and yaw.
+std::vector<Frame> flight(const World& w, int keyframes, double drift_m, double drift_deg, std::uint64_t seed, double start_s = 0) {
+  Rng rng(seed);
+  std::vector<Frame> frames;
+  double yaw = 0;
+  Vec3 offset = Vec3::Zero();
+  for (int i = 0; i < keyframes; ++i) {
+    const double s = start_s + 0.2 * i, a = 0.35 * s;
+    const Pose<W, B> T(Quat(Eigen::AngleAxisd(a + 0.4 * std::sin(0.5 * s), Vec3::UnitZ())) * so3_exp(Vec3(0.05 * std::sin(s), 0.04 * std::cos(0.8 * s), 0)),
+                       Vec3(1.2 * std::cos(a), 0.9 * std::sin(a), 1.4 + 0.3 * std::sin(0.7 * s)));
+    const Quat turned(Eigen::AngleAxisd(yaw, Vec3::UnitZ()));
+    frames.push_back({Time{static_cast<std::int64_t>(s * 1e9)}, T, {Quat(turned * T.q), Vec3(turned * T.p + offset)}, seen(w, T, rng)});
+    yaw += drift_deg * 0.01745 * rng.normal();
+    offset += drift_m * Vec3(rng.normal(), rng.normal(), rng.normal());
+  }
+  return frames;
+}
+
+struct Outcome {
+  double W_m = 0, causal_m = 0, after_m = 0;
+  int accepted = 0, refused = 0;
+};
+
+/// Errors against the truth without alignment: M starts where W starts.
+Outcome run(LoopCloser& closer, const std::vector<Frame>& frames) {
+  Outcome o;
+  Trajectory odometry;
+  const Pose<W, B> T0 = frames[0].truth;
+  const Pose<W, W> to_truth((T0 * frames[0].odometry.inverse()).q, (T0 * frames[0].odometry.inverse()).p);
+  for (const Frame& f : frames) {
+    const MapUpdate u = closer.process(f.place, FrameId{f.t.ns / 1000}, f.t, f.odometry, 0);
+    odometry.push_back({f.t, f.odometry});
+    o.accepted += u.stats.accepted, o.refused += u.stats.refused;
+    o.causal_m += (to_truth * (u.T_MW * f.odometry).cast_frames<W, B>().p - f.truth.p).squaredNorm();
+    o.W_m += (to_truth * f.odometry.p - f.truth.p).squaredNorm();
+  }
+  closer.finish();
+  const Trajectory corrected = closer.corrected(odometry);
+  for (std::size_t i = 0; i < frames.size(); ++i) o.after_m += (to_truth * corrected[i].T_WB.p - frames[i].truth.p).squaredNorm();
+  const auto n = static_cast<double>(frames.size());
+  o.W_m = std::sqrt(o.W_m / n), o.causal_m = std::sqrt(o.causal_m / n), o.after_m = std::sqrt(o.after_m / n);
+  return o;
+}
+
+TEST(LoopCloser, TakesOutDriftAtOnceAndMoreAfterwards) {
+  const auto frames = flight(room(1), 300, 0.004, 0.05, 2);
+  LoopCloser closer(rig(), {}, vocabulary());
+  const Outcome o = run(closer, frames);
+  EXPECT_GT(o.W_m, 0.03);
+  EXPECT_GT(o.accepted, 200);
+  EXPECT_LT(o.causal_m, 0.6 * o.W_m);
+  EXPECT_LT(o.after_m, 0.5 * o.W_m);
+}
+
+TEST(LoopCloser, SameInputSameBytes) {
+  const auto frames = flight(room(1), 200, 0.004, 0.05, 3);
+  LoopCloser a(rig(), {}, vocabulary()), b(rig(), {}, vocabulary());
+  run(a, frames), run(b, frames);
+  EXPECT_EQ(serialise_map(a.map()), serialise_map(b.map()));
+}
+
+TEST(LoopCloser, TwoIdenticalShelvesAreNotOnePlace) {
+  // Straight along a wall with the same shelf every 3.5 m; the odometry is good and says so.
+  Rng shelf_rng(4), rng(5);
+  World w;
+  std::vector<Vec3> shelf;
+  std::vector<Descriptor> looks;
+  for (int i = 0; i < 500; ++i) {
+    shelf.push_back({3.0 + shelf_rng.uniform(0, 0.6), shelf_rng.uniform(-1.7, 1.7), shelf_rng.uniform(0, 2.8)});
+    looks.push_back(random_descriptor(shelf_rng));
+  }
+  for (int copy = 0; copy < 5; ++copy)
+    for (std::size_t i = 0; i < shelf.size(); ++i) w.points.push_back(shelf[i] + Vec3(0, 3.5 * copy, 0)), w.looks.push_back(looks[i]);
+  LoopOptions options;
+  LoopCloser closer(rig(), options, vocabulary());
+  PlaceVerifier by_sight(options.verification);
+  int true_loops = 0, fooled = 0;
+  std::vector<double> y;  // of every keyframe, by id
+  Place first;
+  for (int i = 0; i < 140; ++i) {
+    const Pose<W, B> T(Quat::Identity(), Vec3(0, 0.1 * i, 1.4));
+    Place place = seen(w, T, rng);
+    if (i == 0) first = place;
+    if (i == 35) {
+      by_sight.set_query(place);
+      fooled += by_sight.verify(first).has_value();
+    }
+    const MapUpdate u = closer.process(std::move(place), FrameId{i}, Time{i * 200'000'000LL}, T, 0);
+    y.push_back(T.p.y());
+    for (const LoopConstraint& l : u.loops) {
+      const double flown = y[static_cast<std::size_t>(l.to.value)] - y[static_cast<std::size_t>(l.from.value)];
+      EXPECT_NEAR(l.T_from_to.p.y(), flown, 0.1);  // the next shelf would be 3.5 m off
+      ++true_loops;
+    }
+    EXPECT_LT((u.T_MW.p).norm(), 0.05);
+  }
+  EXPECT_EQ(fooled, 1) << "the shelves must look the same";
+  EXPECT_GT(true_loops, 0);
+}
+
+TEST(LoopCloser, FindsItselfInASavedMapFromAnotherStartAndNeverInAStrangersMap) {
+  LoopCloser first(rig(), {}, vocabulary());
+  const auto mapped = flight(room(1), 250, 0, 0, 2);
+  run(first, mapped);
+  for (const std::uint64_t world : {1, 7}) {
+    const std::string bytes = serialise_map(first.map());
+    auto map = parse_map(std::as_bytes(std::span(bytes)), "map");
+    ASSERT_TRUE(map.ok());
+    LoopCloser again(rig(), {}, vocabulary(), std::move(*map));
+    const Quat turned(Eigen::AngleAxisd(2.0, Vec3::UnitZ()));
+    bool localised = false;
+    for (const Frame& f : flight(room(world), 60, 0.001, 0.01, 9, 7.3)) {
+      const Pose<W, B> in_other_W(Quat(turned * f.odometry.q), Vec3(turned * f.odometry.p + Vec3(5, -3, 1)));
+      const MapUpdate u = again.process(f.place, FrameId{f.t.ns}, f.t, in_other_W, 0);
+      if (!u.localised) continue;
+      localised = true;
+      const Pose<M, B> T_MB = u.T_MW * in_other_W;
+      EXPECT_LT((T_MB.p - f.truth.p).norm(), 0.1);
+    }
+    EXPECT_EQ(localised, world == 1);
+  }
+}
+
+TEST(LoopCloser, RoundsInOneRoomDoNotGrowTheMapWithoutBound) {
+  LoopOptions options;
+  options.thin_above = 150;
+  options.max_keyframes = 300;
+  LoopCloser closer(rig(), options, vocabulary());
+  std::size_t after_three = 0;
+  const World w = room(1);
+  const auto frames = flight(w, 1000, 0.001, 0.01, 4);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    closer.process(frames[i].place, FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry, 0);
+    if (i == 400) after_three = serialise_map(closer.map()).size();
+  }
+  EXPECT_LT(serialise_map(closer.map()).size(), 1.4 * static_cast<double>(after_three));
+  EXPECT_LE(closer.map().size(), 300u);
+}
+
+TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
+  const auto map_of = [](std::uint64_t world, std::uint64_t seed, double start_s) {
+    LoopCloser closer(rig(), {}, vocabulary());
+    run(closer, flight(room(world), 120, 0.001, 0.01, seed, start_s));
+    return closer.map();
+  };
+  const PlaceMap a = map_of(1, 2, 0), b = map_of(1, 3, 9), stranger = map_of(7, 4, 0);
+  const auto both = merge_maps(a, b, {}, vocabulary());
+  ASSERT_TRUE(both.ok()) << both.error().message;
+  EXPECT_EQ(both->size(), a.size() + b.size());
+  // The second flight's frame is its own: only distances between keyframes of both tell.
+  const auto truth_a = flight(room(1), 120, 0, 0, 2, 0), truth_b = flight(room(1), 120, 0, 0, 3, 9);
+  const Vec3 measured = both->keyframes()[a.size() + 50].T_MB.p - both->keyframes()[60].T_MB.p;
+  EXPECT_NEAR(measured.norm(), (truth_b[50].truth.p - truth_a[60].truth.p).norm(), 0.05);
+  EXPECT_FALSE(merge_maps(a, stranger, {}, vocabulary()).ok());
+}
+
+TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
+  MapFrameFollower follower(0.2, 0.05);
+  const Pose<W, B> T_WB(Quat::Identity(), Vec3(30, 0, 0));  // far from the origin: yaw must not swing the body
+  (void)follower.follow({}, T_WB, Time{0});
+  const Pose<M, W> target(so3_exp(Vec3(0, 0, 0.05)), Vec3(0.5, -1, 0));
+  Vec3 before = T_WB.p;
+  for (int i = 1; i <= 200; ++i) {
+    const Vec3 now = follower.follow(target, T_WB, Time{i * 100'000'000LL}) * T_WB.p;
+    EXPECT_LE((now - before).norm(), 0.2 * 0.1 + 1e-9);
+    before = now;
+  }
+  EXPECT_NEAR((before - target * T_WB.p).norm(), 0, 1e-9);
+}
+
+}  // namespace
+}  // namespace fbvins
