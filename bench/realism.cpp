@@ -95,7 +95,7 @@ double verified_share(const Camera& camera, const OrbFeatures& a, const OrbFeatu
     const Vec3 xa = na[static_cast<std::size_t>(m.a)].homogeneous(), xb = nb[static_cast<std::size_t>(m.b)].homogeneous();
     const Vec3 line = E * xb;
     const double off_px = std::abs(xa.dot(line)) / line.head<2>().norm() * camera.focal_px();
-    good += off_px < 2.5 ? 1 : 0;
+    good += off_px < 6 ? 1 : 0;
   }
   return 100.0 * good / std::max<double>(1.0, static_cast<double>(std::min(a.size(), b.size())));
 }
@@ -179,7 +179,7 @@ class Meter {
     int good = 0;
     for (const DescriptorMatch& m : match_descriptors(a.descriptors, b.descriptors, {})) {
       const Vec3 xa = na[static_cast<std::size_t>(m.a)].homogeneous(), line = E * nb[static_cast<std::size_t>(m.b)].homogeneous();
-      good += std::abs(xa.dot(line)) / line.head<2>().norm() * rig_.left.focal_px() < 2.5 ? 1 : 0;
+      good += std::abs(xa.dot(line)) / line.head<2>().norm() * rig_.left.focal_px() < 6 ? 1 : 0;
     }
     return 100.0 * good / std::max<double>(1.0, static_cast<double>(std::min(a.size(), b.size())));
   }

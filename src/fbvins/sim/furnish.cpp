@@ -69,7 +69,7 @@ int Furnisher::texture(Surface surface) {
 }
 
 int Furnisher::plain_or(std::initializer_list<Surface> choices) {
-  if (rng_.uniform() < options_.plain_share) return texture(Surface::plaster);
+  if (rng_.uniform() < options_.plain_share) return texture(rng_.uniform() < options_.weave_share ? Surface::weave : Surface::plaster);
   return texture(*(choices.begin() + rng_.below(static_cast<std::uint32_t>(choices.size()))));
 }
 

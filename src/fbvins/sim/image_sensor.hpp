@@ -28,7 +28,7 @@ struct CameraModelOptions {
   double shot_noise = 0.012;
   double read_noise = 0.9;
   double black_level = 0;
-  double blur_px = 0.4;
+  double blur_px = 0.5;
   double vignetting = 0.35;
   double glare = 0.02;
   double right_gain = 0.94;

@@ -144,9 +144,23 @@ void stains(Canvas& canvas, Rng& rng, int count, float contrast) {
 Canvas plaster(Rng& rng) {
   Canvas canvas;
   const Fractal noise(rng, 4, 6, 0.7f);
-  const float base = between(rng, 0.5, 0.8), contrast = between(rng, 0.03, 0.07);
+  const float base = between(rng, 0.5, 0.8), contrast = between(rng, 0.012, 0.04);
   shade(canvas, [&](int x, int y, float) { return base * (1 + contrast * 2 * noise(static_cast<float>(x), static_cast<float>(y))); });
   scratches(canvas, rng, 6, 0.1f);
+  return canvas;
+}
+
+Canvas weave(Rng& rng) {
+  Canvas canvas;
+  const Fractal folds(rng, 3, 4, 0.5f);
+  const LatticeNoise uneven(rng, 128, 128);
+  const float base = between(rng, 0.3, 0.6), contrast = between(rng, 0.06, 0.14);
+  const int threads = 1 << pick(rng, 5, 6);
+  const float step = 2 * std::numbers::pi_v<float> * static_cast<float>(threads) / S;
+  shade(canvas, [&](int x, int y, float) {
+    const auto fx = static_cast<float>(x), fy = static_cast<float>(y);
+    return base * (1 + contrast * std::sin(step * fx) * std::sin(step * fy) + 0.12f * folds(fx, fy) + 0.02f * uneven(fx, fy));
+  });
   return canvas;
 }
 
@@ -172,7 +186,7 @@ Canvas wood(Rng& rng) {
     const int plank = y * planks / S;
     const float fx = static_cast<float>(x) + shift[plank], fy = static_cast<float>(y);
     const float ring = std::sin(fy * 0.25f + 9 * wave(fx, fy));
-    const float v = base * tone[plank] * (1 + 0.14f * ring + 0.3f * fibre(fx, fy) + 0.2f * colour(fx, fy));
+    const float v = base * tone[plank] * (1 + 0.06f * ring + 0.16f * fibre(fx, fy) + 0.15f * colour(fx, fy));
     const bool gap = (y * planks) % S < 2 * planks || (x + static_cast<int>(shift[plank])) % S < 2;
     return gap ? 0.3f * v : v;
   });
@@ -465,6 +479,7 @@ Canvas mat(Rng& rng) {
 Canvas paint(Surface surface, Rng& rng) {
   switch (surface) {
     case Surface::plaster: return plaster(rng);
+    case Surface::weave: return weave(rng);
     case Surface::concrete: return concrete(rng);
     case Surface::wood: return wood(rng);
     case Surface::brick: return brick(rng);

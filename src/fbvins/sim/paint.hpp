@@ -9,6 +9,7 @@ namespace fbvins {
 
 enum class Surface {
   plaster,    ///< nearly plain
+  weave,      ///< fine threads, the same everywhere: corners that cannot be told apart
   concrete,
   wood,
   brick,

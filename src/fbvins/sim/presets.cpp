@@ -24,7 +24,8 @@ constexpr Preset kPresets[] = {
     {"moving-light", [](SimulationOptions& o) { o.light.change = "moving"; }},
     {"weak-texture",
      [](SimulationOptions& o) {
-       o.world.plain_share = 0.85;
+       o.world.plain_share = 0.9;
+       o.world.weave_share = 0.1;
        o.world.posters_per_m2 = 0.04;
        o.world.clutter_per_m2 = 0.25;
        o.world.floor_marks = 0.1;

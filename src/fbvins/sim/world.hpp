@@ -57,19 +57,20 @@ struct WorldOptions {
   std::string kind = "room";
   double margin_m = 1.8;
   double height_m = 3.2;
-  double plain_share = 0.25;
-  double posters_per_m2 = 0.22;
-  double clutter_per_m2 = 1.1;
-  double repeat_share = 0.25;
+  double plain_share = 0.6;
+  double weave_share = 0.1;
+  double posters_per_m2 = 0.13;
+  double clutter_per_m2 = 0.7;
+  double repeat_share = 0.2;
   double clearance_m = 0.55;
   double lamp_spacing_m = 2.6;
   double ambient = 0.45;
-  double detail = 0.2;
+  double detail = 0.08;
   double gloss = 0.0;
   double lamp_glow = 2.5;
   double window_glow = 1.6;
-  double window_share = 0.4;
-  double floor_marks = 1.0;
+  double window_share = 0.6;
+  double floor_marks = 0.45;
   int movers = 0;
 
   template <class V>
@@ -78,6 +79,7 @@ struct WorldOptions {
     v("margin_m", margin_m, "m", "from the flight to the walls (room, hall)", 0.7, 50.0);
     v("height_m", height_m, "m", "of the ceiling, or more where the flight needs it", 2.2, 30.0);
     v("plain_share", plain_share, "", "share of surfaces with almost no texture", 0.0, 1.0);
+    v("weave_share", weave_share, "", "share of those that are woven: fine corners that look all the same", 0.0, 1.0);
     v("posters_per_m2", posters_per_m2, "1/m^2", "posters, pages and pictures on walls", 0.0, 5.0);
     v("clutter_per_m2", clutter_per_m2, "1/m^2", "boxes and furniture on the floor", 0.0, 10.0);
     v("repeat_share", repeat_share, "", "share of walls with the same thing again and again", 0.0, 1.0);
