@@ -32,6 +32,8 @@ int main(int argc, char** argv) {
   add_info_command(program, exit_code);
   add_config_command(program, exit_code);
   add_simulate_command(program, exit_code);
+  add_map_command(program, exit_code);
+  add_vocab_command(program, exit_code);
   try {
     if (argc <= 1) {
       std::fputs(program.help().c_str(), stderr);

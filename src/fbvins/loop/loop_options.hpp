@@ -14,7 +14,7 @@ struct LoopOptions {
   PlaceVerifierOptions verification;
   PoseGraphOptions graph;
   DriftOptions drift;
-  double min_age_s = 4;
+  double min_age_s = 2;
   double max_distance_m = 4;
   double max_angle_deg = 65;
   int candidates = 3;

@@ -19,7 +19,7 @@ namespace fbvins {
 
 struct PoseGraphOptions {
   int degrees_of_freedom = 4;
-  double tilt_deg = 0.25;
+  double tilt_deg = 0.4;
   int max_iterations = 12;
   double outlier_sigma = 4.0;
 
