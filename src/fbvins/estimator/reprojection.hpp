@@ -2,6 +2,8 @@
 // One landmark seen by one camera: residual and Jacobians (docs/derivations/window.md, W1-W8).
 #pragma once
 
+#include <algorithm>
+
 #include "fbvins/geometry/pose.hpp"
 
 namespace fbvins {
@@ -52,5 +54,81 @@ struct CameraGeometry {
 
 /// Landmarks closer to the image plane than this (scaled by inverse depth) have no projection.
 inline constexpr double kMinScaledDepth = 1e-3;
+
+struct WindowObservation {
+  int frame = 0;
+  bool right = false;
+  Vec2 normalised = Vec2::Zero();
+  Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by the time offset
+  Mat2 sqrt_information = Mat2::Identity();
+};
+
+/// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
+struct WindowLandmark {
+  int host = 0;
+  int first_observation = 0;  ///< its observations are neighbours, sorted by frame
+  int observation_count = 0;
+  Vec3 alpha_beta_rho = Vec3::Zero();
+};
+
+/// Columns of the stacked Jacobian of one observation.
+enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 = 16, kExtrinsic1 = 22, kTimeOffset = 28 };
+
+/// The landmark in its host's body, scaled by its inverse depth (W2).
+inline Vec3 scaled_point_in_host(const CameraGeometry& cameras, const WindowLandmark& l) {
+  const Vec3& m = l.alpha_beta_rho;
+  return cameras.R_BC0 * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC0;
+}
+
+/// Whitened residual (W5); false where there is no projection.
+inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, const Vec3& x_h, double rho,
+                      const WindowObservation& o, Vec3& p_C, Vec2& r) {
+  const Vec3 p_B = pair.R_th * x_h + rho * pair.t_th;
+  p_C.noalias() = cameras.R_CB[o.right] * (p_B - rho * cameras.t_BC[o.right]);
+  if (p_C.z() < kMinScaledDepth) return false;
+  const Vec2 expected = p_C.head<2>() / p_C.z();
+  r = o.sqrt_information * (expected - o.normalised - cameras.time_offset_s * o.velocity);
+  return true;
+}
+
+/// Fills the two rows of Jacobian and residual, unweighted (W6-W8). Same frame: the pose columns stay zero.
+template <int Columns>
+void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair, bool same_frame, const WindowLandmark& l,
+               const Vec3& x_h, const WindowObservation& o, const Vec3& p_C, const Vec2& r, double rows[2][Columns]) {
+  const double rho = l.alpha_beta_rho.z();
+  const double iz = 1.0 / p_C.z();
+  Eigen::Matrix<double, 2, 3> J_projection;  // S * d(x/z, y/z) / d p_C
+  J_projection.leftCols<2>() = iz * o.sqrt_information;
+  J_projection.col(2).noalias() = -iz * iz * (o.sqrt_information * p_C.head<2>());
+  const Eigen::Matrix<double, 2, 3> A = J_projection * cameras.R_CB[o.right];
+  const Vec3 p_B = pair.R_th_first * x_h + rho * pair.t_th_first;
+  for (int k = 0; k < 2; ++k) {
+    double* J = rows[k];
+    std::fill(J, J + Columns, 0.0);
+    const Vec3 a = A.row(k);
+    const Vec3 b = pair.R_th_first.transpose() * a;
+    if (!same_frame) {
+      const Vec3 translation = rho * (pair.R_t_first * a);
+      Eigen::Map<Vec3>(J + kHost) = translation;
+      Eigen::Map<Vec3>(J + kHost + 3) = x_h.cross(b);
+      Eigen::Map<Vec3>(J + kTarget) = -translation;
+      Eigen::Map<Vec3>(J + kTarget + 3) = a.cross(p_B);
+    }
+    const Vec3 c = cameras.R_BC0.transpose() * b;
+    J[kPoint] = c.x();
+    J[kPoint + 1] = c.y();
+    J[kPoint + 2] = b.dot(cameras.t_BC0) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.right]);
+    J[kResidual] = r[k];
+    if constexpr (Columns == 32) {
+      const Vec3 m(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
+      Eigen::Map<Vec3>(J + kExtrinsic0) = rho * b;
+      Eigen::Map<Vec3>(J + kExtrinsic0 + 3) = m.cross(c);
+      double* camera = J + (o.right ? kExtrinsic1 : kExtrinsic0);
+      Eigen::Map<Vec3>(camera) -= rho * a;
+      Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
+      J[kTimeOffset] = -o.sqrt_information.row(k).dot(o.velocity);
+    }
+  }
+}
 
 }  // namespace fbvins

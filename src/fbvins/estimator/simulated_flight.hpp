@@ -66,11 +66,17 @@ class SimulatedFlight {
     return out;
   }
 
+  /// The frame of stamp(k) whose image was taken `late` before its stamp: readings up to the stamp, features from earlier.
+  TrackedFrame frame_with_late_stamp(int k, Duration late) {
+    late_ = late;
+    return frame(k);
+  }
+
   StereoRig rig;
 
  private:
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
-    const Pose<B, W> T_BW = truth(k).T_WB.inverse();
+    const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_WB.inverse();
     // Those followed so far first, then new ones up to the limit.
     for (const bool followed : {true, false}) {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
@@ -117,6 +123,7 @@ class SimulatedFlight {
   std::unordered_map<int, TrackId> tracks_;  ///< point -> its present track
   std::int64_t next_track_ = 0;
   std::optional<ImuSample> last_sample_;
+  Duration late_;
 };
 
 }  // namespace fbvins::test

@@ -18,9 +18,6 @@ constexpr double kUnprojectableSigma = 100.0;
 constexpr double kRegularisation = 1e-8;
 constexpr double kNegligibleLambda = 1e-8;
 
-/// Columns of the stacked Jacobian of one observation.
-enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 = 16, kExtrinsic1 = 22, kTimeOffset = 28 };
-
 /// G += J^T J for two rows of Columns numbers. Full square: plain loops over fixed lanes.
 template <int Columns>
 inline void add_gram(const double* row0, const double* row1, double* G) {
@@ -29,62 +26,6 @@ inline void add_gram(const double* row0, const double* row1, double* G) {
 }
 FBVINS_KERNEL void add_gram_16(const double* row0, const double* row1, double* G) { add_gram<16>(row0, row1, G); }
 FBVINS_KERNEL void add_gram_32(const double* row0, const double* row1, double* G) { add_gram<32>(row0, row1, G); }
-
-Vec3 to_body(const CameraGeometry& cameras, const WindowLandmark& l) {
-  const Vec3& m = l.alpha_beta_rho;
-  return cameras.R_BC0 * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC0;
-}
-
-/// Whitened residual (W5); false where there is no projection.
-bool evaluate(const CameraGeometry& cameras, const PairGeometry& pair, const Vec3& x_h, double rho,
-              const WindowObservation& o, Vec3& p_C, Vec2& r) {
-  const Vec3 p_B = pair.R_th * x_h + rho * pair.t_th;
-  p_C.noalias() = cameras.R_CB[o.right] * (p_B - rho * cameras.t_BC[o.right]);
-  if (p_C.z() < kMinScaledDepth) return false;
-  const Vec2 expected = p_C.head<2>() / p_C.z();
-  r = o.sqrt_information * (expected - o.normalised - cameras.time_offset_s * o.velocity);
-  return true;
-}
-
-/// Fills the two rows of Jacobian and residual, unweighted (W6-W8). Same frame: the pose columns stay zero.
-template <int Columns>
-void fill_rows(const CameraGeometry& cameras, const PairGeometry& pair, bool same_frame, const WindowLandmark& l,
-               const Vec3& x_h, const WindowObservation& o, const Vec3& p_C, const Vec2& r, double rows[2][Columns]) {
-  const double rho = l.alpha_beta_rho.z();
-  const double iz = 1.0 / p_C.z();
-  Eigen::Matrix<double, 2, 3> J_projection;  // S * d(x/z, y/z) / d p_C
-  J_projection.leftCols<2>() = iz * o.sqrt_information;
-  J_projection.col(2).noalias() = -iz * iz * (o.sqrt_information * p_C.head<2>());
-  const Eigen::Matrix<double, 2, 3> A = J_projection * cameras.R_CB[o.right];
-  const Vec3 p_B = pair.R_th_first * x_h + rho * pair.t_th_first;
-  for (int k = 0; k < 2; ++k) {
-    double* J = rows[k];
-    std::fill(J, J + Columns, 0.0);
-    const Vec3 a = A.row(k);
-    const Vec3 b = pair.R_th_first.transpose() * a;
-    if (!same_frame) {
-      const Vec3 translation = rho * (pair.R_t_first * a);
-      Eigen::Map<Vec3>(J + kHost) = translation;
-      Eigen::Map<Vec3>(J + kHost + 3) = x_h.cross(b);
-      Eigen::Map<Vec3>(J + kTarget) = -translation;
-      Eigen::Map<Vec3>(J + kTarget + 3) = a.cross(p_B);
-    }
-    const Vec3 c = cameras.R_BC0.transpose() * b;
-    J[kPoint] = c.x();
-    J[kPoint + 1] = c.y();
-    J[kPoint + 2] = b.dot(cameras.t_BC0) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.right]);
-    J[kResidual] = r[k];
-    if constexpr (Columns == 32) {
-      const Vec3 m(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
-      Eigen::Map<Vec3>(J + kExtrinsic0) = rho * b;
-      Eigen::Map<Vec3>(J + kExtrinsic0 + 3) = m.cross(c);
-      double* camera = J + (o.right ? kExtrinsic1 : kExtrinsic0);
-      Eigen::Map<Vec3>(camera) -= rho * a;
-      Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
-      J[kTimeOffset] = -o.sqrt_information.row(k).dot(o.velocity);
-    }
-  }
-}
 
 }  // namespace
 
@@ -105,12 +46,12 @@ double WindowProblem::landmark_cost() const {
   const CameraGeometry cameras(calibration);
   double cost = 0;
   for (const WindowLandmark& l : landmarks) {
-    const Vec3 x_h = to_body(cameras, l);
+    const Vec3 x_h = scaled_point_in_host(cameras, l);
     for (int k = 0; k < l.observation_count; ++k) {
       const WindowObservation& o = observations[l.first_observation + k];
       Vec3 p_C;
       Vec2 r;
-      const bool ok = evaluate(cameras, pair(l.host, o.frame), x_h, l.alpha_beta_rho.z(), o, p_C, r);
+      const bool ok = reproject(cameras, pair(l.host, o.frame), x_h, l.alpha_beta_rho.z(), o, p_C, r);
       cost += huber(ok ? r.squaredNorm() : kUnprojectableSigma * kUnprojectableSigma, weights.huber_sigma).cost;
     }
   }
@@ -125,7 +66,7 @@ double WindowProblem::add_landmarks() {
   double rows[2][Columns];
   std::vector<int> offsets;
   for (const WindowLandmark& l : landmarks) {
-    const Vec3 x_h = to_body(cameras, l);
+    const Vec3 x_h = scaled_point_in_host(cameras, l);
     const WindowObservation* begin = observations.data() + l.first_observation;
     const WindowObservation* end = begin + l.observation_count;
     offsets.clear();
@@ -155,13 +96,13 @@ double WindowProblem::add_landmarks() {
       for (; o != end && o->frame == target; ++o) {
         Vec3 p_C;
         Vec2 r;
-        if (!evaluate(cameras, pair(l.host, target), x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
+        if (!reproject(cameras, pair(l.host, target), x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
           cost += huber(kUnprojectableSigma * kUnprojectableSigma, weights.huber_sigma).cost;
           continue;
         }
         const RobustValue robust = huber(r.squaredNorm(), weights.huber_sigma);
         cost += robust.cost;
-        fill_rows<Columns>(cameras, pair(l.host, target), same, l, x_h, *o, p_C, r, rows);
+        fill_jacobian_rows<Columns>(cameras, pair(l.host, target), same, l, x_h, *o, p_C, r, rows);
         if (robust.weight < 1) {
           const double s = std::sqrt(robust.weight);
           for (int k = 0; k < 2; ++k)
@@ -389,7 +330,7 @@ Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObserva
   geometry.set(frames[landmark.host].state.T_WB, frames[observation.frame].state.T_WB);
   Vec3 p_C;
   Vec2 r;
-  if (evaluate(cameras, geometry, to_body(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r)) return r;
+  if (reproject(cameras, geometry, scaled_point_in_host(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r)) return r;
   return Vec2::Constant(std::numeric_limits<double>::infinity());
 }
 

@@ -35,22 +35,6 @@ struct WindowFrame {
   bool standstill = false;
 };
 
-struct WindowObservation {
-  int frame = 0;
-  bool right = false;
-  Vec2 normalised = Vec2::Zero();
-  Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by the time offset
-  Mat2 sqrt_information = Mat2::Identity();
-};
-
-/// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
-struct WindowLandmark {
-  int host = 0;
-  int first_observation = 0;  ///< its observations are neighbours, sorted by frame
-  int observation_count = 0;
-  Vec3 alpha_beta_rho = Vec3::Zero();
-};
-
 /// Terms and weights that are not measurements of a frame.
 struct WindowWeights {
   double huber_sigma = 2.0;

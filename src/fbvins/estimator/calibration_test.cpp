@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Online calibration: with a rig that is wrong by a known amount, the estimate moves towards the truth, and
+// with the option off it stays where it was.
+#include <gtest/gtest.h>
+
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+constexpr int kFrames = 300;
+
+EstimatorOptions exact_noise() {
+  EstimatorOptions o;  // the simulated IMU is as good as its data sheet
+  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
+  return o;
+}
+
+/// The rig as a bad calibration has it: both cameras turned and moved together, as a loose mount would.
+StereoRig loose_mount(StereoRig rig, double angle_rad, double shift_m) {
+  const Quat turn = so3_exp(angle_rad * Vec3(0.6, -0.5, 0.62).normalized());
+  const Vec3 shift = shift_m * Vec3(1, -1, 1).normalized();
+  rig.T_BC0 = {turn * rig.T_BC0.q, Vec3(turn * rig.T_BC0.p + shift)};
+  rig.T_BC1 = {turn * rig.T_BC1.q, Vec3(turn * rig.T_BC1.p + shift)};
+  return rig;
+}
+
+double angle_to(const Calibration& calibration, const StereoRig& truth) {
+  return so3_log(truth.T_BC0.q.conjugate() * calibration.T_BC0.q).norm();
+}
+double shift_to(const Calibration& calibration, const StereoRig& truth) { return (truth.T_BC0.p - calibration.T_BC0.p).norm(); }
+
+Calibration fly(SimulatedFlight& flight, const StereoRig& believed, const EstimatorOptions& options) {
+  Estimator estimator(believed, options);
+  Health last;
+  for (int k = 0; k < kFrames; ++k) last = estimator.process(flight.frame(k)).odometry.health;
+  EXPECT_EQ(last.state, HealthState::good);
+  return estimator.calibration();
+}
+
+TEST(OnlineCalibration, FindsTheExtrinsics) {
+  constexpr double kAngle_rad = 2.0 * 3.14159265358979 / 180, kShift_m = 0.01;
+  for (int seed : {1, 2, 3}) {
+    SimulatedFlight flight(Motion(0.6, 0.5), 40 + seed);
+    EstimatorOptions options = exact_noise();
+    options.estimate_extrinsics = true;
+    const Calibration found = fly(flight, loose_mount(flight.rig, kAngle_rad, kShift_m), options);
+    EXPECT_LT(angle_to(found, flight.rig), 0.2 * kAngle_rad) << seed;
+    EXPECT_LT(shift_to(found, flight.rig), 0.6 * kShift_m) << seed;
+  }
+}
+
+TEST(OnlineCalibration, LeavesGoodExtrinsicsWhereTheyAre) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 45);
+  EstimatorOptions options = exact_noise();
+  options.estimate_extrinsics = true;
+  const Calibration found = fly(flight, flight.rig, options);
+  EXPECT_LT(angle_to(found, flight.rig), 0.005);
+  EXPECT_LT(shift_to(found, flight.rig), 0.005);
+}
+
+TEST(OnlineCalibration, TouchesNothingWhenOff) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 46);
+  const StereoRig believed = loose_mount(flight.rig, 0.002, 0.001);
+  const Calibration found = fly(flight, believed, exact_noise());
+  EXPECT_EQ(angle_to(found, believed), 0);
+  EXPECT_EQ(shift_to(found, believed), 0);
+  EXPECT_EQ(found.time_offset_s, 0);
+}
+
+/// The flight's images are stamped `late_s` after they were taken: t_imu = t_image - late_s.
+Calibration fly_with_late_stamps(SimulatedFlight& flight, double late_s, const EstimatorOptions& options) {
+  Estimator estimator(flight.rig, options);
+  const Duration late = Duration::from_seconds(late_s);
+  Health last;
+  for (int k = 0; k < kFrames; ++k) {
+    TrackedFrame frame = flight.frame_with_late_stamp(k, late);
+    last = estimator.process(frame).odometry.health;
+  }
+  EXPECT_EQ(last.state, HealthState::good);
+  return estimator.calibration();
+}
+
+TEST(OnlineCalibration, FindsTheTimeOffset) {
+  for (const double late_s : {0.005, -0.005}) {
+    SimulatedFlight flight(Motion(0.6, 0.5), 47);
+    EstimatorOptions options = exact_noise();
+    options.estimate_time_offset = true;
+    const Calibration found = fly_with_late_stamps(flight, late_s, options);
+    EXPECT_NEAR(found.time_offset_s, -late_s, 0.001);
+    EstimatorOptions off = exact_noise();
+    SimulatedFlight again(Motion(0.6, 0.5), 47);
+    EXPECT_EQ(fly_with_late_stamps(again, late_s, off).time_offset_s, 0);
+  }
+}
+
+}  // namespace
+}  // namespace fbvins
