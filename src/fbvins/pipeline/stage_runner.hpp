@@ -10,17 +10,26 @@
 
 namespace fbvins {
 
+/// Runs `body`; the sentence of the exception it ended with, or empty.
+template <class Body>
+std::string failure_of(Body&& body) {
+  try {
+    body();
+    return {};
+  } catch (const std::exception& e) {
+    return std::string("a stage failed: ") + e.what();
+  } catch (...) {
+    return "a stage failed with an unknown exception";
+  }
+}
+
 class StageRunner {
  public:
   /// `body` runs until its queue is closed; `on_failure` must close the queues that others wait on.
   void start(std::function<void()> body, std::function<void()> on_failure) {
     thread_ = std::thread([this, body = std::move(body), on_failure = std::move(on_failure)] {
-      try {
-        body();
-      } catch (const std::exception& e) {
-        failure_ = e.what();
-        on_failure();
-      }
+      failure_ = failure_of(body);
+      if (!failure_.empty()) on_failure();
     });
   }
 

@@ -42,8 +42,8 @@ void System::forward_packets(bool flush) {
   while (auto packet = packets_.next(flush)) {
     if (mode_ == RunMode::threaded)
       to_frontend_.push(std::move(*packet));
-    else
-      track(std::move(*packet));
+    else if (failure_.empty())
+      failure_ = failure_of([&] { track(std::move(*packet)); });
   }
 }
 
@@ -93,11 +93,13 @@ Result<void> System::finish() {
   finished_ = true;
   forward_packets(true);
   to_frontend_.close();
+  // Both have ended before this returns, whichever failed: no callback comes later.
   for (StageRunner* runner : {&frontend_runner_, &estimator_runner_}) {
     const std::string failure = runner->join();
-    if (!failure.empty()) return Error{ErrorCode::invalid_argument, "a stage failed: " + failure};
+    if (failure_.empty()) failure_ = failure;
   }
-  return {};
+  if (failure_.empty()) return {};
+  return Error{ErrorCode::invalid_argument, failure_};
 }
 
 }  // namespace fbvins

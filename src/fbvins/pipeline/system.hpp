@@ -18,6 +18,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/bounded_queue.hpp"
@@ -65,7 +66,7 @@ class System {
 
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded).
   void push(SensorEvent event);
-  /// Processes what is waiting and ends. An error if a stage threw.
+  /// Processes what is waiting and ends; no callback comes afterwards. An error if a stage or a callback threw.
   Result<void> finish();
 
   InputCounts input_counts() const { return packets_.counts(); }
@@ -91,6 +92,7 @@ class System {
   BoundedQueue<TrackedFrame> to_estimator_{4};
   StageRunner frontend_runner_, estimator_runner_;
   bool finished_ = false;
+  std::string failure_;  ///< of the first stage that threw; the caller's thread only
 
   // The feedback slot: the states after the last frames, and how far the estimator has come.
   std::mutex prior_mutex_;

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/pipeline/packet_maker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+ImuSample reading(std::int64_t ms) {
+  ImuSample sample;
+  sample.t = Time{ms * kMs};
+  sample.accel_mps2 = Vec3(0, 0, 9.81);
+  return sample;
+}
+
+StereoFrame image(std::int64_t ms) { return {Time{ms * kMs}, nullptr, nullptr}; }
+
+std::vector<SensorPacket> drain(PacketMaker& maker, bool flush = false) {
+  std::vector<SensorPacket> packets;
+  while (auto packet = maker.next(flush)) packets.push_back(std::move(*packet));
+  return packets;
+}
+
+PacketMaker make(double time_offset_s = 0) {
+  return PacketMaker(PacketMakerOptions{}, Duration::from_seconds(time_offset_s));
+}
+
+TEST(PacketMaker, AnImageWaitsForTheReadingsUpToItsStamp) {
+  PacketMaker maker = make();
+  for (int ms = 0; ms <= 45; ms += 5) maker.push(reading(ms));
+  maker.push(image(10));
+  maker.push(image(50));
+  ASSERT_EQ(drain(maker).size(), 1u);
+  maker.push(reading(50));
+  const auto packets = drain(maker);
+  ASSERT_EQ(packets.size(), 1u);
+  EXPECT_EQ(packets[0].id.value, 1);
+  ASSERT_FALSE(packets[0].imu.empty());
+  EXPECT_EQ(packets[0].imu.samples.front().t.ns, 10 * kMs);
+  EXPECT_EQ(packets[0].imu.samples.back().t.ns, 50 * kMs);
+  EXPECT_EQ(packets[0].imu.samples.size(), 9u);
+}
+
+TEST(PacketMaker, ASilentImuDoesNotSilenceTheCameras) {
+  PacketMaker maker = make();
+  for (int ms = 0; ms <= 600; ms += 50) maker.push(image(ms));
+  const auto packets = drain(maker);
+  // Images older than the newest by more than 0.25 s have waited long enough: 0 to 300 ms.
+  ASSERT_EQ(packets.size(), 7u);
+  for (const SensorPacket& packet : packets) EXPECT_TRUE(packet.imu.empty());
+}
+
+TEST(PacketMaker, ReadingsThatComeBackServeTheImagesAfterThem) {
+  PacketMaker maker = make();
+  for (int ms = 0; ms <= 600; ms += 50) maker.push(image(ms));
+  (void)drain(maker);
+  for (int ms = 500; ms <= 700; ms += 5) maker.push(reading(ms));
+  const auto packets = drain(maker);
+  ASSERT_EQ(packets.size(), 6u);
+  EXPECT_EQ(packets.back().frame.t.ns, 600 * kMs);
+  EXPECT_EQ(packets.back().imu.samples.size(), 11u);
+}
+
+TEST(PacketMaker, ImagesThatDoNotMoveOnAreSkippedAndCounted) {
+  PacketMaker maker = make();
+  for (int ms : {0, 50, 50, 20, 100}) maker.push(image(ms));
+  const auto packets = drain(maker, true);
+  ASSERT_EQ(packets.size(), 3u);
+  EXPECT_EQ(packets[2].frame.t.ns, 100 * kMs);
+  EXPECT_EQ(packets[2].id.value, 2);
+  EXPECT_EQ(maker.counts().images, 3);
+  EXPECT_EQ(maker.counts().images_backward, 2);
+}
+
+TEST(PacketMaker, FlushHandsOutWhatNeverGotItsReadings) {
+  PacketMaker maker = make();
+  for (int ms = 0; ms <= 70; ms += 5) maker.push(reading(ms));
+  for (int ms : {0, 50, 100}) maker.push(image(ms));
+  EXPECT_EQ(drain(maker).size(), 2u);
+  const auto rest = drain(maker, true);
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_EQ(rest[0].frame.t.ns, 100 * kMs);
+  EXPECT_TRUE(drain(maker, true).empty());
+}
+
+TEST(PacketMaker, TheTimeOffsetMovesTheReadingsAndNotTheImage) {
+  PacketMaker maker = make(0.010);
+  for (int ms = 0; ms <= 100; ms += 5) maker.push(reading(ms));
+  maker.push(image(20));
+  maker.push(image(70));
+  const auto packets = drain(maker);
+  ASSERT_EQ(packets.size(), 2u);
+  EXPECT_EQ(packets[1].frame.t.ns, 70 * kMs);
+  EXPECT_EQ(packets[1].imu.samples.front().t.ns, 30 * kMs);
+  EXPECT_EQ(packets[1].imu.samples.back().t.ns, 80 * kMs);
+}
+
+}  // namespace
+}  // namespace fbvins
