@@ -17,7 +17,8 @@ double weakest_direction_px(const KltLevelTemplate& patch) {
 
 }  // namespace
 
-/// New tracks where there are few: first for image cells with less than their share, then anywhere.
+/// New tracks where there are few: first for image cells with less than their share, then anywhere; and where the
+/// image has too few sharp corners (dark, blurred), its less sharp ones, up to half of what is wanted.
 void OrbFrontend::start_tracks(FrontendStats& stats) {
   points_a_.clear();
   for (const Track& track : tracks_)
@@ -41,15 +42,24 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
   std::stable_sort(order_.begin(), order_.end(),
                    [&](std::size_t a, std::size_t b) { return keypoints[a].score > keypoints[b].score; });
   const double min2 = options_.min_distance_px * options_.min_distance_px;
-  for (const bool only_poor_cells : {true, false}) {
+  struct Pass {
+    bool only_poor_cells;
+    double max_uncertainty_px;
+    int wanted;
+  };
+  const Pass passes[] = {{true, options_.max_uncertainty_px, options_.max_features},
+                         {false, options_.max_uncertainty_px, options_.max_features},
+                         {true, options_.max_uncertainty_dark_px, options_.max_features / 2},
+                         {false, options_.max_uncertainty_dark_px, options_.max_features / 2}};
+  for (const Pass& pass : passes) {
     for (const std::size_t k : order_) {
-      if (static_cast<int>(points_a_.size()) >= options_.max_features) return;
+      if (static_cast<int>(points_a_.size()) >= pass.wanted) break;
       const Keypoint& keypoint = keypoints[k];
-      if (keypoint_used_[k] != 0 || (only_poor_cells && count[cell(keypoint.pixel)] >= share)) continue;
+      if (keypoint_used_[k] != 0 || (pass.only_poor_cells && count[cell(keypoint.pixel)] >= share)) continue;
       const bool crowded = std::any_of(points_a_.begin(), points_a_.end(), [&](const Vec2& other) {
         return (other - keypoint.pixel).squaredNorm() < min2;
       });
-      if (crowded || !start_track(keypoint, left_features_.descriptors[k])) continue;
+      if (crowded || !start_track(keypoint, left_features_.descriptors[k], pass.max_uncertainty_px)) continue;
       keypoint_used_[k] = 1;
       points_a_.push_back(keypoint.pixel);
       ++count[cell(keypoint.pixel)];
@@ -58,14 +68,14 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
   }
 }
 
-bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descriptor) {
+bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descriptor, double max_uncertainty_px) {
   const auto normalised = rig_.left.undistort(keypoint.pixel);
   if (!normalised || free_slots_.empty() || !rig_.left.inside(keypoint.pixel, kBorder_px)) return false;
   Track track;
   track.slot = free_slots_.back();
   Patches& patches = patches_[track.slot];
   if (!patches.newest.cut(left_, keypoint.pixel, 0, kAlignmentLevels - 1)) return false;
-  if (weakest_direction_px(patches.newest.levels[0]) > options_.max_uncertainty_px) return false;
+  if (weakest_direction_px(patches.newest.levels[0]) > max_uncertainty_px) return false;
   if (!patches.reference.take(left_, keypoint.pixel, rig_.left, *normalised)) return false;
   free_slots_.pop_back();
   track.id = TrackId{next_track_++};
