@@ -51,7 +51,9 @@ void add_config_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("config", "print every option with value, unit, range and meaning");
   command->footer(kExamples);
   auto* file = command->add_option("--config", arguments->file, "YAML file that changes the defaults");
-  auto* set = command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
+  auto* set = command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
+                  ->take_all()
+                  ->allow_extra_args(false);
   command->add_flag("--defaults", arguments->defaults, "the defaults (as without any argument)")->excludes(file)->excludes(set);
   command->add_flag("--yaml", arguments->yaml, "as a configuration file");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });

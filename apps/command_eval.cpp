@@ -13,7 +13,8 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples = R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV) or a recording that
+constexpr const char* kExamples =
+    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV) or a recording that
 holds one, which also tells the share of images with a pose. The stamps of both are matched as evo does:
 the nearest, at most --max-diff apart.
 
@@ -105,14 +106,18 @@ void add_eval_command(CLI::App& program, int& exit_code) {
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
   command->add_option("--align", arguments->alignment, "how the estimate is laid over the truth first")
-      ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))->capture_default_str();
+      ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))
+      ->capture_default_str();
   command->add_option("--max-diff", arguments->max_difference_s, "largest difference of matched stamps, s")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--interpolate", arguments->interpolate, "take the truth at the estimate's very stamps instead");
   command->add_option("--pairs", arguments->pairs, "pieces of the relative error: all, or one after the other")
-      ->check(CLI::IsMember({"all", "consecutive"}))->capture_default_str();
+      ->check(CLI::IsMember({"all", "consecutive"}))
+      ->capture_default_str();
   command->add_option("--path", arguments->path, "whose path is measured for pieces of a metre")
-      ->check(CLI::IsMember({"truth", "estimate"}))->capture_default_str();
+      ->check(CLI::IsMember({"truth", "estimate"}))
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = evaluate_files(*arguments); });
 }

@@ -34,13 +34,17 @@ int info(const Arguments& arguments) {
   Vec3 low = Vec3::Constant(1e9), high = Vec3::Constant(-1e9);
   for (const MapKeyframe& k : map->keyframes()) {
     features += k.place.size();
-    points += static_cast<std::size_t>(std::count_if(k.place.features.begin(), k.place.features.end(), [](const PlaceFeature& f) { return f.has_point(); }));
+    points += static_cast<std::size_t>(
+        std::count_if(k.place.features.begin(), k.place.features.end(), [](const PlaceFeature& f) { return f.has_point(); }));
     flights.insert(k.session);
     low = low.cwiseMin(k.T_MB.p), high = high.cwiseMax(k.T_MB.p);
   }
-  const auto loops = std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
-  fmt::print("{}: {} keyframes of {} flights, {} loops, {} features, {} with depth\n", arguments.file, map->size(), flights.size(), loops, features, points);
-  if (!map->empty()) fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
+  const auto loops =
+      std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
+  fmt::print("{}: {} keyframes of {} flights, {} loops, {} features, {} with depth\n", arguments.file, map->size(),
+             flights.size(), loops, features, points);
+  if (!map->empty())
+    fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   return kOk;
 }
 

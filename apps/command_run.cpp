@@ -17,7 +17,8 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples = R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), statistics.csv,
+constexpr const char* kExamples =
+    R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), statistics.csv,
 config.yaml (the effective configuration), summary.json, summary.txt, timing.csv. The same input and
 configuration give the same bytes in the first four, with --threaded as well.
 
@@ -36,7 +37,8 @@ struct Arguments {
 };
 
 Result<Config> config_of(Arguments arguments) {
-  if (!arguments.frontend.empty()) arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
+  if (!arguments.frontend.empty())
+    arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
   return load_config(arguments.config, arguments.assignments);
 }
 
@@ -122,7 +124,9 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip")->required();
   command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");
-  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
+  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
   command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember({"klt", "orb"}));
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");

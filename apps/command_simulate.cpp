@@ -16,7 +16,8 @@
 namespace fbvins::app {
 namespace {
 
-constexpr const char* kExamples = R"(Writes a EuRoC folder with images, IMU and exact truth, and simulation.yaml (the effective options).
+constexpr const char* kExamples =
+    R"(Writes a EuRoC folder with images, IMU and exact truth, and simulation.yaml (the effective options).
 The same options and seed give the same bytes.
 
 examples:
@@ -75,7 +76,9 @@ int simulate_flight(const Arguments& arguments) {
   const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
   if (!written) return fail(written.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
-  if (!arguments.quiet) fmt::print("{} stereo frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(), bold(arguments.out));
+  if (!arguments.quiet)
+    fmt::print("{} stereo frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(),
+               bold(arguments.out));
   return kOk;
 }
 
@@ -85,15 +88,19 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("simulate", "draw a made-up recording with exact truth");
   command->footer(kExamples);
-  command->add_option("PRESET", arguments->preset, "what it is like (default normal)")->check(CLI::IsMember(simulation_presets()));
+  command->add_option("PRESET", arguments->preset, "what it is like (default normal)")
+      ->check(CLI::IsMember(simulation_presets()));
   command->add_option("--out", arguments->out, "folder for the recording");
   command->add_option("--seed", arguments->seed, "of world, flight and noise")->check(CLI::NonNegativeNumber);
   command->add_option("--seconds", arguments->seconds, "length of the flight")->check(CLI::PositiveNumber);
   command->add_option("--config", arguments->config, "YAML file that changes the preset");
-  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
+  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
   command->add_option("--trajectory", arguments->trajectory, "fly along a recorded trajectory (TUM or EuRoC)");
   command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU, used untouched (EuRoC CSV)");
-  command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")->check(CLI::NonNegativeNumber);
+  command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
+      ->check(CLI::NonNegativeNumber);
   command->add_flag("--depth", arguments->depth, "left depth images in millimetres, too");
   command->add_flag("--landmarks", arguments->landmarks, "corners of the world, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");

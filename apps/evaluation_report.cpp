@@ -8,21 +8,18 @@ namespace {
 
 std::string row(std::string_view name, const ErrorStatistics& s) {
   if (s.count == 0) return fmt::format("{:<24}{:>10}\n", name, "too short");
-  return fmt::format("{:<24}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{:>8}\n", name, s.max, s.mean, s.median, s.rmse,
-                     s.std, s.count);
+  return fmt::format("{:<24}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{:>8}\n", name, s.max, s.mean, s.median, s.rmse, s.std,
+                     s.count);
 }
 
 Json numbers(const auto& vector) { return Json(std::vector<double>(vector.begin(), vector.end())); }
 
-Json to_json(const PoseNees& n) {
-  return Json{{"position", n.position}, {"orientation", n.orientation}, {"pose", n.pose}};
-}
+Json to_json(const PoseNees& n) { return Json{{"position", n.position}, {"orientation", n.orientation}, {"pose", n.pose}}; }
 
 }  // namespace
 
 Json to_json(const ErrorStatistics& s) {
-  return Json{{"count", s.count},   {"max", s.max},   {"mean", s.mean},
-              {"median", s.median}, {"rmse", s.rmse}, {"std", s.std}};
+  return Json{{"count", s.count}, {"max", s.max}, {"mean", s.mean}, {"median", s.median}, {"rmse", s.rmse}, {"std", s.std}};
 }
 
 Json to_json(const Evaluation& e, Alignment alignment) {
@@ -52,10 +49,8 @@ Json to_json(const Coverage& c) {
 }
 
 Json to_json(const NeesSummary& n) {
-  return Json{{"count", n.count},
-              {"unusable", n.unusable},
-              {"mean", to_json(n.mean)},
-              {"share_within_95", to_json(n.share_within_95)}};
+  return Json{
+      {"count", n.count}, {"unusable", n.unusable}, {"mean", to_json(n.mean)}, {"share_within_95", to_json(n.share_within_95)}};
 }
 
 std::string to_table(const Evaluation& e, Alignment alignment) {

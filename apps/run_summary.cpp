@@ -17,7 +17,8 @@ void count_health(const RunRecord& record, RunSummary& summary) {
   const Odometry* last_pose = nullptr;
   for (const Odometry& o : record.odometry) {
     const bool plain = o.health.reason == HealthReason::none;
-    ++counts[plain ? std::string(to_string(o.health.state)) : fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
+    ++counts[plain ? std::string(to_string(o.health.state))
+                   : fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
     if (!o.health.has_pose()) continue;
     if (last_pose && o.reset_counter != last_pose->reset_counter) ++summary.restarts;
     last_pose = &o;
@@ -112,7 +113,8 @@ std::string to_text(const RunSummary& s) {
     text += fmt::format("NEES (yaw-aligned; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
                         s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
   text += "-- timing (differs from run to run) --\n";
-  text += timing_line("frontend", s.frontend_ms) + timing_line("estimator", s.estimator_ms) + timing_line("together", total_ms(s));
+  text +=
+      timing_line("frontend", s.frontend_ms) + timing_line("estimator", s.estimator_ms) + timing_line("together", total_ms(s));
   text += fmt::format("wall {:.1f} s ({}), peak memory {:.0f} MB\n", s.wall_s, s.mode, s.peak_memory_mb);
   return text;
 }

@@ -14,18 +14,18 @@ namespace fbvins::app {
 
 struct RunSummary {
   std::string frontend;
-  std::string mode;      ///< deterministic or threaded
-  std::string dataset;   ///< its name, not where it lies
-  int frames = 0;        ///< stereo frames that reached the frontend
-  int images_bad = 0;    ///< image files missing, corrupt or of the wrong size
+  std::string mode;     ///< deterministic or threaded
+  std::string dataset;  ///< its name, not where it lies
+  int frames = 0;       ///< stereo frames that reached the frontend
+  int images_bad = 0;   ///< image files missing, corrupt or of the wrong size
   Coverage coverage;
-  int restarts = 0;      ///< times the estimator started anew after its first pose
+  int restarts = 0;                                 ///< times the estimator started anew after its first pose
   std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"
   std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
   std::string no_evaluation;                        ///< why there is none
   std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
   double wall_s = 0;
-  std::vector<double> frontend_ms, estimator_ms;    ///< CPU time per frame
+  std::vector<double> frontend_ms, estimator_ms;  ///< CPU time per frame
   double peak_memory_mb = 0;
 };
 

@@ -56,10 +56,12 @@ bool measure(const std::string& path, const Vocabulary& vocabulary) {
   const double finish_ms = timer.lap_ms();
   const double w = ate_m(truth, in_W), after = ate_m(truth, closer.corrected(in_W));
   fmt::print("{}: ATE in W {:.4f} m; causal in M {:.4f} ({:.2f}), bounded {:.4f} ({:.2f}); after the run in M {:.4f} ({:.2f})\n",
-             data.info().name, w, ate_m(truth, causal), ate_m(truth, causal) / w, ate_m(truth, smooth), ate_m(truth, smooth) / w, after, after / w);
-  fmt::print("  {} keyframes, {} loops, {} refused, {} left out; a keyframe: extraction {:.2f} ms, recognition {:.2f}, verification {:.2f}, graph {:.2f}, all {:.2f}; at the end {:.0f} ms\n",
-             keyframes, total.accepted, total.refused, report.rejected, total.extract_ms / keyframes, total.recognise_ms / keyframes,
-             total.verify_ms / keyframes, total.optimise_ms / keyframes, total.total_ms() / keyframes, finish_ms);
+             data.info().name, w, ate_m(truth, causal), ate_m(truth, causal) / w, ate_m(truth, smooth), ate_m(truth, smooth) / w,
+             after, after / w);
+  fmt::print(
+      "  {} keyframes, {} loops, {} refused, {} left out; a keyframe: extraction {:.2f} ms, recognition {:.2f}, verification {:.2f}, graph {:.2f}, all {:.2f}; at the end {:.0f} ms\n",
+      keyframes, total.accepted, total.refused, report.rejected, total.extract_ms / keyframes, total.recognise_ms / keyframes,
+      total.verify_ms / keyframes, total.optimise_ms / keyframes, total.total_ms() / keyframes, finish_ms);
   return true;
 }
 

@@ -72,7 +72,8 @@ bool surface_agrees(const View& b, const Vec3& p) {
   const Vec2 xy = p.hnormalized();
   double nearest = 1e9, inverse_depth = 0;
   for (const PlaceFeature& f : b.place.features)
-    if (f.has_point() && (f.xy() - xy).squaredNorm() < nearest) nearest = (f.xy() - xy).squaredNorm(), inverse_depth = f.inverse_depth;
+    if (f.has_point() && (f.xy() - xy).squaredNorm() < nearest)
+      nearest = (f.xy() - xy).squaredNorm(), inverse_depth = f.inverse_depth;
   return std::abs(inverse_depth * p.z() - 1) < 0.2;
 }
 
@@ -111,7 +112,8 @@ void within(const Recording& r, const Vocabulary& vocabulary) {
       verify_ms += timer.lap_ms(), ++verified;
       sharing += shares;
       found += shares && pose;
-      retrieved += shares && std::any_of(hits.begin(), hits.end(), [&](const IndexHit& h) { return h.keyframe.value == static_cast<std::int64_t>(j); });
+      retrieved += shares && std::any_of(hits.begin(), hits.end(),
+                                         [&](const IndexHit& h) { return h.keyframe.value == static_cast<std::int64_t>(j); });
       if (!pose) continue;
       ++accepted;
       const Pose<C0, C0> truth = (q.T_WB * r.rig.T_BC0).inverse() * (c.T_WB * r.rig.T_BC0);
@@ -119,8 +121,10 @@ void within(const Recording& r, const Vocabulary& vocabulary) {
       e << truth.p - pose->pose.T_qc.p, so3_log(pose->pose.T_qc.q.conjugate() * truth.q);
       if (e.head<3>().norm() > kCorrect_m || e.tail<3>().norm() > kCorrect_rad) {
         ++wrong;
-        fmt::print("  wrong: {} <- {} by {:.2f} m {:.1f} deg, {} inliers of {} visible in {} cells, truth {:.2f} m apart, shared {:.2f}\n", i, j,
-                   e.head<3>().norm(), e.tail<3>().norm() * 57.3, pose->pose.inliers.size(), pose->visible, pose->cells, truth.p.norm(), seen_from(r.rig, c, q));
+        fmt::print(
+            "  wrong: {} <- {} by {:.2f} m {:.1f} deg, {} inliers of {} visible in {} cells, truth {:.2f} m apart, shared {:.2f}\n",
+            i, j, e.head<3>().norm(), e.tail<3>().norm() * 57.3, pose->pose.inliers.size(), pose->visible, pose->cells,
+            truth.p.norm(), seen_from(r.rig, c, q));
       } else {
         error_mm.push_back(e.head<3>().norm() * 1e3), error_mrad.push_back(e.tail<3>().norm() * 1e3);
         nees.push_back(e.dot(pose->pose.information * e));
@@ -128,10 +132,14 @@ void within(const Recording& r, const Vocabulary& vocabulary) {
     }
   }
   const ErrorStatistics p = statistics_of(error_mm), a = statistics_of(error_mrad), n = statistics_of(nees);
-  fmt::print("{} keyframes, extraction {:.2f} ms, verification {:.2f} ms a pair\n", r.views.size(), r.extract_ms / r.views.size(), verify_ms / verified);
-  fmt::print("pairs sharing > 40 %: {}; recall {:.1f} %, among the ten most similar {:.1f} %\n", sharing, 100.0 * found / sharing, 100.0 * retrieved / sharing);
-  fmt::print("accepted {}, wrong {}: precision {:.2f} %\n", accepted, wrong, accepted > 0 ? 100.0 * (accepted - wrong) / accepted : 100.0);
-  fmt::print("error median {:.1f} mm {:.2f} mrad, rms {:.1f} mm {:.2f} mrad, NEES median {:.1f} mean {:.1f} (6)\n", p.median, a.median, p.rmse, a.rmse, n.median, n.mean);
+  fmt::print("{} keyframes, extraction {:.2f} ms, verification {:.2f} ms a pair\n", r.views.size(), r.extract_ms / r.views.size(),
+             verify_ms / verified);
+  fmt::print("pairs sharing > 40 %: {}; recall {:.1f} %, among the ten most similar {:.1f} %\n", sharing, 100.0 * found / sharing,
+             100.0 * retrieved / sharing);
+  fmt::print("accepted {}, wrong {}: precision {:.2f} %\n", accepted, wrong,
+             accepted > 0 ? 100.0 * (accepted - wrong) / accepted : 100.0);
+  fmt::print("error median {:.1f} mm {:.2f} mrad, rms {:.1f} mm {:.2f} mrad, NEES median {:.1f} mean {:.1f} (6)\n", p.median,
+             a.median, p.rmse, a.rmse, n.median, n.mean);
 }
 
 void across(const Recording& a, const Recording& b) {
@@ -144,7 +152,9 @@ void across(const Recording& a, const Recording& b) {
       ++queries;
       const auto pose = verifier.verify(b.views[j].place);
       most = std::max(most, static_cast<int>(verifier.last().pose.inliers.size()));
-      if (pose) accepted.push_back(fmt::format("{} <- {}: {} of {} visible, {} cells", i, j, pose->pose.inliers.size(), pose->visible, pose->cells));
+      if (pose)
+        accepted.push_back(
+            fmt::format("{} <- {}: {} of {} visible, {} cells", i, j, pose->pose.inliers.size(), pose->visible, pose->cells));
     }
   }
   fmt::print("across scenes: {} pairs, {} accepted, most inliers of any {}\n", queries, accepted.size(), most);

@@ -101,7 +101,8 @@ double verified_share(const Camera& camera, const OrbFeatures& a, const OrbFeatu
 }
 
 std::optional<Pose<W, B>> pose_at(const std::vector<TrajectoryPoint>& truth, Time t) {
-  const auto at = std::lower_bound(truth.begin(), truth.end(), t - Duration::from_seconds(0.03), [](const TrajectoryPoint& p, Time x) { return p.t < x; });
+  const auto at = std::lower_bound(truth.begin(), truth.end(), t - Duration::from_seconds(0.03),
+                                   [](const TrajectoryPoint& p, Time x) { return p.t < x; });
   std::optional<Pose<W, B>> best;
   double nearest = 0.03;
   for (auto p = at; p != truth.end() && (p->t - t).seconds() < 0.03; ++p)
@@ -109,7 +110,8 @@ std::optional<Pose<W, B>> pose_at(const std::vector<TrajectoryPoint>& truth, Tim
   return best;
 }
 
-void measure_matches(const std::vector<View>& views, const StereoRig& rig, const std::vector<TrajectoryPoint>& truth, Figures& figures) {
+void measure_matches(const std::vector<View>& views, const StereoRig& rig, const std::vector<TrajectoryPoint>& truth,
+                     Figures& figures) {
   for (const auto& [low, high] : {std::pair{0.15, 0.35}, {0.35, 0.7}}) {
     int pairs = 0;
     for (std::size_t i = 0; i < views.size() && pairs < 60; i += 3)
@@ -118,7 +120,8 @@ void measure_matches(const std::vector<View>& views, const StereoRig& rig, const
         if (!a || !b) continue;
         const Pose<C0, C0> T_ab = (*a * rig.T_BC0).inverse() * (*b * rig.T_BC0);
         if (T_ab.p.norm() < low || T_ab.p.norm() > high || so3_log(T_ab.q).norm() > 0.35) continue;
-        figures.add(fmt::format("ORB matches, {} to {} m apart [%]", low, high), verified_share(rig.left, views[i].features, views[j].features, T_ab));
+        figures.add(fmt::format("ORB matches, {} to {} m apart [%]", low, high),
+                    verified_share(rig.left, views[i].features, views[j].features, T_ab));
         ++pairs;
         break;
       }
@@ -128,7 +131,8 @@ void measure_matches(const std::vector<View>& views, const StereoRig& rig, const
 /// Feeds images one by one.
 class Meter {
  public:
-  Meter(const StereoRig& rig, bool consecutive) : rig_(rig), consecutive_(consecutive), orb_(orb_options()), system_(Config{}, rig, RunMode::deterministic) {
+  Meter(const StereoRig& rig, bool consecutive)
+      : rig_(rig), consecutive_(consecutive), orb_(orb_options()), system_(Config{}, rig, RunMode::deterministic) {
     system_.on_tracked_frame([this](const TrackedFrame& frame) { count_tracks(frame); });
   }
   void imu(const ImuSample& sample) {
@@ -161,7 +165,8 @@ class Meter {
     if (consecutive_) {
       (void)system_.finish();
       for (const auto& [id, age] : last_age_)
-        if (first_frame_of_[id] + 60 < frames_) figures_.add("KLT track length (first 60 frames) [frames]", std::min(age, 60) + 1);
+        if (first_frame_of_[id] + 60 < frames_)
+          figures_.add("KLT track length (first 60 frames) [frames]", std::min(age, 60) + 1);
       for (double s : survivors_) figures_.add("KLT features kept from frame to frame [%]", s);
     }
     return figures_;
@@ -198,7 +203,8 @@ class Meter {
       std::vector<int> histogram(256, 0);
       int count = 0;
       for (int y = 8; y < image.height() - 8; y += 2)
-        for (int x = 8; x < image.width() - 8; x += 2) ++histogram[static_cast<std::size_t>(std::abs(image.at(x, y) - last_.at(x, y)))], ++count;
+        for (int x = 8; x < image.width() - 8; x += 2)
+          ++histogram[static_cast<std::size_t>(std::abs(image.at(x, y) - last_.at(x, y)))], ++count;
       int sum = 0, at = 0;
       while (sum < 0.683 * count) sum += histogram[static_cast<std::size_t>(at++)];
       if (at <= 5) figures_.add("pixel noise at rest [grey]", interpolated(histogram, 0.683 * count) / std::sqrt(2.0));
@@ -259,7 +265,8 @@ Figures measure_drawn(const SimulationOptions& options, bool consecutive, const 
   }
   simulation->frames.clear();
   for (Time t : stamps)
-    if (t > simulation->start + Duration::from_seconds(0.02) && t < simulation->imu.samples.back().t) simulation->frames.push_back(t);
+    if (t > simulation->start + Duration::from_seconds(0.02) && t < simulation->imu.samples.back().t)
+      simulation->frames.push_back(t);
   DatasetContents contents = contents_of(*simulation, "drawn");
   const std::vector<TrajectoryPoint> truth = contents.ground_truth;
   Dataset data(std::move(contents), {});
@@ -285,7 +292,8 @@ int compare(const std::string& recording, const SimulationOptions& asked, int se
   }
   fmt::print("| figure | real | drawn, mean of {} worlds | drawn / real |\n|---|---:|---:|---:|\n", seeds);
   for (const std::string& name : real.names())
-    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |\n", name, real.mean(name), drawn.mean(name), drawn.mean(name) / real.mean(name));
+    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |\n", name, real.mean(name), drawn.mean(name),
+               drawn.mean(name) / real.mean(name));
   return 0;
 }
 

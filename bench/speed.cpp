@@ -65,7 +65,7 @@ Json spread(const std::vector<double>& ms) {
 }
 
 template <class Stats>
-Json share(const std::vector<Stats>& stats, double Stats::* member) {
+Json share(const std::vector<Stats>& stats, double Stats::*member) {
   std::vector<double> ms;
   for (const Stats& s : stats) ms.push_back(s.*member);
   return spread(ms);

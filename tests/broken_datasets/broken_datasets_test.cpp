@@ -25,14 +25,21 @@ constexpr const char* kTruth = "state_groundtruth_estimate0/data.csv";
 std::string rows(const char* name, const RowCounts& c) {
   if (c.bad() == 0) return "";
   std::string out = fmt::format("; {}:", name);
-  for (auto [count, what] : {std::pair{c.malformed, "malformed"}, {c.not_finite, "not finite"}, {c.duplicates, "duplicate"}, {c.backwards, "backwards"}})
+  for (auto [count, what] : {std::pair{c.malformed, "malformed"},
+                             {c.not_finite, "not finite"},
+                             {c.duplicates, "duplicate"},
+                             {c.backwards, "backwards"}})
     if (count > 0) out += fmt::format(" {} {}", count, what);
-  return out + fmt::format(", first line {}", c.first_bad.substr(c.first_bad.find(".csv:") + 5, c.first_bad.find(": ") - c.first_bad.find(".csv:") - 5));
+  return out + fmt::format(", first line {}", c.first_bad.substr(c.first_bad.find(".csv:") + 5,
+                                                                 c.first_bad.find(": ") - c.first_bad.find(".csv:") - 5));
 }
 
 std::string images(const char* name, const CameraInfo& c) {
   std::string out;
-  for (auto [count, what] : {std::pair{c.unpaired, "unpaired"}, {c.images.missing, "missing"}, {c.images.corrupt, "corrupt"}, {c.images.wrong_size, "wrong size"}})
+  for (auto [count, what] : {std::pair{c.unpaired, "unpaired"},
+                             {c.images.missing, "missing"},
+                             {c.images.corrupt, "corrupt"},
+                             {c.images.wrong_size, "wrong size"}})
     if (count > 0) out += fmt::format("; {}: {} {}", name, count, what);
   return out;
 }
@@ -64,7 +71,8 @@ std::string deliver(Dataset& data) {
   EXPECT_FALSE(data.next()) << "the end stays the end";
   const DatasetInfo& info = data.info();
   return fmt::format("{}/{}/{}/{}", frames, left, right, imu) + rows("left", info.left.rows) + rows("right", info.right.rows) +
-         rows("imu", info.imu_rows) + rows("truth", info.ground_truth_rows) + images("left", info.left) + images("right", info.right) +
+         rows("imu", info.imu_rows) + rows("truth", info.ground_truth_rows) + images("left", info.left) +
+         images("right", info.right) +
          (info.frames_without_image > 0 ? fmt::format("; {} empty frames", info.frames_without_image) : "");
 }
 
@@ -84,8 +92,18 @@ void edit(Files& files, const char* file, Edit&& change) {
 }
 
 const Refused kRefused[] = {
-    {"NothingInIt", [](Files& f) { f.clear(); f["readme.txt"] = "hello"; }, ": no cam0/data.csv in it: not a EuRoC dataset"},
-    {"RosBag2", [](Files& f) { f.clear(); f["../metadata.yaml"] = "rosbag2"; f["x"] = ""; },
+    {"NothingInIt",
+     [](Files& f) {
+       f.clear();
+       f["readme.txt"] = "hello";
+     },
+     ": no cam0/data.csv in it: not a EuRoC dataset"},
+    {"RosBag2",
+     [](Files& f) {
+       f.clear();
+       f["../metadata.yaml"] = "rosbag2";
+       f["x"] = "";
+     },
      ": no cam0/data.csv in it: not a EuRoC dataset (ROS bags cannot be read)"},
     {"NoLeftList", [](Files& f) { f.erase(kCam0); }, "/mav0/cam0/data.csv: no such file"},
     {"NoLeftCalibration", [](Files& f) { f.erase("cam0/sensor.yaml"); }, "/mav0/cam0/sensor.yaml: no such file"},
@@ -95,29 +113,62 @@ const Refused kRefused[] = {
     {"NoImuRows", [](Files& f) { f.erase(kImu); }, "/mav0/imu0/data.csv: no such file"},
     {"NoImuCalibration", [](Files& f) { f.erase("imu0/sensor.yaml"); }, "/mav0/imu0/sensor.yaml: no such file"},
     {"ImuEmpty", [](Files& f) { f[kImu].clear(); }, "/mav0/imu0/data.csv: there are no data rows in it"},
-    {"ImuOnlyHeader", [](Files& f) { edit(f, kImu, [](Lines& l) { l.resize(1); }); }, "/mav0/imu0/data.csv: there are no data rows in it"},
+    {"ImuOnlyHeader", [](Files& f) { edit(f, kImu, [](Lines& l) { l.resize(1); }); },
+     "/mav0/imu0/data.csv: there are no data rows in it"},
     {"LeftListEmpty", [](Files& f) { f[kCam0].clear(); }, "/mav0/cam0/data.csv: there are no data rows in it"},
-    {"ImuTooFewColumns", [](Files& f) { edit(f, kImu, [](Lines& l) { for (std::size_t i = 100; i < l.size(); ++i) l[i] = l[i].substr(0, l[i].rfind(',')); }); },
+    {"ImuTooFewColumns",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         for (std::size_t i = 100; i < l.size(); ++i) l[i] = l[i].substr(0, l[i].rfind(','));
+       });
+     },
      "/mav0/imu0/data.csv:101: 6 columns where 7 are needed (122 of 221 rows are unusable)"},
-    {"ImuAllNaN", [](Files& f) { edit(f, kImu, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) replace(l[i], "0.01", "nan"); }); },
+    {"ImuAllNaN",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) replace(l[i], "0.01", "nan");
+       });
+     },
      "/mav0/imu0/data.csv:2: a value is not a usable number (221 of 221 rows are unusable)"},
-    {"ImuOneStampForAll", [](Files& f) { edit(f, kImu, [](Lines& l) { for (std::size_t i = 2; i < l.size(); ++i) l[i] = l[1]; }); },
+    {"ImuOneStampForAll",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         for (std::size_t i = 2; i < l.size(); ++i) l[i] = l[1];
+       });
+     },
      "/mav0/imu0/data.csv:3: the stamp was already there (220 of 221 rows are unusable)"},
     {"ImuFromTheEnd", [](Files& f) { edit(f, kImu, [](Lines& l) { std::reverse(l.begin() + 1, l.end()); }); },
      "/mav0/imu0/data.csv:3: the stamp is out of order (220 of 221 rows are unusable)"},
-    {"ListWithoutNames", [](Files& f) { edit(f, kCam0, [](Lines& l) { for (auto& s : l) s = s.substr(0, s.find(',')); }); },
+    {"ListWithoutNames",
+     [](Files& f) {
+       edit(f, kCam0, [](Lines& l) {
+         for (auto& s : l) s = s.substr(0, s.find(','));
+       });
+     },
      "/mav0/cam0/data.csv:2: 1 columns where 2 are needed (20 of 20 rows are unusable)"},
-    {"StampsInSeconds", [](Files& f) { edit(f, kCam0, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) l[i].insert(10, 1, '.'); }); },
+    {"StampsInSeconds",
+     [](Files& f) {
+       edit(f, kCam0, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) l[i].insert(10, 1, '.');
+       });
+     },
      "/mav0/cam0/data.csv:2: '1600000000.000000123' is not a stamp in nanoseconds (20 of 20 rows are unusable)"},
     {"ListIsBinary", [](Files& f) { f[kCam0] = f[toy_image(0, 0)]; }, "/mav0/cam0/data.csv:"},
-    {"NamesLeaveTheFolder", [](Files& f) { edit(f, kCam0, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) l[i].replace(20, std::string::npos, "../../../etc/passwd"); }); },
+    {"NamesLeaveTheFolder",
+     [](Files& f) {
+       edit(f, kCam0, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) l[i].replace(20, std::string::npos, "../../../etc/passwd");
+       });
+     },
      "/mav0/cam0/data.csv:2: '../../../etc/passwd' is not the name of an image file (20 of 20 rows are unusable)"},
-    {"YamlSyntax", [](Files& f) { replace(f["cam0/sensor.yaml"], "comment: toy", "comment: [toy"); }, "/mav0/cam0/sensor.yaml:4: "},
+    {"YamlSyntax", [](Files& f) { replace(f["cam0/sensor.yaml"], "comment: toy", "comment: [toy"); },
+     "/mav0/cam0/sensor.yaml:4: "},
     {"YamlEmpty", [](Files& f) { f["cam1/sensor.yaml"].clear(); }, "/mav0/cam1/sensor.yaml: holds no fields"},
     {"YamlBinary", [](Files& f) { f["cam1/sensor.yaml"] = f[toy_image(0, 0)]; }, "/mav0/cam1/sensor.yaml:"},
     {"MountingTooShort", [](Files& f) { replace(f["cam0/sensor.yaml"], "0.0, 0.0, 0.0, 1.0]", "0.0, 0.0, 0.0]"); },
      "/mav0/cam0/sensor.yaml:7: data: has 15 numbers where 16 are needed"},
-    {"MountingMissing", [](Files& f) { replace(f["cam0/sensor.yaml"], "T_BS", "T_SB"); }, "/mav0/cam0/sensor.yaml: T_BS: is missing"},
+    {"MountingMissing", [](Files& f) { replace(f["cam0/sensor.yaml"], "T_BS", "T_SB"); },
+     "/mav0/cam0/sensor.yaml: T_BS: is missing"},
     {"MountingNoRotation", [](Files& f) { replace(f["cam0/sensor.yaml"], "[1.0, 0.0", "[1.1, 0.0"); },
      "/mav0/cam0/sensor.yaml:7: data: its 3x3 part is not a rotation"},
     {"MountingMirrored", [](Files& f) { replace(f["cam0/sensor.yaml"], "[1.0, 0.0", "[-1.0, 0.0"); },
@@ -146,9 +197,19 @@ const Refused kRefused[] = {
      "/mav0/imu0/sensor.yaml: accelerometer_random_walk: is missing"},
     {"AllImagesMissing", [](Files& f) { std::erase_if(f, [](const auto& e) { return e.first.ends_with(".png"); }); },
      "/mav0/cam0/data/1600000000000000123.png: no such file, nor any other of the images listed"},
-    {"ImuOfAnotherDay", [](Files& f) { edit(f, kImu, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) --l[i][1]; }); },
+    {"ImuOfAnotherDay",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) --l[i][1];
+       });
+     },
      "/mav0/imu0/data.csv: stamps 1499999999.900000123 to 1500000001.000000123 s do not overlap the images' 1600000000.000000123 to 1600000000.950000123 s"},
-    {"RightOfAnotherDay", [](Files& f) { edit(f, kCam1, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) --l[i][1]; }); },
+    {"RightOfAnotherDay",
+     [](Files& f) {
+       edit(f, kCam1, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) --l[i][1];
+       });
+     },
      "/mav0/cam1/data.csv: no stamp lies within 3 ms of one of cam0's"},
 };
 
@@ -168,14 +229,15 @@ TEST_P(RefusedDataset, IsNamedInOneSentence) {
   else EXPECT_EQ(message, expected);
   EXPECT_EQ(message.find('\n'), std::string::npos);
 }
-INSTANTIATE_TEST_SUITE_P(Table, RefusedDataset, testing::ValuesIn(kRefused), [](const auto& row) { return std::string(row.param.name); });
+INSTANTIATE_TEST_SUITE_P(Table, RefusedDataset, testing::ValuesIn(kRefused),
+                         [](const auto& row) { return std::string(row.param.name); });
 
 // ---------------------------------------------------------------- delivered, less what is broken
 
 struct Skipped {
   const char* name;
   Damage damage;
-  const char* outcome;       ///< frames/left/right/IMU; what was left out
+  const char* outcome;  ///< frames/left/right/IMU; what was left out
   int warnings = 1;
 };
 
@@ -183,63 +245,176 @@ void PrintTo(const Skipped& c, std::ostream* out) { *out << c.name; }
 
 const Skipped kSkipped[] = {
     {"Whole", [](Files&) {}, "20/20/20/221", 0},
-    {"WindowsText", [](Files& f) {
+    {"WindowsText",
+     [](Files& f) {
        for (const char* name : {kCam0, kCam1, kImu, kTruth}) {
-         edit(f, name, [](Lines& l) { for (auto& s : l) s += "\r"; l.insert(l.begin() + 2, "# a remark\r"); l.push_back("\r"); l.push_back("  "); });
+         edit(f, name, [](Lines& l) {
+           for (auto& s : l) s += "\r";
+           l.insert(l.begin() + 2, "# a remark\r");
+           l.push_back("\r");
+           l.push_back("  ");
+         });
          f[name] = "\xEF\xBB\xBF" + f[name];
        }
-     }, "20/20/20/221", 0},
-    {"HeaderWithoutHash", [](Files& f) { for (const char* name : {kCam0, kCam1, kImu, kTruth}) f[name].erase(0, 1); }, "20/20/20/221", 0},
-    {"NoNewlineAtTheEnd", [](Files& f) { for (const char* name : {kCam0, kCam1, kImu, kTruth}) f[name].pop_back(); }, "20/20/20/221", 0},
-    {"ImageTwice", [](Files& f) { edit(f, kCam0, [](Lines& l) { l.insert(l.begin() + 5, l[4]); }); }, "20/20/20/221; left: 1 duplicate, first line 6"},
+     },
+     "20/20/20/221", 0},
+    {"HeaderWithoutHash",
+     [](Files& f) {
+       for (const char* name : {kCam0, kCam1, kImu, kTruth}) f[name].erase(0, 1);
+     },
+     "20/20/20/221", 0},
+    {"NoNewlineAtTheEnd",
+     [](Files& f) {
+       for (const char* name : {kCam0, kCam1, kImu, kTruth}) f[name].pop_back();
+     },
+     "20/20/20/221", 0},
+    {"ImageTwice", [](Files& f) { edit(f, kCam0, [](Lines& l) { l.insert(l.begin() + 5, l[4]); }); },
+     "20/20/20/221; left: 1 duplicate, first line 6"},
     {"ImageOutOfOrder", [](Files& f) { edit(f, kCam0, [](Lines& l) { std::swap(l[7], l[9]); }); },
      "18/18/18/221; left: 2 backwards, first line 9; right: 2 unpaired", 2},
     {"ImageFromTheFuture", [](Files& f) { edit(f, kCam0, [](Lines& l) { l[3][1] = '7'; }); },
      "19/19/19/221; left: 1 backwards, first line 4; right: 1 unpaired", 2},
-    {"ImuTwice", [](Files& f) { edit(f, kImu, [](Lines& l) { l.insert(l.begin() + 5, 3, l[4]); }); }, "20/20/20/221; imu: 3 duplicate, first line 6"},
-    {"ImuOutOfOrder", [](Files& f) { edit(f, kImu, [](Lines& l) { l.insert(l.begin() + 50, l[10]); l.insert(l.begin() + 100, l[20]); }); },
+    {"ImuTwice", [](Files& f) { edit(f, kImu, [](Lines& l) { l.insert(l.begin() + 5, 3, l[4]); }); },
+     "20/20/20/221; imu: 3 duplicate, first line 6"},
+    {"ImuOutOfOrder",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         l.insert(l.begin() + 50, l[10]);
+         l.insert(l.begin() + 100, l[20]);
+       });
+     },
      "20/20/20/221; imu: 2 backwards, first line 51"},
-    {"ImuFromTheFuture", [](Files& f) { edit(f, kImu, [](Lines& l) { l[3][1] = '7'; }); }, "20/20/20/220; imu: 1 backwards, first line 4"},
-    {"ImuNaN", [](Files& f) { edit(f, kImu, [](Lines& l) { replace(l[30], "9.8", "nan"); replace(l[31], "0.01", "-NaN"); }); },
+    {"ImuFromTheFuture", [](Files& f) { edit(f, kImu, [](Lines& l) { l[3][1] = '7'; }); },
+     "20/20/20/220; imu: 1 backwards, first line 4"},
+    {"ImuNaN",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         replace(l[30], "9.8", "nan");
+         replace(l[31], "0.01", "-NaN");
+       });
+     },
      "20/20/20/219; imu: 2 not finite, first line 31"},
-    {"ImuInfiniteAndHuge", [](Files& f) { edit(f, kImu, [](Lines& l) { replace(l[30], "9.8", "inf"); replace(l[40], "9.8", "1e30"); }); },
+    {"ImuInfiniteAndHuge",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         replace(l[30], "9.8", "inf");
+         replace(l[40], "9.8", "1e30");
+       });
+     },
      "20/20/20/219; imu: 2 not finite, first line 31"},
-    {"ImuWrongColumns", [](Files& f) { edit(f, kImu, [](Lines& l) { l[10] += ",1"; l[12] = l[12].substr(0, 30); l[14] = "x"; }); },
+    {"ImuWrongColumns",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         l[10] += ",1";
+         l[12] = l[12].substr(0, 30);
+         l[14] = "x";
+       });
+     },
      "20/20/20/218; imu: 3 malformed, first line 11"},
-    {"ImuLettersAndEmptyFields", [](Files& f) { edit(f, kImu, [](Lines& l) { replace(l[10], "0.01", "0.o1"); replace(l[11], "0.01", ""); replace(l[12], "0.01", "0x1"); }); },
+    {"ImuLettersAndEmptyFields",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         replace(l[10], "0.01", "0.o1");
+         replace(l[11], "0.01", "");
+         replace(l[12], "0.01", "0x1");
+       });
+     },
      "20/20/20/218; imu: 3 malformed, first line 11", 2},
     {"ImuCutOff", [](Files& f) { f[kImu].resize(f[kImu].size() - 20); }, "20/20/20/220; imu: 1 malformed, first line 222"},
-    {"StampsBeyondReason", [](Files& f) { edit(f, kImu, [](Lines& l) { l[9][0] = '-'; l[10].insert(0, 1, '9'); l[11][0] = '8'; l[12].insert(0, "99999999999"); }); },
+    {"StampsBeyondReason",
+     [](Files& f) {
+       edit(f, kImu, [](Lines& l) {
+         l[9][0] = '-';
+         l[10].insert(0, 1, '9');
+         l[11][0] = '8';
+         l[12].insert(0, "99999999999");
+       });
+     },
      "20/20/20/217; imu: 4 malformed, first line 10", 2},
-    {"ImuMissingInTheMiddle", [](Files& f) { edit(f, kImu, [](Lines& l) { l.erase(l.begin() + 60, l.begin() + 160); }); }, "20/20/20/121"},
+    {"ImuMissingInTheMiddle", [](Files& f) { edit(f, kImu, [](Lines& l) { l.erase(l.begin() + 60, l.begin() + 160); }); },
+     "20/20/20/121"},
     {"ImuEndsEarly", [](Files& f) { edit(f, kImu, [](Lines& l) { l.resize(101); }); }, "20/20/20/100", 0},
-    {"ImagesMissingInTheMiddle", [](Files& f) { for (auto* n : {kCam0, kCam1}) edit(f, n, [](Lines& l) { l.erase(l.begin() + 5, l.begin() + 15); }); }, "10/10/10/221"},
+    {"ImagesMissingInTheMiddle",
+     [](Files& f) {
+       for (auto* n : {kCam0, kCam1}) edit(f, n, [](Lines& l) { l.erase(l.begin() + 5, l.begin() + 15); });
+     },
+     "10/10/10/221"},
     {"LeftFileMissing", [](Files& f) { f.erase(toy_image(0, 7)); }, "20/19/20/221; left: 1 missing"},
-    {"FolderInsteadOfFile", [](Files& f) { f.erase(toy_image(0, 7)); f[toy_image(0, 7) + "/x"] = ""; }, "20/19/20/221; left: 1 missing"},
-    {"BothFilesMissing", [](Files& f) { f.erase(toy_image(0, 7)); f.erase(toy_image(1, 7)); },
+    {"FolderInsteadOfFile",
+     [](Files& f) {
+       f.erase(toy_image(0, 7));
+       f[toy_image(0, 7) + "/x"] = "";
+     },
+     "20/19/20/221; left: 1 missing"},
+    {"BothFilesMissing",
+     [](Files& f) {
+       f.erase(toy_image(0, 7));
+       f.erase(toy_image(1, 7));
+     },
      "19/19/19/221; left: 1 missing; right: 1 missing; 1 empty frames"},
     {"RightMissesStamps", [](Files& f) { edit(f, kCam1, [](Lines& l) { l.erase(l.begin() + 3, l.begin() + 6); }); },
      "20/20/17/221; left: 3 unpaired", 1},
     {"RightHasMore", [](Files& f) { edit(f, kCam0, [](Lines& l) { l.erase(l.begin() + 3, l.begin() + 6); }); },
      "17/17/17/221; right: 3 unpaired", 2},
-    {"RightALittleLater", [](Files& f) { edit(f, kCam1, [](Lines& l) { for (std::size_t i = 1; i < l.size(); ++i) l[i][12] = '2'; }); },
+    {"RightALittleLater",
+     [](Files& f) {
+       edit(f, kCam1, [](Lines& l) {
+         for (std::size_t i = 1; i < l.size(); ++i) l[i][12] = '2';
+       });
+     },
      "20/20/20/221", 0},
     {"ImageNotAnImage", [](Files& f) { f[toy_image(0, 3)] = "this is no image"; }, "20/19/20/221; left: 1 corrupt"},
     {"ImageEmpty", [](Files& f) { f[toy_image(1, 3)].clear(); }, "20/20/19/221; right: 1 corrupt"},
-    {"ImageCutOff", [](Files& f) { auto& i = f[toy_image(0, 3)]; i.resize(i.size() / 2); }, "20/19/20/221; left: 1 corrupt"},
+    {"ImageCutOff",
+     [](Files& f) {
+       auto& i = f[toy_image(0, 3)];
+       i.resize(i.size() / 2);
+     },
+     "20/19/20/221; left: 1 corrupt"},
     {"ImageOneByteShort", [](Files& f) { f[toy_image(0, 3)].pop_back(); }, "20/19/20/221; left: 1 corrupt"},
-    {"ImageBitFlipped", [](Files& f) { auto& i = f[toy_image(0, 3)]; i[i.size() / 2] ^= 16; }, "20/19/20/221; left: 1 corrupt"},
-    {"ImageHeaderClaimsTheWorld", [](Files& f) { f[toy_image(0, 3)].replace(16, 8, "\x7f\xff\xff\xff\x7f\xff\xff\xff", 8); }, "20/19/20/221; left: 1 corrupt"},
-    {"BothImagesCorrupt", [](Files& f) { for (int c : {0, 1}) f[toy_image(c, 3)].resize(60); }, "19/19/19/221; left: 1 corrupt; right: 1 corrupt; 1 empty frames"},
-    {"ImageOfAnotherSize", [](Files& f) { f[toy_image(1, 3)] = make_png(1, {.width = 32, .height = 48}); f[toy_image(1, 5)] = make_png(1, {.width = 65}); },
+    {"ImageBitFlipped",
+     [](Files& f) {
+       auto& i = f[toy_image(0, 3)];
+       i[i.size() / 2] ^= 16;
+     },
+     "20/19/20/221; left: 1 corrupt"},
+    {"ImageHeaderClaimsTheWorld", [](Files& f) { f[toy_image(0, 3)].replace(16, 8, "\x7f\xff\xff\xff\x7f\xff\xff\xff", 8); },
+     "20/19/20/221; left: 1 corrupt"},
+    {"BothImagesCorrupt",
+     [](Files& f) {
+       for (int c : {0, 1}) f[toy_image(c, 3)].resize(60);
+     },
+     "19/19/19/221; left: 1 corrupt; right: 1 corrupt; 1 empty frames"},
+    {"ImageOfAnotherSize",
+     [](Files& f) {
+       f[toy_image(1, 3)] = make_png(1, {.width = 32, .height = 48});
+       f[toy_image(1, 5)] = make_png(1, {.width = 65});
+     },
      "20/20/18/221; right: 2 wrong size"},
-    {"ColourAndSixteenBit", [](Files& f) { f[toy_image(0, 3)] = make_png(1, {.colour = true}); f[toy_image(1, 3)] = make_png(1, {.sixteen_bit = true}); f[toy_image(1, 4)] = make_png(1, {.colour = true, .sixteen_bit = true}); },
+    {"ColourAndSixteenBit",
+     [](Files& f) {
+       f[toy_image(0, 3)] = make_png(1, {.colour = true});
+       f[toy_image(1, 3)] = make_png(1, {.sixteen_bit = true});
+       f[toy_image(1, 4)] = make_png(1, {.colour = true, .sixteen_bit = true});
+     },
      "20/20/20/221", 0},
     {"JpegUnderThatName", [](Files& f) { f[toy_image(0, 3)] = make_jpeg(3); }, "20/20/20/221", 0},
-    {"JpegCutOff", [](Files& f) { f[toy_image(0, 3)] = make_jpeg(3); f[toy_image(0, 3)].resize(f[toy_image(0, 3)].size() - 40); }, "20/19/20/221; left: 1 corrupt"},
+    {"JpegCutOff",
+     [](Files& f) {
+       f[toy_image(0, 3)] = make_jpeg(3);
+       f[toy_image(0, 3)].resize(f[toy_image(0, 3)].size() - 40);
+     },
+     "20/19/20/221; left: 1 corrupt"},
     {"TruthMissing", [](Files& f) { f.erase(kTruth); }, "20/20/20/221", 0},
     {"TruthUnusable", [](Files& f) { f[kTruth] = "hello\nworld\n"; }, "20/20/20/221"},
-    {"TruthPartlyNaN", [](Files& f) { edit(f, kTruth, [](Lines& l) { replace(l[3], ",1,1,0", ",nan,1,0"); replace(l[4], ",1,1,0", ",1,0,0"); l[5] = l[4]; }); },
+    {"TruthPartlyNaN",
+     [](Files& f) {
+       edit(f, kTruth, [](Lines& l) {
+         replace(l[3], ",1,1,0", ",nan,1,0");
+         replace(l[4], ",1,1,0", ",1,0,0");
+         l[5] = l[4];
+       });
+     },
      "20/20/20/221; truth: 2 malformed 1 not finite, first line 4"},
 };
 
@@ -262,7 +437,8 @@ TEST_P(SkippedDataset, DeliversTheRestAndCounts) {
   ASSERT_TRUE(zipped) << zipped.error().message;
   EXPECT_EQ(deliver(**zipped), GetParam().outcome);
 }
-INSTANTIATE_TEST_SUITE_P(Table, SkippedDataset, testing::ValuesIn(kSkipped), [](const auto& row) { return std::string(row.param.name); });
+INSTANTIATE_TEST_SUITE_P(Table, SkippedDataset, testing::ValuesIn(kSkipped),
+                         [](const auto& row) { return std::string(row.param.name); });
 
 // ---------------------------------------------------------------- archives and paths
 
@@ -309,7 +485,8 @@ TEST_F(BrokenPath, PipeInsideDoesNotBlock) {
 TEST_F(BrokenPath, ZipCutOff) {
   const std::string bytes = zip_bytes();
   for (const double part : {0.01, 0.5, 0.99}) {
-    const std::string path = written("cut.zip", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+    const std::string path =
+        written("cut.zip", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
     expect_refused(path, ": not a whole zip archive (");
   }
 }
@@ -395,7 +572,8 @@ TEST_F(ToyDataset, SkipsAndStops) {
   EXPECT_EQ((*data)->info().first_image.ns, toy_stamp_ns(5));
   EXPECT_EQ((*data)->info().last_image.ns, toy_stamp_ns(8));
   EXPECT_EQ(deliver(**data), "4/4/4/101");  // IMU up to the stamp of frame 8
-  EXPECT_EQ(open_dataset(path(), {.skip_frames = 20}).error().message, path() + "/cam0/data.csv: no frames are left after skipping 20");
+  EXPECT_EQ(open_dataset(path(), {.skip_frames = 20}).error().message,
+            path() + "/cam0/data.csv: no frames are left after skipping 20");
   EXPECT_EQ(open_dataset(path(), {.skip_frames = -1}).error().message, "skip_frames = -1 is outside [0, 1000000000]");
 }
 

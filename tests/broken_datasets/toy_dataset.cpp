@@ -56,8 +56,7 @@ Files toy_dataset() {
   files["imu0/sensor.yaml"] = kImuYaml;
   std::string& truth = files["state_groundtruth_estimate0/data.csv"];
   truth = "#timestamp, p x y z, q w x y z, v x y z, bw x y z, ba x y z\n";
-  for (int i = 0; i < kToyFrames; ++i)
-    truth += fmt::format("{},{},0,1,1,0,0,0,0.2,0,0,0,0,0,0,0,0\n", toy_stamp_ns(i), 0.01 * i);
+  for (int i = 0; i < kToyFrames; ++i) truth += fmt::format("{},{},0,1,1,0,0,0,0.2,0,0,0,0,0,0,0,0\n", toy_stamp_ns(i), 0.01 * i);
   return files;
 }
 

@@ -18,8 +18,8 @@ namespace fbvins::test {
 /// Path below mav0 -> bytes.
 using Files = std::map<std::string, std::string>;
 
-inline constexpr int kToyFrames = 20;      // 20 Hz
-inline constexpr int kToyImuSamples = 221; // 200 Hz, from 0.1 s before the first image to 1.0 s after it
+inline constexpr int kToyFrames = 20;       // 20 Hz
+inline constexpr int kToyImuSamples = 221;  // 200 Hz, from 0.1 s before the first image to 1.0 s after it
 inline constexpr int kToyWidth = 64, kToyHeight = 48;
 inline constexpr std::int64_t kToyStart_ns = 1'600'000'000'000'000'123;
 

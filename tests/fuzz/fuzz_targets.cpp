@@ -47,13 +47,14 @@ std::vector<std::string> calibration_seeds() {
 }
 
 std::vector<std::string> trajectory_seeds() {
-  return {test::toy_dataset().at("state_groundtruth_estimate0/data.csv"),
-          "# t x y z qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n1403636584.8 1.5 2 3 0.6 0 0 -0.8\n1403636585 1 1 1 0 0 0 1\n"};
+  return {
+      test::toy_dataset().at("state_groundtruth_estimate0/data.csv"),
+      "# t x y z qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n1403636584.8 1.5 2 3 0.6 0 0 -0.8\n1403636585 1 1 1 0 0 0 1\n"};
 }
 
 std::vector<std::string> image_seeds() {
-  return {test::make_png(1, {.width = 16, .height = 12}), test::make_png(2, {.width = 9, .height = 7, .colour = true, .sixteen_bit = true}),
-          test::make_jpeg(3)};
+  return {test::make_png(1, {.width = 16, .height = 12}),
+          test::make_png(2, {.width = 9, .height = 7, .colour = true, .sixteen_bit = true}), test::make_jpeg(3)};
 }
 
 }  // namespace

@@ -11,9 +11,36 @@ namespace {
 
 /// Pieces that parsers stumble over.
 std::string nasty_piece(Rng& rng) {
-  static const std::string pieces[] = {"nan", "-inf", "1e400", "1e-400", ",", ",,,,", "\n", "\r\n", "#", "-", "99999999999999999999",
-                                       "9223372036854775807", "\"", "[", "]", "{", "}", ":", "&a ", "*a", "!!", "%", "---\n", "\t",
-                                       std::string("\0", 1), "\xEF\xBB\xBF", "\xff\xff\xff\xff", "\xff\xd9", "IDAT", "tRNS"};
+  static const std::string pieces[] = {"nan",
+                                       "-inf",
+                                       "1e400",
+                                       "1e-400",
+                                       ",",
+                                       ",,,,",
+                                       "\n",
+                                       "\r\n",
+                                       "#",
+                                       "-",
+                                       "99999999999999999999",
+                                       "9223372036854775807",
+                                       "\"",
+                                       "[",
+                                       "]",
+                                       "{",
+                                       "}",
+                                       ":",
+                                       "&a ",
+                                       "*a",
+                                       "!!",
+                                       "%",
+                                       "---\n",
+                                       "\t",
+                                       std::string("\0", 1),
+                                       "\xEF\xBB\xBF",
+                                       "\xff\xff\xff\xff",
+                                       "\xff\xd9",
+                                       "IDAT",
+                                       "tRNS"};
   return pieces[rng.below(std::size(pieces))];
 }
 
@@ -22,12 +49,18 @@ std::string mutated(std::string text, Rng& rng) {
     const std::size_t at = rng.below(static_cast<std::uint32_t>(text.size() + 1));
     const std::size_t length = rng.below(20);
     switch (rng.below(6)) {
-      case 0: if (at < text.size()) text[at] = static_cast<char>(rng.below(256)); break;
-      case 1: if (at < text.size()) text[at] ^= static_cast<char>(1u << rng.below(8)); break;
+      case 0:
+        if (at < text.size()) text[at] = static_cast<char>(rng.below(256));
+        break;
+      case 1:
+        if (at < text.size()) text[at] ^= static_cast<char>(1u << rng.below(8));
+        break;
       case 2: text.erase(at, length); break;
       case 3: text.insert(at, nasty_piece(rng)); break;
       case 4: text.insert(at, text.substr(text.size() - std::min(text.size(), at), length)); break;
-      case 5: if (rng.below(4) == 0) text.resize(at); break;
+      case 5:
+        if (rng.below(4) == 0) text.resize(at);
+        break;
     }
   }
   return text;
@@ -53,7 +86,8 @@ TEST_P(Mutations, NoiseAndNothingAreAnswered) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Parsers, Mutations, testing::ValuesIn(targets()), [](const auto& row) { return std::string(row.param.name); });
+INSTANTIATE_TEST_SUITE_P(Parsers, Mutations, testing::ValuesIn(targets()),
+                         [](const auto& row) { return std::string(row.param.name); });
 
 }  // namespace
 }  // namespace fbvins::fuzz

@@ -87,8 +87,7 @@ std::string OptionField::value_text() const {
 }
 
 std::string OptionField::range_text() const {
-  if (std::holds_alternative<int*>(value) || std::holds_alternative<double*>(value))
-    return fmt::format("[{}, {}]", min, max);
+  if (std::holds_alternative<int*>(value) || std::holds_alternative<double*>(value)) return fmt::format("[{}, {}]", min, max);
   return choices;
 }
 

@@ -18,20 +18,20 @@
 namespace fbvins {
 
 struct OptionField {
-  std::string path;    ///< "klt.max_features"; of a group: "klt"
-  std::string unit;    ///< "px", empty for pure numbers
+  std::string path;  ///< "klt.max_features"; of a group: "klt"
+  std::string unit;  ///< "px", empty for pure numbers
   std::string meaning;
-  std::string choices; ///< of a text: allowed values separated by '|', empty for any text
+  std::string choices;      ///< of a text: allowed values separated by '|', empty for any text
   double min = 0, max = 0;  ///< of a number
   /// Where the value lives; monostate for the heading of a group, whose fields follow it.
   std::variant<std::monostate, bool*, int*, double*, std::string*> value;
 
   bool is_group() const { return value.index() == 0; }
-  int depth() const;                ///< number of groups around it
-  std::string_view name() const;    ///< the path's last part
-  std::string type_name() const;    ///< "true or false", "whole number", "number", "text"
-  std::string value_text() const;   ///< the shortest text that reads back to the same bits
-  std::string range_text() const;   ///< "[10, 5000]", "klt|orb" or nothing
+  int depth() const;               ///< number of groups around it
+  std::string_view name() const;   ///< the path's last part
+  std::string type_name() const;   ///< "true or false", "whole number", "number", "text"
+  std::string value_text() const;  ///< the shortest text that reads back to the same bits
+  std::string range_text() const;  ///< "[10, 5000]", "klt|orb" or nothing
 
   /// Reads a value of this field's type within its range; the error names neither file nor path.
   Result<void> set_from_text(const std::string& text) const;
@@ -44,8 +44,8 @@ class FieldCollector {
     add(name, unit, meaning, &value);
   }
   template <class T>
-  void operator()(std::string_view name, T& value, std::string_view unit, std::string_view meaning,
-                  std::type_identity_t<T> min, std::type_identity_t<T> max) {
+  void operator()(std::string_view name, T& value, std::string_view unit, std::string_view meaning, std::type_identity_t<T> min,
+                  std::type_identity_t<T> max) {
     static_assert(std::is_same_v<T, int> || std::is_same_v<T, double>, "a number option is an int or a double");
     OptionField& field = add(name, unit, meaning, &value);
     field.min = static_cast<double>(min);

@@ -55,7 +55,8 @@ struct Reader {
       return error(mark, fmt::format("option '{}' wants a {}, not a list or group", field.path, field.type_name()));
     const bool quoted_number = value.Tag() == "!" && !std::holds_alternative<std::string*>(field.value);
     if (quoted_number)
-      return error(mark, fmt::format("option '{}': \"{}\" in quotes is text, not a {}", field.path, value.Scalar(), field.type_name()));
+      return error(mark,
+                   fmt::format("option '{}': \"{}\" in quotes is text, not a {}", field.path, value.Scalar(), field.type_name()));
     const Result<void> set = field.set_from_text(value.Scalar());
     if (!set) return error(value.Mark(), fmt::format("option '{}': {}", field.path, set.error().message));
     return {};

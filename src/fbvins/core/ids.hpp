@@ -25,7 +25,5 @@ using KeyframeId = StrongId<struct KeyframeTag>;  ///< a frame that was chosen a
 
 template <class Tag>
 struct std::hash<fbvins::StrongId<Tag>> {
-  std::size_t operator()(fbvins::StrongId<Tag> id) const noexcept {
-    return std::hash<std::int64_t>{}(id.value);
-  }
+  std::size_t operator()(fbvins::StrongId<Tag> id) const noexcept { return std::hash<std::int64_t>{}(id.value); }
 };

@@ -235,7 +235,8 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& out) {
   const Duration blind = frame.t - last_good_tracking_.value_or(frame.t);
   const bool no_imu = frame.imu.empty() && previous_frame_.has_value();
 
-  if (!state.T_WB.p.allFinite() || failed_solves_ >= kFailedSolvesUntilLost) return {HealthState::lost, HealthReason::solver_failed};
+  if (!state.T_WB.p.allFinite() || failed_solves_ >= kFailedSolvesUntilLost)
+    return {HealthState::lost, HealthReason::solver_failed};
   if (state.v_WB.norm() > options_.max_speed_mps) return {HealthState::lost, HealthReason::implausible_speed};
   if (state.bias.gyro_radps.norm() > options_.max_gyro_bias_radps || state.bias.accel_mps2.norm() > options_.max_accel_bias_mps2)
     return {HealthState::lost, HealthReason::implausible_bias};

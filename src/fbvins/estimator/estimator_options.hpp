@@ -11,7 +11,7 @@
 namespace fbvins {
 
 struct InitialiserOptions {
-  int frames = 10;                       // images looked at
+  int frames = 10;  // images looked at
   double min_spacing_s = 0.045;
   double max_rest_motion_px = 0.6;
   int min_features = 20;
@@ -49,9 +49,12 @@ struct KeyframeOptions {
   void visit(V&& v) {
     v("max_keyframes", max_keyframes, "", "keyframes in the sliding window", 3, 30);
     v("newest_frames", newest_frames, "", "newest frames kept beside them, keyframes or not", 2, 10);
-    v("leaving", leaving, "oldest|entropy", "which keyframe leaves a full window: the oldest, or the one whose measurements tell least (paper 2.1.2)");
-    v("min_parallax_px", min_parallax_px, "px", "mean rotation-free image motion since the last keyframe that makes a new one", 0.5, 100.0);
-    v("min_shared_ratio", min_shared_ratio, "", "a new keyframe when fewer of the features than this were seen by the last one", 0.1, 1.0);
+    v("leaving", leaving, "oldest|entropy",
+      "which keyframe leaves a full window: the oldest, or the one whose measurements tell least (paper 2.1.2)");
+    v("min_parallax_px", min_parallax_px, "px", "mean rotation-free image motion since the last keyframe that makes a new one",
+      0.5, 100.0);
+    v("min_shared_ratio", min_shared_ratio, "", "a new keyframe when fewer of the features than this were seen by the last one",
+      0.1, 1.0);
     v("max_interval_s", max_interval_s, "s", "a new keyframe after this time at the latest, unless standing still", 0.1, 10.0);
   }
 };
@@ -97,7 +100,8 @@ struct EstimatorOptions {
     v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
-    v("standstill_velocity_sigma_mps", standstill_velocity_sigma_mps, "m/s", "how firmly a recognised standstill holds the velocity at zero", 1e-4, 1.0);
+    v("standstill_velocity_sigma_mps", standstill_velocity_sigma_mps, "m/s",
+      "how firmly a recognised standstill holds the velocity at zero", 1e-4, 1.0);
     v("max_image_gap_s", max_image_gap_s, "s", "longest time without usable images bridged by the IMU", 0.1, 60.0);
     v("max_imu_gap_s", max_imu_gap_s, "s", "longest time without IMU readings bridged by the images", 0.01, 10.0);
     v("min_tracks", min_tracks, "", "fewer landmarks than this in view: degraded", 3, 200);

@@ -24,7 +24,7 @@ EstimatorOptions exact_noise() {
 struct Flown {
   std::vector<Odometry> odometry;
   std::vector<NavState> truth;
-  int gauge_frame = -1;      ///< the frame whose position and heading W was chosen by
+  int gauge_frame = -1;  ///< the frame whose position and heading W was chosen by
   Pose<W, B> gauge_pose;
 
   std::vector<HealthState> states() const {
@@ -225,7 +225,8 @@ TEST(Estimator, WindowIsBounded) {
   Estimator estimator(flight.rig, options);
   for (int k = 0; k < 200; ++k) {
     (void)estimator.process(flight.frame(k));
-    EXPECT_LE(estimator.window().frames().size(), static_cast<std::size_t>(options.keyframes.max_keyframes + options.keyframes.newest_frames));
+    EXPECT_LE(estimator.window().frames().size(),
+              static_cast<std::size_t>(options.keyframes.max_keyframes + options.keyframes.newest_frames));
     EXPECT_LT(estimator.window().landmarks().size(), 1500u);
   }
 }

@@ -61,12 +61,9 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   }
   remember(frame);
   std::optional<InitialSolution> start;
-  if (rest.seconds() >= options_.initialiser.rest.min_window_s)
-    start = start_from_rest();
-  else if (static_cast<int>(frames_.size()) >= options_.initialiser.frames)
-    start = start_in_motion(calibration);
-  else
-    reason_ = HealthReason::waiting_for_motion_or_rest;
+  if (rest.seconds() >= options_.initialiser.rest.min_window_s) start = start_from_rest();
+  else if (static_cast<int>(frames_.size()) >= options_.initialiser.frames) start = start_in_motion(calibration);
+  else reason_ = HealthReason::waiting_for_motion_or_rest;
   if (start && origin) move_to(*origin, *start);
   return start;
 }
@@ -92,7 +89,8 @@ void Initialiser::remember(const TrackedFrame& frame) {
 std::optional<InitialSolution> Initialiser::start_from_rest() {
   std::vector<ImuSample> readings;
   for (const ImuSegment& segment : readings_)
-    readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1), segment.samples.end());  // neighbours share a stamp
+    readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
+                    segment.samples.end());  // neighbours share a stamp
   const RestEstimate rest = initialise_at_rest(readings, 0, noise_, options_.initialiser.rest, options_.gravity_mps2);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
@@ -148,7 +146,8 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
       Pose<W, B> guess = poses.back();
       guess.q = guess.q * integrate_gyro(frames_[i].imu, Vec3::Zero());
       const PoseRefinement refined = refine_pose(sightings, calibration, guess);
-      if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(sightings.size()))) return false;
+      if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(sightings.size())))
+        return false;
       poses.push_back(refined.T_WB);
     }
     Frame f;

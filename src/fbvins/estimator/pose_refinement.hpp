@@ -17,7 +17,7 @@ struct PointSighting {
 
 struct PoseRefinement {
   Pose<W, B> T_WB;
-  int inliers = 0;       ///< left observations within 3 sigma
+  int inliers = 0;  ///< left observations within 3 sigma
   bool converged = false;
 };
 

@@ -39,8 +39,8 @@ struct PairGeometry {
 struct CameraGeometry {
   Mat3 R_BC0;
   Vec3 t_BC0;
-  Mat3 R_CB[2];   ///< left, right
-  Vec3 t_BC[2];   ///< left, right
+  Mat3 R_CB[2];  ///< left, right
+  Vec3 t_BC[2];  ///< left, right
   double time_offset_s = 0;
 
   explicit CameraGeometry(const Calibration& calibration)
@@ -94,7 +94,7 @@ inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, c
 /// Fills the two rows of Jacobian and residual, unweighted (W6-W8). Same frame: the pose columns stay zero.
 template <int Columns>
 void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair, bool same_frame, const WindowLandmark& l,
-               const Vec3& x_h, const WindowObservation& o, const Vec3& p_C, const Vec2& r, double rows[2][Columns]) {
+                        const Vec3& x_h, const WindowObservation& o, const Vec3& p_C, const Vec2& r, double rows[2][Columns]) {
   const double rho = l.alpha_beta_rho.z();
   const double iz = 1.0 / p_C.z();
   Eigen::Matrix<double, 2, 3> J_projection;  // S * d(x/z, y/z) / d p_C

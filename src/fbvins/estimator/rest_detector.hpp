@@ -10,7 +10,7 @@
 namespace fbvins {
 
 struct RestDetectorOptions {
-  double max_motion_px = 0.6;     ///< median motion since the rest began
+  double max_motion_px = 0.6;  ///< median motion since the rest began
   double max_gyro_std_radps = 0.05;
   double max_accel_std_mps2 = 0.6;
   int min_features = 10;

@@ -86,8 +86,9 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
     if (!landmark.sightings.empty() && landmark.sightings.back().frame == previous && dt > 0) {
       const Sighting& before = landmark.sightings.back();
       sighting.left_velocity = (sighting.left.normalised - before.left.normalised) / dt;
-      sighting.right_velocity = sighting.right && before.right ? Vec2((sighting.right->normalised - before.right->normalised) / dt)
-                                                               : sighting.left_velocity;
+      sighting.right_velocity = sighting.right && before.right
+                                    ? Vec2((sighting.right->normalised - before.right->normalised) / dt)
+                                    : sighting.left_velocity;
     }
     if (landmark.sightings.empty()) landmark.host = frames_.back().id;
     landmark.sightings.push_back(sighting);
@@ -124,10 +125,8 @@ bool SlidingWindow::triangulate(Landmark& landmark, const Calibration& calibrati
   double worst = 0;
   each([&](const RayInCamera& line, const Observation& o) {
     const Vec3 p = line.a + rho * line.b;
-    if (p.z() < kMinScaledDepth)
-      worst = 1e9;
-    else
-      worst = std::max(worst, (o.sqrt_information * (p.head<2>() / p.z() - o.normalised)).squaredNorm());
+    if (p.z() < kMinScaledDepth) worst = 1e9;
+    else worst = std::max(worst, (o.sqrt_information * (p.head<2>() / p.z() - o.normalised)).squaredNorm());
   });
   if (worst > 6.0 * 6.0) return false;
   landmark.alpha_beta_rho << ray, rho;
@@ -145,10 +144,8 @@ Vec3 SlidingWindow::scaled_point_in_camera(const Landmark& landmark, const Frame
 void SlidingWindow::rehost(Landmark& landmark, FrameId new_host, const Calibration& calibration) const {
   if (landmark.triangulated) {
     const Vec3 p = scaled_point_in_camera(landmark, frames_[index_of(new_host)], calibration);
-    if (p.z() < kMinScaledDepth)
-      landmark.triangulated = false;
-    else
-      landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
+    if (p.z() < kMinScaledDepth) landmark.triangulated = false;
+    else landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
   }
   landmark.host = new_host;
 }
@@ -182,7 +179,8 @@ void SlidingWindow::build(WindowProblem& problem, const Calibration& calibration
     for (const Sighting& s : landmark.sightings) {
       const int frame = index_of(s.frame);
       problem.observations.push_back({frame, false, s.left.normalised, s.left_velocity, s.left.sqrt_information});
-      if (s.right) problem.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
+      if (s.right)
+        problem.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
     }
     out.observation_count = static_cast<int>(problem.observations.size()) - out.first_observation;
     problem.landmarks.push_back(out);
@@ -251,13 +249,12 @@ void SlidingWindow::forget_sightings(FrameId frame, const Calibration& calibrati
   std::vector<std::uint8_t> gone(landmarks_.size(), 0);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     Landmark& landmark = landmarks_[i];
-    const auto it = std::find_if(landmark.sightings.begin(), landmark.sightings.end(), [&](const Sighting& s) { return s.frame == frame; });
+    const auto it =
+        std::find_if(landmark.sightings.begin(), landmark.sightings.end(), [&](const Sighting& s) { return s.frame == frame; });
     if (it == landmark.sightings.end()) continue;
     landmark.sightings.erase(it);
-    if (landmark.sightings.empty())
-      gone[i] = 1;
-    else if (landmark.host == frame)
-      rehost(landmark, landmark.sightings.front().frame, calibration);
+    if (landmark.sightings.empty()) gone[i] = 1;
+    else if (landmark.host == frame) rehost(landmark, landmark.sightings.front().frame, calibration);
   }
   remove_flagged(gone);
 }
@@ -272,7 +269,8 @@ void SlidingWindow::drop_frame(int index, WindowProblem& problem, const Calibrat
   Frame& next = frames_[index + 1];
   if (leaving.in_prior) {
     build(problem, calibration, weights);
-    WindowPrior prior = marginalise_frame(problem, index, std::vector<std::uint8_t>(problem.landmarks.size(), 0), marginalisation_scratch_);
+    WindowPrior prior =
+        marginalise_frame(problem, index, std::vector<std::uint8_t>(problem.landmarks.size(), 0), marginalisation_scratch_);
     next.imu.reset();
     forget_sightings(leaving.id, calibration);
     set_prior(std::move(prior));
@@ -289,7 +287,8 @@ void SlidingWindow::drop_frame(int index, WindowProblem& problem, const Calibrat
   forget_frame(index);
 }
 
-void SlidingWindow::marginalise_keyframe(int index, WindowProblem& problem, const Calibration& calibration, const WindowWeights& weights) {
+void SlidingWindow::marginalise_keyframe(int index, WindowProblem& problem, const Calibration& calibration,
+                                         const WindowWeights& weights) {
   build(problem, calibration, weights);
   const FrameId id = frames_[index].id;
   const int zone_end = static_cast<int>(frames_.size()) - options_.keyframes.newest_frames;
@@ -319,10 +318,8 @@ void SlidingWindow::marginalise_keyframe(int index, WindowProblem& problem, cons
     landmark.sightings.erase(std::remove_if(landmark.sightings.begin(), landmark.sightings.end(),
                                             [&](const Sighting& s) { return !in_view || index_of(s.frame) < zone_end; }),
                              landmark.sightings.end());
-    if (landmark.sightings.empty())
-      gone[landmark_of_problem_[i]] = 1;
-    else
-      rehost(landmark, landmark.sightings.front().frame, calibration);
+    if (landmark.sightings.empty()) gone[landmark_of_problem_[i]] = 1;
+    else rehost(landmark, landmark.sightings.front().frame, calibration);
   }
   WindowPrior prior = marginalise_frame(problem, index, leaves, marginalisation_scratch_);
   if (index + 1 < static_cast<int>(frames_.size())) frames_[index + 1].imu.reset();
@@ -374,7 +371,8 @@ Keyframe SlidingWindow::take_keyframe(int index, const Calibration& calibration)
   out.images = std::exchange(frame.images, {});
   for (const Landmark& l : landmarks_) {
     if (!l.triangulated) continue;
-    const auto seen = std::find_if(l.sightings.begin(), l.sightings.end(), [&](const Sighting& s) { return s.frame == frame.id; });
+    const auto seen =
+        std::find_if(l.sightings.begin(), l.sightings.end(), [&](const Sighting& s) { return s.frame == frame.id; });
     if (seen == l.sightings.end()) continue;
     const Vec3 p_C = scaled_point_in_camera(l, frame, calibration) / l.alpha_beta_rho.z();
     out.landmarks.push_back({l.track, seen->left.pixel, calibration.T_BC0 * p_C});

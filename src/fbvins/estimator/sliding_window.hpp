@@ -37,7 +37,7 @@ struct Sighting {
   FrameId frame;
   Observation left;
   std::optional<Observation> right;
-  Vec2 left_velocity = Vec2::Zero();   ///< of the normalised position, 1/s
+  Vec2 left_velocity = Vec2::Zero();  ///< of the normalised position, 1/s
   Vec2 right_velocity = Vec2::Zero();
 };
 
@@ -48,7 +48,7 @@ struct Landmark {
   FrameId host;
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
-  int strikes = 0;      ///< times an observation of it was thrown out
+  int strikes = 0;                  ///< times an observation of it was thrown out
   std::vector<Sighting> sightings;  ///< oldest first
 };
 

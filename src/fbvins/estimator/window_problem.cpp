@@ -108,10 +108,8 @@ double WindowProblem::add_landmarks() {
           for (int k = 0; k < 2; ++k)
             for (double& x : rows[k]) x *= s;
         }
-        if constexpr (Columns == 32)
-          add_gram_32(rows[0], rows[1], G.data());
-        else
-          add_gram_16(rows[0], rows[1], G.data());
+        if constexpr (Columns == 32) add_gram_32(rows[0], rows[1], G.data());
+        else add_gram_16(rows[0], rows[1], G.data());
       }
 
       using Gram = Eigen::Matrix<double, Columns, Columns, Eigen::RowMajor>;
@@ -122,10 +120,8 @@ double WindowProblem::add_landmarks() {
         const int target_row = pose_row(target);
         H_.block<6, 6>(host_row, host_row) += gram.template block<6, 6>(kHost, kHost);
         H_.block<6, 6>(target_row, target_row) += gram.template block<6, 6>(kTarget, kTarget);
-        if (target_row > host_row)
-          H_.block<6, 6>(target_row, host_row) += gram.template block<6, 6>(kTarget, kHost);
-        else
-          H_.block<6, 6>(host_row, target_row) += gram.template block<6, 6>(kHost, kTarget);
+        if (target_row > host_row) H_.block<6, 6>(target_row, host_row) += gram.template block<6, 6>(kTarget, kHost);
+        else H_.block<6, 6>(host_row, target_row) += gram.template block<6, 6>(kHost, kTarget);
         g_.segment<6>(host_row) += gram.template block<6, 1>(kHost, kResidual);
         g_.segment<6>(target_row) += gram.template block<6, 1>(kTarget, kResidual);
         points_.coupling(point, host_block) += gram.template block<3, 6>(kPoint, kHost);
@@ -158,8 +154,8 @@ double WindowProblem::add_imu_terms(bool build) {
       continue;
     }
     Mat15 J[2];
-    const Vec15 r = weighted_imu_residual(frames[i].state, frames[j].state, linearisation_point(i), linearisation_point(j),
-                                          *imu, weights.gravity_mps2, &J[0], &J[1]);
+    const Vec15 r = weighted_imu_residual(frames[i].state, frames[j].state, linearisation_point(i), linearisation_point(j), *imu,
+                                          weights.gravity_mps2, &J[0], &J[1]);
     cost += 0.5 * r.squaredNorm();
     const int frame[2] = {i, j};
     for (int a = 0; a < 2; ++a) {
@@ -330,7 +326,8 @@ Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObserva
   geometry.set(frames[landmark.host].state.T_WB, frames[observation.frame].state.T_WB);
   Vec3 p_C;
   Vec2 r;
-  if (reproject(cameras, geometry, scaled_point_in_host(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r)) return r;
+  if (reproject(cameras, geometry, scaled_point_in_host(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r))
+    return r;
   return Vec2::Constant(std::numeric_limits<double>::infinity());
 }
 

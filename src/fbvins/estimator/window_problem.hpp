@@ -41,7 +41,7 @@ struct WindowWeights {
   double gravity_mps2 = 9.81;
   double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
-  bool at_first_estimates = false;  ///< Jacobians of frames in the prior are taken at their first estimates
+  bool at_first_estimates = false;       ///< Jacobians of frames in the prior are taken at their first estimates
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
 };

@@ -65,8 +65,8 @@ inline void add_landmark(Window& w, const Vec3& p_W, int host, Rng& rng) {
     }
   }
   const Vec3 p_C = in_camera(host, false);
-  l.alpha_beta_rho = Vec3(p_C.x() / p_C.z() + 1e-3 * rng.normal(), p_C.y() / p_C.z() + 1e-3 * rng.normal(),
-                          (1 + 0.05 * rng.normal()) / p_C.z());
+  l.alpha_beta_rho =
+      Vec3(p_C.x() / p_C.z() + 1e-3 * rng.normal(), p_C.y() / p_C.z() + 1e-3 * rng.normal(), (1 + 0.05 * rng.normal()) / p_C.z());
   w.problem.landmarks.push_back(l);
 }
 

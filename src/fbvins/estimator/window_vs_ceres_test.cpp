@@ -154,8 +154,8 @@ class CeresTwin {
                                 nullptr, calibration_.data());
     for (int k = 0; k < kFrames; ++k)
       if (p.frames[k].standstill)
-        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Standstill, 3, 15>(new Standstill{
-                                      p.frames[k].state, 1 / p.weights.standstill_velocity_sigma_mps}),
+        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Standstill, 3, 15>(
+                                      new Standstill{p.frames[k].state, 1 / p.weights.standstill_velocity_sigma_mps}),
                                   nullptr, frames_[k].data());
   }
 

@@ -12,8 +12,7 @@ constexpr std::int64_t kMs = 1'000'000;
 
 Trajectory at_ms(std::initializer_list<std::int64_t> stamps) {
   Trajectory trajectory;
-  for (std::int64_t ms : stamps)
-    trajectory.push_back({Time{ms * kMs}, {Quat::Identity(), Vec3(static_cast<double>(ms), 0, 0)}});
+  for (std::int64_t ms : stamps) trajectory.push_back({Time{ms * kMs}, {Quat::Identity(), Vec3(static_cast<double>(ms), 0, 0)}});
   return trajectory;
 }
 

@@ -47,11 +47,9 @@ Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate,
   RelativeErrors second = relative_errors(pairs, options.per_second);
   e.per_second_m = statistics_of(std::move(second.translation_m));
   e.per_second_deg = statistics_of(std::move(second.rotation_deg));
-  for (std::size_t i = 1; i < pairs.size(); ++i)
-    e.truth_path_m += (pairs[i].truth.T_WB.p - pairs[i - 1].truth.T_WB.p).norm();
+  for (std::size_t i = 1; i < pairs.size(); ++i) e.truth_path_m += (pairs[i].truth.T_WB.p - pairs[i - 1].truth.T_WB.p).norm();
   for (const PosePair& pair : pairs)
-    e.largest_excursion_m =
-        std::max(e.largest_excursion_m, (pair.estimate.T_WB.p - pairs.front().estimate.T_WB.p).norm());
+    e.largest_excursion_m = std::max(e.largest_excursion_m, (pair.estimate.T_WB.p - pairs.front().estimate.T_WB.p).norm());
   return e;
 }
 

@@ -21,7 +21,7 @@ struct EvaluationOptions {
 
 struct Evaluation {
   int pairs = 0;
-  double truth_path_m = 0;   ///< length of the truth between the pairs
+  double truth_path_m = 0;  ///< length of the truth between the pairs
   Similarity alignment;
   ErrorStatistics absolute_m;
   ErrorStatistics absolute_rotation_deg;

@@ -21,8 +21,8 @@ struct PoseNees {
 };
 
 struct NeesSummary {
-  int count = 0;      ///< poses that entered
-  int unusable = 0;   ///< poses whose covariance is not positive definite
+  int count = 0;     ///< poses that entered
+  int unusable = 0;  ///< poses whose covariance is not positive definite
   PoseNees mean;
   /// Share of the poses inside the two-sided 95 % bounds of chi-square with 3, 3 and 6 degrees of freedom.
   PoseNees share_within_95;

@@ -14,8 +14,7 @@ std::vector<double> progress(const std::vector<PosePair>& pairs, const RelativeE
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     const auto of = [&](const PosePair& pair) { return options.path_of_truth ? pair.truth : pair.estimate; };
     const StampedPose a = of(pairs[i - 1]), b = of(pairs[i]);
-    done[i] = options.unit == DeltaUnit::metres ? done[i - 1] + (b.T_WB.p - a.T_WB.p).norm()
-                                                : (b.t - of(pairs[0]).t).seconds();
+    done[i] = options.unit == DeltaUnit::metres ? done[i - 1] + (b.T_WB.p - a.T_WB.p).norm() : (b.t - of(pairs[0]).t).seconds();
   }
   return done;
 }
@@ -50,8 +49,7 @@ std::vector<std::pair<int, int>> delta_pairs(const std::vector<PosePair>& pairs,
   }
   for (int from = 0; from + 1 < n; ++from) {
     const int to = nearest_ahead(done, from, options.delta);
-    if (std::abs(between(from, to) - options.delta) <= options.tolerance * options.delta + slack)
-      result.emplace_back(from, to);
+    if (std::abs(between(from, to) - options.delta) <= options.tolerance * options.delta + slack) result.emplace_back(from, to);
   }
   return result;
 }

@@ -36,9 +36,9 @@ struct EpipolarOptions {
 struct EpipolarResult {
   std::vector<std::uint8_t> inlier;  ///< one flag a match
   int inliers = 0;
-  Mat3 E = Mat3::Zero();             ///< b^T E a = 0; E = [t_ba]x R_ba
+  Mat3 E = Mat3::Zero();  ///< b^T E a = 0; E = [t_ba]x R_ba
   Mat3 R_ba = Mat3::Identity();
-  Vec3 t_ba = Vec3::Zero();          ///< direction, sign not decided; zero when too few matches
+  Vec3 t_ba = Vec3::Zero();  ///< direction, sign not decided; zero when too few matches
   /// False when a rotation alone explains nearly all inliers (rotation on the spot, standstill):
   /// t_ba is arbitrary then and the constraint only sees errors across the epipolar lines it gives.
   bool translation_determined = false;

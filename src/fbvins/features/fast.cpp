@@ -62,8 +62,8 @@ void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector
     std::memcpy(&eight, kept + block, sizeof(eight));
     while (eight != 0) {
       const int k = std::countr_zero(eight) / 8;
-      out.push_back({static_cast<std::int16_t>(x0 + block + k), static_cast<std::int16_t>(y),
-                     static_cast<std::uint8_t>(eight >> (8 * k))});
+      out.push_back(
+          {static_cast<std::int16_t>(x0 + block + k), static_cast<std::int16_t>(y), static_cast<std::uint8_t>(eight >> (8 * k))});
       eight &= ~(std::uint64_t{0xff} << (8 * k));
     }
   }
@@ -73,9 +73,9 @@ void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector
 
 FBVINS_KERNEL
 void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength) {
-  const std::ptrdiff_t circle[16] = {-3 * stride,     -3 * stride + 1, -2 * stride + 2, -stride + 3, 3,  stride + 3,
-                                     2 * stride + 2,  3 * stride + 1,  3 * stride,      3 * stride - 1, 2 * stride - 2,
-                                     stride - 3,      -3,              -stride - 3,     -2 * stride - 2, -3 * stride - 1};
+  const std::ptrdiff_t circle[16] = {
+      -3 * stride, -3 * stride + 1, -2 * stride + 2, -stride + 3, 3,  stride + 3,  2 * stride + 2,  3 * stride + 1,
+      3 * stride,  3 * stride - 1,  2 * stride - 2,  stride - 3,  -3, -stride - 3, -2 * stride - 2, -3 * stride - 1};
   for (int x = 0; x < count; x += kBlock) {
     U8x32 c, bright[16], dark[16];
     load(centre + x, c);
@@ -108,9 +108,7 @@ void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& 
   std::uint8_t* kept = buffers.rows.data() + 3 * pitch;
   std::memset(kept, 0, pitch);
 
-  const auto fill = [&](int y) {
-    fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, ring[y % 3]);
-  };
+  const auto fill = [&](int y) { fast_strength_row(level.row(y) + border - 1, level.stride, with_sides, ring[y % 3]); };
   fill(border - 1);
   fill(border);
   for (int y = border; y < level.height - border; ++y) {

@@ -26,8 +26,8 @@ constexpr std::array<std::array<int, 20>, 20> make_product_table() {
   std::array<std::array<int, 20>, 20> table{};
   for (int i = 0; i < 20; ++i)
     for (int j = 0; j < 20; ++j)
-      table[i][j] = monomial_index(kMonomials[i].x + kMonomials[j].x, kMonomials[i].y + kMonomials[j].y,
-                                   kMonomials[i].z + kMonomials[j].z);
+      table[i][j] =
+          monomial_index(kMonomials[i].x + kMonomials[j].x, kMonomials[i].y + kMonomials[j].y, kMonomials[i].z + kMonomials[j].z);
   return table;
 }
 constexpr auto kProduct = make_product_table();

@@ -46,8 +46,8 @@ bool place_patch(const PyramidLevel& level, double x, double y, int margin, Plac
   const double fl = std::floor(left), ft = std::floor(top);
   if (left + kP + margin + 1 > level.width + kPyramidBorder || top + kP + margin + 1 > level.height + kPyramidBorder)
     return false;
-  place = {level.row(static_cast<int>(ft)) + static_cast<std::ptrdiff_t>(fl), level.stride,
-           static_cast<float>(left - fl), static_cast<float>(top - ft)};
+  place = {level.row(static_cast<int>(ft)) + static_cast<std::ptrdiff_t>(fl), level.stride, static_cast<float>(left - fl),
+           static_cast<float>(top - ft)};
   return true;
 }
 
@@ -112,8 +112,7 @@ void sample_grid(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float f
 }
 
 /// Bilinear samples of a block along a linear map: sample (x, y) lies at (u0 + x ux + y uy, v0 + x vx + y vy).
-void sample_warped(const std::uint8_t* block, int side, float u0, float v0, float ux, float uy, float vx, float vy,
-                   float* grid) {
+void sample_warped(const std::uint8_t* block, int side, float u0, float v0, float ux, float uy, float vx, float vy, float* grid) {
   for (int y = 0; y < kGrid; ++y) {
     for (int x = 0; x < kGrid; ++x) {
       const float u = u0 + static_cast<float>(x) * ux + static_cast<float>(y) * uy;
@@ -280,8 +279,7 @@ bool KltAnchor::take(const Pyramid& pyramid, const Vec2& px) {
   for (int y = 0; y < kSide; ++y) {
     const std::uint8_t* row = level.row(std::clamp(y0 + y, 0, level.height - 1));
     std::uint8_t* out = pixels.data() + y * kSide;
-    if (x0 >= -kPyramidBorder && x0 + kSide <= level.width + kPyramidBorder)
-      std::memcpy(out, row + x0, kSide);
+    if (x0 >= -kPyramidBorder && x0 + kSide <= level.width + kPyramidBorder) std::memcpy(out, row + x0, kSide);
     else
       for (int x = 0; x < kSide; ++x) out[x] = row[std::clamp(x0 + x, 0, level.width - 1)];
   }
@@ -300,8 +298,8 @@ bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) 
   if (!(lowest.minCoeff() >= 0.01 && highest.maxCoeff() < last)) return false;
   alignas(64) float grid[kGrid * kGridStride];
   const Eigen::Matrix2f J = J_anchor_now.cast<float>();
-  sample_warped(anchor.pixels.data(), KltAnchor::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()),
-                J(0, 0), J(0, 1), J(1, 0), J(1, 1), grid);
+  sample_warped(anchor.pixels.data(), KltAnchor::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()), J(0, 0),
+                J(0, 1), J(1, 0), J(1, 1), grid);
   out.valid = finish_template(grid, out);
   return out.valid;
 }

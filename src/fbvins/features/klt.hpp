@@ -37,7 +37,8 @@ struct KltOptions {
     v("max_iterations", max_iterations, "", "Gauss-Newton iterations on each pyramid level", 1, 100);
     v("convergence_px", convergence_px, "px", "step at which the finest level has converged", 1e-4, 0.5);
     v("min_correlation", min_correlation, "", "smallest normalised cross-correlation of an accepted patch", -1.0, 1.0);
-    v("max_residual_noise", max_residual_noise, "grey", "a residual below this is image noise and accepted whatever the correlation", 0.0, 50.0);
+    v("max_residual_noise", max_residual_noise, "grey",
+      "a residual below this is image noise and accepted whatever the correlation", 0.0, 50.0);
     v("max_gain", max_gain, "", "largest change of contrast between two patches, either way", 1.0, 1000.0);
   }
 };
@@ -77,11 +78,11 @@ struct KltTemplate {
 enum class KltStatus { ok, outside, diverged, poor_match };
 
 struct KltResult {
-  Vec2 px = Vec2::Zero();    ///< level-0 pixels
-  float correlation = 0;     ///< weighted normalised cross-correlation at the finest level
-  float gain = 1;            ///< contrast relative to the template
-  float residual = 0;        ///< rms of I - aT - b, grey values
-  int iterations = 0;        ///< over all levels
+  Vec2 px = Vec2::Zero();  ///< level-0 pixels
+  float correlation = 0;   ///< weighted normalised cross-correlation at the finest level
+  float gain = 1;          ///< contrast relative to the template
+  float residual = 0;      ///< rms of I - aT - b, grey values
+  int iterations = 0;      ///< over all levels
   KltStatus status = KltStatus::outside;
 
   bool ok() const { return status == KltStatus::ok; }

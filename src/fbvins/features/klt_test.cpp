@@ -44,7 +44,8 @@ Summary follow(const Image& then, const Image& now, const Vec2& motion, const Ve
 }
 
 Image view(double mean, double contrast, const Vec2& motion, double noise = 0, std::uint64_t seed = 1) {
-  return render_texture(kWidth, kHeight, NoiseTexture(11), [&](const Vec2& p) { return Vec2(p - motion); }, mean, contrast, noise, seed);
+  return render_texture(
+      kWidth, kHeight, NoiseTexture(11), [&](const Vec2& p) { return Vec2(p - motion); }, mean, contrast, noise, seed);
 }
 
 TEST(Klt, FindsSubPixelMotion) {
@@ -85,7 +86,8 @@ TEST(Klt, NoiseOfTwoGreyValues) {
 
 TEST(Klt, RefusesWhatIsNotThere) {
   const Image then = view(120, 35, Vec2::Zero());
-  const Image other = render_texture(kWidth, kHeight, NoiseTexture(99), [](const Vec2& p) { return p; }, 120, 35);
+  const Image other = render_texture(
+      kWidth, kHeight, NoiseTexture(99), [](const Vec2& p) { return p; }, 120, 35);
   const Summary s = follow(then, other, Vec2::Zero());
   // Lucas-Kanade maximises the correlation, so a few smooth patches find a likeness by chance.
   EXPECT_LE(s.accepted, 0.3 * s.tried);

@@ -66,9 +66,8 @@ void OrbExtractor::take_in_rounds(int quota) {
   const auto better = [](const Candidate& a, const Candidate& b) {
     return a.harris != b.harris ? a.harris > b.harris : (a.y != b.y ? a.y < b.y : a.x < b.x);
   };
-  std::stable_sort(candidates_.begin(), candidates_.end(), [&](const Candidate& a, const Candidate& b) {
-    return a.cell != b.cell ? a.cell < b.cell : better(a, b);
-  });
+  std::stable_sort(candidates_.begin(), candidates_.end(),
+                   [&](const Candidate& a, const Candidate& b) { return a.cell != b.cell ? a.cell < b.cell : better(a, b); });
   chosen_.clear();
   for (int round = 0; round < options_.max_per_cell && static_cast<int>(chosen_.size()) < quota; ++round) {
     const std::size_t before = chosen_.size();

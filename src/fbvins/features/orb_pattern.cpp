@@ -73,15 +73,14 @@ std::vector<Candidate> draw_candidates(const Covariance& C) {
     c.bias = std::abs(at(p.ax, p.ay) - at(p.bx, p.by)) / c.deviation;
     candidates.push_back(c);
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.bias < b.bias; });
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.bias < b.bias; });
   return candidates;
 }
 
 double correlation(const Covariance& C, const Candidate& s, const Candidate& t) {
   const PointPair &p = s.pair, &q = t.pair;
-  const double cov = C(p.ax - q.ax, p.ay - q.ay) - C(p.ax - q.bx, p.ay - q.by) - C(p.bx - q.ax, p.by - q.ay) +
-                     C(p.bx - q.bx, p.by - q.by);
+  const double cov =
+      C(p.ax - q.ax, p.ay - q.ay) - C(p.ax - q.bx, p.ay - q.by) - C(p.bx - q.ax, p.by - q.ay) + C(p.bx - q.bx, p.by - q.by);
   return std::abs(cov) / (s.deviation * t.deviation);
 }
 

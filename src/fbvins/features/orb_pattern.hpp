@@ -14,8 +14,8 @@
 
 namespace fbvins {
 
-inline constexpr int kOrbRadius = 15;     ///< disc of the intensity centroid, px of the level
-inline constexpr int kPatternRadius = 13; ///< points of the pairs lie within, px of the level
+inline constexpr int kOrbRadius = 15;      ///< disc of the intensity centroid, px of the level
+inline constexpr int kPatternRadius = 13;  ///< points of the pairs lie within, px of the level
 
 struct PointPair {
   std::int8_t ax = 0, ay = 0, bx = 0, by = 0;

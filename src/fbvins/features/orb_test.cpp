@@ -21,9 +21,7 @@ using Warp = std::function<Vec2(const Vec2&)>;
 const Vec2 kCentre(188, 120);
 
 Warp similarity(double angle, double scale) {
-  return [=](const Vec2& p) {
-    return Vec2(kCentre + Eigen::Rotation2Dd(angle) * (p - kCentre) / scale);
-  };
+  return [=](const Vec2& p) { return Vec2(kCentre + Eigen::Rotation2Dd(angle) * (p - kCentre) / scale); };
 }
 
 /// Pixel -> texture, after which texture coordinates of matches are compared.
@@ -135,9 +133,7 @@ TEST(Orb, MatchesUnderAHomographyAndHalfTheContrast) {
   EXPECT_GT(s.share(), 0.85);
 }
 
-TEST(Orb, WeakTextureStillHasFeatures) {
-  EXPECT_GT(picture(similarity(0, 1), 6, 0.5).features.size(), 60u);
-}
+TEST(Orb, WeakTextureStillHasFeatures) { EXPECT_GT(picture(similarity(0, 1), 6, 0.5).features.size(), 60u); }
 
 TEST(Orb, BlackTinyAndEmptyImagesHaveNone) {
   OrbExtractor extractor(OrbOptions{});

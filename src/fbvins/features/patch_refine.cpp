@@ -28,8 +28,8 @@ Mat2 PatchReference::warp(const Camera& camera, const Vec2& normalised_now) cons
   return J_pixel_normalised * J_normalised_point * R_now_then.leftCols<2>() / depth_ratio * J_normalised_pixel_then;
 }
 
-KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& image, const Vec2& start_px,
-                               const Camera& camera, const Vec2& normalised_guess) {
+KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& image, const Vec2& start_px, const Camera& camera,
+                               const Vec2& normalised_guess) {
   const Mat2 J_now_then = reference.warp(camera, normalised_guess);
   const double area = J_now_then.determinant(), limit = options_.smallest_scale * options_.smallest_scale;
   if (!(area > limit && area * limit < 1)) return {};

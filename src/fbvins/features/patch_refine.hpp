@@ -26,7 +26,8 @@ struct PatchRefineOptions {
   void visit(V&& v) {
     v("max_shift_px", max_shift_px, "px", "farthest a keypoint may be moved, times the scale of its level", 0.5, 20.0);
     v("min_correlation", min_correlation, "", "correlation with the reference below which a new one is taken", 0.0, 1.0);
-    v("smallest_scale", smallest_scale, "", "a reference seen smaller than this, or larger than its inverse, is given up", 0.2, 1.0);
+    v("smallest_scale", smallest_scale, "", "a reference seen smaller than this, or larger than its inverse, is given up", 0.2,
+      1.0);
   }
 };
 

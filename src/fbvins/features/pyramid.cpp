@@ -19,8 +19,7 @@ void filter_columns(const std::uint8_t* centre, std::ptrdiff_t stride, int count
   const std::uint8_t* r1 = centre - stride;
   const std::uint8_t* r3 = centre + stride;
   const std::uint8_t* r4 = centre + 2 * stride;
-  for (int x = 0; x < count; ++x)
-    sums[x] = static_cast<std::uint16_t>(r0[x] + r4[x] + 4 * (r1[x] + r3[x]) + 6 * centre[x]);
+  for (int x = 0; x < count; ++x) sums[x] = static_cast<std::uint16_t>(r0[x] + r4[x] + 4 * (r1[x] + r3[x]) + 6 * centre[x]);
 }
 
 /// Weighted sum 1 4 6 4 1 of five columns at every second place; sums[0] belongs to column -2.

@@ -33,7 +33,7 @@ struct PyramidLevel {
 class Pyramid {
  public:
   Pyramid() = default;
-  Pyramid(Pyramid&&) = default;             // levels point into the moved buffer
+  Pyramid(Pyramid&&) = default;  // levels point into the moved buffer
   Pyramid& operator=(Pyramid&&) = default;
   Pyramid(const Pyramid&) = delete;
   Pyramid& operator=(const Pyramid&) = delete;
@@ -49,8 +49,8 @@ class Pyramid {
   int height() const { return empty() ? 0 : levels_[0].height; }
 
  private:
-  std::vector<std::uint8_t> pixels_;       // all levels, with their borders
-  std::vector<std::uint16_t> column_sums_; // one row of the vertical filter
+  std::vector<std::uint8_t> pixels_;        // all levels, with their borders
+  std::vector<std::uint16_t> column_sums_;  // one row of the vertical filter
   std::vector<PyramidLevel> levels_;
 };
 

@@ -10,7 +10,8 @@ namespace {
 
 TEST(Pyramid, LevelsAreBinomialMeansOfEverySecondPixel) {
   const NoiseTexture texture(3);
-  const Image image = render_texture(101, 67, texture, [](const Vec2& p) { return p; }, 120, 40);
+  const Image image = render_texture(
+      101, 67, texture, [](const Vec2& p) { return p; }, 120, 40);
   Pyramid pyramid;
   pyramid.build(image.view(), 3);
   ASSERT_EQ(pyramid.levels(), 3);
@@ -30,7 +31,8 @@ TEST(Pyramid, LevelsAreBinomialMeansOfEverySecondPixel) {
 
 TEST(Pyramid, BordersRepeatTheEdge) {
   const NoiseTexture texture(4);
-  const Image image = render_texture(64, 48, texture, [](const Vec2& p) { return p; }, 120, 40);
+  const Image image = render_texture(
+      64, 48, texture, [](const Vec2& p) { return p; }, 120, 40);
   Pyramid pyramid;
   pyramid.build(image.view(), 2);
   for (int l = 0; l < 2; ++l) {

@@ -21,8 +21,7 @@ std::ptrdiff_t padded_stride(int width) { return (width + 2 * kBorder + 63) / 64
 FBVINS_KERNEL
 void blend_rows(const std::uint8_t* r0, const std::uint8_t* r1, int w1, int count, std::uint8_t* out) {
   const auto a = static_cast<std::uint16_t>(128 - w1), b = static_cast<std::uint16_t>(w1);
-  for (int x = 0; x < count; ++x)
-    out[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>(r0[x] * a + r1[x] * b + 64) >> 7);
+  for (int x = 0; x < count; ++x) out[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>(r0[x] * a + r1[x] * b + 64) >> 7);
 }
 
 FBVINS_INLINE void pick(const U8x16& from, const U8x16& which, U8x16& out) {
@@ -137,8 +136,7 @@ void ScalePyramid::build(const ImageView& image, int levels, double factor) {
     if (l == 0)
       for (int y = 0; y < level.height; ++y)
         std::memcpy(origin + y * level.stride, image.row(y), static_cast<std::size_t>(level.width));
-    else
-      shrink(levels_[l - 1], scales_[l] / scales_[l - 1], level, origin);
+    else shrink(levels_[l - 1], scales_[l] / scales_[l - 1], level, origin);
     replicate_borders(origin, level.width, level.height, level.stride);
   }
 }

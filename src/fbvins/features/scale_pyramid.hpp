@@ -40,8 +40,8 @@ class ScalePyramid {
   std::vector<std::uint8_t> pixels_;
   std::vector<PyramidLevel> levels_;
   std::vector<double> scales_;
-  std::vector<std::uint8_t> row_;   // after the vertical filter
-  std::vector<ShrinkBlock> blocks_; // of one row
+  std::vector<std::uint8_t> row_;    // after the vertical filter
+  std::vector<ShrinkBlock> blocks_;  // of one row
 };
 
 /// Smooths a level for BRIEF (7x7, about 1.6 px standard deviation), valid up to 8 px beyond the edges.

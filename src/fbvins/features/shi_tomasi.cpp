@@ -11,12 +11,12 @@
 namespace fbvins {
 namespace {
 
-constexpr int kWindow = 7;            // side of the structure tensor's window
+constexpr int kWindow = 7;  // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
-constexpr int kFewestCells = 24;      // searched each time, if as many are empty
+constexpr int kFewestCells = 24;             // searched each time, if as many are empty
 constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
-constexpr double kCrowding = 0.65;    // of the smallest distance, where empty cells did not deliver enough
-constexpr std::size_t kPerCell = 6;   // candidates a cell may offer
+constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not deliver enough
+constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
 /// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
 /// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
 constexpr double kNoiseResponse = 0.12;
@@ -154,8 +154,7 @@ void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int r
   std::sort(cell_corners_.begin(), cell_corners_.end(), stronger);
 }
 
-void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px,
-                               int wanted) {
+void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px, int wanted) {
   std::sort(candidates.begin(), candidates.end(), stronger);
   for (const Corner& corner : candidates) {
     if (static_cast<int>(corners_.size()) >= wanted) return;
@@ -195,8 +194,8 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
   if (wanted <= 0 || pyramid.empty()) return corners_;
   const PyramidLevel& image = pyramid.level(0);
   noise_ = estimate_noise(image);
-  const auto threshold = static_cast<float>(
-      std::max(options_.min_response, options_.noise_factor * kNoiseResponse * noise_ * noise_));
+  const auto threshold =
+      static_cast<float>(std::max(options_.min_response, options_.noise_factor * kNoiseResponse * noise_ * noise_));
 
   const int columns = (image.width + options_.cell_px - 1) / options_.cell_px;
   const int rows = (image.height + options_.cell_px - 1) / options_.cell_px;

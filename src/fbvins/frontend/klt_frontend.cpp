@@ -24,8 +24,12 @@ double median(std::vector<double>& numbers) {
 }  // namespace
 
 KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options)
-    : options_(options), rig_(rig), predictor_(rig.T_BC0), detector_(options.corners),
-      stereo_(rig, options.stereo, options.klt), rng_(1) {
+    : options_(options),
+      rig_(rig),
+      predictor_(rig.T_BC0),
+      detector_(options.corners),
+      stereo_(rig, options.stereo, options.klt),
+      rng_(1) {
   templates_.resize(static_cast<std::size_t>(options.max_features));
   anchors_.resize(templates_.size());
   for (std::size_t i = templates_.size(); i-- > 0;) free_slots_.push_back(i);
@@ -97,8 +101,8 @@ KltResult KltFrontend::align_to_anchor(const Track& track, const Vec2& start_px)
   // A small fronto-parallel plane at the anchor, seen from now.
   Eigen::Matrix<double, 2, 3> project;
   project << 1, 0, -track.normalised.x(), 0, 1, -track.normalised.y();
-  const Mat2 J_now_anchor = J_pixel_normalised * project * track.R_now_anchor.leftCols<2>() / track.depth_ratio *
-                            track.J_normalised_pixel_anchor;
+  const Mat2 J_now_anchor =
+      J_pixel_normalised * project * track.R_now_anchor.leftCols<2>() / track.depth_ratio * track.J_normalised_pixel_anchor;
   const double scale2 = J_now_anchor.determinant();
   if (!(scale2 > kSmallestScale * kSmallestScale && scale2 * kSmallestScale * kSmallestScale < 1)) return {};
   if (!warped_.cut_warped(anchors_[track.slot], J_now_anchor.inverse())) return {};

@@ -44,7 +44,8 @@ struct KltFrontendOptions {
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
     v("long_epipolar_px", long_epipolar_px, "px", "RANSAC threshold between left images six frames apart", 0.1, 10.0);
-    v("min_anchor_correlation", min_anchor_correlation, "", "correlation with the anchor below which it is taken anew", -1.0, 1.0);
+    v("min_anchor_correlation", min_anchor_correlation, "", "correlation with the anchor below which it is taken anew", -1.0,
+      1.0);
     v("max_creep_px", max_creep_px, "px", "a feature farther from its anchor's match has slid and is dropped", 0.1, 20.0);
     v("max_gap_s", max_gap_s, "s", "after a longer gap without left image features start anew", 0.01, 5.0);
     v.group("klt", klt, "Lucas-Kanade alignment");
@@ -64,17 +65,17 @@ class KltFrontend final : public Frontend {
 
   struct Track {
     TrackId id;
-    std::size_t slot = 0;                 // of its template
-    Vec2 px = Vec2::Zero();               // in the last left image it was seen in
+    std::size_t slot = 0;    // of its template
+    Vec2 px = Vec2::Zero();  // in the last left image it was seen in
     Vec2 normalised = Vec2::Zero();
     std::optional<double> inverse_depth;  // 1/m along z of C0, from the last stereo match
     std::optional<StereoMatch> right;     // match in the present right image
     int age_frames = 0;
     // since its anchor was taken:
-    Mat3 R_now_anchor = Mat3::Identity(); // rotation of the left camera
-    double depth_ratio = 1;               // depth now / depth then
+    Mat3 R_now_anchor = Mat3::Identity();  // rotation of the left camera
+    double depth_ratio = 1;                // depth now / depth then
     Mat2 J_normalised_pixel_anchor = Mat2::Identity();
-    std::array<Vec2, kHistory> history{}; // normalised positions, that of age a at a % kHistory
+    std::array<Vec2, kHistory> history{};  // normalised positions, that of age a at a % kHistory
     // while being followed into the present image:
     Vec2 previous_px = Vec2::Zero();
     Vec2 previous_normalised = Vec2::Zero();
@@ -104,19 +105,19 @@ class KltFrontend final : public Frontend {
   ShiTomasiDetector detector_;
   KltStereoMatcher stereo_;
   Rng rng_;
-  double typical_inverse_depth_ = 0;         // 1/m, median of the features matched last
+  double typical_inverse_depth_ = 0;  // 1/m, median of the features matched last
 
   Pyramid left_, previous_left_, right_;
-  Time previous_t_;                          // of previous_left_
+  Time previous_t_;  // of previous_left_
   std::int64_t next_track_ = 0;
   std::vector<Track> tracks_;
   std::vector<KltTemplate> templates_;
   std::vector<KltAnchor> anchors_;
   std::vector<std::size_t> free_slots_;
-  KltTemplate warped_;                       // of the anchor being used
-  std::array<Mat3, kHistory> rotations_;     // of the last frames, oldest at next_rotation_
+  KltTemplate warped_;                    // of the anchor being used
+  std::array<Mat3, kHistory> rotations_;  // of the last frames, oldest at next_rotation_
   int next_rotation_ = 0;
-  std::vector<Vec2> points_a_, points_b_;    // buffers
+  std::vector<Vec2> points_a_, points_b_;  // buffers
   std::vector<std::size_t> indices_;
   std::vector<double> numbers_;
 };

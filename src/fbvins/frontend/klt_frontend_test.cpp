@@ -109,8 +109,7 @@ struct Errors {
       const Vec3& first = points.emplace(feature.id, here).first->second;
       if (feature.age_frames > 0)
         left.push_back((wall.rig.left.project(T_WC0.inverse() * first).value() - feature.left.pixel).norm());
-      if (feature.right)
-        right.push_back((wall.rig.right.project(T_WC1.inverse() * here).value() - feature.right->pixel).norm());
+      if (feature.right) right.push_back((wall.rig.right.project(T_WC1.inverse() * here).value() - feature.right->pixel).norm());
     }
   }
   static double quantile(std::vector<double> v, double q) {
@@ -127,7 +126,8 @@ TEST(KltFrontend, FollowsAWallInBothCamerasBelowATenthOfAPixel) {
     KltFrontend frontend(wall.rig, small_options());
     Errors errors;
     for (int k = 0; k < 10; ++k) {
-      const TrackedFrame out = frontend.process(packets[static_cast<std::size_t>(k)], with_prior && k > 0 ? wall.prior(k - 1) : StatePrior{});
+      const TrackedFrame out =
+          frontend.process(packets[static_cast<std::size_t>(k)], with_prior && k > 0 ? wall.prior(k - 1) : StatePrior{});
       errors.add(wall, out);
       EXPECT_GE(out.features.size(), 40u) << k;
       EXPECT_GE(out.stats.stereo, 30) << k;

@@ -14,7 +14,11 @@ constexpr double kInfinity_px = 1.0;
 }  // namespace
 
 KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, const KltStereoOptions& options, const KltOptions& klt)
-    : options_(options), klt_(klt), camera_right_(rig.right), R_rl_(rig.T_C1C0().R()), p_rl_(rig.T_C1C0().p),
+    : options_(options),
+      klt_(klt),
+      camera_right_(rig.right),
+      R_rl_(rig.T_C1C0().R()),
+      p_rl_(rig.T_C1C0().p),
       focal_px_(rig.right.focal_px()) {}
 
 std::optional<Vec2> KltStereoMatcher::project(const Vec2& left_normalised, double inverse_depth) const {
@@ -22,8 +26,7 @@ std::optional<Vec2> KltStereoMatcher::project(const Vec2& left_normalised, doubl
   return camera_right_.project(ray);
 }
 
-std::optional<Vec2> KltStereoMatcher::search(const KltTemplate& patch, const Vec2& left_normalised,
-                                             const Pyramid& right) const {
+std::optional<Vec2> KltStereoMatcher::search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const {
   const int l = std::min(kSearchLevel, right.levels() - 1);
   const KltLevelTemplate& level_patch = patch.levels[static_cast<std::size_t>(l)];
   const auto far = project(left_normalised, 0), near = project(left_normalised, 1 / options_.min_depth_m);

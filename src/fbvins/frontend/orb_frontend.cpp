@@ -8,9 +8,16 @@
 
 namespace fbvins {
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::unique_ptr<DescriptorStage> stage)
-    : options_(options), rig_(rig), stage_(std::move(stage)), predictor_(rig.T_BC0), extractor_(options.orb),
-      matcher_(options.matching), stereo_(rig, options.stereo),
-      stereo_fill_in_(rig, options.stereo_fill_in, options.alignment), refiner_(options.refine, options.alignment), rng_(2) {
+    : options_(options),
+      rig_(rig),
+      stage_(std::move(stage)),
+      predictor_(rig.T_BC0),
+      extractor_(options.orb),
+      matcher_(options.matching),
+      stereo_(rig, options.stereo),
+      stereo_fill_in_(rig, options.stereo_fill_in, options.alignment),
+      refiner_(options.refine, options.alignment),
+      rng_(2) {
   patches_.resize(static_cast<std::size_t>(options.max_features + options.max_remembered));
   for (std::size_t i = patches_.size(); i-- > 0;) free_slots_.push_back(i);
 }

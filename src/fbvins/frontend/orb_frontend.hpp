@@ -63,12 +63,15 @@ struct OrbFrontendOptions {
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
     v("fill_in_correlation", fill_in_correlation, "", "correlation asked of a feature followed by alignment alone", 0.0, 1.0);
     v("max_creep_px", max_creep_px, "px", "largest disagreement between the newest patch and the reference", 0.05, 10.0);
-    v("max_uncertainty_px", max_uncertainty_px, "px/grey", "uncertainty of a new feature's position along its weakest direction, for noise of one grey value", 1e-4, 10.0);
-    v("max_uncertainty_dark_px", max_uncertainty_dark_px, "px/grey", "the same where the image has too few such features for half of max_features", 1e-4, 10.0);
+    v("max_uncertainty_px", max_uncertainty_px, "px/grey",
+      "uncertainty of a new feature's position along its weakest direction, for noise of one grey value", 1e-4, 10.0);
+    v("max_uncertainty_dark_px", max_uncertainty_dark_px, "px/grey",
+      "the same where the image has too few such features for half of max_features", 1e-4, 10.0);
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
-    v("sigma_unrefined_px", sigma_unrefined_px, "px", "the same without subpixel: descriptors alone are good to a pixel", 0.05, 10.0);
+    v("sigma_unrefined_px", sigma_unrefined_px, "px", "the same without subpixel: descriptors alone are good to a pixel", 0.05,
+      10.0);
     v.group("orb", orb, "feature extraction");
     v.group("matching", matching, "matching over time");
     v.group("stereo", stereo, "matching from left to right by descriptor");
@@ -99,20 +102,20 @@ class OrbFrontend final : public Frontend {
   };
   struct Track {
     TrackId id;
-    std::size_t slot = 0;                 // of its patches
-    Descriptor descriptor;                // as last seen
-    int level = 0;                        // as last seen
-    Vec2 px = Vec2::Zero();               // where it is, or is expected while out of sight
+    std::size_t slot = 0;    // of its patches
+    Descriptor descriptor;   // as last seen
+    int level = 0;           // as last seen
+    Vec2 px = Vec2::Zero();  // where it is, or is expected while out of sight
     Vec2 normalised = Vec2::Zero();
     std::optional<double> inverse_depth;  // 1/m along z of C0
     std::optional<Observation> right;     // match in the present right image
     Time last_seen;
     int age_frames = 0;
-    bool in_sight = false;                // has an observation in the newest image
-    bool was_in_sight = false;            // had one in the image before
+    bool in_sight = false;      // has an observation in the newest image
+    bool was_in_sight = false;  // had one in the image before
     Vec2 previous_px = Vec2::Zero();
     Vec2 previous_normalised = Vec2::Zero();
-    double depth_factor = 1;              // depth now / depth before
+    double depth_factor = 1;  // depth now / depth before
     bool renew_reference = false;
     std::array<Sighting, kHistory> history;  // of frame f at f % kHistory
     bool alive = true;

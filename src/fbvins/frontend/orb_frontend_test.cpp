@@ -35,9 +35,7 @@ class World {
   std::shared_ptr<const Image> render(int k, double offset_x, std::uint64_t noise_seed) const {
     const Eigen::Rotation2Dd R(angle(k));
     const Vec2 centre = position(k).head<2>() + R * Vec2(offset_x, 0);
-    const auto warp = [&](const Vec2& px) {
-      return Vec2((centre + R * (*rig.left.undistort(px) * kDepth_m)) * 230 / kDepth_m);
-    };
+    const auto warp = [&](const Vec2& px) { return Vec2((centre + R * (*rig.left.undistort(px) * kDepth_m)) * 230 / kDepth_m); };
     return std::make_shared<const Image>(render_texture(kWidth, kHeight, texture, warp, 120, 35, 1.0, noise_seed));
   }
 
@@ -175,8 +173,8 @@ TEST(OrbFrontend, WrongSizeTimeJumpsAndNoImuAreHarmless) {
   std::vector<SensorPacket> input(packets().begin(), packets().begin() + 6);
   input[2].frame.left = std::make_shared<const Image>(100, 80, std::uint8_t{90});
   input[3].imu.samples.clear();
-  input[4].frame.t = input[4].frame.t + Duration::from_seconds(5);   // a gap
-  input[5].frame.t = input[0].frame.t;                               // backwards
+  input[4].frame.t = input[4].frame.t + Duration::from_seconds(5);  // a gap
+  input[5].frame.t = input[0].frame.t;                              // backwards
   const auto frames = run(input);
   EXPECT_TRUE(frames[2].features.empty());
   EXPECT_GT(frames[3].stats.tracked, 30);

@@ -60,8 +60,8 @@ void GuidedMatcher::match(std::span<const GuidedQuery> queries, const OrbFeature
     distance_.resize(near_.size());
     hamming_distances(query.descriptor, features.descriptors, near_, distance_.data());
     int distance = kFar;
-    found[i] = pick_match(near_, distance_, features.keypoints, query.max_distance, options_.max_ratio,
-                          options_.rival_px, &distance);
+    found[i] =
+        pick_match(near_, distance_, features.keypoints, query.max_distance, options_.max_ratio, options_.rival_px, &distance);
     if (found[i] < 0) continue;
     const auto k = static_cast<std::size_t>(found[i]);
     if (distance < owner_distance_[k]) owner_distance_[k] = distance, owner_[k] = static_cast<int>(i);

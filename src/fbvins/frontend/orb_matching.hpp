@@ -35,7 +35,7 @@ struct GuidedQuery {
   Vec2 px = Vec2::Zero();  ///< where the track is expected
   double radius_px = 10;
   int level = 0;
-  int max_distance = 60;   ///< bits
+  int max_distance = 60;  ///< bits
   Descriptor descriptor;
 };
 
@@ -55,7 +55,7 @@ class GuidedMatcher {
   std::vector<std::int32_t> cell_start_, members_;  // keypoints by cell, cell_start_[c] .. cell_start_[c + 1]
   std::vector<std::int32_t> near_;
   std::vector<std::uint16_t> distance_;
-  std::vector<int> owner_, owner_distance_;         // best query of each keypoint
+  std::vector<int> owner_, owner_distance_;  // best query of each keypoint
 };
 
 /// Best of the candidates if it passes distance and ratio; rivals are those more than rival_px away. -1 if none.

@@ -56,9 +56,8 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
       if (static_cast<int>(points_a_.size()) >= pass.wanted) break;
       const Keypoint& keypoint = keypoints[k];
       if (keypoint_used_[k] != 0 || (pass.only_poor_cells && count[cell(keypoint.pixel)] >= share)) continue;
-      const bool crowded = std::any_of(points_a_.begin(), points_a_.end(), [&](const Vec2& other) {
-        return (other - keypoint.pixel).squaredNorm() < min2;
-      });
+      const bool crowded = std::any_of(points_a_.begin(), points_a_.end(),
+                                       [&](const Vec2& other) { return (other - keypoint.pixel).squaredNorm() < min2; });
       if (crowded || !start_track(keypoint, left_features_.descriptors[k], pass.max_uncertainty_px)) continue;
       keypoint_used_[k] = 1;
       points_a_.push_back(keypoint.pixel);

@@ -220,8 +220,7 @@ void OrbFrontend::forget(Time now) {
     const double memory_s = track.inverse_depth ? options_.memory_s : 0.3 * options_.memory_s;
     if ((now - track.last_seen).seconds() > memory_s || track.age_frames < 2 || remembered == options_.max_remembered)
       track.alive = false;
-    else
-      ++remembered;
+    else ++remembered;
   }
   drop_dead_tracks();
 }

@@ -33,8 +33,8 @@ bool MotionPredictor::covers(Time a, Time b) const {
 MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const ImuBias& bias) const {
   const Vec3 g_W(0, 0, -kGravity_mps2);
   State s = from;
-  auto it = std::lower_bound(samples_.begin(), samples_.end(), from.t,
-                             [](const ImuSample& sample, Time t) { return sample.t < t; });
+  auto it =
+      std::lower_bound(samples_.begin(), samples_.end(), from.t, [](const ImuSample& sample, Time t) { return sample.t < t; });
   if (it == samples_.end()) return s;
   ImuSample last = *it;
   last.t = s.t;

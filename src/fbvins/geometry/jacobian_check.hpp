@@ -26,8 +26,8 @@ struct JacobianBlock {
 
 struct JacobianCheck {
   bool ok = false;
-  double worst = 0;      ///< largest error, relative to the larger of 1 and the block's largest entry
-  std::string message;   ///< names the worst block: "d r_theta / d rotation: ..."
+  double worst = 0;     ///< largest error, relative to the larger of 1 and the block's largest entry
+  std::string message;  ///< names the worst block: "d r_theta / d rotation: ..."
 };
 
 /// f of a perturbation about zero; differences of fourth order with the given step.
@@ -45,8 +45,7 @@ inline Eigen::MatrixXd numeric_jacobian(const std::function<Eigen::VectorXd(cons
 
 inline JacobianCheck check_jacobian(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& f,
                                     const Eigen::MatrixXd& analytic, const std::vector<JacobianBlock>& rows,
-                                    const std::vector<JacobianBlock>& columns, double tolerance = 1e-7,
-                                    double step = 1e-3) {
+                                    const std::vector<JacobianBlock>& columns, double tolerance = 1e-7, double step = 1e-3) {
   JacobianCheck check;
   const Eigen::MatrixXd numeric = numeric_jacobian(f, static_cast<int>(analytic.cols()), step);
   if (numeric.rows() != analytic.rows()) {
@@ -57,8 +56,8 @@ inline JacobianCheck check_jacobian(const std::function<Eigen::VectorXd(const Ei
   for (const JacobianBlock& r : rows) covered_rows += r.size;
   for (const JacobianBlock& c : columns) covered_columns += c.size;
   if (covered_rows != analytic.rows() || covered_columns != analytic.cols()) {
-    check.message = fmt::format("the named blocks cover {}x{} of {}x{}", covered_rows, covered_columns, analytic.rows(),
-                                analytic.cols());
+    check.message =
+        fmt::format("the named blocks cover {}x{} of {}x{}", covered_rows, covered_columns, analytic.rows(), analytic.cols());
     return check;
   }
   for (const JacobianBlock& r : rows) {
@@ -71,8 +70,8 @@ inline JacobianCheck check_jacobian(const std::function<Eigen::VectorXd(const Ei
                                   : std::numeric_limits<double>::infinity();
       if (error > check.worst) {
         check.worst = error;
-        check.message = fmt::format("d {} / d {}: error {:.3g}, analytic norm {:.6g}, numeric norm {:.6g}", r.name,
-                                    c.name, error, a.norm(), n.norm());
+        check.message = fmt::format("d {} / d {}: error {:.3g}, analytic norm {:.6g}, numeric norm {:.6g}", r.name, c.name, error,
+                                    a.norm(), n.norm());
       }
       column += c.size;
     }

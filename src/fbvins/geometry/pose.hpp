@@ -38,9 +38,7 @@ struct Pose {
   Vec3 operator*(const Vec3& point_From) const { return q * point_From + p; }
 
   /// Adds the perturbation (dp in To, dtheta in From): p + dp, q * Exp(dtheta).
-  Pose boxplus(const Vec3& dp, const Vec3& dtheta) const {
-    return {(q * so3_exp(dtheta)).normalized(), Vec3(p + dp)};
-  }
+  Pose boxplus(const Vec3& dp, const Vec3& dtheta) const { return {(q * so3_exp(dtheta)).normalized(), Vec3(p + dp)}; }
 
   /// The same numbers under other frame names; only where a physical identity justifies it.
   template <class To2, class From2>

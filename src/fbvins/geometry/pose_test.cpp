@@ -9,7 +9,9 @@ namespace fbvins {
 namespace {
 
 template <class A, class B2>
-concept composable = requires(A a, B2 b) { a* b; };
+concept composable = requires(A a, B2 b) {
+  a* b;
+};
 
 static_assert(composable<Pose<W, B>, Pose<B, C0>>);
 static_assert(!composable<Pose<W, B>, Pose<C0, W>>, "frames that do not meet must not compile");

@@ -58,7 +58,8 @@ TEST(So3, RightJacobianMatchesDifferences) {
 
 TEST(So3, InverseOfRightJacobian) {
   for (const Vec3& theta : nasty_rotations(3.1)) {
-    EXPECT_LT((so3_right_jacobian(theta) * so3_right_jacobian_inverse(theta) - Mat3::Identity()).norm(), 1e-9) << theta.transpose();
+    EXPECT_LT((so3_right_jacobian(theta) * so3_right_jacobian_inverse(theta) - Mat3::Identity()).norm(), 1e-9)
+        << theta.transpose();
   }
 }
 

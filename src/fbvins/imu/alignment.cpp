@@ -235,8 +235,7 @@ AlignmentResult align_visual_inertial(const Poses& poses, Intervals& between, co
   }
   result.bias.accel_mps2 = solution.x.segment<3>(solution.accel_bias);
   describe_fit(solution, static_cast<int>(poses.size()), result);
-  if (const auto reason = judge_motion(result, options, gravity_mps2); reason != AlignmentRefusal::none)
-    return refuse(reason);
+  if (const auto reason = judge_motion(result, options, gravity_mps2); reason != AlignmentRefusal::none) return refuse(reason);
 
   for (Preintegration& p : between) p.repropagate(result.bias);
   to_world(poses, solution, gravity_V, result);

@@ -26,16 +26,16 @@ struct VisualWorld {};
 struct AlignmentOptions {
   int min_frames = 4;
   double min_duration_s = 0.3;
-  double pose_sigma_m = 2e-3;            ///< noise of each visual position
-  double pose_sigma_rad = 1.5e-3;        ///< noise of each visual orientation
-  double gyro_bias_prior_radps = 0.3;    ///< sigma about zero
-  double accel_bias_prior_mps2 = 0.1;    ///< sigma about zero
-  double max_gravity_error_mps2 = 0.8;   ///< of the norm, solved without constraint
-  double max_gravity_sigma_rad = 0.05;   ///< about 3 degrees
+  double pose_sigma_m = 2e-3;           ///< noise of each visual position
+  double pose_sigma_rad = 1.5e-3;       ///< noise of each visual orientation
+  double gyro_bias_prior_radps = 0.3;   ///< sigma about zero
+  double accel_bias_prior_mps2 = 0.1;   ///< sigma about zero
+  double max_gravity_error_mps2 = 0.8;  ///< of the norm, solved without constraint
+  double max_gravity_sigma_rad = 0.05;  ///< about 3 degrees
   double max_gyro_bias_radps = 0.25;
   double max_gyro_bias_sigma_radps = 0.03;
   double max_accel_bias_mps2 = 1.0;
-  double max_residual_rms = 4.0;         ///< in sigmas
+  double max_residual_rms = 4.0;  ///< in sigmas
   double max_gap_s = 0.05;
 
   template <class V>
@@ -60,7 +60,7 @@ enum class AlignmentRefusal {
   none,
   too_few_frames,
   too_short,
-  bad_input,              ///< numbers not finite, empty intervals, or sizes that do not match
+  bad_input,  ///< numbers not finite, empty intervals, or sizes that do not match
   imu_gap,
   solver_failed,
   gyro_bias_unobservable,
@@ -69,7 +69,7 @@ enum class AlignmentRefusal {
   gravity_magnitude,      ///< not that of the earth: wrong scale, wrong poses, wrong readings
   gravity_unobservable,
   accel_bias_implausible,
-  motion_inconsistent,    ///< accelerometer and visual positions disagree
+  motion_inconsistent,  ///< accelerometer and visual positions disagree
 };
 
 std::string_view to_string(AlignmentRefusal reason);
@@ -82,24 +82,23 @@ struct AlignmentResult {
   /// about gravity (level_rotation of static_initialiser.hpp).
   Quat R_WV = Quat::Identity();
   ImuBias bias;
-  std::vector<NavState> states;     ///< one a pose: the visual pose in W, velocity, bias
+  std::vector<NavState> states;  ///< one a pose: the visual pose in W, velocity, bias
 
   // Diagnostics, filled as far as the computation went.
-  double gravity_norm_mps2 = 0;             ///< without constraint on its magnitude
-  double gravity_sigma_rad = 0;             ///< standard deviation of the direction, worst axis
-  double gravity_information_min = 0;       ///< smallest eigenvalue of the unconstrained 3x3 information
-  double gravity_condition = 0;             ///< its condition number
-  double gyro_bias_sigma_radps = 0;         ///< worst axis
-  double accel_bias_sigma_mps2 = 0;         ///< worst axis; the prior's where motion shows nothing
-  double velocity_sigma_mps = 0;            ///< of the last velocity, worst axis
-  double rotation_rms = 0;                  ///< in sigmas
-  double motion_rms = 0;                    ///< in sigmas
+  double gravity_norm_mps2 = 0;        ///< without constraint on its magnitude
+  double gravity_sigma_rad = 0;        ///< standard deviation of the direction, worst axis
+  double gravity_information_min = 0;  ///< smallest eigenvalue of the unconstrained 3x3 information
+  double gravity_condition = 0;        ///< its condition number
+  double gyro_bias_sigma_radps = 0;    ///< worst axis
+  double accel_bias_sigma_mps2 = 0;    ///< worst axis; the prior's where motion shows nothing
+  double velocity_sigma_mps = 0;       ///< of the last velocity, worst axis
+  double rotation_rms = 0;             ///< in sigmas
+  double motion_rms = 0;               ///< in sigmas
 };
 
 /// between[k] joins poses[k] and poses[k + 1]. On acceptance all intervals are repropagated at the bias
 /// found; on refusal at some bias.
-AlignmentResult align_visual_inertial(const std::vector<Pose<VisualWorld, B>>& poses,
-                                      std::vector<Preintegration>& between, const AlignmentOptions& options = {},
-                                      double gravity_mps2 = kGravity_mps2);
+AlignmentResult align_visual_inertial(const std::vector<Pose<VisualWorld, B>>& poses, std::vector<Preintegration>& between,
+                                      const AlignmentOptions& options = {}, double gravity_mps2 = kGravity_mps2);
 
 }  // namespace fbvins

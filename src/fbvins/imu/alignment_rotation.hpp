@@ -11,10 +11,10 @@ namespace fbvins {
 struct RotationAlignment {
   bool solved = false;
   Vec3 gyro_bias_radps = Vec3::Zero();
-  double gyro_bias_sigma_radps = 0;   ///< worst axis
-  double rms = 0;                     ///< residual in sigmas
-  std::vector<Quat> R_VB;             ///< visual orientations, corrected by the gyro
-  std::vector<double> sigma_rad;      ///< what is left of their noise, one a pose
+  double gyro_bias_sigma_radps = 0;  ///< worst axis
+  double rms = 0;                    ///< residual in sigmas
+  std::vector<Quat> R_VB;            ///< visual orientations, corrected by the gyro
+  std::vector<double> sigma_rad;     ///< what is left of their noise, one a pose
 };
 
 /// Gauss-Newton on the gyro bias and small corrections of all orientations; repropagates `between`.

@@ -147,7 +147,9 @@ TEST(Alignment, AcceptsRestAndKnowsThatTheAccelerometerBiasIsHidden) {
 }
 
 TEST(Alignment, RefusesWithTheRightReason) {
-  const auto reason = [](Window w, const AlignmentOptions& o = {}) { return align_visual_inertial(w.poses, w.between, o).reason; };
+  const auto reason = [](Window w, const AlignmentOptions& o = {}) {
+    return align_visual_inertial(w.poses, w.between, o).reason;
+  };
   const Window good = make_window(Motion(), 0, 14, {true, 1e-3, 1e-3}, 2);
   EXPECT_EQ(reason(good), AlignmentRefusal::none);
 

@@ -42,7 +42,9 @@ TEST(Conventions, F3_TWBTakesBodyCoordinatesToTheWorld) {
 }
 
 template <class A, class B2>
-concept Multipliable = requires(A a, B2 b) { a * b; };
+concept Multipliable = requires(A a, B2 b) {
+  a* b;
+};
 
 TEST(Conventions, F4_InnerFramesCancelAndOthersDoNotCompile) {
   static_assert(std::same_as<decltype(Pose<W, B>() * Pose<B, C0>()), Pose<W, C0>>);

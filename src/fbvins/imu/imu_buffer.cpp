@@ -52,8 +52,7 @@ std::optional<ImuSegment> ImuBuffer::extract(Time from, Time to) {
 ImuSegment ImuBuffer::extract_now(Time from, Time to) {
   ImuSegment segment;
   if (samples_.empty() || from >= to) return segment;
-  const auto first = std::upper_bound(samples_.begin(), samples_.end(), from,
-                                      [](Time t, const ImuSample& s) { return t < s.t; });
+  const auto first = std::upper_bound(samples_.begin(), samples_.end(), from, [](Time t, const ImuSample& s) { return t < s.t; });
   const auto last = std::lower_bound(first, samples_.end(), to, earlier);
   segment.samples.reserve(static_cast<std::size_t>(last - first) + 2);
   segment.samples.push_back(at(from));
@@ -84,8 +83,8 @@ Duration ImuBuffer::longest_gap(Time from, Time to) const {
 }
 
 void ImuBuffer::drop_before(Time t) {
-  const auto keep = std::upper_bound(samples_.begin(), samples_.end(), t,
-                                     [](Time time, const ImuSample& s) { return time < s.t; });
+  const auto keep =
+      std::upper_bound(samples_.begin(), samples_.end(), t, [](Time time, const ImuSample& s) { return time < s.t; });
   if (keep == samples_.begin()) return;
   samples_.erase(samples_.begin(), keep - 1);  // the last reading at or before t serves the next segment
 }

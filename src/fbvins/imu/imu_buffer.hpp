@@ -18,10 +18,10 @@
 namespace fbvins {
 
 struct ImuBufferOptions {
-  int capacity = 20000;              ///< readings kept at most (100 s at 200 Hz)
+  int capacity = 20000;                   ///< readings kept at most (100 s at 200 Hz)
   double longest_interpolation_s = 0.02;  ///< neighbours further apart: the nearest value is held instead
-  double max_gyro_radps = 70;        ///< a larger number is a broken reading (4000 deg/s)
-  double max_accel_mps2 = 700;       ///< likewise (70 g)
+  double max_gyro_radps = 70;             ///< a larger number is a broken reading (4000 deg/s)
+  double max_accel_mps2 = 700;            ///< likewise (70 g)
 
   template <class V>
   void visit(V&& v) {
@@ -36,10 +36,10 @@ struct ImuBufferOptions {
 /// What became of the readings pushed.
 struct ImuBufferCounts {
   int accepted = 0;
-  int duplicate = 0;   ///< same stamp as the one before
-  int backward = 0;    ///< earlier stamp than the one before, or than the last extraction
-  int invalid = 0;     ///< NaN, infinite or beyond any sensor's range
-  int overflow = 0;    ///< dropped because nobody extracted them
+  int duplicate = 0;  ///< same stamp as the one before
+  int backward = 0;   ///< earlier stamp than the one before, or than the last extraction
+  int invalid = 0;    ///< NaN, infinite or beyond any sensor's range
+  int overflow = 0;   ///< dropped because nobody extracted them
 };
 
 class ImuBuffer {

@@ -6,10 +6,10 @@ namespace {
 
 /// The 3x3 blocks of both Jacobians that are neither zero nor the identity (eq. P21-P24).
 struct Blocks {
-  Mat3 R_i_t;                          ///< d r_p / d p_j = d r_v / d v_j; negative for i
-  Mat3 p_theta, v_theta;               ///< by the rotation of i
-  Mat3 theta_theta_i, theta_theta_j;   ///< by the rotations
-  Mat3 theta_bg;                       ///< by the gyro bias of i
+  Mat3 R_i_t;                         ///< d r_p / d p_j = d r_v / d v_j; negative for i
+  Mat3 p_theta, v_theta;              ///< by the rotation of i
+  Mat3 theta_theta_i, theta_theta_j;  ///< by the rotations
+  Mat3 theta_bg;                      ///< by the gyro bias of i
   double dt_s;
 };
 
@@ -122,8 +122,8 @@ Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const NavState
   return U.triangularView<Eigen::Upper>() * imu_residual(i, j, between, gravity_mps2);
 }
 
-Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2,
-                            Mat15* J_i, Mat15* J_j) {
+Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2, Mat15* J_i,
+                            Mat15* J_j) {
   return weighted_imu_residual(i, j, i, j, between, gravity_mps2, J_i, J_j);
 }
 

@@ -27,16 +27,16 @@ struct ImuDeltas {
 
 /// How far a bias may move before the first-order correction is replaced by integrating anew.
 struct RepropagationThreshold {
-  double gyro_rad = 2e-3;   ///< |d bg| * dt: the second-order error is about half its square
-  double accel_mps = 0.2;   ///< |d ba| * dt: exact on its own, crosses with the gyro's
+  double gyro_rad = 2e-3;  ///< |d bg| * dt: the second-order error is about half its square
+  double accel_mps = 0.2;  ///< |d ba| * dt: exact on its own, crosses with the gyro's
 };
 
 /// What is assumed of the signal where readings are missing (eq. P13).
 struct ImuGapModel {
-  double longest_regular_step = 2.5;   ///< in sampling periods; a longer step is a gap
-  double gyro_sigma_radps = 0.3;       ///< error of the mean rate over a long gap
-  double accel_sigma_mps2 = 2.0;       ///< error of the mean specific force over a long gap
-  double long_gap_s = 0.1;             ///< shorter gaps: sigmas scaled by (gap / long_gap)^2
+  double longest_regular_step = 2.5;  ///< in sampling periods; a longer step is a gap
+  double gyro_sigma_radps = 0.3;      ///< error of the mean rate over a long gap
+  double accel_sigma_mps2 = 2.0;      ///< error of the mean specific force over a long gap
+  double long_gap_s = 0.1;            ///< shorter gaps: sigmas scaled by (gap / long_gap)^2
 };
 
 class Preintegration {

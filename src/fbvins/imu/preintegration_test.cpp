@@ -198,8 +198,9 @@ struct TwoStates {
 
 TwoStates two_states() {
   const Motion motion;
-  TwoStates s{motion.state(kFrom.seconds(), kBias), motion.state(kTo.seconds(), kBias),
-              integrated(motion.segment(kFrom, kTo, Duration{5'000'000}, kBias), ImuBias{Vec3(0.01, -0.02, 0.04), Vec3(0, -0.1, 0.1)})};
+  TwoStates s{
+      motion.state(kFrom.seconds(), kBias), motion.state(kTo.seconds(), kBias),
+      integrated(motion.segment(kFrom, kTo, Duration{5'000'000}, kBias), ImuBias{Vec3(0.01, -0.02, 0.04), Vec3(0, -0.1, 0.1)})};
   Rng rng(5);
   Vec15 d;
   for (int k = 0; k < 15; ++k) d(k) = 0.05 * rng.normal();  // far from the solution, so that no term vanishes
@@ -217,10 +218,12 @@ TEST(ImuResidual, JacobiansMatchNumericOnes) {
   const TwoStates s = two_states();
   Mat15 J_i, J_j;
   imu_residual(s.i, s.j, s.between, kGravity_mps2, &J_i, &J_j);
-  const auto by_i = check_jacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
-    return imu_residual(s.i.boxplus(d), s.j, s.between, kGravity_mps2); }, J_i, kBlocks, kBlocks, 1e-9);
-  const auto by_j = check_jacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
-    return imu_residual(s.i, s.j.boxplus(d), s.between, kGravity_mps2); }, J_j, kBlocks, kBlocks, 1e-9);
+  const auto by_i = check_jacobian(
+      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i.boxplus(d), s.j, s.between, kGravity_mps2); },
+      J_i, kBlocks, kBlocks, 1e-9);
+  const auto by_j = check_jacobian(
+      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i, s.j.boxplus(d), s.between, kGravity_mps2); },
+      J_j, kBlocks, kBlocks, 1e-9);
   EXPECT_TRUE(by_i.ok) << by_i.message;
   EXPECT_TRUE(by_j.ok) << by_j.message;
 }

@@ -144,7 +144,8 @@ TEST(RealImu, MH01IsNotAtRestUntilItsEnd) {
   const auto imu = read_imu(data_folder() + "/MH_01_easy_17s/mav0/imu0/data.csv");
   if (imu.empty()) GTEST_SKIP() << "no data at " << data_folder();
   const auto rests = [&](std::size_t start) {
-    return initialise_at_rest({imu.begin() + static_cast<long>(start), imu.begin() + static_cast<long>(start) + 121}, 0.0, {}).at_rest;
+    return initialise_at_rest({imu.begin() + static_cast<long>(start), imu.begin() + static_cast<long>(start) + 121}, 0.0, {})
+        .at_rest;
   };
   for (std::size_t start = 0; start < 2800; start += 60) EXPECT_FALSE(rests(start)) << "reading " << start;
   EXPECT_TRUE(rests(imu.size() - 130));

@@ -64,10 +64,8 @@ Mat15 covariance_at_rest(const Vec3& up_B, double window_s, const ImuNoise& nois
 
 RestRefusal judge(const Spread& s, double image_motion_px, const ImuNoise& noise, const RestOptions& o, double g) {
   const double root_block = std::sqrt(o.block_s);
-  const double gyro_limit =
-      std::max(o.max_gyro_spread_radps, o.noise_factor * noise.gyro_noise_density_radps_rthz / root_block);
-  const double accel_limit =
-      std::max(o.max_accel_spread_mps2, o.noise_factor * noise.accel_noise_density_mps2_rthz / root_block);
+  const double gyro_limit = std::max(o.max_gyro_spread_radps, o.noise_factor * noise.gyro_noise_density_radps_rthz / root_block);
+  const double accel_limit = std::max(o.max_accel_spread_mps2, o.noise_factor * noise.accel_noise_density_mps2_rthz / root_block);
   if (!(image_motion_px <= o.max_image_motion_px)) return RestRefusal::image_moves;
   if (!(s.gyro <= gyro_limit)) return RestRefusal::gyro_spread;
   if (!(s.accel <= accel_limit)) return RestRefusal::accel_spread;

@@ -37,8 +37,7 @@ Pose<B, B> read_transform(YamlReader& yaml, const YAML::Node& map, const std::st
   constexpr double kTolerance = 1e-3;
   if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kTolerance) || !(R.determinant() > 0))
     yaml.complain(map, field, "its 3x3 part is not a rotation");
-  else if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
-    yaml.complain(map, field, "its last row is not 0 0 0 1");
+  else if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) yaml.complain(map, field, "its last row is not 0 0 0 1");
   const Vec3 p(m[3], m[7], m[11]);
   if (!(p.cwiseAbs().maxCoeff() < 1e3)) yaml.complain(map, field, "its translation is more than a kilometre");
   if (!yaml.ok()) return {};
@@ -77,7 +76,8 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
 Result<void> check_baseline(const StereoRig& rig, const std::string& file) {
   const double baseline_m = rig.T_C1C0().p.norm();
   if (baseline_m > 1e-3 && baseline_m < 10.0) return {};
-  return Error{ErrorCode::malformed, fmt::format("{}: the two cameras are {:.3g} m apart, not between 1 mm and 10 m", file, baseline_m)};
+  return Error{ErrorCode::malformed,
+               fmt::format("{}: the two cameras are {:.3g} m apart, not between 1 mm and 10 m", file, baseline_m)};
 }
 
 }  // namespace fbvins

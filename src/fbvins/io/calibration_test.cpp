@@ -11,7 +11,8 @@ namespace {
 
 std::string rows_of(const Mat3& R, const Vec3& p, const char* open, const char* close, const char* between) {
   std::string out;
-  for (int i = 0; i < 3; ++i) out += fmt::format("{}{:.17g}, {:.17g}, {:.17g}, {:.17g}{}{}", open, R(i, 0), R(i, 1), R(i, 2), p(i), close, between);
+  for (int i = 0; i < 3; ++i)
+    out += fmt::format("{}{:.17g}, {:.17g}, {:.17g}, {:.17g}{}{}", open, R(i, 0), R(i, 1), R(i, 2), p(i), close, between);
   return out + open + "0.0, 0.0, 0.0, 1.0" + close;
 }
 
@@ -71,7 +72,8 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
 }
 
 TEST(Calibration, KalibrSaysWhatIsWrong) {
-  const std::string good = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
+  const std::string good =
+      "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
   const auto message = [&](const std::string& from, const std::string& to) {
     std::string text = good;
     text.replace(text.find(from), from.size(), to);
@@ -85,7 +87,8 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   EXPECT_EQ(message("[752, 480]", "[752.5, 480]"), "c.yaml:12: resolution: 752.5 is not a number of pixels");
   EXPECT_EQ(message("458.6", "none"), "c.yaml:11: intrinsics: holds something that is not a number");
   EXPECT_EQ(message("0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 0.5, 1.0"), "c.yaml:3: T_cam_imu: its last row is not 0 0 0 1");
-  EXPECT_EQ(message("  rostopic: /cam/image_raw\n", "  timeshift_cam_imu: 99\n"), "c.yaml:13: timeshift_cam_imu: 99 s is more than 10 s");
+  EXPECT_EQ(message("  rostopic: /cam/image_raw\n", "  timeshift_cam_imu: 99\n"),
+            "c.yaml:13: timeshift_cam_imu: 99 s is more than 10 s");
   EXPECT_EQ(parse_kalibr_camchain(good + "  timeshift_cam_imu: 0.01\n", "c.yaml").error().message,
             "c.yaml:27: timeshift_cam_imu: differs from cam0's by 10.0 ms");
   EXPECT_EQ(parse_kalibr_camchain("cam0: 5\ncam1: 6\n", "c.yaml").error().message, "c.yaml:1: cam0: is missing or empty");
@@ -94,10 +97,12 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
 }
 
 TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
-  const std::string flat = "accelerometer_noise_density: 0.01\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.005\n"
-                           "gyroscope_random_walk: 4.0e-06\nrostopic: /imu0\nupdate_rate: 200.0\n";
+  const std::string flat =
+      "accelerometer_noise_density: 0.01\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.005\n"
+      "gyroscope_random_walk: 4.0e-06\nrostopic: /imu0\nupdate_rate: 200.0\n";
   std::string nested = "imu0:\n";
-  for (std::size_t start = 0; start < flat.size(); start = flat.find('\n', start) + 1) nested += "  " + flat.substr(start, flat.find('\n', start) + 1 - start);
+  for (std::size_t start = 0; start < flat.size(); start = flat.find('\n', start) + 1)
+    nested += "  " + flat.substr(start, flat.find('\n', start) + 1 - start);
   for (const std::string& text : {flat, nested}) {
     const auto noise = parse_kalibr_imu(text, "imu.yaml");
     ASSERT_TRUE(noise) << noise.error().message;

@@ -49,7 +49,8 @@ void Dataset::count(const LoadedFrame& loaded) {
   }
   if (!loaded.frame.left && !loaded.frame.right) ++info.frames_without_image;
   // One sentence for the first of them; the counts say how many.
-  const int failures = info.left.images.corrupt + info.left.images.wrong_size + info.right.images.corrupt + info.right.images.wrong_size;
+  const int failures =
+      info.left.images.corrupt + info.left.images.wrong_size + info.right.images.corrupt + info.right.images.wrong_size;
   const int now = loaded.left.bad() + loaded.right.bad();
   if (now > 0 && failures == now) info.warnings.push_back(loaded.problem);
 }

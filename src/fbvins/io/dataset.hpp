@@ -25,13 +25,13 @@
 namespace fbvins {
 
 struct DatasetOptions {
-  int skip_frames = 0;             ///< stereo frames left out at the start
-  int max_frames = 0;              ///< 0: all
-  double pair_tolerance_ms = 3.0;  ///< stamps of left and right may differ by this
-  int prefetch_frames = 8;         ///< decoded ahead; 0: decode when asked, without a thread
-  bool require_imu = true;         ///< false: a recording without imu0 is fine
-  std::string kalibr_camchain = "";     ///< replaces the recording's own calibration
-  std::string kalibr_imu = "";          ///< replaces its IMU noise; only with kalibr_camchain
+  int skip_frames = 0;               ///< stereo frames left out at the start
+  int max_frames = 0;                ///< 0: all
+  double pair_tolerance_ms = 3.0;    ///< stamps of left and right may differ by this
+  int prefetch_frames = 8;           ///< decoded ahead; 0: decode when asked, without a thread
+  bool require_imu = true;           ///< false: a recording without imu0 is fine
+  std::string kalibr_camchain = "";  ///< replaces the recording's own calibration
+  std::string kalibr_imu = "";       ///< replaces its IMU noise; only with kalibr_camchain
 
   template <class V>
   void visit(V&& v) {
@@ -70,8 +70,8 @@ struct DatasetContents {
   StereoRig rig;
   DatasetInfo info;
   std::vector<TrajectoryPoint> ground_truth;
-  std::vector<ImuSample> imu;       ///< increasing stamps
-  std::vector<FrameEntry> frames;   ///< increasing stamps
+  std::vector<ImuSample> imu;      ///< increasing stamps
+  std::vector<FrameEntry> frames;  ///< increasing stamps
   std::unique_ptr<FrameLoader> loader;
 };
 
@@ -101,7 +101,7 @@ class Dataset {
 
   DatasetContents contents_;
   std::unique_ptr<FramePrefetcher> prefetcher_;
-  bool deliver_rest_ = true;      ///< IMU samples after the last image
+  bool deliver_rest_ = true;  ///< IMU samples after the last image
   std::size_t next_imu_ = 0;
   std::size_t next_frame_ = 0;
 };

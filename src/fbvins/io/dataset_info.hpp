@@ -27,11 +27,11 @@ struct CameraInfo {
 };
 
 struct DatasetInfo {
-  std::string name;       ///< last part of the path
-  std::string format;     ///< "EuRoC folder" or "EuRoC zip"
+  std::string name;    ///< last part of the path
+  std::string format;  ///< "EuRoC folder" or "EuRoC zip"
   CameraInfo left, right;
   RowCounts imu_rows, ground_truth_rows;
-  int frames = 0;         ///< frames that next() will deliver, less those found without any image
+  int frames = 0;  ///< frames that next() will deliver, less those found without any image
   int imu_samples = 0;
   int ground_truth_poses = 0;
   Time first_image, last_image, first_imu, last_imu;

@@ -25,11 +25,12 @@ Result<std::string> find_root(const FileSource& files, const std::string& path) 
   if (roots.empty()) {
     std::error_code ignored;
     const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
-    return Error{ErrorCode::not_found, fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path,
-                                                   bag ? " (ROS bags cannot be read)" : "")};
+    return Error{ErrorCode::not_found,
+                 fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path, bag ? " (ROS bags cannot be read)" : "")};
   }
   if (roots.size() > 1)
-    return Error{ErrorCode::unsupported, fmt::format("{}: holds {} datasets ({} ...), give one of them", path, roots.size(), roots[0])};
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{}: holds {} datasets ({} ...), give one of them", path, roots.size(), roots[0])};
   return roots.front();
 }
 
@@ -61,7 +62,9 @@ class EurocReader {
  private:
   std::string named(const std::string& file) const { return files_->describe(root_ + file); }
   bool exists(const std::string& file) const { return files_->exists(root_ + file); }
-  Result<std::string> text(const std::string& file, std::uint64_t max_bytes) const { return files_->read(root_ + file, max_bytes); }
+  Result<std::string> text(const std::string& file, std::uint64_t max_bytes) const {
+    return files_->read(root_ + file, max_bytes);
+  }
   void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
 
   template <class Parser>
@@ -131,7 +134,8 @@ class EurocReader {
     out_.frames = std::move(paired.frames);
     cut_frames();
     if (out_.frames.empty())
-      return Error{ErrorCode::invalid_argument, fmt::format("{}: no frames are left after skipping {}", named("cam0/data.csv"), options_.skip_frames)};
+      return Error{ErrorCode::invalid_argument,
+                   fmt::format("{}: no frames are left after skipping {}", named("cam0/data.csv"), options_.skip_frames)};
     return find_images();
   }
 
@@ -154,7 +158,8 @@ class EurocReader {
       look(frame.left_file, "cam0/data/", out_.info.left.images);
       look(frame.right_file, "cam1/data/", out_.info.right.images);
     }
-    const std::size_t emptied = std::erase_if(out_.frames, [](const FrameEntry& f) { return f.left_file.empty() && f.right_file.empty(); });
+    const std::size_t emptied =
+        std::erase_if(out_.frames, [](const FrameEntry& f) { return f.left_file.empty() && f.right_file.empty(); });
     out_.info.frames_without_image = static_cast<int>(emptied);
     if (out_.frames.empty())
       return Error{ErrorCode::not_found, fmt::format("{}: no such file, nor any other of the images listed", first_missing)};
@@ -179,9 +184,10 @@ class EurocReader {
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = out_.frames.front().t + offset, last = out_.frames.back().t + offset;
     if (out_.imu.back().t < first || out_.imu.front().t > last)
-      return Error{ErrorCode::malformed, fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
-                                                     format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t),
-                                                     format_seconds(first), format_seconds(last))};
+      return Error{ErrorCode::malformed,
+                   fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
+                               format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t), format_seconds(first),
+                               format_seconds(last))};
     if (options_.skip_frames > 0) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     return {};
   }
@@ -250,13 +256,14 @@ class EurocReader {
 
   void warn_about_gap(const Intervals& intervals, const char* what) {
     if (intervals.longest.ns > 3 * intervals.median.ns)
-      warn(fmt::format("{}: a gap of {:.3f} s after {} s", what, intervals.longest.seconds(), format_seconds(intervals.longest_start)));
+      warn(fmt::format("{}: a gap of {:.3f} s after {} s", what, intervals.longest.seconds(),
+                       format_seconds(intervals.longest_start)));
   }
 
   void warn_about_rows(const RowCounts& c, const std::string& file) {
     if (c.bad() > 0)
-      warn(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}", file,
-                       c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
+      warn(fmt::format("{}: {} of {} rows left out ({} malformed, {} not finite, {} duplicates, {} out of order), the first: {}",
+                       file, c.bad(), c.rows, c.malformed, c.not_finite, c.duplicates, c.backwards, c.first_bad));
   }
 
   std::unique_ptr<FileSource> files_;

@@ -60,7 +60,8 @@ class EurocLoader : public FrameLoader {
     }
     if (image->width() != camera.width() || image->height() != camera.height()) {
       ++counts.wrong_size;
-      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(), image->height(), camera.width(), camera.height()));
+      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(), image->height(), camera.width(),
+                        camera.height()));
       return nullptr;
     }
     return std::make_shared<const Image>(*std::move(image));
@@ -108,7 +109,8 @@ RowVerdict ImuRowParser::operator()(std::string_view line, ImuSample& sample, st
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance) {
   std::vector<Time> stamps;
   for (const ImageRow& row : left) stamps.push_back(row.t);
-  if (const Duration median = measure_intervals(stamps).median; median.ns > 0) tolerance.ns = std::min(tolerance.ns, median.ns / 2);
+  if (const Duration median = measure_intervals(stamps).median; median.ns > 0)
+    tolerance.ns = std::min(tolerance.ns, median.ns / 2);
   const auto distance = [&](std::size_t l, std::size_t r) { return std::abs((left[l].t - right[r].t).ns); };
   PairedFrames out;
   std::size_t r = 0;

@@ -26,7 +26,7 @@ class ImuRowParser {
 struct PairedFrames {
   std::vector<FrameEntry> frames;  ///< one for each left image
   int left_only = 0;
-  int right_only = 0;              ///< right images that are in no frame
+  int right_only = 0;  ///< right images that are in no frame
 };
 
 /// Each left image with the nearest right one within the tolerance (at most half the median interval).

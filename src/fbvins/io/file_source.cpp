@@ -57,13 +57,12 @@ class ZipSource : public FileSource {
       return Error{ErrorCode::not_found, fmt::format("{}: not in the archive", describe(path))};
     if (info.size > max_bytes) return too_large(describe(path), max_bytes);
     zip_file_t* file = zip_fopen(archive_, path.c_str(), 0);
-    if (file == nullptr)
-      return Error{ErrorCode::unreadable, fmt::format("{}: {}", describe(path), zip_strerror(archive_))};
+    if (file == nullptr) return Error{ErrorCode::unreadable, fmt::format("{}: {}", describe(path), zip_strerror(archive_))};
     std::string bytes(info.size, '\0');
     // The size is only a promise of the directory; the end and the checksum are checked by reading on.
     char beyond = 0;
-    const bool complete = zip_fread(file, bytes.data(), bytes.size()) == static_cast<zip_int64_t>(bytes.size()) &&
-                          zip_fread(file, &beyond, 1) == 0;
+    const bool complete =
+        zip_fread(file, bytes.data(), bytes.size()) == static_cast<zip_int64_t>(bytes.size()) && zip_fread(file, &beyond, 1) == 0;
     zip_fclose(file);
     if (!complete) return Error{ErrorCode::unreadable, fmt::format("{}: damaged in the archive", describe(path))};
     return bytes;

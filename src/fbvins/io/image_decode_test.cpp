@@ -16,14 +16,14 @@ void append_bytes(png_structp png, png_bytep data, size_t size) {
 }
 
 /// rows: big-endian samples as they lie in the file.
-std::string write_png(int width, int height, int depth, int colour_type, const std::vector<std::uint8_t>& bytes, bool interlaced = false,
-                      const std::vector<png_color>& palette = {}) {
+std::string write_png(int width, int height, int depth, int colour_type, const std::vector<std::uint8_t>& bytes,
+                      bool interlaced = false, const std::vector<png_color>& palette = {}) {
   std::string out;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
   png_set_write_fn(png, &out, append_bytes, nullptr);
-  png_set_IHDR(png, info, width, height, depth, colour_type, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, width, height, depth, colour_type, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   if (!palette.empty()) png_set_PLTE(png, info, palette.data(), static_cast<int>(palette.size()));
   png_write_info(png, info);
   const std::size_t stride = bytes.size() / height;
@@ -101,7 +101,9 @@ std::string write_jpeg(const std::vector<std::uint8_t>& grey, int width, int hei
   tjhandle tj = tjInitCompress();
   unsigned char* jpeg = nullptr;
   unsigned long size = 0;
-  EXPECT_EQ(tjCompress2(tj, pixels.data(), width, 0, height, colour ? TJPF_RGB : TJPF_GRAY, &jpeg, &size, colour ? TJSAMP_420 : TJSAMP_GRAY, 95, 0), 0);
+  EXPECT_EQ(tjCompress2(tj, pixels.data(), width, 0, height, colour ? TJPF_RGB : TJPF_GRAY, &jpeg, &size,
+                        colour ? TJSAMP_420 : TJSAMP_GRAY, 95, 0),
+            0);
   std::string out(reinterpret_cast<const char*>(jpeg), size);
   tjFree(jpeg);
   tjDestroy(tj);
@@ -126,7 +128,8 @@ TEST(DecodeJpeg, GreyAndColourComeBackNearly) {
 
 TEST(DecodeJpeg, CutOffIsAnError) {
   const std::string whole = write_jpeg(slope(64, 48), 64, 48, false);
-  for (std::size_t length = 0; length + 2 < whole.size(); length += 7) EXPECT_FALSE(decode_image(whole.substr(0, length))) << length;
+  for (std::size_t length = 0; length + 2 < whole.size(); length += 7)
+    EXPECT_FALSE(decode_image(whole.substr(0, length))) << length;
 }
 
 TEST(DecodeImage, OtherBytesAreRefused) {

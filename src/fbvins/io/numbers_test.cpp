@@ -30,14 +30,16 @@ TEST(Numbers, SecondsRoundToTheNearestNanosecond) {
 }
 
 TEST(Numbers, SecondsRefuseWhatIsNoStamp) {
-  for (const char* text : {"", ".", "e9", "1e", "1e+", "-1", "+1", "1.2.3", "1e99", "9e9", "nan", "inf", "0x10", "1 2", "1e99999999999", "12a"})
+  for (const char* text :
+       {"", ".", "e9", "1e", "1e+", "-1", "+1", "1.2.3", "1e99", "9e9", "nan", "inf", "0x10", "1 2", "1e99999999999", "12a"})
     EXPECT_FALSE(parse_seconds(text)) << text;
 }
 
 TEST(Numbers, SecondsComeBackFromTheirText) {
   Rng rng(11);
   for (int i = 0; i < 5000; ++i) {
-    const auto ns = static_cast<std::int64_t>((std::uint64_t{rng.next_u32()} << 32u | rng.next_u32()) % kLatestStamp_ns) >> rng.below(62);
+    const auto ns =
+        static_cast<std::int64_t>((std::uint64_t{rng.next_u32()} << 32u | rng.next_u32()) % kLatestStamp_ns) >> rng.below(62);
     EXPECT_EQ(parse_seconds(format_seconds(Time{ns})), Time{ns});
   }
   EXPECT_EQ(format_seconds(Time{-1'500'000'000}), "-1.500000000");
@@ -46,7 +48,8 @@ TEST(Numbers, SecondsComeBackFromTheirText) {
 TEST(Numbers, NanosecondsAreWholeAndInRange) {
   EXPECT_EQ(parse_nanoseconds(" 1403636584763555584\r")->ns, 1403636584763555584);
   EXPECT_EQ(parse_nanoseconds("0")->ns, 0);
-  for (const char* text : {"", "-1", "1.5", "1e9", "4000000000000000001", "99999999999999999999", "12x"}) EXPECT_FALSE(parse_nanoseconds(text)) << text;
+  for (const char* text : {"", "-1", "1.5", "1e9", "4000000000000000001", "99999999999999999999", "12x"})
+    EXPECT_FALSE(parse_nanoseconds(text)) << text;
 }
 
 TEST(Numbers, DoublesAreTheWholeField) {

@@ -38,9 +38,7 @@ Result<OutputFile> OutputFile::create(const std::string& path) {
   return OutputFile(std::move(state));
 }
 
-void OutputFile::write(std::string_view text) {
-  state_->stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-}
+void OutputFile::write(std::string_view text) { state_->stream.write(text.data(), static_cast<std::streamsize>(text.size())); }
 
 Result<void> OutputFile::close() {
   const std::unique_ptr<State> state = std::move(state_);

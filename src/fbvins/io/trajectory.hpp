@@ -21,7 +21,7 @@ namespace fbvins {
 struct TrajectoryPoint {
   Time t;
   Pose<W, B> T_WB;
-  std::optional<Vec3> v_WB;     ///< m/s, in W
+  std::optional<Vec3> v_WB;  ///< m/s, in W
   std::optional<ImuBias> bias;
 };
 

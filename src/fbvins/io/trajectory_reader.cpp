@@ -60,8 +60,8 @@ RowVerdict parse_euroc_row(const std::vector<std::string_view>& fields, Trajecto
 }
 
 bool says_no_pose(const std::vector<std::string_view>& fields) {
-  return fields.size() == kOdometryColumns && (fields[kHealthColumn] == to_string(HealthState::initialising) ||
-                                               fields[kHealthColumn] == to_string(HealthState::lost));
+  return fields.size() == kOdometryColumns &&
+         (fields[kHealthColumn] == to_string(HealthState::initialising) || fields[kHealthColumn] == to_string(HealthState::lost));
 }
 
 bool has_commas(std::string_view text) {

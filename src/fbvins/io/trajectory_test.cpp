@@ -118,8 +118,10 @@ TEST_F(TrajectoryFiles, AnAbandonedWriterLeavesNothing) {
 }
 
 TEST(Trajectory, TumAsOtherToolsWriteIt) {
-  const auto read = parse_trajectory("# timestamp tx ty tz qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n"
-                                     "1403636584.8\t1.5  2 3 0.1 0 0 -0.99498743710662 \n", "t.txt");
+  const auto read = parse_trajectory(
+      "# timestamp tx ty tz qx qy qz qw\n1.403636584763555584e+09 1 2 3 0 0 0 1\n"
+      "1403636584.8\t1.5  2 3 0.1 0 0 -0.99498743710662 \n",
+      "t.txt");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->points[0].t.ns, 1403636584763555584);
   EXPECT_EQ(read->points[1].t.ns, 1403636584800000000);
@@ -136,8 +138,10 @@ TEST(Trajectory, EurocQuaternionsBeginWithW) {
 }
 
 TEST(Trajectory, BadRowsAreCounted) {
-  const auto read = parse_trajectory("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 0\n3 0 0 nan 0 0 0 1\n4 0 0\n5 0 0 0 0 0 0 1\n5 0 0 0 0 0 0 1\n"
-                                     "4.5 0 0 0 0 0 0 1\n6 0 0 0 0 0 0 1\n7 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n", "t.txt");
+  const auto read = parse_trajectory(
+      "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 0\n3 0 0 nan 0 0 0 1\n4 0 0\n5 0 0 0 0 0 0 1\n5 0 0 0 0 0 0 1\n"
+      "4.5 0 0 0 0 0 0 1\n6 0 0 0 0 0 0 1\n7 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n",
+      "t.txt");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->points.size(), 5u);
   EXPECT_EQ(read->counts.malformed, 2);

@@ -37,8 +37,8 @@ Result<TumWriter> TumWriter::create(const std::string& path) {
 void TumWriter::write(Time t, const Pose<W, B>& T_WB) {
   const Vec3& p = T_WB.p;
   const Quat& q = T_WB.q;
-  file_.write(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", format_seconds(t), p.x(), p.y(), p.z(),
-                          q.x(), q.y(), q.z(), q.w()));
+  file_.write(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", format_seconds(t), p.x(), p.y(), p.z(), q.x(),
+                          q.y(), q.z(), q.w()));
 }
 
 Result<OdometryCsvWriter> OdometryCsvWriter::create(const std::string& path) {

@@ -22,9 +22,7 @@ struct OpenFile {
   }
 };
 
-Error system_error(ErrorCode code, const std::string& path) {
-  return {code, fmt::format("{}: {}", path, std::strerror(errno))};
-}
+Error system_error(ErrorCode code, const std::string& path) { return {code, fmt::format("{}: {}", path, std::strerror(errno))}; }
 
 bool write_all(int fd, std::string_view bytes) {
   while (!bytes.empty()) {

@@ -134,9 +134,11 @@ std::vector<KeyframeId> LoopCloser::candidates_for(const MapKeyframe& query) {
     std::vector<IndexHit> grouped = hits;
     for (IndexHit& a : grouped)
       for (const IndexHit& b : hits)
-        if (a.keyframe != b.keyframe && std::abs((map_.find(a.keyframe)->t - map_.find(b.keyframe)->t).seconds()) < options_.group_s)
+        if (a.keyframe != b.keyframe &&
+            std::abs((map_.find(a.keyframe)->t - map_.find(b.keyframe)->t).seconds()) < options_.group_s)
           a.similarity += 0.25f * b.similarity;
-    std::stable_sort(grouped.begin(), grouped.end(), [](const IndexHit& a, const IndexHit& b) { return a.similarity > b.similarity; });
+    std::stable_sort(grouped.begin(), grouped.end(),
+                     [](const IndexHit& a, const IndexHit& b) { return a.similarity > b.similarity; });
     hits = std::move(grouped);
   }
   std::vector<KeyframeId> chosen;
@@ -206,7 +208,8 @@ SeenPose LoopCloser::seen_pose(const Proposal& proposal) const {
   return seen;
 }
 
-void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found) {
+void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update,
+                       std::vector<MapEdge>& found) {
   const double gate = options_.gate_sigma * options_.gate_sigma;
   for (const Proposal& proposal : proposals) {
     SeenPose seen = seen_pose(proposal);
@@ -320,8 +323,8 @@ PoseGraphReport LoopCloser::finish() { return map_.optimise(options_.graph); }
 /// Above its size the map lets go of keyframes that others replace, and above its limit of the oldest flight's.
 void LoopCloser::thin() {
   constexpr std::size_t kKeepNewest = 20;
-  while (static_cast<int>(map_.size()) > options_.thin_above && !redundant_.empty() &&
-         map_.size() > kKeepNewest && redundant_.front() < map_.keyframes()[map_.size() - kKeepNewest].id) {
+  while (static_cast<int>(map_.size()) > options_.thin_above && !redundant_.empty() && map_.size() > kKeepNewest &&
+         redundant_.front() < map_.keyframes()[map_.size() - kKeepNewest].id) {
     const KeyframeId id = redundant_.front();
     redundant_.erase(redundant_.begin());
     take_out(id);
@@ -345,7 +348,8 @@ void LoopCloser::take_out(KeyframeId id) {
   // Poses that hung on it hang on a neighbour of the same session from now on.
   const auto& all = map_.keyframes();
   const auto at = static_cast<std::size_t>(gone - all.data());
-  const MapKeyframe* heir = at > 0 && all[at - 1].session == gone->session ? &all[at - 1] : (at + 1 < all.size() ? &all[at + 1] : nullptr);
+  const MapKeyframe* heir =
+      at > 0 && all[at - 1].session == gone->session ? &all[at - 1] : (at + 1 < all.size() ? &all[at + 1] : nullptr);
   if (heir == nullptr || heir->session != gone->session) return;
   const Pose<B, B> T_heir_gone = heir->T_MB.inverse() * gone->T_MB;
   for (Record& r : records_)

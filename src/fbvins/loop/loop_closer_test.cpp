@@ -97,17 +97,20 @@ struct Frame {
 };
 
 /// Rounds through the room looking outwards, five keyframes a second; the odometry drifts in position and yaw.
-std::vector<Frame> flight(const World& w, int keyframes, double drift_m, double drift_deg, std::uint64_t seed, double start_s = 0) {
+std::vector<Frame> flight(const World& w, int keyframes, double drift_m, double drift_deg, std::uint64_t seed,
+                          double start_s = 0) {
   Rng rng(seed);
   std::vector<Frame> frames;
   double yaw = 0;
   Vec3 offset = Vec3::Zero();
   for (int i = 0; i < keyframes; ++i) {
     const double s = start_s + 0.2 * i, a = 0.35 * s;
-    const Pose<W, B> T(Quat(Eigen::AngleAxisd(a + 0.4 * std::sin(0.5 * s), Vec3::UnitZ())) * so3_exp(Vec3(0.05 * std::sin(s), 0.04 * std::cos(0.8 * s), 0)),
+    const Pose<W, B> T(Quat(Eigen::AngleAxisd(a + 0.4 * std::sin(0.5 * s), Vec3::UnitZ())) *
+                           so3_exp(Vec3(0.05 * std::sin(s), 0.04 * std::cos(0.8 * s), 0)),
                        Vec3(1.2 * std::cos(a), 0.9 * std::sin(a), 1.4 + 0.3 * std::sin(0.7 * s)));
     const Quat turned(Eigen::AngleAxisd(yaw, Vec3::UnitZ()));
-    frames.push_back({Time{static_cast<std::int64_t>(s * 1e9)}, T, {Quat(turned * T.q), Vec3(turned * T.p + offset)}, seen(w, T, rng)});
+    frames.push_back(
+        {Time{static_cast<std::int64_t>(s * 1e9)}, T, {Quat(turned * T.q), Vec3(turned * T.p + offset)}, seen(w, T, rng)});
     yaw += drift_deg * 0.01745 * rng.normal();
     offset += drift_m * Vec3(rng.normal(), rng.normal(), rng.normal());
   }
@@ -168,7 +171,8 @@ TEST(LoopCloser, TwoIdenticalShelvesAreNotOnePlace) {
     looks.push_back(random_descriptor(shelf_rng));
   }
   for (int copy = 0; copy < 5; ++copy)
-    for (std::size_t i = 0; i < shelf.size(); ++i) w.points.push_back(shelf[i] + Vec3(0, 3.5 * copy, 0)), w.looks.push_back(looks[i]);
+    for (std::size_t i = 0; i < shelf.size(); ++i)
+      w.points.push_back(shelf[i] + Vec3(0, 3.5 * copy, 0)), w.looks.push_back(looks[i]);
   LoopOptions options;
   LoopCloser closer(rig(), options, vocabulary());
   PlaceVerifier by_sight(options.verification);

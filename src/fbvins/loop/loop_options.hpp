@@ -52,7 +52,8 @@ struct LoopOptions {
     v("sure_inliers", sure_inliers, "", "relocalisation: so many inliers need no second keyframe", 10, 10000);
     v("follow_mps", follow_mps, "m/s", "fastest motion of the smooth T_MW", 0.001, 100.0);
     v("follow_degps", follow_degps, "deg/s", "fastest turn of the smooth T_MW", 0.01, 1000.0);
-    v("optimise_after", optimise_after, "", "loops until the graph is optimised; a large map waits for a quarter of its size", 1, 100000);
+    v("optimise_after", optimise_after, "", "loops until the graph is optimised; a large map waits for a quarter of its size", 1,
+      100000);
     v("thin_above", thin_above, "", "keyframes above which redundant ones are taken out", 10, 1000000);
     v("max_keyframes", max_keyframes, "", "keyframes of the map at most", 20, 1000000);
     v("redundant_m", redundant_m, "m", "a place recognised from so near adds nothing", 0.0, 10.0);

@@ -122,7 +122,8 @@ MapKeyframe get_keyframe(Reader& r) {
   r.raw(k.place.features.data(), n * kFeatureBytes);
   r.raw(k.place.descriptors.data(), n * kDescriptorBytes);
   for (const PlaceFeature& f : k.place.features)
-    r.check(std::isfinite(f.x) && std::isfinite(f.y) && std::isfinite(f.inverse_depth) && f.sigma_xy > 0 && std::isfinite(f.sigma_inverse_depth));
+    r.check(std::isfinite(f.x) && std::isfinite(f.y) && std::isfinite(f.inverse_depth) && f.sigma_xy > 0 &&
+            std::isfinite(f.sigma_inverse_depth));
   return k;
 }
 
@@ -243,8 +244,9 @@ std::string map_as_ply(const PlaceMap& map) {
 std::string map_as_tum(const PlaceMap& map) {
   std::string lines;
   for (const MapKeyframe& k : map.keyframes())
-    fmt::format_to(std::back_inserter(lines), "{}.{:09} {:.6f} {:.6f} {:.6f} {:.8f} {:.8f} {:.8f} {:.8f}\n", k.t.ns / 1'000'000'000,
-                   k.t.ns % 1'000'000'000, k.T_MB.p.x(), k.T_MB.p.y(), k.T_MB.p.z(), k.T_MB.q.x(), k.T_MB.q.y(), k.T_MB.q.z(), k.T_MB.q.w());
+    fmt::format_to(std::back_inserter(lines), "{}.{:09} {:.6f} {:.6f} {:.6f} {:.8f} {:.8f} {:.8f} {:.8f}\n",
+                   k.t.ns / 1'000'000'000, k.t.ns % 1'000'000'000, k.T_MB.p.x(), k.T_MB.p.y(), k.T_MB.p.z(), k.T_MB.q.x(),
+                   k.T_MB.q.y(), k.T_MB.q.z(), k.T_MB.q.w());
   return lines;
 }
 

@@ -33,7 +33,11 @@ PlaceMap map_of(int keyframes, std::uint64_t seed) {
     }
     map.add(std::move(k));
     if (i > 0)
-      map.edges.push_back({KeyframeId{i - 1}, KeyframeId{i}, {so3_exp(Vec3(0, 0, 0.1)), Vec3(1, 0, 0)}, Mat6::Identity(), MapEdge::Kind::odometry});
+      map.edges.push_back({KeyframeId{i - 1},
+                           KeyframeId{i},
+                           {so3_exp(Vec3(0, 0, 0.1)), Vec3(1, 0, 0)},
+                           Mat6::Identity(),
+                           MapEdge::Kind::odometry});
   }
   return map;
 }
@@ -87,7 +91,8 @@ TEST_F(MapFile, ContentThatPassesTheChecksumIsCheckedAllTheSame) {
   Rng rng(4);
   for (int i = 0; i < 3000; ++i) {
     std::string bad = good;
-    for (int k = 0; k < 3; ++k) bad[32 + rng.below(static_cast<std::uint32_t>(good.size() - 32))] = static_cast<char>(rng.below(256));
+    for (int k = 0; k < 3; ++k)
+      bad[32 + rng.below(static_cast<std::uint32_t>(good.size() - 32))] = static_cast<char>(rng.below(256));
     if (i % 3 == 0) bad[32 + rng.below(8)] = static_cast<char>(rng.below(256));
     const std::uint64_t sum = checksum64(view(bad).subspan(32));
     std::memcpy(bad.data() + 24, &sum, sizeof sum);

@@ -32,7 +32,8 @@ struct DriftOptions {
     v("position_m", position_m, "m", "standard deviation of position after a metre of flight; grows with its root", 1e-5, 1.0);
     v("yaw_deg", yaw_deg, "deg", "standard deviation of yaw after a metre of flight; grows with its root", 1e-4, 10.0);
     v("standstill_m", standstill_m, "m", "standard deviation of position after a second; grows with its root", 1e-6, 1.0);
-    v("standstill_yaw_deg", standstill_yaw_deg, "deg", "standard deviation of yaw after a second; grows with its root", 1e-6, 10.0);
+    v("standstill_yaw_deg", standstill_yaw_deg, "deg", "standard deviation of yaw after a second; grows with its root", 1e-6,
+      10.0);
   }
 };
 

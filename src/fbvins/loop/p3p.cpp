@@ -49,11 +49,9 @@ P3pSolutions solve_p3p(const std::array<Vec3, 3>& rays, const std::array<Vec3, 3
   const double ca = j2.dot(j3), cb = j1.dot(j3), cg = j1.dot(j2);
   const double k = (a2 - c2) / b2, s = (a2 + c2) / b2, ab = a2 / b2, cc = c2 / b2;
   const std::array<double, 5> quartic{
-      (1 + k) * (1 + k) - 4 * ab * cg * cg,
-      4 * (-k * (1 + k) * cb + 2 * ab * cg * cg * cb - (1 - s) * ca * cg),
+      (1 + k) * (1 + k) - 4 * ab * cg * cg, 4 * (-k * (1 + k) * cb + 2 * ab * cg * cg * cb - (1 - s) * ca * cg),
       2 * (k * k - 1 + 2 * k * k * cb * cb + 2 * (1 - cc) * ca * ca - 4 * s * ca * cb * cg + 2 * (1 - ab) * cg * cg),
-      4 * (k * (1 - k) * cb - (1 - s) * ca * cg + 2 * cc * ca * ca * cb),
-      (k - 1) * (k - 1) - 4 * cc * ca * ca};
+      4 * (k * (1 - k) * cb - (1 - s) * ca * cg + 2 * cc * ca * ca * cb), (k - 1) * (k - 1) - 4 * cc * ca * ca};
   std::array<double, 4> roots{};
   const int n = real_roots(quartic, roots);
   for (int i = 0; i < n; ++i) {

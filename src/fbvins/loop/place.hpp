@@ -14,9 +14,9 @@ namespace fbvins {
 /// One feature of the left camera. Positions are normalised (x/z, y/z in C0), so a place needs no lens model.
 struct PlaceFeature {
   float x = 0, y = 0;
-  float inverse_depth = -1;        ///< 1/m along z of C0; negative: not known
-  float sigma_xy = 0;              ///< standard deviation of x and of y
-  float sigma_inverse_depth = 0;   ///< 1/m
+  float inverse_depth = -1;       ///< 1/m along z of C0; negative: not known
+  float sigma_xy = 0;             ///< standard deviation of x and of y
+  float sigma_inverse_depth = 0;  ///< 1/m
 
   bool has_depth() const { return inverse_depth >= 0; }
   /// Far enough from infinity to be a point.
@@ -31,8 +31,8 @@ struct Place {
   std::vector<Descriptor> descriptors;
   std::vector<PlaceFeature> features;  ///< feature i has descriptor i
   BowVector words;
-  Vec3 up_C0 = Vec3::UnitZ();          ///< away from gravity, as the odometry knew it
-  double focal_px = 460;               ///< what a pixel is in normalised units
+  Vec3 up_C0 = Vec3::UnitZ();  ///< away from gravity, as the odometry knew it
+  double focal_px = 460;       ///< what a pixel is in normalised units
 
   std::size_t size() const { return features.size(); }
 };

@@ -9,12 +9,14 @@ namespace {
 
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
-  const auto it = std::lower_bound(keyframes.begin(), keyframes.end(), id, [](const MapKeyframe& k, KeyframeId i) { return k.id < i; });
+  const auto it =
+      std::lower_bound(keyframes.begin(), keyframes.end(), id, [](const MapKeyframe& k, KeyframeId i) { return k.id < i; });
   return it != keyframes.end() && it->id == id ? &*it : nullptr;
 }
 
 MapEdge composed(const MapEdge& first, const MapEdge& second, MapEdge::Kind kind) {
-  const Mat6 cov = compose_covariance(first.T_from_to, first.information.inverse(), second.T_from_to, second.information.inverse());
+  const Mat6 cov =
+      compose_covariance(first.T_from_to, first.information.inverse(), second.T_from_to, second.information.inverse());
   const Mat6 information = cov.inverse();
   return {first.from, second.to, first.T_from_to * second.T_from_to, 0.5 * (information + information.transpose()), kind};
 }
@@ -104,7 +106,8 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
     for (const int n : neighbours[static_cast<std::size_t>(at)])
       if (!joined[static_cast<std::size_t>(n)]) joined[static_cast<std::size_t>(n)] = true, open.push_back(n);
   }
-  for (std::size_t i = 0; i < keyframes_.size(); ++i) graph.add_node(keyframes_[i].T_MB, keyframes_[i].T_WB.q, i == 0 || !joined[i]);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i)
+    graph.add_node(keyframes_[i].T_MB, keyframes_[i].T_WB.q, i == 0 || !joined[i]);
   for (const MapEdge& e : edges) {
     const int a = index_of(e.from), b = index_of(e.to);
     if (joined[static_cast<std::size_t>(a)]) graph.add_edge({a, b, e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1});

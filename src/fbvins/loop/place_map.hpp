@@ -22,9 +22,9 @@ struct MapKeyframe {
   std::uint32_t session = 0;  ///< which odometry frame W it was taken in
   Pose<W, B> T_WB;
   Pose<M, B> T_MB;
-  double path_m = 0;          ///< flown in this session until here
-  int seen_again = 0;         ///< loops that ended here
-  bool placed = true;         ///< T_MB means something: its session has found into the map
+  double path_m = 0;   ///< flown in this session until here
+  int seen_again = 0;  ///< loops that ended here
+  bool placed = true;  ///< T_MB means something: its session has found into the map
   Place place;
 };
 

@@ -36,7 +36,8 @@ bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const
   Mat3 J_c;
   J_c << d, 0, -p_c.x() * d, 0, d, -p_c.y() * d, 0, 0, -d * d;
   const Mat3 A = J_p * R * J_c;
-  const double sxy2 = static_cast<double>(c.sigma_xy) * c.sigma_xy, srho2 = static_cast<double>(c.sigma_inverse_depth) * c.sigma_inverse_depth;
+  const double sxy2 = static_cast<double>(c.sigma_xy) * c.sigma_xy,
+               srho2 = static_cast<double>(c.sigma_inverse_depth) * c.sigma_inverse_depth;
   Mat3 S = A * Vec3(sxy2, sxy2, srho2).asDiagonal() * A.transpose();
   const double qxy2 = static_cast<double>(q.sigma_xy) * q.sigma_xy;
   S(0, 0) += qxy2, S(1, 1) += qxy2;
@@ -80,8 +81,8 @@ double tilt_error_rad(const Place& query, const Place& candidate, const Mat3& R_
   return std::atan2(carried.cross(query.up_C0).norm(), carried.dot(query.up_C0));
 }
 
-std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate,
-                                            std::span<const DescriptorMatch> matches, const PlacePoseOptions& options, Rng& rng) {
+std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,
+                                            const PlacePoseOptions& options, Rng& rng) {
   Sampler sampler{query, candidate, {}};
   for (const DescriptorMatch& m : matches)
     if (at(candidate, m.b).has_point()) sampler.usable.push_back(m);

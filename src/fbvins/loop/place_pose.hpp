@@ -39,16 +39,16 @@ struct PlacePoseOptions {
 /// a: index in the query; b: index in the candidate.
 struct RelativePose {
   CameraFromCamera T_qc;
-  Mat6 information = Mat6::Zero();       ///< of (dp in the query's C0, dtheta in the candidate's C0)
+  Mat6 information = Mat6::Zero();  ///< of (dp in the query's C0, dtheta in the candidate's C0)
   std::vector<DescriptorMatch> inliers;
-  int with_depth_both = 0;               ///< inliers with depth in both views
+  int with_depth_both = 0;  ///< inliers with depth in both views
 };
 
 /// Angle between the vertical that T_qc carries over from the candidate and the query's own, rad.
 double tilt_error_rad(const Place& query, const Place& candidate, const Mat3& R_qc);
 
-std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate,
-                                            std::span<const DescriptorMatch> matches, const PlacePoseOptions& options, Rng& rng);
+std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,
+                                            const PlacePoseOptions& options, Rng& rng);
 
 /// Gauss-Newton with Huber weights from `start`; inliers empty when it does not converge.
 RelativePose refine_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,

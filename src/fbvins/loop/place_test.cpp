@@ -95,7 +95,8 @@ TEST(PlaceVerifier, FindsThePoseAndItsInformationIsHonest) {
   double nees = 0;
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
-    const Place candidate = view(c, {}, 0.5, 100 + static_cast<std::uint64_t>(run)), query = view(c, kThere, 0.5, 500 + static_cast<std::uint64_t>(run));
+    const Place candidate = view(c, {}, 0.5, 100 + static_cast<std::uint64_t>(run)),
+                query = view(c, kThere, 0.5, 500 + static_cast<std::uint64_t>(run));
     verifier.set_query(query);
     const auto found = verifier.verify(candidate);
     ASSERT_TRUE(found) << verifier.last().pose.inliers.size();

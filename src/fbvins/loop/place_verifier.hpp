@@ -56,8 +56,8 @@ struct PosePrediction {
 
 struct VerifiedPose {
   RelativePose pose;
-  int visible = 0;       ///< candidate's points inside the query's view
-  int cells = 0;         ///< of a 4x4 grid over the query's view that hold inliers
+  int visible = 0;  ///< candidate's points inside the query's view
+  int cells = 0;    ///< of a 4x4 grid over the query's view that hold inliers
   double tilt_error_rad = 0;
 };
 

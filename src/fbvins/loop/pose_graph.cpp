@@ -69,7 +69,8 @@ void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& infor
               std::vector<std::array<double, 6>>& x) {
   const auto a = static_cast<std::size_t>(e.a), b = static_cast<std::size_t>(e.b);
   const Mat6 root = Eigen::LLT<Mat6>(information).matrixU();
-  auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>{poses[a].q, poses[b].q, e.T_ab, root});
+  auto* cost =
+      new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>{poses[a].q, poses[b].q, e.T_ab, root});
   problem.AddResidualBlock(cost, nullptr, x[a].data(), x[b].data());
 }
 
@@ -123,8 +124,9 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   const double per_sigma = 180 / (std::numbers::pi * options.tilt_deg);
   for (std::size_t i = 0; i < poses_.size() && options.degrees_of_freedom == 6; ++i)
     if (used[i] && !fixed_[i])
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<GravityCost, 2, 6>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}),
-                               nullptr, x[i].data());
+      problem.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<GravityCost, 2, 6>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}), nullptr,
+          x[i].data());
   for (std::size_t i = 0; i < poses_.size(); ++i)
     if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
   ceres::Solver::Options solver;
@@ -140,7 +142,9 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     if (!used[i] || fixed_[i]) continue;
     poses_[i].p = Vec3(x[i][0], x[i][1], x[i][2]);
-    poses_[i].q = (options.degrees_of_freedom == 4 ? orientation<4>(poses_[i].q, x[i].data()) : orientation<6>(poses_[i].q, x[i].data())).normalized();
+    poses_[i].q =
+        (options.degrees_of_freedom == 4 ? orientation<4>(poses_[i].q, x[i].data()) : orientation<6>(poses_[i].q, x[i].data()))
+            .normalized();
   }
   if (report.solves++ == 0) report.initial_cost = summary.initial_cost;
   report.final_cost = summary.final_cost;

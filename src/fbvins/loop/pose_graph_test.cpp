@@ -115,7 +115,8 @@ TEST(PoseGraph, FourDegreesOfFreedomKeepRollAndPitch) {
 
 TEST(ComposeCovariance, AgreesWithSampling) {
   const Pose<B, B> A(so3_exp(Vec3(0.3, -0.5, 0.8)), Vec3(1, 2, -0.5)), C(so3_exp(Vec3(-0.2, 0.1, 0.4)), Vec3(0.4, -1, 0.3));
-  const Mat6 cov_a = information(1 / 0.02, 1 / 0.01).inverse().inverse(), cov_c = information(1 / 0.01, 1 / 0.03).inverse().inverse();
+  const Mat6 cov_a = information(1 / 0.02, 1 / 0.01).inverse().inverse(),
+             cov_c = information(1 / 0.01, 1 / 0.03).inverse().inverse();
   Rng rng(4);
   Mat6 sampled = Mat6::Zero();
   constexpr int kSamples = 20000;
@@ -145,7 +146,8 @@ TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
     map.add(std::move(k));
   }
   for (const PoseGraphEdge& e : f.edges)
-    map.edges.push_back({KeyframeId{e.a}, KeyframeId{e.b}, e.T_ab, e.information, e.loop ? MapEdge::Kind::loop : MapEdge::Kind::odometry});
+    map.edges.push_back(
+        {KeyframeId{e.a}, KeyframeId{e.b}, e.T_ab, e.information, e.loop ? MapEdge::Kind::loop : MapEdge::Kind::odometry});
   for (int i = 119; i > 0; i -= 2) map.remove(KeyframeId{i});
   ASSERT_EQ(map.size(), 60u);
   map.optimise({});

@@ -122,7 +122,8 @@ std::int32_t Vocabulary::leaf_of(const Descriptor& descriptor) const {
   std::uint16_t distance[kMaxChildren];
   while (nodes_[static_cast<std::size_t>(at)].children > 0) {
     const VocabularyNode& node = nodes_[static_cast<std::size_t>(at)];
-    hamming_distances(descriptor, descriptors_.subspan(static_cast<std::size_t>(node.first_child), static_cast<std::size_t>(node.children)),
+    hamming_distances(descriptor,
+                      descriptors_.subspan(static_cast<std::size_t>(node.first_child), static_cast<std::size_t>(node.children)),
                       distance);
     at = node.first_child + static_cast<std::int32_t>(std::min_element(distance, distance + node.children) - distance);
   }

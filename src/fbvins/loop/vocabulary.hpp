@@ -36,8 +36,8 @@ double bow_similarity(const BowVector& a, const BowVector& b);
 struct VocabularyNode {
   std::int32_t first_child = 0;  ///< 0 for a leaf
   std::int32_t children = 0;
-  std::int32_t word = -1;        ///< of a leaf
-  float idf = 0;                 ///< of a leaf: log(images / images with this word)
+  std::int32_t word = -1;  ///< of a leaf
+  float idf = 0;           ///< of a leaf: log(images / images with this word)
 };
 
 class Vocabulary {

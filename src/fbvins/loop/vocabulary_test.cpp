@@ -66,7 +66,9 @@ TEST(Vocabulary, NoisyCopiesShareWordsAndStrangersDoNot) {
 }
 
 TEST(Vocabulary, TrainingRepeatsBitForBitAndDependsOnTheSeed) {
-  const auto train = [](int seed) { return train_vocabulary("orb", images(20, 1), {.branching = 4, .depth = 3, .min_members = 10, .seed = seed}); };
+  const auto train = [](int seed) {
+    return train_vocabulary("orb", images(20, 1), {.branching = 4, .depth = 3, .min_members = 10, .seed = seed});
+  };
   const Vocabulary a = train(1), b = train(1), c = train(2);
   ASSERT_EQ(a.nodes().size(), b.nodes().size());
   EXPECT_TRUE(std::equal(a.descriptors().begin(), a.descriptors().end(), b.descriptors().begin()));

@@ -20,8 +20,8 @@ namespace fbvins {
 struct LmOptions {
   int max_iterations = 5;
   double initial_lambda = 1e-9;
-  int max_retries = 6;                  ///< steps tried at one linearisation, lambda growing tenfold
-  double min_step = 1e-6;               ///< converged when the step is smaller
+  int max_retries = 6;     ///< steps tried at one linearisation, lambda growing tenfold
+  double min_step = 1e-6;  ///< converged when the step is smaller
   /// Converged when the cost, half a chi-square, falls by less than this. Absolute, because a prior's
   /// cost has no meaningful zero; 0.05 is a third of a sigma along the one direction that still moves.
   double min_decrease = 0.05;

@@ -107,7 +107,8 @@ TEST(PointBlocks, EliminationIsTheDenseSchurComplement) {
   ASSERT_TRUE(p.points.eliminate(0, p.H, p.g));
   const int m = static_cast<int>(p.full_g.size()) - 30;
   const Eigen::MatrixXd V_inverse = p.full.bottomRightCorner(m, m).inverse();
-  const Eigen::MatrixXd H = p.full.topLeftCorner(30, 30) - p.full.topRightCorner(30, m) * V_inverse * p.full.bottomLeftCorner(m, 30);
+  const Eigen::MatrixXd H =
+      p.full.topLeftCorner(30, 30) - p.full.topRightCorner(30, m) * V_inverse * p.full.bottomLeftCorner(m, 30);
   const Eigen::VectorXd g = p.full_g.head(30) - p.full.topRightCorner(30, m) * V_inverse * p.full_g.tail(m);
   for (int c = 0; c < 30; ++c)
     for (int r = c; r < 30; ++r) EXPECT_NEAR(p.H(r, c), H(r, c), 1e-9) << r << ' ' << c;
@@ -167,7 +168,8 @@ struct Rosenbrock {
 
 TEST(LevenbergMarquardt, FindsTheEndOfRosenbrocksValley) {
   Rosenbrock problem;
-  const LmSummary summary = minimise(problem, {.max_iterations = 100, .initial_lambda = 1e-4, .min_step = 1e-12, .min_decrease = 0});
+  const LmSummary summary =
+      minimise(problem, {.max_iterations = 100, .initial_lambda = 1e-4, .min_step = 1e-12, .min_decrease = 0});
   EXPECT_TRUE(summary.usable);
   EXPECT_LT((problem.x - Eigen::Vector2d(1, 1)).norm(), 1e-6);
   EXPECT_LT(summary.final_cost, summary.initial_cost);

@@ -17,7 +17,8 @@ struct PacketMakerOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("max_imu_wait_s", max_imu_wait_s, "s", "an image goes on without its IMU readings when newer images are ahead by this", 0.0, 10.0);
+    v("max_imu_wait_s", max_imu_wait_s, "s", "an image goes on without its IMU readings when newer images are ahead by this", 0.0,
+      10.0);
     v.group("imu_buffer", imu_buffer, "IMU readings on their way to the images");
   }
 };
@@ -32,7 +33,8 @@ struct InputCounts {
 class PacketMaker {
  public:
   /// time_offset: t_imu = t_image + offset.
-  PacketMaker(const PacketMakerOptions& options, Duration time_offset) : options_(options), offset_(time_offset), imu_(options.imu_buffer) {}
+  PacketMaker(const PacketMakerOptions& options, Duration time_offset)
+      : options_(options), offset_(time_offset), imu_(options.imu_buffer) {}
 
   void push(const ImuSample& sample) { imu_.push(sample); }
   void push(StereoFrame frame);

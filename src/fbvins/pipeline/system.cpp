@@ -31,29 +31,23 @@ System::System(const Config& config, const StereoRig& rig, RunMode mode)
 System::~System() { (void)finish(); }
 
 void System::push(SensorEvent event) {
-  if (auto* sample = std::get_if<ImuSample>(&event))
-    packets_.push(*sample);
-  else
-    packets_.push(std::get<StereoFrame>(std::move(event)));
+  if (auto* sample = std::get_if<ImuSample>(&event)) packets_.push(*sample);
+  else packets_.push(std::get<StereoFrame>(std::move(event)));
   forward_packets(false);
 }
 
 void System::forward_packets(bool flush) {
   while (auto packet = packets_.next(flush)) {
-    if (mode_ == RunMode::threaded)
-      to_frontend_.push(std::move(*packet));
-    else if (failure_.empty())
-      failure_ = failure_of([&] { track(std::move(*packet)); });
+    if (mode_ == RunMode::threaded) to_frontend_.push(std::move(*packet));
+    else if (failure_.empty()) failure_ = failure_of([&] { track(std::move(*packet)); });
   }
 }
 
 void System::track(SensorPacket packet) {
   TrackedFrame frame = frontend_->process(packet, prior_for(packet.id));
   if (on_keyframe_) frame.images = std::move(packet.frame);
-  if (mode_ == RunMode::threaded)
-    to_estimator_.push(std::move(frame));
-  else
-    estimate(frame);
+  if (mode_ == RunMode::threaded) to_estimator_.push(std::move(frame));
+  else estimate(frame);
 }
 
 void System::estimate(const TrackedFrame& frame) {

@@ -38,7 +38,9 @@ double sway_mps2(double t_s) {
 /// A textured wall two metres ahead, seen by a camera that slides along it.
 class Wall {
  public:
-  Wall() : wall_(render_texture(480, kHeight, NoiseTexture(3, 24), [](const Vec2& p) { return p; }, 120, 45)) {}
+  Wall()
+      : wall_(render_texture(
+            480, kHeight, NoiseTexture(3, 24), [](const Vec2& p) { return p; }, 120, 45)) {}
 
   std::shared_ptr<const Image> seen_from(double x_m) const {
     auto image = std::make_shared<Image>(kWidth, kHeight);
@@ -47,8 +49,8 @@ class Wall {
     const double part = shift - whole;
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u)
-        image->at(u, v) = static_cast<std::uint8_t>(
-            std::lround((1 - part) * wall_.at(u + whole, v) + part * wall_.at(u + whole + 1, v)));
+        image->at(u, v) =
+            static_cast<std::uint8_t>(std::lround((1 - part) * wall_.at(u + whole, v) + part * wall_.at(u + whole + 1, v)));
     }
     return image;
   }
@@ -65,8 +67,7 @@ std::vector<SensorEvent> sway(int images) {
     const double t_s = 0.005 * k;
     const Time t{5 * kMs * k};
     events.push_back(ImuSample{t, Vec3::Zero(), Vec3(sway_mps2(t_s), -9.81, 0)});
-    if (k % 10 == 0)
-      events.push_back(StereoFrame{t, wall.seen_from(sway_m(t_s)), wall.seen_from(sway_m(t_s) + kBaseline)});
+    if (k % 10 == 0) events.push_back(StereoFrame{t, wall.seen_from(sway_m(t_s)), wall.seen_from(sway_m(t_s) + kBaseline)});
   }
   return events;
 }
@@ -151,10 +152,8 @@ TEST_P(Modes, AnExceptionInAStageIsAnErrorOfFinish) {
     const auto fail_at_the_third = [&] {
       if (++calls == 3) throw std::runtime_error("the disk is full");
     };
-    if (first_callback)
-      system.on_tracked_frame([&](const TrackedFrame&) { fail_at_the_third(); });
-    else
-      system.on_odometry([&](const Odometry&) { fail_at_the_third(); });
+    if (first_callback) system.on_tracked_frame([&](const TrackedFrame&) { fail_at_the_third(); });
+    else system.on_odometry([&](const Odometry&) { fail_at_the_third(); });
     for (const SensorEvent& event : recording()) system.push(event);
     const Result<void> end = system.finish();
     ASSERT_FALSE(end.ok());

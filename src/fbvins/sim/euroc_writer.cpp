@@ -21,8 +21,11 @@ std::string encode(const std::vector<const std::uint8_t*>& rows, int width, int 
   std::string bytes;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
-  png_set_write_fn(png, &bytes,
-      [](png_structp p, png_bytep data, png_size_t size) { static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<const char*>(data), size); },
+  png_set_write_fn(
+      png, &bytes,
+      [](png_structp p, png_bytep data, png_size_t size) {
+        static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<const char*>(data), size);
+      },
       [](png_structp) {});
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(rows.size()), depth, PNG_COLOR_TYPE_GRAY,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -37,7 +40,9 @@ std::string encode(const std::vector<const std::uint8_t*>& rows, int width, int 
   return bytes;
 }
 
-Error cannot_write(const fs::path& path) { return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path.string())}; }
+Error cannot_write(const fs::path& path) {
+  return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path.string())};
+}
 
 Result<void> write_file(const fs::path& path, const std::string& bytes) {
   std::ofstream file(path, std::ios::binary);
@@ -57,27 +62,36 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
 std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, double rate_hz) {
   std::string text = "# Drawn by fbvins simulate.\nsensor_type: camera\ncomment: simulated camera\n\n" + matrix_text(q, p);
   text += fmt::format("\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n", rate_hz, camera.width(), camera.height());
-  std::visit([&](const auto& m) {
-    using Model = std::decay_t<decltype(m)>;
-    text += fmt::format("intrinsics: [{}, {}, {}, {}]\n", m.fx, m.fy, m.cx, m.cy);
-    if constexpr (std::is_same_v<Model, PinholeRadtan>)
-      text += fmt::format("distortion_model: radial-tangential\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2, m.p1, m.p2);
-    else
-      text += fmt::format("distortion_model: equidistant\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2, m.k3, m.k4);
-  }, camera.model());
+  std::visit(
+      [&](const auto& m) {
+        using Model = std::decay_t<decltype(m)>;
+        text += fmt::format("intrinsics: [{}, {}, {}, {}]\n", m.fx, m.fy, m.cx, m.cy);
+        if constexpr (std::is_same_v<Model, PinholeRadtan>)
+          text += fmt::format("distortion_model: radial-tangential\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2,
+                              m.p1, m.p2);
+        else
+          text +=
+              fmt::format("distortion_model: equidistant\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2, m.k3, m.k4);
+      },
+      camera.model());
   return text;
 }
 
 std::string imu_yaml(const ImuNoise& n) {
-  return "# Simulated by fbvins simulate.\nsensor_type: imu\ncomment: simulated IMU\n\n" + matrix_text(Quat::Identity(), Vec3::Zero()) +
-         fmt::format("rate_hz: {}\n\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-                     n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz, n.accel_random_walk_mps3_rthz);
+  return "# Simulated by fbvins simulate.\nsensor_type: imu\ncomment: simulated IMU\n\n" +
+         matrix_text(Quat::Identity(), Vec3::Zero()) +
+         fmt::format(
+             "rate_hz: {}\n\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+             n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
+             n.accel_random_walk_mps3_rthz);
 }
 
 std::string imu_csv(const std::vector<ImuSample>& samples) {
-  std::string text = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  std::string text =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
   for (const ImuSample& s : samples)
-    text += fmt::format("{},{},{},{},{},{},{}\n", s.t.ns, s.gyro_radps.x(), s.gyro_radps.y(), s.gyro_radps.z(), s.accel_mps2.x(), s.accel_mps2.y(), s.accel_mps2.z());
+    text += fmt::format("{},{},{},{},{},{},{}\n", s.t.ns, s.gyro_radps.x(), s.gyro_radps.y(), s.gyro_radps.z(), s.accel_mps2.x(),
+                        s.accel_mps2.y(), s.accel_mps2.z());
   return text;
 }
 
@@ -88,8 +102,10 @@ std::string truth_csv(const std::vector<TrueState>& truth) {
   for (const TrueState& s : truth) {
     const auto &p = s.T_WB.p, &v = s.v_WB, &bg = s.bias.gyro_radps, &ba = s.bias.accel_mps2;
     const Quat& q = s.T_WB.q;
-    text += fmt::format("{},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{:.9f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.6f},{:.6f},{:.6f}\n", s.t.ns,
-                        p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), bg.x(), bg.y(), bg.z(), ba.x(), ba.y(), ba.z());
+    text += fmt::format(
+        "{},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{:.9f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.6f},{:.6f},{:.6f}\n",
+        s.t.ns, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), bg.x(), bg.y(), bg.z(), ba.x(), ba.y(),
+        ba.z());
   }
   return text;
 }
@@ -113,18 +129,21 @@ std::string depth_png(const std::vector<float>& depth_m, int width, int height) 
 /// The small files; images follow.
 Result<void> write_texts(const Simulation& s, const fs::path& mav0, const EurocWriterOptions& options) {
   std::error_code error;
-  for (const char* folder : {"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"}) fs::create_directories(mav0 / folder, error);
+  for (const char* folder : {"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"})
+    fs::create_directories(mav0 / folder, error);
   if (options.depth) fs::create_directories(mav0 / "depth0", error);
   if (error) return cannot_write(mav0);
   const Pose<B, C0>& left = s.rig.T_BC0;
   const Pose<B, C1>& right = s.rig.T_BC1;
-  for (const auto& [path, text] : {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(s.rig.left, left.q, left.p, s.rig.image_rate_hz)},
-                                   {mav0 / "cam1/sensor.yaml", camera_yaml(s.rig.right, right.q, right.p, s.rig.image_rate_hz)},
-                                   {mav0 / "imu0/sensor.yaml", imu_yaml(s.rig.imu_noise)},
-                                   {mav0 / "imu0/data.csv", imu_csv(s.imu.samples)},
-                                   {mav0 / "state_groundtruth_estimate0/sensor.yaml", "sensor_type: visual-inertial\ncomment: the simulation's exact state\n" + matrix_text(Quat::Identity(), Vec3::Zero())},
-                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(s.imu.truth)},
-                                   {mav0 / "body.yaml", std::string("comment: simulated by fbvins simulate\n")}})
+  for (const auto& [path, text] :
+       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(s.rig.left, left.q, left.p, s.rig.image_rate_hz)},
+        {mav0 / "cam1/sensor.yaml", camera_yaml(s.rig.right, right.q, right.p, s.rig.image_rate_hz)},
+        {mav0 / "imu0/sensor.yaml", imu_yaml(s.rig.imu_noise)},
+        {mav0 / "imu0/data.csv", imu_csv(s.imu.samples)},
+        {mav0 / "state_groundtruth_estimate0/sensor.yaml",
+         "sensor_type: visual-inertial\ncomment: the simulation's exact state\n" + matrix_text(Quat::Identity(), Vec3::Zero())},
+        {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(s.imu.truth)},
+        {mav0 / "body.yaml", std::string("comment: simulated by fbvins simulate\n")}})
     if (Result<void> done = write_file(path, text); !done) return done;
   if (options.landmarks) return write_file(mav0 / "landmarks.csv", landmarks_csv(s));
   return {};
@@ -135,7 +154,10 @@ Result<void> write_images(const DrawnFrame& drawn, const fs::path& mav0) {
   const std::string left = fmt::format("{}.png", drawn.frame.t.ns), right = fmt::format("{}.png", drawn.right_stamp.ns);
   if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*drawn.frame.left)); !done) return done;
   if (!drawn.depth_left_m.empty())
-    if (Result<void> done = write_file(mav0 / "depth0" / left, depth_png(drawn.depth_left_m, drawn.frame.left->width(), drawn.frame.left->height())); !done) return done;
+    if (Result<void> done = write_file(mav0 / "depth0" / left,
+                                       depth_png(drawn.depth_left_m, drawn.frame.left->width(), drawn.frame.left->height()));
+        !done)
+      return done;
   return write_file(mav0 / "cam1/data" / right, encode_png(*drawn.frame.right));
 }
 
@@ -149,7 +171,8 @@ std::string encode_png(const Image& image) {
 
 std::string encode_png16(const std::vector<std::uint16_t>& values, int width, int height) {
   std::vector<std::uint8_t> bytes;  // PNG has the high byte first
-  for (std::uint16_t v : values) bytes.insert(bytes.end(), {static_cast<std::uint8_t>(v >> 8), static_cast<std::uint8_t>(v & 255)});
+  for (std::uint16_t v : values)
+    bytes.insert(bytes.end(), {static_cast<std::uint8_t>(v >> 8), static_cast<std::uint8_t>(v & 255)});
   std::vector<const std::uint8_t*> rows;
   for (int y = 0; y < height; ++y) rows.push_back(bytes.data() + static_cast<std::ptrdiff_t>(y) * width * 2);
   return encode(rows, width, 16);

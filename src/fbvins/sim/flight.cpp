@@ -50,8 +50,7 @@ double fade_in(double t, double start, double length) {
 }
 
 Vec3 random_waypoint(const FlightOptions& o, Rng& rng) {
-  return {o.extent_x_m * rng.uniform(-0.5, 0.5), o.extent_y_m * rng.uniform(-0.5, 0.5),
-          kLowest_m + o.extent_z_m * rng.uniform()};
+  return {o.extent_x_m * rng.uniform(-0.5, 0.5), o.extent_y_m * rng.uniform(-0.5, 0.5), kLowest_m + o.extent_z_m * rng.uniform()};
 }
 
 std::vector<Vec3> corners_of(const FlightOptions& o, const std::vector<Vec3>& tour, Rng& rng) {
@@ -176,8 +175,7 @@ Quat vehicle_attitude(const Vec3& a_WB, double yaw_rad) {
   return Quat(R).normalized();
 }
 
-SplineTrajectory make_flight(const FlightOptions& options, const Quat& q_VB, const std::vector<Vec3>& tour,
-                             std::uint64_t seed) {
+SplineTrajectory make_flight(const FlightOptions& options, const Quat& q_VB, const std::vector<Vec3>& tour, std::uint64_t seed) {
   Rng rng(seed, 11);
   if (options.kind == "hover") return hover(options, q_VB, rng);
   if (options.kind == "handheld") return handheld(options, q_VB, rng);

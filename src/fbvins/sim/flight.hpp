@@ -50,8 +50,7 @@ struct FlightOptions {
 Quat body_in_vehicle(const StereoRig& rig, double camera_pitch_deg);
 
 /// `tour`: the corners that a flight of kind "tour" visits again and again (z included).
-SplineTrajectory make_flight(const FlightOptions& options, const Quat& q_VB, const std::vector<Vec3>& tour,
-                             std::uint64_t seed);
+SplineTrajectory make_flight(const FlightOptions& options, const Quat& q_VB, const std::vector<Vec3>& tour, std::uint64_t seed);
 
 /// Attitude of a multirotor: thrust along the acceleration it needs, nose at yaw.
 Quat vehicle_attitude(const Vec3& a_WB, double yaw_rad);

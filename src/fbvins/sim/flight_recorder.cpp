@@ -22,10 +22,25 @@ Vec2 place_in_pixel(int i) {
 
 FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, const SplineTrajectory& flight,
                                const Vec3& world_from_flight, std::shared_ptr<const World> world)
-    : options_(options), flight_(flight), world_from_flight_(world_from_flight), world_(std::move(world)),
-      bake_(bake_light(*world_, options.world.ambient)), left_{Renderer(rig.left, *world_), ImageSensor(options.camera, rig.left, 1.0, static_cast<std::uint64_t>(options.seed) * 2), rig.T_BC0, {}, {}, {}, false},
-      right_{Renderer(rig.right, *world_), ImageSensor(options.camera, rig.right, options.camera.right_gain, static_cast<std::uint64_t>(options.seed) * 2 + 1),
-             rig.T_BC1.cast_frames<B, C0>(), {}, {}, {}, false} {}
+    : options_(options),
+      flight_(flight),
+      world_from_flight_(world_from_flight),
+      world_(std::move(world)),
+      bake_(bake_light(*world_, options.world.ambient)),
+      left_{Renderer(rig.left, *world_),
+            ImageSensor(options.camera, rig.left, 1.0, static_cast<std::uint64_t>(options.seed) * 2),
+            rig.T_BC0,
+            {},
+            {},
+            {},
+            false},
+      right_{Renderer(rig.right, *world_),
+             ImageSensor(options.camera, rig.right, options.camera.right_gain, static_cast<std::uint64_t>(options.seed) * 2 + 1),
+             rig.T_BC1.cast_frames<B, C0>(),
+             {},
+             {},
+             {},
+             false} {}
 
 /// Sums the radiance over an exposure that is centred at t.
 void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples) {

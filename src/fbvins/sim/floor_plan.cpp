@@ -18,8 +18,7 @@ void extend(std::vector<WallRun>& runs, const Vec2& a, const Vec2& b) {
   if (!runs.empty() && (runs.back().b - a).norm() < 1e-9 &&
       ((runs.back().b - runs.back().a).normalized() - (b - a).normalized()).norm() < 1e-9)
     runs.back().b = b;
-  else
-    runs.push_back({a, b});
+  else runs.push_back({a, b});
 }
 
 }  // namespace
@@ -73,8 +72,10 @@ FloorPlan corridor_ring(double length_x_m, double length_y_m, double height_m) {
   const double hx = 0.5 * length_x_m, hy = 0.5 * length_y_m, w = 1.1, door = 0.65, deep = 5.0;
   FloorPlan plan;
   plan.height_m = height_m;
-  plan.rooms = {{-hx - w, -hy - w, hx + w, -hy + w}, {-hx - w, hy - w, hx + w, hy + w},   // along x
-                {-hx - w, -hy - w, -hx + w, hy + w}, {hx - w, -hy - w, hx + w, hy + w}};  // along y
+  plan.rooms = {{-hx - w, -hy - w, hx + w, -hy + w},
+                {-hx - w, hy - w, hx + w, hy + w},  // along x
+                {-hx - w, -hy - w, -hx + w, hy + w},
+                {hx - w, -hy - w, hx + w, hy + w}};  // along y
   const double z = 1.4;
   const auto add_room = [&](double x, double y, double side) {  // through a door in the wall of an x corridor
     const double wall = y + side * w, inner = wall + side * 0.3, far = inner + side * deep;

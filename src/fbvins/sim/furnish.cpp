@@ -69,7 +69,8 @@ int Furnisher::texture(Surface surface) {
 }
 
 int Furnisher::plain_or(std::initializer_list<Surface> choices) {
-  if (rng_.uniform() < options_.plain_share) return texture(rng_.uniform() < options_.weave_share ? Surface::weave : Surface::plaster);
+  if (rng_.uniform() < options_.plain_share)
+    return texture(rng_.uniform() < options_.weave_share ? Surface::weave : Surface::plaster);
   return texture(*(choices.begin() + rng_.below(static_cast<std::uint32_t>(choices.size()))));
 }
 
@@ -79,8 +80,8 @@ bool Furnisher::is_clear(const Vec3& p, double radius) const {
 }
 
 /// A rectangle on a wall: metres along it and above the floor.
-void Furnisher::add_panel(const Wall& wall, double from, double to, double low, double high, int texture,
-                          double texture_m, double offset, float tint) {
+void Furnisher::add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m,
+                          double offset, float tint) {
   const Vec3 x = wall.along.normalized();
   Facet f;
   f.corner = wall.corner + from * x + Vec3(0, 0, high - world_.plan.height_m) + offset * wall.inward();
@@ -140,7 +141,8 @@ void Furnisher::repeat_along(const Wall& wall) {
   const double low = rng_.uniform(0.2, 1.0), high = low + rng_.uniform(0.7, 1.4);
   const int what = plain_or({Surface::panel, Surface::metal, Surface::books, Surface::cardboard});
   const double from = rng_.uniform(0, 0.3) * wall.length(), to = wall.length() * rng_.uniform(0.6, 1.0);
-  for (double at = from; at + width < to; at += pitch) add_panel(wall, at, at + width, low, std::min(high, world_.plan.height_m - 0.1), what, width, 0.02, 1);
+  for (double at = from; at + width < to; at += pitch)
+    add_panel(wall, at, at + width, low, std::min(high, world_.plan.height_m - 0.1), what, width, 0.02, 1);
 }
 
 void Furnisher::add_door(const Wall& wall, double at) {
@@ -161,16 +163,17 @@ void Furnisher::add_window(const Wall& wall, double at) {
   for (int i = 0; i < columns; ++i)
     for (int j = 0; j < rows; ++j) {
       const double w = width / columns, h = (high - 0.9) / rows;
-      add_panel(wall, at + i * w + 0.03, at + (i + 1) * w - 0.03, 0.9 + j * h + 0.03, 0.9 + (j + 1) * h - 0.03, glass, 2.0, 0.02, 0.3f);
+      add_panel(wall, at + i * w + 0.03, at + (i + 1) * w - 0.03, 0.9 + j * h + 0.03, 0.9 + (j + 1) * h - 0.03, glass, 2.0, 0.02,
+                0.3f);
       world_.facets.back().emission = static_cast<float>(options_.window_glow);
       world_.facets.back().lamp_group = kAmbient;
     }
-  for (double x = at; x + 0.05 < at + width; x += 0.065)
-    add_panel(wall, x, x + 0.04, 0.15, 0.75, glass, 2.0, 0.06, 1.2f);
+  for (double x = at; x + 0.05 < at + width; x += 0.065) add_panel(wall, x, x + 0.04, 0.15, 0.75, glass, 2.0, 0.06, 1.2f);
   add_panel(wall, at, at + width, 0.12, 0.78, texture(Surface::metal), 2.0, 0.03, 0.35f);
 }
 
-void Furnisher::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m, int layer) {
+void Furnisher::lay_on_floor(const Vec3& centre, double angle, double length, double width, int texture, double texture_m,
+                             int layer) {
   const Vec3 x(std::cos(angle), std::sin(angle), 0), y(-x.y(), x.x(), 0);
   Facet f;
   f.u = length * x;
@@ -195,7 +198,8 @@ void Furnisher::cover_floors() {
     int layer = 0;
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
       const double size = rng_.uniform(0.8, 1.6), angle = rng_.uniform(0, kPi);
-      lay_on_floor(somewhere(), angle, size, size, texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture), size, layer++);
+      lay_on_floor(somewhere(), angle, size, size, texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture), size,
+                   layer++);
     }
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
       const double length = rng_.uniform(1.0, 3.0), angle = rng_.uniform(0, kPi);
@@ -222,11 +226,13 @@ void Furnisher::hang_pictures() {
       const double width = rng_.uniform(0.2, 1.1), height = width * rng_.uniform(0.6, 1.45);
       if (width + 0.1 > wall.length() || height + 0.4 > world_.plan.height_m) continue;
       const double from = rng_.uniform(0, wall.length() - width), low = rng_.uniform(0.3, world_.plan.height_m - height - 0.05);
-      const Surface kinds[] = {Surface::page, Surface::poster, Surface::picture, Surface::picture, Surface::panel, Surface::cloth, Surface::mat, Surface::checker};
+      const Surface kinds[] = {Surface::page,  Surface::poster, Surface::picture, Surface::picture,
+                               Surface::panel, Surface::cloth,  Surface::mat,     Surface::checker};
       const int what = texture(kinds[rng_.below(8)]);
       // Each a little further out than the last, so that overlapping ones do not flicker.
       const double out = 0.022 + 0.0008 * i;
-      add_panel(wall, from - 0.02, from + width + 0.02, low - 0.02, low + height + 0.02, texture(Surface::wood), 1.0, out - 0.0004, 0.5f);
+      add_panel(wall, from - 0.02, from + width + 0.02, low - 0.02, low + height + 0.02, texture(Surface::wood), 1.0,
+                out - 0.0004, 0.5f);
       add_panel(wall, from, from + width, low, low + height, what, std::max(width, height), out, tint());
     }
   }
@@ -234,14 +240,16 @@ void Furnisher::hang_pictures() {
 
 bool Furnisher::add_shelf(const Wall& wall, double at) {
   const Vec3 x = wall.along.normalized();
-  const double width = rng_.uniform(0.6, 1.2), depth = 0.17, height = std::min(rng_.uniform(1.0, 2.1), world_.plan.height_m - 0.2);
+  const double width = rng_.uniform(0.6, 1.2), depth = 0.17,
+               height = std::min(rng_.uniform(1.0, 2.1), world_.plan.height_m - 0.2);
   if (at + width > wall.length()) return false;
   BoxShape shape;
   shape.centre = Vec3(wall.corner.x(), wall.corner.y(), 0.5 * height) + (at + 0.5 * width) * x + (depth + 0.03) * wall.inward();
   shape.half = Vec3(0.5 * width, depth, 0.5 * height);
   shape.q = about_z(std::atan2(x.y(), x.x()));
   if (!is_clear(shape.centre, shape.half.norm())) return false;
-  add_box(world_.facets, shape, plain_or({Surface::books, Surface::books, Surface::metal, Surface::panel}), tint(), std::max(0.7, width));
+  add_box(world_.facets, shape, plain_or({Surface::books, Surface::books, Surface::metal, Surface::panel}), tint(),
+          std::max(0.7, width));
   return true;
 }
 
@@ -252,11 +260,15 @@ bool Furnisher::add_table(const Vec3& floor_point) {
   const int top = plain_or({Surface::wood}), leg = texture(Surface::metal);
   add_box(world_.facets, {floor_point + Vec3(0, 0, h), Vec3(w, d, 0.02), q}, top, tint(), 1.0);
   for (int i = 0; i < 4; ++i)
-    add_box(world_.facets, {floor_point + q * Vec3((i & 1 ? 0.9 : -0.9) * w, (i & 2 ? 0.9 : -0.9) * d, 0.5 * h), Vec3(0.025, 0.025, 0.5 * h - 0.02), q}, leg, 0.8f, 0.4);
+    add_box(world_.facets,
+            {floor_point + q * Vec3((i & 1 ? 0.9 : -0.9) * w, (i & 2 ? 0.9 : -0.9) * d, 0.5 * h),
+             Vec3(0.025, 0.025, 0.5 * h - 0.02), q},
+            leg, 0.8f, 0.4);
   for (int i = 0; i < 4; ++i) {
     const double a = rng_.uniform(0.04, 0.14), b = rng_.uniform(0.04, 0.14), c = rng_.uniform(0.03, 0.2);
     const double x = rng_.uniform(-0.75, 0.75) * w, y = rng_.uniform(-0.7, 0.7) * d;
-    add_box(world_.facets, {floor_point + Vec3(0, 0, h + 0.02 + c) + q * Vec3(x, y, 0), Vec3(a, b, c), about_z(rng_.uniform(0, kPi))},
+    add_box(world_.facets,
+            {floor_point + Vec3(0, 0, h + 0.02 + c) + q * Vec3(x, y, 0), Vec3(a, b, c), about_z(rng_.uniform(0, kPi))},
             plain_or({Surface::cardboard, Surface::books, Surface::panel, Surface::page, Surface::picture}), tint(), 0.35);
   }
   return true;
@@ -265,12 +277,14 @@ bool Furnisher::add_table(const Vec3& floor_point) {
 bool Furnisher::add_box_stack(const Vec3& floor_point) {
   double z = 0;
   for (int i = 1 + static_cast<int>(rng_.below(3)); i > 0; --i) {
-    const double a = std::exp(rng_.uniform(std::log(0.1), std::log(0.4))), b = a * rng_.uniform(0.6, 1.5), c = std::exp(rng_.uniform(std::log(0.08), std::log(0.45)));
+    const double a = std::exp(rng_.uniform(std::log(0.1), std::log(0.4))), b = a * rng_.uniform(0.6, 1.5),
+                 c = std::exp(rng_.uniform(std::log(0.08), std::log(0.45)));
     const Vec3 centre = floor_point + Vec3(0, 0, z + c);
     if (!is_clear(centre, Vec3(a, b, c).norm())) return i > 1;
     add_box(world_.facets, {centre, Vec3(a, b, c), about_z(rng_.uniform(0, kPi))},
-            plain_or({Surface::cardboard, Surface::cardboard, Surface::panel, Surface::wood, Surface::metal, Surface::cloth, Surface::poster, Surface::picture}), tint(),
-            std::max(0.4, 2 * std::max({a, b, c})));
+            plain_or({Surface::cardboard, Surface::cardboard, Surface::panel, Surface::wood, Surface::metal, Surface::cloth,
+                      Surface::poster, Surface::picture}),
+            tint(), std::max(0.4, 2 * std::max({a, b, c})));
     z += 2 * c;
   }
   return true;
@@ -280,7 +294,8 @@ bool Furnisher::add_pillar(const Vec3& floor_point) {
   const double h = 0.5 * world_.plan.height_m;
   for (double z = 0; z < 2 * h; z += 0.4)
     if (!is_clear(floor_point + Vec3(0, 0, z), 0.25)) return false;
-  add_box(world_.facets, {floor_point + Vec3(0, 0, h), Vec3(0.17, 0.17, h), Quat::Identity()}, 1 + kVariants * static_cast<int>(Surface::concrete), 1.0f, 1.2);
+  add_box(world_.facets, {floor_point + Vec3(0, 0, h), Vec3(0.17, 0.17, h), Quat::Identity()},
+          1 + kVariants * static_cast<int>(Surface::concrete), 1.0f, 1.2);
   return true;
 }
 
@@ -294,10 +309,14 @@ void Furnisher::add_pipes(const Wall& wall) {
     const double r = rng_.uniform(0.015, 0.07);
     z -= 2.2 * r;
     const Vec3 centre = foot + 0.5 * wall.along + Vec3(0, 0, z) + (r + 0.04) * wall.inward();
-    if (is_clear(Vec3(centre.x(), centre.y(), z), 0.0)) add_box(world_.facets, {centre, Vec3(0.5 * wall.length(), r, r), q}, what, tint(), 0.6);
+    if (is_clear(Vec3(centre.x(), centre.y(), z), 0.0))
+      add_box(world_.facets, {centre, Vec3(0.5 * wall.length(), r, r), q}, what, tint(), 0.6);
   }
   const double r = rng_.uniform(0.02, 0.06), at = rng_.uniform(0.1, 0.9);
-  add_box(world_.facets, {foot + at * wall.along + Vec3(0, 0, 0.5 * world_.plan.height_m) + (r + 0.03) * wall.inward(), Vec3(r, r, 0.5 * world_.plan.height_m), q}, what, tint(), 0.6);
+  add_box(world_.facets,
+          {foot + at * wall.along + Vec3(0, 0, 0.5 * world_.plan.height_m) + (r + 0.03) * wall.inward(),
+           Vec3(r, r, 0.5 * world_.plan.height_m), q},
+          what, tint(), 0.6);
 }
 
 void Furnisher::place_furniture() {
@@ -360,14 +379,16 @@ void Furnisher::add_movers() {
       const int coat = texture(Surface::cloth), trousers = texture(Surface::carpet), skin = texture(Surface::plaster);
       for (double side : {-1.0, 1.0}) {
         add_box(mover.facets, {Vec3(0, 0.11 * side, 0.42), Vec3(0.09, 0.08, 0.42), about_z(0)}, trousers, 0.8f, 0.6);
-        add_box(mover.facets, {Vec3(0.02, 0.29 * side, 1.13), Vec3(0.06, 0.06, 0.32), so3_exp(Vec3(0.1 * side, 0.25 * side, 0))}, coat, 0.9f, 0.6);
+        add_box(mover.facets, {Vec3(0.02, 0.29 * side, 1.13), Vec3(0.06, 0.06, 0.32), so3_exp(Vec3(0.1 * side, 0.25 * side, 0))},
+                coat, 0.9f, 0.6);
       }
       add_box(mover.facets, {Vec3(0, 0, 1.14), Vec3(0.13, 0.22, 0.31), about_z(0)}, coat, 1.0f, 0.6);
       add_box(mover.facets, {Vec3(0, 0, 1.6), Vec3(0.1, 0.08, 0.12), about_z(0)}, skin, 0.9f, 0.4);
       mover.radius_m = 0.45;
     } else {
       const Vec3 half(rng_.uniform(0.15, 0.4), rng_.uniform(0.15, 0.4), rng_.uniform(0.2, 0.6));
-      add_box(mover.facets, {Vec3(0, 0, rng_.uniform(0.6, 1.6)), half, about_z(0)}, plain_or({Surface::cardboard, Surface::poster, Surface::panel}), 1.0f, 0.8);
+      add_box(mover.facets, {Vec3(0, 0, rng_.uniform(0.6, 1.6)), half, about_z(0)},
+              plain_or({Surface::cardboard, Surface::poster, Surface::panel}), 1.0f, 0.8);
       mover.radius_m = 0.6;
     }
     world_.movers.push_back(std::move(mover));

@@ -25,10 +25,10 @@ class Furnisher {
  public:
   Furnisher(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed);
 
-  void build_shell();      ///< walls, floor, ceiling
+  void build_shell();  ///< walls, floor, ceiling
   void hang_pictures();
   void place_furniture();
-  void cover_floors();     ///< mats, tapes, papers
+  void cover_floors();  ///< mats, tapes, papers
   void hang_lamps();
   void add_movers();
 
@@ -41,8 +41,8 @@ class Furnisher {
   int texture(Surface surface);
   int plain_or(std::initializer_list<Surface> choices);
   bool is_clear(const Vec3& p, double radius) const;
-  void add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m,
-                 double offset, float tint);
+  void add_panel(const Wall& wall, double from, double to, double low, double high, int texture, double texture_m, double offset,
+                 float tint);
   void repeat_along(const Wall& wall);
   void add_door(const Wall& wall, double at);
   bool add_shelf(const Wall& wall, double at);

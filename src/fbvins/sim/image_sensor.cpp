@@ -20,7 +20,8 @@ inline std::uint32_t mix(std::uint32_t x) {
 }
 
 /// Grey values with noise: the sum of eight bytes is normal enough.
-FBVINS_KERNEL void digitise(const float* light, int count, float shot, float read2, float black, std::uint32_t key, std::uint8_t* out) {
+FBVINS_KERNEL void digitise(const float* light, int count, float shot, float read2, float black, std::uint32_t key,
+                            std::uint8_t* out) {
   for (int i = 0; i < count; ++i) {
     const std::uint32_t a = mix(static_cast<std::uint32_t>(i) * 2u + key), b = mix(static_cast<std::uint32_t>(i) * 2u + 1u + key);
     const std::uint32_t pairs = (a & 0x00ff00ffu) + (a >> 8 & 0x00ff00ffu) + (b & 0x00ff00ffu) + (b >> 8 & 0x00ff00ffu);
@@ -41,14 +42,20 @@ FBVINS_KERNEL void blur_row(const float* in, float* out, int count, float w0, fl
 }  // namespace
 
 ImageSensor::ImageSensor(const CameraModelOptions& options, const Camera& camera, double brightness, std::uint64_t seed)
-    : options_(options), width_(camera.width()), height_(camera.height()), brightness_(brightness), seed_(seed),
-      exposure_ms_(options.max_exposure_ms), log_product_(std::log(options.max_exposure_ms)) {
+    : options_(options),
+      width_(camera.width()),
+      height_(camera.height()),
+      brightness_(brightness),
+      seed_(seed),
+      exposure_ms_(options.max_exposure_ms),
+      log_product_(std::log(options.max_exposure_ms)) {
   falloff_.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
       const double r2 = camera.undistort(Vec2(x, y)).value_or(Vec2::Zero()).squaredNorm();
       // 1 on the axis, 1 - vignetting at 45 degrees.
-      falloff_[static_cast<std::size_t>(y) * width_ + x] = static_cast<float>(1 / (1 + r2 * options.vignetting / (1 - options.vignetting)));
+      falloff_[static_cast<std::size_t>(y) * width_ + x] =
+          static_cast<float>(1 / (1 + r2 * options.vignetting / (1 - options.vignetting)));
     }
 }
 
@@ -80,8 +87,10 @@ Image ImageSensor::expose(std::vector<float>& radiance, std::int64_t frame) {
 
   Image image(width_, height_);
   const float read = static_cast<float>(options_.read_noise * gain_);
-  const std::uint32_t key = mix(static_cast<std::uint32_t>(seed_ ^ seed_ >> 32) + mix(static_cast<std::uint32_t>(frame) + 0x9e3779b9u));
-  digitise(radiance.data(), width_ * height_, static_cast<float>(options_.shot_noise * gain_), read * read, static_cast<float>(options_.black_level), key, image.row(0));
+  const std::uint32_t key =
+      mix(static_cast<std::uint32_t>(seed_ ^ seed_ >> 32) + mix(static_cast<std::uint32_t>(frame) + 0x9e3779b9u));
+  digitise(radiance.data(), width_ * height_, static_cast<float>(options_.shot_noise * gain_), read * read,
+           static_cast<float>(options_.black_level), key, image.row(0));
   follow(mean / (options_.sensitivity * exposure_ms_ * gain_), 1 - std::exp(-1 / std::max(options_.exposure_lag_frames, 1e-3)));
   return image;
 }
@@ -102,7 +111,8 @@ void ImageSensor::blur(std::vector<float>& image) {
     blur_row(padded.data() + 2, rows_.data() + static_cast<std::ptrdiff_t>(y + 2) * stride, width_, w0, w1, w2, 1);
   }
   for (int y = 0; y < height_; ++y)
-    blur_row(rows_.data() + static_cast<std::ptrdiff_t>(y + 2) * stride, image.data() + static_cast<std::ptrdiff_t>(y) * width_, width_, w0, w1, w2, stride);
+    blur_row(rows_.data() + static_cast<std::ptrdiff_t>(y + 2) * stride, image.data() + static_cast<std::ptrdiff_t>(y) * width_,
+             width_, w0, w1, w2, stride);
 }
 
 /// Scatters a share of the light widely: box means of two sizes, computed on blocks of 16 pixels.
@@ -125,16 +135,20 @@ void ImageSensor::add_glare(std::vector<float>& image) const {
       for (int x = 0; x < nx; ++x) {
         float sum = 0;
         for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx) sum += old[static_cast<std::size_t>(std::clamp(y + dy, 0, ny - 1) * nx + std::clamp(x + dx, 0, nx - 1))];
+          for (int dx = -1; dx <= 1; ++dx)
+            sum += old[static_cast<std::size_t>(std::clamp(y + dy, 0, ny - 1) * nx + std::clamp(x + dx, 0, nx - 1))];
         blocks[static_cast<std::size_t>(y * nx + x)] = sum / 9;
       }
   }
-  const float share = static_cast<float>(options_.glare), everywhere = static_cast<float>(total / static_cast<double>(image.size()));
+  const float share = static_cast<float>(options_.glare),
+              everywhere = static_cast<float>(total / static_cast<double>(image.size()));
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
       const float fx = (static_cast<float>(x) + 0.5f) / kBlock - 0.5f, fy = (static_cast<float>(y) + 0.5f) / kBlock - 0.5f;
-      const int ix = std::clamp(static_cast<int>(std::floor(fx)), 0, nx - 2), iy = std::clamp(static_cast<int>(std::floor(fy)), 0, ny - 2);
-      const float u = std::clamp(fx - static_cast<float>(ix), 0.0f, 1.0f), v = std::clamp(fy - static_cast<float>(iy), 0.0f, 1.0f);
+      const int ix = std::clamp(static_cast<int>(std::floor(fx)), 0, nx - 2),
+                iy = std::clamp(static_cast<int>(std::floor(fy)), 0, ny - 2);
+      const float u = std::clamp(fx - static_cast<float>(ix), 0.0f, 1.0f),
+                  v = std::clamp(fy - static_cast<float>(iy), 0.0f, 1.0f);
       const float* b = &blocks[static_cast<std::size_t>(iy * nx + ix)];
       const float near = (1 - v) * ((1 - u) * b[0] + u * b[1]) + v * ((1 - u) * b[nx] + u * b[nx + 1]);
       float& p = image[static_cast<std::size_t>(y) * width_ + x];

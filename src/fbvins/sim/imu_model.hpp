@@ -57,7 +57,7 @@ struct SimulatedImu {
 };
 
 /// Samples at noise.rate_hz over the whole trajectory; the first is at `start`.
-SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise, const ImuModelOptions& options,
-                          Time start, std::uint64_t seed);
+SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise, const ImuModelOptions& options, Time start,
+                          std::uint64_t seed);
 
 }  // namespace fbvins

@@ -62,10 +62,12 @@ TEST(ImuModel, AllanDeviationIsThatOfTheCalibration) {
     for (std::size_t n : {1u, 4u, 20u}) {
       const double tau = static_cast<double>(n) / noise.rate_hz;
       EXPECT_NEAR(allan_deviation(gyro, n) / (noise.gyro_noise_density_radps_rthz / std::sqrt(tau)), 1, 0.03) << axis << " " << n;
-      EXPECT_NEAR(allan_deviation(accel, n) / (noise.accel_noise_density_mps2_rthz / std::sqrt(tau)), 1, 0.03) << axis << " " << n;
+      EXPECT_NEAR(allan_deviation(accel, n) / (noise.accel_noise_density_mps2_rthz / std::sqrt(tau)), 1, 0.03)
+          << axis << " " << n;
     }
     const std::size_t n = 4000;  // 20 s
-    const double walk = noise.gyro_random_walk_radps2_rthz * std::sqrt(20.0 / 3), white = noise.gyro_noise_density_radps_rthz / std::sqrt(20.0);
+    const double walk = noise.gyro_random_walk_radps2_rthz * std::sqrt(20.0 / 3),
+                 white = noise.gyro_noise_density_radps_rthz / std::sqrt(20.0);
     EXPECT_NEAR(allan_deviation(gyro, n) / std::hypot(walk, white), 1, 0.25) << axis;
   }
 }

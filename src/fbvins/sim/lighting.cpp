@@ -30,7 +30,8 @@ std::vector<Blocker> blockers_of(const World& world) {
     const double nn = n.squaredNorm();
     blockers.push_back({f.corner.cast<float>(), n.cast<float>(), Vec3(f.v.cross(n) / nn).cast<float>(),
                         Vec3(n.cross(f.u) / nn).cast<float>(), f.centre().cast<float>(),
-                        static_cast<float>(0.5 * (f.u + f.v).norm() > 0.5 * (f.u - f.v).norm() ? 0.5 * (f.u + f.v).norm() : 0.5 * (f.u - f.v).norm())});
+                        static_cast<float>(0.5 * (f.u + f.v).norm() > 0.5 * (f.u - f.v).norm() ? 0.5 * (f.u + f.v).norm()
+                                                                                               : 0.5 * (f.u - f.v).norm())});
   }
   return blockers;
 }
@@ -58,7 +59,8 @@ double lamp_light(const Lamp& lamp, const Vec3& x, const Vec3& n) {
 
 Vec3 node_position(const Facet& f, int i, int j, const LightGrid& g) {
   // A little inside, so that edges shared with other surfaces do not shadow themselves.
-  const double a = std::clamp(static_cast<double>(i) / (g.nx - 1), 0.01, 0.99), b = std::clamp(static_cast<double>(j) / (g.ny - 1), 0.01, 0.99);
+  const double a = std::clamp(static_cast<double>(i) / (g.nx - 1), 0.01, 0.99),
+               b = std::clamp(static_cast<double>(j) / (g.ny - 1), 0.01, 0.99);
   return f.corner + a * f.u + b * f.v + 0.006 * f.normal();
 }
 
@@ -122,7 +124,9 @@ void bake_facet(const World& world, const std::vector<Blocker>& blockers, double
 int nodes_over(double length) { return std::clamp(static_cast<int>(std::lround(length / kNode_m)) + 1, 2, 25); }
 
 /// A value that changes without rhythm, 0..1, the same for the same step.
-double hashed(std::uint64_t seed, std::int64_t step) { return Rng(seed * 1000003u + static_cast<std::uint64_t>(step), 41).uniform(); }
+double hashed(std::uint64_t seed, std::int64_t step) {
+  return Rng(seed * 1000003u + static_cast<std::uint64_t>(step), 41).uniform();
+}
 
 }  // namespace
 
@@ -165,7 +169,9 @@ LightState light_at(const LightOptions& options, const World& world, double t_s,
     state.group = {0.35, 0.35, 0.5};
     const FloorRect& r = world.plan.rooms.front();
     const double angle = 0.6 * t_s + 6.28 * hashed(seed, 0);
-    state.carried = Lamp{Vec3(0.5 * (r.x0 + r.x1) + 0.33 * (r.x1 - r.x0) * std::cos(angle), 0.5 * (r.y0 + r.y1) + 0.33 * (r.y1 - r.y0) * std::sin(angle), 1.9), 3.0 * k * options.level, kLampsA};
+    state.carried = Lamp{Vec3(0.5 * (r.x0 + r.x1) + 0.33 * (r.x1 - r.x0) * std::cos(angle),
+                              0.5 * (r.y0 + r.y1) + 0.33 * (r.y1 - r.y0) * std::sin(angle), 1.9),
+                         3.0 * k * options.level, kLampsA};
   }
   for (double& g : state.group) g *= options.level;
   return state;
@@ -176,7 +182,9 @@ namespace {
 void pack(const std::vector<float>& light, const LightGrid& g, MixedLight::Facet& out, std::vector<std::uint32_t>& words) {
   float largest = 1e-6f;
   for (float v : light) largest = std::max(largest, v);
-  const auto byte = [&](int i, int j) { return static_cast<std::uint32_t>(light[static_cast<std::size_t>(j * g.nx + i)] / largest * 255.0f + 0.5f); };
+  const auto byte = [&](int i, int j) {
+    return static_cast<std::uint32_t>(light[static_cast<std::size_t>(j * g.nx + i)] / largest * 255.0f + 0.5f);
+  };
   out.first = static_cast<int>(words.size());
   out.cells_x = g.nx - 1;
   out.cells_y = g.ny - 1;
@@ -217,7 +225,8 @@ void mix_light(const LightBake& bake, const World& world, const std::vector<Face
         const Vec3 n = facets[k].normal();
         for (int j = 0; j < g.ny; ++j)
           for (int i = 0; i < g.nx; ++i)
-            light[static_cast<std::size_t>(j * g.nx + i)] += static_cast<float>(lamp_light(*lamps.carried, node_position(facets[k], i, j, g), n));
+            light[static_cast<std::size_t>(j * g.nx + i)] +=
+                static_cast<float>(lamp_light(*lamps.carried, node_position(facets[k], i, j, g), n));
       }
     }
     pack(light, g, mixed.facets[k], mixed.words);

@@ -23,8 +23,8 @@ struct LightGrid {
 };
 
 struct LightBake {
-  std::vector<LightGrid> grids;                           ///< one a static facet
-  std::array<std::vector<float>, kLightGroups> nodes;     ///< irradiance by group
+  std::vector<LightGrid> grids;                        ///< one a static facet
+  std::array<std::vector<float>, kLightGroups> nodes;  ///< irradiance by group
 };
 
 LightBake bake_light(const World& world, double ambient);
@@ -53,9 +53,9 @@ LightState light_at(const LightOptions& options, const World& world, double t_s,
 /// one row of (nx - 1) x (ny - 1) cells a facet.
 struct MixedLight {
   struct Facet {
-    int first = 0;      ///< word
+    int first = 0;  ///< word
     int cells_x = 1, cells_y = 1;
-    float scale = 0;    ///< irradiance of 255
+    float scale = 0;  ///< irradiance of 255
   };
   std::vector<Facet> facets;
   std::vector<std::uint32_t> words;

@@ -145,7 +145,8 @@ Canvas plaster(Rng& rng) {
   Canvas canvas;
   const Fractal noise(rng, 4, 6, 0.7f);
   const float base = between(rng, 0.5, 0.8), contrast = between(rng, 0.012, 0.04);
-  shade(canvas, [&](int x, int y, float) { return base * (1 + contrast * 2 * noise(static_cast<float>(x), static_cast<float>(y))); });
+  shade(canvas,
+        [&](int x, int y, float) { return base * (1 + contrast * 2 * noise(static_cast<float>(x), static_cast<float>(y))); });
   scratches(canvas, rng, 6, 0.1f);
   return canvas;
 }
@@ -171,7 +172,8 @@ Canvas concrete(Rng& rng) {
   shade(canvas, [&](int x, int y, float) { return base * (1 + 0.9f * noise(static_cast<float>(x), static_cast<float>(y))); });
   stains(canvas, rng, 25, 0.35f);
   scratches(canvas, rng, 30, 0.4f);
-  for (int i = 0; i < 120; ++i) disc(canvas, between(rng, 0, S), between(rng, 0, S), between(rng, 1, 3), between(rng, 1, 3), base * between(rng, 0.3, 1.3));
+  for (int i = 0; i < 120; ++i)
+    disc(canvas, between(rng, 0, S), between(rng, 0, S), between(rng, 1, 3), between(rng, 1, 3), base * between(rng, 0.3, 1.3));
   return canvas;
 }
 
@@ -260,7 +262,9 @@ Canvas page(Rng& rng) {
     if (rng.uniform() < 0.5) {
       const int tall = pick(rng, 40, 110), x0 = pick(rng, 28, 200), x1 = x0 + pick(rng, 80, 260);
       fill(canvas, x0, y, x1, std::min(S - 12, y + tall), between(rng, 0.2, 0.7));
-      for (int i = 0; i < 12; ++i) disc(canvas, between(rng, x0, x1), between(rng, y, std::min(S - 20, y + tall)), between(rng, 3, 25), between(rng, 3, 18), between(rng, 0.05, 0.9));
+      for (int i = 0; i < 12; ++i)
+        disc(canvas, between(rng, x0, x1), between(rng, y, std::min(S - 20, y + tall)), between(rng, 3, 25), between(rng, 3, 18),
+             between(rng, 0.05, 0.9));
       y += tall + 14;
     }
     y += 12;
@@ -323,7 +327,8 @@ Canvas cardboard(Rng& rng) {
   for (int i = pick(rng, 1, 4); i > 0; --i) {
     const int x = pick(rng, 10, 330), y = pick(rng, 10, 380), w = pick(rng, 80, 170), h = pick(rng, 50, 120);
     fill(canvas, x, y, x + w, y + h, 0.9f);
-    for (int line = y + 8; line + 12 < y + h; line += pick(rng, 14, 26)) text_line(canvas, rng, x + 8, line, x + w - 6, pick(rng, 8, 18), 0.08f);
+    for (int line = y + 8; line + 12 < y + h; line += pick(rng, 14, 26))
+      text_line(canvas, rng, x + 8, line, x + w - 6, pick(rng, 8, 18), 0.08f);
   }
   text_line(canvas, rng, 20, pick(rng, 420, 450), 480, pick(rng, 20, 50), base * 0.3f);
   scratches(canvas, rng, 25, 0.3f);
@@ -337,7 +342,8 @@ Canvas metal(Rng& rng) {
   const LatticeNoise brushed(rng, 4, 256), wide(rng, 3, 6);
   const float base = between(rng, 0.2, 0.6);
   shade(canvas, [&](int x, int y, float) {
-    return base * (1 + 0.12f * brushed(static_cast<float>(x), static_cast<float>(y)) + 0.3f * wide(static_cast<float>(x), static_cast<float>(y)));
+    return base * (1 + 0.12f * brushed(static_cast<float>(x), static_cast<float>(y)) +
+                   0.3f * wide(static_cast<float>(x), static_cast<float>(y)));
   });
   const int n = pick(rng, 1, 3);
   for (int i = 0; i < n; ++i)
@@ -345,9 +351,12 @@ Canvas metal(Rng& rng) {
       const int x = i * S / n, y = j * S / n, w = S / n;
       fill(canvas, x, y, x + w, y + 4, base * 0.3f);
       fill(canvas, x, y, x + 4, y + w, base * 0.3f);
-      for (int r = 0; r < 4; ++r) disc(canvas, static_cast<float>(x + (r & 1 ? w - 16 : 18)), static_cast<float>(y + (r & 2 ? w - 16 : 18)), 5, 5, base * 1.6f);
+      for (int r = 0; r < 4; ++r)
+        disc(canvas, static_cast<float>(x + (r & 1 ? w - 16 : 18)), static_cast<float>(y + (r & 2 ? w - 16 : 18)), 5, 5,
+             base * 1.6f);
       if (rng.uniform() < 0.6)
-        for (int slot = 0; slot < 7; ++slot) fill(canvas, x + w / 4, y + w / 3 + slot * 12, x + 3 * w / 4, y + w / 3 + slot * 12 + 5, base * 0.2f);
+        for (int slot = 0; slot < 7; ++slot)
+          fill(canvas, x + w / 4, y + w / 3 + slot * 12, x + 3 * w / 4, y + w / 3 + slot * 12 + 5, base * 0.2f);
     }
   scratches(canvas, rng, 40, 0.5f);
   stains(canvas, rng, 12, 0.4f);
@@ -421,7 +430,8 @@ Canvas marks(Rng& rng) {
   Canvas canvas;
   fill(canvas, 0, 0, S, S, between(rng, 0.03, 0.1));
   for (int i = 0; i < 90; ++i) {
-    const float cx = between(rng, 0, S), cy = between(rng, 0, S), a = between(rng, 0, 6.28), w = between(rng, 8, 26), h = between(rng, 6, 16);
+    const float cx = between(rng, 0, S), cy = between(rng, 0, S), a = between(rng, 0, 6.28), w = between(rng, 8, 26),
+                h = between(rng, 6, 16);
     const float tone = between(rng, 0.7, 0.95), c = std::cos(a), s = std::sin(a);
     for (int y = static_cast<int>(cy - 30); y < static_cast<int>(cy + 30); ++y)
       for (int x = static_cast<int>(cx - 30); x < static_cast<int>(cx + 30); ++x) {
@@ -459,7 +469,8 @@ Canvas mat(Rng& rng) {
       y += std::sin(a);
       for (int o = -17; o <= 17; ++o) {
         const float edge = std::abs(o) > 14 ? 0.9f : std::abs(o) < 2 && k % 24 < 12 ? 0.92f : 0.2f;
-        canvas.at(static_cast<int>(x - static_cast<float>(o) * std::sin(a)) & (S - 1), static_cast<int>(y + static_cast<float>(o) * std::cos(a)) & (S - 1)) = edge;
+        canvas.at(static_cast<int>(x - static_cast<float>(o) * std::sin(a)) & (S - 1),
+                  static_cast<int>(y + static_cast<float>(o) * std::cos(a)) & (S - 1)) = edge;
       }
     }
   }

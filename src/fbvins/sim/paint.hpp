@@ -8,24 +8,24 @@
 namespace fbvins {
 
 enum class Surface {
-  plaster,    ///< nearly plain
-  weave,      ///< fine threads, the same everywhere: corners that cannot be told apart
+  plaster,  ///< nearly plain
+  weave,    ///< fine threads, the same everywhere: corners that cannot be told apart
   concrete,
   wood,
   brick,
   tiles,
   carpet,
-  page,       ///< text and pictures
-  poster,     ///< shapes and large letters
-  picture,    ///< like a photograph: structure at all scales
+  page,     ///< text and pictures
+  poster,   ///< shapes and large letters
+  picture,  ///< like a photograph: structure at all scales
   cardboard,
   metal,
   books,
   cloth,
-  panel,      ///< switches, lamps and labels of a machine
-  marks,      ///< dark tape with light scraps on it
-  checker,    ///< a calibration board
-  mat,        ///< a play mat: roads, houses, signs
+  panel,    ///< switches, lamps and labels of a machine
+  marks,    ///< dark tape with light scraps on it
+  checker,  ///< a calibration board
+  mat,      ///< a play mat: roads, houses, signs
   count
 };
 

@@ -60,8 +60,10 @@ inline void locate(float s, float t, std::int32_t level, std::int32_t& index, fl
 }
 
 inline float blend(std::uint32_t word, float fx, float fy) {
-  const float p = static_cast<float>(static_cast<std::int32_t>(word & 255u)), q = static_cast<float>(static_cast<std::int32_t>(word >> 8 & 255u));
-  const float r = static_cast<float>(static_cast<std::int32_t>(word >> 16 & 255u)), s = static_cast<float>(static_cast<std::int32_t>(word >> 24));
+  const float p = static_cast<float>(static_cast<std::int32_t>(word & 255u)),
+              q = static_cast<float>(static_cast<std::int32_t>(word >> 8 & 255u));
+  const float r = static_cast<float>(static_cast<std::int32_t>(word >> 16 & 255u)),
+              s = static_cast<float>(static_cast<std::int32_t>(word >> 24));
   const float top = p + fx * (q - p), low = r + fx * (s - r);
   return top + fy * (low - top);
 }

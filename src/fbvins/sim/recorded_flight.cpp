@@ -15,9 +15,7 @@ namespace fbvins {
 namespace {
 
 /// lambda of blend_second_differences for a crossover frequency.
-double lambda_of(double crossover_hz, double dt_s) {
-  return std::pow(2 * std::numbers::pi * crossover_hz * dt_s, -4.0);
-}
+double lambda_of(double crossover_hz, double dt_s) { return std::pow(2 * std::numbers::pi * crossover_hz * dt_s, -4.0); }
 
 /// Pose at t between the two points around it: linear in position, one rotation.
 Pose<W, B> between(const std::vector<TrajectoryPoint>& points, Time t) {
@@ -113,13 +111,15 @@ Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, dou
   const double lambda = lambda_of(3 * crossover_hz, dt);
   std::vector<Quat> q{poses.front().q};
   std::vector<Vec3> turned{Vec3::Zero()};  // rotation vector, summed up: smooth as it were a position
-  for (std::size_t k = 1; k < poses.size(); ++k) turned.push_back(turned.back() + so3_log(poses[k - 1].q.conjugate() * poses[k].q));
+  for (std::size_t k = 1; k < poses.size(); ++k)
+    turned.push_back(turned.back() + so3_log(poses[k - 1].q.conjugate() * poses[k].q));
   const std::vector<Vec3> smooth = blend_second_differences(turned, none, lambda);
   for (std::size_t k = 1; k < poses.size(); ++k) q.push_back((q.back() * so3_exp(smooth[k] - smooth[k - 1])).normalized());
   return RecordedFlight{spline_through(dt, blend_second_differences(positions_of(poses), none, lambda), q), points.front().t, {}};
 }
 
-Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, const std::vector<ImuSample>& all, double crossover_hz) {
+Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, const std::vector<ImuSample>& all,
+                                 double crossover_hz) {
   if (points.size() < 2) return too_short(0);
   RecordedFlight recorded;
   std::vector<ImuSample> imu;

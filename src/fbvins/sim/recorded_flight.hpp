@@ -14,8 +14,8 @@ namespace fbvins {
 
 struct RecordedFlight {
   SplineTrajectory flight;
-  Time start;         ///< where the spline's time is 0
-  SimulatedImu imu;   ///< empty without a real IMU
+  Time start;        ///< where the spline's time is 0
+  SimulatedImu imu;  ///< empty without a real IMU
 };
 
 /// From a trajectory alone: smoothed below `crossover_hz` * 3, made uniform.

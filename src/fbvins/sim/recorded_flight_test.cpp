@@ -54,7 +54,8 @@ TEST(RecordedFlight, WithItsImuTheFlightIsFoundAgain) {
   const Recording r = record(0.002);
   const auto again = fly_again(r.points, r.imu.samples, 1.0);
   ASSERT_TRUE(again) << again.error().message;
-  EXPECT_EQ(again->imu.samples[100].accel_mps2, r.imu.samples[100 + (again->start.ns - r.imu.samples[0].t.ns) / 5'000'000].accel_mps2);
+  EXPECT_EQ(again->imu.samples[100].accel_mps2,
+            r.imu.samples[100 + (again->start.ns - r.imu.samples[0].t.ns) / 5'000'000].accel_mps2);
   for (double t = 1; t < 18; t += 0.3) {
     const MotionState m = again->flight.at(t), truth = r.flight.at(t + (again->start - r.imu.samples[0].t).seconds());
     EXPECT_LT((m.T_WB.p - truth.T_WB.p).norm(), 0.004) << t;

@@ -48,8 +48,11 @@ void store(float* out, const Vec3& v) {
 }  // namespace
 
 Renderer::Renderer(const Camera& camera, const World& world)
-    : world_(world), width_(camera.width()), height_(camera.height()),
-      tiles_x_((width_ + kTile - 1) / kTile), tiles_y_((height_ + kTile - 1) / kTile) {
+    : world_(world),
+      width_(camera.width()),
+      height_(camera.height()),
+      tiles_x_((width_ + kTile - 1) / kTile),
+      tiles_y_((height_ + kTile - 1) / kTile) {
   make_rays(camera);
 }
 
@@ -78,7 +81,8 @@ void Renderer::make_rays(const Camera& camera) {
         ray_y_[index * kRays + k] = y;
         x0 = std::min(x0, x), x1 = std::max(x1, x), y0 = std::min(y0, y), y1 = std::max(y1, y);
       }
-      const Vec2 c(tx * kTile + 3.5, ty * kTile + 3.5), px = ray(c.x() + 1, c.y()) - ray(c.x(), c.y()), py = ray(c.x(), c.y() + 1) - ray(c.x(), c.y());
+      const Vec2 c(tx * kTile + 3.5, ty * kTile + 3.5), px = ray(c.x() + 1, c.y()) - ray(c.x(), c.y()),
+                                                        py = ray(c.x(), c.y() + 1) - ray(c.x(), c.y());
       tile.dx[0] = static_cast<float>(px.x()), tile.dx[1] = static_cast<float>(py.x());
       tile.dy[0] = static_cast<float>(px.y()), tile.dy[1] = static_cast<float>(py.y());
       const float margin = 3.0f * static_cast<float>(std::max(px.norm(), py.norm()));  // shift within the pixel, lines in motion
@@ -101,14 +105,16 @@ void Renderer::look(const Instant& instant, const std::vector<Facet>& facets) {
     if (!(c > 1e-4 * std::sqrt(nn))) continue;  // its back, or edge on
     const Vec3 corner = -(R_CW * s), u = R_CW * f.u, v = R_CW * f.v;
     View view;
-    if (!project_bounds({corner, Vec3(corner + u), Vec3(corner + u + v), Vec3(corner + v)}, view.x0, view.y0, view.x1, view.y1)) continue;
+    if (!project_bounds({corner, Vec3(corner + u), Vec3(corner + u + v), Vec3(corner + v)}, view.x0, view.y0, view.x1, view.y1))
+      continue;
     const Vec3 m = -n / c, dual_u = f.v.cross(n) / nn, dual_v = n.cross(f.u) / nn;
     store(view.m, R_CW * m);
     store(view.a, R_CW * Vec3(dual_u + dual_u.dot(s) * m));
     store(view.b, R_CW * Vec3(dual_v + dual_v.dot(s) * m));
     view.nearest_w = 0;
     for (const Vec3& p : {corner, Vec3(corner + u), Vec3(corner + u + v), Vec3(corner + v)})
-      view.nearest_w = std::max(view.nearest_w, p.z() > kNear_m ? static_cast<float>(1 / p.z()) : static_cast<float>(1 / kNear_m));
+      view.nearest_w =
+          std::max(view.nearest_w, p.z() > kNear_m ? static_cast<float>(1 / p.z()) : static_cast<float>(1 / kNear_m));
     view.facet = static_cast<int>(i);
     views_.push_back(view);
   }
@@ -134,7 +140,8 @@ void Renderer::distribute(int first_row, int last_row) {
         Tile& t = tiles_[static_cast<std::size_t>(ty) * tiles_x_ + tx];
         if (largest_over(view.m, t.x0, t.y0, t.x1, t.y1) < t.occluder_w) continue;
         bool outside = false, covers = true;
-        for (const float* edge : {static_cast<const float*>(view.a), static_cast<const float*>(view.b), static_cast<const float*>(ma), static_cast<const float*>(mb)}) {
+        for (const float* edge : {static_cast<const float*>(view.a), static_cast<const float*>(view.b),
+                                  static_cast<const float*>(ma), static_cast<const float*>(mb)}) {
           outside = outside || largest_over(edge, t.x0, t.y0, t.x1, t.y1) < 0;
           covers = covers && smallest_over(edge, t.x0, t.y0, t.x1, t.y1) >= 0;
         }
@@ -164,7 +171,8 @@ void Renderer::add(const Instant& instant, const std::vector<Facet>& facets, con
   }
 }
 
-void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight) {
+void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light,
+                         float weight) {
   const Tile& tile = tiles_[static_cast<std::size_t>(index)];
   const std::size_t first = static_cast<std::size_t>(index) * kRays;
   alignas(64) float x[kRays], y[kRays];
@@ -246,14 +254,16 @@ void Renderer::radiance(std::vector<float>& image) const {
   image.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x)
-      image[static_cast<std::size_t>(y) * width_ + x] = sum_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
+      image[static_cast<std::size_t>(y) * width_ + x] =
+          sum_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
 }
 
 void Renderer::depth(std::vector<float>& image) const {
   image.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x)
-      image[static_cast<std::size_t>(y) * width_ + x] = depth_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
+      image[static_cast<std::size_t>(y) * width_ + x] =
+          depth_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
 }
 
 }  // namespace fbvins

@@ -22,9 +22,9 @@ namespace fbvins {
 struct Instant {
   Quat q_WC = Quat::Identity();
   Vec3 p_WC = Vec3::Zero();
-  Vec3 w_WC_C = Vec3::Zero();  ///< rad/s, for lines read one after the other
-  Vec3 v_WC = Vec3::Zero();    ///< m/s, in W
-  double line_s = 0;           ///< time from line to line; 0: all at once
+  Vec3 w_WC_C = Vec3::Zero();    ///< rad/s, for lines read one after the other
+  Vec3 v_WC = Vec3::Zero();      ///< m/s, in W
+  double line_s = 0;             ///< time from line to line; 0: all at once
   Vec2 shift_px = Vec2::Zero();  ///< where in the pixel the ray passes, for antialiasing
 };
 
@@ -51,8 +51,8 @@ class Renderer {
     int facet;
   };
   struct Tile {
-    float x0, y0, x1, y1;      ///< of its rays on the plane z = 1, with a margin
-    float dx[2], dy[2];        ///< d(x, y) / d(pixel)
+    float x0, y0, x1, y1;  ///< of its rays on the plane z = 1, with a margin
+    float dx[2], dy[2];    ///< d(x, y) / d(pixel)
     float occluder_w = 0;
     std::vector<int> views;
   };
@@ -60,7 +60,8 @@ class Renderer {
   void look(const Instant& instant, const std::vector<Facet>& facets);
   void distribute(int first_row, int last_row);
   void draw_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
-  void add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const int* ids, int id, float weight, float* sum) const;
+  void add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const int* ids, int id,
+                         float weight, float* sum) const;
 
   const World& world_;
   int width_, height_, tiles_x_, tiles_y_;
@@ -68,7 +69,7 @@ class Renderer {
   std::vector<Tile> tiles_;
   std::vector<float> row_y0_, row_y1_, column_x0_, column_x1_;
   std::vector<View> views_;
-  std::vector<float> sum_, depth_;    ///< tile by tile
+  std::vector<float> sum_, depth_;  ///< tile by tile
 };
 
 }  // namespace fbvins

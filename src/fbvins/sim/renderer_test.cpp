@@ -72,7 +72,9 @@ TEST(Renderer, EdgesAreWhereTheDistortedCameraSeesThem) {
     // The edge's column where it crosses this very row.
     Vec2 exact = *px;
     for (double dz = -0.02; dz <= 0.02; dz += 0.0005)
-      if (const auto p = camera.project(instant.q_WC.conjugate() * (Vec3(3, 0, z + dz) - instant.p_WC)); p && std::abs(p->y() - row) < std::abs(exact.y() - row)) exact = *p;
+      if (const auto p = camera.project(instant.q_WC.conjugate() * (Vec3(3, 0, z + dz) - instant.p_WC));
+          p && std::abs(p->y() - row) < std::abs(exact.y() - row))
+        exact = *p;
     EXPECT_NEAR(edge_column(image, camera.width(), row), exact.x(), 0.15) << "z = " << z;
     ++checked;
   }

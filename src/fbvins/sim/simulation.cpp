@@ -55,7 +55,8 @@ std::vector<Time> frame_times(const SimulationOptions& o, Time start, double dur
 }
 
 FloorPlan plan_for(const SimulationOptions& o, const std::vector<Vec3>& path) {
-  if (o.world.kind == "corridors") return corridor_ring(o.flight.extent_x_m, o.flight.extent_y_m, std::max(o.world.height_m, 2.6));
+  if (o.world.kind == "corridors")
+    return corridor_ring(o.flight.extent_x_m, o.flight.extent_y_m, std::max(o.world.height_m, 2.6));
   return room_around(path, o.world.margin_m, o.world.height_m);
 }
 
@@ -88,7 +89,8 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
   if (Result<void> valid = validate(o); !valid) return valid.error();
   const bool is_recorded = !o.recorded.trajectory.empty();
   if (o.world.kind == "corridors" && (is_recorded || o.flight.kind != "tour"))
-    return Error{ErrorCode::invalid_argument, "world.kind=corridors needs flight.kind=tour: other flights would pass through walls"};
+    return Error{ErrorCode::invalid_argument,
+                 "world.kind=corridors needs flight.kind=tour: other flights would pass through walls"};
   if (!is_recorded && !o.recorded.imu.empty())
     return Error{ErrorCode::invalid_argument, "recorded.imu is given without recorded.trajectory"};
   Result<StereoRig> rig = rig_of(o);

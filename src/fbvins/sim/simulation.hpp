@@ -87,7 +87,7 @@ struct Simulation {
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
-  std::vector<Time> frames;         ///< of the images, on the IMU's clock
+  std::vector<Time> frames;               ///< of the images, on the IMU's clock
   Vec3 world_from_flight = Vec3::Zero();  ///< added to the flight's positions: a recorded one has its origin anywhere
   std::shared_ptr<const World> world;
   std::shared_ptr<FlightRecorder> recorder;

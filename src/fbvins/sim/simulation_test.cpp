@@ -36,7 +36,9 @@ TEST(Simulation, EveryPresetIsValidAndHasItsOwnName) {
     names.insert(name);
   }
   EXPECT_EQ(names.size(), simulation_presets().size());
-  for (const char* name : {"normal", "dim", "flicker", "switching", "moving-light", "weak-texture", "moving-objects", "glare", "fast"}) EXPECT_TRUE(names.count(name)) << name;
+  for (const char* name :
+       {"normal", "dim", "flicker", "switching", "moving-light", "weak-texture", "moving-objects", "glare", "fast"})
+    EXPECT_TRUE(names.count(name)) << name;
   EXPECT_FALSE(simulation_preset("sunny"));
 }
 

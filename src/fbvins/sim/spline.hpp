@@ -36,11 +36,11 @@ std::array<double, k + 1> bspline_basis(double u) {
 /// Everything that a rigid body does at an instant.
 struct MotionState {
   Pose<W, B> T_WB;
-  Vec3 v_WB = Vec3::Zero();      ///< m/s, in W
-  Vec3 a_WB = Vec3::Zero();      ///< m/s^2, in W
-  Vec3 j_WB = Vec3::Zero();      ///< jerk, m/s^3, in W
-  Vec3 w_WB_B = Vec3::Zero();    ///< rad/s, in B
-  Vec3 dw_WB_B = Vec3::Zero();   ///< angular acceleration, rad/s^2, in B
+  Vec3 v_WB = Vec3::Zero();     ///< m/s, in W
+  Vec3 a_WB = Vec3::Zero();     ///< m/s^2, in W
+  Vec3 j_WB = Vec3::Zero();     ///< jerk, m/s^3, in W
+  Vec3 w_WB_B = Vec3::Zero();   ///< rad/s, in B
+  Vec3 dw_WB_B = Vec3::Zero();  ///< angular acceleration, rad/s^2, in B
 
   /// Reading of an ideal accelerometer, in B.
   Vec3 specific_force(double gravity_mps2 = kSimGravity_mps2) const {

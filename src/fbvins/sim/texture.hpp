@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-inline constexpr int kTextureLevels = 10;                       ///< 512, 256, ..., 1 texels a side
+inline constexpr int kTextureLevels = 10;  ///< 512, 256, ..., 1 texels a side
 inline constexpr int kTextureSize = 1 << (kTextureLevels - 1);
 /// Words before level l in a texture.
 constexpr int mip_offset(int level) {

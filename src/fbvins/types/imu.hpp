@@ -11,8 +11,8 @@ namespace fbvins {
 /// One reading of the IMU, in B.
 struct ImuSample {
   Time t;
-  Vec3 gyro_radps = Vec3::Zero();   ///< angular rate, rad/s
-  Vec3 accel_mps2 = Vec3::Zero();   ///< specific force (at rest: +g upwards), m/s^2
+  Vec3 gyro_radps = Vec3::Zero();  ///< angular rate, rad/s
+  Vec3 accel_mps2 = Vec3::Zero();  ///< specific force (at rest: +g upwards), m/s^2
 };
 
 /// The readings between two images: first.t and last.t are the two image stamps (interpolated),

@@ -13,7 +13,7 @@ namespace fbvins {
 
 /// Where one keyframe's body is as seen from another's.
 struct LoopConstraint {
-  KeyframeId from, to;           ///< `to` is the newer one
+  KeyframeId from, to;  ///< `to` is the newer one
   Pose<B, B> T_from_to;
   Mat6 information = Mat6::Zero();  ///< of (dp in the body of `from`, dtheta in the body of `to`)
   int inliers = 0;
@@ -27,10 +27,10 @@ struct CorrectedKeyframe {
 };
 
 struct LoopStats {
-  int keyframes = 0;      ///< in the map
-  int candidates = 0;     ///< places looked at closely for this keyframe
-  int accepted = 0;       ///< of them that became constraints
-  int refused = 0;        ///< verified by sight, but the odometry knows better
+  int keyframes = 0;   ///< in the map
+  int candidates = 0;  ///< places looked at closely for this keyframe
+  int accepted = 0;    ///< of them that became constraints
+  int refused = 0;     ///< verified by sight, but the odometry knows better
   bool optimised = false;
   double extract_ms = 0, recognise_ms = 0, verify_ms = 0, optimise_ms = 0;
   double total_ms() const { return extract_ms + recognise_ms + verify_ms + optimise_ms; }
@@ -40,10 +40,10 @@ struct LoopStats {
 struct MapUpdate {
   FrameId frame;
   Time t;
-  bool localised = false;        ///< false: where W is in M is not known (a loaded map, or after a restart)
-  Pose<M, W> T_MW;               ///< best knowledge now; jumps when a place is recognised
-  Pose<M, W> T_MW_smooth;        ///< the same, moved by a bounded amount a second: to fly by
-  std::uint32_t map_session = 0; ///< counts frames W that met this map
+  bool localised = false;         ///< false: where W is in M is not known (a loaded map, or after a restart)
+  Pose<M, W> T_MW;                ///< best knowledge now; jumps when a place is recognised
+  Pose<M, W> T_MW_smooth;         ///< the same, moved by a bounded amount a second: to fly by
+  std::uint32_t map_session = 0;  ///< counts frames W that met this map
   std::vector<LoopConstraint> loops;
   std::vector<CorrectedKeyframe> corrected;  ///< all keyframes, when the graph was optimised
   LoopStats stats;

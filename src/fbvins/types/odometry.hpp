@@ -16,23 +16,23 @@ namespace fbvins {
 enum class HealthState {
   initialising,  ///< no pose yet
   good,
-  degraded,      ///< a pose, but worse than its sensors could give; the reason says why
-  lost,          ///< no trustworthy pose; a restart follows
+  degraded,  ///< a pose, but worse than its sensors could give; the reason says why
+  lost,      ///< no trustworthy pose; a restart follows
 };
 
 enum class HealthReason {
   none,
   waiting_for_motion_or_rest,
   too_few_features,
-  alignment_refused,      ///< the initial solution was not observable or not plausible
+  alignment_refused,  ///< the initial solution was not observable or not plausible
   few_tracks,
   no_tracks,
-  no_images,              ///< a gap in the images
+  no_images,  ///< a gap in the images
   imu_gap,
   implausible_bias,
   implausible_speed,
   solver_failed,
-  one_camera,             ///< no stereo matches
+  one_camera,  ///< no stereo matches
 };
 
 std::string_view to_string(HealthState state);
@@ -51,7 +51,7 @@ struct EstimatorStats {
   int landmarks = 0;
   int observations = 0;
   int iterations = 0;
-  int outliers = 0;          ///< observations removed after this frame's solve
+  int outliers = 0;  ///< observations removed after this frame's solve
   double initial_cost = 0;
   double final_cost = 0;
   bool keyframe = false;
@@ -65,8 +65,8 @@ struct Odometry {
   FrameId id;
   Time t;
   Pose<W, B> T_WB;
-  Vec3 v_WB = Vec3::Zero();       ///< m/s, in W
-  Vec3 w_WB_B = Vec3::Zero();     ///< rad/s, in B, bias removed
+  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W
+  Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2

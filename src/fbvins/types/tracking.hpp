@@ -22,8 +22,8 @@ struct SensorPacket {
 
 /// Where a feature is seen in one camera.
 struct Observation {
-  Vec2 pixel = Vec2::Zero();        ///< in the raw (distorted) image, px
-  Vec2 normalised = Vec2::Zero();   ///< x/z, y/z of the undistorted ray in that camera's frame
+  Vec2 pixel = Vec2::Zero();       ///< in the raw (distorted) image, px
+  Vec2 normalised = Vec2::Zero();  ///< x/z, y/z of the undistorted ray in that camera's frame
   /// d(pixel)/d(normalised) at this point, divided by the standard deviation of the pixel position:
   /// weighs a residual in normalised coordinates so that it counts in sigmas of the raw image.
   Mat2 sqrt_information = Mat2::Identity();
@@ -38,12 +38,12 @@ struct TrackedFeature {
 };
 
 struct FrontendStats {
-  int tracked = 0;          ///< features continued from the frame before
-  int detected = 0;         ///< new features
-  int stereo = 0;           ///< features matched left-right
-  int lost_flow = 0;        ///< lost by the tracker or matcher
-  int lost_check = 0;       ///< lost by the forward-backward, ratio or mutual check
-  int lost_epipolar = 0;    ///< lost by RANSAC on the epipolar constraint
+  int tracked = 0;        ///< features continued from the frame before
+  int detected = 0;       ///< new features
+  int stereo = 0;         ///< features matched left-right
+  int lost_flow = 0;      ///< lost by the tracker or matcher
+  int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check
+  int lost_epipolar = 0;  ///< lost by RANSAC on the epipolar constraint
   double mean_brightness_left = 0;
   double mean_brightness_right = 0;
   double median_motion_px = 0;  ///< of the features continued, in the raw left image
