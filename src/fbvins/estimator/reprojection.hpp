@@ -87,7 +87,7 @@ inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, c
   p_C.noalias() = cameras.R_CB[o.right] * (p_B - rho * cameras.t_BC[o.right]);
   if (p_C.z() < kMinScaledDepth) return false;
   const Vec2 expected = p_C.head<2>() / p_C.z();
-  r = o.sqrt_information * (expected - o.normalised - cameras.time_offset_s * o.velocity);
+  r = o.sqrt_information * (expected - o.normalised + cameras.time_offset_s * o.velocity);
   return true;
 }
 
@@ -126,7 +126,7 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
       double* camera = J + (o.right ? kExtrinsic1 : kExtrinsic0);
       Eigen::Map<Vec3>(camera) -= rho * a;
       Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
-      J[kTimeOffset] = -o.sqrt_information.row(k).dot(o.velocity);
+      J[kTimeOffset] = o.sqrt_information.row(k).dot(o.velocity);
     }
   }
 }

@@ -61,7 +61,7 @@ struct Reprojection {
     const Vec<T> t = t_BC.cast<T>() + Eigen::Map<const Vec<T>>(d);
     const Vec<T> p_C = (q_BC.cast<T>() * exp(d + 3)).conjugate() * Vec<T>(p_B - t);
     const T offset = T(calibration.time_offset_s) + c[12];
-    const Eigen::Matrix<T, 2, 1> e = p_C.template head<2>() / p_C.z() - o.normalised.cast<T>() - offset * o.velocity.cast<T>();
+    const Eigen::Matrix<T, 2, 1> e = p_C.template head<2>() / p_C.z() - o.normalised.cast<T>() + offset * o.velocity.cast<T>();
     Eigen::Map<Eigen::Matrix<T, 2, 1>> out(r);
     out = o.sqrt_information.cast<T>() * e;
     return true;

@@ -39,7 +39,7 @@ struct OrbFrontendOptions {
   double fill_in_correlation = 0.85;
   double max_creep_px = 0.7;
   double max_uncertainty_px = 0.18;
-  double max_uncertainty_dark_px = 0.6;
+  double max_uncertainty_few_px = 3.0;
   double forward_backward_px = 0.7;
   double epipolar_px = 1.0;
   double sigma_px = 0.8;
@@ -65,7 +65,7 @@ struct OrbFrontendOptions {
     v("max_creep_px", max_creep_px, "px", "largest disagreement between the newest patch and the reference", 0.05, 10.0);
     v("max_uncertainty_px", max_uncertainty_px, "px/grey",
       "uncertainty of a new feature's position along its weakest direction, for noise of one grey value", 1e-4, 10.0);
-    v("max_uncertainty_dark_px", max_uncertainty_dark_px, "px/grey",
+    v("max_uncertainty_few_px", max_uncertainty_few_px, "px/grey",
       "the same where the image has too few such features for half of max_features", 1e-4, 10.0);
     v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature there and back", 0.05, 10.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);

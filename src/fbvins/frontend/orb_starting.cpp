@@ -18,7 +18,8 @@ double weakest_direction_px(const KltLevelTemplate& patch) {
 }  // namespace
 
 /// New tracks where there are few: first for image cells with less than their share, then anywhere; and where the
-/// image has too few sharp corners (dark, blurred), its less sharp ones, up to half of what is wanted.
+/// image has too few sharp corners (dark, blurred, plain walls), its less sharp ones at half the distance, up to
+/// half of what is wanted.
 void OrbFrontend::start_tracks(FrontendStats& stats) {
   points_a_.clear();
   for (const Track& track : tracks_)
@@ -41,17 +42,18 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
   const auto& keypoints = left_features_.keypoints;
   std::stable_sort(order_.begin(), order_.end(),
                    [&](std::size_t a, std::size_t b) { return keypoints[a].score > keypoints[b].score; });
-  const double min2 = options_.min_distance_px * options_.min_distance_px;
   struct Pass {
     bool only_poor_cells;
-    double max_uncertainty_px;
+    double max_uncertainty_px, min_distance_px;
     int wanted;
   };
-  const Pass passes[] = {{true, options_.max_uncertainty_px, options_.max_features},
-                         {false, options_.max_uncertainty_px, options_.max_features},
-                         {true, options_.max_uncertainty_dark_px, options_.max_features / 2},
-                         {false, options_.max_uncertainty_dark_px, options_.max_features / 2}};
+  const double usual_px = options_.min_distance_px, few_px = options_.min_distance_px / 2;
+  const Pass passes[] = {{true, options_.max_uncertainty_px, usual_px, options_.max_features},
+                         {false, options_.max_uncertainty_px, usual_px, options_.max_features},
+                         {true, options_.max_uncertainty_few_px, few_px, options_.max_features / 2},
+                         {false, options_.max_uncertainty_few_px, few_px, options_.max_features / 2}};
   for (const Pass& pass : passes) {
+    const double min2 = pass.min_distance_px * pass.min_distance_px;
     for (const std::size_t k : order_) {
       if (static_cast<int>(points_a_.size()) >= pass.wanted) break;
       const Keypoint& keypoint = keypoints[k];
