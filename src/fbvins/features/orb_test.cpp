@@ -34,7 +34,7 @@ Picture picture(const Warp& warp, double contrast = 35, double noise = 1.5, std:
   static const NoiseTexture texture(7, 80);
   Picture p{warp, {}};
   const Image image = render_texture(376, 240, texture, warp, 120, contrast, noise, noise_seed);
-  OrbExtractor extractor(OrbOptions{.max_features = 300});
+  OrbExtractor extractor(OrbOptions{.max_features = 300, .levels = 4});  // covers a scale of 1.7
   extractor.extract(image.view(), p.features);
   return p;
 }

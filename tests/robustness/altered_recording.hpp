@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests on real data: a recording whose events are changed on their way into the system, and how the
+// result compares with the truth. Tests are skipped where the recordings are absent (FBVINS_DATA).
+//
+//   auto flown = fly("MH_01_easy_17s", "klt", [](double t_s, SensorEvent& e) { return t_s < 8 || t_s > 9; });
+//   flown->rmse_m(HealthState::good)
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fbvins/eval/alignment.hpp"
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins::test {
+
+/// Changes an event, `t_s` after the first image; false: the event never arrives.
+using Alter = std::function<bool(double t_s, SensorEvent& event)>;
+
+struct Flown {
+  int images = 0;  ///< of the recording
+  Time start;
+  std::vector<Odometry> odometry;
+  std::map<FrameId, double> error_m;  ///< of poses, after SE3 alignment of all of them
+  Calibration calibration;
+
+  double time_s(const Odometry& o) const { return (o.t - start).seconds(); }
+  /// Over the poses from `from_s` to `to_s` whose health is `good` or, if asked for, any that has a pose.
+  double rmse_m(double from_s = 0, double to_s = 1e9) const;
+  double largest_error_of_good_m() const;
+  int with_pose() const;
+  int count(HealthState state, double from_s, double to_s) const;
+  std::uint32_t resets() const { return odometry.empty() ? 0 : odometry.back().reset_counter; }
+  /// One line for people.
+  std::string text() const;
+};
+
+inline std::filesystem::path recording(const std::string& name) {
+  const char* data = std::getenv("FBVINS_DATA");
+  return (data ? std::filesystem::path(data) : std::filesystem::path(FBVINS_SOURCE_DIR) / "../shared/data") / name;
+}
+
+Flown fly(const std::string& name, const Config& config, const Alter& alter = nullptr,
+          const std::function<void(StereoRig&)>& believe = nullptr);
+
+Config config_for(const std::string& frontend);
+
+}  // namespace fbvins::test

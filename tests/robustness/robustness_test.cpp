@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// What happens to a real flight when sensors fail on the way: it goes on, and the health column says what
+// happened. And guards against regressions of the whole: accuracy of both frontends, online calibration.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/robustness/altered_recording.hpp"
+
+namespace fbvins::test {
+namespace {
+
+/// The trouble begins this long after the first image, in full motion.
+constexpr double kFrom_s = 6.0;
+
+bool within(double t_s, double length_s) { return t_s >= kFrom_s && t_s < kFrom_s + length_s; }
+
+std::shared_ptr<const Image> brightened(const Image& image, double factor) {
+  auto out = std::make_shared<Image>(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x)
+      out->at(x, y) = static_cast<std::uint8_t>(std::clamp(factor * image.at(x, y) + 0.5, 0.0, 255.0));
+  return out;
+}
+
+class RealFlight : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(recording("MH_01_easy_17s")))
+      GTEST_SKIP() << recording("MH_01_easy_17s") << " is not there; set FBVINS_DATA";
+  }
+
+  /// Flies MH_01_easy_17s with altered events and says how it went.
+  Flown fly_altered(const Alter& alter) {
+    Flown flown = fly("MH_01_easy_17s", config_for(GetParam()), alter);
+    std::printf("%s %s: %s\n", GetParam(), testing::UnitTest::GetInstance()->current_test_info()->name(), flown.text().c_str());
+    return flown;
+  }
+  /// No restart, a pose throughout, well again soon after, and no pose far off that calls itself good.
+  void expect_recovered(const Flown& flown, double length_s, double bound_m, double settle_s = 0.5) {
+    const double end_s = kFrom_s + length_s + settle_s;
+    EXPECT_EQ(flown.resets(), 0u);
+    EXPECT_EQ(flown.count(HealthState::lost, 0, 1e9), 0);
+    EXPECT_GT(flown.count(HealthState::good, end_s, 1e9), 0);
+    EXPECT_EQ(flown.count(HealthState::degraded, end_s, 1e9), 0);
+    EXPECT_LT(flown.rmse_m(end_s), bound_m);
+    EXPECT_LT(flown.largest_error_of_good_m(), 2.5 * bound_m);
+  }
+};
+
+TEST_P(RealFlight, ASecondWithoutImages) {
+  const Flown flown =
+      fly_altered([](double t_s, SensorEvent& e) { return !std::holds_alternative<StereoFrame>(e) || !within(t_s, 1.0); });
+  expect_recovered(flown, 1.0, 0.05);
+}
+
+TEST_P(RealFlight, ASecondOfFramesWithoutImages) {
+  const Flown flown = fly_altered([](double t_s, SensorEvent& e) {
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 1.0)) frame->left = frame->right = nullptr;
+    return true;
+  });
+  EXPECT_GT(flown.count(HealthState::degraded, kFrom_s, kFrom_s + 1.0), 15);
+  expect_recovered(flown, 1.0, 0.05);
+}
+
+TEST_P(RealFlight, HalfASecondWithoutReadings) {
+  const Flown flown =
+      fly_altered([](double t_s, SensorEvent& e) { return !std::holds_alternative<ImuSample>(e) || !within(t_s, 0.5); });
+  EXPECT_GT(flown.count(HealthState::degraded, kFrom_s, kFrom_s + 0.6), 5);
+  expect_recovered(flown, 0.5, 0.03);
+}
+
+TEST_P(RealFlight, ThreeSecondsOfABlackRightCamera) {
+  const Flown flown = fly_altered([](double t_s, SensorEvent& e) {
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0)) frame->right = std::make_shared<Image>(752, 480);
+    return true;
+  });
+  EXPECT_GT(flown.count(HealthState::degraded, kFrom_s, kFrom_s + 3.0), 50);
+  expect_recovered(flown, 3.0, 0.03);
+}
+
+TEST_P(RealFlight, ThreeSecondsOfABlackLeftCamera) {
+  const Flown flown = fly_altered([](double t_s, SensorEvent& e) {
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 3.0)) frame->left = std::make_shared<Image>(752, 480);
+    return true;
+  });
+  EXPECT_EQ(flown.count(HealthState::good, kFrom_s + 0.3, kFrom_s + 2.9), 0);
+  // Both frontends follow features in the left image: three seconds on the IMU alone.
+  const double end_s = kFrom_s + 4.0;
+  EXPECT_GT(flown.count(HealthState::good, end_s, 1e9), 0.9 * flown.count(HealthState::degraded, end_s, 1e9) + 100);
+  EXPECT_LE(flown.resets(), 1u);
+}
+
+TEST_P(RealFlight, TwoSecondsTenTimesAsBright) {
+  const Flown flown = fly_altered([](double t_s, SensorEvent& e) {
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 2.0))
+      frame->left = brightened(*frame->left, 10), frame->right = brightened(*frame->right, 10);
+    return true;
+  });
+  expect_recovered(flown, 2.0, 0.05);
+}
+
+TEST_P(RealFlight, TwoSecondsATenthAsBright) {
+  const Flown flown = fly_altered([](double t_s, SensorEvent& e) {
+    if (auto* frame = std::get_if<StereoFrame>(&e); frame && within(t_s, 2.0))
+      frame->left = brightened(*frame->left, 0.1), frame->right = brightened(*frame->right, 0.1);
+    return true;
+  });
+  expect_recovered(flown, 2.0, 0.05);
+}
+
+TEST_P(RealFlight, IsAsAccurateAsPromised) {
+  const Flown flown = fly_altered(nullptr);
+  EXPECT_LT(flown.rmse_m(), std::string(GetParam()) == "orb" ? 0.010 : 0.008);
+  EXPECT_GE(flown.with_pose(), 0.94 * flown.images);
+  for (const Odometry& o : flown.odometry)
+    if (o.health.has_pose()) {
+      EXPECT_LE(flown.time_s(o), 1.0) << "first pose";
+      break;
+    }
+  EXPECT_EQ(flown.resets(), 0u);
+  EXPECT_EQ(flown.count(HealthState::lost, 0, 1e9), 0);
+}
+
+TEST_P(RealFlight, StaysAtRest) {
+  const Flown flown = fly("V1_01_easy_rest_3s", config_for(GetParam()));
+  ASSERT_GT(flown.with_pose(), 40);
+  std::optional<Vec3> first;
+  for (const Odometry& o : flown.odometry) {
+    if (!o.health.has_pose()) continue;
+    if (!first) first = o.T_WB.p;
+    EXPECT_LT((o.T_WB.p - *first).norm(), 0.005);
+  }
+}
+
+TEST_P(RealFlight, CalibrationIsRefinedInFlight) {
+  const Quat turn = so3_exp(0.0349 * Vec3(0.6, -0.5, 0.62).normalized());
+  const Vec3 shift(0.006, -0.006, 0.005);
+  StereoRig truth;
+  const auto loosen = [&](StereoRig& rig) {
+    truth = rig;
+    rig.T_BC0 = {turn * rig.T_BC0.q, Vec3(turn * rig.T_BC0.p + shift)};
+    rig.T_BC1 = {turn * rig.T_BC1.q, Vec3(turn * rig.T_BC1.p + shift)};
+  };
+  const auto wrong_rad = [&](const Flown& f) { return so3_log(truth.T_BC0.q.conjugate() * f.calibration.T_BC0.q).norm(); };
+  Config config = config_for(GetParam());
+  const Flown off = fly("MH_01_easy_17s", config, nullptr, loosen);
+  EXPECT_NEAR(wrong_rad(off), 0.0349, 1e-4);
+  config.estimator.estimate_extrinsics = true;
+  const Flown on = fly("MH_01_easy_17s", config, nullptr, loosen);
+  std::printf("%s extrinsics 2 deg wrong: off %s\n  on %s\n  left over %.3f deg\n", GetParam(), off.text().c_str(),
+              on.text().c_str(), wrong_rad(on) * 180 / M_PI);
+  EXPECT_LT(wrong_rad(on), 0.3 * 0.0349);
+  EXPECT_LT(on.rmse_m(), 0.05);
+  EXPECT_LT(on.rmse_m(), off.rmse_m());
+}
+
+TEST_P(RealFlight, TimeOffsetIsFoundInFlight) {
+  const auto late = [](StereoRig& rig) { rig.time_offset_s += 0.005; };
+  Config config = config_for(GetParam());
+  const Flown off = fly("MH_01_easy_17s", config, nullptr, late);
+  config.estimator.estimate_time_offset = true;
+  const Flown on = fly("MH_01_easy_17s", config, nullptr, late);
+  std::printf("%s stamps 5 ms wrong: off %s\n  on %s\n  offset found %.2f ms\n", GetParam(), off.text().c_str(),
+              on.text().c_str(), 1e3 * on.calibration.time_offset_s);
+  EXPECT_EQ(off.calibration.time_offset_s, 0);
+  EXPECT_NEAR(std::abs(on.calibration.time_offset_s), 0.005, 0.002);
+  EXPECT_LT(on.rmse_m(), off.rmse_m());
+}
+
+INSTANTIATE_TEST_SUITE_P(Frontend, RealFlight, testing::Values("klt", "orb"), [](const auto& p) { return std::string(p.param); });
+
+}  // namespace
+}  // namespace fbvins::test
