@@ -84,11 +84,15 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
     Landmark& landmark = landmark_of(feature.id);
     Sighting sighting{frames_.back().id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
     if (!landmark.sightings.empty() && landmark.sightings.back().frame == previous && dt > 0) {
-      const Sighting& before = landmark.sightings.back();
+      Sighting& before = landmark.sightings.back();
       sighting.left_velocity = (sighting.left.normalised - before.left.normalised) / dt;
       sighting.right_velocity = sighting.right && before.right
                                     ? Vec2((sighting.right->normalised - before.right->normalised) / dt)
                                     : sighting.left_velocity;
+      if (landmark.sightings.size() == 1) {  // the first sighting moved, too: its velocity is known only now
+        before.left_velocity = sighting.left_velocity;
+        before.right_velocity = sighting.right_velocity;
+      }
     }
     if (landmark.sightings.empty()) landmark.host = frames_.back().id;
     landmark.sightings.push_back(sighting);
