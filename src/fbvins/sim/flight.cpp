@@ -59,7 +59,7 @@ std::vector<Vec3> corners_of(const FlightOptions& o, const std::vector<Vec3>& to
   if (o.kind == "tour" && tour.size() >= 2) {
     double length = 0;
     for (std::size_t i = 0; length < wanted_m; ++i) {
-      corners.push_back(tour[i % tour.size()] + Vec3(rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(-0.15, 0.15)));
+      corners.push_back(tour[i % tour.size()] + Vec3{rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(-0.15, 0.15)});
       if (i > 0) length += (corners[i] - corners[i - 1]).norm();
     }
     return corners;

@@ -198,17 +198,19 @@ void Furnisher::cover_floors() {
     int layer = 0;
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
       const double size = rng_.uniform(0.8, 1.6), angle = rng_.uniform(0, kPi);
-      lay_on_floor(somewhere(), angle, size, size, texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture), size,
-                   layer++);
+      const int what = texture(rng_.uniform() < 0.75 ? Surface::mat : Surface::picture);
+      lay_on_floor(somewhere(), angle, size, size, what, size, layer++);
     }
     for (int i = 0; i < static_cast<int>(0.1 * amount); ++i) {
       const double length = rng_.uniform(1.0, 3.0), angle = rng_.uniform(0, kPi);
-      lay_on_floor(somewhere(), angle, length, 0.13, texture(Surface::marks), 0.45, layer++);
+      const int what = texture(Surface::marks);
+      lay_on_floor(somewhere(), angle, length, 0.13, what, 0.45, layer++);
     }
     for (int i = 0; i < static_cast<int>(0.5 * amount); ++i) {
       const double size = rng_.uniform(0.08, 0.3), angle = rng_.uniform(0, kPi), shape = rng_.uniform(0.5, 1.0);
       const Surface kinds[] = {Surface::page, Surface::plaster, Surface::plaster, Surface::checker};
-      lay_on_floor(somewhere(), angle, size, size * shape, texture(kinds[rng_.below(4)]), size, layer++);
+      const int what = texture(kinds[rng_.below(4)]);
+      lay_on_floor(somewhere(), angle, size, size * shape, what, size, layer++);
     }
   }
 }
@@ -248,8 +250,8 @@ bool Furnisher::add_shelf(const Wall& wall, double at) {
   shape.half = Vec3(0.5 * width, depth, 0.5 * height);
   shape.q = about_z(std::atan2(x.y(), x.x()));
   if (!is_clear(shape.centre, shape.half.norm())) return false;
-  add_box(world_.facets, shape, plain_or({Surface::books, Surface::books, Surface::metal, Surface::panel}), tint(),
-          std::max(0.7, width));
+  const int what = plain_or({Surface::books, Surface::books, Surface::metal, Surface::panel});
+  add_box(world_.facets, shape, what, tint(), std::max(0.7, width));
   return true;
 }
 
@@ -266,10 +268,10 @@ bool Furnisher::add_table(const Vec3& floor_point) {
             leg, 0.8f, 0.4);
   for (int i = 0; i < 4; ++i) {
     const double a = rng_.uniform(0.04, 0.14), b = rng_.uniform(0.04, 0.14), c = rng_.uniform(0.03, 0.2);
-    const double x = rng_.uniform(-0.75, 0.75) * w, y = rng_.uniform(-0.7, 0.7) * d;
-    add_box(world_.facets,
-            {floor_point + Vec3(0, 0, h + 0.02 + c) + q * Vec3(x, y, 0), Vec3(a, b, c), about_z(rng_.uniform(0, kPi))},
-            plain_or({Surface::cardboard, Surface::books, Surface::panel, Surface::page, Surface::picture}), tint(), 0.35);
+    const double x = rng_.uniform(-0.75, 0.75) * w, y = rng_.uniform(-0.7, 0.7) * d, angle = rng_.uniform(0, kPi);
+    const int what = plain_or({Surface::cardboard, Surface::books, Surface::panel, Surface::page, Surface::picture});
+    add_box(world_.facets, {floor_point + Vec3(0, 0, h + 0.02 + c) + q * Vec3(x, y, 0), Vec3(a, b, c), about_z(angle)}, what,
+            tint(), 0.35);
   }
   return true;
 }
@@ -281,10 +283,10 @@ bool Furnisher::add_box_stack(const Vec3& floor_point) {
                  c = std::exp(rng_.uniform(std::log(0.08), std::log(0.45)));
     const Vec3 centre = floor_point + Vec3(0, 0, z + c);
     if (!is_clear(centre, Vec3(a, b, c).norm())) return i > 1;
-    add_box(world_.facets, {centre, Vec3(a, b, c), about_z(rng_.uniform(0, kPi))},
-            plain_or({Surface::cardboard, Surface::cardboard, Surface::panel, Surface::wood, Surface::metal, Surface::cloth,
-                      Surface::poster, Surface::picture}),
-            tint(), std::max(0.4, 2 * std::max({a, b, c})));
+    const double angle = rng_.uniform(0, kPi);
+    const int what = plain_or({Surface::cardboard, Surface::cardboard, Surface::panel, Surface::wood, Surface::metal,
+                               Surface::cloth, Surface::poster, Surface::picture});
+    add_box(world_.facets, {centre, Vec3(a, b, c), about_z(angle)}, what, tint(), std::max(0.4, 2 * std::max({a, b, c})));
     z += 2 * c;
   }
   return true;
@@ -386,9 +388,10 @@ void Furnisher::add_movers() {
       add_box(mover.facets, {Vec3(0, 0, 1.6), Vec3(0.1, 0.08, 0.12), about_z(0)}, skin, 0.9f, 0.4);
       mover.radius_m = 0.45;
     } else {
-      const Vec3 half(rng_.uniform(0.15, 0.4), rng_.uniform(0.15, 0.4), rng_.uniform(0.2, 0.6));
-      add_box(mover.facets, {Vec3(0, 0, rng_.uniform(0.6, 1.6)), half, about_z(0)},
-              plain_or({Surface::cardboard, Surface::poster, Surface::panel}), 1.0f, 0.8);
+      const double a = rng_.uniform(0.15, 0.4), b = rng_.uniform(0.15, 0.4), c = rng_.uniform(0.2, 0.6),
+                   z = rng_.uniform(0.6, 1.6);
+      const int what = plain_or({Surface::cardboard, Surface::poster, Surface::panel});
+      add_box(mover.facets, {Vec3(0, 0, z), Vec3(a, b, c), about_z(0)}, what, 1.0f, 0.8);
       mover.radius_m = 0.6;
     }
     world_.movers.push_back(std::move(mover));

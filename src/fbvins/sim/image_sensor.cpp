@@ -142,18 +142,32 @@ void ImageSensor::add_glare(std::vector<float>& image) const {
   }
   const float share = static_cast<float>(options_.glare),
               everywhere = static_cast<float>(total / static_cast<double>(image.size()));
-  for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x) {
-      const float fx = (static_cast<float>(x) + 0.5f) / kBlock - 0.5f, fy = (static_cast<float>(y) + 0.5f) / kBlock - 0.5f;
-      const int ix = std::clamp(static_cast<int>(std::floor(fx)), 0, nx - 2),
-                iy = std::clamp(static_cast<int>(std::floor(fy)), 0, ny - 2);
-      const float u = std::clamp(fx - static_cast<float>(ix), 0.0f, 1.0f),
-                  v = std::clamp(fy - static_cast<float>(iy), 0.0f, 1.0f);
-      const float* b = &blocks[static_cast<std::size_t>(iy * nx + ix)];
-      const float near = (1 - v) * ((1 - u) * b[0] + u * b[1]) + v * ((1 - u) * b[nx] + u * b[nx + 1]);
-      float& p = image[static_cast<std::size_t>(y) * width_ + x];
-      p = (1 - share) * p + share * (0.6f * near + 0.4f * everywhere);
+  struct Between {  // two neighbouring blocks and the share of the second
+    int first;
+    float second_share;
+  };
+  const auto between = [](int pixel, int blocks_there) {
+    const float f = (static_cast<float>(pixel) + 0.5f) / kBlock - 0.5f;
+    const int i = std::clamp(static_cast<int>(std::floor(f)), 0, blocks_there - 2);
+    return Between{i, std::clamp(f - static_cast<float>(i), 0.0f, 1.0f)};
+  };
+  std::vector<Between> columns;
+  for (int x = 0; x < width_; ++x) columns.push_back(between(x, nx));
+  std::vector<float> row(static_cast<std::size_t>(nx));
+  for (int y = 0; y < height_; ++y) {
+    const Between at = between(y, ny);
+    const float* b = &blocks[static_cast<std::size_t>(at.first * nx)];
+    for (int i = 0; i < nx; ++i) {
+      const float near = (1 - at.second_share) * b[i] + at.second_share * b[nx + i];
+      row[static_cast<std::size_t>(i)] = share * (0.6f * near + 0.4f * everywhere);
     }
+    float* pixels = &image[static_cast<std::size_t>(y) * width_];
+    for (int x = 0; x < width_; ++x) {
+      const auto [i, u] = columns[static_cast<std::size_t>(x)];
+      const float* r = &row[static_cast<std::size_t>(i)];
+      pixels[x] = (1 - share) * pixels[x] + ((1 - u) * r[0] + u * r[1]);
+    }
+  }
 }
 
 }  // namespace fbvins

@@ -8,6 +8,11 @@
 #include "fbvins/sim/texture.hpp"
 
 namespace fbvins::rays {
+namespace {
+
+constexpr int kBlock = 16;  ///< rays shaded at a time
+
+}  // namespace
 
 FBVINS_KERNEL void intersect(const float* x, const float* y, const float* m, const float* a, const float* b, int id, Hits& hits) {
   const float m0 = m[0], m1 = m[1], m2 = m[2], a0 = a[0], a1 = a[1], a2 = a[2], b0 = b[0], b1 = b[1], b2 = b[2];
@@ -43,9 +48,9 @@ inline float rough_log2(float x) {
 
 /// Where a look-up at coordinates (s, t), in copies of the texture, goes.
 struct Lookup {
-  alignas(64) std::int32_t index[kRays];
-  alignas(64) float fx[kRays];
-  alignas(64) float fy[kRays];
+  alignas(64) std::int32_t index[kBlock];
+  alignas(64) float fx[kBlock];
+  alignas(64) float fy[kBlock];
 };
 
 inline void locate(float s, float t, std::int32_t level, std::int32_t& index, float& fx, float& fy) {
@@ -70,17 +75,36 @@ inline float blend(std::uint32_t word, float fx, float fy) {
 
 }  // namespace
 
-FBVINS_KERNEL void shade(const Hits& hits, int id, const Look& look, float weight, float* sum) {
-  Lookup sharp, soft, fine, lit;
-  alignas(64) float mix[kRays], fine_share[kRays];
-  alignas(64) std::uint32_t t0[kRays], t1[kRays], d0[kRays], l0[kRays];
-  constexpr float kCoarsest = kTextureLevels - 2;
+void select(const Hits& hits, int id, Lanes& lanes) {
+  int n = 0;
   for (int i = 0; i < kRays; ++i) {
-    const float lod = look.lod_constant - 1.5f * rough_log2(hits.w[i]);
+    lanes.ray[n] = i;
+    n += hits.id[i] == id ? 1 : 0;
+  }
+  lanes.count = n;
+  for (int k = 0; k < n; ++k) {
+    const int i = lanes.ray[k];
+    lanes.w[k] = hits.w[i], lanes.u[k] = hits.u[i], lanes.v[k] = hits.v[i];
+  }
+  // The last block is filled up with a ray that exists: what it looks up is valid, and nobody adds it.
+  for (int k = n; n > 0 && k % kBlock != 0; ++k)
+    lanes.w[k] = lanes.w[n - 1], lanes.u[k] = lanes.u[n - 1], lanes.v[k] = lanes.v[n - 1];
+}
+
+namespace {
+
+/// Radiance of a block of rays, without weight.
+FBVINS_KERNEL void shade_block(const float* w, const float* u, const float* v, const Look& look, float* radiance) {
+  Lookup sharp, soft, fine, lit;
+  alignas(64) float mix[kBlock], fine_share[kBlock];
+  alignas(64) std::uint32_t t0[kBlock], t1[kBlock], d0[kBlock], l0[kBlock];
+  constexpr float kCoarsest = kTextureLevels - 2;
+  for (int i = 0; i < kBlock; ++i) {
+    const float lod = look.lod_constant - 1.5f * rough_log2(w[i]);
     const float level = lod < 0 ? 0.0f : lod > kCoarsest ? kCoarsest : lod;
     const std::int32_t l = static_cast<std::int32_t>(level);
     mix[i] = level - static_cast<float>(l);
-    const float s = look.shift_u + look.repeat_u * hits.u[i], t = look.shift_v + look.repeat_v * hits.v[i];
+    const float s = look.shift_u + look.repeat_u * u[i], t = look.shift_v + look.repeat_v * v[i];
     locate(s, t, l, sharp.index[i], sharp.fx[i], sharp.fy[i]);
     locate(s, t, l + 1, soft.index[i], soft.fx[i], soft.fy[i]);
     const float fine_lod = lod + look.detail_lod;
@@ -89,7 +113,7 @@ FBVINS_KERNEL void shade(const Hits& hits, int id, const Look& look, float weigh
     // Grain fades between levels instead of being blended; it is gone at level 6.
     fine_share[i] = look.detail_strength * (fine_level > 5.0f ? 6.0f - fine_level : 1.0f);
     locate(s * look.detail_repeat, t * look.detail_repeat, fl, fine.index[i], fine.fx[i], fine.fy[i]);
-    const float cx = hits.u[i] * look.light_x, cy = hits.v[i] * look.light_y;
+    const float cx = u[i] * look.light_x, cy = v[i] * look.light_y;
     std::int32_t ix = static_cast<std::int32_t>(cx), iy = static_cast<std::int32_t>(cy);
     const std::int32_t nx = static_cast<std::int32_t>(look.light_x), ny = static_cast<std::int32_t>(look.light_y);
     ix = ix >= nx ? nx - 1 : ix;
@@ -98,19 +122,28 @@ FBVINS_KERNEL void shade(const Hits& hits, int id, const Look& look, float weigh
     lit.fx[i] = cx - static_cast<float>(ix);
     lit.fy[i] = cy - static_cast<float>(iy);
   }
-  for (int i = 0; i < kRays; ++i) {
+  for (int i = 0; i < kBlock; ++i) {
     t0[i] = look.texture[sharp.index[i]];
     t1[i] = look.texture[soft.index[i]];
     d0[i] = look.detail[fine.index[i]];
     l0[i] = look.light[lit.index[i]];
   }
-  for (int i = 0; i < kRays; ++i) {
+  for (int i = 0; i < kBlock; ++i) {
     const float near = blend(t0[i], sharp.fx[i], sharp.fy[i]), far = blend(t1[i], soft.fx[i], soft.fy[i]);
     const float reflectance = (near + mix[i] * (far - near)) * (1.0f / 255.0f);
     const float grain = 1.0f + fine_share[i] * (blend(d0[i], fine.fx[i], fine.fy[i]) * (2.0f / 255.0f) - 1.0f);
     const float light = blend(l0[i], lit.fx[i], lit.fy[i]) * (1.0f / 255.0f);
-    const float radiance = weight * (reflectance * grain * light * look.brightness + look.emission);
-    sum[i] += hits.id[i] == id ? radiance : 0.0f;
+    radiance[i] = reflectance * grain * light * look.brightness + look.emission;
+  }
+}
+
+}  // namespace
+
+void shade(const Lanes& lanes, const Look& look, float weight, float* sum) {
+  for (int first = 0; first < lanes.count; first += kBlock) {
+    alignas(64) float radiance[kBlock];
+    shade_block(lanes.w + first, lanes.u + first, lanes.v + first, look, radiance);
+    for (int k = first; k < lanes.count && k < first + kBlock; ++k) sum[lanes.ray[k]] += weight * radiance[k - first];
   }
 }
 

@@ -35,7 +35,17 @@ struct Look {
   float emission;
 };
 
-/// Adds weight times the radiance of those rays that hit `id`.
-void shade(const Hits& hits, int id, const Look& look, float weight, float* sum);
+/// The rays that hit `id`, packed: only they cost look-ups.
+struct Lanes {
+  alignas(64) float w[kRays];
+  alignas(64) float u[kRays];
+  alignas(64) float v[kRays];
+  int ray[kRays];
+  int count = 0;
+};
+void select(const Hits& hits, int id, Lanes& lanes);
+
+/// Adds weight times the radiance of those rays.
+void shade(const Lanes& lanes, const Look& look, float weight, float* sum);
 
 }  // namespace fbvins::rays

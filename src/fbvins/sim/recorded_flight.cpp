@@ -5,11 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <numbers>
-
-#include "fbvins/io/euroc_frames.hpp"
 
 namespace fbvins {
 namespace {
@@ -165,15 +161,6 @@ Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, con
   }
   recorded.imu.samples = std::move(imu);
   return recorded;
-}
-
-Result<std::vector<ImuSample>> read_imu_csv(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Error{ErrorCode::not_found, fmt::format("{}: cannot be opened", path)};
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  Result<StampedRows<ImuSample>> rows = read_stamped_rows<ImuSample>(text, path, ImuRowParser{});
-  if (!rows) return rows.error();
-  return std::move(rows->rows);
 }
 
 }  // namespace fbvins

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recorded trajectory made into one that can be flown again, alone or with its real IMU recording.
 // With the IMU, the trajectory counts below a crossover frequency and the IMU's own integral above it, so
-// that images drawn along the result and the untouched IMU agree. Pure functions but for reading files.
+// that images drawn along the result and the untouched IMU agree. Pure functions.
 #pragma once
 
 #include <string>
@@ -28,7 +28,5 @@ Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, con
 /// x that minimises sum |x_k - y_k|^2 + lambda * sum |(x_k-1 - 2 x_k + x_k+1) - c_k|^2: y below the
 /// frequency where lambda * (2 pi f dt)^4 = 1, the double sum of c above it, without any delay.
 std::vector<Vec3> blend_second_differences(const std::vector<Vec3>& y, const std::vector<Vec3>& c, double lambda);
-
-Result<std::vector<ImuSample>> read_imu_csv(const std::string& path);
 
 }  // namespace fbvins

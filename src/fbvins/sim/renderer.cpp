@@ -200,10 +200,10 @@ void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Fa
   for (int i = 0; i < kRays; ++i) depth_[first + i] = hits.id[i] >= 0 ? 1.0f / hits.w[i] : 0.0f;
 
   float* sum = sum_.data() + first;
+  rays::Lanes lanes;
   for (int k : tile.views) {
-    bool seen = false;
-    for (int i = 0; i < kRays; ++i) seen |= hits.id[i] == k;
-    if (!seen) continue;
+    rays::select(hits, k, lanes);
+    if (lanes.count == 0) continue;
     const View& view = views_[static_cast<std::size_t>(k)];
     const Facet& f = facets[static_cast<std::size_t>(view.facet)];
     const MixedLight::Facet& lit = light.facets[static_cast<std::size_t>(view.facet)];
@@ -224,7 +224,7 @@ void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Fa
     look.light_x = static_cast<float>(lit.cells_x), look.light_y = static_cast<float>(lit.cells_y);
     look.brightness = f.tint * lit.scale;
     look.emission = f.emission;
-    rays::shade(hits, k, look, weight, sum);
+    rays::shade(lanes, look, weight, sum);
     if (f.gloss > 0) add_mirror_images(instant, f, x, y, hits.id, k, weight, sum);
   }
 }

@@ -9,6 +9,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/io/calibration.hpp"
+#include "fbvins/io/imu_file.hpp"
 #include "fbvins/sim/flight_recorder.hpp"
 #include "fbvins/sim/recorded_flight.hpp"
 
