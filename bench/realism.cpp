@@ -2,8 +2,12 @@
 // How much drawn images are like real ones. Draws the preset `normal` along a real recording's trajectory,
 // with its IMU and at its stamps, measures both, and prints a Markdown table.
 //
-//   realism RECORDING [--preset NAME] [--trajectory CSV --imu CSV] [--seeds N] [--set NAME=VALUE]
+//   realism RECORDING [--preset NAME] [--trajectory CSV --imu CSV] [--seeds N] [--set NAME=VALUE] [--jpeg QUALITY]
+//
+// JPEG smooths noise and weak corners away. Where the real images are JPEG, the drawn ones must pass through the same
+// quality before they are compared: --jpeg (92 is what V1_01_easy_keyframes was saved with, from its tables).
 #include <fmt/format.h>
+#include <turbojpeg.h>
 
 #include <CLI/CLI.hpp>
 
@@ -257,7 +261,27 @@ Figures measure_real(const std::string& path, bool& consecutive, std::vector<Tim
   return meter.finish(truth);
 }
 
-Figures measure_drawn(const SimulationOptions& options, bool consecutive, const std::vector<Time>& stamps) {
+/// What a JPEG of that quality leaves of an image.
+std::shared_ptr<const Image> through_jpeg(const Image& image, int quality) {
+  Image copy(image.width(), image.height());
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  tjhandle writer = tjInitCompress(), reader = tjInitDecompress();
+  const bool done =
+      tjCompress2(writer, image.row(0), image.width(), 0, image.height(), TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, quality,
+                  TJFLAG_ACCURATEDCT) == 0 &&
+      tjDecompress2(reader, bytes, size, copy.row(0), image.width(), 0, image.height(), TJPF_GRAY, TJFLAG_ACCURATEDCT) == 0;
+  tjFree(bytes);
+  tjDestroy(writer);
+  tjDestroy(reader);
+  if (!done) {
+    fmt::print(stderr, "libjpeg-turbo cannot encode an image\n");
+    std::exit(2);
+  }
+  return std::make_shared<const Image>(std::move(copy));
+}
+
+Figures measure_drawn(const SimulationOptions& options, bool consecutive, const std::vector<Time>& stamps, int jpeg_quality) {
   Result<Simulation> simulation = prepare_simulation(options);
   if (!simulation) {
     fmt::print(stderr, "{}\n", simulation.error().message);
@@ -272,13 +296,21 @@ Figures measure_drawn(const SimulationOptions& options, bool consecutive, const 
   Dataset data(std::move(contents), {});
   Meter meter(simulation->rig, consecutive);
   while (auto event = data.next()) {
-    if (const auto* sample = std::get_if<ImuSample>(&*event)) meter.imu(*sample);
-    else meter.frame(std::get<StereoFrame>(*event));
+    if (const auto* sample = std::get_if<ImuSample>(&*event)) {
+      meter.imu(*sample);
+      continue;
+    }
+    StereoFrame frame = std::get<StereoFrame>(*event);
+    if (jpeg_quality > 0) {
+      frame.left = through_jpeg(*frame.left, jpeg_quality);
+      frame.right = through_jpeg(*frame.right, jpeg_quality);
+    }
+    meter.frame(frame);
   }
   return meter.finish(truth);
 }
 
-int compare(const std::string& recording, const SimulationOptions& asked, int seeds) {
+int compare(const std::string& recording, const SimulationOptions& asked, int seeds, int jpeg_quality) {
   SimulationOptions options = asked;
   bool consecutive = false;
   std::vector<Time> stamps;
@@ -287,7 +319,7 @@ int compare(const std::string& recording, const SimulationOptions& asked, int se
   Figures drawn;
   for (int seed = 1; seed <= seeds; ++seed) {
     options.seed = seed;
-    const Figures one = measure_drawn(options, consecutive, stamps);
+    const Figures one = measure_drawn(options, consecutive, stamps, jpeg_quality);
     for (const std::string& name : one.names()) drawn.add(name, one.mean(name));
   }
   fmt::print("| figure | real | drawn, mean of {} worlds | drawn / real |\n|---|---:|---:|---:|\n", seeds);
@@ -305,12 +337,13 @@ int main(int argc, char** argv) {
   CLI::App program{"compares drawn images with real ones"};
   std::string recording, preset = "normal", trajectory, imu;
   std::vector<std::string> assignments;
-  int seeds = 2;
+  int seeds = 2, jpeg = 0;
   program.add_option("RECORDING", recording)->required();
   program.add_option("--preset", preset);
   program.add_option("--trajectory", trajectory, "where the recording's own truth is too sparse");
   program.add_option("--imu", imu);
   program.add_option("--seeds", seeds);
+  program.add_option("--jpeg", jpeg, "quality that the drawn images are compressed with first, 0 not at all");
   program.add_option("--set", assignments)->take_all()->allow_extra_args(false);
   CLI11_PARSE(program, argc, argv);
   Result<SimulationOptions> options = simulation_preset(preset);
@@ -321,5 +354,5 @@ int main(int argc, char** argv) {
   const auto fields = fields_of(*options);
   for (const std::string& assignment : assignments)
     if (Result<void> set = set_option(fields, assignment); !set) return fmt::print(stderr, "{}\n", set.error().message), 2;
-  return compare(recording, *options, seeds);
+  return compare(recording, *options, seeds, jpeg);
 }

@@ -24,7 +24,7 @@ Canvas weave(Rng& rng) {
   Canvas canvas;
   const Fractal folds(rng, 3, 4, 0.5f);
   const LatticeNoise uneven(rng, 128, 128);
-  const float base = between(rng, 0.3, 0.6), contrast = between(rng, 0.06, 0.14);
+  const float base = between(rng, 0.3, 0.6), contrast = between(rng, 0.05, 0.1);
   const int threads = 1 << pick(rng, 5, 6);
   const float step = 2 * std::numbers::pi_v<float> * static_cast<float>(threads) / S;
   shade(canvas, [&](int x, int y, float) {
@@ -38,7 +38,7 @@ Canvas concrete(Rng& rng) {
   Canvas canvas;
   const Fractal noise(rng, 3, 7, 0.75f);
   const float base = between(rng, 0.3, 0.55);
-  shade(canvas, [&](int x, int y, float) { return base * (1 + 0.9f * noise(static_cast<float>(x), static_cast<float>(y))); });
+  shade(canvas, [&](int x, int y, float) { return base * (1 + 0.7f * noise(static_cast<float>(x), static_cast<float>(y))); });
   stains(canvas, rng, 25, 0.35f);
   scratches(canvas, rng, 30, 0.4f);
   for (int i = 0; i < 120; ++i)
@@ -109,7 +109,7 @@ Canvas carpet(Rng& rng) {
   const int stripes = pick(rng, 0, 6);
   shade(canvas, [&](int x, int y, float) {
     const float stripe = stripes && ((x * stripes / S) & 1) ? 0.75f : 1.0f;
-    return base * stripe * (1 + 1.1f * noise(static_cast<float>(x), static_cast<float>(y)));
+    return base * stripe * (1 + 0.6f * noise(static_cast<float>(x), static_cast<float>(y)));
   });
   stains(canvas, rng, 15, 0.3f);
   return canvas;
