@@ -16,6 +16,36 @@ constexpr const char* kStatisticsHeader =
 constexpr const char* kTimingHeader =
     "#timestamp [ns],frame,pyramid [ms],track [ms],stereo [ms],detect [ms],geometry [ms],prepare [ms],solve [ms],marginalise [ms]\n";
 
+constexpr const char* kTruthHeader =
+    "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z [],v_x [m s^-1],v_y [m s^-1],v_z [m s^-1],"
+    "b_gyro_x [rad s^-1],b_gyro_y [rad s^-1],b_gyro_z [rad s^-1],b_accel_x [m s^-2],b_accel_y [m s^-2],b_accel_z [m s^-2]\n";
+
+std::string covariance_header() {
+  std::string header = "#timestamp [ns]";
+  for (const char* what : {"v", "b_gyro", "b_accel"})
+    for (const char* axes : {"x_x", "x_y", "x_z", "y_y", "y_z", "z_z"}) header += fmt::format(",cov_{}_{}", what, axes);
+  return header + "\n";
+}
+
+std::string covariance_row(const Odometry& o) {
+  std::string row = fmt::format("{}", o.t.ns);
+  for (const Mat3* m : {&o.velocity_covariance, &o.gyro_bias_covariance, &o.accel_bias_covariance})
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) row += fmt::format(",{:.9e}", (*m)(i, j));
+  return row + "\n";
+}
+
+/// Seven columns, or all sixteen where the truth knows velocity and biases.
+std::string truth_row(const TrajectoryPoint& point) {
+  const Quat& q = point.T_WB.q;
+  std::string row = fmt::format("{}", point.t.ns);
+  const auto append = [&](const Vec3& v) { row += fmt::format(",{:.9f},{:.9f},{:.9f}", v.x(), v.y(), v.z()); };
+  append(point.T_WB.p);
+  row += fmt::format(",{:.9f},{:.9f},{:.9f},{:.9f}", q.w(), q.x(), q.y(), q.z());
+  if (point.v_WB && point.bias) append(*point.v_WB), append(point.bias->gyro_radps), append(point.bias->accel_mps2);
+  return row + "\n";
+}
+
 std::string frontend_columns(const FrontendStats& s) {
   return fmt::format("{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check, s.lost_epipolar,
                      s.mean_brightness_left, s.mean_brightness_right, s.median_motion_px);
@@ -63,7 +93,23 @@ Result<void> write_trajectories(const RunRecord& record, const std::string& fold
     csv->write(o);
   }
   if (Result<void> done = tum->close(); !done) return done;
-  return csv->close();
+  if (Result<void> done = csv->close(); !done) return done;
+  std::string covariances = covariance_header();
+  for (const Odometry& o : record.odometry) covariances += covariance_row(o);
+  return write_text(folder + "/covariance.csv", covariances);
+}
+
+Result<void> write_truth(const RunRecord& record, const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
+  const auto earlier = [](const TrajectoryPoint& p, Time t) { return p.t < t; };
+  std::string text = kTruthHeader;
+  auto next = truth.begin();  // what lies before it is written or not wanted
+  for (const Odometry& o : record.odometry) {
+    const auto after = std::lower_bound(truth.begin(), truth.end(), o.t, earlier);
+    const auto from = after == truth.begin() ? after : after - 1, to = after == truth.end() ? after : after + 1;
+    for (auto p = std::max(next, from); p < to; ++p) text += truth_row(*p);
+    next = std::max(next, to);
+  }
+  return write_text(folder + "/ground_truth.csv", text);
 }
 
 Result<void> write_statistics(const RunRecord& record, const std::string& folder) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/trajectory.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
 #include "fbvins/types/trajectory.hpp"
@@ -28,9 +29,12 @@ struct RunRecord {
   Trajectory poses() const;
 };
 
-/// The trajectory and statistics files; the folder must exist.
+/// The trajectory and statistics files; the folder must exist. Beside trajectory.csv lies covariance.csv with what
+/// its columns leave out: velocity and biases.
 Result<void> write_trajectories(const RunRecord& record, const std::string& folder);
 Result<void> write_statistics(const RunRecord& record, const std::string& folder);
+/// The recording's truth around each image, so that a report needs nothing but this folder.
+Result<void> write_truth(const RunRecord& record, const std::vector<TrajectoryPoint>& truth, const std::string& folder);
 Result<void> write_timing(const RunRecord& record, const std::string& folder);
 /// One small file in one go.
 Result<void> write_text(const std::string& path, const std::string& text);

@@ -182,6 +182,8 @@ void Estimator::solve(Odometry& out, const LmOptions& lm) {
   if (summary.usable && problem_.covariance(newest, covariance)) {
     out.pose_covariance = covariance.topLeftCorner<6, 6>();
     out.velocity_covariance = covariance.block<3, 3>(nav::v, nav::v);
+    out.gyro_bias_covariance = covariance.block<3, 3>(nav::bg, nav::bg);
+    out.accel_bias_covariance = covariance.block<3, 3>(nav::ba, nav::ba);
   }
   out.stats.frames_in_window = newest + 1;
   out.stats.landmarks = static_cast<int>(problem_.landmarks.size());

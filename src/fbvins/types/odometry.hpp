@@ -68,8 +68,10 @@ struct Odometry {
   Vec3 v_WB = Vec3::Zero();    ///< m/s, in W
   Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;
-  Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
-  Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
+  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad])
+  Mat3 velocity_covariance = Mat3::Zero();    ///< of v_WB, m^2/s^2
+  Mat3 gyro_bias_covariance = Mat3::Zero();   ///< rad^2/s^2
+  Mat3 accel_bias_covariance = Mat3::Zero();  ///< m^2/s^4
   Health health;
   std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then
   EstimatorStats stats;
