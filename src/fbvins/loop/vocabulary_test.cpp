@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/vocabulary.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -44,7 +46,8 @@ const Vocabulary& trained() {
 
 class VocabularyFile : public testing::Test {
  protected:
-  std::string path_ = (std::filesystem::temp_directory_path() / "fbvins_vocabulary_test.fbv").string();
+  // One file a process: tests run side by side.
+  std::string path_ = (std::filesystem::temp_directory_path() / fmt::format("fbvins_vocabulary_{}.fbv", ::getpid())).string();
   void TearDown() override { std::filesystem::remove(path_); }
   std::string bytes() const {
     std::ifstream in(path_, std::ios::binary);
@@ -101,7 +104,7 @@ TEST_F(VocabularyFile, EveryDamageIsAnErrorWithASentence) {
       EXPECT_EQ(bad.substr(64), good.substr(64));
       EXPECT_EQ(opened->words(), trained().words());
     } else {
-      EXPECT_NE(opened.error().message.find("fbvins_vocabulary_test"), std::string::npos);
+      EXPECT_NE(opened.error().message.find(path_), std::string::npos);
     }
   }
   EXPECT_EQ(Vocabulary::open(path_ + ".absent").error().code, ErrorCode::not_found);
