@@ -7,6 +7,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
+#include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
 #include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
@@ -20,18 +21,23 @@ namespace {
 constexpr const char* kExamples =
     R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), statistics.csv,
 config.yaml (the effective configuration), summary.json, summary.txt, timing.csv. The same input and
-configuration give the same bytes in the first four, with --threaded as well.
+configuration give the same bytes in the first four, with --threaded as well. Loop closure (--loop, --save-map,
+--load-map, --final-ba) adds map_trajectory_tum.txt (M after the run), map_causal_tum.txt and map_bounded_tum.txt
+(M as it was known at each moment, at once and without steps) and map_updates.csv; the odometry is not touched.
 
 examples:
   fbvins run MH_01_easy
   fbvins run MH_01_easy.zip --frontend orb --out /tmp/orb
   fbvins run flight --calibration camchain-imucam.yaml --imu-calibration imu.yaml
   fbvins run MH_01_easy --config drone.yaml --set estimator.max_iterations=8 --threaded
+  fbvins run monday --save-map flat.fbm          with loop closure, the map kept
+  fbvins run tuesday --load-map flat.fbm         finds itself in Monday's map and goes on in its frame
 )";
 
 struct Arguments {
   std::string dataset, config, frontend, out, camchain, imu_calibration;
   std::vector<std::string> assignments;
+  MapArguments map;
   int max_images = 0;
   bool threaded = false, quiet = false;
 };
@@ -59,14 +65,23 @@ Result<std::string> make_folder(const Arguments& arguments, const Config& config
   return folder;
 }
 
-/// Sends the whole recording through the system.
-Result<RunRecord> process(const Config& config, Dataset& data, RunMode mode, Progress& progress) {
-  RunRecord record;
-  record.tracked.reserve(data.frames().size());
-  record.odometry.reserve(data.frames().size());
-  System system(config, data.rig(), mode);
-  system.on_tracked_frame([&](const TrackedFrame& f) { record.tracked.push_back({f.id, f.t, f.stats}); });
-  system.on_odometry([&](const Odometry& o) { record.odometry.push_back(o); });
+struct Flight {
+  RunRecord run;
+  std::optional<MapRecord> map;  ///< with loop closure
+};
+
+/// Sends the whole recording through the system, and ends the map.
+Result<Flight> process(const Arguments& arguments, const Config& config, Dataset& data, Progress& progress) {
+  auto closer = make_loop_closer(arguments.map, data.rig(), config.loop);
+  if (!closer) return closer.error();
+  Flight flight;
+  if (*closer) flight.map.emplace();
+  flight.run.tracked.reserve(data.frames().size());
+  flight.run.odometry.reserve(data.frames().size());
+  System system(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, std::move(*closer));
+  system.on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats}); });
+  system.on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
+  system.on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
   int frames = 0;
   while (auto event = data.next()) {
     const bool is_frame = std::holds_alternative<StereoFrame>(*event);
@@ -74,13 +89,18 @@ Result<RunRecord> process(const Config& config, Dataset& data, RunMode mode, Pro
     if (is_frame) progress.update(++frames);
   }
   if (Result<void> done = system.finish(); !done) return done.error();
-  return record;
+  if (flight.map) finish_map(arguments.map, *system.loop(), flight.run, *flight.map);
+  if (flight.map)
+    if (Result<void> saved = save_map(arguments.map, *system.loop()); !saved) flight.map->not_saved = saved.error().message;
+  return flight;
 }
 
-Result<void> write_all(const RunRecord& record, const RunSummary& summary, const Config& config, const std::string& folder) {
-  if (Result<void> done = write_trajectories(record, folder); !done) return done;
-  if (Result<void> done = write_statistics(record, folder); !done) return done;
-  if (Result<void> done = write_timing(record, folder); !done) return done;
+Result<void> write_all(const Flight& flight, const RunSummary& summary, const Config& config, const std::string& folder) {
+  if (Result<void> done = write_trajectories(flight.run, folder); !done) return done;
+  if (Result<void> done = write_statistics(flight.run, folder); !done) return done;
+  if (Result<void> done = write_timing(flight.run, folder); !done) return done;
+  if (flight.map)
+    if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
   if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
   if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
   return write_text(folder + "/summary.txt", to_text(summary));
@@ -95,21 +115,25 @@ int run(const Arguments& arguments) {
   const auto folder = make_folder(arguments, *config, **data);
   if (!folder) return fail(folder.error().message);
 
-  const RunMode mode = arguments.threaded ? RunMode::threaded : RunMode::deterministic;
   double wall_s = 0;
-  const auto record = [&] {
+  const auto flight = [&] {
     Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
-    auto result = process(*config, **data, mode, progress);
+    auto result = process(arguments, *config, **data, progress);
     wall_s = progress.elapsed_s();
     return result;
   }();
-  if (!record) return fail(record.error().message);
+  if (!flight) return fail(flight.error().message);
 
-  RunSummary summary = summarise(*record, **data);
+  RunSummary summary = summarise(flight->run, **data);
+  if (flight->map) summary.map = summarise(*flight->map, flight->run, truth_of(**data));
   summary.frontend = config->frontend.kind;
   summary.mode = arguments.threaded ? "threaded" : "deterministic";
   summary.wall_s = wall_s;
-  if (Result<void> written = write_all(*record, summary, *config, *folder); !written) return fail(written.error().message);
+  if (Result<void> written = write_all(*flight, summary, *config, *folder); !written) return fail(written.error().message);
+  if ((*data)->has_ground_truth())
+    if (Result<void> written = write_truth(flight->run, (*data)->ground_truth(), *folder); !written)
+      return fail(written.error().message);
+  if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
   if (summary.coverage.with_pose > 0) return kOk;
   warn("no pose could be estimated; the health column of trajectory.csv says why");
@@ -134,6 +158,12 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--threaded", arguments->threaded, "frontend and estimator on threads of their own; the same result");
+  command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
+  command->add_option("--save-map", arguments->map.save, "file for the map after the run; with loop closure");
+  command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
+  command->add_flag("--final-ba", arguments->map.final_ba,
+                    "bundle adjustment over the whole map after the run; with loop closure");
+  command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

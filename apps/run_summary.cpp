@@ -26,9 +26,7 @@ void count_health(const RunRecord& record, RunSummary& summary) {
   summary.health.assign(counts.begin(), counts.end());
 }
 
-void evaluate_against(const std::vector<TrajectoryPoint>& points, const RunRecord& record, RunSummary& summary) {
-  Trajectory truth;
-  for (const TrajectoryPoint& point : points) truth.push_back({point.t, point.T_WB});
+void evaluate_against(Trajectory truth, const RunRecord& record, RunSummary& summary) {
   auto evaluation = evaluate(truth, record.poses(), {});
   if (evaluation) summary.evaluation = *evaluation;
   else summary.no_evaluation = evaluation.error().message;
@@ -41,6 +39,38 @@ void evaluate_against(const std::vector<TrajectoryPoint>& points, const RunRecor
     if (covariances.size() < pairs.size() && o.health.has_pose() && o.t == pairs[covariances.size()].estimate.t)
       covariances.push_back(o.pose_covariance);
   if (const auto yaw = align(pairs, Alignment::yaw)) summary.nees = nees(pairs, covariances, *yaw);
+}
+
+Json map_json(const MapSummary& m) {
+  Json json{{"keyframes", m.keyframes}, {"keyframes_in_map", m.keyframes_in_map}, {"loops", m.loops}};
+  json["refused"] = m.refused;
+  json["left_out"] = m.left_out;
+  if (m.localised_after_s) json["localised_after_s"] = *m.localised_after_s;
+  if (m.causal) json["causal"] = to_json(*m.causal, Alignment::se3);
+  if (m.bounded) json["bounded"] = to_json(*m.bounded, Alignment::se3);
+  if (m.final) json["after_the_run"] = to_json(*m.final, Alignment::se3);
+  if (m.adjustment)
+    json["final_ba"] = Json{{"points", m.adjustment->points},
+                            {"sights", m.adjustment->sights},
+                            {"initial_rms_px", m.adjustment->initial_rms_px},
+                            {"final_rms_px", m.adjustment->final_rms_px}};
+  return json;
+}
+
+std::string map_text(const MapSummary& m) {
+  std::string text = fmt::format("map: {} keyframes of {}, {} loops, {} refused by the odometry, {} left out by the graph\n",
+                                 m.keyframes_in_map, m.keyframes, m.loops, m.refused, m.left_out);
+  if (!m.localised_after_s) text += "map: never localised\n";
+  const auto line = [&](const char* what, const std::optional<Evaluation>& e) {
+    if (e) text += fmt::format("ATE RMSE in M, {:<38}{:8.4f} m\n", what, e->absolute_m.rmse);
+  };
+  line("as known at each moment:", m.causal);
+  line("the same, moved without steps:", m.bounded);
+  line("after the run:", m.final);
+  if (m.adjustment)
+    text += fmt::format("final bundle adjustment: {} points, {} sights, {:.2f} -> {:.2f} px\n", m.adjustment->points,
+                        m.adjustment->sights, m.adjustment->initial_rms_px, m.adjustment->final_rms_px);
+  return text;
 }
 
 double peak_memory_mb() {
@@ -66,6 +96,12 @@ std::vector<double> total_ms(const RunSummary& s) {
 
 }  // namespace
 
+Trajectory truth_of(const Dataset& data) {
+  Trajectory truth;
+  for (const TrajectoryPoint& point : data.ground_truth()) truth.push_back({point.t, point.T_WB});
+  return truth;
+}
+
 RunSummary summarise(const RunRecord& record, const Dataset& data) {
   RunSummary s;
   s.dataset = data.info().name;
@@ -76,7 +112,7 @@ RunSummary summarise(const RunRecord& record, const Dataset& data) {
   for (const StampedPose& pose : record.poses()) poses.push_back(pose.t);
   s.coverage = coverage_of(std::move(images), std::move(poses));
   count_health(record, s);
-  if (data.has_ground_truth()) evaluate_against(data.ground_truth(), record, s);
+  if (data.has_ground_truth()) evaluate_against(truth_of(data), record, s);
   else s.no_evaluation = "the recording holds no ground truth";
   for (const TrackedRecord& tracked : record.tracked) s.frontend_ms.push_back(tracked.stats.total_ms());
   for (const Odometry& o : record.odometry) s.estimator_ms.push_back(o.stats.total_ms());
@@ -94,10 +130,12 @@ std::string to_json_text(const RunSummary& s) {
   if (s.evaluation) result["accuracy"] = to_json(*s.evaluation, Alignment::se3);
   else result["no_accuracy"] = s.no_evaluation;
   if (s.nees) result["nees_yaw"] = to_json(*s.nees);
+  if (s.map) result["map"] = map_json(*s.map);
   Json timing{{"mode", s.mode}, {"wall_s", s.wall_s}};
   timing["frontend_ms"] = timing_json(s.frontend_ms);
   timing["estimator_ms"] = timing_json(s.estimator_ms);
   timing["total_ms"] = timing_json(total_ms(s));
+  if (s.map) timing["loop_ms"] = Json{{"keyframe_mean", s.map->mean_ms}, {"finish", s.map->finish_ms}};
   timing["peak_memory_mb"] = s.peak_memory_mb;
   return Json{{"result", result}, {"timing", timing}}.dump(2) + "\n";
 }
@@ -112,9 +150,12 @@ std::string to_text(const RunSummary& s) {
   if (s.nees && s.nees->count > 0)
     text += fmt::format("NEES (yaw-aligned; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
                         s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
+  if (s.map) text += map_text(*s.map);
   text += "-- timing (differs from run to run) --\n";
   text +=
       timing_line("frontend", s.frontend_ms) + timing_line("estimator", s.estimator_ms) + timing_line("together", total_ms(s));
+  if (s.map)
+    text += fmt::format("loop closure{:7.2f} ms CPU a keyframe, {:.0f} ms at the end\n", s.map->mean_ms, s.map->finish_ms);
   text += fmt::format("wall {:.1f} s ({}), peak memory {:.0f} MB\n", s.wall_s, s.mode, s.peak_memory_mb);
   return text;
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "apps/evaluation_report.hpp"
+#include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
 #include "fbvins/io/dataset.hpp"
 
@@ -24,11 +25,14 @@ struct RunSummary {
   std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
   std::string no_evaluation;                        ///< why there is none
   std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
+  std::optional<MapSummary> map;                    ///< with loop closure
   double wall_s = 0;
   std::vector<double> frontend_ms, estimator_ms;  ///< CPU time per frame
   double peak_memory_mb = 0;
 };
 
+/// The recording's ground truth as a trajectory; empty where there is none.
+Trajectory truth_of(const Dataset& data);
 RunSummary summarise(const RunRecord& record, const Dataset& data);
 std::string to_json_text(const RunSummary& summary);
 std::string to_text(const RunSummary& summary);

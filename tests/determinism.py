@@ -12,6 +12,7 @@ import sys
 import tempfile
 
 REPRODUCIBLE = ["trajectory_tum.txt", "trajectory.csv", "statistics.csv", "config.yaml"]
+OF_THE_MAP = ["map_trajectory_tum.txt", "map_causal_tum.txt", "map_bounded_tum.txt", "map_updates.csv"]
 IMAGES = 150  # starts in motion, so that start, window and marginalisation all take part
 
 
@@ -19,12 +20,31 @@ def run(program, recording, out, *arguments):
     command = [program, "run", str(recording), "--out", str(out), "--max-images", str(IMAGES), "--quiet", *arguments]
     subprocess.run(command, check=True)
     files = {name: (out / name).read_bytes() for name in REPRODUCIBLE}
+    files.update({name: (out / name).read_bytes() for name in OF_THE_MAP if (out / name).exists()})
+    for path in out.glob("*.fbm"):
+        files[path.name] = path.read_bytes()
     files["summary.json result"] = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]
     return files
 
 
 def differing(a, b):
-    return [name for name in a if a[name] != b[name]]
+    return [name for name in a if a[name] != b.get(name)]
+
+
+def check_loop_closure(program, recording, root, kind, odometry):
+    """The map repeats as well, and the odometry is the same with it as without."""
+    def fly(name, *arguments):
+        (root / name).mkdir()
+        return run(program, recording, root / name, *kind, "--save-map", str(root / name / "map.fbm"), *arguments)
+
+    first = fly("map")
+    assert set(OF_THE_MAP + ["map.fbm"]) <= first.keys(), f"only {sorted(first)} were written"
+    assert not (wrong := [n for n in REPRODUCIBLE if first[n] != odometry[n]]), f"loop closure changed {wrong}"
+    assert first["map_updates.csv"].count(b"\n") > 10, "hardly a keyframe reached the loop closer"
+    for name, arguments in {"again": [], "threaded": ["--threaded"]}.items():
+        wrong = differing(first, fly("map " + name, *arguments))
+        assert not wrong, f"loop closure, {name}: {wrong} differ"
+        print(f"loop closure, {name}: same bytes")
 
 
 def main():
@@ -46,6 +66,7 @@ def main():
             wrong = differing(first, run(program, recording, root / "b", *kind, *arguments))
             assert not wrong, f"{name}: {wrong} differ"
             print(f"{frontend} {name}: same bytes")
+        check_loop_closure(program, recording, root, kind, first)
         other = run(program, recording, root / "c", *kind, "--set", "estimator.max_iterations=1")
         assert "trajectory.csv" in differing(first, other), "a changed option changed nothing: the comparison is blind"
     return 0

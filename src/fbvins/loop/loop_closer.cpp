@@ -78,6 +78,7 @@ MapUpdate LoopCloser::process(Place place, FrameId frame, Time t, const Pose<W, 
   MapUpdate update;
   update.frame = frame;
   update.t = t;
+  update.reset_counter = reset_counter;
   if (previous_T_WB_) path_m_ += (T_WB.p - previous_T_WB_->p).norm();
   previous_T_WB_ = T_WB;
   frame_.advance(T_WB, t);
@@ -319,6 +320,8 @@ void LoopCloser::optimise(MapUpdate* update) {
 }
 
 PoseGraphReport LoopCloser::finish() { return map_.optimise(options_.graph); }
+
+FinalAdjustmentReport LoopCloser::adjust() { return adjust_map(map_, options_.verification, options_.graph, options_.final_ba); }
 
 /// Above its size the map lets go of keyframes that others replace, and above its limit of the oldest flight's.
 void LoopCloser::thin() {

@@ -34,6 +34,8 @@ class LoopCloser {
 
   /// A last optimisation over everything.
   PoseGraphReport finish();
+  /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
+  FinalAdjustmentReport adjust();
 
   const PlaceMap& map() const { return map_; }
   /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Frames of a

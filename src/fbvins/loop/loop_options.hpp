@@ -2,6 +2,7 @@
 // Options of loop closure.
 #pragma once
 
+#include "fbvins/loop/final_adjustment.hpp"
 #include "fbvins/loop/map_frame.hpp"
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_verifier.hpp"
@@ -14,6 +15,7 @@ struct LoopOptions {
   PlaceVerifierOptions verification;
   PoseGraphOptions graph;
   DriftOptions drift;
+  FinalAdjustmentOptions final_ba;
   double min_age_s = 2;
   double max_distance_m = 4;
   double max_angle_deg = 65;
@@ -39,6 +41,7 @@ struct LoopOptions {
     v.group("verification", verification, "is it the same place");
     v.group("graph", graph, "pose graph");
     v.group("drift", drift, "how fast odometry drifts");
+    v.group("final_ba", final_ba, "bundle adjustment over the whole map, after the run");
     v("min_age_s", min_age_s, "s", "keyframes younger than this are the odometry's business", 0.0, 1000.0);
     v("max_distance_m", max_distance_m, "m", "places farther than this from where we should be are not looked at", 0.1, 1000.0);
     v("max_angle_deg", max_angle_deg, "deg", "nor those seen from a direction that differs more", 1.0, 180.0);

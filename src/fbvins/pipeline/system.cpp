@@ -9,11 +9,12 @@ constexpr std::int64_t kPriorLag = 2;
 
 }  // namespace
 
-System::System(const Config& config, const StereoRig& rig, RunMode mode)
+System::System(const Config& config, const StereoRig& rig, RunMode mode, std::unique_ptr<LoopCloser> loop)
     : mode_(mode),
       packets_(config.input, Duration::from_seconds(rig.time_offset_s)),
       frontend_(make_frontend(rig, config.frontend)),
-      estimator_(rig, config.estimator) {
+      estimator_(rig, config.estimator),
+      loop_(std::move(loop)) {
   if (mode_ != RunMode::threaded) return;
   frontend_runner_.start(
       [this] {
@@ -24,6 +25,12 @@ System::System(const Config& config, const StereoRig& rig, RunMode mode)
   estimator_runner_.start(
       [this] {
         while (auto frame = to_estimator_.pop()) estimate(*frame);
+        to_loop_.close();
+      },
+      [this] { stop_waiting(); });
+  loop_runner_.start(
+      [this] {
+        while (auto task = to_loop_.pop()) close_loops(*task);
       },
       [this] { stop_waiting(); });
 }
@@ -45,7 +52,7 @@ void System::forward_packets(bool flush) {
 
 void System::track(SensorPacket packet) {
   TrackedFrame frame = frontend_->process(packet, prior_for(packet.id));
-  if (on_keyframe_) frame.images = std::move(packet.frame);
+  if (on_keyframe_ || loop_) frame.images = std::move(packet.frame);
   if (mode_ == RunMode::threaded) to_estimator_.push(std::move(frame));
   else estimate(frame);
 }
@@ -55,8 +62,23 @@ void System::estimate(const TrackedFrame& frame) {
   const Estimate estimate = estimator_.process(frame);
   publish(frame.id, estimator_.prior());
   if (on_odometry_) on_odometry_(estimate.odometry);
-  if (on_keyframe_)
-    for (const Keyframe& keyframe : estimate.keyframes) on_keyframe_(keyframe);
+  hand_on(estimate);
+}
+
+void System::hand_on(const Estimate& estimate) {
+  for (const Keyframe& keyframe : estimate.keyframes) {
+    if (on_keyframe_) on_keyframe_(keyframe);
+    if (!loop_) continue;
+    LoopTask task{keyframe, FrameId{estimate.odometry.id.value + 1}};
+    if (mode_ == RunMode::threaded) to_loop_.push(std::move(task));
+    else close_loops(task);
+  }
+}
+
+void System::close_loops(const LoopTask& task) {
+  MapUpdate update = loop_->process(task.keyframe);
+  update.applies_from = task.applies_from;
+  if (on_map_update_) on_map_update_(update);
 }
 
 StatePrior System::prior_for(FrameId frame) {
@@ -77,6 +99,7 @@ void System::publish(FrameId frame, const StatePrior& prior) {
 void System::stop_waiting() {
   to_frontend_.close();
   to_estimator_.close();
+  to_loop_.close();
   const std::lock_guard lock(prior_mutex_);
   stopped_ = true;
   prior_published_.notify_all();
@@ -88,7 +111,7 @@ Result<void> System::finish() {
   forward_packets(true);
   to_frontend_.close();
   // Both have ended before this returns, whichever failed: no callback comes later.
-  for (StageRunner* runner : {&frontend_runner_, &estimator_runner_}) {
+  for (StageRunner* runner : {&frontend_runner_, &estimator_runner_, &loop_runner_}) {
     const std::string failure = runner->join();
     if (failure_.empty()) failure_ = failure;
   }

@@ -38,12 +38,14 @@ struct LoopStats {
 
 /// After every keyframe. T_MB = T_MW * T_WB.
 struct MapUpdate {
-  FrameId frame;
+  FrameId frame;         ///< the keyframe
+  FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
   Time t;
-  bool localised = false;         ///< false: where W is in M is not known (a loaded map, or after a restart)
-  Pose<M, W> T_MW;                ///< best knowledge now; jumps when a place is recognised
-  Pose<M, W> T_MW_smooth;         ///< the same, moved by a bounded amount a second: to fly by
-  std::uint32_t map_session = 0;  ///< counts frames W that met this map
+  bool localised = false;           ///< false: where W is in M is not known (a loaded map, or after a restart)
+  Pose<M, W> T_MW;                  ///< best knowledge now; jumps when a place is recognised
+  Pose<M, W> T_MW_smooth;           ///< the same, moved by a bounded amount a second: to fly by
+  std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this speaks of
+  std::uint32_t map_session = 0;    ///< counts frames W that met this map
   std::vector<LoopConstraint> loops;
   std::vector<CorrectedKeyframe> corrected;  ///< all keyframes, when the graph was optimised
   LoopStats stats;

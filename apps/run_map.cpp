@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_map.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "fbvins/core/stage_timer.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kUpdatesHeader =
+    "#timestamp [ns],frame,applies_from,localised,session,x [m],y [m],z [m],yaw [rad],keyframes,candidates,accepted,refused,"
+    "optimised\n";
+
+Result<void> check_folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  if (std::filesystem::is_directory(folder)) return {};
+  return Error{ErrorCode::unwritable, fmt::format("{}: there is no folder {}", path, folder.string())};
+}
+
+/// T_MB of every frame that has a pose, with the update that was known when the frame came.
+/// Before the first update a new map is where the odometry began; an old one has to be found first.
+void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
+  MapUpdate begin;
+  begin.localised = new_map;
+  const MapUpdate* now = &begin;
+  auto next = record.updates.begin();
+  for (const Odometry& o : run.odometry) {
+    for (; next != record.updates.end() && next->applies_from <= o.id; ++next) now = &*next;
+    if (now == &begin) begin.reset_counter = o.reset_counter;
+    if (!o.health.has_pose() || !now->localised || now->reset_counter != o.reset_counter) continue;
+    record.causal.push_back({o.t, (now->T_MW * o.T_WB).cast_frames<W, B>()});
+    record.bounded.push_back({o.t, (now->T_MW_smooth * o.T_WB).cast_frames<W, B>()});
+  }
+}
+
+/// Each restart begins a new W: they are corrected one by one.
+Trajectory corrected(const LoopCloser& loop, const RunRecord& run) {
+  Trajectory all, part;
+  std::uint32_t reset_counter = 0;
+  const auto flush = [&] {
+    const Trajectory done = loop.corrected(part);
+    all.insert(all.end(), done.begin(), done.end());
+    part.clear();
+  };
+  for (const Odometry& o : run.odometry) {
+    if (!o.health.has_pose()) continue;
+    if (o.reset_counter != reset_counter) flush(), reset_counter = o.reset_counter;
+    part.push_back({o.t, o.T_WB});
+  }
+  flush();
+  return all;
+}
+
+Result<void> write_tum(const Trajectory& trajectory, const std::string& path) {
+  auto tum = TumWriter::create(path);
+  if (!tum) return tum.error();
+  for (const StampedPose& p : trajectory) tum->write(p.t, p.T_WB);
+  return tum->close();
+}
+
+std::optional<Evaluation> evaluated(const Trajectory& truth, const Trajectory& estimate) {
+  if (truth.empty()) return std::nullopt;
+  const auto evaluation = evaluate(truth, estimate, {});
+  return evaluation ? std::optional(*evaluation) : std::nullopt;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& arguments, const StereoRig& rig,
+                                                     const LoopOptions& options) {
+  if (!arguments.wanted()) return std::unique_ptr<LoopCloser>();
+  if (!arguments.save.empty())
+    if (Result<void> there = check_folder_of(arguments.save); !there) return there.error();
+  auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped_vocabulary() : arguments.vocabulary);
+  if (!vocabulary) return vocabulary.error();
+  if (arguments.load.empty()) return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary));
+  auto map = load_map(arguments.load);
+  if (!map) return map.error();
+  return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary), std::move(*map));
+}
+
+void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record) {
+  compose_causal(run, arguments.load.empty(), record);
+  CpuTimer timer;
+  record.loops_left_out = loop.finish().rejected;
+  if (arguments.final_ba) record.adjustment = loop.adjust();
+  record.finish_ms = timer.lap_ms();
+  record.keyframes_in_map = static_cast<int>(loop.map().size());
+  record.final = corrected(loop, run);
+}
+
+Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop) {
+  return arguments.save.empty() ? Result<void>{} : fbvins::save_map(loop.map(), arguments.save);
+}
+
+Result<void> write_map_record(const MapRecord& record, const std::string& folder) {
+  if (Result<void> done = write_tum(record.final, folder + "/map_trajectory_tum.txt"); !done) return done;
+  if (Result<void> done = write_tum(record.causal, folder + "/map_causal_tum.txt"); !done) return done;
+  if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
+  std::string text = kUpdatesHeader;
+  for (const MapUpdate& u : record.updates)
+    text +=
+        fmt::format("{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{},{},{},{},{}\n", u.t.ns, u.frame.value, u.applies_from.value,
+                    u.localised ? 1 : 0, u.map_session, u.T_MW.p.x(), u.T_MW.p.y(), u.T_MW.p.z(), yaw_of(u.T_MW.q),
+                    u.stats.keyframes, u.stats.candidates, u.stats.accepted, u.stats.refused, u.stats.optimised ? 1 : 0);
+  return write_text(folder + "/map_updates.csv", text);
+}
+
+MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory& truth) {
+  MapSummary s;
+  for (const MapUpdate& u : record.updates) {
+    s.loops += u.stats.accepted;
+    s.refused += u.stats.refused;
+    s.mean_ms += u.stats.total_ms() / static_cast<double>(record.updates.size());
+  }
+  s.keyframes = static_cast<int>(record.updates.size());
+  s.keyframes_in_map = record.keyframes_in_map;
+  s.left_out = record.loops_left_out;
+  const Trajectory poses = run.poses();
+  if (!record.causal.empty()) s.localised_after_s = (record.causal.front().t - poses.front().t).seconds();
+  s.causal = evaluated(truth, record.causal);
+  s.bounded = evaluated(truth, record.bounded);
+  s.final = evaluated(truth, record.final);
+  s.finish_ms = record.finish_ms;
+  s.adjustment = record.adjustment;
+  return s;
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loop closure in `fbvins run`: how it is asked for, and the three trajectories it leaves, which are never mixed:
+// the odometry in W (written by run_output.hpp), M as it was put out at each moment, and M after the run.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/run_output.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/eval/evaluation.hpp"
+#include "fbvins/loop/final_adjustment.hpp"
+#include "fbvins/loop/loop_closer.hpp"
+#include "fbvins/types/loop.hpp"
+
+namespace fbvins::app {
+
+struct MapArguments {
+  bool loop = false, final_ba = false;
+  std::string load, save, vocabulary;
+  bool wanted() const { return loop || final_ba || !load.empty() || !save.empty(); }
+};
+
+/// Null where no loop closure is wanted. Errors of the vocabulary, the old map, the folder of the new one.
+Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& arguments, const StereoRig& rig,
+                                                     const LoopOptions& options);
+
+/// What the loop stage said, keyframe by keyframe, and what came out in the end.
+struct MapRecord {
+  std::vector<MapUpdate> updates;  ///< without the corrected keyframes
+  Trajectory causal, bounded;      ///< T_MB at each frame, with T_MW as it was known then; with the smooth T_MW
+  Trajectory final;                ///< after the last optimisation
+  int keyframes_in_map = 0, loops_left_out = 0;
+  double finish_ms = 0;  ///< CPU
+  std::optional<FinalAdjustmentReport> adjustment;
+  std::string not_saved;  ///< why, where the map could not be written
+};
+
+/// Ends the map (last optimisation, bundle adjustment where asked for) and composes the trajectories.
+void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record);
+Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop);
+/// map_trajectory_tum.txt, map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
+Result<void> write_map_record(const MapRecord& record, const std::string& folder);
+
+/// Errors of the three trajectories, where there is ground truth.
+struct MapSummary {
+  int keyframes = 0, keyframes_in_map = 0, loops = 0, refused = 0, left_out = 0;
+  std::optional<double> localised_after_s;  ///< from the first pose to the first known T_MW
+  std::optional<Evaluation> causal, bounded, final;
+  double mean_ms = 0, finish_ms = 0;  ///< CPU: of a keyframe, at the end
+  std::optional<FinalAdjustmentReport> adjustment;
+};
+/// `truth` may be empty.
+MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory& truth);
+
+}  // namespace fbvins::app

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Residuals of keyframe poses for automatic differentiation, shared by the pose graph and the final adjustment
+// (docs/derivations/loop.md, L8-L10). A node is x = (p, yaw about M's z) or (p, dtheta in B), about a starting orientation.
+#pragma once
+
+#include <cmath>
+
+#include "fbvins/geometry/pose.hpp"
+
+namespace fbvins {
+
+/// Orientation of a node from its parameters: (p, yaw about M's z) or (p, dtheta in B).
+template <int Dof, class T>
+Eigen::Quaternion<T> orientation(const Quat& start, const T* x) {
+  const Eigen::Quaternion<T> q = start.cast<T>();
+  if constexpr (Dof == 4) {
+    const T half = x[3] * 0.5;
+    using std::cos, std::sin;
+    return Eigen::Quaternion<T>(cos(half), T(0), T(0), sin(half)) * q;
+  } else {
+    // Small steps about `start`, which is the pose of the solve before: 2 atan(|v|/2) differs from |v| in third order.
+    const Eigen::Quaternion<T> d(T(1), x[3] * 0.5, x[4] * 0.5, x[5] * 0.5);
+    return (q * d).normalized();
+  }
+}
+
+template <int Dof>
+struct EdgeCost {
+  Quat q_a, q_b;
+  Pose<B, B> T_ab;
+  Mat6 root;  // of the weighted information
+
+  template <class T>
+  bool operator()(const T* a, const T* b, T* out) const {
+    const Eigen::Quaternion<T> Ra = orientation<Dof>(q_a, a), Rb = orientation<Dof>(q_b, b);
+    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> pa(a), pb(b);
+    Eigen::Matrix<T, 6, 1> r;
+    r.template head<3>() = Ra.conjugate() * Eigen::Matrix<T, 3, 1>(pb - pa) - T_ab.p.cast<T>();
+    const Eigen::Quaternion<T> e = T_ab.q.conjugate().cast<T>() * (Ra.conjugate() * Rb);
+    r.template tail<3>() = e.vec() * (e.w() < T(0) ? T(-2) : T(2));
+    Eigen::Map<Eigen::Matrix<T, 6, 1>>(out, 6) = root.cast<T>() * r;
+    return true;
+  }
+};
+
+/// The vertical of a node with six degrees of freedom against M's z.
+struct GravityCost {
+  Quat q;
+  Vec3 up_B;
+  double per_sigma;
+
+  template <class T>
+  bool operator()(const T* a, T* out) const {
+    const Eigen::Matrix<T, 3, 1> up = orientation<6>(q, a) * up_B.cast<T>();
+    out[0] = up.x() * per_sigma;
+    out[1] = up.y() * per_sigma;
+    return true;
+  }
+};
+
+}  // namespace fbvins
