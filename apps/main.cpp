@@ -12,6 +12,7 @@ constexpr const char* kExamples = R"(examples:
   fbvins run MH_01_easy                         estimate a flight, write out/MH_01_easy-klt
   fbvins run MH_01_easy.zip --frontend orb      the other frontend, straight from the zip
   fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
+  fbvins report out/MH_01_easy-*                both in one page: report.html
   fbvins info MH_01_easy                        what is in a recording
   fbvins config                                 every option with unit, default, meaning
 
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
   add_info_command(program, exit_code);
   add_config_command(program, exit_code);
   add_simulate_command(program, exit_code);
+  add_report_command(program, exit_code);
   add_map_command(program, exit_code);
   add_vocab_command(program, exit_code);
   try {

@@ -17,6 +17,7 @@ RANKS = {
     "frontend": 4, "estimator": 4, "loop": 4, "sim": 4,
     "pipeline": 5,
     "config": 6,
+    "experiment": 7,
 }
 # Within a rank only these: a camera rig is made of the values that travel.
 ALLOWED_WITHIN_RANK = {("camera", "types")}

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs as one self-contained HTML page: plots drawn by the page itself from numbers inside it, nothing fetched.
+// Pure function, any thread.
+//
+//   std::string html = report_html(runs, {.title = "MH_01, klt and orb"});
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/experiment/run_folder.hpp"
+
+namespace fbvins {
+
+struct ReportOptions {
+  std::string title = "FB-VINS report";
+  std::size_t max_points = 1500;  ///< of a curve; longer runs are thinned out evenly
+};
+
+/// `bench`: what a matrix found (bench_payload of bench_tables.hpp), or null.
+std::string report_html(const std::vector<RunFolder>& runs, const nlohmann::ordered_json& bench, const ReportOptions& options);
+
+}  // namespace fbvins

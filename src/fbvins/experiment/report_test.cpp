@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/experiment/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/experiment/test_run.hpp"
+
+namespace fbvins {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+RunFolder complete_run() {
+  RunFolder run = circling_run(1);
+  run.summary = Json::parse(R"({"result": {"coverage": {"share": 1.0}, "restarts": 0}, "timing": {"total_ms": {"mean": 4.2}}})");
+  run.config = "a: 1  # </script> & <b>\n";
+  return run;
+}
+
+/// What the page's script will read.
+Json data_of(const std::string& html) {
+  const std::string open = "<script type=\"application/json\" id=\"data\">";
+  const std::size_t from = html.find(open) + open.size();
+  return Json::parse(html.substr(from, html.find("</script>", from) - from));
+}
+
+TEST(Report, HoldsTheNumbersOfTheEvaluation) {
+  const RunFolder run = complete_run();
+  const Json data = data_of(report_html({run}, nullptr, {}));
+  ASSERT_EQ(data["runs"].size(), 1u);
+  const Json& shown = data["runs"][0];
+  EXPECT_NEAR(shown["table"]["absolute_m"]["rmse"].get<double>(), 0.0173, 0.003);  // sqrt(3) times 1 cm
+  EXPECT_EQ(shown["errors"]["t"].size(), 200u);
+  EXPECT_EQ(shown["errors"]["absolute_m"].size(), 200u);
+  EXPECT_NEAR(shown["nees"]["velocity"].get<double>(), 3, 0.6);
+  EXPECT_EQ(shown["config"], run.config);
+}
+
+TEST(Report, ValuesCannotEndTheScript) {
+  const std::string html = report_html({complete_run()}, nullptr, {.title = "<b>&"});
+  EXPECT_NE(html.find("<title>&lt;b>&amp;</title>"), std::string::npos);
+  EXPECT_EQ(data_of(html)["title"], "<b>&");
+}
+
+TEST(Report, FetchesNothing) {
+  const std::string html = report_html({complete_run()}, nullptr, {});
+  for (const char* sign : {"src=", "href=", "@import", "fetch("}) EXPECT_EQ(html.find(sign), std::string::npos) << sign;
+}
+
+TEST(Report, StretchesOfHealthCoverTheFlight) {
+  const Json health = data_of(report_html({complete_run()}, nullptr, {}))["runs"][0]["health"];
+  ASSERT_EQ(health.size(), 3u);
+  EXPECT_EQ(health[1], Json({7.5, 7.55, "degraded", "few_tracks"}));
+  EXPECT_EQ(health[2][1], 9.95);
+}
+
+TEST(Report, LongRunsAreThinnedOut) {
+  const Json data = data_of(report_html({complete_run()}, nullptr, {.max_points = 50}));
+  EXPECT_EQ(data["runs"][0]["errors"]["t"].size(), 50u);
+  EXPECT_EQ(data["runs"][0]["table"]["absolute_m"]["count"], 200);
+}
+
+TEST(Report, WithoutTruthThereAreNoErrors) {
+  RunFolder run = complete_run();
+  run.truth.clear();
+  const Json data = data_of(report_html({run}, nullptr, {}));
+  EXPECT_FALSE(data["runs"][0].contains("errors"));
+  EXPECT_EQ(data["runs"][0]["odometry"]["t"].size(), 200u);
+}
+
+}  // namespace
+}  // namespace fbvins

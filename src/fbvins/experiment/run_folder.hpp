@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `fbvins run` left in a folder, read back. Values; one thread.
+//
+//   Result<RunFolder> run = read_run_folder("out/MH_01_easy-klt");
+//   if (!run->truth.empty()) show(run_errors(*run));
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/experiment/csv_table.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+struct RunFolder {
+  std::string name;  ///< of the folder
+  std::string dataset, frontend, version;
+  nlohmann::ordered_json summary;  ///< summary.json
+  std::string config;              ///< config.yaml, the effective configuration
+  std::vector<Odometry> odometry;  ///< of trajectory.csv and covariance.csv: no statistics
+  std::vector<TrajectoryPoint> truth;
+  CsvTable statistics, timing;
+
+  /// Stamp of the first image.
+  Time start() const { return odometry.empty() ? Time{} : odometry.front().t; }
+};
+
+/// `truth` names a recording or trajectory file; empty: the folder's own ground_truth.csv, where there is one.
+Result<RunFolder> read_run_folder(const std::string& path, const std::string& truth = "");
+
+}  // namespace fbvins
