@@ -89,10 +89,14 @@ void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord
   compose_causal(run, arguments.load.empty(), record);
   CpuTimer timer;
   record.loops_left_out = loop.finish().rejected;
-  if (arguments.final_ba) record.adjustment = loop.adjust();
   record.finish_ms = timer.lap_ms();
   record.keyframes_in_map = static_cast<int>(loop.map().size());
   record.final = corrected(loop, run);
+  if (!arguments.final_ba) return;
+  timer.lap_ms();
+  record.adjustment = loop.adjust();
+  record.adjust_ms = timer.lap_ms();
+  record.adjusted = corrected(loop, run);
 }
 
 Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop) {
@@ -100,7 +104,9 @@ Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop) {
 }
 
 Result<void> write_map_record(const MapRecord& record, const std::string& folder) {
-  if (Result<void> done = write_tum(record.final, folder + "/map_trajectory_tum.txt"); !done) return done;
+  if (Result<void> done = write_tum(record.adjusted.empty() ? record.final : record.adjusted, folder + "/map_trajectory_tum.txt");
+      !done)
+    return done;
   if (Result<void> done = write_tum(record.causal, folder + "/map_causal_tum.txt"); !done) return done;
   if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
   std::string text = kUpdatesHeader;
@@ -127,7 +133,9 @@ MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajec
   s.causal = evaluated(truth, record.causal);
   s.bounded = evaluated(truth, record.bounded);
   s.final = evaluated(truth, record.final);
+  s.adjusted = evaluated(truth, record.adjusted);
   s.finish_ms = record.finish_ms;
+  s.adjust_ms = record.adjust_ms;
   s.adjustment = record.adjustment;
   return s;
 }

@@ -31,9 +31,10 @@ Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& argumen
 struct MapRecord {
   std::vector<MapUpdate> updates;  ///< without the corrected keyframes
   Trajectory causal, bounded;      ///< T_MB at each frame, with T_MW as it was known then; with the smooth T_MW
-  Trajectory final;                ///< after the last optimisation
+  Trajectory final;                ///< after the last optimisation of the graph
+  Trajectory adjusted;             ///< after bundle adjustment, where asked for
   int keyframes_in_map = 0, loops_left_out = 0;
-  double finish_ms = 0;  ///< CPU
+  double finish_ms = 0, adjust_ms = 0;  ///< CPU
   std::optional<FinalAdjustmentReport> adjustment;
   std::string not_saved;  ///< why, where the map could not be written
 };
@@ -41,15 +42,15 @@ struct MapRecord {
 /// Ends the map (last optimisation, bundle adjustment where asked for) and composes the trajectories.
 void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record);
 Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop);
-/// map_trajectory_tum.txt, map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
+/// map_trajectory_tum.txt (the best there is), map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
 Result<void> write_map_record(const MapRecord& record, const std::string& folder);
 
 /// Errors of the three trajectories, where there is ground truth.
 struct MapSummary {
   int keyframes = 0, keyframes_in_map = 0, loops = 0, refused = 0, left_out = 0;
   std::optional<double> localised_after_s;  ///< from the first pose to the first known T_MW
-  std::optional<Evaluation> causal, bounded, final;
-  double mean_ms = 0, finish_ms = 0;  ///< CPU: of a keyframe, at the end
+  std::optional<Evaluation> causal, bounded, final, adjusted;
+  double mean_ms = 0, finish_ms = 0, adjust_ms = 0;  ///< CPU: of a keyframe, at the end, of the bundle adjustment
   std::optional<FinalAdjustmentReport> adjustment;
 };
 /// `truth` may be empty.

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Waking up in a known place: a map is made of a recording (all of it, or its first half only), then the odometry is
+// started at twenty random moments (of all of it, or of the second half) and has to find itself in the map.
+//
+//   loop_relocalise DATASET...
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/eval/alignment.hpp"
+#include "fbvins/eval/association.hpp"
+#include "fbvins/eval/statistics.hpp"
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+using namespace fbvins;
+
+namespace {
+
+constexpr int kStarts = 20;
+constexpr double kGiveUp_s = 4, kInTime_s = 2, kWrong_m = 0.3;
+
+Trajectory truth_of(const Dataset& data) {
+  Trajectory truth;
+  for (const TrajectoryPoint& p : data.ground_truth()) truth.push_back({p.t, p.T_WB});
+  return truth;
+}
+
+/// Images and readings of [from, to), into the system.
+void fly(const std::string& path, System& system, Time from, Time to, const auto& stop) {
+  const auto data = open_dataset(path);
+  while (auto event = (*data)->next()) {
+    const Time t = std::visit([](const auto& e) { return e.t; }, *event);
+    if (t < from || t >= to) continue;
+    system.push(std::move(*event));
+    if (stop()) break;
+  }
+  (void)system.finish();
+}
+
+/// The map of a part of the flight, moved (SE3) to where the ground truth has it.
+PlaceMap map_of(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, Time to) {
+  System system({}, data.rig(), RunMode::deterministic, std::make_unique<LoopCloser>(data.rig(), LoopOptions{}, vocabulary));
+  fly(path, system, Time{0}, to, [] { return false; });
+  system.loop()->finish();
+  PlaceMap map = system.loop()->map();
+  Trajectory keyframes;
+  for (const MapKeyframe& k : map.keyframes()) keyframes.push_back({k.t, k.T_MB.cast_frames<W, B>()});
+  std::vector<PosePair> all;
+  for (const StampedPose& p : keyframes) all.push_back({p, p});
+  const auto aligned = align(associate(truth_of(data), keyframes, {}), Alignment::yaw);
+  all = apply(*aligned, std::move(all));
+  for (std::size_t i = 0; i < all.size(); ++i) map.keyframes()[i].T_MB = all[i].estimate.T_WB.cast_frames<M, B>();
+  return map;
+}
+
+struct Start {
+  std::optional<double> found_after_s;  ///< from the first image
+  double error_m = 0;                   ///< then
+};
+
+Start wake_up(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, const PlaceMap& map, Time from) {
+  System system({}, data.rig(), RunMode::deterministic, std::make_unique<LoopCloser>(data.rig(), LoopOptions{}, vocabulary, map));
+  std::optional<MapUpdate> found;
+  Trajectory in_M;
+  system.on_map_update([&](const MapUpdate& u) {
+    if (u.localised && !found) found = u;
+  });
+  system.on_odometry([&](const Odometry& o) {
+    if (found && in_M.empty() && o.health.has_pose()) in_M.push_back({o.t, (found->T_MW * o.T_WB).cast_frames<W, B>()});
+  });
+  fly(path, system, from, from + Duration::from_seconds(kGiveUp_s), [&] { return !in_M.empty(); });
+  Start start;
+  const auto pairs = associate(truth_of(data), in_M, {.method = AssociationMethod::interpolate_truth});
+  if (pairs.empty()) return start;
+  start.found_after_s = (in_M[0].t - from).seconds();
+  start.error_m = (pairs[0].estimate.T_WB.p - pairs[0].truth.T_WB.p).norm();
+  return start;
+}
+
+void measure(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, bool halves) {
+  const Time first = data.frames().front().t, last = data.frames().back().t;
+  const Time middle = first + Duration::from_seconds(0.5 * (last - first).seconds());
+  const PlaceMap map = map_of(path, data, vocabulary, halves ? middle : last);
+  Rng rng(2026);
+  int in_time = 0, wrong = 0;
+  std::vector<double> errors_m, times_s;
+  for (int i = 0; i < kStarts; ++i) {
+    const Time begin = halves ? middle : first;
+    const double room_s = (last - begin).seconds() - kGiveUp_s;
+    const Start start = wake_up(path, data, vocabulary, map, begin + Duration::from_seconds(rng.uniform(0, room_s)));
+    if (!start.found_after_s) continue;
+    in_time += *start.found_after_s <= kInTime_s;
+    wrong += start.error_m > kWrong_m;
+    errors_m.push_back(start.error_m), times_s.push_back(*start.found_after_s);
+  }
+  std::sort(errors_m.begin(), errors_m.end());
+  fmt::print(
+      "{}, map of {} ({} keyframes): {} of {} found within {} s of the first image, {} in the end; error median {:.4f} m, "
+      "largest {:.4f} m, {} beyond {} m; median {:.2f} s\n",
+      data.info().name, halves ? "the first half, started in the second" : "all, started anywhere", map.size(), in_time, kStarts,
+      kInTime_s, errors_m.size(), percentile(errors_m, 0.5), errors_m.empty() ? 0 : errors_m.back(), wrong, kWrong_m,
+      percentile(times_s, 0.5));
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto vocabulary = Vocabulary::open(shipped_vocabulary());
+  if (!vocabulary || argc < 2) {
+    fmt::print(stderr, "{}\n", argc < 2 ? "usage: loop_relocalise DATASET..." : vocabulary.error().message);
+    return 2;
+  }
+  for (int i = 1; i < argc; ++i) {
+    const auto data = open_dataset(argv[i]);
+    if (!data) {
+      fmt::print(stderr, "{}\n", data.error().message);
+      return 2;
+    }
+    for (const bool halves : {false, true}) measure(argv[i], **data, *vocabulary, halves);
+  }
+  return 0;
+}
