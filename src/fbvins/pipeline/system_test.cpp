@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "fbvins/features/noise_texture.hpp"
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -142,6 +144,52 @@ TEST_P(Frontends, TheSwayIsMeasured) {
   EXPECT_NEAR(outcome.last.T_WB.p.norm(), truth_m, 0.03);
 }
 
+std::unique_ptr<LoopCloser> loop_closer() {
+  auto vocabulary = Vocabulary::open(shipped_vocabulary());
+  EXPECT_TRUE(vocabulary.ok()) << vocabulary.error().message;
+  return std::make_unique<LoopCloser>(small_rig(), LoopOptions{}, std::move(*vocabulary));
+}
+
+struct MapOutcome {
+  std::vector<std::string> odometry, updates;
+  std::string map;
+  int loops = 0;
+};
+
+MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEvent>& events) {
+  System system({}, small_rig(), mode, with_map ? loop_closer() : nullptr);
+  MapOutcome outcome;
+  std::int64_t newest_update = 0;
+  system.on_odometry([&](const Odometry& o) { outcome.odometry.push_back(bytes_of(o)); });
+  system.on_map_update([&](const MapUpdate& u) {
+    std::string bytes = std::to_string(u.frame.value) + " " + std::to_string(u.applies_from.value) + " ";
+    append(bytes, u.T_MW.p);
+    append(bytes, u.T_MW.q.coeffs());
+    outcome.updates.push_back(bytes);
+    outcome.loops += static_cast<int>(u.loops.size());
+    EXPECT_GT(u.applies_from, u.frame);
+    EXPECT_GE(u.applies_from.value, newest_update);
+    newest_update = u.applies_from.value;
+  });
+  for (const SensorEvent& event : events) system.push(event);
+  EXPECT_TRUE(system.finish().ok());
+  if (system.loop() != nullptr) outcome.map = serialise_map(system.loop()->map());
+  return outcome;
+}
+
+TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotFeelIt) {
+  const std::vector<SensorEvent> events = sway(130);  // comes by the same places again and again
+  const MapOutcome without = fly_with_map(RunMode::deterministic, false, events);
+  const MapOutcome alone = fly_with_map(RunMode::deterministic, true, events);
+  const MapOutcome threaded = fly_with_map(RunMode::threaded, true, events);
+  EXPECT_TRUE(without.updates.empty());
+  EXPECT_EQ(alone.odometry, without.odometry);
+  EXPECT_EQ(threaded.odometry, without.odometry);
+  EXPECT_GT(alone.loops, 0);
+  EXPECT_EQ(threaded.updates, alone.updates);
+  EXPECT_EQ(threaded.map, alone.map);
+}
+
 class Modes : public testing::TestWithParam<RunMode> {};
 INSTANTIATE_TEST_SUITE_P(System, Modes, testing::Values(RunMode::deterministic, RunMode::threaded));
 
@@ -160,6 +208,20 @@ TEST_P(Modes, AnExceptionInAStageIsAnErrorOfFinish) {
     EXPECT_NE(end.error().message.find("the disk is full"), std::string::npos);
     EXPECT_EQ(calls, 3);  // nothing is processed behind a failed stage
   }
+}
+
+TEST_P(Modes, AnExceptionBehindTheLoopCloserIsAnErrorOfFinish) {
+  System system({}, small_rig(), GetParam(), loop_closer());
+  int calls = 0;
+  system.on_map_update([&](const MapUpdate&) {
+    ++calls;
+    throw std::runtime_error("no room for the map");
+  });
+  for (const SensorEvent& event : recording()) system.push(event);
+  const Result<void> end = system.finish();
+  ASSERT_FALSE(end.ok());
+  EXPECT_NE(end.error().message.find("no room for the map"), std::string::npos);
+  EXPECT_EQ(calls, 1);
 }
 
 TEST_P(Modes, WhatIsNotAStdExceptionIsCaughtAsWell) {
