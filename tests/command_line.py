@@ -76,6 +76,23 @@ class CommandLine(unittest.TestCase):
         self.assertIn("frontend.kind = klt   klt|orb", text)
         self.assertNotIn("\033", text)
 
+    def test_loop_closure(self):
+        flight, out = self.folder / "flight", self.folder / "out"
+        self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 2, "--quiet").returncode, 0)
+        run = ["run", flight, "--out", out, "--quiet"]
+        self.assert_bad_input(fbvins(*run, "--save-map", self.folder / "none" / "a.fbm"), "a.fbm", "there is no folder")
+        self.assert_bad_input(fbvins(*run, "--load-map", self.folder / "none.fbm"), "none.fbm")
+        self.assert_bad_input(fbvins(*run, "--load-map", self.write("text.fbm", "hello")), "text.fbm", "damaged map")
+        self.assert_bad_input(fbvins(*run, "--loop", "--vocabulary", self.write("text.fbv", "hello")), "text.fbv")
+        self.assertEqual(fbvins(*run, "--final-ba", "--save-map", self.folder / "a.fbm").returncode, 0)
+        in_map = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]["map"]
+        self.assertGreater(in_map["keyframes"], 2)
+        self.assertEqual(fbvins("map", "info", self.folder / "a.fbm").returncode, 0)
+        self.assertEqual(fbvins(*run, "--load-map", self.folder / "a.fbm").returncode, 0)
+        found = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]["map"]
+        self.assertGreater(found["keyframes_in_map"], in_map["keyframes_in_map"])
+        self.assertLess(found["localised_after_s"], 2.0)
+
     def test_eval(self):
         rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]
         truth = self.write("truth.txt", "\n".join(rows) + "\n")
