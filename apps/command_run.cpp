@@ -28,6 +28,7 @@ configuration give the same bytes in the first four, with --threaded as well. Lo
 examples:
   fbvins run MH_01_easy
   fbvins run MH_01_easy.zip --frontend orb --out /tmp/orb
+  fbvins run MH_01_easy --frontend boost         orb with descriptors improved by the network
   fbvins run flight --calibration camchain-imucam.yaml --imu-calibration imu.yaml
   fbvins run MH_01_easy --config drone.yaml --set estimator.max_iterations=8 --threaded
   fbvins run monday --save-map flat.fbm          with loop closure, the map kept
@@ -83,6 +84,7 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
   system.on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
   system.on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
   int frames = 0;
+  if (!system.failure().empty()) return Error{ErrorCode::invalid_argument, system.failure()};
   while (auto event = data.next()) {
     const bool is_frame = std::holds_alternative<StereoFrame>(*event);
     system.push(std::move(*event));
@@ -151,7 +153,8 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember({"klt", "orb"}));
+  command->add_option("--frontend", arguments->frontend, "how features are followed")
+      ->check(CLI::IsMember({"klt", "orb", "boost"}));
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");

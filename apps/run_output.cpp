@@ -11,10 +11,10 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kStatisticsHeader =
-    "#timestamp [ns],frame,tracked,detected,stereo,lost_flow,lost_check,lost_epipolar,brightness_left,brightness_right,"
+    "#timestamp [ns],frame,tracked,detected,stereo,lost_flow,lost_check,lost_epipolar,matches,match_inliers,raw_matches,raw_match_inliers,brightness_left,brightness_right,"
     "median_motion [px],window_frames,landmarks,observations,iterations,outliers,initial_cost,final_cost,keyframe,standstill\n";
 constexpr const char* kTimingHeader =
-    "#timestamp [ns],frame,pyramid [ms],track [ms],stereo [ms],detect [ms],geometry [ms],prepare [ms],solve [ms],marginalise [ms]\n";
+    "#timestamp [ns],frame,pyramid [ms],track [ms],stereo [ms],detect [ms],geometry [ms],boost [ms],prepare [ms],solve [ms],marginalise [ms]\n";
 
 constexpr const char* kTruthHeader =
     "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z [],v_x [m s^-1],v_y [m s^-1],v_z [m s^-1],"
@@ -47,7 +47,8 @@ std::string truth_row(const TrajectoryPoint& point) {
 }
 
 std::string frontend_columns(const FrontendStats& s) {
-  return fmt::format("{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check, s.lost_epipolar,
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check,
+                     s.lost_epipolar, s.matches.found, s.matches.inliers, s.raw_matches.found, s.raw_matches.inliers,
                      s.mean_brightness_left, s.mean_brightness_right, s.median_motion_px);
 }
 
@@ -126,8 +127,8 @@ Result<void> write_timing(const RunRecord& record, const std::string& folder) {
   for_each_frame(record, [&](const TrackedRecord& tracked, const Odometry* odometry) {
     const FrontendStats& f = tracked.stats;
     const EstimatorStats e = odometry ? odometry->stats : EstimatorStats{};
-    text += fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", tracked.t.ns, tracked.id.value,
-                        f.pyramid_ms, f.track_ms, f.stereo_ms, f.detect_ms, f.geometry_ms, e.prepare_ms, e.solve_ms,
+    text += fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", tracked.t.ns, tracked.id.value,
+                        f.pyramid_ms, f.track_ms, f.stereo_ms, f.detect_ms, f.geometry_ms, f.boost_ms, e.prepare_ms, e.solve_ms,
                         e.marginalise_ms);
   });
   return write_text(folder + "/timing.csv", text);

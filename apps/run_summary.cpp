@@ -116,7 +116,12 @@ RunSummary summarise(const RunRecord& record, const Dataset& data) {
   count_health(record, s);
   if (data.has_ground_truth()) evaluate_against(truth_of(data), record, s);
   else s.no_evaluation = "the recording holds no ground truth";
-  for (const TrackedRecord& tracked : record.tracked) s.frontend_ms.push_back(tracked.stats.total_ms());
+  for (const TrackedRecord& tracked : record.tracked) {
+    s.frontend_ms.push_back(tracked.stats.total_ms());
+    s.boost_ms.push_back(tracked.stats.boost_ms);
+    s.matches += tracked.stats.matches;
+    s.raw_matches += tracked.stats.raw_matches;
+  }
   for (const Odometry& o : record.odometry) s.estimator_ms.push_back(o.stats.total_ms());
   s.peak_memory_mb = peak_memory_mb();
   return s;
@@ -132,9 +137,15 @@ std::string to_json_text(const RunSummary& s) {
   if (s.evaluation) result["accuracy"] = to_json(*s.evaluation, Alignment::se3);
   else result["no_accuracy"] = s.no_evaluation;
   if (s.nees) result["nees_yaw"] = to_json(*s.nees);
+  if (s.matches.found > 0)
+    result["descriptor_matches"] = {{"found", s.matches.found},
+                                    {"inliers", s.matches.inliers},
+                                    {"raw_found", s.raw_matches.found},
+                                    {"raw_inliers", s.raw_matches.inliers}};
   if (s.map) result["map"] = map_json(*s.map);
   Json timing{{"mode", s.mode}, {"wall_s", s.wall_s}};
   timing["frontend_ms"] = timing_json(s.frontend_ms);
+  timing["boost_ms"] = timing_json(s.boost_ms);
   timing["estimator_ms"] = timing_json(s.estimator_ms);
   timing["total_ms"] = timing_json(total_ms(s));
   if (s.map)

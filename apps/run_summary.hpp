@@ -26,8 +26,9 @@ struct RunSummary {
   std::string no_evaluation;                        ///< why there is none
   std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
   std::optional<MapSummary> map;                    ///< with loop closure
+  DescriptorMatchCounts matches, raw_matches;       ///< over all frames; none of the klt frontend
   double wall_s = 0;
-  std::vector<double> frontend_ms, estimator_ms;  ///< CPU time per frame
+  std::vector<double> frontend_ms, estimator_ms, boost_ms;  ///< CPU time per frame
   double peak_memory_mb = 0;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/fuzz/fuzz_targets.hpp"
 
+#include "fbvins/features/booster_weights.hpp"
+#include "fbvins/features/safetensors.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/image_decode.hpp"
@@ -57,6 +59,15 @@ std::vector<std::string> image_seeds() {
           test::make_png(2, {.width = 9, .height = 7, .colour = true, .sixteen_bit = true}), test::make_jpeg(3)};
 }
 
+std::vector<std::string> weights_seeds() {
+  const std::string header =
+      R"({"__metadata__":{"format":"fbvins-booster-1","bits":"256","width":"16","descriptor_hidden":"16","layers":"0","keypoint_hidden":"16,32",)"
+      R"("residual":"1"},"identity":{"dtype":"F16","shape":[256],"data_offsets":[0,512]},"head.bias":{"dtype":"F32","shape":[2,3],"data_offsets":[512,536]}})";
+  std::string bytes(8, '\0');
+  bytes[0] = static_cast<char>(header.size() % 256), bytes[1] = static_cast<char>(header.size() / 256);
+  return {bytes + header + std::string(536, '\1')};
+}
+
 }  // namespace
 
 void fuzz_csv(std::string_view bytes) {
@@ -106,11 +117,24 @@ void fuzz_image(std::string_view bytes) {
   if (image) require(image->width() > 0 && image->height() > 0);
 }
 
+void fuzz_weights(std::string_view bytes) {
+  const auto file = parse_safetensors(bytes);
+  require_sentence(file);
+  require_sentence(parse_booster_weights(bytes));
+  if (!file) return;
+  for (const auto& [name, tensor] : file->tensors) {
+    std::size_t count = 1;
+    for (const int side : tensor.shape) count *= static_cast<std::size_t>(side);
+    require(count == tensor.values.size());
+  }
+}
+
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {{"csv", fuzz_csv, csv_seeds},
                                           {"calibration", fuzz_calibration, calibration_seeds},
                                           {"trajectory", fuzz_trajectory, trajectory_seeds},
-                                          {"image", fuzz_image, image_seeds}};
+                                          {"image", fuzz_image, image_seeds},
+                                          {"weights", fuzz_weights, weights_seeds}};
   return all;
 }
 

@@ -13,6 +13,7 @@ void fuzz_csv(std::string_view bytes);
 void fuzz_calibration(std::string_view bytes);
 void fuzz_trajectory(std::string_view bytes);
 void fuzz_image(std::string_view bytes);
+void fuzz_weights(std::string_view bytes);
 
 struct Target {
   const char* name;

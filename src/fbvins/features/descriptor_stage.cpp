@@ -7,6 +7,7 @@ namespace {
 class IdentityStage final : public DescriptorStage {
  public:
   void improve(int, int, OrbFeatures&) override {}
+  bool changes_descriptors() const override { return false; }
 };
 
 }  // namespace

@@ -20,6 +20,9 @@ class DescriptorStage {
   /// Rewrites features.descriptors in place, seeing all keypoints and descriptors of one image
   /// (width x height in px, to normalise positions). The number and order of features stay.
   virtual void improve(int width, int height, OrbFeatures& features) = 0;
+
+  /// False where improve() leaves descriptors as they are: then there is nothing to compare.
+  virtual bool changes_descriptors() const = 0;
 };
 
 /// Leaves descriptors as they are.

@@ -36,16 +36,18 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   // Without a left image tracks wait where they were; the next image's motion spans the gap.
   if (!has_left) return out;
 
-  extract_left(packet.frame.left->view());
+  extract_left(packet.frame.left->view(), stats);
   stats.detect_ms = timer.lap_ms();
   history_t_[static_cast<std::size_t>(frame_count_) % kHistory] = now_;
   if (has_previous_) {
     const CameraMotion motion = predictor_.between(previous_t_, now_, prior);
     predict(motion);
     match_tracks(motion);
+    match_raw(stats);
     locate_tracks(stats);
     stats.track_ms = timer.lap_ms();
     reject_outliers(prior, stats);
+    count_inliers(stats);
     thin_out();
     forget(now_);
     stats.geometry_ms = timer.lap_ms();
@@ -85,9 +87,12 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
   return !left_.empty();
 }
 
-void OrbFrontend::extract_left(const ImageView& image) {
+void OrbFrontend::extract_left(const ImageView& image, FrontendStats& stats) {
   extractor_.extract(image, left_features_);
+  if (stage_->changes_descriptors()) raw_left_ = left_features_;
+  CpuTimer timer;
   stage_->improve(left_.width(), left_.height(), left_features_);
+  stats.boost_ms = timer.lap_ms();
   matcher_.index(left_.width(), left_.height(), left_features_.keypoints);
   keypoint_used_.assign(left_features_.size(), 0);
 }
@@ -106,7 +111,9 @@ void OrbFrontend::cut_patches() {
 void OrbFrontend::match_stereo(FrontendStats& stats) {
   if (right_.empty()) return;
   extractor_.extract(right_view_, right_features_);
+  CpuTimer timer;
   stage_->improve(right_.width(), right_.height(), right_features_);
+  stats.boost_ms += timer.lap_ms();
   stereo_.index(right_features_);
   numbers_.clear();
   for (Track& track : tracks_) {

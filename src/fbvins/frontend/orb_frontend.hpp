@@ -104,6 +104,7 @@ class OrbFrontend final : public Frontend {
     TrackId id;
     std::size_t slot = 0;    // of its patches
     Descriptor descriptor;   // as last seen
+    Descriptor raw;          // the same before it was improved
     int level = 0;           // as last seen
     Vec2 px = Vec2::Zero();  // where it is, or is expected while out of sight
     Vec2 normalised = Vec2::Zero();
@@ -126,9 +127,12 @@ class OrbFrontend final : public Frontend {
   };
 
   bool ingest(const SensorPacket& packet, FrontendStats& stats);
-  void extract_left(const ImageView& image);
+  void extract_left(const ImageView& image, FrontendStats& stats);
   void predict(const CameraMotion& motion);
   void match_tracks(const CameraMotion& motion);
+  void match_raw(FrontendStats& stats);
+  void remember_matches(const std::vector<int>& found, std::vector<std::pair<TrackId, Vec2>>& matched) const;
+  void count_inliers(FrontendStats& stats) const;
   void locate_tracks(FrontendStats& stats);
   std::optional<Vec2> refine_match(Track& track, const Vec2& start_px, double scale);
   std::optional<Vec2> follow_by_alignment(Track& track, const Vec2& expected_px);
@@ -140,7 +144,7 @@ class OrbFrontend final : public Frontend {
   void thin_out();
   void cut_patches();
   void start_tracks(FrontendStats& stats);
-  bool start_track(const Keypoint& keypoint, const Descriptor& descriptor, double max_uncertainty_px);
+  bool start_track(std::size_t keypoint, double max_uncertainty_px);
   void match_stereo(FrontendStats& stats);
   std::optional<Vec2> find_in_right(const Track& track);
   void forget(Time now);
@@ -176,7 +180,9 @@ class OrbFrontend final : public Frontend {
   std::vector<std::size_t> free_slots_;
   // buffers
   std::vector<GuidedQuery> queries_;
-  std::vector<int> found_;
+  std::vector<int> found_, found_raw_;
+  OrbFeatures raw_left_;                                         // before they were improved, where they are
+  std::vector<std::pair<TrackId, Vec2>> matched_, matched_raw_;  // tracks and the keypoints found for them
   std::vector<std::uint8_t> keypoint_used_;
   std::vector<Vec2> points_a_, points_b_;
   std::vector<double> numbers_, numbers_y_;

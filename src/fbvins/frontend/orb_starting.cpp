@@ -60,7 +60,7 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
       if (keypoint_used_[k] != 0 || (pass.only_poor_cells && count[cell(keypoint.pixel)] >= share)) continue;
       const bool crowded = std::any_of(points_a_.begin(), points_a_.end(),
                                        [&](const Vec2& other) { return (other - keypoint.pixel).squaredNorm() < min2; });
-      if (crowded || !start_track(keypoint, left_features_.descriptors[k], pass.max_uncertainty_px)) continue;
+      if (crowded || !start_track(k, pass.max_uncertainty_px)) continue;
       keypoint_used_[k] = 1;
       points_a_.push_back(keypoint.pixel);
       ++count[cell(keypoint.pixel)];
@@ -69,7 +69,8 @@ void OrbFrontend::start_tracks(FrontendStats& stats) {
   }
 }
 
-bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descriptor, double max_uncertainty_px) {
+bool OrbFrontend::start_track(std::size_t index, double max_uncertainty_px) {
+  const Keypoint& keypoint = left_features_.keypoints[index];
   const auto normalised = rig_.left.undistort(keypoint.pixel);
   if (!normalised || free_slots_.empty() || !rig_.left.inside(keypoint.pixel, kBorder_px)) return false;
   Track track;
@@ -80,7 +81,8 @@ bool OrbFrontend::start_track(const Keypoint& keypoint, const Descriptor& descri
   if (!patches.reference.take(left_, keypoint.pixel, rig_.left, *normalised)) return false;
   free_slots_.pop_back();
   track.id = TrackId{next_track_++};
-  track.descriptor = descriptor;
+  track.descriptor = left_features_.descriptors[index];
+  if (stage_->changes_descriptors()) track.raw = raw_left_.descriptors[index];
   track.level = keypoint.level;
   track.px = keypoint.pixel;
   track.normalised = *normalised;

@@ -12,6 +12,10 @@ namespace {
 constexpr double kFarOutside_px = 40;
 /// Descriptor distance asked of a track that was out of sight: it is searched for without its neighbours' help.
 constexpr int kStricterDistance = 45;
+/// Descriptor distance of a match of descriptors as extracted, for comparison with improved ones.
+constexpr int kRawDistance = 60;
+/// A match this near to where its track turned out to be is right.
+constexpr double kInlier_px = 3;
 
 }  // namespace
 
@@ -57,6 +61,45 @@ void OrbFrontend::match_tracks(const CameraMotion& motion) {
     queries_.push_back(query);
   }
   matcher_.match(queries_, left_features_, found_);
+  remember_matches(found_, matched_);
+}
+
+/// What the same search finds by descriptors as they were extracted: for the statistics only.
+void OrbFrontend::match_raw(FrontendStats& stats) {
+  stats.matches.found = static_cast<int>(matched_.size());
+  stats.raw_matches = stats.matches;
+  matched_raw_.clear();
+  if (!stage_->changes_descriptors()) return;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    queries_[i].descriptor = tracks_[i].raw;
+    queries_[i].max_distance = std::min(queries_[i].max_distance, kRawDistance);
+  }
+  matcher_.match(queries_, raw_left_, found_raw_);
+  remember_matches(found_raw_, matched_raw_);
+  stats.raw_matches.found = static_cast<int>(matched_raw_.size());
+}
+
+void OrbFrontend::remember_matches(const std::vector<int>& found, std::vector<std::pair<TrackId, Vec2>>& matched) const {
+  matched.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i)
+    if (found[i] >= 0) matched.emplace_back(tracks_[i].id, left_features_.keypoints[static_cast<std::size_t>(found[i])].pixel);
+}
+
+/// Inliers lie near where their track is after alignment and outlier rejection.
+void OrbFrontend::count_inliers(FrontendStats& stats) const {
+  const auto inliers = [&](const std::vector<std::pair<TrackId, Vec2>>& matched) {
+    int count = 0;
+    auto next = matched.begin();  // both are in the same order; tracks without a match and matches of dropped tracks lie between
+    for (const Track& track : tracks_) {
+      const auto match = std::find_if(next, matched.end(), [&](const auto& m) { return m.first == track.id; });
+      if (match == matched.end()) continue;
+      next = match + 1;
+      if (track.in_sight && (track.px - match->second).norm() < kInlier_px) ++count;
+    }
+    return count;
+  };
+  stats.matches.inliers = inliers(matched_);
+  stats.raw_matches.inliers = stage_->changes_descriptors() ? inliers(matched_raw_) : stats.matches.inliers;
 }
 
 void OrbFrontend::locate_tracks(FrontendStats& stats) {
@@ -95,6 +138,7 @@ void OrbFrontend::locate_tracks(FrontendStats& stats) {
     }
     if (keypoint != nullptr) {
       track.descriptor = left_features_.descriptors[static_cast<std::size_t>(found_[i])];
+      if (stage_->changes_descriptors()) track.raw = raw_left_.descriptors[static_cast<std::size_t>(found_[i])];
       track.level = keypoint->level;
       keypoint_used_[static_cast<std::size_t>(found_[i])] = 1;
     }

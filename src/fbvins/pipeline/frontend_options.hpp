@@ -6,25 +6,47 @@
 #include <string>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/features/booster.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/frontend/klt_frontend.hpp"
 #include "fbvins/frontend/orb_frontend.hpp"
 
 namespace fbvins {
 
+/// The boost frontend is the orb frontend with improved descriptors, whose distances are others.
+struct BoostFrontendOptions {
+  BoosterOptions booster;
+  int max_distance = 60;
+  double max_ratio = 0.85;
+  int stereo_max_distance = 64;
+
+  template <class V>
+  void visit(V&& v) {
+    v.group("booster", booster, "the network");
+    v("max_distance", max_distance, "bit", "largest Hamming distance of a match over time", 1, 256);
+    v("max_ratio", max_ratio, "", "largest ratio of the best to the second-best distance", 0.1, 1.0);
+    v("stereo_max_distance", stereo_max_distance, "bit", "largest Hamming distance of a match from left to right", 1, 256);
+  }
+};
+
 struct FrontendOptions {
   std::string kind = "klt";
   KltFrontendOptions klt;
   OrbFrontendOptions orb;
+  BoostFrontendOptions boost;
 
   template <class V>
   void visit(V&& v) {
-    v("kind", kind, "klt|orb", "corners followed by Lucas-Kanade, or descriptors matched from image to image");
+    v("kind", kind, "klt|orb|boost",
+      "corners followed by Lucas-Kanade, or descriptors matched from image to image, raw or boosted");
     v.group("klt", klt, "the klt frontend");
     v.group("orb", orb, "the orb frontend");
+    v.group("boost", boost, "what the boost frontend does other than the orb frontend");
   }
 };
 
-std::unique_ptr<Frontend> make_frontend(const StereoRig& rig, const FrontendOptions& options);
+/// An error where the booster's weights cannot be used.
+Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const FrontendOptions& options);
 
 }  // namespace fbvins

@@ -12,9 +12,11 @@ constexpr std::int64_t kPriorLag = 2;
 System::System(const Config& config, const StereoRig& rig, RunMode mode, std::unique_ptr<LoopCloser> loop)
     : mode_(mode),
       packets_(config.input, Duration::from_seconds(rig.time_offset_s)),
-      frontend_(make_frontend(rig, config.frontend)),
       estimator_(rig, config.estimator),
       loop_(std::move(loop)) {
+  if (Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, config.frontend)) frontend_ = std::move(*frontend);
+  else failure_ = frontend.error().message;
+  if (!failure_.empty()) mode_ = RunMode::deterministic;  // nothing will be processed
   if (mode_ != RunMode::threaded) return;
   frontend_runner_.start(
       [this] {

@@ -74,9 +74,12 @@ class System {
 
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded).
   void push(SensorEvent event);
-  /// Processes what is waiting and ends; no callback comes afterwards. An error if a stage or a callback threw.
+  /// Processes what is waiting and ends; no callback comes afterwards. An error if a stage or a callback threw, or the
+  /// frontend could not be made.
   Result<void> finish();
 
+  /// Why nothing is or will be processed; empty while all is well (in the deterministic mode; threads tell at finish()).
+  const std::string& failure() const { return failure_; }
   InputCounts input_counts() const { return packets_.counts(); }
   const Estimator& estimator() const { return estimator_; }
   /// The map; null where there is no loop closure. Only after finish().

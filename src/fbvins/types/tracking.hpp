@@ -37,6 +37,15 @@ struct TrackedFeature {
   int age_frames = 0;                ///< 0 when detected in this frame
 };
 
+/// Matches of tracks by descriptor, and how many lie where the track, checked, turned out to be.
+struct DescriptorMatchCounts {
+  int found = 0, inliers = 0;
+  DescriptorMatchCounts& operator+=(const DescriptorMatchCounts& other) {
+    found += other.found, inliers += other.inliers;
+    return *this;
+  }
+};
+
 struct FrontendStats {
   int tracked = 0;        ///< features continued from the frame before
   int detected = 0;       ///< new features
@@ -48,6 +57,9 @@ struct FrontendStats {
   double mean_brightness_right = 0;
   double median_motion_px = 0;  ///< of the features continued, in the raw left image
   double pyramid_ms = 0, track_ms = 0, stereo_ms = 0, detect_ms = 0, geometry_ms = 0;
+  DescriptorMatchCounts matches;      ///< over time, by the descriptors in use
+  DescriptorMatchCounts raw_matches;  ///< what the descriptors would have found before they were improved
+  double boost_ms = 0;                ///< improving descriptors of both images; part of detect_ms and stereo_ms
   double total_ms() const { return pyramid_ms + track_ms + stereo_ms + detect_ms + geometry_ms; }
 };
 

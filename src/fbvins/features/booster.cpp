@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/booster.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "fbvins/features/booster_network.hpp"
+
+namespace fbvins {
+namespace {
+
+class BoosterStage final : public DescriptorStage {
+ public:
+  BoosterStage(const BoosterWeights& weights, BoosterPrecision precision) : network_(weights, precision, best_int8_kernel()) {}
+
+  void improve(int width, int height, OrbFeatures& features) override {
+    network_.run(width, height, features.keypoints, features.descriptors);
+  }
+  bool changes_descriptors() const override { return true; }
+
+ private:
+  BoosterNetwork network_;
+};
+
+}  // namespace
+
+std::string booster_weights_path(const std::string& weights) {
+  if (weights.find('/') != std::string::npos || weights.ends_with(".safetensors")) return weights;
+  const std::string name = "/" + weights + ".safetensors", installed = FBVINS_INSTALLED_DATA + name;
+  if (const char* folder = std::getenv("FBVINS_WEIGHTS"); folder != nullptr && *folder != '\0') return folder + name;
+  std::error_code ignored;
+  return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
+}
+
+Result<std::unique_ptr<DescriptorStage>> make_booster_stage(const BoosterOptions& options) {
+  const Result<BoosterWeights> weights = load_booster_weights(booster_weights_path(options.weights));
+  if (!weights) return weights.error();
+  const auto precision = options.precision == "float32" ? BoosterPrecision::float32 : BoosterPrecision::int8;
+  return std::unique_ptr<DescriptorStage>(std::make_unique<BoosterStage>(*weights, precision));
+}
+
+}  // namespace fbvins

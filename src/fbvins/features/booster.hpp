@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The learned booster as a stage between extraction and matching (paper 2.2.2).
+// One instance is used by one thread at a time.
+//
+//   auto stage = make_booster_stage(BoosterOptions{});            // the weights that ship with the project
+//   if (!stage) return stage.error();
+//   (*stage)->improve(752, 480, features);
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/features/descriptor_stage.hpp"
+
+namespace fbvins {
+
+struct BoosterOptions {
+  std::string weights = "boost-s";
+  std::string precision = "int8";
+
+  template <class V>
+  void visit(V&& v) {
+    v("weights", weights, "", "boost-s or another name of shipped weights, or the path of a .safetensors file");
+    v("precision", precision, "int8|float32", "whole numbers, fast; or single precision, for comparison");
+  }
+};
+
+/// The file that `weights` means: a path as it is, a name in the folder of FBVINS_WEIGHTS, where the project was
+/// installed, or in its sources.
+std::string booster_weights_path(const std::string& weights);
+
+Result<std::unique_ptr<DescriptorStage>> make_booster_stage(const BoosterOptions& options);
+
+}  // namespace fbvins

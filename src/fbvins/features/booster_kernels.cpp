@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/booster_kernels.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/features/lanes.hpp"
+
+namespace fbvins {
+namespace {
+
+/// e^x for x <= 0 to about 2e-7 of its value; below -87 the smallest normal number or so.
+FBVINS_INLINE void exp_of_negative(F16& x) {
+  const F16 lowest = F16{} - 87.0f;
+  x = x < lowest ? lowest : x;
+  constexpr float kRounder = 12582912.0f;
+  const F16 whole = (x * 1.44269504f + kRounder) - kRounder;
+  const F16 r = (x - whole * 0.693359375f) + whole * 2.12194440e-4f;  // ln 2 in two parts
+  F16 p = F16{} + 1.9875691500e-4f;
+  p = p * r + 1.3981999507e-3f;
+  p = p * r + 8.3334519073e-3f;
+  p = p * r + 4.1665795894e-2f;
+  p = p * r + 1.6666665459e-1f;
+  p = p * r + 5.0000001201e-1f;
+  p = p * r * r + r + 1.0f;
+  const I16 exponent = (__builtin_convertvector(whole, I16) + 127) << 23;
+  F16 power;
+  std::memcpy(&power, &exponent, sizeof(power));
+  x = p * power;
+}
+
+}  // namespace
+
+FBVINS_KERNEL
+void multiply_float(const float* x, int rows, int inputs, const float* weight_t, const float* bias, int outputs, float* out) {
+  for (int row = 0; row < rows; ++row) {
+    float* o = out + static_cast<std::ptrdiff_t>(row) * outputs;
+    for (int n = 0; n < outputs; n += kLanes) {
+      F16 sum, w;
+      load_lanes(bias + n, sum);
+      for (int k = 0; k < inputs; ++k) {
+        load_lanes(weight_t + static_cast<std::ptrdiff_t>(k) * outputs + n, w);
+        sum += w * x[static_cast<std::ptrdiff_t>(row) * inputs + k];
+      }
+      store_lanes(sum, o + n);
+    }
+  }
+}
+
+FBVINS_KERNEL
+void clamp_negative(float* x, int n) {
+  for (int i = 0; i < n; ++i) x[i] = x[i] > 0 ? x[i] : 0.0f;
+}
+
+FBVINS_KERNEL
+void add(float* x, const float* y, int n) {
+  for (int i = 0; i < n; ++i) x[i] += y[i];
+}
+
+FBVINS_KERNEL
+void normalise_rows(float* x, int rows, int width, const float* weight, const float* bias) {
+  for (int row = 0; row < rows; ++row) {
+    float* r = x + static_cast<std::ptrdiff_t>(row) * width;
+    F16 sum{}, squares{}, v, w, b;
+    for (int c = 0; c < width; c += kLanes) {
+      load_lanes(r + c, v);
+      sum += v;
+    }
+    const float mean = sum_lanes(sum) / static_cast<float>(width);
+    for (int c = 0; c < width; c += kLanes) {
+      load_lanes(r + c, v);
+      squares += (v - mean) * (v - mean);
+    }
+    const float factor = 1.0f / std::sqrt(sum_lanes(squares) / static_cast<float>(width) + 1e-5f);
+    for (int c = 0; c < width; c += kLanes) {
+      load_lanes(r + c, v);
+      load_lanes(weight + c, w);
+      load_lanes(bias + c, b);
+      store_lanes((v - mean) * factor * w + b, r + c);
+    }
+  }
+}
+
+FBVINS_KERNEL
+void summarise(float* key, const float* value, int rows, int width, float* summary, float* scratch) {
+  float *most = scratch, *total = scratch + width;
+  for (int c = 0; c < width; ++c) most[c] = -1e30f, total[c] = 0, summary[c] = 0;
+  for (int row = 0; row < rows; ++row)
+    for (int c = 0; c < width; ++c) {
+      const float k = key[static_cast<std::ptrdiff_t>(row) * width + c];
+      most[c] = k > most[c] ? k : most[c];
+    }
+  for (int row = 0; row < rows; ++row)
+    for (int c = 0; c < width; c += kLanes) {
+      F16 k, v, m, t, s;
+      load_lanes(key + static_cast<std::ptrdiff_t>(row) * width + c, k);
+      load_lanes(value + static_cast<std::ptrdiff_t>(row) * width + c, v);
+      load_lanes(most + c, m);
+      load_lanes(total + c, t);
+      load_lanes(summary + c, s);
+      k -= m;
+      exp_of_negative(k);
+      store_lanes(t + k, total + c);
+      store_lanes(s + k * v, summary + c);
+    }
+  for (int c = 0; c < width; ++c) summary[c] /= total[c] > 0 ? total[c] : 1.0f;
+}
+
+FBVINS_KERNEL
+void gate(const float* query, const float* summary, int rows, int width, float* out) {
+  for (int row = 0; row < rows; ++row)
+    for (int c = 0; c < width; c += kLanes) {
+      F16 q, s;
+      load_lanes(query + static_cast<std::ptrdiff_t>(row) * width + c, q);
+      load_lanes(summary + c, s);
+      // of minus the magnitude, so that nothing overflows
+      F16 e = q > 0.0f ? -q : q;
+      exp_of_negative(e);
+      const F16 larger = 1.0f / (1.0f + e);
+      store_lanes((q > 0.0f ? larger : 1.0f - larger) * s, out + static_cast<std::ptrdiff_t>(row) * width + c);
+    }
+}
+
+FBVINS_KERNEL
+void take_signs(const float* y, const float* identity, const std::uint64_t* bits, std::uint64_t* out) {
+  for (int word = 0; word < 4; ++word) {
+    std::uint64_t signs = 0;
+    for (int i = 0; i < 64; ++i) {
+      const float with = identity[64 * word + i], raw = y[64 * word + i];
+      const float sum = (bits[word] >> i & 1u) != 0 ? raw + with : raw - with;
+      signs |= static_cast<std::uint64_t>(sum > 0) << i;
+    }
+    out[word] = signs;
+  }
+}
+
+}  // namespace fbvins

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/booster_network.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/features/booster_kernels.hpp"
+
+namespace fbvins {
+namespace {
+
+/// A product with fewer inputs is not worth rounding.
+constexpr int kFewestInputs = 16;
+
+}  // namespace
+
+void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out) {
+  out.resize(keypoints.size() * kBoosterGeometry);
+  const float half = 0.5f * static_cast<float>(std::max(width, height));
+  float mean = 0;
+  for (const Keypoint& k : keypoints) mean += std::log1p(std::max(k.score, 0.0f));
+  mean /= static_cast<float>(std::max<std::size_t>(keypoints.size(), 1));
+  float* g = out.data();
+  for (const Keypoint& k : keypoints) {
+    *g++ = (static_cast<float>(k.pixel.x()) - 0.5f * static_cast<float>(width)) / half;
+    *g++ = (static_cast<float>(k.pixel.y()) - 0.5f * static_cast<float>(height)) / half;
+    *g++ = (std::log1p(std::max(k.score, 0.0f)) - mean) * 0.5f;
+    *g++ = mean * 0.1f;
+    *g++ = std::cos(k.angle_rad);
+    *g++ = std::sin(k.angle_rad);
+    *g++ = std::log(std::max(k.scale, 1.0f)) * 2;
+  }
+}
+
+BoosterNetwork::BoosterNetwork(const BoosterWeights& weights, BoosterPrecision precision, Int8Kernel kernel)
+    : precision_(precision), kernel_(kernel), width_(weights.width), identity_(weights.identity) {
+  descriptor1_ = prepare(weights.descriptor1);
+  descriptor2_ = prepare(weights.descriptor2);
+  for (const LinearWeights& linear : weights.keypoint) keypoint_.push_back(prepare(linear));
+  for (const BoosterLayerWeights& l : weights.layers)
+    layers_.push_back(
+        {prepare(l.query), prepare(l.key), prepare(l.value), prepare(l.out), prepare(l.up), prepare(l.down), l.norm1, l.norm2});
+  head_ = prepare(weights.head);
+}
+
+BoosterNetwork::Linear BoosterNetwork::prepare(const LinearWeights& weights) const {
+  Linear out;
+  out.outputs = weights.outputs, out.inputs = weights.inputs;
+  out.whole_numbers = precision_ == BoosterPrecision::int8 && weights.inputs >= kFewestInputs;
+  if (out.whole_numbers) {
+    out.packed = pack_weights(weights.weight.data(), weights.outputs, weights.inputs, weights.bias.data());
+    return out;
+  }
+  out.bias = weights.bias;
+  out.weight_t.resize(weights.weight.size());
+  for (int n = 0; n < weights.outputs; ++n)
+    for (int k = 0; k < weights.inputs; ++k)
+      out.weight_t[static_cast<std::size_t>(k * weights.outputs + n)] =
+          weights.weight[static_cast<std::size_t>(n * weights.inputs + k)];
+  return out;
+}
+
+void BoosterNetwork::apply(const Linear& linear, const std::vector<float>& x, std::vector<float>& out, bool again) {
+  const int padded = (rows_ + kInt8RowBlock - 1) / kInt8RowBlock * kInt8RowBlock;
+  out.resize(static_cast<std::size_t>(padded) * static_cast<std::size_t>(linear.outputs));
+  if (!linear.whole_numbers) {
+    multiply_float(x.data(), rows_, linear.inputs, linear.weight_t.data(), linear.bias.data(), linear.outputs, out.data());
+    return;
+  }
+  if (!again) quantised_.quantise(x.data(), rows_, linear.inputs);
+  multiply(quantised_, linear.packed, out.data(), kernel_);
+}
+
+void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoints, std::span<Descriptor> descriptors) {
+  rows_ = static_cast<int>(std::min(keypoints.size(), descriptors.size()));
+  y_.clear();
+  if (rows_ == 0) return;
+  booster_geometry(width, height, keypoints.first(static_cast<std::size_t>(rows_)), geometry_);
+  encode(descriptors);
+  encode_geometry();
+  for (const Layer& layer : layers_) {
+    attend(layer);
+    feed_forward(layer);
+  }
+  apply(head_, z_, y_);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) {
+    Descriptor boosted;
+    take_signs(y_.data() + 256 * i, identity_.data(), descriptors[i].bits.data(), boosted.bits.data());
+    descriptors[i] = boosted;
+  }
+}
+
+/// The bits through two layers into z (eq. 6, the descriptor's part).
+void BoosterNetwork::encode(std::span<const Descriptor> descriptors) {
+  if (descriptor1_.whole_numbers) {
+    quantised_.set_bits(descriptors.data()->bits.data(), rows_);
+    apply(descriptor1_, hidden_, hidden_, true);
+  } else {
+    query_.resize(static_cast<std::size_t>(rows_) * 256);
+    for (std::size_t i = 0; i < query_.size(); ++i)
+      query_[i] = (descriptors[i / 256].bits[i % 256 / 64] >> (i % 64) & 1u) != 0 ? 1.0f : -1.0f;
+    apply(descriptor1_, query_, hidden_);
+  }
+  clamp_negative(hidden_.data(), rows_ * descriptor1_.outputs);
+  apply(descriptor2_, hidden_, z_);
+}
+
+/// Geometry is added to z (eq. 6, the keypoint's part).
+void BoosterNetwork::encode_geometry() {
+  hidden_.assign(geometry_.begin(), geometry_.end());
+  for (std::size_t i = 0; i < keypoint_.size(); ++i) {
+    if (i > 0) clamp_negative(hidden_.data(), rows_ * keypoint_[i].inputs);
+    apply(keypoint_[i], hidden_, hidden2_);
+    std::swap(hidden_, hidden2_);
+  }
+  add(z_.data(), hidden_.data(), rows_ * width_);
+}
+
+/// z = norm(z + out(sigmoid(query) * summary of all keypoints)) (eq. 7-8).
+void BoosterNetwork::attend(const Layer& layer) {
+  apply(layer.query, z_, query_);
+  apply(layer.key, z_, key_, true);
+  apply(layer.value, z_, value_, true);
+  summary_.resize(static_cast<std::size_t>(width_));
+  scratch_.resize(2 * static_cast<std::size_t>(width_));
+  summarise(key_.data(), value_.data(), rows_, width_, summary_.data(), scratch_.data());
+  gate(query_.data(), summary_.data(), rows_, width_, value_.data());
+  apply(layer.out, value_, query_);
+  add(z_.data(), query_.data(), rows_ * width_);
+  normalise_rows(z_.data(), rows_, width_, layer.norm1.weight.data(), layer.norm1.bias.data());
+}
+
+/// z = norm(z + down(relu(up(z)))).
+void BoosterNetwork::feed_forward(const Layer& layer) {
+  apply(layer.up, z_, hidden_);
+  clamp_negative(hidden_.data(), rows_ * layer.up.outputs);
+  apply(layer.down, hidden_, query_);
+  add(z_.data(), query_.data(), rows_ * width_);
+  normalise_rows(z_.data(), rows_, width_, layer.norm2.weight.data(), layer.norm2.bias.data());
+}
+
+}  // namespace fbvins

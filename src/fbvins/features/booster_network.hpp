@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The booster's forward pass (paper 2.2.2, eq. 6-8; docs/derivations/booster.md): bits and geometry of all keypoints of
+// one image in, better bits out. In whole numbers (fast, the same bits with every kernel) or single precision (the
+// reference). One instance, one thread; allocates only while it grows.
+//
+//   BoosterNetwork network(*weights, BoosterPrecision::int8, best_int8_kernel());
+//   network.run(752, 480, features.keypoints, features.descriptors);      // rewrites the descriptors
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fbvins/features/booster_weights.hpp"
+#include "fbvins/features/int8_gemm.hpp"
+#include "fbvins/features/keypoint.hpp"
+
+namespace fbvins {
+
+enum class BoosterPrecision { int8, float32 };
+
+/// Geometry of keypoints as the network is told it, kBoosterGeometry numbers each: place relative to the image's centre,
+/// logarithm of the score relative to the image's mean and that mean, cosine and sine of the angle, logarithm of the scale.
+void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out);
+
+class BoosterNetwork {
+ public:
+  BoosterNetwork(const BoosterWeights& weights, BoosterPrecision precision, Int8Kernel kernel);
+
+  /// Replaces each descriptor; keypoints and descriptors are of one image of width x height px, one to one.
+  void run(int width, int height, std::span<const Keypoint> keypoints, std::span<Descriptor> descriptors);
+
+  /// Numbers whose signs were the bits of the last run, without the residual: 256 a keypoint.
+  const std::vector<float>& outputs() const { return y_; }
+
+ private:
+  struct Linear {
+    PackedWeights packed;
+    std::vector<float> weight_t, bias;
+    int outputs = 0, inputs = 0;
+    bool whole_numbers = false;
+  };
+  struct Layer {
+    Linear query, key, value, out, up, down;
+    NormWeights norm1, norm2;
+  };
+
+  Linear prepare(const LinearWeights& weights) const;
+  /// x to out; quantises x unless `again`: the rows of the last call are those of this one.
+  void apply(const Linear& linear, const std::vector<float>& x, std::vector<float>& out, bool again = false);
+  void encode(std::span<const Descriptor> descriptors);
+  void encode_geometry();
+  void attend(const Layer& layer);
+  void feed_forward(const Layer& layer);
+
+  BoosterPrecision precision_;
+  Int8Kernel kernel_;
+  int width_;
+  Linear descriptor1_, descriptor2_, head_;
+  std::vector<Linear> keypoint_;
+  std::vector<Layer> layers_;
+  std::vector<float> identity_;
+  // buffers
+  int rows_ = 0;
+  QuantisedRows quantised_;
+  std::vector<float> geometry_, z_, hidden_, hidden2_, query_, key_, value_, summary_, scratch_, y_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/features/int8_gemm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/features/int8_kernels.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Adding and taking away 1.5 * 2^23 rounds to the nearest whole number, in one instruction each.
+constexpr float kRounder = 12582912.0f;
+
+FBVINS_KERNEL
+float largest_magnitude(const float* x, int n) {
+  float lanes[16] = {};
+  int i = 0;
+  for (; i + 16 <= n; i += 16)
+    for (int l = 0; l < 16; ++l) {
+      const float m = std::fabs(x[i + l]);
+      lanes[l] = m > lanes[l] ? m : lanes[l];
+    }
+  float most = 0;
+  for (; i < n; ++i) most = std::max(most, std::fabs(x[i]));
+  for (const float m : lanes) most = std::max(most, m);
+  return most;
+}
+
+FBVINS_KERNEL
+void round_to_int8(const float* x, int n, float factor, std::int8_t* out) {
+  for (int i = 0; i < n; ++i) out[i] = static_cast<std::int8_t>((x[i] * factor + kRounder) - kRounder);
+}
+
+FBVINS_KERNEL
+void rescale(const std::int32_t* sums, const float* column_scale, const float* bias, float row_scale, int n, float* out) {
+  for (int i = 0; i < n; ++i) out[i] = static_cast<float>(sums[i]) * (row_scale * column_scale[i]) + bias[i];
+}
+
+}  // namespace
+
+PackedWeights pack_weights(const float* weight, int outputs, int inputs, const float* bias) {
+  PackedWeights w;
+  w.outputs = outputs, w.inputs = inputs;
+  w.blocks.resize(static_cast<std::size_t>(outputs) * static_cast<std::size_t>(inputs));
+  w.scale.resize(static_cast<std::size_t>(outputs));
+  w.offset.resize(static_cast<std::size_t>(outputs));
+  w.bias.assign(bias, bias + outputs);
+  for (int n = 0; n < outputs; ++n) {
+    const float* row = weight + static_cast<std::ptrdiff_t>(n) * inputs;
+    const float most = largest_magnitude(row, inputs);
+    const float factor = most > 0 ? 127.0f / most : 0.0f;
+    std::int32_t sum = 0;
+    for (int k = 0; k < inputs; ++k) {
+      const auto q = static_cast<std::int8_t>(std::lround(row[k] * factor));
+      const int place = ((n / 16) * (inputs / 4) + k / 4) * 64 + (n % 16) * 4 + k % 4;
+      w.blocks[static_cast<std::size_t>(place)] = q;
+      sum += q;
+    }
+    w.scale[static_cast<std::size_t>(n)] = most / 127.0f;
+    w.offset[static_cast<std::size_t>(n)] = -128 * sum;
+  }
+  return w;
+}
+
+void QuantisedRows::resize(int rows, int columns) {
+  count = rows, inputs = columns;
+  const int padded = (rows + kInt8RowBlock - 1) / kInt8RowBlock * kInt8RowBlock;
+  const auto size = static_cast<std::size_t>(padded) * static_cast<std::size_t>(columns);
+  values.resize(size);
+  scale.resize(static_cast<std::size_t>(padded));
+  std::fill(values.begin() + static_cast<std::ptrdiff_t>(rows) * columns, values.end(), std::int8_t{0});
+  std::fill(scale.begin() + rows, scale.end(), 0.0f);
+}
+
+void QuantisedRows::quantise(const float* x, int rows, int columns) {
+  resize(rows, columns);
+  for (int r = 0; r < rows; ++r) {
+    const float* row = x + static_cast<std::ptrdiff_t>(r) * columns;
+    const float most = largest_magnitude(row, columns);
+    round_to_int8(row, columns, most > 0 ? 127.0f / most : 0.0f, values.data() + static_cast<std::ptrdiff_t>(r) * columns);
+    scale[static_cast<std::size_t>(r)] = most / 127.0f;
+  }
+}
+
+void QuantisedRows::set_bits(const std::uint64_t* words, int rows) {
+  resize(rows, 256);
+  for (int r = 0; r < rows; ++r) {
+    std::int8_t* out = values.data() + static_cast<std::ptrdiff_t>(r) * 256;
+    for (int i = 0; i < 256; ++i)
+      out[i] = static_cast<std::int8_t>(2 * static_cast<int>(words[4 * r + i / 64] >> (i % 64) & 1u) - 1);
+    scale[static_cast<std::size_t>(r)] = 1;
+  }
+}
+
+void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel) {
+  constexpr int kColumns = 16 * kInt8BlocksTogether;
+  const auto sums_of = int8_kernel(kernel);
+  alignas(64) std::int32_t sums[kInt8RowBlock * kColumns];
+  for (int n = 0; n < w.outputs; n += kColumns) {
+    const int blocks = std::min(kInt8BlocksTogether, (w.outputs - n) / 16);
+    const std::int8_t* weights = w.blocks.data() + static_cast<std::ptrdiff_t>(n) * w.inputs;
+    for (int r = 0; r < rows.count; r += kInt8RowBlock) {
+      sums_of(rows.values.data() + static_cast<std::ptrdiff_t>(r) * w.inputs, weights, w.offset.data() + n, w.inputs, blocks,
+              sums);
+      for (int i = 0; i < kInt8RowBlock; ++i)
+        rescale(sums + i * kColumns, w.scale.data() + n, w.bias.data() + n, rows.scale[static_cast<std::size_t>(r + i)],
+                16 * blocks, out + static_cast<std::ptrdiff_t>(r + i) * w.outputs + n);
+    }
+  }
+}
+
+}  // namespace fbvins

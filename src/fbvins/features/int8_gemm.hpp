@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Products of a matrix of numbers with fixed weights in whole numbers: every row of the left side is scaled to -127..127
+// by its largest number, every column of weights once and for all, and the sums of products are exact 32-bit integers.
+// So the kernels (AVX-512 VNNI, AVX2, NEON dot product, portable; chosen at run time) give the same bits.
+// Weights are read-only after packing; one QuantisedRows a thread; nothing is allocated once buffers have grown.
+//
+//   PackedWeights w = pack_weights(weight.data(), outputs, inputs, bias.data());
+//   rows.quantise(x, count, inputs);
+//   multiply(rows, w, out);                          // out[row * w.outputs + n] = x W^T + bias
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace fbvins {
+
+enum class Int8Kernel { portable, avx2, avx512_vnni, neon_dot };
+
+/// The fastest this processor has.
+Int8Kernel best_int8_kernel();
+bool int8_kernel_works(Int8Kernel kernel);
+const char* name_of(Int8Kernel kernel);
+
+/// Columns of weights in blocks of sixteen outputs by four inputs.
+struct PackedWeights {
+  int outputs = 0;                   ///< multiple of 16
+  int inputs = 0;                    ///< multiple of 4
+  std::vector<std::int8_t> blocks;   ///< [outputs / 16][inputs / 4][16][4]
+  std::vector<float> scale, bias;    ///< of each output
+  std::vector<std::int32_t> offset;  ///< -128 times the sum of each output's weights
+};
+
+/// weight is [outputs][inputs], row-major.
+PackedWeights pack_weights(const float* weight, int outputs, int inputs, const float* bias);
+
+class QuantisedRows {
+ public:
+  /// x is [count][inputs], inputs a multiple of 4.
+  void quantise(const float* x, int count, int inputs);
+  /// Bits as +1 and -1: 32 bytes a row, lowest bit first; exact.
+  void set_bits(const std::uint64_t* words, int count);
+
+  int count = 0, inputs = 0;
+  std::vector<std::int8_t> values;  ///< [count rounded up][inputs], rows past count are zero
+  std::vector<float> scale;         ///< of each row
+
+ private:
+  void resize(int rows, int columns);
+};
+
+/// Rows handled together by a kernel: values are padded to a multiple.
+inline constexpr int kInt8RowBlock = 6;
+
+/// out is [rows.count rounded up to kInt8RowBlock][w.outputs].
+void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel);
+
+}  // namespace fbvins

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is trained for (paper eq. 9-11), on Hamming distances of bits that are hard forwards and soft backwards.
+
+distance (B, N, M) in bits, positive and usable (B, N, M) masks: which pairs show the same point, which count at all
+(pairs a little farther apart than a match may be do not).
+"""
+import torch
+
+
+def hamming(bits_a, bits_b):
+    return 0.5 * (bits_a.shape[-1] - bits_a @ bits_b.transpose(1, 2))
+
+
+def average_precision(distance, positive, usable, bins=24, largest=256.0):
+    """FastAP (eq. 9): the area under precision and recall over a histogram of distances, per row. NaN without positives."""
+    step = largest / bins
+    at = (distance / step).clamp(0, bins)
+    low = at.detach().floor().clamp(max=bins - 1).long()
+    share = at - low  # of the upper bin; triangular kernel
+    def histogram(weight):
+        h = torch.zeros(*distance.shape[:-1], bins + 1, dtype=distance.dtype)
+        h = h.scatter_add(-1, low, (1 - share) * weight)
+        return h.scatter_add(-1, low + 1, share * weight)
+    h_pos = histogram((positive & usable).to(distance.dtype))
+    h_all = histogram(usable.to(distance.dtype))
+    c_pos, c_all = h_pos.cumsum(-1), h_all.cumsum(-1)
+    count = h_pos.sum(-1)
+    ap = (h_pos * c_pos / c_all.clamp(min=1e-6)).sum(-1) / count.clamp(min=1e-6)
+    return torch.where(count > 0.5, ap, torch.full_like(ap, float("nan")))
+
+
+def fast_ap_and_boost(distance, raw_distance, positive, usable, rows=96):
+    """(1 - AP), and how far AP falls below that of the raw descriptors (eq. 10): mean of max(0, AP_raw / AP - 1)."""
+    pick = torch.randperm(distance.shape[1])[:rows]
+    positive, usable = positive[:, pick], usable[:, pick]
+    ap = average_precision(distance[:, pick], positive, usable)
+    with torch.no_grad():
+        ap_raw = average_precision(raw_distance[:, pick], positive, usable)
+    there = ~torch.isnan(ap)
+    ap, ap_raw = ap[there], ap_raw[there]
+    return (1 - ap).mean(), (ap_raw / ap.clamp(min=0.02) - 1).clamp(min=0).mean()
+
+
+def contrastive(distance, positive, usable, bits_per_unit):
+    """InfoNCE with several positives, both ways: minus log of the share of the softmax that falls on positives."""
+    logit = (-distance / bits_per_unit).masked_fill(~usable, -1e4)
+    hit = logit.masked_fill(~(positive & usable), -1e4)
+    total = 0.0
+    for dim in (1, 2):
+        there = (positive & usable).any(dim)
+        total = total + (torch.logsumexp(logit, dim) - torch.logsumexp(hit, dim))[there].mean()
+    return 0.5 * total

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The booster's network (paper 2.2.2, eq. 6-8): descriptor bits and keypoint geometry in, better bits out.
+
+One architecture, two sizes. `src/fbvins/features/booster_network.hpp` is the same in C++; docs/derivations/booster.md
+explains it. Input of one image: bits (N, 256) as +-1, geometry (N, 7) from `geometry_of`; output: (N, 256) numbers
+whose signs are the new bits.
+"""
+import dataclasses
+import math
+
+import torch
+from torch import nn
+
+GEOMETRY = 7  # x, y, score in the image, mean score, cos, sin of the angle, log of the scale
+
+
+@dataclasses.dataclass
+class Size:
+    """Of a network; stored in the weights file."""
+    width: int
+    descriptor_hidden: int
+    keypoint_hidden: tuple
+    layers: int
+    residual: bool  # the input bits added to the output
+    bits: int = 256
+
+
+SIZES = {
+    "boost-b": Size(256, 512, (32, 64, 128), 4, residual=False),
+    "boost-s": Size(128, 256, (32, 64), 2, residual=True),
+}
+
+
+def geometry_of(keypoints, width, height, valid):
+    """(B, N, 6) keypoints x, y, level, scale, angle, score of images of (B,) width and height to (B, N, GEOMETRY)."""
+    x, y, _, scale, angle, score = keypoints.unbind(-1)
+    half = 0.5 * torch.maximum(width, height)[:, None]
+    log_score = torch.log1p(score.clamp(min=0))
+    count = valid.sum(1, keepdim=True).clamp(min=1)
+    mean = (log_score * valid).sum(1, keepdim=True) / count
+    return torch.stack([(x - 0.5 * width[:, None]) / half, (y - 0.5 * height[:, None]) / half, (log_score - mean) * 0.5,
+                        (mean * 0.1).expand_as(x), torch.cos(angle), torch.sin(angle), torch.log(scale.clamp(min=1)) * 2], -1)
+
+
+class AttentionFree(nn.Module):
+    """Every keypoint takes, gated by its own query, one and the same summary of all keypoints (eq. 7-8)."""
+
+    def __init__(self, width):
+        super().__init__()
+        self.query, self.key, self.value, self.out = (nn.Linear(width, width) for _ in range(4))
+
+    def forward(self, z, valid):
+        key = self.key(z).float().masked_fill(~valid[..., None], -math.inf)
+        summary = (torch.softmax(key, 1) * self.value(z).float()).sum(1, keepdim=True)
+        return self.out(torch.sigmoid(self.query(z).float()) * summary)
+
+
+class Layer(nn.Module):
+    def __init__(self, width):
+        super().__init__()
+        self.attention = AttentionFree(width)
+        self.norm1, self.norm2 = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.up, self.down = nn.Linear(width, 2 * width), nn.Linear(2 * width, width)
+
+    def forward(self, z, valid, cross):
+        if cross:
+            z = self.norm1(z + self.attention(z, valid).float())
+        else:
+            z = self.norm1(z)
+        return self.norm2(z + self.down(torch.relu(self.up(z))).float())
+
+
+class Booster(nn.Module):
+    """`geometry` and `cross` switch the two paths off, to learn what they bring."""
+
+    def __init__(self, size, geometry=True, cross=True):
+        super().__init__()
+        self.size, self.geometry, self.cross = size, geometry, cross
+        self.descriptor1 = nn.Linear(size.bits, size.descriptor_hidden)
+        self.descriptor2 = nn.Linear(size.descriptor_hidden, size.width)
+        widths = [GEOMETRY, *size.keypoint_hidden, size.width]
+        self.keypoint = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:]))
+        self.layers = nn.ModuleList(Layer(size.width) for _ in range(size.layers))
+        self.head = nn.Linear(size.width, size.bits)
+        if size.residual:
+            self.identity = nn.Parameter(torch.ones(size.bits))
+
+    def forward(self, bits, geometry, valid):
+        z = self.descriptor2(torch.relu(self.descriptor1(bits)))
+        if self.geometry:
+            g = geometry
+            for i, linear in enumerate(self.keypoint):
+                g = linear(g if i == 0 else torch.relu(g))
+            z = z + g
+        z = z.float()
+        for layer in self.layers:
+            z = layer(z, valid, self.cross)
+        y = self.head(z).float()
+        return y + self.identity * bits if self.size.residual else y
+
+
+def hard_bits(y):
+    """+-1 forwards, the slope of tanh backwards (straight through)."""
+    soft = torch.tanh(y)
+    return soft + (torch.where(y > 0, 1.0, -1.0) - soft).detach()
