@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
   add_config_command(program, exit_code);
   add_simulate_command(program, exit_code);
   add_report_command(program, exit_code);
+  add_bench_command(program, exit_code);
   add_map_command(program, exit_code);
   add_vocab_command(program, exit_code);
   try {

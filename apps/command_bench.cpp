@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/run_output.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/experiment/bench_runner.hpp"
+#include "fbvins/experiment/bench_tables.hpp"
+#include "fbvins/experiment/report.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(MATRIX lists recordings, frontends, configurations and repetitions; every combination is run, several at a time.
+Killed? The same command goes on where it was: finished cells are not run again, unless program or configuration
+changed. Writes results.csv, results.json (machine, version, effective configurations), tables.md and report.html.
+
+examples:
+  fbvins bench configs/table1.yaml --euroc ~/euroc            the paper's Table 1, from real EuRoC
+  fbvins bench configs/table1.yaml --inputs flights           the same flights with drawn images (NAME/imu0.csv, groundtruth.csv)
+  fbvins bench configs/scenarios.yaml --jobs 4 --out scenarios --discard-drawn
+  fbvins bench configs/scenarios.yaml --out new --reference scenarios/results.csv      exit code 1 where it got worse
+)";
+
+struct Arguments {
+  std::string matrix, out, reference;
+  PlanOptions where;
+  BenchOptions bench;
+  Tolerance tolerance;
+  bool quiet = false;
+};
+
+std::string clock_text(double seconds) {
+  const int s = static_cast<int>(seconds + 0.5);
+  return s < 60     ? fmt::format("{} s", s)
+         : s < 3600 ? fmt::format("{}:{:02} min", s / 60, s % 60)
+                    : fmt::format("{}:{:02} h", s / 3600, s / 60 % 60);
+}
+
+/// A bar with the time left on a terminal, a line for each cell elsewhere.
+class BenchProgress {
+ public:
+  explicit BenchProgress(bool quiet) : quiet_(quiet), terminal_(stderr_is_terminal()), start_(std::chrono::steady_clock::now()) {}
+  ~BenchProgress() {
+    if (!quiet_ && terminal_) fmt::print(stderr, "\r\033[K");
+  }
+  BenchProgress(const BenchProgress&) = delete;
+  BenchProgress& operator=(const BenchProgress&) = delete;
+
+  void update(const BenchStep& step) const {
+    if (quiet_) return;
+    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const std::string left =
+        step.share > 0.01 && step.share < 1 ? clock_text(elapsed / step.share * (1 - step.share)) + " left" : "";
+    const std::string text =
+        fmt::format("{:3.0f} %  {}/{} cells  {}  {}", 100 * step.share, step.cells_done, step.cells, left, step.now);
+    constexpr int kWidth = 24;
+    const int filled = static_cast<int>(kWidth * step.share);
+    if (terminal_) fmt::print(stderr, "\r\033[K[{:#>{}}{:.>{}}] {}", "", filled, "", kWidth - filled, text);
+    else fmt::print(stderr, "{}\n", text);
+    std::fflush(stderr);
+  }
+
+ private:
+  bool quiet_, terminal_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+Result<void> write_all(const Arguments& a, const std::string& title, const std::vector<CellResult>& results,
+                       const nlohmann::ordered_json& payload) {
+  if (Result<void> done = write_text(a.out + "/results.csv", results_csv(results)); !done) return done;
+  if (Result<void> done = write_text(a.out + "/results.json", results_json(title, results).dump(1) + "\n"); !done) return done;
+  const std::string provenance = fmt::format("fbvins {} on {}\n\n", FBVINS_VERSION, describe_machine());
+  if (Result<void> done = write_text(a.out + "/tables.md", provenance + markdown(payload)); !done) return done;
+  return write_text(a.out + "/report.html", report_html({}, payload, {.title = title}));
+}
+
+int bench(Arguments a) {
+  const Result<Matrix> matrix = read_matrix(a.matrix);
+  if (!matrix) return fail(matrix.error().message);
+  if (a.out.empty()) a.out = "out/bench-" + std::filesystem::path(a.matrix).stem().string();
+  if (a.where.drawn.empty()) a.where.drawn = a.out + "/drawn";
+  if (a.where.inputs.empty()) a.where.inputs = std::filesystem::path(a.matrix).parent_path().string();
+  const Result<Plan> plan = make_plan(*matrix, a.where);
+  if (!plan) return fail(plan.error().message);
+  std::map<std::string, Reference> reference;
+  if (!a.reference.empty()) {
+    Result<std::map<std::string, Reference>> read = read_reference(a.reference);
+    if (!read) return fail(read.error().message);
+    reference = *std::move(read);
+  }
+  a.bench.out = a.out;
+  a.bench.program = std::filesystem::read_symlink("/proc/self/exe").string();
+
+  const Result<BenchOutcome> outcome = [&] {
+    const BenchProgress progress(a.quiet);
+    return run_plan(*plan, a.bench, [&](const BenchStep& step) { progress.update(step); });
+  }();
+  if (!outcome) return fail(outcome.error().message);
+  for (const std::string& problem : outcome->failed) warn(problem);
+
+  const std::vector<CellResult> results = read_results(*plan, a.out);
+  const std::vector<Regression> worse = regressions(results, reference, a.tolerance);
+  const nlohmann::ordered_json payload = bench_payload(matrix->title, results, worse);
+  if (Result<void> written = write_all(a, matrix->title, results, payload); !written) return fail(written.error().message);
+  if (!a.quiet)
+    fmt::print("{}{} cells run, {} kept from before, {} failed; results in {}\n", markdown(payload), outcome->run,
+               outcome->reused, outcome->failed.size(), bold(a.out));
+  if (!worse.empty()) warn(fmt::format("{} figures are worse than the reference", worse.size()));
+  return outcome->failed.empty() && worse.empty() ? kOk : kEstimationFailed;
+}
+
+}  // namespace
+
+void add_bench_command(CLI::App& program, int& exit_code) {
+  auto a = std::make_shared<Arguments>();
+  a->bench.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  CLI::App* command = program.add_subcommand("bench", "run recordings x frontends x configurations, make tables");
+  command->footer(kExamples);
+  command->add_option("MATRIX", a->matrix, "YAML file")->required();
+  command->add_option("--out", a->out, "folder for the results (default out/bench-<matrix>)");
+  command->add_option("--jobs", a->bench.jobs, "processes at a time")->check(CLI::Range(1, 1024))->capture_default_str();
+  command->add_option("--euroc", a->where.euroc, "folder with the EuRoC recordings that the matrix names");
+  command->add_option("--inputs", a->where.inputs, "folder with recorded flights to draw along (default: the matrix's)");
+  command->add_option("--drawn", a->where.drawn, "folder for drawn recordings (default OUT/drawn); those there are used");
+  command->add_flag("--discard-drawn", a->bench.discard_drawn, "delete what was drawn as soon as its cells are done");
+  command->add_option("--reference", a->reference, "results.csv of an earlier run to compare with");
+  command->add_option("--tolerance", a->tolerance.share, "share by which an error may grow against the reference")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
+  command->callback([a, &exit_code] { exit_code = bench(*a); });
+}
+
+}  // namespace fbvins::app

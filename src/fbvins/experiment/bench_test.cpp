@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "fbvins/experiment/bench_results.hpp"
+#include "fbvins/experiment/bench_runner.hpp"
+#include "fbvins/experiment/bench_tables.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A stand-in for fbvins that notes its calls, and fails to run what the file `fail` names.
+constexpr const char* kProgram = R"SH(#!/bin/sh
+here=$(dirname "$0")
+echo "$*" >> "$here/calls"
+command=$1 subject=$2 out=
+while [ $# -gt 0 ]; do [ "$1" = --out ] && out=$2; shift; done
+[ -e "$here/fail" ] && [ "$command-$(basename "$subject")" = "$(cat "$here/fail")" ] && {
+  echo "it broke";
+  exit 3;
+}
+mkdir -p "$out"
+[ $command = simulate ] && echo x > "$out/simulation.yaml" || echo '{}' > "$out/summary.json"
+)SH";
+
+class BenchRunner : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              ("bench_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    write("fbvins", kProgram);
+    fs::permissions(folder_ / "fbvins", fs::perms::owner_all);
+    const Result<Matrix> matrix =
+        parse_matrix("datasets:\n  - simulate: {preset: [normal, fast], seeds: 2}\nfrontends: [klt, orb]\n", "m.yaml");
+    ASSERT_TRUE(matrix.ok());
+    const Result<Plan> plan = make_plan(*matrix, {.drawn = (folder_ / "drawn").string()});
+    ASSERT_TRUE(plan.ok());
+    plan_ = *plan;
+    options_ = {.program = (folder_ / "fbvins").string(), .out = (folder_ / "out").string(), .jobs = 3};
+  }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  std::vector<std::string> calls() const {
+    std::ifstream file(folder_ / "calls");
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(file, line);) lines.push_back(line);
+    return lines;
+  }
+  BenchOutcome run() {
+    steps_.clear();
+    const Result<BenchOutcome> outcome = run_plan(plan_, options_, [&](const BenchStep& s) { steps_.push_back(s); });
+    EXPECT_TRUE(outcome.ok());
+    return outcome ? *outcome : BenchOutcome{};
+  }
+
+  fs::path folder_;
+  Plan plan_;
+  BenchOptions options_;
+  std::vector<BenchStep> steps_;
+};
+
+TEST_F(BenchRunner, DrawsOnceAndRunsEachCell) {
+  const BenchOutcome outcome = run();
+  EXPECT_EQ(outcome.run, 8);
+  EXPECT_TRUE(outcome.failed.empty());
+  EXPECT_EQ(calls().size(), 4u + 8u);
+  EXPECT_DOUBLE_EQ(steps_.back().share, 1);
+  EXPECT_EQ(steps_.back().cells_done, 8);
+  for (const Cell& cell : plan_.cells) EXPECT_TRUE(fs::exists(cell_folder(options_.out, cell) + "/cell.json")) << cell.id;
+}
+
+TEST_F(BenchRunner, FinishedCellsAreNotRunAgain) {
+  run();
+  const BenchOutcome again = run();
+  EXPECT_EQ(again.run, 0);
+  EXPECT_EQ(again.reused, 8);
+  EXPECT_EQ(calls().size(), 12u);
+}
+
+TEST_F(BenchRunner, OnlyWhatFailedIsRunAgain) {
+  write("fail", "run-fast-s2");
+  const BenchOutcome first = run();
+  ASSERT_EQ(first.failed.size(), 2u);
+  EXPECT_NE(first.failed[0].find("exit code 3: it broke"), std::string::npos) << first.failed[0];
+  EXPECT_EQ(first.run, 6);
+  fs::remove(folder_ / "fail");
+  const BenchOutcome second = run();
+  EXPECT_EQ(second.run, 2);
+  EXPECT_EQ(second.reused, 6);
+}
+
+TEST_F(BenchRunner, CellsOfAFlightThatCannotBeDrawnFail) {
+  write("fail", "simulate-normal");
+  const BenchOutcome outcome = run();
+  EXPECT_EQ(outcome.run, 4);
+  EXPECT_EQ(outcome.failed.size(), 2u + 4u);
+}
+
+TEST_F(BenchRunner, HalfACellDoesNotCount) {
+  run();
+  const std::string cell = cell_folder(options_.out, plan_.cells[0]);
+  fs::rename(cell, cell + ".part");  // as a kill leaves it
+  EXPECT_EQ(run().run, 1);
+  EXPECT_FALSE(fs::exists(cell + ".part"));
+}
+
+TEST_F(BenchRunner, AnotherProgramOrConfigurationRunsAgain) {
+  run();
+  plan_.cells[0].configuration.settings = {"a=1"};
+  EXPECT_EQ(run().run, 1);
+  write("fbvins", std::string(kProgram) + "# changed\n");
+  EXPECT_EQ(run().run, 8);
+}
+
+TEST_F(BenchRunner, DrawnRecordingsCanBeDiscarded) {
+  options_.discard_drawn = true;
+  run();
+  for (const Recording& r : plan_.recordings) EXPECT_FALSE(fs::exists(r.path)) << r.path;
+  EXPECT_EQ(run().reused, 8);  // and nothing is drawn again
+  EXPECT_EQ(calls().size(), 12u);
+}
+
+CellResult result(const std::string& dataset, int seed, const std::string& frontend, double rmse) {
+  CellResult r;
+  r.recording = {dataset + std::to_string(seed), dataset, "", seed, DrawnSpec{}};
+  r.cell = {r.recording.id + "-" + frontend, 0, frontend, {}, 1};
+  r.status = "ok";
+  Evaluation e;
+  e.absolute_m = {100, 3 * rmse, rmse, rmse, rmse, rmse};
+  r.evaluation = e;
+  r.coverage = 0.99;
+  return r;
+}
+
+TEST(BenchTables, ReductionsAreMeansOverRecordings) {
+  // As section 3.2: the mean of the recordings' own reductions, here 50 % and 10 %.
+  const auto payload = bench_payload(
+      "T", {result("A", 1, "klt", 0.4), result("A", 1, "orb", 0.2), result("B", 1, "klt", 0.1), result("B", 1, "orb", 0.09)}, {});
+  ASSERT_EQ(payload["tables"].size(), 2u);
+  EXPECT_EQ(payload["tables"][0]["rows"][1][5], "0.2000");
+  EXPECT_EQ(payload["tables"][1]["title"], "Smaller than with klt");
+  EXPECT_EQ(payload["tables"][1]["rows"][0][4], "30.00 %");
+  EXPECT_NE(markdown(payload).find("| A | orb | 0.6000 |"), std::string::npos);
+}
+
+TEST(BenchTables, SeedsOfAScenarioAreOneRow) {
+  const auto payload = bench_payload("T", {result("A", 1, "klt", 0.1), result("A", 2, "klt", 0.3)}, {});
+  const auto& rows = payload["tables"][0]["rows"];
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0][2], "2");
+  EXPECT_EQ(rows[0][3], "0.2000");
+}
+
+TEST(BenchTables, BoundsOfChiSquare) {
+  // Tables of chi-square: 2.5 % and 97.5 % of 60 degrees of freedom are 40.48 and 83.30.
+  EXPECT_NEAR(nees_bounds(20).low, 40.48 / 20, 0.005);
+  EXPECT_NEAR(nees_bounds(20).high, 83.30 / 20, 0.005);
+}
+
+TEST(BenchResults, RegressionsAreFoundAndOnlyThose) {
+  const std::string path = ::testing::TempDir() + "/reference.csv";
+  std::ofstream(path) << results_csv({result("A", 1, "klt", 0.10), result("B", 1, "klt", 0.10), result("C", 1, "klt", 0.10)});
+  const auto reference = read_reference(path);
+  ASSERT_TRUE(reference.ok()) << reference.error().message;
+  CellResult slightly = result("A", 1, "klt", 0.12), worse = result("B", 1, "klt", 0.13), blind = result("C", 1, "klt", 0.05);
+  blind.coverage = 0.5;
+  const std::vector<Regression> found = regressions({slightly, worse, blind, result("D", 1, "klt", 9)}, *reference, {});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].cell, "B1-klt");
+  EXPECT_EQ(found[1].what, "coverage 50.0 %, was 99.0");
+}
+
+}  // namespace
+}  // namespace fbvins
