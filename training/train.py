@@ -135,8 +135,9 @@ def plot(out):
         points = [(s, float(r[name])) for s, r in zip(steps, rows) if r[name] != ""]
         axes[1].plot(*zip(*points), label=name) if points else None
     axes[1].set(xlabel="step", ylabel="correct matches, held out, against raw [%]")
+    if axes[1].lines:
+        axes[1].legend()
     axes[1].axhline(0, color="grey", lw=0.5)
-    axes[1].legend()
     figure.tight_layout()
     figure.savefig(out / "curve.png", dpi=110)
 
@@ -154,7 +155,7 @@ class Schedule:
         return time.time() - self.start
 
     def rate(self, step):
-        warm = min(1.0, (step + 1) / 100)
+        warm = min(1.0, (step + 1) / min(100, 0.1 * self.a.steps))
         return self.a.rate * warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * self.progress(step))))
 
 

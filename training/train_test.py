@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A few steps of training on a few made-up pictures: the loss falls, the same seed gives the same weights, the weights
+file is read back as it was. train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+try:
+    import numpy as np
+    import torch
+except ImportError as missing:
+    print(f"skipped: {missing.name} is not installed (apt-get install python3-torch, or pip install torch numpy)")
+    sys.exit(77)
+from train import arguments_of, train  # noqa: E402
+from weights import load_model, load_weights  # noqa: E402
+
+
+def main(program):
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as folder:
+        pairs = f"{folder}/pairs.bin"
+        subprocess.run([program, "--leaves", "2", "--pairs", "2", "--seed", "4", "--out", pairs], check=True)
+
+        def weights_of(out):
+            losses = train(arguments_of(["--pairs", pairs, "--out", out, "--steps", "16", "--batch", "4", "--seed", "3", "--rate", "2e-3"]))
+            print("loss:", " ".join(f"{x:.3f}" for x in losses))
+            return losses, pathlib.Path(out, "boost-s.safetensors").read_bytes()
+
+        losses, first = weights_of(f"{folder}/a")
+        assert np.mean(losses[-4:]) < 0.95 * np.mean(losses[:4]), "the loss does not fall"
+        assert weights_of(f"{folder}/b")[1] == first, "the same seed gives other weights"
+        meta, arrays = load_weights(f"{folder}/a/boost-s.safetensors")
+        assert meta["format"] == "fbvins-booster-1" and meta["steps"] == "16"
+        for name, tensor in load_model(f"{folder}/a/boost-s.safetensors").state_dict().items():
+            assert np.array_equal(tensor.numpy(), arrays[name]), name
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
