@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/experiment/bench_runner.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -58,6 +61,26 @@ std::vector<std::string> run_command(const std::string& program, const Cell& c, 
   return command;
 }
 
+/// Held while a bench works in a folder: two would throw away each other's halves. Goes with the process, however it ends.
+class FolderLock {
+ public:
+  FolderLock() = default;
+  ~FolderLock() {
+    if (file_ >= 0) close(file_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+  Result<void> take(const std::string& folder) {
+    file_ = open((folder + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (file_ >= 0 && flock(file_, LOCK_EX | LOCK_NB) == 0) return {};
+    return Error{ErrorCode::unwritable, fmt::format("{}: another bench works in this folder", folder)};
+  }
+
+ private:
+  int file_ = -1;
+};
+
 /// One pass through a plan.
 class Runner {
  public:
@@ -66,6 +89,7 @@ class Runner {
 
   Result<BenchOutcome> work() {
     if (Result<void> made = make_folders(); !made) return made.error();
+    if (Result<void> taken = lock_.take(options_.out); !taken) return taken.error();
     plan_tasks();
     for (;;) {
       while (pool_.running() < std::max(1, options_.jobs))
@@ -226,6 +250,7 @@ class Runner {
   std::vector<int> waiting_cells_;  ///< by recording
   double total_ = 0, done_ = 0;
   BenchOutcome outcome_;
+  FolderLock lock_;
   ProcessPool pool_;
 };
 

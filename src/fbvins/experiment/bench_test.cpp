@@ -118,6 +118,17 @@ TEST_F(BenchRunner, AnotherProgramOrConfigurationRunsAgain) {
   EXPECT_EQ(run().run, 8);
 }
 
+TEST_F(BenchRunner, TwoInOneFolderAreRefused) {
+  std::string refusal;
+  const auto second = [&](const BenchStep&) {
+    if (!refusal.empty()) return;
+    const Result<BenchOutcome> outcome = run_plan(plan_, options_, {});
+    refusal = outcome ? "none" : outcome.error().message;
+  };
+  ASSERT_TRUE(run_plan(plan_, options_, second).ok());
+  EXPECT_EQ(refusal, options_.out + ": another bench works in this folder");
+}
+
 TEST_F(BenchRunner, DrawnRecordingsCanBeDiscarded) {
   options_.discard_drawn = true;
   run();
