@@ -12,23 +12,23 @@ namespace {
 /// A product with fewer inputs is not worth rounding.
 constexpr int kFewestInputs = 16;
 
+double log_score(const Keypoint& k) { return std::log1p(std::max(double{k.score}, 0.0)); }
+
 }  // namespace
 
 void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out) {
   out.resize(keypoints.size() * kBoosterGeometry);
-  const float half = 0.5f * static_cast<float>(std::max(width, height));
-  float mean = 0;
-  for (const Keypoint& k : keypoints) mean += std::log1p(std::max(k.score, 0.0f));
-  mean /= static_cast<float>(std::max<std::size_t>(keypoints.size(), 1));
+  const double half = 0.5 * std::max(width, height);
+  double mean = 0;
+  for (const Keypoint& k : keypoints) mean += log_score(k);
+  mean /= static_cast<double>(std::max<std::size_t>(keypoints.size(), 1));
   float* g = out.data();
   for (const Keypoint& k : keypoints) {
-    *g++ = (static_cast<float>(k.pixel.x()) - 0.5f * static_cast<float>(width)) / half;
-    *g++ = (static_cast<float>(k.pixel.y()) - 0.5f * static_cast<float>(height)) / half;
-    *g++ = (std::log1p(std::max(k.score, 0.0f)) - mean) * 0.5f;
-    *g++ = mean * 0.1f;
-    *g++ = std::cos(k.angle_rad);
-    *g++ = std::sin(k.angle_rad);
-    *g++ = std::log(std::max(k.scale, 1.0f)) * 2;
+    // In double precision, then rounded: the libraries of two machines differ in the last digit only.
+    for (const double v :
+         {(k.pixel.x() - 0.5 * width) / half, (k.pixel.y() - 0.5 * height) / half, (log_score(k) - mean) * 0.5, mean * 0.1,
+          std::cos(double{k.angle_rad}), std::sin(double{k.angle_rad}), 2 * std::log(std::max(double{k.scale}, 1.0))})
+      *g++ = static_cast<float>(v);
   }
 }
 
