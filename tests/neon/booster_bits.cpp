@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prints what every int8 kernel of this processor makes of fixed numbers, and a sum over the bits that the shipped network
+// gives fixed keypoints: compiled for two processors, both must print the same. booster_bits WEIGHTS
+#include <cstdio>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/features/booster_network.hpp"
+
+using namespace fbvins;
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const Result<BoosterWeights> weights = load_booster_weights(argv[1]);
+  if (!weights) return std::fprintf(stderr, "%s\n", weights.error().message.c_str()), 2;
+  Rng rng(9);
+  std::vector<Keypoint> keypoints(123);
+  std::vector<Descriptor> descriptors(keypoints.size());
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    // One draw a statement: compilers choose the order within one.
+    const double x = rng.uniform(0, 752), y = rng.uniform(0, 480);
+    keypoints[i].pixel = Vec2(x, y);
+    keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));
+    keypoints[i].angle_rad = static_cast<float>(rng.uniform(-3, 3));
+    for (std::uint64_t& word : descriptors[i].bits) {
+      word = rng.next_u32();
+      word = word << 32 | rng.next_u32();
+    }
+  }
+  int kernels = 0;
+  for (const Int8Kernel kernel : {Int8Kernel::portable, Int8Kernel::avx2, Int8Kernel::avx512_vnni, Int8Kernel::neon_dot}) {
+    if (!int8_kernel_works(kernel)) continue;
+    std::vector<Descriptor> boosted = descriptors;
+    BoosterNetwork(*weights, BoosterPrecision::int8, kernel).run(752, 480, keypoints, boosted);
+    std::uint64_t sum = 14695981039346656037ull;
+    for (const Descriptor& d : boosted)
+      for (const std::uint64_t word : d.bits) sum = (sum ^ word) * 1099511628211ull;
+    std::printf("%016llx\n", static_cast<unsigned long long>(sum));
+    std::fprintf(stderr, "%s: %016llx\n", name_of(kernel), static_cast<unsigned long long>(sum));
+    ++kernels;
+  }
+  return kernels > 0 ? 0 : 1;
+}
