@@ -149,7 +149,7 @@ std::string real_recording(const DatasetSpec& spec, const PlanOptions& options) 
   if (!spec.path.empty()) return spec.path;
   if (spec.euroc.empty() || options.euroc.empty()) return "";
   for (const char* ending : {"", ".zip"})
-    if (const std::string path = below(options.euroc, fmt::format("{}{}", spec.euroc, ending)); fs::exists(path)) return path;
+    if (std::string path = below(options.euroc, fmt::format("{}{}", spec.euroc, ending)); fs::exists(path)) return path;
   return "";
 }
 

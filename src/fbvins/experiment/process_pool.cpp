@@ -10,7 +10,7 @@
 #endif
 
 #include <cerrno>
-#include <cstring>
+#include <system_error>
 
 namespace fbvins {
 namespace {
@@ -35,14 +35,15 @@ ProcessPool::~ProcessPool() {
 
 Result<void> ProcessPool::start(int tag, const std::vector<std::string>& command, const std::string& log) {
   const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) return Error{ErrorCode::unwritable, log + ": " + std::strerror(errno)};
+  if (file < 0) return Error{ErrorCode::unwritable, log + ": " + std::generic_category().message(errno)};
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const std::string& a : command) arguments.push_back(const_cast<char*>(a.c_str()));
   arguments.push_back(nullptr);
   const pid_t pid = fork();
   if (pid == 0) become(arguments.data(), file);
   close(file);
-  if (pid < 0) return Error{ErrorCode::unreadable, command.front() + ": " + std::strerror(errno)};
+  if (pid < 0) return Error{ErrorCode::unreadable, command.front() + ": " + std::generic_category().message(errno)};
   tags_[pid] = tag;
   return {};
 }

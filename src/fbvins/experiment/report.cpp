@@ -34,6 +34,7 @@ class Curves {
   void add(const std::string& name, const std::vector<Vec3>& values) {
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<double> one;
+      one.reserve(values.size());
       for (const Vec3& v : values) one.push_back(v[axis]);
       add(fmt::format("{}_{}", name, "xyz"[axis]), one);
     }
@@ -183,9 +184,9 @@ std::string run_text(const RunFolder& run, const ReportOptions& options) {
   text += ",\"features\":" +
           table_curves(run, run.statistics,
                        {"tracked", "detected", "stereo", "observations", "landmarks", "outliers", "brightness_left"}, n);
-  text +=
-      ",\"timing\":" +
-      table_curves(run, run.timing, {"pyramid", "track", "stereo", "detect", "geometry", "prepare", "solve", "marginalise"}, n);
+  text += ",\"timing\":" +
+          table_curves(run, run.timing,
+                       {"pyramid", "track", "stereo", "detect", "geometry", "boost", "prepare", "solve", "marginalise"}, n);
   return text + "}";
 }
 
