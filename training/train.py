@@ -97,16 +97,29 @@ def as_if_moved(v, generator):
     return torch.stack([x, y, level, scale, angle + turn, score], -1)
 
 
+def in_a_window(v, generator):
+    """Which keypoints a view keeps: those in a window of its own. Two views of a flight share only a part of what they
+    see; with all the same keypoints in both, the network comes to rely on their summary being the same."""
+    keep = v.valid
+    for axis, length in ((0, v.width), (1, v.height)):
+        share = 0.5 + 0.5 * torch.rand(len(length), 1, generator=generator)
+        start = (1 - share) * torch.rand(len(length), 1, generator=generator)
+        at = v.keypoints[..., axis] / length[:, None]
+        keep = keep & (at >= start) & (at <= start + share)
+    return keep
+
+
 def losses_of(model, batch, a, device, generator):
-    y = []
+    y, kept = [], []
     for v in (batch.a, batch.b):
-        geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid).to(device)
+        kept.append(in_a_window(v, generator))
+        geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, kept[-1]).to(device)
         with torch.autocast(device.type, torch.bfloat16, enabled=a.autocast):
-            y.append(model(v.bits.to(device), geometry, v.valid.to(device)))
+            y.append(model(v.bits.to(device), geometry, kept[-1].to(device)))
     distance = hamming(hard_bits(y[0].float()), hard_bits(y[1].float()))
     apart = batch.apart.to(device)
     positive = apart < a.tolerance
-    usable = batch.both.to(device) & (positive | (apart > 1.7 * a.tolerance))
+    usable = (kept[0][:, :, None] & kept[1][:, None, :]).to(device) & (positive | (apart > 1.7 * a.tolerance))
     out = {}
     if a.contrastive > 0:
         out["contrastive"] = contrastive(distance, positive, usable, a.temperature)
