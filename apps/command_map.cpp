@@ -41,18 +41,19 @@ int info(const Arguments& arguments) {
   }
   const auto loops =
       std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
-  fmt::print("{}: {} keyframes of {} flights, {} loops, {} features, {} with depth\n", arguments.file, map->size(),
-             flights.size(), loops, features, points);
+  fmt::print("{}: {} keyframes of {} flights, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
+             flights.size(), loops, features, map->boosted ? "boosted " : "", points);
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   return kOk;
 }
 
 int merge(const Arguments& arguments) {
-  const auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped_vocabulary() : arguments.vocabulary);
-  if (!vocabulary) return fail(vocabulary.error().message);
   auto all = load_map(arguments.files[0]);
   if (!all) return fail(all.error().message);
+  const std::string shipped = shipped_vocabulary(all->boosted ? kBoostedDescriptors : kRawDescriptors);
+  const auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped : arguments.vocabulary);
+  if (!vocabulary) return fail(vocabulary.error().message);
   for (std::size_t i = 1; i < arguments.files.size(); ++i) {
     const auto next = load_map(arguments.files[i]);
     if (!next) return fail(next.error().message);

@@ -166,6 +166,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
   command->add_flag("--final-ba", arguments->map.final_ba,
                     "bundle adjustment over the whole map after the run; with loop closure");
+  command->add_flag("--boosted-map", arguments->map.boosted, "a new map of boosted descriptors; with loop closure");
   command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -8,9 +8,11 @@
 #include "apps/commands.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/features/booster.hpp"
 #include "fbvins/features/orb.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
 #include "fbvins/loop/vocabulary_training.hpp"
 
 namespace fbvins::app {
@@ -26,6 +28,7 @@ constexpr const char* kExamples = R"(examples:
 struct Arguments {
   std::vector<std::string> images;
   std::string output = "orb_vocabulary.fbv", file;
+  bool boosted = false;
   OrbOptions orb{.max_features = 800, .levels = 6};
   VocabularyTrainingOptions training;
 };
@@ -53,6 +56,9 @@ std::vector<std::string> image_files(const std::vector<std::string>& arguments) 
 
 int train(const Arguments& arguments) {
   if (auto valid = validate(arguments.training); !valid) return fail(valid.error().message);
+  Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
+  if (arguments.boosted) stage = make_booster_stage(BoosterOptions{});
+  if (!stage) return fail(stage.error().message);
   OrbExtractor extractor(arguments.orb);
   OrbFeatures features;
   std::vector<std::vector<Descriptor>> images;
@@ -63,11 +69,13 @@ int train(const Arguments& arguments) {
     const auto image = decode_image(*bytes);
     if (!image) return fail(fmt::format("{}: {}", file, image.error().message));
     extractor.extract(image->view(), features);
+    (*stage)->improve(image->width(), image->height(), features);
     descriptors += features.size();
     images.push_back(features.descriptors);
   }
   if (images.empty()) return fail("no image to train with");
-  const Vocabulary vocabulary = train_vocabulary("orb", images, arguments.training);
+  const Vocabulary vocabulary =
+      train_vocabulary(arguments.boosted ? kBoostedDescriptors : kRawDescriptors, images, arguments.training);
   if (auto saved = vocabulary.save(arguments.output); !saved) return fail(saved.error().message);
   fmt::print("{}: {} words from {} descriptors of {} images\n", arguments.output, vocabulary.words(), descriptors, images.size());
   return kOk;
@@ -91,6 +99,7 @@ void add_vocab_command(CLI::App& program, int& exit_code) {
   CLI::App* training = command->add_subcommand("train", "from images of any kind, folders are searched");
   training->add_option("images", arguments->images, "images or folders")->required()->check(CLI::ExistingPath);
   training->add_option("-o,--output", arguments->output, "the file to write");
+  training->add_flag("--boosted", arguments->boosted, "words of boosted descriptors");
   training->add_option("--features", arguments->orb.max_features, "ORB features of an image");
   training->add_option("--branching", arguments->training.branching, "children of a node");
   training->add_option("--depth", arguments->training.depth, "levels of the tree");

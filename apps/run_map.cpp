@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "fbvins/core/stage_timer.hpp"
+#include "fbvins/features/booster.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
@@ -77,12 +78,20 @@ Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& argumen
   if (!arguments.wanted()) return std::unique_ptr<LoopCloser>();
   if (!arguments.save.empty())
     if (Result<void> there = check_folder_of(arguments.save); !there) return there.error();
-  auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped_vocabulary() : arguments.vocabulary);
-  if (!vocabulary) return vocabulary.error();
-  if (arguments.load.empty()) return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary));
-  auto map = load_map(arguments.load);
+  Result<PlaceMap> map = PlaceMap{};
+  if (!arguments.load.empty()) map = load_map(arguments.load);
   if (!map) return map.error();
-  return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary), std::move(*map));
+  if (map->empty()) map->boosted = arguments.boosted;
+  const char* kind = map->boosted ? kBoostedDescriptors : kRawDescriptors;
+  auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped_vocabulary(kind) : arguments.vocabulary);
+  if (!vocabulary) return vocabulary.error();
+  if (vocabulary->kind() != kind)
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("the vocabulary is of '{}' descriptors, the map of '{}' ones", vocabulary->kind(), kind)};
+  Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
+  if (map->boosted) stage = make_booster_stage(BoosterOptions{});
+  if (!stage) return stage.error();
+  return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary), std::move(*map), std::move(*stage));
 }
 
 void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record) {

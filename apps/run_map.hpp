@@ -18,7 +18,7 @@
 namespace fbvins::app {
 
 struct MapArguments {
-  bool loop = false, final_ba = false;
+  bool loop = false, final_ba = false, boosted = false;
   std::string load, save, vocabulary;
   bool wanted() const { return loop || final_ba || !load.empty() || !save.empty(); }
 };

@@ -96,6 +96,14 @@ class CommandLine(unittest.TestCase):
         self.assertGreater(found["keyframes_in_map"], in_map["keyframes_in_map"])
         self.assertLess(found["localised_after_s"], 2.0)
 
+        boosted = self.folder / "boosted.fbm"
+        self.assertEqual(fbvins(*run, "--boosted-map", "--save-map", boosted).returncode, 0)
+        self.assertIn("boosted", fbvins("map", "info", boosted).stdout)
+        self.assertEqual(fbvins(*run, "--load-map", boosted).returncode, 0)
+        words = pathlib.Path(__file__).resolve().parents[1] / "data" / "orb_vocabulary.fbv"
+        self.assert_bad_input(fbvins(*run, "--load-map", boosted, "--vocabulary", words), "'orb'", "'boosted'")
+        self.assert_bad_input(fbvins("map", "merge", self.folder / "a.fbm", boosted, "-o", self.folder / "c.fbm"), "boosted")
+
     def test_eval(self):
         rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]
         truth = self.write("truth.txt", "\n".join(rows) + "\n")

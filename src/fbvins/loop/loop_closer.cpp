@@ -30,11 +30,12 @@ double angle_between(const Quat& a, const Quat& b) { return 2 * std::acos(std::m
 LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary)
     : LoopCloser(rig, options, std::move(vocabulary), PlaceMap{}) {}
 
-LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map)
+LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
+                       std::unique_ptr<DescriptorStage> stage)
     : options_(options),
       T_BC0_(rig.T_BC0),
       vocabulary_(std::move(vocabulary)),
-      extractor_(rig, options.extraction, vocabulary_),
+      extractor_(rig, options.extraction, vocabulary_, std::move(stage)),
       verifier_(options.verification),
       map_(std::move(map)),
       index_(vocabulary_.words()),

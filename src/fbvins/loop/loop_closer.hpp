@@ -10,6 +10,7 @@
 //   Trajectory in_map = closer.corrected(trajectory_in_W);
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -25,8 +26,10 @@ namespace fbvins {
 class LoopCloser {
  public:
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
-  /// Goes on in an old map: M is that map's frame, and W must first be found in it.
-  LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map);
+  /// Goes on in an old map: M is that map's frame, and W must first be found in it. With boosted descriptors, `stage` makes
+  /// them; vocabulary and map must be of the same kind.
+  LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
+             std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   MapUpdate process(const Keyframe& keyframe);
   /// The same from features already extracted (joining maps, replay).

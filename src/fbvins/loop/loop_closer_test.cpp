@@ -154,6 +154,9 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const Vec3 measured = both->keyframes()[a.size() + 50].T_MB.p - both->keyframes()[60].T_MB.p;
   EXPECT_NEAR(measured.norm(), (truth_b[50].truth.p - truth_a[60].truth.p).norm(), 0.05);
   EXPECT_FALSE(merge_maps(a, stranger, {}, vocabulary()).ok());
+  PlaceMap boosted = b;
+  boosted.boosted = true;
+  EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
 }
 
 TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {

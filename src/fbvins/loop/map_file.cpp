@@ -150,6 +150,9 @@ MapEdge get_edge(Reader& r) {
   return e;
 }
 
+/// The one flag: descriptors are boosted. The checksum covers it.
+constexpr std::uint32_t kBoosted = 1;
+
 Error damaged(const std::string& name, const char* what) {
   return {ErrorCode::malformed, fmt::format("{}: damaged map: {}", name, what)};
 }
@@ -174,9 +177,10 @@ std::string serialise_map(const PlaceMap& map) {
   Writer head;
   head.raw(kMagic, sizeof kMagic);
   head.put(kMapVersion);
-  head.put(std::uint32_t{0});
+  const std::uint32_t flags = map.boosted ? kBoosted : 0;
+  head.put(flags);
   head.put(static_cast<std::uint64_t>(bytes.size()));
-  head.put(checksum64(std::as_bytes(std::span(bytes))));
+  head.put(checksum64(std::as_bytes(std::span(bytes))) ^ flags);
   return head.take() + bytes;
 }
 
@@ -189,12 +193,14 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   const auto version = head.get<std::uint32_t>();
   if (version != kMapVersion)
     return Error{ErrorCode::unsupported, fmt::format("{}: map of version {}, this program reads {}", name, version, kMapVersion)};
-  if (head.get<std::uint32_t>() != 0) return damaged(name, "unknown flags");
+  const auto flags = head.get<std::uint32_t>();
+  if ((flags & ~kBoosted) != 0) return damaged(name, "unknown flags");
   if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
-  if (head.get<std::uint64_t>() != checksum64(bytes.subspan(kHeaderBytes))) return damaged(name, "the checksum differs");
+  if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags)) return damaged(name, "the checksum differs");
 
   Reader r(bytes.subspan(kHeaderBytes));
   PlaceMap map;
+  map.boosted = (flags & kBoosted) != 0;
   const auto keyframes = r.get<std::uint32_t>(), edges = r.get<std::uint32_t>();
   map.T_BC0 = r.pose<Pose<B, C0>>();
   KeyframeId last;

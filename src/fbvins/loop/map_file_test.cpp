@@ -61,6 +61,13 @@ TEST_F(MapFile, WhatWasSavedIsLoadedBitForBit) {
   EXPECT_EQ(loaded->keyframes()[7].place.features, map.keyframes()[7].place.features);
 }
 
+TEST_F(MapFile, RemembersWhichDescriptorsItHolds) {
+  PlaceMap map = map_of(3, 1);
+  EXPECT_FALSE(parse_map(view(serialise_map(map)), "map")->boosted);
+  map.boosted = true;
+  EXPECT_TRUE(parse_map(view(serialise_map(map)), "map")->boosted);
+}
+
 TEST_F(MapFile, PlacesWithoutAPoseAreLeftOut) {
   PlaceMap map = map_of(10, 1);
   map.keyframes()[9].placed = false;

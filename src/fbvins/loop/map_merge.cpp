@@ -4,6 +4,8 @@
 namespace fbvins {
 
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary) {
+  if (first.boosted != second.boosted)
+    return Error{ErrorCode::invalid_argument, "one map holds boosted descriptors, the other raw ones"};
   StereoRig rig;  // only the place of the left camera matters: nothing is extracted
   rig.T_BC0 = first.T_BC0;
   LoopOptions merging = options;

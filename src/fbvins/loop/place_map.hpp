@@ -54,7 +54,8 @@ class PlaceMap {
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   std::vector<MapEdge> edges;
-  Pose<B, C0> T_BC0;  ///< of the camera that saw the places
+  Pose<B, C0> T_BC0;     ///< of the camera that saw the places
+  bool boosted = false;  ///< descriptors are boosted ones, which compare with such only
 
  private:
   std::vector<MapKeyframe> keyframes_;

@@ -6,9 +6,9 @@
 
 namespace fbvins {
 
-std::string shipped_vocabulary() {
+std::string shipped_vocabulary(const std::string& kind) {
   if (const char* chosen = std::getenv("FBVINS_VOCABULARY"); chosen != nullptr && *chosen != '\0') return chosen;
-  const std::string name = "/orb_vocabulary.fbv", installed = FBVINS_INSTALLED_DATA + name;
+  const std::string name = "/" + kind + "_vocabulary.fbv", installed = FBVINS_INSTALLED_DATA + name;
   std::error_code ignored;
   return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
 }

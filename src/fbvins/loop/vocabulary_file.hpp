@@ -8,7 +8,10 @@
 
 namespace fbvins {
 
+/// Kinds of descriptors that words are made of.
+inline constexpr const char *kRawDescriptors = "orb", *kBoostedDescriptors = "boosted";
+
 /// $FBVINS_VOCABULARY if set, else where it was installed, else the source tree this was built from.
-std::string shipped_vocabulary();
+std::string shipped_vocabulary(const std::string& kind = kRawDescriptors);
 
 }  // namespace fbvins
