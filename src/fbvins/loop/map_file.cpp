@@ -196,7 +196,8 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   const auto flags = head.get<std::uint32_t>();
   if ((flags & ~kBoosted) != 0) return damaged(name, "unknown flags");
   if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
-  if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags)) return damaged(name, "the checksum differs");
+  if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags))
+    return damaged(name, "the checksum differs");
 
   Reader r(bytes.subspan(kHeaderBytes));
   PlaceMap map;
