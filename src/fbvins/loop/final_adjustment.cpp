@@ -85,14 +85,7 @@ class Adjustment {
     add_gravity(problem);
     const auto first = std::find_if(poses_.begin(), poses_.end(), [&](auto& x) { return problem.HasParameterBlock(x.data()); });
     problem.SetParameterBlockConstant(first->data());
-    ceres::Solver::Options solver;
-    solver.linear_solver_type = ceres::SPARSE_SCHUR;
-    solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-    solver.num_threads = 1;
-    solver.max_num_iterations = options_.max_iterations;
-    solver.function_tolerance = 1e-5;
-    solver.max_solver_time_in_seconds = 1e9;  // iterations are the budget, never the clock
-    solver.logging_type = ceres::SILENT;
+    const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, options_.max_iterations);
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
     return summary.num_successful_steps;

@@ -3,11 +3,26 @@
 // (docs/derivations/loop.md, L8-L10). A node is x = (p, yaw about M's z) or (p, dtheta in B), about a starting orientation.
 #pragma once
 
+#include <ceres/solver.h>
+
 #include <cmath>
 
 #include "fbvins/geometry/pose.hpp"
 
 namespace fbvins {
+
+/// One thread, and iterations as the only budget: the same problem gives the same bits.
+inline ceres::Solver::Options repeatable_solver(ceres::LinearSolverType type, int max_iterations) {
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = type;
+  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  solver.num_threads = 1;
+  solver.max_num_iterations = max_iterations;
+  solver.function_tolerance = 1e-5;
+  solver.max_solver_time_in_seconds = 1e9;  // never the clock
+  solver.logging_type = ceres::SILENT;
+  return solver;
+}
 
 /// Orientation of a node from its parameters: (p, yaw about M's z) or (p, dtheta in B).
 template <int Dof, class T>

@@ -79,14 +79,7 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
           x[i].data());
   for (std::size_t i = 0; i < poses_.size(); ++i)
     if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  solver.num_threads = 1;
-  solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-5;
-  solver.max_solver_time_in_seconds = 1e9;  // iterations are the budget, never the clock
-  solver.logging_type = ceres::SILENT;
+  const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, options.max_iterations);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
