@@ -12,9 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <numbers>
 #include <string>
@@ -26,7 +23,7 @@
 #include "fbvins/features/hamming.hpp"
 #include "fbvins/features/orb.hpp"
 #include "fbvins/io/dataset.hpp"
-#include "fbvins/io/image_decode.hpp"
+#include "training/native/pictures.hpp"
 #include "training/native/warped_pair.hpp"
 
 namespace fbvins {
@@ -103,15 +100,6 @@ void add_matches(const Described& a, const Described& b, const Correct& correct,
   }
 }
 
-std::vector<std::string> pictures_in(const std::vector<std::string>& folders) {
-  std::vector<std::string> paths;
-  for (const std::string& folder : folders)
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-      if (const auto e = entry.path().extension(); e == ".jpg" || e == ".png") paths.push_back(entry.path().string());
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
 void print_scores(const std::string& what, const std::vector<Score>& scores, double pairs,
                   const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < scores.size(); ++i) {
@@ -125,11 +113,12 @@ int photos(const Arguments& arguments, const std::vector<BoosterWeights>& weight
   constexpr double kCorrect_px = 3;
   Describer describe(arguments.features, weights);
   std::array<std::vector<Score>, kConditionNames.size()> scores;
-  const std::vector<std::string> paths = pictures_in(arguments.photos);
+  std::vector<std::string> paths;
+  for (const std::string& folder : arguments.photos)
+    for (const std::string& path : pictures_in(folder, Part::held_out)) paths.push_back(path);
   int pictures = 0;
   for (std::size_t i = 0; i < paths.size(); i += static_cast<std::size_t>(arguments.every)) {
-    std::ifstream file(paths[i], std::ios::binary);
-    const Result<Image> picture = decode_image(std::string(std::istreambuf_iterator<char>(file), {}));
+    const Result<Image> picture = read_picture(paths[i]);
     if (!picture) return fmt::print(stderr, "{}: {}\n", paths[i], picture.error().message), 2;
     ++pictures;
     for (std::size_t c = 0; c < scores.size(); ++c) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures to training pairs: keypoints and descriptors of both views by the project's own extractor, and the homography
-// between the views, as records of fixed size that numpy maps (training/dataset.py).
+// Pictures to training pairs: keypoints and descriptors of both views by the project's own extractor, and where each
+// keypoint of the first is in the second, as records of fixed size that numpy maps (training/dataset.py).
 //
-//   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG
-//   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        made-up pictures
+//   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG, warped
+//   booster_pairs --images DIR --part train ...                           the first four fifths of each folder
+//   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        made-up pictures, warped
+//   booster_pairs --rooms 100 --pairs 60 --seed 1 --out pairs.bin         two views of simulated rooms, true geometry
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,14 +13,17 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fbvins/features/orb.hpp"
-#include "fbvins/io/image_decode.hpp"
+#include "training/native/pictures.hpp"
+#include "training/native/room_views.hpp"
 #include "training/native/warped_pair.hpp"
 
 namespace fbvins {
@@ -34,7 +39,7 @@ struct ViewRecord {
 };
 struct PairRecord {
   std::int32_t picture = 0, condition = 0;
-  float H_ba[9] = {};
+  float a_in_b[kMost][2] = {};  // px, NaN where not to be seen
   ViewRecord a, b;
 };
 
@@ -54,70 +59,114 @@ void record(const OrbFeatures& features, const Image& image, ViewRecord& out) {
   }
 }
 
-std::vector<std::string> pictures_in(const std::string& folder) {
-  std::vector<std::string> paths;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    const std::string extension = entry.path().extension().string();
-    if (extension == ".jpg" || extension == ".jpeg" || extension == ".png") paths.push_back(entry.path().string());
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-Result<Image> read_picture(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
-  return decode_image(bytes);
-}
-
 struct Arguments {
   std::vector<std::string> folders;
   std::string out;
-  int leaves = 0, pairs = 10, seed = 1, features = 500, every = 1;
+  Part part = Part::all;
+  int leaves = 0, rooms = 0, pairs = 10, seed = 1, features = 500, every = 1;
 };
+
+class PairWriter {
+ public:
+  explicit PairWriter(const Arguments& arguments) : out_(arguments.out, std::ios::binary), extractor_(options(arguments)) {}
+
+  /// `transfer`: a pixel of a to where it is in b, or nothing.
+  template <class Transfer>
+  void write(int picture, Condition condition, const Image& a, const Image& b, const Transfer& transfer) {
+    pair_ = PairRecord{};
+    pair_.picture = picture;
+    pair_.condition = static_cast<std::int32_t>(condition);
+    extractor_.extract(a.view(), features_);
+    record(features_, a, pair_.a);
+    for (std::size_t i = 0; i < kMost; ++i) {
+      constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+      const std::optional<Vec2> px =
+          i < static_cast<std::size_t>(pair_.a.count) ? transfer(features_.keypoints[i].pixel) : std::nullopt;
+      pair_.a_in_b[i][0] = px ? static_cast<float>(px->x()) : kNone;
+      pair_.a_in_b[i][1] = px ? static_cast<float>(px->y()) : kNone;
+    }
+    extractor_.extract(b.view(), features_);
+    record(features_, b, pair_.b);
+    out_.write(reinterpret_cast<const char*>(&pair_), sizeof(pair_));
+    ++written_;
+  }
+
+  bool finish() {
+    out_.close();
+    return static_cast<bool>(out_);
+  }
+  long written() const { return written_; }
+
+ private:
+  static OrbOptions options(const Arguments& arguments) {
+    OrbOptions o;
+    o.max_features = arguments.features;
+    return o;
+  }
+  std::ofstream out_;
+  OrbExtractor extractor_;
+  OrbFeatures features_;
+  PairRecord pair_;
+  long written_ = 0;
+};
+
+Rng rng_of(const Arguments& arguments, int picture) {
+  return Rng(static_cast<std::uint64_t>(arguments.seed), static_cast<std::uint64_t>(picture) + 1);
+}
+
+/// Pairs of one picture, the conditions in turn.
+void write_warped(const Arguments& arguments, const Image& picture, int index, Rng& rng, PairWriter& out) {
+  for (int k = 0; k < arguments.pairs; ++k) {
+    const auto condition = static_cast<Condition>(k % static_cast<int>(kConditionNames.size()));
+    const WarpedPair views = make_warped_pair(picture.view(), condition, rng);
+    out.write(index, condition, views.a, views.b, [&](const Vec2& px) { return std::optional<Vec2>(transfer(views.H_ba, px)); });
+  }
+}
+
+/// Half of the second views are damaged beyond what the simulated camera does.
+Result<void> write_room(const Arguments& arguments, int index, Rng& rng, PairWriter& out) {
+  constexpr int kFrames = 40;
+  Result<RoomViews> room = RoomViews::draw(1000 * arguments.seed + index, kFrames);
+  if (!room) return room.error();
+  for (int k = 0; k < arguments.pairs; ++k) {
+    const auto pair = room->choose(rng);
+    if (!pair) break;
+    const Image& b = room->image(pair->to);
+    out.write(index, Condition::viewpoint, room->image(pair->from),
+              rng.uniform() < 0.5 ? b : damage(b.view(), random_damage(Condition::all, rng), rng),
+              [&](const Vec2& px) { return room->transfer(pair->from, pair->to, px); });
+  }
+  return {};
+}
+
+int fail(const std::string& what) {
+  fmt::print(stderr, "{}\n", what);
+  return 2;
+}
 
 int run(const Arguments& arguments) {
   std::vector<std::string> paths;
   for (const std::string& folder : arguments.folders)
-    for (const std::string& path : pictures_in(folder)) paths.push_back(path);
-  std::ofstream out(arguments.out, std::ios::binary);
-  OrbOptions options;
-  options.max_features = arguments.features;
-  OrbExtractor extractor(options);
-  OrbFeatures features;
-  PairRecord pair;
-  const int pictures = static_cast<int>(paths.size()) / arguments.every + arguments.leaves;
-  long written = 0;
-  for (int i = 0; i < pictures; ++i) {
-    Rng rng(static_cast<std::uint64_t>(arguments.seed), static_cast<std::uint64_t>(i) + 1);
-    const bool leaf = i >= pictures - arguments.leaves;
-    Image picture;
-    if (leaf) picture = rng.uniform() < 0.15 ? dead_leaves(752, 480, rng) : dead_leaves(480, 320, rng);
-    else if (Result<Image> read = read_picture(paths[static_cast<std::size_t>(i * arguments.every)])) picture = std::move(*read);
-    else {
-      fmt::print(stderr, "{}: {}\n", paths[static_cast<std::size_t>(i * arguments.every)], read.error().message);
-      return 2;
-    }
-    for (int k = 0; k < arguments.pairs; ++k) {
-      pair = PairRecord{};
-      pair.picture = i;
-      pair.condition = k % 5;
-      const WarpedPair views = make_warped_pair(picture.view(), static_cast<Condition>(pair.condition), rng);
-      for (int j = 0; j < 9; ++j) pair.H_ba[j] = static_cast<float>(views.H_ba(j / 3, j % 3));
-      extractor.extract(views.a.view(), features);
-      record(features, views.a, pair.a);
-      extractor.extract(views.b.view(), features);
-      record(features, views.b, pair.b);
-      out.write(reinterpret_cast<const char*>(&pair), sizeof(pair));
-      ++written;
-    }
+    for (const std::string& path : pictures_in(folder, arguments.part)) paths.push_back(path);
+  PairWriter out(arguments);
+  int index = 0;
+  for (std::size_t i = 0; i < paths.size(); i += static_cast<std::size_t>(arguments.every), ++index) {
+    const Result<Image> picture = read_picture(paths[i]);
+    if (!picture) return fail(fmt::format("{}: {}", paths[i], picture.error().message));
+    Rng rng = rng_of(arguments, index);
+    write_warped(arguments, *picture, index, rng, out);
   }
-  out.close();
-  if (!out) {
-    fmt::print(stderr, "{}: cannot be written\n", arguments.out);
-    return 2;
+  for (int i = 0; i < arguments.leaves; ++i, ++index) {
+    Rng rng = rng_of(arguments, index);
+    const Image picture = rng.uniform() < 0.15 ? dead_leaves(752, 480, rng) : dead_leaves(480, 320, rng);
+    write_warped(arguments, picture, index, rng, out);
   }
-  fmt::print("{} pairs of {} pictures\n", written, pictures);
+  for (int i = 0; i < arguments.rooms; ++i, ++index) {
+    Rng rng = rng_of(arguments, index);
+    if (Result<void> done = write_room(arguments, i, rng, out); !done) return fail(done.error().message);
+  }
+  if (!out.finish()) return fail(arguments.out + ": cannot be written");
+  fmt::print("{} pairs of {} pictures and rooms\n", out.written(), index);
   return 0;
 }
 
@@ -127,9 +176,14 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("Training pairs for the booster: pictures to keypoints and descriptors of warped, damaged views.");
   fbvins::Arguments arguments;
+  using fbvins::Part;
   app.add_option("--images", arguments.folders, "folders of PNG and JPEG, searched recursively");
+  app.add_option("--part", arguments.part, "of every folder: all, train (the first four fifths), held-out (the last fifth)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Part>{{"all", Part::all}, {"train", Part::train}, {"held-out", Part::held_out}}));
   app.add_option("--leaves", arguments.leaves, "made-up pictures");
-  app.add_option("--pairs", arguments.pairs, "pairs a picture, the conditions in turn");
+  app.add_option("--rooms", arguments.rooms, "simulated rooms");
+  app.add_option("--pairs", arguments.pairs, "pairs a picture, the conditions in turn, or a room");
   app.add_option("--every", arguments.every, "only every n-th file");
   app.add_option("--features", arguments.features, "features a view, up to 500");
   app.add_option("--seed", arguments.seed);

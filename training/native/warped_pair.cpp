@@ -198,20 +198,25 @@ void dim_and_blur(Damage& d, double strength, Rng& rng) {
 
 }  // namespace
 
+Damage random_damage(Condition condition, Rng& rng) {
+  Damage d = mild(rng);
+  if (condition == Condition::light) change_light(d, rng);
+  if (condition == Condition::low_light) dim_and_blur(d, 1, rng);
+  if (condition == Condition::all) {
+    dim_and_blur(d, 0.7, rng);
+    d.gamma = between(0.75, 1.35, rng);
+    d.uneven_light = rng.uniform(0, 0.5);
+  }
+  return d;
+}
+
 Image damage(const ImageView& picture, const Damage& d, Rng& rng) { return expose(plane_of(picture), d, rng); }
 
 WarpedPair make_warped_pair(const ImageView& picture, Condition condition, Rng& rng) {
   constexpr Motion kSmall{6 * kDegree, 1.06, 0.06, 0.06}, kWide{35 * kDegree, 1.4, 0.1, 0.35},
       kMiddle{15 * kDegree, 1.2, 0.08, 0.2};
   const Motion& motion = condition == Condition::viewpoint ? kWide : condition == Condition::all ? kMiddle : kSmall;
-  Damage da = mild(rng), db = mild(rng);
-  if (condition == Condition::light) change_light(db, rng);
-  if (condition == Condition::low_light) dim_and_blur(db, 1, rng);
-  if (condition == Condition::all) {
-    dim_and_blur(db, 0.7, rng);
-    db.gamma = between(0.75, 1.35, rng);
-    db.uneven_light = rng.uniform(0, 0.5);
-  }
+  const Damage da = mild(rng), db = random_damage(condition, rng);
   WarpedPair pair;
   pair.H_ba = homography(picture.width, picture.height, motion, rng);
   Plane source = plane_of(picture);

@@ -41,6 +41,9 @@ struct Damage {
   double exposure = 1;  ///< light that reaches the sensor; the gain brings part of it back
 };
 
+/// As the second view of a pair has it under that condition.
+Damage random_damage(Condition condition, Rng& rng);
+
 /// `picture` (grey 0..255) through that camera.
 Image damage(const ImageView& picture, const Damage& damage, Rng& rng);
 

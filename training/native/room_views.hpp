@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pairs of views of simulated rooms with true geometry: wide baselines, occlusion, surfaces seen askew, other light at
+// another time, which no homography of one picture shows. Same seed, same bytes.
+//
+//   Result<RoomViews> room = RoomViews::draw(7, 40);    // a preset, a world and a flight by seed; 40 frames
+//   if (auto pair = room->choose(rng)) room->transfer(pair->from, pair->to, pixel);
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/simulation.hpp"
+
+namespace fbvins {
+
+class RoomViews {
+ public:
+  static Result<RoomViews> draw(int seed, int frames);
+
+  struct Pair {
+    std::size_t from = 0, to = 0;
+  };
+  const Image& image(std::size_t frame) const { return frames_[frame].image; }
+  /// Two frames of which the second sees 15 to 95 % of what the first sees; none when many draws find no such frames.
+  std::optional<Pair> choose(Rng& rng) const;
+  /// Where the surface at a pixel of frame `from` is in frame `to`; none where it is out of sight or nothing is there.
+  std::optional<Vec2> transfer(std::size_t from, std::size_t to, const Vec2& px) const;
+
+ private:
+  struct Frame {
+    Image image;
+    std::vector<float> depth_m;
+    Pose<W, C0> T_WC;
+  };
+  double overlap(std::size_t from, std::size_t to) const;
+  float depth_at(const Frame& frame, const Vec2& px) const;
+
+  StereoRig rig_;
+  std::vector<Frame> frames_;
+};
+
+}  // namespace fbvins
