@@ -292,6 +292,26 @@ bool Furnisher::add_box_stack(const Vec3& floor_point) {
   return true;
 }
 
+/// Thin rods that cross one another, as plants, tripods and stacked chairs do: what is seen between them, and next to
+/// what, changes with every step.
+bool Furnisher::add_tangle(const Vec3& floor_point) {
+  const double height = rng_.uniform(0.5, 1.7), foot = rng_.uniform(0.05, 0.2), crown = rng_.uniform(0.15, 0.45);
+  for (double z = 0; z < height; z += 0.3)
+    if (!is_clear(floor_point + Vec3(0, 0, z), crown)) return false;
+  const auto within = [&](double radius, double z) {
+    const double angle = rng_.uniform(0, 2 * kPi), r = radius * std::sqrt(rng_.uniform());
+    return Vec3(floor_point + Vec3(r * std::cos(angle), r * std::sin(angle), z));
+  };
+  const int what = plain_or({Surface::metal, Surface::wood, Surface::cloth});
+  for (int i = 10 + static_cast<int>(rng_.below(10)); i > 0; --i) {
+    const double low = rng_.uniform(0, 0.6) * height, high = rng_.uniform(0.7, 1.0) * height, thick = rng_.uniform(0.006, 0.02);
+    const Vec3 from = within(foot + (crown - foot) * low / height, low), to = within(crown, high);
+    const Quat q = Quat::FromTwoVectors(Vec3::UnitZ(), to - from);
+    add_box(world_.facets, {0.5 * (from + to), Vec3(thick, thick, 0.5 * (to - from).norm()), q}, what, tint(), 0.5);
+  }
+  return true;
+}
+
 bool Furnisher::add_pillar(const Vec3& floor_point) {
   const double h = 0.5 * world_.plan.height_m;
   for (double z = 0; z < 2 * h; z += 0.4)
@@ -335,6 +355,11 @@ void Furnisher::place_furniture() {
       const double x = rng_.uniform(room.x0 + 0.35, room.x1 - 0.35), y = rng_.uniform(room.y0 + 0.35, room.y1 - 0.35);
       const bool done = rng_.uniform() < 0.22 ? add_table(Vec3(x, y, 0)) : add_box_stack(Vec3(x, y, 0));
       placed += done ? 1 : 0;
+    }
+    const int tangles = static_cast<int>(options_.tangles_per_m2 * room.area());
+    for (int tries = 0, stand = 0; stand < tangles && tries < 8 * tangles; ++tries) {
+      const double x = rng_.uniform(room.x0 + 0.3, room.x1 - 0.3), y = rng_.uniform(room.y0 + 0.3, room.y1 - 0.3);
+      stand += add_tangle(Vec3(x, y, 0)) ? 1 : 0;
     }
   }
 }

@@ -48,6 +48,7 @@ class Furnisher {
   bool add_shelf(const Wall& wall, double at);
   bool add_table(const Vec3& floor_point);
   bool add_box_stack(const Vec3& floor_point);
+  bool add_tangle(const Vec3& floor_point);
   bool add_pillar(const Vec3& floor_point);
   void add_pipes(const Wall& wall);
   void add_window(const Wall& wall, double at);

@@ -26,9 +26,9 @@ struct CameraModelOptions {
   double max_gain = 6;
   double sensitivity = 60;
   double shot_noise = 0.012;
-  double read_noise = 0.9;
+  double read_noise = 0.4;
   double black_level = 0;
-  double blur_px = 0.5;
+  double blur_px = 0.65;
   double vignetting = 0.35;
   double glare = 0.02;
   double right_gain = 0.94;

@@ -73,7 +73,7 @@ double rotor_power(const MotionState& m, double last, double dt) {
 SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise, const ImuModelOptions& options, Time start,
                           std::uint64_t seed) {
   // Each error has numbers of its own, so that switching one off leaves the others as they are.
-  Rng white(seed, 21), walk(seed, 22), constant(seed, 23), shaking(seed, 24);
+  Rng white(seed, 21), walk(seed, 22), constant(seed, 23), shaking(seed, 24), rumble(seed, 25);
   const double dt = 1.0 / noise.rate_hz, k = options.noise_factor;
   ImuBias bias;
   bias.gyro_radps = normal3(constant, options.turn_on_gyro_bias_radps);
@@ -92,11 +92,13 @@ SimulatedImu simulate_imu(const SplineTrajectory& flight, const ImuNoise& noise,
 
     power = rotor_power(m, power, dt);
     const auto [shake_accel, shake_gyro] = vibration.step(dt, shaking);
-    const double root_rate = k * std::sqrt(noise.rate_hz);
+    const double root_rate = k * std::sqrt(noise.rate_hz), in_flight = power * std::sqrt(noise.rate_hz);
     const Vec3 gyro = gyro_axes * (m.w_WB_B + power * options.vibration_gyro_radps * shake_gyro) + bias.gyro_radps +
-                      normal3(white, root_rate * noise.gyro_noise_density_radps_rthz);
+                      normal3(white, root_rate * noise.gyro_noise_density_radps_rthz) +
+                      normal3(rumble, in_flight * options.rumble_gyro_radps_rthz);
     const Vec3 accel = accel_axes * (m.specific_force() + power * options.vibration_accel_mps2 * shake_accel) + bias.accel_mps2 +
-                       normal3(white, root_rate * noise.accel_noise_density_mps2_rthz);
+                       normal3(white, root_rate * noise.accel_noise_density_mps2_rthz) +
+                       normal3(rumble, in_flight * options.rumble_accel_mps2_rthz);
     imu.samples.push_back({t, digitise(gyro, options.gyro_step_radps, options.gyro_range_radps),
                            digitise(accel, options.accel_step_mps2, options.accel_range_mps2)});
 

@@ -17,11 +17,13 @@ namespace fbvins {
 struct ImuModelOptions {
   double noise_factor = 1.0;
   double turn_on_gyro_bias_radps = 0.03;
-  double turn_on_accel_bias_mps2 = 0.1;
-  double scale_error = 0.0;
-  double misalignment_rad = 0.0;
+  double turn_on_accel_bias_mps2 = 0.2;
+  double scale_error = 0.001;
+  double misalignment_rad = 0.001;
   double vibration_accel_mps2 = 0.25;
   double vibration_gyro_radps = 0.01;
+  double rumble_accel_mps2_rthz = 0.03;
+  double rumble_gyro_radps_rthz = 6e-4;
   double gyro_range_radps = 17.4;
   double accel_range_mps2 = 176.0;
   double gyro_step_radps = 1.745e-4;
@@ -36,6 +38,10 @@ struct ImuModelOptions {
     v("misalignment_rad", misalignment_rad, "rad", "standard deviation of each axis' direction", 0.0, 0.1);
     v("vibration_accel_mps2", vibration_accel_mps2, "m/s^2", "rotors in flight: standard deviation on each axis", 0.0, 50.0);
     v("vibration_gyro_radps", vibration_gyro_radps, "rad/s", "rotors in flight: standard deviation on each axis", 0.0, 5.0);
+    v("rumble_accel_mps2_rthz", rumble_accel_mps2_rthz, "m/s^2/sqrt(Hz)", "rotors in flight: density of what has no tone", 0.0,
+      10.0);
+    v("rumble_gyro_radps_rthz", rumble_gyro_radps_rthz, "rad/s/sqrt(Hz)", "rotors in flight: density of what has no tone", 0.0,
+      1.0);
     v("gyro_range_radps", gyro_range_radps, "rad/s", "readings saturate here", 0.1, 1000.0);
     v("accel_range_mps2", accel_range_mps2, "m/s^2", "readings saturate here", 1.0, 10000.0);
     v("gyro_step_radps", gyro_step_radps, "rad/s", "step of the digital reading, 0 for none", 0.0, 0.1);

@@ -30,7 +30,9 @@ ImuModelOptions ideal() {
   ImuModelOptions options;
   options.noise_factor = 0;
   options.turn_on_gyro_bias_radps = options.turn_on_accel_bias_mps2 = 0;
+  options.scale_error = options.misalignment_rad = 0;
   options.vibration_accel_mps2 = options.vibration_gyro_radps = 0;
+  options.rumble_accel_mps2_rthz = options.rumble_gyro_radps_rthz = 0;
   options.gyro_step_radps = options.accel_step_mps2 = 0;
   return options;
 }

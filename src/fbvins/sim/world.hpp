@@ -57,15 +57,16 @@ struct WorldOptions {
   std::string kind = "room";
   double margin_m = 1.8;
   double height_m = 3.2;
-  double plain_share = 0.6;
-  double weave_share = 0.1;
-  double posters_per_m2 = 0.13;
+  double plain_share = 0.74;
+  double weave_share = 0.55;
+  double posters_per_m2 = 0.1;
   double clutter_per_m2 = 0.7;
+  double tangles_per_m2 = 0.3;
   double repeat_share = 0.2;
   double clearance_m = 0.55;
   double lamp_spacing_m = 2.6;
   double ambient = 0.45;
-  double detail = 0.08;
+  double detail = 1.0;
   double gloss = 0.0;
   double lamp_glow = 2.5;
   double window_glow = 1.6;
@@ -82,11 +83,13 @@ struct WorldOptions {
     v("weave_share", weave_share, "", "share of those that are woven: fine corners that look all the same", 0.0, 1.0);
     v("posters_per_m2", posters_per_m2, "1/m^2", "posters, pages and pictures on walls", 0.0, 5.0);
     v("clutter_per_m2", clutter_per_m2, "1/m^2", "boxes and furniture on the floor", 0.0, 10.0);
+    v("tangles_per_m2", tangles_per_m2, "1/m^2", "plants, tripods, chairs and cables: thin rods in front of one another", 0.0,
+      5.0);
     v("repeat_share", repeat_share, "", "share of walls with the same thing again and again", 0.0, 1.0);
     v("clearance_m", clearance_m, "m", "nothing stands nearer to the flight", 0.1, 10.0);
     v("lamp_spacing_m", lamp_spacing_m, "m", "of the lamps under the ceiling", 0.8, 50.0);
     v("ambient", ambient, "", "share of light without direction", 0.0, 1.0);
-    v("detail", detail, "", "strength of fine grain near by", 0.0, 1.0);
+    v("detail", detail, "", "strength of fine grain near by", 0.0, 2.0);
     v("gloss", gloss, "", "mirror images of lamps on floor and furniture", 0.0, 10.0);
     v("lamp_glow", lamp_glow, "", "brightness of a lamp's own surface", 0.0, 100.0);
     v("window_glow", window_glow, "", "brightness of the sky in windows", 0.0, 100.0);
