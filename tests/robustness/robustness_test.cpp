@@ -164,8 +164,8 @@ TEST_P(RealFlight, TimeOffsetIsFoundInFlight) {
   std::printf("%s stamps 5 ms wrong: off %s\n  on %s\n  offset found %.2f ms\n", GetParam(), off.text().c_str(),
               on.text().c_str(), 1e3 * on.calibration.time_offset_s);
   EXPECT_EQ(off.calibration.time_offset_s, 0);
-  // In 17 s a half (orb) to three quarters (klt) of it is found: features found again carry no velocity.
-  EXPECT_LT(on.calibration.time_offset_s, -0.002);
+  // In 17 s four fifths of it and more are found.
+  EXPECT_LT(on.calibration.time_offset_s, -0.0035);
   EXPECT_GT(on.calibration.time_offset_s, -0.007);
   EXPECT_LT(on.rmse_m(), off.rmse_m());
 }

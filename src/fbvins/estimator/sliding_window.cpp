@@ -74,30 +74,30 @@ Landmark& SlidingWindow::landmark_of(TrackId track) {
 }
 
 void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& features, const Calibration& calibration) {
-  const bool has_previous = !frames_.empty();
-  const FrameId previous = has_previous ? frames_.back().id : FrameId{};
-  const double dt = has_previous ? (frame.t - frames_.back().t).seconds() : 0;
   frames_.push_back(std::move(frame));
   for (const TrackedFeature& feature : features) {
     const auto banned = banned_.find(feature.id);
     if (banned != banned_.end() && banned->second >= kStrikesUntilBanned) continue;
     Landmark& landmark = landmark_of(feature.id);
     Sighting sighting{frames_.back().id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
-    if (!landmark.sightings.empty() && landmark.sightings.back().frame == previous && dt > 0) {
-      Sighting& before = landmark.sightings.back();
-      sighting.left_velocity = (sighting.left.normalised - before.left.normalised) / dt;
-      sighting.right_velocity = sighting.right && before.right
-                                    ? Vec2((sighting.right->normalised - before.right->normalised) / dt)
-                                    : sighting.left_velocity;
-      if (landmark.sightings.size() == 1) {  // the first sighting moved, too: its velocity is known only now
-        before.left_velocity = sighting.left_velocity;
-        before.right_velocity = sighting.right_velocity;
-      }
-    }
+    if (!landmark.sightings.empty()) set_velocities(landmark.sightings.back(), sighting);
     if (landmark.sightings.empty()) landmark.host = frames_.back().id;
     landmark.sightings.push_back(sighting);
     if (!landmark.triangulated) landmark.triangulated = triangulate(landmark, calibration);
   }
+}
+
+void SlidingWindow::set_velocities(Sighting& before, Sighting& now) const {
+  constexpr double kLongestGap_s = 0.25;  // over a longer one the difference says little of the moment
+  const double dt = (frames_.back().t - frames_[index_of(before.frame)].t).seconds();
+  if (dt <= 0 || dt > kLongestGap_s) return;
+  now.left_velocity = (now.left.normalised - before.left.normalised) / dt;
+  now.right_velocity =
+      now.right && before.right ? Vec2((now.right->normalised - before.right->normalised) / dt) : now.left_velocity;
+  // Of the sighting before, the difference on its other side is known only now: their mean is good to second order.
+  const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
+  before.left_velocity += share * (now.left_velocity - before.left_velocity);
+  before.right_velocity += share * (now.right_velocity - before.right_velocity);
 }
 
 bool SlidingWindow::triangulate(Landmark& landmark, const Calibration& calibration) const {

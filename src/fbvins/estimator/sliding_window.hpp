@@ -101,6 +101,7 @@ class SlidingWindow {
 
  private:
   Landmark& landmark_of(TrackId track);
+  void set_velocities(Sighting& before, Sighting& now) const;
   bool triangulate(Landmark& landmark, const Calibration& calibration) const;
   void rehost(Landmark& landmark, FrameId new_host, const Calibration& calibration) const;
   void forget_sightings(FrameId frame, const Calibration& calibration);
