@@ -69,8 +69,8 @@ struct EstimatorOptions {
   double min_depth_m = 0.1;
   double max_depth_m = 200;
   double gravity_mps2 = 9.81;
-  double gyro_noise_scale = 1.7;
-  double accel_noise_scale = 8.0;
+  double gyro_noise_scale = 2.5;
+  double accel_noise_scale = 16.0;
   double gyro_walk_scale = 5.0;
   double accel_walk_scale = 0.4;
   bool estimate_extrinsics = false;

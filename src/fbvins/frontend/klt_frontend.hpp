@@ -25,7 +25,7 @@ namespace fbvins {
 struct KltFrontendOptions {
   int max_features = 150;
   int pyramid_levels = 4;
-  double sigma_px = 0.8;
+  double sigma_px = 0.6;
   double forward_backward_px = 0.7;
   double epipolar_px = 0.7;
   double long_epipolar_px = 1.0;

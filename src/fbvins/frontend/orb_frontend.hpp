@@ -42,7 +42,7 @@ struct OrbFrontendOptions {
   double max_uncertainty_few_px = 3.0;
   double forward_backward_px = 0.7;
   double epipolar_px = 1.0;
-  double sigma_px = 0.8;
+  double sigma_px = 0.6;
   double sigma_unrefined_px = 1.5;
   OrbOptions orb;
   GuidedMatchOptions matching;
