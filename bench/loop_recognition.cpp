@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well places are recognised and verified on stereo keyframes with known poses:
 //
-//   loop_recognition VOCABULARY DATASET [OTHER_DATASET...]
+//   loop_recognition VOCABULARY DATASET [OTHER_DATASET...]     a boosted vocabulary: boosted descriptors
 //
 // Within the first recording every pair is asked for (no odometry helps): recall over the pairs that share more than
 // 40 % of their view, precision of what was accepted. Against the others every accepted pair is a false loop.
@@ -14,10 +14,12 @@
 
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/eval/statistics.hpp"
+#include "fbvins/features/booster.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/loop/inverted_index.hpp"
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_verifier.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
 
 using namespace fbvins;
 
@@ -54,7 +56,12 @@ std::optional<Recording> load(const std::string& path, const Vocabulary& vocabul
   }
   Dataset& data = **opened;
   Recording r{data.rig(), {}, 0};
-  PlaceExtractor extractor(r.rig, {}, vocabulary);
+  auto stage = vocabulary.kind() == kBoostedDescriptors ? make_booster_stage({}) : Result(make_identity_stage());
+  if (!stage) {
+    fmt::print(stderr, "{}\n", stage.error().message);
+    return std::nullopt;
+  }
+  PlaceExtractor extractor(r.rig, {}, vocabulary, *std::move(stage));
   for (int n = 0; auto event = data.next();) {
     const auto* frame = std::get_if<StereoFrame>(&*event);
     if (frame == nullptr || n++ % every != 0) continue;
