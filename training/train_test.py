@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A few steps of training on a few made-up pictures: the loss falls, the same seed gives the same weights, the weights
-file is read back as it was. train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
+file is read back as it was. Pairs of a simulated room show the same points where they say they do. train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
 import pathlib
 import subprocess
 import sys
@@ -14,13 +14,26 @@ try:
 except ImportError as missing:
     print(f"skipped: {missing.name} is not installed (apt-get install python3-torch, or pip install torch numpy)")
     sys.exit(77)
+from dataset import Batch, open_pairs  # noqa: E402
+from losses import hamming  # noqa: E402
 from train import arguments_of, train  # noqa: E402
 from weights import load_model, load_weights  # noqa: E402
+
+
+def rooms_are_true(program, folder):
+    path = f"{folder}/rooms.bin"
+    subprocess.run([program, "--rooms", "1", "--pairs", "6", "--seed", "3", "--out", path], check=True)
+    batch = Batch(open_pairs(path)[:])
+    distance = hamming(batch.a.bits, batch.b.bits)
+    same, other = distance[batch.apart < 1.5].median(), distance[(batch.apart > 30) & batch.both].median()
+    print(f"simulated room: the same points are {same:.0f} bits apart, others {other:.0f}")
+    assert same < 0.6 * other, "points are not where the geometry says"
 
 
 def main(program):
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
+        rooms_are_true(program, folder)
         pairs = f"{folder}/pairs.bin"
         subprocess.run([program, "--leaves", "2", "--pairs", "2", "--seed", "4", "--out", pairs], check=True)
 
