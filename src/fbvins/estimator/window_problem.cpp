@@ -17,6 +17,9 @@ constexpr double kUnprojectableSigma = 100.0;
 /// Keeps directions without any measurement solvable; far below any real information.
 constexpr double kRegularisation = 1e-8;
 constexpr double kNegligibleLambda = 1e-8;
+/// Damps steps of the inverse depth, 1 m^2. One camera at rest knows next to nothing of it; a free step puts the
+/// landmark before the lens, and the whole step is refused for its sake. Moves no optimum and enters no prior.
+constexpr double kDepthDamping = 1.0;
 
 /// G += J^T J for two rows of Columns numbers. Full square: plain loops over fixed lanes.
 template <int Columns>
@@ -270,7 +273,8 @@ bool WindowProblem::solve(double lambda) {
   reduced_g_ = g_;
   reduced_.diagonal() *= 1.0 + lambda;
   reduced_.diagonal().array() += kRegularisation;
-  if (!points_.eliminate(lambda, reduced_, reduced_g_)) return false;
+  const double depth_damping = lambda > 0 ? kDepthDamping : 0.0;
+  if (!points_.eliminate(lambda, reduced_, reduced_g_, depth_damping)) return false;
   llt_.compute(reduced_.selfadjointView<Eigen::Lower>());
   if (llt_.info() != Eigen::Success) return false;
   step_ = -llt_.solve(reduced_g_);
@@ -281,7 +285,8 @@ bool WindowProblem::solve(double lambda) {
   double twice = lambda * step_.cwiseAbs2().dot(H_.diagonal()) - g_.dot(step_);
   for (std::size_t i = 0; i < point_steps_.size(); ++i) {
     const PointBlock& point = points_.points()[i];
-    twice += lambda * point_steps_[i].cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(point_steps_[i]);
+    twice += lambda * point_steps_[i].cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(point_steps_[i]) +
+             depth_damping * point_steps_[i].z() * point_steps_[i].z();
   }
   predicted_decrease_ = 0.5 * twice;
   step_size_ = step_.tail(6 * static_cast<int>(frames.size())).lpNorm<Eigen::Infinity>();

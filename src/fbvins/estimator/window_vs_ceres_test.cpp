@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <vector>
@@ -305,6 +306,36 @@ TEST_P(WindowTwins, MinimumIsThatOfCeres) {
   }
   for (int k = 0; k < kLandmarks; ++k)
     EXPECT_LT((w.problem.landmarks[k].alpha_beta_rho - twin.landmark(k)).norm(), 1e-5) << "landmark " << k;
+}
+
+/// Frames at rest that see twenty landmarks with both cameras and one, half a metre away, with the left alone.
+WindowProblem window_at_rest(std::uint64_t seed) {
+  Rng rng(seed);
+  Window w;
+  w.problem.calibration.T_BC1.p = Vec3(0.11, 0, 0);
+  w.problem.frames.resize(kFrames);
+  for (WindowFrame& f : w.problem.frames) f.standstill = true;
+  for (int k = 0; k < 20; ++k) {
+    const double x = rng.uniform(-2, 2), y = rng.uniform(-1, 1);
+    test::add_landmark(w, Vec3(x, y, rng.uniform(3, 6)), 0, rng);
+  }
+  test::add_landmark(w, Vec3(0.1, 0.1, 0.5), 0, rng);
+  WindowLandmark& alone = w.problem.landmarks.back();
+  auto& seen = w.problem.observations;
+  seen.erase(std::remove_if(seen.begin() + alone.first_observation, seen.end(), [](const auto& o) { return o.right; }), seen.end());
+  alone.observation_count = static_cast<int>(seen.size()) - alone.first_observation;
+  w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;
+  w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(15);
+  w.problem.prior.frames = {0};
+  return w.problem;
+}
+
+TEST(WindowAtRest, IsSolvedThoughOneDepthIsNextToFree) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    WindowProblem problem = window_at_rest(seed);
+    EXPECT_TRUE(problem.optimise(LmOptions{}).usable) << "seed " << seed;
+    EXPECT_LT(problem.landmarks.back().alpha_beta_rho.z(), 20) << "seed " << seed;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(StatesOnlyAndWithCalibration, WindowTwins, testing::Bool(),

@@ -39,8 +39,9 @@ class PointBlocks {
   }
 
   /// Subtracts every point from the lower triangle of H (column-major) and from g.
-  /// V is damped by lambda times its diagonal. False if some V is not positive definite.
-  bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g);
+  /// V is damped by lambda times its diagonal, its third element by `third_damping` as well. False if some V is not
+  /// positive definite.
+  bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, double third_damping = 0);
   /// The step of each point for a step of the dense system; also sums g^T dx and dx^T D dx
   /// (D the diagonal damping), for the model's predicted decrease.
   void back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const;
