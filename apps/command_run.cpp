@@ -80,7 +80,8 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
   flight.run.tracked.reserve(data.frames().size());
   flight.run.odometry.reserve(data.frames().size());
   System system(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, std::move(*closer));
-  system.on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats}); });
+  SurvivalMeter survival;
+  system.on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
   system.on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
   system.on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
   int frames = 0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/frontend/survival.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -20,6 +21,7 @@ struct TrackedRecord {
   FrameId id;
   Time t;
   FrontendStats stats;
+  Survival survival;
 };
 
 struct RunRecord {

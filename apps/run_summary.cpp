@@ -121,6 +121,7 @@ RunSummary summarise(const RunRecord& record, const Dataset& data) {
     s.boost_ms.push_back(tracked.stats.boost_ms);
     s.matches += tracked.stats.matches;
     s.raw_matches += tracked.stats.raw_matches;
+    s.survival += tracked.survival;
   }
   for (const Odometry& o : record.odometry) s.estimator_ms.push_back(o.stats.total_ms());
   s.peak_memory_mb = peak_memory_mb();
@@ -142,6 +143,7 @@ std::string to_json_text(const RunSummary& s) {
                                     {"inliers", s.matches.inliers},
                                     {"raw_found", s.raw_matches.found},
                                     {"raw_inliers", s.raw_matches.inliers}};
+  result["features_in_sight_a_second_later"] = {{"then", s.survival.then}, {"now", s.survival.now}};
   if (s.map) result["map"] = map_json(*s.map);
   Json timing{{"mode", s.mode}, {"wall_s", s.wall_s}};
   timing["frontend_ms"] = timing_json(s.frontend_ms);

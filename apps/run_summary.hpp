@@ -27,6 +27,7 @@ struct RunSummary {
   std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
   std::optional<MapSummary> map;                    ///< with loop closure
   DescriptorMatchCounts matches, raw_matches;       ///< over all frames; none of the klt frontend
+  Survival survival;                                ///< over all frames
   double wall_s = 0;
   std::vector<double> frontend_ms, estimator_ms, boost_ms;  ///< CPU time per frame
   double peak_memory_mb = 0;

@@ -7,6 +7,13 @@
 #include "fbvins/core/stage_timer.hpp"
 
 namespace fbvins {
+namespace {
+
+/// Without images for longer, the predictor's IMU readings no longer span the gap.
+constexpr double kLongestGap_s = 1.4;
+
+}  // namespace
+
 OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::unique_ptr<DescriptorStage> stage)
     : options_(options),
       rig_(rig),
@@ -79,7 +86,8 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
   if (right_.width() != rig_.right.width() || right_.height() != rig_.right.height()) right_.clear();
   right_view_ = right_.empty() ? ImageView{} : packet.frame.right->view();
   // Backwards, or longer than any track is remembered: nothing carries over.
-  if (has_previous_ && (now_ < previous_t_ || (now_ - previous_t_).seconds() > std::max(options_.memory_s, 0.3))) {
+  if (has_previous_ &&
+      (now_ < previous_t_ || (now_ - previous_t_).seconds() > std::clamp(options_.memory_s, 0.3, kLongestGap_s))) {
     for (Track& track : tracks_) track.alive = false;
     drop_dead_tracks();
     has_previous_ = false;

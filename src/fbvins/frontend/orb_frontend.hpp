@@ -32,6 +32,7 @@ struct OrbFrontendOptions {
   double min_distance_px = 14;
   int max_remembered = 200;
   double memory_s = 1.0;
+  int out_of_sight_max_distance = 45;
   double search_px = 12;
   double search_blind_px = 50;
   bool subpixel = true;
@@ -56,7 +57,9 @@ struct OrbFrontendOptions {
     v("max_features", max_features, "", "features followed at once", 10, 2000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
     v("max_remembered", max_remembered, "", "features remembered while out of sight", 0, 2000);
-    v("memory_s", memory_s, "s", "how long a feature out of sight is remembered", 0.0, 1.4);
+    v("memory_s", memory_s, "s", "how long a feature out of sight is remembered", 0.0, 10.0);
+    v("out_of_sight_max_distance", out_of_sight_max_distance, "bit",
+      "largest Hamming distance of a match of a feature that was out of sight", 1, 256);
     v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
     v("search_blind_px", search_blind_px, "px", "search radius when only the rotation or nothing is known", 2.0, 400.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");

@@ -10,8 +10,6 @@ namespace {
 
 /// A track expected this far outside the image is forgotten.
 constexpr double kFarOutside_px = 40;
-/// Descriptor distance asked of a track that was out of sight: it is searched for without its neighbours' help.
-constexpr int kStricterDistance = 45;
 /// Descriptor distance of a match of descriptors as extracted, for comparison with improved ones.
 constexpr int kRawDistance = 60;
 /// A match this near to where its track turned out to be is right.
@@ -57,7 +55,8 @@ void OrbFrontend::match_tracks(const CameraMotion& motion) {
     query.descriptor = track.descriptor;
     query.radius_px = motion.has_translation ? options_.search_px : options_.search_blind_px;
     query.max_distance = options_.matching.max_distance;
-    if (!track.was_in_sight) query.max_distance = std::min(query.max_distance, kStricterDistance);
+    // Searched for without its neighbours' help: a descriptor must say more.
+    if (!track.was_in_sight) query.max_distance = std::min(query.max_distance, options_.out_of_sight_max_distance);
     queries_.push_back(query);
   }
   matcher_.match(queries_, left_features_, found_);

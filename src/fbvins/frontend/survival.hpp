@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many of the features that were in sight a second ago are in sight now: what tracking, and finding again after
+// occlusion or blur, bring together. One instance, one thread; frames in order of time.
+//
+//   SurvivalMeter meter;
+//   sum += meter.add(frame);                   // sum.now / sum.then is the share that survives a second
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+struct Survival {
+  long then = 0;  ///< features in sight a second ago
+  long now = 0;   ///< those of them in sight now
+  Survival& operator+=(const Survival& other) {
+    then += other.then, now += other.now;
+    return *this;
+  }
+};
+
+class SurvivalMeter {
+ public:
+  /// Zeros while the recording is younger than a second.
+  Survival add(const TrackedFrame& frame);
+
+ private:
+  struct Sight {
+    Time t;
+    std::vector<std::int64_t> ids;  // sorted
+  };
+  std::deque<Sight> past_;
+};
+
+}  // namespace fbvins
