@@ -61,7 +61,7 @@ class Describer {
     Described out{raw.keypoints, {raw.descriptors}};
     for (BoosterNetwork& network : networks_) {
       out.descriptors.push_back(raw.descriptors);
-      network.run(image.width, image.height, raw.keypoints, out.descriptors.back());
+      network.run(image.width, image.height, raw.keypoints, raw.margins, out.descriptors.back());
     }
     return out;
   }
@@ -204,12 +204,12 @@ int keyframes(const Arguments& arguments, const std::vector<BoosterWeights>& wei
   return 0;
 }
 
-double cpu_ms(BoosterNetwork& network, const std::vector<Keypoint>& keypoints, const std::vector<Descriptor>& descriptors) {
+double cpu_ms(BoosterNetwork& network, const std::vector<Keypoint>& keypoints, const std::vector<Margins>& margins) {
   std::vector<double> times;
+  std::vector<Descriptor> boosted(keypoints.size());
   for (int i = 0; i < 60; ++i) {
-    std::vector<Descriptor> copy = descriptors;
     CpuTimer timer;
-    network.run(752, 480, keypoints, copy);
+    network.run(752, 480, keypoints, margins, boosted);
     times.push_back(timer.lap_ms());
   }
   std::sort(times.begin(), times.end());
@@ -232,15 +232,14 @@ int times(const Arguments& arguments, const std::vector<BoosterWeights>& weights
       fmt::print("| {} | {} | {} |", arguments.weights[w], int8 ? "int8" : "float32", int8 ? name_of(kernel) : "");
       for (const std::size_t count : {150u, 300u, 500u}) {
         std::vector<Keypoint> keypoints(count);
-        std::vector<Descriptor> descriptors(count);
+        std::vector<Margins> margins(count);
         for (std::size_t i = 0; i < count; ++i) {
           keypoints[i].pixel = Vec2(rng.uniform(0, 752), rng.uniform(0, 480));
           keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));
           keypoints[i].angle_rad = static_cast<float>(rng.uniform(-std::numbers::pi, std::numbers::pi));
-          for (std::uint64_t& word : descriptors[i].bits)
-            word = static_cast<std::uint64_t>(rng.next_u32()) << 32 | rng.next_u32();
+          for (std::int8_t& m : margins[i].of_bit) m = static_cast<std::int8_t>(rng.uniform(-80, 80));
         }
-        fmt::print(" {:.2f} |", cpu_ms(network, keypoints, descriptors));
+        fmt::print(" {:.2f} |", cpu_ms(network, keypoints, margins));
       }
       fmt::print("\n");
     }

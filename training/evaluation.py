@@ -22,12 +22,12 @@ def mutual_matches(bits_a, bits_b, both):
 
 def boosted_bits(model, views):
     geometry = geometry_of(views.keypoints, views.width, views.height, views.valid)
-    return torch.where(model(views.bits, geometry, views.valid) > 0, 1.0, -1.0)
+    return torch.where(model(views.margins, geometry, views.valid) > 0, 1.0, -1.0)
 
 
 def count_correct(bits_a, bits_b, batch, tolerance_px=3.0):
     match = mutual_matches(bits_a, bits_b, batch.both)
-    apart = batch.apart.gather(2, match.clamp(min=0)[..., None])[..., 0]
+    apart = batch.apart().gather(2, match.clamp(min=0)[..., None])[..., 0]
     found = match >= 0
     return (found & (apart < tolerance_px)).sum(1), found.sum(1)
 

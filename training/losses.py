@@ -41,12 +41,36 @@ def fast_ap_and_boost(distance, raw_distance, positive, usable, rows=96):
     return (1 - ap).mean(), (ap_raw / ap.clamp(min=0.02) - 1).clamp(min=0).mean()
 
 
-def contrastive(distance, positive, usable, bits_per_unit):
-    """InfoNCE with several positives, both ways: minus log of the share of the softmax that falls on positives."""
-    logit = (-distance / bits_per_unit).masked_fill(~usable, -1e4)
-    hit = logit.masked_fill(~(positive & usable), -1e4)
-    total = 0.0
-    for dim in (1, 2):
-        there = (positive & usable).any(dim)
-        total = total + (torch.logsumexp(logit, dim) - torch.logsumexp(hit, dim))[there].mean()
-    return 0.5 * total
+class _Contrastive(torch.autograd.Function):
+    """By hand, because the (B, N, M) tensors are what a training step spends most of its time on."""
+
+    @staticmethod
+    def forward(ctx, product, positive, usable, bits, bits_per_unit):
+        share = torch.exp((product.float() - bits) * (0.5 / bits_per_unit)).masked_fill_(~usable, 0)
+        where = (positive & usable).nonzero(as_tuple=True)
+        hit = share[where]
+        loss, slope = 0.0, torch.zeros_like(hit)
+        scales = []
+        for dim, at in ((2, (where[0], where[1])), (1, (where[0], where[2]))):
+            total = share.sum(dim)
+            hits = torch.zeros_like(total).index_put_(at, hit, accumulate=True)
+            there = hits > 0
+            count = there.sum().clamp(min=1)
+            loss = loss + (torch.log(total[there]) - torch.log(hits[there])).sum() / count
+            scales.append((there / total.clamp(min=1e-37) / count).unsqueeze(dim))
+            slope += 1 / (hits[at].clamp(min=1e-37) * count)
+        gradient = share * (scales[0] + scales[1])
+        gradient[where] -= hit * slope
+        ctx.save_for_backward(gradient.mul_(0.25 / bits_per_unit).to(product.dtype))
+        return 0.5 * loss
+
+    @staticmethod
+    def backward(ctx, upstream):
+        return ctx.saved_tensors[0] * upstream.to(ctx.saved_tensors[0].dtype), None, None, None, None
+
+
+def contrastive(product, positive, usable, bits, bits_per_unit):
+    """InfoNCE with several positives, both ways: minus log of the share of the softmax that falls on positives.
+
+    product (B, N, M) of bits as +-1, from which the distance is (bits - product) / 2."""
+    return _Contrastive.apply(product, positive, usable, bits, bits_per_unit)

@@ -21,13 +21,14 @@ class Size:
     descriptor_hidden: int
     keypoint_hidden: tuple
     layers: int
-    residual: bool  # the input bits added to the output
+    residual: bool  # the input added to the output
+    margins: bool  # the input is how clearly each bit was decided rather than +-1
     bits: int = 256
 
 
 SIZES = {
-    "boost-b": Size(256, 512, (32, 64, 128), 4, residual=False),
-    "boost-s": Size(128, 256, (32, 64), 2, residual=True),
+    "boost-b": Size(256, 512, (32, 64, 128), 4, residual=False, margins=False),
+    "boost-s": Size(160, 384, (32, 64), 1, residual=True, margins=True),
 }
 
 
@@ -83,10 +84,13 @@ class Booster(nn.Module):
         self.layers = nn.ModuleList(Layer(size.width) for _ in range(size.layers))
         self.head = nn.Linear(size.width, size.bits)
         if size.residual:
-            self.identity = nn.Parameter(torch.ones(size.bits))
+            self.skip = nn.Linear(size.bits, size.bits, bias=False)
+            with torch.no_grad():
+                self.skip.weight.copy_(torch.eye(size.bits))
 
-    def forward(self, bits, geometry, valid):
-        z = self.descriptor2(torch.relu(self.descriptor1(bits)))
+    def forward(self, margins, geometry, valid):
+        x = margins if self.size.margins else torch.where(margins > 0, 1.0, -1.0)
+        z = self.descriptor2(torch.relu(self.descriptor1(x)))
         if self.geometry:
             g = geometry
             for i, linear in enumerate(self.keypoint):
@@ -96,7 +100,7 @@ class Booster(nn.Module):
         for layer in self.layers:
             z = layer(z, valid, self.cross)
         y = self.head(z).float()
-        return y + self.identity * bits if self.size.residual else y
+        return y + self.skip(x).float() if self.size.residual else y
 
 
 def hard_bits(y):

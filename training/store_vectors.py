@@ -22,11 +22,11 @@ def main(weights, pairs, out, count=40):
     n = int(view["count"][0])
     views = Views(view)
     with torch.no_grad():
-        y = model(views.bits, geometry_of(views.keypoints, views.width, views.height, views.valid), views.valid)
-    tensors = {"keypoints": view["keypoints"][0, :n], "bits": views.bits[0, :n].numpy(), "output": y[0, :n].numpy()}
+        y = model(views.margins, geometry_of(views.keypoints, views.width, views.height, views.valid), views.valid)
+    tensors = {"keypoints": view["keypoints"][0, :n], "margins": view["margins"][0, :n], "output": y[0, :n].numpy()}
     header, blobs, at = {"__metadata__": {"width": str(view["width"][0]), "height": str(view["height"][0])}}, [], 0
     for name, values in tensors.items():
-        half = name == "bits"
+        half = name == "margins"
         blob = np.ascontiguousarray(values, "<f2" if half else "<f4").tobytes()
         header[name] = {"dtype": "F16" if half else "F32", "shape": list(values.shape), "data_offsets": [at, at + len(blob)]}
         blobs.append(blob)

@@ -25,7 +25,7 @@ from dataset import CONDITIONS, Batch, open_pairs  # noqa: E402
 from evaluation import evaluate, gains  # noqa: E402
 from losses import contrastive, fast_ap_and_boost, hamming  # noqa: E402
 from model import SIZES, Booster, geometry_of, hard_bits  # noqa: E402
-from weights import save_weights  # noqa: E402
+from weights import round_weights, save_weights  # noqa: E402
 
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
 
@@ -39,15 +39,19 @@ def arguments_of(argv):
     p.add_argument("--size", choices=list(SIZES), default="boost-s")
     p.add_argument("--steps", type=int, default=20000, help="length of the schedule")
     p.add_argument("--minutes", type=float, default=math.inf, help="the schedule ends after this time at the latest")
-    p.add_argument("--batch", type=int, default=8, help="pairs a step")
+    p.add_argument("--batch", type=int, default=12, help="pairs a step")
+    p.add_argument("--share", type=float, nargs=len(CONDITIONS), default=[1, 1, 1, 1, 1],
+                   help="how often pairs of each condition are drawn, relative to one another")
+    p.add_argument("--keypoints", type=int, default=320, help="of a view at most")
     p.add_argument("--rate", type=float, default=1e-3, help="largest learning rate")
     p.add_argument("--ap", type=float, default=0.0, help="weight of FastAP (eq. 9)")
     p.add_argument("--boost", type=float, default=0.0, help="lambda of the boost loss (eq. 11), relative to --ap")
     p.add_argument("--contrastive", type=float, default=1.0, help="weight of the contrastive term")
-    p.add_argument("--temperature", type=float, default=6.0, help="bits a unit of the contrastive logit")
+    p.add_argument("--temperature", type=float, default=4.0, help="bits a unit of the contrastive logit")
     p.add_argument("--no-geometry", action="store_true", help="without the geometry path")
     p.add_argument("--no-cross", action="store_true", help="without cross-boosting")
-    p.add_argument("--no-residual", action="store_true", help="without the input bits added to the output")
+    p.add_argument("--no-residual", action="store_true", help="without the path from the input straight to the output")
+    p.add_argument("--no-margins", action="store_true", help="told only the bits, not how clearly each was decided")
     p.add_argument("--head-scale", type=float, default=0.1, help="of the last layer's random start")
     p.add_argument("--tolerance", type=float, default=3.0, help="px within which two keypoints are one point")
     p.add_argument("--start", help="checkpoint whose weights to begin with")
@@ -97,23 +101,36 @@ def in_a_window(v, generator):
     return torch.where(keep.sum(1, keepdim=True) < 20, v.valid, keep)  # a window on a bare wall
 
 
+def thin_out(v, most, generator):
+    """At most so many keypoints, at random of those in a window: what is not there is not computed with. Returns their places."""
+    v.valid = in_a_window(v, generator)
+    chance = torch.rand(v.valid.shape, generator=generator) + v.valid
+    index = chance.topk(min(most, chance.shape[1]), dim=1).indices
+    v.keep(index)
+    return index
+
+
 def losses_of(model, batch, a, device, generator):
-    y, kept = [], []
+    index = thin_out(batch.a, a.keypoints, generator)
+    batch.in_b = batch.in_b.gather(1, index[..., None].expand(-1, -1, 2))
+    thin_out(batch.b, a.keypoints, generator)
+    y = []
     for v in (batch.a, batch.b):
-        kept.append(in_a_window(v, generator))
-        geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, kept[-1]).to(device)
+        geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid).to(device)
         with torch.autocast(device.type, torch.bfloat16, enabled=a.autocast):
-            y.append(model(v.bits.to(device), geometry, kept[-1].to(device)))
-    distance = hamming(hard_bits(y[0].float()), hard_bits(y[1].float()))
-    apart = batch.apart.to(device)
+            y.append(model(v.margins.to(device), geometry, v.valid.to(device)))
+    # whole numbers up to 256 are exact in bfloat16
+    half = torch.bfloat16 if a.autocast else torch.float32
+    product = hard_bits(y[0].float()).to(half) @ hard_bits(y[1].float()).to(half).transpose(1, 2)
+    apart = batch.apart().to(device)
     positive = apart < a.tolerance
-    usable = (kept[0][:, :, None] & kept[1][:, None, :]).to(device) & (positive | (apart > 1.7 * a.tolerance))
+    usable = batch.both.to(device) & (positive | (apart > 1.7 * a.tolerance))
     out = {}
     if a.contrastive > 0:
-        out["contrastive"] = contrastive(distance, positive, usable, a.temperature)
+        out["contrastive"] = contrastive(product, positive, usable, y[0].shape[-1], a.temperature)
     if a.ap > 0:
         raw = hamming(batch.a.bits.to(device), batch.b.bits.to(device))
-        out["ap"], out["boost"] = fast_ap_and_boost(distance, raw, positive, usable)
+        out["ap"], out["boost"] = fast_ap_and_boost(0.5 * (y[0].shape[-1] - product.float()), raw, positive, usable)
     total = a.contrastive * out.get("contrastive", 0) + a.ap * (out.get("ap", 0) + a.boost * out.get("boost", 0))
     return total, {k: float(v) for k, v in out.items()}
 
@@ -170,10 +187,14 @@ def train(a):
     files = [open_pairs(p) for p in pairs]
     held = open_pairs(held)[:a.evaluate_pairs] if held else None
     where = np.concatenate([[(f, i) for i in range(len(m))] for f, m in enumerate(files)])
+    chance = np.concatenate([np.asarray(a.share, float)[m["condition"]] for m in files])
+    chance /= chance.sum()
 
     size = SIZES[a.size]
     if a.no_residual:
         size.residual = False
+    if a.no_margins:
+        size.margins = False
     model = Booster(size, not a.no_geometry, not a.no_cross).to(device)
     with torch.no_grad():
         model.head.weight *= a.head_scale
@@ -204,6 +225,7 @@ def train(a):
         (out / "checkpoint.tmp").rename(out / "checkpoint.pt")
         best = Booster(size, model.geometry, model.cross)
         best.load_state_dict(averaged if final or step > 300 else model.state_dict())
+        round_weights(best)
         save_weights(out / f"{a.size}.safetensors", best, {"name": a.size, "steps": step, "minutes": round(schedule.spent_s() / 60)})
         scores = [""] * len(CONDITIONS)
         if held is not None:
@@ -219,7 +241,7 @@ def train(a):
 
     while schedule.progress(step) < 1.0:
         # the step's own generator: the same pairs whether resumed or not
-        pick = np.random.default_rng((a.seed, step)).choice(len(where), a.batch, replace=False)
+        pick = np.random.default_rng((a.seed, step)).choice(len(where), a.batch, replace=False, p=chance)
         batch = Batch(np.stack([files[f][i] for f, i in where[pick]]))
         for group in optimiser.param_groups:
             group["lr"] = schedule.rate(step)

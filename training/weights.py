@@ -4,7 +4,19 @@ import dataclasses
 import json
 import struct
 
-FORMAT = "fbvins-booster-1"
+FORMAT = "fbvins-booster-2"
+
+
+def round_weights(model):
+    """Puts the weights of every product that flies in 8-bit numbers onto those numbers (features/int8_gemm.hpp), in place:
+    what is evaluated and stored is what flies."""
+    import torch
+    with torch.no_grad():
+        for layer in model.modules():
+            if isinstance(layer, torch.nn.Linear) and layer.in_features >= 16:
+                unit = layer.weight.abs().amax(1, keepdim=True).clamp(min=1e-12) / 127
+                layer.weight.copy_(torch.round(layer.weight / unit) * unit)
+    return model
 
 
 def save_weights(path, model, notes):
@@ -46,7 +58,8 @@ def load_model(path):
     for field in dataclasses.fields(Size):
         text = meta[field.name]
         fields[field.name] = tuple(map(int, text.split(","))) if field.name == "keypoint_hidden" else int(text)
-    fields["residual"] = bool(fields["residual"])
+    for name in ("residual", "margins"):
+        fields[name] = bool(fields[name])
     model = Booster(Size(**fields))
     model.load_state_dict({k: torch.from_numpy(v.copy()) for k, v in arrays.items()})
     return model.eval()

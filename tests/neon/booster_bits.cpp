@@ -14,23 +14,20 @@ int main(int argc, char** argv) {
   if (!weights) return std::fprintf(stderr, "%s\n", weights.error().message.c_str()), 2;
   Rng rng(9);
   std::vector<Keypoint> keypoints(123);
-  std::vector<Descriptor> descriptors(keypoints.size());
+  std::vector<Margins> margins(keypoints.size());
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     // One draw a statement: compilers choose the order within one.
     const double x = rng.uniform(0, 752), y = rng.uniform(0, 480);
     keypoints[i].pixel = Vec2(x, y);
     keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));
     keypoints[i].angle_rad = static_cast<float>(rng.uniform(-3, 3));
-    for (std::uint64_t& word : descriptors[i].bits) {
-      word = rng.next_u32();
-      word = word << 32 | rng.next_u32();
-    }
+    for (std::int8_t& m : margins[i].of_bit) m = static_cast<std::int8_t>(static_cast<int>(rng.below(255)) - 127);
   }
   int kernels = 0;
   for (const Int8Kernel kernel : {Int8Kernel::portable, Int8Kernel::avx2, Int8Kernel::avx512_vnni, Int8Kernel::neon_dot}) {
     if (!int8_kernel_works(kernel)) continue;
-    std::vector<Descriptor> boosted = descriptors;
-    BoosterNetwork(*weights, BoosterPrecision::int8, kernel).run(752, 480, keypoints, boosted);
+    std::vector<Descriptor> boosted(keypoints.size());
+    BoosterNetwork(*weights, BoosterPrecision::int8, kernel).run(752, 480, keypoints, margins, boosted);
     std::uint64_t sum = 14695981039346656037ull;
     for (const Descriptor& d : boosted)
       for (const std::uint64_t word : d.bits) sum = (sum ^ word) * 1099511628211ull;

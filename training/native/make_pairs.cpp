@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures to training pairs: keypoints and descriptors of both views by the project's own extractor, and where each
-// keypoint of the first is in the second, as records of fixed size that numpy maps (training/dataset.py).
+// Pictures to training pairs: keypoints and margins (whose signs are the descriptors) of both views by the project's own
+// extractor, and where each keypoint of the first is in the second, as records of fixed size that numpy maps
+// (training/dataset.py).
 //
 //   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG, warped
 //   booster_pairs --images DIR --part train ...                           the first four fifths of each folder
@@ -35,7 +36,7 @@ constexpr std::size_t kMost = 500;
 struct ViewRecord {
   std::int32_t count = 0, width = 0, height = 0;
   float keypoints[kMost][6] = {};  // x, y (px), level, scale, angle (rad), score
-  std::uint8_t descriptors[kMost][32] = {};
+  std::int8_t margins[kMost][256] = {};
 };
 struct PairRecord {
   std::int32_t picture = 0, condition = 0;
@@ -55,7 +56,7 @@ void record(const OrbFeatures& features, const Image& image, ViewRecord& out) {
                           k.angle_rad,
                           k.score};
     std::copy(std::begin(row), std::end(row), out.keypoints[i]);
-    std::memcpy(out.descriptors[i], features.descriptors[i].bits.data(), 32);
+    std::memcpy(out.margins[i], features.margins[i].of_bit.data(), 256);
   }
 }
 

@@ -14,7 +14,7 @@ class BoosterStage final : public DescriptorStage {
   BoosterStage(const BoosterWeights& weights, BoosterPrecision precision) : network_(weights, precision, best_int8_kernel()) {}
 
   void improve(int width, int height, OrbFeatures& features) override {
-    network_.run(width, height, features.keypoints, features.descriptors);
+    network_.run(width, height, features.keypoints, features.margins, features.descriptors);
   }
   bool changes_descriptors() const override { return true; }
 

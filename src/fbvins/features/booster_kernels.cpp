@@ -123,14 +123,10 @@ void gate(const float* query, const float* summary, int rows, int width, float* 
 }
 
 FBVINS_KERNEL
-void take_signs(const float* y, const float* identity, const std::uint64_t* bits, std::uint64_t* out) {
+void take_signs(const float* y, std::uint64_t* out) {
   for (int word = 0; word < 4; ++word) {
     std::uint64_t signs = 0;
-    for (int i = 0; i < 64; ++i) {
-      const float with = identity[64 * word + i], raw = y[64 * word + i];
-      const float sum = (bits[word] >> i & 1u) != 0 ? raw + with : raw - with;
-      signs |= static_cast<std::uint64_t>(sum > 0) << i;
-    }
+    for (int i = 0; i < 64; ++i) signs |= static_cast<std::uint64_t>(y[64 * word + i] > 0) << i;
     out[word] = signs;
   }
 }

@@ -24,7 +24,7 @@ void summarise(float* key, const float* value, int rows, int width, float* summa
 /// out[row][c] = sigmoid(query[row][c]) summary[c]
 void gate(const float* query, const float* summary, int rows, int width, float* out);
 
-/// y += identity * bit for 256 bits as +-1, then the signs of y as bits (y > 0).
-void take_signs(const float* y, const float* identity, const std::uint64_t* bits, std::uint64_t* out);
+/// The signs of 256 numbers as bits (y > 0).
+void take_signs(const float* y, std::uint64_t* out);
 
 }  // namespace fbvins

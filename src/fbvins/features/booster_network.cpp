@@ -33,18 +33,20 @@ void booster_geometry(int width, int height, std::span<const Keypoint> keypoints
 }
 
 BoosterNetwork::BoosterNetwork(const BoosterWeights& weights, BoosterPrecision precision, Int8Kernel kernel)
-    : precision_(precision), kernel_(kernel), width_(weights.width), identity_(weights.identity) {
+    : precision_(precision), kernel_(kernel), width_(weights.width), margins_(weights.margins) {
   descriptor1_ = prepare(weights.descriptor1);
   descriptor2_ = prepare(weights.descriptor2);
   for (const LinearWeights& linear : weights.keypoint) keypoint_.push_back(prepare(linear));
   for (const BoosterLayerWeights& l : weights.layers)
-    layers_.push_back(
-        {prepare(l.query), prepare(l.key), prepare(l.value), prepare(l.out), prepare(l.up), prepare(l.down), l.norm1, l.norm2});
+    layers_.push_back({prepare(l.query), prepare(l.key), prepare(l.value), prepare(l.out), prepare(l.up, true), prepare(l.down),
+                       l.norm1, l.norm2});
   head_ = prepare(weights.head);
+  skip_ = prepare(weights.skip);
 }
 
-BoosterNetwork::Linear BoosterNetwork::prepare(const LinearWeights& weights) const {
+BoosterNetwork::Linear BoosterNetwork::prepare(const LinearWeights& weights, bool fine) const {
   Linear out;
+  out.fine = fine;
   out.outputs = weights.outputs, out.inputs = weights.inputs;
   out.whole_numbers = precision_ == BoosterPrecision::int8 && weights.inputs >= kFewestInputs;
   if (out.whole_numbers) {
@@ -69,36 +71,40 @@ void BoosterNetwork::apply(const Linear& linear, const std::vector<float>& x, st
   }
   if (!again) quantised_.quantise(x.data(), rows_, linear.inputs);
   multiply(quantised_, linear.packed, out.data(), kernel_);
+  if (!linear.fine) return;
+  rest_.quantise_rest(x.data(), quantised_);
+  multiply(rest_, linear.packed, out.data(), kernel_, Start::from_output);
 }
 
-void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoints, std::span<Descriptor> descriptors) {
-  rows_ = static_cast<int>(std::min(keypoints.size(), descriptors.size()));
+void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoints, std::span<const Margins> margins,
+                         std::span<Descriptor> descriptors) {
+  rows_ = static_cast<int>(std::min({keypoints.size(), margins.size(), descriptors.size()}));
   y_.clear();
   if (rows_ == 0) return;
   booster_geometry(width, height, keypoints.first(static_cast<std::size_t>(rows_)), geometry_);
-  encode(descriptors);
+  encode(margins);
   encode_geometry();
   for (const Layer& layer : layers_) {
     attend(layer);
     feed_forward(layer);
   }
   apply(head_, z_, y_);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) {
-    Descriptor boosted;
-    take_signs(y_.data() + 256 * i, identity_.data(), descriptors[i].bits.data(), boosted.bits.data());
-    descriptors[i] = boosted;
-  }
+  if (skip_.outputs > 0) add(y_.data(), skipped_.data(), rows_ * skip_.outputs);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) take_signs(y_.data() + 256 * i, descriptors[i].bits.data());
 }
 
-/// The bits through two layers into z (eq. 6, the descriptor's part).
-void BoosterNetwork::encode(std::span<const Descriptor> descriptors) {
+/// The input through two layers into z (eq. 6, the descriptor's part), and past everything else.
+void BoosterNetwork::encode(std::span<const Margins> margins) {
+  const std::int8_t* values = margins.data()->of_bit.data();
   if (descriptor1_.whole_numbers) {
-    quantised_.set_bits(descriptors.data()->bits.data(), rows_);
+    margins_ ? quantised_.set_values(values, rows_, 256, kMarginUnit) : quantised_.set_signs(values, rows_, 256);
+    if (skip_.outputs > 0) apply(skip_, hidden_, skipped_, true);
     apply(descriptor1_, hidden_, hidden_, true);
   } else {
     query_.resize(static_cast<std::size_t>(rows_) * 256);
     for (std::size_t i = 0; i < query_.size(); ++i)
-      query_[i] = (descriptors[i / 256].bits[i % 256 / 64] >> (i % 64) & 1u) != 0 ? 1.0f : -1.0f;
+      query_[i] = margins_ ? kMarginUnit * static_cast<float>(values[i]) : (values[i] > 0 ? 1.0f : -1.0f);
+    if (skip_.outputs > 0) apply(skip_, query_, skipped_);
     apply(descriptor1_, query_, hidden_);
   }
   clamp_negative(hidden_.data(), rows_ * descriptor1_.outputs);

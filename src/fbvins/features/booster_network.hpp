@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The booster's forward pass (paper 2.2.2, eq. 6-8; docs/derivations/booster.md): bits and geometry of all keypoints of
-// one image in, better bits out. In whole numbers (fast, the same bits with every kernel) or single precision (the
+// The booster's forward pass (paper 2.2.2, eq. 6-8; docs/derivations/booster.md): margins or bits, and geometry, of all
+// keypoints of one image in, better bits out. In whole numbers (fast, the same bits with every kernel) or single precision (the
 // reference). One instance, one thread; allocates only while it grows.
 //
 //   BoosterNetwork network(*weights, BoosterPrecision::int8, best_int8_kernel());
-//   network.run(752, 480, features.keypoints, features.descriptors);      // rewrites the descriptors
+//   network.run(752, 480, features.keypoints, features.margins, features.descriptors);
 #pragma once
 
 #include <span>
@@ -26,10 +26,11 @@ class BoosterNetwork {
  public:
   BoosterNetwork(const BoosterWeights& weights, BoosterPrecision precision, Int8Kernel kernel);
 
-  /// Replaces each descriptor; keypoints and descriptors are of one image of width x height px, one to one.
-  void run(int width, int height, std::span<const Keypoint> keypoints, std::span<Descriptor> descriptors);
+  /// Writes the descriptors; keypoints, margins and descriptors are of one image of width x height px, one to one.
+  void run(int width, int height, std::span<const Keypoint> keypoints, std::span<const Margins> margins,
+           std::span<Descriptor> descriptors);
 
-  /// Numbers whose signs were the bits of the last run, without the residual: 256 a keypoint.
+  /// Numbers whose signs are the bits of the last run: 256 a keypoint.
   const std::vector<float>& outputs() const { return y_; }
 
  private:
@@ -38,16 +39,17 @@ class BoosterNetwork {
     std::vector<float> weight_t, bias;
     int outputs = 0, inputs = 0;
     bool whole_numbers = false;
+    bool fine = false;  // what its input loses in 8 bits is made good with 8 more
   };
   struct Layer {
     Linear query, key, value, out, up, down;
     NormWeights norm1, norm2;
   };
 
-  Linear prepare(const LinearWeights& weights) const;
+  Linear prepare(const LinearWeights& weights, bool fine = false) const;
   /// x to out; quantises x unless `again`: the rows of the last call are those of this one.
   void apply(const Linear& linear, const std::vector<float>& x, std::vector<float>& out, bool again = false);
-  void encode(std::span<const Descriptor> descriptors);
+  void encode(std::span<const Margins> margins);
   void encode_geometry();
   void attend(const Layer& layer);
   void feed_forward(const Layer& layer);
@@ -55,14 +57,14 @@ class BoosterNetwork {
   BoosterPrecision precision_;
   Int8Kernel kernel_;
   int width_;
-  Linear descriptor1_, descriptor2_, head_;
+  bool margins_;
+  Linear descriptor1_, descriptor2_, head_, skip_;
   std::vector<Linear> keypoint_;
   std::vector<Layer> layers_;
-  std::vector<float> identity_;
   // buffers
   int rows_ = 0;
-  QuantisedRows quantised_;
-  std::vector<float> geometry_, z_, hidden_, hidden2_, query_, key_, value_, summary_, scratch_, y_;
+  QuantisedRows quantised_, rest_;
+  std::vector<float> geometry_, z_, hidden_, hidden2_, query_, key_, value_, summary_, scratch_, skipped_, y_;
 };
 
 }  // namespace fbvins

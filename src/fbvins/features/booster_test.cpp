@@ -62,7 +62,7 @@ StoredVectors read_vectors(const std::string& path) {
   }
   out.width = std::stoi(file->metadata.at("width"));
   out.height = std::stoi(file->metadata.at("height"));
-  const std::vector<float>&keypoints = file->tensors.at("keypoints").values, &bits = file->tensors.at("bits").values;
+  const std::vector<float>&keypoints = file->tensors.at("keypoints").values, &margins = file->tensors.at("margins").values;
   for (std::size_t i = 0; i < keypoints.size() / 6; ++i) {
     const float* row = keypoints.data() + 6 * i;
     Keypoint k;
@@ -70,9 +70,14 @@ StoredVectors read_vectors(const std::string& path) {
     k.level = static_cast<int>(row[2]);
     k.scale = row[3], k.angle_rad = row[4], k.score = row[5];
     Descriptor d;
-    for (std::size_t b = 0; b < 256; ++b) d.bits[b / 64] |= static_cast<std::uint64_t>(bits[256 * i + b] > 0) << (b % 64);
+    Margins m;
+    for (std::size_t b = 0; b < 256; ++b) {
+      m.of_bit[b] = static_cast<std::int8_t>(margins[256 * i + b]);
+      d.bits[b / 64] |= static_cast<std::uint64_t>(m.of_bit[b] > 0) << (b % 64);
+    }
     out.features.keypoints.push_back(k);
     out.features.descriptors.push_back(d);
+    out.features.margins.push_back(m);
   }
   out.output = file->tensors.at("output").values;
   return out;
@@ -84,23 +89,21 @@ TEST_P(ShippedWeights, GiveWhatTheTrainingFrameworkComputes) {
   const StoredVectors stored = read_vectors(kTestData + GetParam() + "_vectors.safetensors");
   const auto weights = load_booster_weights(booster_weights_path(GetParam()));
   ASSERT_TRUE(weights) << weights.error().message;
-  std::vector<Descriptor> expected(stored.features.size()), boosted = stored.features.descriptors;
+  std::vector<Descriptor> expected(stored.features.size()), boosted(stored.features.size());
   BoosterNetwork network(*weights, BoosterPrecision::float32, Int8Kernel::portable);
-  network.run(stored.width, stored.height, stored.features.keypoints, boosted);
+  network.run(stored.width, stored.height, stored.features.keypoints, stored.features.margins, boosted);
   double worst = 0;
   for (std::size_t i = 0; i < stored.features.size(); ++i)
     for (std::size_t b = 0; b < 256; ++b) {
-      const bool bit = (stored.features.descriptors[i].bits[b / 64] >> (b % 64) & 1) != 0;
-      const double y = network.outputs()[256 * i + b] + (bit ? 1 : -1) * weights->identity[b];
-      worst = std::max(worst, std::abs(y - static_cast<double>(stored.output[256 * i + b])));
+      worst = std::max(worst, std::abs(double{network.outputs()[256 * i + b]} - stored.output[256 * i + b]));
       expected[i].bits[b / 64] |= static_cast<std::uint64_t>(stored.output[256 * i + b] > 0) << (b % 64);
     }
   EXPECT_LT(worst, 1e-4);
   EXPECT_LT(share_of_different_bits(boosted, expected), 1e-4);
 
-  std::vector<Descriptor> in_whole_numbers = stored.features.descriptors;
+  std::vector<Descriptor> in_whole_numbers(stored.features.size());
   BoosterNetwork(*weights, BoosterPrecision::int8, best_int8_kernel())
-      .run(stored.width, stored.height, stored.features.keypoints, in_whole_numbers);
+      .run(stored.width, stored.height, stored.features.keypoints, stored.features.margins, in_whole_numbers);
   EXPECT_LT(share_of_different_bits(in_whole_numbers, expected), 0.005);
   EXPECT_GT(share_of_different_bits(in_whole_numbers, stored.features.descriptors), 0.01) << "nothing is boosted";
 }
@@ -111,8 +114,8 @@ TEST_P(ShippedWeights, GiveTheSameBitsWithEveryKernelAndEveryTime) {
   const OrbFeatures features = features_of_an_image();
   ASSERT_GT(features.size(), 100u);
   const auto boost = [&](BoosterNetwork& network, std::size_t count) {
-    std::vector<Descriptor> out(features.descriptors.begin(), features.descriptors.begin() + static_cast<std::ptrdiff_t>(count));
-    network.run(376, 240, std::span(features.keypoints).first(count), out);
+    std::vector<Descriptor> out(count);
+    network.run(376, 240, std::span(features.keypoints).first(count), features.margins, out);
     return out;
   };
   BoosterNetwork reference(*weights, BoosterPrecision::int8, Int8Kernel::portable);
@@ -134,7 +137,7 @@ TEST(Booster, TakesAnyNumberOfKeypoints) {
   OrbFeatures none, one = features_of_an_image();
   (*stage)->improve(376, 240, none);
   EXPECT_EQ(none.size(), 0u);
-  one.keypoints.resize(1), one.descriptors.resize(1);
+  one.keypoints.resize(1), one.descriptors.resize(1), one.margins.resize(1);
   (*stage)->improve(376, 240, one);
   EXPECT_EQ(one.size(), 1u);
 }
@@ -148,8 +151,8 @@ TEST(BoosterWeights, ThatDoNotFitAreNamed) {
     const auto weights = parse_booster_weights(bytes);
     return weights ? std::string() : weights.error().message;
   };
-  EXPECT_EQ(error_with("fbvins-booster-1", "fbvins-booster-2"),
-            "metadata \"format\" is \"fbvins-booster-2\", not \"fbvins-booster-1\": these are no weights of this version");
+  EXPECT_EQ(error_with("fbvins-booster-2", "fbvins-booster-3"),
+            "metadata \"format\" is \"fbvins-booster-3\", not \"fbvins-booster-2\": these are no weights of this version");
   EXPECT_EQ(error_with("\"head.bias\"", "\"head.boas\""), "tensor \"head.bias\" is missing");
   EXPECT_EQ(error_with("\"bits\":\"256\"", "\"bits\":\"255\""), "metadata \"bits\" is \"255\", not a number from 256 to 256");
   const auto cut = parse_booster_weights(std::string_view(good).substr(0, good.size() - 1));

@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::string_view kFormat = "fbvins-booster-1";
+constexpr std::string_view kFormat = "fbvins-booster-2";
 constexpr int kBits = 256, kLargestSide = 1024, kMostLayers = 16, kMostKeypointLayers = 8;
 
 Error damaged(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -111,6 +111,7 @@ Result<BoosterWeights> take_weights(SafeTensors file) {
   const int hidden = take.side("descriptor_hidden"), layers = take.number("layers", 0, kMostLayers);
   std::vector<int> widths = take.sides("keypoint_hidden");
   const bool residual = take.number("residual", 0, 1) != 0;
+  w.margins = take.number("margins", 0, 1) != 0;
   if (take.wrong()) return damaged(*take.wrong());
   widths.insert(widths.begin(), kBoosterGeometry);
   widths.push_back(w.width);
@@ -120,7 +121,7 @@ Result<BoosterWeights> take_weights(SafeTensors file) {
     w.keypoint.push_back(take.linear(fmt::format("keypoint.{}", i), widths[i + 1], widths[i]));
   for (int l = 0; l < layers; ++l) w.layers.push_back(take.layer(fmt::format("layers.{}", l), w.width));
   w.head = take.linear("head", kBits, w.width);
-  w.identity = residual ? take.tensor("identity", {kBits}) : std::vector<float>(kBits, 0.0f);
+  if (residual) w.skip = {kBits, kBits, take.tensor("skip.weight", {kBits, kBits}), std::vector<float>(kBits, 0.0f)};
   if (take.wrong()) return damaged(*take.wrong());
   if (!file.tensors.empty())
     return damaged(fmt::format("tensor \"{}\" does not belong to this network", file.tensors.begin()->first));

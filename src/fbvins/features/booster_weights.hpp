@@ -35,8 +35,9 @@ struct BoosterWeights {
   std::vector<LinearWeights> keypoint;
   std::vector<BoosterLayerWeights> layers;
   LinearWeights head;
-  std::vector<float> identity;  ///< weight of each input bit in the output; zero without the residual
-  std::string name;             ///< of the size, as trained
+  LinearWeights skip;    ///< from the input straight to the output; no outputs without the residual
+  bool margins = false;  ///< the input is margins, otherwise bits as +1 and -1
+  std::string name;      ///< of the size, as trained
 };
 
 /// Numbers a keypoint's geometry is told in: see booster_geometry().

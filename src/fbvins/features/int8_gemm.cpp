@@ -35,8 +35,13 @@ void round_to_int8(const float* x, int n, float factor, std::int8_t* out) {
 }
 
 FBVINS_KERNEL
-void rescale(const std::int32_t* sums, const float* column_scale, const float* bias, float row_scale, int n, float* out) {
-  for (int i = 0; i < n; ++i) out[i] = static_cast<float>(sums[i]) * (row_scale * column_scale[i]) + bias[i];
+void rescale(const std::int32_t* sums, const float* column_scale, const float* start, float row_scale, int n, float* out) {
+  for (int i = 0; i < n; ++i) out[i] = static_cast<float>(sums[i]) * (row_scale * column_scale[i]) + start[i];
+}
+
+FBVINS_KERNEL
+void subtract_whole(const float* x, const std::int8_t* whole, float unit, int n, float* out) {
+  for (int i = 0; i < n; ++i) out[i] = x[i] - unit * static_cast<float>(whole[i]);
 }
 
 }  // namespace
@@ -85,17 +90,30 @@ void QuantisedRows::quantise(const float* x, int rows, int columns) {
   }
 }
 
-void QuantisedRows::set_bits(const std::uint64_t* words, int rows) {
-  resize(rows, 256);
-  for (int r = 0; r < rows; ++r) {
-    std::int8_t* out = values.data() + static_cast<std::ptrdiff_t>(r) * 256;
-    for (int i = 0; i < 256; ++i)
-      out[i] = static_cast<std::int8_t>(2 * static_cast<int>(words[4 * r + i / 64] >> (i % 64) & 1u) - 1);
-    scale[static_cast<std::size_t>(r)] = 1;
+void QuantisedRows::quantise_rest(const float* x, const QuantisedRows& coarse) {
+  rest_.resize(static_cast<std::size_t>(coarse.count) * static_cast<std::size_t>(coarse.inputs));
+  for (int r = 0; r < coarse.count; ++r) {
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(r) * coarse.inputs;
+    subtract_whole(x + at, coarse.values.data() + at, coarse.scale[static_cast<std::size_t>(r)], coarse.inputs,
+                   rest_.data() + at);
   }
+  quantise(rest_.data(), coarse.count, coarse.inputs);
 }
 
-void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel) {
+void QuantisedRows::set_values(const std::int8_t* whole, int rows, int columns, float unit) {
+  resize(rows, columns);
+  std::copy_n(whole, static_cast<std::ptrdiff_t>(rows) * columns, values.begin());
+  std::fill_n(scale.begin(), rows, unit);
+}
+
+void QuantisedRows::set_signs(const std::int8_t* whole, int rows, int columns) {
+  resize(rows, columns);
+  std::transform(whole, whole + static_cast<std::ptrdiff_t>(rows) * columns, values.begin(),
+                 [](std::int8_t v) { return static_cast<std::int8_t>(v > 0 ? 1 : -1); });
+  std::fill_n(scale.begin(), rows, 1.0f);
+}
+
+void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel, Start start) {
   constexpr int kColumns = 16 * kInt8BlocksTogether;
   const auto sums_of = int8_kernel(kernel);
   alignas(64) std::int32_t sums[kInt8RowBlock * kColumns];
@@ -105,9 +123,11 @@ void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int
     for (int r = 0; r < rows.count; r += kInt8RowBlock) {
       sums_of(rows.values.data() + static_cast<std::ptrdiff_t>(r) * w.inputs, weights, w.offset.data() + n, w.inputs, blocks,
               sums);
-      for (int i = 0; i < kInt8RowBlock; ++i)
-        rescale(sums + i * kColumns, w.scale.data() + n, w.bias.data() + n, rows.scale[static_cast<std::size_t>(r + i)],
-                16 * blocks, out + static_cast<std::ptrdiff_t>(r + i) * w.outputs + n);
+      for (int i = 0; i < kInt8RowBlock; ++i) {
+        float* row = out + static_cast<std::ptrdiff_t>(r + i) * w.outputs + n;
+        rescale(sums + i * kColumns, w.scale.data() + n, start == Start::from_bias ? w.bias.data() + n : row,
+                rows.scale[static_cast<std::size_t>(r + i)], 16 * blocks, row);
+      }
     }
   }
 }

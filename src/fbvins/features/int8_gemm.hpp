@@ -37,8 +37,12 @@ class QuantisedRows {
  public:
   /// x is [count][inputs], inputs a multiple of 4.
   void quantise(const float* x, int count, int inputs);
-  /// Bits as +1 and -1: 32 bytes a row, lowest bit first; exact.
-  void set_bits(const std::uint64_t* words, int count);
+  /// What is left of x when `coarse`, made of it, is taken away.
+  void quantise_rest(const float* x, const QuantisedRows& coarse);
+  /// Takes numbers that are whole already, [count][inputs], worth `unit` each; exact.
+  void set_values(const std::int8_t* whole, int count, int inputs, float unit);
+  /// Takes +1 of those above zero and -1 of the others; exact.
+  void set_signs(const std::int8_t* whole, int count, int inputs);
 
   int count = 0, inputs = 0;
   std::vector<std::int8_t> values;  ///< [count rounded up][inputs], rows past count are zero
@@ -46,12 +50,16 @@ class QuantisedRows {
 
  private:
   void resize(int rows, int columns);
+  std::vector<float> rest_;
 };
 
 /// Rows handled together by a kernel: values are padded to a multiple.
 inline constexpr int kInt8RowBlock = 6;
 
+/// What the products are added to.
+enum class Start { from_bias, from_output };
+
 /// out is [rows.count rounded up to kInt8RowBlock][w.outputs].
-void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel);
+void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel, Start start = Start::from_bias);
 
 }  // namespace fbvins

@@ -22,6 +22,41 @@ struct Shape {
   int rows, inputs, outputs;
 };
 
+/// Weights that are whole numbers already, the largest of each row 127: nothing is lost in packing.
+std::vector<float> whole_weights(int outputs, int inputs, Rng& rng) {
+  std::vector<float> out(static_cast<std::size_t>(outputs * inputs));
+  for (float& v : out) v = static_cast<float>(static_cast<int>(rng.below(255)) - 127);
+  for (int n = 0; n < outputs; ++n) out[static_cast<std::size_t>(n * inputs)] = 127;
+  return out;
+}
+
+TEST(QuantisedRows, TheirRestMakesProductsAHundredTimesFiner) {
+  constexpr int kRows = 7, kInputs = 64, kOutputs = 32;
+  Rng rng(6);
+  const std::vector<float> x = random_numbers(kRows * kInputs, 3.0f, rng), bias = random_numbers(kOutputs, 1.0f, rng);
+  const std::vector<float> weight = whole_weights(kOutputs, kInputs, rng);
+  const PackedWeights packed = pack_weights(weight.data(), kOutputs, kInputs, bias.data());
+  QuantisedRows coarse, rest;
+  coarse.quantise(x.data(), kRows, kInputs);
+  rest.quantise_rest(x.data(), coarse);
+  std::vector<float> out(2 * kInt8RowBlock * kOutputs);
+  const auto worst = [&] {
+    double most = 0;
+    for (int r = 0; r < kRows; ++r)
+      for (int n = 0; n < kOutputs; ++n) {
+        double exact = bias[static_cast<std::size_t>(n)];
+        for (int k = 0; k < kInputs; ++k)
+          exact += double{x[static_cast<std::size_t>(r * kInputs + k)]} * weight[static_cast<std::size_t>(n * kInputs + k)];
+        most = std::max(most, std::abs(out[static_cast<std::size_t>(r * kOutputs + n)] - exact));
+      }
+    return most;
+  };
+  multiply(coarse, packed, out.data(), Int8Kernel::portable);
+  const double with_one = worst();
+  multiply(rest, packed, out.data(), Int8Kernel::portable, Start::from_output);
+  EXPECT_LT(worst(), with_one / 100);
+}
+
 class Products : public testing::TestWithParam<Shape> {
  protected:
   void SetUp() override {
@@ -102,12 +137,16 @@ TEST(Int8Kernels, AgreeAtTheLargestValues) {
   }
 }
 
-TEST(QuantisedRows, KeepBitsAndZerosExactly) {
-  const std::uint64_t words[4] = {0x8000000000000001ull, 0, ~0ull, 0xf0f0ull};
+TEST(QuantisedRows, KeepWholeNumbersSignsAndZerosExactly) {
+  const std::vector<std::int8_t> whole = {-127, -1, 0, 1, 127, 5, 0, -3};
   QuantisedRows rows;
-  rows.set_bits(words, 1);
-  for (int i = 0; i < 256; ++i)
-    EXPECT_EQ(rows.values[static_cast<std::size_t>(i)], (words[i / 64] >> (i % 64) & 1) != 0 ? 1 : -1) << i;
+  rows.set_values(whole.data(), 2, 4, 0.25f);
+  EXPECT_TRUE(std::equal(whole.begin(), whole.end(), rows.values.begin()));
+  EXPECT_EQ(rows.scale[1], 0.25f);
+  rows.set_signs(whole.data(), 1, 8);
+  const std::vector<std::int8_t> signs = {-1, -1, -1, 1, 1, 1, -1, -1};
+  EXPECT_TRUE(std::equal(signs.begin(), signs.end(), rows.values.begin()));
+  EXPECT_EQ(rows.scale[0], 1.0f);
   const std::vector<float> zeros(32, 0.0f);
   rows.quantise(zeros.data(), 2, 16);
   EXPECT_EQ(rows.scale[0], 0.0f);

@@ -25,6 +25,14 @@ struct Descriptor {
   bool operator==(const Descriptor&) const = default;
 };
 
+/// How clearly each of a descriptor's comparisons was decided: the difference of the two grey values over the root mean
+/// square of all 256, in units of kMarginUnit, saturated. Positive where the bit is set: the signs are the descriptor.
+struct Margins {
+  std::array<std::int8_t, 256> of_bit{};
+  bool operator==(const Margins&) const = default;
+};
+inline constexpr float kMarginUnit = 1.0f / 32;
+
 /// Number of bits that differ: 0 the same, about 128 unrelated.
 inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
   int n = 0;
@@ -32,15 +40,17 @@ inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
   return n;
 }
 
-/// The features of one image; descriptor i belongs to keypoint i.
+/// The features of one image; descriptor i and margins i belong to keypoint i.
 struct OrbFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
+  std::vector<Margins> margins;  ///< of the descriptors as extracted, whatever became of them since
 
   std::size_t size() const { return keypoints.size(); }
   void clear() {
     keypoints.clear();
     descriptors.clear();
+    margins.clear();
   }
 };
 

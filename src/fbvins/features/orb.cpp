@@ -95,7 +95,7 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
     keypoint.angle_rad = static_cast<float>(std::atan2(direction.y(), direction.x()));
     keypoint.score = c.harris;
     out.keypoints.push_back(keypoint);
-    out.descriptors.push_back(steered_brief(smooth, c.x, c.y, direction));
+    steered_brief(smooth, c.x, c.y, direction, out.descriptors.emplace_back(), out.margins.emplace_back());
   }
 }
 

@@ -76,6 +76,6 @@ float harris_score(const PyramidLevel& level, int x, int y);
 Vec2 centroid_direction(const PyramidLevel& level, int x, int y);
 
 /// Steered BRIEF (eq. 5) on a smoothed level; direction is a unit vector.
-Descriptor steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction);
+void steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction, Descriptor& descriptor, Margins& margins);
 
 }  // namespace fbvins

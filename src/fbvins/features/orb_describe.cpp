@@ -99,6 +99,21 @@ void turn_pattern(const PatternLanes& lanes, float c, float s, std::int32_t stri
   }
 }
 
+/// To Margins. What is decided at all keeps its sign.
+FBVINS_KERNEL
+void scale_differences(const std::int16_t* difference, std::int8_t* margin) {
+  std::int32_t squares = 0;
+  for (int i = 0; i < 256; ++i) squares += difference[i] * difference[i];
+  const float factor = squares > 0 ? 1 / (kMarginUnit * std::sqrt(static_cast<float>(squares) / 256)) : 0.0f;
+  for (int i = 0; i < 256; ++i) {
+    const std::int32_t d = difference[i], size = d < 0 ? -d : d;
+    std::int32_t m = static_cast<std::int32_t>(static_cast<float>(size) * factor + 0.5f);
+    m = m > 127 ? 127 : m;
+    m = m < 1 && size > 0 ? 1 : m;
+    margin[i] = static_cast<std::int8_t>(d < 0 ? -m : m);
+  }
+}
+
 }  // namespace
 
 float harris_score(const PyramidLevel& level, int x, int y) {
@@ -116,22 +131,20 @@ Vec2 centroid_direction(const PyramidLevel& level, int x, int y) {
   return length > 0 ? Vec2(m10 / length, m01 / length) : Vec2(1, 0);
 }
 
-Descriptor steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction) {
+void steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction, Descriptor& descriptor, Margins& margins) {
   static const PatternLanes lanes;
   std::int32_t a[256], b[256];
   turn_pattern(lanes, static_cast<float>(direction.x()), static_cast<float>(direction.y()),
                static_cast<std::int32_t>(smooth.stride), a, b);
   const std::uint8_t* centre = smooth.row(y) + x;
-  Descriptor d;
+  std::int16_t difference[256];
+  for (std::size_t i = 0; i < 256; ++i) difference[i] = static_cast<std::int16_t>(centre[b[i]] - centre[a[i]]);
   for (std::size_t word = 0; word < 4; ++word) {
     std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < 64; ++i) {
-      const std::size_t k = 64 * word + i;
-      bits |= static_cast<std::uint64_t>(centre[a[k]] < centre[b[k]]) << i;
-    }
-    d.bits[word] = bits;
+    for (std::size_t i = 0; i < 64; ++i) bits |= static_cast<std::uint64_t>(difference[64 * word + i] > 0) << i;
+    descriptor.bits[word] = bits;
   }
-  return d;
+  scale_differences(difference, margins.of_bit.data());
 }
 
 }  // namespace fbvins

@@ -149,6 +149,36 @@ TEST(Orb, SameImageSameBits) {
   EXPECT_TRUE(a.features.descriptors == b.features.descriptors);
 }
 
+TEST(Orb, MarginsHaveTheSignsOfTheBitsAndDoNotFollowContrast) {
+  const Picture a = picture(similarity(0, 1), 60, 0);
+  ASSERT_EQ(a.features.margins.size(), a.features.size());
+  for (std::size_t i = 0; i < a.features.size(); ++i) {
+    double squares = 0;
+    for (std::size_t b = 0; b < 256; ++b) {
+      const int m = a.features.margins[i].of_bit[b];
+      ASSERT_EQ(m > 0, (a.features.descriptors[i].bits[b / 64] >> (b % 64) & 1) != 0);
+      squares += m * m;
+    }
+    EXPECT_NEAR(std::sqrt(squares / 256) * kMarginUnit, 1, 0.1);  // less what is saturated
+  }
+  // Half the contrast: the same margins but for the rounding of grey values.
+  const Picture b = picture(similarity(0, 1), 30, 0);
+  int compared = 0;
+  for (std::size_t i = 0; i < a.features.size(); ++i)
+    for (std::size_t j = 0; j < b.features.size(); ++j) {
+      if (a.features.keypoints[i].pixel != b.features.keypoints[j].pixel) continue;
+      if (std::abs(a.features.keypoints[i].angle_rad - b.features.keypoints[j].angle_rad) > 0.01) continue;
+      double apart = 0;
+      for (std::size_t k = 0; k < 256; ++k) {
+        const double d = (a.features.margins[i].of_bit[k] - b.features.margins[j].of_bit[k]) * kMarginUnit;
+        apart += d * d / 256;
+      }
+      EXPECT_LT(std::sqrt(apart), 0.25);
+      ++compared;
+    }
+  EXPECT_GT(compared, 50);
+}
+
 TEST(Hamming, CountsBitsAndRefusesAmbiguousMatches) {
   Rng rng(4);
   std::vector<Descriptor> a(40);
