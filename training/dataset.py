@@ -26,7 +26,6 @@ class Views:
         self.height = torch.from_numpy(records["height"].astype(np.float32))
         self.valid = torch.arange(MOST)[None] < torch.from_numpy(records["count"].astype(np.int64))[:, None]
 
-
     def keep(self, index):
         """Keeps the keypoints at index (B, K)."""
         def take(x):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The booster's network (paper 2.2.2, eq. 6-8): descriptor bits and keypoint geometry in, better bits out.
+"""The booster's network (paper 2.2.2, eq. 6-8): descriptors and keypoint geometry in, better bits out.
 
 One architecture, two sizes. `src/fbvins/features/booster_network.hpp` is the same in C++; docs/derivations/booster.md
-explains it. Input of one image: bits (N, 256) as +-1, geometry (N, 7) from `geometry_of`; output: (N, 256) numbers
-whose signs are the new bits.
+explains it. Input of one image: margins (N, 256), whose signs are the bits, geometry (N, 7) from `geometry_of`;
+output: (N, 256) numbers whose signs are the new bits.
 """
 import dataclasses
 import math
