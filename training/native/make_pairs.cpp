@@ -175,7 +175,7 @@ int run(const Arguments& arguments) {
 }  // namespace fbvins
 
 int main(int argc, char** argv) {
-  CLI::App app("Training pairs for the booster: pictures to keypoints and descriptors of warped, damaged views.");
+  CLI::App app("Training pairs for the booster: pictures to keypoints and margins of warped, damaged views.");
   fbvins::Arguments arguments;
   using fbvins::Part;
   app.add_option("--images", arguments.folders, "folders of PNG and JPEG, searched recursively");
