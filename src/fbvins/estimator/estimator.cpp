@@ -119,7 +119,7 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
   // The first solve may have moved the first frame far: Jacobians of the prior follow it.
   window_.restart_first_estimates();
   solve(out, thorough);
-  out.health = judge(frame, out);
+  out.health = judge(frame);
   if (out.health.state != HealthState::good) {
     running_ = false;
     initialiser_.reset();
@@ -160,7 +160,7 @@ Odometry Estimator::track(const TrackedFrame& frame, Duration rest) {
   timer.lap_ms();
   out.stats.standstill = standstill;
   choose_keyframe(standstill, out);
-  out.health = judge(frame, out);
+  out.health = judge(frame);
   if (out.health.has_pose()) shrink_window(out);
   out.stats.marginalise_ms = timer.lap_ms();
   return out;
@@ -230,7 +230,7 @@ void Estimator::hand_on_keyframes(int keyframe_zone) {
   }
 }
 
-Health Estimator::judge(const TrackedFrame& frame, const Odometry& out) {
+Health Estimator::judge(const TrackedFrame& frame) {
   const NavState& state = window_.newest().state;
   const int in_view = window_.landmarks_in_view();
   if (in_view >= options_.min_tracks) last_good_tracking_ = frame.t;
@@ -251,7 +251,6 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& out) {
   if (in_view == 0) return {HealthState::degraded, HealthReason::no_tracks};
   if (in_view < options_.min_tracks) return {HealthState::degraded, HealthReason::few_tracks};
   if (frame.stats.stereo == 0) return {HealthState::degraded, HealthReason::one_camera};
-  (void)out;
   return {HealthState::good, HealthReason::none};
 }
 

@@ -48,7 +48,7 @@ class Estimator {
   void choose_keyframe(bool standstill, Odometry& out);
   void shrink_window(Odometry& out);
   void hand_on_keyframes(int keyframe_zone);
-  Health judge(const TrackedFrame& frame, const Odometry& out);
+  Health judge(const TrackedFrame& frame);
   void restart();
   void fill(Odometry& out);
   WindowWeights weights() const;
