@@ -62,6 +62,7 @@ class Reader {
       ok_ = false;
       return;
     }
+    if (n == 0) return;  // an empty vector has no address to copy to
     std::memcpy(out, rest_.data(), n);
     rest_ = rest_.subspan(n);
   }
