@@ -309,7 +309,7 @@ TEST_P(WindowTwins, MinimumIsThatOfCeres) {
 }
 
 /// Frames at rest that see twenty landmarks with both cameras and one, half a metre away, with the left alone.
-WindowProblem window_at_rest(std::uint64_t seed) {
+Window window_at_rest(std::uint64_t seed) {
   Rng rng(seed);
   Window w;
   w.problem.calibration.T_BC1.p = Vec3(0.11, 0, 0);
@@ -327,14 +327,14 @@ WindowProblem window_at_rest(std::uint64_t seed) {
   w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(15);
   w.problem.prior.frames = {0};
-  return w.problem;
+  return w;
 }
 
 TEST(WindowAtRest, IsSolvedThoughOneDepthIsNextToFree) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    WindowProblem problem = window_at_rest(seed);
-    EXPECT_TRUE(problem.optimise(LmOptions{}).usable) << "seed " << seed;
-    EXPECT_LT(problem.landmarks.back().alpha_beta_rho.z(), 20) << "seed " << seed;
+    Window w = window_at_rest(seed);
+    EXPECT_TRUE(w.problem.optimise(LmOptions{}).usable) << "seed " << seed;
+    EXPECT_LT(w.problem.landmarks.back().alpha_beta_rho.z(), 20) << "seed " << seed;
   }
 }
 
