@@ -135,7 +135,7 @@ class WindowProblem {
   std::vector<Vec3> saved_landmarks_;
   Calibration saved_calibration_;
   Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)};  // one made of nothing has no state to copy
-  double factor_lambda_ = 0;  ///< damping in llt_
+  double factor_lambda_ = 0;                                          ///< damping in llt_
   double predicted_decrease_ = 0;
   double step_size_ = 0;
 };
