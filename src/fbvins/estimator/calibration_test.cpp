@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
@@ -63,6 +64,47 @@ TEST(OnlineCalibration, LeavesGoodExtrinsicsWhereTheyAre) {
   const Calibration found = fly(flight, flight.rig, options);
   EXPECT_LT(angle_to(found, flight.rig), 0.005);
   EXPECT_LT(shift_to(found, flight.rig), 0.005);
+}
+
+/// Scale hangs on the distance between the cameras; a flight that hardly moves says next to nothing about it.
+TEST(OnlineCalibration, HoldsTheCamerasToOneAnother) {
+  for (const double amplitude : {0.02, 0.6}) {
+    SimulatedFlight flight(Motion(amplitude, 0.5), 47);
+    EstimatorOptions options = exact_noise();
+    options.estimate_extrinsics = true;
+    const Calibration found = fly(flight, loose_mount(flight.rig, 0.01, 0.003), options);
+    const Pose<C0, C1> expected = flight.rig.T_C1C0().inverse(), between = found.T_BC0.inverse() * found.T_BC1;
+    EXPECT_LT((between.p - expected.p).norm(), 3e-4) << amplitude;
+    EXPECT_LT(so3_log(expected.q.conjugate() * between.q).norm(), 6e-4) << amplitude;
+  }
+}
+
+TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 48);
+  const Calibration calibrated{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+  const CalibrationBelief belief;
+  const WindowPrior prior = with_calibration_belief(first_frame_prior(InitialiserOptions{}, NavState{}), belief, calibrated);
+  ASSERT_EQ(prior.quadratic.size(), kCalibrationSize + 15);
+  WindowProblem problem;
+  problem.weights.estimate_extrinsics = true;
+  const auto cost = [&](const StereoRig& rig) {
+    problem.calibration = {rig.T_BC0, rig.T_BC1, 0.0};
+    Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
+    dx.head<kCalibrationSize>() = problem.calibration_displacement(calibrated);
+    return prior.quadratic.cost(dx);
+  };
+  // Turned together by one standard deviation about an axis through the IMU: the left camera's rotation, and its position
+  // on the lever arm; nothing of what lies between the cameras.
+  const StereoRig turned = loose_mount(flight.rig, belief.rotation_sigma_rad, 0);
+  const double moved = (turned.T_BC0.p - flight.rig.T_BC0.p).norm() / belief.position_sigma_m;
+  EXPECT_NEAR(cost(turned), 0.5 * (1 + moved * moved), 0.02);
+  // The right camera alone, along the baseline.
+  StereoRig stretched = flight.rig;
+  stretched.T_BC1.p += belief.stereo_position_sigma_m * (flight.rig.T_BC1.p - flight.rig.T_BC0.p).normalized();
+  EXPECT_NEAR(cost(stretched), 0.5, 1e-6);
+  StereoRig squinting = flight.rig;
+  squinting.T_BC1.q = squinting.T_BC1.q * so3_exp(belief.stereo_rotation_sigma_rad * Vec3::UnitY());
+  EXPECT_NEAR(cost(squinting), 0.5, 1e-6);
 }
 
 TEST(OnlineCalibration, TouchesNothingWhenOff) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "fbvins/core/stage_timer.hpp"
+#include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
@@ -19,28 +20,6 @@ ImuNoise scaled(ImuNoise noise, const EstimatorOptions& o) {
   noise.gyro_random_walk_radps2_rthz *= o.gyro_walk_scale;
   noise.accel_random_walk_mps3_rthz *= o.accel_walk_scale;
   return noise;
-}
-
-/// What is believed of the first frame before any measurement: position and heading are a choice of W,
-/// biases are near zero, tilt and velocity are wide open. The initial solution is where the optimiser
-/// starts, not a belief: it was made from the measurements the window still holds.
-WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state) {
-  constexpr double kChosenSigma = 1e-3;  // m and rad: the gauge
-  Vec15 sigma;
-  sigma << Vec3::Constant(kChosenSigma), Vec3::Constant(o.tilt_sigma_rad), Vec3::Constant(o.velocity_sigma_mps),
-      Vec3::Constant(o.gyro_bias_sigma_radps), Vec3::Constant(o.accel_bias_sigma_mps2);
-  WindowPrior prior;
-  prior.frames = {0};
-  prior.quadratic.g = Eigen::VectorXd::Zero(15);
-  prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
-  // Yaw is about the world's vertical, which in B is R^T z.
-  const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
-  const double tilt = 1.0 / (o.tilt_sigma_rad * o.tilt_sigma_rad), yaw = 1.0 / (kChosenSigma * kChosenSigma);
-  prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = tilt * Mat3::Identity() + (yaw - tilt) * up_B * up_B.transpose();
-  Vec15 from_belief = Vec15::Zero();
-  from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
-  prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
-  return prior;
 }
 
 }  // namespace
@@ -110,7 +89,10 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
     }
     window_.add_frame(std::move(f), start->frames[i].features, calibration_);
   }
-  window_.set_prior(first_frame_prior(options_.initialiser, window_.frames().front().state));
+  WindowPrior belief = first_frame_prior(options_.initialiser, window_.frames().front().state);
+  if (options_.estimate_extrinsics || options_.estimate_time_offset)
+    belief = with_calibration_belief(std::move(belief), options_.calibration, {rig_.T_BC0, rig_.T_BC1, 0.0});
+  window_.set_prior(std::move(belief));
   // Tilt, velocity and biases hardly move the cost of so short a time: do not stop on its decrease.
   const LmOptions thorough{.max_iterations = 30, .min_decrease = 1e-9};
   running_ = true;

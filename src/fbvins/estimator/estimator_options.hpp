@@ -59,6 +59,25 @@ struct KeyframeOptions {
   }
 };
 
+/// How far the calibration may be off, where it is estimated.
+struct CalibrationBelief {
+  double rotation_sigma_rad = 0.02;
+  double position_sigma_m = 0.01;
+  double stereo_rotation_sigma_rad = 2e-4;
+  double stereo_position_sigma_m = 1e-4;
+  double time_offset_sigma_s = 0.005;
+
+  template <class V>
+  void visit(V&& v) {
+    v("rotation_sigma_rad", rotation_sigma_rad, "rad", "prior standard deviation of the cameras' rotation to the IMU", 1e-6, 1.0);
+    v("position_sigma_m", position_sigma_m, "m", "prior standard deviation of the cameras' position in the IMU's frame", 1e-6, 1.0);
+    v("stereo_rotation_sigma_rad", stereo_rotation_sigma_rad, "rad", "the same of the rotation between the cameras", 1e-6, 1.0);
+    v("stereo_position_sigma_m", stereo_position_sigma_m, "m", "the same of the right camera's position in the left one's frame",
+      1e-6, 1.0);
+    v("time_offset_sigma_s", time_offset_sigma_s, "s", "prior standard deviation of the time offset", 1e-6, 1.0);
+  }
+};
+
 struct EstimatorOptions {
   InitialiserOptions initialiser;
   KeyframeOptions keyframes;
@@ -75,6 +94,7 @@ struct EstimatorOptions {
   double accel_walk_scale = 0.4;
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
+  CalibrationBelief calibration;
   double standstill_velocity_sigma_mps = 0.01;
   double max_image_gap_s = 3.0;
   double max_imu_gap_s = 1.0;
@@ -100,6 +120,7 @@ struct EstimatorOptions {
     v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
+    v.group("calibration", calibration, "how far the calibration is believed, where it is refined");
     v("standstill_velocity_sigma_mps", standstill_velocity_sigma_mps, "m/s",
       "how firmly a recognised standstill holds the velocity at zero", 1e-4, 1.0);
     v("max_image_gap_s", max_image_gap_s, "s", "longest time without usable images bridged by the IMU", 0.1, 60.0);

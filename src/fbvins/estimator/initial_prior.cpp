@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/initial_prior.hpp"
+
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+double information(double sigma) { return 1 / (sigma * sigma); }
+
+}  // namespace
+
+WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state) {
+  constexpr double kChosenSigma = 1e-3;  // m and rad: the gauge
+  Vec15 sigma;
+  sigma << Vec3::Constant(kChosenSigma), Vec3::Constant(o.tilt_sigma_rad), Vec3::Constant(o.velocity_sigma_mps),
+      Vec3::Constant(o.gyro_bias_sigma_radps), Vec3::Constant(o.accel_bias_sigma_mps2);
+  WindowPrior prior;
+  prior.frames = {0};
+  prior.quadratic.g = Eigen::VectorXd::Zero(15);
+  prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  // Yaw is about the world's vertical, which in B is R^T z.
+  const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
+  const double tilt = information(o.tilt_sigma_rad), yaw = information(kChosenSigma);
+  prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = tilt * Mat3::Identity() + (yaw - tilt) * up_B * up_B.transpose();
+  Vec15 from_belief = Vec15::Zero();
+  from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
+  prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
+  return prior;
+}
+
+WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& belief, const Calibration& calibrated) {
+  // Of T_C0C1 = T_BC0^-1 T_BC1, over T_BC0 (dp, dtheta), T_BC1 (dp, dtheta):
+  // dp = R_0^T (dp_1 - dp_0) + p_01 x dtheta_0, dtheta = dtheta_1 - R_01^T dtheta_0.
+  const Mat3 R_0 = calibrated.T_BC0.R(), R_01 = R_0.transpose() * calibrated.T_BC1.R();
+  const Vec3 p_01 = R_0.transpose() * (calibrated.T_BC1.p - calibrated.T_BC0.p);
+  Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();
+  J.block<3, 3>(0, 0) = -R_0.transpose();
+  J.block<3, 3>(0, 3) = hat(p_01);
+  J.block<3, 3>(0, 6) = R_0.transpose();
+  J.block<3, 3>(3, 3) = -R_01.transpose();
+  J.block<3, 3>(3, 9).setIdentity();
+  Vec6 between;
+  between << Vec3::Constant(information(belief.stereo_position_sigma_m)), Vec3::Constant(information(belief.stereo_rotation_sigma_rad));
+
+  QuadraticPrior both;
+  const int rest = prior.quadratic.size();
+  both.g.setZero(kCalibrationSize + rest);
+  both.g.tail(rest) = prior.quadratic.g;
+  both.H.setZero(both.size(), both.size());
+  both.H.bottomRightCorner(rest, rest) = prior.quadratic.H;
+  both.H.topLeftCorner<12, 12>() = J.transpose() * between.asDiagonal() * J;
+  both.H.diagonal().head<3>().array() += information(belief.position_sigma_m);
+  both.H.diagonal().segment<3>(3).array() += information(belief.rotation_sigma_rad);
+  both.H(kTimeOffsetIndex, kTimeOffsetIndex) = information(belief.time_offset_sigma_s);
+  prior.quadratic = std::move(both);
+  prior.with_calibration = true;
+  prior.calibration = calibrated;
+  return prior;
+}
+
+}  // namespace fbvins
