@@ -59,7 +59,7 @@ int train(const Arguments& arguments) {
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (arguments.boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return fail(stage.error().message);
-  OrbExtractor extractor(arguments.orb);
+  OrbExtractor extractor(arguments.orb, (*stage)->changes_descriptors());
   OrbFeatures features;
   std::vector<std::vector<Descriptor>> images;
   std::size_t descriptors = 0;

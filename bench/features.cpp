@@ -32,7 +32,7 @@ namespace {
 struct Arguments {
   std::vector<std::string> photos;
   std::string keyframes;
-  std::vector<std::string> weights = {"boost-s"};
+  std::vector<std::string> weights = {"boost-s", "boost-b"};
   int every = 1, features = 500, seed = 4242;
   bool time = false;
 };
@@ -51,7 +51,7 @@ struct Described {
 
 class Describer {
  public:
-  Describer(int features, const std::vector<BoosterWeights>& weights) : extractor_(options(features)) {
+  Describer(int features, const std::vector<BoosterWeights>& weights) : extractor_(options(features), true) {
     for (const BoosterWeights& w : weights) networks_.emplace_back(w, BoosterPrecision::int8, best_int8_kernel());
   }
 
@@ -237,7 +237,8 @@ int times(const Arguments& arguments, const std::vector<BoosterWeights>& weights
           keypoints[i].pixel = Vec2(rng.uniform(0, 752), rng.uniform(0, 480));
           keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));
           keypoints[i].angle_rad = static_cast<float>(rng.uniform(-std::numbers::pi, std::numbers::pi));
-          for (std::int8_t& m : margins[i].of_bit) m = static_cast<std::int8_t>(rng.uniform(-80, 80));
+          for (auto* half : {&margins[i].of_bit, &margins[i].around})
+            for (std::int8_t& m : *half) m = static_cast<std::int8_t>(rng.uniform(-80, 80));
         }
         fmt::print(" {:.2f} |", cpu_ms(network, keypoints, margins));
       }

@@ -99,10 +99,10 @@ double seen_from(const StereoRig& rig, const View& a, const View& b) {
   return points > 0 ? static_cast<double>(inside) / points : 0;
 }
 
-void within(const Recording& r, const Vocabulary& vocabulary) {
+void within(const Recording& r, const Vocabulary& vocabulary, const PlaceVerifierOptions& verification) {
   InvertedIndex index(vocabulary.words());
   for (std::size_t i = 0; i < r.views.size(); ++i) index.add(KeyframeId{static_cast<std::int64_t>(i)}, r.views[i].place.words);
-  PlaceVerifier verifier({});
+  PlaceVerifier verifier(verification);
   int sharing = 0, found = 0, retrieved = 0, accepted = 0, wrong = 0;
   double verify_ms = 0, verified = 0;
   std::vector<double> error_mm, error_mrad, nees;
@@ -149,8 +149,8 @@ void within(const Recording& r, const Vocabulary& vocabulary) {
              a.median, p.rmse, a.rmse, n.median, n.mean);
 }
 
-void across(const Recording& a, const Recording& b) {
-  PlaceVerifier verifier({});
+void across(const Recording& a, const Recording& b, const PlaceVerifierOptions& verification) {
+  PlaceVerifier verifier(verification);
   int queries = 0, most = 0;
   std::vector<std::string> accepted;
   for (std::size_t i = 0; i < a.views.size(); ++i) {
@@ -184,8 +184,9 @@ int main(int argc, char** argv) {
   const int every = every_text != nullptr ? std::atoi(every_text) : 1;
   const auto first = load(argv[2], *vocabulary, every);
   if (!first) return 2;
-  within(*first, *vocabulary);
+  const PlaceVerifierOptions verification = vocabulary->kind() == kBoostedDescriptors ? for_boosted({}) : PlaceVerifierOptions{};
+  within(*first, *vocabulary, verification);
   for (int i = 3; i < argc; ++i)
-    if (const auto other = load(argv[i], *vocabulary, 16)) across(*first, *other);
+    if (const auto other = load(argv[i], *vocabulary, 16)) across(*first, *other, verification);
   return 0;
 }

@@ -6,7 +6,7 @@ import torch
 MOST = 500
 MARGIN_UNIT = 1 / 32  # features/keypoint.hpp
 VIEW = np.dtype([("count", "<i4"), ("width", "<i4"), ("height", "<i4"), ("keypoints", "<f4", (MOST, 6)),
-                 ("margins", "i1", (MOST, 256))])
+                 ("margins", "i1", (MOST, 512))])
 PAIR = np.dtype([("picture", "<i4"), ("condition", "<i4"), ("a_in_b", "<f4", (MOST, 2)), ("a", VIEW), ("b", VIEW)])
 CONDITIONS = ["small motion", "viewpoint", "light change", "low light and blur", "all at once"]
 
@@ -16,11 +16,12 @@ def open_pairs(path):
 
 
 class Views:
-    """A batch of views as tensors: margins (B, N, 256) and their signs, the bits, as +-1; keypoints (B, N, 6), valid (B, N)."""
+    """A batch of views as tensors: margins (B, N, 512), of the bits and of the surroundings; the signs of the former, the
+    bits (B, N, 256), as +-1; keypoints (B, N, 6), valid (B, N)."""
 
     def __init__(self, records):
         self.margins = torch.from_numpy(records["margins"].astype(np.float32)) * MARGIN_UNIT
-        self.bits = torch.where(self.margins > 0, 1.0, -1.0)
+        self.bits = torch.where(self.margins[..., :256] > 0, 1.0, -1.0)
         self.keypoints = torch.from_numpy(np.ascontiguousarray(records["keypoints"]))
         self.width = torch.from_numpy(records["width"].astype(np.float32))
         self.height = torch.from_numpy(records["height"].astype(np.float32))

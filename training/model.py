@@ -2,8 +2,8 @@
 """The booster's network (paper 2.2.2, eq. 6-8): descriptors and keypoint geometry in, better bits out.
 
 One architecture, two sizes. `src/fbvins/features/booster_network.hpp` is the same in C++; docs/derivations/booster.md
-explains it. Input of one image: margins (N, 256), whose signs are the bits, geometry (N, 7) from `geometry_of`;
-output: (N, 256) numbers whose signs are the new bits.
+explains it. Input of one image: margins (N, 512), of which the first 256 have the signs of the bits, geometry (N, 7) from
+`geometry_of`; output: (N, 256) numbers whose signs are the new bits.
 """
 import dataclasses
 import math
@@ -22,13 +22,17 @@ class Size:
     keypoint_hidden: tuple
     layers: int
     residual: bool  # the input added to the output
-    margins: bool  # the input is how clearly each bit was decided rather than +-1
+    margins: bool  # the input is how clearly each bit was decided, here and in the surroundings, rather than +-1
     bits: int = 256
+
+    @property
+    def inputs(self):
+        return 2 * self.bits if self.margins else self.bits
 
 
 SIZES = {
-    "boost-b": Size(256, 512, (32, 64, 128), 4, residual=False, margins=False),
-    "boost-s": Size(160, 384, (32, 64), 1, residual=True, margins=True),
+    "boost-b": Size(256, 512, (32, 64, 128), 4, residual=True, margins=True),
+    "boost-s": Size(128, 320, (32, 64), 1, residual=True, margins=True),
 }
 
 
@@ -72,24 +76,27 @@ class Layer(nn.Module):
 
 
 class Booster(nn.Module):
-    """`geometry` and `cross` switch the two paths off, to learn what they bring."""
+    """`geometry`, `cross` and `around` switch the two paths and half of the input off, to learn what they bring."""
 
-    def __init__(self, size, geometry=True, cross=True):
+    def __init__(self, size, geometry=True, cross=True, around=True):
         super().__init__()
-        self.size, self.geometry, self.cross = size, geometry, cross
-        self.descriptor1 = nn.Linear(size.bits, size.descriptor_hidden)
+        self.size, self.geometry, self.cross, self.around = size, geometry, cross, around
+        self.descriptor1 = nn.Linear(size.inputs, size.descriptor_hidden)
         self.descriptor2 = nn.Linear(size.descriptor_hidden, size.width)
         widths = [GEOMETRY, *size.keypoint_hidden, size.width]
         self.keypoint = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:]))
         self.layers = nn.ModuleList(Layer(size.width) for _ in range(size.layers))
         self.head = nn.Linear(size.width, size.bits)
         if size.residual:
-            self.skip = nn.Linear(size.bits, size.bits, bias=False)
+            self.skip = nn.Linear(size.inputs, size.bits, bias=False)
             with torch.no_grad():
-                self.skip.weight.copy_(torch.eye(size.bits))
+                self.skip.weight.copy_(torch.eye(size.bits, size.inputs))
 
     def forward(self, margins, geometry, valid):
-        x = margins if self.size.margins else torch.where(margins > 0, 1.0, -1.0)
+        bits = self.size.bits
+        x = margins if self.size.margins else torch.where(margins[..., :bits] > 0, 1.0, -1.0)
+        if not self.around:
+            x = torch.cat([x[..., :bits], torch.zeros_like(x[..., bits:])], -1)
         z = self.descriptor2(torch.relu(self.descriptor1(x)))
         if self.geometry:
             g = geometry

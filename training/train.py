@@ -52,6 +52,7 @@ def arguments_of(argv):
     p.add_argument("--no-cross", action="store_true", help="without cross-boosting")
     p.add_argument("--no-residual", action="store_true", help="without the path from the input straight to the output")
     p.add_argument("--no-margins", action="store_true", help="told only the bits, not how clearly each was decided")
+    p.add_argument("--no-around", action="store_true", help="without the margins of the surroundings")
     p.add_argument("--head-scale", type=float, default=0.1, help="of the last layer's random start")
     p.add_argument("--tolerance", type=float, default=3.0, help="px within which two keypoints are one point")
     p.add_argument("--start", help="checkpoint whose weights to begin with")
@@ -195,7 +196,7 @@ def train(a):
         size.residual = False
     if a.no_margins:
         size.margins = False
-    model = Booster(size, not a.no_geometry, not a.no_cross).to(device)
+    model = Booster(size, not a.no_geometry, not a.no_cross, not a.no_around).to(device)
     with torch.no_grad():
         model.head.weight *= a.head_scale
         model.head.bias *= a.head_scale
@@ -223,7 +224,7 @@ def train(a):
         torch.save({"model": model.state_dict(), "optimiser": optimiser.state_dict(), "step": step,
                     "spent_s": schedule.spent_s(), "averaged": averaged, "arguments": vars(a)}, out / "checkpoint.tmp")
         (out / "checkpoint.tmp").rename(out / "checkpoint.pt")
-        best = Booster(size, model.geometry, model.cross)
+        best = Booster(size, model.geometry, model.cross, model.around)
         best.load_state_dict(averaged if final or step > 300 else model.state_dict())
         round_weights(best)
         save_weights(out / f"{a.size}.safetensors", best, {"name": a.size, "steps": step, "minutes": round(schedule.spent_s() / 60)})

@@ -4,7 +4,7 @@ import dataclasses
 import json
 import struct
 
-FORMAT = "fbvins-booster-2"
+FORMAT = "fbvins-booster-3"
 
 
 def round_weights(model):

@@ -21,7 +21,8 @@ int main(int argc, char** argv) {
     keypoints[i].pixel = Vec2(x, y);
     keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));
     keypoints[i].angle_rad = static_cast<float>(rng.uniform(-3, 3));
-    for (std::int8_t& m : margins[i].of_bit) m = static_cast<std::int8_t>(static_cast<int>(rng.below(255)) - 127);
+    for (auto* half : {&margins[i].of_bit, &margins[i].around})
+      for (std::int8_t& m : *half) m = static_cast<std::int8_t>(static_cast<int>(rng.below(255)) - 127);
   }
   int kernels = 0;
   for (const Int8Kernel kernel : {Int8Kernel::portable, Int8Kernel::avx2, Int8Kernel::avx512_vnni, Int8Kernel::neon_dot}) {

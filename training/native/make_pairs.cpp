@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -36,7 +35,7 @@ constexpr std::size_t kMost = 500;
 struct ViewRecord {
   std::int32_t count = 0, width = 0, height = 0;
   float keypoints[kMost][6] = {};  // x, y (px), level, scale, angle (rad), score
-  std::int8_t margins[kMost][256] = {};
+  Margins margins[kMost] = {};
 };
 struct PairRecord {
   std::int32_t picture = 0, condition = 0;
@@ -56,7 +55,7 @@ void record(const OrbFeatures& features, const Image& image, ViewRecord& out) {
                           k.angle_rad,
                           k.score};
     std::copy(std::begin(row), std::end(row), out.keypoints[i]);
-    std::memcpy(out.margins[i], features.margins[i].of_bit.data(), 256);
+    out.margins[i] = features.margins[i];
   }
 }
 
@@ -69,7 +68,7 @@ struct Arguments {
 
 class PairWriter {
  public:
-  explicit PairWriter(const Arguments& arguments) : out_(arguments.out, std::ios::binary), extractor_(options(arguments)) {}
+  explicit PairWriter(const Arguments& arguments) : out_(arguments.out, std::ios::binary), extractor_(options(arguments), true) {}
 
   /// `transfer`: a pixel of a to where it is in b, or nothing.
   template <class Transfer>

@@ -70,7 +70,8 @@ struct CalibrationBelief {
   template <class V>
   void visit(V&& v) {
     v("rotation_sigma_rad", rotation_sigma_rad, "rad", "prior standard deviation of the cameras' rotation to the IMU", 1e-6, 1.0);
-    v("position_sigma_m", position_sigma_m, "m", "prior standard deviation of the cameras' position in the IMU's frame", 1e-6, 1.0);
+    v("position_sigma_m", position_sigma_m, "m", "prior standard deviation of the cameras' position in the IMU's frame", 1e-6,
+      1.0);
     v("stereo_rotation_sigma_rad", stereo_rotation_sigma_rad, "rad", "the same of the rotation between the cameras", 1e-6, 1.0);
     v("stereo_position_sigma_m", stereo_position_sigma_m, "m", "the same of the right camera's position in the left one's frame",
       1e-6, 1.0);

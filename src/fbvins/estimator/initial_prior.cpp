@@ -41,7 +41,8 @@ WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& 
   J.block<3, 3>(3, 3) = -R_01.transpose();
   J.block<3, 3>(3, 9).setIdentity();
   Vec6 between;
-  between << Vec3::Constant(information(belief.stereo_position_sigma_m)), Vec3::Constant(information(belief.stereo_rotation_sigma_rad));
+  between << Vec3::Constant(information(belief.stereo_position_sigma_m)),
+      Vec3::Constant(information(belief.stereo_rotation_sigma_rad));
 
   QuadraticPrior both;
   const int rest = prior.quadratic.size();

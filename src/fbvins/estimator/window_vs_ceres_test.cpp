@@ -322,7 +322,8 @@ Window window_at_rest(std::uint64_t seed) {
   test::add_landmark(w, Vec3(0.1, 0.1, 0.5), 0, rng);
   WindowLandmark& alone = w.problem.landmarks.back();
   auto& seen = w.problem.observations;
-  seen.erase(std::remove_if(seen.begin() + alone.first_observation, seen.end(), [](const auto& o) { return o.right; }), seen.end());
+  seen.erase(std::remove_if(seen.begin() + alone.first_observation, seen.end(), [](const auto& o) { return o.right; }),
+             seen.end());
   alone.observation_count = static_cast<int>(seen.size()) - alone.first_observation;
   w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(15);

@@ -31,7 +31,7 @@ OrbFeatures features_of_an_image() {
       for (int x = x0; x < std::min(376, x0 + 25); ++x) image.at(x, y) = grey;
   }
   OrbFeatures features;
-  OrbExtractor(OrbOptions{}).extract(image.view(), features);
+  OrbExtractor(OrbOptions{}, true).extract(image.view(), features);
   return features;
 }
 
@@ -72,7 +72,8 @@ StoredVectors read_vectors(const std::string& path) {
     Descriptor d;
     Margins m;
     for (std::size_t b = 0; b < 256; ++b) {
-      m.of_bit[b] = static_cast<std::int8_t>(margins[256 * i + b]);
+      m.of_bit[b] = static_cast<std::int8_t>(margins[kMarginsPerFeature * i + b]);
+      m.around[b] = static_cast<std::int8_t>(margins[kMarginsPerFeature * i + 256 + b]);
       d.bits[b / 64] |= static_cast<std::uint64_t>(m.of_bit[b] > 0) << (b % 64);
     }
     out.features.keypoints.push_back(k);
@@ -129,7 +130,8 @@ TEST_P(ShippedWeights, GiveTheSameBitsWithEveryKernelAndEveryTime) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedWeights, testing::Values("boost-s"), [](const auto&) { return std::string("s"); });
+INSTANTIATE_TEST_SUITE_P(All, ShippedWeights, testing::Values("boost-s", "boost-b"),
+                         [](const auto& p) { return p.param.substr(6); });
 
 TEST(Booster, TakesAnyNumberOfKeypoints) {
   auto stage = make_booster_stage(BoosterOptions{});
@@ -151,8 +153,8 @@ TEST(BoosterWeights, ThatDoNotFitAreNamed) {
     const auto weights = parse_booster_weights(bytes);
     return weights ? std::string() : weights.error().message;
   };
-  EXPECT_EQ(error_with("fbvins-booster-2", "fbvins-booster-3"),
-            "metadata \"format\" is \"fbvins-booster-3\", not \"fbvins-booster-2\": these are no weights of this version");
+  EXPECT_EQ(error_with("fbvins-booster-3", "fbvins-booster-4"),
+            "metadata \"format\" is \"fbvins-booster-4\", not \"fbvins-booster-3\": these are no weights of this version");
   EXPECT_EQ(error_with("\"head.bias\"", "\"head.boas\""), "tensor \"head.bias\" is missing");
   EXPECT_EQ(error_with("\"bits\":\"256\"", "\"bits\":\"255\""), "metadata \"bits\" is \"255\", not a number from 256 to 256");
   const auto cut = parse_booster_weights(std::string_view(good).substr(0, good.size() - 1));

@@ -6,12 +6,13 @@
 #include <charconv>
 #include <optional>
 
+#include "fbvins/features/keypoint.hpp"
 #include "fbvins/features/safetensors.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::string_view kFormat = "fbvins-booster-2";
+constexpr std::string_view kFormat = "fbvins-booster-3";
 constexpr int kBits = 256, kLargestSide = 1024, kMostLayers = 16, kMostKeypointLayers = 8;
 
 Error damaged(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -115,13 +116,14 @@ Result<BoosterWeights> take_weights(SafeTensors file) {
   if (take.wrong()) return damaged(*take.wrong());
   widths.insert(widths.begin(), kBoosterGeometry);
   widths.push_back(w.width);
-  w.descriptor1 = take.linear("descriptor1", hidden, kBits);
+  const int inputs = w.margins ? kMarginsPerFeature : kBits;
+  w.descriptor1 = take.linear("descriptor1", hidden, inputs);
   w.descriptor2 = take.linear("descriptor2", w.width, hidden);
   for (std::size_t i = 0; i + 1 < widths.size(); ++i)
     w.keypoint.push_back(take.linear(fmt::format("keypoint.{}", i), widths[i + 1], widths[i]));
   for (int l = 0; l < layers; ++l) w.layers.push_back(take.layer(fmt::format("layers.{}", l), w.width));
   w.head = take.linear("head", kBits, w.width);
-  if (residual) w.skip = {kBits, kBits, take.tensor("skip.weight", {kBits, kBits}), std::vector<float>(kBits, 0.0f)};
+  if (residual) w.skip = {kBits, inputs, take.tensor("skip.weight", {kBits, inputs}), std::vector<float>(kBits, 0.0f)};
   if (take.wrong()) return damaged(*take.wrong());
   if (!file.tensors.empty())
     return damaged(fmt::format("tensor \"{}\" does not belong to this network", file.tensors.begin()->first));

@@ -36,7 +36,7 @@ struct BoosterWeights {
   std::vector<BoosterLayerWeights> layers;
   LinearWeights head;
   LinearWeights skip;    ///< from the input straight to the output; no outputs without the residual
-  bool margins = false;  ///< the input is margins, otherwise bits as +1 and -1
+  bool margins = false;  ///< the input is kMarginsPerFeature margins, otherwise 256 bits as +1 and -1
   std::string name;      ///< of the size, as trained
 };
 

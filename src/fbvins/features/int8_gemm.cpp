@@ -106,10 +106,11 @@ void QuantisedRows::set_values(const std::int8_t* whole, int rows, int columns, 
   std::fill_n(scale.begin(), rows, unit);
 }
 
-void QuantisedRows::set_signs(const std::int8_t* whole, int rows, int columns) {
+void QuantisedRows::set_signs(const std::int8_t* whole, int rows, int columns, int stride) {
   resize(rows, columns);
-  std::transform(whole, whole + static_cast<std::ptrdiff_t>(rows) * columns, values.begin(),
-                 [](std::int8_t v) { return static_cast<std::int8_t>(v > 0 ? 1 : -1); });
+  for (std::ptrdiff_t r = 0; r < rows; ++r)
+    std::transform(whole + r * stride, whole + r * stride + columns, values.begin() + r * columns,
+                   [](std::int8_t v) { return static_cast<std::int8_t>(v > 0 ? 1 : -1); });
   std::fill_n(scale.begin(), rows, 1.0f);
 }
 

@@ -41,8 +41,8 @@ class QuantisedRows {
   void quantise_rest(const float* x, const QuantisedRows& coarse);
   /// Takes numbers that are whole already, [count][inputs], worth `unit` each; exact.
   void set_values(const std::int8_t* whole, int count, int inputs, float unit);
-  /// Takes +1 of those above zero and -1 of the others; exact.
-  void set_signs(const std::int8_t* whole, int count, int inputs);
+  /// Takes +1 of those above zero and -1 of the others; exact. Rows begin `stride` numbers apart.
+  void set_signs(const std::int8_t* whole, int count, int inputs, int stride);
 
   int count = 0, inputs = 0;
   std::vector<std::int8_t> values;  ///< [count rounded up][inputs], rows past count are zero

@@ -143,7 +143,7 @@ TEST(QuantisedRows, KeepWholeNumbersSignsAndZerosExactly) {
   rows.set_values(whole.data(), 2, 4, 0.25f);
   EXPECT_TRUE(std::equal(whole.begin(), whole.end(), rows.values.begin()));
   EXPECT_EQ(rows.scale[1], 0.25f);
-  rows.set_signs(whole.data(), 1, 8);
+  rows.set_signs(whole.data(), 1, 8, 8);
   const std::vector<std::int8_t> signs = {-1, -1, -1, 1, 1, 1, -1, -1};
   EXPECT_TRUE(std::equal(signs.begin(), signs.end(), rows.values.begin()));
   EXPECT_EQ(rows.scale[0], 1.0f);

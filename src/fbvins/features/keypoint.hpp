@@ -25,13 +25,17 @@ struct Descriptor {
   bool operator==(const Descriptor&) const = default;
 };
 
-/// How clearly each of a descriptor's comparisons was decided: the difference of the two grey values over the root mean
-/// square of all 256, in units of kMarginUnit, saturated. Positive where the bit is set: the signs are the descriptor.
+/// How clearly comparisons of grey values were decided: the difference over the root mean square of all 256, in units of
+/// kMarginUnit, saturated. of_bit is positive where the bit is set: its signs are the descriptor. `around` is the same of a
+/// pattern twice as wide and smoothed twice as much: less noise, more surroundings, less that survives a change of view.
 struct Margins {
   std::array<std::int8_t, 256> of_bit{};
+  std::array<std::int8_t, 256> around{};
   bool operator==(const Margins&) const = default;
 };
 inline constexpr float kMarginUnit = 1.0f / 32;
+inline constexpr int kMarginsPerFeature = 512;
+static_assert(sizeof(Margins) == kMarginsPerFeature);  // the rows of the booster's input
 
 /// Number of bits that differ: 0 the same, about 128 unrelated.
 inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
@@ -44,7 +48,7 @@ inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
 struct OrbFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
-  std::vector<Margins> margins;  ///< of the descriptors as extracted, whatever became of them since
+  std::vector<Margins> margins;  ///< of the descriptors as extracted, whatever became of them since; only where asked for
 
   std::size_t size() const { return keypoints.size(); }
   void clear() {

@@ -12,7 +12,7 @@ constexpr int kScoredPerCell = 4;
 
 }  // namespace
 
-OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
+OrbExtractor::OrbExtractor(const OrbOptions& options, bool margins) : options_(options), with_margins_(margins) {
   // Features in proportion to the side of the level: coarse levels have less room but survive blur.
   double total = 0;
   for (int l = 0; l < options.levels; ++l) level_share_.push_back(std::pow(options.scale_factor, -l));
@@ -86,6 +86,11 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
   if (chosen_.empty()) return;
   const PyramidLevel& level = pyramid_.level(l);
   const PyramidLevel smooth = smooth_level(level, smooth_, scratch_);
+  PyramidLevel smooth_half;
+  if (with_margins_) {
+    half_.build({level.origin, level.width, level.height, level.stride}, 2);
+    smooth_half = smooth_level(half_.level(1), smooth_half_, scratch_);
+  }
   for (const Candidate& c : chosen_) {
     Keypoint keypoint;
     const Vec2 direction = centroid_direction(level, c.x, c.y);
@@ -95,7 +100,12 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
     keypoint.angle_rad = static_cast<float>(std::atan2(direction.y(), direction.x()));
     keypoint.score = c.harris;
     out.keypoints.push_back(keypoint);
-    steered_brief(smooth, c.x, c.y, direction, out.descriptors.emplace_back(), out.margins.emplace_back());
+    const Comparisons difference = compare(smooth, Vec2(c.x, c.y), direction);
+    out.descriptors.push_back(bits_of(difference));
+    if (!with_margins_) continue;
+    Margins& margins = out.margins.emplace_back();
+    margins_of(difference, margins.of_bit);
+    margins_of(compare(smooth_half, 0.5 * Vec2(c.x, c.y), direction), margins.around);
   }
 }
 

@@ -8,11 +8,13 @@
 //   extractor.extract(image.view(), features);
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "fbvins/features/fast.hpp"
 #include "fbvins/features/keypoint.hpp"
+#include "fbvins/features/pyramid.hpp"
 #include "fbvins/features/scale_pyramid.hpp"
 
 namespace fbvins {
@@ -41,7 +43,8 @@ inline constexpr int kOrbBorder = 12;
 
 class OrbExtractor {
  public:
-  explicit OrbExtractor(const OrbOptions& options);
+  /// `margins`: of interest to a stage that changes descriptors only, and computed for it only.
+  explicit OrbExtractor(const OrbOptions& options, bool margins = false);
 
   /// Replaces `out` by the features of the image (none for an empty one).
   void extract(const ImageView& image, OrbFeatures& out);
@@ -60,13 +63,15 @@ class OrbExtractor {
   void describe(int l, OrbFeatures& out);
 
   OrbOptions options_;
+  bool with_margins_;
   std::vector<double> level_share_;
   ScalePyramid pyramid_;
+  Pyramid half_;  // of one level
   FastBuffers fast_;
   std::vector<FastCorner> corners_;
   std::vector<Candidate> candidates_, chosen_;
   std::vector<std::int32_t> cell_count_;
-  std::vector<std::uint8_t> smooth_, scratch_;
+  std::vector<std::uint8_t> smooth_, smooth_half_, scratch_;
 };
 
 /// Harris response det(M) - 0.04 trace(M)^2 (eq. 2-3) over 8x8 gradients around (x, y); needs 5 px around.
@@ -75,7 +80,13 @@ float harris_score(const PyramidLevel& level, int x, int y);
 /// Direction of the intensity centroid (eq. 4) of the disc of radius 15 as a unit vector; needs 15 px around.
 Vec2 centroid_direction(const PyramidLevel& level, int x, int y);
 
-/// Steered BRIEF (eq. 5) on a smoothed level; direction is a unit vector.
-void steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction, Descriptor& descriptor, Margins& margins);
+/// Differences of grey values (second minus first point) of the pairs of orb_pattern().
+using Comparisons = std::array<std::int16_t, 256>;
+
+/// Of the pattern (eq. 5) around a pixel of a smoothed level, turned to a direction, a unit vector.
+Comparisons compare(const PyramidLevel& smooth, const Vec2& pixel, const Vec2& direction);
+
+Descriptor bits_of(const Comparisons& difference);
+void margins_of(const Comparisons& difference, std::array<std::int8_t, 256>& margins);
 
 }  // namespace fbvins

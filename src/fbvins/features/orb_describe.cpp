@@ -85,15 +85,17 @@ struct PatternLanes {
   }
 };
 
-/// Offsets of both points of the pairs after turning, rounded to whole pixels.
+/// Offsets of both points of the pairs after turning and moving by (x, y), rounded to whole pixels.
 FBVINS_KERNEL
-void turn_pattern(const PatternLanes& lanes, float c, float s, std::int32_t stride, std::int32_t* a, std::int32_t* b) {
+void turn_pattern(const PatternLanes& lanes, float c, float s, float x, float y, std::int32_t stride, std::int32_t* a,
+                  std::int32_t* b) {
   constexpr float kBias = 64.5f;  // truncation of positive numbers rounds without a library call
+  const float x0 = x + kBias, y0 = y + kBias;
   for (int i = 0; i < 256; ++i) {
-    const auto xa = static_cast<std::int32_t>(c * lanes.ax[i] - s * lanes.ay[i] + kBias) - 64;
-    const auto ya = static_cast<std::int32_t>(s * lanes.ax[i] + c * lanes.ay[i] + kBias) - 64;
-    const auto xb = static_cast<std::int32_t>(c * lanes.bx[i] - s * lanes.by[i] + kBias) - 64;
-    const auto yb = static_cast<std::int32_t>(s * lanes.bx[i] + c * lanes.by[i] + kBias) - 64;
+    const auto xa = static_cast<std::int32_t>(c * lanes.ax[i] - s * lanes.ay[i] + x0) - 64;
+    const auto ya = static_cast<std::int32_t>(s * lanes.ax[i] + c * lanes.ay[i] + y0) - 64;
+    const auto xb = static_cast<std::int32_t>(c * lanes.bx[i] - s * lanes.by[i] + x0) - 64;
+    const auto yb = static_cast<std::int32_t>(s * lanes.bx[i] + c * lanes.by[i] + y0) - 64;
     a[i] = ya * stride + xa;
     b[i] = yb * stride + xb;
   }
@@ -131,20 +133,30 @@ Vec2 centroid_direction(const PyramidLevel& level, int x, int y) {
   return length > 0 ? Vec2(m10 / length, m01 / length) : Vec2(1, 0);
 }
 
-void steered_brief(const PyramidLevel& smooth, int x, int y, const Vec2& direction, Descriptor& descriptor, Margins& margins) {
+Comparisons compare(const PyramidLevel& smooth, const Vec2& pixel, const Vec2& direction) {
   static const PatternLanes lanes;
   std::int32_t a[256], b[256];
-  turn_pattern(lanes, static_cast<float>(direction.x()), static_cast<float>(direction.y()),
-               static_cast<std::int32_t>(smooth.stride), a, b);
+  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
+  turn_pattern(lanes, static_cast<float>(direction.x()), static_cast<float>(direction.y()), static_cast<float>(pixel.x() - x),
+               static_cast<float>(pixel.y() - y), static_cast<std::int32_t>(smooth.stride), a, b);
   const std::uint8_t* centre = smooth.row(y) + x;
-  std::int16_t difference[256];
+  Comparisons difference;
   for (std::size_t i = 0; i < 256; ++i) difference[i] = static_cast<std::int16_t>(centre[b[i]] - centre[a[i]]);
+  return difference;
+}
+
+Descriptor bits_of(const Comparisons& difference) {
+  Descriptor descriptor;
   for (std::size_t word = 0; word < 4; ++word) {
     std::uint64_t bits = 0;
     for (std::size_t i = 0; i < 64; ++i) bits |= static_cast<std::uint64_t>(difference[64 * word + i] > 0) << i;
     descriptor.bits[word] = bits;
   }
-  scale_differences(difference, margins.of_bit.data());
+  return descriptor;
+}
+
+void margins_of(const Comparisons& difference, std::array<std::int8_t, 256>& margins) {
+  scale_differences(difference.data(), margins.data());
 }
 
 }  // namespace fbvins

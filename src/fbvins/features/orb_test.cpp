@@ -34,7 +34,7 @@ Picture picture(const Warp& warp, double contrast = 35, double noise = 1.5, std:
   static const NoiseTexture texture(7, 80);
   Picture p{warp, {}};
   const Image image = render_texture(376, 240, texture, warp, 120, contrast, noise, noise_seed);
-  OrbExtractor extractor(OrbOptions{.max_features = 300, .levels = 4});  // covers a scale of 1.7
+  OrbExtractor extractor(OrbOptions{.max_features = 300, .levels = 4}, true);  // covers a scale of 1.7
   extractor.extract(image.view(), p.features);
   return p;
 }
@@ -177,6 +177,55 @@ TEST(Orb, MarginsHaveTheSignsOfTheBitsAndDoNotFollowContrast) {
       ++compared;
     }
   EXPECT_GT(compared, 50);
+}
+
+TEST(Orb, MarginsAreComputedOnlyWhenAskedFor) {
+  const NoiseTexture texture(7, 80);
+  const Image image = render_texture(376, 240, texture, similarity(0, 1), 120, 35, 0, 1);
+  OrbFeatures with, without;
+  OrbExtractor(OrbOptions{}, true).extract(image.view(), with);
+  OrbExtractor(OrbOptions{}).extract(image.view(), without);
+  EXPECT_EQ(with.margins.size(), with.size());
+  EXPECT_EQ(without.margins.size(), 0u);
+  EXPECT_TRUE(with.descriptors == without.descriptors);
+}
+
+/// Share of the numbers of two margins that have another sign.
+double flipped(const std::array<std::int8_t, 256>& a, const std::array<std::int8_t, 256>& b) {
+  int n = 0;
+  for (std::size_t i = 0; i < 256; ++i) n += (a[i] > 0) != (b[i] > 0);
+  return n / 256.0;
+}
+
+TEST(Orb, SurroundingsReachTwiceAsFarAndFeelHalfTheNoise) {
+  const NoiseTexture texture(7, 80);
+  const auto smooth = [](const Image& image, std::vector<std::uint8_t>& out, bool half) {
+    Pyramid pyramid;
+    pyramid.build(image.view(), 2);
+    std::vector<std::uint8_t> scratch;
+    return smooth_level(pyramid.level(half ? 1 : 0), out, scratch);
+  };
+  const auto margins = [&](const Image& image) {
+    Margins m;
+    std::vector<std::uint8_t> pixels;
+    margins_of(compare(smooth(image, pixels, false), kCentre, Vec2(1, 0)), m.of_bit);
+    margins_of(compare(smooth(image, pixels, true), 0.5 * kCentre, Vec2(1, 0)), m.around);
+    return m;
+  };
+  const Image clean = render_texture(376, 240, texture, similarity(0, 1), 120, 35, 0, 1);
+  const Margins m = margins(clean);
+  double bit = 0, around = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const Margins noisy = margins(render_texture(376, 240, texture, similarity(0, 1), 120, 35, 25, seed));
+    bit += flipped(m.of_bit, noisy.of_bit) / 10, around += flipped(m.around, noisy.around) / 10;
+  }
+  EXPECT_LT(around, 0.7 * bit);
+
+  Image changed = clean;  // 20 to 24 px to the right of the keypoint
+  for (int y = 100; y < 140; ++y)
+    for (int x = 208; x < 212; ++x) changed.at(x, y) = static_cast<std::uint8_t>(255 - changed.at(x, y));
+  EXPECT_EQ(margins(changed).of_bit, m.of_bit);
+  EXPECT_GT(flipped(margins(changed).around, m.around), 0.02);
 }
 
 TEST(Hamming, CountsBitsAndRefusesAmbiguousMatches) {

@@ -19,7 +19,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       rig_(rig),
       stage_(std::move(stage)),
       predictor_(rig.T_BC0),
-      extractor_(options.orb),
+      extractor_(options.orb, stage_->changes_descriptors()),
       matcher_(options.matching),
       stereo_(rig, options.stereo),
       stereo_fill_in_(rig, options.stereo_fill_in, options.alignment),
@@ -97,7 +97,10 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
 
 void OrbFrontend::extract_left(const ImageView& image, FrontendStats& stats) {
   extractor_.extract(image, left_features_);
-  if (stage_->changes_descriptors()) raw_left_ = left_features_;
+  if (stage_->changes_descriptors()) {
+    raw_left_.keypoints = left_features_.keypoints;
+    raw_left_.descriptors = left_features_.descriptors;
+  }
   CpuTimer timer;
   stage_->improve(left_.width(), left_.height(), left_features_);
   stats.boost_ms = timer.lap_ms();

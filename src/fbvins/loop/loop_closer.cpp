@@ -25,6 +25,11 @@ Pose<B, B> as_body(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0.p}; }
 
 double angle_between(const Quat& a, const Quat& b) { return 2 * std::acos(std::min(1.0, std::abs(a.dot(b)))); }
 
+LoopOptions for_map(const PlaceMap& map, LoopOptions options) {
+  if (map.boosted) options.verification = for_boosted(options.verification);
+  return options;
+}
+
 }  // namespace
 
 LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary)
@@ -32,11 +37,11 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
 
 LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
                        std::unique_ptr<DescriptorStage> stage)
-    : options_(options),
+    : options_(for_map(map, options)),
       T_BC0_(rig.T_BC0),
       vocabulary_(std::move(vocabulary)),
       extractor_(rig, options.extraction, vocabulary_, std::move(stage)),
-      verifier_(options.verification),
+      verifier_(options_.verification),
       map_(std::move(map)),
       index_(vocabulary_.words()),
       frame_(options.drift),

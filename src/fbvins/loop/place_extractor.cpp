@@ -22,7 +22,7 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
       p_rl_(rig.T_C1C0().p),
       focal_px_(rig.left.focal_px()),
       baseline_m_(p_rl_.norm()),
-      orb_(options.orb) {}
+      orb_(options.orb, stage_->changes_descriptors()) {}
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_WB) {
   Place place;

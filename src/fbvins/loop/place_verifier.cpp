@@ -8,6 +8,13 @@
 
 namespace fbvins {
 
+PlaceVerifierOptions for_boosted(PlaceVerifierOptions options) {
+  constexpr int kFarthest = 60;  // 97 % of true pairs, docs/results.md
+  options.matching.max_distance = std::min(options.matching.max_distance, kFarthest);
+  options.guided_distance = std::min(options.guided_distance, kFarthest);
+  return options;
+}
+
 void PlaceVerifier::set_query(const Place& query) {
   query_ = &query;
   low_ = Vec2::Constant(1e9), high_ = Vec2::Constant(-1e9);

@@ -48,6 +48,9 @@ struct PlaceVerifierOptions {
   }
 };
 
+/// Boosted descriptors of one point lie nearer to one another than raw ones: no match is farther than suits them.
+PlaceVerifierOptions for_boosted(PlaceVerifierOptions options);
+
 /// A guess of the pose, and how far a feature may be from where it predicts it.
 struct PosePrediction {
   CameraFromCamera T_qc;
