@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A few steps of training on a few made-up pictures: the loss falls, the same seed gives the same weights, the weights
-file is read back as it was. Pairs of a simulated room show the same points where they say they do. train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
+file is read back as it was. Pairs of a simulated room show the same points where they say they do.
+train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
 import pathlib
 import subprocess
 import sys
@@ -17,7 +18,7 @@ except ImportError as missing:
 from dataset import Batch, open_pairs  # noqa: E402
 from losses import hamming  # noqa: E402
 from train import arguments_of, train  # noqa: E402
-from weights import load_model, load_weights  # noqa: E402
+from weights import FORMAT, load_model, load_weights  # noqa: E402
 
 
 def rooms_are_true(program, folder):
@@ -46,7 +47,7 @@ def main(program):
         assert np.mean(losses[-4:]) < 0.95 * np.mean(losses[:4]), "the loss does not fall"
         assert weights_of(f"{folder}/b")[1] == first, "the same seed gives other weights"
         meta, arrays = load_weights(f"{folder}/a/boost-s.safetensors")
-        assert meta["format"] == "fbvins-booster-2" and meta["steps"] == "16"
+        assert meta["format"] == FORMAT and meta["steps"] == "16"
         for name, tensor in load_model(f"{folder}/a/boost-s.safetensors").state_dict().items():
             assert np.array_equal(tensor.numpy(), arrays[name]), name
 
