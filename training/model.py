@@ -76,7 +76,8 @@ class Layer(nn.Module):
 
 
 class Booster(nn.Module):
-    """`geometry`, `cross` and `around` switch the two paths and half of the input off, to learn what they bring."""
+    """`geometry`, `cross` and `around` switch the two paths and half of the input off, to learn what they bring: weights to
+    compare, not to fly, where nothing is switched off."""
 
     def __init__(self, size, geometry=True, cross=True, around=True):
         super().__init__()

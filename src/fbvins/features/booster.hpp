@@ -21,7 +21,7 @@ struct BoosterOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("weights", weights, "", "boost-s or another name of shipped weights, or the path of a .safetensors file");
+    v("weights", weights, "", "shipped weights, boost-s (small) or boost-b, or the path of a .safetensors file");
     v("precision", precision, "int8|float32", "whole numbers, fast; or single precision, for comparison");
   }
 };

@@ -95,20 +95,17 @@ void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoi
 
 /// The input through two layers into z (eq. 6, the descriptor's part), and past everything else.
 void BoosterNetwork::encode(std::span<const Margins> margins) {
+  const auto* values = reinterpret_cast<const std::int8_t*>(margins.data());
   if (descriptor1_.whole_numbers) {
-    const std::int8_t* values = margins.data()->of_bit.data();
     margins_ ? quantised_.set_values(values, rows_, kMarginsPerFeature, kMarginUnit)
              : quantised_.set_signs(values, rows_, 256, kMarginsPerFeature);
     if (skip_.outputs > 0) apply(skip_, hidden_, skipped_, true);
     apply(descriptor1_, hidden_, hidden_, true);
   } else {
     query_.clear();
-    for (const Margins& m : margins.first(static_cast<std::size_t>(rows_))) {
-      for (const std::int8_t v : m.of_bit)
-        query_.push_back(margins_ ? kMarginUnit * static_cast<float>(v) : (v > 0 ? 1.0f : -1.0f));
-      if (margins_)
-        for (const std::int8_t v : m.around) query_.push_back(kMarginUnit * static_cast<float>(v));
-    }
+    for (int i = 0; i < rows_; ++i, values += kMarginsPerFeature)
+      for (int k = 0; k < descriptor1_.inputs; ++k)
+        query_.push_back(margins_ ? kMarginUnit * static_cast<float>(values[k]) : (values[k] > 0 ? 1.0f : -1.0f));
     if (skip_.outputs > 0) apply(skip_, query_, skipped_);
     apply(descriptor1_, query_, hidden_);
   }
