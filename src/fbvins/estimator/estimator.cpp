@@ -49,7 +49,7 @@ StatePrior Estimator::prior() const {
   StatePrior out;
   if (!running_) return out;
   const Frame& newest = window_.newest();
-  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, true};
+  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, true, located_};
 }
 
 Estimate Estimator::process(const TrackedFrame& frame) {
@@ -59,6 +59,7 @@ Estimate Estimator::process(const TrackedFrame& frame) {
   out.id = frame.id;
   out.t = frame.t;
   if (running_) fill(out);
+  located_ = window_.known().take_new();
   out.reset_counter = reset_counter_;
   if (out.health.state == HealthState::lost) restart();
   previous_frame_ = frame.t;
@@ -151,8 +152,13 @@ Odometry Estimator::track(const TrackedFrame& frame, Duration rest) {
 void Estimator::solve(Odometry& out, const LmOptions& lm) {
   CpuTimer timer;
   window_.build(problem_, calibration_, weights());
-  const LmSummary summary = problem_.optimise(lm);
+  LmSummary summary = problem_.optimise(lm);
+  if (!summary.usable && window_.refuse_beliefs(problem_) > 0) {  // one of them can make every step worse
+    window_.build(problem_, calibration_, weights());
+    summary = problem_.optimise(lm);
+  }
   if (summary.usable) {
+    window_.refuse_beliefs(problem_);
     window_.accept(problem_);
     calibration_ = problem_.calibration;
     failed_solves_ = 0;
@@ -162,7 +168,8 @@ void Estimator::solve(Odometry& out, const LmOptions& lm) {
   Mat15 covariance;
   const int newest = static_cast<int>(window_.frames().size()) - 1;
   if (summary.usable && problem_.covariance(newest, covariance)) {
-    out.pose_covariance = covariance.topLeftCorner<6, 6>();
+    out.pose_covariance =
+        window_.known().anchor(window_.newest().state.T_WB, covariance.topLeftCorner<6, 6>(), problem_.beliefs);
     out.velocity_covariance = covariance.block<3, 3>(nav::v, nav::v);
     out.gyro_bias_covariance = covariance.block<3, 3>(nav::bg, nav::bg);
     out.accel_bias_covariance = covariance.block<3, 3>(nav::ba, nav::ba);

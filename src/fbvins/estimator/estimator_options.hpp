@@ -79,9 +79,31 @@ struct CalibrationBelief {
   }
 };
 
+struct KnownLandmarkOptions {
+  bool enabled = true;
+  int capacity = 20000;
+  double position_sigma_m = 0.005;
+  double max_relative_depth_sigma = 0.05;
+  double max_tilt_sigma_rad = 0.01;
+  double outlier_sigma = 6;
+
+  template <class V>
+  void visit(V&& v) {
+    v("enabled", enabled, "", "landmarks seen again are held to where they were");
+    v("capacity", capacity, "", "landmarks remembered", 0, 10000000);
+    v("position_sigma_m", position_sigma_m, "m", "standard deviation of where a landmark is in the map, beside what its depth leaves open",
+      1e-4, 1.0);
+    v("max_relative_depth_sigma", max_relative_depth_sigma, "", "standard deviation of the depth, as a share of it, of those remembered",
+      1e-4, 1.0);
+    v("max_tilt_sigma_rad", max_tilt_sigma_rad, "rad", "nothing is remembered before roll and pitch are known to this", 1e-4, 3.0);
+    v("outlier_sigma", outlier_sigma, "sigma", "a landmark further off than this is another one", 0.5, 100.0);
+  }
+};
+
 struct EstimatorOptions {
   InitialiserOptions initialiser;
   KeyframeOptions keyframes;
+  KnownLandmarkOptions known_landmarks;
   int max_iterations = 4;
   int max_landmarks = 300;
   double huber_sigma = 2.0;
@@ -108,6 +130,7 @@ struct EstimatorOptions {
   void visit(V&& v) {
     v.group("initialiser", initialiser, "start, from rest or in motion");
     v.group("keyframes", keyframes, "the sliding window");
+    v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("huber_sigma", huber_sigma, "sigma", "reprojection errors beyond this count linearly", 0.1, 100.0);

@@ -122,11 +122,47 @@ TEST(Estimator, CovarianceIsHonest) {
   EXPECT_LT(nees, 12.0);
 }
 
+TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
+  double with = 0, without = 0, nees = 0;
+  int n = 0;
+  for (int seed = 0; seed < 4; ++seed) {
+    for (const bool known : {true, false}) {
+      SimulatedFlight flight(Motion(0.8, 0.8), 200 + seed);
+      flight.knows_again = true;
+      flight.max_features = 60;
+      EstimatorOptions options = exact_noise();
+      options.known_landmarks.enabled = known;
+      Flown flown = fly(flight, 600, options);
+      for (int k = 300; known && k < 600; k += 20, ++n) nees += normalised_error(flown, k);
+      flown.gauge_frame = 200;  // what comes after the start
+      flown.gauge_pose = flown.odometry[200].T_WB;
+      for (int k = 300; k < 600; k += 20) (known ? with : without) += flown.position_error(k);
+    }
+  }
+  EXPECT_LT(with, 0.6 * without);
+  EXPECT_GT(nees / n, 3.0);
+  EXPECT_LT(nees / n, 12.0);
+}
+
+TEST(Estimator, ALandmarkTakenForAnotherHarmsNothing) {
+  // From the sixth second on, tracks come back as those of points elsewhere: one in ten.
+  SimulatedFlight flight(Motion(0.8, 0.8), 210);
+  flight.knows_again = true;
+  flight.mistaken = [](int k, int point) { return k > 120 && point % 10 == 3; };
+  const Flown flown = fly(flight, 400);
+  for (int k = flown.first_pose(); k < 400; ++k) {
+    EXPECT_NE(flown.odometry[k].health.reason, HealthReason::solver_failed) << k;
+    EXPECT_LT(flown.position_error(k), 0.06) << k;
+  }
+  EXPECT_EQ(flown.odometry.back().reset_counter, 0u);
+}
+
 TEST(Estimator, PriorKnowsNothingOfPositionAndHeadingBeyondTheGauge) {
   for (const char* policy : {"oldest", "entropy"}) {
     SimulatedFlight flight(Motion(0.6, 0.3), 5);
     EstimatorOptions options = exact_noise();
     options.keyframes.leaving = policy;
+    options.known_landmarks.enabled = false;  // they do know position and heading
     Estimator estimator(flight.rig, options);
     for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
     const WindowPrior& prior = estimator.window().prior();

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <functional>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
@@ -24,6 +25,7 @@ class SimulatedFlight {
   double pixel_sigma_px = 0.5;
   double image_rate_hz = 20;
   int max_features = 120;
+  bool knows_again = false;  ///< a point that was out of view is the same track when it is seen again
   ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.1, -0.08)};
   /// What goes wrong at frame k; the defaults let everything work.
   std::function<bool(int)> images = [](int) { return true; };
@@ -31,6 +33,8 @@ class SimulatedFlight {
   std::function<bool(int)> readings = [](int) { return true; };
   /// Turns an exact pixel displacement into an outlier; nullptr: none.
   std::function<Vec2(int, std::int64_t)> outlier = nullptr;
+  /// With knows_again: whether point i, seen again in frame k, is taken for the one before.
+  std::function<bool(int, int)> mistaken = [](int, int) { return false; };
 
   SimulatedFlight(const Motion& motion, std::uint64_t seed) : motion_(motion), rng_(seed) {
     rig.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
@@ -62,6 +66,7 @@ class SimulatedFlight {
     }
     std::unordered_map<int, TrackId> still;
     if (images(k)) see(k, still, out);
+    for (const auto& [point, track] : still) known_[point] = track;
     tracks_ = std::move(still);
     return out;
   }
@@ -77,6 +82,7 @@ class SimulatedFlight {
  private:
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
     const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_WB.inverse();
+    std::unordered_set<TrackId> in_use;
     // Those followed so far first, then new ones up to the limit.
     for (const bool followed : {true, false}) {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
@@ -86,7 +92,11 @@ class SimulatedFlight {
         const auto left = observe(rig.left, rig.T_BC0.inverse() * p_B);
         if (!left) continue;
         TrackedFeature f;
-        f.id = followed ? track->second : TrackId{next_track_++};
+        const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
+        if (followed) f.id = track->second;
+        else if (knows_again && known != known_.end() && !in_use.contains(known->second)) f.id = known->second;
+        else f.id = TrackId{next_track_++};
+        in_use.insert(f.id);
         f.left = *left;
         if (outlier) f.left = shifted(f.left, outlier(k, f.id.value));
         if (right_camera(k)) f.right = observe(rig.right, rig.T_BC1.inverse() * p_B);
@@ -121,6 +131,7 @@ class SimulatedFlight {
   Rng rng_;
   std::vector<Vec3> points_;
   std::unordered_map<int, TrackId> tracks_;  ///< point -> its present track
+  std::unordered_map<int, TrackId> known_;   ///< point -> its last track
   std::int64_t next_track_ = 0;
   std::optional<ImuSample> last_sample_;
   Duration late_;

@@ -9,6 +9,8 @@ namespace fbvins {
 namespace {
 
 constexpr int kStrikesUntilBanned = 3;
+/// W may have drifted since a landmark was seen, but not by more than this many times what tells it from others.
+constexpr double kFarFromBelief = 5;
 
 /// p_C = a + rho * b of a ray hosted in one frame, in some camera of another (W2, W3).
 struct RayInCamera {
@@ -32,6 +34,7 @@ void SlidingWindow::clear() {
   landmarks_.clear();
   landmark_of_track_.clear();
   banned_.clear();
+  known_.clear();
   prior_ = {};
 }
 
@@ -68,6 +71,7 @@ Landmark& SlidingWindow::landmark_of(TrackId track) {
     landmark.track = track;
     const auto banned = banned_.find(track);
     if (banned != banned_.end()) landmark.strikes = banned->second;
+    landmark.belief = known_.find(track);
     landmarks_.push_back(std::move(landmark));
   }
   return landmarks_[it->second];
@@ -83,7 +87,9 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
     if (!landmark.sightings.empty()) set_velocities(landmark.sightings.back(), sighting);
     if (landmark.sightings.empty()) landmark.host = frames_.back().id;
     landmark.sightings.push_back(sighting);
-    if (!landmark.triangulated) landmark.triangulated = triangulate(landmark, calibration);
+    if (landmark.triangulated) continue;
+    landmark.triangulated = triangulate(landmark, calibration);
+    if (landmark.triangulated && landmark.belief) refuse_distant_belief(landmark, calibration);
   }
 }
 
@@ -137,6 +143,16 @@ bool SlidingWindow::triangulate(Landmark& landmark, const Calibration& calibrati
   return true;
 }
 
+/// One that is nowhere near is another one, and would spoil the whole solve.
+void SlidingWindow::refuse_distant_belief(Landmark& landmark, const Calibration& calibration) {
+  const WindowLandmark numbers{.alpha_beta_rho = landmark.alpha_beta_rho};
+  const Pose<W, B>& host = frames_[index_of(landmark.host)].state.T_WB;
+  const double distance_sigma = belief_residual(CameraGeometry(calibration), host, numbers, *landmark.belief).norm();
+  if (distance_sigma < kFarFromBelief * options_.known_landmarks.outlier_sigma) return;
+  landmark.belief.reset();
+  known_.forget(landmark.track);
+}
+
 Vec3 SlidingWindow::scaled_point_in_camera(const Landmark& landmark, const Frame& target, const Calibration& calibration) const {
   const CameraGeometry cameras(calibration);
   PairGeometry pair;
@@ -163,6 +179,7 @@ void SlidingWindow::build(WindowProblem& problem, const Calibration& calibration
   problem.prior = prior_;
   problem.landmarks.clear();
   problem.observations.clear();
+  problem.beliefs.clear();
 
   // Landmarks seen by most frames first, when there are too many; filed order among equals.
   landmark_of_problem_.clear();
@@ -187,6 +204,10 @@ void SlidingWindow::build(WindowProblem& problem, const Calibration& calibration
         problem.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
     }
     out.observation_count = static_cast<int>(problem.observations.size()) - out.first_observation;
+    if (landmark.belief) {
+      out.belief = static_cast<int>(problem.beliefs.size());
+      problem.beliefs.push_back(*landmark.belief);
+    }
     problem.landmarks.push_back(out);
   }
 }
@@ -199,6 +220,19 @@ void SlidingWindow::accept(const WindowProblem& problem) {
   }
   for (std::size_t i = 0; i < problem.landmarks.size(); ++i)
     landmarks_[landmark_of_problem_[i]].alpha_beta_rho = problem.landmarks[i].alpha_beta_rho;
+}
+
+int SlidingWindow::refuse_beliefs(const WindowProblem& problem) {
+  int refused = 0;
+  for (std::size_t i = 0; i < problem.landmarks.size(); ++i) {
+    const WindowLandmark& numbers = problem.landmarks[i];
+    if (numbers.belief < 0 || problem.distance_to_belief(numbers).norm() <= options_.known_landmarks.outlier_sigma) continue;
+    Landmark& landmark = landmarks_[landmark_of_problem_[i]];
+    landmark.belief.reset();
+    known_.forget(landmark.track);
+    ++refused;
+  }
+  return refused;
 }
 
 int SlidingWindow::remove_outliers(const WindowProblem& problem, double threshold_sigma) {
@@ -326,11 +360,26 @@ void SlidingWindow::marginalise_keyframe(int index, WindowProblem& problem, cons
     else rehost(landmark, landmark.sightings.front().frame, calibration);
   }
   WindowPrior prior = marginalise_frame(problem, index, leaves, marginalisation_scratch_);
+  remember_leaving(problem, leaves, calibration);
   if (index + 1 < static_cast<int>(frames_.size())) frames_[index + 1].imu.reset();
   remove_flagged(gone);
   forget_sightings(id, calibration);
   set_prior(std::move(prior));
   forget_frame(index);
+}
+
+/// Of those still in view the position now found holds what comes: they are known again at once.
+void SlidingWindow::remember_leaving(const WindowProblem& problem, const std::vector<std::uint8_t>& leaves,
+                                     const Calibration& calibration) {
+  const std::vector<PointBlock>& points = marginalisation_scratch_.points().points();  // of the leaving, in order
+  auto point = points.begin();
+  for (std::size_t i = 0; i < problem.landmarks.size(); ++i) {
+    if (!leaves[i]) continue;
+    const WindowLandmark& numbers = problem.landmarks[i];
+    Landmark& landmark = landmarks_[landmark_of_problem_[i]];
+    known_.remember(landmark.track, frames_[numbers.host].state.T_WB * calibration.T_BC0, numbers.alpha_beta_rho, point++->V);
+    landmark.belief = known_.find(landmark.track);
+  }
 }
 
 int SlidingWindow::landmarks_in_view() const {

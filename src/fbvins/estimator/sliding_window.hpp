@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/known_landmarks.hpp"
 #include "fbvins/estimator/window_marginalisation.hpp"
 #include "fbvins/estimator/window_problem.hpp"
 #include "fbvins/types/keyframe.hpp"
@@ -48,13 +49,14 @@ struct Landmark {
   FrameId host;
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
+  std::optional<LandmarkBelief> belief;  ///< of one that was known before
   int strikes = 0;                  ///< times an observation of it was thrown out
   std::vector<Sighting> sightings;  ///< oldest first
 };
 
 class SlidingWindow {
  public:
-  explicit SlidingWindow(const EstimatorOptions& options) : options_(options) {}
+  explicit SlidingWindow(const EstimatorOptions& options) : options_(options), known_(options.known_landmarks) {}
 
   void clear();
   const std::vector<Frame>& frames() const { return frames_; }
@@ -75,12 +77,14 @@ class SlidingWindow {
   void build(WindowProblem& problem, const Calibration& calibration, const WindowWeights& weights);
   /// Takes the solution back.
   void accept(const WindowProblem& problem);
+  /// Landmarks far from where they are believed to be are others, or have been moved: they count as new ones. Returns how many.
+  int refuse_beliefs(const WindowProblem& problem);
   /// Removes observations far off after a solve, and landmarks that are left with too little.
   int remove_outliers(const WindowProblem& problem, double threshold_sigma);
 
   /// A frame that is not a keyframe leaves: its IMU readings join those of the next frame.
   void drop_frame(int index, WindowProblem& problem, const Calibration& calibration, const WindowWeights& weights);
-  /// A keyframe leaves through marginalisation, with the landmarks it hosts.
+  /// A keyframe leaves through marginalisation, with the landmarks it hosts; they are known from now on.
   void marginalise_keyframe(int index, WindowProblem& problem, const Calibration& calibration, const WindowWeights& weights);
 
   /// Triangulated landmarks seen in the newest frame.
@@ -98,14 +102,18 @@ class SlidingWindow {
   Keyframe take_keyframe(int index, const Calibration& calibration);
 
   int index_of(FrameId id) const;
+  /// Landmarks that have left the window.
+  KnownLandmarks& known() { return known_; }
 
  private:
   Landmark& landmark_of(TrackId track);
   void set_velocities(Sighting& before, Sighting& now) const;
   bool triangulate(Landmark& landmark, const Calibration& calibration) const;
+  void refuse_distant_belief(Landmark& landmark, const Calibration& calibration);
   void rehost(Landmark& landmark, FrameId new_host, const Calibration& calibration) const;
   void forget_sightings(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
+  void remember_leaving(const WindowProblem& problem, const std::vector<std::uint8_t>& leaves, const Calibration& calibration);
   void remove_flagged(const std::vector<std::uint8_t>& remove);
   Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const Calibration& calibration) const;
 
@@ -115,6 +123,7 @@ class SlidingWindow {
   std::unordered_map<TrackId, int> landmark_of_track_;
   std::unordered_map<TrackId, int> banned_;  ///< tracks that proved wrong, with their strikes
   std::vector<int> landmark_of_problem_;
+  KnownLandmarks known_;
   WindowPrior prior_;
   std::int64_t next_landmark_ = 0;
   WindowProblem marginalisation_problem_, marginalisation_scratch_;

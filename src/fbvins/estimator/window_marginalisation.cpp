@@ -14,6 +14,7 @@ void select_factors(const WindowProblem& problem, int leaving, const std::vector
   out.prior = problem.prior;
   out.landmarks.clear();
   out.observations.clear();
+  out.beliefs = problem.beliefs;
   for (int i = 0; i < static_cast<int>(out.frames.size()); ++i) {
     if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
     if (i != leaving) out.frames[i].standstill = false;

@@ -57,6 +57,7 @@ double WindowProblem::landmark_cost() const {
       const bool ok = reproject(cameras, pair(l.host, o.frame), x_h, l.alpha_beta_rho.z(), o, p_C, r);
       cost += huber(ok ? r.squaredNorm() : kUnprojectableSigma * kUnprojectableSigma, weights.huber_sigma).cost;
     }
+    if (l.belief >= 0) cost += belief_cost(cameras, l);
   }
   return cost;
 }
@@ -91,6 +92,7 @@ double WindowProblem::add_landmarks() {
       return static_cast<int>(std::lower_bound(offsets.begin() + first_pose_block, offsets.end(), row) - offsets.begin());
     };
     const int host_block = block_of(host_row);
+    if (l.belief >= 0) cost += add_belief(cameras, l, host_block, point);
 
     for (const WindowObservation* o = begin; o != end;) {
       const int target = o->frame;

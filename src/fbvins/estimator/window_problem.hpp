@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/landmark_belief.hpp"
 #include "fbvins/estimator/reprojection.hpp"
 #include "fbvins/imu/imu_residual.hpp"
 #include "fbvins/imu/preintegration.hpp"
@@ -65,6 +66,7 @@ class WindowProblem {
   std::vector<WindowFrame> frames;
   std::vector<WindowLandmark> landmarks;
   std::vector<WindowObservation> observations;
+  std::vector<LandmarkBelief> beliefs;
   Calibration calibration;
   WindowPrior prior;
   WindowWeights weights;
@@ -74,6 +76,9 @@ class WindowProblem {
 
   /// Whitened reprojection residual of an observation at the current estimate; infinite behind the camera.
   Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
+
+  /// Whitened distance of a landmark that has a belief from it, at the current estimate.
+  Vec3 distance_to_belief(const WindowLandmark& landmark) const;
 
   /// Cost at the current estimate.
   double cost() const;
@@ -118,6 +123,8 @@ class WindowProblem {
   template <int Columns>
   double add_landmarks();
   double landmark_cost() const;
+  double add_belief(const CameraGeometry& cameras, const WindowLandmark& landmark, int host_block, PointBlock& point);
+  double belief_cost(const CameraGeometry& cameras, const WindowLandmark& landmark) const;
   Eigen::VectorXd prior_displacement() const;
   void fix_inactive_calibration();
   const PairGeometry& pair(int host, int target) const { return pairs_[host * frames.size() + target]; }

@@ -83,6 +83,19 @@ struct Reprojection {
   }
 };
 
+/// The landmark's distance from where it was (K1), from its definition.
+struct Belief {
+  Reprojection seen;
+  LandmarkBelief belief;
+  template <class T>
+  bool operator()(const T* d_host, const T* l, const T* c, T* r) const {
+    const Moved<T> h(seen.host, d_host);
+    Eigen::Map<Vec<T>> out(r);
+    out = belief.sqrt_information.cast<T>() * Vec<T>(h.q * seen.in_host_body(l, c) + h.p - belief.p_W.cast<T>());
+    return true;
+  }
+};
+
 struct Imu {
   NavState from, to;
   const Preintegration* between;
@@ -209,6 +222,11 @@ class CeresTwin {
         problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 15, 15, 3, 13>(functor), loss,
                                   frames_[l.host].data(), frames_[o.frame].data(), landmarks_[index].data(), calibration_.data());
     }
+    if (l.belief < 0) return;
+    auto* functor = new Belief{{p.frames[l.host].state, {}, p.calibration, {}, false}, p.beliefs[l.belief]};
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Belief, 3, 15, 3, 13>(functor),
+                              new ceres::HuberLoss(p.weights.huber_sigma), frames_[l.host].data(), landmarks_[index].data(),
+                              calibration_.data());
   }
 
   struct Start {

@@ -37,8 +37,8 @@ KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& i
   return klt_align(warped_, image, start_px, 0, 0, klt_);
 }
 
-bool PatchRefiner::accept(const KltResult& result, const Vec2& start_px, double scale) const {
-  return result.ok() && result.correlation >= options_.min_correlation &&
+bool PatchRefiner::accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) const {
+  return result.ok() && result.correlation >= min_correlation &&
          (result.px - start_px).norm() <= options_.max_shift_px * scale;
 }
 

@@ -54,7 +54,11 @@ class PatchRefiner {
   KltResult refine(const PatchReference& reference, const Pyramid& image, const Vec2& start_px, const Camera& camera,
                    const Vec2& normalised_guess);
   /// Whether a result may be used: converged, similar, and not far from where it started.
-  bool accept(const KltResult& result, const Vec2& start_px, double scale) const;
+  bool accept(const KltResult& result, const Vec2& start_px, double scale) const {
+    return accept(result, start_px, scale, options_.min_correlation);
+  }
+  /// The same by another correlation.
+  bool accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) const;
 
  private:
   PatchRefineOptions options_;

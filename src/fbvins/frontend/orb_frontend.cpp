@@ -24,7 +24,8 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       stereo_(rig, options.stereo),
       stereo_fill_in_(rig, options.stereo_fill_in, options.alignment),
       refiner_(options.refine, options.alignment),
-      rng_(2) {
+      rng_(2),
+      memory_(options.recognition) {
   patches_.resize(static_cast<std::size_t>(options.max_features + options.max_remembered));
   for (std::size_t i = patches_.size(); i-- > 0;) free_slots_.push_back(i);
 }
@@ -41,7 +42,9 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   const bool has_left = ingest(packet, stats);
   stats.pyramid_ms = timer.lap_ms();
   // Without a left image tracks wait where they were; the next image's motion spans the gap.
+  learn_positions(prior);
   if (!has_left) return out;
+  T_WC_ = predictor_.camera_at(now_, prior);
 
   extract_left(packet.frame.left->view(), stats);
   stats.detect_ms = timer.lap_ms();
@@ -52,12 +55,15 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
     match_tracks(motion);
     match_raw(stats);
     locate_tracks(stats);
+    recognise(stats);
     stats.track_ms = timer.lap_ms();
     reject_outliers(prior, stats);
     count_inliers(stats);
     thin_out();
     forget(now_);
     stats.geometry_ms = timer.lap_ms();
+  } else {
+    recognise(stats);
   }
   cut_patches();
   start_tracks(stats);
@@ -88,7 +94,10 @@ bool OrbFrontend::ingest(const SensorPacket& packet, FrontendStats& stats) {
   // Backwards, or longer than any track is remembered: nothing carries over.
   if (has_previous_ &&
       (now_ < previous_t_ || (now_ - previous_t_).seconds() > std::clamp(options_.memory_s, 0.3, kLongestGap_s))) {
-    for (Track& track : tracks_) track.alive = false;
+    for (Track& track : tracks_) {
+      remember(track);
+      track.alive = false;
+    }
     drop_dead_tracks();
     has_previous_ = false;
   }

@@ -21,6 +21,7 @@
 #include "fbvins/features/patch_refine.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
+#include "fbvins/frontend/landmark_memory.hpp"
 #include "fbvins/frontend/orb_matching.hpp"
 #include "fbvins/frontend/orb_stereo.hpp"
 #include "fbvins/frontend/prediction.hpp"
@@ -51,6 +52,7 @@ struct OrbFrontendOptions {
   PatchRefineOptions refine;
   KltOptions alignment;
   KltStereoOptions stereo_fill_in;
+  RecognitionOptions recognition;
 
   template <class V>
   void visit(V&& v) {
@@ -80,6 +82,7 @@ struct OrbFrontendOptions {
     v.group("stereo", stereo, "matching from left to right by descriptor");
     v.group("refine", refine, "refinement below a pixel");
     v.group("alignment", alignment, "Lucas-Kanade alignment");
+    v.group("recognition", recognition, "landmarks known again after they were out of view");
     v.group("stereo_fill_in", stereo_fill_in, "matching from left to right by alignment, where descriptors found nothing");
   }
 };
@@ -122,6 +125,8 @@ class OrbFrontend final : public Frontend {
     double depth_factor = 1;  // depth now / depth before
     bool renew_reference = false;
     std::array<Sighting, kHistory> history;  // of frame f at f % kHistory
+    std::optional<Vec3> seen_from_W;  // camera when it was last in sight
+    std::optional<Vec3> p_W;          // where the estimator has left it, once it has
     bool alive = true;
   };
   struct Patches {
@@ -142,6 +147,10 @@ class OrbFrontend final : public Frontend {
   std::optional<Vec2> hold_to_reference(Track& track, const Vec2& newest_px);
   bool returns(const Track& track, const Vec2& px);
   bool settle(Track& track, const Vec2& px);
+  void learn_positions(const StatePrior& prior);
+  void remember(const Track& track);
+  void recognise(FrontendStats& stats);
+  bool begin_again(const ExpectedLandmark& expected, std::size_t keypoint);
   void reject_outliers(const StatePrior& prior, FrontendStats& stats);
   void check_epipolar(const CameraMotion& motion, std::int64_t then, FrontendStats& stats);
   void thin_out();
@@ -167,6 +176,7 @@ class OrbFrontend final : public Frontend {
   KltStereoMatcher stereo_fill_in_;
   PatchRefiner refiner_;
   Rng rng_;
+  LandmarkMemory memory_;
 
   Pyramid left_, previous_left_, right_;
   KltTemplate scratch_;
@@ -174,6 +184,7 @@ class OrbFrontend final : public Frontend {
   OrbFeatures left_features_, right_features_;
   bool has_previous_ = false;
   Time now_, previous_t_;
+  std::optional<Pose<W, C0>> T_WC_;  // of the newest image, where the state is known
   std::int64_t frame_count_ = 0;
   std::array<Time, kHistory> history_t_;
   double typical_inverse_depth_ = 0;  // 1/m, median of the features matched last
@@ -183,6 +194,7 @@ class OrbFrontend final : public Frontend {
   std::vector<std::size_t> free_slots_;
   // buffers
   std::vector<GuidedQuery> queries_;
+  std::vector<ExpectedLandmark> expected_;
   std::vector<int> found_, found_raw_;
   OrbFeatures raw_left_;                                         // before they were improved, where they are
   std::vector<std::pair<TrackId, Vec2>> matched_, matched_raw_;  // tracks and the keypoints found for them

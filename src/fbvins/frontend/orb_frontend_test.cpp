@@ -40,11 +40,16 @@ class World {
   }
 
   SensorPacket packet(int k) const {
+    SensorPacket p = packet_without_images(k);
+    p.frame.left = render(k, 0, static_cast<std::uint64_t>(2 * k));
+    p.frame.right = render(k, 0.11, static_cast<std::uint64_t>(2 * k + 1));
+    return p;
+  }
+
+  SensorPacket packet_without_images(int k) const {
     SensorPacket p;
     p.id = FrameId{k};
     p.frame.t = Time{static_cast<std::int64_t>(k * kFramePeriod_s * 1e9)};
-    p.frame.left = render(k, 0, static_cast<std::uint64_t>(2 * k));
-    p.frame.right = render(k, 0.11, static_cast<std::uint64_t>(2 * k + 1));
     for (int i = 0; k > 0 && i <= 10; ++i)
       p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3(0, 0, 0.2), Vec3(0, 0, 9.81)});
     return p;
@@ -159,6 +164,68 @@ TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
     EXPECT_GT(old, 25) << (missing ? "missing" : "black");
     EXPECT_LT(median_error_px(frames), 0.12);
   }
+}
+
+/// The exact state at frame k.
+StatePrior true_state(int k) {
+  StatePrior prior;
+  prior.t = Time{static_cast<std::int64_t>(k * kFramePeriod_s * 1e9)};
+  prior.T_WB = {Quat(Eigen::AngleAxisd(world().angle(k), Vec3::UnitZ())), world().position(k)};
+  prior.v_WB = Vec3(kSpeed_mps, 0.02, 0);
+  prior.valid = true;
+  return prior;
+}
+
+/// Ten images, three seconds in the dark, and one image more. `drift_m`: how far W has moved on in the dark.
+TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFrame>& before) {
+  OrbFrontendOptions options = small_options();
+  options.recognition.enabled = enabled;
+  OrbFrontend frontend(world().rig, options);
+  constexpr int kDark = 60;
+  for (int k = 0;; ++k) {
+    StatePrior prior = true_state(std::max(0, k - 2));
+    if (k == 15)  // by now the window has let go of them
+      for (const TrackedFrame& frame : before)
+        for (const TrackedFeature& f : frame.features) {
+          const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left.normalised);
+          prior.located.push_back({f.id, Vec3(p.x(), p.y(), kDepth_m)});
+        }
+    const bool dark = k >= 10 && k < 10 + kDark;
+    SensorPacket packet = dark ? world().packet_without_images(k) : world().packet(k);
+    if (!dark && k >= 10) prior.T_WB.p.x() += drift_m;
+    TrackedFrame tracked = frontend.process(packet, prior);
+    if (k == 10 + kDark) return tracked;
+    if (!dark) before.push_back(std::move(tracked));
+  }
+}
+
+TEST(OrbFrontend, LandmarksAreKnownAgainHoweverLongTheyWereOutOfView) {
+  for (const double drift_m : {0.0, 0.08}) {
+    std::vector<TrackedFrame> frames;
+    frames.push_back(after_the_dark(true, drift_m, frames));
+    EXPECT_GT(frames.back().stats.recognised, 15) << drift_m;
+    EXPECT_GE(frames.back().stats.expected, frames.back().stats.recognised);
+    std::map<std::int64_t, Vec2> first;
+    int again = 0, wrong = 0;
+    for (const TrackedFrame& frame : frames)
+      for (const TrackedFeature& f : frame.features) {
+        const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left.normalised);
+        const auto [it, is_new] = first.try_emplace(f.id.value, p);
+        if (is_new || frame.id != frames.back().id) continue;
+        ++again;
+        wrong += (p - it->second).norm() / kDepth_m * 230 > 0.5;
+      }
+    EXPECT_EQ(again, frames.back().stats.recognised);
+    EXPECT_LE(wrong, again / 20) << drift_m;
+  }
+}
+
+TEST(OrbFrontend, WithoutRecognitionEveryLandmarkIsNew) {
+  std::vector<TrackedFrame> before;
+  const TrackedFrame after = after_the_dark(false, 0, before);
+  EXPECT_EQ(after.stats.recognised, 0);
+  EXPECT_EQ(after.stats.detected, static_cast<int>(after.features.size()));
+  EXPECT_GT(after.stats.detected, 40);
 }
 
 TEST(OrbFrontend, WithoutRightImageThereIsNoStereo) {

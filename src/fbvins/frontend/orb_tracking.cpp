@@ -41,7 +41,10 @@ void OrbFrontend::predict(const CameraMotion& motion) {
     track.depth_factor = ray.z();
     if (track.inverse_depth) *track.inverse_depth /= ray.z();
     patches_[track.slot].reference.carry(motion.R_ba, ray.z());
-    if (!rig_.left.inside(track.px, -kFarOutside_px)) track.alive = false;
+    if (!rig_.left.inside(track.px, -kFarOutside_px)) {
+      remember(track);
+      track.alive = false;
+    }
   }
   drop_dead_tracks();
 }
@@ -192,6 +195,7 @@ bool OrbFrontend::settle(Track& track, const Vec2& px) {
   track.normalised = *normalised;
   track.in_sight = true;
   track.last_seen = now_;
+  if (T_WC_) track.seen_from_W = T_WC_->p;
   ++track.age_frames;
   return true;
 }
@@ -261,8 +265,10 @@ void OrbFrontend::forget(Time now) {
     if (track.in_sight) continue;
     // Without depth the prediction is a guess that soon is worth nothing.
     const double memory_s = track.inverse_depth ? options_.memory_s : 0.3 * options_.memory_s;
-    if ((now - track.last_seen).seconds() > memory_s || track.age_frames < 2 || remembered == options_.max_remembered)
+    if ((now - track.last_seen).seconds() > memory_s || track.age_frames < 2 || remembered == options_.max_remembered) {
+      remember(track);
       track.alive = false;
+    }
     else ++remembered;
   }
   drop_dead_tracks();

@@ -59,6 +59,11 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const 
   return s;
 }
 
+std::optional<Pose<W, C0>> MotionPredictor::camera_at(Time t, const StatePrior& prior) const {
+  if (!prior.valid || prior.t > t || t - prior.t >= kOldestPrior || !covers(prior.t, t)) return std::nullopt;
+  return carry({prior.t, prior.T_WB, prior.v_WB}, t, prior.bias).T_WB * T_BC0_;
+}
+
 CameraMotion MotionPredictor::between(Time a, Time b, const StatePrior& prior) const {
   CameraMotion motion;
   if (!(b > a) || !covers(a, b)) return motion;

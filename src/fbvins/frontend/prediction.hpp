@@ -32,6 +32,8 @@ class MotionPredictor {
   void forget_before(Time t);
 
   CameraMotion between(Time a, Time b, const StatePrior& prior) const;
+  /// The left camera in W; nothing without a valid prior that can be carried to t.
+  std::optional<Pose<W, C0>> camera_at(Time t, const StatePrior& prior) const;
 
  private:
   struct State {

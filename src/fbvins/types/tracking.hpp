@@ -53,6 +53,8 @@ struct FrontendStats {
   int lost_flow = 0;      ///< lost by the tracker or matcher
   int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check
   int lost_epipolar = 0;  ///< lost by RANSAC on the epipolar constraint
+  int expected = 0;       ///< landmarks out of view until now that this image should show
+  int recognised = 0;     ///< of these, tracks again under their old id
   double mean_brightness_left = 0;
   double mean_brightness_right = 0;
   double median_motion_px = 0;  ///< of the features continued, in the raw left image
@@ -72,6 +74,12 @@ struct TrackedFrame {
   StereoFrame images;  ///< null unless keyframes are wanted: they carry them on
 };
 
+/// A landmark that has left the window, where it was estimated to be.
+struct LocatedLandmark {
+  TrackId track;
+  Vec3 p_W = Vec3::Zero();  ///< m
+};
+
 /// The newest estimate, fed back to the frontend for guided matching.
 struct StatePrior {
   Time t;
@@ -79,6 +87,7 @@ struct StatePrior {
   Vec3 v_WB = Vec3::Zero();  ///< m/s, in W
   ImuBias bias;
   bool valid = false;
+  std::vector<LocatedLandmark> located;  ///< with this frame
 };
 
 }  // namespace fbvins

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/known_landmarks.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// What was seen of a landmark before it was remembered is in the window's prior and in its belief (K4).
+constexpr double kTimesCounted = 2;
+
+}  // namespace
+
+void KnownLandmarks::clear() {
+  beliefs_.clear();
+  order_.clear();
+  anchors_.clear();
+  first_anchor_ = 0;
+  next_ = {};
+  level_ = false;
+  held_to_ = {};
+  new_.clear();
+}
+
+void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information) {
+  if (!options_.enabled || !level_ || beliefs_.contains(track)) return;
+  const double depth = 1.0 / alpha_beta_rho.z();
+  const Mat3 covariance = information.inverse();
+  const double relative_sigma = depth * std::sqrt(covariance(2, 2));
+  if (!(relative_sigma < options_.max_relative_depth_sigma)) return;  // neither NaN
+
+  LandmarkBelief belief;
+  const Vec3 p_C = depth * Vec3(alpha_beta_rho.x(), alpha_beta_rho.y(), 1);
+  belief.p_W = T_WC * p_C;
+  Mat3 J;  // of p_W by (alpha, beta, rho)
+  J << depth * T_WC.R().leftCols<2>(), -depth * (T_WC.R() * p_C);
+  Mat3 covariance_W = J * covariance * J.transpose();  // (K3)
+  covariance_W.diagonal().array() += options_.position_sigma_m * options_.position_sigma_m;
+  belief.sqrt_information = Mat3(covariance_W.inverse()).llt().matrixU();
+  if (!belief.p_W.allFinite() || !belief.sqrt_information.allFinite()) return;
+
+  if (anchors_.empty() || anchors_.back().p_W != next_.p_W) anchors_.push_back(next_);
+  belief.anchor = first_anchor_ + static_cast<std::int64_t>(anchors_.size()) - 1;
+  beliefs_.emplace(track, belief);
+  order_.push_back(track);
+  new_.push_back({track, belief.p_W});
+  make_room();
+}
+
+void KnownLandmarks::make_room() {
+  while (static_cast<int>(order_.size()) > options_.capacity) {
+    beliefs_.erase(order_.front());
+    order_.pop_front();
+  }
+  const auto oldest = std::find_if(order_.begin(), order_.end(), [&](TrackId track) { return beliefs_.contains(track); });
+  if (oldest == order_.end()) return;
+  for (const std::int64_t needed = beliefs_.at(*oldest).anchor; first_anchor_ < needed; ++first_anchor_) anchors_.pop_front();
+}
+
+std::optional<LandmarkBelief> KnownLandmarks::find(TrackId track) const {
+  const auto it = beliefs_.find(track);
+  return it == beliefs_.end() ? std::nullopt : std::optional<LandmarkBelief>(it->second);
+}
+
+/// A map in error by (dp, dtheta) at the anchor is in error by dp - [p - p_anchor]x dtheta at p (K5).
+Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
+  Mat6 T = Mat6::Identity();
+  T.topRightCorner<3, 3>() = -hat(p_W - anchor.p_W);
+  return T * anchor.covariance * T.transpose();
+}
+
+void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use) {
+  if (in_use.empty() || anchors_.empty()) return;  // still to what it was held to last
+  Anchor mean{p_W, Mat6::Zero()};
+  for (const LandmarkBelief& belief : in_use) {  // (K6)
+    const std::int64_t i = std::max<std::int64_t>(belief.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
+    mean.covariance += carried(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
+  }
+  held_to_ = mean;
+}
+
+Mat6 KnownLandmarks::anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance, std::span<const LandmarkBelief> in_use) {
+  Mat6 to_world = Mat6::Identity();
+  to_world.bottomRightCorner<3, 3>() = T_WB.R();
+  const Mat6 window = to_world * window_covariance * to_world.transpose();
+  level_ = std::sqrt(std::max(window(3, 3), window(4, 4))) < options_.max_tilt_sigma_rad;
+  hold_to(T_WB.p, in_use);
+  const double counted = in_use.empty() ? 1.0 : kTimesCounted;
+  next_ = {T_WB.p, counted * window + carried(held_to_, T_WB.p)};
+  return to_world.transpose() * next_.covariance * to_world;
+}
+
+}  // namespace fbvins

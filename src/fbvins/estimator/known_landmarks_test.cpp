@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/known_landmarks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+namespace fbvins {
+namespace {
+
+const Pose<W, C0> kCamera{so3_exp(Vec3(0.3, -1.0, 0.4)), Vec3(1, 2, 3)};
+const Vec3 kPoint{0.2, -0.1, 0.5};  // alpha, beta, rho: 2 m deep
+const Mat3 kInformation = Vec3(1e6, 1e6, 1e5).asDiagonal();
+
+Pose<W, B> body_at(const Vec3& p_W) { return {so3_exp(Vec3(0.1, 0.2, 0.3)), p_W}; }
+
+KnownLandmarks level(KnownLandmarkOptions options = {}, const Mat6& covariance = 1e-6 * Mat6::Identity()) {
+  KnownLandmarks known(options);
+  known.anchor(body_at(Vec3::Zero()), covariance, {});
+  return known;
+}
+
+TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
+  KnownLandmarkOptions options;
+  options.position_sigma_m = 0.003;
+  KnownLandmarks known = level(options);
+  known.remember(TrackId{7}, kCamera, kPoint, kInformation);
+  const auto belief = known.find(TrackId{7});
+  ASSERT_TRUE(belief.has_value());
+  const Vec3 p_C(0.4, -0.2, 2.0);
+  EXPECT_LT((belief->p_W - kCamera * p_C).norm(), 1e-12);
+  const Mat3 covariance = (belief->sqrt_information.transpose() * belief->sqrt_information).inverse();
+  const Mat3 in_camera = kCamera.R().transpose() * covariance * kCamera.R();
+  // Along the ray: sigma of 1/depth times depth squared; beside it the ray's own, at this depth; and 3 mm everywhere.
+  const Vec3 ray = p_C / p_C.z();
+  EXPECT_NEAR(in_camera(2, 2), 16e-5 * 1.0 + 9e-6, 1e-12);
+  const Mat3 expected =
+      16e-5 * ray * ray.transpose() + Mat3(Vec3(4e-6, 4e-6, 0).asDiagonal()) + 9e-6 * Mat3::Identity();
+  EXPECT_LT((in_camera - expected).norm(), 1e-12);
+}
+
+TEST(KnownLandmarks, TheFirstTimeCountsUntilForgotten) {
+  KnownLandmarks known = level();
+  known.remember(TrackId{7}, kCamera, kPoint, kInformation);
+  const Vec3 first = known.find(TrackId{7})->p_W;
+  known.remember(TrackId{7}, kCamera, 1.1 * kPoint, kInformation);
+  EXPECT_EQ(known.find(TrackId{7})->p_W, first);
+  EXPECT_EQ(known.take_new().size(), 1u);
+  EXPECT_TRUE(known.take_new().empty());
+  known.forget(TrackId{7});
+  EXPECT_FALSE(known.find(TrackId{7}).has_value());
+  known.remember(TrackId{7}, kCamera, 1.1 * kPoint, kInformation);
+  EXPECT_NE(known.find(TrackId{7})->p_W, first);
+}
+
+TEST(KnownLandmarks, NothingOfUncertainDepthOrBeforeWIsLevel) {
+  KnownLandmarkOptions options;
+  KnownLandmarks known(options);
+  known.remember(TrackId{1}, kCamera, kPoint, kInformation);  // before any pose
+  Mat6 tilted = 1e-6 * Mat6::Identity();
+  tilted.bottomRightCorner<3, 3>() *= 1e3;
+  known.anchor(body_at(Vec3::Zero()), tilted, {});
+  known.remember(TrackId{2}, kCamera, kPoint, kInformation);
+  EXPECT_EQ(known.size(), 0u);
+  known.anchor(body_at(Vec3::Zero()), 1e-6 * Mat6::Identity(), {});
+  known.remember(TrackId{3}, kCamera, kPoint, Vec3(1e6, 1e6, 1e3).asDiagonal());  // sigma of a sixteenth of the depth
+  EXPECT_EQ(known.size(), 0u);
+  known.remember(TrackId{4}, kCamera, kPoint, kInformation);
+  EXPECT_EQ(known.size(), 1u);
+  options.enabled = false;
+  KnownLandmarks off = level(options);
+  off.remember(TrackId{5}, kCamera, kPoint, kInformation);
+  EXPECT_EQ(off.size(), 0u);
+}
+
+TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
+  KnownLandmarkOptions options;
+  options.capacity = 10;
+  KnownLandmarks known(options);
+  for (int k = 0; k < 40; ++k) {
+    known.anchor(body_at(Vec3(k, 0, 0)), 1e-6 * (k + 1) * Mat6::Identity(), {});
+    known.remember(TrackId{k}, kCamera, kPoint, kInformation);
+    if (k % 4 == 0) known.forget(TrackId{k});
+    EXPECT_LE(known.size(), 10u);
+  }
+  EXPECT_FALSE(known.find(TrackId{29}).has_value());
+  ASSERT_TRUE(known.find(TrackId{39}).has_value());
+  // Anchors go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
+  const LandmarkBelief newest = *known.find(TrackId{39});
+  const Mat6 sum = known.anchor(body_at(Vec3(39, 0, 0)), Mat6::Zero(), std::array{newest});
+  EXPECT_NEAR(sum(0, 0), 40e-6, 1e-9);
+}
+
+TEST(KnownLandmarks, APoseOwesItsMapWhatThatWasUncertainOf) {
+  // Heading known to 2 mrad, the rest exactly, where the landmark was remembered; seen again from 5 m away.
+  Mat6 heading = Mat6::Zero();
+  const Pose<W, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
+  heading(5, 5) = 4e-6;
+  KnownLandmarks known{KnownLandmarkOptions{}};
+  known.anchor(there, heading, {});
+  known.remember(TrackId{1}, kCamera, kPoint, kInformation);
+  const Mat6 window = 1e-8 * Mat6::Identity();
+  const Mat6 held = known.anchor(here, window, std::array{*known.find(TrackId{1})});
+  EXPECT_NEAR(held(5, 5), 4e-6 + 2e-8, 1e-12) << "what was seen twice is counted twice";
+  EXPECT_NEAR(held(0, 0), 25 * 4e-6 + 2e-8, 1e-12) << "the lever of 5 m along y moves x";
+  EXPECT_NEAR(held(1, 1), 2e-8, 1e-12);
+  EXPECT_NEAR(held(0, 5), -5 * 4e-6, 1e-12);
+  // With nothing of the map in view its uncertainty stays.
+  EXPECT_NEAR(known.anchor(here, window, {})(0, 0), 25 * 4e-6 + 1e-8, 1e-12);
+  known.clear();
+  EXPECT_NEAR(known.anchor(here, window, {})(0, 0), 1e-8, 1e-15);
+}
+
+}  // namespace
+}  // namespace fbvins
