@@ -84,7 +84,7 @@ struct KnownLandmarkOptions {
   int capacity = 20000;
   double position_sigma_m = 0.005;
   double max_relative_depth_sigma = 0.05;
-  double max_tilt_sigma_rad = 0.01;
+  double max_tilt_sigma_rad = 0.005;
   double outlier_sigma = 6;
 
   template <class V>
