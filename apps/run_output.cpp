@@ -11,8 +11,8 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kStatisticsHeader =
-    "#timestamp [ns],frame,tracked,detected,stereo,lost_flow,lost_check,lost_epipolar,matches,match_inliers,raw_matches,raw_match_inliers,brightness_left,brightness_right,"
-    "median_motion [px],window_frames,landmarks,observations,iterations,outliers,initial_cost,final_cost,keyframe,standstill\n";
+    "#timestamp [ns],frame,tracked,detected,stereo,lost_flow,lost_check,lost_epipolar,matches,match_inliers,raw_matches,raw_match_inliers,expected,recognised,brightness_left,brightness_right,"
+    "median_motion [px],window_frames,landmarks,known_landmarks,observations,iterations,outliers,initial_cost,final_cost,keyframe,standstill\n";
 constexpr const char* kTimingHeader =
     "#timestamp [ns],frame,pyramid [ms],track [ms],stereo [ms],detect [ms],geometry [ms],boost [ms],prepare [ms],solve [ms],marginalise [ms]\n";
 
@@ -47,14 +47,14 @@ std::string truth_row(const TrajectoryPoint& point) {
 }
 
 std::string frontend_columns(const FrontendStats& s) {
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check,
-                     s.lost_epipolar, s.matches.found, s.matches.inliers, s.raw_matches.found, s.raw_matches.inliers,
-                     s.mean_brightness_left, s.mean_brightness_right, s.median_motion_px);
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check,
+                     s.lost_epipolar, s.matches.found, s.matches.inliers, s.raw_matches.found, s.raw_matches.inliers, s.expected,
+                     s.recognised, s.mean_brightness_left, s.mean_brightness_right, s.median_motion_px);
 }
 
 std::string estimator_columns(const EstimatorStats& s) {
-  return fmt::format("{},{},{},{},{},{},{},{},{}", s.frames_in_window, s.landmarks, s.observations, s.iterations, s.outliers,
-                     s.initial_cost, s.final_cost, s.keyframe ? 1 : 0, s.standstill ? 1 : 0);
+  return fmt::format("{},{},{},{},{},{},{},{},{},{}", s.frames_in_window, s.landmarks, s.known_landmarks, s.observations,
+                     s.iterations, s.outliers, s.initial_cost, s.final_cost, s.keyframe ? 1 : 0, s.standstill ? 1 : 0);
 }
 
 /// Calls row(tracked, odometry or null) for every frame, joined by id; both lists are in order of id.

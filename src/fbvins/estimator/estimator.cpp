@@ -168,14 +168,14 @@ void Estimator::solve(Odometry& out, const LmOptions& lm) {
   Mat15 covariance;
   const int newest = static_cast<int>(window_.frames().size()) - 1;
   if (summary.usable && problem_.covariance(newest, covariance)) {
-    out.pose_covariance =
-        window_.known().anchor(window_.newest().state.T_WB, covariance.topLeftCorner<6, 6>(), problem_.beliefs);
+    out.pose_covariance = window_.known().anchor(window_.newest().state.T_WB, covariance.topLeftCorner<6, 6>(), problem_.beliefs);
     out.velocity_covariance = covariance.block<3, 3>(nav::v, nav::v);
     out.gyro_bias_covariance = covariance.block<3, 3>(nav::bg, nav::bg);
     out.accel_bias_covariance = covariance.block<3, 3>(nav::ba, nav::ba);
   }
   out.stats.frames_in_window = newest + 1;
   out.stats.landmarks = static_cast<int>(problem_.landmarks.size());
+  out.stats.known_landmarks = static_cast<int>(problem_.beliefs.size());
   out.stats.observations = static_cast<int>(problem_.observations.size());
   out.stats.iterations += summary.iterations;
   out.stats.initial_cost = summary.initial_cost;

@@ -68,7 +68,7 @@ class Estimator {
   std::optional<Time> previous_frame_, last_good_tracking_;
   Vec3 last_rate_ = Vec3::Zero();
   FrameId newest_handed_on_;
-  std::vector<LocatedLandmark> located_;  ///< that have left the window with the present frame
+  std::vector<LocatedLandmark> located_;    ///< that have left the window with the present frame
   std::vector<Keyframe> keyframes_;         ///< that became final with the present frame
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
 };

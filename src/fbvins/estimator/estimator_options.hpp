@@ -91,11 +91,12 @@ struct KnownLandmarkOptions {
   void visit(V&& v) {
     v("enabled", enabled, "", "landmarks seen again are held to where they were");
     v("capacity", capacity, "", "landmarks remembered", 0, 10000000);
-    v("position_sigma_m", position_sigma_m, "m", "standard deviation of where a landmark is in the map, beside what its depth leaves open",
-      1e-4, 1.0);
-    v("max_relative_depth_sigma", max_relative_depth_sigma, "", "standard deviation of the depth, as a share of it, of those remembered",
-      1e-4, 1.0);
-    v("max_tilt_sigma_rad", max_tilt_sigma_rad, "rad", "nothing is remembered before roll and pitch are known to this", 1e-4, 3.0);
+    v("position_sigma_m", position_sigma_m, "m",
+      "standard deviation of where a landmark is in the map, beside what its depth leaves open", 1e-4, 1.0);
+    v("max_relative_depth_sigma", max_relative_depth_sigma, "",
+      "standard deviation of the depth, as a share of it, of those remembered", 1e-4, 1.0);
+    v("max_tilt_sigma_rad", max_tilt_sigma_rad, "rad", "nothing is remembered before roll and pitch are known to this", 1e-4,
+      3.0);
     v("outlier_sigma", outlier_sigma, "sigma", "a landmark further off than this is another one", 0.5, 100.0);
   }
 };

@@ -75,7 +75,7 @@ Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
 void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use) {
   if (in_use.empty() || anchors_.empty()) return;  // still to what it was held to last
   Anchor mean{p_W, Mat6::Zero()};
-  for (const LandmarkBelief& belief : in_use) {  // (K6)
+  for (const LandmarkBelief& belief : in_use) {                                       // (K6)
     const std::int64_t i = std::max<std::int64_t>(belief.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
     mean.covariance += carried(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
   }

@@ -54,12 +54,12 @@ class KnownLandmarks {
 
   KnownLandmarkOptions options_;
   std::unordered_map<TrackId, LandmarkBelief> beliefs_;
-  std::deque<TrackId> order_;     // as remembered; forgotten ones may still be named
-  std::deque<Anchor> anchors_;    // of the landmarks remembered, oldest first
+  std::deque<TrackId> order_;      // as remembered; forgotten ones may still be named
+  std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest
-  Anchor next_;                   // of those remembered next
-  bool level_ = false;            // W is known to be, well enough to remember anything in it
-  Anchor held_to_;                // what the newest pose is held to
+  Anchor next_;                    // of those remembered next
+  bool level_ = false;             // W is known to be, well enough to remember anything in it
+  Anchor held_to_;                 // what the newest pose is held to
   std::vector<LocatedLandmark> new_;
 };
 

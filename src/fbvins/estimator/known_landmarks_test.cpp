@@ -34,8 +34,7 @@ TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
   // Along the ray: sigma of 1/depth times depth squared; beside it the ray's own, at this depth; and 3 mm everywhere.
   const Vec3 ray = p_C / p_C.z();
   EXPECT_NEAR(in_camera(2, 2), 16e-5 * 1.0 + 9e-6, 1e-12);
-  const Mat3 expected =
-      16e-5 * ray * ray.transpose() + Mat3(Vec3(4e-6, 4e-6, 0).asDiagonal()) + 9e-6 * Mat3::Identity();
+  const Mat3 expected = 16e-5 * ray * ray.transpose() + Mat3(Vec3(4e-6, 4e-6, 0).asDiagonal()) + 9e-6 * Mat3::Identity();
   EXPECT_LT((in_camera - expected).norm(), 1e-12);
 }
 

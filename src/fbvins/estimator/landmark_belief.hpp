@@ -8,9 +8,9 @@ namespace fbvins {
 
 /// Where a landmark was when it left the window before.
 struct LandmarkBelief {
-  Vec3 p_W = Vec3::Zero();                  ///< m
+  Vec3 p_W = Vec3::Zero();                   ///< m
   Mat3 sqrt_information = Mat3::Identity();  ///< 1/m; of the position, in W, relative to the map around it
-  std::int64_t anchor = 0;                  ///< which of KnownLandmarks' anchors holds what that map has in common
+  std::int64_t anchor = 0;                   ///< which of KnownLandmarks' anchors holds what that map has in common
 };
 
 /// The landmark in the body of its host, m (W1).

@@ -50,8 +50,8 @@ struct Landmark {
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
   std::optional<LandmarkBelief> belief;  ///< of one that was known before
-  int strikes = 0;                  ///< times an observation of it was thrown out
-  std::vector<Sighting> sightings;  ///< oldest first
+  int strikes = 0;                       ///< times an observation of it was thrown out
+  std::vector<Sighting> sightings;       ///< oldest first
 };
 
 class SlidingWindow {

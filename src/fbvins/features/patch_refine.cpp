@@ -38,8 +38,7 @@ KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& i
 }
 
 bool PatchRefiner::accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) const {
-  return result.ok() && result.correlation >= min_correlation &&
-         (result.px - start_px).norm() <= options_.max_shift_px * scale;
+  return result.ok() && result.correlation >= min_correlation && (result.px - start_px).norm() <= options_.max_shift_px * scale;
 }
 
 }  // namespace fbvins

@@ -31,9 +31,8 @@ void LandmarkMemory::locate(TrackId track, const Vec3& p_W) {
 }
 
 void LandmarkMemory::forget_unlocated(Time now) {
-  std::erase_if(landmarks_, [&](const auto& entry) {
-    return !entry.second.p_W && (now - entry.second.kept).seconds() > kWaitForPosition_s;
-  });
+  std::erase_if(landmarks_,
+                [&](const auto& entry) { return !entry.second.p_W && (now - entry.second.kept).seconds() > kWaitForPosition_s; });
 }
 
 void LandmarkMemory::expect(const Pose<W, C0>& T_WC, const Camera& camera, const OrbOptions& scales,

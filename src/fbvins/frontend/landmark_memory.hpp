@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tracks that have ended, with what it takes to know their landmarks again: descriptor, patch, where the estimator left
-// them and where they were seen from. Those that an image taken elsewhere should show are looked for in it (docs/derivations/known_landmarks.md, K7).
-// Synchronous; one instance, one thread. At most `capacity` landmarks: those unseen for longest are forgotten.
+// them and where they were seen from. Those that an image taken elsewhere should show are looked for in it
+// (docs/derivations/known_landmarks.md, K7). Synchronous; one instance, one thread. At most `capacity` landmarks: those unseen
+// for longest are forgotten.
 //
 //   LandmarkMemory memory(options);
 //   memory.keep(landmark);                            // when a track has ended

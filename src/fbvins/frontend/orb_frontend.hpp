@@ -125,8 +125,8 @@ class OrbFrontend final : public Frontend {
     double depth_factor = 1;  // depth now / depth before
     bool renew_reference = false;
     std::array<Sighting, kHistory> history;  // of frame f at f % kHistory
-    std::optional<Vec3> seen_from_W;  // camera when it was last in sight
-    std::optional<Vec3> p_W;          // where the estimator has left it, once it has
+    std::optional<Vec3> seen_from_W;         // camera when it was last in sight
+    std::optional<Vec3> p_W;                 // where the estimator has left it, once it has
     bool alive = true;
   };
   struct Patches {

@@ -268,8 +268,7 @@ void OrbFrontend::forget(Time now) {
     if ((now - track.last_seen).seconds() > memory_s || track.age_frames < 2 || remembered == options_.max_remembered) {
       remember(track);
       track.alive = false;
-    }
-    else ++remembered;
+    } else ++remembered;
   }
   drop_dead_tracks();
 }

@@ -49,6 +49,7 @@ struct Health {
 struct EstimatorStats {
   int frames_in_window = 0;
   int landmarks = 0;
+  int known_landmarks = 0;  ///< of these, held to where they were when they left the window
   int observations = 0;
   int iterations = 0;
   int outliers = 0;  ///< observations removed after this frame's solve
