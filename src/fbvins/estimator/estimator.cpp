@@ -54,6 +54,7 @@ StatePrior Estimator::prior() const {
 
 Estimate Estimator::process(const TrackedFrame& frame) {
   keyframes_.clear();
+  window_.remember_landmarks(options_.known_landmarks.enabled && frame.knows_again);
   const Duration rest = rest_.update(frame);
   Odometry out = running_ ? track(frame, rest) : initialise(frame, rest);
   out.id = frame.id;

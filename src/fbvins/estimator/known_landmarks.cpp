@@ -26,7 +26,7 @@ void KnownLandmarks::clear() {
 }
 
 void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information) {
-  if (!options_.enabled || !level_ || beliefs_.contains(track)) return;
+  if (!level_ || beliefs_.contains(track)) return;
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
   const double relative_sigma = depth * std::sqrt(covariance(2, 2));

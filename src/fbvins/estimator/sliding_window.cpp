@@ -360,7 +360,7 @@ void SlidingWindow::marginalise_keyframe(int index, WindowProblem& problem, cons
     else rehost(landmark, landmark.sightings.front().frame, calibration);
   }
   WindowPrior prior = marginalise_frame(problem, index, leaves, marginalisation_scratch_);
-  remember_leaving(problem, leaves, calibration);
+  if (remembers_) remember_leaving(problem, leaves, calibration);
   if (index + 1 < static_cast<int>(frames_.size())) frames_[index + 1].imu.reset();
   remove_flagged(gone);
   forget_sightings(id, calibration);

@@ -104,6 +104,8 @@ class SlidingWindow {
   int index_of(FrameId id) const;
   /// Landmarks that have left the window.
   KnownLandmarks& known() { return known_; }
+  /// Whether landmarks that leave are remembered: worth it only where they are seen again.
+  void remember_landmarks(bool on) { remembers_ = on; }
 
  private:
   Landmark& landmark_of(TrackId track);
@@ -124,6 +126,7 @@ class SlidingWindow {
   std::unordered_map<TrackId, int> banned_;  ///< tracks that proved wrong, with their strikes
   std::vector<int> landmark_of_problem_;
   KnownLandmarks known_;
+  bool remembers_ = false;
   WindowPrior prior_;
   std::int64_t next_landmark_ = 0;
   WindowProblem marginalisation_problem_, marginalisation_scratch_;

@@ -34,6 +34,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   TrackedFrame out;
   out.id = packet.id;
   out.t = packet.frame.t;
+  out.knows_again = options_.recognition.enabled;
   out.imu = packet.imu;
   FrontendStats& stats = out.stats;
   CpuTimer timer;

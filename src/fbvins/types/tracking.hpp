@@ -69,6 +69,8 @@ struct TrackedFrame {
   FrameId id;
   Time t;
   std::vector<TrackedFeature> features;
+  /// The frontend knows landmarks again: one that was out of view comes back under its old id.
+  bool knows_again = false;
   ImuSegment imu;  ///< since the frame before
   FrontendStats stats;
   StereoFrame images;  ///< null unless keyframes are wanted: they carry them on
