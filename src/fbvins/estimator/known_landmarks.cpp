@@ -55,9 +55,13 @@ void KnownLandmarks::make_room() {
     beliefs_.erase(order_.front());
     order_.pop_front();
   }
-  const auto oldest = std::find_if(order_.begin(), order_.end(), [&](TrackId track) { return beliefs_.contains(track); });
-  if (oldest == order_.end()) return;
-  for (const std::int64_t needed = beliefs_.at(*oldest).anchor; first_anchor_ < needed; ++first_anchor_) anchors_.pop_front();
+  if (order_.empty()) return;
+  for (const std::int64_t needed = beliefs_.at(order_.front()).anchor; first_anchor_ < needed; ++first_anchor_)
+    anchors_.pop_front();
+}
+
+void KnownLandmarks::forget(TrackId track) {
+  if (beliefs_.erase(track) > 0) std::erase(order_, track);
 }
 
 std::optional<LandmarkBelief> KnownLandmarks::find(TrackId track) const {

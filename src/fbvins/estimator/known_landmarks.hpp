@@ -37,7 +37,7 @@ class KnownLandmarks {
   /// it has drifted least; not one whose depth is too uncertain.
   void remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information);
   std::optional<LandmarkBelief> find(TrackId track) const;
-  void forget(TrackId track) { beliefs_.erase(track); }
+  void forget(TrackId track);
   /// Those remembered since the last call.
   std::vector<LocatedLandmark> take_new() { return std::exchange(new_, {}); }
 
@@ -54,7 +54,7 @@ class KnownLandmarks {
 
   KnownLandmarkOptions options_;
   std::unordered_map<TrackId, LandmarkBelief> beliefs_;
-  std::deque<TrackId> order_;      // as remembered; forgotten ones may still be named
+  std::deque<TrackId> order_;      // as remembered
   std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest
   Anchor next_;                    // of those remembered next

@@ -75,9 +75,13 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
     known.anchor(body_at(Vec3(k, 0, 0)), 1e-7 * (k + 1) * Mat6::Identity(), {});
     known.remember(TrackId{k}, kCamera, kPoint, kInformation);
     if (k % 4 == 0) known.forget(TrackId{k});
+    if (k % 8 == 0) known.remember(TrackId{k}, kCamera, kPoint, kInformation);  // again
     EXPECT_LE(known.size(), 10u);
   }
-  EXPECT_FALSE(known.find(TrackId{29}).has_value());
+  EXPECT_FALSE(known.find(TrackId{27}).has_value());
+  EXPECT_FALSE(known.find(TrackId{36}).has_value()) << "forgotten";
+  EXPECT_TRUE(known.find(TrackId{29}).has_value());
+  EXPECT_TRUE(known.find(TrackId{32}).has_value()) << "forgotten, and remembered again";
   ASSERT_TRUE(known.find(TrackId{39}).has_value());
   // Anchors go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
   const LandmarkBelief newest = *known.find(TrackId{39});
