@@ -42,8 +42,8 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   predictor_.add(packet.imu);
   const bool has_left = ingest(packet, stats);
   stats.pyramid_ms = timer.lap_ms();
-  // Without a left image tracks wait where they were; the next image's motion spans the gap.
   learn_positions(prior);
+  // Without a left image tracks wait where they were; the next image's motion spans the gap.
   if (!has_left) return out;
   T_WC_ = predictor_.camera_at(now_, prior);
 

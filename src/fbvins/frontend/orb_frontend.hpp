@@ -2,7 +2,8 @@
 // The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features matched by Hamming distance where the predicted pose
 // expects them, left to right along the epipolar band, checked by epipolar RANSAC, and refined below a
 // pixel by patch alignment. A track that is not seen for a moment (blur, occlusion, a black image) is remembered with
-// its descriptor and patch, and continues under its old id when it is seen again.
+// its descriptor and patch, and continues under its old id when it is seen again; so does, however much later, one whose
+// landmark the estimator has located.
 // Synchronous; one instance is used by one thread at a time; allocates only while it grows.
 //
 //   OrbFrontend frontend(rig, OrbFrontendOptions{});

@@ -15,7 +15,10 @@ constexpr int kFewFrames = 4;
 void OrbFrontend::learn_positions(const StatePrior& prior) {
   if (!prior.valid) {  // the next W is another one
     memory_.clear();
-    for (Track& track : tracks_) track.p_W.reset();
+    for (Track& track : tracks_) {
+      track.seen_from_W.reset();
+      track.p_W.reset();
+    }
     return;
   }
   for (const LocatedLandmark& located : prior.located) {
