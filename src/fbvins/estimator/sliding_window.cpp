@@ -149,6 +149,10 @@ void SlidingWindow::refuse_distant_belief(Landmark& landmark, const Calibration&
   const Pose<W, B>& host = frames_[index_of(landmark.host)].state.T_WB;
   const double distance_sigma = belief_residual(CameraGeometry(calibration), host, numbers, *landmark.belief).norm();
   if (distance_sigma < kFarFromBelief * options_.known_landmarks.outlier_sigma) return;
+  disbelieve(landmark);
+}
+
+void SlidingWindow::disbelieve(Landmark& landmark) {
   landmark.belief.reset();
   known_.forget(landmark.track);
 }
@@ -227,9 +231,7 @@ int SlidingWindow::refuse_beliefs(const WindowProblem& problem) {
   for (std::size_t i = 0; i < problem.landmarks.size(); ++i) {
     const WindowLandmark& numbers = problem.landmarks[i];
     if (numbers.belief < 0 || problem.distance_to_belief(numbers).norm() <= options_.known_landmarks.outlier_sigma) continue;
-    Landmark& landmark = landmarks_[landmark_of_problem_[i]];
-    landmark.belief.reset();
-    known_.forget(landmark.track);
+    disbelieve(landmarks_[landmark_of_problem_[i]]);
     ++refused;
   }
   return refused;

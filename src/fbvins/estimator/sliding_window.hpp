@@ -112,6 +112,7 @@ class SlidingWindow {
   void set_velocities(Sighting& before, Sighting& now) const;
   bool triangulate(Landmark& landmark, const Calibration& calibration) const;
   void refuse_distant_belief(Landmark& landmark, const Calibration& calibration);
+  void disbelieve(Landmark& landmark);
   void rehost(Landmark& landmark, FrameId new_host, const Calibration& calibration) const;
   void forget_sightings(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
