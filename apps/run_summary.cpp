@@ -38,7 +38,7 @@ void evaluate_against(Trajectory truth, const RunRecord& record, RunSummary& sum
   for (const Odometry& o : record.odometry)
     if (covariances.size() < pairs.size() && o.health.has_pose() && o.t == pairs[covariances.size()].estimate.t)
       covariances.push_back(o.pose_covariance);
-  if (const auto yaw = align(pairs, Alignment::yaw)) summary.nees = nees(pairs, covariances, *yaw);
+  if (const auto start = align_start(pairs)) summary.nees = nees(pairs, covariances, *start);
 }
 
 Json map_json(const MapSummary& m) {
@@ -137,7 +137,7 @@ std::string to_json_text(const RunSummary& s) {
   for (const auto& [name, frames] : s.health) result["health"][name] = frames;
   if (s.evaluation) result["accuracy"] = to_json(*s.evaluation, Alignment::se3);
   else result["no_accuracy"] = s.no_evaluation;
-  if (s.nees) result["nees_yaw"] = to_json(*s.nees);
+  if (s.nees) result["nees_from_start"] = to_json(*s.nees);
   if (s.matches.found > 0)
     result["descriptor_matches"] = {{"found", s.matches.found},
                                     {"inliers", s.matches.inliers},
@@ -164,8 +164,9 @@ std::string to_text(const RunSummary& s) {
   text += s.images_bad > 0 ? fmt::format("\n{} image files could not be used\n", s.images_bad) : "\n";
   text += s.evaluation ? to_table(*s.evaluation, Alignment::se3) : fmt::format("no accuracy: {}\n", s.no_evaluation);
   if (s.nees && s.nees->count > 0)
-    text += fmt::format("NEES (yaw-aligned; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
-                        s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
+    text += fmt::format(
+        "NEES (from the first second on; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
+        s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
   if (s.map) text += map_text(*s.map);
   text += "-- timing (differs from run to run) --\n";
   text +=

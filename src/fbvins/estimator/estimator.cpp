@@ -40,6 +40,7 @@ WindowWeights Estimator::weights() const {
   w.gravity_mps2 = options_.gravity_mps2;
   w.standstill_velocity_sigma_mps = options_.standstill_velocity_sigma_mps;
   w.min_inverse_depth_1pm = 1.0 / options_.max_depth_m;
+  w.estimate_tilt = estimates_tilt_;
   w.estimate_extrinsics = options_.estimate_extrinsics;
   w.estimate_time_offset = options_.estimate_time_offset;
   return w;
@@ -49,8 +50,10 @@ StatePrior Estimator::prior() const {
   StatePrior out;
   if (!running_) return out;
   const Frame& newest = window_.newest();
-  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, true, located_};
+  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, gravity_W(), true, located_};
 }
+
+Vec3 Estimator::gravity_W() const { return window_.tilt().gravity_W(options_.gravity_mps2); }
 
 Estimate Estimator::process(const TrackedFrame& frame) {
   keyframes_.clear();
@@ -77,6 +80,7 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
     return out;
   }
   window_.clear();
+  estimates_tilt_ = window_.remembers_landmarks();
   for (std::size_t i = 0; i < start->frames.size(); ++i) {
     Frame f;
     f.id = start->frames[i].id;
@@ -91,10 +95,11 @@ Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {
     }
     window_.add_frame(std::move(f), start->frames[i].features, calibration_);
   }
-  WindowPrior belief = first_frame_prior(options_.initialiser, window_.frames().front().state);
+  WindowPrior belief = first_frame_prior(options_.initialiser, window_.frames().front().state, estimates_tilt_);
   if (options_.estimate_extrinsics || options_.estimate_time_offset)
     belief = with_calibration_belief(std::move(belief), options_.calibration, {rig_.T_BC0, rig_.T_BC1, 0.0});
   window_.set_prior(std::move(belief));
+  window_.set_pivot(window_.frames().front().state.T_WB.p);
   // Tilt, velocity and biases hardly move the cost of so short a time: do not stop on its decrease.
   const LmOptions thorough{.max_iterations = 30, .min_decrease = 1e-9};
   running_ = true;
@@ -127,7 +132,7 @@ Frame Estimator::predict(const TrackedFrame& frame) const {
   }
   f.imu.emplace(imu_noise_, last.state.bias);
   f.imu->integrate(frame.imu);
-  f.state = f.imu->predict(last.state, options_.gravity_mps2);
+  f.state = f.imu->predict(last.state, gravity_W());
   return f;
 }
 
@@ -166,15 +171,8 @@ void Estimator::solve(Odometry& out, const LmOptions& lm) {
   } else {
     ++failed_solves_;
   }
-  Mat15 covariance;
-  const int newest = static_cast<int>(window_.frames().size()) - 1;
-  if (summary.usable && problem_.covariance(newest, covariance)) {
-    out.pose_covariance = window_.known().anchor(window_.newest().state.T_WB, covariance.topLeftCorner<6, 6>(), problem_.beliefs);
-    out.velocity_covariance = covariance.block<3, 3>(nav::v, nav::v);
-    out.gyro_bias_covariance = covariance.block<3, 3>(nav::bg, nav::bg);
-    out.accel_bias_covariance = covariance.block<3, 3>(nav::ba, nav::ba);
-  }
-  out.stats.frames_in_window = newest + 1;
+  if (summary.usable) fill_covariances(out);
+  out.stats.frames_in_window = static_cast<int>(window_.frames().size());
   out.stats.landmarks = static_cast<int>(problem_.landmarks.size());
   out.stats.known_landmarks = static_cast<int>(problem_.beliefs.size());
   out.stats.observations = static_cast<int>(problem_.observations.size());
@@ -185,6 +183,20 @@ void Estimator::solve(Odometry& out, const LmOptions& lm) {
   out.stats.solve_ms += timer.lap_ms();
 }
 
+void Estimator::fill_covariances(Odometry& out) {
+  Mat17 covariance;
+  if (!problem_.covariance(static_cast<int>(window_.frames().size()) - 1, covariance)) return;
+  const NavState& state = window_.newest().state;
+  KnownLandmarks& known = window_.known();
+  known.hold_to(state.T_WB.p, problem_.beliefs);
+  covariance.topLeftCorner<6, 6>() = known.with_map(state.T_WB, covariance.topLeftCorner<6, 6>());
+  const Mat15 level = window_.tilt().levelled_covariance(state, covariance);
+  out.pose_covariance = level.topLeftCorner<6, 6>();
+  out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);
+  out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg);
+  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba);
+}
+
 void Estimator::choose_keyframe(bool standstill, Odometry& out) {
   const bool keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.newest().keyframe = keyframe;
@@ -193,7 +205,10 @@ void Estimator::choose_keyframe(bool standstill, Odometry& out) {
 
 void Estimator::shrink_window(Odometry& out) {
   const auto keyframe_zone = [&] { return static_cast<int>(window_.frames().size()) - options_.keyframes.newest_frames; };
-  hand_on_keyframes(keyframe_zone());  // while problem_ still is this window's
+  // While problem_ still is this window's:
+  hand_on_keyframes(keyframe_zone());
+  if (Mat17 covariance; keyframe_zone() > options_.keyframes.max_keyframes && problem_.covariance(0, covariance))
+    window_.known().anchor(window_.frames()[0].state.T_WB, covariance.topLeftCorner<6, 6>());
   for (int i = keyframe_zone() - 1; i >= 1; --i)
     if (!window_.frames()[i].keyframe) window_.drop_frame(i, problem_, calibration_, weights());
   while (keyframe_zone() > options_.keyframes.max_keyframes) {
@@ -213,8 +228,9 @@ void Estimator::hand_on_keyframes(int keyframe_zone) {
     if (!frame.keyframe || frame.id <= newest_handed_on_) continue;
     newest_handed_on_ = frame.id;
     Keyframe keyframe = window_.take_keyframe(i, calibration_);
-    Mat15 covariance;
-    if (problem_.covariance(i, covariance)) keyframe.pose_covariance = covariance.topLeftCorner<6, 6>();
+    Mat17 covariance;
+    if (problem_.covariance(i, covariance))
+      keyframe.pose_covariance = window_.tilt().levelled_covariance(frame.state, covariance).topLeftCorner<6, 6>();
     keyframe.reset_counter = reset_counter_;
     keyframes_.push_back(std::move(keyframe));
   }
@@ -245,7 +261,7 @@ Health Estimator::judge(const TrackedFrame& frame) {
 }
 
 void Estimator::restart() {
-  const Pose<W, B>& last = window_.newest().state.T_WB;
+  const Pose<W, B> last = window_.tilt().levelled(window_.newest().state.T_WB);
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last;
   running_ = false;
   failed_solves_ = 0;
@@ -256,7 +272,7 @@ void Estimator::restart() {
 }
 
 void Estimator::fill(Odometry& out) {
-  const NavState& state = window_.newest().state;
+  const NavState state = window_.tilt().levelled(window_.newest().state);
   out.T_WB = state.T_WB;
   out.v_WB = state.v_WB;
   out.bias = state.bias;

@@ -33,7 +33,7 @@ class Estimator {
   /// The state at the frame's stamp. Never a silent wrong pose: health says what it is worth.
   Estimate process(const TrackedFrame& frame);
 
-  /// For the frontend: the newest state; not valid before initialisation.
+  /// For the frontend: the newest state in the window's W, not levelled; not valid before initialisation.
   StatePrior prior() const;
   WindowSnapshot snapshot() const { return window_.snapshot(calibration_); }
   const Calibration& calibration() const { return calibration_; }
@@ -45,6 +45,7 @@ class Estimator {
   Odometry track(const TrackedFrame& frame, Duration rest);
   Frame predict(const TrackedFrame& frame) const;
   void solve(Odometry& out, const LmOptions& lm);
+  void fill_covariances(Odometry& out);
   void choose_keyframe(bool standstill, Odometry& out);
   void shrink_window(Odometry& out);
   void hand_on_keyframes(int keyframe_zone);
@@ -52,6 +53,7 @@ class Estimator {
   void restart();
   void fill(Odometry& out);
   WindowWeights weights() const;
+  Vec3 gravity_W() const;
 
   EstimatorOptions options_;
   StereoRig rig_;
@@ -63,6 +65,7 @@ class Estimator {
   SlidingWindow window_;
   WindowProblem problem_;
   bool running_ = false;
+  bool estimates_tilt_ = true;  ///< a W in which landmarks are remembered is not turned
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
   std::optional<Time> previous_frame_, last_good_tracking_;

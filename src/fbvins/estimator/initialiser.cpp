@@ -121,7 +121,7 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& c
 }
 
 bool Initialiser::refine_structure(const Calibration& calibration) {
-  structure_.build(problem_, calibration, WindowWeights{});
+  structure_.build(problem_, calibration, WindowWeights{.estimate_tilt = false});
   LmOptions lm;
   lm.max_iterations = 6;
   if (!problem_.optimise(lm).usable) return false;

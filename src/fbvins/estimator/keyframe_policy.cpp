@@ -35,9 +35,9 @@ double entropy_of_newest(const WindowProblem& problem, int unseen, WindowProblem
   // A landmark with fewer than two rays left says nothing: it would only make the elimination singular.
   std::erase_if(scratch.landmarks, [](const WindowLandmark& l) { return l.observation_count < 2; });
   scratch.linearise();
-  Mat15 covariance;
+  Mat17 covariance;
   if (!scratch.solve(0) || !scratch.covariance(static_cast<int>(scratch.frames.size()) - 1, covariance)) return 0;
-  const Eigen::LLT<Mat15> llt(covariance);
+  const Eigen::LLT<Mat15> llt(covariance.topLeftCorner<15, 15>());
   return llt.matrixLLT().diagonal().array().log().sum();  // ln det(covariance) / 2
 }
 

@@ -20,13 +20,13 @@ void KnownLandmarks::clear() {
   anchors_.clear();
   first_anchor_ = 0;
   next_ = {};
-  level_ = false;
   held_to_ = {};
+  in_use_ = false;
   new_.clear();
 }
 
 void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information) {
-  if (!level_ || beliefs_.contains(track)) return;
+  if (beliefs_.contains(track)) return;
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
   const double relative_sigma = depth * std::sqrt(covariance(2, 2));
@@ -77,7 +77,8 @@ Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
 }
 
 void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use) {
-  if (in_use.empty() || anchors_.empty()) return;  // still to what it was held to last
+  in_use_ = !in_use.empty();
+  if (!in_use_ || anchors_.empty()) return;  // still to what it was held to last
   Anchor mean{p_W, Mat6::Zero()};
   for (const LandmarkBelief& belief : in_use) {                                       // (K6)
     const std::int64_t i = std::max<std::int64_t>(belief.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
@@ -86,15 +87,16 @@ void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in
   held_to_ = mean;
 }
 
-Mat6 KnownLandmarks::anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance, std::span<const LandmarkBelief> in_use) {
+Mat6 KnownLandmarks::with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const {
+  Mat6 from_world = Mat6::Identity();
+  from_world.bottomRightCorner<3, 3>() = T_WB.R().transpose();
+  return (in_use_ ? kTimesCounted : 1.0) * window_covariance + from_world * carried(held_to_, T_WB.p) * from_world.transpose();
+}
+
+void KnownLandmarks::anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance) {
   Mat6 to_world = Mat6::Identity();
   to_world.bottomRightCorner<3, 3>() = T_WB.R();
-  const Mat6 window = to_world * window_covariance * to_world.transpose();
-  level_ = std::sqrt(std::max(window(3, 3), window(4, 4))) < options_.max_tilt_sigma_rad;
-  hold_to(T_WB.p, in_use);
-  const double counted = in_use.empty() ? 1.0 : kTimesCounted;
-  next_ = {T_WB.p, counted * window + carried(held_to_, T_WB.p)};
-  return to_world.transpose() * next_.covariance * to_world;
+  next_ = {T_WB.p, to_world * with_map(T_WB, window_covariance) * to_world.transpose()};
 }
 
 }  // namespace fbvins

@@ -6,7 +6,9 @@
 // landmarks of a moment, as an anchor, and is part of what W is uncertain of from then on.
 // Synchronous; one instance, one thread. At most `capacity` landmarks: the oldest are forgotten.
 //
-//   covariance = known.anchor(T_WB, covariance, beliefs_in_use);   // after each solve
+//   known.hold_to(T_WB.p, beliefs_in_use);                         // after each solve
+//   covariance = known.with_map(T_WB, covariance);                 // of any pose of the window
+//   known.anchor(T_WB_leaving, covariance);                        // before a keyframe leaves
 //   known.remember(track, T_WC, point, V);                         // when a landmark leaves
 //   landmark.belief = known.find(track);                           // when a track appears
 #pragma once
@@ -30,9 +32,12 @@ class KnownLandmarks {
   explicit KnownLandmarks(const KnownLandmarkOptions& options) : options_(options) {}
 
   void clear();
-  /// The newest pose and its covariance of (dp in W, dtheta in B) in the window alone. Adds what the pose owes to the
-  /// map it is held to (K5, K6), and returns their sum. Landmarks remembered from now on are as uncertain in common.
-  Mat6 anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance, std::span<const LandmarkBelief> in_use);
+  /// The window is held to the map by these, around the newest position.
+  void hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use);
+  /// Covariance of (dp in W, dtheta in B) of a pose: of the window alone, and with what it owes to the map (K4-K6).
+  Mat6 with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
+  /// Landmarks remembered from now on have in common what this pose, their host's, is uncertain of.
+  void anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance);
   /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. The first time counts,
   /// it has drifted least; not one whose depth is too uncertain.
   void remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information);
@@ -48,7 +53,6 @@ class KnownLandmarks {
     Vec3 p_W = Vec3::Zero();
     Mat6 covariance = Mat6::Zero();  // (dp, dtheta) in W
   };
-  void hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use);
   static Mat6 carried(const Anchor& anchor, const Vec3& p_W);
   void make_room();
 
@@ -58,8 +62,8 @@ class KnownLandmarks {
   std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest
   Anchor next_;                    // of those remembered next
-  bool level_ = false;             // W is known to be, well enough to remember anything in it
   Anchor held_to_;                 // what the newest pose is held to
+  bool in_use_ = false;            // any landmark in the window is known from before
   std::vector<LocatedLandmark> new_;
 };
 

@@ -14,16 +14,10 @@ const Mat3 kInformation = Vec3(1e6, 1e6, 1e5).asDiagonal();
 
 Pose<W, B> body_at(const Vec3& p_W) { return {so3_exp(Vec3(0.1, 0.2, 0.3)), p_W}; }
 
-KnownLandmarks level(KnownLandmarkOptions options = {}, const Mat6& covariance = 1e-6 * Mat6::Identity()) {
-  KnownLandmarks known(options);
-  known.anchor(body_at(Vec3::Zero()), covariance, {});
-  return known;
-}
-
 TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
   KnownLandmarkOptions options;
   options.position_sigma_m = 0.003;
-  KnownLandmarks known = level(options);
+  KnownLandmarks known(options);
   known.remember(TrackId{7}, kCamera, kPoint, kInformation);
   const auto belief = known.find(TrackId{7});
   ASSERT_TRUE(belief.has_value());
@@ -39,7 +33,7 @@ TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
 }
 
 TEST(KnownLandmarks, TheFirstTimeCountsUntilForgotten) {
-  KnownLandmarks known = level();
+  KnownLandmarks known{KnownLandmarkOptions{}};
   known.remember(TrackId{7}, kCamera, kPoint, kInformation);
   const Vec3 first = known.find(TrackId{7})->p_W;
   known.remember(TrackId{7}, kCamera, 1.1 * kPoint, kInformation);
@@ -52,15 +46,8 @@ TEST(KnownLandmarks, TheFirstTimeCountsUntilForgotten) {
   EXPECT_NE(known.find(TrackId{7})->p_W, first);
 }
 
-TEST(KnownLandmarks, NothingOfUncertainDepthOrBeforeWIsLevel) {
+TEST(KnownLandmarks, NothingOfUncertainDepth) {
   KnownLandmarks known{KnownLandmarkOptions{}};
-  known.remember(TrackId{1}, kCamera, kPoint, kInformation);  // before any pose
-  Mat6 tilted = 1e-6 * Mat6::Identity();
-  tilted.bottomRightCorner<3, 3>() *= 1e3;
-  known.anchor(body_at(Vec3::Zero()), tilted, {});
-  known.remember(TrackId{2}, kCamera, kPoint, kInformation);
-  EXPECT_EQ(known.size(), 0u);
-  known.anchor(body_at(Vec3::Zero()), 1e-6 * Mat6::Identity(), {});
   known.remember(TrackId{3}, kCamera, kPoint, Vec3(1e6, 1e6, 1e3).asDiagonal());  // sigma of a sixteenth of the depth
   EXPECT_EQ(known.size(), 0u);
   known.remember(TrackId{4}, kCamera, kPoint, kInformation);
@@ -72,7 +59,7 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   options.capacity = 10;
   KnownLandmarks known(options);
   for (int k = 0; k < 40; ++k) {
-    known.anchor(body_at(Vec3(k, 0, 0)), 1e-7 * (k + 1) * Mat6::Identity(), {});
+    known.anchor(body_at(Vec3(k, 0, 0)), 1e-7 * (k + 1) * Mat6::Identity());
     known.remember(TrackId{k}, kCamera, kPoint, kInformation);
     if (k % 4 == 0) known.forget(TrackId{k});
     if (k % 8 == 0) known.remember(TrackId{k}, kCamera, kPoint, kInformation);  // again
@@ -84,9 +71,8 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   EXPECT_TRUE(known.find(TrackId{32}).has_value()) << "forgotten, and remembered again";
   ASSERT_TRUE(known.find(TrackId{39}).has_value());
   // Anchors go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
-  const LandmarkBelief newest = *known.find(TrackId{39});
-  const Mat6 sum = known.anchor(body_at(Vec3(39, 0, 0)), Mat6::Zero(), std::array{newest});
-  EXPECT_NEAR(sum(0, 0), 40e-7, 1e-10);
+  known.hold_to(Vec3(39, 0, 0), std::array{*known.find(TrackId{39})});
+  EXPECT_NEAR(known.with_map(body_at(Vec3(39, 0, 0)), Mat6::Zero())(0, 0), 40e-7, 1e-10);
 }
 
 TEST(KnownLandmarks, APoseOwesItsMapWhatThatWasUncertainOf) {
@@ -95,18 +81,20 @@ TEST(KnownLandmarks, APoseOwesItsMapWhatThatWasUncertainOf) {
   const Pose<W, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
   heading(5, 5) = 4e-6;
   KnownLandmarks known{KnownLandmarkOptions{}};
-  known.anchor(there, heading, {});
+  known.anchor(there, heading);
   known.remember(TrackId{1}, kCamera, kPoint, kInformation);
   const Mat6 window = 1e-8 * Mat6::Identity();
-  const Mat6 held = known.anchor(here, window, std::array{*known.find(TrackId{1})});
+  known.hold_to(here.p, std::array{*known.find(TrackId{1})});
+  const Mat6 held = known.with_map(here, window);
   EXPECT_NEAR(held(5, 5), 4e-6 + 2e-8, 1e-12) << "what was seen twice is counted twice";
   EXPECT_NEAR(held(0, 0), 25 * 4e-6 + 2e-8, 1e-12) << "the lever of 5 m along y moves x";
   EXPECT_NEAR(held(1, 1), 2e-8, 1e-12);
   EXPECT_NEAR(held(0, 5), -5 * 4e-6, 1e-12);
   // With nothing of the map in view its uncertainty stays.
-  EXPECT_NEAR(known.anchor(here, window, {})(0, 0), 25 * 4e-6 + 1e-8, 1e-12);
+  known.hold_to(here.p, {});
+  EXPECT_NEAR(known.with_map(here, window)(0, 0), 25 * 4e-6 + 1e-8, 1e-12);
   known.clear();
-  EXPECT_NEAR(known.anchor(here, window, {})(0, 0), 1e-8, 1e-15);
+  EXPECT_NEAR(known.with_map(here, window)(0, 0), 1e-8, 1e-15);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "fbvins/estimator/sliding_window.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -36,6 +37,7 @@ void SlidingWindow::clear() {
   banned_.clear();
   known_.clear();
   prior_ = {};
+  tilt_ = {};
 }
 
 int SlidingWindow::index_of(FrameId id) const {
@@ -45,6 +47,7 @@ int SlidingWindow::index_of(FrameId id) const {
 
 void SlidingWindow::set_prior(WindowPrior prior) {
   prior_ = std::move(prior);
+  assert(prior_.quadratic.size() == prior_.frames_row() + 15 * static_cast<int>(prior_.frames.size()));
   for (int i : prior_.frames) {
     if (frames_[i].in_prior) continue;
     frames_[i].in_prior = true;
@@ -54,7 +57,7 @@ void SlidingWindow::set_prior(WindowPrior prior) {
 
 void SlidingWindow::restart_first_estimates() {
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior_.quadratic.size());
-  int at = prior_.with_calibration ? kCalibrationSize : 0;
+  int at = prior_.frames_row();
   for (int i : prior_.frames) {
     dx.segment<15>(at) = frames_[i].state.boxminus(frames_[i].first_estimate);
     frames_[i].first_estimate = frames_[i].state;
@@ -178,6 +181,7 @@ void SlidingWindow::build(WindowProblem& problem, const Calibration& calibration
   problem.frames.clear();
   for (const Frame& f : frames_)
     problem.frames.push_back({f.state, f.first_estimate, f.in_prior, f.imu ? &*f.imu : nullptr, f.standstill});
+  problem.tilt = tilt_;
   problem.calibration = calibration;
   problem.weights = weights;
   problem.prior = prior_;
@@ -217,6 +221,7 @@ void SlidingWindow::build(WindowProblem& problem, const Calibration& calibration
 }
 
 void SlidingWindow::accept(const WindowProblem& problem) {
+  tilt_ = problem.tilt;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     frames_[i].state = problem.frames[i].state;
     if (frames_[i].imu && frames_[i].imu->needs_repropagation(frames_[i - 1].state.bias))
@@ -421,8 +426,9 @@ Keyframe SlidingWindow::take_keyframe(int index, const Calibration& calibration)
   Keyframe out;
   out.id = frame.id;
   out.t = frame.t;
-  out.T_WB = frame.state.T_WB;
-  out.v_WB = frame.state.v_WB;
+  const NavState level = tilt_.levelled(frame.state);
+  out.T_WB = level.T_WB;
+  out.v_WB = level.v_WB;
   out.images = std::exchange(frame.images, {});
   for (const Landmark& l : landmarks_) {
     if (!l.triangulated) continue;
@@ -437,12 +443,12 @@ Keyframe SlidingWindow::take_keyframe(int index, const Calibration& calibration)
 
 WindowSnapshot SlidingWindow::snapshot(const Calibration& calibration) const {
   WindowSnapshot out;
-  for (const Frame& f : frames_) out.frames.push_back({f.id, f.t, f.state.T_WB, f.keyframe});
+  for (const Frame& f : frames_) out.frames.push_back({f.id, f.t, tilt_.levelled(f.state.T_WB), f.keyframe});
   for (const Landmark& l : landmarks_) {
     if (!l.triangulated) continue;
     const Pose<W, C0> T_WC = frames_[index_of(l.host)].state.T_WB * calibration.T_BC0;
     const Vec3 p_C = Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z();
-    out.landmarks.push_back({l.id, l.track, T_WC * p_C, static_cast<int>(l.sightings.size())});
+    out.landmarks.push_back({l.id, l.track, tilt_.levelled(Vec3(T_WC * p_C)), static_cast<int>(l.sightings.size())});
   }
   return out;
 }

@@ -64,6 +64,9 @@ class SlidingWindow {
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Frame& newest() const { return frames_.back(); }
   Frame& newest() { return frames_.back(); }
+  const Tilt& tilt() const { return tilt_; }
+  /// Level is turned about this point from now on.
+  void set_pivot(const Vec3& p_W) { tilt_.pivot_W = p_W; }
   const WindowPrior& prior() const { return prior_; }
   void set_prior(WindowPrior prior);
   /// Moves the linearisation point of the prior to the present states; what it believes stays. Only
@@ -97,6 +100,7 @@ class SlidingWindow {
     Duration age;
   };
   KeyframeDistance distance_to_last_keyframe(const Calibration& calibration, double focal_px) const;
+  /// Levelled, as is what follows.
   WindowSnapshot snapshot(const Calibration& calibration) const;
   /// The frame as a keyframe for loop closure, with what it sees; its images move out.
   Keyframe take_keyframe(int index, const Calibration& calibration);
@@ -106,6 +110,7 @@ class SlidingWindow {
   KnownLandmarks& known() { return known_; }
   /// Whether landmarks that leave are remembered: worth it only where they are seen again.
   void remember_landmarks(bool on) { remembers_ = on; }
+  bool remembers_landmarks() const { return remembers_; }
 
  private:
   Landmark& landmark_of(TrackId track);
@@ -129,6 +134,7 @@ class SlidingWindow {
   KnownLandmarks known_;
   bool remembers_ = false;
   WindowPrior prior_;
+  Tilt tilt_;
   std::int64_t next_landmark_ = 0;
   WindowProblem marginalisation_problem_, marginalisation_scratch_;
 };

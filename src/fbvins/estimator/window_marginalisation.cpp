@@ -8,6 +8,7 @@ namespace {
 void select_factors(const WindowProblem& problem, int leaving, const std::vector<std::uint8_t>& landmark_leaves,
                     WindowProblem& out) {
   out.frames = problem.frames;
+  out.tilt = problem.tilt;
   out.calibration = problem.calibration;
   out.weights = problem.weights;
   out.weights.at_first_estimates = true;
@@ -51,9 +52,11 @@ WindowPrior marginalise_frame(const WindowProblem& problem, int leaving, const s
   const Eigen::MatrixXd information = scratch.reduced_information();
 
   WindowPrior out;
+  out.with_tilt = problem.weights.estimate_tilt;
   out.with_calibration = problem.calibrating();
   out.calibration = problem.prior.with_calibration ? problem.prior.calibration : problem.calibration;
   std::vector<int> keep, drop;
+  for (int k = 0; k < scratch.tilt_size(); ++k) keep.push_back(scratch.tilt_row() + k);
   if (out.with_calibration)
     for (int k = 0; k < kCalibrationSize; ++k) keep.push_back(scratch.calibration_row() + k);
   const std::vector<std::uint8_t> touched = touched_frames(scratch);
@@ -66,11 +69,10 @@ WindowPrior marginalise_frame(const WindowProblem& problem, int leaving, const s
 
   // The gradient was taken at the current estimate; the prior is measured from the first estimates.
   Eigen::VectorXd back = Eigen::VectorXd::Zero(out.quadratic.size());
-  int at = 0;
-  if (out.with_calibration) {
-    if (problem.prior.with_calibration) back.head(kCalibrationSize) = -scratch.calibration_displacement(out.calibration);
-    at = kCalibrationSize;
-  }
+  if (out.with_tilt) back.head<kTiltSize>() = -problem.tilt.angle_rad;
+  if (problem.prior.with_calibration)
+    back.segment<kCalibrationSize>(out.calibration_row()) = -scratch.calibration_displacement(out.calibration);
+  int at = out.frames_row();
   for (int frame : out.frames) {
     if (problem.frames[frame].in_prior)
       back.segment<15>(at) = -problem.frames[frame].state.boxminus(problem.frames[frame].first_estimate);

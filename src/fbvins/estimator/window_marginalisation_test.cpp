@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a leaving frame leaves behind: all that it knew, and nothing of the four directions that no sensor
-// sees (origin and heading of the world), also after the states moved on from their first estimates.
+// What a leaving frame leaves behind: all that it knew, and nothing of the six directions that no sensor
+// sees (where the world has its origin and how it is turned, gravity with it), also after the states moved on from their first
+// estimates.
 #include "fbvins/estimator/window_marginalisation.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <cstdint>
 #include <vector>
 
@@ -50,6 +52,7 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<std:
   WindowProblem out;
   out.calibration = p.calibration;
   out.weights = p.weights;
+  out.tilt = p.tilt;
   out.frames.assign(p.frames.begin() + 1, p.frames.end());
   out.frames[0].imu = nullptr;  // its factor is in the prior
   for (int& frame : prior.frames) {
@@ -76,21 +79,25 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<std:
 
 NavState linearisation_point(const WindowFrame& f) { return f.in_prior ? f.first_estimate : f.state; }
 
-/// Moves of the whole world, as perturbations of the prior's frames: x, y, z, heading; and roll for contrast.
+/// Moves of the whole world, as perturbations of the prior's tilt and frames: x, y, z, and rotations about x, y, z; and
+/// roll of the frames alone for contrast.
 Eigen::MatrixXd world_moves(const WindowProblem& p, const WindowPrior& prior) {
-  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 5);
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 7);
   for (std::size_t k = 0; k < prior.frames.size(); ++k) {
     const NavState s = linearisation_point(p.frames[prior.frames[k]]);
-    const int at = 15 * static_cast<int>(k);
+    const int at = prior.frames_row() + 15 * static_cast<int>(k);
     N.block<3, 3>(at + nav::p, 0).setIdentity();
-    for (int axis : {2, 0}) {
-      const int column = axis == 2 ? 3 : 4;
-      const Vec3 e = Vec3::Unit(axis);
+    for (int column : {3, 4, 5, 6}) {
+      const Vec3 e = Vec3::Unit(column % 3);
       N.block<3, 1>(at + nav::p, column) = e.cross(s.T_WB.p);
       N.block<3, 1>(at + nav::theta, column) = s.T_WB.q.conjugate() * e;
       N.block<3, 1>(at + nav::v, column) = e.cross(s.v_WB);
     }
   }
+  // Gravity turns with the world: J dtilt = e x g.
+  const Vec3 g = p.tilt.gravity_W(1);
+  const Mat32 J = p.tilt.gravity_jacobian(1);
+  for (int axis : {0, 1, 2}) N.block<2, 1>(0, 3 + axis) = J.colPivHouseholderQr().solve(Vec3::Unit(axis).cross(g));
   return N;
 }
 
@@ -99,18 +106,18 @@ double relative_information(const Eigen::MatrixXd& H, const Eigen::VectorXd& n) 
   return n.dot(H * n) / n.cwiseAbs2().dot(H.diagonal());
 }
 
-void expect_four_free_directions(const WindowProblem& p, const WindowPrior& prior) {
+void expect_six_free_directions(const WindowProblem& p, const WindowPrior& prior) {
   const Eigen::MatrixXd N = world_moves(p, prior);
   const Eigen::MatrixXd& H = prior.quadratic.H;
-  for (int k = 0; k < 4; ++k) EXPECT_LT(std::abs(relative_information(H, N.col(k))), 1e-11) << "direction " << k;
-  EXPECT_GT(relative_information(H, N.col(4)), 1e-7) << "gravity shows roll";
+  for (int k = 0; k < 6; ++k) EXPECT_LT(std::abs(relative_information(H, N.col(k))), 1e-11) << "direction " << k;
+  EXPECT_GT(relative_information(H, N.col(6)), 1e-7) << "gravity shows roll";
 }
 
-TEST(Marginalisation, PriorIsBlindToOriginAndHeading) {
+TEST(Marginalisation, PriorIsBlindToOriginAndTurn) {
   const Scene s = make_scene(false);
   WindowProblem scratch;
   const WindowPrior prior = marginalise_frame(s.w.problem, 0, s.leaves, scratch);
-  expect_four_free_directions(s.w.problem, prior);
+  expect_six_free_directions(s.w.problem, prior);
   const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(prior.quadratic.H).eigenvalues();
   EXPECT_GT(eigenvalues.minCoeff(), -1e-9 * eigenvalues.maxCoeff()) << "never negative";
 }
@@ -127,12 +134,12 @@ TEST(Marginalisation, StaysBlindAfterTheStatesMovedFromTheirFirstEstimates) {
   }
   const std::vector<std::uint8_t> all(rest.landmarks.size(), 1);
   const WindowPrior prior = marginalise_frame(rest, 0, all, scratch);
-  expect_four_free_directions(rest, prior);
+  expect_six_free_directions(rest, prior);
 
   // The same without first estimates: heading is no longer free. The test can fail.
   for (WindowFrame& f : rest.frames) f.first_estimate = f.state;
   const WindowPrior naive = marginalise_frame(rest, 0, all, scratch);
-  EXPECT_GT(std::abs(relative_information(naive.quadratic.H, world_moves(rest, naive).col(3))), 1e-9);
+  EXPECT_GT(std::abs(relative_information(naive.quadratic.H, world_moves(rest, naive).col(5))), 1e-9);
 }
 
 TEST(Marginalisation, KeepsTheStepOfTheFramesThatStay) {

@@ -149,24 +149,38 @@ double WindowProblem::add_landmarks() {
 }
 
 double WindowProblem::add_imu_terms(bool build) {
+  const Vec3 gravity_W = tilt.gravity_W(weights.gravity_mps2);
+  const Mat32 gravity_by_tilt = tilt.gravity_jacobian(weights.gravity_mps2);
   double cost = 0;
   for (int j = 1; j < static_cast<int>(frames.size()); ++j) {
     const Preintegration* imu = frames[j].imu;
     if (imu == nullptr || imu->empty()) continue;
     const int i = j - 1;
     if (!build) {
-      cost += 0.5 * weighted_imu_residual(frames[i].state, frames[j].state, *imu, weights.gravity_mps2).squaredNorm();
+      cost += 0.5 * weighted_imu_residual(frames[i].state, frames[j].state, *imu, gravity_W).squaredNorm();
       continue;
     }
     Mat15 J[2];
     const Vec15 r = weighted_imu_residual(frames[i].state, frames[j].state, linearisation_point(i), linearisation_point(j), *imu,
-                                          weights.gravity_mps2, &J[0], &J[1]);
+                                          gravity_W, &J[0], &J[1]);
     cost += 0.5 * r.squaredNorm();
+    const double dt = imu->dt_s();  // gravity acts as p_j and v_j do, the other way (W15)
+    const Eigen::Matrix<double, 15, 2> J_tilt =
+        -(0.5 * dt * dt * J[1].middleCols<3>(nav::p) + dt * J[1].middleCols<3>(nav::v)) * gravity_by_tilt;
+    if (weights.estimate_tilt) {
+      H_.block<2, 2>(tilt_row(), tilt_row()) += J_tilt.transpose() * J_tilt;
+      g_.segment<2>(tilt_row()) += J_tilt.transpose() * r;
+    }
     const int frame[2] = {i, j};
     for (int a = 0; a < 2; ++a) {
       const Vec15 gradient = J[a].transpose() * r;
       g_.segment<6>(pose_row(frame[a])) += gradient.head<6>();
       g_.segment<9>(speed_bias_row(frame[a])) += gradient.tail<9>();
+      if (weights.estimate_tilt) {
+        const Eigen::Matrix<double, 15, 2> block = J[a].transpose() * J_tilt;
+        H_.block<6, 2>(pose_row(frame[a]), tilt_row()) += block.topRows<6>();
+        H_.block<2, 9>(tilt_row(), speed_bias_row(frame[a])) += block.bottomRows<9>().transpose();
+      }
       for (int b = 0; b <= a; ++b) {
         const Mat15 block = J[a].transpose() * J[b];
         H_.block<6, 6>(pose_row(frame[a]), pose_row(frame[b])) += block.topLeftCorner<6, 6>();
@@ -206,11 +220,9 @@ Eigen::Matrix<double, kCalibrationSize, 1> WindowProblem::calibration_displaceme
 
 Eigen::VectorXd WindowProblem::prior_displacement() const {
   Eigen::VectorXd dx(prior.quadratic.size());
-  int at = 0;
-  if (prior.with_calibration) {
-    dx.head<kCalibrationSize>() = calibration_displacement(prior.calibration);
-    at = kCalibrationSize;
-  }
+  if (prior.with_tilt) dx.head<kTiltSize>() = tilt.angle_rad;
+  if (prior.with_calibration) dx.segment<kCalibrationSize>(prior.calibration_row()) = calibration_displacement(prior.calibration);
+  int at = prior.frames_row();
   for (int frame : prior.frames) {
     dx.segment<15>(at) = frames[frame].state.boxminus(frames[frame].first_estimate);
     at += 15;
@@ -223,6 +235,7 @@ double WindowProblem::add_prior(bool build) {
   const Eigen::VectorXd dx = prior_displacement();
   if (!build) return prior.quadratic.cost(dx);
   prior_rows_.clear();
+  for (int k = 0; prior.with_tilt && k < kTiltSize; ++k) prior_rows_.push_back(tilt_row() + k);
   if (prior.with_calibration)
     for (int k = 0; k < kCalibrationSize; ++k) prior_rows_.push_back(calibration_row() + k);
   for (int frame : prior.frames)
@@ -299,6 +312,8 @@ double WindowProblem::apply_step() {
   saved_states_.resize(frames.size());
   saved_landmarks_.resize(landmarks.size());
   saved_calibration_ = calibration;
+  saved_tilt_ = tilt;
+  if (weights.estimate_tilt) tilt.angle_rad += step_.segment<kTiltSize>(tilt_row());
   for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
     saved_states_[i] = frames[i].state;
     Vec15 d;
@@ -323,6 +338,7 @@ void WindowProblem::undo_step() {
   for (std::size_t i = 0; i < frames.size(); ++i) frames[i].state = saved_states_[i];
   for (std::size_t i = 0; i < landmarks.size(); ++i) landmarks[i].alpha_beta_rho = saved_landmarks_[i];
   calibration = saved_calibration_;
+  tilt = saved_tilt_;
 }
 
 LmSummary WindowProblem::optimise(const LmOptions& options) { return minimise(*this, options); }
@@ -345,11 +361,12 @@ Eigen::MatrixXd WindowProblem::reduced_information() {
   return reduced_.selfadjointView<Eigen::Lower>();
 }
 
-bool WindowProblem::covariance(int frame, Mat15& out) {
+bool WindowProblem::covariance(int frame, Mat17& out) {
   if (factor_lambda_ > kNegligibleLambda && !solve(0)) return false;  // damping would feign certainty
   if (llt_.rows() != system_size() || llt_.info() != Eigen::Success) return false;
-  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(system_size(), 15);
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(system_size(), 17);
   for (int k = 0; k < 15; ++k) unit(row_of(frame, k), k) = 1;
+  for (int k = 0; k < tilt_size(); ++k) unit(tilt_row() + k, 15 + k) = 1;
   llt_.matrixL().solveInPlace(unit);
   out.noalias() = unit.transpose() * unit;
   return out.allFinite();

@@ -17,6 +17,7 @@ inline constexpr int kFrames = 6, kLandmarks = 50;
 struct Window {
   WindowProblem problem;
   std::vector<std::unique_ptr<Preintegration>> imu;
+  Vec2 tilt_weight;
   Eigen::Matrix<double, 15, 1> frame_weight;
   Eigen::Matrix<double, kCalibrationSize, 1> calibration_weight;
 };
@@ -100,19 +101,21 @@ inline Window make_window(bool calibrating) {
     if (&f != &w.problem.frames[0]) f.state = f.state.boxplus(d);
     f.first_estimate = f.state;
   }
+  w.problem.tilt.angle_rad = Vec2(0.03, -0.02);
   w.problem.frames[3].standstill = true;  // untrue, but a term like any other
   w.problem.weights.standstill_velocity_sigma_mps = 0.5;
 
+  w.tilt_weight << 20, 30;
   w.frame_weight << Vec3::Constant(1e4), Vec3::Constant(1e4), Vec3::Constant(1e2), Vec3::Constant(1e2), Vec3::Constant(10);
   w.calibration_weight.setZero();
   w.calibration_weight.head<13>() << Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), 100;
   const int calibration_size = calibrating ? kCalibrationSize : 0;
-  Eigen::VectorXd weight(calibration_size + 15);
-  if (calibrating) weight.head<kCalibrationSize>() = w.calibration_weight;
-  weight.tail<15>() = w.frame_weight;
+  Eigen::VectorXd weight(kTiltSize + calibration_size + 15);
+  weight << w.tilt_weight, w.calibration_weight.head(calibration_size), w.frame_weight;
   w.problem.prior.quadratic.H = weight.cwiseAbs2().asDiagonal();
   w.problem.prior.quadratic.g = Eigen::VectorXd::Zero(weight.size());
   w.problem.prior.frames = {0};
+  w.problem.prior.with_tilt = true;
   w.problem.prior.with_calibration = calibrating;
   w.problem.prior.calibration = w.problem.calibration;
   w.problem.weights.estimate_extrinsics = calibrating;

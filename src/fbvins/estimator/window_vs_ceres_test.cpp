@@ -102,10 +102,11 @@ struct Imu {
   double gravity;
 
   template <class T>
-  bool operator()(const T* d_i, const T* d_j, T* out) const {
+  bool operator()(const T* d_i, const T* d_j, const T* tilt, T* out) const {
     const Moved<T> i(from, d_i), j(to, d_j);
     const T dt(between->dt_s());
-    const Vec<T> g(T(0), T(0), T(-gravity));
+    const T turn[3] = {tilt[0], tilt[1], T(0)};
+    const Vec<T> g = exp(turn) * Vec<T>(T(0), T(0), T(-gravity));
     const Vec<T> dbg = i.bg - between->linearisation_bias().gyro_radps.cast<T>();
     const Vec<T> dba = i.ba - between->linearisation_bias().accel_mps2.cast<T>();
     const Vec<T> theta = between->J_theta_bg().cast<T>() * dbg;
@@ -153,14 +154,17 @@ class CeresTwin {
     const WindowProblem& p = w.problem;
     for (auto& d : frames_) d.fill(0);
     calibration_.fill(0);
+    tilt_ = p.tilt.angle_rad;
     for (const WindowLandmark& l : p.landmarks) landmarks_.push_back(l.alpha_beta_rho);
     problem_.AddParameterBlock(calibration_.data(), 13);
     if (!p.calibrating()) problem_.SetParameterBlockConstant(calibration_.data());
     for (std::size_t k = 0; k < p.landmarks.size(); ++k) add_landmark(p, k);
     for (int j = 1; j < kFrames; ++j)
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Imu, 15, 15, 15>(
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Imu, 15, 15, 15, 2>(
                                     new Imu{p.frames[j - 1].state, p.frames[j].state, p.frames[j].imu, p.weights.gravity_mps2}),
-                                nullptr, frames_[j - 1].data(), frames_[j].data());
+                                nullptr, frames_[j - 1].data(), frames_[j].data(), tilt_.data());
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Diagonal, 2, 2>(new Diagonal{w.tilt_weight}), nullptr,
+                              tilt_.data());
     problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Diagonal, 15, 15>(new Diagonal{w.frame_weight}), nullptr,
                               frames_[0].data());
     if (p.calibrating())
@@ -173,11 +177,12 @@ class CeresTwin {
                                   nullptr, frames_[k].data());
   }
 
-  /// Cost, and residuals with Jacobian (robust weights applied); columns: landmarks, frames, calibration.
+  /// Cost, and residuals with Jacobian (robust weights applied); columns: landmarks, frames, tilt, calibration.
   double evaluate(Eigen::VectorXd& r, Eigen::MatrixXd& J) {
     ceres::Problem::EvaluateOptions options;
     for (Vec3& l : landmarks_) options.parameter_blocks.push_back(l.data());
     for (auto& d : frames_) options.parameter_blocks.push_back(d.data());
+    options.parameter_blocks.push_back(tilt_.data());
     if (start_.calibrating()) options.parameter_blocks.push_back(calibration_.data());
     double cost = 0;
     std::vector<double> residuals;
@@ -205,6 +210,7 @@ class CeresTwin {
   }
 
   NavState state(int k) const { return start_.frames[k].state.boxplus(Eigen::Map<const Vec15>(frames_[k].data())); }
+  const Vec2& tilt() const { return tilt_; }
   const Vec3& landmark(int k) const { return landmarks_[k]; }
 
  private:
@@ -237,6 +243,7 @@ class CeresTwin {
   };
   Start start_;
   std::array<std::array<double, 15>, kFrames> frames_;
+  Vec2 tilt_;
   std::array<double, 13> calibration_;
   std::vector<Vec3> landmarks_ = [] {
     std::vector<Vec3> v;
@@ -250,13 +257,14 @@ class WindowTwins : public testing::TestWithParam<bool> {
  protected:
   Window w = test::make_window(GetParam());
   CeresTwin twin{w};
-  int dense_size() const { return 15 * kFrames + (GetParam() ? 13 : 0); }
+  int dense_size() const { return 15 * kFrames + kTiltSize + (GetParam() ? 13 : 0); }
 
   /// Column of the Ceres Jacobian (after the landmarks) that is row `row` of our dense system; -1: padding.
   std::vector<int> rows_of_columns() const {
     std::vector<int> rows;
     for (int f = 0; f < kFrames; ++f)
       for (int k = 0; k < 15; ++k) rows.push_back(w.problem.row_of(f, k));
+    for (int k = 0; k < kTiltSize; ++k) rows.push_back(w.problem.tilt_row() + k);
     for (int k = 0; GetParam() && k < 13; ++k) rows.push_back(w.problem.calibration_row() + k);
     return rows;
   }
@@ -322,6 +330,7 @@ TEST_P(WindowTwins, MinimumIsThatOfCeres) {
     EXPECT_LT(d.segment<3>(6).norm(), 1e-5) << "velocity of frame " << k;
     EXPECT_LT(d.tail<6>().norm(), 1e-5) << "biases of frame " << k;
   }
+  EXPECT_LT((w.problem.tilt.angle_rad - twin.tilt()).norm(), 1e-6);
   for (int k = 0; k < kLandmarks; ++k)
     EXPECT_LT((w.problem.landmarks[k].alpha_beta_rho - twin.landmark(k)).norm(), 1e-5) << "landmark " << k;
 }
@@ -330,6 +339,7 @@ TEST_P(WindowTwins, MinimumIsThatOfCeres) {
 Window window_at_rest(std::uint64_t seed) {
   Rng rng(seed);
   Window w;
+  w.problem.weights.estimate_tilt = false;
   w.problem.calibration.T_BC1.p = Vec3(0.11, 0, 0);
   w.problem.frames.resize(kFrames);
   for (WindowFrame& f : w.problem.frames) f.standstill = true;

@@ -86,6 +86,21 @@ Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment
   return align_umeyama(m, alignment == Alignment::sim3);
 }
 
+Result<Similarity> align_start(const std::vector<PosePair>& pairs) {
+  if (pairs.empty()) return Error{ErrorCode::invalid_argument, "no pair of poses to align"};
+  std::vector<PosePair> first;
+  double sine = 0, cosine = 0;
+  for (const PosePair& pair : pairs) {
+    if ((pair.truth.t - pairs.front().truth.t).seconds() > 1) break;
+    first.push_back(pair);
+    const Quat turn = pair.truth.T_WB.q * pair.estimate.T_WB.q.conjugate();
+    const double yaw = 2 * std::atan2(turn.z(), turn.w());
+    sine += std::sin(yaw), cosine += std::cos(yaw);
+  }
+  const Quat about_z(Eigen::AngleAxisd(std::atan2(sine, cosine), Vec3::UnitZ()));
+  return around_means(moments_of(first), about_z, 1.0);
+}
+
 std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs) {
   for (PosePair& pair : pairs) pair.estimate.T_WB = similarity * pair.estimate.T_WB;
   return pairs;

@@ -39,6 +39,10 @@ struct Similarity {
 /// three pairs, or (se3, sim3) no two directions of motion.
 Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment);
 
+/// Shift and heading as the poses of the first second have them: where a covariance that grows from the start is measured
+/// from. An error without any pair.
+Result<Similarity> align_start(const std::vector<PosePair>& pairs);
+
 /// The same pairs with the estimate moved.
 std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs);
 

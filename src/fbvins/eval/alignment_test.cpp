@@ -55,6 +55,25 @@ TEST(Alignment, YawKeepsGravity) {
   EXPECT_LT(cost(turned, *exact), 1e-18);
 }
 
+TEST(Alignment, OfTheStartLeavesWhatComesLaterAsItIs) {
+  const Quat heading = so3_exp(Vec3(0, 0, 2.8));
+  auto pairs = moved_pairs(heading, Vec3(4, 5, 6), 1.0);
+  const Time begin = pairs.front().truth.t;
+  std::size_t later = 0;
+  for (PosePair& pair : pairs) {
+    if ((pair.truth.t - begin).seconds() <= 1) continue;
+    pair.estimate.T_WB.p += Vec3(0, 0, 0.1);
+    ++later;
+  }
+  ASSERT_GT(later, 0u);
+  ASSERT_LT(later, pairs.size());
+  const auto start = align_start(pairs);
+  ASSERT_TRUE(start);
+  EXPECT_LT(start->q.angularDistance(heading), 1e-12);
+  EXPECT_NEAR(cost(pairs, *start), 0.01 * static_cast<double>(later), 1e-9);
+  EXPECT_FALSE(align_start({}));
+}
+
 TEST(Alignment, IsAMinimumOfItsOwnFamily) {
   auto pairs = moved_pairs(so3_exp(Vec3(0.1, 0.2, 1)), Vec3(1, 1, 1), 1.3);
   Rng rng(5);

@@ -6,7 +6,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
 constexpr Duration kMemory = Duration{1'500'000'000};
 /// The prior may be this much older than image a.
 constexpr Duration kOldestPrior = Duration{500'000'000};
@@ -30,8 +29,7 @@ bool MotionPredictor::covers(Time a, Time b) const {
 }
 
 /// Midpoint integration over the readings in [from.t, to].
-MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const ImuBias& bias) const {
-  const Vec3 g_W(0, 0, -kGravity_mps2);
+MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const ImuBias& bias, const Vec3& gravity_W) const {
   State s = from;
   auto it =
       std::lower_bound(samples_.begin(), samples_.end(), from.t, [](const ImuSample& sample, Time t) { return sample.t < t; });
@@ -47,7 +45,7 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const 
     if (dt > 0) {
       const Vec3 w = 0.5 * (last.gyro_radps + next.gyro_radps) - bias.gyro_radps;
       const Vec3 f = 0.5 * (last.accel_mps2 + next.accel_mps2) - bias.accel_mps2;
-      const Vec3 a_W = s.T_WB.q * (so3_exp(0.5 * dt * w) * f) + g_W;
+      const Vec3 a_W = s.T_WB.q * (so3_exp(0.5 * dt * w) * f) + gravity_W;
       s.T_WB.p += dt * s.v_WB + 0.5 * dt * dt * a_W;
       s.v_WB += dt * a_W;
       s.T_WB.q = (s.T_WB.q * so3_exp(dt * w)).normalized();
@@ -61,7 +59,7 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const 
 
 std::optional<Pose<W, C0>> MotionPredictor::camera_at(Time t, const StatePrior& prior) const {
   if (!prior.valid || prior.t > t || t - prior.t >= kOldestPrior || !covers(prior.t, t)) return std::nullopt;
-  return carry({prior.t, prior.T_WB, prior.v_WB}, t, prior.bias).T_WB * T_BC0_;
+  return carry({prior.t, prior.T_WB, prior.v_WB}, t, prior.bias, prior.gravity_W).T_WB * T_BC0_;
 }
 
 CameraMotion MotionPredictor::between(Time a, Time b, const StatePrior& prior) const {
@@ -70,8 +68,8 @@ CameraMotion MotionPredictor::between(Time a, Time b, const StatePrior& prior) c
   State at_a;
   at_a.t = a;
   const bool with_state = prior.valid && prior.t <= a && a - prior.t < kOldestPrior && covers(prior.t, a);
-  if (with_state) at_a = carry({prior.t, prior.T_WB, prior.v_WB}, a, prior.bias);
-  const State at_b = carry(at_a, b, prior.bias);
+  if (with_state) at_a = carry({prior.t, prior.T_WB, prior.v_WB}, a, prior.bias, prior.gravity_W);
+  const State at_b = carry(at_a, b, prior.bias, prior.gravity_W);
   const Pose<C0, C0> T_ba = (at_b.T_WB * T_BC0_).inverse() * (at_a.T_WB * T_BC0_);
   motion.R_ba = T_ba.R();
   motion.has_rotation = true;

@@ -42,7 +42,7 @@ class MotionPredictor {
     Vec3 v_WB = Vec3::Zero();
   };
   bool covers(Time a, Time b) const;
-  State carry(const State& from, Time to, const ImuBias& bias) const;
+  State carry(const State& from, Time to, const ImuBias& bias, const Vec3& gravity_W) const;
 
   Pose<B, C0> T_BC0_;
   std::deque<ImuSample> samples_;  // in order of time; the stamps of images are among them

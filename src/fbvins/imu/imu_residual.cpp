@@ -17,16 +17,15 @@ struct Motion {
   Vec3 p, v;  ///< displacement and change of velocity less gravity, in B_i
 };
 
-Motion motion(const NavState& i, const NavState& j, double dt, double gravity_mps2) {
-  const Vec3 gravity_W(0, 0, -gravity_mps2);
+Motion motion(const NavState& i, const NavState& j, double dt, const Vec3& gravity_W) {
   const Quat q_i_t = i.T_WB.q.conjugate();
   return {q_i_t * Vec3(j.T_WB.p - i.T_WB.p - dt * i.v_WB - 0.5 * dt * dt * gravity_W),
           q_i_t * Vec3(j.v_WB - i.v_WB - dt * gravity_W)};
 }
 
-Blocks blocks(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2) {
+Blocks blocks(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W) {
   const double dt = between.dt_s();
-  const Motion m = motion(i, j, dt, gravity_mps2);
+  const Motion m = motion(i, j, dt, gravity_W);
   const Vec3 dbg = i.bias.gyro_radps - between.linearisation_bias().gyro_radps;
   const Vec3 correction = between.J_theta_bg() * dbg;
   const Quat q_ij = i.T_WB.q.conjugate() * j.T_WB.q;
@@ -66,9 +65,9 @@ void weighted(const Blocks& b, const Preintegration& between, const Mat15& U, Ma
 
 }  // namespace
 
-Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2) {
+Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W) {
   const ImuDeltas d = between.corrected(i.bias);
-  const Motion m = motion(i, j, between.dt_s(), gravity_mps2);
+  const Motion m = motion(i, j, between.dt_s(), gravity_W);
   Vec15 r;  // eq. P17-P20
   r.segment<3>(nav::p) = m.p - d.p;
   r.segment<3>(nav::theta) = so3_log(d.q.conjugate() * (i.T_WB.q.conjugate() * j.T_WB.q));
@@ -78,9 +77,9 @@ Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& b
   return r;
 }
 
-void imu_jacobians(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2, Mat15& J_i,
+void imu_jacobians(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W, Mat15& J_i,
                    Mat15& J_j) {
-  const Blocks b = blocks(i, j, between, gravity_mps2);
+  const Blocks b = blocks(i, j, between, gravity_W);
   J_i.setZero();
   J_i.block<3, 3>(nav::p, nav::p) = -b.R_i_t;
   J_i.block<3, 3>(nav::p, nav::theta) = b.p_theta;
@@ -102,29 +101,29 @@ void imu_jacobians(const NavState& i, const NavState& j, const Preintegration& b
 }
 
 Vec15 imu_residual(const NavState& i, const NavState& j, const NavState& i_lin, const NavState& j_lin,
-                   const Preintegration& between, double gravity_mps2, Mat15* J_i, Mat15* J_j) {
+                   const Preintegration& between, const Vec3& gravity_W, Mat15* J_i, Mat15* J_j) {
   if (J_i != nullptr || J_j != nullptr) {
     Mat15 unused_i, unused_j;
-    imu_jacobians(i_lin, j_lin, between, gravity_mps2, J_i != nullptr ? *J_i : unused_i, J_j != nullptr ? *J_j : unused_j);
+    imu_jacobians(i_lin, j_lin, between, gravity_W, J_i != nullptr ? *J_i : unused_i, J_j != nullptr ? *J_j : unused_j);
   }
-  return imu_residual(i, j, between, gravity_mps2);
+  return imu_residual(i, j, between, gravity_W);
 }
 
-Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2, Mat15* J_i,
+Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W, Mat15* J_i,
                    Mat15* J_j) {
-  return imu_residual(i, j, i, j, between, gravity_mps2, J_i, J_j);
+  return imu_residual(i, j, i, j, between, gravity_W, J_i, J_j);
 }
 
 Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const NavState& i_lin, const NavState& j_lin,
-                            const Preintegration& between, double gravity_mps2, Mat15* J_i, Mat15* J_j) {
+                            const Preintegration& between, const Vec3& gravity_W, Mat15* J_i, Mat15* J_j) {
   const Mat15& U = between.sqrt_information();
-  if (J_i != nullptr || J_j != nullptr) weighted(blocks(i_lin, j_lin, between, gravity_mps2), between, U, J_i, J_j);
-  return U.triangularView<Eigen::Upper>() * imu_residual(i, j, between, gravity_mps2);
+  if (J_i != nullptr || J_j != nullptr) weighted(blocks(i_lin, j_lin, between, gravity_W), between, U, J_i, J_j);
+  return U.triangularView<Eigen::Upper>() * imu_residual(i, j, between, gravity_W);
 }
 
-Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const Preintegration& between, double gravity_mps2, Mat15* J_i,
-                            Mat15* J_j) {
-  return weighted_imu_residual(i, j, i, j, between, gravity_mps2, J_i, J_j);
+Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W,
+                            Mat15* J_i, Mat15* J_j) {
+  return weighted_imu_residual(i, j, i, j, between, gravity_W, J_i, J_j);
 }
 
 }  // namespace fbvins

@@ -15,8 +15,11 @@ namespace fbvins {
 using Vec15 = Eigen::Matrix<double, 15, 1>;
 using Mat15 = Eigen::Matrix<double, 15, 15>;
 
-/// Magnitude of gravity; gravity_W = (0, 0, -kGravity_mps2).
+/// Magnitude of gravity.
 inline constexpr double kGravity_mps2 = 9.81;
+
+/// Gravity in a world whose z is up, m/s^2.
+inline Vec3 level_gravity(double gravity_mps2 = kGravity_mps2) { return {0, 0, -gravity_mps2}; }
 
 /// Where each block of a 15-vector begins.
 namespace nav {

@@ -165,10 +165,9 @@ const Mat15& Preintegration::sqrt_information() const {
   return sqrt_information_;
 }
 
-NavState Preintegration::predict(const NavState& i, double gravity_mps2) const {
+NavState Preintegration::predict(const NavState& i, const Vec3& gravity_W) const {
   const ImuDeltas d = corrected(i.bias);
   const double dt = dt_s();
-  const Vec3 gravity_W(0, 0, -gravity_mps2);
   NavState j = i;
   j.T_WB.p += dt * i.v_WB + 0.5 * dt * dt * gravity_W + i.T_WB.q * d.p;
   j.v_WB += dt * gravity_W + i.T_WB.q * d.v;

@@ -4,7 +4,7 @@
 //
 //   Preintegration between(noise, bias);
 //   between.integrate(frame.imu);               // again for each consecutive segment
-//   NavState j = between.predict(state_i, kGravity_mps2);
+//   NavState j = between.predict(state_i, gravity_W);
 //
 // Perturbation order (p, theta, v, bg, ba); delta_p and delta_v are in B_i, theta is right (local).
 // Threads: a value; const members may fill a cache, so share one object between threads only by copy.
@@ -84,7 +84,7 @@ class Preintegration {
   const Mat15& sqrt_information() const;
 
   /// State at j from the state at i (eq. P1).
-  NavState predict(const NavState& i, double gravity_mps2) const;
+  NavState predict(const NavState& i, const Vec3& gravity_W) const;
 
   /// Angular rate at the end of the interval, bias removed, rad/s in B_j.
   Vec3 last_rate_radps(const ImuBias& bias) const;

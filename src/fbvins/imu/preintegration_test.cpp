@@ -23,7 +23,7 @@ Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const 
 
 Vec15 prediction_error(const Motion& motion, Duration period) {
   const Preintegration p = integrated(motion.segment(kFrom, kTo, period, kBias), kBias);
-  return p.predict(motion.state(kFrom.seconds(), kBias), kGravity_mps2).boxminus(motion.state(kTo.seconds(), kBias));
+  return p.predict(motion.state(kFrom.seconds(), kBias), level_gravity()).boxminus(motion.state(kTo.seconds(), kBias));
 }
 
 TEST(Preintegration, FollowsAnExactMotionWithErrorOfSecondOrder) {
@@ -52,7 +52,7 @@ TEST(Preintegration, AgreesWithPropagation) {
   const Motion motion;
   const ImuSegment segment = motion.segment(kFrom, kTo, Duration{5'000'000}, kBias);
   const NavState i = motion.state(kFrom.seconds(), kBias);
-  const NavState a = integrated(segment, kBias).predict(i, kGravity_mps2), b = propagate(i, segment, kGravity_mps2);
+  const NavState a = integrated(segment, kBias).predict(i, level_gravity()), b = propagate(i, segment, level_gravity());
   EXPECT_LT(a.boxminus(b).norm(), 1e-12);
   EXPECT_LT(so3_log(integrate_gyro(segment, kBias.gyro_radps).conjugate() * integrated(segment, kBias).delta_q()).norm(), 1e-13);
 }
@@ -175,7 +175,7 @@ TEST(Preintegration, MissingReadingsInflateTheCovariance) {
   EXPECT_NEAR(c.longest_gap_s(), 0.305, 1e-9);
   EXPECT_LT(b.covariance().trace(), 1.5 * a.covariance().trace());
   const NavState i = motion.state(kFrom.seconds()), j = motion.state(kTo.seconds());
-  const Vec15 error = c.predict(i, kGravity_mps2).boxminus(j);
+  const Vec15 error = c.predict(i, level_gravity()).boxminus(j);
   for (int k = 0; k < 9; ++k)
     EXPECT_LT(std::abs(error(k)), 3.5 * std::sqrt(c.covariance()(k, k))) << "the gap's error is covered, component " << k;
   EXPECT_GT(std::sqrt(c.covariance()(nav::v, nav::v)), 0.3);
@@ -210,19 +210,19 @@ TwoStates two_states() {
 
 TEST(ImuResidual, VanishesAtThePredictedState) {
   TwoStates s = two_states();
-  s.j = s.between.predict(s.i, kGravity_mps2);
-  EXPECT_LT(imu_residual(s.i, s.j, s.between, kGravity_mps2).norm(), 1e-12);
+  s.j = s.between.predict(s.i, level_gravity());
+  EXPECT_LT(imu_residual(s.i, s.j, s.between, level_gravity()).norm(), 1e-12);
 }
 
 TEST(ImuResidual, JacobiansMatchNumericOnes) {
   const TwoStates s = two_states();
   Mat15 J_i, J_j;
-  imu_residual(s.i, s.j, s.between, kGravity_mps2, &J_i, &J_j);
+  imu_residual(s.i, s.j, s.between, level_gravity(), &J_i, &J_j);
   const auto by_i = check_jacobian(
-      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i.boxplus(d), s.j, s.between, kGravity_mps2); },
+      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i.boxplus(d), s.j, s.between, level_gravity()); },
       J_i, kBlocks, kBlocks, 1e-9);
   const auto by_j = check_jacobian(
-      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i, s.j.boxplus(d), s.between, kGravity_mps2); },
+      [&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return imu_residual(s.i, s.j.boxplus(d), s.between, level_gravity()); },
       J_j, kBlocks, kBlocks, 1e-9);
   EXPECT_TRUE(by_i.ok) << by_i.message;
   EXPECT_TRUE(by_j.ok) << by_j.message;
@@ -232,8 +232,8 @@ TEST(ImuResidual, WeightedIsTheRootOfTheInformationTimesTheResidual) {
   const TwoStates s = two_states();
   Mat15 J_i, J_j, WJ_i, WJ_j;
   const Mat15& U = s.between.sqrt_information();
-  const Vec15 r = imu_residual(s.i, s.j, s.between, kGravity_mps2, &J_i, &J_j);
-  const Vec15 wr = weighted_imu_residual(s.i, s.j, s.between, kGravity_mps2, &WJ_i, &WJ_j);
+  const Vec15 r = imu_residual(s.i, s.j, s.between, level_gravity(), &J_i, &J_j);
+  const Vec15 wr = weighted_imu_residual(s.i, s.j, s.between, level_gravity(), &WJ_i, &WJ_j);
   EXPECT_LT((wr - U * r).norm() / wr.norm(), 1e-13);
   EXPECT_LT((WJ_i - U * J_i).norm() / WJ_i.norm(), 1e-13);
   EXPECT_LT((WJ_j - U * J_j).norm() / WJ_j.norm(), 1e-13);
@@ -244,9 +244,9 @@ TEST(ImuResidual, FirstEstimatesMoveTheJacobiansAndNotTheResidual) {
   Vec15 d = Vec15::Constant(0.02);
   const NavState i_lin = s.i.boxplus(d), j_lin = s.j.boxplus(-d);
   Mat15 J_i, J_j, at_lin_i, at_lin_j;
-  const Vec15 r = weighted_imu_residual(s.i, s.j, i_lin, j_lin, s.between, kGravity_mps2, &J_i, &J_j);
-  weighted_imu_residual(i_lin, j_lin, s.between, kGravity_mps2, &at_lin_i, &at_lin_j);
-  EXPECT_EQ(r, weighted_imu_residual(s.i, s.j, s.between, kGravity_mps2));
+  const Vec15 r = weighted_imu_residual(s.i, s.j, i_lin, j_lin, s.between, level_gravity(), &J_i, &J_j);
+  weighted_imu_residual(i_lin, j_lin, s.between, level_gravity(), &at_lin_i, &at_lin_j);
+  EXPECT_EQ(r, weighted_imu_residual(s.i, s.j, s.between, level_gravity()));
   EXPECT_EQ(J_i, at_lin_i);
   EXPECT_EQ(J_j, at_lin_j);
 }
@@ -260,8 +260,8 @@ TEST(ImuResidual, DoesNotSeeOriginAndHeading) {
     x.v_WB = yaw * x.v_WB;
     return x;
   };
-  const Vec15 r = imu_residual(s.i, s.j, s.between, kGravity_mps2);
-  EXPECT_LT((imu_residual(moved(s.i), moved(s.j), s.between, kGravity_mps2) - r).norm(), 1e-12);
+  const Vec15 r = imu_residual(s.i, s.j, s.between, level_gravity());
+  EXPECT_LT((imu_residual(moved(s.i), moved(s.j), s.between, level_gravity()) - r).norm(), 1e-12);
 }
 
 TEST(NavState, BoxminusUndoesBoxplus) {

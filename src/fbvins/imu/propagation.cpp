@@ -12,9 +12,8 @@ Quat step_rotation(const ImuSample& from, const ImuSample& to, double dt, const 
 
 }  // namespace
 
-NavState propagate(const NavState& state, const ImuSegment& segment, double gravity_mps2) {
+NavState propagate(const NavState& state, const ImuSegment& segment, const Vec3& gravity_W) {
   NavState s = state;
-  const Vec3 gravity_W(0, 0, -gravity_mps2);
   for (std::size_t k = 1; k < segment.samples.size(); ++k) {
     const ImuSample &from = segment.samples[k - 1], &to = segment.samples[k];
     const double dt = (to.t - from.t).seconds();

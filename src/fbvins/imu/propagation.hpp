@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The state carried along a segment of readings, without covariance: for prediction between images.
 //
-//   NavState now = propagate(state, frame.imu, kGravity_mps2);
+//   NavState now = propagate(state, frame.imu, gravity_W);
 //
 // Threads: pure functions. Same integration rule as Preintegration (eq. P5-P7).
 #pragma once
@@ -12,7 +12,7 @@
 namespace fbvins {
 
 /// State at the segment's last stamp; an empty segment returns the state unchanged.
-NavState propagate(const NavState& state, const ImuSegment& segment, double gravity_mps2);
+NavState propagate(const NavState& state, const ImuSegment& segment, const Vec3& gravity_W);
 
 /// Rotation R_BiBj over the segment, gyro bias (rad/s) removed.
 Quat integrate_gyro(const ImuSegment& segment, const Vec3& gyro_bias_radps);

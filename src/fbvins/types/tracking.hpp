@@ -82,12 +82,14 @@ struct LocatedLandmark {
   Vec3 p_W = Vec3::Zero();  ///< m
 };
 
-/// The newest estimate, fed back to the frontend for guided matching.
+/// The newest estimate, fed back to the frontend for guided matching. Its W is the window's, which is not turned when it proves
+/// not to be level: `gravity_W` tells.
 struct StatePrior {
   Time t;
   Pose<W, B> T_WB;
   Vec3 v_WB = Vec3::Zero();  ///< m/s, in W
   ImuBias bias;
+  Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< m/s^2
   bool valid = false;
   std::vector<LocatedLandmark> located;  ///< with this frame
 };
