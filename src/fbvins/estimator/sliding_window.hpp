@@ -5,7 +5,7 @@
 // frames: [ keyframes ... | newest_frames ... ], oldest first. One owner, one thread.
 #pragma once
 
-#include <deque>
+#include <map>
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -113,6 +113,7 @@ class SlidingWindow {
   bool remembers_landmarks() const { return remembers_; }
 
  private:
+  static constexpr int kStrikesUntilBanned = 3;
   Landmark& landmark_of(TrackId track);
   void set_velocities(Sighting& before, Sighting& now) const;
   bool triangulate(Landmark& landmark, const Calibration& calibration) const;
@@ -129,7 +130,7 @@ class SlidingWindow {
   std::vector<Frame> frames_;
   std::vector<Landmark> landmarks_;
   std::unordered_map<TrackId, int> landmark_of_track_;
-  std::unordered_map<TrackId, int> banned_;  ///< tracks that proved wrong, with their strikes
+  std::map<TrackId, int> banned_;  ///< tracks that proved wrong, with their strikes
   std::vector<int> landmark_of_problem_;
   KnownLandmarks known_;
   bool remembers_ = false;
