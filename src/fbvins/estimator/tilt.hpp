@@ -20,6 +20,7 @@ struct Tilt {
   Vec2 angle_rad = Vec2::Zero();  ///< the rotation vector (x, y, 0) turns z into up
   Vec3 pivot_W = Vec3::Zero();    ///< m; stays where it is
 
+  /// Takes directions of the level world to W (W13).
   Quat q() const { return so3_exp(rotation()); }
   Vec3 gravity_W(double gravity_mps2) const { return -gravity_mps2 * (q() * Vec3::UnitZ()); }
 
