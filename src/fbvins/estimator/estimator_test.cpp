@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "fbvins/estimator/simulated_flight.hpp"
+#include "fbvins/geometry/heading.hpp"
 
 namespace fbvins {
 namespace {

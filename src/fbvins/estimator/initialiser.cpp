@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/geometry/heading.hpp"
 #include "fbvins/imu/alignment.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
@@ -41,11 +42,6 @@ void move_to(const Pose<W, B>& origin, InitialSolution& start) {
 }
 
 }  // namespace
-
-double heading_between(const Quat& from, const Quat& to) {
-  const Mat3 E = (to * from.conjugate()).toRotationMatrix();
-  return std::atan2(E(1, 0) - E(0, 1), E(0, 0) + E(1, 1));
-}
 
 Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise)
     : options_(options), noise_(noise), structure_(options) {}

@@ -54,7 +54,4 @@ class Initialiser {
   HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;
 };
 
-/// The rotation about z, rad, that brings `from` closest to `to`.
-double heading_between(const Quat& from, const Quat& to);
-
 }  // namespace fbvins

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sliding window as a least-squares problem: reprojection, IMU and prior factors over frame
 // states, the tilt of the world, landmarks and, if wanted, calibration. Numbers only; who enters and leaves is decided in
-// window.hpp. Solved by optim/levenberg_marquardt.hpp. Formulas: docs/derivations/window.md (W1-W16).
+// sliding_window.hpp. Solved by optim/levenberg_marquardt.hpp. Formulas: docs/derivations/window.md (W1-W16).
 //
 //   WindowProblem problem;
 //   problem.frames = ...; problem.landmarks = ...; problem.observations = ...;

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 
+#include "fbvins/geometry/heading.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -93,8 +95,7 @@ Result<Similarity> align_start(const std::vector<PosePair>& pairs) {
   for (const PosePair& pair : pairs) {
     if ((pair.truth.t - pairs.front().truth.t).seconds() > 1) break;
     first.push_back(pair);
-    const Quat turn = pair.truth.T_WB.q * pair.estimate.T_WB.q.conjugate();
-    const double yaw = 2 * std::atan2(turn.z(), turn.w());
+    const double yaw = heading_between(pair.estimate.T_WB.q, pair.truth.T_WB.q);
     sine += std::sin(yaw), cosine += std::cos(yaw);
   }
   const Quat about_z(Eigen::AngleAxisd(std::atan2(sine, cosine), Vec3::UnitZ()));

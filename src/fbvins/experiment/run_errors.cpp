@@ -6,15 +6,14 @@
 #include <numbers>
 
 #include "fbvins/eval/nees.hpp"
+#include "fbvins/geometry/heading.hpp"
 
 namespace fbvins {
 namespace {
 
 /// Shift and rotation about z that take the estimate to the truth.
 Pose<W, W> yaw_between(const Pose<W, B>& truth, const Pose<W, B>& estimate) {
-  const Quat q = truth.q * estimate.q.conjugate();
-  const double yaw = 2 * std::atan2(q.z(), q.w());
-  const Quat about_z(std::cos(0.5 * yaw), 0, 0, std::sin(0.5 * yaw));
+  const Quat about_z(Eigen::AngleAxisd(heading_between(estimate.q, truth.q), Vec3::UnitZ()));
   return {about_z, Vec3(truth.p - about_z * estimate.p)};
 }
 
