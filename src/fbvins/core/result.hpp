@@ -14,7 +14,7 @@
 
 namespace fbvins {
 
-enum class ErrorCode { not_found, unreadable, malformed, unsupported, invalid_argument, unwritable };
+enum class ErrorCode { not_found, unreadable, malformed, unsupported, invalid_argument, unwritable, stage_failed };
 
 struct Error {
   ErrorCode code = ErrorCode::invalid_argument;

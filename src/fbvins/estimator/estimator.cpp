@@ -50,24 +50,23 @@ StatePrior Estimator::prior() const {
   StatePrior out;
   if (!running_) return out;
   const Frame& newest = window_.newest();
-  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, gravity_W(), true, located_};
+  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, gravity_W(), true};
 }
 
 Vec3 Estimator::gravity_W() const { return window_.tilt().gravity_W(options_.gravity_mps2); }
 
 Estimate Estimator::process(const TrackedFrame& frame) {
   keyframes_.clear();
-  window_.remember_landmarks(options_.known_landmarks.enabled && frame.knows_again);
+  window_.remember_landmarks(options_.known_landmarks.enabled);
   const Duration rest = rest_.update(frame);
   Odometry out = running_ ? track(frame, rest) : initialise(frame, rest);
   out.id = frame.id;
   out.t = frame.t;
   if (running_) fill(out);
-  located_ = window_.known().take_new();
   out.reset_counter = reset_counter_;
   if (out.health.state == HealthState::lost) restart();
   previous_frame_ = frame.t;
-  return {std::move(out), std::exchange(keyframes_, {})};
+  return {std::move(out), std::exchange(keyframes_, {}), {next_update_++, reset_counter_, window_.known().take_new()}};
 }
 
 Odometry Estimator::initialise(const TrackedFrame& frame, Duration rest) {

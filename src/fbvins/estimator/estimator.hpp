@@ -20,10 +20,11 @@
 
 namespace fbvins {
 
-/// What one frame brought: its pose, and the keyframes that have become final with it.
+/// What one frame brought: its pose, the keyframes that have become final with it, and the landmarks that left the window.
 struct Estimate {
   Odometry odometry;
   std::vector<Keyframe> keyframes;
+  LandmarkUpdate landmarks;  ///< for the frontend
 };
 
 class Estimator {
@@ -71,7 +72,7 @@ class Estimator {
   std::optional<Time> previous_frame_, last_good_tracking_;
   Vec3 last_rate_ = Vec3::Zero();
   FrameId newest_handed_on_;
-  std::vector<LocatedLandmark> located_;    ///< that have left the window with the present frame
+  std::int64_t next_update_ = 0;            ///< sequence number
   std::vector<Keyframe> keyframes_;         ///< that became final with the present frame
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
 };

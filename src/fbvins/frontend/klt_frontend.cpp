@@ -45,6 +45,8 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
 
   predictor_.add(packet.imu);
   ingest(packet, stats);
+  out.has_left = !left_.empty();
+  out.has_right = !right_.empty();
   stats.pyramid_ms = timer.lap_ms();
   // Without a left image features wait in the previous one for a while.
   if (left_.empty()) return out;

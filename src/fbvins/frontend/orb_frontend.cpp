@@ -34,15 +34,16 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   TrackedFrame out;
   out.id = packet.id;
   out.t = packet.frame.t;
-  out.knows_again = options_.recognition.enabled;
   out.imu = packet.imu;
   FrontendStats& stats = out.stats;
   CpuTimer timer;
 
   predictor_.add(packet.imu);
   const bool has_left = ingest(packet, stats);
+  out.has_left = has_left;
+  out.has_right = !right_.empty();
   stats.pyramid_ms = timer.lap_ms();
-  learn_positions(prior);
+  memory_.forget_unlocated(now_);
   // Without a left image tracks wait where they were; the next image's motion spans the gap.
   if (!has_left) return out;
   T_WC_ = predictor_.camera_at(now_, prior);

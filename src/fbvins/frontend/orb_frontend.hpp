@@ -95,6 +95,7 @@ class OrbFrontend final : public Frontend {
               std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
+  void locate(const LandmarkUpdate& update) override;
 
  private:
   /// Levels of the pyramid that patches are aligned on.
@@ -148,7 +149,6 @@ class OrbFrontend final : public Frontend {
   std::optional<Vec2> hold_to_reference(Track& track, const Vec2& newest_px);
   bool returns(const Track& track, const Vec2& px);
   bool settle(Track& track, const Vec2& px);
-  void learn_positions(const StatePrior& prior);
   void remember(const Track& track);
   void recognise(FrontendStats& stats);
   bool begin_again(const ExpectedLandmark& expected, std::size_t keypoint);
@@ -178,6 +178,7 @@ class OrbFrontend final : public Frontend {
   PatchRefiner refiner_;
   Rng rng_;
   LandmarkMemory memory_;
+  std::uint32_t reset_counter_ = 0;  // of the W in which landmarks are located
 
   Pyramid left_, previous_left_, right_;
   KltTemplate scratch_;

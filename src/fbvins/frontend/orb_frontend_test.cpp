@@ -184,12 +184,15 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
   constexpr int kDark = 60;
   for (int k = 0;; ++k) {
     StatePrior prior = true_state(std::max(0, k - 2));
-    if (k == 15)  // by now the window has let go of them
+    if (k == 15) {  // by now the window has let go of them
+      LandmarkUpdate update;
       for (const TrackedFrame& frame : before)
         for (const TrackedFeature& f : frame.features) {
           const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left.normalised);
-          prior.located.push_back({f.id, Vec3(p.x(), p.y(), kDepth_m)});
+          update.landmarks.push_back({f.id, Vec3(p.x(), p.y(), kDepth_m)});
         }
+      frontend.locate(update);
+    }
     const bool dark = k >= 10 && k < 10 + kDark;
     SensorPacket packet = dark ? world().packet_without_images(k) : world().packet(k);
     if (!dark && k >= 10) prior.T_WB.p.x() += drift_m;

@@ -12,21 +12,20 @@ constexpr int kFewFrames = 4;
 
 }  // namespace
 
-void OrbFrontend::learn_positions(const StatePrior& prior) {
-  if (!prior.valid) {  // the next W is another one
+void OrbFrontend::locate(const LandmarkUpdate& update) {
+  if (update.reset_counter != reset_counter_) {  // another W
+    reset_counter_ = update.reset_counter;
     memory_.clear();
     for (Track& track : tracks_) {
       track.seen_from_W.reset();
       track.p_W.reset();
     }
-    return;
   }
-  for (const LocatedLandmark& located : prior.located) {
+  for (const LocatedLandmark& located : update.landmarks) {
     const auto track = std::find_if(tracks_.begin(), tracks_.end(), [&](const Track& t) { return t.id == located.track; });
     if (track != tracks_.end()) track->p_W = located.p_W;
     else memory_.locate(located.track, located.p_W);
   }
-  memory_.forget_unlocated(now_);
 }
 
 void OrbFrontend::remember(const Track& track) {

@@ -17,13 +17,12 @@
 #include "fbvins/loop/inverted_index.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/place_map.hpp"
-#include "fbvins/types/keyframe.hpp"
-#include "fbvins/types/loop.hpp"
+#include "fbvins/types/mapper.hpp"
 #include "fbvins/types/trajectory.hpp"
 
 namespace fbvins {
 
-class LoopCloser {
+class LoopCloser final : public Mapper {
  public:
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
   /// Goes on in an old map: M is that map's frame, and W must first be found in it. With boosted descriptors, `stage` makes
@@ -31,7 +30,7 @@ class LoopCloser {
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
-  MapUpdate process(const Keyframe& keyframe);
+  MapUpdate process(const Keyframe& keyframe) override;
   /// The same from features already extracted (joining maps, replay).
   MapUpdate process(Place place, FrameId frame, Time t, const Pose<W, B>& T_WB, std::uint32_t reset_counter);
 

@@ -53,7 +53,7 @@ void System::forward_packets(bool flush) {
 }
 
 void System::track(SensorPacket packet) {
-  TrackedFrame frame = frontend_->process(packet, prior_for(packet.id));
+  TrackedFrame frame = frontend_->process(packet, feedback_for(packet.id));
   if (on_keyframe_ || loop_) frame.images = std::move(packet.frame);
   if (mode_ == RunMode::threaded) to_estimator_.push(std::move(frame));
   else estimate(frame);
@@ -61,8 +61,8 @@ void System::track(SensorPacket packet) {
 
 void System::estimate(const TrackedFrame& frame) {
   if (on_tracked_frame_) on_tracked_frame_(frame);
-  const Estimate estimate = estimator_.process(frame);
-  publish(frame.id, estimator_.prior());
+  Estimate estimate = estimator_.process(frame);
+  publish(frame.id, estimator_.prior(), std::move(estimate.landmarks));
   if (on_odometry_) on_odometry_(estimate.odometry);
   hand_on(estimate);
 }
@@ -83,16 +83,20 @@ void System::close_loops(const LoopTask& task) {
   if (on_map_update_) on_map_update_(update);
 }
 
-StatePrior System::prior_for(FrameId frame) {
+/// The state that this frame's prediction starts from; the frontend has been told of all landmarks up to then.
+StatePrior System::feedback_for(FrameId frame) {
   const std::int64_t wanted = frame.value - kPriorLag;
   if (wanted < 0) return {};
   std::unique_lock lock(prior_mutex_);
   prior_published_.wait(lock, [&] { return stopped_ || frames_estimated_ > wanted; });
+  for (; !landmark_updates_.empty() && landmark_updates_.front().sequence <= wanted; landmark_updates_.pop_front())
+    frontend_->locate(landmark_updates_.front());
   return priors_[wanted % priors_.size()];
 }
 
-void System::publish(FrameId frame, const StatePrior& prior) {
+void System::publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks) {
   const std::lock_guard lock(prior_mutex_);
+  landmark_updates_.push_back(std::move(landmarks));
   priors_[frame.value % priors_.size()] = prior;
   frames_estimated_ = frame.value + 1;
   prior_published_.notify_all();

@@ -16,6 +16,7 @@
 
 #include <array>
 #include <condition_variable>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -95,8 +96,8 @@ class System {
   void estimate(const TrackedFrame& frame);
   void hand_on(const Estimate& estimate);
   void close_loops(const LoopTask& task);
-  StatePrior prior_for(FrameId frame);
-  void publish(FrameId frame, const StatePrior& prior);
+  StatePrior feedback_for(FrameId frame);
+  void publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks);
   void stop_waiting();
 
   RunMode mode_;
@@ -121,6 +122,7 @@ class System {
   std::mutex prior_mutex_;
   std::condition_variable prior_published_;
   std::array<StatePrior, 4> priors_;
+  std::deque<LandmarkUpdate> landmark_updates_;  ///< not yet seen by the frontend; one a frame
   std::int64_t frames_estimated_ = 0;
   bool stopped_ = false;
 };

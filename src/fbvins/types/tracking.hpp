@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the frontend tells the estimator, and the one value that comes back.
+// What the frontend tells the estimator, and the two values that come back.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -69,8 +70,7 @@ struct TrackedFrame {
   FrameId id;
   Time t;
   std::vector<TrackedFeature> features;
-  /// The frontend knows landmarks again: one that was out of view comes back under its old id.
-  bool knows_again = false;
+  bool has_left = false, has_right = false;  ///< a usable image of that camera came
   ImuSegment imu;  ///< since the frame before
   FrontendStats stats;
   StereoFrame images;  ///< null unless keyframes are wanted: they carry them on
@@ -82,8 +82,16 @@ struct LocatedLandmark {
   Vec3 p_W = Vec3::Zero();  ///< m
 };
 
-/// The newest estimate, fed back to the frontend for guided matching. Its W is the window's, which is not turned when it proves
-/// not to be level: `gravity_W` tells.
+/// Positions of the landmarks that left the window with one frame. A message of its own beside StatePrior, because a state may
+/// be skipped and a position must not: updates are numbered without gaps, and each is delivered once, in order.
+struct LandmarkUpdate {
+  std::int64_t sequence = 0;        ///< counts from 0
+  std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, and positions of before are void
+  std::vector<LocatedLandmark> landmarks;
+};
+
+/// The newest estimate, fed back to the frontend for guided matching; one may be skipped. Its W is the window's, which is not
+/// turned when it proves not to be level: `gravity_W` tells.
 struct StatePrior {
   Time t;
   Pose<W, B> T_WB;
@@ -91,7 +99,6 @@ struct StatePrior {
   ImuBias bias;
   Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< m/s^2
   bool valid = false;
-  std::vector<LocatedLandmark> located;  ///< with this frame
 };
 
 }  // namespace fbvins

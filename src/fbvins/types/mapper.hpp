@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the odometry hands its keyframes to. Loop closure is one; the odometry knows no more of it than this.
+//
+//   MapUpdate update = mapper.process(keyframe);
+//   Pose<M, B> T_MB = update.T_MW * odometry.T_WB;
+#pragma once
+
+#include "fbvins/types/keyframe.hpp"
+#include "fbvins/types/loop.hpp"
+
+namespace fbvins {
+
+class Mapper {
+ public:
+  virtual ~Mapper() = default;
+
+  /// Takes a keyframe into the map and says where W is in it now. Keyframes come in order of time, from one thread.
+  virtual MapUpdate process(const Keyframe& keyframe) = 0;
+};
+
+}  // namespace fbvins
