@@ -39,11 +39,33 @@ Result<void> set_bool(const std::string& text, bool& target) {
   return {};
 }
 
+std::vector<std::string> names_in(const std::string& choices) {
+  std::vector<std::string> names(1);
+  for (const char c : choices)
+    if (c == '|') names.emplace_back();
+    else names.back() += c;
+  return names;
+}
+
+/// Which of the choices the text is.
+Result<std::size_t> choice(const OptionField& field, const std::string& text) {
+  const std::vector<std::string> names = names_in(field.choices);
+  const auto it = std::find(names.begin(), names.end(), text);
+  if (it == names.end()) return invalid(fmt::format("'{}' is none of {}", text, field.choices));
+  return static_cast<std::size_t>(it - names.begin());
+}
+
 Result<void> set_text(const OptionField& field, const std::string& text, std::string& target) {
-  const bool one_word = !text.empty() && text.find('|') == std::string::npos;
-  const bool allowed = one_word && fmt::format("|{}|", field.choices).find(fmt::format("|{}|", text)) != std::string::npos;
-  if (!field.choices.empty() && !allowed) return invalid(fmt::format("'{}' is none of {}", text, field.choices));
+  if (!field.choices.empty())
+    if (const auto index = choice(field, text); !index) return index.error();
   target = text;
+  return {};
+}
+
+Result<void> set_enum(const OptionField& field, const std::string& text, const EnumValue& target) {
+  const auto index = choice(field, text);
+  if (!index) return index.error();
+  target.set(*index);
   return {};
 }
 
@@ -74,7 +96,7 @@ int OptionField::depth() const { return static_cast<int>(std::count(path.begin()
 std::string_view OptionField::name() const { return last_part(path); }
 
 std::string OptionField::type_name() const {
-  constexpr const char* kNames[] = {"group", "true or false", "whole number", "number", "text"};
+  constexpr const char* kNames[] = {"group", "true or false", "whole number", "number", "text", "text"};
   return kNames[value.index()];
 }
 
@@ -83,6 +105,7 @@ std::string OptionField::value_text() const {
   if (auto* whole = std::get_if<int*>(&value)) return fmt::format("{}", **whole);
   if (auto* number = std::get_if<double*>(&value)) return fmt::format("{}", **number);
   if (auto* text = std::get_if<std::string*>(&value)) return **text;
+  if (auto* chosen = std::get_if<EnumValue>(&value)) return names_in(choices).at(chosen->get());
   return {};
 }
 
@@ -96,6 +119,7 @@ Result<void> OptionField::set_from_text(const std::string& text) const {
   if (auto* whole = std::get_if<int*>(&value)) return set_number(*this, text, **whole);
   if (auto* number = std::get_if<double*>(&value)) return set_number(*this, text, **number);
   if (auto* target = std::get_if<std::string*>(&value)) return set_text(*this, text, **target);
+  if (auto* target = std::get_if<EnumValue>(&value)) return set_enum(*this, text, *target);
   return invalid("is a group of options, not a value");
 }
 

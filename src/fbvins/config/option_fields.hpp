@@ -7,6 +7,7 @@
 //   for (const OptionField& f : fields_of(options)) use(f.path, f.value_text());
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -17,14 +18,20 @@
 
 namespace fbvins {
 
+/// An enum's value as one of its names.
+struct EnumValue {
+  std::function<std::size_t()> get;  ///< which of the names, from 0
+  std::function<void(std::size_t)> set;
+};
+
 struct OptionField {
   std::string path;  ///< "klt.max_features"; of a group: "klt"
   std::string unit;  ///< "px", empty for pure numbers
   std::string meaning;
-  std::string choices;      ///< of a text: allowed values separated by '|', empty for any text
+  std::string choices;      ///< of a text or an enum: allowed values separated by '|', empty for any text
   double min = 0, max = 0;  ///< of a number
   /// Where the value lives; monostate for the heading of a group, whose fields follow it.
-  std::variant<std::monostate, bool*, int*, double*, std::string*> value;
+  std::variant<std::monostate, bool*, int*, double*, std::string*, EnumValue> value;
 
   bool is_group() const { return value.index() == 0; }
   int depth() const;               ///< number of groups around it
@@ -53,6 +60,13 @@ class FieldCollector {
   }
   void operator()(std::string_view name, std::string& value, std::string_view choices, std::string_view meaning) {
     add(name, "", meaning, &value).choices = choices;
+  }
+  template <class Enum>
+  requires std::is_enum_v<Enum>
+  void operator()(std::string_view name, Enum& value, std::string_view names, std::string_view meaning) {
+    const EnumValue access{[&value] { return static_cast<std::size_t>(value); },
+                           [&value](std::size_t index) { value = static_cast<Enum>(index); }};
+    add(name, "", meaning, access).choices = names;
   }
   template <class Group>
   void group(std::string_view name, Group& options, std::string_view meaning) {

@@ -53,7 +53,7 @@ struct Reader {
     }
     if (!value.IsScalar())
       return error(mark, fmt::format("option '{}' wants a {}, not a list or group", field.path, field.type_name()));
-    const bool quoted_number = value.Tag() == "!" && !std::holds_alternative<std::string*>(field.value);
+    const bool quoted_number = value.Tag() == "!" && field.type_name() != "text";
     if (quoted_number)
       return error(mark,
                    fmt::format("option '{}': \"{}\" in quotes is text, not a {}", field.path, value.Scalar(), field.type_name()));

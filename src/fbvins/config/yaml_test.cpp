@@ -8,15 +8,19 @@
 namespace fbvins {
 namespace {
 
+enum class Leaving { oldest, entropy };
+
 struct TrackerOptions {
   int max_features = 150;
   double min_distance_px = 20;
   bool subpixel = true;
+  Leaving leaving = Leaving::oldest;
   template <class V>
   void visit(V&& v) {
     v("max_features", max_features, "", "features followed at once", 10, 5000);
     v("min_distance_px", min_distance_px, "px", "smallest distance between features", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine below a pixel");
+    v("leaving", leaving, "oldest|entropy", "which keyframe leaves");
   }
 };
 
@@ -64,6 +68,18 @@ TEST(Yaml, RoundTripsToTheSameBytesAndBits) {
   EXPECT_EQ(back.note, config.note);
   EXPECT_EQ(back.klt.min_distance_px, config.klt.min_distance_px);
   EXPECT_EQ(write_yaml(fields_of(back)), text);
+}
+
+TEST(Yaml, AnEnumIsOneOfItsNames) {
+  SomeConfig config, back;
+  ASSERT_TRUE(read_yaml("klt: {leaving: entropy}\n", "f.yaml", fields_of(config)));
+  EXPECT_EQ(config.klt.leaving, Leaving::entropy);
+  ASSERT_TRUE(read_yaml(write_yaml(fields_of(config)), "f.yaml", fields_of(back)));
+  EXPECT_EQ(back.klt.leaving, Leaving::entropy);
+  EXPECT_EQ(error_of("klt: {leaving: newest}\n"), "f.yaml:1: option 'klt.leaving': 'newest' is none of oldest|entropy");
+  EXPECT_TRUE(validate(config));
+  config.klt.leaving = static_cast<Leaving>(2);
+  EXPECT_EQ(validate(config).error().message, "klt.leaving = 2 is none of oldest|entropy");
 }
 
 TEST(Yaml, TextThatLooksLikeAnotherTypeStaysText) {

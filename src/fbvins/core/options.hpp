@@ -13,15 +13,17 @@
 //     }
 //   };
 //
-// Field kinds: bool, int, double (name, reference, unit, meaning, min, max) and
-// std::string (name, reference, allowed values separated by '|', meaning).
-// Groups: v.group("klt", klt_options, "meaning").
+// Field kinds: bool, int, double (name, reference, unit, meaning, min, max), std::string (name, reference, allowed
+// values separated by '|', meaning), and enum class, counted from 0 in the order of its names (name, reference,
+// names separated by '|', meaning). Groups: v.group("klt", klt_options, "meaning").
 #pragma once
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "fbvins/core/result.hpp"
 
@@ -35,6 +37,13 @@ class OptionsValidator {
     if (!(value >= min && value <= max)) fail(fmt::format("{}{} = {} is outside [{}, {}]", prefix_, name, value, min, max));
   }
   void operator()(std::string_view, bool&, std::string_view, std::string_view) {}
+  template <class Enum>
+  requires std::is_enum_v<Enum>
+  void operator()(std::string_view name, Enum& value, std::string_view names, std::string_view) {
+    const auto count = 1 + std::count(names.begin(), names.end(), '|');
+    if (static_cast<long>(value) < 0 || static_cast<long>(value) >= count)
+      fail(fmt::format("{}{} = {} is none of {}", prefix_, name, static_cast<long>(value), names));
+  }
   void operator()(std::string_view name, std::string& value, std::string_view choices, std::string_view) {
     if (choices.empty()) return;
     const std::string padded = fmt::format("|{}|", choices);
