@@ -336,9 +336,10 @@ void LoopCloser::thin() {
          redundant_.front() < map_.keyframes()[map_.size() - kKeepNewest].id) {
     const KeyframeId id = redundant_.front();
     redundant_.erase(redundant_.begin());
-    take_out(id);
+    if (map_.find(id) != nullptr) take_out(id);
   }
-  while (static_cast<int>(map_.size()) > options_.max_keyframes) {
+  // The first keyframe holds M, the newest ones are where the flight is; what lies between them may go.
+  while (static_cast<int>(map_.size()) > options_.max_keyframes && map_.size() > 2) {
     // The one whose neighbours in time are nearest to one another says least.
     const auto& k = map_.keyframes();
     std::size_t least = 1;
@@ -351,19 +352,29 @@ void LoopCloser::thin() {
   }
 }
 
-void LoopCloser::take_out(KeyframeId id) {
-  const MapKeyframe* gone = map_.find(id);
-  if (gone == nullptr) return;
-  // Poses that hung on it hang on a neighbour of the same session from now on.
+/// Who takes over the poses that hang on a keyframe: a neighbour of its session, else the last one before it that knows
+/// where it is in M too. Null for a session's only keyframe while that is not known.
+const MapKeyframe* LoopCloser::heir_of(const MapKeyframe& gone) const {
   const auto& all = map_.keyframes();
-  const auto at = static_cast<std::size_t>(gone - all.data());
-  const MapKeyframe* heir =
-      at > 0 && all[at - 1].session == gone->session ? &all[at - 1] : (at + 1 < all.size() ? &all[at + 1] : nullptr);
-  if (heir == nullptr || heir->session != gone->session) return;
-  const Pose<B, B> T_heir_gone = heir->T_MB.inverse() * gone->T_MB;
-  for (Record& r : records_)
-    if (r.anchor == id) r.anchor = heir->id, r.T_anchor_B = T_heir_gone * r.T_anchor_B;
-  index_.remove(id, gone->place.words);
+  const auto at = static_cast<std::size_t>(&gone - all.data());
+  if (at > 0 && all[at - 1].session == gone.session) return &all[at - 1];
+  if (at + 1 < all.size() && all[at + 1].session == gone.session) return &all[at + 1];
+  for (std::size_t i = at; gone.placed && i-- > 0;)
+    if (all[i].placed) return &all[i];
+  return nullptr;
+}
+
+/// Always makes the map smaller. Poses that hung on the keyframe hang on its heir from now on; without one they go too.
+void LoopCloser::take_out(KeyframeId id) {
+  const MapKeyframe& gone = *map_.find(id);
+  if (const MapKeyframe* heir = heir_of(gone); heir != nullptr) {
+    const Pose<B, B> T_heir_gone = heir->T_MB.inverse() * gone.T_MB;
+    for (Record& r : records_)
+      if (r.anchor == id) r.anchor = heir->id, r.T_anchor_B = T_heir_gone * r.T_anchor_B;
+  } else {
+    std::erase_if(records_, [&](const Record& r) { return r.anchor == id; });
+  }
+  index_.remove(id, gone.place.words);
   map_.remove(id);
 }
 

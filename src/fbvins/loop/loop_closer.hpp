@@ -70,6 +70,7 @@ class LoopCloser final : public Mapper {
   bool optimisation_due() const;
   void optimise(MapUpdate* update);
   void thin();
+  const MapKeyframe* heir_of(const MapKeyframe& gone) const;
   void take_out(KeyframeId id);
 
   LoopOptions options_;

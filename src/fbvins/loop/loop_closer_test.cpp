@@ -4,6 +4,7 @@
 #include "fbvins/loop/loop_closer.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -139,6 +140,50 @@ TEST(LoopCloser, RoundsInOneRoomDoNotGrowTheMapWithoutBound) {
   EXPECT_LE(closer.map().size(), 300u);
 }
 
+/// A restart with every keyframe: W has to be found in the map again and again. Returns how often it was.
+int fly_with_restarts(LoopCloser& closer, const std::vector<Frame>& frames) {
+  int localised = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    localised += closer
+                     .process(frames[i].place, FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry,
+                              static_cast<std::uint32_t>(i))
+                     .localised;
+  return localised;
+}
+
+LoopOptions small_map() {
+  LoopOptions options;
+  options.max_keyframes = 25;
+  return options;
+}
+
+TEST(LoopCloser, AMapOfSingleKeyframesKeepsItsLimitToo) {
+  const auto frames = flight(room(1), 60, 0, 0, 2);
+  // In a process of its own: one that never ends is killed by its alarm.
+  const auto in_time = [&] {
+    alarm(60);
+    LoopCloser closer(rig(), small_map(), vocabulary());
+    fly_with_restarts(closer, frames);
+    _exit(closer.map().size() == 25 ? 0 : 1);
+  };
+  EXPECT_EXIT(in_time(), testing::ExitedWithCode(0), "");
+}
+
+TEST(LoopCloser, PosesOfASessionWhoseKeyframesAreGoneStayWhereTheyWere) {
+  const auto frames = flight(room(1), 60, 0, 0, 2);
+  LoopCloser closer(rig(), small_map(), vocabulary());
+  const int localised = fly_with_restarts(closer, frames);
+  int placed = 0;
+  for (const Frame& f : frames) {
+    const Trajectory corrected = closer.corrected({{f.t, f.odometry}});
+    if (corrected.empty()) continue;
+    ++placed;
+    EXPECT_LT((corrected[0].T_WB.p - f.truth.p).norm(), 0.1);
+  }
+  EXPECT_GT(localised, 10);
+  EXPECT_EQ(placed, localised);
+}
+
 TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const auto map_of = [](std::uint64_t world, std::uint64_t seed, double start_s) {
     LoopCloser closer(rig(), {}, vocabulary());
@@ -154,6 +199,10 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const Vec3 measured = both->keyframes()[a.size() + 50].T_MB.p - both->keyframes()[60].T_MB.p;
   EXPECT_NEAR(measured.norm(), (truth_b[50].truth.p - truth_a[60].truth.p).norm(), 0.05);
   EXPECT_FALSE(merge_maps(a, stranger, {}, vocabulary()).ok());
+  const std::string bytes = serialise_map(b);
+  const auto from_file = merge_maps(a, *parse_map(std::as_bytes(std::span(bytes)), "b"), {}, vocabulary());
+  ASSERT_TRUE(from_file.ok()) << "words are not kept in files";
+  EXPECT_EQ(serialise_map(*from_file), serialise_map(*both));
   PlaceMap boosted = b;
   boosted.boosted = true;
   EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
