@@ -12,8 +12,7 @@ set_target_properties(fbvins_all PROPERTIES EXPORT_NAME fbvins)
 add_library(fbvins::fbvins ALIAS fbvins_all)
 
 install(TARGETS fbvins_all ${modules} EXPORT fbvinsTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY src/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.hpp" PATTERN "*_test*" EXCLUDE)
+install(DIRECTORY include/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 install(EXPORT fbvinsTargets NAMESPACE fbvins:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
 
 configure_package_config_file(cmake/fbvinsConfig.cmake.in ${PROJECT_BINARY_DIR}/fbvinsConfig.cmake

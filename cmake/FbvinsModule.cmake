@@ -10,6 +10,8 @@ if(FBVINS_BUILD_TESTS)
 endif()
 
 add_library(fbvins_flags INTERFACE)
+# The interior's headers: for the sources of this repository, not for who links its libraries.
+target_include_directories(fbvins_flags INTERFACE ${PROJECT_SOURCE_DIR}/src)
 target_compile_options(fbvins_flags INTERFACE
   -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wno-psabi
   # The same bits whatever instruction set a kernel is dispatched to: no silent fused multiply-add.
@@ -31,7 +33,7 @@ function(fbvins_module NAME)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${NAME})
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope}
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
   list(TRANSFORM ARG_DEPS PREPEND fbvins:: OUTPUT_VARIABLE deps)
   target_link_libraries(${target} ${scope} Eigen3::Eigen fmt::fmt Threads::Threads ${deps})
   set_property(GLOBAL APPEND PROPERTY FBVINS_MODULE_TARGETS ${target})

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Arrows between modules run one way: a module includes only modules of lower rank (docs/architecture.md).
+And the border holds: a public header (include/) includes public headers, the standard library, Eigen and fmt, nothing else.
 
 usage: check_ranks.py [REPOSITORY]      exit 1 and one line a fault; check_ranks.py --self-test
 """
@@ -24,17 +25,39 @@ ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
 
+# Where modules live: folder -> the folders whose headers its headers may include; None: any.
+FOLDERS = {
+    "include": ("include",),
+    "src": None,
+}
+
+
 def faults(root):
-    sources = root / "src" / "fbvins"
-    for path in sorted(p for p in sources.rglob("*") if p.suffix in (".cpp", ".hpp")):
-        module = path.relative_to(sources).parts[0]
-        if module not in RANKS:
-            yield f"{path.relative_to(root)}: module '{module}' has no rank; give it one in tests/check_ranks.py"
-            continue
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-            match = INCLUDE.match(line)
-            if match and (problem := judge(module, match[1], path)):
-                yield f"{path.relative_to(root)}:{number}: {problem}"
+    for folder, public in FOLDERS.items():
+        sources = root / folder / "fbvins"
+        for path in sorted(p for p in sources.rglob("*") if p.suffix in (".cpp", ".hpp")):
+            module = path.relative_to(sources).parts[0]
+            if module not in RANKS:
+                yield f"{path.relative_to(root)}: module '{module}' has no rank; give it one in tests/check_ranks.py"
+                continue
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                match = INCLUDE.match(line)
+                if not match:
+                    continue
+                problem = judge(module, match[1], path) or (public and judge_border(root, public, match[1]))
+                if problem:
+                    yield f"{path.relative_to(root)}:{number}: {problem}"
+
+
+def judge_border(root, public, included):
+    """What is wrong with one include of a public header, or None."""
+    if included.startswith("fbvins/"):
+        if any((root / folder / included).exists() for folder in public):
+            return None
+        return f"a public header includes {included}, which is not public (not in {' or '.join(public)}/)"
+    if included.startswith(("Eigen/", "fmt/")) or re.fullmatch(r"[a-z_]+", included):
+        return None
+    return f"a public header includes {included}: only the standard library, Eigen and fmt are there for every user"
 
 
 def judge(module, included, path):
@@ -58,19 +81,24 @@ def self_test():
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in {
-            "core/a.hpp": '#include "fbvins/types/b.hpp"\n',
-            "types/b.hpp": '#include <vector>\n#include "fbvins/core/a.hpp"\n',
-            "frontend/c.cpp": '#include "fbvins/estimator/d.hpp"\n',
-            "frontend/c_test.cpp": '#include "fbvins/estimator/d.hpp"\n#include "fbvins/pipeline/e.hpp"\n',
-            "camera/f.hpp": '#include "fbvins/types/b.hpp"\n',
-            "odd/g.hpp": "\n",
+            "src/fbvins/core/a.hpp": '#include "fbvins/types/b.hpp"\n',
+            "src/fbvins/types/b.hpp": '#include <vector>\n#include "fbvins/core/a.hpp"\n',
+            "src/fbvins/frontend/c.cpp": '#include "fbvins/estimator/d.hpp"\n',
+            "src/fbvins/frontend/c_test.cpp": '#include "fbvins/estimator/d.hpp"\n#include "fbvins/pipeline/e.hpp"\n',
+            "src/fbvins/camera/f.hpp": '#include "fbvins/types/b.hpp"\n',
+            "src/fbvins/odd/g.hpp": "\n",
+            "include/fbvins/core/h.hpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n',
+            "include/fbvins/types/i.hpp": '#include "fbvins/core/h.hpp"\n#include "fbvins/core/a.hpp"\n',
+            "include/fbvins/types/j.hpp": '#include <ceres/ceres.h>\n#include <png.h>\n',
+            "include/fbvins/types/k.hpp": '#include "fbvins/pipeline/e.hpp"\n',
         }.items():
-            path = root / "src" / "fbvins" / name
+            path = root / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         where = [fault.split(": ")[0] for fault in faults(root)]
-    wanted = ["core/a.hpp:1", "frontend/c.cpp:1", "frontend/c_test.cpp:2", "odd/g.hpp"]
-    assert where == [f"src/fbvins/{w}" for w in wanted], where
+    wanted = ["include/fbvins/" + w for w in ("types/i.hpp:2", "types/j.hpp:1", "types/j.hpp:2", "types/k.hpp:1")]
+    wanted += ["src/fbvins/" + w for w in ("core/a.hpp:1", "frontend/c.cpp:1", "frontend/c_test.cpp:2", "odd/g.hpp")]
+    assert where == wanted, where
 
 
 def main():
@@ -78,7 +106,7 @@ def main():
     if sys.argv[1:] == ["--self-test"]:
         return 0
     found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()))
-    print("\n".join(found) or "ranks: every include goes down")
+    print("\n".join(found) or "ranks: every include goes down, and none crosses the border")
     return 1 if found else 0
 
 

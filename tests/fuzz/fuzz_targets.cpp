@@ -4,6 +4,7 @@
 #include "fbvins/features/booster_weights.hpp"
 #include "fbvins/features/safetensors.hpp"
 #include "fbvins/io/calibration.hpp"
+#include "fbvins/io/csv.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/trajectory.hpp"

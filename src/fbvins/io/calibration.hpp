@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration files to a StereoRig, checked. Pure functions but for reading files; any thread.
-//
-//   Result<StereoRig> rig = load_kalibr("camchain-imucam.yaml", "imu.yaml");
-//   if (!rig) { report(rig.error().message); ... }   // "camchain.yaml:12: intrinsics: has 3 numbers ..."
+// The text of calibration files to values, checked. Pure functions, any thread.
 //
 // Frames: EuRoC's T_BS takes sensor to body coordinates; Kalibr's T_cam_imu takes IMU to camera
 // coordinates and is inverted here. Our B is the IMU.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "fbvins/camera/camera.hpp"
@@ -41,7 +37,5 @@ Result<StereoRig> join_euroc(const CameraSensor& left, const CameraSensor& right
 Result<StereoRig> parse_kalibr_camchain(const std::string& text, const std::string& file);
 /// Kalibr's imu.yaml, with or without the `imu0:` level.
 Result<ImuNoise> parse_kalibr_imu(const std::string& text, const std::string& file);
-/// cam0 is left, cam1 right. Without imu_path the noise figures stay at their defaults.
-Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt);
 
 }  // namespace fbvins

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/calibration.hpp"
+#include "fbvins/io/kalibr.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

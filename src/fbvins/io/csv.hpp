@@ -18,20 +18,9 @@
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
+#include "fbvins/io/row_counts.hpp"
 
 namespace fbvins {
-
-/// What became of the data rows of one file.
-struct RowCounts {
-  int rows = 0;           ///< data rows in the file
-  int malformed = 0;      ///< wrong number of columns, not a number, stamp out of range
-  int not_finite = 0;     ///< NaN, infinite or absurdly large values
-  int duplicates = 0;     ///< stamp already seen
-  int backwards = 0;      ///< stamp out of order
-  std::string first_bad;  ///< "file:line: sentence" about the first row left out
-
-  int bad() const { return malformed + not_finite + duplicates + backwards; }
-};
 
 /// What a row parser says about one row.
 enum class RowVerdict { good, not_finite, malformed };

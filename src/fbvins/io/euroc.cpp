@@ -10,6 +10,7 @@
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {

@@ -2,6 +2,7 @@
 // Private to io: rows of EuRoC's CSV files, pairing of left and right images, and loading them.
 #pragma once
 
+#include "fbvins/io/csv.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/file_source.hpp"
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalibr's yaml formats: https://github.com/ethz-asl/kalibr/wiki/yaml-formats
+#include "fbvins/io/kalibr.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>

@@ -8,8 +8,8 @@
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/rng.hpp"
-#include "fbvins/io/calibration.hpp"
 #include "fbvins/io/imu_file.hpp"
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/sim/flight_recorder.hpp"
 #include "fbvins/sim/recorded_flight.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fbvins/core/time.hpp"
-#include "fbvins/io/csv.hpp"
+#include "fbvins/io/row_counts.hpp"
 
 namespace fbvins {
 

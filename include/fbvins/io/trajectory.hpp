@@ -9,10 +9,11 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "fbvins/io/csv.hpp"
 #include "fbvins/io/output_file.hpp"
+#include "fbvins/io/row_counts.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/trajectory.hpp"
 

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rig of your own camera from Kalibr's files, checked. Any thread.
+//
+//   Result<StereoRig> rig = load_kalibr("camchain-imucam.yaml", "imu.yaml");
+//   if (!rig) { report(rig.error().message); ... }   // "camchain.yaml:12: intrinsics: has 3 numbers ..."
+//
+// Frames: Kalibr's T_cam_imu takes IMU to camera coordinates and is inverted here. B is the IMU.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+
+namespace fbvins {
+
+/// cam0 is left, cam1 right. Without imu_path the noise figures stay at their defaults.
+Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt);
+
+}  // namespace fbvins
