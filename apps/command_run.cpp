@@ -154,8 +154,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--frontend", arguments->frontend, "how features are followed")
-      ->check(CLI::IsMember({"klt", "orb", "boost"}));
+  command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");

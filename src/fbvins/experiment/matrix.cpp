@@ -2,6 +2,7 @@
 #include "fbvins/experiment/matrix.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <initializer_list>
 #include <set>
 
+#include "fbvins/frontend/frontend_options.hpp"
 #include "fbvins/io/file_source.hpp"
 
 namespace fbvins {
@@ -168,7 +170,11 @@ Result<Matrix> parse_matrix(const std::string& text, const std::string& source) 
   if (!reader.problem().empty()) return Error{ErrorCode::malformed, reader.problem()};
   matrix.title = reader.text(root, "title");
   matrix.frontends = reader.texts(root, "frontends");
-  if (matrix.frontends.empty()) matrix.frontends.emplace_back("klt");
+  const std::vector<std::string> known = frontend_names();
+  for (const std::string& name : matrix.frontends)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      reader.complain(root["frontends"], fmt::format("there is no frontend '{}'; there are {}", name, fmt::join(known, ", ")));
+  if (matrix.frontends.empty()) matrix.frontends.push_back(known.front());
   matrix.repetitions = static_cast<int>(reader.number(root, "repetitions", 1, 1000, 1));
   const YAML::Node datasets = root["datasets"], configurations = root["configurations"];
   if (!datasets || !datasets.IsSequence() || datasets.size() == 0) reader.complain(root, "a list 'datasets' is needed");

@@ -59,6 +59,8 @@ TEST(Matrix, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(message("frontends: [klt]\n"), "m.yaml:1: a list 'datasets' is needed");
   EXPECT_EQ(message("datasets: [{path: a}]\nrepetitions: many\n"), "m.yaml:2: 'repetitions' wants a number from 1 to 1000");
   EXPECT_NE(message("datasets: [{path: a\n").find("m.yaml:"), std::string::npos);
+  EXPECT_EQ(message("datasets: [{path: a}]\nfrontends: [klt, surf]\n"),
+            "m.yaml:2: there is no frontend 'surf'; there are klt, orb, boost");
   EXPECT_EQ(message("datasets: [{name: a}]\n"), "m.yaml:1: a dataset needs euroc, path or simulate");
 }
 

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frontends by name.
+// The frontends by name. A new frontend is one line in the table of frontend_options.cpp, and a group below where it has
+// options; programs and configuration files ask for the names.
+//
+//   for (const std::string& name : frontend_names()) offer(name);
+//   Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options);     // or make_frontend(rig, "orb")
 #pragma once
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
@@ -13,6 +18,13 @@
 #include "fbvins/frontend/orb_frontend.hpp"
 
 namespace fbvins {
+
+/// All there are; the first is the default.
+std::vector<std::string> frontend_names();
+/// The same as the choices of an option: "klt|orb|boost".
+const std::string& frontend_choices();
+/// One line about all of them, for the option.
+const std::string& frontend_meanings();
 
 /// The boost frontend is the orb frontend with improved descriptors, whose distances are others.
 struct BoostFrontendOptions {
@@ -31,22 +43,23 @@ struct BoostFrontendOptions {
 };
 
 struct FrontendOptions {
-  std::string kind = "klt";
+  std::string kind = frontend_names().front();
   KltFrontendOptions klt;
   OrbFrontendOptions orb;
   BoostFrontendOptions boost;
 
   template <class V>
   void visit(V&& v) {
-    v("kind", kind, "klt|orb|boost",
-      "corners followed by Lucas-Kanade, or descriptors matched from image to image, raw or boosted");
+    v("kind", kind, frontend_choices(), frontend_meanings());
     v.group("klt", klt, "the klt frontend");
     v.group("orb", orb, "the orb frontend");
     v.group("boost", boost, "what the boost frontend does other than the orb frontend");
   }
 };
 
-/// An error where the booster's weights cannot be used.
+/// An error where there is no frontend of that name, or what it needs (the booster's weights) cannot be used.
 Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const FrontendOptions& options);
+/// The same with the options' defaults.
+Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const std::string& name);
 
 }  // namespace fbvins

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/frontend_options.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <string_view>
+
+namespace fbvins {
+namespace {
+
+using Made = Result<std::unique_ptr<Frontend>>;
+
+Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
+  return std::unique_ptr<Frontend>(std::make_unique<KltFrontend>(rig, options.klt));
+}
+
+Made make_orb(const StereoRig& rig, const FrontendOptions& options) {
+  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, options.orb));
+}
+
+/// The orb frontend's options with the distances that suit boosted descriptors.
+OrbFrontendOptions boosted(OrbFrontendOptions orb, const BoostFrontendOptions& boost) {
+  orb.matching.max_distance = boost.max_distance;
+  orb.matching.max_ratio = boost.max_ratio;
+  orb.stereo.max_distance = boost.stereo_max_distance;
+  orb.stereo.max_ratio = boost.max_ratio;
+  return orb;
+}
+
+Made make_boost(const StereoRig& rig, const FrontendOptions& options) {
+  Result<std::unique_ptr<DescriptorStage>> stage = make_booster_stage(options.boost.booster);
+  if (!stage) return stage.error();
+  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, boosted(options.orb, options.boost), std::move(*stage)));
+}
+
+struct Registration {
+  std::string_view name, meaning;
+  Made (*make)(const StereoRig&, const FrontendOptions&);
+};
+
+/// The one place that knows all frontends. The first is the default.
+constexpr Registration kFrontends[] = {
+    {"klt", "corners followed by Lucas-Kanade", make_klt},
+    {"orb", "descriptors matched from image to image", make_orb},
+    {"boost", "orb with descriptors improved by a network", make_boost},
+};
+
+}  // namespace
+
+std::vector<std::string> frontend_names() {
+  std::vector<std::string> names;
+  for (const Registration& r : kFrontends) names.emplace_back(r.name);
+  return names;
+}
+
+const std::string& frontend_choices() {
+  static const std::string choices = fmt::format("{}", fmt::join(frontend_names(), "|"));
+  return choices;
+}
+
+const std::string& frontend_meanings() {
+  static const std::string meanings = [] {
+    std::vector<std::string> lines;
+    for (const Registration& r : kFrontends) lines.push_back(fmt::format("{}: {}", r.name, r.meaning));
+    return fmt::format("{}", fmt::join(lines, "; "));
+  }();
+  return meanings;
+}
+
+Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const FrontendOptions& options) {
+  for (const Registration& r : kFrontends)
+    if (r.name == options.kind) return r.make(rig, options);
+  return Error{ErrorCode::invalid_argument,
+               fmt::format("there is no frontend \"{}\"; there are {}", options.kind, fmt::join(frontend_names(), ", "))};
+}
+
+Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const std::string& name) {
+  FrontendOptions options;
+  options.kind = name;
+  return make_frontend(rig, options);
+}
+
+}  // namespace fbvins
