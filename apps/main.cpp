@@ -32,11 +32,13 @@ int main(int argc, char** argv) {
   add_eval_command(program, exit_code);
   add_info_command(program, exit_code);
   add_config_command(program, exit_code);
+  add_map_command(program, exit_code);
+  add_vocab_command(program, exit_code);
+#ifdef FBVINS_WITH_LAB
   add_simulate_command(program, exit_code);
   add_report_command(program, exit_code);
   add_bench_command(program, exit_code);
-  add_map_command(program, exit_code);
-  add_vocab_command(program, exit_code);
+#endif
   try {
     if (argc <= 1) {
       std::fputs(program.help().c_str(), stderr);

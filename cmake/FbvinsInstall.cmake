@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-# Install and export: a downstream project says find_package(fbvins) and links fbvins::fbvins.
+# Install and export. A downstream project says find_package(fbvins COMPONENTS core io loop sim) and links fbvins::<component>,
+# or fbvins::fbvins for all that it found. The same names serve in a project that takes this one by add_subdirectory.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
 
-get_property(modules GLOBAL PROPERTY FBVINS_MODULE_TARGETS)
-
-# All modules under one name.
+# One export set a component, so that nobody looks for the libraries of a component that was not asked for.
 add_library(fbvins_all INTERFACE)
-target_link_libraries(fbvins_all INTERFACE ${modules})
-set_target_properties(fbvins_all PROPERTIES EXPORT_NAME fbvins)
 add_library(fbvins::fbvins ALIAS fbvins_all)
+foreach(component ${FBVINS_COMPONENTS})
+  list(TRANSFORM FBVINS_${component}_MODULES PREPEND fbvins_ OUTPUT_VARIABLE modules)
+  add_library(fbvins_component_${component} INTERFACE)
+  add_library(fbvins::${component} ALIAS fbvins_component_${component})
+  target_link_libraries(fbvins_component_${component} INTERFACE ${modules})
+  target_link_libraries(fbvins_all INTERFACE fbvins_component_${component})
+  set_target_properties(fbvins_component_${component} PROPERTIES EXPORT_NAME ${component})
+  install(TARGETS fbvins_component_${component} ${modules} EXPORT fbvins-${component} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT fbvins-${component} NAMESPACE fbvins:: DESTINATION ${package_folder} FILE fbvins-${component}-targets.cmake)
+endforeach()
 
-install(TARGETS fbvins_all ${modules} EXPORT fbvinsTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
-install(EXPORT fbvinsTargets NAMESPACE fbvins:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
-
-configure_package_config_file(cmake/fbvinsConfig.cmake.in ${PROJECT_BINARY_DIR}/fbvinsConfig.cmake
-  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
+if(FBVINS_BUILD_LAB)
+  install(DIRECTORY lab/include/fbvins DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+endif()
+configure_package_config_file(cmake/fbvinsConfig.cmake.in ${PROJECT_BINARY_DIR}/fbvinsConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/fbvinsConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/fbvinsConfig.cmake ${PROJECT_BINARY_DIR}/fbvinsConfigVersion.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
+install(FILES ${PROJECT_BINARY_DIR}/fbvinsConfig.cmake ${PROJECT_BINARY_DIR}/fbvinsConfigVersion.cmake DESTINATION ${package_folder})

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # fbvins_module(NAME DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
-# One static library fbvins_<NAME> (alias fbvins::<NAME>) and one test program fbvins_<NAME>_test beside it.
+# One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
+# where they can, other libraries else. What users link are components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
@@ -29,14 +30,14 @@ function(fbvins_module NAME)
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
   endif()
-  add_library(fbvins::${NAME} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${NAME})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME module_${NAME})
   target_compile_features(${target} ${scope} cxx_std_20)
-  target_include_directories(${target} ${scope}
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
-  list(TRANSFORM ARG_DEPS PREPEND fbvins:: OUTPUT_VARIABLE deps)
+  target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+  foreach(folder ${FBVINS_MODULE_INCLUDES})
+    target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${folder}>)
+  endforeach()
+  list(TRANSFORM ARG_DEPS PREPEND fbvins_ OUTPUT_VARIABLE deps)
   target_link_libraries(${target} ${scope} Eigen3::Eigen fmt::fmt Threads::Threads ${deps})
-  set_property(GLOBAL APPEND PROPERTY FBVINS_MODULE_TARGETS ${target})
   if(FBVINS_BUILD_TESTS AND ARG_TESTS)
     add_executable(${target}_test ${ARG_TESTS})
     target_link_libraries(${target}_test PRIVATE ${target} fbvins_flags ${ARG_TEST_DEPS} GTest::gtest_main)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Arrows between modules run one way: a module includes only modules of lower rank (docs/architecture.md).
-And the border holds: a public header (include/) includes public headers, the standard library, Eigen and fmt, nothing else.
+And the border holds: a public header (include/) includes public headers, the standard library, Eigen and fmt, nothing else;
+the laboratory (lab/) sees everything and is seen by nothing.
 
 usage: check_ranks.py [REPOSITORY]      exit 1 and one line a fault; check_ranks.py --self-test
 """
@@ -20,6 +21,8 @@ RANKS = {
     "config": 6,
     "experiment": 7,
 }
+# What makes and judges data lives in lab/, and nothing outside sees it.
+LABORATORY = {"sim", "experiment"}
 # Within a rank only these: a camera rig is made of the values that travel.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
@@ -29,6 +32,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 FOLDERS = {
     "include": ("include",),
     "src": None,
+    "lab/include": ("include", "lab/include"),
+    "lab": None,
 }
 
 
@@ -40,13 +45,25 @@ def faults(root):
             if module not in RANKS:
                 yield f"{path.relative_to(root)}: module '{module}' has no rank; give it one in tests/check_ranks.py"
                 continue
+            if (module in LABORATORY) != folder.startswith("lab"):
+                yield f"{path.relative_to(root)}: module '{module}' does not live in {folder}/"
+                continue
             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
                 match = INCLUDE.match(line)
                 if not match:
                     continue
-                problem = judge(module, match[1], path) or (public and judge_border(root, public, match[1]))
+                problem = (judge(module, match[1], path) or judge_laboratory(module, match[1])
+                           or (public and judge_border(root, public, match[1])))
                 if problem:
                     yield f"{path.relative_to(root)}:{number}: {problem}"
+
+
+def judge_laboratory(module, included):
+    """What is wrong with one include as far as the laboratory goes, or None."""
+    parts = included.split("/")
+    if module not in LABORATORY and parts[0] == "fbvins" and parts[1] in LABORATORY:
+        return f"{module} includes {included}: nothing outside the laboratory sees it"
+    return None
 
 
 def judge_border(root, public, included):
@@ -91,13 +108,19 @@ def self_test():
             "include/fbvins/types/i.hpp": '#include "fbvins/core/h.hpp"\n#include "fbvins/core/a.hpp"\n',
             "include/fbvins/types/j.hpp": '#include <ceres/ceres.h>\n#include <png.h>\n',
             "include/fbvins/types/k.hpp": '#include "fbvins/pipeline/e.hpp"\n',
+            "src/fbvins/pipeline/l.cpp": '#include "fbvins/sim/m.hpp"\n',
+            "src/fbvins/sim/n.hpp": "\n",
+            "lab/include/fbvins/sim/m.hpp": '#include "fbvins/core/h.hpp"\n#include "fbvins/sim/o.hpp"\n',
+            "lab/fbvins/sim/o.hpp": '#include "fbvins/core/a.hpp"\n#include "fbvins/pipeline/e.hpp"\n',
         }.items():
             path = root / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         where = [fault.split(": ")[0] for fault in faults(root)]
     wanted = ["include/fbvins/" + w for w in ("types/i.hpp:2", "types/j.hpp:1", "types/j.hpp:2", "types/k.hpp:1")]
-    wanted += ["src/fbvins/" + w for w in ("core/a.hpp:1", "frontend/c.cpp:1", "frontend/c_test.cpp:2", "odd/g.hpp")]
+    wanted += ["src/fbvins/" + w for w in ("core/a.hpp:1", "frontend/c.cpp:1", "frontend/c_test.cpp:2", "odd/g.hpp",
+                                         "pipeline/l.cpp:1", "sim/n.hpp")]
+    wanted += ["lab/include/fbvins/sim/m.hpp:2", "lab/fbvins/sim/o.hpp:2"]
     assert where == wanted, where
 
 

@@ -13,7 +13,7 @@ FILES = ["booster_network", "booster_kernels", "booster_weights", "safetensors",
 
 def build(compiler, source, out):
     sources = [str(source / "src/fbvins/features" / f"{name}.cpp") for name in FILES] + [str(source / "tests/neon/booster_bits.cpp")]
-    command = [compiler, "-std=c++20", "-O2", "-ffp-contract=off", "-DFMT_HEADER_ONLY", f"-I{source}/src", "-I/usr/include/eigen3",
+    command = [compiler, "-std=c++20", "-O2", "-ffp-contract=off", "-DFMT_HEADER_ONLY", f"-I{source}/src", f"-I{source}/include", "-I/usr/include/eigen3",
                *sources, "-o", out]
     if compiler.startswith("aarch64"):
         # fmt and Eigen are headers only and know no processor
