@@ -51,8 +51,7 @@ int info(const Arguments& arguments) {
 int merge(const Arguments& arguments) {
   auto all = load_map(arguments.files[0]);
   if (!all) return fail(all.error().message);
-  const std::string shipped = shipped_vocabulary(all->boosted ? kBoostedDescriptors : kRawDescriptors);
-  const auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped : arguments.vocabulary);
+  const auto vocabulary = open_vocabulary(all->boosted ? kBoostedDescriptors : kRawDescriptors, arguments.vocabulary);
   if (!vocabulary) return fail(vocabulary.error().message);
   for (std::size_t i = 1; i < arguments.files.size(); ++i) {
     const auto next = load_map(arguments.files[i]);

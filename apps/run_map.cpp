@@ -82,12 +82,8 @@ Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& argumen
   if (!arguments.load.empty()) map = load_map(arguments.load);
   if (!map) return map.error();
   if (map->empty()) map->boosted = arguments.boosted;
-  const char* kind = map->boosted ? kBoostedDescriptors : kRawDescriptors;
-  auto vocabulary = Vocabulary::open(arguments.vocabulary.empty() ? shipped_vocabulary(kind) : arguments.vocabulary);
+  auto vocabulary = open_vocabulary(map->boosted ? kBoostedDescriptors : kRawDescriptors, arguments.vocabulary);
   if (!vocabulary) return vocabulary.error();
-  if (vocabulary->kind() != kind)
-    return Error{ErrorCode::invalid_argument,
-                 fmt::format("the vocabulary is of '{}' descriptors, the map of '{}' ones", vocabulary->kind(), kind)};
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (map->boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return stage.error();

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <numbers>
 #include <set>
 
 #include "fbvins/loop/feature_tracks.hpp"
@@ -17,8 +16,14 @@ namespace fbvins {
 namespace {
 
 constexpr double kNearest_m = 0.1;
+constexpr int kMaxIterations = 25;  // of each of the two solves
+/// Keyframes before it that each keyframe is matched with, and how far from where the map predicts it a match may be.
+constexpr int kNeighbours = 3;
+constexpr double kMatchRadius_px = 8;
+/// Residual from which a sight counts less (Cauchy).
+constexpr double kRobust_sigma = 2;
 /// Sights farther than this from where the first solve puts them are wrong matches.
-constexpr double kOutlierSigma = 3.5;
+constexpr double kOutlier_sigma = 3.5;
 
 /// (x, y, inverse depth) of a point of M in the camera of a keyframe, in standard deviations.
 struct SightCost {
@@ -48,8 +53,7 @@ struct Sight {
 /// All unknowns: six numbers a keyframe (position in M, turn about its orientation at the start) and three a point.
 class Adjustment {
  public:
-  Adjustment(PlaceMap& map, const PoseGraphOptions& graph, const FinalAdjustmentOptions& options)
-      : map_(map), graph_(graph), options_(options) {
+  explicit Adjustment(PlaceMap& map) : map_(map) {
     for (const MapKeyframe& k : map.keyframes()) poses_.push_back({k.T_MB.p.x(), k.T_MB.p.y(), k.T_MB.p.z(), 0, 0, 0});
   }
 
@@ -78,14 +82,13 @@ class Adjustment {
     ceres::Problem problem;
     for (const Sight& s : sights_) {
       auto* cost = new ceres::AutoDiffCostFunction<SightCost, 3, 6, 3>(cost_of(s));
-      problem.AddResidualBlock(cost, new ceres::CauchyLoss(options_.robust_sigma), poses_[s.keyframe].data(),
-                               points_[s.point].data());
+      problem.AddResidualBlock(cost, new ceres::CauchyLoss(kRobust_sigma), poses_[s.keyframe].data(), points_[s.point].data());
     }
     add_odometry(problem);
     add_gravity(problem);
     const auto first = std::find_if(poses_.begin(), poses_.end(), [&](auto& x) { return problem.HasParameterBlock(x.data()); });
     problem.SetParameterBlockConstant(first->data());
-    const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, options_.max_iterations);
+    const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, kMaxIterations);
     ceres::Solver::Summary summary;
     ceres::Solve(solver, &problem, &summary);
     return summary.num_successful_steps;
@@ -94,7 +97,7 @@ class Adjustment {
   void drop_outliers() {
     std::erase_if(sights_, [&](const Sight& s) {
       const auto r = residual(s, poses_, points_);
-      return !r || r->norm() > kOutlierSigma * std::sqrt(3.0);
+      return !r || r->norm() > kOutlier_sigma * std::sqrt(3.0);
     });
     std::vector<int> views(points_.size(), 0);
     for (const Sight& s : sights_) ++views[s.point];
@@ -164,13 +167,12 @@ class Adjustment {
       const Mat6 root = Eigen::LLT<Mat6>(e.information).matrixU();
       auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<6>, 6, 6, 6>(
           new EdgeCost<6>{map_.keyframes()[a].T_MB.q, map_.keyframes()[b].T_MB.q, e.T_from_to, root});
-      problem.AddResidualBlock(cost, loop ? new ceres::CauchyLoss(options_.robust_sigma) : nullptr, poses_[a].data(),
-                               poses_[b].data());
+      problem.AddResidualBlock(cost, loop ? new ceres::CauchyLoss(kRobust_sigma) : nullptr, poses_[a].data(), poses_[b].data());
     }
   }
 
   void add_gravity(ceres::Problem& problem) {
-    const double per_sigma = 180 / (std::numbers::pi * graph_.tilt_deg);
+    constexpr double per_sigma = 1 / kTilt_rad;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       const MapKeyframe& k = map_.keyframes()[i];
       if (!problem.HasParameterBlock(poses_[i].data())) continue;
@@ -181,8 +183,6 @@ class Adjustment {
   }
 
   PlaceMap& map_;
-  const PoseGraphOptions& graph_;
-  const FinalAdjustmentOptions& options_;
   PoseBlocks poses_, start_poses_;
   PointBlocks points_, start_points_;
   std::vector<Sight> sights_;
@@ -190,13 +190,11 @@ class Adjustment {
 
 }  // namespace
 
-FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matching, const PoseGraphOptions& graph,
-                                 const FinalAdjustmentOptions& options) {
+FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matching) {
   FinalAdjustmentReport report;
   if (map.empty()) return report;
-  Adjustment adjustment(map, graph, options);
-  for (const FeatureTrack& track : feature_tracks(map, matching, options.neighbours, options.radius_px))
-    adjustment.add_track(track);
+  Adjustment adjustment(map);
+  for (const FeatureTrack& track : feature_tracks(map, matching, kNeighbours, kMatchRadius_px)) adjustment.add_track(track);
   if (adjustment.empty()) return report;
   adjustment.remember_start();
   report.iterations = adjustment.solve();

@@ -14,9 +14,15 @@
 #include <optional>
 #include <vector>
 
-#include "fbvins/loop/inverted_index.hpp"
+#include "fbvins/loop/candidate_search.hpp"
+#include "fbvins/loop/flight_record.hpp"
 #include "fbvins/loop/loop_options.hpp"
+#include "fbvins/loop/map_frame.hpp"
+#include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_map.hpp"
+#include "fbvins/loop/place_verifier.hpp"
+#include "fbvins/loop/relocaliser.hpp"
+#include "fbvins/loop/thinning.hpp"
 #include "fbvins/types/mapper.hpp"
 #include "fbvins/types/trajectory.hpp"
 
@@ -42,61 +48,48 @@ class LoopCloser final : public Mapper {
   const PlaceMap& map() const { return map_; }
   /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Frames of a
   /// session that never found into the map are left out.
-  Trajectory corrected(const Trajectory& in_W) const;
+  Trajectory corrected(const Trajectory& in_W) const { return flight_.corrected(map_, in_W); }
 
  private:
-  /// Every keyframe that passed, hung on one that is still in the map.
-  struct Record {
-    Time t;
-    KeyframeId anchor;
-    Pose<B, B> T_anchor_B;
-    std::uint32_t session = 0;
+  /// The odometry's present W.
+  struct Session {
+    std::uint32_t number = 0;  ///< counts those that met this map
+    bool begun = false;
+    std::uint32_t reset_counter = 0;
+    KeyframeId newest = {};
+    std::optional<Pose<W, B>> T_WB = {};  ///< of the newest
+    double path_m = 0;
   };
   struct Proposal {
     KeyframeId candidate;
     VerifiedPose verified;
+    MapEdge edge;
   };
 
   void begin_session(std::uint32_t reset_counter);
+  MapKeyframe query_of(Place place, Time t, const Pose<W, B>& T_WB);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
-  std::vector<KeyframeId> plausible(const MapKeyframe& query) const;
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
-  SeenPose seen_pose(const Proposal& proposal) const;
-  MapEdge edge_to(KeyframeId query, const Proposal& proposal) const;
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, W>& T_MW);
   void add(MapKeyframe query, const std::vector<MapEdge>& found, MapUpdate& update);
   bool optimisation_due() const;
-  void optimise(MapUpdate* update);
-  void thin();
-  const MapKeyframe* heir_of(const MapKeyframe& gone) const;
+  void optimise(MapUpdate& update);
   void take_out(KeyframeId id);
 
   LoopOptions options_;
   Pose<B, C0> T_BC0_;
-  Vocabulary vocabulary_;
   PlaceExtractor extractor_;
   PlaceVerifier verifier_;
   PlaceMap map_;
-  InvertedIndex index_;
+  CandidateSearch search_;
   MapFrame frame_;
   MapFrameFollower follower_;
-
-  std::uint32_t session_ = 0;
-  bool session_begun_ = false;
-  std::uint32_t reset_counter_ = 0;
-  KeyframeId previous_;  // newest keyframe of this session in the map
-  Time previous_t_;
-  double path_m_ = 0;
-  std::optional<Pose<W, B>> previous_T_WB_;
-  struct Guess {
-    Time t;
-    Pose<M, W> T_MW;
-  };
-  std::vector<Guess> guesses_;  // of a session that is not localised yet
-  std::vector<Record> records_;
-  std::vector<KeyframeId> redundant_;
+  Relocaliser relocaliser_;
+  Thinning thinning_;
+  FlightRecord flight_;
+  Session session_;
   int loops_since_optimised_ = 0;
 };
 

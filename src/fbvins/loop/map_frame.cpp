@@ -9,9 +9,8 @@
 namespace fbvins {
 namespace {
 
-constexpr double kRad = std::numbers::pi / 180;
-
-Quat about_z(double yaw) { return {std::cos(0.5 * yaw), 0, 0, std::sin(0.5 * yaw)}; }
+/// What an odometry at rest drifts in a second, as standard deviations that grow with the root of time.
+constexpr double kStandstill_m = 0.001, kStandstillYaw_rad = 0.01 * kDegree;
 
 /// T_MW with this yaw that takes the body at T_WB to p_MB.
 Pose<M, W> frame_at(double yaw, const Vec3& p_MB, const Vec3& p_WB) {
@@ -25,9 +24,11 @@ double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi
 
 DriftVariance drift_over(const DriftOptions& o, double metres, double seconds) {
   const auto square = [](double x) { return x * x; };
-  return {square(o.position_m) * metres + square(o.standstill_m) * seconds,
-          square(o.yaw_deg * kRad) * metres + square(o.standstill_yaw_deg * kRad) * seconds};
+  return {square(o.position_m) * metres + square(kStandstill_m) * seconds,
+          square(o.yaw_rad) * metres + square(kStandstillYaw_rad) * seconds};
 }
+
+Quat about_z(double yaw_rad) { return {std::cos(0.5 * yaw_rad), 0, 0, std::sin(0.5 * yaw_rad)}; }
 
 double yaw_of(const Quat& q) { return wrapped(2 * std::atan2(q.z(), q.w())); }
 

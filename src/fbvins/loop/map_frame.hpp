@@ -14,28 +14,12 @@
 
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/loop/loop_options.hpp"
 
 namespace fbvins {
 
 using Vec4 = Eigen::Vector4d;
 using Mat4 = Eigen::Matrix4d;
-
-/// How fast the odometry may drift: variances grow with the path flown and with time.
-struct DriftOptions {
-  double position_m = 0.006;
-  double yaw_deg = 0.06;
-  double standstill_m = 0.001;
-  double standstill_yaw_deg = 0.01;
-
-  template <class V>
-  void visit(V&& v) {
-    v("position_m", position_m, "m", "standard deviation of position after a metre of flight; grows with its root", 1e-5, 1.0);
-    v("yaw_deg", yaw_deg, "deg", "standard deviation of yaw after a metre of flight; grows with its root", 1e-4, 10.0);
-    v("standstill_m", standstill_m, "m", "standard deviation of position after a second; grows with its root", 1e-6, 1.0);
-    v("standstill_yaw_deg", standstill_yaw_deg, "deg", "standard deviation of yaw after a second; grows with its root", 1e-6,
-      10.0);
-  }
-};
 
 /// Variances of position and yaw that the odometry gathers over `metres` and `seconds`.
 struct DriftVariance {
@@ -49,8 +33,9 @@ struct SeenPose {
   Mat4 covariance = Mat4::Identity();
 };
 
-/// Rotation about z of a rotation that is nearly one.
+/// Rotation about z of a rotation that is nearly one, rad; and the rotation about z by that much.
 double yaw_of(const Quat& q);
+Quat about_z(double yaw_rad);
 
 class MapFrame {
  public:

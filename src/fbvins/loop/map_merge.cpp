@@ -9,7 +9,7 @@ Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOp
   StereoRig rig;  // only the place of the left camera matters: nothing is extracted
   rig.T_BC0 = first.T_BC0;
   LoopOptions merging = options;
-  merging.graph.degrees_of_freedom = 6;
+  merging.degrees_of_freedom = 6;
   LoopCloser closer(rig, merging, vocabulary, std::move(first));
   bool joined = false;
   for (const MapKeyframe& k : second.keyframes()) {

@@ -6,7 +6,22 @@
 namespace fbvins {
 namespace {
 
-constexpr int kSearchLevel = 2;
+constexpr int kLevels = 6;       // of the scale pyramid
+constexpr int kSearchLevel = 2;  // of the image pyramid, for the search along the epipolar curve
+/// Nearest point searched for in the right image.
+constexpr double kMinDepth_m = 0.4;
+constexpr double kMinSearchCorrelation = 0.7;
+/// The curve is nearly straight on the search level: it is projected at the ends of so many pieces.
+constexpr int kPieces = 6;
+/// Of the search level: the patch is 16 wide, so a peak is a few steps wide.
+constexpr double kStep_px = 1.4;
+constexpr int kMaxStepsOfAPiece = 64;
+/// Largest distance from the epipolar curve after refinement.
+constexpr double kEpipolar_px = 1.0;
+/// Refinement may leave the depths that were searched by this factor.
+constexpr double kNearerThanSearched = 1.1;
+/// Standard deviations: of a keypoint, times the scale of its level, and of a disparity.
+constexpr double kKeypoint_px = 0.7, kDisparity_px = 0.25;
 /// Disparities down to this are infinitely far rather than wrong.
 constexpr double kInfinity_px = 1.0;
 
@@ -15,14 +30,13 @@ constexpr double kInfinity_px = 1.0;
 PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
                                std::unique_ptr<DescriptorStage> stage)
     : rig_(rig),
-      options_(options),
       vocabulary_(std::move(vocabulary)),
       stage_(std::move(stage)),
       R_rl_(rig.T_C1C0().R()),
       p_rl_(rig.T_C1C0().p),
       focal_px_(rig.left.focal_px()),
       baseline_m_(p_rl_.norm()),
-      orb_(options.orb, stage_->changes_descriptors()) {}
+      orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {}
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_WB) {
   Place place;
@@ -42,7 +56,7 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_WB) {
     PlaceFeature feature;
     feature.x = static_cast<float>(xy->x());
     feature.y = static_cast<float>(xy->y());
-    feature.sigma_xy = static_cast<float>(options_.keypoint_px * keypoint.scale / focal_px_);
+    feature.sigma_xy = static_cast<float>(kKeypoint_px * keypoint.scale / focal_px_);
     if (images.right)
       if (const auto depth = stereo(keypoint.pixel, *xy)) {
         feature.inverse_depth = static_cast<float>(depth->inverse_depth);
@@ -59,21 +73,18 @@ std::optional<Vec2> PlaceExtractor::project(const Vec2& left_normalised, double 
   return rig_.right.project(R_rl_ * left_normalised.homogeneous() + inverse_depth * p_rl_);
 }
 
-/// Best place along the epipolar curve on a coarse level. The curve is nearly straight there: projected at a few
-/// points only, straight between them.
+/// Best place along the epipolar curve on a coarse level.
 std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
-  constexpr int kPieces = 6;
   const int l = std::min(kSearchLevel, right_.levels() - 1);
   const KltLevelTemplate& patch = patch_.levels[static_cast<std::size_t>(l)];
   if (!patch.valid) return std::nullopt;
   const double scale = 1 << l;
-  float best = static_cast<float>(options_.min_search_correlation);
+  float best = static_cast<float>(kMinSearchCorrelation);
   std::optional<Vec2> best_px, from = project(left_normalised, 0);
   for (int piece = 1; piece <= kPieces; ++piece) {
-    const auto to = project(left_normalised, piece / (kPieces * options_.min_depth_m));
+    const auto to = project(left_normalised, piece / (kPieces * kMinDepth_m));
     if (from && to) {
-      // Steps of 1.4 px of the level: the patch is 16 wide, so a peak is a few steps wide.
-      const int steps = std::clamp(static_cast<int>((*to - *from).norm() / (1.4 * scale)) + 1, 1, 64);
+      const int steps = std::clamp(static_cast<int>((*to - *from).norm() / (kStep_px * scale)) + 1, 1, kMaxStepsOfAPiece);
       for (int i = 0; i < steps; ++i) {
         const Vec2 px = *from + (*to - *from) * (static_cast<double>(i) / steps);
         const float correlation = klt_correlation(patch, right_.level(l), px / scale);
@@ -98,11 +109,11 @@ std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px
   const Vec3 far = R_rl_ * left_normalised.homogeneous(), seen = right->homogeneous();
   const Vec3 line = p_rl_.cross(far);
   const double across = line.head<2>().norm();
-  if (!(across > 0) || std::abs(seen.dot(line)) / across * focal_px_ > options_.epipolar_px) return std::nullopt;
+  if (!(across > 0) || std::abs(seen.dot(line)) / across * focal_px_ > kEpipolar_px) return std::nullopt;
   const Vec3 a = seen.cross(p_rl_), b = seen.cross(far);
   const double rho = -a.dot(b) / a.squaredNorm(), rho_per_px = 1 / (focal_px_ * baseline_m_);
-  if (rho < -kInfinity_px * rho_per_px || rho > 1.1 / options_.min_depth_m) return std::nullopt;
-  return Stereo{std::max(rho, 0.0), options_.disparity_px * rho_per_px};
+  if (rho < -kInfinity_px * rho_per_px || rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
+  return Stereo{std::max(rho, 0.0), kDisparity_px * rho_per_px};
 }
 
 }  // namespace fbvins

@@ -14,29 +14,11 @@
 #include "fbvins/features/descriptor_stage.hpp"
 #include "fbvins/features/klt.hpp"
 #include "fbvins/features/orb.hpp"
+#include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/place.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
-
-struct PlaceExtractorOptions {
-  OrbOptions orb{.max_features = 500, .levels = 6};
-  double min_depth_m = 0.4;
-  double min_search_correlation = 0.7;
-  double epipolar_px = 1.0;
-  double keypoint_px = 0.7;
-  double disparity_px = 0.25;
-
-  template <class V>
-  void visit(V&& v) {
-    v.group("orb", orb, "features of a keyframe");
-    v("min_depth_m", min_depth_m, "m", "nearest point searched for in the right image", 0.05, 10.0);
-    v("min_search_correlation", min_search_correlation, "", "correlation along the epipolar curve", 0.0, 1.0);
-    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar curve after refinement", 0.1, 10.0);
-    v("keypoint_px", keypoint_px, "px", "standard deviation of a keypoint, times the scale of its level", 0.05, 10.0);
-    v("disparity_px", disparity_px, "px", "standard deviation of a disparity", 0.02, 10.0);
-  }
-};
 
 class PlaceExtractor {
  public:
@@ -57,7 +39,6 @@ class PlaceExtractor {
   std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
 
   StereoRig rig_;
-  PlaceExtractorOptions options_;
   Vocabulary vocabulary_;
   std::unique_ptr<DescriptorStage> stage_;
   Mat3 R_rl_;

@@ -4,12 +4,32 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "fbvins/loop/p3p.hpp"
 
 namespace fbvins {
 namespace {
+
+/// Samples of three points tried at most, and the share of draws that may end without one good sample.
+constexpr int kMaxSamples = 100;
+constexpr double kMissedGoodSample = 1e-4;
+/// RANSAC: matches below which nothing is tried, and which a pose must explain.
+constexpr int kMinMatches = 6;
+/// Largest reprojection error of an inlier of a sample at the finest scale.
+constexpr double kInlier_px = 3.0;
+/// Standard deviation of a keypoint of the finest scale: what others are compared with.
+constexpr double kFinestKeypoint_px = 0.7;
+/// A point nearer to the camera's plane than this is behind it.
+constexpr double kNearest_m = 0.05;
+/// Refinement: residuals count less from here, and not at all from there.
+constexpr double kHuber_sigma = 2.0, kGross_sigma = 10;
+/// A match farther from the refined pose than this is an outlier; with depth its squared residual has a third row.
+constexpr double kOutlier_sigma = 3.4, kThreeRowsOverTwo = 1.25;
+constexpr int kRefinements = 8;
+/// Keeps the normal equations solvable; far below what one match says.
+constexpr double kDamping = 1e-6;
+/// A step (m and rad together) this long has diverged, one this short has arrived.
+constexpr double kDivergedStep = 5, kArrivedStep = 1e-6;
 
 const PlaceFeature& at(const Place& place, int i) { return place.features[static_cast<std::size_t>(i)]; }
 
@@ -24,7 +44,7 @@ struct MatchTerm {
 /// False when the point is behind the query's camera.
 bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const Vec3& t, MatchTerm& term) {
   const Vec3 p_c = c.p_C0(), p = R * p_c + t;
-  if (!(p.z() > 0.05)) return false;
+  if (!(p.z() > kNearest_m)) return false;
   const double iz = 1 / p.z();
   Mat3 J_p;  // d(x, y, inverse depth)/d(point)
   J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz, 0, 0, -iz * iz;
@@ -53,21 +73,22 @@ bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const
   return true;
 }
 
-double chi2_gate(const PlaceFeature& q, double sigma) { return sigma * sigma * (q.has_depth() ? 1.25 : 1.0); }
+double chi2_gate(const PlaceFeature& q) { return kOutlier_sigma * kOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0); }
 
 struct Sampler {
   const Place& query;
   const Place& candidate;
   std::vector<DescriptorMatch> usable;  // the candidate's side is a point
 
-  int score(const Mat3& R, const Vec3& t, double inlier_px) const {
+  int score(const Mat3& R, const Vec3& t) const {
     int n = 0;
     for (const DescriptorMatch& m : usable) {
       const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
       const Vec3 p = R * c.p_C0() + t;
-      if (!(p.z() > 0.05)) continue;
+      if (!(p.z() > kNearest_m)) continue;
       const double dx = p.x() / p.z() - q.x, dy = p.y() / p.z() - q.y;
-      const double limit = inlier_px / query.focal_px * std::max(1.0, 0.5 * (1 + q.sigma_xy / (0.7 / query.focal_px)));
+      const double limit =
+          kInlier_px / query.focal_px * std::max(1.0, 0.5 * (1 + q.sigma_xy / (kFinestKeypoint_px / query.focal_px)));
       n += dx * dx + dy * dy < limit * limit;
     }
     return n;
@@ -82,15 +103,14 @@ double tilt_error_rad(const Place& query, const Place& candidate, const Mat3& R_
 }
 
 std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,
-                                            const PlacePoseOptions& options, Rng& rng) {
+                                            Rng& rng) {
   Sampler sampler{query, candidate, {}};
   for (const DescriptorMatch& m : matches)
     if (at(candidate, m.b).has_point()) sampler.usable.push_back(m);
   const auto n = static_cast<std::uint32_t>(sampler.usable.size());
-  if (n < 6) return std::nullopt;
-  const double max_tilt = options.max_tilt_deg * std::numbers::pi / 180;
+  if (n < kMinMatches) return std::nullopt;
   std::optional<CameraFromCamera> best;
-  int best_score = 5, needed = options.max_iterations;
+  int best_score = kMinMatches - 1, needed = kMaxSamples;
   for (int i = 0; i < needed; ++i) {
     std::array<Vec3, 3> rays, points;
     std::uint32_t pick[3];
@@ -102,27 +122,25 @@ std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& can
     }
     if (pick[0] == pick[1] || pick[0] == pick[2] || pick[1] == pick[2]) continue;
     for (const auto& [R, t] : solve_p3p(rays, points)) {
-      if (tilt_error_rad(query, candidate, R) > max_tilt) continue;  // before the costly count
-      const int score = sampler.score(R, t, options.inlier_px);
+      if (tilt_error_rad(query, candidate, R) > kMaxTilt_rad) continue;  // before the costly count
+      const int score = sampler.score(R, t);
       if (score <= best_score) continue;
       best_score = score;
       best = CameraFromCamera(R, t);
       const double w = static_cast<double>(score) / n;
       const double log_miss = std::log(std::max(1e-12, 1 - w * w * w));
-      needed = std::min(options.max_iterations, static_cast<int>(std::log(1e-4) / log_miss) + 1);
+      needed = std::min(kMaxSamples, static_cast<int>(std::log(kMissedGoodSample) / log_miss) + 1);
     }
   }
   return best;
 }
 
 RelativePose refine_pose(const Place& query, const Place& candidate, std::span<const DescriptorMatch> matches,
-                         const CameraFromCamera& start, const PlacePoseOptions& options) {
-  constexpr int kIterations = 8;
-  constexpr double kHuber = 2.0;
+                         const CameraFromCamera& start) {
   RelativePose out;
   out.T_qc = start;
   MatchTerm term;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kRefinements; ++iteration) {
     const Mat3 R = out.T_qc.R();
     Mat6 H = Mat6::Zero();
     Vec6 b = Vec6::Zero();
@@ -130,22 +148,22 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
       const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
       if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
       const double s = std::sqrt(term.chi2);
-      const double weight = s <= kHuber ? 1 : (s > 10 ? 0 : kHuber / s);
+      const double weight = s <= kHuber_sigma ? 1 : (s > kGross_sigma ? 0 : kHuber_sigma / s);
       const Eigen::Matrix<double, 6, 3> JtW = weight * term.J.transpose() * term.information;
       H += JtW * term.J;
       b -= JtW * term.r;
     }
-    H.diagonal().array() += 1e-6;
+    H.diagonal().array() += kDamping;
     const Vec6 step = H.ldlt().solve(b);
-    if (!step.allFinite() || step.norm() > 5) return out;
+    if (!step.allFinite() || step.norm() > kDivergedStep) return out;
     out.T_qc = out.T_qc.boxplus(step.head<3>(), step.tail<3>());
-    if (step.norm() < 1e-6) break;
+    if (step.norm() < kArrivedStep) break;
   }
   const Mat3 R = out.T_qc.R();
   for (const DescriptorMatch& m : matches) {
     const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
     if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
-    if (term.chi2 > chi2_gate(q, options.outlier_sigma)) continue;
+    if (term.chi2 > chi2_gate(q)) continue;
     out.inliers.push_back(m);
     out.with_depth_both += q.has_depth();
     out.information += term.J.transpose() * term.information * term.J;

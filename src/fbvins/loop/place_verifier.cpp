@@ -4,14 +4,32 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <numbers>
 
 namespace fbvins {
+namespace {
+
+/// First matching, by descriptors alone: best over second-best distance, and matches below which RANSAC is not tried.
+constexpr double kMaxRatio = 0.9;
+constexpr int kMinMatches = 12;
+/// Inliers of a first refinement below which RANSAC's pose is the better start.
+constexpr std::size_t kMinRefined = 6;
+/// Guided matching: radius times the scale of the keypoint, wider where the start is RANSAC's, and how often.
+constexpr double kGuided_px = 8, kWidenedAfterRansac = 1.5;
+constexpr int kRounds = 2;
+/// A feature whose size differs by more than this factor from what it should look like now is another one.
+constexpr double kMaxScaleRatio = 1.8;
+constexpr double kNearest_m = 0.1;
+/// Inliers must lie in this many cells of the grid over the image.
+constexpr int kSpreadGrid = 4, kMinCells = 5;
+/// The other direction must find this share of the inliers needed, and the same pose to within this.
+constexpr double kMutualShare = 0.5, kMutual_m = 0.1, kMutual_rad = 0.03;
+constexpr std::uint64_t kSeed = 1;        // of RANSAC
+constexpr int kFarthestBoosted_bit = 60;  // 97 % of true pairs, docs/results.md
+
+}  // namespace
 
 PlaceVerifierOptions for_boosted(PlaceVerifierOptions options) {
-  constexpr int kFarthest = 60;  // 97 % of true pairs, docs/results.md
-  options.matching.max_distance = std::min(options.matching.max_distance, kFarthest);
-  options.guided_distance = std::min(options.guided_distance, kFarthest);
+  options.max_distance_bit = std::min(options.max_distance_bit, kFarthestBoosted_bit);
   return options;
 }
 
@@ -52,36 +70,37 @@ bool PlaceVerifier::confirmed_by_other_way(const Place& candidate, const CameraF
   (void)one_way(query);
   set_query(query);
   const CameraFromCamera difference = T_qc * last_.pose.T_qc;
-  return static_cast<double>(last_.pose.inliers.size()) >= options_.mutual_share * options_.min_inliers &&
-         difference.p.norm() < options_.mutual_m && so3_log(difference.q).norm() < options_.mutual_rad;
+  return static_cast<double>(last_.pose.inliers.size()) >= kMutualShare * options_.min_inliers &&
+         difference.p.norm() < kMutual_m && so3_log(difference.q).norm() < kMutual_rad;
 }
 
 std::optional<VerifiedPose> PlaceVerifier::one_way(const Place& candidate) {
   last_ = {};
   if (query_ == nullptr || query_->size() == 0 || candidate.size() == 0) return std::nullopt;
-  const auto matches = match_descriptors(query_->descriptors, candidate.descriptors, options_.matching);
-  if (static_cast<int>(matches.size()) < options_.min_matches) return std::nullopt;
-  Rng rng(static_cast<std::uint64_t>(options_.seed));
-  const auto start = ransac_pose(*query_, candidate, matches, options_.pose, rng);
+  const auto matches = match_descriptors(query_->descriptors, candidate.descriptors,
+                                         {.max_distance = options_.max_distance_bit, .max_ratio = kMaxRatio, .mutual = true});
+  if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
+  Rng rng(kSeed);
+  const auto start = ransac_pose(*query_, candidate, matches, rng);
   if (!start) return std::nullopt;
-  const RelativePose rough = refine_pose(*query_, candidate, matches, *start, options_.pose);
-  const bool better = rough.inliers.size() >= 6;
-  return collect(candidate, better ? rough.T_qc : *start, 1.5 * options_.guided_px, 2);
+  const RelativePose rough = refine_pose(*query_, candidate, matches, *start);
+  const bool better = rough.inliers.size() >= kMinRefined;
+  return collect(candidate, better ? rough.T_qc : *start, kWidenedAfterRansac * kGuided_px);
 }
 
 std::optional<VerifiedPose> PlaceVerifier::verify(const Place& candidate, const PosePrediction& prediction) {
   last_ = {};
   if (query_ == nullptr || query_->size() == 0 || candidate.size() == 0) return std::nullopt;
-  return collect(candidate, prediction.T_qc, prediction.radius_px, 2);
+  return collect(candidate, prediction.T_qc, prediction.radius_px);
 }
 
-std::optional<VerifiedPose> PlaceVerifier::collect(const Place& candidate, CameraFromCamera start, double radius_px, int rounds) {
-  for (int round = 0; round < rounds; ++round) {
+std::optional<VerifiedPose> PlaceVerifier::collect(const Place& candidate, CameraFromCamera start, double radius_px) {
+  for (int round = 0; round < kRounds; ++round) {
     match_guided(candidate, start, radius_px);
     if (static_cast<int>(guided_.size()) < options_.min_inliers / 2) return std::nullopt;
-    RelativePose pose = refine_pose(*query_, candidate, guided_, start, options_.pose);
+    RelativePose pose = refine_pose(*query_, candidate, guided_, start);
     start = pose.T_qc;
-    radius_px = std::min(radius_px, options_.guided_px);
+    radius_px = std::min(radius_px, kGuided_px);
     judge(candidate, std::move(pose));
     if (static_cast<int>(last_.pose.inliers.size()) < options_.min_inliers / 2) return std::nullopt;
   }
@@ -99,7 +118,7 @@ void PlaceVerifier::match_guided(const Place& candidate, const CameraFromCamera&
     const PlaceFeature& c = candidate.features[j];
     if (!c.has_point()) continue;
     const Vec3 p = R * c.p_C0() + T_qc.p;
-    if (!(p.z() > 0.1)) continue;
+    if (!(p.z() > kNearest_m)) continue;
     const Vec2 at = p.hnormalized();
     if ((at - low_).minCoeff() < 0 || (high_ - at).minCoeff() < 0) continue;
     ++visible_;
@@ -110,14 +129,14 @@ void PlaceVerifier::match_guided(const Place& candidate, const CameraFromCamera&
               c1 = std::min(kColumns - 1, static_cast<int>((at.x() + reach - low_.x()) / cell.x()));
     const int r0 = std::max(0, static_cast<int>((at.y() - reach - low_.y()) / cell.y())),
               r1 = std::min(kRows - 1, static_cast<int>((at.y() + reach - low_.y()) / cell.y()));
-    int best = -1, first = options_.guided_distance + 1;
+    int best = -1, first = options_.max_distance_bit + 1;
     for (int r = r0; r <= r1; ++r)
       for (std::int32_t k = cell_begin_[static_cast<std::size_t>(r * kColumns + c0)];
            k < cell_begin_[static_cast<std::size_t>(r * kColumns + c1) + 1]; ++k) {
         const auto i = static_cast<std::size_t>(by_cell_[static_cast<std::size_t>(k)]);
         const PlaceFeature& q = query_->features[i];
         if ((q.xy() - at).squaredNorm() > reach * reach) continue;
-        if (q.sigma_xy > 1.8 * sigma_expected || sigma_expected > 1.8 * q.sigma_xy) continue;
+        if (q.sigma_xy > kMaxScaleRatio * sigma_expected || sigma_expected > kMaxScaleRatio * q.sigma_xy) continue;
         const int d = hamming_distance(query_->descriptors[i], candidate.descriptors[j]);
         if (d < first) first = d, best = static_cast<int>(i);
       }
@@ -131,12 +150,12 @@ void PlaceVerifier::match_guided(const Place& candidate, const CameraFromCamera&
 }
 
 void PlaceVerifier::judge(const Place& candidate, RelativePose pose) {
-  std::bitset<16> cells;
+  std::bitset<kSpreadGrid * kSpreadGrid> cells;
   for (const DescriptorMatch& m : pose.inliers) {
     const PlaceFeature& q = query_->features[static_cast<std::size_t>(m.a)];
-    const int c = std::min(3, static_cast<int>((q.x - low_.x()) / (high_.x() - low_.x()) * 4));
-    const int r = std::min(3, static_cast<int>((q.y - low_.y()) / (high_.y() - low_.y()) * 4));
-    cells.set(static_cast<std::size_t>(4 * r + c));
+    const int c = std::min(kSpreadGrid - 1, static_cast<int>((q.x - low_.x()) / (high_.x() - low_.x()) * kSpreadGrid));
+    const int r = std::min(kSpreadGrid - 1, static_cast<int>((q.y - low_.y()) / (high_.y() - low_.y()) * kSpreadGrid));
+    cells.set(static_cast<std::size_t>(kSpreadGrid * r + c));
   }
   last_.visible = visible_;
   last_.cells = static_cast<int>(cells.count());
@@ -146,8 +165,8 @@ void PlaceVerifier::judge(const Place& candidate, RelativePose pose) {
 
 bool PlaceVerifier::accepted() const {
   const auto inliers = static_cast<int>(last_.pose.inliers.size());
-  return inliers >= options_.min_inliers && inliers >= options_.min_visible_share * last_.visible &&
-         last_.cells >= options_.min_cells && last_.tilt_error_rad < options_.pose.max_tilt_deg * std::numbers::pi / 180;
+  return inliers >= options_.min_inliers && inliers >= options_.min_visible_share * last_.visible && last_.cells >= kMinCells &&
+         last_.tilt_error_rad < kMaxTilt_rad;
 }
 
 }  // namespace fbvins

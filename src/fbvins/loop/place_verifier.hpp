@@ -13,40 +13,10 @@
 #include <optional>
 #include <vector>
 
+#include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/place_pose.hpp"
 
 namespace fbvins {
-
-struct PlaceVerifierOptions {
-  PlacePoseOptions pose;
-  HammingOptions matching{.max_distance = 72, .max_ratio = 0.9, .mutual = true};
-  int min_matches = 12;
-  double guided_px = 8;
-  int guided_distance = 72;
-  int min_inliers = 28;
-  double min_visible_share = 0.16;
-  int min_cells = 5;
-  double mutual_share = 0.5;
-  double mutual_m = 0.1;
-  double mutual_rad = 0.03;
-  int seed = 1;
-
-  template <class V>
-  void visit(V&& v) {
-    v.group("pose", pose, "relative pose from matches");
-    v.group("matching", matching, "first matching, by descriptors alone");
-    v("min_matches", min_matches, "", "first matches below which RANSAC is not tried", 4, 1000);
-    v("guided_px", guided_px, "px", "radius of the guided second matching, times the scale of the keypoint", 0.5, 100.0);
-    v("guided_distance", guided_distance, "bit", "largest Hamming distance of the guided matching", 1, 256);
-    v("min_inliers", min_inliers, "", "inliers of an accepted pose", 4, 1000);
-    v("min_visible_share", min_visible_share, "", "inliers out of the candidate's points that should be visible", 0.0, 1.0);
-    v("min_cells", min_cells, "", "cells of a 4x4 grid over the image that hold inliers", 1, 16);
-    v("mutual_share", mutual_share, "", "inliers that the other direction must find, out of those needed", 0.0, 1.0);
-    v("mutual_m", mutual_m, "m", "largest difference of the poses found from both directions", 0.0, 10.0);
-    v("mutual_rad", mutual_rad, "rad", "largest difference of the rotations found from both directions", 0.0, 3.0);
-    v("seed", seed, "", "of RANSAC", 0, 1000000);
-  }
-};
 
 /// Boosted descriptors of one point lie nearer to one another than raw ones: no match is farther than suits them.
 PlaceVerifierOptions for_boosted(PlaceVerifierOptions options);
@@ -81,7 +51,7 @@ class PlaceVerifier {
  private:
   std::optional<VerifiedPose> one_way(const Place& candidate);
   bool confirmed_by_other_way(const Place& candidate, const CameraFromCamera& T_qc);
-  std::optional<VerifiedPose> collect(const Place& candidate, CameraFromCamera start, double radius_px, int rounds);
+  std::optional<VerifiedPose> collect(const Place& candidate, CameraFromCamera start, double radius_px);
   void match_guided(const Place& candidate, const CameraFromCamera& T_qc, double radius_px);
   void judge(const Place& candidate, RelativePose pose);
   bool accepted() const;

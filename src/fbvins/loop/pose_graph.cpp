@@ -7,12 +7,19 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 #include "fbvins/loop/graph_costs.hpp"
 
 namespace fbvins {
 namespace {
+
+constexpr int kMaxIterations = 12;  // of one solve
+/// Residual of a loop beyond which it counts little; loops that count less than this are false.
+constexpr double kOutlier_sigma = 4.0, kRejectedWeight = 0.1;
+/// Each round of graduated non-convexity bends the loss by this.
+constexpr double kMuStep = 2.0;
+/// A loop that counts for nothing still keeps its block of the problem definite.
+constexpr double kMinWeight = 1e-6;
 
 template <int Dof>
 void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& information, const std::vector<Pose<M, B>>& poses,
@@ -50,9 +57,9 @@ double PoseGraph::chi2(const PoseGraphEdge& edge, const PoseGraphOptions& option
 /// With four degrees of freedom a node cannot tilt: what the odometry's roll and pitch may be wrong by is added to the
 /// covariance of loops, in rotation and with the lever of their length.
 Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOptions& options) const {
-  const double weight = e.loop ? std::max(e.weight, 1e-6) : 1.0;
+  const double weight = e.loop ? std::max(e.weight, kMinWeight) : 1.0;
   if (!e.loop || options.degrees_of_freedom == 6) return weight * e.information;
-  const double tilt = options.tilt_deg * std::numbers::pi / 180;
+  const double tilt = kTilt_rad;
   Mat6 cov = e.information.inverse();
   const Vec3& up = up_B_[static_cast<std::size_t>(e.b)];
   cov.topLeftCorner<3, 3>().diagonal().array() += tilt * tilt * e.T_ab.p.squaredNorm();
@@ -71,7 +78,7 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
     else add_cost<6>(problem, e, weighted_information(e, options), poses_, x);
     used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
   }
-  const double per_sigma = 180 / (std::numbers::pi * options.tilt_deg);
+  const double per_sigma = 1 / kTilt_rad;
   for (std::size_t i = 0; i < poses_.size() && options.degrees_of_freedom == 6; ++i)
     if (used[i] && !fixed_[i])
       problem.AddResidualBlock(
@@ -79,7 +86,7 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
           x[i].data());
   for (std::size_t i = 0; i < poses_.size(); ++i)
     if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
-  const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, options.max_iterations);
+  const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, kMaxIterations);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -95,8 +102,7 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
 }
 
 PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
-  constexpr double kMuStep = 2.0;
-  const double c2 = options.outlier_sigma * options.outlier_sigma;
+  constexpr double c2 = kOutlier_sigma * kOutlier_sigma;
   PoseGraphReport report;
   double worst = 0;
   for (PoseGraphEdge& e : edges_)
@@ -117,7 +123,7 @@ PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
     if (!e.loop) continue;
     const double s = c2 / (chi2(e, options) + c2);
     e.weight = s * s;
-    report.rejected += e.weight < 0.1;
+    report.rejected += e.weight < kRejectedWeight;
   }
   return report;
 }

@@ -13,23 +13,17 @@
 
 #include <vector>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/loop/map_report.hpp"
 
 namespace fbvins {
 
-struct PoseGraphOptions {
-  int degrees_of_freedom = 4;
-  double tilt_deg = 0.4;
-  int max_iterations = 12;
-  double outlier_sigma = 4.0;
+/// Standard deviation of roll and pitch as the odometry knows them.
+inline constexpr double kTilt_rad = 0.4 * kDegree;
 
-  template <class V>
-  void visit(V&& v) {
-    v("degrees_of_freedom", degrees_of_freedom, "", "4: position and yaw; 6: roll and pitch as well", 4, 6);
-    v("tilt_deg", tilt_deg, "deg", "standard deviation of roll and pitch as the odometry knows them", 0.001, 45.0);
-    v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations of one solve", 1, 1000);
-    v("outlier_sigma", outlier_sigma, "", "residual of a loop beyond which it counts little", 1.0, 100.0);
-  }
+struct PoseGraphOptions {
+  int degrees_of_freedom = 4;  ///< 4: position and yaw; 6: roll and pitch as well
 };
 
 struct PoseGraphEdge {
@@ -38,13 +32,6 @@ struct PoseGraphEdge {
   Mat6 information = Mat6::Identity();  ///< of (dp in a, dtheta in b)
   bool loop = false;                    ///< may be an outlier
   double weight = 1;                    ///< found by optimise(): 0 a false loop, 1 a good one
-};
-
-struct PoseGraphReport {
-  int solves = 0;
-  int iterations = 0;
-  int rejected = 0;  ///< loops with a weight below a tenth
-  double initial_cost = 0, final_cost = 0;
 };
 
 class PoseGraph {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/vocabulary_file.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdlib>
 #include <filesystem>
 
@@ -11,6 +13,14 @@ std::string shipped_vocabulary(const std::string& kind) {
   const std::string name = "/" + kind + "_vocabulary.fbv", installed = FBVINS_INSTALLED_DATA + name;
   std::error_code ignored;
   return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
+}
+
+Result<Vocabulary> open_vocabulary(const std::string& kind, const std::string& path) {
+  auto vocabulary = Vocabulary::open(path.empty() ? shipped_vocabulary(kind) : path);
+  if (vocabulary && vocabulary->kind() != kind)
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("the vocabulary is of '{}' descriptors, the map of '{}' ones", vocabulary->kind(), kind)};
+  return vocabulary;
 }
 
 }  // namespace fbvins

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the vocabulary that ships with the project lies. Pure function of the machine, any thread.
+// Where the vocabularies that ship with the project lie. Pure functions of the machine, any thread.
 //
-//   Result<Vocabulary> vocabulary = Vocabulary::open(shipped_vocabulary());
+//   Result<Vocabulary> vocabulary = open_vocabulary(kRawDescriptors);
 #pragma once
 
 #include <string>
+
+#include "fbvins/loop/vocabulary.hpp"
 
 namespace fbvins {
 
@@ -13,5 +15,8 @@ inline constexpr const char *kRawDescriptors = "orb", *kBoostedDescriptors = "bo
 
 /// $FBVINS_VOCABULARY if set, else where it was installed, else the source tree this was built from.
 std::string shipped_vocabulary(const std::string& kind = kRawDescriptors);
+
+/// The one that ships for this kind of descriptors, or the one at `path`, which must be of that kind.
+Result<Vocabulary> open_vocabulary(const std::string& kind, const std::string& path = {});
 
 }  // namespace fbvins

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// A map beside the odometry: recognises places, says where W lies in M, and is saved and loaded.
+//
+//   auto map = LoopMap::create(rig, {.file = "monday.fbm"});                           // to go on with; {}: a new map
+//   if (!map) return report(map.error().message);
+//   auto system = System::create(options, rig, RunMode::threaded, {.mapper = map->get()});
+//   system->on_map_update([&](const MapUpdate& u) { T_MW = u.T_MW; });                 // T_MB = T_MW * T_WB
+//   ...                                                                                // push the flight, finish() the system
+//   (*map)->finish();
+//   Result<void> saved = (*map)->save("flat.fbm");
+//
+// The pipeline calls process() from one thread; everything else is called before the first keyframe or after the system's
+// finish(). The same keyframes give the same bytes in the file.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/loop/loop_options.hpp"
+#include "fbvins/loop/map_report.hpp"
+#include "fbvins/types/mapper.hpp"
+#include "fbvins/types/trajectory.hpp"
+
+namespace fbvins {
+
+class LoopCloser;
+
+struct MapOptions {
+  std::string file;        ///< a map to find oneself in and go on with; empty: a new one, in which M begins where W does
+  std::string vocabulary;  ///< words, instead of those that ship
+  bool boosted = false;    ///< a new map of descriptors that the network improves; an old map knows its kind itself
+  LoopOptions loop = {};
+};
+
+class LoopMap final : public Mapper {
+ public:
+  /// An error where an option is out of range, or the map, the vocabulary or the network cannot be read or do not belong
+  /// together.
+  static Result<std::unique_ptr<LoopMap>> create(const StereoRig& rig, const MapOptions& options = {});
+  ~LoopMap() override;
+
+  MapUpdate process(const Keyframe& keyframe) override;
+
+  /// A last optimisation over everything, once the flight is over.
+  PoseGraphReport finish();
+  /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
+  FinalAdjustmentReport adjust();
+
+  /// Poses of a flight (in one W) as the map has them now: exact at keyframes, blended between them. Empty where the flight
+  /// never found into the map.
+  Trajectory corrected(const Trajectory& in_W) const;
+  /// Keyframes in the map now.
+  int keyframes() const;
+  /// Replaces the file as a whole: there is never half of one.
+  Result<void> save(const std::string& path) const;
+
+ private:
+  explicit LoopMap(std::unique_ptr<LoopCloser> closer);
+
+  std::unique_ptr<LoopCloser> closer_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options of loop closure. What no one sets is a named constant beside the code that uses it.
+#pragma once
+
+#include "fbvins/core/angle.hpp"
+
+namespace fbvins {
+
+/// Features of a keyframe.
+struct PlaceExtractorOptions {
+  int max_features = 500;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_features", max_features, "", "features of one image", 10, 10000);
+  }
+};
+
+/// Whether two keyframes show the same place.
+struct PlaceVerifierOptions {
+  int min_inliers = 28;
+  double min_visible_share = 0.16;
+  int max_distance_bit = 72;  ///< largest Hamming distance of a match
+
+  template <class V>
+  void visit(V&& v) {
+    v("min_inliers", min_inliers, "", "inliers of an accepted pose", 4, 1000);
+    v("min_visible_share", min_visible_share, "", "inliers out of the candidate's points that should be visible", 0.0, 1.0);
+  }
+};
+
+/// How fast the odometry may drift: variances grow with the path flown.
+struct DriftOptions {
+  double position_m = 0.006;
+  double yaw_rad = 0.06 * kDegree;
+
+  template <class V>
+  void visit(V&& v) {
+    v("position_m", position_m, "m", "standard deviation of position after a metre of flight; grows with its root", 1e-5, 1.0);
+    v("yaw_rad", yaw_rad, "rad", "standard deviation of yaw after a metre of flight; grows with its root", 1e-6, 0.2);
+  }
+};
+
+struct LoopOptions {
+  PlaceExtractorOptions extraction;
+  PlaceVerifierOptions verification;
+  DriftOptions drift;
+  double max_distance_m = 4;
+  double gate_sigma = 5;
+  double follow_mps = 0.15;
+  double follow_radps = 3 * kDegree;
+  int thin_above = 600;
+  int max_keyframes = 3000;
+  int degrees_of_freedom = 4;  ///< of a keyframe in the graph: 4, position and yaw; 6, roll and pitch as well
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_keyframes", max_keyframes, "", "keyframes of the map at most", 20, 1000000);
+    v("thin_above", thin_above, "", "keyframes above which redundant ones are taken out", 10, 1000000);
+    v("max_distance_m", max_distance_m, "m", "places farther than this from where we should be are not looked at", 0.1, 1000.0);
+    v("gate_sigma", gate_sigma, "", "a recognised place farther from the odometry's own idea than this is refused", 1.0, 100.0);
+    v("follow_mps", follow_mps, "m/s", "fastest motion of the smooth T_MW", 0.001, 100.0);
+    v("follow_radps", follow_radps, "rad/s", "fastest turn of the smooth T_MW", 1e-4, 20.0);
+    v.group("extraction", extraction, "features of a keyframe");
+    v.group("verification", verification, "is it the same place");
+    v.group("drift", drift, "how fast odometry drifts");
+  }
+};
+
+}  // namespace fbvins

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/candidate_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/core/angle.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Places looked at closely for a keyframe, out of so many of the most similar.
+constexpr std::size_t kCandidates = 3;
+constexpr int kMostSimilar = 40;
+/// Keyframes younger than this are the odometry's business.
+constexpr double kMinAge_s = 2;
+/// Places seen from a direction that differs more are not looked at.
+constexpr double kMaxAngle_rad = 65 * kDegree;
+/// The search reaches so many standard deviations of the position farther.
+constexpr double kReach_sigma = 3;
+/// Keyframes this near in time show one place; where nothing else tells, each speaks for its neighbours with this share
+/// of its own similarity.
+constexpr double kGroup_s = 3;
+constexpr float kNeighbourShare = 0.25f;
+
+double seconds_between(const MapKeyframe& a, const MapKeyframe& b) { return std::abs((a.t - b.t).seconds()); }
+
+/// Several similar neighbours speak for a place.
+std::vector<IndexHit> supported_by_neighbours(const PlaceMap& map, const std::vector<IndexHit>& hits) {
+  std::vector<IndexHit> grouped = hits;
+  for (IndexHit& a : grouped)
+    for (const IndexHit& b : hits)
+      if (a.keyframe != b.keyframe && seconds_between(*map.find(a.keyframe), *map.find(b.keyframe)) < kGroup_s)
+        a.similarity += kNeighbourShare * b.similarity;
+  std::stable_sort(grouped.begin(), grouped.end(),
+                   [](const IndexHit& a, const IndexHit& b) { return a.similarity > b.similarity; });
+  return grouped;
+}
+
+/// The most similar ones, one of each group of neighbours in time.
+std::vector<KeyframeId> one_of_each_place(const PlaceMap& map, const std::vector<IndexHit>& hits) {
+  std::vector<KeyframeId> chosen;
+  for (const IndexHit& hit : hits) {
+    if (chosen.size() == kCandidates) break;
+    const MapKeyframe& k = *map.find(hit.keyframe);
+    const bool covered = std::any_of(chosen.begin(), chosen.end(), [&](KeyframeId c) {
+      const MapKeyframe& other = *map.find(c);
+      return other.session == k.session && seconds_between(other, k) < kGroup_s;
+    });
+    if (!covered) chosen.push_back(hit.keyframe);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<KeyframeId> CandidateSearch::plausible(const PlaceMap& map, const MapKeyframe& query, double sigma_m) const {
+  const double reach = max_distance_m_ + kReach_sigma * sigma_m, min_cos = std::cos(kMaxAngle_rad);
+  const Vec3 axis = query.T_MB.q * (T_BC0_.q * Vec3::UnitZ());
+  std::vector<KeyframeId> ids;
+  for (const MapKeyframe& k : map.keyframes()) {
+    if (!k.placed) continue;
+    if (k.session == query.session && seconds_between(query, k) < kMinAge_s) continue;
+    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach) continue;
+    if ((k.T_MB.q * (T_BC0_.q * Vec3::UnitZ())).dot(axis) < min_cos) continue;
+    ids.push_back(k.id);
+  }
+  return ids;
+}
+
+std::vector<KeyframeId> CandidateSearch::around(const PlaceMap& map, const MapKeyframe& query, double sigma_m) {
+  const std::vector<KeyframeId> near = plausible(map, query, sigma_m);
+  const auto is_near = [&](KeyframeId k) { return std::binary_search(near.begin(), near.end(), k); };
+  return one_of_each_place(map, index_.query(query.place.words, kMostSimilar, is_near));
+}
+
+std::vector<KeyframeId> CandidateSearch::anywhere(const PlaceMap& map, const MapKeyframe& query) {
+  const auto placed = [&](KeyframeId k) { return map.find(k)->placed; };
+  return one_of_each_place(map, supported_by_neighbours(map, index_.query(query.place.words, kMostSimilar, placed)));
+}
+
+}  // namespace fbvins

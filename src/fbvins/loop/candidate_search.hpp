@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which keyframes of the map are worth a close look for a new one: the most similar by words, one of each place. One
+// thread at a time.
+//
+//   CandidateSearch search(vocabulary.words(), T_BC0, 4.0);
+//   search.add(id, place.words);
+//   for (KeyframeId id : search.around(map, query, sigma_m)) verify(id);   // W is known in M
+//   for (KeyframeId id : search.anywhere(map, query)) verify(id);          // it is not
+#pragma once
+
+#include <vector>
+
+#include "fbvins/loop/inverted_index.hpp"
+#include "fbvins/loop/place_map.hpp"
+
+namespace fbvins {
+
+class CandidateSearch {
+ public:
+  CandidateSearch(int words, const Pose<B, C0>& T_BC0, double max_distance_m)
+      : index_(words), T_BC0_(T_BC0), max_distance_m_(max_distance_m) {}
+
+  void add(KeyframeId id, const BowVector& words) { index_.add(id, words); }
+  void remove(KeyframeId id, const BowVector& words) { index_.remove(id, words); }
+
+  /// Of those that could have been taken around `query.T_MB`, whose position is known to `sigma_m`, looking the same way.
+  std::vector<KeyframeId> around(const PlaceMap& map, const MapKeyframe& query, double sigma_m);
+  /// Of all that have a place in M.
+  std::vector<KeyframeId> anywhere(const PlaceMap& map, const MapKeyframe& query);
+
+ private:
+  std::vector<KeyframeId> plausible(const PlaceMap& map, const MapKeyframe& query, double sigma_m) const;
+
+  InvertedIndex index_;
+  Pose<B, C0> T_BC0_;
+  double max_distance_m_;
+};
+
+}  // namespace fbvins

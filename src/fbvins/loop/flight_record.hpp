@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every keyframe that flew past, each hung on one that is still in the map: from it the poses of the whole flight follow
+// the map, though the map lets go of keyframes. One thread at a time.
+//
+//   FlightRecord flight;
+//   flight.add(t, id);
+//   flight.hand_over(gone.id, heir.id, heir.T_MB.inverse() * gone.T_MB);
+//   Trajectory in_map = flight.corrected(map, trajectory_in_W);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/loop/place_map.hpp"
+#include "fbvins/types/trajectory.hpp"
+
+namespace fbvins {
+
+class FlightRecord {
+ public:
+  void add(Time t, KeyframeId id) { entries_.push_back({t, id, {}}); }
+  /// What hung on `gone` hangs on `heir` from now on.
+  void hand_over(KeyframeId gone, KeyframeId heir, const Pose<B, B>& T_heir_gone);
+  /// What hung on `gone` is lost.
+  void drop(KeyframeId gone);
+  /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Keyframes that have no
+  /// place in M are passed over; empty where there is no other.
+  Trajectory corrected(const PlaceMap& map, const Trajectory& in_W) const;
+
+ private:
+  struct Entry {
+    Time t;
+    KeyframeId anchor;
+    Pose<B, B> T_anchor_B;
+  };
+  std::vector<Entry> entries_;
+};
+
+}  // namespace fbvins

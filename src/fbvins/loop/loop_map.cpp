@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/loop_map.hpp"
+
+#include "fbvins/core/options.hpp"
+#include "fbvins/features/booster.hpp"
+#include "fbvins/loop/loop_closer.hpp"
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/vocabulary_file.hpp"
+
+namespace fbvins {
+
+Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const MapOptions& options) {
+  if (Result<void> valid = validate(options.loop); !valid) return valid.error();
+  Result<PlaceMap> map = PlaceMap{};
+  if (!options.file.empty()) map = load_map(options.file);
+  if (!map) return map.error();
+  if (map->empty()) map->boosted = options.boosted;
+  auto vocabulary = open_vocabulary(map->boosted ? kBoostedDescriptors : kRawDescriptors, options.vocabulary);
+  if (!vocabulary) return vocabulary.error();
+  Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
+  if (map->boosted) stage = make_booster_stage(BoosterOptions{});
+  if (!stage) return stage.error();
+  return std::unique_ptr<LoopMap>(
+      new LoopMap(std::make_unique<LoopCloser>(rig, options.loop, std::move(*vocabulary), std::move(*map), std::move(*stage))));
+}
+
+LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer) : closer_(std::move(closer)) {}
+LoopMap::~LoopMap() = default;
+
+MapUpdate LoopMap::process(const Keyframe& keyframe) { return closer_->process(keyframe); }
+PoseGraphReport LoopMap::finish() { return closer_->finish(); }
+FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
+Trajectory LoopMap::corrected(const Trajectory& in_W) const { return closer_->corrected(in_W); }
+int LoopMap::keyframes() const { return static_cast<int>(closer_->map().size()); }
+Result<void> LoopMap::save(const std::string& path) const { return save_map(closer_->map(), path); }
+
+}  // namespace fbvins

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_edges.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// Loops are many and never quite independent of one another.
+constexpr double kLoopInflation = 2.0;
+/// No loop is more certain than this.
+constexpr double kLoopFloor_m = 0.006, kLoopFloor_rad = 0.10 * kDegree;
+/// Nor is a step of the odometry, as variances: two keyframes may stand on one spot.
+constexpr double kOdometryFloor_m2 = 1e-6, kOdometryFloor_rad2 = 1e-8;
+
+Mat6 symmetric(const Mat6& m) { return 0.5 * (m + m.transpose()); }
+
+}  // namespace
+
+double angle_between(const Quat& a, const Quat& b) { return 2 * std::acos(std::min(1.0, std::abs(a.dot(b)))); }
+
+MapEdge odometry_edge(const MapKeyframe& from, const Pose<W, B>& T_WB, Time t, const DriftOptions& options) {
+  const Pose<B, B> T = from.T_WB.inverse() * T_WB;
+  const DriftVariance drift = drift_over(options, T.p.norm(), std::abs((t - from.t).seconds()));
+  Mat6 information = Mat6::Zero();
+  // Variance of yaw in all three: a step is short, and roll and pitch drift less, not more.
+  information.diagonal().head<3>().setConstant(1 / (drift.position_m2 + kOdometryFloor_m2));
+  information.diagonal().tail<3>().setConstant(1 / (drift.yaw_rad2 + kOdometryFloor_rad2));
+  return {from.id, {}, T, information, MapEdge::Kind::odometry};
+}
+
+/// T_BcBq with the covariance of (dp in the candidate's body, dtheta in the query's), from the cameras' T_qc.
+MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose) {
+  const CameraFromCamera& T_qc = pose.T_qc;
+  const Pose<B, B> T_cq(T_qc.inverse().q, T_qc.inverse().p);  // of cameras; frames are told apart by the formulas here
+  Mat6 J = Mat6::Zero();
+  J.topLeftCorner<3, 3>() = -T_qc.R().transpose();
+  J.topRightCorner<3, 3>() = hat(T_cq.p);
+  J.bottomRightCorner<3, 3>() = -T_qc.R();
+  const Mat6 cov_cq = kLoopInflation * J * pose.information.inverse() * J.transpose();
+  const Pose<B, B> T_BC(T_BC0.q, T_BC0.p);
+  Mat6 cov = compose_covariance(T_BC, Mat6::Zero(), T_cq, cov_cq);
+  cov = compose_covariance(T_BC * T_cq, cov, T_BC.inverse(), Mat6::Zero());
+  cov.diagonal().head<3>().array() += kLoopFloor_m * kLoopFloor_m;
+  cov.diagonal().tail<3>().array() += kLoopFloor_rad * kLoopFloor_rad;
+  return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop};
+}
+
+SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge) {
+  SeenPose seen;
+  seen.T_MB = from.T_MB * edge.T_from_to;
+  const Mat6 cov = edge.information.inverse();
+  const Mat3 R = from.T_MB.R(), R_q = seen.T_MB.R();
+  // Position in M and the rotation's part about M's z.
+  Eigen::Matrix<double, 4, 6> J = Eigen::Matrix<double, 4, 6>::Zero();
+  J.topLeftCorner<3, 3>() = R;
+  J.bottomRightCorner<1, 3>() = R_q.row(2);
+  seen.covariance = J * cov * J.transpose();
+  return seen;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Edges of the map from what was measured: the odometry between two keyframes, a place seen again; and what a place seen
+// again says of where the body is in M (docs/derivations/loop.md, L13). Pure functions.
+//
+//   MapEdge edge = loop_edge(T_BC0, candidate.id, verified.pose);
+//   if (frame.mahalanobis2(seen_pose(candidate, edge)) < gate) map.edges.push_back(edge);
+#pragma once
+
+#include "fbvins/loop/map_frame.hpp"
+#include "fbvins/loop/place_map.hpp"
+#include "fbvins/loop/place_pose.hpp"
+
+namespace fbvins {
+
+/// Angle of the rotation that takes one attitude to the other, rad.
+double angle_between(const Quat& a, const Quat& b);
+
+/// From the keyframe before to a pose of the same W; `to` is left open.
+MapEdge odometry_edge(const MapKeyframe& from, const Pose<W, B>& T_WB, Time t, const DriftOptions& drift);
+
+/// From the candidate to the body that saw it again; `to` is left open. `pose`: of the candidate's camera in the query's.
+MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);
+
+/// Where the body at the end of `edge` is, as `from` says.
+SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge);
+
+}  // namespace fbvins

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/relocaliser.hpp"
+
+#include <algorithm>
+
+#include "fbvins/loop/map_edges.hpp"
+
+namespace fbvins {
+namespace {
+
+/// A guess of W in M is forgotten after this.
+constexpr double kGuessLife_s = 5;
+/// Two keyframes agree to this.
+constexpr double kAgree_m = 0.15, kAgree_rad = 2.5 * kDegree;
+/// So many inliers, and this share of what is visible, need no second keyframe.
+constexpr int kSureInliers = 90;
+constexpr double kSureShare = 0.35;
+
+bool beyond_doubt(const VerifiedPose& verified) {
+  const auto inliers = static_cast<int>(verified.pose.inliers.size());
+  return inliers >= kSureInliers && inliers > kSureShare * verified.visible;
+}
+
+}  // namespace
+
+std::optional<Pose<M, W>> Relocaliser::consider(const MapKeyframe& query, const Pose<M, B>& T_MB, const VerifiedPose& verified) {
+  std::erase_if(guesses_, [&](const Guess& g) { return (query.t - g.t).seconds() > kGuessLife_s; });
+  const Quat level = about_z(yaw_of((T_MB * query.T_WB.inverse()).q));
+  const Guess guess{query.t, {level, Vec3(T_MB.p - level * query.T_WB.p)}};
+  const bool agreed = std::any_of(guesses_.begin(), guesses_.end(), [&](const Guess& g) {
+    return g.t != guess.t && (g.T_MW * query.T_WB.p - T_MB.p).norm() < kAgree_m &&
+           angle_between(g.T_MW.q, guess.T_MW.q) < kAgree_rad;
+  });
+  if (agreed || beyond_doubt(verified)) return guess.T_MW;
+  guesses_.push_back(guess);
+  return std::nullopt;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which keyframes a map lets go of: above `thin_above` those that others replace, above `max_keyframes` those that say
+// least (docs/derivations/loop.md, Thinning). One thread at a time.
+//
+//   Thinning thinning(600, 3000);
+//   thinning.note(id, loops, map.size());                  // every keyframe, with the loops that end there
+//   while (auto id = thinning.next(map)) map.remove(*id);  // must be removed before the next question
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fbvins/loop/place_map.hpp"
+
+namespace fbvins {
+
+class Thinning {
+ public:
+  Thinning(int thin_above, int max_keyframes) : thin_above_(thin_above), max_keyframes_(max_keyframes) {}
+
+  /// Remembers `id` as redundant where one of the loops shows that its place was taken from nearly there before. The fuller
+  /// the map (`size`, without `id`), the less is new.
+  void note(KeyframeId id, std::span<const MapEdge> loops, std::size_t size);
+  /// The next one that should go, if any.
+  std::optional<KeyframeId> next(const PlaceMap& map);
+
+ private:
+  int thin_above_, max_keyframes_;
+  std::vector<KeyframeId> redundant_;
+};
+
+/// Who takes over the poses that hang on a keyframe of the map: a neighbour of its session, else the last one before it
+/// that knows where it is in M too. Null for a session's only keyframe while that is not known.
+const MapKeyframe* heir_of(const PlaceMap& map, const MapKeyframe& gone);
+
+}  // namespace fbvins
