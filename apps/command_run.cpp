@@ -76,25 +76,27 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
   auto closer = make_loop_closer(arguments.map, data.rig(), config.loop);
   if (!closer) return closer.error();
   Flight flight;
-  if (*closer) flight.map.emplace();
+  const std::unique_ptr<LoopCloser> loop = std::move(*closer);
+  if (loop) flight.map.emplace();
   flight.run.tracked.reserve(data.frames().size());
   flight.run.odometry.reserve(data.frames().size());
-  System system(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, std::move(*closer));
+  Result<System> system =
+      System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, {.mapper = loop.get()});
+  if (!system) return system.error();
   SurvivalMeter survival;
-  system.on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
-  system.on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
-  system.on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
+  system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
+  system->on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
+  system->on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
   int frames = 0;
-  if (!system.failure().empty()) return Error{ErrorCode::invalid_argument, system.failure()};
   while (auto event = data.next()) {
     const bool is_frame = std::holds_alternative<StereoFrame>(*event);
-    system.push(std::move(*event));
+    if (Result<void> taken = system->push(std::move(*event)); !taken) return taken.error();
     if (is_frame) progress.update(++frames);
   }
-  if (Result<void> done = system.finish(); !done) return done.error();
-  if (flight.map) finish_map(arguments.map, *system.loop(), flight.run, *flight.map);
+  if (Result<void> done = system->finish(); !done) return done.error();
+  if (flight.map) finish_map(arguments.map, *loop, flight.run, *flight.map);
   if (flight.map)
-    if (Result<void> saved = save_map(arguments.map, *system.loop()); !saved) flight.map->not_saved = saved.error().message;
+    if (Result<void> saved = save_map(arguments.map, *loop); !saved) flight.map->not_saved = saved.error().message;
   return flight;
 }
 

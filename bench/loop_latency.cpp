@@ -13,6 +13,7 @@
 
 #include "fbvins/eval/statistics.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 #include "fbvins/pipeline/system.hpp"
 
@@ -22,8 +23,8 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 /// Milliseconds from arrival to pose, frame by frame.
-std::vector<double> play(const std::vector<SensorEvent>& events, const StereoRig& rig, std::unique_ptr<LoopCloser> loop) {
-  System system({}, rig, RunMode::threaded, std::move(loop));
+std::vector<double> play(const std::vector<SensorEvent>& events, const StereoRig& rig, Mapper* mapper) {
+  System system = *System::create({}, rig, RunMode::threaded, {.mapper = mapper});
   std::vector<Clock::time_point> arrived(events.size());
   std::vector<double> ms;
   system.on_odometry([&](const Odometry& o) {
@@ -37,9 +38,9 @@ std::vector<double> play(const std::vector<SensorEvent>& events, const StereoRig
   for (const SensorEvent& event : events) {
     std::this_thread::sleep_until(start + std::chrono::nanoseconds((time_of(event) - t0).ns));
     if (std::holds_alternative<StereoFrame>(event)) arrived[frames++] = Clock::now();
-    system.push(event);
+    if (!system.push(event)) break;  // finish() says why
   }
-  (void)system.finish();
+  if (Result<void> end = system.finish(); !end) throw std::runtime_error(end.error().message);
   return ms;
 }
 
@@ -62,7 +63,8 @@ int main(int argc, char** argv) {
   std::vector<double> without, with;
   for (int round = 0; round < rounds; ++round) {
     const auto a = play(events, (*data)->rig(), nullptr);
-    const auto b = play(events, (*data)->rig(), std::make_unique<LoopCloser>((*data)->rig(), LoopOptions{}, *vocabulary));
+    LoopCloser loop((*data)->rig(), LoopOptions{}, *vocabulary);
+    const auto b = play(events, (*data)->rig(), &loop);
     without.insert(without.end(), a.begin(), a.end());
     with.insert(with.end(), b.begin(), b.end());
   }

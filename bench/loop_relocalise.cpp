@@ -13,6 +13,7 @@
 #include "fbvins/eval/association.hpp"
 #include "fbvins/eval/statistics.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 #include "fbvins/pipeline/system.hpp"
 
@@ -35,18 +36,19 @@ void fly(const std::string& path, System& system, Time from, Time to, const auto
   while (auto event = (*data)->next()) {
     const Time t = std::visit([](const auto& e) { return e.t; }, *event);
     if (t < from || t >= to) continue;
-    system.push(std::move(*event));
+    if (!system.push(std::move(*event))) break;  // finish() says why
     if (stop()) break;
   }
-  (void)system.finish();
+  if (Result<void> end = system.finish(); !end) throw std::runtime_error(end.error().message);
 }
 
 /// The map of a part of the flight, moved (SE3) to where the ground truth has it.
 PlaceMap map_of(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, Time to) {
-  System system({}, data.rig(), RunMode::deterministic, std::make_unique<LoopCloser>(data.rig(), LoopOptions{}, vocabulary));
+  LoopCloser loop(data.rig(), LoopOptions{}, vocabulary);
+  System system = *System::create({}, data.rig(), RunMode::deterministic, {.mapper = &loop});
   fly(path, system, Time{0}, to, [] { return false; });
-  system.loop()->finish();
-  PlaceMap map = system.loop()->map();
+  loop.finish();
+  PlaceMap map = loop.map();
   Trajectory keyframes;
   for (const MapKeyframe& k : map.keyframes()) keyframes.push_back({k.t, k.T_MB.cast_frames<W, B>()});
   std::vector<PosePair> all;
@@ -63,7 +65,8 @@ struct Start {
 };
 
 Start wake_up(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, const PlaceMap& map, Time from) {
-  System system({}, data.rig(), RunMode::deterministic, std::make_unique<LoopCloser>(data.rig(), LoopOptions{}, vocabulary, map));
+  LoopCloser loop(data.rig(), LoopOptions{}, vocabulary, map);
+  System system = *System::create({}, data.rig(), RunMode::deterministic, {.mapper = &loop});
   std::optional<MapUpdate> found;
   Trajectory in_M;
   system.on_map_update([&](const MapUpdate& u) {

@@ -134,11 +134,11 @@ void measure_matches(const std::vector<View>& views, const StereoRig& rig, const
 class Meter {
  public:
   Meter(const StereoRig& rig, bool consecutive)
-      : rig_(rig), consecutive_(consecutive), orb_(orb_options()), system_(Config{}, rig, RunMode::deterministic) {
+      : rig_(rig), consecutive_(consecutive), orb_(orb_options()), system_(*System::create({}, rig)) {
     system_.on_tracked_frame([this](const TrackedFrame& frame) { count_tracks(frame); });
   }
   void imu(const ImuSample& sample) {
-    if (consecutive_) system_.push(sample);
+    if (consecutive_) (void)system_.push(sample);  // finish() says why, where that fails
   }
   void frame(const StereoFrame& frame) {
     pyramid_.build(frame.left->view(), 3);
@@ -159,13 +159,13 @@ class Meter {
     views_.push_back(std::move(view));
     if (consecutive_) {
       count_noise(*frame.left);
-      system_.push(frame);
+      (void)system_.push(frame);
     }
   }
   Figures finish(const std::vector<TrajectoryPoint>& truth) {
     measure_matches(views_, rig_, truth, figures_);
     if (consecutive_) {
-      (void)system_.finish();
+      if (Result<void> end = system_.finish(); !end) throw std::runtime_error(end.error().message);
       for (const auto& [id, age] : last_age_)
         if (first_frame_of_[id] + 60 < frames_)
           figures_.add("KLT track length (first 60 frames) [frames]", std::min(age, 60) + 1);

@@ -32,9 +32,9 @@ struct Measured {
   Trajectory poses;
 };
 
-Measured fly(const Config& config, const StereoRig& rig, std::vector<SensorEvent> events) {
+Measured fly(const SystemOptions& config, const StereoRig& rig, std::vector<SensorEvent> events) {
   Measured m;
-  System system(config, rig, RunMode::deterministic);
+  System system = *System::create(config, rig);
   system.on_tracked_frame([&](const TrackedFrame& f) { m.frontend.push_back(f.stats); });
   CpuTimer timer;
   double since_pose_ms = 0;  // reading in IMU samples counts for the image that follows them
@@ -52,10 +52,10 @@ Measured fly(const Config& config, const StereoRig& rig, std::vector<SensorEvent
     posed = false;
   };
   for (SensorEvent& event : events) {
-    system.push(std::move(event));
+    if (!system.push(std::move(event))) break;  // finish() says why
     account();
   }
-  (void)system.finish();
+  if (Result<void> end = system.finish(); !end) throw std::runtime_error(end.error().message);
   account();
   return m;
 }

@@ -67,13 +67,14 @@ std::string Flown::text() const {
   return line;
 }
 
-Config config_for(const std::string& frontend) {
-  Config config;
+SystemOptions config_for(const std::string& frontend) {
+  SystemOptions config;
   config.frontend.kind = frontend;
   return config;
 }
 
-Flown fly(const std::string& name, const Config& config, const Alter& alter, const std::function<void(StereoRig&)>& believe) {
+Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter,
+          const std::function<void(StereoRig&)>& believe) {
   auto data = open_dataset(recording(name).string());
   if (!data) throw std::runtime_error(data.error().message);
   Flown flown;
@@ -81,14 +82,16 @@ Flown fly(const std::string& name, const Config& config, const Alter& alter, con
   flown.start = (*data)->frames().front().t;
   StereoRig rig = (*data)->rig();
   if (believe) believe(rig);
-  System system(config, rig, RunMode::deterministic);
-  system.on_odometry([&](const Odometry& o) { flown.odometry.push_back(o); });
+  Result<System> system = System::create(config, rig);
+  if (!system) throw std::runtime_error(system.error().message);
+  system->on_odometry([&](const Odometry& o) { flown.odometry.push_back(o); });
   while (auto event = (*data)->next()) {
     const Time t = std::visit([](const auto& e) { return e.t; }, *event);
-    if (!alter || alter((t - flown.start).seconds(), *event)) system.push(std::move(*event));
+    if (alter && !alter((t - flown.start).seconds(), *event)) continue;
+    if (!system->push(std::move(*event))) break;
   }
-  if (auto end = system.finish(); !end) throw std::runtime_error(end.error().message);
-  flown.calibration = system.estimator().calibration();
+  if (auto end = system->finish(); !end) throw std::runtime_error(end.error().message);
+  flown.calibration = system->calibration();
   compare_with_truth((*data)->ground_truth(), flown);
   return flown;
 }

@@ -46,9 +46,9 @@ inline std::filesystem::path recording(const std::string& name) {
   return (data ? std::filesystem::path(data) : std::filesystem::path(FBVINS_SOURCE_DIR) / "../shared/data") / name;
 }
 
-Flown fly(const std::string& name, const Config& config, const Alter& alter = nullptr,
+Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter = nullptr,
           const std::function<void(StereoRig&)>& believe = nullptr);
 
-Config config_for(const std::string& frontend);
+SystemOptions config_for(const std::string& frontend);
 
 }  // namespace fbvins::test

@@ -143,7 +143,7 @@ TEST_P(RealFlight, CalibrationIsRefinedInFlight) {
     rig.T_BC1 = {turn * rig.T_BC1.q, Vec3(turn * rig.T_BC1.p + shift)};
   };
   const auto wrong_rad = [&](const Flown& f) { return so3_log(truth.T_BC0.q.conjugate() * f.calibration.T_BC0.q).norm(); };
-  Config config = config_for(GetParam());
+  SystemOptions config = config_for(GetParam());
   const Flown off = fly("MH_01_easy_17s", config, nullptr, loosen);
   EXPECT_NEAR(wrong_rad(off), 0.0349, 1e-4);
   config.estimator.estimate_extrinsics = true;
@@ -157,7 +157,7 @@ TEST_P(RealFlight, CalibrationIsRefinedInFlight) {
 
 TEST_P(RealFlight, TimeOffsetIsFoundInFlight) {
   const auto late = [](StereoRig& rig) { rig.time_offset_s += 0.005; };
-  Config config = config_for(GetParam());
+  SystemOptions config = config_for(GetParam());
   const Flown off = fly("MH_01_easy_17s", config, nullptr, late);
   config.estimator.estimate_time_offset = true;
   const Flown on = fly("MH_01_easy_17s", config, nullptr, late);

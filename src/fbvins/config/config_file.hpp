@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "fbvins/config/config.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/pipeline/system.hpp"
 
 namespace fbvins {
 

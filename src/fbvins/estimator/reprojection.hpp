@@ -5,15 +5,9 @@
 #include <algorithm>
 
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/calibration.hpp"
 
 namespace fbvins {
-
-/// Camera-IMU calibration as a state.
-struct Calibration {
-  Pose<B, C0> T_BC0;
-  Pose<B, C1> T_BC1;
-  double time_offset_s = 0;  ///< t_imu = t_image + offset, beyond what the input has applied
-};
 
 /// How the body at the target frame sees what is given in the body at the host frame (W2):
 /// p_Bt = R_th * x_h + rho * t_th, with x_h = R_BC0 * (alpha, beta, 1) + rho * t_BC0.

@@ -14,6 +14,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/types/imu.hpp"
+#include "fbvins/types/input_counts.hpp"
 
 namespace fbvins {
 
@@ -31,15 +32,6 @@ struct ImuBufferOptions {
     v("max_gyro_radps", max_gyro_radps, "rad/s", "a faster reading is rejected", 1.0, 1000.0);
     v("max_accel_mps2", max_accel_mps2, "m/s^2", "a stronger reading is rejected", 20.0, 10000.0);
   }
-};
-
-/// What became of the readings pushed.
-struct ImuBufferCounts {
-  int accepted = 0;
-  int duplicate = 0;  ///< same stamp as the one before
-  int backward = 0;   ///< earlier stamp than the one before, or than the last extraction
-  int invalid = 0;    ///< NaN, infinite or beyond any sensor's range
-  int overflow = 0;   ///< dropped because nobody extracted them
 };
 
 class ImuBuffer {

@@ -7,34 +7,16 @@
 #include <optional>
 
 #include "fbvins/imu/imu_buffer.hpp"
+#include "fbvins/pipeline/input_options.hpp"
+#include "fbvins/types/input_counts.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
 
-struct PacketMakerOptions {
-  double max_imu_wait_s = 0.25;
-  ImuBufferOptions imu_buffer;
-
-  template <class V>
-  void visit(V&& v) {
-    v("max_imu_wait_s", max_imu_wait_s, "s", "an image goes on without its IMU readings when newer images are ahead by this", 0.0,
-      10.0);
-    v.group("imu_buffer", imu_buffer, "IMU readings on their way to the images");
-  }
-};
-
-/// What became of the input.
-struct InputCounts {
-  ImuBufferCounts imu;
-  int images = 0;
-  int images_backward = 0;  ///< stamp not after the image before: skipped
-};
-
 class PacketMaker {
  public:
   /// time_offset: t_imu = t_image + offset.
-  PacketMaker(const PacketMakerOptions& options, Duration time_offset)
-      : options_(options), offset_(time_offset), imu_(options.imu_buffer) {}
+  PacketMaker(const InputOptions& options, Duration time_offset) : options_(options), offset_(time_offset) {}
 
   void push(const ImuSample& sample) { imu_.push(sample); }
   void push(StereoFrame frame);
@@ -43,7 +25,7 @@ class PacketMaker {
   InputCounts counts() const;
 
  private:
-  PacketMakerOptions options_;
+  InputOptions options_;
   Duration offset_;
   ImuBuffer imu_;
   std::deque<StereoFrame> waiting_;

@@ -1,49 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only owner of threads: runs one function on a thread of its own until it returns, and keeps
-// the sentence of a foreign exception instead of letting it end the program.
+// The only owner of threads: runs one function on a thread of its own until it returns. And what becomes of an exception
+// in a stage: it ends neither the thread nor the program, it becomes the status that the caller sees.
 #pragma once
 
 #include <exception>
 #include <functional>
+#include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
+
+#include "fbvins/core/result.hpp"
 
 namespace fbvins {
 
-/// Runs `body`; the sentence of the exception it ended with, or empty.
+/// The first failure of any stage; the rest follow from it. Any thread.
+class StageStatus {
+ public:
+  void fail(Error error) {
+    const std::lock_guard lock(mutex_);
+    if (status_) status_ = std::move(error);
+  }
+  Result<void> get() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Result<void> status_;
+};
+
+/// Runs one step of a stage; an exception becomes ErrorCode::stage_failed with the stage's name.
 template <class Body>
-std::string failure_of(Body&& body) {
+Result<void> guarded(const char* stage, Body&& body) {
+  const auto failed = [&](const std::string& why) {
+    return Error{ErrorCode::stage_failed, std::string(stage) + " failed: " + why};
+  };
   try {
     body();
     return {};
   } catch (const std::exception& e) {
-    return std::string("a stage failed: ") + e.what();
+    return failed(e.what());
   } catch (...) {
-    return "a stage failed with an unknown exception";
+    return failed("an exception that is none of the standard library's");
   }
 }
 
 class StageRunner {
  public:
-  /// `body` runs until its queue is closed; `on_failure` must close the queues that others wait on.
-  void start(std::function<void()> body, std::function<void()> on_failure) {
-    thread_ = std::thread([this, body = std::move(body), on_failure = std::move(on_failure)] {
-      failure_ = failure_of(body);
-      if (!failure_.empty()) on_failure();
-    });
-  }
+  /// `body` runs until its queue is closed, and throws nothing.
+  void start(std::function<void()> body) { thread_ = std::thread(std::move(body)); }
 
-  /// Waits for the end; the sentence of an exception, or empty.
-  std::string join() {
+  /// Waits for the end.
+  void join() {
     if (thread_.joinable()) thread_.join();
-    return failure_;
   }
 
   ~StageRunner() { join(); }
 
  private:
   std::thread thread_;
-  std::string failure_;
 };
 
 }  // namespace fbvins

@@ -1,128 +1,183 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/pipeline/system.hpp"
 
+#include <optional>
+#include <utility>
+
+#include "fbvins/core/bounded_queue.hpp"
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/pipeline/feedback.hpp"
+#include "fbvins/pipeline/packet_maker.hpp"
+#include "fbvins/pipeline/stage_runner.hpp"
+
 namespace fbvins {
-namespace {
 
-/// The frontend of frame k sees the state after frame k - kPriorLag, in every mode.
-constexpr std::int64_t kPriorLag = 2;
+/// A step of the work with its own queue and, in the threaded mode, its own thread.
+template <class Task, class Owner>
+struct Stage {
+  const char* name;
+  void (Owner::*step)(Task);
+  BoundedQueue<Task> queue;
+  StageRunner runner = {};
+};
 
-}  // namespace
+// images, IMU -> PacketMaker -[packets]-> Frontend -[tracked frames]-> Estimator -> Odometry
+//                                            ^-------- Feedback -----------'  '-[keyframes]-> Mapper -> MapUpdate
+struct System::Impl {
+  struct MapTask {
+    Keyframe keyframe;
+    FrameId applies_from;
+  };
 
-System::System(const Config& config, const StereoRig& rig, RunMode mode, std::unique_ptr<LoopCloser> loop)
-    : mode_(mode),
-      packets_(config.input, Duration::from_seconds(rig.time_offset_s)),
-      estimator_(rig, config.estimator),
-      loop_(std::move(loop)) {
-  if (Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, config.frontend)) frontend_ = std::move(*frontend);
-  else failure_ = frontend.error().message;
-  if (!failure_.empty()) mode_ = RunMode::deterministic;  // nothing will be processed
-  if (mode_ != RunMode::threaded) return;
-  frontend_runner_.start(
-      [this] {
-        while (auto packet = to_frontend_.pop()) track(std::move(*packet));
-        to_estimator_.close();
-      },
-      [this] { stop_waiting(); });
-  estimator_runner_.start(
-      [this] {
-        while (auto frame = to_estimator_.pop()) estimate(*frame);
-        to_loop_.close();
-      },
-      [this] { stop_waiting(); });
-  loop_runner_.start(
-      [this] {
-        while (auto task = to_loop_.pop()) close_loops(*task);
-      },
-      [this] { stop_waiting(); });
-}
+  RunMode mode;
+  PacketMaker packet_maker;
+  std::unique_ptr<Frontend> frontend;
+  Estimator estimator;
+  Mapper* mapper;
+  Feedback feedback;
 
-System::~System() { (void)finish(); }
+  std::function<void(const TrackedFrame&)> on_tracked_frame;
+  std::function<void(const Keyframe&)> on_keyframe;
+  std::function<void(const Odometry&)> on_odometry;
+  std::function<void(const MapUpdate&)> on_map_update;
 
-void System::push(SensorEvent event) {
-  if (auto* sample = std::get_if<ImuSample>(&event)) packets_.push(*sample);
-  else packets_.push(std::get<StereoFrame>(std::move(event)));
-  forward_packets(false);
-}
+  StageStatus status;
+  bool finished = false;
+  Stage<SensorPacket, Impl> tracking{"the frontend", &Impl::track, BoundedQueue<SensorPacket>{4}};
+  Stage<TrackedFrame, Impl> estimation{"the estimator", &Impl::estimate, BoundedQueue<TrackedFrame>{4}};
+  /// Deep enough for the keyframes of a second or two, while the mapper optimises its whole graph.
+  Stage<MapTask, Impl> mapping{"the mapper", &Impl::map, BoundedQueue<MapTask>{12}};
 
-void System::forward_packets(bool flush) {
-  while (auto packet = packets_.next(flush)) {
-    if (mode_ == RunMode::threaded) to_frontend_.push(std::move(*packet));
-    else if (failure_.empty()) failure_ = failure_of([&] { track(std::move(*packet)); });
+  Impl(const SystemOptions& options, const StereoRig& rig, RunMode mode_wanted, SystemParts parts)
+      : mode(mode_wanted),
+        packet_maker(options.input, Duration::from_seconds(rig.time_offset_s)),
+        frontend(std::move(parts.frontend)),
+        estimator(rig, options.estimator),
+        mapper(parts.mapper) {
+    if (mode != RunMode::threaded) return;
+    start(tracking, [this] { estimation.queue.close(); });
+    start(estimation, [this] { mapping.queue.close(); });
+    start(mapping, [] {});
   }
-}
+  ~Impl() { (void)finish(); }
 
-void System::track(SensorPacket packet) {
-  TrackedFrame frame = frontend_->process(packet, feedback_for(packet.id));
-  if (on_keyframe_ || loop_) frame.images = std::move(packet.frame);
-  if (mode_ == RunMode::threaded) to_estimator_.push(std::move(frame));
-  else estimate(frame);
-}
+  // What happens to a frame, whatever the thread.
 
-void System::estimate(const TrackedFrame& frame) {
-  if (on_tracked_frame_) on_tracked_frame_(frame);
-  Estimate estimate = estimator_.process(frame);
-  publish(frame.id, estimator_.prior(), std::move(estimate.landmarks));
-  if (on_odometry_) on_odometry_(estimate.odometry);
-  hand_on(estimate);
-}
-
-void System::hand_on(const Estimate& estimate) {
-  for (const Keyframe& keyframe : estimate.keyframes) {
-    if (on_keyframe_) on_keyframe_(keyframe);
-    if (!loop_) continue;
-    LoopTask task{keyframe, FrameId{estimate.odometry.id.value + 1}};
-    if (mode_ == RunMode::threaded) to_loop_.push(std::move(task));
-    else close_loops(task);
+  void track(SensorPacket packet) {
+    const Feedback::Message told = feedback.for_frame(packet.id);
+    for (const LandmarkUpdate& update : told.landmarks) frontend->locate(update);
+    TrackedFrame frame = frontend->process(packet, told.prior);
+    frame.id = packet.id;
+    frame.t = packet.frame.t;
+    frame.imu = std::move(packet.imu);
+    if (on_keyframe || mapper != nullptr) frame.images = std::move(packet.frame);
+    hand_on(estimation, std::move(frame));
   }
-}
 
-void System::close_loops(const LoopTask& task) {
-  MapUpdate update = loop_->process(task.keyframe);
-  update.applies_from = task.applies_from;
-  if (on_map_update_) on_map_update_(update);
-}
-
-/// The state that this frame's prediction starts from; the frontend has been told of all landmarks up to then.
-StatePrior System::feedback_for(FrameId frame) {
-  const std::int64_t wanted = frame.value - kPriorLag;
-  if (wanted < 0) return {};
-  std::unique_lock lock(prior_mutex_);
-  prior_published_.wait(lock, [&] { return stopped_ || frames_estimated_ > wanted; });
-  for (; !landmark_updates_.empty() && landmark_updates_.front().sequence <= wanted; landmark_updates_.pop_front())
-    frontend_->locate(landmark_updates_.front());
-  return priors_[wanted % priors_.size()];
-}
-
-void System::publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks) {
-  const std::lock_guard lock(prior_mutex_);
-  landmark_updates_.push_back(std::move(landmarks));
-  priors_[frame.value % priors_.size()] = prior;
-  frames_estimated_ = frame.value + 1;
-  prior_published_.notify_all();
-}
-
-void System::stop_waiting() {
-  to_frontend_.close();
-  to_estimator_.close();
-  to_loop_.close();
-  const std::lock_guard lock(prior_mutex_);
-  stopped_ = true;
-  prior_published_.notify_all();
-}
-
-Result<void> System::finish() {
-  if (finished_) return {};
-  finished_ = true;
-  forward_packets(true);
-  to_frontend_.close();
-  // Both have ended before this returns, whichever failed: no callback comes later.
-  for (StageRunner* runner : {&frontend_runner_, &estimator_runner_, &loop_runner_}) {
-    const std::string failure = runner->join();
-    if (failure_.empty()) failure_ = failure;
+  void estimate(TrackedFrame frame) {
+    if (on_tracked_frame) on_tracked_frame(frame);
+    Estimate estimate = estimator.process(frame);
+    feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
+    if (on_odometry) on_odometry(estimate.odometry);
+    for (Keyframe& keyframe : estimate.keyframes) {
+      if (on_keyframe) on_keyframe(keyframe);
+      if (mapper != nullptr) hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
+    }
   }
-  if (failure_.empty()) return {};
-  return Error{ErrorCode::invalid_argument, failure_};
+
+  void map(MapTask task) {
+    MapUpdate update = mapper->process(task.keyframe);
+    update.applies_from = task.applies_from;
+    if (on_map_update) on_map_update(update);
+  }
+
+  // How it gets from stage to stage.
+
+  /// Sends on what has become ready; with `flush`, all that waits.
+  void forward(bool flush) {
+    while (std::optional<SensorPacket> packet = packet_maker.next(flush)) {
+      feedback.wait_for(packet->id);  // the frontend could not begin earlier, and the caller sees a failure in time
+      hand_on(tracking, std::move(*packet));
+    }
+  }
+
+  template <class Task>
+  void hand_on(Stage<Task, Impl>& stage, Task task) {
+    if (mode == RunMode::threaded) stage.queue.push(std::move(task));
+    else run(stage, std::move(task));
+  }
+
+  /// Nothing is processed after a failure.
+  template <class Task>
+  void run(Stage<Task, Impl>& stage, Task task) {
+    if (!status.get()) return;
+    const Result<void> done = guarded(stage.name, [&] { (this->*stage.step)(std::move(task)); });
+    if (!done) stop(done.error());
+  }
+
+  template <class Task, class AtEnd>
+  void start(Stage<Task, Impl>& stage, AtEnd at_end) {
+    stage.runner.start([this, &stage, at_end] {
+      while (std::optional<Task> task = stage.queue.pop()) run(stage, std::move(*task));
+      at_end();
+    });
+  }
+
+  void stop(const Error& error) {
+    status.fail(error);
+    feedback.stop();
+    tracking.queue.close();
+    estimation.queue.close();
+    mapping.queue.close();
+  }
+
+  Result<void> finish() {
+    if (!std::exchange(finished, true)) {
+      forward(true);
+      tracking.queue.close();
+      // All have ended before this returns, whichever failed: no callback comes later.
+      tracking.runner.join();
+      estimation.runner.join();
+      mapping.runner.join();
+    }
+    return status.get();
+  }
+};
+
+Result<System> System::create(const SystemOptions& options, const StereoRig& rig, RunMode mode, SystemParts parts) {
+  if (Result<void> valid = validate(options); !valid) return valid.error();
+  if (!parts.frontend) {
+    Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options.frontend);
+    if (!frontend) return frontend.error();
+    parts.frontend = std::move(*frontend);
+  }
+  return System(std::make_unique<Impl>(options, rig, mode, std::move(parts)));
 }
+
+System::System(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+System::~System() = default;
+System::System(System&&) noexcept = default;
+System& System::operator=(System&&) noexcept = default;
+
+void System::on_tracked_frame(std::function<void(const TrackedFrame&)> callback) {
+  impl_->on_tracked_frame = std::move(callback);
+}
+void System::on_keyframe(std::function<void(const Keyframe&)> callback) { impl_->on_keyframe = std::move(callback); }
+void System::on_odometry(std::function<void(const Odometry&)> callback) { impl_->on_odometry = std::move(callback); }
+void System::on_map_update(std::function<void(const MapUpdate&)> callback) { impl_->on_map_update = std::move(callback); }
+
+Result<void> System::push(SensorEvent event) {
+  if (impl_->finished && impl_->status.get())
+    return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
+  if (auto* sample = std::get_if<ImuSample>(&event)) impl_->packet_maker.push(*sample);
+  else impl_->packet_maker.push(std::get<StereoFrame>(std::move(event)));
+  impl_->forward(false);
+  return impl_->status.get();
+}
+
+Result<void> System::finish() { return impl_->finish(); }
+Result<void> System::status() const { return impl_->status.get(); }
+InputCounts System::input_counts() const { return impl_->packet_maker.counts(); }
+Calibration System::calibration() const { return impl_->estimator.calibration(); }
 
 }  // namespace fbvins

@@ -1,130 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole odometry: images and IMU readings in, poses out.
 //
-//   System system(config, dataset->rig(), RunMode::deterministic);
-//   system.on_odometry([&](const Odometry& o) { writer.write(o); });
-//   while (auto event = dataset->next()) system.push(std::move(*event));
-//   Result<void> end = system.finish();
+//   Result<System> system = System::create(options, rig);
+//   if (!system) return report(system.error().message);
+//   system->on_odometry([&](const Odometry& o) { use(o.T_WB, o.health); });
+//   while (std::optional<SensorEvent> event = next())
+//     if (Result<void> taken = system->push(std::move(*event)); !taken) return report(taken.error().message);
+//   Result<void> end = system->finish();
 //
-// With a LoopCloser, keyframes go on to it and T_MW comes back through on_map_update().
+// A frontend of one's own, or a map, is handed over as a part:
 //
-// Threads: push() and finish() are called by one thread. `deterministic` runs everything on it;
-// `threaded` runs the frontend, the estimator and the loop closer each on a thread of their own, where
-// they call back. Both give the same bits: the frontend of frame k always sees the estimator's state
-// after frame k - 2, so that the two can work side by side, and nothing flows back from the loop closer.
+//   System::create(options, rig, RunMode::threaded, {.frontend = std::make_unique<MyFrontend>(rig), .mapper = &map});
+//
+// Threads: callbacks are set before the first push(); push() and finish() are called by one thread, status() by any.
+// `deterministic` runs everything on the caller's thread; `threaded` runs the frontend, the estimator and the mapper each
+// on a thread of its own, where they call back. Both give the same bits.
+//
+// Failures: an exception in a stage or a callback ends the work. push() says so from then on, at the latest two images
+// after the one that failed in the frontend or the estimator (the mapper may be behind by its queue), and finish() says it again.
 #pragma once
 
-#include <array>
-#include <condition_variable>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <optional>
-#include <string>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/estimator/estimator.hpp"
 #include "fbvins/frontend/frontend.hpp"
-#include "fbvins/frontend/frontend_options.hpp"
-#include "fbvins/loop/loop_closer.hpp"
-#include "fbvins/pipeline/packet_maker.hpp"
-#include "fbvins/pipeline/stage_runner.hpp"
+#include "fbvins/pipeline/system_options.hpp"
+#include "fbvins/types/calibration.hpp"
+#include "fbvins/types/input_counts.hpp"
+#include "fbvins/types/mapper.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/sensor_event.hpp"
+#include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
 
 enum class RunMode { deterministic, threaded };
 
-/// Everything that can be configured.
-struct Config {
-  FrontendOptions frontend;
-  EstimatorOptions estimator;
-  PacketMakerOptions input;
-  LoopOptions loop;
-
-  template <class V>
-  void visit(V&& v) {
-    v.group("frontend", frontend, "features and their tracks");
-    v.group("estimator", estimator, "sliding window");
-    v.group("input", input, "sensor data on its way in");
-    v.group("loop", loop, "loop closure, where it is asked for");
-  }
+/// What a user may bring instead of the parts that the options name.
+struct SystemParts {
+  std::unique_ptr<Frontend> frontend = {};  ///< instead of `options.frontend.kind`
+  Mapper* mapper = nullptr;                 ///< gets every keyframe; not owned, must live longer than the System
 };
 
 class System {
  public:
-  System(const Config& config, const StereoRig& rig, RunMode mode, std::unique_ptr<LoopCloser> loop = nullptr);
+  /// An error where an option is out of its range or the frontend cannot be made (its name, the booster's weights).
+  static Result<System> create(const SystemOptions& options, const StereoRig& rig, RunMode mode = RunMode::deterministic,
+                               SystemParts parts = {});
   ~System();
-  System(const System&) = delete;
-  System& operator=(const System&) = delete;
+  System(System&&) noexcept;
+  System& operator=(System&&) noexcept;
 
-  using TrackedFrameCallback = std::function<void(const TrackedFrame&)>;
-  using KeyframeCallback = std::function<void(const Keyframe&)>;
-  using OdometryCallback = std::function<void(const Odometry&)>;
-  using MapUpdateCallback = std::function<void(const MapUpdate&)>;
-  void on_tracked_frame(TrackedFrameCallback callback) { on_tracked_frame_ = std::move(callback); }
-  /// Keyframes as they become final, with their images: for loop closure.
-  void on_keyframe(KeyframeCallback callback) { on_keyframe_ = std::move(callback); }
-  void on_odometry(OdometryCallback callback) { on_odometry_ = std::move(callback); }
-  /// After every keyframe that the loop closer has seen.
-  void on_map_update(MapUpdateCallback callback) { on_map_update_ = std::move(callback); }
+  /// What the frontend saw in an image.
+  void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
+  /// Keyframes as they become final, with their images.
+  void on_keyframe(std::function<void(const Keyframe&)> callback);
+  /// One for every image, with or without a pose: `health` tells.
+  void on_odometry(std::function<void(const Odometry&)> callback);
+  /// After every keyframe that the mapper has seen.
+  void on_map_update(std::function<void(const MapUpdate&)> callback);
 
-  /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded).
-  void push(SensorEvent event);
-  /// Processes what is waiting and ends; no callback comes afterwards. An error if a stage or a callback threw, or the
-  /// frontend could not be made.
+  /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). The error of the stage
+  /// that failed, if one has; the event is dropped then.
+  Result<void> push(SensorEvent event);
+  /// Processes what is waiting and ends; no callback comes afterwards. Says the same however often it is called.
   Result<void> finish();
+  /// The first failure of a stage, or success.
+  Result<void> status() const;
 
-  /// Why nothing is or will be processed; empty while all is well (in the deterministic mode; threads tell at finish()).
-  const std::string& failure() const { return failure_; }
-  InputCounts input_counts() const { return packets_.counts(); }
-  const Estimator& estimator() const { return estimator_; }
-  /// The map; null where there is no loop closure. Only after finish().
-  LoopCloser* loop() { return loop_.get(); }
+  InputCounts input_counts() const;
+  /// The camera-IMU calibration as estimated; only after finish().
+  Calibration calibration() const;
 
  private:
-  struct LoopTask {
-    Keyframe keyframe;
-    FrameId applies_from;
-  };
-  void forward_packets(bool flush);
-  void track(SensorPacket packet);
-  void estimate(const TrackedFrame& frame);
-  void hand_on(const Estimate& estimate);
-  void close_loops(const LoopTask& task);
-  StatePrior feedback_for(FrameId frame);
-  void publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks);
-  void stop_waiting();
-
-  RunMode mode_;
-  PacketMaker packets_;
-  std::unique_ptr<Frontend> frontend_;
-  Estimator estimator_;
-  std::unique_ptr<LoopCloser> loop_;
-  TrackedFrameCallback on_tracked_frame_;
-  KeyframeCallback on_keyframe_;
-  OdometryCallback on_odometry_;
-  MapUpdateCallback on_map_update_;
-
-  BoundedQueue<SensorPacket> to_frontend_{4};
-  BoundedQueue<TrackedFrame> to_estimator_{4};
-  /// Deep enough for the keyframes of a second or two, while the loop closer optimises its whole graph.
-  BoundedQueue<LoopTask> to_loop_{12};
-  StageRunner frontend_runner_, estimator_runner_, loop_runner_;
-  bool finished_ = false;
-  std::string failure_;  ///< of the first stage that threw; the caller's thread only
-
-  // The feedback slot: the states after the last frames, and how far the estimator has come.
-  std::mutex prior_mutex_;
-  std::condition_variable prior_published_;
-  std::array<StatePrior, 4> priors_;
-  std::deque<LandmarkUpdate> landmark_updates_;  ///< not yet seen by the frontend; one a frame
-  std::int64_t frames_estimated_ = 0;
-  bool stopped_ = false;
+  struct Impl;
+  explicit System(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace fbvins

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fbvins/features/noise_texture.hpp"
+#include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 
@@ -104,18 +105,28 @@ struct Outcome {
   Odometry last;
 };
 
+System system_of(RunMode mode, SystemParts parts = {}, const std::string& frontend = "klt") {
+  SystemOptions options;
+  options.frontend.kind = frontend;
+  Result<System> system = System::create(options, small_rig(), mode, std::move(parts));
+  EXPECT_TRUE(system.ok()) << system.error().message;
+  return std::move(*system);
+}
+
+void push_all(System& system, const std::vector<SensorEvent>& events) {
+  for (const SensorEvent& event : events) ASSERT_TRUE(system.push(event));
+}
+
 Outcome fly(RunMode mode, const std::string& frontend) {
-  Config config;
-  config.frontend.kind = frontend;
   Outcome outcome;
-  System system(config, small_rig(), mode);
+  System system = system_of(mode, {}, frontend);
   system.on_keyframe([&](const Keyframe&) { ++outcome.keyframes; });
   system.on_odometry([&](const Odometry& o) {
     outcome.odometry.push_back(bytes_of(o));
     outcome.with_pose += o.health.has_pose();
     outcome.last = o;
   });
-  for (const SensorEvent& event : recording()) system.push(event);
+  push_all(system, recording());
   EXPECT_TRUE(system.finish().ok());
   return outcome;
 }
@@ -157,7 +168,8 @@ struct MapOutcome {
 };
 
 MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEvent>& events) {
-  System system({}, small_rig(), mode, with_map ? loop_closer() : nullptr);
+  const std::unique_ptr<LoopCloser> loop = with_map ? loop_closer() : nullptr;
+  System system = system_of(mode, {.mapper = loop.get()});
   MapOutcome outcome;
   std::int64_t newest_update = 0;
   system.on_odometry([&](const Odometry& o) { outcome.odometry.push_back(bytes_of(o)); });
@@ -171,9 +183,9 @@ MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEve
     EXPECT_GE(u.applies_from.value, newest_update);
     newest_update = u.applies_from.value;
   });
-  for (const SensorEvent& event : events) system.push(event);
+  push_all(system, events);
   EXPECT_TRUE(system.finish().ok());
-  if (system.loop() != nullptr) outcome.map = serialise_map(system.loop()->map());
+  if (loop) outcome.map = serialise_map(loop->map());
   return outcome;
 }
 
@@ -190,67 +202,159 @@ TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotFeelIt) {
   EXPECT_EQ(threaded.map, alone.map);
 }
 
+TEST(SystemParts, AnUnknownFrontendOrAnOptionOutOfRangeIsAnErrorAtOnce) {
+  SystemOptions options;
+  options.frontend.kind = "surf";
+  EXPECT_FALSE(System::create(options, small_rig()));
+  options = {};
+  options.estimator.max_iterations = 0;
+  const Result<System> system = System::create(options, small_rig());
+  ASSERT_FALSE(system);
+  EXPECT_NE(system.error().message.find("estimator.max_iterations"), std::string::npos);
+}
+
+/// Sees nothing, and throws at a frame.
+class ThrowingFrontend final : public Frontend {
+ public:
+  explicit ThrowingFrontend(std::int64_t at) : at_(at) {}
+  TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
+    if (packet.id.value == at_) throw std::runtime_error("the lens fell off");
+    return {};
+  }
+
+ private:
+  std::int64_t at_;
+};
+
+/// Counts keyframes, and throws at one.
+class ThrowingMapper final : public Mapper {
+ public:
+  explicit ThrowingMapper(int at) : at_(at) {}
+  MapUpdate process(const Keyframe&) override {
+    if (++calls == at_) throw std::runtime_error("no room for the map");
+    return {};
+  }
+  int calls = 0;
+
+ private:
+  int at_;
+};
+
 class Modes : public testing::TestWithParam<RunMode> {};
 INSTANTIATE_TEST_SUITE_P(System, Modes, testing::Values(RunMode::deterministic, RunMode::threaded));
 
-TEST_P(Modes, AnExceptionInAStageIsAnErrorOfFinish) {
-  for (const bool first_callback : {true, false}) {
-    System system(Config{}, small_rig(), GetParam());
-    int calls = 0;
-    const auto fail_at_the_third = [&] {
-      if (++calls == 3) throw std::runtime_error("the disk is full");
+/// Pushes until the system refuses; the number of the newest image then.
+std::int64_t push_until_refused(System& system, const std::vector<SensorEvent>& events, Result<void>& refused) {
+  std::int64_t image = -1;
+  for (const SensorEvent& event : events) {
+    image += std::holds_alternative<StereoFrame>(event);
+    refused = system.push(event);
+    if (!refused) break;
+  }
+  return image;
+}
+
+void expect_stage_failed(const Result<void>& result, const std::string& sentence) {
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::stage_failed);
+  EXPECT_EQ(result.error().message, sentence);
+}
+
+TEST_P(Modes, AStageThatThrowsAtFrame50IsSeenByFrame52) {
+  const std::vector<SensorEvent> events = sway(70);
+  for (const std::string stage : {"frontend", "estimator", "callback"}) {
+    SystemParts parts;
+    if (stage == "frontend") parts.frontend = std::make_unique<ThrowingFrontend>(50);
+    System system = system_of(GetParam(), std::move(parts));
+    std::int64_t newest = -1;
+    const auto throw_at_50 = [&](FrameId id) {
+      newest = id.value;
+      if (id.value == 50 && stage != "frontend") throw std::runtime_error("the lens fell off");
     };
-    if (first_callback) system.on_tracked_frame([&](const TrackedFrame&) { fail_at_the_third(); });
-    else system.on_odometry([&](const Odometry&) { fail_at_the_third(); });
-    for (const SensorEvent& event : recording()) system.push(event);
-    const Result<void> end = system.finish();
-    ASSERT_FALSE(end.ok());
-    EXPECT_NE(end.error().message.find("the disk is full"), std::string::npos);
-    EXPECT_EQ(calls, 3);  // nothing is processed behind a failed stage
+    if (stage == "callback") system.on_odometry([&](const Odometry& o) { throw_at_50(o.id); });
+    else system.on_tracked_frame([&](const TrackedFrame& f) { throw_at_50(f.id); });  // on the estimator's thread
+    Result<void> refused;
+    EXPECT_LE(push_until_refused(system, events, refused), 52);
+    const std::string sentence =
+        (stage == "frontend" ? "the frontend" : "the estimator") + std::string(" failed: the lens fell off");
+    expect_stage_failed(refused, sentence);
+    expect_stage_failed(system.status(), sentence);
+    expect_stage_failed(system.push(events.back()), sentence);
+    expect_stage_failed(system.finish(), sentence);
+    expect_stage_failed(system.finish(), sentence);
+    EXPECT_EQ(newest, stage == "frontend" ? 49 : 50);  // nothing is processed after a failed stage
   }
 }
 
-TEST_P(Modes, AnExceptionBehindTheLoopCloserIsAnErrorOfFinish) {
-  System system({}, small_rig(), GetParam(), loop_closer());
-  int calls = 0;
-  system.on_map_update([&](const MapUpdate&) {
-    ++calls;
-    throw std::runtime_error("no room for the map");
-  });
-  for (const SensorEvent& event : recording()) system.push(event);
-  const Result<void> end = system.finish();
-  ASSERT_FALSE(end.ok());
-  EXPECT_NE(end.error().message.find("no room for the map"), std::string::npos);
-  EXPECT_EQ(calls, 1);
+TEST_P(Modes, AMapperThatThrowsIsSeenByTheCaller) {
+  ThrowingMapper mapper(2);
+  System system = system_of(GetParam(), {.mapper = &mapper});
+  const std::vector<SensorEvent> events = sway(200);
+  Result<void> refused;
+  push_until_refused(system, events, refused);
+  expect_stage_failed(refused, "the mapper failed: no room for the map");
+  expect_stage_failed(system.finish(), "the mapper failed: no room for the map");
+  EXPECT_EQ(mapper.calls, 2);
 }
 
 TEST_P(Modes, WhatIsNotAStdExceptionIsCaughtAsWell) {
-  System system(Config{}, small_rig(), GetParam());
+  System system = system_of(GetParam());
   system.on_odometry([](const Odometry&) { throw 42; });
-  for (const SensorEvent& event : recording()) system.push(event);
-  EXPECT_FALSE(system.finish().ok());
+  Result<void> refused;
+  push_until_refused(system, recording(), refused);
+  EXPECT_FALSE(refused);
+  EXPECT_EQ(system.finish().error().code, ErrorCode::stage_failed);
 }
 
-TEST_P(Modes, DestructionAtAnyTimeNeitherHangsNorThrows) {
+TEST_P(Modes, DestructionAndMovingAtAnyTimeNeitherHangNorThrow) {
   for (const std::size_t events : {0u, 1u, 2u, 25u, 90u}) {
-    System system(Config{}, small_rig(), GetParam());
-    for (std::size_t i = 0; i < events; ++i) system.push(recording()[i]);
+    System system = system_of(GetParam());
+    for (std::size_t i = 0; i < events; ++i) ASSERT_TRUE(system.push(recording()[i]));
+    System moved = std::move(system);
+    for (std::size_t i = events; i < events + 5; ++i) ASSERT_TRUE(moved.push(recording()[i]));
   }
-  System failing(Config{}, small_rig(), GetParam());
+  System failing = system_of(GetParam());
   failing.on_odometry([](const Odometry&) { throw std::runtime_error("no"); });
-  for (std::size_t i = 0; i < 40; ++i) failing.push(recording()[i]);
+  for (std::size_t i = 0; i < 40; ++i) (void)failing.push(recording()[i]);
 }
 
 TEST_P(Modes, FinishFlushesAndMayBeCalledTwice) {
-  System system(Config{}, small_rig(), GetParam());
+  System system = system_of(GetParam());
   int frames = 0;
   system.on_odometry([&](const Odometry&) { ++frames; });
   const Wall wall;
-  for (int k = 0; k < 4; ++k) system.push(StereoFrame{Time{50 * kMs * k}, wall.seen_from(0), wall.seen_from(kBaseline)});
+  const auto image = [&](int k) { return StereoFrame{Time{50 * kMs * k}, wall.seen_from(0), wall.seen_from(kBaseline)}; };
+  for (int k = 0; k < 4; ++k) ASSERT_TRUE(system.push(image(k)));
   EXPECT_TRUE(system.finish().ok());
   EXPECT_EQ(frames, 4);  // no reading ever came
   EXPECT_TRUE(system.finish().ok());
   EXPECT_EQ(system.input_counts().images, 4);
+  EXPECT_EQ(system.push(image(4)).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(frames, 4);
+}
+
+TEST(SystemParts, AFrontendOfOnesOwnGetsStampsReadingsAndLandmarksInOrder) {
+  class Recorder final : public Frontend {
+   public:
+    explicit Recorder(std::vector<std::int64_t>& updates) : updates_(updates) {}
+    TrackedFrame process(const SensorPacket&, const StatePrior&) override { return {}; }
+    void locate(const LandmarkUpdate& update) override { updates_.push_back(update.sequence); }
+
+   private:
+    std::vector<std::int64_t>& updates_;
+  };
+  std::vector<std::int64_t> updates;
+  System system = system_of(RunMode::deterministic, {.frontend = std::make_unique<Recorder>(updates)});
+  std::vector<TrackedFrame> frames;
+  system.on_tracked_frame([&](const TrackedFrame& f) { frames.push_back(f); });
+  push_all(system, recording());
+  ASSERT_TRUE(system.finish());
+  ASSERT_EQ(frames.size(), 44u);
+  EXPECT_EQ(frames[7].id.value, 7);
+  EXPECT_EQ(frames[7].t.ns, 350 * kMs);
+  EXPECT_EQ(frames[7].imu.samples.size(), 11u);
+  ASSERT_EQ(updates.size(), 42u);  // those of the last two frames come too late for any image
+  for (std::size_t i = 0; i < updates.size(); ++i) EXPECT_EQ(updates[i], static_cast<std::int64_t>(i));
 }
 
 }  // namespace

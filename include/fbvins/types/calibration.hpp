@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the cameras sit on the IMU, as the estimator has it: the rig's calibration, refined where that is asked for.
+#pragma once
+
+#include "fbvins/geometry/pose.hpp"
+
+namespace fbvins {
+
+struct Calibration {
+  Pose<B, C0> T_BC0;
+  Pose<B, C1> T_BC1;
+  double time_offset_s = 0;  ///< t_imu = t_image + offset, beyond what the input has applied
+};
+
+}  // namespace fbvins

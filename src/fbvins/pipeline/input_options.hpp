@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace fbvins {
+
+/// Sensor data on its way in.
+struct InputOptions {
+  double max_imu_wait_s = 0.25;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_imu_wait_s", max_imu_wait_s, "s", "an image goes on without its IMU readings when newer images are ahead by this", 0.0,
+      10.0);
+  }
+};
+
+}  // namespace fbvins
