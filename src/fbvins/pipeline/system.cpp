@@ -77,12 +77,14 @@ struct System::Impl {
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(frame);
     Estimate estimate = estimator.process(frame);
-    feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
     if (on_odometry) on_odometry(estimate.odometry);
-    for (Keyframe& keyframe : estimate.keyframes) {
-      if (on_keyframe) on_keyframe(keyframe);
-      if (mapper != nullptr) hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
-    }
+    if (on_keyframe)
+      for (const Keyframe& keyframe : estimate.keyframes) on_keyframe(keyframe);
+    // After the callbacks: whoever waits for this frame sees whether one of them threw.
+    feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
+    if (mapper != nullptr)
+      for (Keyframe& keyframe : estimate.keyframes)
+        hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
   }
 
   void map(MapTask task) {
