@@ -56,7 +56,7 @@ TEST(FinalAdjustment, MakesTheMapBetterThanTheGraph) {
   for (const std::uint64_t seed : {5, 6, 7}) {
     Mapped m = mapped(seed);
     const double before = error_m(m);
-    const FinalAdjustmentReport report = adjust_map(m.map, {}, {}, {});
+    const FinalAdjustmentReport report = adjust_map(m.map, {});
     EXPECT_LT(error_m(m), 0.7 * before) << seed;
     EXPECT_LT(error_m(m), 0.01) << seed;
     EXPECT_LT(report.final_rms_px, std::sqrt(2) * kPixel) << seed;
@@ -70,23 +70,23 @@ TEST(FinalAdjustment, WrongDepthsDoNotBendIt) {
   for (MapKeyframe& k : m.map.keyframes())
     for (PlaceFeature& f : k.place.features)
       if (rng.below(20) == 0) f.inverse_depth *= 1.5f;
-  adjust_map(clean.map, {}, {}, {});
-  adjust_map(m.map, {}, {}, {});
+  adjust_map(clean.map, {});
+  adjust_map(m.map, {});
   EXPECT_LT(error_m(m), 1.5 * error_m(clean) + 0.001);
 }
 
 TEST(FinalAdjustment, SameBitsAndNothingToDo) {
   Mapped a = mapped(5), b = a;
-  adjust_map(a.map, {}, {}, {});
-  adjust_map(b.map, {}, {}, {});
+  adjust_map(a.map, {});
+  adjust_map(b.map, {});
   EXPECT_EQ(serialise_map(a.map), serialise_map(b.map));
   PlaceMap nothing;
-  EXPECT_EQ(adjust_map(nothing, {}, {}, {}).points, 0);
+  EXPECT_EQ(adjust_map(nothing, {}).points, 0);
   PlaceMap alone;
   alone.T_BC0 = rig().T_BC0;
   alone.add(a.map.keyframes()[0]);
   const PlaceMap before = alone;
-  EXPECT_EQ(adjust_map(alone, {}, {}, {}).points, 0);
+  EXPECT_EQ(adjust_map(alone, {}).points, 0);
   EXPECT_EQ(serialise_map(alone), serialise_map(before));
 }
 
