@@ -7,7 +7,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "fbvins/features/five_point.hpp"
+#include "fbvins/geometry/five_point.hpp"
 
 namespace fbvins {
 namespace {

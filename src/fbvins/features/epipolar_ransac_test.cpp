@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "fbvins/features/five_point.hpp"
+#include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
 namespace {
@@ -51,26 +51,6 @@ double angle_deg(const Mat3& A, const Mat3& B_) { return so3_log(Quat(A.transpos
 
 const Mat3 kTurn = so3_exp(Vec3(0.03, -0.05, 0.08)).toRotationMatrix();
 const Vec3 kMove(0.25, -0.05, 0.1);
-
-TEST(FivePoint, TheTrueEssentialMatrixIsAmongTheSolutions) {
-  Rng rng(3);
-  for (int trial = 0; trial < 50; ++trial) {
-    const Mat3 R = so3_exp(Vec3(rng.normal(), rng.normal(), rng.normal()) * 0.2).toRotationMatrix();
-    const Vec3 t = Vec3(rng.normal(), rng.normal(), rng.normal()).normalized();
-    const Scene s = make_scene(R, t, 5, 0.0, 0.0, rng);
-    const Mat3 truth = (hat(t) * R).normalized();
-    double best = 1e9;
-    for (const Mat3& E : five_point(std::span<const Vec2, 5>(s.a.data(), 5), std::span<const Vec2, 5>(s.b.data(), 5)))
-      best = std::min({best, (E.normalized() - truth).norm(), (E.normalized() + truth).norm()});
-    EXPECT_LT(best, 1e-6) << "trial " << trial;
-  }
-}
-
-TEST(FivePoint, DecompositionRebuildsTheMatrix) {
-  const auto [R, t] = decompose_essential(hat(kMove) * kTurn);
-  EXPECT_LT(angle_deg(R, kTurn), 1e-6);
-  EXPECT_GT(std::abs(t.dot(kMove.normalized())), 1 - 1e-12);
-}
 
 class WithOutliers : public testing::TestWithParam<double> {};
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/triangulation.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -51,17 +53,12 @@ std::optional<Vec2> KltStereoMatcher::search(const KltTemplate& patch, const Vec
 StereoFailure KltStereoMatcher::check_geometry(const Vec2& left_normalised, StereoMatch& match) const {
   const Vec3 far = R_rl_ * left_normalised.homogeneous();
   const Vec3 seen = match.normalised.homogeneous();
-  const Vec3 line = p_rl_.cross(far);  // E * left, the epipolar line in the right image
-  const double across = line.head<2>().norm();
-  if (across > 0 && std::abs(seen.dot(line)) / across * focal_px_ > options_.epipolar_px) return StereoFailure::epipolar;
-  // seen x (far + rho * p) = 0, least squares over the three rows
-  const Vec3 a = seen.cross(p_rl_), b = seen.cross(far);
-  const double aa = a.squaredNorm();
-  if (!(aa > 0)) return StereoFailure::epipolar;
-  const double rho = -a.dot(b) / aa;
+  const auto off_line = distance_from_epipolar_line(far, p_rl_, seen);
+  if (off_line && *off_line * focal_px_ > options_.epipolar_px) return StereoFailure::epipolar;
+  const auto rho = inverse_depth_along(far, p_rl_, seen);
   const double rho_per_px = 1 / (focal_px_ * p_rl_.norm());
-  if (rho < -kInfinity_px * rho_per_px || rho > 1.2 / options_.min_depth_m) return StereoFailure::epipolar;
-  match.inverse_depth = std::max(rho, 0.0);
+  if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > 1.2 / options_.min_depth_m) return StereoFailure::epipolar;
+  match.inverse_depth = std::max(*rho, 0.0);
   return StereoFailure::none;
 }
 

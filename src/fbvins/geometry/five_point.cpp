@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/features/five_point.hpp"
+#include "fbvins/geometry/five_point.hpp"
 
 #include <Eigen/Dense>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/loop/p3p.hpp"
+#include "fbvins/geometry/p3p.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>

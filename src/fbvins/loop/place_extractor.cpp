@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "fbvins/geometry/triangulation.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -105,15 +107,13 @@ std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px
   if (!found.ok() || !rig_.right.inside(found.px, 2)) return std::nullopt;
   const auto right = rig_.right.undistort(found.px);
   if (!right) return std::nullopt;
-  // Distance from the epipolar line; then seen x (far + rho * p) = 0, least squares over the three rows.
   const Vec3 far = R_rl_ * left_normalised.homogeneous(), seen = right->homogeneous();
-  const Vec3 line = p_rl_.cross(far);
-  const double across = line.head<2>().norm();
-  if (!(across > 0) || std::abs(seen.dot(line)) / across * focal_px_ > kEpipolar_px) return std::nullopt;
-  const Vec3 a = seen.cross(p_rl_), b = seen.cross(far);
-  const double rho = -a.dot(b) / a.squaredNorm(), rho_per_px = 1 / (focal_px_ * baseline_m_);
-  if (rho < -kInfinity_px * rho_per_px || rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
-  return Stereo{std::max(rho, 0.0), kDisparity_px * rho_per_px};
+  const auto off_line = distance_from_epipolar_line(far, p_rl_, seen);
+  if (!off_line || *off_line * focal_px_ > kEpipolar_px) return std::nullopt;
+  const auto rho = inverse_depth_along(far, p_rl_, seen);
+  const double rho_per_px = 1 / (focal_px_ * baseline_m_);
+  if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
+  return Stereo{std::max(*rho, 0.0), kDisparity_px * rho_per_px};
 }
 
 }  // namespace fbvins

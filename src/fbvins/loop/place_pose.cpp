@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/loop/p3p.hpp"
+#include "fbvins/geometry/p3p.hpp"
 
 namespace fbvins {
 namespace {

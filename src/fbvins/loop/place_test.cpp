@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two synthetic views of one cloud of points: three points, RANSAC, refinement, verification.
+// Two synthetic views of one cloud of points: RANSAC, refinement, verification.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "fbvins/loop/p3p.hpp"
 #include "fbvins/loop/place_verifier.hpp"
 
 namespace fbvins {
@@ -61,33 +60,6 @@ Place view(const Cloud& c, const Pose<W, C0>& T_WC, double px, std::uint64_t see
 }
 
 const Pose<W, C0> kThere(so3_exp(Vec3(0.1, -0.35, 0.05)), Vec3(0.9, -0.2, 0.5));
-
-TEST(P3p, FindsTheTruePoseAmongItsSolutionsOfRandomTriples) {
-  Rng rng(3);
-  int found = 0;
-  constexpr int kTries = 500;
-  for (int i = 0; i < kTries; ++i) {
-    const Quat q = so3_exp(Vec3(rng.normal(), rng.normal(), rng.normal()));
-    const Vec3 t(rng.normal(), rng.normal(), rng.normal());
-    std::array<Vec3, 3> rays, points;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 p_C = rng.uniform(1, 8) * Vec3(rng.uniform(-0.8, 0.8), rng.uniform(-0.6, 0.6), 1);
-      rays[k] = p_C;
-      points[k] = q.conjugate() * (p_C - t);
-    }
-    double best = 1e9;
-    for (const auto& [R, p] : solve_p3p(rays, points)) {
-      EXPECT_NEAR(R.determinant(), 1.0, 1e-9);
-      best = std::min(best, (R - q.toRotationMatrix()).norm() + (p - t).norm());
-    }
-    found += best < 1e-5;
-  }
-  EXPECT_GE(found, kTries - 5);  // a handful of triples is close to degenerate
-}
-
-TEST(P3p, PointsOnALineGiveNothing) {
-  EXPECT_EQ(solve_p3p({Vec3(0, 0, 1), Vec3(0.1, 0, 1), Vec3(0.2, 0, 1)}, {Vec3(0, 0, 3), Vec3(1, 0, 3), Vec3(2, 0, 3)}).count, 0);
-}
 
 TEST(PlaceVerifier, FindsThePoseAndItsInformationIsHonest) {
   const Cloud c = cloud(500, 1);
