@@ -8,12 +8,15 @@
 #include "apps/terminal.hpp"
 #include "fbvins/config/config_file.hpp"
 #include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/option_tiers.hpp"
+#include "fbvins/config/yaml.hpp"
 
 namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples = R"(examples:
-  fbvins config                                  every option with unit, range, value and meaning
+  fbvins config                                  the user's options with unit, range, value and meaning
+  fbvins config --all                            the expert's as well
   fbvins config --yaml > drone.yaml              a file to start from
   fbvins config --config drone.yaml --set estimator.max_iterations=8
 )";
@@ -21,11 +24,11 @@ constexpr const char* kExamples = R"(examples:
 struct Arguments {
   std::string file;
   std::vector<std::string> assignments;
-  bool defaults = false, yaml = false;
+  bool all = false, defaults = false, yaml = false;
 };
 
-void print_table(Config config) {
-  for (const OptionField& field : fields_of(config)) {
+void print_table(const std::vector<OptionField>& fields) {
+  for (const OptionField& field : fields) {
     if (field.is_group()) {
       fmt::print("\n{}: {}\n", bold(field.path), field.meaning);
       continue;
@@ -37,10 +40,12 @@ void print_table(Config config) {
 }
 
 int show(const Arguments& arguments) {
-  const auto config = arguments.defaults ? Config{} : load_config(arguments.file, arguments.assignments);
+  auto config = arguments.defaults ? Config{} : load_config(arguments.file, arguments.assignments);
   if (!config) return fail(config.error().message);
-  if (arguments.yaml) fmt::print("{}", to_yaml(*config));
-  else print_table(*config);
+  std::vector<OptionField> fields = fields_of(*config);
+  if (!arguments.all) fields = user_fields(fields);
+  if (arguments.yaml) fmt::print("{}", write_yaml(fields));
+  else print_table(fields);
   return kOk;
 }
 
@@ -48,13 +53,14 @@ int show(const Arguments& arguments) {
 
 void add_config_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("config", "print every option with value, unit, range and meaning");
+  CLI::App* command = program.add_subcommand("config", "print options with value, unit, range and meaning");
   command->footer(kExamples);
   auto* file = command->add_option("--config", arguments->file, "YAML file that changes the defaults");
   auto* set = command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
                   ->take_all()
                   ->allow_extra_args(false);
   command->add_flag("--defaults", arguments->defaults, "the defaults (as without any argument)")->excludes(file)->excludes(set);
+  command->add_flag("--all", arguments->all, "the expert's options as well as the user's");
   command->add_flag("--yaml", arguments->yaml, "as a configuration file");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });
 }

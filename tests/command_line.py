@@ -59,8 +59,8 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("bench", self.write("m.yaml", "datasets:\n  - {pth: x}\n")), "m.yaml:2: unknown key 'pth'")
 
     def test_config_round_trip(self):
-        first = fbvins("config", "--yaml").stdout
-        again = fbvins("config", "--yaml", "--config", self.write("c.yaml", first)).stdout
+        first = fbvins("config", "--all", "--yaml").stdout
+        again = fbvins("config", "--all", "--yaml", "--config", self.write("c.yaml", first)).stdout
         self.assertEqual(first, again)
         changed = fbvins("config", "--yaml", "--set", "estimator.max_iterations=9").stdout
         self.assertEqual([line for line in changed.splitlines() if line not in first.splitlines()],
@@ -75,7 +75,10 @@ class CommandLine(unittest.TestCase):
 
     def test_every_option_is_explained(self):
         text = fbvins("config").stdout
+        everything = fbvins("config", "--all").stdout
         self.assertIn("estimator.max_iterations = ", text)
+        self.assertNotIn("estimator.keyframes.leaving", text)
+        self.assertIn("estimator.keyframes.leaving = oldest   oldest|entropy", everything)
         self.assertIn("frontend.kind = klt   klt|orb", text)
         self.assertNotIn("\033", text)
 

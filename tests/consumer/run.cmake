@@ -1,16 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -DBUILD=<build folder> -DSOURCE=<tests/consumer> -DCXX=<compiler> -P run.cmake
-# Installs into a fresh prefix, then configures, builds and runs the consumer against it alone.
-set(prefix ${BUILD}/consumer/prefix)
-file(REMOVE_RECURSE ${BUILD}/consumer)
+# cmake -DBUILD=<build folder> -DSOURCE=<tests/consumer> -DCXX=<compiler> -DTUTORIAL=<file> -DFBVINS=<program> -P run.cmake
+# Installs into a fresh prefix, then configures, builds and runs users' projects against it alone.
+set(folder ${BUILD}/consumer)
+file(REMOVE_RECURSE ${folder})
 function(step)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "failed: ${ARGN}")
   endif()
 endfunction()
-step(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
-step(${CMAKE_COMMAND} -S ${SOURCE} -B ${BUILD}/consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release
-  -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_PREFIX_PATH=${prefix})
-step(${CMAKE_COMMAND} --build ${BUILD}/consumer/build)
-step(${BUILD}/consumer/build/consumer)
+function(build project)
+  step(${CMAKE_COMMAND} -S ${SOURCE}/${project} -B ${folder}/${project} -G Ninja -DCMAKE_BUILD_TYPE=Release
+    -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_PREFIX_PATH=${folder}/prefix -DFBVINS_INCLUDE=${folder}/prefix/include
+    -DTUTORIAL=${TUTORIAL} ${ARGN})
+  step(${CMAKE_COMMAND} --build ${folder}/${project})
+endfunction()
+step(${CMAKE_COMMAND} --install ${BUILD} --prefix ${folder}/prefix)
+
+# The core, as on a machine that has none of the other components' libraries.
+set(hidden "")
+foreach(package Ceres PNG yaml-cpp PkgConfig nlohmann_json CLI11)
+  list(APPEND hidden -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
+endforeach()
+build(core ${hidden})
+step(${folder}/core/consumer)
+execute_process(COMMAND ldd ${folder}/core/consumer OUTPUT_VARIABLE linked)
+if(linked MATCHES "lib(ceres|zip|png|turbojpeg|yaml)")
+  message(FATAL_ERROR "a user of the core links more than it needs:\n${linked}")
+endif()
+
+# A component that is not there is said by name.
+file(MAKE_DIRECTORY ${folder}/absent)
+file(WRITE ${folder}/absent/CMakeLists.txt "cmake_minimum_required(VERSION 3.22)
+project(absent LANGUAGES CXX)
+find_package(fbvins REQUIRED COMPONENTS loop teleport)
+")
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${folder}/absent -B ${folder}/absent/build -DCMAKE_PREFIX_PATH=${folder}/prefix ${hidden}
+  RESULT_VARIABLE result ERROR_VARIABLE message OUTPUT_QUIET)
+if(result EQUAL 0 OR NOT message MATCHES "teleport" OR NOT message MATCHES "Ceres")
+  message(FATAL_ERROR "asking for what is absent must fail by name, but: ${result}\n${message}")
+endif()
+
+# Recordings and maps, by the lines of the tutorial.
+build(recording)
+step(${FBVINS} simulate normal --seconds 4 --seed 1 --out ${folder}/flight --quiet)
+step(${folder}/recording/consumer ${folder}/flight ${folder}/flat.fbm)

@@ -11,7 +11,9 @@
 
 namespace fbvins {
 
-struct W {};   ///< odometry world: z up, gravity along -z, never jumps
+/// Odometry frame: z up as far as gravity is known, origin and heading from the start. Loop closure never moves W, and only
+/// a restart begins a new one; poses in W are corrected when landmarks are re-observed and while W is levelled.
+struct W {};
 struct M {};   ///< map: W corrected by loop closure
 struct B {};   ///< body = IMU
 struct C0 {};  ///< left camera, z forward, x right, y down

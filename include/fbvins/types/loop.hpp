@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What loop closure tells the world: M is W corrected by places seen again. W itself never jumps.
+// What loop closure tells the world: M is W corrected by places seen again. Loop closure never moves W.
 #pragma once
 
 #include <cstdint>

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// A frontend of a user's own, whole in this file: follows round dots that are told apart by their grey value.
+#pragma once
+
+#include <array>
+#include <fbvins/frontend/frontend.hpp>
+#include <optional>
+
+#include "../wall.hpp"
+
+class DotFrontend final : public fbvins::Frontend {
+ public:
+  explicit DotFrontend(const fbvins::StereoRig& rig) : rig_(rig) {}
+
+  fbvins::TrackedFrame process(const fbvins::SensorPacket& packet, const fbvins::StatePrior&) override {
+    fbvins::TrackedFrame out;
+    out.has_left = packet.frame.left != nullptr;
+    out.has_right = packet.frame.right != nullptr;
+    if (!out.has_left || !out.has_right) return out;
+    const auto left = dots_in(*packet.frame.left, rig_.left), right = dots_in(*packet.frame.right, rig_.right);
+    for (int dot = 0; dot < wall::kDots; ++dot) {
+      const auto k = static_cast<std::size_t>(dot);
+      if (!left[k]) continue;
+      out.features.push_back({fbvins::TrackId{dot}, *left[k], right[k], packet.id.value > 0});
+      out.stats.stereo += right[k].has_value();
+    }
+    return out;
+  }
+
+ private:
+  using Dots = std::array<std::optional<fbvins::Observation>, wall::kDots>;
+
+  /// The centre of each dot that is wholly inside the image.
+  static Dots dots_in(const fbvins::Image& image, const fbvins::Camera& camera) {
+    constexpr double kWhole_px2 = 100, kSigma_px = 0.1;
+    std::array<fbvins::Vec3, wall::kDots> sums;
+    sums.fill(fbvins::Vec3::Zero());
+    for (int v = 0; v < image.height(); ++v)
+      for (int u = 0; u < image.width(); ++u)
+        if (const int dot = image.at(u, v) - wall::kFirstDot; dot >= 0 && dot < wall::kDots)
+          sums[static_cast<std::size_t>(dot)] += fbvins::Vec3(u, v, 1);
+    Dots dots;
+    for (std::size_t k = 0; k < dots.size(); ++k) {
+      if (sums[k].z() < kWhole_px2) continue;
+      fbvins::Observation observation;
+      observation.pixel = sums[k].head<2>() / sums[k].z();
+      observation.normalised = camera.undistort(observation.pixel).value();
+      fbvins::Mat2 J_pixel_normalised;
+      camera.distort(observation.normalised, &J_pixel_normalised);
+      observation.sqrt_information = J_pixel_normalised / kSigma_px;
+      dots[k] = observation;
+    }
+    return dots;
+  }
+
+  fbvins::StereoRig rig_;
+};

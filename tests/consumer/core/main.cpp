@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The installed core alone: images and readings made here go in, poses come out, with a frontend that ships and with one
+// of the user's own.
+#include <cmath>
+#include <cstdio>
+#include <fbvins/pipeline/system.hpp>
+
+#include "dot_frontend.hpp"
+
+/// Error of the last pose's distance from the start, m; not a number without a pose.
+double fly(fbvins::SystemParts parts, const char* name) {
+  auto system = fbvins::System::create({}, wall::rig(), fbvins::RunMode::threaded, std::move(parts));
+  if (!system) {
+    std::puts(system.error().message.c_str());
+    return NAN;
+  }
+  int poses = 0;
+  double error_m = NAN;
+  system->on_odometry([&](const fbvins::Odometry& o) {
+    if (!o.health.has_pose()) return;
+    ++poses;
+    error_m = std::abs(o.T_WB.p.norm() - wall::sway_m(o.t.seconds()));
+  });
+  for (fbvins::SensorEvent& event : wall::flight(44))
+    if (!system->push(std::move(event))) break;
+  if (const auto end = system->finish(); !end) {
+    std::puts(end.error().message.c_str());
+    return NAN;
+  }
+  std::printf("%s: %d poses, the last %.1f mm off\n", name, poses, 1e3 * error_m);
+  return poses > 20 ? error_m : NAN;
+}
+
+int main() {
+  const double shipped_m = fly({}, "klt");
+  const double own_m = fly({.frontend = std::make_unique<DotFrontend>(wall::rig())}, "dots");
+  return shipped_m < 0.03 && own_m < 0.03 ? 0 : 1;
+}
