@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+# fbvins_use_precompiled(TARGET KIND): the large headers of other libraries, parsed once for all targets of a kind.
+# A compiler accepts precompiled headers only where its flags are the same: libraries are compiled with -fPIC, programs with
+# -fPIE, and a source with options of its own says SKIP_PRECOMPILE_HEADERS. Headers of this project are not among them: a
+# source must include what it uses, and -DFBVINS_PRECOMPILED_HEADERS=OFF (dev lint, dev check) sees whether it does.
+set(FBVINS_PRECOMPILED_library <Eigen/Dense> <fmt/format.h> <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory>
+  <numeric> <optional> <string> <unordered_map> <vector>)
+set(FBVINS_PRECOMPILED_program ${FBVINS_PRECOMPILED_library} <CLI/CLI.hpp> <nlohmann/json.hpp>)
+set(FBVINS_PRECOMPILED_test ${FBVINS_PRECOMPILED_library} <gtest/gtest.h>)
+
+# The target that holds the precompiled headers of a kind, made when first asked for.
+function(fbvins_precompiled_holder KIND)
+  set(source ${PROJECT_BINARY_DIR}/precompiled_${KIND}.cpp)
+  file(CONFIGURE OUTPUT ${source} CONTENT "int main() {}\n")
+  if(KIND STREQUAL "library")
+    add_library(fbvins_precompiled_${KIND} OBJECT EXCLUDE_FROM_ALL ${source})
+  else()
+    add_executable(fbvins_precompiled_${KIND} EXCLUDE_FROM_ALL ${source})
+  endif()
+  target_link_libraries(fbvins_precompiled_${KIND} PRIVATE fbvins_flags Eigen3::Eigen fmt::fmt Threads::Threads)
+  if(KIND STREQUAL "program")
+    find_package(CLI11 REQUIRED)
+    find_package(nlohmann_json REQUIRED)
+    target_link_libraries(fbvins_precompiled_${KIND} PRIVATE CLI11::CLI11 nlohmann_json::nlohmann_json)
+  elseif(KIND STREQUAL "test")
+    target_link_libraries(fbvins_precompiled_${KIND} PRIVATE GTest::gtest)
+  endif()
+  target_precompile_headers(fbvins_precompiled_${KIND} PRIVATE ${FBVINS_PRECOMPILED_${KIND}})
+endfunction()
+
+function(fbvins_use_precompiled TARGET KIND)
+  if(NOT FBVINS_PRECOMPILED_HEADERS)
+    return()
+  endif()
+  if(NOT TARGET fbvins_precompiled_${KIND})
+    fbvins_precompiled_holder(${KIND})
+  endif()
+  target_precompile_headers(${TARGET} REUSE_FROM fbvins_precompiled_${KIND})
+endfunction()
