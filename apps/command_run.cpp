@@ -73,15 +73,14 @@ struct Flight {
 
 /// Sends the whole recording through the system, and ends the map.
 Result<Flight> process(const Arguments& arguments, const Config& config, Dataset& data, Progress& progress) {
-  auto closer = make_loop_closer(arguments.map, data.rig(), config.loop);
-  if (!closer) return closer.error();
+  const auto map = make_map(arguments.map, data.rig(), config.loop);
+  if (!map) return map.error();
   Flight flight;
-  const std::unique_ptr<LoopCloser> loop = std::move(*closer);
-  if (loop) flight.map.emplace();
+  if (*map) flight.map.emplace();
   flight.run.tracked.reserve(data.frames().size());
   flight.run.odometry.reserve(data.frames().size());
   Result<System> system =
-      System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, {.mapper = loop.get()});
+      System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, {.mapper = map->get()});
   if (!system) return system.error();
   SurvivalMeter survival;
   system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
@@ -94,9 +93,9 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
     if (is_frame) progress.update(++frames);
   }
   if (Result<void> done = system->finish(); !done) return done.error();
-  if (flight.map) finish_map(arguments.map, *loop, flight.run, *flight.map);
+  if (flight.map) finish_map(arguments.map, **map, flight.run, *flight.map);
   if (flight.map)
-    if (Result<void> saved = save_map(arguments.map, *loop); !saved) flight.map->not_saved = saved.error().message;
+    if (Result<void> saved = save_map(arguments.map, **map); !saved) flight.map->not_saved = saved.error().message;
   return flight;
 }
 

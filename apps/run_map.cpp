@@ -6,10 +6,8 @@
 #include <filesystem>
 
 #include "fbvins/core/stage_timer.hpp"
-#include "fbvins/features/booster.hpp"
 #include "fbvins/io/trajectory.hpp"
-#include "fbvins/loop/map_file.hpp"
-#include "fbvins/loop/vocabulary_file.hpp"
+#include "fbvins/loop/map_frame.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -41,11 +39,11 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
 }
 
 /// Each restart begins a new W: they are corrected one by one.
-Trajectory corrected(const LoopCloser& loop, const RunRecord& run) {
+Trajectory corrected(const LoopMap& map, const RunRecord& run) {
   Trajectory all, part;
   std::uint32_t reset_counter = 0;
   const auto flush = [&] {
-    const Trajectory done = loop.corrected(part);
+    const Trajectory done = map.corrected(part);
     all.insert(all.end(), done.begin(), done.end());
     part.clear();
   };
@@ -73,39 +71,30 @@ std::optional<Evaluation> evaluated(const Trajectory& truth, const Trajectory& e
 
 }  // namespace
 
-Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& arguments, const StereoRig& rig,
-                                                     const LoopOptions& options) {
-  if (!arguments.wanted()) return std::unique_ptr<LoopCloser>();
+Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {
+  if (!arguments.wanted()) return std::unique_ptr<LoopMap>();
   if (!arguments.save.empty())
     if (Result<void> there = check_folder_of(arguments.save); !there) return there.error();
-  Result<PlaceMap> map = PlaceMap{};
-  if (!arguments.load.empty()) map = load_map(arguments.load);
-  if (!map) return map.error();
-  if (map->empty()) map->boosted = arguments.boosted;
-  auto vocabulary = open_vocabulary(map->boosted ? kBoostedDescriptors : kRawDescriptors, arguments.vocabulary);
-  if (!vocabulary) return vocabulary.error();
-  Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
-  if (map->boosted) stage = make_booster_stage(BoosterOptions{});
-  if (!stage) return stage.error();
-  return std::make_unique<LoopCloser>(rig, options, std::move(*vocabulary), std::move(*map), std::move(*stage));
+  return LoopMap::create(
+      rig, {.file = arguments.load, .vocabulary = arguments.vocabulary, .boosted = arguments.boosted, .loop = options});
 }
 
-void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record) {
+void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record) {
   compose_causal(run, arguments.load.empty(), record);
   CpuTimer timer;
-  record.loops_left_out = loop.finish().rejected;
+  record.loops_left_out = map.finish().rejected;
   record.finish_ms = timer.lap_ms();
-  record.keyframes_in_map = static_cast<int>(loop.map().size());
-  record.final = corrected(loop, run);
+  record.keyframes_in_map = map.keyframes();
+  record.final = corrected(map, run);
   if (!arguments.final_ba) return;
   timer.lap_ms();
-  record.adjustment = loop.adjust();
+  record.adjustment = map.adjust();
   record.adjust_ms = timer.lap_ms();
-  record.adjusted = corrected(loop, run);
+  record.adjusted = corrected(map, run);
 }
 
-Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop) {
-  return arguments.save.empty() ? Result<void>{} : fbvins::save_map(loop.map(), arguments.save);
+Result<void> save_map(const MapArguments& arguments, const LoopMap& map) {
+  return arguments.save.empty() ? Result<void>{} : map.save(arguments.save);
 }
 
 Result<void> write_map_record(const MapRecord& record, const std::string& folder) {

@@ -11,8 +11,7 @@
 #include "apps/run_output.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/eval/evaluation.hpp"
-#include "fbvins/loop/final_adjustment.hpp"
-#include "fbvins/loop/loop_closer.hpp"
+#include "fbvins/loop/loop_map.hpp"
 #include "fbvins/types/loop.hpp"
 
 namespace fbvins::app {
@@ -24,8 +23,7 @@ struct MapArguments {
 };
 
 /// Null where no loop closure is wanted. Errors of the vocabulary, the old map, the folder of the new one.
-Result<std::unique_ptr<LoopCloser>> make_loop_closer(const MapArguments& arguments, const StereoRig& rig,
-                                                     const LoopOptions& options);
+Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options);
 
 /// What the loop stage said, keyframe by keyframe, and what came out in the end.
 struct MapRecord {
@@ -40,8 +38,8 @@ struct MapRecord {
 };
 
 /// Ends the map (last optimisation, bundle adjustment where asked for) and composes the trajectories.
-void finish_map(const MapArguments& arguments, LoopCloser& loop, const RunRecord& run, MapRecord& record);
-Result<void> save_map(const MapArguments& arguments, const LoopCloser& loop);
+void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record);
+Result<void> save_map(const MapArguments& arguments, const LoopMap& map);
 /// map_trajectory_tum.txt (the best there is), map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
 Result<void> write_map_record(const MapRecord& record, const std::string& folder);
 

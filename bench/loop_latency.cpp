@@ -13,8 +13,7 @@
 
 #include "fbvins/eval/statistics.hpp"
 #include "fbvins/io/dataset.hpp"
-#include "fbvins/loop/loop_closer.hpp"
-#include "fbvins/loop/vocabulary_file.hpp"
+#include "fbvins/loop/loop_map.hpp"
 #include "fbvins/pipeline/system.hpp"
 
 using namespace fbvins;
@@ -47,9 +46,8 @@ std::vector<double> play(const std::vector<SensorEvent>& events, const StereoRig
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto vocabulary = Vocabulary::open(shipped_vocabulary());
-  if (argc < 2 || !vocabulary) {
-    fmt::print(stderr, "{}\n", argc < 2 ? "usage: loop_latency DATASET [ROUNDS]" : vocabulary.error().message);
+  if (argc < 2) {
+    fmt::print(stderr, "usage: loop_latency DATASET [ROUNDS]\n");
     return 2;
   }
   const auto data = open_dataset(argv[1]);
@@ -63,8 +61,12 @@ int main(int argc, char** argv) {
   std::vector<double> without, with;
   for (int round = 0; round < rounds; ++round) {
     const auto a = play(events, (*data)->rig(), nullptr);
-    LoopCloser loop((*data)->rig(), LoopOptions{}, *vocabulary);
-    const auto b = play(events, (*data)->rig(), &loop);
+    const auto map = LoopMap::create((*data)->rig());
+    if (!map) {
+      fmt::print(stderr, "{}\n", map.error().message);
+      return 2;
+    }
+    const auto b = play(events, (*data)->rig(), map->get());
     without.insert(without.end(), a.begin(), a.end());
     with.insert(with.end(), b.begin(), b.end());
   }
