@@ -35,8 +35,7 @@ std::string booster_weights_path(const std::string& weights) {
 Result<std::unique_ptr<DescriptorStage>> make_booster_stage(const BoosterOptions& options) {
   const Result<BoosterWeights> weights = load_booster_weights(booster_weights_path(options.weights));
   if (!weights) return weights.error();
-  const auto precision = options.precision == "float32" ? BoosterPrecision::float32 : BoosterPrecision::int8;
-  return std::unique_ptr<DescriptorStage>(std::make_unique<BoosterStage>(*weights, precision));
+  return std::unique_ptr<DescriptorStage>(std::make_unique<BoosterStage>(*weights, options.precision));
 }
 
 }  // namespace fbvins

@@ -11,20 +11,10 @@
 #include <string>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/features/booster_options.hpp"
 #include "fbvins/features/descriptor_stage.hpp"
 
 namespace fbvins {
-
-struct BoosterOptions {
-  std::string weights = "boost-s";
-  std::string precision = "int8";
-
-  template <class V>
-  void visit(V&& v) {
-    v("weights", weights, "", "shipped weights, boost-s (small) or boost-b, or the path of a .safetensors file");
-    v("precision", precision, "int8|float32", "whole numbers, fast; or single precision, for comparison");
-  }
-};
 
 /// The file that `weights` means: a path as it is, a name in the folder of FBVINS_WEIGHTS, where the project was
 /// installed, or in its sources.

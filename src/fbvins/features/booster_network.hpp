@@ -10,13 +10,12 @@
 #include <span>
 #include <vector>
 
+#include "fbvins/features/booster_options.hpp"
 #include "fbvins/features/booster_weights.hpp"
 #include "fbvins/features/int8_gemm.hpp"
 #include "fbvins/features/keypoint.hpp"
 
 namespace fbvins {
-
-enum class BoosterPrecision { int8, float32 };
 
 /// Geometry of keypoints as the network is told it, kBoosterGeometry numbers each: place relative to the image's centre,
 /// logarithm of the score relative to the image's mean and that mean, cosine and sine of the angle, logarithm of the scale.

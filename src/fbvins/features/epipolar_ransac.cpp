@@ -114,10 +114,13 @@ void settle(const Matches& m, double threshold, Candidate& best) {
   }
 }
 
+/// Probability that one sample was free of outliers.
+constexpr double kConfidence = 0.999;
+
 int iterations_needed(double inlier_share, int sample_size, const EpipolarOptions& options) {
   const double good = std::pow(inlier_share, sample_size);
   if (good > 1.0 - 1e-9) return 1;
-  const double n = std::log(1.0 - options.confidence) / std::log(1.0 - std::max(good, 1e-12));
+  const double n = std::log(1.0 - kConfidence) / std::log(1.0 - std::max(good, 1e-12));
   return static_cast<int>(std::clamp(std::ceil(n), 1.0, static_cast<double>(options.max_iterations)));
 }
 
@@ -174,11 +177,13 @@ int count_rotation_only(const Mat3& R, const Matches& m, double threshold) {
   return n;
 }
 
+constexpr int kRotationSamples = 40;
+
 /// The rotation that alone explains most matches, and how many.
 std::pair<Mat3, int> search_rotation_only(const Matches& m, const EpipolarOptions& options, Rng& rng) {
   Mat3 best = Mat3::Identity();
   int count = count_rotation_only(best, m, options.threshold);
-  for (int iteration = 0; iteration < std::min(40, options.max_iterations); ++iteration) {
+  for (int iteration = 0; iteration < std::min(kRotationSamples, options.max_iterations); ++iteration) {
     const auto [i, j] = draw<2>(m.size(), rng);
     if ((m.a[i] - m.a[j]).squaredNorm() < 1e-4) continue;
     const Mat3 R = rotation_of_two(m, i, j);

@@ -22,15 +22,7 @@ namespace fbvins {
 struct EpipolarOptions {
   /// Largest Sampson distance of an inlier in normalised coordinates: pixels / focal length.
   double threshold = 1.0 / 460.0;
-  double confidence = 0.999;  ///< probability that one sample was free of outliers
-  int max_iterations = 200;   ///< samples tried at most
-
-  template <class V>
-  void visit(V&& v) {
-    v("threshold", threshold, "px/focal", "largest epipolar (Sampson) distance of an inlier", 1e-6, 0.1);
-    v("confidence", confidence, "", "probability that one sample was free of outliers", 0.5, 0.999999);
-    v("max_iterations", max_iterations, "", "samples tried at most", 1, 10000);
-  }
+  int max_iterations = 200;  ///< samples tried at most
 };
 
 struct EpipolarResult {

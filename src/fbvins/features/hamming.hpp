@@ -20,16 +20,9 @@ void hamming_distances(const Descriptor& query, std::span<const Descriptor> trai
 void hamming_distances(const Descriptor& query, std::span<const Descriptor> train, std::uint16_t* out);
 
 struct HammingOptions {
-  int max_distance = 64;
+  int max_distance = 64;    ///< bits
   double max_ratio = 0.85;  ///< best over second-best distance
   bool mutual = true;       ///< each is the other's best
-
-  template <class V>
-  void visit(V&& v) {
-    v("max_distance", max_distance, "bit", "largest Hamming distance of a match", 1, 256);
-    v("max_ratio", max_ratio, "", "largest ratio of the best to the second-best distance", 0.1, 1.0);
-    v("mutual", mutual, "", "a match must be the best both ways");
-  }
 };
 
 struct DescriptorMatch {

@@ -213,13 +213,26 @@ struct LevelFit {
   KltStatus status = KltStatus::ok;
 };
 
+/// Gauss-Newton iterations on each pyramid level.
+constexpr int kMaxIterations = 15;
+/// Step at which the finest level has converged; coarse levels only have to bring the next one within reach.
+constexpr double kConverged_px = 0.01;
+constexpr double kConvergedCoarse_px = 0.05;
+/// Smallest normalised cross-correlation of an accepted patch.
+constexpr double kMinCorrelation = 0.75;
+/// A residual below this, grey values, is image noise and accepted whatever the correlation, if there is some.
+constexpr double kMaxResidualNoise = 2.5;
+constexpr float kSomeCorrelation = 0.3f;
+/// Largest change of contrast between two patches, either way.
+constexpr double kMaxGain = 20;
+/// Longest step of one iteration.
+constexpr double kMaxStep_px = 2;
 /// A level may not carry the feature farther than this from where it started on that level.
 constexpr double kMaxTravel_px = 10;
 
-void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, double convergence_px, int max_iterations,
-                 double max_gain, LevelFit& fit) {
+void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, double convergence_px, LevelFit& fit) {
   const Vec2 start = fit.px;
-  for (int i = 0; i < max_iterations; ++i) {
+  for (int i = 0; i < kMaxIterations; ++i) {
     Place place;
     if (!place_patch(image, fit.px.x(), fit.px.y(), 0, place)) {
       fit.status = KltStatus::outside;
@@ -230,13 +243,13 @@ void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, doubl
     const float asx = patch.ihxx * fit.sums.gx + patch.ihxy * fit.sums.gy;
     const float asy = patch.ihxy * fit.sums.gx + patch.ihyy * fit.sums.gy;
     fit.gain = fit.sums.t / patch.energy - patch.ctx * asx - patch.cty * asy;
-    if (!(fit.gain * max_gain > 1 && fit.gain < max_gain)) {
+    if (!(fit.gain * kMaxGain > 1 && fit.gain < kMaxGain)) {
       fit.status = KltStatus::diverged;
       return;
     }
     Vec2 step(asx / fit.gain, asy / fit.gain);
     const double length = step.norm();
-    if (length > 2) step *= 2 / length;
+    if (length > kMaxStep_px) step *= kMaxStep_px / length;
     fit.px -= step;
     if ((fit.px - start).squaredNorm() > kMaxTravel_px * kMaxTravel_px) {
       fit.status = KltStatus::diverged;
@@ -304,8 +317,7 @@ bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) 
   return out.valid;
 }
 
-KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
-                    const KltOptions& options) {
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest) {
   KltResult result;
   result.px = start_px;
   LevelFit fit;
@@ -316,9 +328,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
     fit = LevelFit{};
     fit.px = result.px / scale;
     const bool last = l == finest;
-    // Coarse levels only have to bring the next one within reach.
-    const double convergence_px = last ? options.convergence_px : std::max(options.convergence_px, 0.05);
-    align_level(level_patch, image.level(l), convergence_px, options.max_iterations, options.max_gain, fit);
+    align_level(level_patch, image.level(l), last ? kConverged_px : kConvergedCoarse_px, fit);
     result.iterations += fit.iterations;
     if (fit.status == KltStatus::ok) result.px = fit.px * scale;
     else if (last) break;
@@ -336,8 +346,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
   result.gain = fit.gain;
   const float variance = std::max(0.0f, fit.sums.square - fit.sums.one * fit.sums.one);
   result.residual = std::sqrt(std::max(0.0f, variance * (1 - result.correlation * result.correlation)));
-  if (result.correlation < options.min_correlation &&
-      !(result.correlation > 0.3f && result.residual < options.max_residual_noise))
+  if (result.correlation < kMinCorrelation && !(result.correlation > kSomeCorrelation && result.residual < kMaxResidualNoise))
     result.status = KltStatus::poor_match;
   return result;
 }

@@ -9,7 +9,7 @@
 //
 //   KltTemplate patch;
 //   patch.cut(pyramid_then, px, 0, 3);
-//   KltResult found = klt_align(patch, pyramid_now, predicted_px, 3, 0, options);
+//   KltResult found = klt_align(patch, pyramid_now, predicted_px, 3, 0);
 //   if (found.ok()) use(found.px);
 #pragma once
 
@@ -24,24 +24,8 @@ namespace fbvins {
 inline constexpr int kKltPatch = 16;
 /// Distance from a feature to the farthest pixel its template reads, rounded up.
 inline constexpr int kKltReach = kKltPatch / 2 + 2;
-
-struct KltOptions {
-  int max_iterations = 15;
-  double convergence_px = 0.01;
-  double min_correlation = 0.75;
-  double max_residual_noise = 2.5;
-  double max_gain = 20;
-
-  template <class V>
-  void visit(V&& v) {
-    v("max_iterations", max_iterations, "", "Gauss-Newton iterations on each pyramid level", 1, 100);
-    v("convergence_px", convergence_px, "px", "step at which the finest level has converged", 1e-4, 0.5);
-    v("min_correlation", min_correlation, "", "smallest normalised cross-correlation of an accepted patch", -1.0, 1.0);
-    v("max_residual_noise", max_residual_noise, "grey",
-      "a residual below this is image noise and accepted whatever the correlation", 0.0, 50.0);
-    v("max_gain", max_gain, "", "largest change of contrast between two patches, either way", 1.0, 1000.0);
-  }
-};
+/// A feature nearer to the image's edge than this has no whole patch.
+inline constexpr double kPatchBorder_px = kKltReach - 2;
 
 /// What one pyramid level needs of the template: the projections onto gradient and grey value.
 struct alignas(64) KltLevelTemplate {
@@ -88,9 +72,9 @@ struct KltResult {
   bool ok() const { return status == KltStatus::ok; }
 };
 
-/// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`.
-KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
-                    const KltOptions& options);
+/// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it
+/// correlates with the template, or what differs is no more than noise.
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest);
 
 /// Weighted normalised cross-correlation of a template with the image at one place of level `level`
 /// (position in pixels of that level); -1 outside the image.

@@ -21,7 +21,7 @@ Summary follow(const Image& then, const Image& now, const Vec2& motion, const Ve
   Pyramid a, b;
   a.build(then.view(), 4);
   b.build(now.view(), 4);
-  ShiTomasiDetector detector(ShiTomasiOptions{});
+  ShiTomasiDetector detector(22);
   Summary summary;
   std::vector<double> errors;
   KltTemplate patch;
@@ -30,7 +30,7 @@ Summary follow(const Image& then, const Image& now, const Vec2& motion, const Ve
     if (truth.x() < 12 || truth.y() < 12 || truth.x() > kWidth - 13 || truth.y() > kHeight - 13) continue;
     ++summary.tried;
     if (!patch.cut(a, corner.px, 0, 3)) continue;
-    const KltResult found = klt_align(patch, b, corner.px + prediction, 3, 0, KltOptions{});
+    const KltResult found = klt_align(patch, b, corner.px + prediction, 3, 0);
     if (!found.ok()) continue;
     ++summary.accepted;
     errors.push_back((found.px - truth).norm());
@@ -104,10 +104,10 @@ TEST(Klt, RefusesTemplatesWithoutTextureOrOutside) {
   EXPECT_FALSE(patch.cut(textured, Vec2(-30, 100), 0, 3));
   EXPECT_FALSE(patch.cut(textured, Vec2(100, std::nan("")), 0, 3));
   ASSERT_TRUE(patch.cut(textured, Vec2(100, 100), 0, 3));
-  EXPECT_FALSE(klt_align(patch, textured, Vec2(5000, 100), 3, 0, KltOptions{}).ok());
-  EXPECT_FALSE(klt_align(patch, textured, Vec2(std::nan(""), 100), 3, 0, KltOptions{}).ok());
-  EXPECT_FALSE(klt_align(patch, Pyramid{}, Vec2(100, 100), 3, 0, KltOptions{}).ok());
-  const KltResult itself = klt_align(patch, textured, Vec2(100, 100), 3, 0, KltOptions{});
+  EXPECT_FALSE(klt_align(patch, textured, Vec2(5000, 100), 3, 0).ok());
+  EXPECT_FALSE(klt_align(patch, textured, Vec2(std::nan(""), 100), 3, 0).ok());
+  EXPECT_FALSE(klt_align(patch, Pyramid{}, Vec2(100, 100), 3, 0).ok());
+  const KltResult itself = klt_align(patch, textured, Vec2(100, 100), 3, 0);
   EXPECT_TRUE(itself.ok());
   EXPECT_NEAR((itself.px - Vec2(100, 100)).norm(), 0, 1e-3);
   EXPECT_NEAR(itself.gain, 1, 1e-3);

@@ -9,25 +9,30 @@ namespace {
 
 /// Corners of a cell whose Harris score is computed; the rest is weaker on FAST already.
 constexpr int kScoredPerCell = 4;
+constexpr int kMostPerCell = 4;
+/// Side of a grid cell, on each level.
+constexpr int kCell_px = 32;
+/// FAST threshold at the noise floor, grey values: a cell goes no lower.
+constexpr int kMinThreshold = 6;
 
 }  // namespace
 
 OrbExtractor::OrbExtractor(const OrbOptions& options, bool margins) : options_(options), with_margins_(margins) {
   // Features in proportion to the side of the level: coarse levels have less room but survive blur.
   double total = 0;
-  for (int l = 0; l < options.levels; ++l) level_share_.push_back(std::pow(options.scale_factor, -l));
+  for (int l = 0; l < options.levels; ++l) level_share_.push_back(std::pow(kOrbScaleFactor, -l));
   for (const double share : level_share_) total += share;
   for (double& share : level_share_) share /= total;
 }
 
 void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
   out.clear();
-  pyramid_.build(image, options_.levels, options_.scale_factor);
+  pyramid_.build(image, options_.levels, kOrbScaleFactor);
   double carried = 0;  // what finer levels could not fill goes to coarser ones
   for (int l = 0; l < pyramid_.levels(); ++l) {
     const PyramidLevel& level = pyramid_.level(l);
     carried += level_share_[static_cast<std::size_t>(l)] * options_.max_features;
-    detect_fast(level, kOrbBorder, options_.min_threshold, fast_, corners_);
+    detect_fast(level, kOrbBorder, kMinThreshold, fast_, corners_);
     select(level, static_cast<int>(carried));
     carried -= static_cast<double>(chosen_.size());
     describe(l, out);
@@ -43,13 +48,13 @@ void OrbExtractor::select(const PyramidLevel& level, int quota) {
 
 /// The cell's threshold sinks from corner to corner until the cell has its share or the floor is reached.
 void OrbExtractor::keep_strongest_of_cells(const PyramidLevel& level) {
-  const int columns = (level.width + options_.cell_px - 1) / options_.cell_px;
-  const int rows = (level.height + options_.cell_px - 1) / options_.cell_px;
+  const int columns = (level.width + kCell_px - 1) / kCell_px;
+  const int rows = (level.height + kCell_px - 1) / kCell_px;
   const auto cells = static_cast<std::size_t>(columns * rows);
   cell_count_.assign(cells, 0);
   candidates_.assign(cells * kScoredPerCell, Candidate{});
   for (const FastCorner& corner : corners_) {
-    const int cell = (corner.y / options_.cell_px) * columns + corner.x / options_.cell_px;
+    const int cell = (corner.y / kCell_px) * columns + corner.x / kCell_px;
     Candidate* first = &candidates_[static_cast<std::size_t>(cell) * kScoredPerCell];
     std::int32_t& count = cell_count_[static_cast<std::size_t>(cell)];
     if (count == kScoredPerCell && first[count - 1].strength >= corner.strength) continue;
@@ -69,7 +74,7 @@ void OrbExtractor::take_in_rounds(int quota) {
   std::stable_sort(candidates_.begin(), candidates_.end(),
                    [&](const Candidate& a, const Candidate& b) { return a.cell != b.cell ? a.cell < b.cell : better(a, b); });
   chosen_.clear();
-  for (int round = 0; round < options_.max_per_cell && static_cast<int>(chosen_.size()) < quota; ++round) {
+  for (int round = 0; round < kMostPerCell && static_cast<int>(chosen_.size()) < quota; ++round) {
     const std::size_t before = chosen_.size();
     for (std::size_t i = 0, rank = 0; i < candidates_.size(); ++i) {
       rank = i > 0 && candidates_[i].cell == candidates_[i - 1].cell ? rank + 1 : 0;

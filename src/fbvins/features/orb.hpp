@@ -19,23 +19,12 @@
 
 namespace fbvins {
 
-struct OrbOptions {
-  int max_features = 500;
-  int levels = 3;
-  double scale_factor = 1.2;
-  int min_threshold = 6;
-  int cell_px = 32;
-  int max_per_cell = 4;
+/// Size of a level of the scale pyramid relative to the next.
+inline constexpr double kOrbScaleFactor = 1.2;
 
-  template <class V>
-  void visit(V&& v) {
-    v("max_features", max_features, "", "features of one image", 10, 10000);
-    v("levels", levels, "", "levels of the scale pyramid", 1, 12);
-    v("scale_factor", scale_factor, "", "size of a level relative to the next", 1.05, 2.0);
-    v("min_threshold", min_threshold, "grey", "FAST threshold at the noise floor: a cell goes no lower", 1, 100);
-    v("cell_px", cell_px, "px", "side of a grid cell, on each level", 8, 256);
-    v("max_per_cell", max_per_cell, "", "features of one cell at most", 1, 4);
-  }
+struct OrbOptions {
+  int max_features = 500;  ///< of one image
+  int levels = 3;          ///< of the scale pyramid
 };
 
 /// Smallest distance of a keypoint from the edges of its level, px.

@@ -4,6 +4,14 @@
 #include <Eigen/LU>
 
 namespace fbvins {
+namespace {
+
+/// Farthest that a keypoint may be moved, times the scale of its level.
+constexpr double kMaxShift_px = 3.0;
+/// A reference seen smaller than this, or larger than its inverse, is given up.
+constexpr double kSmallestScale = 0.65;
+
+}  // namespace
 
 bool PatchReference::take(const Pyramid& pyramid, const Vec2& px, const Camera& camera, const Vec2& normalised) {
   Mat2 J_pixel_normalised;
@@ -31,14 +39,14 @@ Mat2 PatchReference::warp(const Camera& camera, const Vec2& normalised_now) cons
 KltResult PatchRefiner::refine(const PatchReference& reference, const Pyramid& image, const Vec2& start_px, const Camera& camera,
                                const Vec2& normalised_guess) {
   const Mat2 J_now_then = reference.warp(camera, normalised_guess);
-  const double area = J_now_then.determinant(), limit = options_.smallest_scale * options_.smallest_scale;
+  const double area = J_now_then.determinant(), limit = kSmallestScale * kSmallestScale;
   if (!(area > limit && area * limit < 1)) return {};
   if (!warped_.cut_warped(reference.anchor, J_now_then.inverse())) return {};
-  return klt_align(warped_, image, start_px, 0, 0, klt_);
+  return klt_align(warped_, image, start_px, 0, 0);
 }
 
-bool PatchRefiner::accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) const {
-  return result.ok() && result.correlation >= min_correlation && (result.px - start_px).norm() <= options_.max_shift_px * scale;
+bool PatchRefiner::accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) {
+  return result.ok() && result.correlation >= min_correlation && (result.px - start_px).norm() <= kMaxShift_px * scale;
 }
 
 }  // namespace fbvins

@@ -17,20 +17,6 @@
 
 namespace fbvins {
 
-struct PatchRefineOptions {
-  double max_shift_px = 3.0;
-  double min_correlation = 0.85;
-  double smallest_scale = 0.65;
-
-  template <class V>
-  void visit(V&& v) {
-    v("max_shift_px", max_shift_px, "px", "farthest a keypoint may be moved, times the scale of its level", 0.5, 20.0);
-    v("min_correlation", min_correlation, "", "correlation with the reference below which a new one is taken", 0.0, 1.0);
-    v("smallest_scale", smallest_scale, "", "a reference seen smaller than this, or larger than its inverse, is given up", 0.2,
-      1.0);
-  }
-};
-
 /// A piece of an image and how it is seen now: a small plane that faced the camera then.
 struct PatchReference {
   KltAnchor anchor;
@@ -46,23 +32,19 @@ struct PatchReference {
   Mat2 warp(const Camera& camera, const Vec2& normalised_now) const;
 };
 
+/// Correlation with the reference below which a new one is taken.
+inline constexpr double kReferenceCorrelation = 0.85;
+
 class PatchRefiner {
  public:
-  PatchRefiner(const PatchRefineOptions& options, const KltOptions& klt) : options_(options), klt_(klt) {}
-
   /// Aligns the reference from `start_px` on. status is outside when the warp is too strong for the patch.
   KltResult refine(const PatchReference& reference, const Pyramid& image, const Vec2& start_px, const Camera& camera,
                    const Vec2& normalised_guess);
   /// Whether a result may be used: converged, similar, and not far from where it started.
-  bool accept(const KltResult& result, const Vec2& start_px, double scale) const {
-    return accept(result, start_px, scale, options_.min_correlation);
-  }
-  /// The same by another correlation.
-  bool accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation) const;
+  /// `scale`: of the keypoint's level, pixels.
+  static bool accept(const KltResult& result, const Vec2& start_px, double scale, double min_correlation = kReferenceCorrelation);
 
  private:
-  PatchRefineOptions options_;
-  KltOptions klt_;
   KltTemplate warped_;
 };
 

@@ -17,6 +17,10 @@ constexpr int kFewestCells = 24;             // searched each time, if as many a
 constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
 constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not deliver enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
+constexpr int kBorder_px = 10;               // no corner is nearer to the image's edge
+/// Smallest response of a corner in a noiseless image, (grey/px)^2; else this many times that of the noise.
+constexpr double kMinResponse = 0.4;
+constexpr double kNoiseFactor = 5.0;
 /// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
 /// smaller eigenvalue over a 7x7 window comes out about a third below the mean.
 constexpr double kNoiseResponse = 0.12;
@@ -117,7 +121,7 @@ bool ShiTomasiDetector::far_from_all(const Vec2& px, std::span<const Vec2> exist
 
 void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int row, float threshold) {
   cell_corners_.clear();
-  const int cell = options_.cell_px, border = options_.border_px;
+  const int cell = cell_px_, border = kBorder_px;
   const int x0 = std::max(column * cell, border), x1 = std::min((column + 1) * cell, image.width - border);
   const int y0 = std::max(row * cell, border), y1 = std::min((row + 1) * cell, image.height - border);
   const int width = x1 - x0, height = y1 - y0;
@@ -171,7 +175,7 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   const int cells = static_cast<int>(occupancy_.size());
   const int budget = existing.size() < kTooFewFeatures ? cells : std::max(kFewestCells, empty ? wanted : 0);
   // Crowded is better than few.
-  const double distance_px = (empty ? 1.0 : kCrowding) * options_.min_distance_px;
+  const double distance_px = (empty ? 1.0 : kCrowding) * min_distance_px_;
   int searched = 0;
   for (int i = 0; i < cells && searched < budget; ++i) {
     next = (next + 1) % cells;
@@ -194,14 +198,13 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
   if (wanted <= 0 || pyramid.empty()) return corners_;
   const PyramidLevel& image = pyramid.level(0);
   noise_ = estimate_noise(image);
-  const auto threshold =
-      static_cast<float>(std::max(options_.min_response, options_.noise_factor * kNoiseResponse * noise_ * noise_));
+  const auto threshold = static_cast<float>(std::max(kMinResponse, kNoiseFactor * kNoiseResponse * noise_ * noise_));
 
-  const int columns = (image.width + options_.cell_px - 1) / options_.cell_px;
-  const int rows = (image.height + options_.cell_px - 1) / options_.cell_px;
+  const int columns = (image.width + cell_px_ - 1) / cell_px_;
+  const int rows = (image.height + cell_px_ - 1) / cell_px_;
   occupancy_.assign(static_cast<std::size_t>(columns) * rows, 0);
   for (const Vec2& px : existing) {
-    const int column = static_cast<int>(px.x()) / options_.cell_px, row = static_cast<int>(px.y()) / options_.cell_px;
+    const int column = static_cast<int>(px.x()) / cell_px_, row = static_cast<int>(px.y()) / cell_px_;
     if (column >= 0 && row >= 0 && column < columns && row < rows) ++occupancy_[static_cast<std::size_t>(row * columns + column)];
   }
 

@@ -4,7 +4,7 @@
 // so that dim and weakly textured cells deliver as long as their best corner stands out of the noise.
 // Buffers are reused; not thread-safe.
 //
-//   ShiTomasiDetector detector(options);
+//   ShiTomasiDetector detector(22);
 //   const std::vector<Corner>& fresh = detector.detect(pyramid, tracked_px, 150 - tracked_px.size());
 #pragma once
 
@@ -21,30 +21,17 @@ struct Corner {
   float response = 0;      ///< smaller eigenvalue of the mean structure tensor, (grey/px)^2
 };
 
-struct ShiTomasiOptions {
-  int cell_px = 44;
-  double min_distance_px = 22;
-  double noise_factor = 5.0;
-  double min_response = 0.4;
-  int border_px = 10;
-
-  template <class V>
-  void visit(V&& v) {
-    v("cell_px", cell_px, "px", "side of a grid cell; a cell without a feature is searched first", 16, 256);
-    v("min_distance_px", min_distance_px, "px", "smallest distance between features", 4.0, 200.0);
-    v("noise_factor", noise_factor, "", "a corner's response is at least this times that of image noise", 0.0, 100.0);
-    v("min_response", min_response, "grey^2", "smallest response of a corner in a noiseless image", 0.0, 1000.0);
-    v("border_px", border_px, "px", "no corner is nearer to the image's edge", 8, 100);
-  }
-};
-
 /// Standard deviation of the pixel noise, grey values: median response to a mask that is blind to planes
 /// and straight edges (Immerkaer 1996), on a sparse grid.
 double estimate_noise(const PyramidLevel& image);
 
 class ShiTomasiDetector {
  public:
-  explicit ShiTomasiDetector(const ShiTomasiOptions& options) : options_(options) {}
+  /// `min_distance_px`: between features; cells, each of which is to have one, have twice that side.
+  explicit ShiTomasiDetector(double min_distance_px)
+      : min_distance_px_(min_distance_px), cell_px_(static_cast<int>(2 * min_distance_px)) {}
+
+  int cell_px() const { return cell_px_; }
 
   /// At most `wanted` new corners of level 0: first the best of each empty cell, then their next best, then
   /// what occupied cells have beside. None is nearer than min_distance_px (two thirds of it for the last
@@ -61,7 +48,8 @@ class ShiTomasiDetector {
   bool far_from_all(const Vec2& px, std::span<const Vec2> existing, double distance_px) const;
   void accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px, int wanted);
 
-  ShiTomasiOptions options_;
+  double min_distance_px_;
+  int cell_px_;
   double noise_ = 0;
   int next_cell_[2] = {-1, -1};        // where the searches of empty and of occupied cells stopped
   std::vector<Corner> corners_;        // accepted

@@ -10,20 +10,21 @@
 namespace fbvins {
 namespace {
 
+constexpr double kMinDistance_px = 22;
 constexpr auto kIdentity = [](const Vec2& p) { return p; };
 
 TEST(ShiTomasi, FillsTheImageAndKeepsCornersApart) {
   const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);
   Pyramid pyramid;
   pyramid.build(image.view(), 1);
-  ShiTomasiOptions options;
-  ShiTomasiDetector detector(options);
+  ShiTomasiDetector detector(kMinDistance_px);
   const std::vector<Corner> corners = detector.detect(pyramid, {}, 60);
   EXPECT_EQ(corners.size(), 60u);
   std::set<std::pair<int, int>> cells;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    cells.insert({static_cast<int>(corners[i].px.x()) / options.cell_px, static_cast<int>(corners[i].px.y()) / options.cell_px});
-    for (std::size_t j = 0; j < i; ++j) EXPECT_GE((corners[i].px - corners[j].px).norm(), 0.6 * options.min_distance_px);
+    cells.insert(
+        {static_cast<int>(corners[i].px.x()) / detector.cell_px(), static_cast<int>(corners[i].px.y()) / detector.cell_px()});
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GE((corners[i].px - corners[j].px).norm(), 0.6 * kMinDistance_px);
   }
   EXPECT_GE(cells.size(), 40u);  // of 54
 }
@@ -32,14 +33,14 @@ TEST(ShiTomasi, LeavesCellsAloneThatHaveFeatures) {
   const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);
   Pyramid pyramid;
   pyramid.build(image.view(), 1);
-  ShiTomasiDetector detector(ShiTomasiOptions{});
+  ShiTomasiDetector detector(kMinDistance_px);
   const std::vector<Corner> first = detector.detect(pyramid, {}, 30);
   std::vector<Vec2> existing;
   for (const Corner& corner : first) existing.push_back(corner.px);
   const std::vector<Corner> second = detector.detect(pyramid, existing, 30);
   EXPECT_GT(second.size(), 5u);
   for (const Corner& corner : second)
-    for (const Vec2& px : existing) EXPECT_GE((corner.px - px).norm(), 0.6 * ShiTomasiOptions{}.min_distance_px);
+    for (const Vec2& px : existing) EXPECT_GE((corner.px - px).norm(), 0.6 * kMinDistance_px);
   EXPECT_TRUE(detector.detect(pyramid, existing, 0).empty());
 }
 
@@ -49,7 +50,7 @@ TEST(ShiTomasi, FindsTheCornerOfASquareBelowAPixel) {
     for (int x = 60; x < 120; ++x) image.at(x, y) = 200;
   Pyramid pyramid;
   pyramid.build(image.view(), 1);
-  ShiTomasiDetector detector(ShiTomasiOptions{});
+  ShiTomasiDetector detector(kMinDistance_px);
   const std::vector<Corner> corners = detector.detect(pyramid, {}, 1);
   ASSERT_EQ(corners.size(), 1u);
   // The edge runs between 59 and 60; the window's best place lies a little inside the corner.
@@ -59,7 +60,7 @@ TEST(ShiTomasi, FindsTheCornerOfASquareBelowAPixel) {
 
 TEST(ShiTomasi, DimTextureDeliversAndPureNoiseDoesNot) {
   Pyramid pyramid;
-  ShiTomasiDetector detector(ShiTomasiOptions{});
+  ShiTomasiDetector detector(kMinDistance_px);
   pyramid.build(render_texture(376, 240, NoiseTexture(6), kIdentity, 12, 6, 0.7).view(), 1);
   EXPECT_GE(detector.detect(pyramid, {}, 60).size(), 40u);
   pyramid.build(render_texture(376, 240, NoiseTexture(6), kIdentity, 100, 0, 3.0).view(), 1);

@@ -6,6 +6,10 @@
 
 #include <string_view>
 
+#include "fbvins/features/booster.hpp"
+#include "fbvins/frontend/klt_frontend.hpp"
+#include "fbvins/frontend/orb_frontend.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -19,19 +23,10 @@ Made make_orb(const StereoRig& rig, const FrontendOptions& options) {
   return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, options.orb));
 }
 
-/// The orb frontend's options with the distances that suit boosted descriptors.
-OrbFrontendOptions boosted(OrbFrontendOptions orb, const BoostFrontendOptions& boost) {
-  orb.matching.max_distance = boost.max_distance;
-  orb.matching.max_ratio = boost.max_ratio;
-  orb.stereo.max_distance = boost.stereo_max_distance;
-  orb.stereo.max_ratio = boost.max_ratio;
-  return orb;
-}
-
 Made make_boost(const StereoRig& rig, const FrontendOptions& options) {
   Result<std::unique_ptr<DescriptorStage>> stage = make_booster_stage(options.boost.booster);
   if (!stage) return stage.error();
-  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, boosted(options.orb, options.boost), std::move(*stage)));
+  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, options.orb, std::move(*stage)));
 }
 
 struct Registration {

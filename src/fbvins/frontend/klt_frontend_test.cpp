@@ -89,8 +89,7 @@ class Wall {
 KltFrontendOptions small_options() {
   KltFrontendOptions options;
   options.max_features = 60;
-  options.corners.cell_px = 36;
-  options.corners.min_distance_px = 16;
+  options.min_distance_px = 16;
   return options;
 }
 
@@ -237,24 +236,6 @@ TEST(KltFrontend, SameInputSameBits) {
       EXPECT_EQ(x.features[i].right.has_value(), y.features[i].right.has_value());
     }
   }
-}
-
-TEST(MotionPredictor, CarriesThePriorToBothImages) {
-  const Wall wall;
-  MotionPredictor predictor(wall.rig.T_BC0);
-  predictor.add(wall.imu(0.0, 0.3));
-  const CameraMotion motion = predictor.between(Time{100'000'000}, Time{150'000'000}, wall.prior(1));
-  const Pose<C0, C0> truth = wall.T_WC0(0.15).inverse() * wall.T_WC0(0.10);
-  ASSERT_TRUE(motion.has_rotation && motion.has_translation);
-  EXPECT_LT(so3_log(Quat(Mat3(motion.R_ba.transpose() * truth.R()))).norm(), 1e-4);
-  EXPECT_LT((motion.p_ba - truth.p).norm(), 1e-3);
-
-  const CameraMotion gyro_only = predictor.between(Time{100'000'000}, Time{150'000'000}, StatePrior{});
-  EXPECT_TRUE(gyro_only.has_rotation);
-  EXPECT_FALSE(gyro_only.has_translation);
-  EXPECT_LT((gyro_only.R_ba - motion.R_ba).norm(), 1e-6);
-  EXPECT_FALSE(predictor.between(Time{100'000'000}, Time{900'000'000}, wall.prior(1)).has_rotation);
-  EXPECT_FALSE(MotionPredictor(wall.rig.T_BC0).between(Time{0}, Time{1}, StatePrior{}).has_rotation);
 }
 
 }  // namespace

@@ -9,15 +9,26 @@
 namespace fbvins {
 namespace {
 
+/// Level of the correlation search, and the coarsest of the alignment that follows it.
 constexpr int kSearchLevel = 2;
+/// Coarsest level of the alignment from a depth that is known.
+constexpr int kKnownDepthLevel = 1;
+constexpr int kMostSteps = 200;
+/// Correlation that the search must reach.
+constexpr double kMinSearchCorrelation = 0.6;
+/// Largest error of following a feature right and back.
+constexpr double kForwardBackward_px = 0.7;
+/// Largest distance from the epipolar line in the right image.
+constexpr double kEpipolar_px = 1.5;
+/// A match may turn out this much nearer than the nearest point searched for: noise of the disparity.
+constexpr double kNearerThanSearched = 1.2;
 /// Disparities down to this are taken as infinitely far rather than as wrong.
 constexpr double kInfinity_px = 1.0;
 
 }  // namespace
 
-KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, const KltStereoOptions& options, const KltOptions& klt)
-    : options_(options),
-      klt_(klt),
+KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m)
+    : min_depth_m_(min_depth_m),
       camera_right_(rig.right),
       R_rl_(rig.T_C1C0().R()),
       p_rl_(rig.T_C1C0().p),
@@ -31,15 +42,15 @@ std::optional<Vec2> KltStereoMatcher::project(const Vec2& left_normalised, doubl
 std::optional<Vec2> KltStereoMatcher::search(const KltTemplate& patch, const Vec2& left_normalised, const Pyramid& right) const {
   const int l = std::min(kSearchLevel, right.levels() - 1);
   const KltLevelTemplate& level_patch = patch.levels[static_cast<std::size_t>(l)];
-  const auto far = project(left_normalised, 0), near = project(left_normalised, 1 / options_.min_depth_m);
+  const auto far = project(left_normalised, 0), near = project(left_normalised, 1 / min_depth_m_);
   if (!level_patch.valid || !far || !near) return std::nullopt;
   const double scale = 1 << l;
   // Steps of about a pixel of the level: the patch is 16 wide, so a peak is a few steps wide.
-  const int steps = std::clamp(static_cast<int>((*near - *far).norm() / scale) + 1, 1, 200);
-  float best = static_cast<float>(options_.min_search_correlation);
+  const int steps = std::clamp(static_cast<int>((*near - *far).norm() / scale) + 1, 1, kMostSteps);
+  float best = static_cast<float>(kMinSearchCorrelation);
   std::optional<Vec2> best_px;
   for (int i = 0; i <= steps; ++i) {
-    const auto px = project(left_normalised, i / (steps * options_.min_depth_m));
+    const auto px = project(left_normalised, i / (steps * min_depth_m_));
     if (!px) continue;
     const float correlation = klt_correlation(level_patch, right.level(l), *px / scale);
     if (correlation > best) {
@@ -54,10 +65,10 @@ StereoFailure KltStereoMatcher::check_geometry(const Vec2& left_normalised, Ster
   const Vec3 far = R_rl_ * left_normalised.homogeneous();
   const Vec3 seen = match.normalised.homogeneous();
   const auto off_line = distance_from_epipolar_line(far, p_rl_, seen);
-  if (off_line && *off_line * focal_px_ > options_.epipolar_px) return StereoFailure::epipolar;
+  if (off_line && *off_line * focal_px_ > kEpipolar_px) return StereoFailure::epipolar;
   const auto rho = inverse_depth_along(far, p_rl_, seen);
   const double rho_per_px = 1 / (focal_px_ * p_rl_.norm());
-  if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > 1.2 / options_.min_depth_m) return StereoFailure::epipolar;
+  if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > kNearerThanSearched / min_depth_m_) return StereoFailure::epipolar;
   match.inverse_depth = std::max(*rho, 0.0);
   return StereoFailure::none;
 }
@@ -65,8 +76,8 @@ StereoFailure KltStereoMatcher::check_geometry(const Vec2& left_normalised, Ster
 StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
                                      const Vec2& start_px, int coarsest, const Pyramid& left, const Pyramid& right) {
   StereoMatch match;
-  const KltResult found = klt_align(patch, right, start_px, coarsest, 0, klt_);
-  if (!found.ok() || !camera_right_.inside(found.px, 2)) return match;
+  const KltResult found = klt_align(patch, right, start_px, coarsest, 0);
+  if (!found.ok() || !camera_right_.inside(found.px, kRightBorder_px)) return match;
   match.px = found.px;
   const auto normalised = camera_right_.undistort(found.px);
   if (!normalised) return match;
@@ -74,8 +85,8 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
   match.failure = check_geometry(left_normalised, match);
   if (match.failure != StereoFailure::none) return match;
   scratch_.cut(right, found.px, 0, 0);
-  const KltResult back = klt_align(scratch_, left, left_px, 0, 0, klt_);
-  if (!back.ok() || (back.px - left_px).norm() > options_.forward_backward_px) match.failure = StereoFailure::check;
+  const KltResult back = klt_align(scratch_, left, left_px, 0, 0);
+  if (!back.ok() || (back.px - left_px).norm() > kForwardBackward_px) match.failure = StereoFailure::check;
   return match;
 }
 
@@ -84,11 +95,11 @@ StereoMatch KltStereoMatcher::match(const KltTemplate& patch, const Vec2& left_p
   StereoMatch match;
   if (inverse_depth) {
     if (const auto start = project(left_normalised, *inverse_depth))
-      match = refine(patch, left_px, left_normalised, *start, 1, left, right);
+      match = refine(patch, left_px, left_normalised, *start, kKnownDepthLevel, left, right);
     if (match.failure == StereoFailure::none) return match;
   }
   if (const auto start = search(patch, left_normalised, right))
-    match = refine(patch, left_px, left_normalised, *start, 2, left, right);
+    match = refine(patch, left_px, left_normalised, *start, kSearchLevel, left, right);
   return match;
 }
 

@@ -3,7 +3,7 @@
 // epipolar curve on a coarse level; then Lucas-Kanade, backward check and epipolar check.
 // One instance is used by one thread at a time (it reuses a template as scratch).
 //
-//   KltStereoMatcher matcher(rig, options, klt_options);
+//   KltStereoMatcher matcher(rig, 0.35);
 //   auto match = matcher.match(patch, px, normalised, inverse_depth, left, right);
 #pragma once
 
@@ -15,20 +15,8 @@
 
 namespace fbvins {
 
-struct KltStereoOptions {
-  double forward_backward_px = 0.7;
-  double epipolar_px = 1.5;
-  double min_depth_m = 0.35;
-  double min_search_correlation = 0.6;
-
-  template <class V>
-  void visit(V&& v) {
-    v("forward_backward_px", forward_backward_px, "px", "largest error of following a feature right and back", 0.05, 10.0);
-    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar line in the right image", 0.1, 20.0);
-    v("min_depth_m", min_depth_m, "m", "nearest point that is searched in the right image", 0.05, 10.0);
-    v("min_search_correlation", min_search_correlation, "", "correlation that the coarse search must reach", 0.0, 1.0);
-  }
-};
+/// A match nearer to the right image's edge is not believed.
+inline constexpr double kRightBorder_px = 2;
 
 enum class StereoFailure { none, flow, check, epipolar };
 
@@ -41,7 +29,8 @@ struct StereoMatch {
 
 class KltStereoMatcher {
  public:
-  KltStereoMatcher(const StereoRig& rig, const KltStereoOptions& options, const KltOptions& klt);
+  /// `min_depth_m`: nearest point that is searched in the right image.
+  KltStereoMatcher(const StereoRig& rig, double min_depth_m);
 
   /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure says what went wrong, if anything.
   StereoMatch match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
@@ -55,8 +44,7 @@ class KltStereoMatcher {
   /// Epipolar distance and depth of a match.
   StereoFailure check_geometry(const Vec2& left_normalised, StereoMatch& match) const;
 
-  KltStereoOptions options_;
-  KltOptions klt_;
+  double min_depth_m_;
   Camera camera_right_;
   Mat3 R_rl_;  // C1 <- C0
   Vec3 p_rl_;

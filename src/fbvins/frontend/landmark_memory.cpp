@@ -11,16 +11,18 @@ namespace {
 constexpr double kWaitForPosition_s = 15;
 /// Nearer to the image's edge a keypoint has no descriptor or no patch.
 constexpr double kBorder_px = 16;
+/// Along the camera's z; what is nearer or behind is not seen.
+constexpr double kNearest_m = 0.1;
 
 }  // namespace
 
 void LandmarkMemory::clear() { landmarks_.clear(); }
 
 void LandmarkMemory::keep(RememberedLandmark landmark) {
-  if (options_.capacity == 0) return;
+  if (capacity_ == 0) return;
   const TrackId track = landmark.track;
   landmarks_.insert_or_assign(track, std::move(landmark));
-  if (static_cast<int>(landmarks_.size()) <= options_.capacity) return;
+  if (static_cast<int>(landmarks_.size()) <= capacity_) return;
   landmarks_.erase(std::min_element(landmarks_.begin(), landmarks_.end(),
                                     [](const auto& a, const auto& b) { return a.second.kept < b.second.kept; }));
 }
@@ -35,23 +37,22 @@ void LandmarkMemory::forget_unlocated(Time now) {
                 [&](const auto& entry) { return !entry.second.p_W && (now - entry.second.kept).seconds() > kWaitForPosition_s; });
 }
 
-void LandmarkMemory::expect(const Pose<W, C0>& T_WC, const Camera& camera, const OrbOptions& scales,
-                            std::vector<ExpectedLandmark>& out) const {
+void LandmarkMemory::expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const {
   out.clear();
   const Pose<C0, W> T_CW = T_WC.inverse();
-  const double cos_limit = std::cos(options_.max_angle_rad);
+  const double cos_limit = std::cos(kMaxViewAngle_rad);
   for (const auto& [track, landmark] : landmarks_) {
     if (!landmark.p_W) continue;
     const Vec3 p_C = T_CW * *landmark.p_W;
-    if (p_C.z() < 0.1) continue;
+    if (p_C.z() < kNearest_m) continue;
     const Vec3 ray_now = *landmark.p_W - T_WC.p, ray_then = *landmark.p_W - landmark.seen_from_W;
     const double now = ray_now.norm(), then = ray_then.norm(), scale = then / now;
-    if (scale < options_.smallest_scale || scale * options_.smallest_scale > 1) continue;
+    if (scale < kSmallestViewScale || scale * kSmallestViewScale > 1) continue;
     if (ray_now.dot(ray_then) < cos_limit * now * then) continue;
     const auto px = camera.project(p_C);
     if (!px || !camera.inside(*px, kBorder_px)) continue;
-    const int level = landmark.level + static_cast<int>(std::lround(std::log(scale) / std::log(scales.scale_factor)));
-    out.push_back({&landmark, *px, p_C.hnormalized(), std::clamp(level, 0, scales.levels - 1), p_C.z()});
+    const int level = landmark.level + static_cast<int>(std::lround(std::log(scale) / std::log(kOrbScaleFactor)));
+    out.push_back({&landmark, *px, p_C.hnormalized(), std::clamp(level, 0, levels - 1), p_C.z()});
   }
 }
 

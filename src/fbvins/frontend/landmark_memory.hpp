@@ -4,10 +4,10 @@
 // (docs/derivations/known_landmarks.md, K7). Synchronous; one instance, one thread. At most `capacity` landmarks: those unseen
 // for longest are forgotten.
 //
-//   LandmarkMemory memory(options);
+//   LandmarkMemory memory(3000);
 //   memory.keep(landmark);                            // when a track has ended
 //   memory.locate(track, p_W);                        // when the estimator has left its landmark somewhere
-//   memory.expect(T_WC, camera, scales, expected);    // what the newest image should show, and where
+//   memory.expect(T_WC, camera, levels, expected);    // what the newest image should show, and where
 //   memory.take_out(track);                           // found: it is a track again
 #pragma once
 
@@ -23,31 +23,10 @@
 
 namespace fbvins {
 
-struct RecognitionOptions {
-  bool enabled = true;
-  int capacity = 3000;
-  double search_px = 15;
-  int max_distance = 50;
-  double max_angle_rad = 0.6;
-  double smallest_scale = 0.6;
-  int min_together = 4;
-  double agreement_px = 4;
-  double min_correlation = 0.7;
-
-  template <class V>
-  void visit(V&& v) {
-    v("enabled", enabled, "", "know landmarks again, however long they were out of view");
-    v("capacity", capacity, "", "landmarks remembered", 0, 100000);
-    v("search_px", search_px, "px", "search radius around where a landmark should be", 1.0, 200.0);
-    v("max_distance", max_distance, "bit", "largest Hamming distance of a match", 1, 256);
-    v("max_angle_rad", max_angle_rad, "rad", "largest angle between the directions it was and is seen from", 0.01, 3.1);
-    v("smallest_scale", smallest_scale, "", "one that is seen smaller than this, or larger than its inverse, is not looked for",
-      0.1, 1.0);
-    v("min_together", min_together, "", "fewer than this in one image are chance", 1, 100);
-    v("agreement_px", agreement_px, "px", "how far one may be from where the others say that it should be", 0.1, 100.0);
-    v("min_correlation", min_correlation, "", "correlation asked with the patch it began with", 0.0, 1.0);
-  }
-};
+/// Largest angle between the directions that a landmark was and is seen from.
+inline constexpr double kMaxViewAngle_rad = 0.6;
+/// One that is seen smaller than this, or larger than its inverse, is not looked for.
+inline constexpr double kSmallestViewScale = 0.6;
 
 /// What stays of a track.
 struct RememberedLandmark {
@@ -73,21 +52,23 @@ struct ExpectedLandmark {
 
 class LandmarkMemory {
  public:
-  explicit LandmarkMemory(const RecognitionOptions& options) : options_(options) {}
+  explicit LandmarkMemory(int capacity) : capacity_(capacity) {}
 
   void clear();
   void keep(RememberedLandmark landmark);
   void locate(TrackId track, const Vec3& p_W);
-  /// Located landmarks that a left camera at T_WC sees from about where they were seen from before.
-  void expect(const Pose<W, C0>& T_WC, const Camera& camera, const OrbOptions& scales, std::vector<ExpectedLandmark>& out) const;
+  /// Located landmarks that a left camera at T_WC sees from about where they were seen from before. `levels`: of the
+  /// scale pyramid that keypoints come from.
+  void expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const;
   void take_out(TrackId track) { landmarks_.erase(track); }
   /// Landmarks that the estimator has not located long after it must have let go of them.
   void forget_unlocated(Time now);
 
+  bool contains(TrackId track) const { return landmarks_.contains(track); }
   std::size_t size() const { return landmarks_.size(); }
 
  private:
-  RecognitionOptions options_;
+  int capacity_;
   std::map<TrackId, RememberedLandmark> landmarks_;  // in order, so that the same ones are found in the same order everywhere
 };
 

@@ -3,11 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/core/options.hpp"
-
 namespace fbvins {
 namespace {
 
+constexpr int kLevels = 3;
 const Camera kCamera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
 
 /// Seen from the origin, 4 m along z.
@@ -21,12 +20,12 @@ RememberedLandmark landmark(std::int64_t track, const Vec3& p_W = Vec3(0, 0, 4))
 
 std::vector<ExpectedLandmark> expected_from(const LandmarkMemory& memory, const Vec3& p_W, const Vec3& turn = Vec3::Zero()) {
   std::vector<ExpectedLandmark> out;
-  memory.expect({so3_exp(turn), p_W}, kCamera, OrbOptions{}, out);
+  memory.expect({so3_exp(turn), p_W}, kCamera, kLevels, out);
   return out;
 }
 
 TEST(LandmarkMemory, ExpectsALandmarkWhereItProjects) {
-  LandmarkMemory memory(RecognitionOptions{});
+  LandmarkMemory memory(3000);
   memory.keep(landmark(3));
   const auto same = expected_from(memory, Vec3::Zero());
   ASSERT_EQ(same.size(), 1u);
@@ -42,25 +41,22 @@ TEST(LandmarkMemory, ExpectsALandmarkWhereItProjects) {
 }
 
 TEST(LandmarkMemory, LooksForNothingThatWouldLookDifferent) {
-  RecognitionOptions options;
-  options.max_angle_rad = 0.5;
-  options.smallest_scale = 0.6;
-  LandmarkMemory memory(options);
+  LandmarkMemory memory(3000);
   memory.keep(landmark(3));
   const auto seen_at_angle = [&](double angle) {  // from 4 m away, looking at it
     return expected_from(memory, Vec3(-4 * std::sin(angle), 0, 4 - 4 * std::cos(angle)), Vec3(0, angle, 0)).size();
   };
-  EXPECT_EQ(seen_at_angle(0.49), 1u);
-  EXPECT_EQ(seen_at_angle(0.51), 0u);
-  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 * 0.61)).size(), 1u);
-  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 * 0.59)).size(), 0u) << "too near";
-  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 / 0.59)).size(), 0u) << "too far";
+  EXPECT_EQ(seen_at_angle(kMaxViewAngle_rad - 0.01), 1u);
+  EXPECT_EQ(seen_at_angle(kMaxViewAngle_rad + 0.01), 0u);
+  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 * (kSmallestViewScale + 0.01))).size(), 1u);
+  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 * (kSmallestViewScale - 0.01))).size(), 0u) << "too near";
+  EXPECT_EQ(expected_from(memory, Vec3(0, 0, 4 - 4 / (kSmallestViewScale - 0.01))).size(), 0u) << "too far";
   EXPECT_EQ(expected_from(memory, Vec3(0, 0, 5)).size(), 0u) << "behind";
   EXPECT_EQ(expected_from(memory, Vec3(0, 0, 0), Vec3(0, 1.2, 0)).size(), 0u) << "out of the image";
 }
 
 TEST(LandmarkMemory, WaitsForThePosition) {
-  LandmarkMemory memory(RecognitionOptions{});
+  LandmarkMemory memory(3000);
   for (const std::int64_t track : {1, 2}) {
     RememberedLandmark l = landmark(track);
     l.p_W.reset();
@@ -79,9 +75,7 @@ TEST(LandmarkMemory, WaitsForThePosition) {
 }
 
 TEST(LandmarkMemory, IsBoundedAndForgetsThoseUnseenForLongest) {
-  RecognitionOptions options;
-  options.capacity = 3;
-  LandmarkMemory memory(options);
+  LandmarkMemory memory(3);
   for (const std::int64_t track : {5, 1, 4, 2, 3}) {
     RememberedLandmark l = landmark(track);
     l.kept = Time{10 * (track == 1 ? 7 : track)};  // track 1 was seen again last
@@ -95,8 +89,6 @@ TEST(LandmarkMemory, IsBoundedAndForgetsThoseUnseenForLongest) {
   memory.clear();
   EXPECT_EQ(memory.size(), 0u);
 }
-
-TEST(RecognitionOptions, DefaultsAreValid) { EXPECT_TRUE(validate(RecognitionOptions{}).ok()); }
 
 }  // namespace
 }  // namespace fbvins

@@ -8,6 +8,7 @@
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/noise_texture.hpp"
+#include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
 namespace {
@@ -83,7 +84,7 @@ const std::vector<SensorPacket>& packets() {
 OrbFrontendOptions small_options() {
   OrbFrontendOptions options;
   options.max_features = 80;
-  options.orb.max_features = 250;
+  options.max_keypoints = 250;
   return options;
 }
 
@@ -220,6 +221,108 @@ TEST(OrbFrontend, LandmarksAreKnownAgainHoweverLongTheyWereOutOfView) {
       }
     EXPECT_EQ(again, frames.back().stats.recognised);
     EXPECT_LE(wrong, again / 20) << drift_m;
+  }
+}
+
+/// A camera that slides along a wall and back, so that half of what it sees goes out of view and returns. The one who flies it
+/// plays the estimator: exact priors, two frames old, and where landmarks are, a while after they were last seen.
+class Sweep {
+ public:
+  static constexpr int kFrames = 64, kUnseenBeforeTold = 12;
+  static constexpr double kPeriod_s = 3.2, kReach_m = 1.6, kOmega_radps = 2 * 3.14159265358979 / kPeriod_s;
+
+  struct Known {
+    int frames = 0, last = 0;
+    Vec2 px = Vec2::Zero();
+    Vec3 p_W = Vec3::Zero();
+    bool told = false, again = false;
+  };
+  std::map<TrackId, Known> known;
+  int forgotten = 0;  // landmarks told of that cannot be known again, summed over frames
+
+  int count(bool Known::*what) const {
+    return static_cast<int>(std::count_if(known.begin(), known.end(), [&](const auto& k) { return k.second.*what; }));
+  }
+
+  /// `prior_every`: 2 withholds every second prior. Every update comes twice.
+  void fly(int prior_every) {
+    OrbFrontend frontend(wall_.rig(), small_options());
+    for (int k = 0; k < kFrames; ++k) {
+      const LandmarkUpdate update = left_behind(k);
+      for (int i = 0; i < 2; ++i) frontend.locate(update);
+      take_in(k, frontend.process(packets()[static_cast<std::size_t>(k)], k % prior_every == 0 ? prior(k - 2) : StatePrior{}));
+      for (const auto& [id, landmark] : known) forgotten += landmark.told && !landmark.again && !frontend.can_know_again(id);
+    }
+  }
+
+ private:
+  static double x_m(double s) { return 0.5 * kReach_m * (1 - std::cos(kOmega_radps * s)); }
+  static double a_mps2(double s) { return 0.5 * kReach_m * kOmega_radps * kOmega_radps * std::cos(kOmega_radps * s); }
+
+  const std::vector<SensorPacket>& packets() const {
+    static const std::vector<SensorPacket> all = [&] {
+      std::vector<SensorPacket> out(kFrames);
+      for (int k = 0; k < kFrames; ++k) {
+        SensorPacket& p = out[static_cast<std::size_t>(k)];
+        const double t_s = k * kFramePeriod_s;
+        p.id = FrameId{k};
+        p.frame.t = Time{} + Duration::from_seconds(t_s);
+        p.frame.left = wall_.render(x_m(t_s), static_cast<std::uint64_t>(2 * k));
+        p.frame.right = wall_.render(x_m(t_s) + TestWall::kBaseline_m, static_cast<std::uint64_t>(2 * k + 1));
+        for (int i = 0; k > 0 && i <= 10; ++i) {
+          const double s = t_s - kFramePeriod_s + 0.005 * i;
+          p.imu.samples.push_back({Time{} + Duration::from_seconds(s), Vec3::Zero(), Vec3(a_mps2(s), 0, 9.81)});
+        }
+      }
+      return out;
+    }();
+    return all;
+  }
+  StatePrior prior(int k) const {
+    const double s = k * kFramePeriod_s;
+    StatePrior prior;
+    prior.t = Time{} + Duration::from_seconds(s);
+    prior.T_WB.p.x() = x_m(s);
+    prior.v_WB.x() = 0.5 * kReach_m * kOmega_radps * std::sin(kOmega_radps * s);
+    prior.valid = k >= 0;
+    return prior;
+  }
+  /// Landmarks that left the image over its edge, once each.
+  LandmarkUpdate left_behind(int k) {
+    LandmarkUpdate update;
+    update.sequence = k;
+    for (auto& [id, landmark] : known) {
+      const double from_edge_px = std::min(landmark.px.x(), TestWall::kWidth - landmark.px.x());
+      if (landmark.told || landmark.last != k - kUnseenBeforeTold || landmark.frames < 6 || from_edge_px > 25) continue;
+      landmark.told = true;
+      update.landmarks.push_back({id, landmark.p_W});
+    }
+    return update;
+  }
+  void take_in(int k, const TrackedFrame& frame) {
+    for (const TrackedFeature& f : frame.features) {
+      Known& landmark = known[f.id];
+      if (landmark.told) landmark.again = true;
+      else landmark.p_W = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left.normalised.homogeneous());
+      landmark.px = f.left.pixel;
+      landmark.last = k;
+      ++landmark.frames;
+    }
+  }
+  TestWall wall_;
+};
+
+TEST(OrbFrontend, NoLandmarkIsLostWithEverySecondPriorWithheld) {
+  Sweep all, half;
+  all.fly(1);
+  half.fly(2);
+  EXPECT_GT(all.count(&Sweep::Known::told), 15);
+  EXPECT_GT(all.count(&Sweep::Known::again), 10) << "the others left on the way back";
+  EXPECT_EQ(all.forgotten, 0);
+  EXPECT_EQ(half.forgotten, 0);
+  for (const auto& [id, landmark] : all.known) {
+    EXPECT_EQ(half.known[id].told, landmark.told) << id.value;
+    EXPECT_EQ(half.known[id].again, landmark.again) << id.value;
   }
 }
 

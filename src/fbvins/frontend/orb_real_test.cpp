@@ -46,7 +46,7 @@ Tally run(const std::filesystem::path& folder, int max_frames, bool subpixel) {
   OrbFrontendOptions options;
   options.subpixel = subpixel;
   options.fill_in = subpixel;
-  options.stereo.epipolar_px = 3.0;
+  options.stereo_epipolar_px = 3.0;
   OrbFrontend frontend(data.rig(), options);
   while (auto event = data.next()) {
     const auto* stereo = std::get_if<StereoFrame>(&*event);

@@ -12,12 +12,18 @@ namespace {
 
 /// Disparities down to this are taken as infinitely far rather than as wrong.
 constexpr double kInfinity_px = 1.0;
-constexpr double kRival_px = 4.0;
+/// Half-width of the band that is searched, times the scale of the keypoint, up to the largest scale.
+constexpr double kBand_px = 2.0;
+constexpr float kLargestScale = 3.0f;
+constexpr int kLevelsApart = 1;
+constexpr int kMaxDistance_bits = 64;
+/// Smallest z of a ray, of any length near 1, that still meets the rectified image plane.
+constexpr double kGrazing = 0.05;
 
 }  // namespace
 
-OrbStereoMatcher::OrbStereoMatcher(const StereoRig& rig, const OrbStereoOptions& options)
-    : options_(options), right_camera_(rig.right), focal_px_(rig.right.focal_px()) {
+OrbStereoMatcher::OrbStereoMatcher(const StereoRig& rig, double min_depth_m, double epipolar_px)
+    : min_depth_m_(min_depth_m), epipolar_px_(epipolar_px), right_camera_(rig.right), focal_px_(rig.right.focal_px()) {
   const Pose<C1, C0> T_rl = rig.T_C1C0();
   const Vec3 right_centre = -(T_rl.R().transpose() * T_rl.p);
   baseline_m_ = right_centre.norm();
@@ -29,7 +35,7 @@ OrbStereoMatcher::OrbStereoMatcher(const StereoRig& rig, const OrbStereoOptions&
 
 std::optional<Vec2> OrbStereoMatcher::rectify(const Mat3& R, const Vec2& normalised) const {
   const Vec3 ray = R * normalised.homogeneous();
-  if (!(ray.z() > 0.05)) return std::nullopt;
+  if (!(ray.z() > kGrazing)) return std::nullopt;
   return ray.hnormalized();
 }
 
@@ -49,9 +55,8 @@ void OrbStereoMatcher::index(const OrbFeatures& right) {
 int OrbStereoMatcher::candidate(const Vec2& left_normalised, int level, const Descriptor& descriptor) {
   const auto left = rectify(R_rect_left_, left_normalised);
   if (!left || right_ == nullptr) return -1;
-  constexpr float kLargestScale = 3.0f;
-  const double band = options_.band_px / focal_px_, infinity = kInfinity_px / focal_px_;
-  const double nearest = baseline_m_ / options_.min_depth_m;
+  const double band = kBand_px / focal_px_, infinity = kInfinity_px / focal_px_;
+  const double nearest = baseline_m_ / min_depth_m_;
   near_.clear();
   auto it = std::lower_bound(entries_.begin(), entries_.end(), left->y() - kLargestScale * band,
                              [](const Entry& e, double y) { return e.rectified.y() < y; });
@@ -59,25 +64,25 @@ int OrbStereoMatcher::candidate(const Vec2& left_normalised, int level, const De
     const Keypoint& keypoint = right_->keypoints[static_cast<std::size_t>(it->keypoint)];
     const double scale = std::min(keypoint.scale, kLargestScale);
     const double disparity = left->x() - it->rectified.x();
-    if (std::abs(it->rectified.y() - left->y()) > scale * band || std::abs(keypoint.level - level) > 1) continue;
+    if (std::abs(it->rectified.y() - left->y()) > scale * band || std::abs(keypoint.level - level) > kLevelsApart) continue;
     if (disparity >= -scale * infinity && disparity <= nearest) near_.push_back(it->keypoint);
   }
   distance_.resize(near_.size());
   hamming_distances(descriptor, right_->descriptors, near_, distance_.data());
   int distance = 0;
-  return pick_match(near_, distance_, right_->keypoints, options_.max_distance, options_.max_ratio, kRival_px, &distance);
+  return pick_match(near_, distance_, right_->keypoints, kMaxDistance_bits, &distance);
 }
 
 std::optional<double> OrbStereoMatcher::inverse_depth(const Vec2& left_normalised, const Vec2& right_normalised) const {
   const auto left = rectify(R_rect_left_, left_normalised), right = rectify(R_rect_right_, right_normalised);
   if (!left || !right) return std::nullopt;
-  if (std::abs(left->y() - right->y()) * focal_px_ > options_.epipolar_px) return std::nullopt;
+  if (std::abs(left->y() - right->y()) * focal_px_ > epipolar_px_) return std::nullopt;
   const double disparity = left->x() - right->x();
   if (disparity < -kInfinity_px / focal_px_) return std::nullopt;
   // depth along the rectified z is baseline / disparity; this turns it into depth along z of C0
   const double z_of_unit_depth = (R_rect_left_.transpose() * left->homogeneous()).z();
   const double rho = std::max(disparity, 0.0) / (baseline_m_ * z_of_unit_depth);
-  if (rho > 1.0 / options_.min_depth_m) return std::nullopt;
+  if (rho > 1.0 / min_depth_m_) return std::nullopt;
   return rho;
 }
 

@@ -3,7 +3,7 @@
 // is the x axis; matches then differ in x only (rectified normalised coordinates; images are never rectified).
 // Buffers are reused; one instance, one thread.
 //
-//   OrbStereoMatcher stereo(rig, options);
+//   OrbStereoMatcher stereo(rig, 0.35, 1.5);
 //   stereo.index(right_features);
 //   int keypoint = stereo.candidate(left_normalised, level, descriptor);          // -1: none
 //   auto inverse_depth = stereo.inverse_depth(left_normalised, right_normalised); // 1/m, or nothing
@@ -19,26 +19,10 @@
 
 namespace fbvins {
 
-struct OrbStereoOptions {
-  double band_px = 2.0;
-  double epipolar_px = 1.5;
-  double min_depth_m = 0.35;
-  int max_distance = 64;
-  double max_ratio = 0.85;
-
-  template <class V>
-  void visit(V&& v) {
-    v("band_px", band_px, "px", "half-width of the band searched, times the scale of the keypoint", 0.1, 50.0);
-    v("epipolar_px", epipolar_px, "px", "largest distance from the epipolar line after refinement", 0.05, 20.0);
-    v("min_depth_m", min_depth_m, "m", "nearest point that is matched", 0.05, 10.0);
-    v("max_distance", max_distance, "bit", "largest Hamming distance of a match", 1, 256);
-    v("max_ratio", max_ratio, "", "largest ratio of the best to the second-best distance", 0.1, 1.0);
-  }
-};
-
 class OrbStereoMatcher {
  public:
-  OrbStereoMatcher(const StereoRig& rig, const OrbStereoOptions& options);
+  /// `min_depth_m`: nearest point that is matched. `epipolar_px`: largest distance from the epipolar line after refinement.
+  OrbStereoMatcher(const StereoRig& rig, double min_depth_m, double epipolar_px);
 
   /// Keeps a reference to `right` until the next call.
   void index(const OrbFeatures& right);
@@ -54,7 +38,7 @@ class OrbStereoMatcher {
   };
   std::optional<Vec2> rectify(const Mat3& R, const Vec2& normalised) const;
 
-  OrbStereoOptions options_;
+  double min_depth_m_, epipolar_px_;
   Camera right_camera_;
   Mat3 R_rect_left_, R_rect_right_;
   double baseline_m_, focal_px_;

@@ -7,14 +7,25 @@ namespace fbvins {
 namespace {
 
 constexpr Duration kMemory = Duration{1'500'000'000};
-/// The prior may be this much older than image a.
+/// The prior may be this much older than the image that it is carried to.
 constexpr Duration kOldestPrior = Duration{500'000'000};
 /// Between the ends of an interval and the readings inside it there may be this much.
 constexpr Duration kTolerance = Duration{30'000'000};
 
 }  // namespace
 
-void MotionPredictor::add(const ImuSegment& imu) {
+std::optional<CarriedPoint> carry_point(const Camera& camera, const CameraMotion& motion, const Vec2& normalised,
+                                        double inverse_depth) {
+  Vec3 p = motion.R_ba * normalised.homogeneous();
+  if (motion.has_translation) p += inverse_depth * motion.p_ba;
+  const auto a_px = camera.project(normalised.homogeneous());
+  const auto b_px = camera.project(p);
+  if (!a_px || !b_px) return std::nullopt;
+  return CarriedPoint{p, *a_px, *b_px};
+}
+
+void MotionPredictor::add(const ImuSegment& imu, const StatePrior& prior) {
+  if (prior.valid) prior_ = prior;
   for (const ImuSample& sample : imu.samples)
     if (samples_.empty() || sample.t > samples_.back().t) samples_.push_back(sample);
   if (!samples_.empty()) forget_before(samples_.back().t - kMemory);
@@ -29,7 +40,7 @@ bool MotionPredictor::covers(Time a, Time b) const {
 }
 
 /// Midpoint integration over the readings in [from.t, to].
-MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const ImuBias& bias, const Vec3& gravity_W) const {
+MotionPredictor::State MotionPredictor::carry(const State& from, Time to) const {
   State s = from;
   auto it =
       std::lower_bound(samples_.begin(), samples_.end(), from.t, [](const ImuSample& sample, Time t) { return sample.t < t; });
@@ -43,9 +54,9 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const 
     if (end) next.t = to;
     const double dt = (next.t - s.t).seconds();
     if (dt > 0) {
-      const Vec3 w = 0.5 * (last.gyro_radps + next.gyro_radps) - bias.gyro_radps;
-      const Vec3 f = 0.5 * (last.accel_mps2 + next.accel_mps2) - bias.accel_mps2;
-      const Vec3 a_W = s.T_WB.q * (so3_exp(0.5 * dt * w) * f) + gravity_W;
+      const Vec3 w = 0.5 * (last.gyro_radps + next.gyro_radps) - prior_.bias.gyro_radps;
+      const Vec3 f = 0.5 * (last.accel_mps2 + next.accel_mps2) - prior_.bias.accel_mps2;
+      const Vec3 a_W = s.T_WB.q * (so3_exp(0.5 * dt * w) * f) + prior_.gravity_W;
       s.T_WB.p += dt * s.v_WB + 0.5 * dt * dt * a_W;
       s.v_WB += dt * a_W;
       s.T_WB.q = (s.T_WB.q * so3_exp(dt * w)).normalized();
@@ -57,19 +68,25 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to, const 
   return s;
 }
 
-std::optional<Pose<W, C0>> MotionPredictor::camera_at(Time t, const StatePrior& prior) const {
-  if (!prior.valid || prior.t > t || t - prior.t >= kOldestPrior || !covers(prior.t, t)) return std::nullopt;
-  return carry({prior.t, prior.T_WB, prior.v_WB}, t, prior.bias, prior.gravity_W).T_WB * T_BC0_;
+bool MotionPredictor::state_reaches(Time t) const {
+  return prior_.valid && prior_.t <= t && t - prior_.t < kOldestPrior && covers(prior_.t, t);
 }
 
-CameraMotion MotionPredictor::between(Time a, Time b, const StatePrior& prior) const {
+MotionPredictor::State MotionPredictor::state_at(Time t) const { return carry({prior_.t, prior_.T_WB, prior_.v_WB}, t); }
+
+std::optional<Pose<W, C0>> MotionPredictor::camera_at(Time t) const {
+  if (!state_reaches(t)) return std::nullopt;
+  return state_at(t).T_WB * T_BC0_;
+}
+
+CameraMotion MotionPredictor::between(Time a, Time b) const {
   CameraMotion motion;
   if (!(b > a) || !covers(a, b)) return motion;
   State at_a;
   at_a.t = a;
-  const bool with_state = prior.valid && prior.t <= a && a - prior.t < kOldestPrior && covers(prior.t, a);
-  if (with_state) at_a = carry({prior.t, prior.T_WB, prior.v_WB}, a, prior.bias, prior.gravity_W);
-  const State at_b = carry(at_a, b, prior.bias, prior.gravity_W);
+  const bool with_state = state_reaches(a);
+  if (with_state) at_a = state_at(a);
+  const State at_b = carry(at_a, b);
   const Pose<C0, C0> T_ba = (at_b.T_WB * T_BC0_).inverse() * (at_a.T_WB * T_BC0_);
   motion.R_ba = T_ba.R();
   motion.has_rotation = true;

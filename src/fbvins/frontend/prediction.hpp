@@ -3,13 +3,14 @@
 // that state carried on by the IMU. Guides matching only: nothing here reaches the estimate.
 //
 //   MotionPredictor predictor(rig.T_BC0);
-//   predictor.add(packet.imu);
-//   CameraMotion motion = predictor.between(t_then, t_now, prior);
+//   predictor.add(packet.imu, prior);
+//   CameraMotion motion = predictor.between(t_then, t_now);
 //   Vec3 ray_now = motion.R_ba * ray_then;      // + motion.p_ba / depth, if motion.has_translation
 #pragma once
 
 #include <deque>
 
+#include "fbvins/camera/camera.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -22,18 +23,33 @@ struct CameraMotion {
   bool has_translation = false;  ///< a valid prior could be carried to both images
 };
 
+/// A feature of image a as the motion to b carries it.
+struct CarriedPoint {
+  Vec3 p;  ///< in the camera at b, scaled so that its depth at a was 1: p.z() is depth at b / depth at a
+  /// Its projections. A track moves by their difference, whatever its own position: exact for no motion.
+  Vec2 a_px = Vec2::Zero(), b_px = Vec2::Zero();
+};
+
+/// Nothing where one of the two cannot be seen. `inverse_depth`, 1/m, counts where the motion has a translation; the motion
+/// must have a rotation.
+std::optional<CarriedPoint> carry_point(const Camera& camera, const CameraMotion& motion, const Vec2& normalised,
+                                        double inverse_depth);
+
 class MotionPredictor {
  public:
   explicit MotionPredictor(const Pose<B, C0>& T_BC0) : T_BC0_(T_BC0) {}
 
-  /// Keeps the readings of the last second or so.
-  void add(const ImuSegment& imu);
+  /// Keeps the readings of the last second or so, and the newest valid prior: where an image has none, the one before is
+  /// carried on, for half a second.
+  void add(const ImuSegment& imu, const StatePrior& prior);
+  /// W is another: the prior is void.
+  void forget_state() { prior_ = {}; }
   /// Readings older than this are of no use any more.
   void forget_before(Time t);
 
-  CameraMotion between(Time a, Time b, const StatePrior& prior) const;
-  /// The left camera in W; nothing without a valid prior that can be carried to t.
-  std::optional<Pose<W, C0>> camera_at(Time t, const StatePrior& prior) const;
+  CameraMotion between(Time a, Time b) const;
+  /// The left camera in W; nothing without a prior that can be carried to t.
+  std::optional<Pose<W, C0>> camera_at(Time t) const;
 
  private:
   struct State {
@@ -42,9 +58,12 @@ class MotionPredictor {
     Vec3 v_WB = Vec3::Zero();
   };
   bool covers(Time a, Time b) const;
-  State carry(const State& from, Time to, const ImuBias& bias, const Vec3& gravity_W) const;
+  bool state_reaches(Time t) const;
+  State state_at(Time t) const;
+  State carry(const State& from, Time to) const;
 
   Pose<B, C0> T_BC0_;
+  StatePrior prior_;               // the newest valid one, if any
   std::deque<ImuSample> samples_;  // in order of time; the stamps of images are among them
 };
 

@@ -99,11 +99,10 @@ std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
 }
 
 std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px, const Vec2& left_normalised) {
-  static const KltOptions klt;
   if (!patch_.cut(left_, left_px, 0, std::min(kSearchLevel, left_.levels() - 1))) return std::nullopt;
   const auto start = search(left_normalised);
   if (!start) return std::nullopt;
-  const KltResult found = klt_align(patch_, right_, *start, 1, 0, klt);
+  const KltResult found = klt_align(patch_, right_, *start, 1, 0);
   if (!found.ok() || !rig_.right.inside(found.px, 2)) return std::nullopt;
   const auto right = rig_.right.undistort(found.px);
   if (!right) return std::nullopt;

@@ -12,10 +12,10 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/features/booster.hpp"
+#include "fbvins/features/booster_options.hpp"
 #include "fbvins/frontend/frontend.hpp"
-#include "fbvins/frontend/klt_frontend.hpp"
-#include "fbvins/frontend/orb_frontend.hpp"
+#include "fbvins/frontend/klt_options.hpp"
+#include "fbvins/frontend/orb_options.hpp"
 
 namespace fbvins {
 
@@ -26,19 +26,13 @@ const std::string& frontend_choices();
 /// One line about all of them, for the option.
 const std::string& frontend_meanings();
 
-/// The boost frontend is the orb frontend with improved descriptors, whose distances are others.
+/// The boost frontend is the orb frontend, with its options, and a network that improves descriptors.
 struct BoostFrontendOptions {
   BoosterOptions booster;
-  int max_distance = 60;
-  double max_ratio = 0.85;
-  int stereo_max_distance = 64;
 
   template <class V>
   void visit(V&& v) {
     v.group("booster", booster, "the network");
-    v("max_distance", max_distance, "bit", "largest Hamming distance of a match over time", 1, 256);
-    v("max_ratio", max_ratio, "", "largest ratio of the best to the second-best distance", 0.1, 1.0);
-    v("stereo_max_distance", stereo_max_distance, "bit", "largest Hamming distance of a match from left to right", 1, 256);
   }
 };
 
@@ -53,7 +47,7 @@ struct FrontendOptions {
     v("kind", kind, frontend_choices(), frontend_meanings());
     v.group("klt", klt, "the klt frontend");
     v.group("orb", orb, "the orb frontend");
-    v.group("boost", boost, "what the boost frontend does other than the orb frontend");
+    v.group("boost", boost, "what the boost frontend has beside the orb frontend's options");
   }
 };
 

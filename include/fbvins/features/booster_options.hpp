@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which network improves descriptors (paper 2.2.2), and in which numbers.
+#pragma once
+
+#include <string>
+
+namespace fbvins {
+
+enum class BoosterPrecision { int8, float32 };
+
+struct BoosterOptions {
+  std::string weights = "boost-s";
+  BoosterPrecision precision = BoosterPrecision::int8;
+
+  template <class V>
+  void visit(V&& v) {
+    v("weights", weights, "", "shipped weights, boost-s (small) or boost-b, or the path of a .safetensors file");
+    v("precision", precision, "int8|float32", "whole numbers, fast; or single precision, for comparison");
+  }
+};
+
+}  // namespace fbvins

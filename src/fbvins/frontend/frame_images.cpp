@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/frame_images.hpp"
+
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+void clear_if_of_another_size(Pyramid& pyramid, const Camera& camera) {
+  if (pyramid.width() != camera.width() || pyramid.height() != camera.height()) pyramid.clear();
+}
+
+}  // namespace
+
+void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
+  t_ = frame.t;
+  left_.clear();
+  right_.clear();
+  if (frame.left) left_.build(frame.left->view(), levels_);
+  if (frame.right) right_.build(frame.right->view(), levels_);
+  stats.mean_brightness_left = mean_brightness(left_);
+  stats.mean_brightness_right = mean_brightness(right_);
+  clear_if_of_another_size(left_, rig_.left);
+  clear_if_of_another_size(right_, rig_.right);
+}
+
+bool FrameImages::forget_before_gap(double longest_s) {
+  if (!has_before() || (t_ >= t_before_ && (t_ - t_before_).seconds() <= longest_s)) return false;
+  before_.clear();
+  return true;
+}
+
+void FrameImages::advance() {
+  std::swap(left_, before_);
+  t_before_ = t_;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The images that tracks are followed in: pyramids of the newest stereo image and of the left one before it.
+// Buffers are reused; one instance, one thread.
+//
+//   FrameImages images(rig, 4);
+//   images.take(packet.frame, stats);
+//   if (images.forget_before_gap(0.6)) drop_all_tracks();
+//   if (images.has_before()) follow(images.before(), images.left());
+//   images.advance();
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/features/pyramid.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class FrameImages {
+ public:
+  FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(levels) {}
+
+  /// The newest images. One that is missing, or of another size than the calibration's (its geometry is unknown), is empty.
+  void take(const StereoFrame& frame, FrontendStats& stats);
+  /// Time went backwards, or on by more than `longest_s`, since the image before: it counts as none. False where there was
+  /// none, or no gap.
+  bool forget_before_gap(double longest_s);
+  /// The newest left image becomes the one before.
+  void advance();
+
+  Time t() const { return t_; }
+  const Pyramid& left() const { return left_; }
+  const Pyramid& right() const { return right_; }
+  bool has_before() const { return !before_.empty(); }
+  Time t_before() const { return t_before_; }
+  const Pyramid& before() const { return before_; }
+
+ private:
+  StereoRig rig_;
+  int levels_;
+  Time t_, t_before_;
+  Pyramid left_, right_, before_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/klt_follower.hpp"
+
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+/// An anchor seen smaller than this, or larger than its inverse, gives way to a new one.
+constexpr double kSmallestScale = 0.65;
+/// Correlation with the anchor below which it is taken anew.
+constexpr double kMinAnchorCorrelation = 0.8;
+/// A feature farther from its anchor's match has slid and is dropped.
+constexpr double kMaxCreep_px = 0.7;
+/// Largest error of following a feature there and back.
+constexpr double kForwardBackward_px = 0.7;
+constexpr int kTop = kKltLevels - 1;
+/// Coarsest level where motion and depth are known, and that of the way back.
+constexpr int kWellPredictedLevel = 2, kBackLevel = 1;
+
+}  // namespace
+
+Vec2 KltFollower::predict(const KltTrack& track, const CameraMotion& motion, double typical_inverse_depth) const {
+  if (!motion.has_rotation) return track.px;
+  const auto carried = carry_point(camera_, motion, track.normalised, track.inverse_depth.value_or(typical_inverse_depth));
+  if (!carried) return track.px;
+  return track.px + carried->b_px - carried->a_px;
+}
+
+KltResult KltFollower::align(const KltTrack& track, const KltTemplate& patch, const CameraMotion& motion,
+                             double typical_inverse_depth, const Pyramid& left) const {
+  const Vec2 start = predict(track, motion, typical_inverse_depth);
+  const bool well_predicted = motion.has_translation && track.inverse_depth;
+  const KltResult found = klt_align(patch, left, start, well_predicted ? std::min(kTop, kWellPredictedLevel) : kTop, 0);
+  return found.ok() || !well_predicted ? found : klt_align(patch, left, start, kTop, 0);
+}
+
+KltResult KltFollower::align_to_anchor(const KltTrack& track, const KltAnchor& anchor, const Vec2& start_px,
+                                       const Pyramid& left) {
+  Mat2 J_pixel_normalised;
+  camera_.distort(track.normalised, &J_pixel_normalised);
+  // A small fronto-parallel plane at the anchor, seen from now.
+  Eigen::Matrix<double, 2, 3> project;
+  project << 1, 0, -track.normalised.x(), 0, 1, -track.normalised.y();
+  const Mat2 J_now_anchor =
+      J_pixel_normalised * project * track.R_now_anchor.leftCols<2>() / track.depth_ratio * track.J_normalised_pixel_anchor;
+  const double scale2 = J_now_anchor.determinant();
+  if (!(scale2 > kSmallestScale * kSmallestScale && scale2 * kSmallestScale * kSmallestScale < 1)) return {};
+  if (!warped_.cut_warped(anchor, J_now_anchor.inverse())) return {};
+  return klt_align(warped_, left, start_px, 0, 0);
+}
+
+void KltFollower::set_anchor(KltTrack& track, KltPatches& patches, const Pyramid& left) const {
+  patches.anchor.take(left, track.px);
+  Mat2 J_pixel_normalised;
+  camera_.distort(track.normalised, &J_pixel_normalised);
+  track.J_normalised_pixel_anchor = J_pixel_normalised.inverse();
+  track.R_now_anchor.setIdentity();
+  track.depth_ratio = 1;
+}
+
+/// What of the track moves with the camera, and its position by optical flow.
+bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotion& motion) const {
+  const Vec3 p_now = motion.R_ba * track.normalised.homogeneous() + track.inverse_depth.value_or(0) * motion.p_ba;
+  const auto normalised = camera_.undistort(found_px);
+  if (!normalised || !(p_now.z() > 0)) return false;
+  track.previous_px = track.px;
+  track.previous_normalised = track.normalised;
+  track.normalised = *normalised;
+  track.R_now_anchor = motion.R_ba * track.R_now_anchor;
+  track.depth_ratio *= p_now.z();
+  if (track.inverse_depth) *track.inverse_depth /= p_now.z();
+  return true;
+}
+
+bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
+                         const FrameImages& images, FrontendStats& stats) {
+  KltResult found = align(track, patches.newest, motion, typical_inverse_depth, images.left());
+  if (!found.ok()) {
+    ++stats.lost_flow;
+    return false;
+  }
+  if (!carry(track, found.px, motion)) return false;
+  const KltResult anchored = align_to_anchor(track, patches.anchor, found.px, images.left());
+  const bool anchor_holds = anchored.ok() && anchored.correlation > kMinAnchorCorrelation;
+  if (anchor_holds && (anchored.px - found.px).norm() > kMaxCreep_px) {
+    ++stats.lost_check;
+    return false;
+  }
+  if (anchor_holds) found.px = anchored.px;
+  if (!camera_.inside(found.px, kPatchBorder_px) || !patches.newest.cut(images.left(), found.px, 0, kTop)) {
+    ++stats.lost_flow;
+    return false;
+  }
+  const KltResult back = klt_align(patches.newest, images.before(), track.px, kBackLevel, 0);
+  if (!back.ok() || (back.px - track.px).norm() > kForwardBackward_px) {
+    ++stats.lost_check;
+    return false;
+  }
+  const auto normalised = camera_.undistort(found.px);
+  if (!normalised) return false;
+  track.px = found.px;
+  track.normalised = *normalised;
+  if (!anchor_holds) set_anchor(track, patches, images.left());
+  ++track.age_frames;
+  return true;
+}
+
+}  // namespace fbvins

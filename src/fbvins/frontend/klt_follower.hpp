@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Follows one feature of the klt frontend into the newest image: Lucas-Kanade from where the motion predicts it, held to
+// the patch where it began (its anchor), and followed back as a check.
+// Holds scratch memory; one instance, one thread.
+//
+//   KltFollower follower(camera);
+//   if (!follower.follow(track, patches, motion, typical_inverse_depth, images, stats)) track.fate = Fate::lost;
+#pragma once
+
+#include <array>
+
+#include "fbvins/features/klt.hpp"
+#include "fbvins/frontend/frame_images.hpp"
+#include "fbvins/frontend/prediction.hpp"
+#include "fbvins/frontend/track_table.hpp"
+
+namespace fbvins {
+
+/// Pyramid levels, the finest included.
+inline constexpr int kKltLevels = 4;
+
+struct KltTrack : TrackState {
+  static constexpr int kHistory = 6;  ///< frames of the long epipolar check
+  // since its anchor was taken:
+  Mat3 R_now_anchor = Mat3::Identity();  ///< rotation of the left camera
+  double depth_ratio = 1;                ///< depth now / depth then
+  Mat2 J_normalised_pixel_anchor = Mat2::Identity();
+  std::array<Vec2, kHistory> history{};  ///< normalised positions, that of age a at a % kHistory
+
+  Vec2& at_age(int age) { return history[static_cast<std::size_t>(age % kHistory)]; }
+  const Vec2& at_age(int age) const { return history[static_cast<std::size_t>(age % kHistory)]; }
+};
+
+struct KltPatches {
+  KltTemplate newest;
+  KltAnchor anchor;
+};
+
+class KltFollower {
+ public:
+  explicit KltFollower(const Camera& camera) : camera_(camera) {}
+
+  /// False when it is lost.
+  bool follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
+              const FrameImages& images, FrontendStats& stats);
+  /// From here on the feature is what the newest image shows.
+  void set_anchor(KltTrack& track, KltPatches& patches, const Pyramid& left) const;
+
+ private:
+  Vec2 predict(const KltTrack& track, const CameraMotion& motion, double typical_inverse_depth) const;
+  bool carry(KltTrack& track, const Vec2& found_px, const CameraMotion& motion) const;
+  KltResult align(const KltTrack& track, const KltTemplate& patch, const CameraMotion& motion, double typical_inverse_depth,
+                  const Pyramid& left) const;
+  KltResult align_to_anchor(const KltTrack& track, const KltAnchor& anchor, const Vec2& start_px, const Pyramid& left);
+
+  Camera camera_;
+  KltTemplate warped_;  // of the anchor being used
+};
+
+}  // namespace fbvins

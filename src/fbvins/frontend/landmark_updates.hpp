@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keeps count of the updates that come from the estimator, each once and in order. One instance, one thread.
+//
+//   switch (updates.take(update)) { ... }
+#pragma once
+
+#include <cassert>
+
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class LandmarkUpdates {
+ public:
+  enum class Kind {
+    next,
+    in_another_W,  ///< the next, and all positions of before are void
+    repeated,      ///< has been taken already
+  };
+
+  /// A gap is a fault of whoever delivers them: positions in it would be lost.
+  Kind take(const LandmarkUpdate& update) {
+    if (update.sequence < next_) return Kind::repeated;
+    assert(update.sequence == next_ && "landmark updates come without gaps and in order");
+    next_ = update.sequence + 1;
+    const bool another_W = update.reset_counter != reset_counter_;
+    reset_counter_ = update.reset_counter;
+    return another_W ? Kind::in_another_W : Kind::next;
+  }
+
+ private:
+  std::int64_t next_ = 0;
+  std::uint32_t reset_counter_ = 0;
+};
+
+}  // namespace fbvins

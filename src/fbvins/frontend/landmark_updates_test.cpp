@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/landmark_updates.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+using Kind = LandmarkUpdates::Kind;
+
+LandmarkUpdate update(std::int64_t sequence, std::uint32_t reset_counter = 0) { return {sequence, reset_counter, {}}; }
+
+TEST(LandmarkUpdates, EveryUpdateCountsOnce) {
+  LandmarkUpdates updates;
+  EXPECT_EQ(updates.take(update(0)), Kind::next);
+  EXPECT_EQ(updates.take(update(0)), Kind::repeated);
+  EXPECT_EQ(updates.take(update(1)), Kind::next);
+  EXPECT_EQ(updates.take(update(0)), Kind::repeated);
+}
+
+TEST(LandmarkUpdates, AnotherWIsSaidOnce) {
+  LandmarkUpdates updates;
+  EXPECT_EQ(updates.take(update(0)), Kind::next);
+  EXPECT_EQ(updates.take(update(1, 1)), Kind::in_another_W);
+  EXPECT_EQ(updates.take(update(2, 1)), Kind::next);
+}
+
+TEST(LandmarkUpdatesDeathTest, AGapIsABug) {
+  LandmarkUpdates updates;
+  updates.take(update(0));
+  EXPECT_DEBUG_DEATH(updates.take(update(2)), "without gaps");
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the estimator is told of a feature: where it is seen, and how well. Pure functions.
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+/// `sigma_px`: standard deviation of the position in the raw image.
+Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised, double sigma_px);
+
+/// The tracks in sight, in their order.
+template <class Tracks>
+std::vector<TrackedFeature> features_of(const Tracks& tracks, const Camera& left, double sigma_px) {
+  std::vector<TrackedFeature> features;
+  features.reserve(tracks.size());
+  for (const auto& track : tracks) {
+    if (!track.in_sight) continue;
+    TrackedFeature feature;
+    feature.id = track.id;
+    feature.left = observe(left, track.px, track.normalised, sigma_px);
+    feature.right = track.right;
+    feature.age_frames = track.age_frames;
+    features.push_back(feature);
+  }
+  return features;
+}
+
+}  // namespace fbvins

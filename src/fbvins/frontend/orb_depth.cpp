@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/orb_depth.hpp"
+
+#include "fbvins/frontend/observe.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Coarsest level on which the position of a keypoint is aligned.
+constexpr int kNearLevel = 1;
+
+}  // namespace
+
+OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px)
+    : right_camera_(rig.right),
+      subpixel_(options.subpixel),
+      fill_in_(options.fill_in),
+      sigma_px_(sigma_px),
+      by_descriptor_(rig, options.min_depth_m, options.stereo_epipolar_px),
+      by_alignment_(rig, options.min_depth_m) {}
+
+void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats) {
+  by_descriptor_.index(right_features_);
+  inverse_depths_.clear();
+  for (OrbTrack& track : tracks) {
+    if (!track.in_sight) continue;
+    const auto px = find(track, tracks.patches(track), images);
+    if (!px) continue;
+    const auto normalised = right_camera_.undistort(*px);
+    if (!normalised) continue;
+    const auto rho = by_descriptor_.inverse_depth(track.normalised, *normalised);
+    if (!rho) continue;
+    track.right = observe(right_camera_, *px, *normalised, sigma_px_);
+    track.inverse_depth = *rho;
+    inverse_depths_.push_back(*rho);
+    ++stats.stereo;
+  }
+  typical_.update(inverse_depths_);
+}
+
+std::optional<Vec2> OrbDepth::find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images) {
+  const int k = by_descriptor_.candidate(track.normalised, track.level, track.descriptor);
+  if (k >= 0) {
+    const Keypoint& keypoint = right_features_.keypoints[static_cast<std::size_t>(k)];
+    if (!subpixel_) return keypoint.pixel;
+    const KltResult fine = klt_align(patches.newest, images.right(), keypoint.pixel, kNearLevel, 0);
+    if (refiner_.accept(fine, keypoint.pixel, keypoint.scale) && right_camera_.inside(fine.px, kRightBorder_px)) return fine.px;
+  }
+  if (!fill_in_) return std::nullopt;
+  const StereoMatch match =
+      by_alignment_.match(patches.newest, track.px, track.normalised, track.inverse_depth, images.left(), images.right());
+  if (match.failure != StereoFailure::none) return std::nullopt;
+  return match.px;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tracks in sight found in the right image, and their depth with that: by descriptor along the epipolar band, where
+// that finds nothing by aligning the patch. Buffers are reused; one instance, one thread.
+//
+//   OrbDepth depth(rig, options);
+//   stats.boost_ms += describer.describe(right_view, depth.right_features());
+//   depth.match(tracks, images, stats);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/frontend/frame_images.hpp"
+#include "fbvins/frontend/klt_stereo.hpp"
+#include "fbvins/frontend/median.hpp"
+#include "fbvins/frontend/orb_options.hpp"
+#include "fbvins/frontend/orb_stereo.hpp"
+#include "fbvins/frontend/orb_track.hpp"
+
+namespace fbvins {
+
+class OrbDepth {
+ public:
+  /// `sigma_px`: standard deviation of an observation in the right image.
+  OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
+
+  /// To be filled before match().
+  OrbFeatures& right_features() { return right_features_; }
+  void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
+  /// Median of those matched last, 1/m.
+  double typical_inverse_depth() const { return typical_.inverse_depth(); }
+
+ private:
+  std::optional<Vec2> find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
+
+  Camera right_camera_;
+  bool subpixel_, fill_in_;
+  double sigma_px_;
+  OrbFeatures right_features_;
+  OrbStereoMatcher by_descriptor_;
+  KltStereoMatcher by_alignment_;
+  PatchRefiner refiner_;
+  TypicalDepth typical_;
+  std::vector<double> inverse_depths_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where each track is in the newest image, to a fraction of a pixel: from the keypoint that its descriptor was matched
+// with, or, without one, from where it is expected, by aligning its patches; and back into the image before as a check.
+// Buffers are reused; one instance, one thread.
+//
+//   OrbLocator locator(camera, {.subpixel = true, .fill_in = true});
+//   locator.locate(tracks, view, images, found, stats);
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/frontend/frame_images.hpp"
+#include "fbvins/frontend/orb_track.hpp"
+
+namespace fbvins {
+
+class OrbLocator {
+ public:
+  struct Choices {
+    bool subpixel = true;  ///< refine positions of keypoints
+    bool fill_in = true;   ///< follow tracks without a keypoint
+  };
+  OrbLocator(const Camera& camera, const Choices& choices) : camera_(camera), choices_(choices) {}
+
+  /// `found`: the keypoint of each track, or -1. Tracks that are found are in sight afterwards, and their keypoints used.
+  void locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found, FrontendStats& stats);
+
+ private:
+  Vec2 common_miss(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found);
+  std::optional<Vec2> place(OrbTrack& track, const OrbPatches& patches, const Keypoint* keypoint, const Vec2& expected_px,
+                            const FrameImages& images, FrontendStats& stats);
+  std::optional<Vec2> refine_match(OrbTrack& track, const OrbPatches& patches, const Keypoint& keypoint, const Pyramid& left);
+  std::optional<Vec2> follow_by_alignment(OrbTrack& track, const OrbPatches& patches, const Vec2& expected_px,
+                                          const Pyramid& left);
+  std::optional<Vec2> hold_to_reference(OrbTrack& track, const OrbPatches& patches, const Vec2& newest_px, const Pyramid& left);
+  bool returns(const OrbTrack& track, const Vec2& px, const FrameImages& images);
+
+  Camera camera_;
+  Choices choices_;
+  PatchRefiner refiner_;
+  KltTemplate back_;  // patch found now, to be followed back
+  std::vector<double> miss_x_px_, miss_y_px_, motion_px_;
+};
+
+}  // namespace fbvins

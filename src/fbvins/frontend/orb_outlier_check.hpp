@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Outliers among the tracks in sight (paper 2.2.3): against the image before, and against one some images back, because
+// where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
+// One instance, one thread.
+//
+//   OrbOutlierCheck check(camera.focal_px(), 1.0);
+//   check.begin(view);                                   // every image, also one without tracks
+//   check.judge(tracks, view, predictor, stats);  // those that break the constraint are lost
+#pragma once
+
+#include <array>
+
+#include "fbvins/frontend/epipolar_check.hpp"
+#include "fbvins/frontend/orb_track.hpp"
+
+namespace fbvins {
+
+class OrbOutlierCheck {
+ public:
+  OrbOutlierCheck(double focal_px, double threshold_px) : threshold_px_(threshold_px), epipolar_(focal_px, kSeed) {}
+
+  void begin(const OrbView& view) { t_[static_cast<std::size_t>(view.index) % OrbTrack::kHistory] = view.t; }
+  /// Also notes where tracks are seen in this image.
+  void judge(OrbTracks& tracks, const OrbView& view, const MotionPredictor& predictor, FrontendStats& stats);
+
+ private:
+  static constexpr std::uint64_t kSeed = 2;
+
+  double threshold_px_;
+  EpipolarCheck epipolar_;
+  std::array<Time, OrbTrack::kHistory> t_;  // of image i at i % kHistory
+};
+
+}  // namespace fbvins

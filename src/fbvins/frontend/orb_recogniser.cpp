@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/orb_recogniser.hpp"
+
+#include <algorithm>
+
+#include "fbvins/frontend/median.hpp"
+
+namespace fbvins {
+namespace {
+
+/// A track of fewer images was hardly a landmark.
+constexpr int kFewestFrames = 4;
+/// Around where a landmark should be.
+constexpr double kSearch_px = 15;
+constexpr int kMaxDistance_bits = 50;
+/// Fewer than this in one image are chance.
+constexpr int kFewestTogether = 4;
+/// How far one may be from where the others say that it should be.
+constexpr double kAgreement_px = 4;
+/// Asked with the patch that the track began with.
+constexpr double kMinCorrelation = 0.7;
+
+}  // namespace
+
+void OrbRecogniser::locate(const LandmarkUpdate& update, OrbTracks& tracks) {
+  for (const LocatedLandmark& located : update.landmarks) {
+    const auto track = std::find_if(tracks.begin(), tracks.end(), [&](const OrbTrack& t) { return t.id == located.track; });
+    if (track != tracks.end()) track->p_W = located.p_W;
+    else memory_.locate(located.track, located.p_W);
+  }
+}
+
+void OrbRecogniser::clear(OrbTracks& tracks) {
+  memory_.clear();
+  for (OrbTrack& track : tracks) {
+    track.seen_from_W.reset();
+    track.p_W.reset();
+  }
+}
+
+void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now) {
+  if (!options_.enabled || !view.T_WC || !track.seen_from_W || !track.inverse_depth || track.age_frames < kFewestFrames) return;
+  RememberedLandmark landmark;
+  landmark.track = track.id;
+  landmark.descriptor = track.descriptor;
+  landmark.raw = track.raw;
+  landmark.level = track.level;
+  landmark.age_frames = track.age_frames;
+  landmark.reference = reference;
+  landmark.R_W_reference = view.T_WC->R() * reference.R_now_then;
+  landmark.reference_depth_m = 1.0 / (*track.inverse_depth * reference.depth_ratio);
+  landmark.seen_from_W = *track.seen_from_W;
+  landmark.p_W = track.p_W;
+  landmark.kept = now;
+  memory_.keep(std::move(landmark));
+}
+
+void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats) {
+  if (!view.T_WC || !options_.enabled) return;
+  memory_.expect(*view.T_WC, camera_, levels_, expected_);
+  queries_.clear();
+  for (const ExpectedLandmark& e : expected_)
+    queries_.push_back({e.px, kSearch_px, e.level, kMaxDistance_bits, e.landmark->descriptor});
+  matcher_.match(queries_, view.features, view.grid, found_);
+
+  const auto miss = [&](std::size_t i) -> Vec2 {
+    return view.features.keypoints[static_cast<std::size_t>(found_[i])].pixel - expected_[i].px;
+  };
+  miss_x_px_.clear();
+  miss_y_px_.clear();
+  for (std::size_t i = 0; i < expected_.size(); ++i) {
+    if (found_[i] < 0) continue;
+    miss_x_px_.push_back(miss(i).x());
+    miss_y_px_.push_back(miss(i).y());
+  }
+  stats.expected = static_cast<int>(expected_.size());
+  if (static_cast<int>(miss_x_px_.size()) < kFewestTogether) return;
+  // What W has drifted since they were seen moves all of them alike.
+  const Vec2 common_miss(median(miss_x_px_), median(miss_y_px_));
+  for (std::size_t i = 0; i < expected_.size(); ++i) {
+    if (found_[i] < 0 || (miss(i) - common_miss).norm() > kAgreement_px) continue;
+    if (begin_again(expected_[i], static_cast<std::size_t>(found_[i]), tracks, view, left)) ++stats.recognised;
+  }
+}
+
+bool OrbRecogniser::begin_again(const ExpectedLandmark& expected, std::size_t k, OrbTracks& tracks, OrbView& view,
+                                const Pyramid& left) {
+  if (tracks.full()) return false;
+  const Keypoint& keypoint = view.features.keypoints[k];
+  const RememberedLandmark& landmark = *expected.landmark;
+  PatchReference reference = landmark.reference;
+  reference.R_now_then = view.T_WC->R().transpose() * landmark.R_W_reference;
+  reference.depth_ratio = expected.depth_m / landmark.reference_depth_m;
+  const KltResult fine = refiner_.refine(reference, left, keypoint.pixel, camera_, expected.normalised);
+  if (!refiner_.accept(fine, keypoint.pixel, keypoint.scale, kMinCorrelation)) return false;
+  OrbTrack track;
+  track.id = landmark.track;
+  track.descriptor = view.descriptor(k);
+  track.raw = view.raw_descriptor(k);
+  track.level = keypoint.level;
+  track.inverse_depth = 1.0 / expected.depth_m;
+  track.age_frames = landmark.age_frames;
+  track.p_W = landmark.p_W;
+  if (!settle(track, fine.px, camera_, view)) return false;
+  tracks.free_patches().reference = reference;
+  tracks.resume(track);
+  view.used[k] = 1;
+  memory_.take_out(landmark.track);  // `landmark` ends here
+  return true;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Landmarks known again after they were out of view (docs/derivations/known_landmarks.md, K7): tracks that end are remembered,
+// and begin again under their old id where descriptor, patch and the others' places agree.
+// Buffers are reused; one instance, one thread.
+//
+//   OrbRecogniser recogniser(camera, options.recognition, levels);
+//   tracks.drop_ended([&](const OrbTrack& t, const OrbPatches& p) { recogniser.remember(t, p.reference, view, now); });
+//   recogniser.locate(update, tracks);                 // where the estimator has left them
+//   recogniser.recognise(tracks, view, left, stats);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/frontend/landmark_memory.hpp"
+#include "fbvins/frontend/orb_matching.hpp"
+#include "fbvins/frontend/orb_options.hpp"
+#include "fbvins/frontend/orb_track.hpp"
+
+namespace fbvins {
+
+class OrbRecogniser {
+ public:
+  /// `levels`: of the scale pyramid that keypoints come from.
+  OrbRecogniser(const Camera& camera, const RecognitionOptions& options, int levels)
+      : camera_(camera), options_(options), levels_(levels), memory_(options.capacity) {}
+
+  void locate(const LandmarkUpdate& update, OrbTracks& tracks);
+  /// W is another: all positions are void.
+  void clear(OrbTracks& tracks);
+  /// A track that has gone out of view, if it was a landmark. `view`: the last image that it was carried to.
+  void remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now);
+  bool remembers(TrackId track) const { return memory_.contains(track); }
+  void forget_unlocated(Time now) { memory_.forget_unlocated(now); }
+  void recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
+
+ private:
+  bool begin_again(const ExpectedLandmark& expected, std::size_t keypoint, OrbTracks& tracks, OrbView& view, const Pyramid& left);
+
+  Camera camera_;
+  RecognitionOptions options_;
+  int levels_;
+  LandmarkMemory memory_;
+  PatchRefiner refiner_;
+  GuidedMatcher matcher_;
+  std::vector<ExpectedLandmark> expected_;
+  std::vector<GuidedQuery> queries_;
+  std::vector<int> found_;
+  std::vector<double> miss_x_px_, miss_y_px_;
+};
+
+}  // namespace fbvins

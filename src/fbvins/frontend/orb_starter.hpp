@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// New tracks where there are few: first for image cells with less than their share, then anywhere; and where the image has
+// too few sharp corners (dark, blurred, plain walls), its less sharp ones at half the distance, up to half of what is
+// wanted. Buffers are reused; one instance, one thread.
+//
+//   OrbStarter starter(camera, 180, 14);
+//   starter.start(tracks, view, left, stats);
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "fbvins/frontend/orb_track.hpp"
+
+namespace fbvins {
+
+class OrbStarter {
+ public:
+  OrbStarter(const Camera& camera, int wanted, double min_distance_px)
+      : camera_(camera), wanted_(wanted), min_distance_px_(min_distance_px) {}
+
+  /// From keypoints that no track has. Counts tracks in sight and those started.
+  void start(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
+
+ private:
+  static constexpr int kColumns = 8, kRows = 5;
+  struct Pass {
+    bool only_poor_cells;
+    double max_uncertainty_px;
+    double min_distance_px;
+    int wanted;
+  };
+  std::size_t cell_of(const Vec2& px) const;
+  void list_unused(const OrbView& view);
+  void run(const Pass& pass, OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
+  bool start_track(std::size_t keypoint, double max_uncertainty_px, OrbTracks& tracks, const OrbView& view,
+                   const Pyramid& left) const;
+
+  Camera camera_;
+  int wanted_;
+  double min_distance_px_;
+  std::vector<Vec2> occupied_;                 // where tracks are
+  std::array<int, kColumns * kRows> count_{};  // of them in each cell
+  std::vector<std::size_t> strongest_first_;   // keypoints without a track
+};
+
+}  // namespace fbvins

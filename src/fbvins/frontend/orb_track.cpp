@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/orb_track.hpp"
+
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+/// A track expected this far outside the image is forgotten.
+constexpr double kFarOutside_px = 40;
+/// Depth now / depth before; nearer, or behind the camera, a prediction means nothing.
+constexpr double kNearestAhead = 0.1;
+/// Tracks whose squared distance is less than this share of the smallest distance's square (0.4 of it) are one.
+constexpr double kTogetherShare2 = 0.16;
+/// Without depth the prediction is a guess that soon is worth nothing: this share of the usual time.
+constexpr double kMemoryWithoutDepth = 0.3;
+/// Younger tracks are not worth remembering.
+constexpr int kFewestFrames = 2;
+
+void predict_one(OrbTrack& track, PatchReference& reference, const Camera& camera, const CameraMotion& motion,
+                 double typical_inverse_depth) {
+  const auto carried = carry_point(camera, motion, track.normalised, track.inverse_depth.value_or(typical_inverse_depth));
+  if (!carried || !(carried->p.z() > kNearestAhead)) {
+    track.fate = Fate::lost;
+    return;
+  }
+  track.px += carried->b_px - carried->a_px;
+  track.normalised = carried->p.hnormalized();
+  if (track.inverse_depth) *track.inverse_depth /= carried->p.z();
+  reference.carry(motion.R_ba, carried->p.z());
+  if (!camera.inside(track.px, -kFarOutside_px)) track.fate = Fate::out_of_view;
+}
+
+}  // namespace
+
+void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth) {
+  for (OrbTrack& track : tracks) {
+    track.was_in_sight = track.in_sight;
+    track.in_sight = false;
+    track.right.reset();
+    track.previous_normalised = track.normalised;
+    track.previous_px = track.px;
+    if (motion.has_rotation) predict_one(track, tracks.patches(track).reference, camera, motion, typical_inverse_depth);
+  }
+}
+
+bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view) {
+  if (!camera.inside(px, kPatchBorder_px)) return false;
+  const auto normalised = camera.undistort(px);
+  if (!normalised) return false;
+  track.px = px;
+  track.normalised = *normalised;
+  track.in_sight = true;
+  track.last_seen = view.t;
+  if (view.T_WC) track.seen_from_W = view.T_WC->p;
+  ++track.age_frames;
+  return true;
+}
+
+void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
+  std::stable_sort(tracks.begin(), tracks.end(),
+                   [](const OrbTrack& a, const OrbTrack& b) { return a.age_frames > b.age_frames; });
+  const double closest2 = kTogetherShare2 * min_distance_px * min_distance_px;
+  std::vector<Vec2> kept;
+  kept.reserve(tracks.size());
+  for (OrbTrack& track : tracks) {
+    if (!track.in_sight) continue;
+    const bool crowded =
+        std::any_of(kept.begin(), kept.end(), [&](const Vec2& other) { return (other - track.px).squaredNorm() < closest2; });
+    if (crowded || static_cast<int>(kept.size()) == most) track.fate = Fate::lost;
+    else kept.push_back(track.px);
+  }
+}
+
+void forget(OrbTracks& tracks, Time now, double memory_s) {
+  int remembered = 0;
+  for (OrbTrack& track : tracks) {
+    if (track.in_sight) continue;
+    const double patience_s = track.inverse_depth ? memory_s : kMemoryWithoutDepth * memory_s;
+    const bool too_long = (now - track.last_seen).seconds() > patience_s;
+    if (too_long || track.age_frames < kFewestFrames || remembered == kMostOutOfSight) track.fate = Fate::out_of_view;
+    else ++remembered;
+  }
+}
+
+void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera) {
+  for (OrbTrack& track : tracks) {
+    if (!track.in_sight) continue;
+    OrbPatches& patches = tracks.patches(track);
+    if (!patches.newest.cut(left, track.px, 0, kOrbAlignmentLevels - 1)) track.fate = Fate::lost;
+    else if (track.renew_reference) patches.reference.take(left, track.px, camera, track.normalised);
+    track.renew_reference = false;
+  }
+}
+
+}  // namespace fbvins

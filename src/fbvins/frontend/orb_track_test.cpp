@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/orb_track.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/frontend/test_wall.hpp"
+
+namespace fbvins {
+namespace {
+
+OrbTrack track_at(const Camera& camera, const Vec2& px, int age_frames = 5) {
+  OrbTrack track;
+  track.px = px;
+  track.normalised = camera.undistort(px).value();
+  track.age_frames = age_frames;
+  return track;
+}
+
+TEST(OrbTrack, IsPredictedWhereItsDepthSaysAndLeavesWithTheImage) {
+  const TestWall wall;
+  OrbTracks tracks(3);
+  OrbTrack with_depth = track_at(wall.camera, Vec2(100, 90));
+  with_depth.inverse_depth = 1 / wall.kDepth_m;
+  tracks.start(with_depth);
+  tracks.start(track_at(wall.camera, Vec2(100, 50)));  // taken as far away
+  tracks.start(track_at(wall.camera, Vec2(2, 90)));
+  tracks[2].inverse_depth = 1 / 0.5;
+  predict(tracks, wall.camera, wall.motion(0.3), 0);
+  EXPECT_NEAR((tracks[0].px - Vec2(100, 90) - wall.shift(0.3)).norm(), 0, 1e-9);
+  EXPECT_EQ(tracks[1].px, Vec2(100, 50));
+  EXPECT_EQ(tracks[0].previous_px, Vec2(100, 90));
+  EXPECT_TRUE(tracks[0].was_in_sight && !tracks[0].in_sight);
+  EXPECT_EQ(tracks[0].fate, Fate::goes_on);
+  EXPECT_EQ(tracks[2].fate, Fate::out_of_view) << "120 px to the left of the image";
+}
+
+TEST(OrbTrack, IsLostBehindTheCamera) {
+  const TestWall wall;
+  OrbTracks tracks(1);
+  tracks.start(track_at(wall.camera, Vec2(100, 90)));
+  tracks[0].inverse_depth = 1;
+  CameraMotion through;
+  through.has_rotation = through.has_translation = true;
+  through.p_ba = Vec3(0, 0, -0.95);
+  predict(tracks, wall.camera, through, 0);
+  EXPECT_EQ(tracks[0].fate, Fate::lost);
+}
+
+TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasSeen) {
+  OrbTrack track;
+  for (const std::int64_t image : {10, 11, 12}) {
+    track.normalised = Vec2(static_cast<double>(image), 0);
+    track.in_sight = image != 11;
+    track.see(image);
+  }
+  ASSERT_NE(track.sighting(10), nullptr);
+  EXPECT_EQ(track.sighting(10)->x(), 10);
+  EXPECT_EQ(track.sighting(11), nullptr);
+  EXPECT_EQ(track.sighting(12 - static_cast<std::int64_t>(OrbTrack::kHistory)), nullptr) << "overwritten";
+}
+
+TEST(OrbTrack, SettlesInsideTheImageOnly) {
+  const TestWall wall;
+  OrbView view;
+  view.t = Time{7};
+  view.T_WC = Pose<W, C0>(Quat::Identity(), Vec3(1, 2, 3));
+  OrbTrack track = track_at(wall.camera, Vec2(100, 90));
+  track.in_sight = false;
+  EXPECT_FALSE(settle(track, Vec2(kPatchBorder_px - 1, 90), wall.camera, view));
+  EXPECT_FALSE(track.in_sight);
+  EXPECT_TRUE(settle(track, Vec2(110, 95), wall.camera, view));
+  EXPECT_TRUE(track.in_sight);
+  EXPECT_EQ(track.age_frames, 6);
+  EXPECT_EQ(track.last_seen, view.t);
+  EXPECT_EQ(*track.seen_from_W, Vec3(1, 2, 3));
+}
+
+TEST(ThinOut, KeepsTheOlderOfTwoThatHaveComeTogetherAndNoMoreThanWanted) {
+  const TestWall wall;
+  OrbTracks tracks(5);
+  tracks.start(track_at(wall.camera, Vec2(100, 90), 1));
+  tracks.start(track_at(wall.camera, Vec2(103, 90), 9));  // 4 px are 0.4 of the smallest distance
+  tracks.start(track_at(wall.camera, Vec2(50, 90), 3));
+  tracks.start(track_at(wall.camera, Vec2(104.5, 94), 2));
+  tracks.start(track_at(wall.camera, Vec2(105, 90), 8));
+  tracks[4].in_sight = false;
+  thin_out(tracks, 2, 10);
+  tracks.drop_ended();
+  ASSERT_EQ(tracks.size(), 3u);
+  EXPECT_EQ(tracks[0].age_frames, 9);
+  EXPECT_EQ(tracks[1].age_frames, 8) << "out of sight it is in nobody's way";
+  EXPECT_EQ(tracks[2].age_frames, 3);
+}
+
+TEST(Forget, IsPatientWithTracksWhoseDepthIsKnown) {
+  const TestWall wall;
+  const Time now{2'000'000'000};
+  const auto fate = [&](double seen_ago_s, bool depth, int age_frames, bool in_sight = false) {
+    OrbTracks tracks(1);
+    OrbTrack track = track_at(wall.camera, Vec2(100, 90), age_frames);
+    track.in_sight = in_sight;
+    track.last_seen = now - Duration::from_seconds(seen_ago_s);
+    if (depth) track.inverse_depth = 0.3;
+    tracks.start(track);
+    forget(tracks, now, 1.0);
+    return tracks[0].fate;
+  };
+  EXPECT_EQ(fate(0.9, true, 5), Fate::goes_on);
+  EXPECT_EQ(fate(1.1, true, 5), Fate::out_of_view);
+  EXPECT_EQ(fate(0.2, false, 5), Fate::goes_on);
+  EXPECT_EQ(fate(0.4, false, 5), Fate::out_of_view);
+  EXPECT_EQ(fate(0.1, true, 1), Fate::out_of_view) << "seen once only";
+  EXPECT_EQ(fate(1.1, true, 5, true), Fate::goes_on) << "in sight";
+}
+
+}  // namespace
+}  // namespace fbvins

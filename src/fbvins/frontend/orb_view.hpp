@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// The newest left image as all parts of the orb frontend see it: its keypoints with the descriptors in use, and from where
+// it was taken. OrbDescriber makes it: extraction, and the stage that may improve descriptors (paper 2.2.2).
+// Buffers are reused; one instance, one thread.
+//
+//   OrbDescriber describer(orb_options, make_identity_stage());
+//   stats.boost_ms = describer.describe(image.view(), view);
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fbvins/features/descriptor_stage.hpp"
+#include "fbvins/features/orb.hpp"
+#include "fbvins/frontend/keypoint_grid.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+struct OrbView {
+  std::int64_t index = 0;  ///< of usable left images, counted from 0
+  Time t;
+  std::optional<Pose<W, C0>> T_WC;  ///< where the state is known
+  OrbFeatures features;
+  OrbFeatures raw;  ///< the same before descriptors were improved; empty where they are as extracted
+  bool improved = false;
+  KeypointGrid grid;
+  std::vector<std::uint8_t> used;  ///< of each keypoint, whether a track has it
+
+  const Descriptor& descriptor(std::size_t k) const { return features.descriptors[k]; }
+  /// As extracted; one that means nothing where none was improved.
+  Descriptor raw_descriptor(std::size_t k) const { return improved ? raw.descriptors[k] : Descriptor{}; }
+};
+
+class OrbDescriber {
+ public:
+  OrbDescriber(const OrbOptions& options, std::unique_ptr<DescriptorStage> stage)
+      : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
+
+  /// All of the view that comes from the image alone. Returns the CPU time that improving took, ms.
+  double describe(const ImageView& image, OrbView& view);
+  /// The features alone, of another image.
+  double describe(const ImageView& image, OrbFeatures& features);
+
+ private:
+  double improve(const ImageView& image, OrbFeatures& features);
+
+  std::unique_ptr<DescriptorStage> stage_;
+  OrbExtractor extractor_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The features that are being followed: what every frontend knows of one, and the table of them with their patches.
+// Patches are large and stay where they are; tracks are small and move. One instance, one thread.
+//
+//   TrackTable<KltTrack, KltPatches> tracks(150);
+//   if (!tracks.full() && tracks.free_patches().newest.cut(left, px, 0, 3)) tracks.start(track);
+//   for (KltTrack& track : tracks) if (!follow(track, tracks.patches(track))) track.fate = Fate::lost;
+//   tracks.drop_ended();
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+/// Whether a track is still one. One whose feature went out of view may be known again; a lost one was wrong.
+enum class Fate : std::uint8_t { goes_on, out_of_view, lost };
+
+struct TrackState {
+  TrackId id;
+  std::size_t slot = 0;            ///< of its patches
+  Vec2 px = Vec2::Zero();          ///< in the newest left image; where it is expected, while out of sight
+  Vec2 normalised = Vec2::Zero();  ///< the same in C0
+  Vec2 previous_px = Vec2::Zero();
+  Vec2 previous_normalised = Vec2::Zero();
+  std::optional<double> inverse_depth;  ///< 1/m along z of C0, from the last stereo match
+  std::optional<Observation> right;     ///< match in the newest right image
+  int age_frames = 0;
+  bool in_sight = true;  ///< has an observation in the newest image
+  Fate fate = Fate::goes_on;
+};
+
+template <class Track, class Patches>
+class TrackTable {
+ public:
+  explicit TrackTable(int capacity) : patches_(static_cast<std::size_t>(capacity)) {
+    for (std::size_t i = patches_.size(); i-- > 0;) free_.push_back(i);
+  }
+
+  auto begin() { return tracks_.begin(); }
+  auto end() { return tracks_.end(); }
+  auto begin() const { return tracks_.begin(); }
+  auto end() const { return tracks_.end(); }
+  std::size_t size() const { return tracks_.size(); }
+  Track& operator[](std::size_t i) { return tracks_[i]; }
+  const Track& operator[](std::size_t i) const { return tracks_[i]; }
+  Patches& patches(const Track& track) { return patches_[track.slot]; }
+  const Patches& patches(const Track& track) const { return patches_[track.slot]; }
+
+  bool full() const { return free_.empty(); }
+  /// Those that the next track gets: cut first, and start only when that went well. Not of a full table.
+  Patches& free_patches() {
+    assert(!full());
+    return patches_[free_.back()];
+  }
+  /// A new track, with an id of its own.
+  Track& start(Track track) {
+    track.id = TrackId{next_id_++};
+    return resume(std::move(track));
+  }
+  /// A track that goes on under the id it has.
+  Track& resume(Track track) {
+    assert(!full());
+    track.slot = free_.back();
+    free_.pop_back();
+    return tracks_.emplace_back(std::move(track));
+  }
+
+  /// Takes out those whose fate is not to go on, after `on_end(track, patches)`.
+  template <class OnEnd>
+  void drop_ended(OnEnd&& on_end) {
+    for (const Track& track : tracks_) {
+      if (track.fate == Fate::goes_on) continue;
+      on_end(track, std::as_const(patches_[track.slot]));
+      free_.push_back(track.slot);
+    }
+    std::erase_if(tracks_, [](const Track& track) { return track.fate != Fate::goes_on; });
+  }
+  void drop_ended() {
+    drop_ended([](const Track&, const Patches&) {});
+  }
+  void end_all(Fate fate) {
+    for (Track& track : tracks_) track.fate = fate;
+  }
+
+ private:
+  std::vector<Track> tracks_;
+  std::vector<Patches> patches_;
+  std::vector<std::size_t> free_;
+  std::int64_t next_id_ = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/track_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace fbvins {
+namespace {
+
+struct Named {
+  int name = 0;
+};
+using Table = TrackTable<TrackState, Named>;
+
+/// A track whose patches carry its number.
+void start(Table& table, int name) {
+  table.free_patches().name = name;
+  table.start({});
+}
+
+TEST(TrackTable, KeepsEachTracksPatchesWhileOthersComeAndGo) {
+  Table table(3);
+  for (const int name : {0, 1, 2}) start(table, name);
+  EXPECT_TRUE(table.full());
+  table[1].fate = Fate::lost;
+  table.drop_ended();
+  ASSERT_EQ(table.size(), 2u);
+  EXPECT_FALSE(table.full());
+  start(table, 3);
+  EXPECT_TRUE(table.full());
+  std::set<std::size_t> slots;
+  for (const TrackState& track : table) {
+    EXPECT_EQ(table.patches(track).name, track.id.value);
+    slots.insert(track.slot);
+  }
+  EXPECT_EQ(slots.size(), 3u);
+}
+
+TEST(TrackTable, ResumedTracksKeepTheirIdAndNewOnesNeverShareOne) {
+  Table table(4);
+  start(table, 0);
+  start(table, 1);
+  const TrackState old = table[0];
+  table.end_all(Fate::out_of_view);
+  table.drop_ended();
+  EXPECT_EQ(table.size(), 0u);
+  EXPECT_EQ(table.resume(old).id, TrackId{0});
+  EXPECT_EQ(table.start({}).id, TrackId{2});
+}
+
+TEST(TrackTable, TellsOfEveryTrackThatEndsAndOfNoOther) {
+  Table table(4);
+  for (const int name : {0, 1, 2, 3}) start(table, name);
+  table[1].fate = Fate::lost;
+  table[3].fate = Fate::out_of_view;
+  std::vector<std::pair<int, Fate>> ended;
+  table.drop_ended([&](const TrackState& track, const Named& patches) { ended.emplace_back(patches.name, track.fate); });
+  const std::vector<std::pair<int, Fate>> wanted{{1, Fate::lost}, {3, Fate::out_of_view}};
+  EXPECT_EQ(ended, wanted);
+}
+
+}  // namespace
+}  // namespace fbvins
