@@ -22,8 +22,9 @@ class Frontend {
   /// carry it on. A missing image gives a frame without features of that camera.
   virtual TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) = 0;
 
-  /// Where landmarks were when they left the estimator's window. Every update comes once and in order, before the image that
-  /// follows it. For frontends that re-observe landmarks under their old track; others ignore it.
+  /// Where landmarks were when they left the estimator's window. Every update comes in order and without gaps, before the image
+  /// that follows it; one that comes twice counts once. For frontends that re-observe landmarks under their old track; others
+  /// ignore it.
   virtual void locate(const LandmarkUpdate& update) { (void)update; }
 };
 

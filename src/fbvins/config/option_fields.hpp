@@ -3,7 +3,7 @@
 // parsing, printing and setting need no template. A list is valid as long as the struct it was made of
 // lives and stays where it is; one thread at a time.
 //
-//   KltOptions options;
+//   KltFrontendOptions options;
 //   for (const OptionField& f : fields_of(options)) use(f.path, f.value_text());
 #pragma once
 

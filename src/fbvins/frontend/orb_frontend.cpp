@@ -57,7 +57,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
 
   view_.t = images_.t();
   view_.T_WC = predictor_.camera_at(view_.t);
-  stats.boost_ms = describer_.describe(packet.frame.left->view(), view_);
+  stats.boost_ms = describer_.describe(packet.frame.left->view(), view_);  // 2.2.1, 2.2.2
   outliers_.begin(view_);
   stats.detect_ms = timer.lap_ms();
   if (images_.has_before()) follow(stats);
@@ -78,7 +78,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   return out;
 }
 
-/// The tracks there are, from the image before into this one.
+/// The tracks there are, from the image before into this one (2.1.1, 2.2.3): predicted, matched, refined, checked.
 void OrbFrontend::follow(FrontendStats& stats) {
   const CameraMotion motion = predictor_.between(images_.t_before(), view_.t);
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
