@@ -83,15 +83,11 @@ TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   SimulatedFlight flight(Motion(0.6, 0.5), 48);
   const Calibration calibrated{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
   const CalibrationBelief belief;
-  const WindowPrior prior =
-      with_calibration_belief(first_frame_prior(InitialiserOptions{}, NavState{}, true), belief, calibrated);
+  const WindowPrior prior = with_calibration_belief(first_frame_prior(NavState{}, true), belief, calibrated);
   ASSERT_EQ(prior.quadratic.size(), kTiltSize + kCalibrationSize + 15);
-  WindowProblem problem;
-  problem.weights.estimate_extrinsics = true;
   const auto cost = [&](const StereoRig& rig) {
-    problem.calibration = {rig.T_BC0, rig.T_BC1, 0.0};
     Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
-    dx.segment<kCalibrationSize>(prior.calibration_row()) = problem.calibration_displacement(calibrated);
+    dx.segment<kCalibrationSize>(prior.calibration_row()) = calibration_displacement({rig.T_BC0, rig.T_BC1, 0.0}, calibrated);
     return prior.quadratic.cost(dx);
   };
   // Turned together by one standard deviation about an axis through the IMU: the left camera's rotation, and its position

@@ -11,10 +11,13 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/estimator/window_solver.hpp"
+#include "fbvins/types/keyframe.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
 
@@ -36,44 +39,41 @@ class Estimator {
 
   /// For the frontend: the newest state in the window's W, not levelled; not valid before initialisation.
   StatePrior prior() const;
-  WindowSnapshot snapshot() const { return window_.snapshot(calibration_); }
+  WindowSnapshot snapshot() const;
   const Calibration& calibration() const { return calibration_; }
   /// For tests and those who want to look inside.
   const SlidingWindow& window() const { return window_; }
 
  private:
-  Odometry initialise(const TrackedFrame& frame, Duration rest);
-  Odometry track(const TrackedFrame& frame, Duration rest);
+  void initialise(const TrackedFrame& frame, Duration rest, Estimate& out);
+  void open_window(const InitialSolution& start);
+  void track(const TrackedFrame& frame, Duration rest, Estimate& out);
   Frame predict(const TrackedFrame& frame) const;
-  void solve(Odometry& out, const LmOptions& lm);
-  void fill_covariances(Odometry& out);
-  void choose_keyframe(bool standstill, Odometry& out);
-  void shrink_window(Odometry& out);
-  void hand_on_keyframes(int keyframe_zone);
+  const WindowSolution& solve(Odometry& out, const LmOptions& lm);
+  void fill_covariances(const WindowSolution& solution, Odometry& out);
+  void shrink_window(const WindowSolution& solution, Estimate& out);
+  void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame);
   void restart();
-  void fill(Odometry& out);
-  WindowWeights weights() const;
+  void fill(Odometry& out) const;
   Vec3 gravity_W() const;
 
   EstimatorOptions options_;
-  StereoRig rig_;
-  ImuNoise imu_noise_;  ///< calibrated noise times the options' factors
-  Calibration calibration_;
+  ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
+  Calibration calibrated_, calibration_;  ///< as given, and as estimated
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;
+  HealthJudge health_;
   SlidingWindow window_;
-  WindowProblem problem_;
+  WindowSolver solver_;
+  WindowSolution solution_;  ///< of the newest solve; kept for its memory
   bool running_ = false;
-  bool estimates_tilt_ = true;  ///< a W in which landmarks are remembered is not turned
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
-  std::optional<Time> previous_frame_, last_good_tracking_;
   Vec3 last_rate_ = Vec3::Zero();
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number
-  std::vector<Keyframe> keyframes_;         ///< that became final with the present frame
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
 };
 

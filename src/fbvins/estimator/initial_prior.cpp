@@ -6,6 +6,14 @@
 namespace fbvins {
 namespace {
 
+/// The gauge: position and heading of the first frame are chosen; and roll and pitch, where the tilt is estimated instead.
+constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad
+/// Next to nothing is known of the rest.
+constexpr double kTiltSigma_rad = 0.5;
+constexpr double kVelocitySigma_mps = 5;
+constexpr double kGyroBiasSigma_radps = 0.1;
+constexpr double kAccelBiasSigma_mps2 = 0.2;
+
 double information(double sigma) { return 1 / (sigma * sigma); }
 
 /// With variables of their own, known to H and not moved from where they are, before number `at`.
@@ -24,24 +32,23 @@ QuadraticPrior inserted(const QuadraticPrior& prior, int at, const Eigen::Matrix
 
 }  // namespace
 
-WindowPrior first_frame_prior(const InitialiserOptions& o, const NavState& state, bool estimate_tilt) {
-  constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad: the gauge
+WindowPrior first_frame_prior(const NavState& state, bool estimate_tilt) {
   Vec15 sigma;
-  sigma << Vec6::Constant(kChosenSigma), Vec3::Constant(o.velocity_sigma_mps), Vec3::Constant(o.gyro_bias_sigma_radps),
-      Vec3::Constant(o.accel_bias_sigma_mps2);
+  sigma << Vec6::Constant(kChosenSigma), Vec3::Constant(kVelocitySigma_mps), Vec3::Constant(kGyroBiasSigma_radps),
+      Vec3::Constant(kAccelBiasSigma_mps2);
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
   prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
   // Heading is about the world's vertical, which in B is R^T z.
   const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
-  const double level = information(estimate_tilt ? kLevelSigma : o.tilt_sigma_rad), heading = information(kChosenSigma);
+  const double level = information(estimate_tilt ? kLevelSigma : kTiltSigma_rad), heading = information(kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
   Vec15 from_belief = Vec15::Zero();
   from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
   prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
   prior.with_tilt = estimate_tilt;
-  if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(o.tilt_sigma_rad) * Mat2::Identity());
+  if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(kTiltSigma_rad) * Mat2::Identity());
   return prior;
 }
 

@@ -3,17 +3,25 @@
 // Pure functions.
 #pragma once
 
-#include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/window_problem.hpp"
 
 namespace fbvins {
 
+/// How far the calibration may be off, where it is estimated: standard deviations.
+struct CalibrationBelief {
+  double rotation_sigma_rad = 0.02;         ///< of the cameras to the IMU
+  double position_sigma_m = 0.01;           ///< of the cameras in the IMU's frame
+  double stereo_rotation_sigma_rad = 2e-4;  ///< between the cameras
+  double stereo_position_sigma_m = 1e-4;    ///< of the right camera in the left one's frame
+  double time_offset_sigma_s = 0.005;
+};
+
 /// Of the first frame: position and heading are a choice of W, biases are near zero, tilt and velocity are wide open: the
 /// tilt of W where that is estimated, else that of the frame. The initial solution is where the optimiser starts, not a belief:
 /// it was made from measurements that the window still holds.
-WindowPrior first_frame_prior(const InitialiserOptions& options, const NavState& state, bool estimate_tilt);
+WindowPrior first_frame_prior(const NavState& state, bool estimate_tilt);
 
-/// Puts the belief about the calibration before the first frame's: `calibrated` is right within the options' standard
+/// Puts the belief about the calibration before the first frame's: `calibrated` is right within the belief's standard
 /// deviations. The two cameras are held to one another far more firmly than to the IMU: scale hangs on their distance.
 WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& belief, const Calibration& calibrated);
 

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/estimator/window_views.hpp"
 #include "fbvins/geometry/heading.hpp"
 #include "fbvins/imu/alignment.hpp"
 #include "fbvins/imu/propagation.hpp"
@@ -12,6 +13,11 @@
 namespace fbvins {
 namespace {
 
+/// An initial solution is made from so many images, at least so far apart.
+constexpr int kFrames = 10;
+constexpr double kMinSpacing_s = 0.045;
+/// Stereo features needed in each of them.
+constexpr int kMinFeatures = 20;
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
 constexpr std::size_t kFramesPerRefinement = 3;
@@ -44,21 +50,21 @@ void move_to(const Pose<W, B>& origin, InitialSolution& start) {
 }  // namespace
 
 Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise)
-    : options_(options), noise_(noise), structure_(options) {}
+    : gravity_mps2_(options.gravity_mps2), noise_(noise), structure_(options, WindowWeights{.estimate_tilt = false}) {}
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                                     const std::optional<Pose<W, B>>& origin) {
   // A break in images or readings makes what came before useless: frames must follow one another.
   const bool broken = !frames_.empty() && frame.imu.empty();
-  if (stereo_features(frame) < options_.initialiser.min_features || broken) {
+  if (stereo_features(frame) < kMinFeatures || broken) {
     reason_ = HealthReason::too_few_features;
     reset();
     if (!broken) return std::nullopt;
   }
   remember(frame);
   std::optional<InitialSolution> start;
-  if (rest.seconds() >= options_.initialiser.rest.min_window_s) start = start_from_rest();
-  else if (static_cast<int>(frames_.size()) >= options_.initialiser.frames) start = start_in_motion(calibration);
+  if (rest.seconds() >= RestOptions{}.min_window_s) start = start_from_rest();
+  else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
   if (start && origin) move_to(*origin, *start);
   return start;
@@ -66,12 +72,12 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
 
 void Initialiser::remember(const TrackedFrame& frame) {
   if (!frame.imu.empty()) readings_.push_back(frame.imu);
-  while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= options_.initialiser.rest.min_window_s)
+  while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= RestOptions{}.min_window_s)
     readings_.pop_front();
   // A fast camera would fill the window in no time: the newest frame takes the place of one just before it.
   const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
-  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < options_.initialiser.min_spacing_s) {
+  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < kMinSpacing_s) {
     ImuSegment joined = std::move(frames_.back().imu);
     joined.samples.insert(joined.samples.end(), frame.imu.samples.begin() + 1, frame.imu.samples.end());
     joined.longest_gap = std::max(joined.longest_gap, frame.imu.longest_gap);
@@ -79,7 +85,7 @@ void Initialiser::remember(const TrackedFrame& frame) {
     frames_.pop_back();
   }
   frames_.push_back(std::move(newest));
-  while (static_cast<int>(frames_.size()) > options_.initialiser.frames) frames_.pop_front();
+  while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
 }
 
 std::optional<InitialSolution> Initialiser::start_from_rest() {
@@ -87,7 +93,7 @@ std::optional<InitialSolution> Initialiser::start_from_rest() {
   for (const ImuSegment& segment : readings_)
     readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
                     segment.samples.end());  // neighbours share a stamp
-  const RestEstimate rest = initialise_at_rest(readings, 0, noise_, options_.initialiser.rest, options_.gravity_mps2);
+  const RestEstimate rest = initialise_at_rest(readings, 0, noise_, RestOptions{}, gravity_mps2_);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
     return std::nullopt;
@@ -108,7 +114,7 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& c
     visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());
     if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_[i].imu);
   }
-  AlignmentResult alignment = align_visual_inertial(visual_poses, between, options_.initialiser.alignment, options_.gravity_mps2);
+  AlignmentResult alignment = align_visual_inertial(visual_poses, between, AlignmentOptions{}, gravity_mps2_);
   if (!alignment.accepted) {
     reason_ = HealthReason::alignment_refused;
     return std::nullopt;
@@ -117,12 +123,12 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& c
 }
 
 bool Initialiser::refine_structure(const Calibration& calibration) {
-  structure_.build(problem_, calibration, WindowWeights{.estimate_tilt = false});
-  LmOptions lm;
-  lm.max_iterations = 6;
-  if (!problem_.optimise(lm).usable) return false;
-  structure_.accept(problem_);
-  structure_.remove_outliers(problem_, options_.outlier_sigma);
+  WindowSolution solution;
+  structure_.describe(calibration, solution.window);
+  solver_.solve(solution, LmOptions{.max_iterations = 6});
+  if (!solution.summary.usable) return false;
+  structure_.accept(solution.window);
+  structure_.remove_outliers(solution.window);
   return true;
 }
 
@@ -155,9 +161,9 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
     // Stereo alone knows far points badly: the motion so far improves them before the next pose needs them.
     if (i % kFramesPerRefinement == 0 || i + 1 == frames_.size()) {
       if (!refine_structure(calibration)) return false;
-      for (const WindowSnapshot::Landmark& l : structure_.snapshot(calibration).landmarks) points[l.track] = l.p_W;
+      for (const WindowSnapshot::Landmark& l : snapshot_of(structure_, calibration).landmarks) points[l.track] = l.p_W;
     } else {
-      for (const WindowSnapshot::Landmark& l : structure_.snapshot(calibration).landmarks) points.try_emplace(l.track, l.p_W);
+      for (const WindowSnapshot::Landmark& l : snapshot_of(structure_, calibration).landmarks) points.try_emplace(l.track, l.p_W);
     }
     poses.back() = structure_.newest().state.T_WB;
   }

@@ -12,6 +12,7 @@
 
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
@@ -45,12 +46,12 @@ class Initialiser {
   bool refine_structure(const Calibration& calibration);
   bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
 
-  EstimatorOptions options_;
+  double gravity_mps2_;
   ImuNoise noise_;
   std::deque<TrackedFrame> frames_;
   std::deque<ImuSegment> readings_;  ///< of the last moments, for the judgement of rest
   SlidingWindow structure_;
-  WindowProblem problem_;
+  WindowSolver solver_;
   HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;
 };
 

@@ -2,10 +2,9 @@
 // Which frames become keyframes, and which keyframe leaves a full window (paper 2.1.2).
 #pragma once
 
-#include <vector>
-
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/estimator/window_solver.hpp"
 
 namespace fbvins {
 
@@ -17,18 +16,20 @@ class KeyframePolicy {
   bool is_keyframe(const SlidingWindow& window, const Calibration& calibration, bool standstill) const;
 
   /// Index of the keyframe that leaves, out of the first `keyframes` frames. `oldest`: 0.
-  /// `entropy`: the one whose images tell least about the newest state (docs/derivations/entropy.md,
-  /// E4). `problem` holds the window, as built.
-  int leaving(const WindowProblem& problem, int keyframes);
+  /// `entropy`: the one whose images tell least about the newest state (docs/derivations/entropy.md, E4).
+  int leaving(const SlidingWindow& window, const Calibration& calibration, int keyframes);
 
  private:
   KeyframeOptions options_;
   double focal_px_;
-  WindowProblem scratch_;
+  WindowSolver solver_;
 };
+
+/// Index of the keyframe whose images tell least about the newest state.
+int least_telling_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver);
 
 /// Differential entropy of the newest frame's fifteen numbers without what frame `unseen` saw; with all
 /// observations for unseen = -1. In nats, up to the constant of E2.
-double entropy_of_newest(const WindowProblem& problem, int unseen, WindowProblem& scratch);
+double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver& solver);
 
 }  // namespace fbvins

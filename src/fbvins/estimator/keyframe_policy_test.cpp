@@ -13,22 +13,21 @@ namespace {
 struct MidFlight {
   test::SimulatedFlight flight{test::Motion(0.6, 0.3), 21};
   Estimator estimator{flight.rig, EstimatorOptions{}};
-  SlidingWindow window{EstimatorOptions{}};
-  WindowProblem problem, scratch;
+  WindowProblem problem;
+  WindowSolver solver;
   int keyframes = 0;
 
   MidFlight() {
     for (int k = 0; k < 100; ++k) (void)estimator.process(flight.frame(k));
-    window = estimator.window();
-    window.build(problem, estimator.calibration(), WindowWeights{});
+    estimator.window().describe(estimator.calibration(), problem);
     keyframes = static_cast<int>(problem.frames.size()) - KeyframeOptions{}.newest_frames;
   }
 };
 
 TEST(KeyframePolicy, WhatAKeyframeSawNeverRaisesTheEntropy) {
   MidFlight m;
-  const double all = entropy_of_newest(m.problem, -1, m.scratch);
-  for (int i = 0; i < m.keyframes; ++i) EXPECT_GE(entropy_of_newest(m.problem, i, m.scratch), all - 1e-9) << i;
+  const double all = entropy_of_newest(m.problem, -1, m.solver);
+  for (int i = 0; i < m.keyframes; ++i) EXPECT_GE(entropy_of_newest(m.problem, i, m.solver), all - 1e-9) << i;
 }
 
 TEST(KeyframePolicy, AKeyframeThatSharesNothingTellsNothingAndLeaves) {
@@ -39,21 +38,19 @@ TEST(KeyframePolicy, AKeyframeThatSharesNothingTellsNothingAndLeaves) {
     for (int k = 0; k < l.observation_count; ++k)  // as if it had looked the other way
       if (m.problem.observations[first + k].frame == outdated) m.problem.observations[first + k].sqrt_information.setZero();
   }
-  const double all = entropy_of_newest(m.problem, -1, m.scratch);
-  EXPECT_NEAR(entropy_of_newest(m.problem, outdated, m.scratch), all, 1e-6);
-  KeyframeOptions options;
-  options.leaving = "entropy";
-  EXPECT_EQ(KeyframePolicy(options, 450).leaving(m.problem, m.keyframes), outdated);
+  const double all = entropy_of_newest(m.problem, -1, m.solver);
+  EXPECT_NEAR(entropy_of_newest(m.problem, outdated, m.solver), all, 1e-6);
+  EXPECT_EQ(least_telling_keyframe(m.problem, m.keyframes, m.solver), outdated);
 }
 
 TEST(KeyframePolicy, OldestIsTheFirst) {
   MidFlight m;
-  EXPECT_EQ(KeyframePolicy(KeyframeOptions{}, 450).leaving(m.problem, m.keyframes), 0);
+  EXPECT_EQ(KeyframePolicy(KeyframeOptions{}, 450).leaving(m.estimator.window(), m.estimator.calibration(), m.keyframes), 0);
 }
 
 TEST(KeyframePolicy, StandingStillMakesNoKeyframes) {
   MidFlight m;
-  EXPECT_FALSE(KeyframePolicy(KeyframeOptions{}, 450).is_keyframe(m.window, m.estimator.calibration(), true));
+  EXPECT_FALSE(KeyframePolicy(KeyframeOptions{}, 450).is_keyframe(m.estimator.window(), m.estimator.calibration(), true));
 }
 
 }  // namespace

@@ -11,6 +11,8 @@ namespace {
 
 /// What was seen of a landmark before it was remembered is in the window's prior and in its belief (K4).
 constexpr double kTimesCounted = 2;
+/// Standard deviation of the depth, as a share of it, of landmarks worth remembering.
+constexpr double kMaxRelativeDepthSigma = 0.05;
 
 }  // namespace
 
@@ -30,7 +32,7 @@ void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
   const double relative_sigma = depth * std::sqrt(covariance(2, 2));
-  if (!(relative_sigma < options_.max_relative_depth_sigma)) return;  // neither NaN
+  if (!(relative_sigma < kMaxRelativeDepthSigma)) return;  // neither NaN
 
   LandmarkBelief belief;
   const Vec3 p_C = depth * Vec3(alpha_beta_rho.x(), alpha_beta_rho.y(), 1);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "fbvins/core/ids.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/calibration.hpp"
 
@@ -59,6 +60,7 @@ struct WindowObservation {
 
 /// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
 struct WindowLandmark {
+  LandmarkId id = {};  ///< the window's
   int host = 0;
   int first_observation = 0;  ///< its observations are neighbours, sorted by frame
   int observation_count = 0;

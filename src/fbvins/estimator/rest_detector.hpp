@@ -18,7 +18,7 @@ struct RestDetectorOptions {
 
 class RestDetector {
  public:
-  explicit RestDetector(const RestDetectorOptions& options) : options_(options) {}
+  explicit RestDetector(const RestDetectorOptions& options = {}) : options_(options) {}
 
   /// Takes the next frame; returns how long the body has been at rest (zero when it moves).
   Duration update(const TrackedFrame& frame);

@@ -58,7 +58,8 @@ class SimulatedFlight {
     TrackedFrame out;
     out.id = FrameId{k};
     out.t = stamp(k);
-    out.has_left = out.has_right = true;
+    out.has_left = images(k);
+    out.has_right = images(k) && right_camera(k);
     if (k > 0 && readings(k)) {
       out.imu = motion_.segment(stamp(k - 1), out.t, Duration::from_seconds(1 / rig.imu_noise.rate_hz), bias);
       add_noise(out.imu, rig.imu_noise, rng_);

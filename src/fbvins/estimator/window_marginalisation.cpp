@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/window_marginalisation.hpp"
 
+#include <cstdint>
+#include <utility>
+
 namespace fbvins {
 namespace {
 
 /// The factors that go into the new prior, as a problem of their own.
-void select_factors(const WindowProblem& problem, int leaving, const std::vector<std::uint8_t>& landmark_leaves,
-                    WindowProblem& out) {
+void select_factors(const WindowProblem& problem, int leaving, std::span<const LeavingLandmark> landmarks, WindowProblem& out) {
   out.frames = problem.frames;
   out.tilt = problem.tilt;
   out.calibration = problem.calibration;
@@ -16,16 +18,16 @@ void select_factors(const WindowProblem& problem, int leaving, const std::vector
   out.landmarks.clear();
   out.observations.clear();
   out.beliefs = problem.beliefs;
-  for (int i = 0; i < static_cast<int>(out.frames.size()); ++i) {
+  for (int i = 0; i < out.frame_count(); ++i) {
     if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
     if (i != leaving) out.frames[i].standstill = false;
   }
-  for (std::size_t i = 0; i < problem.landmarks.size(); ++i) {
-    if (!landmark_leaves[i]) continue;
-    WindowLandmark landmark = problem.landmarks[i];
+  for (const LeavingLandmark& l : landmarks) {
+    WindowLandmark landmark = problem.landmarks[l.index];
     const auto first = problem.observations.begin() + landmark.first_observation;
     landmark.first_observation = static_cast<int>(out.observations.size());
-    out.observations.insert(out.observations.end(), first, first + landmark.observation_count);
+    landmark.observation_count = l.observations;
+    out.observations.insert(out.observations.end(), first, first + l.observations);
     out.landmarks.push_back(landmark);
   }
 }
@@ -43,42 +45,70 @@ std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   return touched;
 }
 
-}  // namespace
-
-WindowPrior marginalise_frame(const WindowProblem& problem, int leaving, const std::vector<std::uint8_t>& landmark_leaves,
-                              WindowProblem& scratch) {
-  select_factors(problem, leaving, landmark_leaves, scratch);
-  scratch.linearise();
-  const Eigen::MatrixXd information = scratch.reduced_information();
-
-  WindowPrior out;
-  out.with_tilt = problem.weights.estimate_tilt;
-  out.with_calibration = problem.calibrating();
-  out.calibration = problem.prior.with_calibration ? problem.prior.calibration : problem.calibration;
-  std::vector<int> keep, drop;
-  for (int k = 0; k < scratch.tilt_size(); ++k) keep.push_back(scratch.tilt_row() + k);
-  if (out.with_calibration)
-    for (int k = 0; k < kCalibrationSize; ++k) keep.push_back(scratch.calibration_row() + k);
-  const std::vector<std::uint8_t> touched = touched_frames(scratch);
-  for (int i = 0; i < static_cast<int>(problem.frames.size()); ++i) {
-    if (i != leaving && !touched[i]) continue;
-    if (i != leaving) out.frames.push_back(i);
-    for (int k = 0; k < 15; ++k) (i == leaving ? drop : keep).push_back(scratch.row_of(i, k));
-  }
-  out.quadratic = marginalise(information, scratch.reduced_gradient(), keep, drop);
-
-  // The gradient was taken at the current estimate; the prior is measured from the first estimates.
-  Eigen::VectorXd back = Eigen::VectorXd::Zero(out.quadratic.size());
-  if (out.with_tilt) back.head<kTiltSize>() = -problem.tilt.angle_rad;
+/// From where the new prior is measured, to the present estimate, at which it was built; with the sign turned.
+Eigen::VectorXd way_back(const WindowProblem& problem, const WindowPrior& prior) {
+  Eigen::VectorXd back = Eigen::VectorXd::Zero(prior.quadratic.size());
+  if (prior.with_tilt) back.head<kTiltSize>() = -problem.tilt.angle_rad;
   if (problem.prior.with_calibration)
-    back.segment<kCalibrationSize>(out.calibration_row()) = -scratch.calibration_displacement(out.calibration);
-  int at = out.frames_row();
-  for (int frame : out.frames) {
+    back.segment<kCalibrationSize>(prior.calibration_row()) = -calibration_displacement(problem.calibration, prior.calibration);
+  int at = prior.frames_row();
+  for (int frame : prior.frames) {
     if (problem.frames[frame].in_prior)
       back.segment<15>(at) = -problem.frames[frame].state.boxminus(problem.frames[frame].first_estimate);
     at += 15;
   }
-  out.quadratic = shifted(std::move(out.quadratic), back);
+  return back;
+}
+
+}  // namespace
+
+std::vector<LeavingLandmark> landmarks_leaving_with(const WindowProblem& problem, int leaving, int newest_begin) {
+  std::vector<LeavingLandmark> out;
+  for (int i = 0; i < static_cast<int>(problem.landmarks.size()); ++i) {
+    const WindowLandmark& l = problem.landmarks[i];
+    if (l.host != leaving) continue;
+    const WindowObservation* seen = problem.observations.data() + l.first_observation;
+    const bool in_view = seen[l.observation_count - 1].frame == problem.frame_count() - 1;
+    int count = l.observation_count;
+    if (in_view) {
+      int frames = 0;
+      for (count = 0; count < l.observation_count && seen[count].frame < newest_begin; ++count)
+        frames += count == 0 || seen[count].frame != seen[count - 1].frame;
+      if (frames < 2) continue;  // says nothing about motion
+    }
+    out.push_back({i, count, in_view});
+  }
+  return out;
+}
+
+Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::span<const LeavingLandmark> landmarks,
+                               MarginalisationMemory& memory) {
+  WindowProblem& factors = memory.factors;
+  NormalEquations& equations = memory.equations;
+  select_factors(problem, leaving, landmarks, factors);
+  linearise(factors, memory.pairs, equations);
+  const ReducedEquations information = reduced(equations);
+  const WindowLayout& at = equations.layout;
+
+  Marginalised out;
+  for (const PointBlock& point : equations.points.points()) out.landmark_information.push_back(point.V);
+  WindowPrior& prior = out.prior;
+  prior.with_tilt = problem.weights.estimate_tilt;
+  prior.with_calibration = problem.calibrating();
+  prior.calibration = problem.prior.with_calibration ? problem.prior.calibration : problem.calibration;
+  std::vector<int> keep, drop;
+  for (int k = 0; k < at.tilt_size; ++k) keep.push_back(at.tilt_row() + k);
+  if (prior.with_calibration)
+    for (int k = 0; k < kCalibrationSize; ++k) keep.push_back(at.calibration_row() + k);
+  const std::vector<std::uint8_t> touched = touched_frames(factors);
+  for (int i = 0; i < problem.frame_count(); ++i) {
+    if (i != leaving && !touched[i]) continue;
+    if (i != leaving) prior.frames.push_back(i);
+    for (int k = 0; k < 15; ++k) (i == leaving ? drop : keep).push_back(at.row_of(i, k));
+  }
+  prior.quadratic = marginalise(information.H, information.g, keep, drop);
+  // The gradient was taken at the present estimate; the prior is measured from the first estimates.
+  prior.quadratic = shifted(std::move(prior.quadratic), way_back(problem, prior));
   return out;
 }
 

@@ -3,19 +3,40 @@
 // prior say about the frames that stay becomes the new prior (docs/derivations/window.md, W10-W12).
 #pragma once
 
-#include <cstdint>
+#include <span>
 #include <vector>
 
-#include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/estimator/window_equations.hpp"
 
 namespace fbvins {
 
-/// The prior on the other frames once `leaving` and the flagged landmarks are gone: takes the old
-/// prior, the standstill and IMU factors that touch the frame, and every observation of those
-/// landmarks. Frame indices of the result still count the leaving frame. Frames named in it are
-/// linearised at linearisation_point(): first estimates where they have one, else their state.
-/// `scratch` lends its memory.
-WindowPrior marginalise_frame(const WindowProblem& problem, int leaving, const std::vector<std::uint8_t>& landmark_leaves,
-                              WindowProblem& scratch);
+/// A landmark of a problem that leaves with a frame.
+struct LeavingLandmark {
+  int index = 0;         ///< into WindowProblem::landmarks
+  int observations = 0;  ///< so many of its observations go into the prior, the oldest
+  bool in_view = false;  ///< of the newest frame
+};
+
+/// The landmarks that leave with keyframe `leaving`: those it hosts. One still in view gives up only what frames before
+/// `newest_begin` saw of it, and starts anew from the rest: no observation is used twice. In the problem's order.
+std::vector<LeavingLandmark> landmarks_leaving_with(const WindowProblem& problem, int leaving, int newest_begin);
+
+struct Marginalised {
+  WindowPrior prior;                       ///< its frames still count the leaving one
+  std::vector<Mat3> landmark_information;  ///< of (alpha, beta, rho) given the poses, one a leaving landmark
+};
+
+/// Working memory.
+struct MarginalisationMemory {
+  WindowProblem factors;
+  PairTable pairs;
+  NormalEquations equations;
+};
+
+/// The prior on the other frames once `leaving` and the landmarks are gone: takes the old prior, the standstill and IMU
+/// factors that touch the frame, and those landmarks' observations. Frames named in it are linearised at
+/// linearisation_point(): first estimates where they have one, else their state.
+Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::span<const LeavingLandmark> landmarks,
+                               MarginalisationMemory& memory);
 
 }  // namespace fbvins

@@ -8,9 +8,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
-#include <cstdint>
+#include <algorithm>
 #include <vector>
 
+#include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/estimator/window_test_scene.hpp"
 
 namespace fbvins {
@@ -21,7 +22,7 @@ using test::Window;
 /// The window whose landmarks either leave with frame 0 or are not seen from it; without a prior.
 struct Scene {
   Window w;
-  std::vector<std::uint8_t> leaves;
+  std::vector<LeavingLandmark> leaving;
 };
 
 Scene make_scene(bool with_prior) {
@@ -31,7 +32,6 @@ Scene make_scene(bool with_prior) {
   for (std::size_t k = 0; k < p.landmarks.size(); ++k) {
     WindowLandmark& l = p.landmarks[k];
     const bool leaves = l.host == 0 || k % 2 == 0;
-    s.leaves.push_back(leaves);
     const int first = static_cast<int>(kept.size());
     for (int i = 0; i < l.observation_count; ++i) {
       const WindowObservation& o = p.observations[l.first_observation + i];
@@ -39,6 +39,7 @@ Scene make_scene(bool with_prior) {
     }
     l.first_observation = first;
     l.observation_count = static_cast<int>(kept.size()) - first;
+    if (leaves) s.leaving.push_back({static_cast<int>(k), l.observation_count, false});
   }
   p.observations = kept;
   if (!with_prior) p.prior = {};
@@ -48,7 +49,7 @@ Scene make_scene(bool with_prior) {
 }
 
 /// The window after frame 0 and its landmarks are gone and `prior` has come.
-WindowProblem without_first_frame(const WindowProblem& p, const std::vector<std::uint8_t>& leaves, WindowPrior prior) {
+WindowProblem without_first_frame(const WindowProblem& p, const std::vector<LeavingLandmark>& leaving, WindowPrior prior) {
   WindowProblem out;
   out.calibration = p.calibration;
   out.weights = p.weights;
@@ -62,7 +63,8 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<std:
   }
   out.prior = std::move(prior);
   for (std::size_t k = 0; k < p.landmarks.size(); ++k) {
-    if (leaves[k]) continue;
+    const auto leaves = [&](const LeavingLandmark& l) { return l.index == static_cast<int>(k); };
+    if (std::any_of(leaving.begin(), leaving.end(), leaves)) continue;
     WindowLandmark l = p.landmarks[k];
     const int first = static_cast<int>(out.observations.size());
     for (int i = 0; i < l.observation_count; ++i) {
@@ -115,8 +117,8 @@ void expect_six_free_directions(const WindowProblem& p, const WindowPrior& prior
 
 TEST(Marginalisation, PriorIsBlindToOriginAndTurn) {
   const Scene s = make_scene(false);
-  WindowProblem scratch;
-  const WindowPrior prior = marginalise_frame(s.w.problem, 0, s.leaves, scratch);
+  MarginalisationMemory memory;
+  const WindowPrior prior = marginalise_frame(s.w.problem, 0, s.leaving, memory).prior;
   expect_six_free_directions(s.w.problem, prior);
   const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(prior.quadratic.H).eigenvalues();
   EXPECT_GT(eigenvalues.minCoeff(), -1e-9 * eigenvalues.maxCoeff()) << "never negative";
@@ -124,36 +126,44 @@ TEST(Marginalisation, PriorIsBlindToOriginAndTurn) {
 
 TEST(Marginalisation, StaysBlindAfterTheStatesMovedFromTheirFirstEstimates) {
   const Scene s = make_scene(false);
-  WindowProblem scratch;
-  WindowProblem rest = without_first_frame(s.w.problem, s.leaves, marginalise_frame(s.w.problem, 0, s.leaves, scratch));
+  MarginalisationMemory memory;
+  WindowProblem rest = without_first_frame(s.w.problem, s.leaving, marginalise_frame(s.w.problem, 0, s.leaving, memory).prior);
   Rng rng(3);
   for (WindowFrame& f : rest.frames) {
     Vec15 d;
     for (int k = 0; k < 15; ++k) d(k) = 0.02 * rng.normal();
     f.state = f.state.boxplus(d);  // first estimates stay
   }
-  const std::vector<std::uint8_t> all(rest.landmarks.size(), 1);
-  const WindowPrior prior = marginalise_frame(rest, 0, all, scratch);
+  std::vector<LeavingLandmark> all;
+  for (int k = 0; k < static_cast<int>(rest.landmarks.size()); ++k)
+    all.push_back({k, rest.landmarks[k].observation_count, false});
+  const WindowPrior prior = marginalise_frame(rest, 0, all, memory).prior;
   expect_six_free_directions(rest, prior);
 
   // The same without first estimates: heading is no longer free. The test can fail.
   for (WindowFrame& f : rest.frames) f.first_estimate = f.state;
-  const WindowPrior naive = marginalise_frame(rest, 0, all, scratch);
+  const WindowPrior naive = marginalise_frame(rest, 0, all, memory).prior;
   EXPECT_GT(std::abs(relative_information(naive.quadratic.H, world_moves(rest, naive).col(5))), 1e-9);
 }
 
 TEST(Marginalisation, KeepsTheStepOfTheFramesThatStay) {
   const Scene s = make_scene(true);
-  WindowProblem whole = s.w.problem, scratch;
-  WindowProblem rest = without_first_frame(whole, s.leaves, marginalise_frame(whole, 0, s.leaves, scratch));
-  whole.linearise();
-  ASSERT_TRUE(whole.solve(0));
-  rest.linearise();
-  ASSERT_TRUE(rest.solve(0));
-  const double size = whole.step().lpNorm<Eigen::Infinity>();
+  const WindowProblem& whole = s.w.problem;
+  MarginalisationMemory memory;
+  const WindowProblem rest = without_first_frame(whole, s.leaving, marginalise_frame(whole, 0, s.leaving, memory).prior);
+  const auto step_of = [](const WindowProblem& window) {
+    WindowSolver solver;
+    WindowInformation information;
+    solver.linearise(window);
+    EXPECT_TRUE(solver.step(0, information));
+    return solver.step().dense;
+  };
+  const Eigen::VectorXd step = step_of(whole), step_of_rest = step_of(rest);
+  const WindowLayout at(whole), at_rest(rest);
+  const double size = step.lpNorm<Eigen::Infinity>();
   for (int f = 0; f + 1 < test::kFrames; ++f)
     for (int k = 0; k < 15; ++k)
-      EXPECT_NEAR(rest.step()(rest.row_of(f, k)), whole.step()(whole.row_of(f + 1, k)), 1e-6 * size) << f << " " << k;
+      EXPECT_NEAR(step_of_rest(at_rest.row_of(f, k)), step(at.row_of(f + 1, k)), 1e-6 * size) << f << " " << k;
 }
 
 }  // namespace

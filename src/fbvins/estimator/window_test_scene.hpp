@@ -16,7 +16,6 @@ inline constexpr int kFrames = 6, kLandmarks = 50;
 /// A noisy window off its optimum, with outliers; frame 0 is held by a prior.
 struct Window {
   WindowProblem problem;
-  std::vector<std::unique_ptr<Preintegration>> imu;
   Vec2 tilt_weight;
   Eigen::Matrix<double, 15, 1> frame_weight;
   Eigen::Matrix<double, kCalibrationSize, 1> calibration_weight;
@@ -29,13 +28,14 @@ inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
   const auto stamp = [](int k) { return Time{k * 100'000'000}; };
   for (int k = 0; k < kFrames; ++k) {
     WindowFrame frame;
+    frame.id = FrameId{k};
     frame.state = motion.state(stamp(k).seconds(), bias);
     if (k > 0) {
       ImuSegment segment = motion.segment(stamp(k - 1), stamp(k), Duration{5'000'000}, bias);
       add_noise(segment, {}, rng);
-      w.imu.push_back(std::make_unique<Preintegration>(ImuNoise{}, ImuBias{}));
-      w.imu.back()->integrate(segment);
-      frame.imu = w.imu.back().get();
+      Preintegration imu(ImuNoise{}, ImuBias{});
+      imu.integrate(segment);
+      frame.imu = std::make_shared<const Preintegration>(std::move(imu));
     }
     w.problem.frames.push_back(frame);
   }

@@ -24,36 +24,19 @@ namespace fbvins {
 struct VisualWorld {};
 
 struct AlignmentOptions {
-  int min_frames = 4;
-  double min_duration_s = 0.3;
+  int min_frames = 4;                   ///< visual poses needed
+  double min_duration_s = 0.3;          ///< shortest window
   double pose_sigma_m = 2e-3;           ///< noise of each visual position
   double pose_sigma_rad = 1.5e-3;       ///< noise of each visual orientation
   double gyro_bias_prior_radps = 0.3;   ///< sigma about zero
   double accel_bias_prior_mps2 = 0.1;   ///< sigma about zero
   double max_gravity_error_mps2 = 0.8;  ///< of the norm, solved without constraint
   double max_gravity_sigma_rad = 0.05;  ///< about 3 degrees
-  double max_gyro_bias_radps = 0.25;
+  double max_gyro_bias_radps = 0.25;    ///< larger is implausible
   double max_gyro_bias_sigma_radps = 0.03;
-  double max_accel_bias_mps2 = 1.0;
-  double max_residual_rms = 4.0;  ///< in sigmas
-  double max_gap_s = 0.05;
-
-  template <class V>
-  void visit(V&& v) {
-    v("min_frames", min_frames, "", "visual poses needed", 3, 100);
-    v("min_duration_s", min_duration_s, "s", "shortest window", 0.05, 10.0);
-    v("pose_sigma_m", pose_sigma_m, "m", "noise of each visual position", 1e-5, 1.0);
-    v("pose_sigma_rad", pose_sigma_rad, "rad", "noise of each visual orientation", 1e-5, 0.5);
-    v("gyro_bias_prior_radps", gyro_bias_prior_radps, "rad/s", "sigma of the gyro bias about zero", 1e-4, 2.0);
-    v("accel_bias_prior_mps2", accel_bias_prior_mps2, "m/s^2", "sigma of the accelerometer bias about zero", 1e-4, 2.0);
-    v("max_gravity_error_mps2", max_gravity_error_mps2, "m/s^2", "error of the magnitude of gravity", 0.01, 5.0);
-    v("max_gravity_sigma_rad", max_gravity_sigma_rad, "rad", "uncertainty of the direction of gravity", 1e-3, 0.5);
-    v("max_gyro_bias_radps", max_gyro_bias_radps, "rad/s", "largest plausible gyro bias", 1e-3, 2.0);
-    v("max_gyro_bias_sigma_radps", max_gyro_bias_sigma_radps, "rad/s", "uncertainty of the gyro bias", 1e-4, 1.0);
-    v("max_accel_bias_mps2", max_accel_bias_mps2, "m/s^2", "largest plausible accelerometer bias", 1e-3, 5.0);
-    v("max_residual_rms", max_residual_rms, "", "residual in sigmas", 1.0, 100.0);
-    v("max_gap_s", max_gap_s, "s", "longest gap in the readings", 0.005, 1.0);
-  }
+  double max_accel_bias_mps2 = 1.0;  ///< larger is implausible
+  double max_residual_rms = 4.0;     ///< in sigmas
+  double max_gap_s = 0.05;           ///< longest in the readings
 };
 
 enum class AlignmentRefusal {

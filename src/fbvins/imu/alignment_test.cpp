@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "fbvins/core/options.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
@@ -188,8 +187,6 @@ TEST(Alignment, RefusesWhatPosesThisCoarseCannotShow) {
   w = make_window(Motion(), 0, 10, {true, 2e-3, 1e-3}, 2);
   EXPECT_EQ(align_visual_inertial(w.poses, w.between, coarse).reason, AlignmentRefusal::gyro_bias_unobservable);
 }
-
-TEST(Alignment, OptionsAreInRange) { EXPECT_TRUE(validate(AlignmentOptions{}).ok()); }
 
 }  // namespace
 }  // namespace fbvins

@@ -11,7 +11,6 @@
 #include <optional>
 #include <vector>
 
-#include "fbvins/core/options.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/types/imu.hpp"
 #include "fbvins/types/input_counts.hpp"
@@ -23,15 +22,6 @@ struct ImuBufferOptions {
   double longest_interpolation_s = 0.02;  ///< neighbours further apart: the nearest value is held instead
   double max_gyro_radps = 70;             ///< a larger number is a broken reading (4000 deg/s)
   double max_accel_mps2 = 700;            ///< likewise (70 g)
-
-  template <class V>
-  void visit(V&& v) {
-    v("capacity", capacity, "", "IMU readings kept at most", 100, 10'000'000);
-    v("longest_interpolation_s", longest_interpolation_s, "s",
-      "readings further apart than this are not interpolated at an image stamp", 0.001, 1.0);
-    v("max_gyro_radps", max_gyro_radps, "rad/s", "a faster reading is rejected", 1.0, 1000.0);
-    v("max_accel_mps2", max_accel_mps2, "m/s^2", "a stronger reading is rejected", 20.0, 10000.0);
-  }
 };
 
 class ImuBuffer {

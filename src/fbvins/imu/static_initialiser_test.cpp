@@ -5,7 +5,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "fbvins/core/options.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
@@ -106,8 +105,6 @@ TEST(StaticInitialiser, AcceptsVibrationAtRest) {
   const RestEstimate r = initialise_at_rest(samples, 0.2, {});
   EXPECT_TRUE(r.at_rest) << to_string(r.reason) << " " << r.gyro_spread_radps << " " << r.accel_spread_mps2;
 }
-
-TEST(StaticInitialiser, OptionsAreInRange) { EXPECT_TRUE(validate(RestOptions{}).ok()); }
 
 }  // namespace
 }  // namespace fbvins

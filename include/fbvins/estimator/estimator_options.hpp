@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options of the estimator, with defaults and units.
+#pragma once
+
+#include "fbvins/core/options.hpp"
+
+namespace fbvins {
+
+/// Which keyframe leaves a full window.
+enum class KeyframeLeaving { oldest, entropy };
+
+/// Whether the direction of gravity in W is estimated, or W is level by definition from the start on.
+enum class UpDirection { state, fixed };
+
+struct KeyframeOptions {
+  int max_keyframes = 8;
+  int newest_frames = 3;
+  KeyframeLeaving leaving = KeyframeLeaving::oldest;
+  double min_parallax_px = 12;
+
+  template <class V>
+  void visit(V&& v) {
+    v("max_keyframes", max_keyframes, "", "keyframes in the sliding window", 3, 30);
+    v("newest_frames", newest_frames, "", "newest frames kept beside them, keyframes or not", 2, 10);
+    v("leaving", leaving, "oldest|entropy",
+      "which keyframe leaves a full window: the oldest, or the one whose measurements tell least (paper 2.1.2)");
+    v("min_parallax_px", min_parallax_px, "px", "mean rotation-free image motion since the last keyframe that makes a new one",
+      0.5, 100.0);
+  }
+};
+
+struct KnownLandmarkOptions {
+  bool enabled = true;
+  int capacity = 20000;  ///< landmarks remembered
+  double position_sigma_m = 0.01;
+
+  template <class V>
+  void visit(V&& v) {
+    v("enabled", enabled, "", "landmarks seen again are held to where they were; none is while up is fixed");
+    v("position_sigma_m", position_sigma_m, "m",
+      "standard deviation of where a landmark is in the map, beside what its depth leaves open", 1e-4, 1.0);
+  }
+};
+
+struct EstimatorOptions {
+  KeyframeOptions keyframes;
+  KnownLandmarkOptions known_landmarks;
+  UpDirection up = UpDirection::state;
+  int max_iterations = 4;
+  int max_landmarks = 300;
+  double gravity_mps2 = 9.81;
+  double gyro_noise_scale = 2.5;
+  double accel_noise_scale = 16.0;
+  double gyro_walk_scale = 5.0;
+  double accel_walk_scale = 0.4;
+  bool estimate_extrinsics = false;
+  bool estimate_time_offset = false;
+  double max_image_gap_s = 3.0;
+  double max_imu_gap_s = 1.0;
+  int min_tracks = 10;
+  double max_speed_mps = 30;
+
+  template <class V>
+  void visit(V&& v) {
+    v.group("keyframes", keyframes, "the sliding window");
+    v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
+    v("up", up, "state|fixed",
+      "the direction of gravity in W is estimated all the time, or W is held level from the start on and itself turns");
+    v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
+    v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
+    v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);
+    v("gyro_noise_scale", gyro_noise_scale, "", "factor on the calibrated gyroscope noise density", 0.1, 100.0);
+    v("accel_noise_scale", accel_noise_scale, "", "factor on the calibrated accelerometer noise density (vibration)", 0.1, 100.0);
+    v("gyro_walk_scale", gyro_walk_scale, "", "factor on the calibrated gyroscope bias random walk", 0.01, 100.0);
+    v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
+    v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
+    v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
+    v("max_image_gap_s", max_image_gap_s, "s", "longest time without usable images bridged by the IMU", 0.1, 60.0);
+    v("max_imu_gap_s", max_imu_gap_s, "s", "longest time without IMU readings bridged by the images", 0.01, 10.0);
+    v("min_tracks", min_tracks, "", "fewer landmarks than this in view: degraded", 3, 200);
+    v("max_speed_mps", max_speed_mps, "m/s", "faster is implausible and restarts the estimator", 1.0, 1000.0);
+  }
+};
+
+}  // namespace fbvins

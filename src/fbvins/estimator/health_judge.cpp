@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/health_judge.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kImuGapDegraded_s = 0.05;
+/// Images further apart than this have others missing between them.
+constexpr double kImageHole_s = 0.25;
+constexpr int kFailedSolvesUntilLost = 3;
+/// Larger biases are implausible.
+constexpr double kMaxGyroBias_radps = 0.5;
+constexpr double kMaxAccelBias_mps2 = 2.5;
+
+bool without_images(const TrackedFrame& frame) { return !frame.has_left && !frame.has_right; }
+
+Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
+Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
+
+}  // namespace
+
+Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) {
+  return {HealthState::initialising, without_images(frame) ? HealthReason::no_images : reason};
+}
+
+void HealthJudge::pass(const TrackedFrame& frame) {
+  if (!without_images(frame)) previous_image_ = frame.t;
+}
+
+/// Neither camera's image came, or this is the first after a hole.
+bool HealthJudge::images_missing(const TrackedFrame& frame) const {
+  return without_images(frame) || (previous_image_ && (frame.t - *previous_image_).seconds() > kImageHole_s);
+}
+
+Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves) {
+  const bool few_tracks = landmarks_in_view < options_.min_tracks;
+  if (!few_tracks) last_good_tracking_ = frame.t;
+  const Duration blind = frame.t - last_good_tracking_.value_or(frame.t);
+  const bool no_imu = frame.imu.empty();
+
+  if (!state.T_WB.p.allFinite() || failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
+  if (state.v_WB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
+  if (state.bias.gyro_radps.norm() > kMaxGyroBias_radps || state.bias.accel_mps2.norm() > kMaxAccelBias_mps2)
+    return lost(HealthReason::implausible_bias);
+  if (blind.seconds() > options_.max_image_gap_s)
+    return lost(images_missing(frame) ? HealthReason::no_images : HealthReason::no_tracks);
+  if (few_tracks && (no_imu || frame.imu.longest_gap.seconds() > options_.max_imu_gap_s)) return lost(HealthReason::imu_gap);
+  if (failed_solves > 0) return degraded(HealthReason::solver_failed);
+  if (no_imu || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
+  if (images_missing(frame)) return degraded(HealthReason::no_images);
+  if (!frame.has_left || !frame.has_right) return degraded(HealthReason::one_camera);
+  if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
+  if (few_tracks) return degraded(HealthReason::few_tracks);
+  if (frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
+  return {HealthState::good, HealthReason::none};
+}
+
+}  // namespace fbvins

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a pose is worth, and why: sensors that are missing, tracks that are few, numbers that cannot be. Causes go before
+// their symptoms: an image that did not come is `no_images`, not `no_tracks`. One owner, one thread.
+#pragma once
+
+#include <optional>
+
+#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class HealthJudge {
+ public:
+  explicit HealthJudge(const EstimatorOptions& options) : options_(options) {}
+
+  /// The window starts with this frame.
+  void start(const TrackedFrame& frame) { last_good_tracking_ = frame.t; }
+  /// Of a frame in the window, after its solve.
+  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves);
+  /// Of a frame before the start; `reason` is what the initialiser waits for.
+  static Health before_start(const TrackedFrame& frame, HealthReason reason);
+  /// The frame is done with, whether it was judged or not.
+  void pass(const TrackedFrame& frame);
+
+ private:
+  bool images_missing(const TrackedFrame& frame) const;
+
+  EstimatorOptions options_;
+  std::optional<Time> previous_image_, last_good_tracking_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/health_judge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace fbvins {
+namespace {
+
+constexpr int kManyTracks = 50;
+
+Health good() { return {HealthState::good, HealthReason::none}; }
+Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
+Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
+
+TrackedFrame frame_at(double t_s) {
+  TrackedFrame f;
+  f.t = Time{} + Duration::from_seconds(t_s);
+  f.has_left = f.has_right = true;
+  f.stats.stereo = kManyTracks;
+  f.imu.samples.resize(11);
+  f.imu.longest_gap = Duration::from_seconds(0.005);
+  return f;
+}
+
+/// Starts with a good frame at 0 s, and passes what follows.
+class Judged {
+ public:
+  Judged() {
+    judge_.start(frame_at(0));
+    EXPECT_EQ(next(frame_at(0)), good());
+  }
+  Health next(const TrackedFrame& frame, int in_view = kManyTracks, int failed_solves = 0) {
+    const Health health = judge_.judge(frame, NavState{}, in_view, failed_solves);
+    judge_.pass(frame);
+    return health;
+  }
+
+ private:
+  HealthJudge judge_{EstimatorOptions{}};
+};
+
+TEST(HealthJudge, NoImageIsNoImagesAndNotNoTracks) {
+  Judged judged;
+  for (double t_s = 0.05; t_s < 3; t_s += 0.05) {
+    TrackedFrame blind = frame_at(t_s);
+    blind.has_left = blind.has_right = false;
+    blind.stats.stereo = 0;
+    EXPECT_EQ(judged.next(blind, 0), degraded(HealthReason::no_images)) << t_s;
+  }
+  TrackedFrame too_late = frame_at(3.05);
+  too_late.has_left = too_late.has_right = false;
+  EXPECT_EQ(judged.next(too_late, 0), lost(HealthReason::no_images));
+}
+
+TEST(HealthJudge, ImagesWithoutTracksAreNoTracks) {
+  Judged judged;
+  for (double t_s = 0.05; t_s < 3; t_s += 0.05)
+    EXPECT_EQ(judged.next(frame_at(t_s), 0), degraded(HealthReason::no_tracks)) << t_s;
+  EXPECT_EQ(judged.next(frame_at(3.05), 0), lost(HealthReason::no_tracks));
+}
+
+TEST(HealthJudge, TheFirstImageAfterAHoleSaysSo) {
+  Judged judged;
+  EXPECT_EQ(judged.next(frame_at(0.24)), good());
+  EXPECT_EQ(judged.next(frame_at(0.50)), degraded(HealthReason::no_images)) << "a quarter of a second without a stamp";
+  EXPECT_EQ(judged.next(frame_at(0.55)), good());
+  for (double t_s : {0.60, 0.70, 0.80}) {
+    TrackedFrame blind = frame_at(t_s);
+    blind.has_left = blind.has_right = false;
+    EXPECT_EQ(judged.next(blind, 0), degraded(HealthReason::no_images));
+  }
+  EXPECT_EQ(judged.next(frame_at(0.85)), degraded(HealthReason::no_images)) << "or of stamps without an image";
+  EXPECT_EQ(judged.next(frame_at(0.90)), good());
+  EXPECT_EQ(judged.next(frame_at(4.00), 0), lost(HealthReason::no_images)) << "a hole longer than can be bridged";
+}
+
+TEST(HealthJudge, OneImageIsOneCamera) {
+  for (const bool left : {true, false}) {
+    Judged judged;
+    TrackedFrame one = frame_at(0.05);
+    (left ? one.has_right : one.has_left) = false;
+    one.stats.stereo = 0;
+    EXPECT_EQ(judged.next(one, left ? kManyTracks : 0), degraded(HealthReason::one_camera)) << left;
+  }
+  Judged judged;
+  TrackedFrame blocked = frame_at(0.05);  // both came, and nothing matches
+  blocked.stats.stereo = 0;
+  EXPECT_EQ(judged.next(blocked), degraded(HealthReason::one_camera));
+}
+
+TEST(HealthJudge, SilentImuGoesBeforeMissingImages) {
+  Judged judged;
+  TrackedFrame silent = frame_at(0.05);
+  silent.imu = {};
+  EXPECT_EQ(judged.next(silent), degraded(HealthReason::imu_gap));
+  silent.has_left = silent.has_right = false;
+  EXPECT_EQ(judged.next(silent, 0), lost(HealthReason::imu_gap)) << "nothing carries the pose";
+}
+
+TEST(HealthJudge, SolverThatFailsThriceIsLost) {
+  Judged judged;
+  EXPECT_EQ(judged.next(frame_at(0.05), kManyTracks, 2), degraded(HealthReason::solver_failed));
+  EXPECT_EQ(judged.next(frame_at(0.10), kManyTracks, 3), lost(HealthReason::solver_failed));
+}
+
+TEST(HealthJudge, NumbersThatCannotBeAreLost) {
+  HealthJudge judge{EstimatorOptions{}};
+  judge.start(frame_at(0));
+  NavState fast, biased;
+  fast.v_WB = Vec3(31, 0, 0);
+  biased.bias.gyro_radps = Vec3(0.6, 0, 0);
+  EXPECT_EQ(judge.judge(frame_at(0), fast, kManyTracks, 0), lost(HealthReason::implausible_speed));
+  EXPECT_EQ(judge.judge(frame_at(0), biased, kManyTracks, 0), lost(HealthReason::implausible_bias));
+}
+
+TEST(HealthJudge, BeforeTheStartMissingImagesGoBeforeOtherReasons) {
+  TrackedFrame frame = frame_at(0);
+  EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
+            (Health{HealthState::initialising, HealthReason::too_few_features}));
+  frame.has_left = frame.has_right = false;
+  EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
+            (Health{HealthState::initialising, HealthReason::no_images}));
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/landmark_geometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// A landmark whose inverse depth is known worse than this is not worth starting with.
+constexpr double kMaxInverseDepthSigma_1pm = 0.15;
+/// No sighting may be further than this from a point that starts.
+constexpr double kMaxError_sigma = 6.0;
+/// Over a longer gap the difference of two sightings says little of the velocity at either.
+constexpr double kLongestGap_s = 0.25;
+
+/// p_C = a + rho * b of a ray hosted in one frame, in some camera of another (W2, W3).
+struct RayInCamera {
+  Vec3 a, b;
+};
+
+RayInCamera ray_in_camera(const Vec2& ray, const PairGeometry& pair, const CameraGeometry& cameras, bool right) {
+  const Vec3 direction_B = cameras.R_BC0 * Vec3(ray.x(), ray.y(), 1);
+  const Mat3& R_CB = cameras.R_CB[right];
+  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC0 + pair.t_th - cameras.t_BC[right])};
+}
+
+}  // namespace
+
+bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
+  // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
+  const CameraGeometry cameras(calibration);
+  const Pose<W, B>& host = frames.at(landmark.host).state.T_WB;
+  const Vec2 ray = landmark.sightings.front().left.normalised;
+  double numerator = 0, information = 0;
+  const auto each = [&](auto&& visit) {
+    for (const Sighting& s : landmark.sightings) {
+      PairGeometry pair;
+      pair.set(host, frames.at(s.frame).state.T_WB);
+      if (s.frame != landmark.host) visit(ray_in_camera(ray, pair, cameras, false), s.left);
+      if (s.right) visit(ray_in_camera(ray, pair, cameras, true), *s.right);
+    }
+  };
+  each([&](const RayInCamera& line, const Observation& o) {
+    const Vec2 u = o.sqrt_information * (line.a.head<2>() - line.a.z() * o.normalised);
+    const Vec2 w = o.sqrt_information * (line.b.head<2>() - line.b.z() * o.normalised);
+    numerator -= u.dot(w);
+    information += w.squaredNorm();
+  });
+  if (information < 1.0 / (kMaxInverseDepthSigma_1pm * kMaxInverseDepthSigma_1pm)) return false;
+  const double sigma = 1.0 / std::sqrt(information);
+  double rho = numerator / information;
+  if (rho < -2 * sigma || rho > 1.0 / kNearestLandmark_m) return false;
+  rho = std::max(rho, 1.0 / kFarthestLandmark_m);
+  double worst = 0;
+  each([&](const RayInCamera& line, const Observation& o) {
+    const Vec3 p = line.a + rho * line.b;
+    if (p.z() < kMinScaledDepth) worst = 1e9;
+    else worst = std::max(worst, (o.sqrt_information * (p.head<2>() / p.z() - o.normalised)).squaredNorm());
+  });
+  if (worst > kMaxError_sigma * kMaxError_sigma) return false;
+  landmark.alpha_beta_rho << ray, rho;
+  return true;
+}
+
+Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const FrameList& frames,
+                            const Calibration& calibration) {
+  const CameraGeometry cameras(calibration);
+  PairGeometry pair;
+  pair.set(frames.at(landmark.host).state.T_WB, target.state.T_WB);
+  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), pair, cameras, false);
+  return line.a + landmark.alpha_beta_rho.z() * line.b;
+}
+
+void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration) {
+  if (landmark.triangulated) {
+    const Vec3 p = scaled_point_in_camera(landmark, frames.at(new_host), frames, calibration);
+    if (p.z() < kMinScaledDepth) landmark.triangulated = false;
+    else landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
+  }
+  landmark.host = new_host;
+}
+
+void set_velocities(Sighting& before, Sighting& now, double gap_s) {
+  if (gap_s <= 0 || gap_s > kLongestGap_s) return;
+  now.left_velocity = (now.left.normalised - before.left.normalised) / gap_s;
+  now.right_velocity =
+      now.right && before.right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
+  // Of the sighting before, the difference on its other side is known only now: their mean is good to second order.
+  const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
+  before.left_velocity += share * (now.left_velocity - before.left_velocity);
+  before.right_velocity += share * (now.right_velocity - before.right_velocity);
+}
+
+}  // namespace fbvins

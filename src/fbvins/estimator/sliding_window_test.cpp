@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+// The books of the window, on a body that moves sideways before points it sees exactly.
+#include "fbvins/estimator/sliding_window.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "fbvins/estimator/window_views.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kBaseline_m = 0.1, kStep_m = 0.1;
+
+/// Body and left camera are one; frame k is at x = k * kStep_m and looks along z.
+Calibration rig() {
+  Calibration c;
+  c.T_BC1.p = Vec3(kBaseline_m, 0, 0);
+  return c;
+}
+NavState state_at(int k) {
+  NavState s;
+  s.T_WB.p = Vec3(kStep_m * k, 0, 0);
+  return s;
+}
+Time stamp(int k) { return Time{k * 50'000'000}; }
+
+Observation seen_at(const Vec3& p_C) {
+  Observation o;
+  o.normalised = p_C.head<2>() / p_C.z();
+  o.pixel = 400 * o.normalised + Vec2(376, 240);
+  o.sqrt_information = 800 * Mat2::Identity();
+  return o;
+}
+
+/// Readings at rest from the frame before.
+ImuSegment readings_up_to(int k) {
+  ImuSegment out;
+  for (int i = 0; i <= 10; ++i) out.samples.push_back({stamp(k - 1) + Duration{i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  return out;
+}
+
+struct Scene {
+  std::map<int, Vec3> points_W;  ///< by track
+  Calibration calibration = rig();
+  SlidingWindow window;
+  WindowProblem problem;
+
+  explicit Scene(const EstimatorOptions& options = {}) : window(options, WindowWeights{}) {
+    for (int track = 0; track < 12; ++track) points_W[track] = Vec3(0.2 * track - 1, 0.1 * (track % 4), 2 + 0.1 * track);
+  }
+
+  TrackedFeature feature(int track, int k, bool stereo = true, const Vec2& left_shift = Vec2::Zero()) const {
+    const Vec3 p_B = state_at(k).T_WB.inverse() * points_W.at(track);
+    TrackedFeature f;
+    f.id = TrackId{track};
+    f.left = seen_at(p_B);
+    f.left.normalised += left_shift;
+    if (stereo) f.right = seen_at(calibration.T_BC1.inverse() * p_B);
+    return f;
+  }
+  std::vector<TrackedFeature> all(int k, bool stereo = true) const {
+    std::vector<TrackedFeature> out;
+    for (const auto& [track, p] : points_W) out.push_back(feature(track, k, stereo));
+    return out;
+  }
+  void add(int k, const std::vector<TrackedFeature>& features, bool keyframe = false) {
+    Frame f;
+    f.id = FrameId{k};
+    f.t = stamp(k);
+    f.state = state_at(k);
+    f.keyframe = keyframe;
+    if (k > 0) {
+      Preintegration imu(ImuNoise{}, ImuBias{});
+      imu.integrate(readings_up_to(k));
+      f.imu = std::make_shared<const Preintegration>(std::move(imu));
+    }
+    window.add_frame(std::move(f), features, calibration);
+  }
+  const Landmark* landmark(int track) const {
+    for (const Landmark& l : window.landmarks().all())
+      if (l.track == TrackId{track}) return &l;
+    return nullptr;
+  }
+  Vec3 position_W(int track) const {
+    const Landmark& l = *landmark(track);
+    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * calibration.T_BC0;
+    return T_WC * Vec3(Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z());
+  }
+  const WindowProblem& describe() {
+    window.describe(calibration, problem);
+    return problem;
+  }
+  /// The first frame is held, as an estimator would.
+  void hold_first() {
+    WindowPrior prior;
+    prior.frames = {0};
+    prior.with_tilt = true;
+    prior.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(17, 17);
+    prior.quadratic.g = Eigen::VectorXd::Zero(17);
+    window.set_prior(std::move(prior));
+  }
+};
+
+TEST(SlidingWindow, FilesSightingsUnderTheirTracks) {
+  Scene s;
+  s.add(0, s.all(0));
+  s.add(1, {s.feature(3, 1), s.feature(4, 1, false)});
+  EXPECT_EQ(s.window.frames().size(), 2);
+  ASSERT_EQ(s.window.landmarks().all().size(), s.points_W.size());
+  EXPECT_EQ(s.landmark(3)->sightings.size(), 2u);
+  EXPECT_TRUE(s.landmark(3)->sightings[1].right.has_value());
+  EXPECT_FALSE(s.landmark(4)->sightings[1].right.has_value());
+  EXPECT_EQ(s.landmark(5)->sightings.size(), 1u);
+  EXPECT_EQ(s.landmark(5)->host, FrameId{0});
+  // 0.1 m in 50 ms, 2.3 m away: the velocity of both sightings is that of their difference.
+  EXPECT_NEAR(s.landmark(3)->sightings[0].left_velocity.x(), -kStep_m / 0.05 / 2.3, 1e-9);
+  EXPECT_EQ(s.landmark(3)->sightings[0].left_velocity, s.landmark(3)->sightings[1].left_velocity);
+  EXPECT_EQ(landmarks_in_view(s.window), 2);
+}
+
+TEST(SlidingWindow, TriangulatesWhereTwoRaysAgreeAndFarEnoughApart) {
+  Scene s;
+  s.add(0, {s.feature(0, 0), s.feature(1, 0, false), s.feature(2, 0)});
+  EXPECT_TRUE(s.landmark(0)->triangulated) << "two cameras";
+  EXPECT_LT((s.position_W(0) - s.points_W[0]).norm(), 1e-9);
+  EXPECT_FALSE(s.landmark(1)->triangulated) << "one ray";
+  s.add(1, {s.feature(1, 1, false)});
+  EXPECT_TRUE(s.landmark(1)->triangulated) << "two frames";
+  EXPECT_LT((s.position_W(1) - s.points_W[1]).norm(), 1e-9);
+}
+
+TEST(SlidingWindow, DoesNotTriangulateWhatDoesNotMeet) {
+  Scene s;
+  s.points_W[20] = Vec3(0.02, 0.01, 0.05);  // nearer than any landmark may be
+  s.points_W[21] = Vec3(3, 1, 4000);
+  s.add(0, {s.feature(6, 0, true, Vec2(0, 0.02)), s.feature(7, 0, true, Vec2(-0.2, 0)), s.feature(20, 0), s.feature(21, 0)});
+  EXPECT_FALSE(s.landmark(6)->triangulated) << "rays pass one another by sixteen sigmas";
+  EXPECT_FALSE(s.landmark(7)->triangulated) << "they meet behind the cameras";
+  EXPECT_FALSE(s.landmark(20)->triangulated);
+  ASSERT_TRUE(s.landmark(21)->triangulated);
+  EXPECT_NEAR(s.landmark(21)->alpha_beta_rho.z(), 1 / kFarthestLandmark_m, 1e-12) << "kept at the limit";
+}
+
+TEST(SlidingWindow, DescribesWhichLandmarkIsWhich) {
+  Scene s;
+  for (int k = 0; k < 3; ++k) s.add(k, s.all(k, k != 1));
+  s.add(3, {s.feature(5, 3)});
+  const WindowProblem& p = s.describe();
+  ASSERT_EQ(p.frames.size(), 4u);
+  EXPECT_EQ(p.frames[2].id, FrameId{2});
+  EXPECT_EQ(p.index_of(FrameId{2}), 2);
+  ASSERT_EQ(p.landmarks.size(), s.points_W.size());
+  for (const WindowLandmark& l : p.landmarks) {
+    const Landmark* filed = s.window.landmarks().find(l.id);
+    ASSERT_NE(filed, nullptr);
+    EXPECT_EQ(l.alpha_beta_rho, filed->alpha_beta_rho);
+    EXPECT_EQ(l.observation_count, filed->track == TrackId{5} ? 7 : 5) << "both cameras, the left alone in frame 1";
+    for (int k = 0; k < l.observation_count; ++k) EXPECT_LT(p.residual(l, p.observations[l.first_observation + k]).norm(), 1e-6);
+  }
+}
+
+TEST(SlidingWindow, DescribesTheLandmarksSeenMostWhenThereAreTooMany) {
+  EstimatorOptions options;
+  options.max_landmarks = 5;
+  Scene s(options);
+  for (int k = 0; k < 2; ++k) s.add(k, s.all(k));
+  s.add(2, {s.feature(1, 2), s.feature(8, 2), s.feature(10, 2)});
+  std::vector<TrackId> tracks;
+  for (const WindowLandmark& l : s.describe().landmarks) tracks.push_back(s.window.landmarks().find(l.id)->track);
+  EXPECT_EQ(tracks, (std::vector<TrackId>{{0}, {1}, {2}, {8}, {10}})) << "then those filed first";
+}
+
+TEST(SlidingWindow, AcceptsASolutionByIdsThoughFramesHaveLeftMeanwhile) {
+  Scene s;
+  for (int k = 0; k < 4; ++k) s.add(k, s.all(k));
+  WindowProblem solved = s.describe();
+  for (WindowFrame& f : solved.frames) f.state.v_WB = Vec3(static_cast<double>(f.id.value), 0, 0);
+  for (WindowLandmark& l : solved.landmarks) l.alpha_beta_rho.z() += 1e-3 * static_cast<double>(l.id.value);
+  s.window.drop_frame(1, s.calibration);
+  const double before = s.landmark(7)->alpha_beta_rho.z();
+  s.window.accept(solved);
+  EXPECT_EQ(s.window.frames().size(), 3);
+  for (const Frame& f : s.window.frames()) EXPECT_EQ(f.state.v_WB.x(), static_cast<double>(f.id.value));
+  EXPECT_NEAR(s.landmark(7)->alpha_beta_rho.z() - before, 1e-3 * static_cast<double>(s.landmark(7)->id.value), 1e-12);
+}
+
+TEST(SlidingWindow, AFrameThatIsDroppedLeavesItsReadingsToTheNext) {
+  Scene s;
+  for (int k = 0; k < 4; ++k) s.add(k, k == 0 ? std::vector<TrackedFeature>{} : s.all(k));
+  EXPECT_EQ(s.landmark(2)->host, FrameId{1});
+  s.window.drop_frame(1, s.calibration);
+  EXPECT_EQ(s.window.frames().index_of(FrameId{1}), -1);
+  const Frame& next = s.window.frames()[1];
+  EXPECT_EQ(next.id, FrameId{2});
+  EXPECT_EQ(next.imu->begin(), stamp(0));
+  EXPECT_EQ(next.imu->end(), stamp(2));
+  EXPECT_EQ(next.imu->size(), 21);
+  // Landmarks it hosted are hosted by the next frame that sees them, and stay where they are.
+  EXPECT_EQ(s.landmark(2)->host, FrameId{2});
+  EXPECT_EQ(s.landmark(2)->sightings.size(), 2u);
+  EXPECT_LT((s.position_W(2) - s.points_W[2]).norm(), 1e-9);
+}
+
+TEST(SlidingWindow, AFrameInThePriorIsDroppedIntoIt) {
+  Scene s;
+  for (int k = 0; k < 4; ++k) s.add(k, s.all(k));
+  s.hold_first();
+  WindowPrior prior = s.window.prior();
+  s.window.drop_frame(0, s.calibration);
+  EXPECT_EQ(s.window.frames().oldest().id, FrameId{1});
+  EXPECT_EQ(s.window.frames().oldest().imu, nullptr) << "its readings are in the prior";
+  EXPECT_EQ(s.window.prior().frames, std::vector<int>{0});
+  EXPECT_TRUE(s.window.frames().oldest().in_prior);
+  EXPECT_EQ(s.window.landmarks().all().size(), s.points_W.size());
+}
+
+TEST(SlidingWindow, OutliersAreRemovedAndThreeStrikesBanATrack) {
+  Scene s;
+  for (int k = 0; k < 3; ++k) s.add(k, s.all(k));
+  for (int round = 1; round <= 3; ++round) {
+    const int k = 2 + round;
+    std::vector<TrackedFeature> features = s.all(k);
+    features[4] = s.feature(4, k, true, Vec2(0, 0.05));  // forty sigmas
+    s.add(k, features);
+    EXPECT_EQ(s.window.remove_outliers(s.describe()), 1) << round;
+    if (round < 3) EXPECT_EQ(s.landmark(4)->strikes, round);
+    if (round < 3) EXPECT_EQ(s.landmark(4)->sightings.size(), 3u) << "the good ones stay";
+  }
+  EXPECT_EQ(s.landmark(4), nullptr);
+  EXPECT_TRUE(s.window.landmarks().banned(TrackId{4}));
+  s.add(6, s.all(6));
+  EXPECT_EQ(s.landmark(4), nullptr) << "the track is not followed any more";
+  s.window.clear();
+  s.add(7, s.all(7));
+  EXPECT_NE(s.landmark(4), nullptr) << "in a new window it is";
+}
+
+TEST(SlidingWindow, ARightObservationThatIsOffGoesAlone) {
+  Scene s;
+  for (int k = 0; k < 2; ++k) s.add(k, s.all(k));
+  std::vector<TrackedFeature> features = s.all(2);
+  features[4].right->normalised.y() += 0.05;
+  s.add(2, features);
+  EXPECT_EQ(s.window.remove_outliers(s.describe()), 1);
+  EXPECT_EQ(s.landmark(4)->sightings.size(), 3u);
+  EXPECT_FALSE(s.landmark(4)->sightings[2].right.has_value());
+}
+
+/// Keyframes 0 and 1, then three newest frames; track 0 is seen by the keyframes alone, track 1 by all.
+Scene about_to_shrink() {
+  Scene s;
+  for (int k = 0; k < 2; ++k) s.add(k, s.all(k), true);
+  for (int k = 2; k < 5; ++k) s.add(k, {s.feature(1, k), s.feature(2, k), s.feature(3, k)});
+  s.hold_first();
+  return s;
+}
+
+TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreKnownFromThenOn) {
+  Scene s = about_to_shrink();
+  s.window.marginalise_keyframe(0, s.calibration);
+  EXPECT_EQ(s.window.frames().oldest().id, FrameId{1});
+  EXPECT_EQ(s.window.frames().oldest().imu, nullptr);
+  EXPECT_EQ(s.landmark(0), nullptr) << "out of view";
+  ASSERT_NE(s.landmark(1), nullptr) << "in view: starts anew from the newest frames";
+  EXPECT_EQ(s.landmark(1)->host, FrameId{2});
+  EXPECT_EQ(s.landmark(1)->sightings.size(), 3u);
+  ASSERT_TRUE(s.landmark(1)->belief.has_value());
+  EXPECT_LT((s.landmark(1)->belief->p_W - s.points_W[1]).norm(), 1e-6);
+  const auto known = s.window.known().find(TrackId{0});
+  ASSERT_TRUE(known.has_value());
+  EXPECT_LT((known->p_W - s.points_W[0]).norm(), 1e-6);
+  EXPECT_EQ(s.window.known().take_new().size(), s.points_W.size());
+
+  s.add(5, {s.feature(0, 5)});  // seen again under its old track
+  ASSERT_TRUE(s.landmark(0)->belief.has_value());
+  s.add(6, {s.feature(0, 6)});
+  EXPECT_EQ(s.window.refuse_beliefs(s.describe()), 0);
+}
+
+TEST(SlidingWindow, NothingIsKnownOfLandmarksInAWorldThatTurns) {
+  Scene s;
+  WindowWeights level;
+  level.estimate_tilt = false;
+  s.window = SlidingWindow(EstimatorOptions{}, level);
+  for (int k = 0; k < 5; ++k) s.add(k, s.all(k), k < 2);
+  WindowPrior prior;
+  prior.frames = {0};
+  prior.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
+  prior.quadratic.g = Eigen::VectorXd::Zero(15);
+  s.window.set_prior(std::move(prior));
+  s.window.marginalise_keyframe(0, s.calibration);
+  EXPECT_EQ(s.window.known().size(), 0u);
+}
+
+TEST(SlidingWindow, ALandmarkElsewhereThanBelievedIsAnother) {
+  Scene s = about_to_shrink();
+  s.window.marginalise_keyframe(0, s.calibration);
+  s.points_W[0] += Vec3(0, 0.8, 0);  // nowhere near: refused as soon as its depth is known
+  s.add(5, {s.feature(0, 5), s.feature(1, 5), s.feature(2, 5)});
+  EXPECT_FALSE(s.landmark(0)->belief.has_value());
+  EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
+
+  WindowProblem solved = s.describe();  // near, but the solve took it away
+  ASSERT_FALSE(solved.beliefs.empty());
+  const int believed = solved.landmarks[0].belief >= 0 ? 0 : 1;
+  solved.landmarks[believed].alpha_beta_rho.y() += 0.1;
+  const LandmarkId id = solved.landmarks[believed].id;
+  EXPECT_EQ(s.window.refuse_beliefs(solved), 1);
+  EXPECT_FALSE(s.window.landmarks().find(id)->belief.has_value());
+}
+
+TEST(SlidingWindow, ShowsItself) {
+  Scene s;
+  for (int k = 0; k < 3; ++k) s.add(k, s.all(k), k == 1);
+  const WindowSnapshot snapshot = snapshot_of(s.window, s.calibration);
+  ASSERT_EQ(snapshot.frames.size(), 3u);
+  EXPECT_TRUE(snapshot.frames[1].keyframe);
+  EXPECT_EQ(snapshot.frames[2].T_WB.p, state_at(2).T_WB.p);
+  ASSERT_EQ(snapshot.landmarks.size(), s.points_W.size());
+  for (const WindowSnapshot::Landmark& l : snapshot.landmarks) {
+    EXPECT_EQ(l.observations, 3);
+    EXPECT_LT((l.p_W - s.points_W[static_cast<int>(l.track.value)]).norm(), 1e-9);
+  }
+  const Keyframe keyframe = keyframe_of(s.window, 1, s.calibration);
+  EXPECT_EQ(keyframe.id, FrameId{1});
+  ASSERT_EQ(keyframe.landmarks.size(), s.points_W.size());
+  EXPECT_LT((keyframe.landmarks[0].p_B - (s.points_W[0] - state_at(1).T_WB.p)).norm(), 1e-9);
+  // Nothing turned: motion of the image since the keyframe is its step over the depth.
+  const KeyframeDistance d = distance_to_last_keyframe(s.window, s.calibration, 400);
+  EXPECT_EQ(d.shared_ratio, 1);
+  EXPECT_GT(d.parallax_px, 400 * kStep_m / 3.2);
+  EXPECT_LT(d.parallax_px, 400 * kStep_m / 1.9);
+  EXPECT_EQ(d.age, Duration{50'000'000});
+}
+
+}  // namespace
+}  // namespace fbvins

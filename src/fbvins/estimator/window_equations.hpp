@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cost and normal equations of a window, landmarks still apart (docs/derivations/window.md, W2-W9). Pure functions; the
+// values they fill keep their memory from call to call.
+//
+//   double cost = linearise(window, pairs, equations);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/optim/schur.hpp"
+
+namespace fbvins {
+
+/// Where each variable is in the dense system: 9 of each frame (v, bg, ba), 2 of the tilt and calibration if they are
+/// estimated, 6 of each frame (p, theta): poses that follow one another are neighbours, which the Schur kernel likes.
+struct WindowLayout {
+  int frames = 0;
+  int tilt_size = 0;
+  int calibration_size = 0;
+
+  WindowLayout() = default;
+  explicit WindowLayout(const WindowProblem& window)
+      : frames(window.frame_count()),
+        tilt_size(window.weights.estimate_tilt ? kTiltSize : 0),
+        calibration_size(window.calibrating() ? kCalibrationSize : 0) {}
+
+  int size() const { return 15 * frames + tilt_size + calibration_size; }
+  int speed_bias_row(int frame) const { return 9 * frame; }
+  int tilt_row() const { return 9 * frames; }
+  int calibration_row() const { return tilt_row() + tilt_size; }
+  int pose_row(int frame) const { return calibration_row() + calibration_size + 6 * frame; }
+  /// Of element k of a frame's 15 numbers (p, theta, v, bg, ba).
+  int row_of(int frame, int k) const { return k < 6 ? pose_row(frame) + k : speed_bias_row(frame) + k - 6; }
+};
+
+/// Geometry of every frame towards every other.
+class PairTable {
+ public:
+  void fill(const WindowProblem& window, bool with_first_estimates);
+  const PairGeometry& operator()(int host, int target) const { return pairs_[host * n_ + target]; }
+
+ private:
+  std::size_t n_ = 0;
+  std::vector<PairGeometry> pairs_;
+};
+
+struct NormalEquations {
+  WindowLayout layout;
+  Eigen::MatrixXd H;  ///< lower triangle
+  Eigen::VectorXd g;
+  PointBlocks points;  ///< landmarks, in the window's order
+};
+
+/// Frames, tilt and calibration with the landmarks eliminated; lower triangle.
+struct ReducedEquations {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+};
+
+/// Cost where the window is.
+double cost_of(const WindowProblem& window, PairTable& pairs);
+/// The same, and the equations there.
+double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out);
+/// Eliminates the landmarks without damping (W10); H is filled in both triangles.
+ReducedEquations reduced(NormalEquations& equations);
+
+/// Of all landmarks: their observations, and where they were known to be. In window_landmark_terms.cpp.
+double landmark_cost(const WindowProblem& window, const PairTable& pairs);
+double add_landmarks(const WindowProblem& window, const PairTable& pairs, NormalEquations& out);
+
+}  // namespace fbvins

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// The normal equations' part that landmarks have: where nearly all of a solve's time goes.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/core/simd.hpp"
+#include "fbvins/estimator/window_equations.hpp"
+#include "fbvins/optim/robust_loss.hpp"
+
+namespace fbvins {
+namespace {
+
+/// What an observation without a projection costs: a residual of this many sigmas, with no slope.
+constexpr double kUnprojectableSigma = 100.0;
+
+/// G += J^T J for two rows of Columns numbers. Full square: plain loops over fixed lanes.
+template <int Columns>
+inline void add_gram(const double* row0, const double* row1, double* G) {
+  for (int i = 0; i < Columns; ++i)
+    for (int j = 0; j < Columns; ++j) G[i * Columns + j] += row0[i] * row0[j] + row1[i] * row1[j];
+}
+FBVINS_KERNEL void add_gram_16(const double* row0, const double* row1, double* G) { add_gram<16>(row0, row1, G); }
+FBVINS_KERNEL void add_gram_32(const double* row0, const double* row1, double* G) { add_gram<32>(row0, row1, G); }
+
+double belief_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
+  const Vec3 r = belief_residual(cameras, w.frames[l.host].state.T_WB, l, w.beliefs[l.belief]);
+  return huber(r.squaredNorm(), w.weights.huber_sigma).cost;
+}
+
+double add_belief(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l, int host_block,
+                  PointBlock& point, NormalEquations& out) {
+  const LandmarkBelief& belief = w.beliefs[l.belief];
+  const Vec3 r = belief_residual(cameras, w.frames[l.host].state.T_WB, l, belief);
+  const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
+  const BeliefJacobian J(cameras, w.linearisation_point(l.host).T_WB, l, belief);
+  const int host = out.layout.pose_row(l.host);
+  out.H.block<6, 6>(host, host) += robust.weight * J.host.transpose() * J.host;
+  out.g.segment<6>(host) += robust.weight * J.host.transpose() * r;
+  point.V += robust.weight * J.point.transpose() * J.point;
+  point.w += robust.weight * J.point.transpose() * r;
+  out.points.coupling(point, host_block) += robust.weight * J.point.transpose() * J.host;
+  if (w.calibrating()) {
+    const int row = out.layout.calibration_row();
+    out.H.block<6, 6>(row, row) += robust.weight * J.extrinsic.transpose() * J.extrinsic;
+    out.H.block<6, 6>(host, row) += robust.weight * J.host.transpose() * J.extrinsic;
+    out.g.segment<6>(row) += robust.weight * J.extrinsic.transpose() * r;
+    out.points.coupling(point, 0) += robust.weight * J.point.transpose() * J.extrinsic;
+  }
+  return robust.cost;
+}
+
+/// The blocks of the dense system that a landmark is coupled to, ascending: calibration's, if it is estimated, then poses'.
+template <int Columns>
+void list_blocks(const WindowLayout& at, const WindowLandmark& l, const WindowObservation* begin, const WindowObservation* end,
+                 std::vector<int>& offsets) {
+  offsets.clear();
+  if constexpr (Columns == 32)
+    for (int k = 0; k < 3; ++k) offsets.push_back(at.calibration_row() + 6 * k);
+  bool host_listed = false;
+  for (const WindowObservation* o = begin; o != end; ++o) {
+    if (!host_listed && o->frame >= l.host) {
+      host_listed = true;
+      offsets.push_back(at.pose_row(l.host));
+    }
+    if (o->frame != l.host && (o == begin || o->frame != o[-1].frame)) offsets.push_back(at.pose_row(o->frame));
+  }
+  if (!host_listed) offsets.push_back(at.pose_row(l.host));
+}
+
+template <int Columns>
+double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEquations& out) {
+  const CameraGeometry cameras(w.calibration);
+  const WindowLayout at = out.layout;
+  Eigen::MatrixXd& H = out.H;
+  Eigen::VectorXd& g = out.g;
+  double cost = 0;
+  std::array<double, Columns * Columns> G;
+  double rows[2][Columns];
+  std::vector<int> offsets;
+  constexpr int kFirstPoseBlock = Columns == 32 ? 3 : 0;
+  for (const WindowLandmark& l : w.landmarks) {
+    const Vec3 x_h = scaled_point_in_host(cameras, l);
+    const WindowObservation* begin = w.observations.data() + l.first_observation;
+    const WindowObservation* end = begin + l.observation_count;
+    list_blocks<Columns>(at, l, begin, end, offsets);
+    PointBlock& point = out.points.add(offsets);
+    const int host_row = at.pose_row(l.host);
+    const auto block_of = [&](int row) {
+      return static_cast<int>(std::lower_bound(offsets.begin() + kFirstPoseBlock, offsets.end(), row) - offsets.begin());
+    };
+    const int host_block = block_of(host_row);
+    if (l.belief >= 0) cost += add_belief(w, cameras, l, host_block, point, out);
+
+    for (const WindowObservation* o = begin; o != end;) {
+      const int target = o->frame;
+      const bool same = target == l.host;
+      const PairGeometry& pair = pairs(l.host, target);
+      G.fill(0);
+      for (; o != end && o->frame == target; ++o) {
+        Vec3 p_C;
+        Vec2 r;
+        if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
+          cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
+          continue;
+        }
+        const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
+        cost += robust.cost;
+        fill_jacobian_rows<Columns>(cameras, pair, same, l, x_h, *o, p_C, r, rows);
+        if (robust.weight < 1) {
+          const double s = std::sqrt(robust.weight);
+          for (int k = 0; k < 2; ++k)
+            for (double& x : rows[k]) x *= s;
+        }
+        if constexpr (Columns == 32) add_gram_32(rows[0], rows[1], G.data());
+        else add_gram_16(rows[0], rows[1], G.data());
+      }
+
+      using Gram = Eigen::Matrix<double, Columns, Columns, Eigen::RowMajor>;
+      const Eigen::Map<const Gram> gram(G.data());
+      point.V += gram.template block<3, 3>(kPoint, kPoint);
+      point.w += gram.template block<3, 1>(kPoint, kResidual);
+      if (!same) {
+        const int target_row = at.pose_row(target);
+        H.block<6, 6>(host_row, host_row) += gram.template block<6, 6>(kHost, kHost);
+        H.block<6, 6>(target_row, target_row) += gram.template block<6, 6>(kTarget, kTarget);
+        if (target_row > host_row) H.block<6, 6>(target_row, host_row) += gram.template block<6, 6>(kTarget, kHost);
+        else H.block<6, 6>(host_row, target_row) += gram.template block<6, 6>(kHost, kTarget);
+        g.segment<6>(host_row) += gram.template block<6, 1>(kHost, kResidual);
+        g.segment<6>(target_row) += gram.template block<6, 1>(kTarget, kResidual);
+        out.points.coupling(point, host_block) += gram.template block<3, 6>(kPoint, kHost);
+        out.points.coupling(point, block_of(target_row)) += gram.template block<3, 6>(kPoint, kTarget);
+      }
+      if constexpr (Columns == 32) {
+        const int row = at.calibration_row();
+        H.block<13, 13>(row, row) += gram.template block<13, 13>(kExtrinsic0, kExtrinsic0);
+        g.segment<13>(row) += gram.template block<13, 1>(kExtrinsic0, kResidual);
+        if (!same) {
+          H.block<6, 13>(host_row, row) += gram.template block<6, 13>(kHost, kExtrinsic0);
+          H.block<6, 13>(at.pose_row(target), row) += gram.template block<6, 13>(kTarget, kExtrinsic0);
+        }
+        for (int k = 0; k < 2; ++k) out.points.coupling(point, k) += gram.template block<3, 6>(kPoint, kExtrinsic0 + 6 * k);
+        out.points.coupling(point, 2).col(0) += gram.template block<3, 1>(kPoint, kTimeOffset);
+      }
+    }
+  }
+  return cost;
+}
+
+}  // namespace
+
+double landmark_cost(const WindowProblem& w, const PairTable& pairs) {
+  const CameraGeometry cameras(w.calibration);
+  double cost = 0;
+  for (const WindowLandmark& l : w.landmarks) {
+    const Vec3 x_h = scaled_point_in_host(cameras, l);
+    for (int k = 0; k < l.observation_count; ++k) {
+      const WindowObservation& o = w.observations[l.first_observation + k];
+      Vec3 p_C;
+      Vec2 r;
+      const bool ok = reproject(cameras, pairs(l.host, o.frame), x_h, l.alpha_beta_rho.z(), o, p_C, r);
+      cost += huber(ok ? r.squaredNorm() : kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
+    }
+    if (l.belief >= 0) cost += belief_cost(w, cameras, l);
+  }
+  return cost;
+}
+
+double add_landmarks(const WindowProblem& window, const PairTable& pairs, NormalEquations& out) {
+  return window.calibrating() ? add_landmarks_of<32>(window, pairs, out) : add_landmarks_of<16>(window, pairs, out);
+}
+
+}  // namespace fbvins

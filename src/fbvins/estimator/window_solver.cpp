@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/window_solver.hpp"
+
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+/// Keeps directions without any measurement solvable; far below any real information.
+constexpr double kRegularisation = 1e-8;
+constexpr double kNegligibleLambda = 1e-8;
+/// Damps steps of the inverse depth, 1 m^2. One camera at rest knows next to nothing of it; a free step puts the
+/// landmark before the lens, and the whole step is refused for its sake. Moves no optimum and enters no prior.
+constexpr double kDepthDamping = 1.0;
+
+/// The variables of a window, apart from what was measured.
+struct Estimate {
+  std::vector<NavState> states;
+  std::vector<Vec3> landmarks;
+  Calibration calibration;
+  Tilt tilt;
+
+  void save(const WindowProblem& window) {
+    states.resize(window.frames.size());
+    landmarks.resize(window.landmarks.size());
+    for (std::size_t i = 0; i < states.size(); ++i) states[i] = window.frames[i].state;
+    for (std::size_t i = 0; i < landmarks.size(); ++i) landmarks[i] = window.landmarks[i].alpha_beta_rho;
+    calibration = window.calibration;
+    tilt = window.tilt;
+  }
+  void restore(WindowProblem& window) const {
+    for (std::size_t i = 0; i < states.size(); ++i) window.frames[i].state = states[i];
+    for (std::size_t i = 0; i < landmarks.size(); ++i) window.landmarks[i].alpha_beta_rho = landmarks[i];
+    window.calibration = calibration;
+    window.tilt = tilt;
+  }
+};
+
+void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step) {
+  const Eigen::VectorXd& d = step.dense;
+  if (at.tilt_size > 0) window.tilt.angle_rad += d.segment<kTiltSize>(at.tilt_row());
+  for (int i = 0; i < window.frame_count(); ++i) {
+    Vec15 d_frame;
+    d_frame << d.segment<6>(at.pose_row(i)), d.segment<9>(at.speed_bias_row(i));
+    window.frames[i].state = window.frames[i].state.boxplus(d_frame);
+  }
+  for (std::size_t i = 0; i < window.landmarks.size(); ++i) {
+    Vec3& l = window.landmarks[i].alpha_beta_rho;
+    l += step.landmarks[i];
+    l.z() = std::max(l.z(), window.weights.min_inverse_depth_1pm);
+  }
+  if (at.calibration_size > 0) {
+    const auto c = d.segment<kCalibrationSize>(at.calibration_row());
+    window.calibration.T_BC0 = window.calibration.T_BC0.boxplus(c.segment<3>(0), c.segment<3>(3));
+    window.calibration.T_BC1 = window.calibration.T_BC1.boxplus(c.segment<3>(6), c.segment<3>(9));
+    window.calibration.time_offset_s += c(kTimeOffsetIndex);
+  }
+}
+
+}  // namespace
+
+bool WindowInformation::factorise(const WindowLayout& layout, const Eigen::MatrixXd& information) {
+  layout_ = layout;
+  llt_.compute(information.selfadjointView<Eigen::Lower>());
+  valid_ = llt_.info() == Eigen::Success;
+  return valid_;
+}
+
+std::optional<Mat17> WindowInformation::covariance(int frame) const {
+  if (!valid_) return std::nullopt;
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(layout_.size(), 17);
+  for (int k = 0; k < 15; ++k) unit(layout_.row_of(frame, k), k) = 1;
+  for (int k = 0; k < layout_.tilt_size; ++k) unit(layout_.tilt_row() + k, 15 + k) = 1;
+  llt_.matrixL().solveInPlace(unit);
+  std::optional<Mat17> out(std::in_place);
+  out->noalias() = unit.transpose() * unit;
+  if (!out->allFinite()) return std::nullopt;
+  return out;
+}
+
+std::optional<Mat17> WindowSolution::covariance(FrameId frame) const {
+  const int index = window.index_of(frame);
+  return index < 0 ? std::nullopt : information.covariance(index);
+}
+
+bool WindowSolver::step(double lambda, WindowInformation& information) {
+  information.clear();
+  reduced_.H = equations_.H;
+  reduced_.g = equations_.g;
+  reduced_.H.diagonal() *= 1.0 + lambda;
+  reduced_.H.diagonal().array() += kRegularisation;
+  const double depth_damping = lambda > 0 ? kDepthDamping : 0.0;
+  if (!equations_.points.eliminate(lambda, reduced_.H, reduced_.g, depth_damping)) return false;
+  if (!information.factorise(equations_.layout, reduced_.H)) return false;
+  step_.dense = -information.solve(reduced_.g);
+  equations_.points.back_substitute(step_.dense, step_.landmarks);
+  if (!step_.dense.allFinite()) return false;
+
+  // Of the damped quadratic model: (dx^T D dx - g^T dx) / 2.
+  double twice = lambda * step_.dense.cwiseAbs2().dot(equations_.H.diagonal()) - equations_.g.dot(step_.dense);
+  for (std::size_t i = 0; i < step_.landmarks.size(); ++i) {
+    const PointBlock& point = equations_.points.points()[i];
+    const Vec3& d = step_.landmarks[i];
+    twice += lambda * d.cwiseAbs2().dot(point.V.diagonal()) - point.w.dot(d) + depth_damping * d.z() * d.z();
+  }
+  step_.predicted_decrease = 0.5 * twice;
+  step_.size = step_.dense.tail(6 * equations_.layout.frames).lpNorm<Eigen::Infinity>();
+  return true;
+}
+
+/// What minimise() wants.
+struct WindowSolver::Descent {
+  WindowSolver& solver;
+  WindowSolution& solution;
+  Estimate before;
+  double lambda = 0;  ///< of the last step
+
+  double linearise() { return solver.linearise(solution.window); }
+  bool solve(double damping) {
+    lambda = damping;
+    return solver.step(damping, solution.information);
+  }
+  double predicted_decrease() const { return solver.step_.predicted_decrease; }
+  double step_size() const { return solver.step_.size; }
+  double apply_step() {
+    before.save(solution.window);
+    move(solution.window, solver.equations_.layout, solver.step_);
+    return cost_of(solution.window, solver.pairs_);
+  }
+  void undo_step() { before.restore(solution.window); }
+};
+
+void WindowSolver::solve(WindowSolution& solution, const LmOptions& options) {
+  Descent descent{*this, solution, {}};
+  solution.information.clear();
+  solution.summary = minimise(descent, options);
+  if (descent.lambda > kNegligibleLambda) (void)step(0, solution.information);  // damping would feign certainty
+}
+
+}  // namespace fbvins

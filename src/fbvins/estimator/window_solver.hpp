@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Minimises a WindowProblem by optim/levenberg_marquardt.hpp, and says how well what it found is known.
+//
+//   WindowSolver solver;                       // keeps its working memory from call to call; one thread
+//   WindowSolution solution;
+//   solution.window = ...;
+//   solver.solve(solution, LmOptions{});
+//   if (solution.summary.usable) use(solution.window.frames, solution.information.covariance(0));
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <optional>
+#include <vector>
+
+#include "fbvins/estimator/window_equations.hpp"
+#include "fbvins/optim/levenberg_marquardt.hpp"
+
+namespace fbvins {
+
+/// Cholesky factor of what is known of frames, tilt and calibration, the landmarks eliminated. A value.
+class WindowInformation {
+ public:
+  /// From the lower triangle; false where it is not positive definite.
+  bool factorise(const WindowLayout& layout, const Eigen::MatrixXd& information);
+  Eigen::VectorXd solve(const Eigen::VectorXd& rhs) const { return llt_.solve(rhs); }
+  /// Of a frame's (p, theta, v, bg, ba) and the tilt (zero where it is not estimated); none where nothing was factorised.
+  std::optional<Mat17> covariance(int frame) const;
+  void clear() { valid_ = false; }
+
+ private:
+  WindowLayout layout_;
+  Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)};  // one made of nothing has no state to copy
+  bool valid_ = false;
+};
+
+/// A window at its minimum.
+struct WindowSolution {
+  WindowProblem window;  ///< filled by the caller, and minimised in place
+  LmSummary summary;
+  WindowInformation information;  ///< at the last linearisation, undamped
+
+  /// Of a frame of the window, as WindowInformation::covariance().
+  std::optional<Mat17> covariance(FrameId frame) const;
+};
+
+/// A step of all variables, and what the damped quadratic model says of it.
+struct WindowStep {
+  Eigen::VectorXd dense;
+  std::vector<Vec3> landmarks;
+  double predicted_decrease = 0;
+  double size = 0;  ///< largest element of the poses' part
+};
+
+class WindowSolver {
+ public:
+  void solve(WindowSolution& solution, const LmOptions& options);
+
+  /// Step by step: linearises where the window is; then a damped step from there, and its factor.
+  double linearise(const WindowProblem& window) { return fbvins::linearise(window, pairs_, equations_); }
+  bool step(double lambda, WindowInformation& information);
+  const WindowStep& step() const { return step_; }
+  const NormalEquations& equations() const { return equations_; }
+
+ private:
+  struct Descent;
+
+  PairTable pairs_;
+  NormalEquations equations_;
+  ReducedEquations reduced_;
+  WindowStep step_;
+};
+
+}  // namespace fbvins

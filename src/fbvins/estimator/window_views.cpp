@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/window_views.hpp"
+
+#include <algorithm>
+
+namespace fbvins {
+
+int landmarks_in_view(const SlidingWindow& window) {
+  const FrameId newest = window.newest().id;
+  const std::vector<Landmark>& landmarks = window.landmarks().all();
+  return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
+    return l.triangulated && l.sightings.back().frame == newest && l.sightings.size() >= 2;
+  }));
+}
+
+KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px) {
+  KeyframeDistance out;
+  const Frame& newest = window.newest();
+  const FrameList& frames = window.frames();
+  int last = frames.size() - 2;
+  while (last >= 0 && !frames[last].keyframe) --last;
+  if (last < 0) return out;
+  const Frame& keyframe = frames[last];
+  out.age = newest.t - keyframe.t;
+  const Mat3 R_BC = calibration.T_BC0.R();
+  const Mat3 R_new_last = (newest.state.T_WB.R() * R_BC).transpose() * keyframe.state.T_WB.R() * R_BC;
+  int seen = 0;
+  std::vector<double> motion;
+  for (const Landmark& l : window.landmarks().all()) {
+    if (l.sightings.back().frame != newest.id) continue;
+    ++seen;
+    const Sighting* before = l.sighting_in(keyframe.id);
+    if (before == nullptr) continue;
+    const Vec3 p = R_new_last * Vec3(before->left.normalised.x(), before->left.normalised.y(), 1);
+    motion.push_back(focal_px * (p.head<2>() / p.z() - l.sightings.back().left.normalised).norm());
+  }
+  if (seen > 0) out.shared_ratio = static_cast<double>(motion.size()) / seen;
+  if (!motion.empty()) {
+    std::nth_element(motion.begin(), motion.begin() + motion.size() / 2, motion.end());
+    out.parallax_px = motion[motion.size() / 2];
+  }
+  return out;
+}
+
+WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration) {
+  WindowSnapshot out;
+  const Tilt& tilt = window.tilt();
+  for (const Frame& f : window.frames()) out.frames.push_back({f.id, f.t, tilt.levelled(f.state.T_WB), f.keyframe});
+  for (const Landmark& l : window.landmarks().all()) {
+    if (!l.triangulated) continue;
+    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * calibration.T_BC0;
+    const Vec3 p_C = Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z();
+    out.landmarks.push_back({l.id, l.track, tilt.levelled(Vec3(T_WC * p_C)), static_cast<int>(l.sightings.size())});
+  }
+  return out;
+}
+
+Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& calibration) {
+  const Frame& f = window.frames()[frame];
+  const NavState level = window.tilt().levelled(f.state);
+  Keyframe out;
+  out.id = f.id;
+  out.t = f.t;
+  out.T_WB = level.T_WB;
+  out.v_WB = level.v_WB;
+  for (const Landmark& l : window.landmarks().all()) {
+    const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;
+    if (seen == nullptr) continue;
+    const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
+    out.landmarks.push_back({l.track, seen->left.pixel, calibration.T_BC0 * p_C});
+  }
+  return out;
+}
+
+}  // namespace fbvins

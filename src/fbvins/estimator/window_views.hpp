@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// What others want to know of a window: pictures of it, taken without changing it. Pure functions.
+#pragma once
+
+#include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/types/keyframe.hpp"
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+/// Triangulated landmarks seen in the newest frame.
+int landmarks_in_view(const SlidingWindow& window);
+
+/// Share of the newest frame's features that the last keyframe saw, and the median rotation-free
+/// motion of these in px of a camera with this focal length.
+struct KeyframeDistance {
+  double shared_ratio = 0;
+  double parallax_px = 0;
+  Duration age;
+};
+KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px);
+
+/// Levelled, as is what follows.
+WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);
+/// A frame as a keyframe for loop closure, with what it sees, but without its images.
+Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& calibration);
+
+}  // namespace fbvins
