@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/initial_prior.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+NavState tilted() {
+  NavState s;
+  s.T_WB = {so3_exp(Vec3(0.4, -0.3, 1.0)), Vec3(1, 2, 3)};
+  s.bias = {Vec3(0.01, 0.02, -0.01), Vec3(0.1, -0.05, 0.02)};
+  return s;
+}
+
+/// Cost of turning the frame by a small angle about an axis of W; W's tilt, if it is in the prior, stays.
+double cost_of_turn(const WindowPrior& prior, const Vec3& angle_W) {
+  Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
+  dx.segment<3>(prior.frames_row() + nav::theta) = tilted().T_WB.q.conjugate() * angle_W;
+  return prior.quadratic.cost(dx) - prior.quadratic.cost(Eigen::VectorXd::Zero(prior.quadratic.size()));
+}
+
+TEST(FirstFramePrior, HoldsHeadingAndLeavesTiltOpenWhereUpIsFixed) {
+  const WindowPrior prior = first_frame_prior(tilted(), false);
+  EXPECT_EQ(prior.quadratic.size(), 15);
+  const double angle = 0.01;
+  EXPECT_GT(cost_of_turn(prior, angle * Vec3::UnitZ()), 40) << "ten sigmas";
+  EXPECT_LT(cost_of_turn(prior, angle * Vec3::UnitX()), 1e-3);
+  EXPECT_LT(cost_of_turn(prior, angle * Vec3::UnitY()), 1e-3);
+}
+
+TEST(FirstFramePrior, HoldsTheFrameAndLeavesTheTiltOpenWhereUpIsAState) {
+  const WindowPrior prior = first_frame_prior(tilted(), true);
+  EXPECT_EQ(prior.quadratic.size(), 17);
+  for (int axis = 0; axis < 3; ++axis) EXPECT_GT(cost_of_turn(prior, 0.01 * Vec3::Unit(axis)), 40);
+  Eigen::VectorXd tilt = Eigen::VectorXd::Zero(17);
+  tilt(0) = 0.01;
+  EXPECT_LT(prior.quadratic.cost(tilt), 1e-3);
+}
+
+TEST(FirstFramePrior, BelievesBiasesNearZeroAndNotNearTheInitialSolution) {
+  const WindowPrior prior = first_frame_prior(tilted(), true);
+  Eigen::VectorXd to_zero = Eigen::VectorXd::Zero(17);
+  to_zero.tail<6>() << -tilted().bias.gyro_radps, -tilted().bias.accel_mps2;
+  EXPECT_LT(prior.quadratic.cost(to_zero), prior.quadratic.cost(Eigen::VectorXd::Zero(17)));
+  EXPECT_LT(prior.quadratic.gradient(to_zero).norm(), 1e-9) << "the least";
+}
+
+TEST(CalibrationBelief, ComesBetweenTiltAndFrame) {
+  const WindowPrior frame = first_frame_prior(tilted(), true);
+  const Calibration calibrated{{Quat::Identity(), Vec3(0.1, 0, 0)}, {Quat::Identity(), Vec3(0.2, 0, 0)}, 0.0};
+  const WindowPrior prior = with_calibration_belief(frame, CalibrationBelief{}, calibrated);
+  EXPECT_EQ(prior.calibration_row(), kTiltSize);
+  EXPECT_EQ(prior.frames_row(), kTiltSize + kCalibrationSize);
+  EXPECT_EQ(prior.quadratic.H.bottomRightCorner(15, 15), frame.quadratic.H.bottomRightCorner(15, 15));
+  EXPECT_EQ(prior.quadratic.H.topLeftCorner(2, 2), frame.quadratic.H.topLeftCorner(2, 2));
+  EXPECT_EQ(prior.quadratic.g.tail(15), frame.quadratic.g.tail(15));
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/initialiser.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/estimator/simulated_flight.hpp"
+#include "fbvins/geometry/heading.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+/// The first solution within `frames` frames, and the frame it came with.
+struct Started {
+  std::optional<InitialSolution> solution;
+  int frame = -1;
+  HealthReason reason = HealthReason::none;
+};
+
+Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<W, B>>& origin = {}, double rest_s_a_frame = 0) {
+  Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
+  const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+  Started out;
+  for (int k = 0; k < frames && !out.solution; ++k) {
+    out.solution = initialiser.process(flight.frame(k), Duration::from_seconds(rest_s_a_frame * k), calibration, origin);
+    out.frame = k;
+  }
+  out.reason = initialiser.reason();
+  return out;
+}
+
+TEST(Initialiser, StartsInMotion) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 51);
+  const Started s = start(flight, 40);
+  ASSERT_TRUE(s.solution.has_value());
+  EXPECT_FALSE(s.solution->from_rest);
+  EXPECT_EQ(s.solution->states.size(), s.solution->frames.size());
+  EXPECT_EQ(s.solution->frames.back().id, FrameId{s.frame});
+  const NavState& first = s.solution->states.front();
+  const NavState& last = s.solution->states.back();
+  const NavState from = flight.truth(static_cast<int>(s.solution->frames.front().id.value)), to = flight.truth(s.frame);
+  EXPECT_NEAR((last.T_WB.p - first.T_WB.p).norm(), (to.T_WB.p - from.T_WB.p).norm(), 0.05);
+  EXPECT_NEAR(last.v_WB.norm(), to.v_WB.norm(), 0.2);
+  const Vec3 up_error = last.T_WB.q.conjugate() * Vec3::UnitZ() - to.T_WB.q.conjugate() * Vec3::UnitZ();
+  EXPECT_LT(up_error.norm(), 0.05);
+  EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 0.02);
+}
+
+TEST(Initialiser, StartsFromRest) {
+  SimulatedFlight flight(Motion(0, 0), 52);
+  const Started s = start(flight, 40, {}, 0.05);
+  ASSERT_TRUE(s.solution.has_value());
+  EXPECT_TRUE(s.solution->from_rest);
+  EXPECT_LT((s.solution->states.back().bias.gyro_radps - flight.bias.gyro_radps).norm(), 5e-3);
+  EXPECT_TRUE(s.solution->states.back().v_WB.isZero());
+}
+
+TEST(Initialiser, PutsTheFirstFrameWhereItIsTold) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 53);
+  const Pose<W, B> origin(so3_exp(Vec3(0.1, -0.2, 2)), Vec3(10, -5, 3));
+  const Started s = start(flight, 40, origin);
+  ASSERT_TRUE(s.solution.has_value());
+  const Pose<W, B>& first = s.solution->states.front().T_WB;
+  EXPECT_LT((first.p - origin.p).norm(), 1e-9);
+  EXPECT_LT(std::abs(heading_between(first.q, origin.q)), 1e-9);
+}
+
+TEST(Initialiser, WaitsForFeaturesInBothCameras) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 54);
+  flight.right_camera = [](int) { return false; };
+  const Started s = start(flight, 30);
+  EXPECT_FALSE(s.solution.has_value());
+  EXPECT_EQ(s.reason, HealthReason::too_few_features);
+}
+
+TEST(Initialiser, BeginsAnewAfterABreakInTheReadings) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 55);
+  flight.readings = [](int k) { return k != 6; };
+  const Started s = start(flight, 40);
+  ASSERT_TRUE(s.solution.has_value());
+  EXPECT_GE(s.solution->frames.front().id, FrameId{6});
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/window_equations.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/estimator/window_test_scene.hpp"
+#include "fbvins/geometry/jacobian_check.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::kFrames;
+
+/// The window moved by a step of the dense system; calibration is left alone.
+WindowProblem moved(const WindowProblem& window, const Eigen::VectorXd& d) {
+  WindowProblem out = window;
+  const WindowLayout at(window);
+  out.tilt.angle_rad += d.segment<2>(at.tilt_row());
+  for (int f = 0; f < kFrames; ++f) {
+    Vec15 d_frame;
+    for (int k = 0; k < 15; ++k) d_frame(k) = d(at.row_of(f, k));
+    out.frames[f].state = out.frames[f].state.boxplus(d_frame);
+  }
+  return out;
+}
+
+TEST(WindowEquations, GradientIsTheDerivativeOfTheCost) {
+  const test::Window w = test::make_window(false);
+  PairTable pairs;
+  NormalEquations equations;
+  EXPECT_NEAR(linearise(w.problem, pairs, equations), cost_of(w.problem, pairs), 1e-6);
+  const auto cost = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Constant(1, cost_of(moved(w.problem, d), pairs));
+  };
+  const auto check = check_jacobian(cost, equations.g.transpose(), {{"cost", 1}},
+                                    {{"velocities and biases", 9 * kFrames}, {"tilt", 2}, {"poses", 6 * kFrames}}, 1e-6, 1e-5);
+  EXPECT_TRUE(check.ok) << check.message;
+}
+
+TEST(WindowEquations, GradientOfLandmarksIsTheDerivativeOfTheCost) {
+  const test::Window w = test::make_window(false);
+  PairTable pairs;
+  NormalEquations equations;
+  linearise(w.problem, pairs, equations);
+  for (std::size_t k = 0; k < w.problem.landmarks.size(); k += 7) {
+    const auto cost = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+      WindowProblem other = w.problem;
+      other.landmarks[k].alpha_beta_rho += d;
+      return Eigen::VectorXd::Constant(1, cost_of(other, pairs));
+    };
+    const auto check =
+        check_jacobian(cost, equations.points.points()[k].w.transpose(), {{"cost", 1}}, {{"landmark", 3}}, 1e-6, 1e-5);
+    EXPECT_TRUE(check.ok) << k << ": " << check.message;
+  }
+}
+
+TEST(WindowEquations, LayoutCoversEveryRowOnce) {
+  for (const bool calibrating : {false, true}) {
+    const test::Window w = test::make_window(calibrating);
+    const WindowLayout at(w.problem);
+    std::vector<int> rows;
+    for (int f = 0; f < kFrames; ++f)
+      for (int k = 0; k < 15; ++k) rows.push_back(at.row_of(f, k));
+    for (int k = 0; k < at.tilt_size; ++k) rows.push_back(at.tilt_row() + k);
+    for (int k = 0; k < at.calibration_size; ++k) rows.push_back(at.calibration_row() + k);
+    std::sort(rows.begin(), rows.end());
+    for (int k = 0; k < at.size(); ++k) EXPECT_EQ(rows[static_cast<std::size_t>(k)], k);
+    EXPECT_EQ(static_cast<int>(rows.size()), at.size());
+  }
+}
+
+TEST(WindowEquations, WhatIsNotCalibratedIsLeftAlone) {
+  test::Window w = test::make_window(true);
+  w.problem.weights.estimate_time_offset = false;
+  PairTable pairs;
+  NormalEquations equations;
+  linearise(w.problem, pairs, equations);
+  const int row = equations.layout.calibration_row() + kTimeOffsetIndex;
+  EXPECT_EQ(equations.g(row), 0);
+  EXPECT_EQ(equations.H(row, row), 1);
+  EXPECT_TRUE(equations.H.row(row).head(row).isZero(0));
+  for (PointBlock& point : equations.points.points()) EXPECT_TRUE(equations.points.coupling(point, 2).isZero(0));
+}
+
+}  // namespace
+}  // namespace fbvins

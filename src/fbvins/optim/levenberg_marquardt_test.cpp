@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/optim/levenberg_marquardt.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <limits>
+
+namespace fbvins {
+namespace {
+
+/// Rosenbrock's valley as two residuals: (1 - x, 10 (y - x^2)).
+struct Rosenbrock {
+  Eigen::Vector2d x{-1.2, 1.0}, saved, step;
+  Eigen::Matrix2d H;
+  Eigen::Vector2d g, d;
+
+  Eigen::Vector2d residual() const { return {1 - x(0), 10 * (x(1) - x(0) * x(0))}; }
+  double cost() const { return 0.5 * residual().squaredNorm(); }
+  double linearise() {
+    Eigen::Matrix2d J;
+    J << -1, 0, -20 * x(0), 10;
+    H = J.transpose() * J;
+    g = J.transpose() * residual();
+    return cost();
+  }
+  bool solve(double lambda) {
+    d = lambda * H.diagonal();
+    step = -(H + Eigen::Matrix2d(d.asDiagonal())).ldlt().solve(g);
+    return step.allFinite();
+  }
+  double predicted_decrease() const { return 0.5 * (step.dot(d.cwiseProduct(step)) - g.dot(step)); }
+  double step_size() const { return step.norm(); }
+  double apply_step() {
+    saved = x;
+    x += step;
+    return cost();
+  }
+  void undo_step() { x = saved; }
+};
+
+TEST(LevenbergMarquardt, FindsTheEndOfRosenbrocksValley) {
+  Rosenbrock problem;
+  const LmSummary summary =
+      minimise(problem, {.max_iterations = 100, .initial_lambda = 1e-4, .min_step = 1e-12, .min_decrease = 0});
+  EXPECT_TRUE(summary.usable);
+  EXPECT_LT((problem.x - Eigen::Vector2d(1, 1)).norm(), 1e-6);
+  EXPECT_LT(summary.final_cost, summary.initial_cost);
+}
+
+TEST(LevenbergMarquardt, NeverEndsWorseThanItBegan) {
+  for (int iterations = 1; iterations < 6; ++iterations) {
+    Rosenbrock problem;
+    const double before = problem.cost();
+    const LmSummary summary = minimise(problem, {.max_iterations = iterations});
+    EXPECT_LE(problem.cost(), before);
+    EXPECT_LE(summary.iterations, iterations);
+  }
+}
+
+struct Broken : Rosenbrock {
+  double linearise() { return std::numeric_limits<double>::quiet_NaN(); }
+};
+
+TEST(LevenbergMarquardt, SaysWhenTheCostIsNotANumber) {
+  Broken problem;
+  EXPECT_FALSE(minimise(problem, {}).usable);
+}
+
+}  // namespace
+}  // namespace fbvins
