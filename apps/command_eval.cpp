@@ -31,11 +31,11 @@ struct Arguments {
 };
 
 struct Truth {
-  Trajectory poses;
+  Trajectory<W> poses;
   std::vector<Time> images;  ///< empty when the truth came from a file
 };
 
-Result<Trajectory> read_poses(const std::string& path) {
+Result<Trajectory<W>> read_poses(const std::string& path) {
   auto file = read_trajectory(path);
   if (!file) return file.error();
   if (file->counts.bad() > 0) warn(fmt::format("{} rows left out, the first: {}", file->counts.bad(), file->counts.first_bad));
@@ -83,7 +83,7 @@ int evaluate_files(const Arguments& arguments) {
   std::optional<Coverage> coverage;
   if (!truth->images.empty()) {
     std::vector<Time> stamps;
-    for (const StampedPose& pose : *estimate) stamps.push_back(pose.t);
+    for (const StampedPose<W>& pose : *estimate) stamps.push_back(pose.t);
     coverage = coverage_of(truth->images, std::move(stamps));
   }
   if (arguments.json) {

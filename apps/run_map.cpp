@@ -33,17 +33,18 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
     for (; next != record.updates.end() && next->applies_from <= o.id; ++next) now = &*next;
     if (now == &begin) begin.reset_counter = o.reset_counter;
     if (!o.health.has_pose() || !now->localised || now->reset_counter != o.reset_counter) continue;
-    record.causal.push_back({o.t, (now->T_MW * o.T_WB).cast_frames<W, B>()});
-    record.bounded.push_back({o.t, (now->T_MW_smooth * o.T_WB).cast_frames<W, B>()});
+    record.causal.push_back({o.t, now->T_MW * o.T_WB});
+    record.bounded.push_back({o.t, now->T_MW_smooth * o.T_WB});
   }
 }
 
 /// Each restart begins a new W: they are corrected one by one.
-Trajectory corrected(const LoopMap& map, const RunRecord& run) {
-  Trajectory all, part;
+Trajectory<M> corrected(const LoopMap& map, const RunRecord& run) {
+  Trajectory<M> all;
+  Trajectory<W> part;
   std::uint32_t reset_counter = 0;
   const auto flush = [&] {
-    const Trajectory done = map.corrected(part);
+    const Trajectory<M> done = map.corrected(part);
     all.insert(all.end(), done.begin(), done.end());
     part.clear();
   };
@@ -56,14 +57,14 @@ Trajectory corrected(const LoopMap& map, const RunRecord& run) {
   return all;
 }
 
-Result<void> write_tum(const Trajectory& trajectory, const std::string& path) {
+Result<void> write_tum(const Trajectory<M>& trajectory, const std::string& path) {
   auto tum = TumWriter::create(path);
   if (!tum) return tum.error();
-  for (const StampedPose& p : trajectory) tum->write(p.t, p.T_WB);
+  for (const StampedPose<M>& p : trajectory) tum->write(p.t, p.T);
   return tum->close();
 }
 
-std::optional<Evaluation> evaluated(const Trajectory& truth, const Trajectory& estimate) {
+std::optional<Evaluation> evaluated(const Trajectory<W>& truth, const Trajectory<M>& estimate) {
   if (truth.empty()) return std::nullopt;
   const auto evaluation = evaluate(truth, estimate, {});
   return evaluation ? std::optional(*evaluation) : std::nullopt;
@@ -112,7 +113,7 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
   return write_text(folder + "/map_updates.csv", text);
 }
 
-MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory& truth) {
+MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory<W>& truth) {
   MapSummary s;
   for (const MapUpdate& u : record.updates) {
     s.loops += u.stats.accepted;
@@ -122,7 +123,7 @@ MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajec
   s.keyframes = static_cast<int>(record.updates.size());
   s.keyframes_in_map = record.keyframes_in_map;
   s.left_out = record.loops_left_out;
-  const Trajectory poses = run.poses();
+  const Trajectory<W> poses = run.poses();
   if (!record.causal.empty()) s.localised_after_s = (record.causal.front().t - poses.front().t).seconds();
   s.causal = evaluated(truth, record.causal);
   s.bounded = evaluated(truth, record.bounded);

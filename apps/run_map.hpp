@@ -28,9 +28,9 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
 /// What the loop stage said, keyframe by keyframe, and what came out in the end.
 struct MapRecord {
   std::vector<MapUpdate> updates;  ///< without the corrected keyframes
-  Trajectory causal, bounded;      ///< T_MB at each frame, with T_MW as it was known then; with the smooth T_MW
-  Trajectory final;                ///< after the last optimisation of the graph
-  Trajectory adjusted;             ///< after bundle adjustment, where asked for
+  Trajectory<M> causal, bounded;   ///< T_MB at each frame, with T_MW as it was known then; with the smooth T_MW
+  Trajectory<M> final;             ///< after the last optimisation of the graph
+  Trajectory<M> adjusted;          ///< after bundle adjustment, where asked for
   int keyframes_in_map = 0, loops_left_out = 0;
   double finish_ms = 0, adjust_ms = 0;  ///< CPU
   std::optional<FinalAdjustmentReport> adjustment;
@@ -52,6 +52,6 @@ struct MapSummary {
   std::optional<FinalAdjustmentReport> adjustment;
 };
 /// `truth` may be empty.
-MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory& truth);
+MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajectory<W>& truth);
 
 }  // namespace fbvins::app

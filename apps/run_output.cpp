@@ -70,8 +70,8 @@ void for_each_frame(const RunRecord& record, const Row& row) {
 
 }  // namespace
 
-Trajectory RunRecord::poses() const {
-  Trajectory trajectory;
+Trajectory<W> RunRecord::poses() const {
+  Trajectory<W> trajectory;
   for (const Odometry& o : odometry)
     if (o.health.has_pose()) trajectory.push_back({o.t, o.T_WB});
   return trajectory;

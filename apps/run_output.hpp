@@ -28,7 +28,7 @@ struct RunRecord {
   std::vector<TrackedRecord> tracked;  ///< one per image the frontend saw
   std::vector<Odometry> odometry;      ///< one per image, with or without a pose
 
-  Trajectory poses() const;
+  Trajectory<W> poses() const;
 };
 
 /// The trajectory and statistics files; the folder must exist. Beside trajectory.csv lies covariance.csv with what

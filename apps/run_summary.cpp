@@ -26,7 +26,7 @@ void count_health(const RunRecord& record, RunSummary& summary) {
   summary.health.assign(counts.begin(), counts.end());
 }
 
-void evaluate_against(Trajectory truth, const RunRecord& record, RunSummary& summary) {
+void evaluate_against(Trajectory<W> truth, const RunRecord& record, RunSummary& summary) {
   auto evaluation = evaluate(truth, record.poses(), {});
   if (evaluation) summary.evaluation = *evaluation;
   else summary.no_evaluation = evaluation.error().message;
@@ -98,8 +98,8 @@ std::vector<double> total_ms(const RunSummary& s) {
 
 }  // namespace
 
-Trajectory truth_of(const Dataset& data) {
-  Trajectory truth;
+Trajectory<W> truth_of(const Dataset& data) {
+  Trajectory<W> truth;
   for (const TrajectoryPoint& point : data.ground_truth()) truth.push_back({point.t, point.T_WB});
   return truth;
 }
@@ -111,7 +111,7 @@ RunSummary summarise(const RunRecord& record, const Dataset& data) {
   s.images_bad = data.info().left.images.bad() + data.info().right.images.bad();
   std::vector<Time> images, poses;
   for (const FrameEntry& frame : data.frames()) images.push_back(frame.t);
-  for (const StampedPose& pose : record.poses()) poses.push_back(pose.t);
+  for (const StampedPose<W>& pose : record.poses()) poses.push_back(pose.t);
   s.coverage = coverage_of(std::move(images), std::move(poses));
   count_health(record, s);
   if (data.has_ground_truth()) evaluate_against(truth_of(data), record, s);

@@ -34,7 +34,7 @@ struct RunSummary {
 };
 
 /// The recording's ground truth as a trajectory; empty where there is none.
-Trajectory truth_of(const Dataset& data);
+Trajectory<W> truth_of(const Dataset& data);
 RunSummary summarise(const RunRecord& record, const Dataset& data);
 std::string to_json_text(const RunSummary& summary);
 std::string to_text(const RunSummary& summary);

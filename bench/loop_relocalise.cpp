@@ -24,8 +24,8 @@ namespace {
 constexpr int kStarts = 20;
 constexpr double kGiveUp_s = 4, kInTime_s = 2, kWrong_m = 0.3;
 
-Trajectory truth_of(const Dataset& data) {
-  Trajectory truth;
+Trajectory<W> truth_of(const Dataset& data) {
+  Trajectory<W> truth;
   for (const TrajectoryPoint& p : data.ground_truth()) truth.push_back({p.t, p.T_WB});
   return truth;
 }
@@ -42,20 +42,17 @@ void fly(const std::string& path, System& system, Time from, Time to, const auto
   if (Result<void> end = system.finish(); !end) throw std::runtime_error(end.error().message);
 }
 
-/// The map of a part of the flight, moved (SE3) to where the ground truth has it.
+/// The map of a part of the flight, moved (shift and heading) to where the ground truth has it.
 PlaceMap map_of(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, Time to) {
   LoopCloser loop(data.rig(), LoopOptions{}, vocabulary);
   System system = *System::create({}, data.rig(), RunMode::deterministic, {.mapper = &loop});
   fly(path, system, Time{0}, to, [] { return false; });
   loop.finish();
   PlaceMap map = loop.map();
-  Trajectory keyframes;
-  for (const MapKeyframe& k : map.keyframes()) keyframes.push_back({k.t, k.T_MB.cast_frames<W, B>()});
-  std::vector<PosePair> all;
-  for (const StampedPose& p : keyframes) all.push_back({p, p});
+  Trajectory<M> keyframes;
+  for (const MapKeyframe& k : map.keyframes()) keyframes.push_back({k.t, k.T_MB});
   const auto aligned = align(associate(truth_of(data), keyframes, {}), Alignment::yaw);
-  all = apply(*aligned, std::move(all));
-  for (std::size_t i = 0; i < all.size(); ++i) map.keyframes()[i].T_MB = all[i].estimate.T_WB.cast_frames<M, B>();
+  for (MapKeyframe& k : map.keyframes()) k.T_MB = *aligned * k.T_MB;
   return map;
 }
 
@@ -68,19 +65,19 @@ Start wake_up(const std::string& path, const Dataset& data, const Vocabulary& vo
   LoopCloser loop(data.rig(), LoopOptions{}, vocabulary, map);
   System system = *System::create({}, data.rig(), RunMode::deterministic, {.mapper = &loop});
   std::optional<MapUpdate> found;
-  Trajectory in_M;
+  Trajectory<M> in_M;
   system.on_map_update([&](const MapUpdate& u) {
     if (u.localised && !found) found = u;
   });
   system.on_odometry([&](const Odometry& o) {
-    if (found && in_M.empty() && o.health.has_pose()) in_M.push_back({o.t, (found->T_MW * o.T_WB).cast_frames<W, B>()});
+    if (found && in_M.empty() && o.health.has_pose()) in_M.push_back({o.t, found->T_MW * o.T_WB});
   });
   fly(path, system, from, from + Duration::from_seconds(kGiveUp_s), [&] { return !in_M.empty(); });
   Start start;
   const auto pairs = associate(truth_of(data), in_M, {.method = AssociationMethod::interpolate_truth});
   if (pairs.empty()) return start;
   start.found_after_s = (in_M[0].t - from).seconds();
-  start.error_m = (pairs[0].estimate.T_WB.p - pairs[0].truth.T_WB.p).norm();
+  start.error_m = (pairs[0].estimate.T.p - pairs[0].truth.T.p).norm();
   return start;
 }
 

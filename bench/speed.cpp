@@ -29,7 +29,7 @@ struct Measured {
   std::vector<double> total_ms;  ///< of each image: everything between its arrival and its pose
   std::vector<FrontendStats> frontend;
   std::vector<EstimatorStats> estimator;
-  Trajectory poses;
+  Trajectory<W> poses;
 };
 
 Measured fly(const SystemOptions& config, const StereoRig& rig, std::vector<SensorEvent> events) {
@@ -90,7 +90,7 @@ Json report(const Measured& m, const std::vector<TrajectoryPoint>& truth_points)
   stages["marginalise"] = share(m.estimator, &EstimatorStats::marginalise_ms);
   json["mean_features"] = features / static_cast<double>(std::max<std::size_t>(1, m.frontend.size()));
   json["mean_window_frames"] = window / static_cast<double>(std::max<std::size_t>(1, m.estimator.size()));
-  Trajectory truth;
+  Trajectory<W> truth;
   for (const TrajectoryPoint& point : truth_points) truth.push_back({point.t, point.T_WB});
   if (const auto evaluation = evaluate(truth, m.poses, {})) json["ate_rmse_m"] = evaluation->absolute_m.rmse;
   return json;

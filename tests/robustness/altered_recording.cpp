@@ -11,7 +11,7 @@ namespace fbvins::test {
 namespace {
 
 void compare_with_truth(const std::vector<TrajectoryPoint>& points, Flown& flown) {
-  Trajectory truth, estimate;
+  Trajectory<W> truth, estimate;
   std::map<Time, FrameId> id;
   for (const TrajectoryPoint& p : points) truth.push_back({p.t, p.T_WB});
   for (const Odometry& o : flown.odometry) {
@@ -23,7 +23,7 @@ void compare_with_truth(const std::vector<TrajectoryPoint>& points, Flown& flown
   const auto alignment = align(pairs, Alignment::se3);
   if (!alignment) return;
   for (const PosePair& pair : pairs)
-    flown.error_m[id[pair.estimate.t]] = ((*alignment * pair.estimate.T_WB).p - pair.truth.T_WB.p).norm();
+    flown.error_m[id[pair.estimate.t]] = ((*alignment * pair.estimate.T).p - pair.truth.T.p).norm();
 }
 
 }  // namespace

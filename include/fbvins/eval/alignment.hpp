@@ -32,7 +32,11 @@ struct Similarity {
   Quat q = Quat::Identity();
   Vec3 p = Vec3::Zero();
 
-  Pose<W, B> operator*(const Pose<W, B>& T_WB) const;
+  /// The pose as the truth's world has it. Its frame keeps the letter: that is what an alignment says.
+  template <class Frame>
+  Pose<Frame, B> operator*(const Pose<Frame, B>& T) const {
+    return {(q * T.q).normalized(), Vec3(scale * (q * T.p) + p)};
+  }
 };
 
 /// Least squares over the positions. An error where the positions do not determine it: fewer than

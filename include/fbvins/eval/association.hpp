@@ -25,12 +25,28 @@ struct AssociationOptions {
   double max_interpolation_s = 0.25;  ///< longest hole of the truth that is bridged; interpolation only
 };
 
+/// Some world, whichever the trajectory is told in: errors are the same in all of them.
+struct AnyWorld {};
+
+/// A trajectory of whichever frame, so that evaluation is compiled once and takes them all.
+struct AnyTrajectory {
+  AnyTrajectory() = default;
+  template <class Frame>
+  AnyTrajectory(const Trajectory<Frame>& trajectory) {  // implicit: a call reads evaluate(truth, estimate)
+    poses.reserve(trajectory.size());
+    for (const StampedPose<Frame>& pose : trajectory) poses.push_back({pose.t, {pose.T.q, pose.T.p}});
+  }
+
+  Trajectory<AnyWorld> poses;
+};
+
+/// Each in a world of its own, until `apply` (alignment.hpp) lays the estimate over the truth.
 struct PosePair {
-  StampedPose truth;
-  StampedPose estimate;
+  StampedPose<AnyWorld> truth;
+  StampedPose<AnyWorld> estimate;
 };
 
 /// Pairs in order of time. Both trajectories may be unsorted; equal stamps keep their order.
-std::vector<PosePair> associate(Trajectory truth, Trajectory estimate, const AssociationOptions& options);
+std::vector<PosePair> associate(AnyTrajectory truth, AnyTrajectory estimate, const AssociationOptions& options);
 
 }  // namespace fbvins

@@ -30,8 +30,8 @@ struct Evaluation {
   double largest_excursion_m = 0;  ///< of the estimate from its first pose: drift where the truth is at rest
 };
 
-/// An error when no poses belong together or they do not determine the alignment.
-Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options);
+/// Trajectories of any frames. An error when no poses belong together or they do not determine the alignment.
+Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options);
 
 /// |p_estimate - p_truth| of each pair, m.
 std::vector<double> absolute_errors_m(const std::vector<PosePair>& pairs);

@@ -42,7 +42,8 @@ struct Pose {
   /// Adds the perturbation (dp in To, dtheta in From): p + dp, q * Exp(dtheta).
   Pose boxplus(const Vec3& dp, const Vec3& dtheta) const { return {(q * so3_exp(dtheta)).normalized(), Vec3(p + dp)}; }
 
-  /// The same numbers under other frame names; only where a physical identity justifies it.
+  /// The same numbers under other frame names; only where a physical identity justifies it: a file's sensor is the left
+  /// camera, the world of a start is the odometry's. Never between W and M, which loop closure moves apart.
   template <class To2, class From2>
   Pose<To2, From2> cast_frames() const {
     return {q, p};

@@ -31,7 +31,14 @@ struct TrajectoryFile {
   RowCounts counts;                     ///< what was left out
   int without_pose = 0;                 ///< rows of an odometry CSV whose health says that there is no pose
 
-  Trajectory poses() const;
+  /// In the frame that the file is said to be in; it cannot tell.
+  template <class Frame = W>
+  Trajectory<Frame> poses() const {
+    Trajectory<Frame> out;
+    out.reserve(points.size());
+    for (const TrajectoryPoint& point : points) out.push_back({point.t, {point.T_WB.q, point.T_WB.p}});
+    return out;
+  }
 };
 
 /// Told apart by content: commas mean EuRoC's CSV (ns, p, q wxyz[, v, gyro bias, accelerometer bias[, ...]]),
@@ -43,11 +50,15 @@ Result<TrajectoryFile> read_trajectory(const std::string& path);
 class TumWriter {
  public:
   static Result<TumWriter> create(const std::string& path);
-  void write(Time t, const Pose<W, B>& T_WB);
+  template <class Frame>
+  void write(Time t, const Pose<Frame, B>& T) {
+    write(t, T.q, T.p);
+  }
   Result<void> close() { return file_.close(); }
 
  private:
   explicit TumWriter(OutputFile file) : file_(std::move(file)) {}
+  void write(Time t, const Quat& q, const Vec3& p);
   OutputFile file_;
 };
 

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A trajectory as evaluation and files see it: poses in order of time, nothing else.
+// A trajectory: the poses of the body in one frame, in order of time, nothing else. The frame is part of the type, so
+// that odometry and map are not mixed:
+//
+//   Trajectory<W> odometry;                                  // what the estimator says
+//   Trajectory<M> in_map = closer.corrected(odometry);       // what loop closure makes of it
 #pragma once
 
 #include <vector>
@@ -9,11 +13,13 @@
 
 namespace fbvins {
 
+template <class Frame>
 struct StampedPose {
   Time t;
-  Pose<W, B> T_WB;
+  Pose<Frame, B> T;  ///< takes body to Frame: T_WB in a Trajectory<W>, T_MB in a Trajectory<M>
 };
 
-using Trajectory = std::vector<StampedPose>;
+template <class Frame>
+using Trajectory = std::vector<StampedPose<Frame>>;
 
 }  // namespace fbvins

@@ -64,7 +64,7 @@ std::optional<TrajectoryPoint> truth_at(const std::vector<TrajectoryPoint>& trut
 
 RunErrors run_errors(const RunFolder& run) {
   RunErrors errors;
-  Trajectory truth, estimate;
+  Trajectory<W> truth, estimate;
   for (const TrajectoryPoint& p : run.truth) truth.push_back({p.t, p.T_WB});
   for (const Odometry& o : run.odometry)
     if (o.health.has_pose()) estimate.push_back({o.t, o.T_WB});

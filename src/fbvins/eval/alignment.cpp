@@ -28,12 +28,12 @@ Moments moments_of(const std::vector<PosePair>& pairs) {
   const double weight = 1.0 / static_cast<double>(pairs.size());
   Moments m;
   for (const PosePair& pair : pairs) {
-    m.mean_truth += weight * pair.truth.T_WB.p;
-    m.mean_estimate += weight * pair.estimate.T_WB.p;
+    m.mean_truth += weight * pair.truth.T.p;
+    m.mean_estimate += weight * pair.estimate.T.p;
   }
   for (const PosePair& pair : pairs) {
-    const Vec3 estimate = pair.estimate.T_WB.p - m.mean_estimate;
-    m.covariance += weight * (pair.truth.T_WB.p - m.mean_truth) * estimate.transpose();
+    const Vec3 estimate = pair.estimate.T.p - m.mean_estimate;
+    m.covariance += weight * (pair.truth.T.p - m.mean_truth) * estimate.transpose();
     m.variance_estimate += weight * estimate.squaredNorm();
   }
   return m;
@@ -75,10 +75,6 @@ std::optional<Alignment> alignment_from_string(std::string_view name) {
   return std::nullopt;
 }
 
-Pose<W, B> Similarity::operator*(const Pose<W, B>& T_WB) const {
-  return {(q * T_WB.q).normalized(), Vec3(scale * (q * T_WB.p) + p)};
-}
-
 Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment) {
   if (alignment == Alignment::none) return Similarity{};
   if (pairs.size() < 3)
@@ -95,7 +91,7 @@ Result<Similarity> align_start(const std::vector<PosePair>& pairs) {
   for (const PosePair& pair : pairs) {
     if ((pair.truth.t - pairs.front().truth.t).seconds() > 1) break;
     first.push_back(pair);
-    const double yaw = heading_between(pair.estimate.T_WB.q, pair.truth.T_WB.q);
+    const double yaw = heading_between(pair.estimate.T.q, pair.truth.T.q);
     sine += std::sin(yaw), cosine += std::cos(yaw);
   }
   const Quat about_z(Eigen::AngleAxisd(std::atan2(sine, cosine), Vec3::UnitZ()));
@@ -103,7 +99,7 @@ Result<Similarity> align_start(const std::vector<PosePair>& pairs) {
 }
 
 std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs) {
-  for (PosePair& pair : pairs) pair.estimate.T_WB = similarity * pair.estimate.T_WB;
+  for (PosePair& pair : pairs) pair.estimate.T = similarity * pair.estimate.T;
   return pairs;
 }
 

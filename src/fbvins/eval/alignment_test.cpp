@@ -15,9 +15,9 @@ using eval_test::noisy;
 /// The flight seen from a world turned by q, shifted by p and shrunk.
 std::vector<PosePair> moved_pairs(const Quat& q, const Vec3& p, double scale) {
   std::vector<PosePair> pairs;
-  for (const StampedPose& truth : flight(200)) {
+  for (const StampedPose<AnyWorld>& truth : flight(200)) {
     const Similarity inverse{1 / scale, q.conjugate(), Vec3(-(q.conjugate() * p) / scale)};
-    pairs.push_back({truth, {truth.t, inverse * truth.T_WB}});
+    pairs.push_back({truth, {truth.t, inverse * truth.T}});
   }
   return pairs;
 }
@@ -62,7 +62,7 @@ TEST(Alignment, OfTheStartLeavesWhatComesLaterAsItIs) {
   std::size_t later = 0;
   for (PosePair& pair : pairs) {
     if ((pair.truth.t - begin).seconds() <= 1) continue;
-    pair.estimate.T_WB.p += Vec3(0, 0, 0.1);
+    pair.estimate.T.p += Vec3(0, 0, 0.1);
     ++later;
   }
   ASSERT_GT(later, 0u);
@@ -77,7 +77,7 @@ TEST(Alignment, OfTheStartLeavesWhatComesLaterAsItIs) {
 TEST(Alignment, IsAMinimumOfItsOwnFamily) {
   auto pairs = moved_pairs(so3_exp(Vec3(0.1, 0.2, 1)), Vec3(1, 1, 1), 1.3);
   Rng rng(5);
-  for (PosePair& pair : pairs) pair.estimate.T_WB.p += eval_test::normal3(rng, 0.05);
+  for (PosePair& pair : pairs) pair.estimate.T.p += eval_test::normal3(rng, 0.05);
   for (Alignment kind : {Alignment::yaw, Alignment::se3, Alignment::sim3}) {
     const auto best = align(pairs, kind);
     ASSERT_TRUE(best);
@@ -96,7 +96,7 @@ TEST(Alignment, IsAMinimumOfItsOwnFamily) {
 
 TEST(Alignment, MirrorIsNotARotation) {
   auto pairs = moved_pairs(Quat::Identity(), Vec3::Zero(), 1.0);
-  for (PosePair& pair : pairs) pair.estimate.T_WB.p.x() *= -1;
+  for (PosePair& pair : pairs) pair.estimate.T.p.x() *= -1;
   const auto se3 = align(pairs, Alignment::se3);
   ASSERT_TRUE(se3);
   EXPECT_NEAR(se3->q.toRotationMatrix().determinant(), 1.0, 1e-12);
@@ -105,7 +105,7 @@ TEST(Alignment, MirrorIsNotARotation) {
 
 TEST(Alignment, SaysWhenPositionsDoNotDetermineIt) {
   auto still = moved_pairs(Quat::Identity(), Vec3::Zero(), 1.0);
-  for (PosePair& pair : still) pair.estimate.T_WB.p.setZero();
+  for (PosePair& pair : still) pair.estimate.T.p.setZero();
   ASSERT_FALSE(align(still, Alignment::se3));
   EXPECT_NE(align(still, Alignment::se3).error().message.find("two directions"), std::string::npos);
   EXPECT_TRUE(align(still, Alignment::yaw));
@@ -121,7 +121,7 @@ TEST(Alignment, NamesRoundTrip) {
 }
 
 TEST(Evaluation, ErrorsOfAKnownNoise) {
-  const Trajectory truth = flight(2000);
+  const Trajectory<AnyWorld> truth = flight(2000);
   const auto e = evaluate(truth, noisy(truth, 0.02, 0.01, 3), {});
   ASSERT_TRUE(e);
   EXPECT_EQ(e->pairs, 2000);
@@ -131,9 +131,20 @@ TEST(Evaluation, ErrorsOfAKnownNoise) {
   EXPECT_EQ(e->per_second_m.count, 1982) << "all pairs 1 s apart, and the two within 10 % of it at the end";
 }
 
+TEST(Evaluation, OdometryAndMapAreJudgedAlikeAgainstTheSameTruth) {
+  Trajectory<W> truth;
+  Trajectory<M> estimate;
+  for (const StampedPose<AnyWorld>& pose : flight(300)) truth.push_back({pose.t, {pose.T.q, pose.T.p}});
+  for (const StampedPose<AnyWorld>& pose : noisy(flight(300), 0.02, 0.01, 3)) estimate.push_back({pose.t, {pose.T.q, pose.T.p}});
+  const auto in_map = evaluate(truth, estimate, {}), in_any = evaluate(flight(300), noisy(flight(300), 0.02, 0.01, 3), {});
+  ASSERT_TRUE(in_map && in_any);
+  EXPECT_EQ(in_map->absolute_m.rmse, in_any->absolute_m.rmse);
+  EXPECT_EQ(in_map->per_metre_deg.rmse, in_any->per_metre_deg.rmse);
+}
+
 TEST(Evaluation, NothingInCommonIsAnError) {
-  Trajectory late = flight(10);
-  for (StampedPose& pose : late) pose.t = pose.t + Duration{1'000'000'000'000};
+  Trajectory<AnyWorld> late = flight(10);
+  for (StampedPose<AnyWorld>& pose : late) pose.t = pose.t + Duration{1'000'000'000'000};
   const auto e = evaluate(flight(10), late, {});
   ASSERT_FALSE(e);
   EXPECT_NE(e.error().message.find("clock"), std::string::npos);

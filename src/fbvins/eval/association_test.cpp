@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-Trajectory at_ms(std::initializer_list<std::int64_t> stamps) {
-  Trajectory trajectory;
+Trajectory<AnyWorld> at_ms(std::initializer_list<std::int64_t> stamps) {
+  Trajectory<AnyWorld> trajectory;
   for (std::int64_t ms : stamps) trajectory.push_back({Time{ms * kMs}, {Quat::Identity(), Vec3(static_cast<double>(ms), 0, 0)}});
   return trajectory;
 }
@@ -51,12 +51,12 @@ TEST(Association, OrderInTheFileDoesNotMatter) {
 TEST(Association, InterpolationHitsTheStampAndRefusesHoles) {
   AssociationOptions options;
   options.method = AssociationMethod::interpolate_truth;
-  Trajectory truth = at_ms({0, 100, 1000});
-  truth[1].T_WB.q = so3_exp(Vec3(0, 0, 0.4));
+  Trajectory<AnyWorld> truth = at_ms({0, 100, 1000});
+  truth[1].T.q = so3_exp(Vec3(0, 0, 0.4));
   const auto pairs = associate(truth, at_ms({-5, 25, 100, 500, 1000, 1005}), options);
   ASSERT_EQ(pairs.size(), 3u) << "outside the truth, and inside its hole of 0.9 s, there is no pair";
-  EXPECT_NEAR(pairs[0].truth.T_WB.p.x(), 25, 1e-9);
-  EXPECT_NEAR(so3_log(pairs[0].truth.T_WB.q).z(), 0.1, 1e-12);
+  EXPECT_NEAR(pairs[0].truth.T.p.x(), 25, 1e-9);
+  EXPECT_NEAR(so3_log(pairs[0].truth.T.q).z(), 0.1, 1e-12);
   EXPECT_EQ(pairs[1].truth.t.ns, 100 * kMs);
   EXPECT_EQ(pairs[2].truth.t.ns, 1000 * kMs);
 }

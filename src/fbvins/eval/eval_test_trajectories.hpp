@@ -5,15 +5,15 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/types/trajectory.hpp"
+#include "fbvins/eval/association.hpp"
 
 namespace fbvins::eval_test {
 
 inline Vec3 normal3(Rng& rng, double sigma) { return sigma * Vec3(rng.normal(), rng.normal(), rng.normal()); }
 
 /// A winding flight of n poses, 20 a second.
-inline Trajectory flight(int n) {
-  Trajectory trajectory;
+inline Trajectory<AnyWorld> flight(int n) {
+  Trajectory<AnyWorld> trajectory;
   for (int i = 0; i < n; ++i) {
     const double s = 0.05 * i;
     const Vec3 p(2 * std::sin(0.5 * s), 1.5 * std::cos(0.3 * s), 1 + 0.4 * std::sin(0.9 * s));
@@ -23,11 +23,11 @@ inline Trajectory flight(int n) {
   return trajectory;
 }
 
-inline Trajectory noisy(Trajectory trajectory, double sigma_m, double sigma_rad, std::uint64_t seed) {
+inline Trajectory<AnyWorld> noisy(Trajectory<W> trajectory, double sigma_m, double sigma_rad, std::uint64_t seed) {
   Rng rng(seed);
-  for (StampedPose& pose : trajectory) {
+  for (StampedPose<AnyWorld>& pose : trajectory) {
     const Vec3 dp = normal3(rng, sigma_m);
-    pose.T_WB = pose.T_WB.boxplus(dp, normal3(rng, sigma_rad));
+    pose.T = pose.T.boxplus(dp, normal3(rng, sigma_rad));
   }
   return trajectory;
 }

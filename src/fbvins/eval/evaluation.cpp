@@ -11,7 +11,7 @@ namespace fbvins {
 std::vector<double> absolute_errors_m(const std::vector<PosePair>& pairs) {
   std::vector<double> errors;
   errors.reserve(pairs.size());
-  for (const PosePair& pair : pairs) errors.push_back((pair.estimate.T_WB.p - pair.truth.T_WB.p).norm());
+  for (const PosePair& pair : pairs) errors.push_back((pair.estimate.T.p - pair.truth.T.p).norm());
   return errors;
 }
 
@@ -19,19 +19,19 @@ std::vector<double> absolute_errors_deg(const std::vector<PosePair>& pairs) {
   std::vector<double> errors;
   errors.reserve(pairs.size());
   for (const PosePair& pair : pairs) {
-    const Quat error = pair.truth.T_WB.q.conjugate() * pair.estimate.T_WB.q;
+    const Quat error = pair.truth.T.q.conjugate() * pair.estimate.T.q;
     errors.push_back(so3_log(error).norm() * 180.0 / std::numbers::pi);
   }
   return errors;
 }
 
-Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate, const EvaluationOptions& options) {
+Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options) {
   std::vector<PosePair> pairs = associate(truth, estimate, options.association);
   if (pairs.empty())
     return Error{ErrorCode::invalid_argument,
                  fmt::format("none of the {} estimated poses belongs to one of the {} true poses: do the stamps use "
                              "the same clock?",
-                             estimate.size(), truth.size())};
+                             estimate.poses.size(), truth.poses.size())};
   const Result<Similarity> alignment = align(pairs, options.alignment);
   if (!alignment) return alignment.error();
 
@@ -47,9 +47,9 @@ Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate,
   RelativeErrors second = relative_errors(pairs, options.per_second);
   e.per_second_m = statistics_of(std::move(second.translation_m));
   e.per_second_deg = statistics_of(std::move(second.rotation_deg));
-  for (std::size_t i = 1; i < pairs.size(); ++i) e.truth_path_m += (pairs[i].truth.T_WB.p - pairs[i - 1].truth.T_WB.p).norm();
+  for (std::size_t i = 1; i < pairs.size(); ++i) e.truth_path_m += (pairs[i].truth.T.p - pairs[i - 1].truth.T.p).norm();
   for (const PosePair& pair : pairs)
-    e.largest_excursion_m = std::max(e.largest_excursion_m, (pair.estimate.T_WB.p - pairs.front().estimate.T_WB.p).norm());
+    e.largest_excursion_m = std::max(e.largest_excursion_m, (pair.estimate.T.p - pairs.front().estimate.T.p).norm());
   return e;
 }
 

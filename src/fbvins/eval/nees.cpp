@@ -25,9 +25,7 @@ Result<double> squared(const Eigen::Matrix<double, N, 1>& error, const Eigen::Ma
 
 }  // namespace
 
-Result<PoseNees> pose_nees(const Pose<W, B>& truth, const Pose<W, B>& estimate, const Mat6& covariance) {
-  Vec6 error;
-  error << truth.p - estimate.p, so3_log(estimate.q.conjugate() * truth.q);
+Result<PoseNees> pose_nees(const Vec6& error, const Mat6& covariance) {
   const auto pose = squared<6>(error, covariance);
   if (!pose) return pose.error();  // its diagonal blocks are positive definite when it is
   const auto position = squared<3>(error.head<3>(), covariance.topLeftCorner<3, 3>());
@@ -38,11 +36,10 @@ Result<PoseNees> pose_nees(const Pose<W, B>& truth, const Pose<W, B>& estimate, 
 }
 
 NeesSummary nees(const std::vector<PosePair>& pairs, const std::vector<Mat6>& covariances, const Similarity& to_truth) {
-  const Pose<W, W> T_truth_estimate{to_truth.q, to_truth.p};
-  const Pose<W, W> back = T_truth_estimate.inverse();
+  const Pose<AnyWorld, AnyWorld> back = Pose<AnyWorld, AnyWorld>{to_truth.q, to_truth.p}.inverse();
   NeesSummary sum;
   for (std::size_t i = 0; i < std::min(pairs.size(), covariances.size()); ++i) {
-    const auto one = pose_nees(back * pairs[i].truth.T_WB, pairs[i].estimate.T_WB, covariances[i]);
+    const auto one = pose_nees(back * pairs[i].truth.T, pairs[i].estimate.T, covariances[i]);
     if (!one) {
       ++sum.unusable;
       continue;

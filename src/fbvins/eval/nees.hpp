@@ -31,7 +31,13 @@ struct NeesSummary {
 /// Error of one pose against its covariance, of (dp in W [m], dtheta in B [rad]) with
 /// truth = estimate.boxplus(dp, dtheta), both in the estimate's world. An error for a covariance
 /// that is not positive definite.
-Result<PoseNees> pose_nees(const Pose<W, B>& truth, const Pose<W, B>& estimate, const Mat6& covariance);
+Result<PoseNees> pose_nees(const Vec6& error, const Mat6& covariance);
+template <class Frame>
+Result<PoseNees> pose_nees(const Pose<Frame, B>& truth, const Pose<Frame, B>& estimate, const Mat6& covariance) {
+  Vec6 error;
+  error << truth.p - estimate.p, so3_log(estimate.q.conjugate() * truth.q);
+  return pose_nees(error, covariance);
+}
 
 /// Over a trajectory: covariances[i] belongs to pairs[i]; `to_truth` is the alignment of the estimate,
 /// which is undone on the truth because covariances live in the estimate's world. Its scale is ignored.

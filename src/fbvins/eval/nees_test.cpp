@@ -21,15 +21,15 @@ Mat6 some_covariance() {
 }
 
 /// Estimates whose errors are drawn from the covariance, in a world turned against the truth's.
-std::vector<PosePair> drawn(const Mat6& covariance, const Pose<W, W>& T_truth_estimate, int n) {
+std::vector<PosePair> drawn(const Mat6& covariance, const Pose<AnyWorld, AnyWorld>& T_truth_estimate, int n) {
   const Mat6 L = covariance.llt().matrixL();
   Rng rng(12);
   std::vector<PosePair> pairs;
-  for (const StampedPose& estimate : eval_test::flight(n)) {
+  for (const StampedPose<AnyWorld>& estimate : eval_test::flight(n)) {
     Vec6 e;
     for (int i = 0; i < 6; ++i) e(i) = rng.normal();
     e = L * e;
-    pairs.push_back({{estimate.t, T_truth_estimate * estimate.T_WB.boxplus(e.head<3>(), e.tail<3>())}, estimate});
+    pairs.push_back({{estimate.t, T_truth_estimate * estimate.T.boxplus(e.head<3>(), e.tail<3>())}, estimate});
   }
   return pairs;
 }
@@ -37,7 +37,7 @@ std::vector<PosePair> drawn(const Mat6& covariance, const Pose<W, W>& T_truth_es
 TEST(Nees, HonestCovarianceGivesItsDegreesOfFreedom) {
   const Mat6 P = some_covariance();
   const Similarity S{1, so3_exp(Vec3(0, 0, 1.2)), Vec3(4, 5, 6)};
-  const auto pairs = drawn(P, Pose<W, W>{S.q, S.p}, 4000);
+  const auto pairs = drawn(P, Pose<AnyWorld, AnyWorld>{S.q, S.p}, 4000);
   const NeesSummary s = nees(pairs, std::vector<Mat6>(pairs.size(), P), S);
   EXPECT_EQ(s.count, 4000);
   EXPECT_NEAR(s.mean.position, 3, 0.15);
@@ -64,7 +64,7 @@ TEST(Nees, CovarianceThatIsNoneIsCountedNotUsed) {
   const NeesSummary s = nees(pairs, {P, Mat6::Zero(), nan}, {});
   EXPECT_EQ(s.count, 1);
   EXPECT_EQ(s.unusable, 2);
-  EXPECT_FALSE(pose_nees(pairs[0].truth.T_WB, pairs[0].estimate.T_WB, -P));
+  EXPECT_FALSE(pose_nees(pairs[0].truth.T, pairs[0].estimate.T, -P));
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ std::vector<double> progress(const std::vector<PosePair>& pairs, const RelativeE
   std::vector<double> done(pairs.size(), 0.0);
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     const auto of = [&](const PosePair& pair) { return options.path_of_truth ? pair.truth : pair.estimate; };
-    const StampedPose a = of(pairs[i - 1]), b = of(pairs[i]);
-    done[i] = options.unit == DeltaUnit::metres ? done[i - 1] + (b.T_WB.p - a.T_WB.p).norm() : (b.t - of(pairs[0]).t).seconds();
+    const StampedPose<AnyWorld> a = of(pairs[i - 1]), b = of(pairs[i]);
+    done[i] = options.unit == DeltaUnit::metres ? done[i - 1] + (b.T.p - a.T.p).norm() : (b.t - of(pairs[0]).t).seconds();
   }
   return done;
 }
@@ -59,8 +59,8 @@ RelativeErrors relative_errors(const std::vector<PosePair>& pairs, const Relativ
   for (const auto& [i, j] : delta_pairs(pairs, options)) {
     const PosePair& from = pairs[static_cast<std::size_t>(i)];
     const PosePair& to = pairs[static_cast<std::size_t>(j)];
-    const auto truth = from.truth.T_WB.inverse() * to.truth.T_WB;
-    const auto estimate = from.estimate.T_WB.inverse() * to.estimate.T_WB;
+    const auto truth = from.truth.T.inverse() * to.truth.T;
+    const auto estimate = from.estimate.T.inverse() * to.estimate.T;
     const auto error = truth.inverse() * estimate;
     errors.translation_m.push_back(error.p.norm());
     errors.rotation_deg.push_back(so3_log(error.q).norm() * 180.0 / std::numbers::pi);

@@ -36,7 +36,7 @@ TEST(RelativeError, SecondsCountTimeNotPath) {
 TEST(RelativeError, PathOfTheEstimateGivesOtherPieces) {
   RelativeErrorOptions options{.unit = DeltaUnit::metres, .delta = 1, .all_pairs = false, .path_of_truth = false};
   auto pairs = straight(41);
-  for (PosePair& pair : pairs) pair.estimate.T_WB.p *= 2;
+  for (PosePair& pair : pairs) pair.estimate.T.p *= 2;
   EXPECT_EQ(delta_pairs(pairs, options).size(), 20u);
   options.path_of_truth = true;
   EXPECT_EQ(delta_pairs(pairs, options).size(), 10u);
@@ -55,13 +55,13 @@ TEST(RelativeError, StandingStillIsNotAMetre) {
 }
 
 TEST(RelativeError, DoesNotSeeTheChoiceOfWorld) {
-  const Trajectory truth = eval_test::flight(300);
-  const Trajectory estimate = eval_test::noisy(truth, 0.01, 0.01, 8);
-  const Pose<W, W> turn{so3_exp(Vec3(0.4, 0.5, -2)), Vec3(1, 2, 3)};
+  const Trajectory<AnyWorld> truth = eval_test::flight(300);
+  const Trajectory<AnyWorld> estimate = eval_test::noisy(truth, 0.01, 0.01, 8);
+  const Pose<AnyWorld, AnyWorld> turn{so3_exp(Vec3(0.4, 0.5, -2)), Vec3(1, 2, 3)};
   std::vector<PosePair> pairs, turned;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     pairs.push_back({truth[i], estimate[i]});
-    turned.push_back({truth[i], {estimate[i].t, turn * estimate[i].T_WB}});
+    turned.push_back({truth[i], {estimate[i].t, turn * estimate[i].T}});
   }
   const RelativeErrors a = relative_errors(pairs, {}), b = relative_errors(turned, {});
   ASSERT_EQ(a.translation_m.size(), b.translation_m.size());

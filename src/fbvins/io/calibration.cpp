@@ -33,7 +33,8 @@ Result<ImuSensor> parse_euroc_imu(const std::string& text, const std::string& fi
 Result<Pose<B, B>> parse_euroc_mounting(const std::string& text, const std::string& file) {
   YamlReader yaml(file, text);
   const YAML::Node T_BS = yaml.get(yaml.root(), "T_BS");
-  const Pose<B, B> pose = yaml.has(T_BS, "data") ? read_transform(yaml, T_BS, "data") : read_transform(yaml, yaml.root(), "T_BS");
+  const Pose<B, B> pose =
+      yaml.has(T_BS, "data") ? read_transform<B, B>(yaml, T_BS, "data") : read_transform<B, B>(yaml, yaml.root(), "T_BS");
   if (!yaml.ok()) return yaml.error();
   return pose;
 }

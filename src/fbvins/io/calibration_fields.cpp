@@ -28,7 +28,7 @@ std::vector<double> read_coefficients(YamlReader& yaml, const YAML::Node& map, c
 
 }  // namespace
 
-Pose<B, B> read_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   const std::vector<double> m = yaml.numbers(map, field, 16);
   if (!yaml.ok()) return {};
   Mat3 R;
@@ -41,7 +41,7 @@ Pose<B, B> read_transform(YamlReader& yaml, const YAML::Node& map, const std::st
   const Vec3 p(m[3], m[7], m[11]);
   if (!(p.cwiseAbs().maxCoeff() < 1e3)) yaml.complain(map, field, "its translation is more than a kilometre");
   if (!yaml.ok()) return {};
-  return {R, p};
+  return {Quat(R).normalized(), p};
 }
 
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field) {

@@ -10,7 +10,18 @@ namespace fbvins {
 inline constexpr std::uint64_t kLargestYaml_bytes = 1u << 20u;
 
 /// A 4x4 rigid transform, row by row; complains unless the rotation is orthonormal to 1e-3.
-Pose<B, B> read_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field);
+struct RigidTransform {
+  Quat q = Quat::Identity();
+  Vec3 p = Vec3::Zero();
+};
+RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field);
+
+/// The same, between the frames that the format gives the field.
+template <class To, class From>
+Pose<To, From> read_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+  const RigidTransform T = read_rigid_transform(yaml, map, field);
+  return {T.q, T.p};
+}
 
 /// camera_model, intrinsics, resolution, distortion_model and the coefficients in `coefficients_field`.
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field);

@@ -15,8 +15,8 @@ namespace {
 
 /// T_C1B of the second camera: its own, or by way of the first one.
 Pose<C1, B> read_second_camera(YamlReader& yaml, const YAML::Node& cam1, const Pose<C0, B>& T_C0B) {
-  if (yaml.has(cam1, "T_cam_imu")) return read_transform(yaml, cam1, "T_cam_imu").cast_frames<C1, B>();
-  return read_transform(yaml, cam1, "T_cn_cnm1").cast_frames<C1, C0>() * T_C0B;
+  if (yaml.has(cam1, "T_cam_imu")) return read_transform<C1, B>(yaml, cam1, "T_cam_imu");
+  return read_transform<C1, C0>(yaml, cam1, "T_cn_cnm1") * T_C0B;
 }
 
 double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& cam1) {
@@ -43,7 +43,7 @@ Result<StereoRig> parse_kalibr_camchain(const std::string& text, const std::stri
   StereoRig rig;
   rig.left = read_camera(yaml, cam0, "distortion_coeffs");
   rig.right = read_camera(yaml, cam1, "distortion_coeffs");
-  const Pose<C0, B> T_C0B = read_transform(yaml, cam0, "T_cam_imu").cast_frames<C0, B>();
+  const Pose<C0, B> T_C0B = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
   rig.T_BC0 = T_C0B.inverse();
   rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
   rig.time_offset_s = read_time_offset_s(yaml, cam0, cam1);

@@ -80,13 +80,6 @@ struct Row {
 
 }  // namespace
 
-Trajectory TrajectoryFile::poses() const {
-  Trajectory out;
-  out.reserve(points.size());
-  for (const TrajectoryPoint& point : points) out.push_back({point.t, point.T_WB});
-  return out;
-}
-
 Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string& file) {
   const bool commas = has_commas(text);
   std::vector<std::string_view> fields;

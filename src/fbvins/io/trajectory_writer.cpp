@@ -34,9 +34,7 @@ Result<TumWriter> TumWriter::create(const std::string& path) {
   return TumWriter(*std::move(file));
 }
 
-void TumWriter::write(Time t, const Pose<W, B>& T_WB) {
-  const Vec3& p = T_WB.p;
-  const Quat& q = T_WB.q;
+void TumWriter::write(Time t, const Quat& q, const Vec3& p) {
   file_.write(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", format_seconds(t), p.x(), p.y(), p.z(), q.x(),
                           q.y(), q.z(), q.w()));
 }

@@ -24,7 +24,7 @@ class FlightRecord {
   void drop(KeyframeId gone);
   /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Keyframes that have no
   /// place in M are passed over; empty where there is no other.
-  Trajectory corrected(const PlaceMap& map, const Trajectory& in_W) const;
+  Trajectory<M> corrected(const PlaceMap& map, const Trajectory<W>& in_W) const;
 
  private:
   struct Entry {

@@ -7,7 +7,7 @@
 //   MapUpdate update = closer.process(keyframe);
 //   Pose<M, B> T_MB = update.T_MW * odometry.T_WB;
 //   closer.finish();
-//   Trajectory in_map = closer.corrected(trajectory_in_W);
+//   Trajectory<M> in_map = closer.corrected(trajectory_in_W);
 #pragma once
 
 #include <memory>
@@ -48,7 +48,7 @@ class LoopCloser final : public Mapper {
   const PlaceMap& map() const { return map_; }
   /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Frames of a
   /// session that never found into the map are left out.
-  Trajectory corrected(const Trajectory& in_W) const { return flight_.corrected(map_, in_W); }
+  Trajectory<M> corrected(const Trajectory<W>& in_W) const { return flight_.corrected(map_, in_W); }
 
  private:
   /// The odometry's present W.

@@ -26,19 +26,20 @@ struct Outcome {
 /// Errors against the truth without alignment: M starts where W starts.
 Outcome run(LoopCloser& closer, const std::vector<Frame>& frames) {
   Outcome o;
-  Trajectory odometry;
+  Trajectory<W> odometry;
   const Pose<W, B> T0 = frames[0].truth;
-  const Pose<W, W> to_truth((T0 * frames[0].odometry.inverse()).q, (T0 * frames[0].odometry.inverse()).p);
+  const Pose<W, W> to_truth = T0 * frames[0].odometry.inverse();
+  const Pose<W, M> M_to_truth(to_truth.q, to_truth.p);
   for (const Frame& f : frames) {
     const MapUpdate u = closer.process(f.place, FrameId{f.t.ns / 1000}, f.t, f.odometry, 0);
     odometry.push_back({f.t, f.odometry});
     o.accepted += u.stats.accepted, o.refused += u.stats.refused;
-    o.causal_m += (to_truth * (u.T_MW * f.odometry).cast_frames<W, B>().p - f.truth.p).squaredNorm();
+    o.causal_m += (M_to_truth * (u.T_MW * f.odometry).p - f.truth.p).squaredNorm();
     o.W_m += (to_truth * f.odometry.p - f.truth.p).squaredNorm();
   }
   closer.finish();
-  const Trajectory corrected = closer.corrected(odometry);
-  for (std::size_t i = 0; i < frames.size(); ++i) o.after_m += (to_truth * corrected[i].T_WB.p - frames[i].truth.p).squaredNorm();
+  const Trajectory<M> corrected = closer.corrected(odometry);
+  for (std::size_t i = 0; i < frames.size(); ++i) o.after_m += (M_to_truth * corrected[i].T.p - frames[i].truth.p).squaredNorm();
   const auto n = static_cast<double>(frames.size());
   o.W_m = std::sqrt(o.W_m / n), o.causal_m = std::sqrt(o.causal_m / n), o.after_m = std::sqrt(o.after_m / n);
   return o;
@@ -175,10 +176,10 @@ TEST(LoopCloser, PosesOfASessionWhoseKeyframesAreGoneStayWhereTheyWere) {
   const int localised = fly_with_restarts(closer, frames);
   int placed = 0;
   for (const Frame& f : frames) {
-    const Trajectory corrected = closer.corrected({{f.t, f.odometry}});
+    const Trajectory<M> corrected = closer.corrected({{f.t, f.odometry}});
     if (corrected.empty()) continue;
     ++placed;
-    EXPECT_LT((corrected[0].T_WB.p - f.truth.p).norm(), 0.1);
+    EXPECT_LT((corrected[0].T.p - f.truth.p).norm(), 0.1);
   }
   EXPECT_GT(localised, 10);
   EXPECT_EQ(placed, localised);

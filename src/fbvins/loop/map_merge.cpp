@@ -13,12 +13,12 @@ Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOp
   LoopCloser closer(rig, merging, vocabulary, std::move(first));
   bool joined = false;
   for (const MapKeyframe& k : second.keyframes()) {
-    // Its map is its odometry, already corrected; the body may sit elsewhere on the other rig.
+    // Its map is flown once more as odometry, already corrected; the body may sit elsewhere on the other rig.
     const Pose<M, C0> T_MC = k.T_MB * second.T_BC0;
     const Pose<M, B> T_MB = T_MC * rig.T_BC0.inverse();
     Place place = k.place;
     place.words = vocabulary.words_of(place.descriptors);  // a file keeps none
-    joined |= closer.process(std::move(place), FrameId{k.id.value}, k.t, T_MB.cast_frames<W, B>(), 0).localised;
+    joined |= closer.process(std::move(place), FrameId{k.id.value}, k.t, {T_MB.q, T_MB.p}, 0).localised;
   }
   if (!joined) return Error{ErrorCode::invalid_argument, "the two maps have no place in common"};
   closer.finish();

@@ -141,7 +141,7 @@ TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
   for (std::size_t i = 0; i < f.odometry.size(); ++i) {
     MapKeyframe k;
     k.t = Time{static_cast<std::int64_t>(i) * 100'000'000};
-    k.T_WB = f.odometry[i].cast_frames<W, B>();
+    k.T_WB = {f.odometry[i].q, f.odometry[i].p};  // M begins as W
     k.T_MB = f.odometry[i];
     map.add(std::move(k));
   }
