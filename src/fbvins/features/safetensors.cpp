@@ -8,115 +8,82 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargestHeader = 1u << 20;
-constexpr std::int64_t kLargestNumber = std::int64_t{1} << 40;
+constexpr std::uint64_t kLargestNumber = std::uint64_t{1} << 40;
+using Json = nlohmann::json;
 
 Error damaged(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
 
-/// The JSON that safetensors headers are made of: objects, strings and lists of whole numbers.
-class HeaderReader {
- public:
-  explicit HeaderReader(std::string_view text) : text_(text) {}
-
-  /// Skips spaces; true and past it if the next character is `c`.
-  bool take(char c) {
-    skip_spaces();
-    if (at_ >= text_.size() || text_[at_] != c) return false;
-    ++at_;
+/// Refuses what JSON leaves open: a name given twice.
+Result<Json> parse_header(std::string_view text) {
+  std::vector<std::set<std::string>> open_objects;  ///< the names in each
+  std::optional<std::string> twice;
+  const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) open_objects.emplace_back();
+    else if (event == Json::parse_event_t::object_end) open_objects.pop_back();
+    else if (event == Json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second && !twice)
+      twice = parsed.get<std::string>();
     return true;
+  };
+  try {
+    Json header = Json::parse(text.begin(), text.end(), watch);
+    if (twice) return damaged(fmt::format("\"{}\" appears twice in the header", *twice));
+    if (!header.is_object() || header.empty()) return damaged("the header names no tensors");
+    return header;
+  } catch (const Json::parse_error& e) {
+    return damaged(fmt::format("the header is not valid near byte {}", e.byte));
+  } catch (const Json::exception&) {
+    return damaged("the header is not valid");
   }
-
-  bool at_end() {
-    skip_spaces();
-    return at_ == text_.size();
-  }
-
-  std::optional<std::string> string() {
-    if (!take('"')) return std::nullopt;
-    std::string out;
-    for (; at_ < text_.size() && text_[at_] != '"'; ++at_) {
-      if (static_cast<unsigned char>(text_[at_]) < 0x20) return std::nullopt;
-      if (text_[at_] == '\\' && (++at_ == text_.size() || (text_[at_] != '"' && text_[at_] != '\\' && text_[at_] != '/')))
-        return std::nullopt;
-      out += text_[at_];
-    }
-    if (at_ == text_.size()) return std::nullopt;
-    ++at_;
-    return out;
-  }
-
-  std::optional<std::vector<std::int64_t>> numbers() {
-    std::vector<std::int64_t> out;
-    if (!take('[')) return std::nullopt;
-    if (take(']')) return out;
-    do {
-      skip_spaces();
-      std::int64_t value = 0;
-      const std::size_t first = at_;
-      for (; at_ < text_.size() && text_[at_] >= '0' && text_[at_] <= '9'; ++at_)
-        if (value = 10 * value + (text_[at_] - '0'); value > kLargestNumber) return std::nullopt;
-      if (at_ == first) return std::nullopt;
-      out.push_back(value);
-    } while (take(','));
-    if (!take(']')) return std::nullopt;
-    return out;
-  }
-
-  std::size_t at() const { return at_; }
-
- private:
-  void skip_spaces() {
-    while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\n' || text_[at_] == '\r' || text_[at_] == '\t')) ++at_;
-  }
-
-  std::string_view text_;
-  std::size_t at_ = 0;
-};
+}
 
 struct Entry {
   std::string type;
   std::vector<std::int64_t> shape, place;
 };
 
-std::optional<std::map<std::string, std::string>> read_metadata(HeaderReader& header) {
-  std::map<std::string, std::string> out;
-  if (!header.take('{')) return std::nullopt;
-  if (header.take('}')) return out;
-  do {
-    auto key = header.string();
-    if (!key || !header.take(':')) return std::nullopt;
-    auto value = header.string();
-    if (!value) return std::nullopt;
-    out[*key] = *value;
-  } while (header.take(','));
-  if (!header.take('}')) return std::nullopt;
+std::optional<std::vector<std::int64_t>> whole_numbers(const Json& list) {
+  if (!list.is_array()) return std::nullopt;
+  std::vector<std::int64_t> out;
+  for (const Json& value : list) {
+    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kLargestNumber) return std::nullopt;
+    out.push_back(value.get<std::int64_t>());
+  }
   return out;
 }
 
-std::optional<Entry> read_entry(HeaderReader& header) {
+std::optional<std::map<std::string, std::string>> read_metadata(const Json& json) {
+  if (!json.is_object()) return std::nullopt;
+  std::map<std::string, std::string> out;
+  for (const auto& [key, value] : json.items()) {
+    if (!value.is_string()) return std::nullopt;
+    out[key] = value.get<std::string>();
+  }
+  return out;
+}
+
+std::optional<Entry> read_entry(const Json& json) {
+  if (!json.is_object()) return std::nullopt;
   Entry entry;
-  if (!header.take('{')) return std::nullopt;
-  do {
-    const auto key = header.string();
-    if (!key || !header.take(':')) return std::nullopt;
-    if (*key == "dtype") {
-      const auto type = header.string();
-      if (!type) return std::nullopt;
-      entry.type = *type;
-    } else if (*key == "shape" || *key == "data_offsets") {
-      const auto numbers = header.numbers();
+  for (const auto& [key, value] : json.items()) {
+    if (key == "dtype") {
+      if (!value.is_string()) return std::nullopt;
+      entry.type = value.get<std::string>();
+    } else if (key == "shape" || key == "data_offsets") {
+      const auto numbers = whole_numbers(value);
       if (!numbers) return std::nullopt;
-      (*key == "shape" ? entry.shape : entry.place) = *numbers;
+      (key == "shape" ? entry.shape : entry.place) = *numbers;
     } else {
       return std::nullopt;
     }
-  } while (header.take(','));
-  if (!header.take('}')) return std::nullopt;
+  }
   return entry;
 }
 
@@ -171,27 +138,24 @@ Result<SafeTensors> parse_safetensors(std::string_view bytes) {
   std::memcpy(&length, bytes.data(), sizeof(length));
   if (length > kLargestHeader || length > bytes.size() - sizeof(length))
     return damaged(fmt::format("the header is said to have {} bytes, the file has {}", length, bytes.size()));
-  HeaderReader header(bytes.substr(sizeof(length), length));
+  const Result<Json> header = parse_header(bytes.substr(sizeof(length), length));
+  if (!header) return header.error();
   const std::string_view data = bytes.substr(sizeof(length) + length);
+  const auto bad_entry = [](const std::string& name) { return damaged(fmt::format("\"{}\" is not valid in the header", name)); };
   SafeTensors out;
-  const auto bad_header = [&] { return damaged(fmt::format("the header is not valid near byte {}", header.at())); };
-  if (!header.take('{')) return bad_header();
-  do {
-    const auto name = header.string();
-    if (!name || !header.take(':')) return bad_header();
-    if (*name == "__metadata__") {
-      auto metadata = read_metadata(header);
-      if (!metadata) return bad_header();
+  for (const auto& [name, json] : header->items()) {
+    if (name == "__metadata__") {
+      auto metadata = read_metadata(json);
+      if (!metadata) return bad_entry(name);
       out.metadata = std::move(*metadata);
       continue;
     }
-    const auto entry = read_entry(header);
-    if (!entry) return bad_header();
-    Result<Tensor> tensor = read_tensor(*name, *entry, data);
+    const auto entry = read_entry(json);
+    if (!entry) return bad_entry(name);
+    Result<Tensor> tensor = read_tensor(name, *entry, data);
     if (!tensor) return tensor.error();
-    if (!out.tensors.emplace(*name, std::move(*tensor)).second) return damaged(fmt::format("tensor \"{}\" appears twice", *name));
-  } while (header.take(','));
-  if (!header.take('}') || !header.at_end()) return bad_header();
+    out.tensors.emplace(name, std::move(*tensor));
+  }
   return out;
 }
 

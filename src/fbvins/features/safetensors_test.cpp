@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/features/safetensors.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -48,11 +49,31 @@ TEST(SafeTensors, SaysWhatIsWrongWithADamagedFile) {
   EXPECT_EQ(error_of(file_of(R"({"a":{"dtype":"I64","shape":[1],"data_offsets":[0,8]}})", floats({1, 2}))),
             "tensor \"a\" has type \"I64\", not F32 or F16");
   EXPECT_EQ(error_of(file_of(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]})", "")),
-            error_of(file_of(good, "")).substr(0, 0) + "tensor \"a\" ends at byte 8 of 0: the file is cut off");
-  EXPECT_NE(error_of(file_of(R"({"a":[1,2]})", "")).find("the header is not valid near byte"), std::string::npos);
+            "the header is not valid near byte 54")
+      << "its last brace is missing";
+  EXPECT_EQ(error_of(file_of(good, "")), "tensor \"a\" ends at byte 8 of 0: the file is cut off");
+  EXPECT_EQ(error_of(file_of(R"({"a":[1,2]})", "")), "\"a\" is not valid in the header");
+  EXPECT_EQ(error_of(file_of(good.substr(0, 20), "")), "the header is not valid near byte 21");
   std::string long_header = file_of(good, floats({1, 2}));
   long_header[6] = '\x7f';
   EXPECT_NE(error_of(long_header).find("the header is said to have"), std::string::npos);
+}
+
+TEST(SafeTensors, IsStricterThanJson) {
+  const std::string two = floats({1, 2});
+  const auto with = [&](const std::string& entry) { return error_of(file_of("{\"a\":" + entry + "}", two)); };
+  const std::string entry = R"({"dtype":"F32","shape":[2],"data_offsets":[0,8]})", invalid = "\"a\" is not valid in the header";
+  ASSERT_EQ(with(entry), "");
+  EXPECT_EQ(with(entry + ",\"a\":" + entry), "\"a\" appears twice in the header");
+  EXPECT_EQ(with(R"({"dtype":"F32","dtype":"F32","shape":[2],"data_offsets":[0,8]})"), "\"dtype\" appears twice in the header");
+  EXPECT_EQ(with(R"({"dtype":"F32","shape":[2],"data_offsets":[0,8],"more":1})"), invalid);
+  for (const char* side : {"-2", "2.0", "2e0", "\"2\"", "[2]", "1099511627777", "99999999999999999999", "null"})
+    EXPECT_EQ(with(fmt::format(R"({{"dtype":"F32","shape":[{}],"data_offsets":[0,8]}})", side)), invalid) << side;
+  EXPECT_EQ(error_of(file_of(R"({"__metadata__":{"a":1}})", "")), "\"__metadata__\" is not valid in the header");
+  EXPECT_EQ(error_of(file_of("{}", "")), "the header names no tensors");
+  EXPECT_EQ(error_of(file_of("[]", "")), "the header names no tensors");
+  EXPECT_NE(error_of(file_of(std::string(1 << 20, '['), "")), "") << "deep nesting is an error, not a crash";
+  EXPECT_EQ(with(std::string(1 << 18, '[') + std::string(1 << 18, ']')), invalid);
 }
 
 TEST(SafeTensors, NamesTheFileThatIsMissing) {
