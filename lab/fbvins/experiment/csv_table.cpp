@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -13,16 +14,6 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargest_bytes = std::uint64_t{1} << 30u;
-
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    fields.push_back(trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
-  }
-}
 
 /// "p_WB_x [m]" is the column p_WB_x.
 std::string bare_name(std::string_view header) { return std::string(trim(header.substr(0, header.find('[')))); }
@@ -37,12 +28,9 @@ Result<CsvTable> CsvTable::read(const std::string& path) {
 
 Result<CsvTable> CsvTable::parse(std::string_view text, const std::string& source) {
   CsvTable table;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = trim(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-    if (line.empty()) continue;
-    const std::vector<std::string_view> fields = split(line);
+  std::vector<std::string_view> fields;
+  for (const auto& [number, line] : lines_of(text)) {
+    split_at_commas(line, fields);
     if (table.names_.empty()) {
       if (line.front() != '#') return Error{ErrorCode::malformed, fmt::format("{}:1: a header line is missing", source)};
       for (std::size_t i = 1; i < fields.size(); ++i) table.names_.push_back(bare_name(fields[i]));

@@ -3,15 +3,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <initializer_list>
 #include <set>
 
 #include "fbvins/frontend/frontend_options.hpp"
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
 namespace {
@@ -19,70 +18,18 @@ namespace {
 namespace fs = std::filesystem;
 constexpr int kMostSeeds = 100'000;
 
-/// Reads and keeps the first complaint.
-class Reader {
- public:
-  explicit Reader(std::string source) : source_(std::move(source)) {}
-
-  const std::string& problem() const { return problem_; }
-  void complain(const YAML::Node& at, const std::string& sentence) {
-    if (problem_.empty()) problem_ = fmt::format("{}:{}: {}", source_, at.Mark().line + 1, sentence);
-  }
-  void only(const YAML::Node& map, std::initializer_list<const char*> known) {
-    if (!map.IsMap()) return complain(map, "names and values are wanted here");
-    for (const auto& entry : map) {
-      const std::string name = entry.first.Scalar();
-      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-      std::string list;
-      for (const char* k : known) list += fmt::format("{}{}", list.empty() ? "" : ", ", k);
-      complain(entry.first, fmt::format("unknown key '{}'; known here: {}", name, list));
-    }
-  }
-  std::string text(const YAML::Node& map, const char* key) {
-    const YAML::Node node = map[key];
-    if (!node) return "";
-    if (!node.IsScalar()) complain(node, fmt::format("'{}' wants one value", key));
-    return node.IsScalar() ? node.Scalar() : "";
-  }
-  /// One value is a list of one.
-  std::vector<std::string> texts(const YAML::Node& map, const char* key) {
-    std::vector<std::string> out;
-    const YAML::Node node = map[key];
-    if (!node) return out;
-    if (node.IsScalar()) return {node.Scalar()};
-    if (!node.IsSequence()) complain(node, fmt::format("'{}' wants a list", key));
-    else
-      for (const YAML::Node& item : node) {
-        if (!item.IsScalar()) complain(item, fmt::format("'{}' wants a list of plain values", key));
-        else out.push_back(item.Scalar());
-      }
-    return out;
-  }
-  double number(const YAML::Node& map, const char* key, double low, double high, double otherwise) {
-    const YAML::Node node = map[key];
-    if (!node) return otherwise;
-    double value = 0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !(value >= low && value <= high))
-      complain(node, fmt::format("'{}' wants a number from {} to {}", key, low, high));
-    return value;
-  }
-
- private:
-  std::string source_, problem_;
-};
-
 /// `seeds: 20` are 1 to 20; a list names them.
-std::vector<int> seeds_of(Reader& reader, const YAML::Node& map) {
+std::vector<int> seeds_of(YamlReader& yaml, const YAML::Node& map) {
   std::vector<int> seeds;
-  if (map["seeds"] && map["seeds"].IsScalar()) {
-    const int count = static_cast<int>(reader.number(map, "seeds", 1, kMostSeeds, 1));
+  if (yaml.get(map, "seeds").IsDefined() && yaml.get(map, "seeds").IsScalar()) {
+    const int count = static_cast<int>(yaml.number_between(map, "seeds", 1, kMostSeeds, 1));
     for (int s = 1; s <= count; ++s) seeds.push_back(s);
     return seeds;
   }
-  for (const std::string& text : reader.texts(map, "seeds")) {
+  for (const std::string& text : yaml.texts(map, "seeds")) {
     int seed = -1;
     if (!YAML::convert<int>::decode(YAML::Node(text), seed) || seed < 0)
-      reader.complain(map["seeds"], "a seed is a whole number");
+      yaml.complain(yaml.get(map, "seeds"), "a seed is a whole number");
     seeds.push_back(seed);
   }
   return seeds.empty() ? std::vector<int>{1} : seeds;
@@ -93,31 +40,32 @@ std::string default_name(const DrawnSpec& drawn) {
 }
 
 /// One entry may stand for several presets.
-void read_dataset(Reader& reader, const YAML::Node& node, Matrix& matrix) {
-  reader.only(node, {"name", "euroc", "path", "simulate"});
-  if (!reader.problem().empty()) return;
+void read_dataset(YamlReader& yaml, const YAML::Node& node, Matrix& matrix) {
+  yaml.only(node, {"name", "euroc", "path", "simulate"});
+  if (!yaml.ok()) return;
   DatasetSpec spec;
-  spec.name = reader.text(node, "name");
-  spec.euroc = reader.text(node, "euroc");
-  spec.path = reader.text(node, "path");
-  const YAML::Node simulate = node["simulate"];
-  if (!simulate) {
-    if (spec.euroc.empty() && spec.path.empty()) return reader.complain(node, "a dataset needs euroc, path or simulate");
+  spec.name = yaml.text(node, "name");
+  spec.euroc = yaml.text(node, "euroc");
+  spec.path = yaml.text(node, "path");
+  const YAML::Node simulate = yaml.get(node, "simulate");
+  if (!simulate.IsDefined()) {
+    if (spec.euroc.empty() && spec.path.empty()) return yaml.complain(node, "a dataset needs euroc, path or simulate");
     if (spec.name.empty()) spec.name = spec.euroc.empty() ? fs::path(spec.path).stem().string() : spec.euroc;
     matrix.datasets.push_back(std::move(spec));
     return;
   }
-  reader.only(simulate, {"preset", "trajectory", "imu", "seconds", "seeds", "set"});
-  if (!reader.problem().empty()) return;
+  yaml.only(simulate, {"preset", "trajectory", "imu", "seconds", "seeds", "set"});
+  if (!yaml.ok()) return;
   DrawnSpec drawn;
-  drawn.trajectory = reader.text(simulate, "trajectory");
-  drawn.imu = reader.text(simulate, "imu");
-  drawn.seconds = reader.number(simulate, "seconds", 1, 86'400, 0);
-  drawn.settings = reader.texts(simulate, "set");
-  spec.seeds = seeds_of(reader, simulate);
-  std::vector<std::string> presets = reader.texts(simulate, "preset");
+  drawn.trajectory = yaml.text(simulate, "trajectory");
+  drawn.imu = yaml.text(simulate, "imu");
+  drawn.seconds = yaml.number_between(simulate, "seconds", 1, 86'400, 0);
+  drawn.settings = yaml.texts(simulate, "set");
+  spec.seeds = seeds_of(yaml, simulate);
+  std::vector<std::string> presets = yaml.texts(simulate, "preset");
   if (presets.empty()) presets.emplace_back("normal");
-  if (presets.size() > 1 && !spec.name.empty()) return reader.complain(node["name"], "several presets cannot share one name");
+  if (presets.size() > 1 && !spec.name.empty())
+    return yaml.complain(yaml.get(node, "name"), "several presets cannot share one name");
   for (const std::string& preset : presets) {
     DatasetSpec one = spec;
     drawn.preset = preset;
@@ -127,11 +75,11 @@ void read_dataset(Reader& reader, const YAML::Node& node, Matrix& matrix) {
   }
 }
 
-ConfigurationSpec read_configuration(Reader& reader, const YAML::Node& node) {
-  reader.only(node, {"name", "config", "set"});
-  if (!reader.problem().empty()) return {};
-  ConfigurationSpec spec{reader.text(node, "name"), reader.text(node, "config"), reader.texts(node, "set")};
-  if (spec.name.empty()) reader.complain(node, "a configuration needs a name");
+ConfigurationSpec read_configuration(YamlReader& yaml, const YAML::Node& node) {
+  yaml.only(node, {"name", "config", "set"});
+  if (!yaml.ok()) return {};
+  ConfigurationSpec spec{yaml.text(node, "name"), yaml.text(node, "config"), yaml.texts(node, "set")};
+  if (spec.name.empty()) yaml.complain(node, "a configuration needs a name");
   return spec;
 }
 
@@ -158,32 +106,29 @@ std::string real_recording(const DatasetSpec& spec, const PlanOptions& options) 
 }  // namespace
 
 Result<Matrix> parse_matrix(const std::string& text, const std::string& source) {
-  Reader reader(source);
+  YamlReader yaml(source, text, YamlReader::Root::anything);
+  if (!yaml.ok()) return yaml.error();
+  const YAML::Node& root = yaml.root();
   Matrix matrix;
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    return Error{ErrorCode::malformed, fmt::format("{}:{}: {}", source, error.mark.line + 1, error.msg)};
-  }
-  reader.only(root, {"title", "datasets", "frontends", "configurations", "repetitions"});
-  if (!reader.problem().empty()) return Error{ErrorCode::malformed, reader.problem()};
-  matrix.title = reader.text(root, "title");
-  matrix.frontends = reader.texts(root, "frontends");
+  yaml.only(root, {"title", "datasets", "frontends", "configurations", "repetitions"});
+  if (!yaml.ok()) return yaml.error();
+  matrix.title = yaml.text(root, "title");
+  matrix.frontends = yaml.texts(root, "frontends");
   const std::vector<std::string> known = frontend_names();
   for (const std::string& name : matrix.frontends)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      reader.complain(root["frontends"], fmt::format("there is no frontend '{}'; there are {}", name, fmt::join(known, ", ")));
+      yaml.complain(yaml.get(root, "frontends"),
+                    fmt::format("there is no frontend '{}'; there are {}", name, fmt::join(known, ", ")));
   if (matrix.frontends.empty()) matrix.frontends.push_back(known.front());
-  matrix.repetitions = static_cast<int>(reader.number(root, "repetitions", 1, 1000, 1));
-  const YAML::Node datasets = root["datasets"], configurations = root["configurations"];
-  if (!datasets || !datasets.IsSequence() || datasets.size() == 0) reader.complain(root, "a list 'datasets' is needed");
+  matrix.repetitions = static_cast<int>(yaml.number_between(root, "repetitions", 1, 1000, 1));
+  const YAML::Node datasets = yaml.get(root, "datasets"), configurations = yaml.get(root, "configurations");
+  if (!datasets.IsDefined() || !datasets.IsSequence() || datasets.size() == 0) yaml.complain(root, "a list 'datasets' is needed");
   else
-    for (const YAML::Node& node : datasets) read_dataset(reader, node, matrix);
-  if (configurations)
-    for (const YAML::Node& node : configurations) matrix.configurations.push_back(read_configuration(reader, node));
+    for (const YAML::Node& node : datasets) read_dataset(yaml, node, matrix);
+  if (configurations.IsDefined())
+    for (const YAML::Node& node : configurations) matrix.configurations.push_back(read_configuration(yaml, node));
   if (matrix.configurations.empty()) matrix.configurations.emplace_back();
-  if (!reader.problem().empty()) return Error{ErrorCode::malformed, reader.problem()};
+  if (!yaml.ok()) return yaml.error();
   return matrix;
 }
 

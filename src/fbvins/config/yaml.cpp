@@ -2,64 +2,61 @@
 #include "fbvins/config/yaml.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <set>
+
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
 namespace {
 
-/// One reading of one text: carries what every error needs.
-struct Reader {
-  const std::string& source;
-  const std::vector<OptionField>& fields;
+constexpr std::uint64_t kLargestConfig_bytes = 1u << 20u;
 
-  Error error(const YAML::Mark& mark, const std::string& message) const {
-    return {ErrorCode::malformed, fmt::format("{}:{}: {}", source, mark.line + 1, message)};
-  }
+/// Sets the options that a text names; the reader keeps the first complaint.
+struct OptionReader {
+  YamlReader& yaml;
+  const std::vector<OptionField>& fields;
 
   const OptionField* find(const std::string& path) const {
     const auto it = std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path == path; });
     return it == fields.end() ? nullptr : &*it;
   }
 
-  Result<void> unknown(const YAML::Mark& mark, const std::string& path) const {
+  void complain_unknown(const YAML::Node& name, const std::string& path) const {
     const std::string near = nearest_path(fields, path);
-    return error(mark, fmt::format("unknown option '{}'{}", path, near.empty() ? "" : fmt::format("; did you mean '{}'?", near)));
+    yaml.complain(name,
+                  fmt::format("unknown option '{}'{}", path, near.empty() ? "" : fmt::format("; did you mean '{}'?", near)));
   }
 
-  Result<void> read_map(const YAML::Node& map, const std::string& prefix) const {
+  void read_map(const YAML::Node& map, const std::string& prefix) const {
     std::set<std::string> seen;
     for (const auto& entry : map) {
-      if (!entry.first.IsScalar()) return error(entry.first.Mark(), "the name of an option must be plain text");
+      if (!yaml.ok()) return;
+      if (!entry.first.IsScalar()) return yaml.complain(entry.first, "the name of an option must be plain text");
       const std::string path = prefix + entry.first.Scalar();
       const OptionField* field = find(path);
-      if (!field) return unknown(entry.first.Mark(), path);
-      if (!seen.insert(path).second) return error(entry.first.Mark(), fmt::format("option '{}' is given twice", path));
-      const Result<void> read = read_entry(*field, entry.first.Mark(), entry.second);
-      if (!read) return read;
+      if (!field) return complain_unknown(entry.first, path);
+      if (!seen.insert(path).second) return yaml.complain(entry.first, fmt::format("option '{}' is given twice", path));
+      read_entry(*field, entry.first, entry.second);
     }
-    return {};
   }
 
-  Result<void> read_entry(const OptionField& field, const YAML::Mark& mark, const YAML::Node& value) const {
+  void read_entry(const OptionField& field, const YAML::Node& name, const YAML::Node& value) const {
     if (field.is_group()) {
-      if (value.IsNull()) return {};
-      if (!value.IsMap()) return error(mark, fmt::format("'{}' is a group of options, not a value", field.path));
+      if (value.IsNull()) return;
+      if (!value.IsMap()) return yaml.complain(name, fmt::format("'{}' is a group of options, not a value", field.path));
       return read_map(value, field.path + ".");
     }
     if (!value.IsScalar())
-      return error(mark, fmt::format("option '{}' wants a {}, not a list or group", field.path, field.type_name()));
+      return yaml.complain(name, fmt::format("option '{}' wants a {}, not a list or group", field.path, field.type_name()));
     const bool quoted_number = value.Tag() == "!" && field.type_name() != "text";
     if (quoted_number)
-      return error(mark,
-                   fmt::format("option '{}': \"{}\" in quotes is text, not a {}", field.path, value.Scalar(), field.type_name()));
+      return yaml.complain(
+          name, fmt::format("option '{}': \"{}\" in quotes is text, not a {}", field.path, value.Scalar(), field.type_name()));
     const Result<void> set = field.set_from_text(value.Scalar());
-    if (!set) return error(value.Mark(), fmt::format("option '{}': {}", field.path, set.error().message));
-    return {};
+    if (!set) yaml.complain(value, fmt::format("option '{}': {}", field.path, set.error().message));
   }
 };
 
@@ -86,23 +83,19 @@ std::string comment_of(const OptionField& field) {
 }  // namespace
 
 Result<void> read_yaml(const std::string& text, const std::string& source, const std::vector<OptionField>& fields) {
-  const Reader reader{source, fields};
-  try {
-    const YAML::Node root = YAML::Load(text);
-    if (root.IsNull()) return {};
-    if (!root.IsMap()) return reader.error(root.Mark(), "a configuration is a list of 'name: value' lines");
-    return reader.read_map(root, "");
-  } catch (const YAML::Exception& e) {
-    return reader.error(e.mark, fmt::format("not YAML: {}", e.msg));
+  YamlReader yaml(source, text, YamlReader::Root::anything);
+  if (yaml.ok() && !yaml.root().IsNull()) {
+    if (!yaml.root().IsMap()) yaml.complain(yaml.root(), "a configuration is a list of 'name: value' lines");
+    else OptionReader{yaml, fields}.read_map(yaml.root(), "");
   }
+  if (!yaml.ok()) return yaml.error();
+  return {};
 }
 
 Result<void> read_yaml_file(const std::string& path, const std::vector<OptionField>& fields) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Error{ErrorCode::not_found, fmt::format("{}: cannot be opened", path)};
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad()) return Error{ErrorCode::unreadable, fmt::format("{}: cannot be read", path)};
-  return read_yaml(text, path, fields);
+  const Result<std::string> text = read_file(path, kLargestConfig_bytes);
+  if (!text) return text.error();
+  return read_yaml(*text, path, fields);
 }
 
 std::string write_yaml(const std::vector<OptionField>& fields) {

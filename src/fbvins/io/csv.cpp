@@ -17,23 +17,23 @@ bool looks_like_header(std::string_view line) {
 
 }  // namespace
 
-std::vector<CsvLine> data_lines(std::string_view text) {
+std::vector<CsvLine> lines_of(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.substr(0, 3) == kByteOrderMark) text.remove_prefix(3);
   std::vector<CsvLine> lines;
-  bool header_possible = true;
   for (int number = 1; !text.empty(); ++number) {
     const auto end = text.find('\n');
     const std::string_view line = trim(text.substr(0, end));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    if (line.empty() || line.front() == '#') continue;
-    if (header_possible && looks_like_header(line)) {
-      header_possible = false;
-      continue;
-    }
-    header_possible = false;
-    lines.push_back({number, line});
+    if (!line.empty()) lines.push_back({number, line});
   }
+  return lines;
+}
+
+std::vector<CsvLine> data_lines(std::string_view text) {
+  std::vector<CsvLine> lines = lines_of(text);
+  std::erase_if(lines, [](const CsvLine& line) { return line.text.front() == '#'; });
+  if (!lines.empty() && looks_like_header(lines.front().text)) lines.erase(lines.begin());
   return lines;
 }
 

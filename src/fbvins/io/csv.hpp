@@ -31,13 +31,15 @@ struct StampedRows {
   RowCounts counts;
 };
 
-/// One line of data.
+/// One line of a file.
 struct CsvLine {
   int number = 0;  ///< from 1
   std::string_view text;
 };
 
-/// The data lines of a file: no comments, blanks or header.
+/// Every line that is not blank, trimmed, without the byte order mark.
+std::vector<CsvLine> lines_of(std::string_view text);
+/// Those of them that hold data: no comments, no header.
 std::vector<CsvLine> data_lines(std::string_view text);
 
 /// Splits at commas; outer blanks removed. The vector is reused from row to row.

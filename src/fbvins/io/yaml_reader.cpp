@@ -2,6 +2,7 @@
 #include "fbvins/io/yaml_reader.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -25,13 +26,13 @@ std::string one_line(std::string text) {
 
 }  // namespace
 
-YamlReader::YamlReader(std::string file, std::string text) : file_(std::move(file)) {
+YamlReader::YamlReader(std::string file, std::string text, Root root) : file_(std::move(file)) {
   hide_opencv_header(text);
   try {
     root_ = YAML::Load(text);
-    if (!root_.IsMap()) error_.message = fmt::format("{}: holds no fields", file_);
+    if (root == Root::fields && !root_.IsMap()) error_.message = fmt::format("{}: holds no fields", file_);
   } catch (const YAML::Exception& e) {
-    error_.message = fmt::format("{}:{}: {}", file_, e.mark.line + 1, one_line(e.msg));
+    complain(e.mark, "not YAML: " + one_line(e.msg));
   } catch (const std::exception& e) {
     error_.message = fmt::format("{}: {}", file_, one_line(e.what()));
   }
@@ -51,6 +52,10 @@ void YamlReader::complain(const YAML::Node& map, const std::string& field, const
   const int line = node.IsDefined() ? node.Mark().line : map.IsDefined() ? map.Mark().line : -1;
   error_.message = line >= 0 && node.IsDefined() ? fmt::format("{}:{}: {}: {}", file_, line + 1, field, sentence)
                                                  : fmt::format("{}: {}: {}", file_, field, sentence);
+}
+
+void YamlReader::complain(const YAML::Mark& mark, const std::string& sentence) {
+  if (ok()) error_.message = fmt::format("{}:{}: {}", file_, mark.line + 1, sentence);
 }
 
 double YamlReader::number(const YAML::Node& map, const std::string& field) {
@@ -96,6 +101,44 @@ std::vector<double> YamlReader::numbers(const YAML::Node& map, const std::string
   else if (!node.IsSequence()) complain(map, field, "is not a list of numbers");
   else flatten(node, map, field, 0, out);
   return out;
+}
+
+double YamlReader::number_between(const YAML::Node& map, const std::string& field, double low, double high, double otherwise) {
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) return otherwise;
+  const auto value = node.IsScalar() ? parse_double(node.Scalar()) : std::nullopt;
+  if (value && *value >= low && *value <= high) return *value;
+  complain(node, fmt::format("'{}' wants a number from {} to {}", field, low, high));
+  return otherwise;
+}
+
+std::string YamlReader::text(const YAML::Node& map, const std::string& field) {
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) return "";
+  if (!node.IsScalar()) return complain(node, fmt::format("'{}' wants one value", field)), "";
+  return node.Scalar();
+}
+
+std::vector<std::string> YamlReader::texts(const YAML::Node& map, const std::string& field) {
+  const YAML::Node node = get(map, field);
+  if (!node.IsDefined()) return {};
+  if (node.IsScalar()) return {node.Scalar()};
+  if (!node.IsSequence()) return complain(node, fmt::format("'{}' wants a list", field)), std::vector<std::string>{};
+  std::vector<std::string> out;
+  for (const YAML::Node& item : node) {
+    if (!item.IsScalar()) complain(item, fmt::format("'{}' wants a list of plain values", field));
+    else out.push_back(item.Scalar());
+  }
+  return out;
+}
+
+void YamlReader::only(const YAML::Node& map, std::initializer_list<const char*> known) {
+  if (!map.IsMap()) return complain(map, "names and values are wanted here");
+  for (const auto& entry : map) {
+    const std::string name = entry.first.IsScalar() ? one_line(entry.first.Scalar().substr(0, 80)) : "";
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      complain(entry.first, fmt::format("unknown key '{}'; known here: {}", name, fmt::join(known, ", ")));
+  }
 }
 
 std::vector<double> YamlReader::numbers(const YAML::Node& map, const std::string& field, std::size_t count) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: fields of a YAML file, checked, with file and line in the first complaint.
+// The one reader of YAML: fields checked, with file and line in the first complaint. Calibrations, configurations and
+// experiment matrices are read with it. Private: it shows yaml-cpp. One thread.
 //
 //   YamlReader yaml("cam0/sensor.yaml", text);
-//   double rate = yaml.number(yaml.root()["rate_hz"], "rate_hz");
+//   double rate_hz = yaml.positive(yaml.root(), "rate_hz");
 //   if (!yaml.ok()) return yaml.error();
 //
 // After a complaint every getter still returns a harmless value, so that reading code has no branches.
@@ -10,6 +11,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -19,8 +21,12 @@ namespace fbvins {
 
 class YamlReader {
  public:
+  enum class Root {
+    fields,   ///< complain unless the file is a map
+    anything  ///< whoever reads says what is wrong
+  };
   /// OpenCV's header line `%YAML:1.0`, which is not YAML, is accepted.
-  YamlReader(std::string file, std::string text);
+  YamlReader(std::string file, std::string text, Root root = Root::fields);
 
   bool ok() const { return error_.message.empty(); }
   const Error& error() const { return error_; }
@@ -30,6 +36,7 @@ class YamlReader {
   const YAML::Node& root() const { return root_; }
   bool has(const YAML::Node& map, const std::string& field) const { return get(map, field).IsDefined(); }
 
+  // Fields that must be there.
   double number(const YAML::Node& map, const std::string& field);
   double positive(const YAML::Node& map, const std::string& field);
   std::string word(const YAML::Node& map, const std::string& field);
@@ -38,8 +45,20 @@ class YamlReader {
   /// Same, of any length.
   std::vector<double> numbers(const YAML::Node& map, const std::string& field);
 
+  // Fields that may be left out.
+  double number_between(const YAML::Node& map, const std::string& field, double low, double high, double otherwise);
+  std::string text(const YAML::Node& map, const std::string& field);
+  /// One value is a list of one.
+  std::vector<std::string> texts(const YAML::Node& map, const std::string& field);
+
+  /// Complains about every field of another name.
+  void only(const YAML::Node& map, std::initializer_list<const char*> known);
+
   /// "file:line: field: sentence" (line of the field where it is there). Only the first one counts.
   void complain(const YAML::Node& map, const std::string& field, const std::string& sentence);
+  /// "file:line: sentence".
+  void complain(const YAML::Mark& mark, const std::string& sentence);
+  void complain(const YAML::Node& node, const std::string& sentence) { complain(node.Mark(), sentence); }
 
  private:
   void flatten(const YAML::Node& node, const YAML::Node& map, const std::string& field, int depth, std::vector<double>& out);
