@@ -50,7 +50,7 @@ class LoopMap final : public Mapper {
 
   /// Poses of a flight (in one W) as the map has them now: exact at keyframes, blended between them. Empty where the flight
   /// never found into the map.
-  Trajectory corrected(const Trajectory& in_W) const;
+  Trajectory<M> corrected(const Trajectory<W>& in_W) const;
   /// Keyframes in the map now.
   int keyframes() const;
   /// Replaces the file as a whole: there is never half of one.

@@ -120,35 +120,5 @@ TEST(Alignment, NamesRoundTrip) {
   EXPECT_FALSE(alignment_from_string("SE4"));
 }
 
-TEST(Evaluation, ErrorsOfAKnownNoise) {
-  const Trajectory<AnyWorld> truth = flight(2000);
-  const auto e = evaluate(truth, noisy(truth, 0.02, 0.01, 3), {});
-  ASSERT_TRUE(e);
-  EXPECT_EQ(e->pairs, 2000);
-  EXPECT_NEAR(e->absolute_m.rmse, 0.02 * std::sqrt(3.0), 0.001);
-  EXPECT_NEAR(e->absolute_rotation_deg.rmse, 0.01 * std::sqrt(3.0) * 57.29578, 0.05);
-  EXPECT_GT(e->per_metre_m.count, 1000);
-  EXPECT_EQ(e->per_second_m.count, 1982) << "all pairs 1 s apart, and the two within 10 % of it at the end";
-}
-
-TEST(Evaluation, OdometryAndMapAreJudgedAlikeAgainstTheSameTruth) {
-  Trajectory<W> truth;
-  Trajectory<M> estimate;
-  for (const StampedPose<AnyWorld>& pose : flight(300)) truth.push_back({pose.t, {pose.T.q, pose.T.p}});
-  for (const StampedPose<AnyWorld>& pose : noisy(flight(300), 0.02, 0.01, 3)) estimate.push_back({pose.t, {pose.T.q, pose.T.p}});
-  const auto in_map = evaluate(truth, estimate, {}), in_any = evaluate(flight(300), noisy(flight(300), 0.02, 0.01, 3), {});
-  ASSERT_TRUE(in_map && in_any);
-  EXPECT_EQ(in_map->absolute_m.rmse, in_any->absolute_m.rmse);
-  EXPECT_EQ(in_map->per_metre_deg.rmse, in_any->per_metre_deg.rmse);
-}
-
-TEST(Evaluation, NothingInCommonIsAnError) {
-  Trajectory<AnyWorld> late = flight(10);
-  for (StampedPose<AnyWorld>& pose : late) pose.t = pose.t + Duration{1'000'000'000'000};
-  const auto e = evaluate(flight(10), late, {});
-  ASSERT_FALSE(e);
-  EXPECT_NE(e.error().message.find("clock"), std::string::npos);
-}
-
 }  // namespace
 }  // namespace fbvins

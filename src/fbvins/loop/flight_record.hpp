@@ -5,7 +5,7 @@
 //   FlightRecord flight;
 //   flight.add(t, id);
 //   flight.hand_over(gone.id, heir.id, heir.T_MB.inverse() * gone.T_MB);
-//   Trajectory in_map = flight.corrected(map, trajectory_in_W);
+//   Trajectory<M> in_map = flight.corrected(map, trajectory_in_W);
 #pragma once
 
 #include <vector>
