@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/euroc_frames.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+std::vector<ImageRow> at_ms(std::initializer_list<int> stamps) {
+  std::vector<ImageRow> rows;
+  for (int ms : stamps) rows.push_back({Time{ms * kMs}, std::to_string(ms)});
+  return rows;
+}
+
+TEST(PairFrames, TakesTheNearestWithinTheTolerance) {
+  const PairedFrames p = pair_frames(at_ms({0, 50, 100, 150}), at_ms({1, 49, 104, 151}), Duration{3 * kMs});
+  ASSERT_EQ(p.frames.size(), 4u) << "every left image is a frame";
+  EXPECT_EQ(p.frames[0].right_file, "1");
+  EXPECT_EQ(p.frames[1].right_file, "49");
+  EXPECT_EQ(p.frames[2].right_file, "") << "4 ms are too much";
+  EXPECT_EQ(p.frames[3].right_file, "151");
+  EXPECT_EQ(p.left_only, 1);
+  EXPECT_EQ(p.right_only, 1);
+}
+
+TEST(PairFrames, ARightImageServesOnce) {
+  const PairedFrames p = pair_frames(at_ms({0, 2, 100, 200, 300}), at_ms({1}), Duration{3 * kMs});
+  EXPECT_EQ(p.left_only, 4);
+  EXPECT_EQ(p.right_only, 0);
+}
+
+TEST(PairFrames, HalfTheIntervalBoundsAGenerousTolerance) {
+  // Right is late by 30 of 50 ms: it belongs to the next left image, not to the one before.
+  const PairedFrames p = pair_frames(at_ms({0, 50, 100}), at_ms({30, 80, 130}), Duration{1000 * kMs});
+  EXPECT_EQ(p.frames[0].right_file, "");
+  EXPECT_EQ(p.frames[1].right_file, "30");
+  EXPECT_EQ(p.frames[2].right_file, "80");
+  EXPECT_EQ(p.right_only, 1);
+}
+
+TEST(PairFrames, OneSideMayBeEmpty) {
+  EXPECT_EQ(pair_frames(at_ms({0, 50}), {}, Duration{kMs}).left_only, 2);
+  EXPECT_EQ(pair_frames({}, at_ms({0, 50}), Duration{kMs}).right_only, 2);
+}
+
+TEST(MeasureIntervals, MedianIsTheRateAndTheLongestIsFound) {
+  const Intervals i = measure_intervals({Time{0}, Time{50 * kMs}, Time{100 * kMs}, Time{400 * kMs}, Time{450 * kMs}});
+  EXPECT_EQ(i.median.ns, 50 * kMs);
+  EXPECT_DOUBLE_EQ(i.rate_hz, 20);
+  EXPECT_EQ(i.longest.ns, 300 * kMs);
+  EXPECT_EQ(i.longest_start.ns, 100 * kMs);
+  EXPECT_EQ(measure_intervals({Time{5}}).rate_hz, 0);
+}
+
+TEST(ImageRows, NamesThatLeadOutOfTheFolderAreRefused) {
+  const auto rows = read_image_rows("1,a.png\n2,../../etc/passwd\n3,/etc/passwd\n4,b.png\n5,c.png\n", "cam0/data.csv");
+  ASSERT_TRUE(rows) << rows.error().message;
+  ASSERT_EQ(rows->rows.size(), 3u);
+  EXPECT_EQ(rows->rows[1].file, "b.png");
+  EXPECT_EQ(rows->counts.first_bad, "cam0/data.csv:2: '../../etc/passwd' is not the name of an image file");
+}
+
+TEST(ImuRows, GyroComesBeforeTheAccelerometer) {
+  ImuRowParser parse;
+  ImuSample sample;
+  std::string problem;
+  ASSERT_EQ(parse("7, 1,2,3, 4,5,6", sample, problem), RowVerdict::good);
+  EXPECT_EQ(sample.t.ns, 7);
+  EXPECT_EQ(sample.gyro_radps, Vec3(1, 2, 3));
+  EXPECT_EQ(sample.accel_mps2, Vec3(4, 5, 6));
+  EXPECT_EQ(parse("7,1,2,3,4,5", sample, problem), RowVerdict::malformed);
+  EXPECT_EQ(problem, "6 columns where 7 are needed");
+  EXPECT_EQ(parse("7,1,2,3,4,5,inf", sample, problem), RowVerdict::not_finite);
+}
+
+}  // namespace
+}  // namespace fbvins
