@@ -50,7 +50,7 @@ Result<TrajectoryFile> read_trajectory(const std::string& path);
 class TumWriter {
  public:
   static Result<TumWriter> create(const std::string& path);
-  template <class Frame>
+  template <class Frame = W>
   void write(Time t, const Pose<Frame, B>& T) {
     write(t, T.q, T.p);
   }
