@@ -23,7 +23,7 @@ inline Trajectory<AnyWorld> flight(int n) {
   return trajectory;
 }
 
-inline Trajectory<AnyWorld> noisy(Trajectory<W> trajectory, double sigma_m, double sigma_rad, std::uint64_t seed) {
+inline Trajectory<AnyWorld> noisy(Trajectory<AnyWorld> trajectory, double sigma_m, double sigma_rad, std::uint64_t seed) {
   Rng rng(seed);
   for (StampedPose<AnyWorld>& pose : trajectory) {
     const Vec3 dp = normal3(rng, sigma_m);
