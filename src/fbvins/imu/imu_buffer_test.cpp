@@ -112,7 +112,6 @@ TEST(ImuBuffer, MemoryIsBounded) {
   for (int k = 0; k < 1000; ++k) buffer.push(ramp(5.0 * k));
   EXPECT_LE(buffer.size(), 100);
   EXPECT_EQ(buffer.size() + buffer.counts().overflow, 1000);
-  EXPECT_TRUE(validate(options).ok());
 }
 
 TEST(ImuBuffer, DropsWhatNoLaterSegmentNeeds) {
