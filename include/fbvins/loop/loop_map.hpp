@@ -28,9 +28,9 @@ namespace fbvins {
 class LoopCloser;
 
 struct MapOptions {
-  std::string file;        ///< a map to find oneself in and go on with; empty: a new one, in which M begins where W does
-  std::string vocabulary;  ///< words, instead of those that ship
-  bool boosted = false;    ///< a new map of descriptors that the network improves; an old map knows its kind itself
+  std::string file = {};        ///< a map to find oneself in and go on with; empty: a new one, in which M begins where W does
+  std::string vocabulary = {};  ///< words, instead of those that ship
+  bool boosted = false;         ///< a new map of descriptors that the network improves; an old map knows its kind itself
   LoopOptions loop = {};
 };
 

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "fbvins/loop/feature_tracks.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
@@ -37,19 +36,6 @@ double error_m(const Mapped& m) {
   for (std::size_t i = 0; i < m.map.size(); ++i)
     sum += (T0 * (T_B0_M * m.map.keyframes()[i].T_MB).p - m.frames[i].truth.p).squaredNorm();
   return std::sqrt(sum / static_cast<double>(m.map.size()));
-}
-
-TEST(FeatureTracks, HoldOneFeatureAKeyframeAndReachAcrossLoops) {
-  const Mapped m = mapped(5);
-  const auto tracks = feature_tracks(m.map, {}, 3, 8.0);
-  ASSERT_GT(tracks.size(), 500u);
-  std::size_t across = 0;
-  for (const FeatureTrack& t : tracks) {
-    ASSERT_GE(t.size(), 2u);
-    for (std::size_t i = 1; i < t.size(); ++i) ASSERT_LT(t[i - 1].keyframe, t[i].keyframe);
-    across += t.back().keyframe - t.front().keyframe > 80;
-  }
-  EXPECT_GT(across, 50u) << "no track joins the two rounds";
 }
 
 TEST(FinalAdjustment, MakesTheMapBetterThanTheGraph) {

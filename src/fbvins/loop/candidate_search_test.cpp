@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/candidate_search.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+constexpr int kWords = 10;
+const Pose<B, C0> kForward(so3_exp(Vec3(0, 1.5707963267948966, 0)), Vec3::Zero());  // the camera looks along the body's x
+
+class Search : public testing::Test {
+ protected:
+  KeyframeId add(double t_s, const Vec3& p, double yaw_rad, float similarity, std::uint32_t session = 0) {
+    MapKeyframe k;
+    k.t = Time{} + Duration::from_seconds(t_s);
+    k.session = session;
+    k.T_MB = {so3_exp(Vec3(0, 0, yaw_rad)), p};
+    const BowVector words{{0, similarity}, {1, 1 - similarity}};
+    const KeyframeId id = map_.add(std::move(k));
+    search_.add(id, words);
+    return id;
+  }
+  static MapKeyframe query(double t_s) {
+    MapKeyframe q;
+    q.t = Time{} + Duration::from_seconds(t_s);
+    q.place.words = {{0, 1.0f}};
+    return q;
+  }
+
+  PlaceMap map_;
+  CandidateSearch search_{kWords, kForward, 4.0};
+};
+
+TEST_F(Search, FindsTheMostSimilarOnesAroundHereThatLookTheSameWay) {
+  const KeyframeId good = add(0, Vec3(1, 0, 0), 0.3, 0.5f), better = add(10, Vec3(0, 2, 0), -0.5, 0.9f);
+  add(20, Vec3(4.5, 0, 0), 0, 0.9f);                      // too far
+  add(30, Vec3(0, 0, 0), 1.3, 0.9f);                      // looks elsewhere
+  const KeyframeId young = add(99, Vec3(0, 0, 0), 0, 1);  // the odometry's business
+  EXPECT_EQ(search_.around(map_, query(100), 0), (std::vector{better, good}));
+  EXPECT_EQ(search_.around(map_, query(200), 0), (std::vector{young, better, good}));
+}
+
+TEST_F(Search, ReachesFartherWhereThePositionIsVague) {
+  const KeyframeId far = add(0, Vec3(6, 0, 0), 0, 0.5f);
+  EXPECT_TRUE(search_.around(map_, query(100), 0.5).empty());
+  EXPECT_EQ(search_.around(map_, query(100), 1.0), std::vector{far});
+}
+
+TEST_F(Search, NeighboursInTimeAreOnePlaceOfThreeAtMost) {
+  for (int place = 0; place < 5; ++place)
+    for (int i = 0; i < 3; ++i) add(10 * place + 0.5 * i, Vec3(0, 0, 0), 0, 0.9f - 0.1f * static_cast<float>(place));
+  const auto found = search_.around(map_, query(100), 0);
+  ASSERT_EQ(found.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(found[i].value / 3, static_cast<std::int64_t>(i));
+}
+
+TEST_F(Search, AnywhereNeighboursSpeakForAPlace) {
+  const KeyframeId alone = add(0, Vec3(50, 0, 0), 2, 0.6f);
+  const KeyframeId first = add(10, Vec3(90, 0, 0), 2, 0.5f);
+  add(10.5, Vec3(90, 0, 0), 2, 0.5f);
+  add(11, Vec3(90, 0, 0), 2, 0.5f);
+  EXPECT_EQ(search_.anywhere(map_, query(100)), (std::vector{first, alone}));
+  map_.find(alone)->placed = false;
+  EXPECT_EQ(search_.anywhere(map_, query(100)), std::vector{first});
+}
+
+TEST_F(Search, WhatIsRemovedIsNotFound) {
+  const KeyframeId id = add(0, Vec3(0, 0, 0), 0, 0.5f);
+  search_.remove(id, {{0, 0.5f}, {1, 0.5f}});
+  EXPECT_TRUE(search_.around(map_, query(100), 0).empty());
+  EXPECT_TRUE(search_.anywhere(map_, query(100)).empty());
+}
+
+}  // namespace
+}  // namespace fbvins

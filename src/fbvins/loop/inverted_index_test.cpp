@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/inverted_index.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kWords = 50;
+
+/// Words of one image, weights of sum 1.
+BowVector image(Rng& rng) {
+  BowVector bow;
+  float sum = 0;
+  for (std::int32_t w = 0; w < kWords; ++w)
+    if (rng.below(3) == 0) bow.push_back({w, static_cast<float>(rng.uniform(0.1, 1))}), sum += bow.back().weight;
+  for (BowEntry& e : bow) e.weight /= sum;
+  return bow;
+}
+
+TEST(InvertedIndex, SaysWhatComparingWithEveryImageSays) {
+  Rng rng(1);
+  InvertedIndex index(kWords);
+  std::vector<BowVector> images;
+  for (int i = 0; i < 40; ++i) images.push_back(image(rng)), index.add(KeyframeId{i}, images.back());
+  const BowVector query = image(rng);
+  const auto hits = index.query(query, 100);
+  ASSERT_EQ(hits.size(), 40u);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    EXPECT_NEAR(hits[i].similarity, bow_similarity(query, images[static_cast<std::size_t>(hits[i].keyframe.value)]), 1e-5);
+    EXPECT_GE(hits[i == 0 ? 0 : i - 1].similarity, hits[i].similarity);
+  }
+  EXPECT_EQ(index.query(query, 3).size(), 3u);
+  EXPECT_EQ(index.query(query, 3)[0].keyframe, hits[0].keyframe) << "nothing stays behind from the query before";
+}
+
+TEST(InvertedIndex, EqualOnesComeInOrderOfId) {
+  InvertedIndex index(kWords);
+  for (const int id : {7, 2, 5}) index.add(KeyframeId{id}, {{3, 1.0f}});
+  const auto hits = index.query({{3, 1.0f}}, 10);
+  ASSERT_EQ(hits.size(), 3u);
+  EXPECT_EQ(hits[0].keyframe, KeyframeId{2});
+  EXPECT_EQ(hits[1].keyframe, KeyframeId{5});
+  EXPECT_EQ(hits[2].keyframe, KeyframeId{7});
+}
+
+TEST(InvertedIndex, LeavesOutWhatIsNotAllowedOrNotThere) {
+  InvertedIndex index(kWords);
+  const BowVector words{{1, 0.5f}, {4, 0.5f}};
+  for (int id = 0; id < 3; ++id) index.add(KeyframeId{id}, words);
+  index.remove(KeyframeId{1}, words);
+  const auto hits = index.query(words, 10, [](KeyframeId k) { return k != KeyframeId{0}; });
+  ASSERT_EQ(hits.size(), 1u);
+  EXPECT_EQ(hits[0].keyframe, KeyframeId{2});
+  EXPECT_TRUE(index.query({{9, 1.0f}}, 10).empty());
+  EXPECT_TRUE(index.query({}, 10).empty());
+}
+
+}  // namespace
+}  // namespace fbvins

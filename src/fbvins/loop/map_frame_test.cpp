@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace fbvins {
+namespace {
+
+Pose<W, B> body_at(const Vec3& p) { return {Quat::Identity(), p}; }
+
+TEST(DriftOver, GrowsWithTheRootOfThePathAndALittleAtRest) {
+  const DriftOptions drift{.position_m = 0.01, .yaw_rad = 0.002};
+  EXPECT_NEAR(drift_over(drift, 4, 0).position_m2, 4 * 0.01 * 0.01, 1e-12);
+  EXPECT_NEAR(drift_over(drift, 4, 0).yaw_rad2, 4 * 0.002 * 0.002, 1e-12);
+  EXPECT_GT(drift_over(drift, 0, 1).position_m2, 0);
+  EXPECT_GT(drift_over(drift, 0, 1).yaw_rad2, 0);
+  EXPECT_LT(drift_over(drift, 0, 1).position_m2, drift_over(drift, 1, 0).position_m2);
+}
+
+TEST(Yaw, IsTheTurnAboutZ) {
+  for (const double yaw : {-3.0, -0.4, 0.0, 1.2, 3.1}) EXPECT_NEAR(yaw_of(about_z(yaw)), yaw, 1e-12);
+  EXPECT_LT((about_z(std::numbers::pi / 2) * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-12);
+}
+
+TEST(MapFrame, IsUnknownUntilItIsSetAndKeepsYawAndPositionOnly) {
+  MapFrame frame({});
+  EXPECT_FALSE(frame.known());
+  frame.reset({so3_exp(Vec3(0.1, 0, 0)) * about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
+  EXPECT_TRUE(frame.known());
+  EXPECT_NEAR((frame.T_MW().q * Vec3::UnitZ()).z(), 1, 1e-12);
+  EXPECT_LT((frame.T_MW().p - Vec3(1, 2, 3)).norm(), 1e-12);
+  frame.forget();
+  EXPECT_FALSE(frame.known());
+}
+
+TEST(MapFrame, FlyingWidensAndAPlaceNarrows) {
+  MapFrame frame({.position_m = 0.01, .yaw_rad = 0.002});
+  frame.advance(body_at(Vec3::Zero()), Time{0});
+  frame.reset({}, 0.01, 0.001);
+  const Mat4 before = frame.covariance();
+  frame.advance(body_at(Vec3(9, 0, 0)), Time{1'000'000'000});
+  const Mat4 flown = frame.covariance();
+  EXPECT_GT(flown(0, 0), before(0, 0) + 8 * 0.01 * 0.01);
+  EXPECT_GT(flown(1, 1), flown(0, 0)) << "the yaw swings the step sideways";
+  EXPECT_NEAR(flown(1, 3), 9 * before(3, 3), 1e-6) << "and the two errors hang together";
+  SeenPose seen{{about_z(0.01), Vec3(9, 0.05, 0)}, 1e-4 * Mat4::Identity()};
+  const double far = frame.mahalanobis2(seen);
+  frame.update(seen);
+  EXPECT_LT(frame.mahalanobis2(seen), far);
+  for (int i = 0; i < 4; ++i) EXPECT_LT(frame.covariance()(i, i), flown(i, i));
+  const Vec3 p = frame.T_MW() * Vec3(9, 0, 0);
+  EXPECT_GT(p.y(), 0.02);
+  EXPECT_LT(p.y(), 0.05);
+}
+
+TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
+  MapFrame frame({});
+  frame.advance(body_at(Vec3::Zero()), Time{0});
+  frame.reset({}, 0.3, 0.02);
+  SeenPose seen{{Quat::Identity(), Vec3(0.5, 0, 0)}, Mat4::Zero()};
+  seen.covariance.diagonal() << 0.16, 0.16, 0.16, 1e-4;  // 0.09 + 0.16 = 0.25
+  EXPECT_NEAR(frame.mahalanobis2(seen), 1, 1e-9);
+}
+
+TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
+  MapFrameFollower follower(0.2, 0.05);
+  const Pose<W, B> T_WB(Quat::Identity(), Vec3(30, 0, 0));  // far from the origin: yaw must not swing the body
+  (void)follower.follow({}, T_WB, Time{0});
+  const Pose<M, W> target(so3_exp(Vec3(0, 0, 0.05)), Vec3(0.5, -1, 0));
+  Vec3 before = T_WB.p;
+  for (int i = 1; i <= 200; ++i) {
+    const Vec3 now = follower.follow(target, T_WB, Time{i * 100'000'000LL}) * T_WB.p;
+    EXPECT_LE((now - before).norm(), 0.2 * 0.1 + 1e-9);
+    before = now;
+  }
+  EXPECT_NEAR((before - target * T_WB.p).norm(), 0, 1e-9);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/map_merge.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/test_room.hpp"
+
+namespace fbvins {
+namespace {
+
+using namespace test_room;
+
+TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
+  const auto map_of = [](std::uint64_t world, std::uint64_t seed, double start_s) {
+    LoopCloser closer(rig(), {}, vocabulary());
+    for (const Frame& f : flight(room(world), 120, 0.001, 0.01, seed, start_s))
+      closer.process(f.place, FrameId{f.t.ns / 1000}, f.t, f.odometry, 0);
+    closer.finish();
+    return closer.map();
+  };
+  const PlaceMap a = map_of(1, 2, 0), b = map_of(1, 3, 9), stranger = map_of(7, 4, 0);
+  const auto both = merge_maps(a, b, {}, vocabulary());
+  ASSERT_TRUE(both.ok()) << both.error().message;
+  EXPECT_EQ(both->size(), a.size() + b.size());
+  // The second flight's frame is its own: only distances between keyframes of both tell.
+  const auto truth_a = flight(room(1), 120, 0, 0, 2, 0), truth_b = flight(room(1), 120, 0, 0, 3, 9);
+  const Vec3 measured = both->keyframes()[a.size() + 50].T_MB.p - both->keyframes()[60].T_MB.p;
+  EXPECT_NEAR(measured.norm(), (truth_b[50].truth.p - truth_a[60].truth.p).norm(), 0.05);
+  EXPECT_FALSE(merge_maps(a, stranger, {}, vocabulary()).ok());
+  const std::string bytes = serialise_map(b);
+  const auto from_file = merge_maps(a, *parse_map(std::as_bytes(std::span(bytes)), "b"), {}, vocabulary());
+  ASSERT_TRUE(from_file.ok()) << "words are not kept in files";
+  EXPECT_EQ(serialise_map(*from_file), serialise_map(*both));
+  PlaceMap boosted = b;
+  boosted.boosted = true;
+  EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
+}
+
+}  // namespace
+}  // namespace fbvins

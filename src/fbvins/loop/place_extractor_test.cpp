@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// A textured wall parallel to the images: every feature of it lies at one depth.
+#include "fbvins/loop/place_extractor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "fbvins/features/noise_texture.hpp"
+#include "fbvins/loop/test_room.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kDepth_m = 3;
+
+std::shared_ptr<const Image> wall(double shift_px) {
+  static const NoiseTexture texture(3);
+  return std::make_shared<Image>(render_texture(
+      752, 480, texture, [&](const Vec2& p) { return Vec2(p + Vec2(shift_px, 0)); }, 128, 40));
+}
+
+StereoFrame before_the_wall() {
+  StereoFrame frame;
+  frame.left = wall(0);
+  frame.right = wall(test_room::kFocal * test_room::kBaseline / kDepth_m);
+  return frame;
+}
+
+PlaceExtractor extractor(int max_features = 200) {
+  return PlaceExtractor(test_room::rig(), {.max_features = max_features}, test_room::vocabulary());
+}
+
+TEST(PlaceExtractor, FindsTheDepthOfAWall) {
+  const Place place = extractor().extract(before_the_wall(), Mat3::Identity());
+  ASSERT_GT(place.size(), 100u);
+  EXPECT_LE(place.size(), 200u);
+  EXPECT_EQ(place.descriptors.size(), place.size());
+  EXPECT_FALSE(place.words.empty());
+  EXPECT_NEAR(place.focal_px, test_room::kFocal, 1e-9);
+  int with_depth = 0, right = 0;
+  for (const PlaceFeature& f : place.features) {
+    with_depth += f.has_depth();
+    right += f.has_depth() && std::abs(f.inverse_depth - 1 / kDepth_m) < 3 * f.sigma_inverse_depth;
+  }
+  EXPECT_GT(with_depth, static_cast<int>(place.size()) / 2);
+  EXPECT_GT(right, 0.95 * with_depth);
+}
+
+TEST(PlaceExtractor, KnowsUpFromTheAttitude) {
+  const Quat R_WB = so3_exp(Vec3(0.3, -0.2, 1.0));
+  const Place place = extractor().extract({}, R_WB.toRotationMatrix());
+  EXPECT_LT((R_WB * (test_room::rig().T_BC0.q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);
+}
+
+TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing) {
+  StereoFrame frame = before_the_wall();
+  frame.right = nullptr;
+  const Place place = extractor().extract(frame, Mat3::Identity());
+  EXPECT_GT(place.size(), 100u);
+  EXPECT_TRUE(std::none_of(place.features.begin(), place.features.end(), [](const PlaceFeature& f) { return f.has_depth(); }));
+  EXPECT_EQ(extractor().extract({}, Mat3::Identity()).size(), 0u);
+}
+
+TEST(PlaceExtractor, SameImagesSameBits) {
+  PlaceExtractor used = extractor(), fresh = extractor();
+  const StereoFrame frame = before_the_wall();
+  (void)used.extract(frame, Mat3::Identity());
+  EXPECT_EQ(used.extract(frame, Mat3::Identity()).features, fresh.extract(frame, Mat3::Identity()).features);
+}
+
+}  // namespace
+}  // namespace fbvins
