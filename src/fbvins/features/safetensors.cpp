@@ -17,15 +17,19 @@ namespace {
 
 constexpr std::uint64_t kLargestHeader = 1u << 20;
 constexpr std::uint64_t kLargestNumber = std::uint64_t{1} << 40;
+constexpr int kDeepest = 3;  ///< a number in a list of an entry of the header
 using Json = nlohmann::json;
 
 Error damaged(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
 
-/// Refuses what JSON leaves open: a name given twice.
+/// Refuses what JSON leaves open: a name given twice, and nesting without end, which is costly to hold.
 Result<Json> parse_header(std::string_view text) {
   std::vector<std::set<std::string>> open_objects;  ///< the names in each
   std::optional<std::string> twice;
-  const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
+  bool too_deep = false;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    too_deep = too_deep || depth > kDeepest;
+    if (too_deep) return false;  // nothing below is kept
     if (event == Json::parse_event_t::object_start) open_objects.emplace_back();
     else if (event == Json::parse_event_t::object_end) open_objects.pop_back();
     else if (event == Json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second && !twice)
@@ -34,6 +38,7 @@ Result<Json> parse_header(std::string_view text) {
   };
   try {
     Json header = Json::parse(text.begin(), text.end(), watch);
+    if (too_deep) return damaged("the header is nested too deeply");
     if (twice) return damaged(fmt::format("\"{}\" appears twice in the header", *twice));
     if (!header.is_object() || header.empty()) return damaged("the header names no tensors");
     return header;
