@@ -230,12 +230,13 @@ Result<PlaceMap> load_map(const std::string& path) {
 }
 
 std::string map_as_ply(const PlaceMap& map) {
+  constexpr float kMaxRelativeSigma = 0.1f;  // of a depth worth looking at
   std::string points;
   std::size_t count = 0;
   for (const MapKeyframe& k : map.keyframes()) {
     const Pose<M, C0> T_MC = k.T_MB * map.T_BC0;
     for (const PlaceFeature& f : k.place.features) {
-      if (!f.has_point() || f.sigma_inverse_depth > 0.1f * f.inverse_depth) continue;
+      if (!f.has_point() || f.sigma_inverse_depth > kMaxRelativeSigma * f.inverse_depth) continue;
       const Vec3 p = T_MC * f.p_C0();
       const int grey = std::clamp(static_cast<int>(255 * std::min(1.0f, f.inverse_depth)), 40, 255);
       fmt::format_to(std::back_inserter(points), "{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), grey, grey, grey);

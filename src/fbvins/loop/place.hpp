@@ -20,7 +20,10 @@ struct PlaceFeature {
 
   bool has_depth() const { return inverse_depth >= 0; }
   /// Far enough from infinity to be a point.
-  bool has_point() const { return inverse_depth > 1e-3f && sigma_inverse_depth < 0.5f * inverse_depth; }
+  bool has_point() const {
+    constexpr float kFarthest_1pm = 1e-3f, kMaxRelativeSigma = 0.5f;
+    return inverse_depth > kFarthest_1pm && sigma_inverse_depth < kMaxRelativeSigma * inverse_depth;
+  }
   Vec2 xy() const { return {x, y}; }
   /// In C0, m; only with has_point().
   Vec3 p_C0() const { return Vec3(x, y, 1) / inverse_depth; }
