@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Install and export. A downstream project says find_package(fbvins COMPONENTS core io loop sim) and links fbvins::<component>,
+# Install and export. A downstream project says find_package(fbvins COMPONENTS core io loop live sim) and links fbvins::<component>,
 # or fbvins::fbvins for all that it found. The same names serve in a project that takes this one by add_subdirectory.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)

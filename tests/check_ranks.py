@@ -18,7 +18,7 @@ RANKS = {
     "imu": 3, "features": 3, "io": 3, "eval": 3, "mavlink": 3, "web": 3,
     "frontend": 4, "estimator": 4, "loop": 4, "sim": 4,
     "pipeline": 5,
-    "config": 6,
+    "config": 6, "live": 6,
     "experiment": 7,
 }
 # What makes and judges data lives in lab/, and nothing outside sees it.

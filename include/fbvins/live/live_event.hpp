@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a live system tells its sinks. Values; images are shared, not copied.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/image.hpp"
+#include "fbvins/types/imu.hpp"
+#include "fbvins/types/loop.hpp"
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+/// The body at an IMU reading: the newest estimate propagated to it. Without a pose (`health`) all but the times is void.
+struct LivePose {
+  Time t;                                   ///< of the reading, on the sensors' clock
+  Time host_t;                              ///< the same moment on this machine's CLOCK_MONOTONIC
+  Time estimate_t;                          ///< of the image whose estimate was propagated
+  Pose<W, B> T_WB;                          ///< converges to each new estimate without a step (LiveOptions::smoothing_s)
+  Vec3 v_WB = Vec3::Zero();                 ///< m/s, in W
+  Vec3 w_WB_B = Vec3::Zero();               ///< rad/s, in B, bias removed
+  Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
+  Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
+  Health health;                            ///< the estimator's, or what the watchdogs see since
+  std::uint32_t reset_counter = 0;          ///< +1 whenever W is a new frame
+};
+
+/// What became of the input since the start.
+struct LiveCounts {
+  std::int64_t imu = 0, images = 0;    ///< arrived
+  std::int64_t images_estimated = 0;   ///< of these, with an answer of the estimator
+  std::int64_t images_dropped = 0;     ///< because the stages were busy with older ones
+  std::int64_t images_incomplete = 0;  ///< one camera missing or frozen
+  std::int64_t imu_late = 0;           ///< too late to be put in order
+  std::int64_t imu_reordered = 0;      ///< came late, and were put in order
+  std::int64_t clock_leaps = 0;        ///< of a sensor's clock, mended
+  std::int64_t resets = 0;             ///< restarts of the estimator
+};
+
+/// Percentiles of a time over all frames or readings so far, ms.
+struct LatencySummary {
+  double p50_ms = 0, p99_ms = 0, max_ms = 0;
+  std::int64_t count = 0;
+};
+
+/// Whenever health changes, and once a second.
+struct LiveStatus {
+  Time t;       ///< newest stamp of any sensor
+  Time host_t;  ///< when this was said, on CLOCK_MONOTONIC
+  Health health;
+  std::uint32_t reset_counter = 0;
+  LiveCounts counts;
+  LatencySummary shutter_to_pose;  ///< from the image's stamp to the estimator's answer
+  LatencySummary pose_age;         ///< of the newest estimate, looked at with every IMU reading
+  std::string problem;             ///< of a sink or a source, in one sentence; empty: none
+};
+
+/// Sensor events are those that the estimator consumes, in its order.
+using LiveEvent = std::variant<ImuSample, StereoFrame, Odometry, LivePose, MapUpdate, LiveStatus>;
+
+}  // namespace fbvins

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// The odometry on live sensors: data in from any thread, the pose out at IMU rate, sinks that cannot hold it up.
+//
+//   Result<LiveSystem> live = LiveSystem::create(system_options, live_options, source->rig());
+//   if (!live) return report(live.error().message);
+//   live->add_sink(std::make_unique<Printer>());
+//   Result<void> end = source->run(live->input());   // in this thread; input() may be used by others as well
+//   Result<void> done = live->finish();
+//
+// An image that comes while older ones are being worked on waits; when the next one comes it is dropped and counted. IMU
+// readings are never dropped. Silent and frozen sensors and clocks that leap are seen by watchdogs, and the work goes on when
+// they are back (docs/live.md).
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/live/live_options.hpp"
+#include "fbvins/live/sink.hpp"
+#include "fbvins/live/source.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins {
+
+class LiveSystem {
+ public:
+  /// `clock_rate`: Source::clock_rate(). Errors as System::create.
+  static Result<LiveSystem> create(const SystemOptions& system, const LiveOptions& options, const StereoRig& rig,
+                                   double clock_rate = 1, SystemParts parts = {});
+  ~LiveSystem();
+  LiveSystem(LiveSystem&&) noexcept;
+  LiveSystem& operator=(LiveSystem&&) noexcept;
+
+  /// Before the first reading.
+  void add_sink(std::unique_ptr<Sink> sink);
+  /// What the frontend saw in an image, on its thread; before the first reading.
+  void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
+
+  SensorInput& input();
+  /// From any thread.
+  LiveStatus status() const;
+  /// Works off what is waiting, ends the sinks. The first failure of a stage, else the first of a sink.
+  Result<void> finish();
+
+ private:
+  struct Impl;
+  explicit LiveSystem(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a live system's results go: a file, a flight controller, a page. One class a destination:
+//
+//   struct Printer final : Sink {
+//     std::string_view name() const override { return "printer"; }
+//     Result<void> take(const LiveEvent& event) override {
+//       if (const auto* pose = std::get_if<LivePose>(&event)) fmt::print("{}\n", pose->T_WB.p.transpose());
+//       return {};
+//     }
+//   };
+//
+// Threads: each sink is called on a thread of its own, which nothing of the estimator waits for. A sink that is slower than
+// the events loses the oldest of those that wait; how many is told in the status.
+#pragma once
+
+#include <string_view>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/live_event.hpp"
+
+namespace fbvins {
+
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  /// For messages: "mavlink udp:127.0.0.1:14540".
+  virtual std::string_view name() const = 0;
+  /// An error is reported once; later events still come.
+  virtual Result<void> take(const LiveEvent& event) = 0;
+  /// The last call: close what is open.
+  virtual Result<void> finish() { return {}; }
+};
+
+}  // namespace fbvins

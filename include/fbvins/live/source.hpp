@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a live system's sensor data come from: a device, another process, a recording played in wall time.
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+/// What a source pushes into, from any threads, at the moment the data arrive. Stamps are the sensors' own; camera and IMU
+/// share one clock (StereoRig::time_offset_s is applied later). A camera that delivered nothing is a null pointer.
+class SensorInput {
+ public:
+  virtual ~SensorInput() = default;
+  virtual void push(const ImuSample& sample) = 0;
+  virtual void push(StereoFrame frame) = 0;
+};
+
+class Source {
+ public:
+  virtual ~Source() = default;
+  virtual const StereoRig& rig() const = 0;
+  /// Seconds of the sensors' clock in one second: other than 1 only where a recording is played faster or slower.
+  virtual double clock_rate() const { return 1; }
+  /// Delivers until the data end, the source fails for good, or stop(). Cables that come and go are its own business.
+  virtual Result<void> run(SensorInput& input) = 0;
+  /// From any thread: run() returns soon.
+  virtual void stop() = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pose at IMU rate: the newest estimate carried on with the readings since its image (eq. P5-P7), with its covariance.
+// A new estimate starts the propagation anew; what it moves the newest pose by is taken back with a time constant, so that the
+// output has no steps. After a restart of the estimator W is new, and the pose changes at once.
+//
+//   PosePropagator propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), 0.1);
+//   propagator.rebase(odometry);                  // whenever an image is estimated
+//   LivePose pose = propagator.add(reading);      // every reading, in order of time
+//
+// Threads: one owner.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "fbvins/imu/nav_state.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+class PosePropagator {
+ public:
+  /// time_offset: t_imu = t_image + offset.
+  PosePropagator(const ImuNoise& noise, Duration time_offset, double smoothing_s)
+      : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s) {}
+
+  void rebase(const Odometry& estimate);
+  /// The pose at this reading, with the health of the estimate beneath. Stamps must increase.
+  LivePose add(const ImuSample& reading);
+
+ private:
+  /// A state at a reading; `P` in the order of NavState.
+  struct Propagated {
+    NavState state;
+    Mat15 P = Mat15::Zero();
+  };
+
+  void advance(Propagated& p, const ImuSample& from, const ImuSample& to) const;
+  Propagated propagate_all(const Odometry& estimate) const;
+  void decay_offset(double dt_s);
+
+  ImuNoise noise_;
+  Duration time_offset_;
+  double smoothing_s_;
+  std::deque<ImuSample> readings_;  ///< from the last one at or before the estimate's image on
+  std::optional<Odometry> estimate_;
+  std::optional<Propagated> newest_;  ///< at readings_.back(); none while there is no pose
+  Vec15 offset_ = Vec15::Zero();      ///< published = newest (+) offset; biases have none
+};
+
+}  // namespace fbvins
