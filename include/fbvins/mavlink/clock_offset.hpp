@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far another machine's clock is ahead of this one's, from questions and answers (TIMESYNC).
+//
+//   offset.add(asked, their_time, answered);   // each answer
+//   if (offset.known()) stamp = host_time + offset.value();
+#pragma once
+
+#include <deque>
+
+#include "fbvins/core/time.hpp"
+
+namespace fbvins {
+
+/// An answer is taken to be given in the middle between question and answer. Queues on the way only ever add to the round
+/// trip, so of the newest answers the quicker half counts, and of it the median.
+class ClockOffset {
+ public:
+  /// `asked` and `answered` are of this machine's clock, `theirs` of the other.
+  void add(Time asked, Time theirs, Time answered);
+  bool known() const { return answers_.size() >= kEnough; }
+  /// Theirs less ours; only where known().
+  Duration value() const { return value_; }
+  /// How often the other clock leapt, as it does when that machine restarts.
+  int leaps() const { return leaps_; }
+
+ private:
+  struct Answer {
+    Duration offset, round_trip;
+  };
+  static constexpr std::size_t kEnough = 8, kKept = 32, kLeapAnswers = 3;
+  static constexpr Duration kLongestRoundTrip{200'000'000}, kLeap{30'000'000};
+
+  bool leapt(const Answer& answer) const;
+  std::deque<Answer> answers_, strays_;
+  Duration value_;
+  int leaps_ = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// MAVLink 2 frames: written whole, read from a stream that may begin anywhere and hold anything.
+//
+//   MavlinkDecoder decoder;
+//   for (const MavlinkFrame& frame : decoder.push(bytes_from_the_cable))
+//     if (const auto* beat = std::get_if<HeartbeatMessage>(&frame.message)) ...
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fbvins/mavlink/messages.hpp"
+
+namespace fbvins {
+
+/// Who speaks: the vehicle's system number, and MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY.
+struct MavlinkAddress {
+  std::uint8_t system = 1, component = 197;
+  bool operator==(const MavlinkAddress&) const = default;
+};
+
+/// One frame, unsigned; zeros at the payload's end are left out as the protocol demands.
+std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkAddress from, std::uint8_t sequence);
+
+struct MavlinkFrame {
+  MavlinkAddress from;
+  std::uint8_t sequence = 0;
+  MavlinkMessage message;
+};
+
+/// Reads MAVLink 2 and 1, as flight controllers begin with 1 until they are spoken to. Messages that are not of
+/// MavlinkMessage are skipped without a look at their checksum, which takes their definition. Signatures are not checked.
+class MavlinkDecoder {
+ public:
+  struct Counts {
+    std::int64_t frames = 0;        ///< returned
+    std::int64_t skipped = 0;       ///< of other messages
+    std::int64_t bad_checksum = 0;  ///< looked like a frame
+    std::int64_t noise_bytes = 0;   ///< not of any frame
+  };
+
+  /// The frames that end within these bytes, in order. What begins a frame is kept for the next call: at most 300 bytes.
+  std::vector<MavlinkFrame> push(std::span<const std::uint8_t> bytes);
+  const Counts& counts() const { return counts_; }
+
+ private:
+  std::size_t step(std::span<const std::uint8_t> bytes, std::vector<MavlinkFrame>& frames);
+  std::vector<std::uint8_t> pending_;
+  Counts counts_;
+};
+
+}  // namespace fbvins

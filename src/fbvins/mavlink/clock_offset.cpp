@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/mavlink/clock_offset.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+namespace fbvins {
+
+/// Further off than an answer that was held up on one way alone could be.
+bool ClockOffset::leapt(const Answer& answer) const {
+  const std::int64_t off = std::abs((answer.offset - value_).ns);
+  return off > answer.round_trip.ns / 2 + kLeap.ns;
+}
+
+void ClockOffset::add(Time asked, Time theirs, Time answered) {
+  Answer answer;
+  answer.round_trip = answered - asked;
+  if (answer.round_trip.ns < 0 || answer.round_trip > kLongestRoundTrip) return;
+  answer.offset = theirs - Time{asked.ns + answer.round_trip.ns / 2};
+
+  if (!answers_.empty() && leapt(answer)) {
+    strays_.push_back(answer);
+    if (strays_.size() < kLeapAnswers) return;
+    answers_ = std::exchange(strays_, {});
+    ++leaps_;
+  } else {
+    strays_.clear();
+    answers_.push_back(answer);
+    if (answers_.size() > kKept) answers_.pop_front();
+  }
+
+  std::vector<Answer> quick(answers_.begin(), answers_.end());
+  std::sort(quick.begin(), quick.end(), [](const Answer& a, const Answer& b) { return a.round_trip < b.round_trip; });
+  quick.resize((quick.size() + 1) / 2);
+  const auto middle = quick.begin() + static_cast<std::ptrdiff_t>(quick.size() / 2);
+  std::nth_element(quick.begin(), middle, quick.end(), [](const Answer& a, const Answer& b) { return a.offset < b.offset; });
+  value_ = middle->offset;
+}
+
+}  // namespace fbvins

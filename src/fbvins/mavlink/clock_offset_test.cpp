@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/mavlink/clock_offset.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+/// A cable with 1 ms each way, on which one of five questions or answers is held up by up to 30 ms.
+struct Cable {
+  Rng rng{5};
+  Time now{1'000'000 * kMs};
+
+  std::int64_t way_ns() {
+    return kMs + static_cast<std::int64_t>(rng.below(5) == 0 ? rng.below(30'000'000) : rng.below(100'000));
+  }
+  void ask(ClockOffset& offset, Duration ahead) {
+    const Time asked = now, theirs = asked + Duration{way_ns()} + ahead, answered = theirs - ahead + Duration{way_ns()};
+    offset.add(asked, theirs, answered);
+    now = now + Duration{100 * kMs};
+  }
+};
+
+TEST(ClockOffset, IsKnownToATenthOfAMillisecondInSpiteOfQueues) {
+  Cable cable;
+  ClockOffset offset;
+  const Duration ahead{-123'456'789'012};
+  int asked = 0;
+  for (; !offset.known(); ++asked) cable.ask(offset, ahead);
+  EXPECT_EQ(asked, 8);
+  for (int i = 0; i < 200; ++i) {
+    cable.ask(offset, ahead);
+    if (i > 10) EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 10);
+  }
+  EXPECT_EQ(offset.leaps(), 0);
+}
+
+TEST(ClockOffset, FollowsADrift) {
+  Cable cable;
+  ClockOffset offset;
+  Duration ahead{5 * kMs};
+  for (int i = 0; i < 600; ++i) cable.ask(offset, ahead = ahead + Duration{5'000});  // 50 ppm
+  EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 5);
+}
+
+TEST(ClockOffset, ALeapIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) {
+  Cable cable;
+  ClockOffset offset;
+  for (int i = 0; i < 40; ++i) cable.ask(offset, Duration{5'000'000 * kMs});
+  const Duration restarted{-7'000 * kMs};
+  for (int i = 0; i < 2; ++i) cable.ask(offset, restarted);
+  EXPECT_TRUE(offset.known());
+  cable.ask(offset, restarted);
+  EXPECT_FALSE(offset.known());
+  EXPECT_EQ(offset.leaps(), 1);
+  for (int i = 0; i < 10; ++i) cable.ask(offset, restarted);
+  EXPECT_TRUE(offset.known());
+  EXPECT_LT(std::abs((offset.value() - restarted).ns), kMs);
+}
+
+TEST(ClockOffset, AnswersBeforeTheirQuestionOrLongAfterSayNothing) {
+  ClockOffset offset;
+  for (int i = 0; i < 20; ++i) {
+    offset.add(Time{1000}, Time{5000}, Time{900});
+    offset.add(Time{1000}, Time{5000}, Time{1'000'000'000});
+  }
+  EXPECT_FALSE(offset.known());
+}
+
+}  // namespace
+}  // namespace fbvins

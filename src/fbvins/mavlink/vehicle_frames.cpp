@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/mavlink/vehicle_frames.hpp"
+
+#include <numbers>
+
+namespace fbvins {
+namespace {
+
+const Quat kHalfTurnAboutX(0, 1, 0, 0);  // between z up and z down
+
+Mat3 columns(const Vec3& x, const Vec3& y, const Vec3& z) {
+  Mat3 R;
+  R << x, y, z;
+  return R;
+}
+
+/// Columns: where the IMU's axes look, in forward-right-down.
+Mat3 axes(ImuAxes imu_axes) {
+  const Vec3 forward(1, 0, 0), right(0, 1, 0), down(0, 0, 1);
+  switch (imu_axes) {
+    case ImuAxes::frd: break;
+    case ImuAxes::flu: return columns(forward, -right, -down);
+    case ImuAxes::camera_fwd: return columns(right, down, forward);
+    case ImuAxes::camera_down: return columns(right, -forward, down);
+  }
+  return columns(forward, right, down);
+}
+
+double heading_rad(const Quat& q) {
+  const Mat3 R = q.toRotationMatrix();
+  return std::atan2(R(1, 0), R(0, 0));
+}
+
+}  // namespace
+
+Pose<BodyFrd, B> mounting(const MountingOptions& options) {
+  const Quat turn =
+      so3_exp(Vec3(0, 0, options.yaw_rad)) * so3_exp(Vec3(0, options.pitch_rad, 0)) * so3_exp(Vec3(options.roll_rad, 0, 0));
+  return {Quat(turn * Quat(axes(options.imu_axes))).normalized(), Vec3(options.x_m, options.y_m, options.z_m)};
+}
+
+VehicleFrames::VehicleFrames(const MountingOptions& options)
+    : heading_(options.heading), T_BF_(mounting(options).inverse()), q_LW_(kHalfTurnAboutX) {}
+
+std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
+  const bool finite = odometry.T_WB.p.allFinite() && odometry.T_WB.q.coeffs().allFinite() && odometry.v_WB.allFinite() &&
+                      odometry.w_WB_B.allFinite();
+  if (!odometry.health.has_pose() || !finite) return std::nullopt;
+  const Pose<W, BodyFrd> T_WF = odometry.T_WB * T_BF_;
+  if (reset_counter_ != odometry.reset_counter) {
+    reset_counter_ = odometry.reset_counter;
+    const double start_rad = heading_ == LocalHeading::vehicle ? heading_rad(kHalfTurnAboutX * T_WF.q) : 0.0;
+    q_LW_ = so3_exp(Vec3(0, 0, -start_rad)) * kHalfTurnAboutX;
+  }
+
+  const Mat3 R_LW = q_LW_.toRotationMatrix(), R_WB = odometry.T_WB.R(), R_FW = T_WF.R().transpose();
+  VehicleState state;
+  state.T_LF = Pose<LocalFrd, W>(q_LW_, Vec3::Zero()) * T_WF;
+  state.v_LF_F = R_FW * (odometry.v_WB + R_WB * odometry.w_WB_B.cross(T_BF_.p));
+  state.w_LF_F = T_BF_.q.conjugate() * odometry.w_WB_B;
+  // The IMU's position and attitude errors, carried to the vehicle's origin and seen in L.
+  Mat6 J = Mat6::Zero();
+  J.topLeftCorner<3, 3>() = R_LW;
+  J.topRightCorner<3, 3>() = -R_LW * R_WB * hat(T_BF_.p);
+  J.bottomRightCorner<3, 3>() = R_LW * R_WB;
+  state.pose_covariance = J * odometry.pose_covariance * J.transpose();
+  state.velocity_covariance = R_FW * odometry.velocity_covariance * R_FW.transpose();
+  state.health = odometry.health;
+  state.reset_counter = odometry.reset_counter;
+  return state;
+}
+
+}  // namespace fbvins
