@@ -44,11 +44,10 @@ struct TimesyncMessage {
   static constexpr std::uint8_t kCrcExtra = 34;
 
   std::int64_t tc1 = 0, ts1 = 0;  ///< ns
-  std::uint8_t target_system = 0, target_component = 0;
 
   template <class V>
   void wire(V&& v) {
-    v(tc1), v(ts1), v(target_system), v(target_component);
+    v(tc1), v(ts1);
   }
 };
 

@@ -2,6 +2,7 @@
 #include "fbvins/mavlink/wire.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "fbvins/mavlink/checksum.hpp"
@@ -66,20 +67,14 @@ std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkA
         auto& bytes = payload.bytes();
         while (bytes.size() > 1 && bytes.back() == 0) bytes.pop_back();
         const auto id = fields.kId;
-        std::vector<std::uint8_t> frame = {kMagic2,
-                                           static_cast<std::uint8_t>(bytes.size()),
-                                           0,
-                                           0,
-                                           sequence,
-                                           from.system,
-                                           from.component,
-                                           static_cast<std::uint8_t>(id),
-                                           static_cast<std::uint8_t>(id >> 8),
-                                           static_cast<std::uint8_t>(id >> 16)};
-        frame.insert(frame.end(), bytes.begin(), bytes.end());
-        const std::uint16_t crc = mavlink_checksum(std::span(frame).subspan(1), fields.kCrcExtra);
-        frame.push_back(static_cast<std::uint8_t>(crc)), frame.push_back(static_cast<std::uint8_t>(crc >> 8));
-        return frame;
+        PayloadWriter frame;
+        frame(std::array<std::uint8_t, 7>{kMagic2, static_cast<std::uint8_t>(bytes.size()), 0, 0, sequence, from.system,
+                                          from.component});
+        frame(std::array<std::uint8_t, 3>{static_cast<std::uint8_t>(id), static_cast<std::uint8_t>(id >> 8),
+                                          static_cast<std::uint8_t>(id >> 16)});
+        for (const std::uint8_t byte : bytes) frame(byte);
+        frame(mavlink_checksum(std::span(frame.bytes()).subspan(1), fields.kCrcExtra));
+        return std::move(frame.bytes());
       },
       message);
 }
