@@ -100,9 +100,7 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
 }
 
 Result<void> write_all(const Flight& flight, const RunSummary& summary, const Config& config, const std::string& folder) {
-  if (Result<void> done = write_trajectories(flight.run, folder); !done) return done;
-  if (Result<void> done = write_statistics(flight.run, folder); !done) return done;
-  if (Result<void> done = write_timing(flight.run, folder); !done) return done;
+  if (Result<void> done = write_run(flight.run, folder); !done) return done;
   if (flight.map)
     if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
   if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
@@ -135,7 +133,7 @@ int run(const Arguments& arguments) {
   summary.wall_s = wall_s;
   if (Result<void> written = write_all(*flight, summary, *config, *folder); !written) return fail(written.error().message);
   if ((*data)->has_ground_truth())
-    if (Result<void> written = write_truth(flight->run, (*data)->ground_truth(), *folder); !written)
+    if (Result<void> written = write_truth(flight->run.images(), (*data)->ground_truth(), *folder); !written)
       return fail(written.error().message);
   if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));

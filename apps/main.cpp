@@ -11,6 +11,7 @@ namespace {
 constexpr const char* kExamples = R"(examples:
   fbvins run MH_01_easy                         estimate a flight, write out/MH_01_easy-klt
   fbvins run MH_01_easy.zip --frontend orb      the other frontend, straight from the zip
+  fbvins live --source replay:MH_01_easy        the same flight in wall time, poses at IMU rate
   fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
   fbvins report out/MH_01_easy-*                both in one page: report.html
   fbvins info MH_01_easy                        what is in a recording
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {
   program.require_subcommand(1);
   int exit_code = kOk;
   add_run_command(program, exit_code);
+  add_live_command(program, exit_code);
   add_eval_command(program, exit_code);
   add_info_command(program, exit_code);
   add_config_command(program, exit_code);

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <deque>
+#include <mutex>
+#include <utility>
 
 #include "fbvins/io/trajectory.hpp"
 
@@ -35,17 +38,6 @@ std::string covariance_row(const Odometry& o) {
   return row + "\n";
 }
 
-/// Seven columns, or all sixteen where the truth knows velocity and biases.
-std::string truth_row(const TrajectoryPoint& point) {
-  const Quat& q = point.T_WB.q;
-  std::string row = fmt::format("{}", point.t.ns);
-  const auto append = [&](const Vec3& v) { row += fmt::format(",{:.9f},{:.9f},{:.9f}", v.x(), v.y(), v.z()); };
-  append(point.T_WB.p);
-  row += fmt::format(",{:.9f},{:.9f},{:.9f},{:.9f}", q.w(), q.x(), q.y(), q.z());
-  if (point.v_WB && point.bias) append(*point.v_WB), append(point.bias->gyro_radps), append(point.bias->accel_mps2);
-  return row + "\n";
-}
-
 std::string frontend_columns(const FrontendStats& s) {
   return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check,
                      s.lost_epipolar, s.matches.found, s.matches.inliers, s.raw_matches.found, s.raw_matches.inliers, s.expected,
@@ -57,15 +49,26 @@ std::string estimator_columns(const EstimatorStats& s) {
                      s.iterations, s.outliers, s.initial_cost, s.final_cost, s.keyframe ? 1 : 0, s.standstill ? 1 : 0);
 }
 
-/// Calls row(tracked, odometry or null) for every frame, joined by id; both lists are in order of id.
-template <class Row>
-void for_each_frame(const RunRecord& record, const Row& row) {
-  auto odometry = record.odometry.begin();
-  for (const TrackedRecord& tracked : record.tracked) {
-    while (odometry != record.odometry.end() && odometry->id < tracked.id) ++odometry;
-    const bool found = odometry != record.odometry.end() && odometry->id == tracked.id;
-    row(tracked, found ? &*odometry : nullptr);
-  }
+std::string statistics_row(const TrackedRecord& tracked, const EstimatorStats& e) {
+  return fmt::format("{},{},{},{}\n", tracked.t.ns, tracked.id.value, frontend_columns(tracked.stats), estimator_columns(e));
+}
+
+std::string timing_row(const TrackedRecord& tracked, const EstimatorStats& e) {
+  const FrontendStats& f = tracked.stats;
+  return fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", tracked.t.ns, tracked.id.value,
+                     f.pyramid_ms, f.track_ms, f.stereo_ms, f.detect_ms, f.geometry_ms, f.boost_ms, e.prepare_ms, e.solve_ms,
+                     e.marginalise_ms);
+}
+
+/// Seven columns, or all sixteen where the truth knows velocity and biases.
+std::string truth_row(const TrajectoryPoint& point) {
+  const Quat& q = point.T_WB.q;
+  std::string row = fmt::format("{}", point.t.ns);
+  const auto append = [&](const Vec3& v) { row += fmt::format(",{:.9f},{:.9f},{:.9f}", v.x(), v.y(), v.z()); };
+  append(point.T_WB.p);
+  row += fmt::format(",{:.9f},{:.9f},{:.9f},{:.9f}", q.w(), q.x(), q.y(), q.z());
+  if (point.v_WB && point.bias) append(*point.v_WB), append(point.bias->gyro_radps), append(point.bias->accel_mps2);
+  return row + "\n";
 }
 
 }  // namespace
@@ -77,6 +80,12 @@ Trajectory<W> RunRecord::poses() const {
   return trajectory;
 }
 
+std::vector<Time> RunRecord::images() const {
+  std::vector<Time> stamps;
+  for (const Odometry& o : odometry) stamps.push_back(o.t);
+  return stamps;
+}
+
 Result<void> write_text(const std::string& path, const std::string& text) {
   auto file = OutputFile::create(path);
   if (!file) return file.error();
@@ -84,54 +93,88 @@ Result<void> write_text(const std::string& path, const std::string& text) {
   return file->close();
 }
 
-Result<void> write_trajectories(const RunRecord& record, const std::string& folder) {
+struct RunWriter::State {
+  TumWriter tum;
+  OdometryCsvWriter csv;
+  OutputFile covariance, statistics, timing;
+  std::mutex mutex;
+  std::deque<TrackedRecord> without_odometry;  ///< frames the estimator has not answered yet
+
+  void write(const TrackedRecord& tracked, const EstimatorStats& stats) {
+    statistics.write(statistics_row(tracked, stats));
+    timing.write(timing_row(tracked, stats));
+  }
+};
+
+Result<RunWriter> RunWriter::create(const std::string& folder) {
   auto tum = TumWriter::create(folder + "/trajectory_tum.txt");
   if (!tum) return tum.error();
   auto csv = OdometryCsvWriter::create(folder + "/trajectory.csv");
   if (!csv) return csv.error();
-  for (const Odometry& o : record.odometry) {
-    if (o.health.has_pose()) tum->write(o.t, o.T_WB);
-    csv->write(o);
-  }
-  if (Result<void> done = tum->close(); !done) return done;
-  if (Result<void> done = csv->close(); !done) return done;
-  std::string covariances = covariance_header();
-  for (const Odometry& o : record.odometry) covariances += covariance_row(o);
-  return write_text(folder + "/covariance.csv", covariances);
+  auto covariance = OutputFile::create(folder + "/covariance.csv");
+  if (!covariance) return covariance.error();
+  auto statistics = OutputFile::create(folder + "/statistics.csv");
+  if (!statistics) return statistics.error();
+  auto timing = OutputFile::create(folder + "/timing.csv");
+  if (!timing) return timing.error();
+  covariance->write(covariance_header());
+  statistics->write(kStatisticsHeader);
+  timing->write(kTimingHeader);
+  return RunWriter(std::unique_ptr<State>(
+      new State{std::move(*tum), std::move(*csv), std::move(*covariance), std::move(*statistics), std::move(*timing), {}, {}}));
 }
 
-Result<void> write_truth(const RunRecord& record, const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
+RunWriter::RunWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RunWriter::RunWriter(RunWriter&&) noexcept = default;
+RunWriter& RunWriter::operator=(RunWriter&&) noexcept = default;
+RunWriter::~RunWriter() = default;
+
+void RunWriter::add(const TrackedRecord& tracked) {
+  const std::lock_guard lock(state_->mutex);
+  state_->without_odometry.push_back(tracked);
+}
+
+/// A frame that the estimator has passed by without an answer has a row of zeros.
+void RunWriter::add(const Odometry& o) {
+  const std::lock_guard lock(state_->mutex);
+  if (o.health.has_pose()) state_->tum.write(o.t, o.T_WB);
+  state_->csv.write(o);
+  state_->covariance.write(covariance_row(o));
+  auto& waiting = state_->without_odometry;
+  for (; !waiting.empty() && waiting.front().id <= o.id; waiting.pop_front())
+    state_->write(waiting.front(), waiting.front().id == o.id ? o.stats : EstimatorStats{});
+}
+
+Result<void> RunWriter::close() {
+  const std::lock_guard lock(state_->mutex);
+  for (const TrackedRecord& tracked : state_->without_odometry) state_->write(tracked, {});
+  state_->without_odometry.clear();
+  Result<void> first;
+  for (Result<void> done :
+       {state_->tum.close(), state_->csv.close(), state_->covariance.close(), state_->statistics.close(), state_->timing.close()})
+    if (first && !done) first = done;
+  return first;
+}
+
+Result<void> write_run(const RunRecord& record, const std::string& folder) {
+  auto writer = RunWriter::create(folder);
+  if (!writer) return writer.error();
+  for (const TrackedRecord& tracked : record.tracked) writer->add(tracked);
+  for (const Odometry& o : record.odometry) writer->add(o);
+  return writer->close();
+}
+
+Result<void> write_truth(const std::vector<Time>& images, const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
   const auto earlier = [](const TrajectoryPoint& p, Time t) { return p.t < t; };
   std::string text = kTruthHeader;
   auto next = truth.begin();  // what lies before it is written or not wanted
-  for (const Odometry& o : record.odometry) {
-    const auto after = std::lower_bound(truth.begin(), truth.end(), o.t, earlier);
+  for (const Time image : images) {
+    const auto after = std::lower_bound(truth.begin(), truth.end(), image, earlier);
     const auto from = after == truth.begin() ? after : after - 1, to = after == truth.end() ? after : after + 1;
     for (auto p = std::max(next, from); p < to; ++p) text += truth_row(*p);
     next = std::max(next, to);
   }
   return write_text(folder + "/ground_truth.csv", text);
-}
-
-Result<void> write_statistics(const RunRecord& record, const std::string& folder) {
-  std::string text = kStatisticsHeader;
-  for_each_frame(record, [&](const TrackedRecord& tracked, const Odometry* odometry) {
-    text += fmt::format("{},{},{},{}\n", tracked.t.ns, tracked.id.value, frontend_columns(tracked.stats),
-                        estimator_columns(odometry ? odometry->stats : EstimatorStats{}));
-  });
-  return write_text(folder + "/statistics.csv", text);
-}
-
-Result<void> write_timing(const RunRecord& record, const std::string& folder) {
-  std::string text = kTimingHeader;
-  for_each_frame(record, [&](const TrackedRecord& tracked, const Odometry* odometry) {
-    const FrontendStats& f = tracked.stats;
-    const EstimatorStats e = odometry ? odometry->stats : EstimatorStats{};
-    text += fmt::format("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", tracked.t.ns, tracked.id.value,
-                        f.pyramid_ms, f.track_ms, f.stereo_ms, f.detect_ms, f.geometry_ms, f.boost_ms, e.prepare_ms, e.solve_ms,
-                        e.marginalise_ms);
-  });
-  return write_text(folder + "/timing.csv", text);
 }
 
 }  // namespace fbvins::app

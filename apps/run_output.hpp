@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run leaves behind, gathered frame by frame and written to a folder at the end.
+// What a run leaves behind: gathered frame by frame (RunRecord) or written as it comes (RunWriter).
 // trajectory_tum.txt, trajectory.csv, statistics.csv and config.yaml are the same bytes whenever
 // input and configuration are; times go to timing.csv and to their own part of the summary.
 // Frames and odometry may come from two threads: either side touches only its own vector.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,15 +30,31 @@ struct RunRecord {
   std::vector<Odometry> odometry;      ///< one per image, with or without a pose
 
   Trajectory<W> poses() const;
+  std::vector<Time> images() const;
 };
 
-/// The trajectory and statistics files; the folder must exist. Beside trajectory.csv lies covariance.csv with what
-/// its columns leave out: velocity and biases.
-Result<void> write_trajectories(const RunRecord& record, const std::string& folder);
-Result<void> write_statistics(const RunRecord& record, const std::string& folder);
+/// The trajectory, statistics and timing files, written as the frames come; the folder must exist. Beside trajectory.csv lies
+/// covariance.csv with what its columns leave out: velocity and biases. Any threads; frames come before their odometry.
+class RunWriter {
+ public:
+  static Result<RunWriter> create(const std::string& folder);
+  RunWriter(RunWriter&&) noexcept;
+  RunWriter& operator=(RunWriter&&) noexcept;
+  ~RunWriter();
+
+  void add(const TrackedRecord& tracked);
+  void add(const Odometry& odometry);
+  Result<void> close();
+
+ private:
+  struct State;
+  explicit RunWriter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+Result<void> write_run(const RunRecord& record, const std::string& folder);
 /// The recording's truth around each image, so that a report needs nothing but this folder.
-Result<void> write_truth(const RunRecord& record, const std::vector<TrajectoryPoint>& truth, const std::string& folder);
-Result<void> write_timing(const RunRecord& record, const std::string& folder);
+Result<void> write_truth(const std::vector<Time>& images, const std::vector<TrajectoryPoint>& truth, const std::string& folder);
 /// One small file in one go.
 Result<void> write_text(const std::string& path, const std::string& text);
 

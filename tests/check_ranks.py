@@ -18,8 +18,9 @@ RANKS = {
     "imu": 3, "features": 3, "io": 3, "eval": 3, "mavlink": 3, "web": 3,
     "frontend": 4, "estimator": 4, "loop": 4, "sim": 4,
     "pipeline": 5,
-    "config": 6, "live": 6,
-    "experiment": 7,
+    "live": 6,
+    "config": 7,
+    "experiment": 8,
 }
 # What makes and judges data lives in lab/, and nothing outside sees it.
 LABORATORY = {"sim", "experiment"}

@@ -54,7 +54,7 @@ void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSamp
   p.P.diagonal().segment<3>(nav::v).array() += dt * square(noise_.accel_noise_density_mps2_rthz);
   p.P.diagonal().segment<3>(nav::bg).array() += dt * square(noise_.gyro_random_walk_radps2_rthz);
   p.P.diagonal().segment<3>(nav::ba).array() += dt * square(noise_.accel_random_walk_mps3_rthz);
-  p.state = propagate(p.state, {{from, to}, {}}, level_gravity());
+  p.state = propagate(p.state, {{from, to}, {}}, gravity_W_);
 }
 
 PosePropagator::Propagated PosePropagator::propagate_all(const Odometry& estimate) const {

@@ -22,8 +22,8 @@ namespace fbvins {
 class PosePropagator {
  public:
   /// time_offset: t_imu = t_image + offset.
-  PosePropagator(const ImuNoise& noise, Duration time_offset, double smoothing_s)
-      : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s) {}
+  PosePropagator(const ImuNoise& noise, Duration time_offset, double smoothing_s, double gravity_mps2 = kGravity_mps2)
+      : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s), gravity_W_(level_gravity(gravity_mps2)) {}
 
   void rebase(const Odometry& estimate);
   /// The pose at this reading, with the health of the estimate beneath. Stamps must increase.
@@ -43,6 +43,7 @@ class PosePropagator {
   ImuNoise noise_;
   Duration time_offset_;
   double smoothing_s_;
+  Vec3 gravity_W_;
   std::deque<ImuSample> readings_;  ///< from the last one at or before the estimate's image on
   std::optional<Odometry> estimate_;
   std::optional<Propagated> newest_;  ///< at readings_.back(); none while there is no pose

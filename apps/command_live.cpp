@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/live_files.hpp"
+#include "apps/live_summary.hpp"
+#include "apps/run_map.hpp"
+#include "apps/stop_signal.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/config/config_file.hpp"
+#include "fbvins/live/live_system.hpp"
+#include "fbvins/live/make_source.hpp"
+#include "fbvins/live/replay_source.hpp"
+#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/live/status_sink.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(Takes sensor data as they come and says the pose at IMU rate. Ends with its source, or at Ctrl-C. Without --quiet one
+JSON object a line tells the state, whenever health changes and once a second. --out writes the files of `fbvins run` while
+the flight goes on, live_tum.txt (poses at IMU rate) and summary.json (latency, what was dropped, health; accuracy where the
+source is a recording with truth).
+
+sources:
+  replay:DATASET[@SPEED]     a recording played in wall time
+faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
+  camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
+  burst:..:HELD_BACK, leap:..:SECONDS
+
+examples:
+  fbvins live --source replay:MH_01_easy --out out/live
+  fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
+  fbvins live --source replay:MH_01_easy --loop --save-map flat.fbm
+  fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
+)";
+
+struct Arguments {
+  std::string source, config, frontend, out;
+  std::vector<std::string> assignments, faults;
+  DatasetOptions dataset;
+  MapArguments map;
+  bool quiet = false;
+};
+
+Result<Config> config_of(Arguments arguments) {
+  if (!arguments.frontend.empty())
+    arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
+  return load_config(arguments.config, arguments.assignments);
+}
+
+Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
+  std::vector<SensorFault> faults;
+  for (const std::string& text : arguments.faults) {
+    auto fault = parse_fault(text);
+    if (!fault) return fault.error();
+    faults.push_back(*fault);
+  }
+  return faults;
+}
+
+/// The sinks that the command line asks for; the one that writes files, if any, also wants to see the frontend's frames.
+Result<void> add_sinks(const Arguments& arguments, LiveSystem& live, LiveTally& tally) {
+  live.add_sink(tally.make_sink());
+  if (!arguments.quiet) live.add_sink(std::make_unique<StatusSink>(stdout));
+  if (arguments.out.empty()) return {};
+  auto files = LiveFiles::create(arguments.out, arguments.map.wanted(), arguments.map.load.empty());
+  if (!files) return files.error();
+  live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
+  live.add_sink(std::move(*files));
+  return {};
+}
+
+Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault>& faults) {
+  const StopSignal stop([&] { source.stop(); });
+  Result<void> ended;
+  if (faults.empty()) {
+    ended = source.run(live.input());
+  } else {
+    FaultyInput faulty(live.input(), faults);
+    ended = source.run(faulty);
+  }
+  const Result<void> done = live.finish();
+  return ended ? done : ended;
+}
+
+Result<void> write_results(const Arguments& arguments, const Config& config, const Source& source, const LiveSummary& summary) {
+  if (Result<void> done = write_text(arguments.out + "/config.yaml", to_yaml(config)); !done) return done;
+  if (const auto* replay = dynamic_cast<const ReplaySource*>(&source); replay && replay->dataset().has_ground_truth()) {
+    std::vector<Time> images;
+    for (const FrameEntry& frame : replay->dataset().frames()) images.push_back(frame.t);
+    if (Result<void> done = write_truth(images, replay->dataset().ground_truth(), arguments.out); !done) return done;
+  }
+  if (Result<void> done = write_text(arguments.out + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_text(arguments.out + "/summary.txt", to_text(summary));
+}
+
+int run(const Arguments& arguments) {
+  block_stop_signals();  // before any thread is made
+  const auto config = config_of(arguments);
+  if (!config) return fail(config.error().message);
+  const auto faults = faults_of(arguments);
+  if (!faults) return fail(faults.error().message);
+  const auto source = make_source(arguments.source, {.dataset = arguments.dataset});
+  if (!source) return fail(source.error().message);
+  if (!arguments.out.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(arguments.out, error);
+    if (error) return fail(fmt::format("{}: {}", arguments.out, error.message()));
+  }
+  const auto map = make_map(arguments.map, (*source)->rig(), config->loop);
+  if (!map) return fail(map.error().message);
+  LiveTally tally;
+  const Result<void> flown = [&]() -> Result<void> {
+    auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = map->get()});
+    if (!live) return live.error();
+    if (Result<void> added = add_sinks(arguments, *live, tally); !added) return added;
+    const Result<void> done = fly(**source, *live, *faults);
+    tally.finish(live->status());
+    return done;
+  }();
+  if (!flown) return fail(flown.error().message);
+  if (*map) {
+    (*map)->finish();
+    if (Result<void> saved = save_map(arguments.map, **map); !saved) return fail(saved.error().message);
+  }
+  const LiveSummary summary = summarise(tally, arguments.source, config->frontend.kind, **source, arguments.out);
+  if (!arguments.out.empty())
+    if (Result<void> written = write_results(arguments, *config, **source, summary); !written)
+      return fail(written.error().message);
+  if (!arguments.quiet) std::fputs(to_text(summary).c_str(), stderr);
+  return tally.with_pose > 0 ? kOk : kEstimationFailed;
+}
+
+}  // namespace
+
+void add_live_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("live", "sensors in, the pose out while they come");
+  command->footer(kExamples);
+  command->add_option("--source", arguments->source, "where sensor data come from")->required();
+  command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");
+  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
+  command->add_option("--out", arguments->out, "folder for files; without, none are written");
+  command->add_option("--calibration", arguments->dataset.kalibr_camchain,
+                      "Kalibr camchain-imucam.yaml instead of the source's own");
+  command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
+  command->add_option("--max-images", arguments->dataset.max_frames, "of a replay: end after this many stereo images, 0 for all")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
+  command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
+  command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
+  command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
+  command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace fbvins::app

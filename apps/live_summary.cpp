@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/live_summary.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include "apps/evaluation_report.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/live/replay_source.hpp"
+
+namespace fbvins::app {
+namespace {
+
+class TallySink final : public Sink {
+ public:
+  explicit TallySink(LiveTally& tally) : tally_(tally) {}
+  std::string_view name() const override { return "tally"; }
+  Result<void> take(const LiveEvent& event) override {
+    if (const auto* pose = std::get_if<LivePose>(&event)) tally_.live_poses += pose->health.has_pose() ? 1 : 0;
+    const auto* o = std::get_if<Odometry>(&event);
+    if (o == nullptr) return {};
+    tally_.with_pose += o->health.has_pose() ? 1 : 0;
+    const bool plain = o->health.reason == HealthReason::none;
+    ++tally_.health[plain ? std::string(to_string(o->health.state))
+                          : fmt::format("{}/{}", to_string(o->health.state), to_string(o->health.reason))];
+    return {};
+  }
+
+ private:
+  LiveTally& tally_;
+};
+
+std::optional<Evaluation> accuracy(const Trajectory<W>& truth, const std::string& path) {
+  const auto file = read_trajectory(path);
+  if (!file) return std::nullopt;
+  const auto evaluation = evaluate(truth, file->poses(), {});
+  return evaluation ? std::optional(*evaluation) : std::nullopt;
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+Json to_json(const LatencySummary& s) {
+  return Json{{"p50", s.p50_ms}, {"p99", s.p99_ms}, {"max", s.max_ms}, {"count", s.count}};
+}
+
+std::string line(const char* what, const LatencySummary& s) {
+  return fmt::format("{:<34} p50 {:6.1f} ms, p99 {:6.1f} ms, longest {:7.1f} ms\n", what, s.p50_ms, s.p99_ms, s.max_ms);
+}
+
+}  // namespace
+
+std::unique_ptr<Sink> LiveTally::make_sink() { return std::make_unique<TallySink>(*this); }
+
+LiveSummary summarise(const LiveTally& tally, const std::string& source_name, const std::string& frontend, const Source& source,
+                      const std::string& folder) {
+  LiveSummary s{tally, source_name, frontend, {}, {}, peak_memory_mb()};
+  const auto* replay = dynamic_cast<const ReplaySource*>(&source);
+  if (replay == nullptr || !replay->dataset().has_ground_truth() || folder.empty()) return s;
+  Trajectory<W> truth;
+  for (const TrajectoryPoint& point : replay->dataset().ground_truth()) truth.push_back({point.t, point.T_WB});
+  s.at_images = accuracy(truth, folder + "/trajectory_tum.txt");
+  s.at_imu_rate = accuracy(truth, folder + "/live_tum.txt");
+  return s;
+}
+
+std::string to_json_text(const LiveSummary& s) {
+  const LiveCounts& c = s.tally.last.counts;
+  Json result{{"version", FBVINS_VERSION}, {"source", s.source}, {"frontend", s.frontend}};
+  result["health"] = Json::object();
+  for (const auto& [name, images] : s.tally.health) result["health"][name] = images;
+  if (s.at_images) result["accuracy"] = to_json(*s.at_images, Alignment::se3);
+  if (s.at_imu_rate) result["accuracy_at_imu_rate"] = to_json(*s.at_imu_rate, Alignment::se3);
+  Json live{{"imu", c.imu}, {"images", c.images}, {"images_estimated", c.images_estimated}};
+  live["images_with_pose"] = s.tally.with_pose;
+  live["images_dropped"] = c.images_dropped;
+  live["images_incomplete"] = c.images_incomplete;
+  live["imu_late"] = c.imu_late;
+  live["imu_reordered"] = c.imu_reordered;
+  live["clock_leaps"] = c.clock_leaps;
+  live["resets"] = c.resets;
+  live["live_poses"] = s.tally.live_poses;
+  live["shutter_to_pose_ms"] = to_json(s.tally.last.shutter_to_pose);
+  live["pose_age_ms"] = to_json(s.tally.last.pose_age);
+  live["peak_memory_mb"] = s.peak_memory_mb;
+  return Json{{"result", result}, {"live", live}}.dump(2) + "\n";
+}
+
+std::string to_text(const LiveSummary& s) {
+  const LiveCounts& c = s.tally.last.counts;
+  std::string text = fmt::format("{} with {} (fbvins " FBVINS_VERSION ")\n", s.source, s.frontend);
+  text +=
+      fmt::format("images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock leaps {}, resets {}\n",
+                  c.images, s.tally.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
+  text += "images by health:";
+  for (const auto& [name, images] : s.tally.health) text += fmt::format(" {} {}", name, images);
+  text += "\n" + line("from the image's stamp to its pose:", s.tally.last.shutter_to_pose);
+  text += line("age of the newest estimate:", s.tally.last.pose_age);
+  if (s.at_images) text += "at images:\n" + to_table(*s.at_images, Alignment::se3);
+  if (s.at_imu_rate) text += fmt::format("ATE RMSE at IMU rate {:.4f} m\n", s.at_imu_rate->absolute_m.rmse);
+  return text + fmt::format("peak memory {:.0f} MB\n", s.peak_memory_mb);
+}
+
+}  // namespace fbvins::app

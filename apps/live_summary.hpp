@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// A live flight in a page: what came, what was dropped, how old poses were, how healthy; accuracy where there is truth.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "fbvins/eval/evaluation.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/live/sink.hpp"
+#include "fbvins/live/source.hpp"
+
+namespace fbvins::app {
+
+/// Counts what goes by; its sink must not outlive it.
+struct LiveTally {
+  std::map<std::string, std::int64_t> health;  ///< images per "state" or "state/reason"
+  std::int64_t with_pose = 0;                  ///< images
+  std::int64_t live_poses = 0;                 ///< at IMU rate
+  LiveStatus last;
+
+  std::unique_ptr<Sink> make_sink();
+  void finish(const LiveStatus& status) { last = status; }
+};
+
+struct LiveSummary {
+  LiveTally tally;
+  std::string source, frontend;
+  std::optional<Evaluation> at_images, at_imu_rate;  ///< against the recording's truth
+  double peak_memory_mb = 0;
+};
+
+/// `folder` holds the finished trajectories; empty: no accuracy.
+LiveSummary summarise(const LiveTally& tally, const std::string& source_name, const std::string& frontend, const Source& source,
+                      const std::string& folder);
+std::string to_json_text(const LiveSummary& summary);
+std::string to_text(const LiveSummary& summary);
+
+}  // namespace fbvins::app

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/clock_guard.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// Stamps further ahead of this machine's clock than any before are from the future.
+constexpr double kForwardLeap_s = 0.2;
+/// Readings that come out of order come so by less.
+constexpr double kBackwardLeap_s = 0.1;
+/// Camera and IMU share a clock: two leaps as close as these are the same leap.
+constexpr double kSameLeap_s = 0.05, kSameLeapWithin_s = 5;
+constexpr double kWindow_s = 5;
+
+}  // namespace
+
+double ClockGuard::lateness_s(Time t, Time host) const {
+  return (host - *first_host_).seconds() - (t - *first_).seconds() / rate_;
+}
+double ClockGuard::shortest_lateness_s() const { return std::min(current_s_, previous_s_); }
+
+Time ClockGuard::mend(Stream stream, Time raw, Time host) {
+  if (!first_) {
+    first_ = raw;
+    first_host_ = window_start_ = host;
+  }
+  State& s = states_[stream];
+  if (leapt(s, raw + s.correction, host)) {
+    s.correction = correction_after_leap(stream, raw, host);
+    s.leapt_host = host;
+    ++leaps_;
+  }
+  const Time t = raw + s.correction;
+  learn(s, t, host);
+  return t;
+}
+
+bool ClockGuard::leapt(const State& s, Time t, Time host) const {
+  if (s.newest && (t - *s.newest).seconds() < -kBackwardLeap_s) return true;
+  // On the host's clock, so that a recording played at another speed is judged alike.
+  return lateness_s(t, host) < shortest_lateness_s() - kForwardLeap_s && std::isfinite(shortest_lateness_s());
+}
+
+/// As many whole periods after the stream's newest stamp as fit the time that has passed, or as the other stream has leapt.
+Duration ClockGuard::correction_after_leap(Stream stream, Time raw, Time host) const {
+  const State &s = states_[stream], &other = states_[1 - stream];
+  Duration own = s.correction;
+  if (s.newest) {
+    const double passed_s = (host - *s.newest_host).seconds() * rate_;
+    const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
+    const double steps = std::max(1.0, std::round(passed_s / period_s));
+    own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
+  } else {
+    own = *first_ + Duration::from_seconds(((host - *first_host_).seconds() - shortest_lateness_s()) * rate_) - raw;
+  }
+  const bool other_leapt = (host - other.leapt_host).seconds() < kSameLeapWithin_s;
+  return other_leapt && std::abs((own - other.correction).seconds()) < kSameLeap_s ? other.correction : own;
+}
+
+void ClockGuard::learn(State& s, Time t, Time host) {
+  if (s.newest) s.period.add(t - *s.newest);
+  if (!s.newest || t > *s.newest) s.newest = t;
+  s.newest_host = host;
+  if ((host - window_start_).seconds() > kWindow_s) {
+    previous_s_ = current_s_;
+    current_s_ = std::numeric_limits<double>::infinity();
+    window_start_ = host;
+  }
+  current_s_ = std::min(current_s_, lateness_s(t, host));
+}
+
+Time ClockGuard::host_of(Time t) const {
+  if (!first_) return {};
+  const double since_first_s = (t - *first_).seconds() / rate_;
+  return *first_host_ + Duration::from_seconds(since_first_s + shortest_lateness_s());
+}
+
+}  // namespace fbvins

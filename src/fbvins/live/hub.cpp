@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/hub.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "fbvins/pipeline/stage_runner.hpp"
+
+namespace fbvins {
+namespace {
+
+using SharedEvent = std::shared_ptr<const LiveEvent>;
+
+bool is_image(const SharedEvent& event) { return std::holds_alternative<StereoFrame>(*event); }
+
+}  // namespace
+
+/// A sink, its queue and its thread.
+class Hub::Lane {
+ public:
+  Lane(std::unique_ptr<Sink> sink, Limits limits) : sink_(std::move(sink)), limits_(limits) {
+    report_.name = sink_->name();
+    thread_ = std::thread([this] { work(); });
+  }
+  ~Lane() { finish(); }
+
+  void put(const SharedEvent& event) {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;
+    if (is_image(event) && ++images_ > limits_.images) drop_oldest_image();
+    if (queue_.size() >= limits_.events) drop(queue_.begin());
+    queue_.push_back(event);
+    filled_.notify_one();
+  }
+
+  SinkReport report() const {
+    const std::lock_guard lock(mutex_);
+    return report_;
+  }
+
+  void finish() {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      filled_.notify_one();
+    }
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  void drop(std::deque<SharedEvent>::iterator event) {
+    if (is_image(*event)) --images_;
+    queue_.erase(event);
+    ++report_.dropped;
+  }
+  void drop_oldest_image() {
+    const auto oldest = std::find_if(queue_.begin(), queue_.end(), is_image);
+    if (oldest != queue_.end()) drop(oldest);
+  }
+
+  void work() {
+    while (const SharedEvent event = next()) note(guarded_call([&] { return sink_->take(*event); }));
+    note(guarded_call([&] { return sink_->finish(); }));
+  }
+
+  SharedEvent next() {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [&] { return closed_ || !queue_.empty(); });
+    if (queue_.empty()) return nullptr;
+    SharedEvent event = std::move(queue_.front());
+    queue_.pop_front();
+    if (is_image(event)) --images_;
+    ++report_.taken;
+    return event;
+  }
+
+  /// A sink that throws has failed, and nothing else has.
+  template <class Call>
+  Result<void> guarded_call(const Call& call) {
+    Result<void> result;
+    const Result<void> ran = guarded(report_.name.c_str(), [&] { result = call(); });
+    return ran ? result : ran;
+  }
+
+  void note(const Result<void>& result) {
+    if (result) return;
+    const std::lock_guard lock(mutex_);
+    if (report_.problem.empty()) report_.problem = result.error().message;
+  }
+
+  std::unique_ptr<Sink> sink_;
+  Limits limits_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<SharedEvent> queue_;
+  std::size_t images_ = 0;
+  bool closed_ = false;
+  SinkReport report_;
+  std::thread thread_;
+};
+
+Hub::Hub(Limits limits) : limits_(limits) {}
+Hub::~Hub() = default;
+
+void Hub::add(std::unique_ptr<Sink> sink) { lanes_.push_back(std::make_unique<Lane>(std::move(sink), limits_)); }
+
+void Hub::publish(LiveEvent event) {
+  if (lanes_.empty()) return;
+  const auto shared = std::make_shared<const LiveEvent>(std::move(event));
+  for (const auto& lane : lanes_) lane->put(shared);
+}
+
+std::vector<Hub::SinkReport> Hub::reports() const {
+  std::vector<SinkReport> reports;
+  for (const auto& lane : lanes_) reports.push_back(lane->report());
+  return reports;
+}
+
+Result<void> Hub::finish() {
+  for (const auto& lane : lanes_) lane->finish();
+  for (const SinkReport& report : reports())
+    if (!report.problem.empty()) return Error{ErrorCode::stage_failed, report.name + ": " + report.problem};
+  return {};
+}
+
+}  // namespace fbvins

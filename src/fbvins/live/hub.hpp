@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// From one publisher to every sink, each on a thread of its own behind a queue that drops its oldest: a sink that hangs costs
+// nobody else anything.
+//
+//   hub.add(std::make_unique<Printer>());
+//   hub.publish(pose);                        // any thread; never waits for a sink
+//   Result<void> done = hub.finish();
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/live/sink.hpp"
+
+namespace fbvins {
+
+class Hub {
+ public:
+  struct Limits {
+    std::size_t events = 8192;  ///< that may wait for one sink: some ten seconds
+    std::size_t images = 32;    ///< of them stereo frames, for their memory
+  };
+  struct SinkReport {
+    std::string name;
+    std::int64_t taken = 0, dropped = 0;
+    std::string problem;  ///< its first error; empty: none
+  };
+
+  Hub() : Hub(Limits{}) {}
+  explicit Hub(Limits limits);
+  ~Hub();
+
+  /// Before the first publish().
+  void add(std::unique_ptr<Sink> sink);
+  bool empty() const { return lanes_.empty(); }
+  void publish(LiveEvent event);
+  std::vector<SinkReport> reports() const;
+  /// Lets every sink take what waits for it, and ends it. The first error of any.
+  Result<void> finish();
+
+ private:
+  class Lane;
+  Limits limits_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts IMU readings in order of their stamps with a bounded wait. A reading that follows its predecessor by about one period
+// goes on at once; one that leaves a hole waits for what may still come, but no longer than the wait allows.
+// Threads: one owner.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+
+#include "fbvins/live/sample_period.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class ImuOrder {
+ public:
+  using Release = std::function<void(const ImuSample&)>;
+
+  explicit ImuOrder(Duration longest_wait) : longest_wait_(longest_wait) {}
+
+  /// Calls `release` for every reading that is next in order, now that this one has come at `host`.
+  void push(const ImuSample& sample, Time host, const Release& release);
+  /// Nothing has come: lets go what has waited long enough at `host`.
+  void tick(Time host, const Release& release);
+  /// Lets go everything.
+  void flush(const Release& release);
+
+  int late() const { return late_; }            ///< after a reading with a later stamp had gone on: dropped
+  int reordered() const { return reordered_; }  ///< came after a later one and went before it
+
+ private:
+  struct Waiting {
+    ImuSample sample;
+    Time since;
+  };
+  bool is_next(Time t) const;
+  void release_front(const Release& release);
+
+  Duration longest_wait_;
+  std::map<Time, Waiting> waiting_;
+  std::optional<Time> newest_;
+  SamplePeriod period_;
+  int late_ = 0, reordered_ = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// What sensors push into, from any thread, and one thread takes from. Mends stamps, puts IMU readings in order, blanks frozen
+// cameras, and keeps one image waiting at most: when the next comes, the older one is dropped and counted. No reading ever is.
+//
+//   ingest.push(sample); ingest.push(std::move(frame));                         // the sensors' threads
+//   while (std::optional<SensorEvent> event = ingest.pop()) system.push(*event);   // the taker's
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+
+#include "fbvins/live/clock_guard.hpp"
+#include "fbvins/live/frozen_camera.hpp"
+#include "fbvins/live/imu_order.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/live/live_options.hpp"
+#include "fbvins/live/source.hpp"
+
+namespace fbvins {
+
+class Ingest final : public SensorInput {
+ public:
+  using Clock = std::function<Time()>;
+  using OnReading = std::function<void(const ImuSample& sample, Time host_t)>;
+
+  /// `now` is this machine's clock. `on_reading` gets each reading in order, at once, on the thread that brought it,
+  /// with its time on this machine's clock; it must not call back.
+  Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading);
+
+  void push(const ImuSample& sample) override;
+  void push(StereoFrame frame) override;
+  /// Lets readings go that have waited long enough; to be called now and then.
+  void tick();
+
+  /// Waits for the next event; nothing once closed and empty.
+  std::optional<SensorEvent> pop();
+  void close();
+
+  struct Arrival {
+    std::optional<Time> imu, image, left, right;  ///< newest of each, on this machine's clock
+    Time newest;                                  ///< stamp, on the sensors' clock
+  };
+  Arrival arrivals() const;
+  /// When a stamp was on this machine's clock.
+  Time host_of(Time t) const;
+  /// What is known here; the rest is left at zero.
+  LiveCounts counts() const;
+
+ private:
+  void release(const ImuSample& sample);
+  void drop_waiting_image();
+
+  Clock now_;
+  OnReading on_reading_;
+  mutable std::mutex order_mutex_;  ///< keeps readings in order up to the end of on_reading; taken before mutex_
+  ClockGuard clock_;
+  ImuOrder order_;
+  std::array<FrozenCamera, 2> frozen_;
+  Arrival arrivals_;
+  LiveCounts counts_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<SensorEvent> queue_;
+  bool image_waits_ = false, closed_ = false;
+  std::int64_t images_dropped_ = 0;
+};
+
+}  // namespace fbvins

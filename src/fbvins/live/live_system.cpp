@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/live_system.hpp"
+
+#include <atomic>
+#include <condition_variable>
+#include <ctime>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "fbvins/live/hub.hpp"
+#include "fbvins/live/ingest.hpp"
+#include "fbvins/live/latency_histogram.hpp"
+#include "fbvins/live/pose_propagator.hpp"
+#include "fbvins/live/sensor_watch.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr Duration kWatchPeriod = Duration::from_seconds(0.02);
+constexpr Duration kStatusPeriod = Duration::from_seconds(1);
+
+Time monotonic_now() {
+  timespec ts{};
+  clock_gettime(CLOCK_MONOTONIC, &ts);
+  return {ts.tv_sec * 1'000'000'000LL + ts.tv_nsec};
+}
+
+}  // namespace
+
+// sensors' threads -> Ingest -[one waiting image, all readings]-> feeder -> System -> Odometry
+//                       '-[each reading, at once]-> PosePropagator -> LivePose        '-> rebase
+//                                                                     all of it -> Hub -> sinks
+struct LiveSystem::Impl {
+  Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate, System made)
+      : ingest(options, clock_rate, monotonic_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
+        system(std::move(made)),
+        watch(options, system_options.estimator.max_image_gap_s),
+        propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), options.smoothing_s,
+                   system_options.estimator.gravity_mps2),
+        started(monotonic_now()) {
+    system.on_odometry([this](const Odometry& o) { on_odometry(o); });
+    system.on_map_update([this](const MapUpdate& u) { hub.publish(u); });
+  }
+  ~Impl() { (void)finish(); }
+
+  // What happens to readings and estimates.
+
+  void on_reading(const ImuSample& sample, Time host_t) {
+    LivePose pose;
+    {
+      const std::lock_guard lock(pose_mutex);
+      pose = propagator.add(sample);
+      if (pose.health.has_pose()) pose.health = health;  // never a pose where the propagator has none
+      if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
+    }
+    pose.host_t = host_t;
+    hub.publish(pose);
+  }
+
+  void on_odometry(const Odometry& o) {
+    const Time image_host_t = ingest.host_of(o.t);
+    shutter_to_pose.add(monotonic_now() - image_host_t);
+    {
+      const std::lock_guard lock(pose_mutex);
+      propagator.rebase(o);
+      estimated = o.health;
+      resets += o.reset_counter - reset_counter;
+      reset_counter = o.reset_counter;
+      ++images_estimated;
+      if (o.health.has_pose()) estimate_host_t = image_host_t;
+    }
+    hub.publish(o);
+    look(false);
+  }
+
+  // Threads.
+
+  void start() {
+    if (std::exchange(running, true)) return;
+    feeder = std::thread([this] { feed(); });
+    watcher = std::thread([this] { watch_sensors(); });
+  }
+
+  void feed() {
+    while (std::optional<SensorEvent> event = ingest.pop()) {
+      std::visit([this](const auto& e) { hub.publish(e); }, *event);
+      if (Result<void> taken = system.push(std::move(*event)); !taken) break;
+    }
+  }
+
+  void watch_sensors() {
+    Time told = monotonic_now();
+    std::unique_lock lock(end_mutex);
+    while (!end.wait_for(lock, std::chrono::nanoseconds(kWatchPeriod.ns), [&] { return ended; })) {
+      ingest.tick();
+      const Time now = monotonic_now();
+      const bool due = now - told >= kStatusPeriod;
+      if (due) told = now;
+      look(due);
+    }
+  }
+
+  /// Brings health up to date; a status goes out when it has changed or `due`.
+  void look(bool due) {
+    const Ingest::Arrival arrivals = ingest.arrivals();
+    bool changed = false;
+    {
+      const std::lock_guard lock(pose_mutex);
+      const Health now = watch.judge(estimated, arrivals, started, monotonic_now());
+      changed = !(now == health);
+      health = now;
+    }
+    if (changed || due) hub.publish(status());
+  }
+
+  LiveStatus status() {
+    LiveStatus s;
+    s.t = ingest.arrivals().newest;
+    s.host_t = monotonic_now();
+    s.counts = ingest.counts();
+    s.shutter_to_pose = shutter_to_pose.summary();
+    s.pose_age = pose_age.summary();
+    for (const Hub::SinkReport& report : hub.reports())
+      if (!report.problem.empty()) s.problem = report.name + ": " + report.problem;
+    if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
+    const std::lock_guard lock(pose_mutex);
+    s.health = health;
+    s.reset_counter = reset_counter;
+    s.counts.images_estimated = images_estimated;
+    s.counts.resets = resets;
+    return s;
+  }
+
+  Result<void> finish() {
+    if (std::exchange(finished, true)) return result;
+    ingest.close();
+    if (feeder.joinable()) feeder.join();
+    result = system.finish();
+    {
+      const std::lock_guard lock(end_mutex);
+      ended = true;
+      end.notify_all();
+    }
+    if (watcher.joinable()) watcher.join();
+    hub.publish(status());
+    const Result<void> sinks = hub.finish();
+    if (result) result = sinks;
+    return result;
+  }
+
+  Hub hub;
+  Ingest ingest;
+  System system;
+  SensorWatch watch;
+
+  std::mutex pose_mutex;  ///< of all up to `resets`
+  PosePropagator propagator;
+  Health estimated, health;  ///< as the estimator said, and as the watchdogs see it since
+  std::optional<Time> estimate_host_t;
+  std::uint32_t reset_counter = 0;
+  std::int64_t images_estimated = 0, resets = 0;
+
+  LatencyHistogram shutter_to_pose, pose_age;
+  Time started;
+  std::thread feeder, watcher;
+  std::mutex end_mutex;
+  std::condition_variable end;
+  bool ended = false, running = false, finished = false;
+  Result<void> result;
+};
+
+Result<LiveSystem> LiveSystem::create(const SystemOptions& system, const LiveOptions& options, const StereoRig& rig,
+                                      double clock_rate, SystemParts parts) {
+  if (Result<void> valid = validate(options); !valid) return valid.error();
+  Result<System> made = System::create(system, rig, RunMode::threaded, std::move(parts));
+  if (!made) return made.error();
+  return LiveSystem(std::make_unique<Impl>(system, options, rig, clock_rate, std::move(*made)));
+}
+
+LiveSystem::LiveSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LiveSystem::~LiveSystem() = default;
+LiveSystem::LiveSystem(LiveSystem&&) noexcept = default;
+LiveSystem& LiveSystem::operator=(LiveSystem&&) noexcept = default;
+
+void LiveSystem::add_sink(std::unique_ptr<Sink> sink) { impl_->hub.add(std::move(sink)); }
+void LiveSystem::on_tracked_frame(std::function<void(const TrackedFrame&)> callback) {
+  impl_->system.on_tracked_frame(std::move(callback));
+}
+
+SensorInput& LiveSystem::input() {
+  impl_->start();
+  return impl_->ingest;
+}
+
+LiveStatus LiveSystem::status() const { return impl_->status(); }
+Result<void> LiveSystem::finish() { return impl_->finish(); }
+
+}  // namespace fbvins

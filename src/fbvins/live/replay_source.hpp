@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording played as a live sensor: each event is pushed when its stamp is due on this machine's clock, whether or not
+// anybody keeps up. Images are decoded ahead, as a camera's are.
+//
+//   Result<std::unique_ptr<ReplaySource>> source = ReplaySource::open("MH_01_easy@2", {});   // twice as fast
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/live/source.hpp"
+
+namespace fbvins {
+
+class ReplaySource final : public Source {
+ public:
+  /// `where`: DATASET or DATASET@SPEED.
+  static Result<std::unique_ptr<ReplaySource>> open(const std::string& where, DatasetOptions options);
+
+  const StereoRig& rig() const override { return data_->rig(); }
+  double clock_rate() const override { return speed_; }
+  Result<void> run(SensorInput& input) override;
+  void stop() override;
+
+  const Dataset& dataset() const { return *data_; }
+
+ private:
+  ReplaySource(std::unique_ptr<Dataset> data, double speed) : data_(std::move(data)), speed_(speed) {}
+  /// False when stopped before.
+  bool wait_until(std::int64_t host_ns);
+
+  std::unique_ptr<Dataset> data_;
+  double speed_;
+  std::mutex mutex_;
+  std::condition_variable stopped_changed_;
+  bool stopped_ = false;
+};
+
+}  // namespace fbvins

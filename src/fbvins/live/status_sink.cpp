@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/status_sink.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace fbvins {
+namespace {
+
+nlohmann::ordered_json to_json(const LatencySummary& s) {
+  return {{"p50", s.p50_ms}, {"p99", s.p99_ms}, {"max", s.max_ms}, {"count", s.count}};
+}
+
+}  // namespace
+
+std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
+  const LiveCounts& c = status.counts;
+  nlohmann::ordered_json json{{"t_ns", status.t.ns}, {"host_ns", status.host_t.ns}};
+  json["health"] = to_string(status.health.state);
+  json["reason"] = to_string(status.health.reason);
+  json["reset_counter"] = status.reset_counter;
+  if (newest.health.has_pose()) {
+    const Vec3& p = newest.T_WB.p;
+    const Quat& q = newest.T_WB.q;
+    json["position_m"] = {p.x(), p.y(), p.z()};
+    json["orientation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+    json["velocity_mps"] = {newest.v_WB.x(), newest.v_WB.y(), newest.v_WB.z()};
+  }
+  json["counts"] = {{"imu", c.imu},
+                    {"images", c.images},
+                    {"images_estimated", c.images_estimated},
+                    {"images_dropped", c.images_dropped},
+                    {"images_incomplete", c.images_incomplete},
+                    {"imu_late", c.imu_late},
+                    {"imu_reordered", c.imu_reordered},
+                    {"clock_leaps", c.clock_leaps},
+                    {"resets", c.resets}};
+  json["shutter_to_pose_ms"] = to_json(status.shutter_to_pose);
+  json["pose_age_ms"] = to_json(status.pose_age);
+  if (!status.problem.empty()) json["problem"] = status.problem;
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+Result<void> StatusSink::take(const LiveEvent& event) {
+  if (const auto* pose = std::get_if<LivePose>(&event)) newest_ = *pose;
+  const auto* status = std::get_if<LiveStatus>(&event);
+  if (status == nullptr) return {};
+  const std::string line = to_json_line(*status, newest_) + "\n";
+  const bool written = std::fwrite(line.data(), 1, line.size(), file_) == line.size() && std::fflush(file_) == 0;
+  if (!written) return Error{ErrorCode::unwritable, "the status cannot be written"};
+  return {};
+}
+
+}  // namespace fbvins
