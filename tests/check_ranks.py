@@ -73,7 +73,7 @@ def judge_border(root, public, included):
         if any((root / folder / included).exists() for folder in public):
             return None
         return f"a public header includes {included}, which is not public (not in {' or '.join(public)}/)"
-    if included.startswith(("Eigen/", "fmt/")) or re.fullmatch(r"[a-z_]+", included):
+    if included.startswith(("Eigen/", "fmt/")) or re.fullmatch(r"[a-z_]+|stdint\.h", included):
         return None
     return f"a public header includes {included}: only the standard library, Eigen and fmt are there for every user"
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "fbvins/core/time.hpp"
@@ -27,20 +28,35 @@ class Image {
   Image() = default;
   Image(int width, int height, std::uint8_t fill = 0)
       : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height, fill) {}
+  /// Pixels in somebody else's memory, row after row: read in place, kept by `keeper` until the last copy of this image is
+  /// gone, never written. Whoever writes to the image gets pixels of its own first.
+  Image(int width, int height, std::shared_ptr<const std::uint8_t> keeper)
+      : width_(width), height_(height), foreign_(std::move(keeper)) {}
 
   int width() const { return width_; }
   int height() const { return height_; }
-  bool empty() const { return pixels_.empty(); }
-  std::uint8_t* row(int y) { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
-  const std::uint8_t* row(int y) const { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
+  bool empty() const { return pixels_.empty() && !foreign_; }
+  bool foreign() const { return foreign_ != nullptr; }
+  std::uint8_t* row(int y) {
+    if (foreign_) copy_foreign();
+    return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_;
+  }
+  const std::uint8_t* row(int y) const { return data() + static_cast<std::ptrdiff_t>(y) * width_; }
   std::uint8_t& at(int x, int y) { return row(y)[x]; }
   std::uint8_t at(int x, int y) const { return row(y)[x]; }
-  ImageView view() const { return {pixels_.data(), width_, height_, width_}; }
+  ImageView view() const { return {data(), width_, height_, width_}; }
 
  private:
+  const std::uint8_t* data() const { return foreign_ ? foreign_.get() : pixels_.data(); }
+  void copy_foreign() {
+    pixels_.assign(foreign_.get(), foreign_.get() + static_cast<std::size_t>(width_) * height_);
+    foreign_.reset();
+  }
+
   int width_ = 0;
   int height_ = 0;
   std::vector<std::uint8_t> pixels_;
+  std::shared_ptr<const std::uint8_t> foreign_;
 };
 
 /// Two images taken at the same instant. A camera that delivered nothing has a null pointer.

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// The messages of `fbvins live --source socket:PATH`, for whoever has sensors. C and C++; needs nothing else of FB-VINS.
+// docs/socket.md tells what is sent when; examples/socket_sender.cpp does it.
+//
+//   int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);          // every message is one packet
+//   connect(connection, ...);
+//   send a FbvinsSocketHello, with the images' memory as SCM_RIGHTS; wait for FbvinsSocketWelcome
+//   send FbvinsSocketImu and FbvinsSocketFrame as the sensors deliver, take FbvinsSocketReleased and FbvinsSocketStatus
+//
+// Numbers are as this machine has them (both ends run on it). All fields lie at multiples of their size: no padding.
+// Reserved fields are 0.
+#ifndef FBVINS_LIVE_SOCKET_PROTOCOL_HPP
+#define FBVINS_LIVE_SOCKET_PROTOCOL_HPP
+
+#include <stdint.h>
+
+enum {
+  FBVINS_SOCKET_MAJOR = 1,  ///< raised when an older end would misunderstand
+  FBVINS_SOCKET_MINOR = 0,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MOST_SLOTS = 64,
+  FBVINS_SOCKET_MOST_READINGS = 512,
+  FBVINS_SOCKET_LARGEST_MESSAGE = 32768  ///< bytes
+};
+
+/// FbvinsSocketHeader::type
+enum {
+  FBVINS_SOCKET_HELLO = 1,  ///< sender to estimator
+  FBVINS_SOCKET_IMU = 2,
+  FBVINS_SOCKET_FRAME = 3,
+  FBVINS_SOCKET_GOODBYE = 4,   ///< either way
+  FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
+  FBVINS_SOCKET_RELEASED = 66,
+  FBVINS_SOCKET_STATUS = 67
+};
+
+typedef struct FbvinsSocketHeader {
+  uint32_t type;
+  uint32_t size_bytes;  ///< of the whole message
+} FbvinsSocketHeader;
+
+/// FbvinsSocketCamera::model
+enum { FBVINS_SOCKET_RADTAN = 0, FBVINS_SOCKET_EQUIDISTANT = 1 };
+
+typedef struct FbvinsSocketCamera {
+  uint32_t model;
+  uint32_t reserved;
+  double focal_px[2];    ///< fx, fy
+  double centre_px[2];   ///< cx, cy; the centre of the top-left pixel is (0, 0)
+  double distortion[4];  ///< k1 k2 p1 p2 (radtan), k1 k2 k3 k4 (equidistant)
+  double T_BC[12];       ///< three rows of four, R | p: p_B = R * p_C + p; B is the IMU
+} FbvinsSocketCamera;
+
+typedef struct FbvinsSocketRig {
+  FbvinsSocketCamera left, right;
+  double gyro_noise_density_radps_rthz;
+  double gyro_random_walk_radps2_rthz;
+  double accel_noise_density_mps2_rthz;
+  double accel_random_walk_mps3_rthz;
+  double imu_rate_hz;
+  double image_rate_hz;
+  double time_offset_s;  ///< t_imu = t_image + time_offset_s
+} FbvinsSocketRig;
+
+#define FBVINS_SOCKET_MAGIC "fb-vins"  ///< with its 0: eight bytes
+
+/// FbvinsSocketHello::flags
+enum { FBVINS_SOCKET_HAS_RIG = 1 };
+
+/// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
+/// Slot k begins at k * slot_bytes: the left image, row after row, and at right_offset_bytes the right one.
+typedef struct FbvinsSocketHello {
+  FbvinsSocketHeader header;
+  char magic[8];
+  uint16_t major, minor;
+  uint32_t flags;
+  char name[32];  ///< for messages to people; ends with a 0 unless full
+  uint32_t width_px, height_px;
+  uint32_t slots;
+  uint32_t slot_bytes;
+  uint32_t right_offset_bytes;
+  uint32_t reserved;
+  FbvinsSocketRig rig;  ///< with FBVINS_SOCKET_HAS_RIG; else 0
+} FbvinsSocketHello;
+
+typedef struct FbvinsSocketReading {
+  int64_t t_ns;
+  double gyro_radps[3];  ///< in B
+  double accel_mps2[3];  ///< specific force, in B: at rest +g upwards
+} FbvinsSocketReading;
+
+/// Only the first `count` readings are sent.
+typedef struct FbvinsSocketImu {
+  FbvinsSocketHeader header;
+  uint32_t count;
+  uint32_t reserved;
+  FbvinsSocketReading readings[FBVINS_SOCKET_MOST_READINGS];
+} FbvinsSocketImu;
+
+/// FbvinsSocketFrame::images
+enum { FBVINS_SOCKET_LEFT = 1, FBVINS_SOCKET_RIGHT = 2 };
+
+typedef struct FbvinsSocketFrame {
+  FbvinsSocketHeader header;
+  int64_t t_ns;
+  uint64_t sequence;  ///< +1 for each frame that the cameras made, sent or not: gaps are counted
+  uint32_t slot;      ///< the estimator's until it says FbvinsSocketReleased
+  uint32_t images;    ///< which of the two the slot holds
+} FbvinsSocketFrame;
+
+/// FbvinsSocketGoodbye::reason
+enum {
+  FBVINS_SOCKET_DONE = 0,
+  FBVINS_SOCKET_WRONG_VERSION = 1,
+  FBVINS_SOCKET_MALFORMED = 2,  ///< a message or the memory is not as this header says
+  FBVINS_SOCKET_WRONG_RIG = 3,  ///< no calibration, or another one than the estimator runs with
+  FBVINS_SOCKET_BUSY = 4,       ///< another sender is there
+  FBVINS_SOCKET_TOO_SLOW = 5    ///< no hello in time
+};
+
+typedef struct FbvinsSocketGoodbye {
+  FbvinsSocketHeader header;
+  uint32_t reason;
+  uint32_t reserved;
+  char text[240];  ///< one sentence; ends with a 0 unless full
+} FbvinsSocketGoodbye;
+
+typedef struct FbvinsSocketWelcome {
+  FbvinsSocketHeader header;
+  uint16_t major, minor;
+  uint32_t reserved;
+} FbvinsSocketWelcome;
+
+typedef struct FbvinsSocketReleased {
+  FbvinsSocketHeader header;
+  uint64_t slots;  ///< bit k: slot k is the sender's again
+} FbvinsSocketReleased;
+
+/// FbvinsSocketStatus::health
+enum {
+  FBVINS_SOCKET_UNKNOWN = 0,
+  FBVINS_SOCKET_INITIALISING = 1,
+  FBVINS_SOCKET_GOOD = 2,
+  FBVINS_SOCKET_DEGRADED = 3,
+  FBVINS_SOCKET_LOST = 4
+};
+
+/// Once a second, and when health changes. Counts are of this connection.
+typedef struct FbvinsSocketStatus {
+  FbvinsSocketHeader header;
+  uint64_t frames;
+  uint64_t frames_missed;  ///< gaps in FbvinsSocketFrame::sequence
+  uint64_t readings;
+  uint64_t readings_refused;  ///< not finite
+  uint32_t slots_held;
+  uint32_t health;
+  uint32_t reset_counter;  ///< +1 whenever the estimator started again
+  uint32_t reserved;
+} FbvinsSocketStatus;
+
+#endif

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/frame_ring.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/live/socket_test_sender.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::kSlotBytes;
+
+const FrameLayout kLayout{test::kWidth, test::kHeight, test::kSlots, kSlotBytes, kSlotBytes / 2};
+
+bool rings(const Bell& bell) {
+  pollfd watched{bell.fd(), POLLIN, 0};
+  return ::poll(&watched, 1, 0) == 1;
+}
+
+class FrameRingTest : public testing::Test {
+ protected:
+  FrameRingTest() {
+    slots_ =
+        static_cast<std::uint8_t*>(::mmap(nullptr, kLayout.bytes(), PROT_READ | PROT_WRITE, MAP_SHARED, memory_.number(), 0));
+    for (std::size_t i = 0; i < kLayout.bytes(); ++i) slots_[i] = static_cast<std::uint8_t>(i * 7 + i / kSlotBytes);
+    auto ring = FrameRing::map(memory_, kLayout, bell_);
+    EXPECT_TRUE(ring);
+    if (ring) ring_ = *ring;
+  }
+  ~FrameRingTest() override { ::munmap(slots_, kLayout.bytes()); }
+
+  FileDescriptor memory_ = test::test_memory();
+  std::shared_ptr<const Bell> bell_ = std::make_shared<const Bell>();
+  std::shared_ptr<FrameRing> ring_;
+  std::uint8_t* slots_ = nullptr;
+};
+
+SocketFrame frame_in(int slot) { return {{1000 + slot}, 0, slot, true, true}; }
+
+TEST_F(FrameRingTest, FramesAreTheSendersMemory) {
+  const auto frame = ring_->take(frame_in(2));
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->t, Time{1002});
+  EXPECT_TRUE(frame->left->foreign());
+  EXPECT_EQ(std::memcmp(frame->left->row(0), slots_ + 2 * kSlotBytes, kLayout.image_bytes()), 0);
+  EXPECT_EQ(std::memcmp(frame->right->row(0), slots_ + 2 * kSlotBytes + kSlotBytes / 2, kLayout.image_bytes()), 0);
+  slots_[2 * kSlotBytes] = 123;  // the same memory, not a copy
+  EXPECT_EQ(frame->left->at(0, 0), 123);
+}
+
+TEST_F(FrameRingTest, ASlotIsFreeWhenItsLastImageIsGone) {
+  auto frame = ring_->take(frame_in(1));
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(ring_->held(), 1);
+  std::shared_ptr<const Image> right = frame->right;
+  frame->left.reset();
+  frame->right.reset();
+  EXPECT_EQ(ring_->released(), 0u);
+  EXPECT_FALSE(rings(*bell_));
+  EXPECT_FALSE(ring_->take(frame_in(1)));  // still held
+  right.reset();
+  EXPECT_TRUE(rings(*bell_));
+  EXPECT_FALSE(ring_->take(frame_in(1)));  // free, but the sender does not know yet
+  EXPECT_EQ(ring_->held(), 0);
+  EXPECT_EQ(ring_->released(), 2u);
+  EXPECT_EQ(ring_->released(), 0u);
+  EXPECT_TRUE(ring_->take(frame_in(1)));
+}
+
+TEST_F(FrameRingTest, WhereSlotsAreScarceImagesAreCopied) {
+  const auto first = ring_->take(frame_in(0)), second = ring_->take(frame_in(3));
+  ASSERT_TRUE(first && second);
+  const auto third = ring_->take(frame_in(1));
+  ASSERT_TRUE(third);
+  EXPECT_FALSE(third->left->foreign());
+  EXPECT_EQ(ring_->released(), 2u);
+  EXPECT_EQ(third->right->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
+  slots_[kSlotBytes + kSlotBytes / 2 + 5] ^= 1;
+  EXPECT_NE(third->right->at(5, 0), slots_[kSlotBytes + kSlotBytes / 2 + 5]);
+}
+
+TEST_F(FrameRingTest, AMissingImageIsANullPointer) {
+  const auto frame = ring_->take({{1}, 0, 0, false, true});
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->left, nullptr);
+  ASSERT_NE(frame->right, nullptr);
+  EXPECT_EQ(frame->right->at(0, 0), slots_[kSlotBytes / 2]);
+}
+
+TEST_F(FrameRingTest, ImagesOutliveTheRingAndItsSender) {
+  const auto frame = ring_->take(frame_in(3));
+  ASSERT_TRUE(frame);
+  const std::uint8_t wanted = slots_[3 * kSlotBytes + 9];
+  ring_.reset();
+  memory_ = FileDescriptor();
+  EXPECT_EQ(frame->left->at(9, 0), wanted);
+}
+
+TEST_F(FrameRingTest, NoSlotBeyondTheLast) {
+  const auto frame = ring_->take(frame_in(4));
+  ASSERT_FALSE(frame);
+  EXPECT_EQ(frame.error().message, "frame: no slot 4, there are 4");
+}
+
+TEST(FrameRing, MemoryThatCouldGoAwayIsRefused) {
+  const auto bell = std::make_shared<const Bell>();
+  const auto refusal = [&](const FileDescriptor& memory) {
+    const auto ring = FrameRing::map(memory, kLayout, bell);
+    return ring ? "taken" : ring.error().message;
+  };
+  EXPECT_EQ(refusal(test::test_memory(kLayout.bytes(), F_SEAL_GROW)), "the images' memory is not sealed with F_SEAL_SHRINK");
+  EXPECT_EQ(refusal(test::test_memory(kLayout.bytes() - 1)), "the images' memory has 32767 bytes where 4 slots need 32768");
+  EXPECT_EQ(refusal(FileDescriptor(::eventfd(0, EFD_CLOEXEC))), "the images' memory is not a memfd that allows sealing");
+  EXPECT_EQ(refusal(FileDescriptor(::open("/proc/self/status", O_RDONLY | O_CLOEXEC))),
+            "the images' memory is not a memfd that allows sealing");
+  const FileDescriptor good = test::test_memory();
+  EXPECT_EQ(refusal(good), "taken");
+  EXPECT_NE(::ftruncate(good.number(), 1), 0);  // the seal holds
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/socket_message.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "fbvins/io/image_decode.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
+/// Stamps beyond (146 years) would overflow in differences.
+constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
+
+static_assert(sizeof(FbvinsSocketHello) == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
+static_assert(sizeof(FbvinsSocketReading) == 56 && sizeof(FbvinsSocketFrame) == 32 && sizeof(FbvinsSocketGoodbye) == 256);
+static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
+
+Error malformed(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
+
+/// The message as its struct; an error where it is shorter. What is longer is of a later version.
+template <class Struct>
+Result<Struct> read(std::span<const std::byte> bytes, const char* name, std::size_t size = sizeof(Struct)) {
+  if (bytes.size() < size) return malformed(fmt::format("{} of {} bytes where {} are needed", name, bytes.size(), size));
+  Struct out{};
+  std::memcpy(&out, bytes.data(), size);
+  return out;
+}
+
+bool is_stamp(std::int64_t t_ns) { return t_ns >= 0 && t_ns < kLastStamp_ns; }
+
+/// Text of a stranger, for a terminal.
+template <std::size_t size>
+std::string printable(const char (&text)[size]) {
+  std::string out(text, strnlen(text, size));
+  for (char& c : out)
+    if (c < ' ' || c > '~') c = '?';
+  return out;
+}
+
+Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
+  constexpr auto kLargest = static_cast<std::uint32_t>(kLargestImageSide_px);
+  if (hello.width_px < 1 || hello.height_px < 1 || hello.width_px > kLargest || hello.height_px > kLargest)
+    return malformed(fmt::format("hello: images of {} x {} pixels", hello.width_px, hello.height_px));
+  if (hello.slots < 2 || hello.slots > FBVINS_SOCKET_MOST_SLOTS)
+    return malformed(fmt::format("hello: {} slots, not 2 to {}", hello.slots, int{FBVINS_SOCKET_MOST_SLOTS}));
+  const FrameLayout layout{static_cast<int>(hello.width_px), static_cast<int>(hello.height_px), static_cast<int>(hello.slots),
+                           hello.slot_bytes, hello.right_offset_bytes};
+  if (layout.right_offset_bytes < layout.image_bytes() || layout.slot_bytes < layout.right_offset_bytes + layout.image_bytes())
+    return malformed(fmt::format("hello: two images of {} bytes, the right one at {}, do not fit into a slot of {} bytes",
+                                 layout.image_bytes(), layout.right_offset_bytes, layout.slot_bytes));
+  if (layout.bytes() > kMostMemory_bytes) return malformed(fmt::format("hello: {} bytes of images, over 1 GiB", layout.bytes()));
+  return layout;
+}
+
+Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
+  // The version stands where every version has it, and is judged before what depends on it.
+  constexpr std::size_t kUpToVersion = offsetof(FbvinsSocketHello, flags);
+  const auto version = read<FbvinsSocketHello>(bytes, "hello", kUpToVersion);
+  if (!version) return version.error();
+  if (std::memcmp(version->magic, FBVINS_SOCKET_MAGIC, sizeof(version->magic)) != 0)
+    return malformed("hello: not an FB-VINS sender");
+  if (version->major != FBVINS_SOCKET_MAJOR)
+    return Error{ErrorCode::unsupported,
+                 fmt::format("the sender speaks version {}.{} of the protocol, this program {}.{}", version->major,
+                             version->minor, int{FBVINS_SOCKET_MAJOR}, int{FBVINS_SOCKET_MINOR})};
+  const auto hello = read<FbvinsSocketHello>(bytes, "hello");
+  if (!hello) return hello.error();
+  const auto layout = layout_of(*hello);
+  if (!layout) return layout.error();
+  SocketHello out{printable(hello->name), hello->minor, *layout, std::nullopt};
+  if ((hello->flags & FBVINS_SOCKET_HAS_RIG) == 0) return SocketMessage(std::move(out));
+  out.rig = hello->rig;
+  const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
+  if (!rig) return rig.error();
+  return SocketMessage(std::move(out));
+}
+
+Result<SocketMessage> parse_imu(std::span<const std::byte> bytes) {
+  constexpr std::size_t kBefore = offsetof(FbvinsSocketImu, readings);
+  const auto head = read<FbvinsSocketImu>(bytes, "imu", kBefore);
+  if (!head) return head.error();
+  if (head->count > FBVINS_SOCKET_MOST_READINGS || bytes.size() < kBefore + head->count * sizeof(FbvinsSocketReading))
+    return malformed(fmt::format("imu: {} readings in {} bytes", head->count, bytes.size()));
+  SocketImu out;
+  out.readings.reserve(head->count);
+  for (std::size_t i = 0; i < head->count; ++i) {
+    FbvinsSocketReading reading;
+    std::memcpy(&reading, bytes.data() + kBefore + i * sizeof(reading), sizeof(reading));
+    if (!is_stamp(reading.t_ns)) return malformed(fmt::format("imu: stamp {} ns", reading.t_ns));
+    const ImuSample sample{{reading.t_ns}, Vec3(reading.gyro_radps), Vec3(reading.accel_mps2)};
+    if (sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite()) out.readings.push_back(sample);
+    else ++out.refused;
+  }
+  return SocketMessage(std::move(out));
+}
+
+Result<SocketMessage> parse_frame(std::span<const std::byte> bytes) {
+  const auto frame = read<FbvinsSocketFrame>(bytes, "frame");
+  if (!frame) return frame.error();
+  if (!is_stamp(frame->t_ns)) return malformed(fmt::format("frame: stamp {} ns", frame->t_ns));
+  if (frame->slot >= FBVINS_SOCKET_MOST_SLOTS) return malformed(fmt::format("frame: no slot {}", frame->slot));
+  const bool left = (frame->images & FBVINS_SOCKET_LEFT) != 0, right = (frame->images & FBVINS_SOCKET_RIGHT) != 0;
+  if (!left && !right) return malformed("frame: without an image");
+  return SocketMessage(SocketFrame{{frame->t_ns}, frame->sequence, static_cast<int>(frame->slot), left, right});
+}
+
+Result<SocketMessage> parse_goodbye(std::span<const std::byte> bytes) {
+  const auto goodbye = read<FbvinsSocketGoodbye>(bytes, "goodbye");
+  if (!goodbye) return goodbye.error();
+  return SocketMessage(SocketGoodbye{printable(goodbye->text)});
+}
+
+}  // namespace
+
+Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
+  const auto header = read<FbvinsSocketHeader>(bytes, "a message");
+  if (!header) return header.error();
+  if (header->size_bytes != bytes.size())
+    return malformed(fmt::format("a message of {} bytes says that it has {}", bytes.size(), header->size_bytes));
+  switch (header->type) {
+    case FBVINS_SOCKET_HELLO: return parse_hello(bytes);
+    case FBVINS_SOCKET_IMU: return parse_imu(bytes);
+    case FBVINS_SOCKET_FRAME: return parse_frame(bytes);
+    case FBVINS_SOCKET_GOODBYE: return parse_goodbye(bytes);
+    default: return SocketMessage(SocketUnknown{header->type});
+  }
+}
+
+}  // namespace fbvins

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a sender's messages say (fbvins/live/socket_protocol.hpp), as values that are checked: whatever the bytes, the answer
+// is a message that is right in itself, or one sentence. Pure functions, any thread.
+//
+//   Result<SocketMessage> message = parse_socket_message(bytes);
+//   if (!message) return refuse(message.error());
+//   if (const auto* frame = std::get_if<SocketFrame>(&*message)) ...
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/socket_protocol.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// Where the images lie in the shared memory.
+struct FrameLayout {
+  int width_px = 0, height_px = 0;
+  int slots = 0;
+  std::size_t slot_bytes = 0;
+  std::size_t right_offset_bytes = 0;
+
+  std::size_t image_bytes() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+  std::size_t bytes() const { return static_cast<std::size_t>(slots) * slot_bytes; }
+};
+
+struct SocketHello {
+  std::string name;  ///< printable
+  int minor = 0;     ///< of the sender's version; the major one is ours
+  FrameLayout layout;
+  std::optional<FbvinsSocketRig> rig;  ///< as sent, so that two can be compared
+};
+
+struct SocketImu {
+  std::vector<ImuSample> readings;  ///< finite
+  int refused = 0;                  ///< left out, not being finite
+};
+
+struct SocketFrame {
+  Time t;
+  std::uint64_t sequence = 0;
+  int slot = 0;  ///< below FBVINS_SOCKET_MOST_SLOTS
+  bool left = false, right = false;
+};
+
+struct SocketGoodbye {
+  std::string text;  ///< printable
+};
+
+/// A type that version 1.0 does not have.
+struct SocketUnknown {
+  std::uint32_t type = 0;
+};
+
+using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketGoodbye, SocketUnknown>;
+
+/// ErrorCode::unsupported: the version is another one.
+Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);
+
+/// The rig of a hello, checked as calibration files are.
+Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int height_px);
+/// The reverse, for senders of our own and for tests.
+FbvinsSocketRig socket_rig(const StereoRig& rig);
+
+}  // namespace fbvins

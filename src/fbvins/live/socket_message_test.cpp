@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/socket_message.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "fbvins/live/socket_test_sender.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::bytes_of;
+using test::hello_message;
+
+std::string refusal(std::span<const std::byte> bytes) {
+  const auto message = parse_socket_message(bytes);
+  return message ? "taken" : message.error().message;
+}
+
+TEST(SocketMessage, HelloWithItsCalibrationAsSent) {
+  const StereoRig rig = test::socket_test_rig();
+  const auto message = parse_socket_message(bytes_of(hello_message(&rig)));
+  ASSERT_TRUE(message) << message.error().message;
+  const auto& hello = std::get<SocketHello>(*message);
+  EXPECT_EQ(hello.name, "tester");
+  EXPECT_EQ(hello.layout.slots, test::kSlots);
+  EXPECT_EQ(hello.layout.right_offset_bytes, test::kSlotBytes / 2);
+  const auto sent = parse_socket_rig(*hello.rig, test::kWidth, test::kHeight);
+  ASSERT_TRUE(sent);
+  EXPECT_EQ(sent->T_BC0.R(), rig.T_BC0.R());
+  EXPECT_EQ(sent->T_BC1.p, rig.T_BC1.p);
+  EXPECT_EQ(sent->time_offset_s, rig.time_offset_s);
+  EXPECT_EQ(sent->imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.accel_random_walk_mps3_rthz);
+  EXPECT_EQ(std::get<PinholeRadtan>(sent->right.model()).k1, -0.125);
+  EXPECT_EQ(sent->right.width(), test::kWidth);
+}
+
+TEST(SocketMessage, HelloOfALaterMinorVersionMayBeLonger) {
+  struct Longer {
+    FbvinsSocketHello hello;
+    double more = 0;
+  } longer{hello_message(nullptr)};
+  longer.hello.header.size_bytes = sizeof(longer);
+  longer.hello.minor = FBVINS_SOCKET_MINOR + 1;
+  const auto message = parse_socket_message(bytes_of(longer));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(std::get<SocketHello>(*message).minor, FBVINS_SOCKET_MINOR + 1);
+}
+
+TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
+  FbvinsSocketHello hello = hello_message(nullptr);
+  hello.major = 7;
+  hello.slots = 0;
+  hello.header.size_bytes = 20;  // whatever follows the version may be different there
+  const auto message = parse_socket_message(bytes_of(hello, 20));
+  ASSERT_FALSE(message);
+  EXPECT_EQ(message.error().code, ErrorCode::unsupported);
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.0 of the protocol, this program 1.0");
+}
+
+TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
+  const auto with = [](auto change) {
+    FbvinsSocketHello hello = hello_message(nullptr);
+    change(hello);
+    return refusal(bytes_of(hello));
+  };
+  EXPECT_EQ(with([](auto& h) { h.magic[0] = 'x'; }), "hello: not an FB-VINS sender");
+  EXPECT_EQ(with([](auto& h) { h.width_px = 0; }), "hello: images of 0 x 48 pixels");
+  EXPECT_EQ(with([](auto& h) { h.height_px = 0xffffffffu; }), "hello: images of 64 x 4294967295 pixels");
+  EXPECT_EQ(with([](auto& h) { h.slots = 1; }), "hello: 1 slots, not 2 to 64");
+  EXPECT_EQ(with([](auto& h) { h.slots = 65; }), "hello: 65 slots, not 2 to 64");
+  EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 3071; }),
+            "hello: two images of 3072 bytes, the right one at 3071, do not fit into a slot of 8192 bytes");
+  EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 0xfffff000u; }),
+            "hello: two images of 3072 bytes, the right one at 4294963200, do not fit into a slot of 8192 bytes");
+  EXPECT_EQ(with([](auto& h) { h.slots = 64, h.slot_bytes = 0x7fffffffu; }), "hello: 137438953408 bytes of images, over 1 GiB");
+  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 472 bytes says that it has 12");
+  EXPECT_EQ(with([](auto& h) { std::memset(h.name, 0x1b, sizeof(h.name)); }), "taken");
+}
+
+TEST(SocketMessage, NamesArePrintable) {
+  FbvinsSocketHello hello = hello_message(nullptr);
+  std::memcpy(hello.name, "a\n\x1b[31m\xff", 9);
+  const auto message = parse_socket_message(bytes_of(hello));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(std::get<SocketHello>(*message).name, "a??[31m?");
+}
+
+TEST(SocketMessage, CalibrationsThatCannotBeAreRefused) {
+  const auto with = [](auto change) {
+    FbvinsSocketRig rig = socket_rig(test::socket_test_rig());
+    change(rig);
+    const auto parsed = parse_socket_rig(rig, test::kWidth, test::kHeight);
+    return parsed ? "taken" : parsed.error().message;
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(with([](auto&) {}), "taken");
+  EXPECT_EQ(with([](auto& r) { r.left.model = 9; }), "calibration: the left camera has no model 9");
+  EXPECT_EQ(with([](auto& r) { r.right.focal_px[1] = -1; }),
+            "calibration: the right camera's intrinsics are not finite, with positive focal lengths");
+  EXPECT_EQ(with([](auto& r) { r.left.distortion[3] = kNan; }),
+            "calibration: the left camera's intrinsics are not finite, with positive focal lengths");
+  EXPECT_EQ(with([](auto& r) { r.right.T_BC[0] = 2; }),
+            "calibration: the right camera's T_BC is not a rotation and a translation");
+  EXPECT_EQ(with([](auto& r) { r.right.T_BC[3] = kNan; }),
+            "calibration: the right camera's T_BC is not a rotation and a translation");
+  EXPECT_EQ(with([](auto& r) { r.right = r.left; }), "calibration: the two cameras are 0 m apart, not between 1 mm and 10 m");
+  EXPECT_EQ(with([](auto& r) { r.imu_rate_hz = 0; }), "calibration: a noise density or a rate is not positive");
+  EXPECT_EQ(with([](auto& r) { r.time_offset_s = kNan; }), "calibration: the time offset is more than 10 s");
+}
+
+TEST(SocketMessage, ReadingsThatAreNotFiniteAreLeftOutAndCounted) {
+  FbvinsSocketImu imu{};
+  const auto size = static_cast<std::uint32_t>(offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading));
+  imu.header = {FBVINS_SOCKET_IMU, size};
+  imu.count = 3;
+  for (int i = 0; i < 3; ++i) imu.readings[i] = {100 + i, {0.1, 0.2, 0.3}, {1, 2, 9.5}};
+  imu.readings[1].accel_mps2[2] = std::numeric_limits<double>::infinity();
+  const auto message = parse_socket_message(bytes_of(imu, size));
+  ASSERT_TRUE(message);
+  const auto& taken = std::get<SocketImu>(*message);
+  ASSERT_EQ(taken.readings.size(), 2u);
+  EXPECT_EQ(taken.refused, 1);
+  EXPECT_EQ(taken.readings[1].t, Time{102});
+  EXPECT_EQ(taken.readings[1].gyro_radps, Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(taken.readings[1].accel_mps2, Vec3(1, 2, 9.5));
+
+  imu.count = 4;
+  EXPECT_EQ(refusal(bytes_of(imu, size)), "imu: 4 readings in 184 bytes");
+  imu.count = 0xffffffffu;
+  EXPECT_EQ(refusal(bytes_of(imu, size)), "imu: 4294967295 readings in 184 bytes");
+  imu.count = 3;
+  imu.readings[0].t_ns = -5;
+  EXPECT_EQ(refusal(bytes_of(imu, size)), "imu: stamp -5 ns");
+}
+
+TEST(SocketMessage, FramesNameASlotAStampAndAnImage) {
+  const FbvinsSocketFrame good{{FBVINS_SOCKET_FRAME, sizeof(good)}, 42, 7, 3, FBVINS_SOCKET_RIGHT};
+  const auto message = parse_socket_message(bytes_of(good));
+  ASSERT_TRUE(message);
+  const auto& frame = std::get<SocketFrame>(*message);
+  EXPECT_EQ(frame.t, Time{42});
+  EXPECT_EQ(frame.sequence, 7u);
+  EXPECT_EQ(frame.slot, 3);
+  EXPECT_FALSE(frame.left);
+  EXPECT_TRUE(frame.right);
+
+  FbvinsSocketFrame wrong = good;
+  wrong.slot = 64;
+  EXPECT_EQ(refusal(bytes_of(wrong)), "frame: no slot 64");
+  wrong = good;
+  wrong.images = 4;
+  EXPECT_EQ(refusal(bytes_of(wrong)), "frame: without an image");
+  wrong = good;
+  wrong.t_ns = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(refusal(bytes_of(wrong)), "frame: stamp 9223372036854775807 ns");
+  wrong = good;
+  wrong.header.size_bytes = 31;
+  EXPECT_EQ(refusal(bytes_of(wrong, 31)), "frame of 31 bytes where 32 are needed");
+}
+
+TEST(SocketMessage, NothingAndUnknownTypes) {
+  EXPECT_EQ(refusal({}), "a message of 0 bytes where 8 are needed");
+  const FbvinsSocketHeader unknown{999, sizeof(unknown)};
+  const auto message = parse_socket_message(bytes_of(unknown));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(std::get<SocketUnknown>(*message).type, 999u);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// The calibration in a sender's hello: parse_socket_rig() and its reverse.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/live/socket_message.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kLargestOffset_s = 10, kSmallestBaseline_m = 1e-3, kLargestBaseline_m = 10;
+/// Matrices typed by hand carry three or four digits.
+constexpr double kRotationTolerance = 1e-3;
+
+Error malformed(std::string sentence) { return {ErrorCode::malformed, "calibration: " + std::move(sentence)}; }
+
+bool are_finite(const double* begin, std::size_t count) {
+  return std::all_of(begin, begin + count, [](double x) { return std::isfinite(x); });
+}
+
+Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_px, const char* side) {
+  const double* f = c.focal_px;
+  const double* m = c.centre_px;
+  const double* k = c.distortion;
+  if (!are_finite(f, 2) || !are_finite(m, 2) || !are_finite(k, 4) || !(f[0] > 0 && f[1] > 0))
+    return malformed(fmt::format("the {} camera's intrinsics are not finite, with positive focal lengths", side));
+  if (c.model == FBVINS_SOCKET_RADTAN)
+    return Camera(PinholeRadtan{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
+  if (c.model == FBVINS_SOCKET_EQUIDISTANT)
+    return Camera(KannalaBrandt{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
+  return malformed(fmt::format("the {} camera has no model {}", side, c.model));
+}
+
+template <class C>
+Result<Pose<B, C>> mounting_of(const FbvinsSocketCamera& camera, const char* side) {
+  const double* m = camera.T_BC;
+  Mat3 R;
+  R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
+  const Vec3 p(m[3], m[7], m[11]);
+  if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kRotationTolerance) || !(R.determinant() > 0) ||
+      !are_finite(m, 12))
+    return malformed(fmt::format("the {} camera's T_BC is not a rotation and a translation", side));
+  if (!(p.cwiseAbs().maxCoeff() < 1e3)) return malformed(fmt::format("the {} camera is more than a kilometre away", side));
+  return Pose<B, C>{Quat(R).normalized(), p};
+}
+
+Result<void> check_figures(const FbvinsSocketRig& rig) {
+  for (const double figure :
+       {rig.gyro_noise_density_radps_rthz, rig.gyro_random_walk_radps2_rthz, rig.accel_noise_density_mps2_rthz,
+        rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz, rig.image_rate_hz})
+    if (!(figure > 0 && std::isfinite(figure))) return malformed("a noise density or a rate is not positive");
+  if (!(std::abs(rig.time_offset_s) <= kLargestOffset_s)) return malformed("the time offset is more than 10 s");
+  return {};
+}
+
+FbvinsSocketCamera camera_message(const Camera& camera, const Quat& q_BC, const Vec3& p_BC) {
+  FbvinsSocketCamera out{};
+  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model()))
+    out = {FBVINS_SOCKET_RADTAN, 0, {m->fx, m->fy}, {m->cx, m->cy}, {m->k1, m->k2, m->p1, m->p2}, {}};
+  else if (const auto* e = std::get_if<KannalaBrandt>(&camera.model()))
+    out = {FBVINS_SOCKET_EQUIDISTANT, 0, {e->fx, e->fy}, {e->cx, e->cy}, {e->k1, e->k2, e->k3, e->k4}, {}};
+  Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> T_BC(out.T_BC);
+  T_BC.leftCols<3>() = q_BC.toRotationMatrix();
+  T_BC.col(3) = p_BC;
+  return out;
+}
+
+}  // namespace
+
+Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int height_px) {
+  const auto left = camera_of(rig.left, width_px, height_px, "left");
+  if (!left) return left.error();
+  const auto right = camera_of(rig.right, width_px, height_px, "right");
+  if (!right) return right.error();
+  const auto T_BC0 = mounting_of<C0>(rig.left, "left");
+  if (!T_BC0) return T_BC0.error();
+  const auto T_BC1 = mounting_of<C1>(rig.right, "right");
+  if (!T_BC1) return T_BC1.error();
+  if (Result<void> good = check_figures(rig); !good) return good.error();
+  const ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
+                       rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
+  const StereoRig out{*left, *right, *T_BC0, *T_BC1, noise, rig.image_rate_hz, rig.time_offset_s};
+  const double baseline_m = out.T_C1C0().p.norm();
+  if (!(baseline_m > kSmallestBaseline_m && baseline_m < kLargestBaseline_m))
+    return malformed(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
+  return out;
+}
+
+FbvinsSocketRig socket_rig(const StereoRig& rig) {
+  return {camera_message(rig.left, rig.T_BC0.q, rig.T_BC0.p),
+          camera_message(rig.right, rig.T_BC1.q, rig.T_BC1.p),
+          rig.imu_noise.gyro_noise_density_radps_rthz,
+          rig.imu_noise.gyro_random_walk_radps2_rthz,
+          rig.imu_noise.accel_noise_density_mps2_rthz,
+          rig.imu_noise.accel_random_walk_mps3_rthz,
+          rig.imu_noise.rate_hz,
+          rig.image_rate_hz,
+          rig.time_offset_s};
+}
+
+}  // namespace fbvins

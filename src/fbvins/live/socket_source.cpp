@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/socket_source.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+
+namespace fbvins {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStatusEvery = 1s;
+/// No descriptor for a new connection: it is tried again later.
+constexpr auto kAcceptAgain = 1s;
+
+bool same(const FbvinsSocketRig& a, const FbvinsSocketRig& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }
+
+std::uint32_t health_number(HealthState state) {
+  switch (state) {
+    case HealthState::initialising: return FBVINS_SOCKET_INITIALISING;
+    case HealthState::good: return FBVINS_SOCKET_GOOD;
+    case HealthState::degraded: return FBVINS_SOCKET_DEGRADED;
+    case HealthState::lost: return FBVINS_SOCKET_LOST;
+  }
+  return FBVINS_SOCKET_UNKNOWN;
+}
+
+}  // namespace
+
+/// From the thread of the status sink to that of the source.
+struct SocketSource::Report {
+  std::mutex mutex;
+  std::uint32_t health = FBVINS_SOCKET_UNKNOWN;
+  std::uint32_t reset_counter = 0;
+  bool fresh = false;
+};
+
+class SocketSource::StatusSink final : public Sink {
+ public:
+  StatusSink(std::shared_ptr<Report> report, std::shared_ptr<const Bell> bell)
+      : report_(std::move(report)), bell_(std::move(bell)) {}
+  std::string_view name() const override { return "status to the sender"; }
+  Result<void> take(const LiveEvent& event) override {
+    if (const auto* status = std::get_if<LiveStatus>(&event)) {
+      const std::lock_guard lock(report_->mutex);
+      const std::uint32_t health = health_number(status->health.state);
+      report_->fresh = report_->fresh || health != report_->health || status->reset_counter != report_->reset_counter;
+      report_->health = health;
+      report_->reset_counter = status->reset_counter;
+      if (report_->fresh) bell_->ring();
+    }
+    return {};
+  }
+
+ private:
+  std::shared_ptr<Report> report_;
+  std::shared_ptr<const Bell> bell_;
+};
+
+SocketSource::SocketSource(SocketFile file, SocketOptions options)
+    : file_(std::move(file)), options_(std::move(options)), report_(std::make_shared<Report>()) {
+  if (!options_.rig) return;
+  rig_ = *options_.rig;
+  rig_known_ = true;
+}
+
+Result<std::unique_ptr<SocketSource>> SocketSource::open(const std::string& path, SocketOptions options) {
+  Result<SocketFile> file = SocketFile::listen(path);
+  if (!file) return file.error();
+  std::unique_ptr<SocketSource> source(new SocketSource(*std::move(file), std::move(options)));
+  if (Result<void> known = source->wait_for_rig(); !known) return known.error();
+  return source;
+}
+
+Result<void> SocketSource::wait_for_rig() {
+  if (!rig_known_) say("waiting for a sender that has the calibration");
+  while (!rig_known_) {
+    if (options_.give_up()) return Error{ErrorCode::not_found, file_.path() + ": no sender came"};
+    step(100ms, nullptr);
+  }
+  return {};
+}
+
+Result<void> SocketSource::run(SensorInput& input) {
+  if (session_ && session_->greeted()) session_->welcome();
+  while (!stopped_) step(kStatusEvery, &input);
+  if (session_) session_->refuse(FBVINS_SOCKET_DONE, "the estimator ends");
+  session_.reset();
+  return {};
+}
+
+void SocketSource::stop() {
+  stopped_ = true;
+  bell_->ring();
+}
+
+std::unique_ptr<Sink> SocketSource::status_sink() { return std::make_unique<StatusSink>(report_, bell_); }
+
+/// Waits until something comes, `longest` at most, and sees to it. Without an input nobody is welcomed yet.
+void SocketSource::step(Clock::duration longest, SensorInput* input) {
+  const auto now = Clock::now();
+  const auto until = session_ ? std::clamp(next_, now, now + longest) : now + longest;
+  const auto to_sender = static_cast<short>(backlog_ ? POLLOUT : 0);
+  std::array<pollfd, 3> watched = {pollfd{bell_->fd(), POLLIN, 0}, pollfd{now < accept_after_ ? -1 : file_.fd(), POLLIN, 0},
+                                   pollfd{session_ ? session_->fd() : -1, static_cast<short>(POLLIN | to_sender), 0}};
+  ::poll(watched.data(), watched.size(), static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
+  if (watched[0].revents != 0) bell_->silence();
+  if (session_) {
+    if (!session_->greeted()) greet(input != nullptr);
+    else if (input != nullptr) serve(*input);
+  }
+  // A sender that comes back meets its old connection otherwise, which may still hold messages.
+  if (watched[1].revents != 0 && watched[2].revents == 0) accept();
+}
+
+void SocketSource::accept() {
+  FileDescriptor connection(::accept4(file_.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  if (!connection) {
+    if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM) return;
+    say(fmt::format("a sender cannot be taken: {}", std::strerror(errno)));
+    accept_after_ = Clock::now() + kAcceptAgain;
+    return;
+  }
+  auto newcomer = std::make_unique<SocketSession>(std::move(connection), bell_);
+  if (session_) return newcomer->refuse(FBVINS_SOCKET_BUSY, fmt::format("another sender is connected: {}", session_->name()));
+  session_ = std::move(newcomer);
+  next_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options_.hello_s));
+}
+
+void SocketSource::greet(bool begin) {
+  session_->greet();
+  if (session_->greeted()) check_hello();
+  else if (session_->ended().empty() && Clock::now() >= next_) session_->refuse(FBVINS_SOCKET_TOO_SLOW, "no hello in time");
+  if (!session_->ended().empty()) return let_go();
+  if (!session_->greeted()) return;
+  say(fmt::format("{} is connected", session_->name()));
+  next_ = Clock::now();
+  if (begin) session_->welcome();
+}
+
+/// Whether the sender's images and calibration are those that the estimator runs with.
+void SocketSource::check_hello() {
+  const SocketHello& hello = *session_->hello();
+  const auto refuse = [&](const std::string& why) { session_->refuse(FBVINS_SOCKET_WRONG_RIG, why); };
+  if (!rig_known_) {
+    if (!hello.rig) return refuse("no calibration: neither here nor in the hello");
+    rig_ = *parse_socket_rig(*hello.rig, hello.layout.width_px, hello.layout.height_px);
+    senders_rig_ = hello.rig;
+    rig_known_ = true;
+  }
+  for (const Camera* camera : {&rig_.left, &rig_.right})
+    if (hello.layout.width_px != camera->width() || hello.layout.height_px != camera->height())
+      return refuse(fmt::format("images of {} x {} pixels, the calibration is for {} x {}", hello.layout.width_px,
+                                hello.layout.height_px, camera->width(), camera->height()));
+  if (senders_rig_ && hello.rig && !same(*senders_rig_, *hello.rig))
+    refuse("another calibration than the first sender's, which the estimator runs with");
+}
+
+void SocketSource::serve(SensorInput& input) {
+  session_->receive(input);
+  backlog_ = session_->send_released();
+  if (session_->ended().empty()) send_status();
+  if (!session_->ended().empty()) let_go();
+}
+
+void SocketSource::send_status() {
+  const std::lock_guard lock(report_->mutex);
+  if (!report_->fresh && Clock::now() < next_) return;
+  session_->send_status(report_->health, report_->reset_counter);
+  report_->fresh = false;
+  next_ = Clock::now() + kStatusEvery;
+}
+
+void SocketSource::let_go() {
+  const SocketCounts& counts = session_->counts();
+  std::string sentence = fmt::format("{}: {}", session_->name(), session_->ended());
+  if (session_->greeted())
+    sentence += fmt::format(" ({} frames, {} missed, {} readings, {} refused)", counts.frames, counts.frames_missed,
+                            counts.readings, counts.readings_refused);
+  say(sentence);
+  session_.reset();
+  backlog_ = false;
+}
+
+}  // namespace fbvins
