@@ -6,7 +6,12 @@
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/mcap_dataset.hpp"
+#include "fbvins/io/mcap_format.hpp"
+#include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 
@@ -67,6 +72,47 @@ std::vector<std::string> weights_seeds() {
   std::string bytes(8, '\0');
   bytes[0] = static_cast<char>(header.size() % 256), bytes[1] = static_cast<char>(header.size() / 256);
   return {bytes + header + std::string(536, '\1')};
+}
+
+/// Else whatever is changed inside of a chunk would be left out with it.
+std::string without_checksums(std::string record) {
+  for (std::size_t at = kMcapMagic.size(); at + kMcapRecordHead_bytes < record.size();) {
+    const auto kind = static_cast<McapRecord>(record[at]);
+    const auto length = ByteCursor(std::string_view(record).substr(at + 1)).get<std::uint64_t>();
+    const std::size_t content = at + kMcapRecordHead_bytes;
+    if (kind == McapRecord::chunk) overwrite_le(record, content + 24, std::uint32_t{0});
+    if (kind == McapRecord::attachment) overwrite_le(record, content + length - 4, std::uint32_t{0});
+    if (kind == McapRecord::footer) break;
+    at = content + length;
+  }
+  return record;
+}
+
+/// Three small frames without the definitions of messages, which are most of a short record, and a whole record.
+std::vector<std::string> mcap_seeds() {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.path() + "/flight.mcap", bare_path = folder.path() + "/bare.mcap";
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{9, 9, 4, 3}, 8, 6);
+  rig.T_BC1.p.x() = 0.1;
+  auto record = FlightRecord::create(path, rig);
+  auto bare = McapWriter::create(
+      bare_path, {}, {{std::string(kImuTopic), "", ""}, {std::string(kLeftTopic), "", ""}, {std::string(kRightTopic), "", ""}});
+  require(record.ok() && bare.ok() && bare->attach(std::string(kCalibrationAttachment), "", rig_to_yaml(rig)).ok());
+  const auto image = std::make_shared<const Image>(8, 6, std::uint8_t{7});
+  for (std::int64_t i = 0; i < 3; ++i) {
+    const ImuSample sample{Time{1000 * i}};
+    require(record->add(sample).ok() && record->add(StereoFrame{sample.t, image, image}).ok());
+    append_imu(bare->begin_message(0, sample.t), sample, rig.imu_noise);
+    bare->end_message();
+    for (const std::size_t camera : {1, 2}) {
+      append_image(bare->begin_message(camera, sample.t), sample.t, "x", image.get());
+      bare->end_message();
+    }
+    if (i == 1) require(record->flush().ok() && bare->flush().ok());
+  }
+  require(record->finish().ok() && bare->finish().ok());
+  return {*read_file(path, 1u << 20u), without_checksums(*read_file(bare_path, 1u << 20u))};
 }
 
 }  // namespace
@@ -130,12 +176,26 @@ void fuzz_weights(std::string_view bytes) {
   }
 }
 
+void fuzz_mcap(std::string_view bytes) {
+  auto contents = read_mcap(bytes_in_memory(std::string(bytes)), "flight.mcap", {.prefetch_frames = 0});
+  require_sentence(contents);
+  if (!contents) return;
+  require_rigid(contents->rig.T_BC1);
+  for (const ImuSample& sample : contents->imu) require(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite());
+  const int width = contents->rig.left.width(), height = contents->rig.left.height();
+  Dataset data(*std::move(contents), {.prefetch_frames = 0});
+  while (const auto event = data.next())
+    if (const auto* frame = std::get_if<StereoFrame>(&*event); frame != nullptr && frame->left)
+      require(frame->left->width() == width && frame->left->height() == height);
+}
+
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {{"csv", fuzz_csv, csv_seeds},
                                           {"calibration", fuzz_calibration, calibration_seeds},
                                           {"trajectory", fuzz_trajectory, trajectory_seeds},
                                           {"image", fuzz_image, image_seeds},
-                                          {"weights", fuzz_weights, weights_seeds}};
+                                          {"weights", fuzz_weights, weights_seeds},
+                                          {"mcap", fuzz_mcap, mcap_seeds}};
   return all;
 }
 

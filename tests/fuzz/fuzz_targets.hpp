@@ -14,6 +14,7 @@ void fuzz_calibration(std::string_view bytes);
 void fuzz_trajectory(std::string_view bytes);
 void fuzz_image(std::string_view bytes);
 void fuzz_weights(std::string_view bytes);
+void fuzz_mcap(std::string_view bytes);
 
 struct Target {
   const char* name;

@@ -8,7 +8,8 @@
 //   while (auto event = data.next()) system.push(std::move(*event));
 //
 // Order: every IMU sample up to the first one at or after an image (stamp + time offset), then the
-// image. After the last image the remaining samples, unless max_frames cut the recording short.
+// image. After the last image the remaining samples, unless max_frames cut the recording short. A flight record comes in the
+// order in which it was recorded.
 #pragma once
 
 #include <memory>
@@ -48,7 +49,8 @@ struct DatasetOptions {
 /// One stereo frame as listed, before its images are read.
 struct FrameEntry {
   Time t;
-  std::string left_file, right_file;  ///< empty where that camera has none
+  std::string left_file, right_file;           ///< names known to the loader; empty where that camera has none; both: so recorded
+  std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; without it stamps decide
 };
 
 /// One stereo frame as read.
@@ -70,8 +72,8 @@ struct DatasetContents {
   StereoRig rig;
   DatasetInfo info;
   std::vector<TrajectoryPoint> ground_truth;
-  std::vector<ImuSample> imu;      ///< increasing stamps
-  std::vector<FrameEntry> frames;  ///< increasing stamps
+  std::vector<ImuSample> imu;      ///< increasing stamps, but as they came where frames tell what is before them
+  std::vector<FrameEntry> frames;  ///< the same
   std::unique_ptr<FrameLoader> loader;
 };
 

@@ -28,7 +28,7 @@ struct CameraInfo {
 
 struct DatasetInfo {
   std::string name;    ///< last part of the path
-  std::string format;  ///< "EuRoC folder" or "EuRoC zip"
+  std::string format;  ///< "EuRoC folder", "EuRoC zip" or "MCAP flight record"
   CameraInfo left, right;
   RowCounts imu_rows, ground_truth_rows;
   int frames = 0;  ///< frames that next() will deliver, less those found without any image

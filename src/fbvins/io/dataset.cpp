@@ -6,6 +6,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/euroc.hpp"
 #include "fbvins/io/frame_prefetcher.hpp"
+#include "fbvins/io/mcap_dataset.hpp"
 
 namespace fbvins {
 
@@ -24,18 +25,21 @@ std::optional<SensorEvent> Dataset::next() {
   }
 }
 
-/// True until one sample at or after the next image, on the IMU's clock, has been handed out.
+/// True until one sample at or after the next image, on the IMU's clock, has been handed out, or as many as the record says.
 bool Dataset::imu_is_due() const {
   if (next_imu_ == contents_.imu.size()) return false;
   if (next_frame_ == contents_.frames.size()) return deliver_rest_;
-  const Time image = contents_.frames[next_frame_].t + Duration::from_seconds(contents_.rig.time_offset_s);
+  const FrameEntry& frame = contents_.frames[next_frame_];
+  if (frame.imu_before) return next_imu_ < *frame.imu_before;
+  const Time image = frame.t + Duration::from_seconds(contents_.rig.time_offset_s);
   return next_imu_ == 0 || contents_.imu[next_imu_ - 1].t < image;
 }
 
-/// Nullopt for a frame that lost both of its images.
+/// Nullopt for a frame that lost both of its images, unless it was recorded without any.
 std::optional<StereoFrame> Dataset::next_frame() {
-  ++next_frame_;
+  const FrameEntry& entry = contents_.frames[next_frame_++];
   std::optional<LoadedFrame> loaded = prefetcher_->next();
+  if (entry.left_file.empty() && entry.right_file.empty()) return std::move(loaded->frame);
   count(*loaded);
   if (!loaded->frame.left && !loaded->frame.right) return std::nullopt;
   return std::move(loaded->frame);
@@ -59,7 +63,7 @@ Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const Dat
   if (Result<void> valid = validate(options); !valid) return valid.error();
   if (!options.kalibr_imu.empty() && options.kalibr_camchain.empty())
     return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
-  Result<DatasetContents> contents = open_euroc(path, options);
+  Result<DatasetContents> contents = is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
   if (!contents) return contents.error();
   return std::make_unique<Dataset>(*std::move(contents), options);
 }

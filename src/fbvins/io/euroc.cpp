@@ -8,6 +8,7 @@
 
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/kalibr.hpp"
@@ -225,40 +226,8 @@ class EurocReader {
   }
 
   void describe_frames() {
-    DatasetInfo& info = out_.info;
-    info.frames = static_cast<int>(out_.frames.size());
-    std::vector<Time> stamps;
-    for (const FrameEntry& frame : out_.frames) stamps.push_back(frame.t);
-    info.first_image = stamps.front();
-    info.last_image = stamps.back();
-    const Intervals images = measure_intervals(stamps);
-    info.image_rate_hz = images.rate_hz;
-    info.longest_image_gap = images.longest;
-    info.longest_image_gap_start = images.longest_start;
-    if (!options_.kalibr_camchain.empty() && images.rate_hz > 0) out_.rig.image_rate_hz = images.rate_hz;
-    warn_about_gap(images, "images");
-    describe_imu();
-  }
-
-  void describe_imu() {
-    DatasetInfo& info = out_.info;
-    info.imu_samples = static_cast<int>(out_.imu.size());
-    if (out_.imu.empty()) return warn("there is no IMU in the recording");
-    std::vector<Time> stamps;
-    for (const ImuSample& sample : out_.imu) stamps.push_back(sample.t);
-    info.first_imu = stamps.front();
-    info.last_imu = stamps.back();
-    const Intervals imu = measure_intervals(stamps);
-    info.imu_rate_hz = imu.rate_hz;
-    info.longest_imu_gap = imu.longest;
-    info.longest_imu_gap_start = imu.longest_start;
-    warn_about_gap(imu, "IMU");
-  }
-
-  void warn_about_gap(const Intervals& intervals, const char* what) {
-    if (intervals.longest.ns > 3 * intervals.median.ns)
-      warn(fmt::format("{}: a gap of {:.3f} s after {} s", what, intervals.longest.seconds(),
-                       format_seconds(intervals.longest_start)));
+    describe(out_);
+    if (!options_.kalibr_camchain.empty() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
   }
 
   void warn_about_rows(const RowCounts& c, const std::string& file) {

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/byte_source.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "fbvins/io/file_handle.hpp"
+
+namespace fbvins {
+namespace {
+
+/// How many of `count` bytes from `offset` there are.
+std::size_t available(std::uint64_t size, std::uint64_t offset, std::uint64_t count) {
+  return offset >= size ? 0 : static_cast<std::size_t>(std::min(count, size - offset));
+}
+
+class FileBytes : public ByteSource {
+ public:
+  FileBytes(FileHandle file, std::uint64_t size) : file_(std::move(file)), size_(size) {}
+
+  std::uint64_t size() const override { return size_; }
+  std::string read(std::uint64_t offset, std::uint64_t count) const override {
+    std::string out(available(size_, offset, count), '\0');
+    std::size_t done = 0;
+    while (done < out.size()) {
+      const ssize_t now = ::pread(file_.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+      if (now < 0 && errno == EINTR) continue;
+      if (now <= 0) break;
+      done += static_cast<std::size_t>(now);
+    }
+    out.resize(done);
+    return out;
+  }
+
+ private:
+  FileHandle file_;
+  std::uint64_t size_;
+};
+
+class MemoryBytes : public ByteSource {
+ public:
+  explicit MemoryBytes(std::string bytes) : bytes_(std::move(bytes)) {}
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::string read(std::uint64_t offset, std::uint64_t count) const override {
+    const std::size_t there = available(bytes_.size(), offset, count);
+    return there == 0 ? std::string() : bytes_.substr(offset, there);
+  }
+
+ private:
+  std::string bytes_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<ByteSource>> open_bytes(const std::string& path) {
+  FileHandle file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file)
+    return Error{errno == ENOENT ? ErrorCode::not_found : ErrorCode::unreadable,
+                 fmt::format("{}: {}", path, std::strerror(errno))};
+  struct stat status {};
+  if (::fstat(file.get(), &status) != 0 || !S_ISREG(status.st_mode))
+    return Error{ErrorCode::unreadable, fmt::format("{}: is not a plain file", path)};
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  return std::shared_ptr<ByteSource>(std::make_shared<FileBytes>(std::move(file), size));
+}
+
+std::shared_ptr<ByteSource> bytes_in_memory(std::string bytes) { return std::make_shared<MemoryBytes>(std::move(bytes)); }
+
+}  // namespace fbvins

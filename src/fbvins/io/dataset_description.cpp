@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/dataset_description.hpp"
+
+#include <fmt/format.h>
+
+#include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/numbers.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Stamps that go back are left out.
+template <class Row>
+std::vector<Time> increasing_stamps(const std::vector<Row>& rows) {
+  std::vector<Time> out;
+  for (const Row& row : rows)
+    if (out.empty() || out.back() < row.t) out.push_back(row.t);
+  return out;
+}
+
+void warn_about_gap(const Intervals& intervals, const char* what, std::vector<std::string>& warnings) {
+  if (intervals.longest.ns > 3 * intervals.median.ns)
+    warnings.push_back(fmt::format("{}: a gap of {:.3f} s after {} s", what, intervals.longest.seconds(),
+                                   format_seconds(intervals.longest_start)));
+}
+
+void describe_imu(const std::vector<ImuSample>& imu, DatasetInfo& info) {
+  info.imu_samples = static_cast<int>(imu.size());
+  if (imu.empty()) {
+    info.warnings.emplace_back("there is no IMU in the recording");
+    return;
+  }
+  const std::vector<Time> stamps = increasing_stamps(imu);
+  info.first_imu = stamps.front();
+  info.last_imu = stamps.back();
+  const Intervals intervals = measure_intervals(stamps);
+  info.imu_rate_hz = intervals.rate_hz;
+  info.longest_imu_gap = intervals.longest;
+  info.longest_imu_gap_start = intervals.longest_start;
+  warn_about_gap(intervals, "IMU", info.warnings);
+}
+
+}  // namespace
+
+void describe(DatasetContents& contents) {
+  DatasetInfo& info = contents.info;
+  info.frames = static_cast<int>(contents.frames.size());
+  const std::vector<Time> stamps = increasing_stamps(contents.frames);
+  info.first_image = stamps.front();
+  info.last_image = stamps.back();
+  const Intervals images = measure_intervals(stamps);
+  info.image_rate_hz = images.rate_hz;
+  info.longest_image_gap = images.longest;
+  info.longest_image_gap_start = images.longest_start;
+  warn_about_gap(images, "images", info.warnings);
+  describe_imu(contents.imu, info);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/flight_record.hpp"
+
+#include <fmt/format.h>
+
+#include "fbvins/io/rig_text.hpp"
+#include "fbvins/io/ros_definitions.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Places in topics().
+enum Topic : std::size_t {
+  kImu,
+  kLeft,
+  kRight,
+  kLeftInfo,
+  kRightInfo,
+  kOdometry,
+  kLiveOdometry,
+  kTransforms,
+  kFixedTransforms,
+  kHealth
+};
+
+constexpr std::size_t kLargeChunk_bytes = 1'000'000;
+// Those who begin to look in the middle find the cameras' places again soon.
+constexpr Duration kCalibrationInterval = {1'000'000'000};
+
+std::vector<McapTopic> topics() {
+  const auto topic = [](std::string_view name, const char* type) {
+    return McapTopic{std::string(name), type, ros_definition(type)};
+  };
+  return {
+      topic(kImuTopic, "sensor_msgs/msg/Imu"),
+      topic(kLeftTopic, "sensor_msgs/msg/Image"),
+      topic(kRightTopic, "sensor_msgs/msg/Image"),
+      topic("/camera/left/camera_info", "sensor_msgs/msg/CameraInfo"),
+      topic("/camera/right/camera_info", "sensor_msgs/msg/CameraInfo"),
+      topic("/odometry", "nav_msgs/msg/Odometry"),
+      topic("/odometry/live", "nav_msgs/msg/Odometry"),
+      topic("/tf", "tf2_msgs/msg/TFMessage"),
+      topic("/tf_static", "tf2_msgs/msg/TFMessage"),
+      topic("/health", "diagnostic_msgs/msg/DiagnosticArray"),
+  };
+}
+
+Result<void> check_stamp(Time t) {
+  if (t.ns >= 0 && t < ros_time_end()) return {};
+  return Error{ErrorCode::invalid_argument,
+               fmt::format("a stamp of {} ns is not recorded: ROS's time reaches from 1970 to 2038", t.ns)};
+}
+
+std::string numbers(const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); }
+
+RosDiagnostic diagnostic_of(const Odometry& o) {
+  const EstimatorStats& s = o.stats;
+  return {health_level(o.health),
+          "odometry",
+          health_sentence(o.health),
+          {{"state", std::string(to_string(o.health.state))},
+           {"reason", std::string(to_string(o.health.reason))},
+           {"reset_counter", fmt::to_string(o.reset_counter)},
+           {"frame", fmt::to_string(o.id.value)},
+           {"keyframe", s.keyframe ? "yes" : "no"},
+           {"standstill", s.standstill ? "yes" : "no"},
+           {"frames_in_window", fmt::to_string(s.frames_in_window)},
+           {"landmarks", fmt::to_string(s.landmarks)},
+           {"known_landmarks", fmt::to_string(s.known_landmarks)},
+           {"observations", fmt::to_string(s.observations)},
+           {"outliers", fmt::to_string(s.outliers)},
+           {"iterations", fmt::to_string(s.iterations)},
+           {"estimator_ms", fmt::format("{:.2f}", s.total_ms())},
+           {"gyro_bias_radps", numbers(o.bias.gyro_radps)},
+           {"accel_bias_mps2", numbers(o.bias.accel_mps2)}}};
+}
+
+}  // namespace
+
+std::uint8_t health_level(const Health& health) {
+  if (health.state == HealthState::good) return 0;
+  return health.state == HealthState::lost ? 2 : 1;
+}
+
+std::string health_sentence(const Health& health) {
+  if (health.reason == HealthReason::none) return std::string(to_string(health.state));
+  return fmt::format("{}: {}", to_string(health.state), to_string(health.reason));
+}
+
+Result<FlightRecord> FlightRecord::create(const std::string& path, const StereoRig& rig, const FlightRecordOptions& options) {
+  Result<McapWriter> file = McapWriter::create(path, {"ros2", options.program}, topics());
+  if (!file) return file.error();
+  const std::string yaml = "application/yaml";
+  if (Result<void> done = file->attach(std::string(kCalibrationAttachment), yaml, rig_to_yaml(rig)); !done) return done.error();
+  if (Result<void> done = file->attach(std::string(kConfigurationAttachment), yaml, options.configuration); !done)
+    return done.error();
+  const std::map<std::string, std::string> about = {
+      {"record", "1"}, {"program", options.program}, {"images", options.images ? "yes" : "no"}};
+  if (Result<void> done = file->add_metadata("fbvins", about); !done) return done.error();
+  return FlightRecord(*std::move(file), rig, options.images);
+}
+
+template <class Append>
+void FlightRecord::write(std::size_t topic, Time t, Append&& append) {
+  append(file_.begin_message(topic, t));
+  file_.end_message();
+}
+
+Result<void> FlightRecord::flush_if_large() { return file_.waiting_bytes() < kLargeChunk_bytes ? Result<void>() : file_.flush(); }
+
+Result<void> FlightRecord::add(const ImuSample& sample) {
+  if (Result<void> good = check_stamp(sample.t); !good) return good;
+  write(kImu, sample.t, [&](std::string& out) { append_imu(out, sample, rig_.imu_noise); });
+  return flush_if_large();
+}
+
+/// A frame without any image leaves an image without pixels: the estimator takes it as well.
+Result<void> FlightRecord::add(const StereoFrame& frame) {
+  if (Result<void> good = check_stamp(frame.t); !good) return good;
+  if (calibration_t_.ns < 0 || frame.t < calibration_t_ || frame.t - calibration_t_ >= kCalibrationInterval)
+    write_calibration(frame.t);
+  if (!images_) return flush_if_large();
+  const bool left = frame.left || !frame.right, right = frame.right != nullptr;
+  const Time t = frame.t;
+  // The two images lie side by side: a record that breaks off between them shows it.
+  if (left) write(kLeft, t, [&](std::string& out) { append_image(out, t, kLeftFrame, frame.left.get()); });
+  if (right) write(kRight, t, [&](std::string& out) { append_image(out, t, kRightFrame, frame.right.get()); });
+  if (left) write(kLeftInfo, t, [&](std::string& out) { append_camera_info(out, t, kLeftFrame, rig_.left); });
+  if (right) write(kRightInfo, t, [&](std::string& out) { append_camera_info(out, t, kRightFrame, rig_.right); });
+  return flush_if_large();
+}
+
+void FlightRecord::write_calibration(Time t) {
+  const RosTransform cameras[] = {{kBodyFrame, kLeftFrame, rig_.T_BC0.q, rig_.T_BC0.p},
+                                  {kBodyFrame, kRightFrame, rig_.T_BC1.q, rig_.T_BC1.p}};
+  write(kFixedTransforms, t, [&](std::string& out) { append_transforms(out, t, cameras); });
+  calibration_t_ = t;
+}
+
+Result<void> FlightRecord::add(const Odometry& o) {
+  if (Result<void> good = check_stamp(o.t); !good) return good;
+  const RosDiagnostic health = diagnostic_of(o);
+  write(kHealth, o.t, [&](std::string& out) { append_diagnostics(out, o.t, {&health, 1}); });
+  if (!o.health.has_pose()) return flush_if_large();
+  const ImuNoise& noise = rig_.imu_noise;
+  const double reading = noise.gyro_noise_density_radps_rthz * noise.gyro_noise_density_radps_rthz * noise.rate_hz;
+  const RosOdometry message{o.t,
+                            o.T_WB,
+                            o.v_WB,
+                            o.w_WB_B,
+                            o.pose_covariance,
+                            o.velocity_covariance,
+                            o.gyro_bias_covariance + reading * Mat3::Identity()};
+  write(kOdometry, o.t, [&](std::string& out) { append_odometry(out, message); });
+  const RosTransform body[] = {{kOdometryFrame, kBodyFrame, o.T_WB.q, o.T_WB.p}};
+  write(kTransforms, o.t, [&](std::string& out) { append_transforms(out, o.t, body); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add(const MapUpdate& update) {
+  if (Result<void> good = check_stamp(update.t); !good || !update.localised) return good;
+  const RosTransform odometry[] = {{kMapFrame, kOdometryFrame, update.T_MW.q, update.T_MW.p}};
+  write(kTransforms, update.t, [&](std::string& out) { append_transforms(out, update.t, odometry); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add_live(const RosOdometry& odometry) {
+  if (Result<void> good = check_stamp(odometry.t); !good) return good;
+  write(kLiveOdometry, odometry.t, [&](std::string& out) { append_odometry(out, odometry); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add_health(Time t, const RosDiagnostic& diagnostic) {
+  if (Result<void> good = check_stamp(t); !good) return good;
+  write(kHealth, t, [&](std::string& out) { append_diagnostics(out, t, {&diagnostic, 1}); });
+  return flush_if_large();
+}
+
+}  // namespace fbvins

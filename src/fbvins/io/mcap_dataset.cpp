@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/mcap_dataset.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+
+#include "fbvins/io/dataset_description.hpp"
+#include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/rig_text.hpp"
+#include "fbvins/io/ros_messages.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+// IMU samples this long before the first frame delivered are of use for starting up.
+constexpr Duration kImuLeadIn = {1'000'000'000};
+// An image finds its partner among this many frames before it.
+constexpr std::ptrdiff_t kPairingReach = 8;
+
+/// Where an image's message is in the file, as a FrameEntry names it.
+struct ImagePlace {
+  std::uint64_t offset = 0, length = 0;
+
+  std::string name() const { return fmt::format("{}+{}", offset, length); }
+  static ImagePlace of(const std::string& name) {
+    ImagePlace place;
+    const char* end = name.data() + name.size();
+    const auto offset = std::from_chars(name.data(), end, place.offset);
+    if (offset.ptr != end) std::from_chars(offset.ptr + 1, end, place.length);
+    return place;
+  }
+};
+
+class McapLoader : public FrameLoader {
+ public:
+  McapLoader(std::shared_ptr<const ByteSource> bytes, std::string name, const StereoRig& rig)
+      : bytes_(std::move(bytes)), name_(std::move(name)), left_(rig.left), right_(rig.right) {}
+
+  LoadedFrame load(const FrameEntry& entry) override {
+    LoadedFrame out;
+    out.frame.t = entry.t;
+    out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
+    out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
+    return out;
+  }
+
+ private:
+  std::shared_ptr<const Image> load_image(const std::string& file, const Camera& camera, ImageCounts& counts,
+                                          std::string& problem) const {
+    if (file.empty()) return nullptr;
+    const ImagePlace place = ImagePlace::of(file);
+    const auto blame = [&](const std::string& sentence) {
+      if (problem.empty()) problem = fmt::format("{}: byte {}: {}", name_, place.offset, sentence);
+    };
+    const std::string message = bytes_->read(place.offset, place.length);
+    const std::optional<RosImage> image = read_image(message);
+    if (!image) {
+      ++counts.corrupt;
+      blame("this image cannot be read any more");
+      return nullptr;
+    }
+    if (static_cast<int>(image->width) != camera.width() || static_cast<int>(image->height) != camera.height()) {
+      ++counts.wrong_size;
+      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width, image->height, camera.width(),
+                        camera.height()));
+      return nullptr;
+    }
+    auto out = std::make_shared<Image>(camera.width(), camera.height());
+    for (int y = 0; y < camera.height(); ++y)
+      std::memcpy(out->row(y), image->pixels.data() + std::size_t{image->step} * static_cast<std::size_t>(y), image->width);
+    return out;
+  }
+
+  std::shared_ptr<const ByteSource> bytes_;
+  std::string name_;
+  Camera left_, right_;
+};
+
+/// Reads a record step by step; each step leaves its findings in `out`.
+class RecordReader {
+ public:
+  RecordReader(std::shared_ptr<const ByteSource> bytes, McapReader reader, std::string name, const DatasetOptions& options)
+      : bytes_(std::move(bytes)), reader_(std::move(reader)), name_(std::move(name)), options_(options) {}
+
+  Result<DatasetContents> read() {
+    out_.info.name = std::filesystem::path(name_).stem().string();
+    out_.info.format = "MCAP flight record";
+    while (const auto message = reader_.next()) take(*message);
+    drop_half_frame();
+    for (auto step : {&RecordReader::check, &RecordReader::read_calibration, &RecordReader::cut})
+      if (Result<void> done = (this->*step)(); !done) return done.error();
+    warn();
+    describe(out_);
+    if (!options_.kalibr_camchain.empty() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
+    out_.loader = std::make_unique<McapLoader>(std::move(bytes_), name_, out_.rig);
+    return std::move(out_);
+  }
+
+ private:
+  void take(const McapMessage& message) {
+    const std::string& topic = message.channel->topic;
+    ends_with_image_ = false;
+    if (topic == kImuTopic) take_imu(message);
+    if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
+    if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
+  }
+
+  void take_imu(const McapMessage& message) {
+    RowCounts& counts = out_.info.imu_rows;
+    ++counts.rows;
+    const std::optional<ImuSample> sample = read_imu(message.data);
+    if (!sample) {
+      ++counts.malformed;
+      return reader_.complain(message.offset, "this is no reading of an IMU");
+    }
+    const auto usable = [](const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargestImuValue; };
+    if (!usable(sample->gyro_radps) || !usable(sample->accel_mps2)) {
+      ++counts.not_finite;
+      return reader_.complain(message.offset, "a value of the IMU is not a usable number");
+    }
+    out_.imu.push_back(*sample);
+  }
+
+  void take_image(const McapMessage& message, CameraInfo& camera, std::string FrameEntry::*file) {
+    ++camera.rows.rows;
+    const std::optional<RosImage> image = read_image(message.data);
+    if (!image || !image->is_grey()) {
+      ++camera.rows.malformed;
+      return reader_.complain(message.offset, image ? "this image is not in 8-bit grey (mono8)" : "this is no image");
+    }
+    if (image->empty()) {  // the writer's sign for a frame of which no camera delivered anything
+      out_.frames.push_back({image->t, "", "", out_.imu.size()});
+      return;
+    }
+    ++camera.listed;
+    ends_with_image_ = true;
+    FrameEntry& frame = frame_at(image->t, file);
+    frame.*file = ImagePlace{message.offset, message.data.size()}.name();
+    frame.imu_before = out_.imu.size();
+  }
+
+  /// The other camera's frame of that instant, or a new one.
+  FrameEntry& frame_at(Time t, std::string FrameEntry::*file) {
+    auto& frames = out_.frames;
+    const auto last = frames.rbegin() + std::min(kPairingReach, std::ssize(frames));
+    const auto partner = std::find_if(frames.rbegin(), last, [&](const FrameEntry& f) { return f.t == t && (f.*file).empty(); });
+    return partner != last ? *partner : frames.emplace_back(FrameEntry{t, "", "", std::nullopt});
+  }
+
+  /// Where the file breaks off behind one image of a frame nobody knows whether there was another.
+  void drop_half_frame() {
+    if (!reader_.damage().ends_early || !ends_with_image_) return;
+    const FrameEntry& last = out_.frames.back();
+    if (last.left_file.empty() || last.right_file.empty()) out_.frames.pop_back();
+  }
+
+  Result<void> check() {
+    const char* lack = nullptr;
+    if (out_.info.left.listed + out_.info.right.listed == 0) lack = "holds no images, so the flight cannot be run again";
+    else if (out_.imu.empty() && options_.require_imu) lack = "holds no IMU readings";
+    if (!lack) return {};
+    if (reader_.damage().parts > 0) return Error{ErrorCode::malformed, reader_.damage().first};
+    return Error{ErrorCode::unsupported, fmt::format("{}: {}", name_, lack)};
+  }
+
+  Result<void> read_calibration() {
+    if (!options_.kalibr_camchain.empty()) {
+      const auto& imu = options_.kalibr_imu;
+      Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
+      if (!rig) return rig.error();
+      out_.rig = *rig;
+      return {};
+    }
+    for (const McapAttachment& attachment : reader_.attachments()) {
+      if (attachment.name != kCalibrationAttachment) continue;
+      Result<StereoRig> rig = parse_rig(attachment.data, fmt::format("{}: {}", name_, attachment.name));
+      if (!rig) return rig.error();
+      out_.rig = *rig;
+      return {};
+    }
+    return Error{ErrorCode::malformed, fmt::format("{}: holds no calibration, and none is given with it", name_)};
+  }
+
+  Result<void> cut() {
+    auto& frames = out_.frames;
+    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(options_.skip_frames, std::ssize(frames)));
+    if (options_.max_frames > 0 && std::ssize(frames) > options_.max_frames) frames.resize(options_.max_frames);
+    if (frames.empty())
+      return Error{ErrorCode::invalid_argument,
+                   fmt::format("{}: no frames are left after skipping {}", name_, options_.skip_frames)};
+    if (options_.skip_frames > 0) cut_lead_in();
+    return {};
+  }
+
+  void cut_lead_in() {
+    const Time start = out_.frames.front().t + Duration::from_seconds(out_.rig.time_offset_s) - kImuLeadIn;
+    const auto first = std::find_if(out_.imu.begin(), out_.imu.end(), [&](const ImuSample& s) { return s.t >= start; });
+    const auto cut = static_cast<std::size_t>(first - out_.imu.begin());
+    out_.imu.erase(out_.imu.begin(), first);
+    for (FrameEntry& frame : out_.frames) *frame.imu_before -= std::min(cut, *frame.imu_before);
+  }
+
+  void warn() {
+    const McapDamage& damage = reader_.damage();
+    DatasetInfo& info = out_.info;
+    for (const FrameEntry& frame : out_.frames) {
+      info.left.unpaired += !frame.left_file.empty() && frame.right_file.empty();
+      info.right.unpaired += !frame.right_file.empty() && frame.left_file.empty();
+    }
+    if (damage.parts > 0)
+      info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
+    if (damage.ends_early)
+      info.warnings.push_back(fmt::format("{}: was cut off while it was written; all up to byte {} is read", name_, damage.end));
+    if (info.left.unpaired + info.right.unpaired > 0)
+      info.warnings.push_back(
+          fmt::format("{} left and {} right images have no partner of the same stamp", info.left.unpaired, info.right.unpaired));
+  }
+
+  std::shared_ptr<const ByteSource> bytes_;
+  McapReader reader_;
+  std::string name_;
+  const DatasetOptions& options_;
+  bool ends_with_image_ = false;
+  DatasetContents out_;
+};
+
+}  // namespace
+
+bool is_mcap(const std::string& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  const auto bytes = open_bytes(path);
+  return path.ends_with(".mcap") || (bytes && (*bytes)->read(0, kMcapMagic.size()) == kMcapMagic);
+}
+
+Result<DatasetContents> open_mcap(const std::string& path, const DatasetOptions& options) {
+  const auto bytes = open_bytes(path);
+  if (!bytes) return bytes.error();
+  return read_mcap(*bytes, path, options);
+}
+
+Result<DatasetContents> read_mcap(std::shared_ptr<const ByteSource> bytes, const std::string& name,
+                                  const DatasetOptions& options) {
+  Result<McapReader> reader = McapReader::open(bytes, name);
+  if (!reader) return reader.error();
+  return RecordReader(std::move(bytes), *std::move(reader), name, options).read();
+}
+
+}  // namespace fbvins

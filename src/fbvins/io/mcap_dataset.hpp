@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to io: flight records as recordings. They are scanned once when opened; images are read from the file when it is their
+// turn.
+#pragma once
+
+#include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins {
+
+/// By content, or by name where there is no content.
+bool is_mcap(const std::string& path);
+Result<DatasetContents> open_mcap(const std::string& path, const DatasetOptions& options);
+/// The same of bytes; `name` is only for messages.
+Result<DatasetContents> read_mcap(std::shared_ptr<const ByteSource> bytes, const std::string& name,
+                                  const DatasetOptions& options);
+
+}  // namespace fbvins

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+// A flight record read as a recording: the same events in the same order, whatever their stamps.
+#include "fbvins/io/mcap_dataset.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/flight_record.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kStart_ns = 1'600'000'000'000'000'123, kMs = 1'000'000;
+
+StereoRig small_rig() {
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11, -0.1, 0.01, 1e-4, -2e-4}, 32, 24);
+  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  return rig;
+}
+
+std::shared_ptr<const Image> picture(int seed, int width = 32, int height = 24) {
+  auto image = std::make_shared<Image>(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) image->at(x, y) = static_cast<std::uint8_t>(3 * x + 5 * y + 7 * seed);
+  return image;
+}
+
+ImuSample reading(std::int64_t ms) { return {Time{kStart_ns + ms * kMs}, Vec3(0.1, -0.2, 1.0 / 3), Vec3(0, 1e-9, 9.81)}; }
+
+StereoFrame frame(std::int64_t ms, bool left = true, bool right = true) {
+  const int seed = static_cast<int>(ms);
+  return {Time{kStart_ns + ms * kMs}, left ? picture(seed) : nullptr, right ? picture(seed + 100) : nullptr};
+}
+
+/// As an estimator may have taken them: an image before its readings, readings that stay out, one camera alone, none, a stamp
+/// that goes back.
+std::vector<SensorEvent> eventful_flight() {
+  return {reading(0),
+          reading(5),
+          reading(10),
+          frame(10),
+          reading(15),
+          frame(20),
+          reading(25),
+          reading(30),
+          frame(30, true, false),
+          frame(40, false, true),
+          frame(50, false, false),
+          reading(12),
+          reading(500),
+          frame(500),
+          frame(90),
+          reading(505),
+          reading(510)};
+}
+
+bool same_image(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Image>& b) {
+  if (!a || !b) return !a && !b;
+  return a->width() == b->width() && a->height() == b->height() &&
+         std::equal(a->row(0), a->row(0) + static_cast<std::ptrdiff_t>(a->width()) * a->height(), b->row(0));
+}
+
+bool same_event(const SensorEvent& a, const SensorEvent& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* s = std::get_if<ImuSample>(&a)) {
+    const auto& o = std::get<ImuSample>(b);
+    return s->t == o.t && s->gyro_radps == o.gyro_radps && s->accel_mps2 == o.accel_mps2;
+  }
+  const auto &f = std::get<StereoFrame>(a), &g = std::get<StereoFrame>(b);
+  return f.t == g.t && same_image(f.left, g.left) && same_image(f.right, g.right);
+}
+
+class FlightRecordTest : public ::testing::Test {
+ protected:
+  FlightRecordTest() { fs::create_directories(folder_); }
+  ~FlightRecordTest() override { fs::remove_all(folder_); }
+
+  FlightRecord create(bool images = true) {
+    auto record = FlightRecord::create(path_, small_rig(), {.program = "a test", .images = images});
+    EXPECT_TRUE(record) << record.error().message;
+    return *std::move(record);
+  }
+  void write(const std::vector<SensorEvent>& events, bool images = true) {
+    FlightRecord record = create(images);
+    for (const SensorEvent& event : events) std::visit([&](const auto& e) { EXPECT_TRUE(record.add(e)); }, event);
+    EXPECT_TRUE(record.finish());
+  }
+  void expect_refused(const std::string& sentence, const DatasetOptions& options = {}) {
+    const auto data = open_dataset(path_, options);
+    ASSERT_FALSE(data);
+    EXPECT_EQ(data.error().message, path_ + sentence);
+  }
+
+  const std::string folder_ = ::testing::TempDir() + "/fbvins_record_" + std::to_string(getpid());
+  const std::string path_ = folder_ + "/flight.mcap";
+};
+
+std::vector<SensorEvent> drain(Dataset& data) {
+  std::vector<SensorEvent> out;
+  while (auto event = data.next()) out.push_back(*std::move(event));
+  return out;
+}
+
+TEST_F(FlightRecordTest, GivesBackTheEventsAndTheirOrder) {
+  const std::vector<SensorEvent> events = eventful_flight();
+  write(events);
+  for (const int prefetch : {0, 8}) {
+    auto data = open_dataset(path_, {.prefetch_frames = prefetch});
+    ASSERT_TRUE(data) << data.error().message;
+    const std::vector<SensorEvent> back = drain(**data);
+    ASSERT_EQ(back.size(), events.size());
+    for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
+    EXPECT_EQ((*data)->rig().T_BC1.p, small_rig().T_BC1.p);
+    EXPECT_EQ((*data)->info().name, "flight");
+    EXPECT_EQ((*data)->info().left.unpaired, 1);
+    EXPECT_EQ((*data)->info().right.unpaired, 1);
+  }
+}
+
+TEST_F(FlightRecordTest, CanBeReadFromALaterFrameOn) {
+  write(eventful_flight());
+  auto data = open_dataset(path_, {.skip_frames = 2, .max_frames = 1});
+  ASSERT_TRUE(data) << data.error().message;
+  const std::vector<SensorEvent> back = drain(**data);
+  ASSERT_EQ(back.size(), 7u) << "six readings, of the second before it, and the frame";
+  EXPECT_TRUE(same_event(back.back(), frame(30, true, false)));
+}
+
+/// What else is in a record must not stand between its events.
+TEST_F(FlightRecordTest, PosesAndHealthChangeNothing) {
+  FlightRecord record = create();
+  Odometry odometry;
+  odometry.t = Time{kStart_ns};
+  odometry.health = {HealthState::good, HealthReason::none};
+  MapUpdate update;
+  update.t = odometry.t;
+  update.localised = true;
+  const std::vector<SensorEvent> events = eventful_flight();
+  for (const SensorEvent& event : events) {
+    std::visit([&](const auto& e) { EXPECT_TRUE(record.add(e)); }, event);
+    EXPECT_TRUE(record.add(odometry));
+    EXPECT_TRUE(record.add_live({odometry.t, odometry.T_WB}));
+    EXPECT_TRUE(record.add(update));
+    EXPECT_TRUE(record.add_health(odometry.t, {0, "live", "good", {{"key", "value"}}}));
+  }
+  EXPECT_TRUE(record.finish());
+  auto data = open_dataset(path_);
+  ASSERT_TRUE(data) << data.error().message;
+  const std::vector<SensorEvent> back = drain(**data);
+  ASSERT_EQ(back.size(), events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
+  EXPECT_EQ((*data)->info().warnings.size(), 3u)
+      << "two gaps and images without partner, no damage: " << (*data)->info().warnings[0];
+}
+
+TEST_F(FlightRecordTest, BreakingOffCostsTheEndOnly) {
+  write(eventful_flight());
+  const std::string whole = *read_file(path_, 1u << 24u);
+  const std::vector<SensorEvent> events = eventful_flight();
+  std::size_t opened = 0, most = 0;
+  for (std::size_t size = 0; size < whole.size(); size += 97) {
+    auto contents = read_mcap(bytes_in_memory(whole.substr(0, size)), "flight.mcap", {});
+    if (!contents) {
+      EXPECT_EQ(opened, 0u) << "once there is an image it can be opened";
+      EXPECT_EQ(contents.error().message.find('\n'), std::string::npos);
+      continue;
+    }
+    ++opened;
+    Dataset data(*std::move(contents), {});
+    const std::vector<SensorEvent> back = drain(data);
+    ASSERT_GE(back.size(), most) << "more bytes, more events";
+    most = back.size();
+    for (std::size_t i = 0; i < back.size(); ++i) ASSERT_TRUE(same_event(back[i], events[i])) << "event " << i << " of " << size;
+  }
+  EXPECT_GT(opened, 50u);
+  EXPECT_EQ(most, events.size());
+}
+
+TEST_F(FlightRecordTest, WithoutImagesItIsRefused) {
+  write(eventful_flight(), false);
+  expect_refused(": holds no images, so the flight cannot be run again");
+}
+
+TEST_F(FlightRecordTest, WithoutReadingsItIsRefusedWhereTheyAreNeeded) {
+  write({frame(10), frame(20)});
+  expect_refused(": holds no IMU readings");
+  EXPECT_TRUE(open_dataset(path_, {.require_imu = false}));
+}
+
+TEST_F(FlightRecordTest, WithoutCalibrationItIsRefusedUnlessOneIsGiven) {
+  auto file = McapWriter::create(path_, {"ros2", "someone else"},
+                                 {{"/imu", "sensor_msgs/msg/Imu", ""}, {"/camera/left", "sensor_msgs/msg/Image", ""}});
+  ASSERT_TRUE(file);
+  append_imu(file->begin_message(0, Time{5}), reading(0), {});
+  file->end_message();
+  append_image(file->begin_message(1, Time{5}), Time{5}, "x", picture(1).get());
+  file->end_message();
+  ASSERT_TRUE(file->finish());
+  expect_refused(": holds no calibration, and none is given with it");
+}
+
+TEST_F(FlightRecordTest, MessagesThatAreNoneAreNamedAndLeftOut) {
+  {
+    auto file = McapWriter::create(path_, {"ros2", "a test"},
+                                   {{"/imu", "sensor_msgs/msg/Imu", ""}, {"/camera/left", "sensor_msgs/msg/Image", ""}});
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->attach("calibration.yaml", "application/yaml", *read_file(path_, 1u << 20u)));
+    file->begin_message(0, Time{5}) += "nonsense";
+    file->end_message();
+    file->begin_message(1, Time{5}) += "nonsense";
+    file->end_message();
+    ASSERT_TRUE(file->finish());
+  }
+  const auto data = open_dataset(path_);
+  ASSERT_FALSE(data);
+  EXPECT_TRUE(data.error().message.starts_with(path_ + ": byte ")) << data.error().message;
+  EXPECT_TRUE(data.error().message.ends_with(": this is no reading of an IMU")) << data.error().message;
+}
+
+TEST_F(FlightRecordTest, AnImageOfAnotherSizeIsLeftOut) {
+  write({reading(0), frame(0), reading(5), StereoFrame{Time{kStart_ns + 5 * kMs}, picture(1, 8, 8), picture(2)}, reading(10),
+         frame(10)});
+  auto data = open_dataset(path_);
+  ASSERT_TRUE(data) << data.error().message;
+  const std::vector<SensorEvent> back = drain(**data);
+  EXPECT_EQ(std::get<StereoFrame>(back[3]).left, nullptr);
+  EXPECT_EQ((*data)->info().left.images.wrong_size, 1);
+  EXPECT_TRUE((*data)->info().warnings.back().ends_with(": 8 x 8 pixels where the calibration says 32 x 24"));
+}
+
+TEST_F(FlightRecordTest, StampsBeyondRosAreRefused) {
+  FlightRecord record = create();
+  EXPECT_FALSE(record.add(ImuSample{Time{-1}}));
+  EXPECT_FALSE(record.add(ImuSample{ros_time_end()}));
+  EXPECT_TRUE(record.add(ImuSample{Time{ros_time_end().ns - 1}}));
+  EXPECT_TRUE(record.finish());
+}
+
+TEST_F(FlightRecordTest, AFileOfThatNameThatIsNoneIsNamed) {
+  std::ofstream(path_) << "hello";
+  expect_refused(": does not begin as an MCAP file does");
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/mcap_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace fbvins {
+namespace {
+
+constexpr std::uint64_t kLargestChunk_bytes = std::uint64_t{256} << 20u;
+constexpr std::uint64_t kLargestAttachment_bytes = std::uint64_t{4} << 20u;  // larger ones are not ours to read
+
+/// Other people's text in a sentence: short and printable.
+std::string quoted(std::string_view text) {
+  std::string out(text.substr(0, 40));
+  std::replace_if(
+      out.begin(), out.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return out;
+}
+
+}  // namespace
+
+Result<McapReader> McapReader::open(std::shared_ptr<const ByteSource> bytes, const std::string& name) {
+  McapReader reader(std::move(bytes), name);
+  if (reader.bytes_->read(0, kMcapMagic.size()) != kMcapMagic)
+    return Error{ErrorCode::malformed, fmt::format("{}: does not begin as an MCAP file does", name)};
+  reader.next_ = kMcapMagic.size();
+  return reader;
+}
+
+void McapReader::complain(std::uint64_t offset, const std::string& sentence) {
+  if (damage_.parts++ == 0) damage_.first = fmt::format("{}: byte {}: {}", name_, offset, sentence);
+}
+
+std::optional<McapMessage> McapReader::next() {
+  while (true) {
+    if (auto message = next_loaded()) return message;
+    if (!load_next()) return std::nullopt;
+  }
+}
+
+/// The file ends inside of the record at `at`, or there is none.
+bool McapReader::cut_off(std::uint64_t at) {
+  damage_.ends_early = true;
+  damage_.end = at;
+  next_ = bytes_->size();
+  return false;
+}
+
+/// Goes on to the next record outside of chunks; false at the end of the data.
+bool McapReader::load_next() {
+  const std::uint64_t at = next_;
+  const std::string head = bytes_->read(at, kMcapRecordHead_bytes);
+  if (head.size() < kMcapRecordHead_bytes) return cut_off(damage_.ends_early ? damage_.end : at);
+  ByteCursor in(head);
+  const auto kind = static_cast<McapRecord>(in.get<std::uint8_t>());
+  const auto length = in.get<std::uint64_t>();
+  const std::uint64_t there = bytes_->size() - at - kMcapRecordHead_bytes;
+  if (kind == McapRecord::data_end || kind == McapRecord::footer) return damage_.end = at, next_ = at, false;
+  if (kind == McapRecord{0}) {
+    complain(at, "there is no record here, and what follows cannot be read");
+    return cut_off(at);
+  }
+  const bool whole = length <= there;
+  next_ = whole ? at + kMcapRecordHead_bytes + length : bytes_->size();
+  if (kind == McapRecord::chunk) load_chunk(at + kMcapRecordHead_bytes, std::min(length, there), whole);
+  if (!whole) {
+    damage_.ends_early = true;
+    damage_.end = at;
+    return kind == McapRecord::chunk;
+  }
+  if (kind == McapRecord::schema || kind == McapRecord::channel || kind == McapRecord::message)
+    load_records(at, kMcapRecordHead_bytes + length);
+  if (kind == McapRecord::attachment) load_attachment(at + kMcapRecordHead_bytes, length);
+  return true;  // other kinds are passed over
+}
+
+void McapReader::load_records(std::uint64_t offset, std::uint64_t length) {
+  if (length > kLargestChunk_bytes) return complain(offset, fmt::format("{} bytes in one piece are too many", length));
+  loaded_ = bytes_->read(offset, length);
+  loaded_offset_ = offset;
+  position_ = 0;
+  loaded_whole_ = true;
+}
+
+/// Nothing of a whole chunk is believed unless its checksum says so; one that the file ends in is read as far as it goes.
+void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool whole) {
+  const std::string head = bytes_->read(offset, std::min<std::uint64_t>(length, 100));
+  ByteCursor in(head);
+  in.skip(8 + 8 + 8);  // first stamp, last stamp, uncompressed size
+  const auto checksum = in.get<std::uint32_t>();
+  const std::string_view compression = take_mcap_text(in);
+  const auto records = in.get<std::uint64_t>();
+  if (!in.ok()) return whole ? complain(offset, "this chunk's head is not what it should be") : void();
+  if (!compression.empty())
+    return complain(offset,
+                    fmt::format("this chunk is compressed by '{}', and only uncompressed ones are read", quoted(compression)));
+  const std::uint64_t there = length - in.position();
+  if (whole && records > there) return complain(offset, "this chunk's messages are longer than the chunk");
+  load_records(offset + in.position(), std::min(records, there));
+  loaded_whole_ = whole;
+  if (!whole || checksum == 0 || crc32_of(loaded_) == checksum) return;
+  loaded_.clear();
+  complain(offset, "this chunk's checksum is wrong");
+}
+
+void McapReader::load_attachment(std::uint64_t offset, std::uint64_t length) {
+  if (length > kLargestAttachment_bytes) return;
+  const std::string bytes = bytes_->read(offset, length);
+  ByteCursor in(bytes);
+  in.skip(8 + 8);  // times
+  const std::string_view name = take_mcap_text(in);
+  take_mcap_text(in);  // media type
+  const std::string_view data = in.take(in.get<std::uint64_t>());
+  const std::size_t end = in.position();
+  const auto checksum = in.get<std::uint32_t>();
+  if (!in.ok()) return complain(offset, "this attachment is not what it should be");
+  if (checksum != 0 && crc32_of(std::string_view(bytes).substr(0, end)) != checksum)
+    return complain(offset, fmt::format("the checksum of the attachment '{}' is wrong", quoted(name)));
+  attachments_.push_back({std::string(name), std::string(data)});
+}
+
+/// The next message of what is loaded.
+std::optional<McapMessage> McapReader::next_loaded() {
+  while (position_ < loaded_.size()) {
+    const std::uint64_t at = loaded_offset_ + position_;
+    ByteCursor in(std::string_view(loaded_).substr(position_));
+    const auto kind = static_cast<McapRecord>(in.get<std::uint8_t>());
+    const std::string_view content = in.take(in.get<std::uint64_t>());
+    if (!in.ok() || kind == McapRecord{0}) {
+      if (loaded_whole_) complain(at, "there is no whole record here in the chunk");
+      position_ = loaded_.size();
+      return std::nullopt;
+    }
+    position_ += in.position();
+    if (!loaded_whole_) damage_.end = loaded_offset_ + position_;
+    ByteCursor record(content);
+    if (kind == McapRecord::schema) take_schema(record);
+    if (kind == McapRecord::channel) take_channel(record, at);
+    if (kind != McapRecord::message) continue;
+    if (auto message = take_message(content, at + kMcapRecordHead_bytes)) return message;
+  }
+  return std::nullopt;
+}
+
+void McapReader::take_schema(ByteCursor& in) {
+  const auto id = in.get<std::uint16_t>();
+  const std::string_view name = take_mcap_text(in);
+  if (in.ok()) schemas_.try_emplace(id, name);
+}
+
+void McapReader::take_channel(ByteCursor& in, std::uint64_t offset) {
+  const auto id = in.get<std::uint16_t>(), schema = in.get<std::uint16_t>();
+  const std::string_view topic = take_mcap_text(in), encoding = take_mcap_text(in);
+  if (!in.ok()) return complain(offset, "this channel is not what it should be");
+  const auto known = schemas_.find(schema);
+  channels_.try_emplace(id, McapChannel{std::string(topic), std::string(encoding), known == schemas_.end() ? "" : known->second});
+}
+
+std::optional<McapMessage> McapReader::take_message(std::string_view content, std::uint64_t offset) {
+  ByteCursor in(content);
+  const auto channel = channels_.find(in.get<std::uint16_t>());
+  in.skip(sizeof(std::uint32_t));  // sequence
+  const auto log_ns = in.get<std::uint64_t>();
+  in.skip(sizeof(std::uint64_t));  // time of publishing
+  if (!in.ok() || channel == channels_.end()) {
+    complain(offset, "this message is of no known channel");
+    return std::nullopt;
+  }
+  return McapMessage{&channel->second, Time{static_cast<std::int64_t>(log_ns)}, content.substr(kMcapMessageHead_bytes),
+                     offset + kMcapMessageHead_bytes};
+}
+
+}  // namespace fbvins

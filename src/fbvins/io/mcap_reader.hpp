@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to io: the messages of an MCAP file in their order, without need of an index. One thread.
+//
+//   Result<McapReader> file = McapReader::open(bytes, "flight.mcap");
+//   while (auto message = file->next()) use(message->channel->topic, message->data);
+//   file->damage();   // what could not be read, and where
+//
+// A file that ends too early is read up to its last whole record, in an unfinished chunk too. A chunk whose checksum is wrong
+// is left out, as is what does not fit together; each is counted, the first one with its place. Chunks must not be compressed.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/core/time.hpp"
+#include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/mcap_format.hpp"
+
+namespace fbvins {
+
+struct McapChannel {
+  std::string topic, message_encoding, schema_name;
+};
+
+struct McapMessage {
+  const McapChannel* channel = nullptr;  ///< lives as long as the reader
+  Time log_time;
+  std::string_view data;     ///< until next()
+  std::uint64_t offset = 0;  ///< of data in the file
+};
+
+struct McapAttachment {
+  std::string name, data;
+};
+
+struct McapDamage {
+  int parts = 0;            ///< records and chunks left out
+  std::string first;        ///< "file: byte N: sentence" about the first of them
+  bool ends_early = false;  ///< no end of data was met: the writer was cut off
+  std::uint64_t end = 0;    ///< up to where it was read
+};
+
+class McapReader {
+ public:
+  /// `name` is only for messages. An error where this is not MCAP.
+  static Result<McapReader> open(std::shared_ptr<const ByteSource> bytes, const std::string& name);
+
+  /// Nullopt at the end.
+  std::optional<McapMessage> next();
+  /// Those met so far.
+  const std::vector<McapAttachment>& attachments() const { return attachments_; }
+  const McapDamage& damage() const { return damage_; }
+  /// Counts something that the caller could not use.
+  void complain(std::uint64_t offset, const std::string& sentence);
+
+ private:
+  McapReader(std::shared_ptr<const ByteSource> bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
+  bool load_next();
+  bool cut_off(std::uint64_t at);
+  void load_records(std::uint64_t offset, std::uint64_t length);
+  void load_chunk(std::uint64_t offset, std::uint64_t length, bool whole);
+  void load_attachment(std::uint64_t offset, std::uint64_t length);
+  std::optional<McapMessage> next_loaded();
+  void take_schema(ByteCursor& in);
+  void take_channel(ByteCursor& in, std::uint64_t offset);
+  std::optional<McapMessage> take_message(std::string_view content, std::uint64_t offset);
+
+  std::shared_ptr<const ByteSource> bytes_;
+  std::string name_;
+  std::uint64_t next_ = 0;           ///< the next record outside of chunks
+  std::string loaded_;               ///< records in work
+  std::uint64_t loaded_offset_ = 0;  ///< their place in the file
+  std::size_t position_ = 0;         ///< in loaded_
+  bool loaded_whole_ = true;         ///< false: the file ends inside of them
+  std::map<std::uint16_t, std::string> schemas_;
+  std::map<std::uint16_t, McapChannel> channels_;
+  std::vector<McapAttachment> attachments_;
+  McapDamage damage_;
+};
+
+}  // namespace fbvins

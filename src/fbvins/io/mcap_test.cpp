@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writer and reader of MCAP against each other, and against files that break off or are damaged. Other people's readers are
+// asked in tests/mcap_by_others.py.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/mcap_writer.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<McapTopic> kTopics = {{"/a", "x_msgs/msg/A", "int32 a\n"}, {"/b", "x_msgs/msg/B", "int32 b\n"}};
+
+struct Said {
+  std::string topic, data;
+  std::int64_t t_ns = 0;
+  std::uint64_t end = 0;  ///< of the message in the file
+  bool operator==(const Said& o) const { return topic == o.topic && data == o.data && t_ns == o.t_ns; }
+};
+
+class Mcap : public ::testing::Test {
+ protected:
+  Mcap() { fs::create_directories(folder_); }
+  ~Mcap() override { fs::remove_all(folder_); }
+
+  McapWriter create() {
+    auto file = McapWriter::create(path_, {"ros2", "a test"}, kTopics);
+    EXPECT_TRUE(file) << file.error().message;
+    return *std::move(file);
+  }
+
+  Said say(McapWriter& file, int number) {
+    const std::size_t topic = number % 3 == 0;
+    const Said said{kTopics[topic].topic, std::string(static_cast<std::size_t>(number % 17), static_cast<char>(number)),
+                    1000 + number};
+    file.begin_message(topic, Time{said.t_ns}) += said.data;
+    file.end_message();
+    return said;
+  }
+
+  /// Three chunks of ten messages.
+  std::vector<Said> write_thirty(bool finished) {
+    McapWriter file = create();
+    std::vector<Said> all;
+    EXPECT_TRUE(file.attach("note.txt", "text/plain", "hello"));
+    EXPECT_TRUE(file.add_metadata("about", {{"key", "value"}}));
+    for (int i = 0; i < 30; ++i) {
+      all.push_back(say(file, i));
+      if (i % 10 == 9) {
+        EXPECT_TRUE(file.flush());
+      }
+    }
+    if (finished) {
+      EXPECT_TRUE(file.finish());
+    }
+    return all;
+  }
+
+  std::string bytes() const { return *read_file(path_, 1u << 20u); }
+
+  const std::string folder_ = ::testing::TempDir() + "/fbvins_mcap_" + std::to_string(getpid());
+  const std::string path_ = folder_ + "/a.mcap";
+};
+
+std::vector<Said> read_all(McapReader& reader) {
+  std::vector<Said> out;
+  while (const auto m = reader.next())
+    out.push_back({m->channel->topic, std::string(m->data), m->log_time.ns, m->offset + m->data.size()});
+  EXPECT_FALSE(reader.next()) << "the end stays the end";
+  return out;
+}
+
+McapReader reader_of(const std::string& bytes) {
+  auto reader = McapReader::open(bytes_in_memory(bytes), "a.mcap");
+  EXPECT_TRUE(reader) << reader.error().message;
+  return *std::move(reader);
+}
+
+TEST_F(Mcap, WhatIsWrittenIsReadInItsOrder) {
+  const std::vector<Said> said = write_thirty(true);
+  McapReader reader = reader_of(bytes());
+  EXPECT_EQ(read_all(reader), said);
+  EXPECT_FALSE(reader.damage().ends_early);
+  EXPECT_EQ(reader.damage().parts, 0) << reader.damage().first;
+  ASSERT_EQ(reader.attachments().size(), 1u);
+  EXPECT_EQ(reader.attachments()[0].name, "note.txt");
+  EXPECT_EQ(reader.attachments()[0].data, "hello");
+}
+
+TEST_F(Mcap, AFileThatIsCutAnywhereIsReadUpToItsLastWholeMessage) {
+  const std::vector<Said> said = write_thirty(true);
+  const std::string whole = bytes();
+  McapReader all = reader_of(whole);
+  const std::vector<Said> places = read_all(all);
+  const std::uint64_t data_end = all.damage().end;
+  for (std::size_t size = kMcapMagic.size(); size < whole.size(); ++size) {
+    McapReader reader = reader_of(whole.substr(0, size));
+    const std::vector<Said> read = read_all(reader);
+    const auto expected = std::count_if(places.begin(), places.end(), [&](const Said& m) { return m.end <= size; });
+    ASSERT_EQ(std::ssize(read), expected) << "cut at " << size;
+    ASSERT_TRUE(std::equal(read.begin(), read.end(), said.begin()));
+    ASSERT_EQ(reader.damage().ends_early, size < data_end + kMcapRecordHead_bytes) << "cut at " << size;
+    ASSERT_EQ(reader.damage().parts, 0) << reader.damage().first;
+  }
+}
+
+TEST_F(Mcap, NothingWaitsInMemoryAfterFlush) {
+  McapWriter file = create();
+  std::vector<Said> said;
+  for (int i = 0; i < 5; ++i) {
+    said.push_back(say(file, i));
+    ASSERT_TRUE(file.flush());
+    McapReader reader = reader_of(bytes());
+    EXPECT_EQ(read_all(reader), said) << "while the writer is still there";
+  }
+}
+
+TEST_F(Mcap, ADamagedChunkIsLeftOutAndNamed) {
+  const std::vector<Said> said = write_thirty(true);
+  std::string damaged = bytes();
+  McapReader all = reader_of(damaged);
+  const std::vector<Said> places = read_all(all);
+  damaged[places[14].end - 1] ^= 1;
+  McapReader reader = reader_of(damaged);
+  const std::vector<Said> read = read_all(reader);
+  ASSERT_EQ(read.size(), 20u);
+  EXPECT_EQ(read[9], said[9]);
+  EXPECT_EQ(read[10], said[20]);
+  EXPECT_EQ(reader.damage().parts, 1);
+  EXPECT_TRUE(reader.damage().first.starts_with("a.mcap: byte ")) << reader.damage().first;
+  EXPECT_TRUE(reader.damage().first.ends_with(": this chunk's checksum is wrong")) << reader.damage().first;
+}
+
+TEST_F(Mcap, ZerosAtTheEndAreNoMessages) {
+  const std::vector<Said> said = write_thirty(false);
+  McapReader reader = reader_of(bytes() + std::string(5000, '\0'));
+  EXPECT_EQ(read_all(reader), said);
+  EXPECT_EQ(reader.damage().parts, 1);
+  EXPECT_TRUE(reader.damage().ends_early);
+}
+
+TEST_F(Mcap, CompressedChunksAreRefusedByName) {
+  std::string file(kMcapMagic);
+  const std::size_t start = begin_mcap_record(file, McapRecord::chunk);
+  file.append(8 + 8 + 8 + 4, '\0');
+  append_mcap_text(file, "zstd");
+  append_le(file, std::uint64_t{3});
+  file += "abc";
+  end_mcap_record(file, start);
+  McapReader reader = reader_of(file);
+  EXPECT_FALSE(reader.next());
+  EXPECT_EQ(reader.damage().first, "a.mcap: byte 17: this chunk is compressed by 'zstd', and only uncompressed ones are read");
+}
+
+TEST_F(Mcap, WhatIsNoMcapIsRefused) {
+  for (const char* text : {"", "hello", "\x89PNG\r\n\x1a\n"}) {
+    const auto reader = McapReader::open(bytes_in_memory(text), "a.mcap");
+    ASSERT_FALSE(reader);
+    EXPECT_EQ(reader.error().message, "a.mcap: does not begin as an MCAP file does");
+  }
+}
+
+TEST_F(Mcap, ARecordIsNeverWrittenOver) {
+  write_thirty(true);
+  const auto second = McapWriter::create(path_, {"ros2", "a test"}, kTopics);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().message, path_ + ": is there already, and a record is never written over");
+  EXPECT_FALSE(McapWriter::create(folder_ + "/nowhere/a.mcap", {"ros2", "a test"}, kTopics));
+}
+
+/// A limit on the size of files stands for a disk that is full, and then has room again.
+TEST_F(Mcap, AFullDiskCostsOnlyWhatDidNotFit) {
+  McapWriter file = create();
+  std::vector<Said> said = {say(file, 1)};
+  ASSERT_TRUE(file.flush());
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto old = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit full = before;
+  full.rlim_cur = bytes().size() + 40;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+  say(file, 2);
+  const auto refused = file.flush();
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, old);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, path_ + ": writing failed (File too large)");
+  said.push_back(say(file, 3));
+  ASSERT_TRUE(file.finish());
+  McapReader reader = reader_of(bytes());
+  EXPECT_EQ(read_all(reader), said);
+  EXPECT_EQ(reader.damage().parts, 0) << reader.damage().first;
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/rig_text.hpp"
+
+#include <fmt/format.h>
+
+#include "fbvins/io/calibration_fields.hpp"
+
+namespace fbvins {
+namespace {
+
+/// 17 digits name a double without loss.
+std::string list(std::initializer_list<double> values) {
+  std::string out;
+  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "[" : ", ", value);
+  return out + "]";
+}
+
+std::string camera_text(const char* name, const Camera& camera) {
+  const auto text = [&](const auto& m, const char* distortion, const std::string& coefficients) {
+    return fmt::format(
+        "{}:\n  camera_model: pinhole\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
+        "  distortion_coefficients: {}\n",
+        name, camera.width(), camera.height(), list({m.fx, m.fy, m.cx, m.cy}), distortion, coefficients);
+  };
+  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model())) return text(*m, "radtan", list({m->k1, m->k2, m->p1, m->p2}));
+  const auto& m = std::get<KannalaBrandt>(camera.model());
+  return text(m, "equidistant", list({m.k1, m.k2, m.k3, m.k4}));
+}
+
+template <class To, class From>
+std::string pose_text(const char* name, const Pose<To, From>& T) {
+  return fmt::format("{}:\n  q_wxyz: {}\n  p_m: {}\n", name, list({T.q.w(), T.q.x(), T.q.y(), T.q.z()}),
+                     list({T.p.x(), T.p.y(), T.p.z()}));
+}
+
+template <class To, class From>
+Pose<To, From> read_pose(YamlReader& yaml, const std::string& name) {
+  const YAML::Node map = yaml.get(yaml.root(), name);
+  const std::vector<double> q = yaml.numbers(map, "q_wxyz", 4), p = yaml.numbers(map, "p_m", 3);
+  Pose<To, From> T;
+  T.q = Quat(q[0], q[1], q[2], q[3]);  // as it is: normalising would change its last bits
+  T.p = Vec3(p[0], p[1], p[2]);
+  if (!(std::abs(T.q.norm() - 1) < 1e-9)) yaml.complain(map, "q_wxyz", "is not a rotation");
+  if (!(T.p.cwiseAbs().maxCoeff() < 1e3)) yaml.complain(map, "p_m", "is more than a kilometre");
+  return T;
+}
+
+}  // namespace
+
+std::string rig_to_yaml(const StereoRig& rig) {
+  const ImuNoise& n = rig.imu_noise;
+  return "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
+         "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
+         camera_text("left", rig.left) + camera_text("right", rig.right) + pose_text("T_BC0", rig.T_BC0) +
+         pose_text("T_BC1", rig.T_BC1) +
+         fmt::format(
+             "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
+             "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
+             "image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
+             n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
+             n.accel_random_walk_mps3_rthz, rig.image_rate_hz, rig.time_offset_s);
+}
+
+Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);
+  StereoRig rig;
+  rig.left = read_camera(yaml, yaml.get(yaml.root(), "left"), "distortion_coefficients");
+  rig.right = read_camera(yaml, yaml.get(yaml.root(), "right"), "distortion_coefficients");
+  rig.T_BC0 = read_pose<B, C0>(yaml, "T_BC0");
+  rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
+  rig.imu_noise = read_imu_noise(yaml, yaml.get(yaml.root(), "imu"), "rate_hz");
+  rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
+  rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");
+  if (!yaml.ok()) return yaml.error();
+  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  return rig;
+}
+
+}  // namespace fbvins

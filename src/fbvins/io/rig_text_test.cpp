@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/rig_text.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Numbers whose last bits matter.
+StereoRig awkward_rig(Rng& rng, bool fisheye) {
+  const auto odd = [&] { return rng.normal() / 3.0; };
+  StereoRig rig;
+  const double f = 400.0 + odd(), c = 100.0 + odd(), k1 = odd(), k2 = 1e-7 * odd(), k3 = odd(), k4 = odd();
+  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 481);
+  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 481);
+  rig.right = Camera(PinholeRadtan{f / 7, f / 11, c / 3, c / 13, k2, k1, k4, k3}, 752, 480);
+  const double x = odd(), y = odd(), z = odd();
+  rig.T_BC0 = {so3_exp(Vec3(x, y, z)), Vec3(z, x, y)};
+  rig.T_BC1 = {so3_exp(Vec3(y, z, x)), Vec3(z + 0.1, x, y)};
+  rig.imu_noise = {1e-4 / 3, 2e-3 / 7, 2e-5 / 3, 3e-3 / 11, 200.0 / 3};
+  rig.image_rate_hz = 20.0 / 3;
+  rig.time_offset_s = odd() / 100;
+  return rig;
+}
+
+template <class Model>
+bool same(const Model& a, const Model& b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;
+}
+
+bool same_camera(const Camera& a, const Camera& b) {
+  if (a.width() != b.width() || a.height() != b.height() || a.model().index() != b.model().index()) return false;
+  if (const auto* m = std::get_if<PinholeRadtan>(&a.model())) return same(*m, std::get<PinholeRadtan>(b.model()));
+  return same(std::get<KannalaBrandt>(a.model()), std::get<KannalaBrandt>(b.model()));
+}
+
+TEST(RigText, GivesBackTheSameBits) {
+  Rng rng(11);
+  for (int i = 0; i < 100; ++i) {
+    const StereoRig rig = awkward_rig(rng, i % 2 == 0);
+    const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_TRUE(same_camera(back->left, rig.left));
+    EXPECT_TRUE(same_camera(back->right, rig.right));
+    EXPECT_TRUE(back->T_BC0.q.coeffs() == rig.T_BC0.q.coeffs() && back->T_BC0.p == rig.T_BC0.p);
+    EXPECT_TRUE(back->T_BC1.q.coeffs() == rig.T_BC1.q.coeffs() && back->T_BC1.p == rig.T_BC1.p);
+    EXPECT_TRUE(same(back->imu_noise, rig.imu_noise));
+    EXPECT_EQ(back->image_rate_hz, rig.image_rate_hz);
+    EXPECT_EQ(back->time_offset_s, rig.time_offset_s);
+    EXPECT_EQ(back->left.max_normalised_radius(), rig.left.max_normalised_radius());
+  }
+}
+
+TEST(RigText, ComplainsWithTheField) {
+  Rng rng(3);
+  const std::string good = rig_to_yaml(awkward_rig(rng, false));
+  for (const auto& [from, to, sentence] :
+       {std::tuple{"T_BC1:\n  q_wxyz: [", "T_BC1:\n  q_wxyz: [2", "c.yaml:19: q_wxyz: is not a rotation"},
+        {"\ntime_offset_s", "\ntime_offset", "c.yaml: time_offset_s: is missing"},
+        {"  rate_hz: ", "  rate_hz: -", "c.yaml:22: rate_hz: "}}) {
+    std::string text = good;
+    text.replace(text.find(from), std::string(from).size(), to);
+    const auto rig = parse_rig(text, "c.yaml");
+    ASSERT_FALSE(rig) << from;
+    EXPECT_TRUE(rig.error().message.starts_with(sentence)) << rig.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace fbvins

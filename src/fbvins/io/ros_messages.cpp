@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/ros_messages.hpp"
+
+#include "fbvins/io/cdr.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using RowMajor6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+void put_header(CdrWriter& cdr, Time t, std::string_view frame) {
+  cdr.put(static_cast<std::int32_t>(t.ns / kSecond_ns));
+  cdr.put(static_cast<std::uint32_t>(t.ns % kSecond_ns));
+  cdr.text(frame);
+}
+
+void put(CdrWriter& cdr, const Vec3& v) { cdr.array({v.data(), 3}); }
+void put(CdrWriter& cdr, const Quat& q) { put(cdr, Vec3(q.vec())), cdr.put(q.w()); }
+void put(CdrWriter& cdr, const RowMajor3& m) { cdr.array({m.data(), 9}); }
+void put(CdrWriter& cdr, const RowMajor6& m) { cdr.array({m.data(), 36}); }
+
+std::optional<Time> get_header(CdrReader& cdr) {
+  const auto seconds = cdr.get<std::int32_t>();
+  const auto nanoseconds = cdr.get<std::uint32_t>();
+  cdr.text();  // frame
+  if (!cdr.ok() || seconds < 0 || nanoseconds >= kSecond_ns) return std::nullopt;
+  return Time{seconds * kSecond_ns + nanoseconds};
+}
+
+Vec3 get_vector(CdrReader& cdr) {
+  const double x = cdr.get<double>(), y = cdr.get<double>(), z = cdr.get<double>();
+  return {x, y, z};
+}
+
+/// Variance of a single reading.
+RowMajor3 of_readings(double density, double rate_hz) { return density * density * rate_hz * RowMajor3::Identity(); }
+
+}  // namespace
+
+void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise) {
+  CdrWriter cdr(out);
+  put_header(cdr, sample.t, kBodyFrame);
+  put(cdr, Quat::Identity());
+  RowMajor3 unknown = RowMajor3::Zero();
+  unknown(0, 0) = -1;  // ROS's sign for: there is no orientation
+  put(cdr, unknown);
+  put(cdr, sample.gyro_radps);
+  put(cdr, of_readings(noise.gyro_noise_density_radps_rthz, noise.rate_hz));
+  put(cdr, sample.accel_mps2);
+  put(cdr, of_readings(noise.accel_noise_density_mps2_rthz, noise.rate_hz));
+}
+
+void append_image(std::string& out, Time t, std::string_view frame, const Image* image) {
+  CdrWriter cdr(out);
+  const ImageView view = image ? image->view() : ImageView{};
+  put_header(cdr, t, frame);
+  cdr.put(static_cast<std::uint32_t>(view.height));
+  cdr.put(static_cast<std::uint32_t>(view.width));
+  cdr.text("mono8");
+  cdr.put(std::uint8_t{0});  // not big-endian
+  cdr.put(static_cast<std::uint32_t>(view.width));
+  cdr.count(static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height));
+  for (int y = 0; y < view.height; ++y) cdr.raw(view.row(y), static_cast<std::size_t>(view.width));
+}
+
+void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera) {
+  const auto* radtan = std::get_if<PinholeRadtan>(&camera.model());
+  const auto* fisheye = std::get_if<KannalaBrandt>(&camera.model());
+  const std::vector<double> d = radtan ? std::vector{radtan->k1, radtan->k2, radtan->p1, radtan->p2, 0.0}
+                                       : std::vector{fisheye->k1, fisheye->k2, fisheye->k3, fisheye->k4};
+  RowMajor3 K = RowMajor3::Identity();
+  K(0, 0) = radtan ? radtan->fx : fisheye->fx, K(0, 2) = radtan ? radtan->cx : fisheye->cx;
+  K(1, 1) = radtan ? radtan->fy : fisheye->fy, K(1, 2) = radtan ? radtan->cy : fisheye->cy;
+  CdrWriter cdr(out);
+  put_header(cdr, t, frame);
+  cdr.put(static_cast<std::uint32_t>(camera.height()));
+  cdr.put(static_cast<std::uint32_t>(camera.width()));
+  cdr.text(radtan ? "plumb_bob" : "equidistant");
+  cdr.count(d.size());
+  cdr.array(d);
+  put(cdr, K);
+  put(cdr, RowMajor3(RowMajor3::Identity()));  // the images are not rectified
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) cdr.put(K(row, column));
+    cdr.put(0.0);
+  }
+  for (int i = 0; i < 6; ++i) cdr.put(std::uint32_t{0});  // no binning, no region of interest
+  cdr.put(std::uint8_t{0});
+}
+
+void append_odometry(std::string& out, const RosOdometry& o) {
+  const Mat3 R_WB = o.T_WB.R();
+  Mat6 to_W = Mat6::Identity();
+  to_W.bottomRightCorner<3, 3>() = R_WB;
+  const RowMajor6 pose_covariance = to_W * o.pose_covariance * to_W.transpose();
+  RowMajor6 twist_covariance = RowMajor6::Zero();
+  twist_covariance.topLeftCorner<3, 3>() = R_WB.transpose() * o.velocity_covariance * R_WB;
+  twist_covariance.bottomRightCorner<3, 3>() = o.rate_covariance;
+  CdrWriter cdr(out);
+  put_header(cdr, o.t, kOdometryFrame);
+  cdr.text(kBodyFrame);
+  put(cdr, o.T_WB.p);
+  put(cdr, o.T_WB.q);
+  put(cdr, pose_covariance);
+  put(cdr, Vec3(R_WB.transpose() * o.v_WB));
+  put(cdr, o.w_WB_B);
+  put(cdr, twist_covariance);
+}
+
+void append_transforms(std::string& out, Time t, std::span<const RosTransform> transforms) {
+  CdrWriter cdr(out);
+  cdr.count(transforms.size());
+  for (const RosTransform& transform : transforms) {
+    put_header(cdr, t, transform.to);
+    cdr.text(transform.from);
+    put(cdr, transform.p);
+    put(cdr, transform.q);
+  }
+}
+
+void append_diagnostics(std::string& out, Time t, std::span<const RosDiagnostic> diagnostics) {
+  CdrWriter cdr(out);
+  put_header(cdr, t, "");
+  cdr.count(diagnostics.size());
+  for (const RosDiagnostic& diagnostic : diagnostics) {
+    cdr.put(diagnostic.level);
+    cdr.text(diagnostic.name);
+    cdr.text(diagnostic.message);
+    cdr.text("");  // hardware
+    cdr.count(diagnostic.values.size());
+    for (const auto& [key, value] : diagnostic.values) {
+      cdr.text(key);
+      cdr.text(value);
+    }
+  }
+}
+
+std::optional<ImuSample> read_imu(std::string_view bytes) {
+  CdrReader cdr(bytes);
+  const std::optional<Time> t = get_header(cdr);
+  if (!t) return std::nullopt;
+  ImuSample sample{*t};
+  constexpr int kOrientation = 4 + 9, kCovariance = 9;
+  for (int i = 0; i < kOrientation; ++i) cdr.get<double>();
+  sample.gyro_radps = get_vector(cdr);
+  for (int i = 0; i < kCovariance; ++i) cdr.get<double>();
+  sample.accel_mps2 = get_vector(cdr);
+  for (int i = 0; i < kCovariance; ++i) cdr.get<double>();
+  if (!cdr.ok()) return std::nullopt;
+  return sample;
+}
+
+std::optional<RosImage> read_image(std::string_view bytes) {
+  CdrReader cdr(bytes);
+  const std::optional<Time> t = get_header(cdr);
+  if (!t) return std::nullopt;
+  RosImage image;
+  image.t = *t;
+  image.height = cdr.get<std::uint32_t>();
+  image.width = cdr.get<std::uint32_t>();
+  image.encoding = cdr.text();
+  cdr.get<std::uint8_t>();  // is_bigendian says nothing about bytes
+  image.step = cdr.get<std::uint32_t>();
+  image.pixels = cdr.bytes();
+  const bool fits = !image.is_grey() || image.empty() ||
+                    (image.step >= image.width && std::uint64_t{image.step} * image.height <= image.pixels.size());
+  if (!cdr.ok() || !fits) return std::nullopt;
+  return image;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: our values as ROS 2's messages in bytes, and back. Pure functions, any thread.
+//
+//   append_imu(bytes, sample, noise);
+//   std::optional<ImuSample> sample = read_imu(bytes);      // the same doubles, the same nanosecond
+//
+// Stamps are whole nanoseconds from 0 to ros_time_end(), where ROS's seconds overflow (2038).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/time.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+// Names of frames in messages: M, W, B, C0, C1 (docs/conventions.md).
+inline constexpr std::string_view kMapFrame = "map", kOdometryFrame = "odom", kBodyFrame = "body", kLeftFrame = "camera_left",
+                                  kRightFrame = "camera_right";
+
+constexpr Time ros_time_end() { return {(std::int64_t{1} << 31) * 1'000'000'000}; }
+
+void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise);
+/// mono8. Null: an image without pixels.
+void append_image(std::string& out, Time t, std::string_view frame, const Image* image);
+void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera);
+
+/// A pose with its derivatives, in our conventions; the message has ROS's: velocities in the body, angles about the axes of W.
+struct RosOdometry {
+  Time t;
+  Pose<W, B> T_WB;
+  Vec3 v_WB = Vec3::Zero(), w_WB_B = Vec3::Zero();
+  Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W, dtheta in B)
+  Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB
+  Mat3 rate_covariance = Mat3::Zero();      ///< of w_WB_B
+};
+void append_odometry(std::string& out, const RosOdometry& odometry);
+
+struct RosTransform {
+  std::string_view to, from;  ///< frames: takes coordinates in `from` to `to`, ROS's parent
+  Quat q;
+  Vec3 p;
+};
+void append_transforms(std::string& out, Time t, std::span<const RosTransform> transforms);
+
+/// Level: 0 fine, 1 warning, 2 error.
+struct RosDiagnostic {
+  std::uint8_t level = 0;
+  std::string name, message;
+  std::vector<std::pair<std::string, std::string>> values;
+};
+void append_diagnostics(std::string& out, Time t, std::span<const RosDiagnostic> diagnostics);
+
+/// Nullopt for bytes that are no such message.
+std::optional<ImuSample> read_imu(std::string_view bytes);
+
+struct RosImage {
+  Time t;
+  std::uint32_t width = 0, height = 0, step = 0;
+  std::string_view encoding, pixels;  ///< in the bytes given
+
+  bool is_grey() const { return encoding == "mono8" || encoding == "8UC1"; }
+  /// A frame of which this camera delivered nothing.
+  bool empty() const { return width == 0 && height == 0; }
+};
+/// With as many pixels as it says.
+std::optional<RosImage> read_image(std::string_view bytes);
+
+}  // namespace fbvins
