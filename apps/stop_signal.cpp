@@ -23,6 +23,12 @@ void block_stop_signals() {
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
 }
 
+bool stop_is_wanted() {
+  sigset_t pending;
+  sigpending(&pending);
+  return sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1;
+}
+
 StopSignal::StopSignal(std::function<void()> on_stop)
     : thread_([on_stop = std::move(on_stop)](const std::stop_token& ended) {
         const sigset_t set = stop_signals();

@@ -20,5 +20,7 @@ class StopSignal {
 
 /// Blocks both signals in this thread and all that it starts.
 void block_stop_signals();
+/// Whether one has come since, which no StopSignal has seen.
+bool stop_is_wanted();
 
 }  // namespace fbvins::app

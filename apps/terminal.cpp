@@ -27,6 +27,8 @@ bool stderr_is_terminal() { return isatty(STDERR_FILENO) == 1; }
 
 std::string bold(std::string_view text) { return painted(STDOUT_FILENO, "1", text); }
 
+void note(std::string_view message) { fmt::print(stderr, "fbvins: {}\n", message); }
+
 void warn(std::string_view message) { fmt::print(stderr, "fbvins: {} {}\n", painted(STDERR_FILENO, "33", "warning:"), message); }
 
 int fail(std::string_view message) {

@@ -12,7 +12,8 @@ bool stderr_is_terminal();
 /// Colours are for people: only on a terminal, and not where NO_COLOR is set (no-color.org).
 std::string bold(std::string_view text);
 
-/// One line on stderr, with the program's name.
+/// One line on stderr, with the program's name: news, and what is wrong.
+void note(std::string_view message);
 void warn(std::string_view message);
 /// The same in red; returns the exit code of bad input.
 int fail(std::string_view message);

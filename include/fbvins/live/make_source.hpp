@@ -4,6 +4,7 @@
 //   Result<std::unique_ptr<Source>> source = make_source("replay:MH_01_easy");
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -14,10 +15,15 @@ namespace fbvins {
 
 /// What may be said of a source beside its name.
 struct SourceOptions {
-  DatasetOptions dataset;  ///< of a replay
+  DatasetOptions dataset;  ///< of a replay; its Kalibr files are the calibration of any source
+  /// Told in one sentence what happens at the device, on the source's thread.
+  std::function<void(const std::string&)> say = [](const std::string&) {};
+  /// Asked now and then while a source waits for a device before it can be made: true ends that with an error.
+  std::function<bool()> give_up = [] { return false; };
 };
 
-/// KIND:WHERE. replay:DATASET[@SPEED] plays a recording in wall time.
+/// KIND:WHERE. replay:DATASET[@SPEED] plays a recording in wall time; socket:PATH listens there for another process
+/// (docs/socket.md), and waits for the first one where there is no calibration.
 Result<std::unique_ptr<Source>> make_source(const std::string& name, const SourceOptions& options = {});
 
 }  // namespace fbvins

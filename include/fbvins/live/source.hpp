@@ -2,8 +2,11 @@
 // Where a live system's sensor data come from: a device, another process, a recording played in wall time.
 #pragma once
 
+#include <memory>
+
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/live/sink.hpp"
 #include "fbvins/types/sensor_event.hpp"
 
 namespace fbvins {
@@ -27,6 +30,8 @@ class Source {
   virtual Result<void> run(SensorInput& input) = 0;
   /// From any thread: run() returns soon.
   virtual void stop() = 0;
+  /// By which the source hears of the flight, to tell its device; null: it does not care. May outlive the source.
+  virtual std::unique_ptr<Sink> status_sink() { return nullptr; }
 };
 
 }  // namespace fbvins

@@ -5,9 +5,27 @@
 
 #include <utility>
 
+#include "fbvins/io/kalibr.hpp"
 #include "fbvins/live/replay_source.hpp"
+#include "fbvins/live/socket_source.hpp"
 
 namespace fbvins {
+namespace {
+
+Result<std::unique_ptr<Source>> make_socket_source(const std::string& path, const SourceOptions& options) {
+  SocketOptions socket{.say = options.say, .give_up = options.give_up};
+  if (!options.dataset.kalibr_camchain.empty()) {
+    const std::string& imu = options.dataset.kalibr_imu;
+    const auto rig = load_kalibr(options.dataset.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
+    if (!rig) return rig.error();
+    socket.rig = *rig;
+  }
+  auto source = SocketSource::open(path, std::move(socket));
+  if (!source) return source.error();
+  return std::unique_ptr<Source>(std::move(*source));
+}
+
+}  // namespace
 
 Result<std::unique_ptr<Source>> make_source(const std::string& name, const SourceOptions& options) {
   const auto colon = name.find(':');
@@ -17,7 +35,8 @@ Result<std::unique_ptr<Source>> make_source(const std::string& name, const Sourc
     if (!source) return source.error();
     return std::unique_ptr<Source>(std::move(*source));
   }
-  return Error{ErrorCode::invalid_argument, fmt::format("source '{}': it is replay:DATASET[@SPEED]", name)};
+  if (kind == "socket" && !where.empty()) return make_socket_source(where, options);
+  return Error{ErrorCode::invalid_argument, fmt::format("source '{}': it is replay:DATASET[@SPEED] or socket:PATH", name)};
 }
 
 }  // namespace fbvins

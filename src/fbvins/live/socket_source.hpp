@@ -14,7 +14,6 @@
 #include <optional>
 #include <string>
 
-#include "fbvins/live/sink.hpp"
 #include "fbvins/live/socket_file.hpp"
 #include "fbvins/live/socket_session.hpp"
 #include "fbvins/live/source.hpp"
@@ -39,8 +38,7 @@ class SocketSource final : public Source {
   const StereoRig& rig() const override { return rig_; }
   Result<void> run(SensorInput& input) override;
   void stop() override;
-  /// May outlive the source.
-  std::unique_ptr<Sink> status_sink();
+  std::unique_ptr<Sink> status_sink() override;
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -174,6 +174,19 @@ TEST_F(SocketSourceTest, ASenderThatCrashesIsFollowedByTheNext) {
   expect_service();
 }
 
+TEST_F(SocketSourceTest, WhatASenderSentBeforeItsEndArrives) {
+  for (int life = 0; life < 20; ++life) {
+    TestSender sender(path());
+    ASSERT_EQ(sender.begin(), std::uint32_t{FBVINS_SOCKET_WELCOME});
+    for (std::int64_t i = 0; i < 50; ++i) {
+      const FbvinsSocketReading reading{i, {0, 0, 0}, {0, 0, 9.8}};
+      sender.send_readings({&reading, 1});
+    }
+    ASSERT_TRUE(status_->take(LiveStatus{}));  // which it will not read
+  }
+  EXPECT_EQ(inbox_.readings(1000).size(), 1000u);
+}
+
 TEST_F(SocketSourceTest, ASecondSenderIsToldWhoIsThere) {
   TestSender first(path());
   ASSERT_EQ(first.begin(), std::uint32_t{FBVINS_SOCKET_WELCOME});
