@@ -79,6 +79,7 @@ Result<void> add_sinks(const Arguments& arguments, LiveSystem& live, LiveTally& 
 
 Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault>& faults) {
   const StopSignal stop([&] { source.stop(); });
+  live.on_failure([&] { source.stop(); });
   Result<void> ended;
   if (faults.empty()) {
     ended = source.run(live.input());

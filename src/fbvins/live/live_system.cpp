@@ -85,7 +85,11 @@ struct LiveSystem::Impl {
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
       std::visit([this](const auto& e) { hub.publish(e); }, *event);
-      if (Result<void> taken = system.push(std::move(*event)); !taken) break;
+      if (system.push(std::move(*event))) continue;
+      ingest.close();
+      look(true);
+      if (on_failure) on_failure();
+      return;
     }
   }
 
@@ -161,6 +165,7 @@ struct LiveSystem::Impl {
   std::uint32_t reset_counter = 0;
   std::int64_t images_estimated = 0, resets = 0;
 
+  std::function<void()> on_failure;
   LatencyHistogram shutter_to_pose, pose_age;
   Time started;
   std::thread feeder, watcher;
@@ -187,6 +192,8 @@ void LiveSystem::add_sink(std::unique_ptr<Sink> sink) { impl_->hub.add(std::move
 void LiveSystem::on_tracked_frame(std::function<void(const TrackedFrame&)> callback) {
   impl_->system.on_tracked_frame(std::move(callback));
 }
+
+void LiveSystem::on_failure(std::function<void()> callback) { impl_->on_failure = std::move(callback); }
 
 SensorInput& LiveSystem::input() {
   impl_->start();

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole of live, with a frontend that sees a simulated flight: no images are needed, and the truth is exact.
+#include "fbvins/live/live_system.hpp"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <latch>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+#include "fbvins/live/pose_propagator.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+constexpr int kReadingsPerImage = 10;
+
+/// What goes by, and a way to wait for it.
+class Watcher {
+ public:
+  void note(const LiveEvent& event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(event);
+    changed_.notify_all();
+  }
+  template <class Event>
+  std::vector<Event> all() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<Event> found;
+    for (const LiveEvent& e : events_)
+      if (const auto* event = std::get_if<Event>(&e)) found.push_back(*event);
+    return found;
+  }
+  /// Waits until an event satisfies `wanted`; false after a time that no machine needs.
+  template <class Event, class Predicate>
+  bool wait_for(const Predicate& wanted) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::seconds(60), [&] {
+      return std::any_of(events_.begin(), events_.end(), [&](const LiveEvent& e) {
+        const auto* event = std::get_if<Event>(&e);
+        return event != nullptr && wanted(*event);
+      });
+    });
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<LiveEvent> events_;
+};
+
+class WatcherSink final : public Sink {
+ public:
+  explicit WatcherSink(Watcher& watcher) : watcher_(watcher) {}
+  std::string_view name() const override { return "watcher"; }
+  Result<void> take(const LiveEvent& event) override {
+    watcher_.note(event);
+    return {};
+  }
+
+ private:
+  Watcher& watcher_;
+};
+
+/// The features of the simulated flight at the packet's stamp.
+class SeesTheFlight final : public Frontend {
+ public:
+  explicit SeesTheFlight(SimulatedFlight flight, std::function<void(FrameId)> before = {})
+      : flight_(std::move(flight)), before_(std::move(before)) {}
+  TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
+    if (before_) before_(packet.id);
+    const int k = static_cast<int>(std::lround((packet.frame.t - flight_.stamp(0)).seconds() * flight_.image_rate_hz));
+    return flight_.frame(k);
+  }
+
+ private:
+  SimulatedFlight flight_;
+  std::function<void(FrameId)> before_;
+};
+
+struct Fixture {
+  Motion motion{0.5, 0.3};
+  SimulatedFlight flight{motion, 1};
+  Watcher watcher;
+  std::uint8_t pixel = 0;
+
+  LiveSystem live(std::function<void(FrameId)> before = {}, LiveOptions options = {}) {
+    auto made = LiveSystem::create({}, options, flight.rig, 1, {.frontend = std::make_unique<SeesTheFlight>(flight, before)});
+    EXPECT_TRUE(made);
+    made->add_sink(std::make_unique<WatcherSink>(watcher));
+    return std::move(*made);
+  }
+  ImuSample reading(int k) const { return motion.sample(flight.stamp(0) + Duration::from_seconds(k * 0.005), flight.bias); }
+  StereoFrame image(int k) {
+    ++pixel;
+    return {flight.stamp(k), std::make_shared<Image>(8, 8, pixel),
+            std::make_shared<Image>(8, 8, static_cast<std::uint8_t>(pixel + 1))};
+  }
+  /// Image k and the readings up to the next one; waits for the estimate, so that nothing is dropped.
+  void play(LiveSystem& live, int first, int last) {
+    for (int k = first; k < last; ++k) {
+      live.input().push(image(k));
+      for (int i = 0; i < kReadingsPerImage; ++i) live.input().push(reading(k * kReadingsPerImage + i));
+      ASSERT_TRUE(watcher.wait_for<Odometry>([&](const Odometry& o) { return o.t == flight.stamp(k); })) << k;
+    }
+  }
+};
+
+TEST(LiveSystem, SaysAPoseWithEveryReading) {
+  Fixture f;
+  LiveSystem live = f.live();
+  f.play(live, 0, 60);
+  ASSERT_TRUE(live.finish());
+  const std::vector<LivePose> poses = f.watcher.all<LivePose>();
+  ASSERT_EQ(poses.size(), 600u);
+  for (std::size_t k = 1; k < poses.size(); ++k) EXPECT_EQ((poses[k].t - poses[k - 1].t).ns, 5'000'000);
+  EXPECT_TRUE(poses.back().health.has_pose());
+  const LiveStatus status = live.status();
+  EXPECT_EQ(status.counts.images_estimated, 60);
+  EXPECT_EQ(status.counts.images_dropped, 0);
+  EXPECT_EQ(status.counts.imu, 600);
+}
+
+/// What the estimator consumes is what sinks are told, so that a record of it can be run again.
+TEST(LiveSystem, SinksGetTheSensorEventsThatTheEstimatorGets) {
+  Fixture f;
+  LiveSystem live = f.live();
+  f.play(live, 0, 30);
+  ASSERT_TRUE(live.finish());
+  EXPECT_EQ(f.watcher.all<StereoFrame>().size(), 30u);
+  EXPECT_EQ(f.watcher.all<ImuSample>().size(), 300u);
+  EXPECT_EQ(f.watcher.all<Odometry>().size(), 30u);
+}
+
+TEST(LiveSystem, ABusyFrontendCostsImagesButNoReadings) {
+  Fixture f;
+  std::mutex gate;
+  std::unique_lock closed(gate);
+  LiveSystem live = f.live([&](FrameId id) {
+    if (id.value >= 20) const std::lock_guard wait(gate);
+  });
+  f.play(live, 0, 20);
+  for (int k = 20; k < 40; ++k) {
+    live.input().push(f.image(k));
+    for (int i = 0; i < kReadingsPerImage; ++i) live.input().push(f.reading(k * kReadingsPerImage + i));
+  }
+  // Poses at IMU rate go on although no image is worked on.
+  EXPECT_TRUE(f.watcher.wait_for<LivePose>([&](const LivePose& p) { return p.t == f.reading(399).t; }));
+  closed.unlock();
+  ASSERT_TRUE(live.finish());
+  const LiveCounts counts = live.status().counts;
+  EXPECT_GE(counts.images_dropped, 10);
+  EXPECT_EQ(counts.images_dropped + counts.images_estimated, 40);
+  EXPECT_EQ(f.watcher.all<ImuSample>().size(), 400u);
+  EXPECT_EQ(f.watcher.all<StereoFrame>().back().t, f.flight.stamp(39));
+}
+
+TEST(LiveSystem, SilentCamerasAreToldWhileReadingsGoOn) {
+  Fixture f;
+  LiveSystem live = f.live({}, {.camera_silence_s = 0.02});
+  f.play(live, 0, 40);
+  // No image comes any more. Readings do, in wall time.
+  for (int k = 400; k < 430; ++k) {
+    live.input().push(f.reading(k));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const Health expected{HealthState::degraded, HealthReason::no_images};
+  EXPECT_TRUE(f.watcher.wait_for<LiveStatus>([&](const LiveStatus& s) { return s.health == expected; }));
+  EXPECT_TRUE(f.watcher.wait_for<LivePose>([&](const LivePose& p) { return p.health == expected; }));
+  ASSERT_TRUE(live.finish());
+}
+
+TEST(LiveSystem, AStageThatThrowsIsTheStatus) {
+  Fixture f;
+  LiveSystem live = f.live([](FrameId id) {
+    if (id.value == 5) throw std::runtime_error("the lens fell off");
+  });
+  std::latch told(1);
+  live.on_failure([&] { told.count_down(); });
+  f.play(live, 0, 5);
+  for (int k = 5; k < 20; ++k) {
+    live.input().push(f.image(k));
+    for (int i = 0; i < kReadingsPerImage; ++i) live.input().push(f.reading(k * kReadingsPerImage + i));
+  }
+  told.wait();
+  const Result<void> done = live.finish();
+  ASSERT_FALSE(done);
+  EXPECT_NE(done.error().message.find("the lens fell off"), std::string::npos);
+  EXPECT_NE(live.status().problem.find("the lens fell off"), std::string::npos);
+}
+
+TEST(LiveSystem, EndsAtOnceWithoutAnyInput) {
+  Fixture f;
+  EXPECT_TRUE(f.live().finish());
+  LiveSystem never_ended = f.live();
+  never_ended.input().push(f.reading(0));
+}
+
+/// Estimates come 15 ms after their image, as they do in flight. Against exact truth, poses at IMU rate are as good as those
+/// of the images.
+TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Motion motion(0.5, 0.3);
+    SimulatedFlight flight(motion, seed);
+    Estimator estimator(flight.rig, {});
+    PosePropagator propagator(flight.rig.imu_noise, {}, LiveOptions{}.smoothing_s);
+    // Both compared after the same first-pose alignment of position and heading: W begins at the body.
+    std::optional<Pose<W, W>> T_truth_W;
+    double at_images = 0, at_readings = 0;
+    int images = 0, readings = 0;
+    const auto error2 = [&](const Pose<W, B>& estimate, Time t) {
+      const NavState truth = motion.state(t.seconds());
+      return (*T_truth_W * estimate.p - truth.T_WB.p).squaredNorm();
+    };
+    for (int k = 0; k < 400; ++k) {
+      const TrackedFrame frame = flight.frame(k);
+      std::optional<Odometry> estimate;
+      for (std::size_t i = 1; i < frame.imu.samples.size(); ++i) {
+        const LivePose pose = propagator.add(frame.imu.samples[i]);
+        if (pose.health.has_pose() && T_truth_W && k > 100) at_readings += error2(pose.T_WB, pose.t), ++readings;
+      }
+      const Odometry o = estimator.process(frame).odometry;
+      if (o.health.has_pose()) {
+        const NavState truth = motion.state(o.t.seconds());
+        if (!T_truth_W) {
+          const Quat turn = truth.T_WB.q * o.T_WB.q.conjugate();
+          const Quat heading = Quat(turn.w(), 0, 0, turn.z()).normalized();
+          T_truth_W = Pose<W, W>{heading, truth.T_WB.p - heading * o.T_WB.p};
+        }
+        if (k > 100) at_images += error2(o.T_WB, o.t), ++images;
+      }
+      propagator.rebase(o);
+    }
+    ASSERT_GT(images, 250);
+    ASSERT_GT(readings, 2500);
+    EXPECT_LT(std::sqrt(at_readings / readings), 1.2 * std::sqrt(at_images / images)) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace fbvins

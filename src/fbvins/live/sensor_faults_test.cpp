@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/sensor_faults.hpp"
+
+#include <gtest/gtest.h>
+
+#include <variant>
+
+namespace fbvins {
+namespace {
+
+Time ms(std::int64_t value) { return Time{value * 1'000'000}; }
+
+struct Notes final : SensorInput {
+  std::vector<std::pair<std::int64_t, SensorEvent>> events;  ///< with the flight's time at which each came, ms
+  std::int64_t now = 0;
+  void push(const ImuSample& s) override { events.emplace_back(now, s); }
+  void push(StereoFrame f) override { events.emplace_back(now, std::move(f)); }
+
+  template <class Event>
+  std::vector<std::int64_t> stamps() const {
+    std::vector<std::int64_t> all;
+    for (const auto& [when, event] : events)
+      if (const auto* e = std::get_if<Event>(&event)) all.push_back(e->t.ns / 1'000'000);
+    return all;
+  }
+};
+
+/// Three seconds: readings every 10 ms, images every 100 ms.
+Notes fly(const std::vector<std::string>& texts) {
+  std::vector<SensorFault> faults;
+  for (const std::string& text : texts) faults.push_back(*parse_fault(text));
+  Notes notes;
+  FaultyInput faulty(notes, faults);
+  for (std::int64_t t = 0; t < 3000; t += 10) {
+    notes.now = t;
+    faulty.push(ImuSample{ms(t), Vec3::Zero(), Vec3::Zero()});
+    if (t % 100 != 0) continue;
+    const auto value = static_cast<std::uint8_t>(t / 100);
+    faulty.push(StereoFrame{ms(t), std::make_shared<Image>(2, 2, value), std::make_shared<Image>(2, 2, value)});
+  }
+  return notes;
+}
+
+TEST(SensorFaults, WithoutAFaultEverythingPasses) {
+  const Notes notes = fly({});
+  EXPECT_EQ(notes.events.size(), 330u);
+  for (const auto& [when, event] : notes.events) EXPECT_EQ(std::visit([](const auto& e) { return e.t; }, event), ms(when));
+}
+
+TEST(SensorFaults, SensorsFallSilent) {
+  EXPECT_EQ(fly({"camera_off:1:0.5"}).stamps<StereoFrame>().size(), 25u);
+  EXPECT_EQ(fly({"imu_off:1:0.5"}).stamps<ImuSample>().size(), 250u);
+  const Notes unplugged = fly({"unplugged:1:0.5"});
+  EXPECT_EQ(unplugged.stamps<StereoFrame>().size(), 25u);
+  EXPECT_EQ(unplugged.stamps<ImuSample>().size(), 250u);
+}
+
+TEST(SensorFaults, OneCameraIsOffOrFrozen) {
+  for (const auto& [when, event] : fly({"left_off:1:0.5", "right_frozen:2:0.5"}).events) {
+    const auto* frame = std::get_if<StereoFrame>(&event);
+    if (frame == nullptr) continue;
+    const bool off = when >= 1000 && when < 1500, frozen = when >= 2000 && when < 2500;
+    EXPECT_EQ(frame->left == nullptr, off) << when;
+    EXPECT_EQ(frame->right->at(0, 0), frozen ? 19 : when / 100) << when;
+  }
+}
+
+TEST(SensorFaults, AShareOfImagesIsLost) {
+  const std::size_t left = fly({"lose_images:0:3:0.5"}).stamps<StereoFrame>().size();
+  EXPECT_GT(left, 8u);
+  EXPECT_LT(left, 22u);
+}
+
+TEST(SensorFaults, ABurstComesAtOnceAndWhole) {
+  const Notes notes = fly({"burst:1:0.5:0.25"});
+  EXPECT_EQ(notes.events.size(), 330u);
+  EXPECT_EQ(notes.stamps<ImuSample>(), fly({}).stamps<ImuSample>());
+  for (const auto& [when, event] : notes.events) {
+    const std::int64_t t = std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event);
+    if (t < 1000 || t >= 1500) {
+      EXPECT_EQ(when, t);
+    } else {
+      EXPECT_EQ(when, t < 1250 ? 1250 : 1500);
+    }
+  }
+}
+
+TEST(SensorFaults, StampsLeapThereAndBack) {
+  for (const auto& [when, event] : fly({"leap:1:0.5:7"}).events) {
+    const std::int64_t t = std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event);
+    EXPECT_EQ(t - when, when >= 1000 && when < 1500 ? 7000 : 0);
+  }
+}
+
+TEST(SensorFaults, NonsenseIsRefusedInOneSentence) {
+  for (const char* text : {"", "camera_off", "camera_off:1", "camera_off:1:2:3", "camera_off:x:1", "camera_off:-1:1",
+                           "camera_off:1:0", "lose_images:0:1", "lose_images:0:1:1.5", "burst:0:1:0", "earthquake:0:1"}) {
+    const auto fault = parse_fault(text);
+    ASSERT_FALSE(fault) << text;
+    EXPECT_NE(fault.error().message.find("KIND:START:LENGTH"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/sensor_watch.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
+
+const Health kGood{HealthState::good, HealthReason::none};
+
+Ingest::Arrival arrivals(double imu_s, double left_s, double right_s) {
+  return {at(imu_s), at(std::max(left_s, right_s)), at(left_s), at(right_s), {}};
+}
+
+Health judged(const Health& estimated, const Ingest::Arrival& a, double now_s) {
+  return SensorWatch(LiveOptions{}, 3).judge(estimated, a, at(0), at(now_s));
+}
+
+TEST(SensorWatch, SaysWhatTheEstimatorSaysWhileAllIsWell) {
+  EXPECT_EQ(judged(kGood, arrivals(9.99, 9.95, 9.95), 10), kGood);
+  const Health few{HealthState::degraded, HealthReason::few_tracks};
+  EXPECT_EQ(judged(few, arrivals(9.99, 9.95, 9.95), 10), few);
+}
+
+TEST(SensorWatch, SilenceIsSeenAndNamed) {
+  using enum HealthReason;
+  EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.7), 10), (Health{HealthState::degraded, no_images}));
+  EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.99), 10), (Health{HealthState::degraded, one_camera}));
+  EXPECT_EQ(judged(kGood, arrivals(9.8, 9.99, 9.99), 10), (Health{HealthState::degraded, imu_gap}));
+  EXPECT_EQ(judged(kGood, arrivals(9.8, 9.7, 9.7), 10), (Health{HealthState::degraded, imu_gap}));
+}
+
+TEST(SensorWatch, APoseCarriedOnBlindForTooLongIsLost) {
+  EXPECT_EQ(judged(kGood, arrivals(9.99, 6.5, 6.5), 10), (Health{HealthState::lost, HealthReason::no_images}));
+}
+
+TEST(SensorWatch, BeforeTheFirstPoseItOnlySaysWhatIsMissing) {
+  const Health waiting{HealthState::initialising, HealthReason::waiting_for_motion_or_rest};
+  EXPECT_EQ(judged(waiting, {}, 1), (Health{HealthState::initialising, HealthReason::imu_gap}));
+  EXPECT_EQ(judged(waiting, arrivals(0.99, 0, 0), 1), (Health{HealthState::initialising, HealthReason::no_images}));
+  EXPECT_EQ(judged(waiting, {}, 0.05), waiting);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/status_sink.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "fbvins/live/latency_histogram.hpp"
+
+namespace fbvins {
+namespace {
+
+TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
+  LiveStatus status;
+  status.health = {HealthState::degraded, HealthReason::no_images};
+  status.counts.images_dropped = 7;
+  status.problem = "a \"quoted\" name\n";
+  LivePose pose;
+  pose.T_WB.p = Vec3(1, 2, 3);
+  const auto without = nlohmann::json::parse(to_json_line(status, pose));
+  EXPECT_FALSE(without.contains("position_m"));
+  EXPECT_EQ(without["reason"], "no_images");
+  EXPECT_EQ(without["counts"]["images_dropped"], 7);
+  EXPECT_EQ(without["problem"], status.problem);
+  pose.health = status.health;
+  EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["position_m"][2], 3);
+  EXPECT_EQ(to_json_line(status, pose).find('\n'), std::string::npos);
+}
+
+TEST(LatencyHistogram, PercentilesAreWithinABin) {
+  LatencyHistogram histogram;
+  for (int k = 1; k <= 1000; ++k) histogram.add(Duration::from_seconds(k * 1e-4));  // 0.1 to 100 ms
+  const LatencySummary summary = histogram.summary();
+  EXPECT_NEAR(summary.p50_ms, 50, 50 * 0.021);
+  EXPECT_NEAR(summary.p99_ms, 99, 99 * 0.021);
+  EXPECT_DOUBLE_EQ(summary.max_ms, 100);
+  EXPECT_EQ(summary.count, 1000);
+}
+
+}  // namespace
+}  // namespace fbvins
