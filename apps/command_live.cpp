@@ -15,6 +15,7 @@
 #include "fbvins/config/config_file.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
+#include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/live/status_sink.hpp"
@@ -38,12 +39,13 @@ examples:
   fbvins live --source replay:MH_01_easy --out out/live
   fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
   fbvins live --source replay:MH_01_easy --loop --save-map flat.fbm
+  fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
 struct Arguments {
   std::string source, config, frontend, out;
-  std::vector<std::string> assignments, faults;
+  std::vector<std::string> assignments, faults, mavlink;
   DatasetOptions dataset;
   MapArguments map;
   bool quiet = false;
@@ -66,9 +68,14 @@ Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
 }
 
 /// The sinks that the command line asks for; the one that writes files, if any, also wants to see the frontend's frames.
-Result<void> add_sinks(const Arguments& arguments, LiveSystem& live, LiveTally& tally) {
+Result<void> add_sinks(const Arguments& arguments, const LiveOptions& options, LiveSystem& live, LiveTally& tally) {
   live.add_sink(tally.make_sink());
   if (!arguments.quiet) live.add_sink(std::make_unique<StatusSink>(stdout));
+  for (const std::string& address : arguments.mavlink) {
+    auto sink = MavlinkSink::create(address, options.mavlink);
+    if (!sink) return sink.error();
+    live.add_sink(*std::move(sink));
+  }
   if (arguments.out.empty()) return {};
   auto files = LiveFiles::create(arguments.out, arguments.map.wanted(), arguments.map.load.empty());
   if (!files) return files.error();
@@ -121,7 +128,7 @@ int run(const Arguments& arguments) {
   const Result<void> flown = [&]() -> Result<void> {
     auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = map->get()});
     if (!live) return live.error();
-    if (Result<void> added = add_sinks(arguments, *live, tally); !added) return added;
+    if (Result<void> added = add_sinks(arguments, config->live, *live, tally); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
     tally.finish(live->status());
     return done;
@@ -161,6 +168,11 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
   command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
   command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
+  command
+      ->add_option("--mavlink", arguments->mavlink,
+                   "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
   command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
       ->take_all()
       ->allow_extra_args(false);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "fbvins/live/mavlink_options.hpp"
+
 namespace fbvins {
 
 /// How sensors are watched and poses are put out while they come.
@@ -9,6 +11,7 @@ struct LiveOptions {
   double camera_silence_s = 0.2;
   double imu_silence_s = 0.1;
   double imu_reorder_wait_s = 0.01;
+  MavlinkOptions mavlink;
 
   template <class V>
   void visit(V&& v) {
@@ -16,6 +19,7 @@ struct LiveOptions {
     v("camera_silence_s", camera_silence_s, "s", "without an image for this long the health is degraded", 0.02, 10.0);
     v("imu_silence_s", imu_silence_s, "s", "without an IMU reading for this long the health is degraded", 0.01, 10.0);
     v("imu_reorder_wait_s", imu_reorder_wait_s, "s", "a missing IMU reading is waited for no longer than this", 0.0, 0.1);
+    v.group("mavlink", mavlink, "poses to a flight controller (--mavlink)");
   }
 };
 

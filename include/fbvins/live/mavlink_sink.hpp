@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Poses to a flight controller over MAVLink 2 (docs/px4.md).
+//
+//   auto sink = MavlinkSink::create("udp:127.0.0.1:14580", MavlinkOptions{});
+//   if (!sink) return report(sink.error().message);
+//   live.add_sink(std::move(*sink));
+//
+// Threads: take() leaves what it is given to a thread of the sink's own and returns; cables that come and go, queues that are
+// full and a flight controller that is silent hold up nobody.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "fbvins/live/mavlink_options.hpp"
+#include "fbvins/live/sink.hpp"
+
+namespace fbvins {
+
+/// What has become of the connection so far.
+struct MavlinkLinkState {
+  bool connected = false;          ///< the port is open
+  bool flight_controller = false;  ///< heard within the last three seconds
+  bool clock_known = false;        ///< stamps are on the flight controller's clock
+  double clock_offset_s = 0;       ///< its clock less CLOCK_MONOTONIC
+  std::int64_t poses_sent = 0, frames_sent = 0, frames_dropped = 0, frames_received = 0;
+  int times_opened = 0;
+  std::string problem;  ///< one sentence while the port is not open
+};
+
+class MavlinkSink final : public Sink {
+ public:
+  /// `udp:HOST:PORT`, `udp:HOST:PORT:OWN_PORT` (HOST: an IPv4 address or localhost) or `serial:DEVICE:BAUD`. An error says
+  /// what is wrong with these words or options; a device that is not there is waited for.
+  static Result<std::unique_ptr<MavlinkSink>> create(const std::string& address, const MavlinkOptions& options);
+  ~MavlinkSink() override;
+
+  std::string_view name() const override;
+  Result<void> take(const LiveEvent& event) override;
+  Result<void> finish() override;
+  MavlinkLinkState state() const;
+
+ private:
+  struct Impl;
+  explicit MavlinkSink(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace fbvins {
+
+/// Which way the axes of the IMU's frame B look on the vehicle, before the mounting's angles.
+enum class ImuAxes {
+  frd,         ///< x forward, y right, z down
+  flu,         ///< x forward, y left, z up
+  camera_fwd,  ///< x right, y down, z forward, as in cameras that look ahead
+  camera_down  ///< x right, y backward, z down, as in cameras that look at the ground
+};
+
+/// Whether the local frame looks to where the vehicle looked at the start.
+enum class LocalHeading { vehicle, world };
+
+struct MountingOptions {
+  ImuAxes imu_axes = ImuAxes::flu;
+  double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
+  double x_m = 0, y_m = 0, z_m = 0;
+  LocalHeading heading = LocalHeading::vehicle;
+
+  template <class V>
+  void visit(V&& v) {
+    v("imu_axes", imu_axes, "frd|flu|camera_fwd|camera_down", "which way the IMU's axes look on the vehicle");
+    v("roll_rad", roll_rad, "rad", "the IMU is turned by this about the vehicle's forward axis", -3.2, 3.2);
+    v("pitch_rad", pitch_rad, "rad", "then pitched up by this", -3.2, 3.2);
+    v("yaw_rad", yaw_rad, "rad", "then turned to the right by this", -3.2, 3.2);
+    v("x_m", x_m, "m", "the IMU's place on the vehicle, forward", -10.0, 10.0);
+    v("y_m", y_m, "m", "the IMU's place on the vehicle, right", -10.0, 10.0);
+    v("z_m", z_m, "m", "the IMU's place on the vehicle, down", -10.0, 10.0);
+    v("heading", heading, "vehicle|world", "x of the local frame: ahead of the vehicle at the start, or the world's own");
+  }
+};
+
+}  // namespace fbvins

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is said to a flight controller and when, without threads, ports or clocks of its own: time comes in as an argument.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fbvins/live/mavlink_sink.hpp"
+#include "fbvins/mavlink/clock_offset.hpp"
+#include "fbvins/mavlink/vehicle_frames.hpp"
+#include "fbvins/mavlink/wire.hpp"
+
+namespace fbvins {
+
+/// Times are of this machine's CLOCK_MONOTONIC. Each call returns the frames to send, in order.
+///
+/// Clocks: a flight controller learns how far our clock is from its own by asking (TIMESYNC), and moves our stamps by that.
+/// Here stamps are moved to its clock already, so its questions are answered in its own time too, and not before that is
+/// known: it never sees two clocks.
+class MavlinkSession {
+ public:
+  using Frames = std::vector<std::vector<std::uint8_t>>;
+
+  explicit MavlinkSession(const MavlinkOptions& options);
+
+  Frames take(const LivePose& pose);
+  Frames take(const LiveStatus& status, Time now);
+  Frames receive(std::span<const std::uint8_t> bytes, Time now);
+  /// What is due: heartbeats, questions for the time, health that changed.
+  Frames tick(Time now);
+  /// The port was opened anew: what is half read is of no use, and the health is told again.
+  void restart();
+
+  bool flight_controller_heard(Time now) const;
+  const ClockOffset& clock() const { return clock_; }
+  std::int64_t poses() const { return poses_; }
+  std::int64_t frames_received() const { return decoder_.counts().frames + decoder_.counts().skipped; }
+
+ private:
+  void receive(const MavlinkFrame& frame, Time now, Frames& out);
+  void synchronise(const TimesyncMessage& message, const MavlinkAddress& from, Time now, Frames& out);
+  void say(const MavlinkMessage& message, Frames& out);
+  HeartbeatMessage heartbeat() const;
+  std::uint64_t stamp_usec(Time host_t) const;
+
+  MavlinkOptions options_;
+  VehicleFrames frames_;
+  MavlinkDecoder decoder_;
+  ClockOffset clock_;
+  std::uint8_t sequence_ = 0;
+  std::optional<MavlinkAddress> flight_controller_;
+  Time heard_at_{};
+  std::deque<Time> questions_;
+  Health health_;
+  std::optional<Health> told_health_;
+  Time next_heartbeat_{}, next_question_{}, next_text_{}, next_pose_{};
+  std::int64_t poses_ = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/mavlink_session.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr MavlinkAddress kAutopilot{1, 1};
+constexpr Health kGood{HealthState::good, HealthReason::none}, kLost{HealthState::lost, HealthReason::no_tracks};
+
+std::vector<MavlinkMessage> messages(const MavlinkSession::Frames& frames) {
+  MavlinkDecoder decoder;
+  std::vector<MavlinkMessage> all;
+  for (const auto& frame : frames)
+    for (const auto& read : decoder.push(frame)) all.push_back(read.message);
+  return all;
+}
+
+template <class T>
+std::vector<T> only(const MavlinkSession::Frames& frames) {
+  std::vector<T> chosen;
+  for (const auto& message : messages(frames))
+    if (const auto* one = std::get_if<T>(&message)) chosen.push_back(*one);
+  return chosen;
+}
+
+LivePose pose_at(std::int64_t host_ms, Health health = kGood) {
+  LivePose pose;
+  pose.t = Time{5'000 * kMs + host_ms * kMs}, pose.host_t = Time{host_ms * kMs};
+  pose.health = health;
+  return pose;
+}
+
+LiveStatus status(Health health) {
+  LiveStatus s;
+  s.health = health;
+  return s;
+}
+
+/// A flight controller whose clock is ahead by 100 s; questions and answers take 1 ms.
+struct FlightController {
+  explicit FlightController(MavlinkSession& with) : session(with) {}
+
+  MavlinkSession& session;
+  std::int64_t now_ms = 1000;
+  Duration ahead{100'000 * kMs};
+  MavlinkSession::Frames said;
+
+  void hear(const MavlinkMessage& message, MavlinkAddress from = kAutopilot) {
+    for (auto& frame : session.receive(encode_mavlink(message, from, 0), Time{now_ms * kMs})) said.push_back(frame);
+  }
+  void beat() {
+    HeartbeatMessage beat;
+    beat.autopilot = 12;
+    hear(beat);
+  }
+  /// Ten milliseconds in which every question is answered.
+  void step(bool answers = true) {
+    now_ms += 8;
+    const auto frames = session.tick(Time{now_ms * kMs});
+    said.insert(said.end(), frames.begin(), frames.end());
+    for (const auto& sync : only<TimesyncMessage>(frames)) {
+      if (!answers || sync.tc1 != 0) continue;
+      now_ms += 2;
+      hear(TimesyncMessage{(now_ms - 1) * kMs + ahead.ns, sync.ts1});
+    }
+  }
+};
+
+TEST(MavlinkSession, BeatsOnceASecondWhoeverListens) {
+  MavlinkSession session({});
+  int beats = 0;
+  for (int ms = 0; ms < 10'000; ms += 20) beats += static_cast<int>(only<HeartbeatMessage>(session.tick(Time{ms * kMs})).size());
+  EXPECT_EQ(beats, 10);
+}
+
+TEST(MavlinkSession, FiftyPosesASecondOfTwoHundredOrSoReadings) {
+  for (const double imu_hz : {100.0, 200.0, 400.0, 1000.0}) {
+    MavlinkSession session({});
+    int poses = 0;
+    for (int i = 0; i < 10 * imu_hz; ++i) {
+      LivePose pose = pose_at(0);
+      pose.host_t = Time{static_cast<std::int64_t>(i * 1e9 / imu_hz) + (i % 3 - 1) * 300'000};  // jitter
+      poses += static_cast<int>(only<OdometryMessage>(session.take(pose)).size());
+    }
+    EXPECT_NEAR(poses, 500, 2) << imu_hz;
+  }
+}
+
+TEST(MavlinkSession, StampsAreTheHostsUntilTheFlightControllersClockIsKnown) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  EXPECT_EQ(only<OdometryMessage>(session.take(pose_at(900)))[0].time_usec, 900'000u);
+  px4.beat();
+  for (int i = 0; i < 200; ++i) px4.step();
+  ASSERT_TRUE(session.clock().known());
+  EXPECT_NEAR(static_cast<double>(only<OdometryMessage>(session.take(pose_at(5000)))[0].time_usec), 105'000'000.0, 1.0);
+}
+
+TEST(MavlinkSession, AQuestionForTheTimeIsAnsweredOnThatClockAndNotBefore) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  px4.beat();
+  px4.hear(TimesyncMessage{0, 77});
+  EXPECT_TRUE(only<TimesyncMessage>(px4.said).empty());
+  for (int i = 0; i < 200; ++i) px4.step();
+  px4.said.clear();
+  px4.hear(TimesyncMessage{0, 78});
+  const auto answers = only<TimesyncMessage>(px4.said);
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].ts1, 78);
+  EXPECT_NEAR(static_cast<double>(answers[0].tc1), static_cast<double>(px4.now_ms * kMs + px4.ahead.ns), 1e3);
+}
+
+TEST(MavlinkSession, OnlyTheFlightControllersOwnAnswersToOurQuestionsCount) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  px4.beat();
+  for (int i = 0; i < 300; ++i) {
+    px4.step(false);
+    px4.hear(TimesyncMessage{5 * kMs, 12'345});  // never asked
+    for (const auto& sync : only<TimesyncMessage>(px4.said)) px4.hear(TimesyncMessage{5 * kMs, sync.ts1}, {255, 190});
+    px4.said.clear();
+    px4.beat();
+  }
+  EXPECT_FALSE(session.clock().known());
+}
+
+TEST(MavlinkSession, AGroundStationOrAnotherVehicleIsNotTheFlightController) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  px4.hear(HeartbeatMessage{}, {1, 190});
+  HeartbeatMessage other;
+  other.autopilot = 12;
+  px4.hear(other, {2, 1});
+  EXPECT_FALSE(session.flight_controller_heard(Time{px4.now_ms * kMs}));
+  px4.beat();
+  EXPECT_TRUE(session.flight_controller_heard(Time{px4.now_ms * kMs}));
+  EXPECT_FALSE(session.flight_controller_heard(Time{(px4.now_ms + 3000) * kMs}));
+}
+
+TEST(MavlinkSession, HealthIsToldWhenItChangesAndToWhoeverComesBack) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  const auto told = [&] {
+    std::vector<std::string> texts;
+    for (int i = 0; i < 100; ++i) px4.step();
+    for (const auto& text : only<StatusTextMessage>(px4.said)) texts.emplace_back(text.text.data());
+    px4.said.clear();
+    return texts;
+  };
+  session.take(status(kGood), Time{px4.now_ms * kMs});
+  EXPECT_TRUE(told().empty());  // nobody there
+  px4.beat();
+  EXPECT_EQ(told(), std::vector<std::string>{"VIO good"});
+  px4.beat();
+  EXPECT_TRUE(told().empty());
+  px4.said = session.take(status(kLost), Time{px4.now_ms * kMs});
+  EXPECT_EQ(told(), std::vector<std::string>{"VIO lost: no_tracks"});
+  for (int i = 0; i < 5; ++i) told();  // silent for more than three seconds
+  px4.beat();
+  EXPECT_EQ(told(), std::vector<std::string>{"VIO lost: no_tracks"});
+}
+
+TEST(MavlinkSession, WithoutAPoseOdometrySaysSoAndVisionIsSilent) {
+  MavlinkSession px4({});
+  const auto none = only<OdometryMessage>(px4.take(pose_at(100, kLost)));
+  ASSERT_EQ(none.size(), 1u);
+  EXPECT_EQ(none[0].quality, -1);
+  EXPECT_NE(none[0].x, none[0].x);
+  MavlinkOptions options;
+  options.dialect = MavlinkDialect::ardupilot;
+  MavlinkSession ardupilot(options);
+  EXPECT_TRUE(ardupilot.take(pose_at(100, kLost)).empty());
+  const auto both = messages(ardupilot.take(pose_at(200)));
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_TRUE(std::holds_alternative<VisionPositionMessage>(both[0]));
+  EXPECT_TRUE(std::holds_alternative<VisionSpeedMessage>(both[1]));
+}
+
+}  // namespace
+}  // namespace fbvins

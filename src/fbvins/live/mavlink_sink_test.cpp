@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sink on a loopback socket and on a pseudo-terminal that is unplugged. Waits have an end, but no time is asserted.
+#include "fbvins/live/mavlink_sink.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include "fbvins/live/file_descriptor.hpp"
+#include "fbvins/mavlink/wire.hpp"
+
+namespace fbvins {
+namespace {
+
+bool comes_true(const std::function<bool()>& fact) {
+  for (int i = 0; i < 2000; ++i) {
+    if (fact()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+/// A flight controller at the other end of a descriptor, whose clock is 1000 s ahead.
+struct FarEnd {
+  MavlinkDecoder decoder;
+  int odometries = 0, heartbeats = 0, texts = 0, answers = 0;
+  std::uint8_t newest_reset = 0;
+  std::uint64_t newest_usec = 0;
+
+  using Send = std::function<void(const std::vector<std::uint8_t>&)>;
+  void hear(std::span<const std::uint8_t> bytes, const Send& send) {
+    for (const MavlinkFrame& frame : decoder.push(bytes)) {
+      if (const auto* odometry = std::get_if<OdometryMessage>(&frame.message)) {
+        ++odometries;
+        newest_reset = odometry->reset_counter, newest_usec = odometry->time_usec;
+      } else if (std::holds_alternative<StatusTextMessage>(frame.message)) {
+        ++texts;
+      } else if (std::holds_alternative<HeartbeatMessage>(frame.message)) {
+        ++heartbeats;
+      } else if (const auto* sync = std::get_if<TimesyncMessage>(&frame.message)) {
+        if (sync->tc1 == 0) send(encode_mavlink(TimesyncMessage{sync->ts1 + 1'000'000'000'000, sync->ts1}, {1, 1}, 0));
+        else ++answers;
+      }
+    }
+  }
+  static void greet(const Send& send) {
+    HeartbeatMessage beat;
+    beat.autopilot = 12;
+    send(encode_mavlink(beat, {1, 1}, 0));
+    send(encode_mavlink(TimesyncMessage{0, 5}, {1, 1}, 0));
+  }
+};
+
+LivePose pose(std::int64_t i, std::uint32_t resets = 0) {
+  LivePose p;
+  p.t = p.host_t = Time{i * 20'000'000};
+  p.health = {HealthState::good, HealthReason::none};
+  p.reset_counter = resets;
+  return p;
+}
+
+struct UdpEnd {
+  FileDescriptor fd{socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0)};
+  sockaddr_in peer{};
+  FarEnd end;
+
+  std::uint16_t bind_any() {
+    sockaddr_in own{};
+    own.sin_family = AF_INET, own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof own;
+    EXPECT_EQ(bind(fd.number(), reinterpret_cast<sockaddr*>(&own), size), 0);
+    EXPECT_EQ(getsockname(fd.number(), reinterpret_cast<sockaddr*>(&own), &size), 0);
+    return ntohs(own.sin_port);
+  }
+  void serve() {
+    std::array<std::uint8_t, 2048> bytes{};
+    socklen_t size = sizeof peer;
+    const FarEnd::Send send = [this](const std::vector<std::uint8_t>& frame) {
+      sendto(fd.number(), frame.data(), frame.size(), 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
+    };
+    for (ssize_t got = 0;
+         (got = recvfrom(fd.number(), bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size)) > 0;) {
+      const int beats = end.heartbeats;
+      end.hear(std::span(bytes).first(static_cast<std::size_t>(got)), send);
+      if (end.heartbeats > beats || end.odometries % 10 == 1) FarEnd::greet(send);
+    }
+  }
+};
+
+TEST(MavlinkSink, OverUdpPosesComeAndTheClockIsFound) {
+  UdpEnd px4;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}", px4.bind_any()), {});
+  ASSERT_TRUE(sink);
+  std::int64_t i = 0;
+  EXPECT_TRUE(comes_true([&] {
+    EXPECT_TRUE((*sink)->take(LiveEvent(pose(i++))));
+    px4.serve();
+    return px4.end.odometries > 20 && px4.end.answers > 0 && px4.end.texts > 0 && (*sink)->state().clock_known;
+  }));
+  EXPECT_NEAR((*sink)->state().clock_offset_s, 1000, 1);
+  EXPECT_TRUE((*sink)->state().flight_controller);
+  EXPECT_GT(px4.end.newest_usec, 999'000'000u);
+  EXPECT_TRUE((*sink)->finish());
+}
+
+TEST(MavlinkSink, WhatWasTakenBeforeTheEndIsSent) {
+  UdpEnd px4;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}", px4.bind_any()), {});
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE((*sink)->take(LiveEvent(pose(i, 4))));
+  EXPECT_TRUE((*sink)->finish());
+  px4.serve();
+  EXPECT_EQ(px4.end.odometries, 5);
+  EXPECT_EQ(px4.end.newest_reset, 4);
+}
+
+/// A serial cable: a pseudo-terminal under a name that stays.
+struct Cable {
+  std::filesystem::path folder;
+  FileDescriptor master;
+  FarEnd end;
+
+  Cable() {
+    std::string pattern = testing::TempDir() + "fbvins_cable_XXXXXX";
+    folder = mkdtemp(pattern.data());
+  }
+  ~Cable() { std::filesystem::remove_all(folder); }
+  std::string device() const { return folder / "tty"; }
+  void plug() {
+    master = FileDescriptor(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK));
+    ASSERT_EQ(grantpt(master.number()) | unlockpt(master.number()), 0);
+    std::filesystem::remove(device());
+    std::filesystem::create_symlink(ptsname(master.number()), device());
+    end = FarEnd();
+  }
+  void unplug() {
+    std::filesystem::remove(device());
+    master = FileDescriptor();
+  }
+  void serve() {
+    const FarEnd::Send send = [this](const std::vector<std::uint8_t>& frame) {
+      EXPECT_EQ(::write(master.number(), frame.data(), frame.size()), static_cast<ssize_t>(frame.size()));
+    };
+    std::array<std::uint8_t, 2048> bytes{};
+    for (ssize_t got = 0; (got = ::read(master.number(), bytes.data(), bytes.size())) > 0;) {
+      end.hear(std::span(bytes).first(static_cast<std::size_t>(got)), send);
+      if (end.heartbeats > 0 && end.answers == 0) FarEnd::greet(send);
+    }
+  }
+};
+
+TEST(MavlinkSink, ASerialCableMayComeLateGoAndComeAgain) {
+  Cable cable;
+  const auto sink = MavlinkSink::create("serial:" + cable.device() + ":921600", {});
+  ASSERT_TRUE(sink);
+  std::int64_t i = 0;
+  int errors = 0;
+  const auto step = [&] {
+    const Result<void> taken = (*sink)->take(LiveEvent(pose(i++)));
+    if (taken) return;
+    ++errors;
+    EXPECT_NE(taken.error().message.find(cable.device()), std::string::npos);
+  };
+  EXPECT_TRUE(comes_true([&] { return step(), errors > 0; }));
+  for (int again = 0; again < 20; ++again) step();
+  EXPECT_EQ(errors, 1);  // said once
+
+  cable.plug();
+  EXPECT_TRUE(comes_true([&] { return step(), cable.serve(), cable.end.odometries > 20 && cable.end.answers > 0; }));
+  EXPECT_EQ((*sink)->state().times_opened, 1);
+
+  cable.unplug();
+  EXPECT_TRUE(comes_true([&] { return step(), !(*sink)->state().connected; }));
+  EXPECT_NE((*sink)->state().problem, "");
+
+  cable.plug();
+  EXPECT_TRUE(comes_true([&] { return step(), cable.serve(), cable.end.odometries > 20; }));
+  EXPECT_EQ(cable.end.decoder.counts().noise_bytes, 0);  // begins with a whole frame
+  EXPECT_EQ((*sink)->state().times_opened, 2);
+}
+
+TEST(MavlinkSink, ACableThatTakesNothingLosesWholeFrames) {
+  Cable cable;
+  cable.plug();
+  const auto sink = MavlinkSink::create("serial:" + cable.device() + ":57600", {});
+  std::int64_t i = 0;
+  EXPECT_TRUE(comes_true([&] { return (void)(*sink)->take(LiveEvent(pose(i++))).ok(), (*sink)->state().frames_dropped > 10; }));
+  EXPECT_TRUE(
+      comes_true([&] { return (void)(*sink)->take(LiveEvent(pose(i++))).ok(), cable.serve(), cable.end.odometries > 40; }));
+  EXPECT_EQ(cable.end.decoder.counts().noise_bytes, 0);
+}
+
+TEST(MavlinkSink, AnAddressThatIsNoneIsSaidInASentence) {
+  for (const char* address :
+       {"", "udp", "udp:127.0.0.1", "udp:127.0.0.1:0", "udp:127.0.0.1:70000", "udp:drone.local:14540", "udp:127.0.0.1:1:2:3",
+        "udp:1.2.3.4:12x", "serial:/dev/ttyS0", "serial:/dev/ttyS0:12345", "serial::57600", "tcp:127.0.0.1:5760"}) {
+    const auto sink = MavlinkSink::create(address, {});
+    ASSERT_FALSE(sink) << address;
+    EXPECT_NE(sink.error().message.find(fmt::format("'{}'", address)), std::string::npos);
+  }
+  MavlinkOptions options;
+  options.rate_hz = 0;
+  const auto sink = MavlinkSink::create("udp:localhost:14580:14540", options);
+  ASSERT_FALSE(sink);
+  EXPECT_EQ(sink.error().message, "rate_hz = 0 is outside [1, 1000]");
+}
+
+}  // namespace
+}  // namespace fbvins
