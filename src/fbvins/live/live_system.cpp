@@ -85,21 +85,24 @@ struct LiveSystem::Impl {
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
       std::visit([this](const auto& e) { hub.publish(e); }, *event);
-      if (system.push(std::move(*event))) continue;
-      ingest.close();
-      look(true);
-      if (on_failure) on_failure();
-      return;
+      if (Result<void> taken = system.push(std::move(*event)); !taken) return;  // the watcher sees it, too
     }
   }
 
   void watch_sensors() {
     Time told = monotonic_now();
+    bool failed = false;
     std::unique_lock lock(end_mutex);
     while (!end.wait_for(lock, std::chrono::nanoseconds(kWatchPeriod.ns), [&] { return ended; })) {
       ingest.tick();
+      const bool fails_now = !failed && !system.status();
+      if (fails_now) {
+        failed = true;
+        ingest.close();
+        if (on_failure) on_failure();
+      }
       const Time now = monotonic_now();
-      const bool due = now - told >= kStatusPeriod;
+      const bool due = fails_now || now - told >= kStatusPeriod;
       if (due) told = now;
       look(due);
     }
