@@ -16,6 +16,7 @@
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
+#include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/live/status_sink.hpp"
@@ -40,15 +41,16 @@ examples:
   fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
   fbvins live --source replay:MH_01_easy --loop --save-map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
+  fbvins live --source replay:MH_01_easy --record flight.mcap
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
 struct Arguments {
-  std::string source, config, frontend, out;
+  std::string source, config, frontend, out, record;
   std::vector<std::string> assignments, faults, mavlink;
   DatasetOptions dataset;
   MapArguments map;
-  bool quiet = false;
+  bool record_images = true, quiet = false;
 };
 
 Result<Config> config_of(Arguments arguments) {
@@ -68,11 +70,19 @@ Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
 }
 
 /// The sinks that the command line asks for; the one that writes files, if any, also wants to see the frontend's frames.
-Result<void> add_sinks(const Arguments& arguments, const LiveOptions& options, LiveSystem& live, LiveTally& tally) {
+Result<void> add_sinks(const Arguments& arguments, const Config& config, const Source& source, LiveSystem& live,
+                       LiveTally& tally) {
   live.add_sink(tally.make_sink());
+  if (!arguments.record.empty()) {
+    auto record = RecordSink::create(
+        arguments.record, source.rig(),
+        {.program = "fbvins " FBVINS_VERSION, .configuration = to_yaml(config), .images = arguments.record_images});
+    if (!record) return record.error();
+    live.add_sink(std::move(*record));
+  }
   if (!arguments.quiet) live.add_sink(std::make_unique<StatusSink>(stdout));
   for (const std::string& address : arguments.mavlink) {
-    auto sink = MavlinkSink::create(address, options.mavlink);
+    auto sink = MavlinkSink::create(address, config.live.mavlink);
     if (!sink) return sink.error();
     live.add_sink(*std::move(sink));
   }
@@ -128,7 +138,7 @@ int run(const Arguments& arguments) {
   const Result<void> flown = [&]() -> Result<void> {
     auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = map->get()});
     if (!live) return live.error();
-    if (Result<void> added = add_sinks(arguments, config->live, *live, tally); !added) return added;
+    if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
     tally.finish(live->status());
     return done;
@@ -176,6 +186,8 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
+  command->add_option("--record", arguments->record, "MCAP file for the flight record; fbvins run takes it as a recording");
+  command->add_flag("!--record-no-images", arguments->record_images, "keep images out of the record; it cannot be run then");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -144,13 +144,8 @@ Result<void> FlightRecord::add(const Odometry& o) {
   if (!o.health.has_pose()) return flush_if_large();
   const ImuNoise& noise = rig_.imu_noise;
   const double reading = noise.gyro_noise_density_radps_rthz * noise.gyro_noise_density_radps_rthz * noise.rate_hz;
-  const RosOdometry message{o.t,
-                            o.T_WB,
-                            o.v_WB,
-                            o.w_WB_B,
-                            o.pose_covariance,
-                            o.velocity_covariance,
-                            o.gyro_bias_covariance + reading * Mat3::Identity()};
+  rate_covariance_ = o.gyro_bias_covariance + reading * Mat3::Identity();
+  const RosOdometry message{o.t, o.T_WB, o.v_WB, o.w_WB_B, o.pose_covariance, o.velocity_covariance, rate_covariance_};
   write(kOdometry, o.t, [&](std::string& out) { append_odometry(out, message); });
   const RosTransform body[] = {{kOdometryFrame, kBodyFrame, o.T_WB.q, o.T_WB.p}};
   write(kTransforms, o.t, [&](std::string& out) { append_transforms(out, o.t, body); });
@@ -164,8 +159,9 @@ Result<void> FlightRecord::add(const MapUpdate& update) {
   return flush_if_large();
 }
 
-Result<void> FlightRecord::add_live(const RosOdometry& odometry) {
+Result<void> FlightRecord::add_live(RosOdometry odometry) {
   if (Result<void> good = check_stamp(odometry.t); !good) return good;
+  odometry.rate_covariance = rate_covariance_;
   write(kLiveOdometry, odometry.t, [&](std::string& out) { append_odometry(out, odometry); });
   return flush_if_large();
 }

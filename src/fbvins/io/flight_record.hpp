@@ -46,7 +46,8 @@ class FlightRecord {
   /// Pose where there is one, and health.
   Result<void> add(const Odometry& odometry);
   Result<void> add(const MapUpdate& update);
-  Result<void> add_live(const RosOdometry& odometry);
+  /// At an IMU reading; its rate is taken to be as good as that of the newest Odometry.
+  Result<void> add_live(RosOdometry odometry);
   Result<void> add_health(Time t, const RosDiagnostic& diagnostic);
 
   /// Lets all that was added reach the file.
@@ -65,7 +66,8 @@ class FlightRecord {
   McapWriter file_;
   StereoRig rig_;
   bool images_;
-  Time calibration_t_{-1};  ///< when the cameras' places were written
+  Time calibration_t_{-1};               ///< when the cameras' places were written
+  Mat3 rate_covariance_ = Mat3::Zero();  ///< of the body's rate: a reading's noise, and the bias
 };
 
 }  // namespace fbvins
