@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A live flight is recorded and run again: the same bytes, also where sensors failed, and after a kill up to its end.
+
+usage: flight_record.py FBVINS
+"""
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+FILES = ["trajectory_tum.txt", "trajectory.csv"]
+FAULTS = {"whole": [], "one camera and no IMU": ["--fault", "left_off:1.5:0.5", "--fault", "imu_off:2.5:0.3"],
+          "images lost": ["--fault", "lose_images:1:2:0.4", "--fault", "camera_off:3.2:0.3"]}
+
+
+class Failure(Exception):
+    pass
+
+
+def require(fact, sentence):
+    if not fact:
+        raise Failure(sentence)
+
+
+def fly(program, flight, record, *arguments):
+    return [program, "live", "--source", f"replay:{flight}", "--record", str(record), "--quiet", *map(str, arguments)]
+
+
+def run_again(program, record, out):
+    done = subprocess.run([program, "run", str(record), "--out", str(out), "--quiet"], capture_output=True, text=True)
+    return done.returncode, done.stderr
+
+
+def check_same_bytes(program, flight, root):
+    """Whatever the estimator took, dropped images included: the record holds it."""
+    for number, (name, faults) in enumerate(FAULTS.items()):
+        record, live, again = (root / f"{number}{end}" for end in (".mcap", "live", "again"))
+        subprocess.run(fly(program, flight, record, "--out", live, *faults), check=True)
+        require(run_again(program, record, again)[0] == 0, f"{name}: the record cannot be run")
+        for file in FILES:
+            require((live / file).read_bytes() == (again / file).read_bytes(), f"{name}: {file} is another")
+        require(b"\n" in (again / FILES[0]).read_bytes(), f"{name}: there is no pose")
+
+
+def check_kill(program, flight, root):
+    record = root / "killed.mcap"
+    with subprocess.Popen(fly(program, flight, record)) as process:
+        # Not before there are images; what is written by then is all that must be there.
+        while process.poll() is None and (not record.exists() or record.stat().st_size < 3_000_000):
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    require(process.returncode == -signal.SIGKILL, "the flight ended before it was killed")
+    code, said = run_again(program, record, root / "after_kill")
+    require(code == 0 or "no pose could be estimated" in said, f"after a kill: {said}")
+    require("was cut off while it was written" in said, f"after a kill nothing is said of it: {said}")
+
+
+def check_refusals(program, flight, root):
+    record = root / "0.mcap"
+    before = record.read_bytes()
+    done = subprocess.run(fly(program, flight, record), capture_output=True, text=True)
+    require(done.returncode == 2 and "never written over" in done.stderr, f"written over: {done}")
+    require(record.read_bytes() == before, "the record that was there has changed")
+    blind = root / "blind.mcap"
+    subprocess.run(fly(program, flight, blind, "--record-no-images", "--max-images", 20), capture_output=True)
+    code, said = run_again(program, blind, root / "blind")
+    require(code == 2 and f"{blind}: holds no images" in said, f"without images: {said}")
+
+
+def main():
+    program = sys.argv[1]
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        flight = root / "flight"
+        subprocess.run([program, "simulate", "normal", "--seconds", "4", "--set", "image_rate_hz=10", "--out", flight, "--quiet"],
+                       check=True)
+        try:
+            for check in (check_same_bytes, check_kill, check_refusals):
+                check(program, flight, root)
+        except Failure as failure:
+            print(failure)
+            return 1
+    print("flights recorded live run again with the same bytes, whole, with faults and killed")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

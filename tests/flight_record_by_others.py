@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A flight record in the hands of other people's programs: `mcap` and `mcap-ros2-support` (PyPI) find every topic, by index and
+without, whole and broken off, and every number is the one that went in.
+
+usage: flight_record_by_others.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
+exit 77 (skipped) where they are not installed
+"""
+import csv
+import io
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import warnings
+
+try:
+    from mcap.exceptions import McapError
+    from mcap.reader import NonSeekingReader, make_reader
+    from mcap_ros2.decoder import DecoderFactory
+except ImportError as missing:
+    if len(sys.argv) > 2 and pathlib.Path(sys.argv[2]).exists():
+        os.execv(sys.argv[2], [sys.argv[2], __file__, sys.argv[1]])
+    print(f"skipped: mcap and mcap-ros2-support are not installed ({missing}); ./dev test installs them where PyPI can be reached")
+    sys.exit(77)
+
+TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
+         "/camera/left/camera_info": "sensor_msgs/msg/CameraInfo", "/camera/right/camera_info": "sensor_msgs/msg/CameraInfo",
+         "/odometry": "nav_msgs/msg/Odometry", "/odometry/live": "nav_msgs/msg/Odometry", "/tf": "tf2_msgs/msg/TFMessage",
+         "/tf_static": "tf2_msgs/msg/TFMessage", "/health": "diagnostic_msgs/msg/DiagnosticArray"}
+
+
+class Failure(Exception):
+    pass
+
+
+def require(fact, sentence):
+    if not fact:
+        raise Failure(sentence)
+
+
+def stamp_ns(header):
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def messages(reader, topic=None):
+    return [(channel.topic, schema.name, message, decoded)
+            for schema, channel, message, decoded in reader.iter_decoded_messages(topics=topic)]
+
+
+def indexed(record):
+    return make_reader(io.BytesIO(record), validate_crcs=True, decoder_factories=[DecoderFactory()])
+
+
+def rows(path):
+    with open(path, encoding="utf-8", newline="") as file:
+        return [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+
+
+def check_summary(record):
+    reader = indexed(record)
+    require(reader.get_header().profile == "ros2", "the profile is not ros2")
+    summary = reader.get_summary()
+    require({c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values()} == TYPES, "topics or types differ")
+    statistics, all_messages = summary.statistics, messages(reader)
+    require(statistics.message_count == len(all_messages), "the statistics count other messages than there are")
+    require(statistics.chunk_count == len(summary.chunk_indexes), "the index is not of all chunks")
+    require(statistics.message_start_time == min(m.log_time for _, _, m, _ in all_messages), "the first time is another")
+    attachments = {a.name: a.data.decode() for a in reader.iter_attachments()}
+    require(set(attachments) == {"calibration.yaml", "config.yaml"}, f"attachments: {list(attachments)}")
+    require("T_BC0:" in attachments["calibration.yaml"] and "frontend:" in attachments["config.yaml"], "attachments are empty")
+    about = {m.name: m.metadata for m in reader.iter_metadata()}
+    require(about["fbvins"]["images"] == "yes", f"metadata: {about}")
+
+
+def check_time_window(record):
+    """By the index, from the middle of the file."""
+    reader = indexed(record)
+    statistics = reader.get_summary().statistics
+    middle = (statistics.message_start_time + statistics.message_end_time) // 2
+    late = [m.log_time for _, _, m in reader.iter_messages(topics="/imu", start_time=middle)]
+    require(middle <= late[0] <= middle + 5_000_000, f"the first reading after {middle} is at {late[0]}")
+    require(late == sorted(late), "readings found by the index are out of order")
+
+
+def check_readings(record, flight):
+    read = {stamp_ns(m.header): (m.angular_velocity, m.linear_acceleration) for _, _, _, m in messages(indexed(record), "/imu")}
+    known = {int(row[0]): [float(v) for v in row[1:7]] for row in rows(flight / "imu0" / "data.csv")}
+    require(len(read) > 500, f"{len(read)} readings")
+    for stamp, (gyro, accel) in read.items():
+        require([gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z] == known[stamp], f"the reading at {stamp} is another")
+
+
+def check_poses(record, live):
+    known = {int(row[0]): [float(v) for v in row[1:8]] for row in rows(live / "trajectory.csv")}
+    poses = messages(indexed(record), "/odometry")
+    require(len(poses) > 10, f"{len(poses)} poses")
+    for _, _, message, m in poses:
+        p, q = m.pose.pose.position, m.pose.pose.orientation
+        ours = known[stamp_ns(m.header)]
+        # The table has nine digits behind the point, the record all of them.
+        require(all(abs(a - b) < 1e-8 for a, b in zip([p.x, p.y, p.z, q.w, q.x, q.y, q.z], ours)), f"{m.pose.pose} is not {ours}")
+        require(message.log_time == stamp_ns(m.header), "the message's time is not its stamp")
+        require(m.header.frame_id == "odom" and m.child_frame_id == "body", "frames have other names")
+        require(m.pose.covariance[0] > 0 and m.twist.covariance[35] > 0, "there is no covariance")
+    live_poses = messages(indexed(record), "/odometry/live")
+    require(len(live_poses) > 5 * len(poses), "poses at IMU rate are fewer than that")
+
+
+def check_images(record, flight):
+    images = messages(indexed(record), ["/camera/left", "/camera/right"])
+    require(len(images) > 50, f"{len(images)} images")
+    for topic, _, _, m in images:
+        require(m.encoding == "mono8" and m.step == m.width and len(m.data) == m.height * m.width, f"{topic}: {m.encoding}")
+        require(m.header.frame_id == topic.strip("/").replace("/", "_"), f"{topic} is in {m.header.frame_id}")
+    stamps = {topic: [stamp_ns(m.header) for t, _, _, m in images if t == topic] for topic in ("/camera/left", "/camera/right")}
+    require(stamps["/camera/left"] == stamps["/camera/right"], "left and right have other stamps")
+    known = {int(row[0]) for row in rows(flight / "cam0" / "data.csv")}
+    require(set(stamps["/camera/left"]) <= known, "a stamp is none of the flight's")
+
+
+def check_health(record):
+    diagnostics = [status for _, _, _, m in messages(indexed(record), "/health") for status in m.status]
+    by_name = {name: [s for s in diagnostics if s.name == name] for name in ("odometry", "live")}
+    require(by_name["odometry"] and by_name["live"], f"names: {set(s.name for s in diagnostics)}")
+    last = by_name["odometry"][-1]
+    values = {v.key: v.value for v in last.values}
+    require(values["state"] in ("good", "degraded") and "reset_counter" in values, f"{last}")
+    require(int({v.key: v.value for v in by_name["live"][-1].values}["imu"]) > 500, "the live counts are not there")
+
+
+def check_broken_off(record):
+    """Streamed, as a recovery tool does: up to the last whole chunk."""
+    whole = len(list(NonSeekingReader(io.BytesIO(record), validate_crcs=True).iter_messages(log_time_order=False)))
+    last = 0
+    for part in (0.2, 0.5, 0.8, 0.99):
+        count = 0
+        reader = NonSeekingReader(io.BytesIO(record[:int(part * len(record))]), validate_crcs=True)
+        try:
+            for _ in reader.iter_messages(log_time_order=False):
+                count += 1
+        except McapError:  # the end is not there
+            pass
+        require(count > last and count >= whole * (part - 0.2), f"{count} of {whole} messages in {part} of the file")
+        last = count
+
+
+def main():
+    program = sys.argv[1]
+    warnings.filterwarnings("ignore", category=DeprecationWarning)  # start_time has this name in all versions of mcap
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        flight, live, path = root / "flight", root / "live", root / "flight.mcap"
+        subprocess.run([program, "simulate", "normal", "--seconds", "4", "--set", "image_rate_hz=10", "--out", flight, "--quiet"],
+                       check=True)
+        subprocess.run([program, "live", "--source", f"replay:{flight}", "--record", path, "--out", live, "--quiet"], check=True)
+        record = path.read_bytes()
+        try:
+            check_summary(record)
+            check_time_window(record)
+            check_readings(record, next(flight.rglob("imu0")).parent)
+            check_poses(record, live)
+            check_images(record, next(flight.rglob("cam0")).parent)
+            check_health(record)
+            check_broken_off(record)
+        except Failure as failure:
+            print(failure)
+            return 1
+    print(f"mcap and mcap-ros2-support read all {len(TYPES)} topics, and every number is the one that went in")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
