@@ -13,6 +13,7 @@ import time
 
 FILES = ["trajectory_tum.txt", "trajectory.csv"]
 FAULTS = {"whole": [], "one camera and no IMU": ["--fault", "left_off:1.5:0.5", "--fault", "imu_off:2.5:0.3"],
+          "another frontend": ["--frontend", "orb", "--set", "estimator.max_iterations=5"],
           "images lost": ["--fault", "lose_images:1:2:0.4", "--fault", "camera_off:3.2:0.3"]}
 
 
@@ -30,7 +31,8 @@ def fly(program, flight, record, *arguments):
 
 
 def run_again(program, record, out):
-    done = subprocess.run([program, "run", str(record), "--out", str(out), "--quiet"], capture_output=True, text=True)
+    command = [program, "run", str(record), "--config", str(record), "--out", str(out), "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True)
     return done.returncode, done.stderr
 
 

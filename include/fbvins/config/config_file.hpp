@@ -13,7 +13,7 @@
 
 namespace fbvins {
 
-/// The defaults, changed by the file.
+/// The defaults, changed by the file. A flight record (MCAP) gives what it was flown with.
 Result<Config> load_config(const std::string& path);
 
 /// The defaults, changed by the file (none for an empty path), then by "name=value" assignments in order.

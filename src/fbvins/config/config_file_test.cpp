@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <set>
 
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/flight_record.hpp"
 
 namespace fbvins {
 namespace {
@@ -48,6 +51,27 @@ TEST(ConfigFile, AssignmentsComeAfterTheFileAndInOrder) {
   EXPECT_EQ(config->estimator.max_iterations, 9);
   EXPECT_FALSE(load_config("", {"estimator.max_iteration=7"}));
   EXPECT_FALSE(load_config("no/such/file.yaml"));
+}
+
+TEST(ConfigFile, AFlightRecordGivesWhatItWasFlownWith) {
+  const std::string path = ::testing::TempDir() + "/fbvins_config_" + std::to_string(getpid()) + ".mcap";
+  Config flown;
+  flown.frontend.kind = "orb";
+  flown.estimator.accel_noise_scale = 1.0 / 3 + 16;
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
+  rig.T_BC1.p.x() = 0.1;
+  ASSERT_TRUE(FlightRecord::create(path, rig, {.configuration = to_yaml(flown)}));
+  const auto config = load_config(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(to_yaml(*config), to_yaml(flown));
+
+  ASSERT_TRUE(FlightRecord::create(path, rig, {.configuration = "no_such_option: 1\n"}));
+  const auto refused = load_config(path);
+  std::filesystem::remove(path);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().message.starts_with(path + ": config.yaml:1: ")) << refused.error().message;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "fbvins/io/file_source.hpp"
+#include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
@@ -93,9 +94,10 @@ Result<void> read_yaml(const std::string& text, const std::string& source, const
 }
 
 Result<void> read_yaml_file(const std::string& path, const std::vector<OptionField>& fields) {
-  const Result<std::string> text = read_file(path, kLargestConfig_bytes);
+  const bool record = is_mcap(path);
+  const Result<std::string> text = record ? recorded_configuration(path) : read_file(path, kLargestConfig_bytes);
   if (!text) return text.error();
-  return read_yaml(*text, path, fields);
+  return read_yaml(*text, record ? path + ": config.yaml" : path, fields);
 }
 
 std::string write_yaml(const std::vector<OptionField>& fields) {

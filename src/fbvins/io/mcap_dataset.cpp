@@ -253,4 +253,15 @@ Result<DatasetContents> read_mcap(std::shared_ptr<const ByteSource> bytes, const
   return RecordReader(std::move(bytes), *std::move(reader), name, options).read();
 }
 
+Result<std::string> recorded_configuration(const std::string& path) {
+  const auto bytes = open_bytes(path);
+  if (!bytes) return bytes.error();
+  Result<McapReader> reader = McapReader::open(*bytes, path);
+  if (!reader) return reader.error();
+  (void)reader->next();  // attachments are before the first message
+  for (const McapAttachment& attachment : reader->attachments())
+    if (attachment.name == kConfigurationAttachment) return attachment.data;
+  return Error{ErrorCode::malformed, fmt::format("{}: holds no configuration", path)};
+}
+
 }  // namespace fbvins

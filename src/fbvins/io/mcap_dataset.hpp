@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: flight records as recordings. They are scanned once when opened; images are read from the file when it is their
+// Private: flight records as recordings. They are scanned once when opened; images are read from the file when it is their
 // turn.
 #pragma once
 
@@ -14,5 +14,8 @@ Result<DatasetContents> open_mcap(const std::string& path, const DatasetOptions&
 /// The same of bytes; `name` is only for messages.
 Result<DatasetContents> read_mcap(std::shared_ptr<const ByteSource> bytes, const std::string& name,
                                   const DatasetOptions& options);
+
+/// The configuration that the flight was flown with, as YAML.
+Result<std::string> recorded_configuration(const std::string& path);
 
 }  // namespace fbvins
