@@ -20,6 +20,9 @@ constexpr auto kStatusEvery = 1s;
 /// No descriptor for a new connection: it is tried again later.
 constexpr auto kAcceptAgain = 1s;
 
+/// A connection is closed so long after its goodbye: a sender that is about to send would meet an error before it.
+constexpr auto kGoodbyeIsRead = 1s;
+
 bool same(const FbvinsSocketRig& a, const FbvinsSocketRig& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }
 
 std::uint32_t health_number(HealthState state) {
@@ -112,6 +115,7 @@ void SocketSource::step(Clock::duration longest, SensorInput* input) {
                                    pollfd{session_ ? session_->fd() : -1, static_cast<short>(POLLIN | to_sender), 0}};
   ::poll(watched.data(), watched.size(), static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
   if (watched[0].revents != 0) bell_->silence();
+  if (Clock::now() > leaving_until_) leaving_.reset();
   if (session_) {
     if (!session_->greeted()) greet(input != nullptr);
     else if (input != nullptr) serve(*input);
@@ -129,7 +133,10 @@ void SocketSource::accept() {
     return;
   }
   auto newcomer = std::make_unique<SocketSession>(std::move(connection), bell_);
-  if (session_) return newcomer->refuse(FBVINS_SOCKET_BUSY, fmt::format("another sender is connected: {}", session_->name()));
+  if (session_) {
+    newcomer->refuse(FBVINS_SOCKET_BUSY, fmt::format("another sender is connected: {}", session_->name()));
+    return linger(std::move(newcomer));
+  }
   session_ = std::move(newcomer);
   next_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options_.hello_s));
 }
@@ -185,8 +192,13 @@ void SocketSource::let_go() {
     sentence += fmt::format(" ({} frames, {} missed, {} readings, {} refused)", counts.frames, counts.frames_missed,
                             counts.readings, counts.readings_refused);
   say(sentence);
-  session_.reset();
+  linger(std::move(session_));
   backlog_ = false;
+}
+
+void SocketSource::linger(std::unique_ptr<SocketSession> refused) {
+  leaving_ = std::move(refused);
+  leaving_until_ = Clock::now() + kGoodbyeIsRead;
 }
 
 }  // namespace fbvins

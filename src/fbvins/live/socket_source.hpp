@@ -53,6 +53,7 @@ class SocketSource final : public Source {
   void serve(SensorInput& input);
   void send_status();
   void let_go();
+  void linger(std::unique_ptr<SocketSession> refused);
   void say(const std::string& what) { options_.say(file_.path() + ": " + what); }
 
   SocketFile file_;
@@ -63,6 +64,8 @@ class SocketSource final : public Source {
   std::shared_ptr<const Bell> bell_ = std::make_shared<const Bell>();
   std::shared_ptr<Report> report_;
   std::unique_ptr<SocketSession> session_;
+  std::unique_ptr<SocketSession> leaving_;  ///< the last one that is over, until its goodbye is read
+  Clock::time_point leaving_until_;
   bool backlog_ = false;            ///< the session has more to tell than its sender takes
   Clock::time_point accept_after_;  ///< no connection is taken before
   Clock::time_point next_;          ///< of the session: its hello is overdue then, or its next status due

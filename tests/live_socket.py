@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`fbvins live --source socket:PATH` with the senders of examples/, in wall time (about a minute).
+
+usage: live_socket.py FBVINS CXX
+"""
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM, CXX = sys.argv[1:3]
+REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
+RECORDING = pathlib.Path(os.environ.get("FBVINS_DATA") or REPOSITORY.parent / "shared" / "data") / "MH_01_easy_17s"
+# The Python sender as it is, but with the same made-up wall and noise every time.
+SEEDED = "import random, runpy, sys; random.seed(7); del sys.argv[0]; runpy.run_path(sys.argv[0], run_name='__main__')"
+
+
+def seconds_left(until):
+    return max(0.0, until - time.monotonic())
+
+
+class LiveSocket(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.path, self.out = self.folder / "s", self.folder / "out"
+
+    def listen(self, *arguments):
+        live = subprocess.Popen([PROGRAM, "live", "--source", f"socket:{self.path}", "--out", self.out, "--quiet", *arguments],
+                                stderr=subprocess.PIPE, text=True)
+        self.addCleanup(live.kill)
+        self.addCleanup(live.stderr.close)
+        until = time.monotonic() + 30
+        while not self.path.exists() and seconds_left(until):
+            time.sleep(0.01)
+        self.assertTrue(self.path.exists())
+        return live
+
+    def end(self, live):
+        time.sleep(0.5)  # the last image's pose
+        live.send_signal(signal.SIGINT)
+        self.assertEqual(live.wait(timeout=30), 0)
+        self.assertFalse(self.path.exists(), "the socket is removed")
+        return live.stderr.read()
+
+    def python_sender(self, seconds):
+        return subprocess.Popen([sys.executable, "-c", SEEDED, REPOSITORY / "examples/socket_sender.py", self.path, str(seconds)])
+
+    def compile_sender(self):
+        sender = self.folder / "socket_sender"
+        subprocess.run([CXX, "-std=c++20", "-O2", "-Wall", "-Wextra", "-Werror", "-pthread", "-I", REPOSITORY / "include",
+                        REPOSITORY / "examples/socket_sender.cpp", "-lpng", "-o", sender], check=True)
+        return sender
+
+    def poses(self):
+        rows = [line.split() for line in (self.out / "trajectory_tum.txt").read_text().splitlines() if not line.startswith("#")]
+        return [[float(number) for number in row[:4]] for row in rows]
+
+    def test_the_header_is_c(self):
+        subprocess.run([CXX, "-x", "c", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
+                        REPOSITORY / "include/fbvins/live/socket_protocol.hpp"], check=True)
+
+    def test_a_sender_is_killed_and_the_next_goes_on(self):
+        live = self.listen()
+        first = self.python_sender(60)
+        time.sleep(4)
+        first.kill()
+        first.wait()
+        self.assertIsNone(live.poll())
+        self.assertEqual(self.python_sender(7).wait(timeout=60), 0)
+        said = self.end(live)
+        self.assertIn("made-up rig: left without a goodbye", said)
+        self.assertRegex(said, r"made-up rig: said goodbye: the show is over \(1\d\d frames, \d+ missed, 1400 readings, 0 refused\)")
+        # The rig sways by 0.4 m to the right, and by nothing else. The second sender has another wall: W may be a new one.
+        last = self.poses()[-60:]
+        span_m = [max(p[i] for p in last) - min(p[i] for p in last) for i in (1, 2, 3)]
+        self.assertAlmostEqual((span_m[0]**2 + span_m[1]**2)**0.5, 0.4, delta=0.03)
+        self.assertLess(span_m[2], 0.03)
+
+    def test_a_second_listener_and_a_second_sender_are_refused(self):
+        live = self.listen()
+        again = subprocess.run([PROGRAM, "live", "--source", f"socket:{self.path}"], capture_output=True, text=True, timeout=30,
+                               check=False)
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("another program listens there", again.stderr)
+        first = self.python_sender(4)
+        time.sleep(1)
+        second = subprocess.run([sys.executable, REPOSITORY / "examples/socket_sender.py", self.path], capture_output=True, text=True,
+                                timeout=30, check=False)
+        self.assertEqual(second.returncode, 1)
+        self.assertIn("goodbye: another sender is connected: made-up rig", second.stderr)
+        self.assertEqual(first.wait(timeout=30), 0)
+        self.end(live)
+
+    def test_waiting_for_a_calibration_ends_at_a_signal(self):
+        live = self.listen()
+        live.send_signal(signal.SIGTERM)
+        self.assertEqual(live.wait(timeout=30), 2)
+        self.assertIn("no sender came", live.stderr.read())
+        self.assertFalse(self.path.exists())
+
+    @unittest.skipUnless(RECORDING.exists(), f"{RECORDING} is not there; set FBVINS_DATA")
+    def test_a_recording_over_the_socket_is_the_recording(self):
+        sender, plain = self.compile_sender(), self.folder / "plain"
+        subprocess.run([PROGRAM, "run", RECORDING, "--quiet", "--out", plain], check=True)
+        live = self.listen()
+        subprocess.run([sender, self.path, RECORDING / "mav0"], check=True, timeout=60)
+        said = self.end(live)
+        self.assertIn("3531 readings, 0 refused)", said)
+        if "(340 frames" not in said or '"images_dropped": 0' not in (self.out / "summary.json").read_text():
+            self.skipTest("this machine is too slow, or too busy, for wall time")
+        for name in ("trajectory_tum.txt", "trajectory.csv"):
+            self.assertEqual((self.out / name).read_bytes(), (plain / name).read_bytes(), name)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
