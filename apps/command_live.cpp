@@ -51,6 +51,7 @@ struct Arguments {
   DatasetOptions dataset;
   MapArguments map;
   bool record_images = true, quiet = false;
+  int laps = 1;
 };
 
 Result<Config> config_of(Arguments arguments) {
@@ -125,7 +126,7 @@ int run(const Arguments& arguments) {
   if (!config) return fail(config.error().message);
   const auto faults = faults_of(arguments);
   if (!faults) return fail(faults.error().message);
-  const auto source = make_source(arguments.source, {.dataset = arguments.dataset});
+  const auto source = make_source(arguments.source, {.dataset = arguments.dataset, .laps = arguments.laps});
   if (!source) return fail(source.error().message);
   if (!arguments.out.empty()) {
     std::error_code error;
@@ -174,6 +175,8 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
   command->add_option("--max-images", arguments->dataset.max_frames, "of a replay: end after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
+  command->add_option("--laps", arguments->laps, "of a replay: play it this often, one after the other")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
   command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");

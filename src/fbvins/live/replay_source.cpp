@@ -16,7 +16,7 @@ constexpr double kSlowest = 0.01, kFastest = 100;
 
 }  // namespace
 
-Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& where, DatasetOptions options) {
+Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& where, DatasetOptions options, int laps) {
   const auto at = where.rfind('@');
   double speed = 1;
   if (at != std::string::npos) {
@@ -29,22 +29,37 @@ Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& wher
   options.prefetch_frames = kDecodedAhead;
   auto data = open_dataset(where.substr(0, at), options);
   if (!data) return data.error();
-  return std::unique_ptr<ReplaySource>(new ReplaySource(std::move(*data), speed));
+  return std::unique_ptr<ReplaySource>(new ReplaySource(where.substr(0, at), options, std::move(*data), speed, laps));
 }
 
 Result<void> ReplaySource::run(SensorInput& input) {
-  using std::chrono::steady_clock;
-  std::optional<SensorEvent> event = data_->next();  // the first images are decoded before the clock starts
-  if (!event) return {};
-  const auto stamp = [](const SensorEvent& e) { return std::visit([](const auto& x) { return x.t; }, e); };
-  const Time first = stamp(*event);
-  const std::int64_t start_ns = steady_clock::now().time_since_epoch().count();
-  for (; event; event = data_->next()) {
-    const double since_first_s = (stamp(*event) - first).seconds() / speed_;
-    if (!wait_until(start_ns + Duration::from_seconds(since_first_s).ns)) return {};
-    std::visit([&](auto& e) { input.push(std::move(e)); }, *event);
+  Duration later;
+  for (int lap = 0; lap < laps_; ++lap) {
+    if (lap > 0) {
+      auto again = open_dataset(path_, options_);
+      if (!again) return again.error();
+      data_ = std::move(*again);
+      later = *newest_ - *first_ + Duration::from_seconds(1 / data_->rig().image_rate_hz);
+    }
+    if (!play(input, later)) return {};
   }
   return {};
+}
+
+bool ReplaySource::play(SensorInput& input, Duration later) {
+  std::optional<SensorEvent> event = data_->next();  // the first images are decoded before the clock starts
+  for (; event; event = data_->next()) {
+    Time& t = std::visit([](auto& e) -> Time& { return e.t; }, *event);
+    t = t + later;
+    if (!first_) {
+      first_ = t;
+      start_ns_ = std::chrono::steady_clock::now().time_since_epoch().count();
+    }
+    if (!wait_until(start_ns_ + Duration::from_seconds((t - *first_).seconds() / speed_).ns)) return false;
+    newest_ = t;
+    std::visit([&](auto& e) { input.push(std::move(e)); }, *event);
+  }
+  return true;
 }
 
 bool ReplaySource::wait_until(std::int64_t host_ns) {

@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "fbvins/io/dataset.hpp"
@@ -17,8 +18,8 @@ namespace fbvins {
 
 class ReplaySource final : public Source {
  public:
-  /// `where`: DATASET or DATASET@SPEED.
-  static Result<std::unique_ptr<ReplaySource>> open(const std::string& where, DatasetOptions options);
+  /// `where`: DATASET or DATASET@SPEED. `laps`: how often it is played; stamps go on from lap to lap, and the scene leaps back.
+  static Result<std::unique_ptr<ReplaySource>> open(const std::string& where, DatasetOptions options, int laps = 1);
 
   const StereoRig& rig() const override { return data_->rig(); }
   double clock_rate() const override { return speed_; }
@@ -28,12 +29,20 @@ class ReplaySource final : public Source {
   const Dataset& dataset() const { return *data_; }
 
  private:
-  ReplaySource(std::unique_ptr<Dataset> data, double speed) : data_(std::move(data)), speed_(speed) {}
+  ReplaySource(std::string path, const DatasetOptions& options, std::unique_ptr<Dataset> data, double speed, int laps)
+      : path_(std::move(path)), options_(options), data_(std::move(data)), speed_(speed), laps_(laps) {}
+  /// The recording once; `later` is added to its stamps. False when stopped before its end.
+  bool play(SensorInput& input, Duration later);
   /// False when stopped before.
   bool wait_until(std::int64_t host_ns);
 
+  std::string path_;
+  DatasetOptions options_;
   std::unique_ptr<Dataset> data_;
   double speed_;
+  int laps_;
+  std::optional<Time> first_, newest_;  ///< stamps pushed
+  std::int64_t start_ns_ = 0;           ///< when the first was due, on this machine's clock
   std::mutex mutex_;
   std::condition_variable stopped_changed_;
   bool stopped_ = false;
