@@ -190,12 +190,17 @@ void fuzz_mcap(std::string_view bytes) {
 }
 
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all = {{"csv", fuzz_csv, csv_seeds},
-                                          {"calibration", fuzz_calibration, calibration_seeds},
-                                          {"trajectory", fuzz_trajectory, trajectory_seeds},
-                                          {"image", fuzz_image, image_seeds},
-                                          {"weights", fuzz_weights, weights_seeds},
-                                          {"mcap", fuzz_mcap, mcap_seeds}};
+  static const std::vector<Target> all = {
+      {"csv", fuzz_csv, csv_seeds},
+      {"calibration", fuzz_calibration, calibration_seeds},
+      {"trajectory", fuzz_trajectory, trajectory_seeds},
+      {"image", fuzz_image, image_seeds},
+      {"weights", fuzz_weights, weights_seeds},
+      {"mcap", fuzz_mcap, mcap_seeds},
+#ifdef FBVINS_WITH_LIVE
+      {"socket", fuzz_socket, socket_seeds},
+#endif
+  };
   return all;
 }
 

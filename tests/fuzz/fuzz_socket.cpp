@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// The messages of a sender of sensor data (fbvins/live/socket_protocol.hpp), as a fuzz target.
+#include <span>
+
+#include "fbvins/live/socket_message.hpp"
+#include "tests/fuzz/fuzz_targets.hpp"
+
+namespace fbvins::fuzz {
+namespace {
+
+void require(bool fact) {
+  if (!fact) __builtin_trap();
+}
+
+template <class Struct>
+std::string bytes_of(std::uint32_t type, Struct message, std::size_t size = sizeof(Struct)) {
+  message.header = {type, static_cast<std::uint32_t>(size)};
+  return {reinterpret_cast<const char*>(&message), size};
+}
+
+FbvinsSocketRig seed_rig() {
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625}, 64, 48);
+  rig.T_BC1.p.x() = 0.125;
+  return socket_rig(rig);
+}
+
+/// Mutations change the size, and a message that contradicts its size is refused at once: it is made to agree.
+std::string with_its_size(std::string_view bytes) {
+  std::string out(bytes);
+  const auto size = static_cast<std::uint32_t>(out.size());
+  if (out.size() >= sizeof(FbvinsSocketHeader))
+    out.replace(offsetof(FbvinsSocketHeader, size_bytes), sizeof(size), reinterpret_cast<const char*>(&size), sizeof(size));
+  return out;
+}
+
+void check(const SocketHello& hello) {
+  const FrameLayout& layout = hello.layout;
+  require(layout.slots >= 2 && layout.slots <= FBVINS_SOCKET_MOST_SLOTS && layout.bytes() <= (std::size_t{1} << 30U));
+  require(layout.right_offset_bytes >= layout.image_bytes());
+  require(layout.right_offset_bytes + layout.image_bytes() <= layout.slot_bytes);
+  if (hello.rig) require(parse_socket_rig(*hello.rig, layout.width_px, layout.height_px).ok());
+}
+
+void check(const SocketImu& imu) {
+  for (const ImuSample& sample : imu.readings) require(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite());
+}
+
+void check(const SocketFrame& frame) {
+  require(frame.t.ns >= 0 && frame.slot >= 0 && frame.slot < FBVINS_SOCKET_MOST_SLOTS && (frame.left || frame.right));
+}
+
+void check(const SocketGoodbye& goodbye) { require(goodbye.text.find('\n') == std::string::npos); }
+void check(const SocketUnknown&) {}
+
+}  // namespace
+
+std::vector<std::string> socket_seeds() {
+  const FbvinsSocketHello hello{{}, FBVINS_SOCKET_MAGIC, 1, 0, FBVINS_SOCKET_HAS_RIG, "seed", 64, 48, 4, 8192, 4096,
+                                0,  seed_rig()};
+  FbvinsSocketImu imu{{}, 3, 0, {}};
+  for (int i = 0; i < 3; ++i) imu.readings[i] = {100 + i, {0.1, 0.2, 0.3}, {0, 0, 9.81}};
+  return {bytes_of(FBVINS_SOCKET_HELLO, hello),
+          bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
+          bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT}),
+          bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};
+}
+
+void fuzz_socket(std::string_view bytes) {
+  const std::string whole = with_its_size(bytes);
+  const auto message = parse_socket_message(std::as_bytes(std::span(whole)));
+  if (message) std::visit([](const auto& m) { check(m); }, *message);
+  else require(!message.error().message.empty() && message.error().message.find('\n') == std::string::npos);
+}
+
+}  // namespace fbvins::fuzz
