@@ -52,6 +52,7 @@ struct Arguments {
   MapArguments map;
   bool record_images = true, quiet = false;
   int laps = 1;
+  bool preload = false;
 };
 
 Result<Config> config_of(Arguments arguments) {
@@ -126,7 +127,8 @@ int run(const Arguments& arguments) {
   if (!config) return fail(config.error().message);
   const auto faults = faults_of(arguments);
   if (!faults) return fail(faults.error().message);
-  const auto source = make_source(arguments.source, {.dataset = arguments.dataset, .laps = arguments.laps});
+  const auto source =
+      make_source(arguments.source, {.dataset = arguments.dataset, .laps = arguments.laps, .preload = arguments.preload});
   if (!source) return fail(source.error().message);
   if (!arguments.out.empty()) {
     std::error_code error;
@@ -177,6 +179,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--laps", arguments->laps, "of a replay: play it this often, one after the other")
       ->check(CLI::PositiveNumber);
+  command->add_flag("--preload", arguments->preload, "of a replay: decode all images before the clock starts");
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
   command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");

@@ -17,6 +17,7 @@ namespace fbvins {
 struct SourceOptions {
   DatasetOptions dataset;  ///< of a replay; its Kalibr files are the calibration of any source
   int laps = 1;            ///< how often a replay is played
+  bool preload = false;    ///< a replay is decoded before its clock starts
   /// Told in one sentence what happens at the device, on the source's thread.
   std::function<void(const std::string&)> say = [](const std::string&) {};
   /// Asked now and then while a source waits for a device before it can be made: true ends that with an error.

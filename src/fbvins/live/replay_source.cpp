@@ -16,7 +16,7 @@ constexpr double kSlowest = 0.01, kFastest = 100;
 
 }  // namespace
 
-Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& where, DatasetOptions options, int laps) {
+Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& where, Options options) {
   const auto at = where.rfind('@');
   double speed = 1;
   if (at != std::string::npos) {
@@ -26,29 +26,40 @@ Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& wher
       return Error{ErrorCode::invalid_argument,
                    fmt::format("replay:{}: after @ comes a speed from {} to {}", where, kSlowest, kFastest)};
   }
-  options.prefetch_frames = kDecodedAhead;
-  auto data = open_dataset(where.substr(0, at), options);
+  options.dataset.prefetch_frames = kDecodedAhead;
+  auto data = open_dataset(where.substr(0, at), options.dataset);
   if (!data) return data.error();
-  return std::unique_ptr<ReplaySource>(new ReplaySource(where.substr(0, at), options, std::move(*data), speed, laps));
+  return std::unique_ptr<ReplaySource>(new ReplaySource(where.substr(0, at), std::move(options), std::move(*data), speed));
+}
+
+ReplaySource::ReplaySource(std::string path, Options options, std::unique_ptr<Dataset> data, double speed)
+    : path_(std::move(path)), options_(std::move(options)), data_(std::move(data)), speed_(speed) {
+  if (!options_.preload) return;
+  while (auto event = data_->next()) loaded_.push_back(std::move(*event));
 }
 
 Result<void> ReplaySource::run(SensorInput& input) {
   Duration later;
-  for (int lap = 0; lap < laps_; ++lap) {
+  for (int lap = 0; lap < options_.laps; ++lap) {
     if (lap > 0) {
-      auto again = open_dataset(path_, options_);
-      if (!again) return again.error();
-      data_ = std::move(*again);
       later = *newest_ - *first_ + Duration::from_seconds(1 / data_->rig().image_rate_hz);
+      if (!options_.preload) {
+        auto again = open_dataset(path_, options_.dataset);
+        if (!again) return again.error();
+        data_ = std::move(*again);
+      }
     }
-    if (!play(input, later)) return {};
+    std::size_t k = 0;
+    const auto from_memory = [&] { return k < loaded_.size() ? std::optional(loaded_[k++]) : std::nullopt; };
+    const auto from_disk = [&] { return data_->next(); };
+    if (!(options_.preload ? play(input, later, from_memory) : play(input, later, from_disk))) return {};
   }
   return {};
 }
 
-bool ReplaySource::play(SensorInput& input, Duration later) {
-  std::optional<SensorEvent> event = data_->next();  // the first images are decoded before the clock starts
-  for (; event; event = data_->next()) {
+bool ReplaySource::play(SensorInput& input, Duration later, const std::function<std::optional<SensorEvent>()>& next) {
+  std::optional<SensorEvent> event = next();  // the first images are decoded before the clock starts
+  for (; event; event = next()) {
     Time& t = std::visit([](auto& e) -> Time& { return e.t; }, *event);
     t = t + later;
     if (!first_) {

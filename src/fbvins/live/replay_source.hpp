@@ -6,10 +6,12 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/live/source.hpp"
@@ -18,8 +20,14 @@ namespace fbvins {
 
 class ReplaySource final : public Source {
  public:
-  /// `where`: DATASET or DATASET@SPEED. `laps`: how often it is played; stamps go on from lap to lap, and the scene leaps back.
-  static Result<std::unique_ptr<ReplaySource>> open(const std::string& where, DatasetOptions options, int laps = 1);
+  struct Options {
+    DatasetOptions dataset;
+    int laps = 1;          ///< how often it is played; stamps go on from lap to lap, and the scene leaps back
+    bool preload = false;  ///< everything is decoded before the clock starts: a camera costs no decoding, and memory is there
+  };
+
+  /// `where`: DATASET or DATASET@SPEED.
+  static Result<std::unique_ptr<ReplaySource>> open(const std::string& where, Options options);
 
   const StereoRig& rig() const override { return data_->rig(); }
   double clock_rate() const override { return speed_; }
@@ -29,18 +37,17 @@ class ReplaySource final : public Source {
   const Dataset& dataset() const { return *data_; }
 
  private:
-  ReplaySource(std::string path, const DatasetOptions& options, std::unique_ptr<Dataset> data, double speed, int laps)
-      : path_(std::move(path)), options_(options), data_(std::move(data)), speed_(speed), laps_(laps) {}
-  /// The recording once; `later` is added to its stamps. False when stopped before its end.
-  bool play(SensorInput& input, Duration later);
+  ReplaySource(std::string path, Options options, std::unique_ptr<Dataset> data, double speed);
+  /// Pushes all that `next` gives; `later` is added to stamps. False when stopped before the end.
+  bool play(SensorInput& input, Duration later, const std::function<std::optional<SensorEvent>()>& next);
   /// False when stopped before.
   bool wait_until(std::int64_t host_ns);
 
   std::string path_;
-  DatasetOptions options_;
+  Options options_;
   std::unique_ptr<Dataset> data_;
+  std::vector<SensorEvent> loaded_;  ///< all of it, where asked for
   double speed_;
-  int laps_;
   std::optional<Time> first_, newest_;  ///< stamps pushed
   std::int64_t start_ns_ = 0;           ///< when the first was due, on this machine's clock
   std::mutex mutex_;
