@@ -114,7 +114,7 @@ struct LiveSystem::Impl {
     bool changed = false;
     {
       const std::lock_guard lock(pose_mutex);
-      const Health now = watch.judge(estimated, arrivals, started, monotonic_now());
+      const Health now = watch.judge({estimated, estimate_host_t}, arrivals, started, monotonic_now());
       changed = !(now == health);
       health = now;
     }

@@ -93,7 +93,7 @@ struct Fixture {
 
   LiveSystem live(std::function<void(FrameId)> before = {}, LiveOptions options = {}) {
     auto made = LiveSystem::create({}, options, flight.rig, 1, {.frontend = std::make_unique<SeesTheFlight>(flight, before)});
-    EXPECT_TRUE(made);
+    EXPECT_TRUE(made) << (made ? "" : made.error().message);
     made->add_sink(std::make_unique<WatcherSink>(watcher));
     return std::move(*made);
   }
@@ -164,7 +164,9 @@ TEST(LiveSystem, ABusyFrontendCostsImagesButNoReadings) {
 
 TEST(LiveSystem, SilentCamerasAreToldWhileReadingsGoOn) {
   Fixture f;
-  LiveSystem live = f.live({}, {.camera_silence_s = 0.02});
+  LiveOptions options;
+  options.camera_silence_s = 0.02;
+  LiveSystem live = f.live({}, options);
   f.play(live, 0, 40);
   // No image comes any more. Readings do, in wall time.
   for (int k = 400; k < 430; ++k) {

@@ -14,8 +14,15 @@ class SensorWatch {
   /// `longest_blind_s`: a pose carried on without images for longer is lost (estimator.max_image_gap_s).
   SensorWatch(const LiveOptions& options, double longest_blind_s) : options_(options), longest_blind_s_(longest_blind_s) {}
 
-  /// The health at `host`, on this machine's clock. `started` is when sensors were first listened to.
-  Health judge(const Health& estimated, const Ingest::Arrival& arrivals, Time started, Time host) const;
+  /// What the estimator said last, and of the image of when.
+  struct Estimated {
+    Health health;
+    std::optional<Time> image;  ///< on this machine's clock
+  };
+
+  /// The health at `host`, on this machine's clock. `started` is when sensors were first listened to. Images that come again
+  /// after a silence are not enough: the pose is as old as its estimate until the next one.
+  Health judge(const Estimated& estimated, const Ingest::Arrival& arrivals, Time started, Time host) const;
 
  private:
   LiveOptions options_;

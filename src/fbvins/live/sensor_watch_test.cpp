@@ -15,7 +15,7 @@ Ingest::Arrival arrivals(double imu_s, double left_s, double right_s) {
 }
 
 Health judged(const Health& estimated, const Ingest::Arrival& a, double now_s) {
-  return SensorWatch(LiveOptions{}, 3).judge(estimated, a, at(0), at(now_s));
+  return SensorWatch(LiveOptions{}, 3).judge({estimated, a.image}, a, at(0), at(now_s));
 }
 
 TEST(SensorWatch, SaysWhatTheEstimatorSaysWhileAllIsWell) {
@@ -34,6 +34,14 @@ TEST(SensorWatch, SilenceIsSeenAndNamed) {
 
 TEST(SensorWatch, APoseCarriedOnBlindForTooLongIsLost) {
   EXPECT_EQ(judged(kGood, arrivals(9.99, 6.5, 6.5), 10), (Health{HealthState::lost, HealthReason::no_images}));
+}
+
+TEST(SensorWatch, ImagesThatComeAgainAreNoPoseYet) {
+  const SensorWatch watch(LiveOptions{}, 3);
+  EXPECT_EQ(watch.judge({kGood, at(8)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)),
+            (Health{HealthState::degraded, HealthReason::no_images}));
+  EXPECT_EQ(watch.judge({kGood, at(6)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)),
+            (Health{HealthState::lost, HealthReason::no_images}));
 }
 
 TEST(SensorWatch, BeforeTheFirstPoseItOnlySaysWhatIsMissing) {
