@@ -32,6 +32,7 @@ source is a recording with truth).
 
 sources:
   replay:DATASET[@SPEED]     a recording played in wall time
+  socket:PATH                another process, over a Unix socket (docs/socket.md); without --calibration it gives its own
 faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
   camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
   burst:..:HELD_BACK, leap:..:SECONDS
@@ -39,6 +40,7 @@ faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
 examples:
   fbvins live --source replay:MH_01_easy --out out/live
   fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
+  fbvins live --source socket:/run/fbvins.sock --out out/live
   fbvins live --source replay:MH_01_easy --loop --save-map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
@@ -127,8 +129,11 @@ int run(const Arguments& arguments) {
   if (!config) return fail(config.error().message);
   const auto faults = faults_of(arguments);
   if (!faults) return fail(faults.error().message);
-  const auto source =
-      make_source(arguments.source, {.dataset = arguments.dataset, .laps = arguments.laps, .preload = arguments.preload});
+  const auto source = make_source(arguments.source, {.dataset = arguments.dataset,
+                                                     .laps = arguments.laps,
+                                                     .preload = arguments.preload,
+                                                     .say = note,
+                                                     .give_up = stop_is_wanted});
   if (!source) return fail(source.error().message);
   if (!arguments.out.empty()) {
     std::error_code error;
@@ -141,6 +146,7 @@ int run(const Arguments& arguments) {
   const Result<void> flown = [&]() -> Result<void> {
     auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = map->get()});
     if (!live) return live.error();
+    if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
     tally.finish(live->status());
