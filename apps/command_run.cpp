@@ -31,6 +31,7 @@ examples:
   fbvins run MH_01_easy --frontend boost         orb with descriptors improved by the network
   fbvins run flight --calibration camchain-imucam.yaml --imu-calibration imu.yaml
   fbvins run MH_01_easy --config drone.yaml --set estimator.max_iterations=8 --threaded
+  fbvins run flight.mcap --config flight.mcap    a flight record of fbvins live, as it was flown
   fbvins run monday --save-map flat.fbm          with loop closure, the map kept
   fbvins run tuesday --load-map flat.fbm         finds itself in Monday's map and goes on in its frame
 )";
