@@ -11,7 +11,7 @@ struct LiveOptions {
   double camera_silence_s = 0.2;
   double imu_silence_s = 0.1;
   double imu_reorder_wait_s = 0.01;
-  MavlinkOptions mavlink;
+  MavlinkOptions mavlink = {};
 
   template <class V>
   void visit(V&& v) {

@@ -13,7 +13,7 @@ struct MavlinkOptions {
   double rate_hz = 50;
   int system_id = 1;
   int component_id = 197;
-  MountingOptions mounting;
+  MountingOptions mounting = {};
 
   template <class V>
   void visit(V&& v) {

@@ -11,14 +11,15 @@ enum class ImuAxes {
   camera_down  ///< x right, y backward, z down, as in cameras that look at the ground
 };
 
-/// Whether the local frame looks to where the vehicle looked at the start.
-enum class LocalHeading { vehicle, world };
+/// vehicle: x ahead of the vehicle at the start, and after a restart the frame goes on where the vehicle was last seen;
+/// world: W turned about its x, whatever W is.
+enum class LocalOrigin { vehicle, world };
 
 struct MountingOptions {
   ImuAxes imu_axes = ImuAxes::flu;
   double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
   double x_m = 0, y_m = 0, z_m = 0;
-  LocalHeading heading = LocalHeading::vehicle;
+  LocalOrigin local_frame = LocalOrigin::vehicle;
 
   template <class V>
   void visit(V&& v) {
@@ -29,7 +30,8 @@ struct MountingOptions {
     v("x_m", x_m, "m", "the IMU's place on the vehicle, forward", -10.0, 10.0);
     v("y_m", y_m, "m", "the IMU's place on the vehicle, right", -10.0, 10.0);
     v("z_m", z_m, "m", "the IMU's place on the vehicle, down", -10.0, 10.0);
-    v("heading", heading, "vehicle|world", "x of the local frame: ahead of the vehicle at the start, or the world's own");
+    v("local_frame", local_frame, "vehicle|world",
+      "ahead of the vehicle at the start and gone on with after a restart, or the world's own");
   }
 };
 

@@ -16,7 +16,7 @@
 namespace fbvins {
 
 struct BodyFrd {};   ///< the vehicle: x forward, y right, z down, origin where its flight controller says
-struct LocalFrd {};  ///< W with z down, and x forward at the start (or W's own x)
+struct LocalFrd {};  ///< z down; see LocalOrigin
 
 /// The IMU on the vehicle.
 Pose<BodyFrd, B> mounting(const MountingOptions& options);
@@ -34,15 +34,18 @@ struct VehicleState {
 class VehicleFrames {
  public:
   explicit VehicleFrames(const MountingOptions& options);
-  /// The heading of the local frame is taken from the first odometry that has a pose, and anew at each reset.
-  /// Without a pose, or with numbers that are not finite, there is none.
+  /// Without a pose, or with numbers that are not finite, there is none. A flight controller that is told of a reset takes over
+  /// position and heading; the less they jump, the less its filter is shaken.
   std::optional<VehicleState> state(const Odometry& odometry);
 
  private:
-  LocalHeading heading_;
+  void begin(const Pose<W, BodyFrd>& T_WF);
+
+  LocalOrigin origin_;
   Pose<B, BodyFrd> T_BF_;
-  Quat q_LW_;
+  Pose<LocalFrd, W> T_LW_;
   std::optional<std::uint32_t> reset_counter_;
+  std::optional<Pose<LocalFrd, BodyFrd>> last_;
 };
 
 /// Percent as ODOMETRY has it: positive only where one may fly by this pose.

@@ -67,7 +67,8 @@ MavlinkSession::Frames MavlinkSession::take(const LiveStatus& status, Time now) 
 HeartbeatMessage MavlinkSession::heartbeat() const {
   constexpr std::uint8_t calibrating = 2, active = 4, critical = 5;  // MAV_STATE
   HeartbeatMessage beat;
-  beat.system_status = health_.has_pose() ? active : health_.state == HealthState::lost ? critical : calibrating;
+  const Health health = health_.value_or(Health{});
+  beat.system_status = health.has_pose() ? active : health.state == HealthState::lost ? critical : calibrating;
   return beat;
 }
 
@@ -85,9 +86,9 @@ MavlinkSession::Frames MavlinkSession::tick(Time now) {
     if (questions_.size() > kOpenQuestions) questions_.pop_front();
     say(TimesyncMessage{0, now.ns}, out);
   }
-  if (told_health_ != health_ && due(now, kTextEvery, next_text_)) {
+  if (health_ && told_health_ != health_ && due(now, kTextEvery, next_text_)) {
     told_health_ = health_;
-    say(health_message(health_), out);
+    say(health_message(*health_), out);
   }
   return out;
 }

@@ -53,7 +53,7 @@ class MavlinkSession {
   std::optional<MavlinkAddress> flight_controller_;
   Time heard_at_{};
   std::deque<Time> questions_;
-  Health health_;
+  std::optional<Health> health_;  // of the newest status
   std::optional<Health> told_health_;
   Time next_heartbeat_{}, next_question_{}, next_text_{}, next_pose_{};
   std::int64_t poses_ = 0;

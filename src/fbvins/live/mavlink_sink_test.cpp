@@ -102,6 +102,7 @@ TEST(MavlinkSink, OverUdpPosesComeAndTheClockIsFound) {
   const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}", px4.bind_any()), {});
   ASSERT_TRUE(sink);
   std::int64_t i = 0;
+  EXPECT_TRUE((*sink)->take(LiveEvent(LiveStatus{})));
   EXPECT_TRUE(comes_true([&] {
     EXPECT_TRUE((*sink)->take(LiveEvent(pose(i++))));
     px4.serve();

@@ -40,7 +40,15 @@ Pose<BodyFrd, B> mounting(const MountingOptions& options) {
 }
 
 VehicleFrames::VehicleFrames(const MountingOptions& options)
-    : heading_(options.heading), T_BF_(mounting(options).inverse()), q_LW_(kHalfTurnAboutX) {}
+    : origin_(options.local_frame), T_BF_(mounting(options).inverse()), T_LW_(kHalfTurnAboutX, Vec3::Zero()) {}
+
+/// The local frame for a world that is new.
+void VehicleFrames::begin(const Pose<W, BodyFrd>& T_WF) {
+  if (origin_ == LocalOrigin::world) return;
+  const double wanted_rad = last_ ? heading_rad(last_->q) : 0.0;
+  T_LW_.q = so3_exp(Vec3(0, 0, wanted_rad - heading_rad(kHalfTurnAboutX * T_WF.q))) * kHalfTurnAboutX;
+  if (last_) T_LW_.p = last_->p - T_LW_.q * T_WF.p;
+}
 
 std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
   const bool finite = odometry.T_WB.p.allFinite() && odometry.T_WB.q.coeffs().allFinite() && odometry.v_WB.allFinite() &&
@@ -49,13 +57,13 @@ std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
   const Pose<W, BodyFrd> T_WF = odometry.T_WB * T_BF_;
   if (reset_counter_ != odometry.reset_counter) {
     reset_counter_ = odometry.reset_counter;
-    const double start_rad = heading_ == LocalHeading::vehicle ? heading_rad(kHalfTurnAboutX * T_WF.q) : 0.0;
-    q_LW_ = so3_exp(Vec3(0, 0, -start_rad)) * kHalfTurnAboutX;
+    begin(T_WF);
   }
 
-  const Mat3 R_LW = q_LW_.toRotationMatrix(), R_WB = odometry.T_WB.R(), R_FW = T_WF.R().transpose();
+  const Mat3 R_LW = T_LW_.R(), R_WB = odometry.T_WB.R(), R_FW = T_WF.R().transpose();
   VehicleState state;
-  state.T_LF = Pose<LocalFrd, W>(q_LW_, Vec3::Zero()) * T_WF;
+  state.T_LF = T_LW_ * T_WF;
+  last_ = state.T_LF;
   state.v_LF_F = R_FW * (odometry.v_WB + R_WB * odometry.w_WB_B.cross(T_BF_.p));
   state.w_LF_F = T_BF_.q.conjugate() * odometry.w_WB_B;
   // The IMU's position and attitude errors, carried to the vehicle's origin and seen in L.

@@ -91,9 +91,9 @@ TEST(VehicleFrames, UpIsMinusZAndForwardIsXWhereTheVehicleStarts) {
   }
 }
 
-TEST(VehicleFrames, WithTheWorldsHeadingLocalIsTheWorldTurnedAboutX) {
+TEST(VehicleFrames, LocalMayBeTheWorldTurnedAboutX) {
   MountingOptions options = odd_mounting();
-  options.heading = LocalHeading::world;
+  options.local_frame = LocalOrigin::world;
   Rng rng(3);
   const Odometry o = anywhere(rng);
   const VehicleState state = *VehicleFrames(options).state(o);
@@ -136,15 +136,22 @@ TEST(VehicleFrames, CovarianceIsThatOfErrorsCarriedAlong) {
   }
 }
 
-TEST(VehicleFrames, AResetIsANewLocalFrameAheadOfTheVehicle) {
+TEST(VehicleFrames, AfterARestartTheLocalFrameGoesOnWhereTheVehicleWasLastSeen) {
   const MountingOptions options = odd_mounting();
   VehicleFrames frames(options);
   Odometry o = level_vehicle(options);
   ASSERT_TRUE(frames.state(o));
-  o.T_WB = Pose<W, W>(so3_exp(Vec3(0, 0, 0.7)), Vec3::Zero()) * o.T_WB;
-  EXPECT_NEAR(so3_log(frames.state(o)->T_LF.q).norm(), 0.7, 1e-9);
+  o.T_WB = Pose<W, W>(so3_exp(Vec3(0, 0, 0.7)), Vec3(3, 4, 1)) * o.T_WB;
+  const VehicleState before = *frames.state(o);
+  EXPECT_NEAR(so3_log(before.T_LF.q).norm(), 0.7, 1e-9);
+  o.T_WB = Pose<W, W>(so3_exp(Vec3(0, 0, -2)), Vec3(-1, 8, 0)) * o.T_WB;  // another world
   o.reset_counter = 1;
-  EXPECT_NEAR(so3_log(frames.state(o)->T_LF.q).norm(), 0, 1e-9);
+  const VehicleState after = *frames.state(o);
+  EXPECT_LT((after.T_LF.p - before.T_LF.p).norm(), 1e-9);
+  EXPECT_LT(so3_log(after.T_LF.q.conjugate() * before.T_LF.q).norm(), 1e-9);
+  EXPECT_EQ(after.reset_counter, 1u);
+  o.T_WB.p.z() += 2;
+  EXPECT_NEAR((frames.state(o)->T_LF.p - after.T_LF.p).z(), -2, 1e-9);
 }
 
 TEST(VehicleFrames, WithoutATrustworthyPoseThereIsNoState) {
