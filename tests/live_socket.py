@@ -6,6 +6,7 @@ usage: live_socket.py FBVINS CXX
 """
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -65,6 +66,24 @@ class LiveSocket(unittest.TestCase):
     def test_the_header_is_c(self):
         subprocess.run([CXX, "-x", "c", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
                         REPOSITORY / "include/fbvins/live/socket_protocol.hpp"], check=True)
+
+    def test_the_page_and_the_header_agree(self):
+        facts = []
+        for line in (REPOSITORY / "docs/socket.md").read_text(encoding="utf-8").splitlines():
+            if match := re.match(r"### (Fbvins\w+),(?: type (\d+),)? (\d+) bytes", line):
+                struct = match[1]
+                facts.append(f"sizeof({struct}) == {match[3]}")
+                if match[2]:
+                    facts.append(f"FBVINS_SOCKET_{struct.removeprefix('FbvinsSocket').upper()} == {match[2]}")
+            elif match := re.match(r"### (Fbvins\w+), type", line):
+                struct = match[1]
+            elif match := re.match(r"\| (\d+) \| `(\w+)` \|", line):
+                facts.append(f"offsetof({struct}, {match[2]}) == {match[1]}")
+        self.assertGreater(len(facts), 60)
+        source = self.folder / "facts.cpp"
+        source.write_text('#include <cstddef>\n#include "fbvins/live/socket_protocol.hpp"\n'
+                          + "".join(f"static_assert({fact});\n" for fact in facts))
+        subprocess.run([CXX, "-std=c++20", "-fsyntax-only", "-I", REPOSITORY / "include", source], check=True)
 
     def test_a_sender_is_killed_and_the_next_goes_on(self):
         live = self.listen()
