@@ -96,6 +96,13 @@ TEST_F(FrameRingTest, ImagesOutliveTheRingAndItsSender) {
   EXPECT_EQ(frame->left->at(9, 0), wanted);
 }
 
+TEST_F(FrameRingTest, MemoryThatTheSenderTakesBackReadsAsBlack) {
+  const auto frame = ring_->take(frame_in(0));
+  ASSERT_TRUE(frame);
+  ASSERT_EQ(::fallocate(memory_.number(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(kLayout.bytes())), 0);
+  EXPECT_EQ(frame->left->at(9, 9), 0);
+}
+
 TEST_F(FrameRingTest, NoSlotBeyondTheLast) {
   const auto frame = ring_->take(frame_in(4));
   ASSERT_FALSE(frame);
