@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# fbvins_module(NAME DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
+# fbvins_module(NAME [COLD] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
 # One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
-# where they can, other libraries else. What users link are components (FbvinsInstall.cmake).
+# where they can, other libraries else. COLD: its own code does not compute. What users link are components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
@@ -22,13 +22,17 @@ target_compile_options(fbvins_flags INTERFACE
 include(cmake/FbvinsPrecompiled.cmake)
 
 function(fbvins_module NAME)
-  cmake_parse_arguments(ARG "" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "COLD" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
   set(target fbvins_${NAME})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fbvins_flags> ${ARG_PRIVATE_DEPS})
-    fbvins_use_precompiled(${target} library)
+    if(ARG_COLD)
+      fbvins_use_precompiled(${target} cold)
+    else()
+      fbvins_use_precompiled(${target} library)
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
