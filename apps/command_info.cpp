@@ -116,7 +116,7 @@ void add_info_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("info", "say what is in a recording: rates, gaps, calibration, stamps");
   command->footer(kExamples);
-  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip")->required();
+  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
   command->add_option("--calibration", arguments->calibration, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });

@@ -149,7 +149,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("run", "estimate the trajectory of a recording");
   command->footer(kExamples);
-  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip")->required();
+  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
   command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");
   command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
       ->take_all()
