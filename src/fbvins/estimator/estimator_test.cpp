@@ -272,8 +272,11 @@ TEST(Estimator, SaysOfTheFirstImageAfterAHoleThatThereWasOne) {
       frame.imu = since;
     }
     const Health health = estimator.process(frame).odometry.health;
-    if (k == 90) EXPECT_EQ(health, (Health{HealthState::degraded, HealthReason::no_images}));
-    else if (k > 40) EXPECT_EQ(health, (Health{HealthState::good, HealthReason::none})) << k;
+    if (k == 90) {
+      EXPECT_EQ(health, (Health{HealthState::degraded, HealthReason::no_images}));
+    } else if (k > 40) {
+      EXPECT_EQ(health, (Health{HealthState::good, HealthReason::none})) << k;
+    }
   }
 }
 
@@ -289,7 +292,9 @@ TEST(Estimator, UpIsAStateOrFixedWhetherLandmarksAreRememberedOrNot) {
       for (int k = 0; k < 120; ++k) {
         const Estimate estimate = estimator.process(flight.frame(k));
         located += estimate.landmarks.landmarks.size();
-        if (k > 40) EXPECT_EQ(estimate.odometry.health.state, HealthState::good) << k;
+        if (k > 40) {
+          EXPECT_EQ(estimate.odometry.health.state, HealthState::good) << k;
+        }
       }
       EXPECT_EQ(estimator.window().prior().with_tilt, up == UpDirection::state);
       EXPECT_EQ(estimator.window().tilt().angle_rad.isZero(0), up == UpDirection::fixed);
