@@ -37,8 +37,8 @@ HOST_AHEAD_NS = 7_000_000_000_000  # the companion's clock is another one
 class Companion:
     """The MAVLink sink's session, in its own process, on a clock of its own."""
 
-    def __init__(self, program):
-        self.process = subprocess.Popen([program, *MOUNTING], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    def __init__(self, program, options=()):
+        self.process = subprocess.Popen([program, *MOUNTING, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def __call__(self, what, t_us, *values):
         print(what, t_us * 1000 + HOST_AHEAD_NS, *values, file=self.process.stdin, flush=True)
@@ -108,7 +108,8 @@ class Flight:
                     self.said.append(message.text)
 
     def hear(self, message):
-        if message.get_type() == "ODOMETRY" and np.isfinite(message.x):
+        # Its own, not ours that it passes on.
+        if message.get_type() == "ODOMETRY" and message.get_srcComponent() == 1 and np.isfinite(message.x):
             self.odometry.append(message)
 
     def errors(self, begin_s, end_s, align_s=None):
@@ -155,9 +156,9 @@ class Report:
         self.fact(f"{what}: {100 * rms:.1f} cm RMS, {100 * worst:.1f} cm at most, of {len(errors)} poses", worst <= BAR_M and len(errors) > 50)
 
 
-def fly(program, recording, trajectory, deliver, ask_at):
+def fly(program, recording, trajectory, deliver, ask_at, options=(), parameters=None):
     with tempfile.TemporaryDirectory() as folder:
-        px4, companion = Px4(os.environ["FBVINS_PX4"], folder), Companion(program)
+        px4, companion = Px4(os.environ["FBVINS_PX4"], folder, parameters), Companion(program, options)
         flight = Flight(px4, companion, recording, trajectory, deliver)
         flight.ask_at = dict(ask_at)
         try:
@@ -213,6 +214,14 @@ def outage(report, *world):
     report.error("after it, to truth, aligned before it", flight.errors(11, 16.8, align_s=2))
 
 
+def vision_messages(report, *world):
+    """ArduPilot's dialect, which PX4 understands but for the velocity; these messages have no quality."""
+    flight = fly(*world, lambda pose, s: pose, {12: FLAGS}, ["live.mavlink.dialect=ardupilot"], {"EKF2_EV_QMIN": 0})
+    report.fact("PX4 fuses position, height and yaw of vision messages",
+                all(flight.flags(FLAGS).get(aid) == "True" for aid in ("cs_ev_pos", "cs_ev_yaw", "cs_ev_hgt")))
+    report.error("flight by vision messages, to truth, from the eighth second", flight.errors(8, 16.8))
+
+
 def main():
     if "FBVINS_PX4" not in os.environ:
         print("SKIPPED: FBVINS_PX4 does not name a PX4 (bin/px4 of a px4_sitl build), see docs/px4.md")
@@ -226,7 +235,7 @@ def main():
         subprocess.run([sys.argv[1], "run", str(folder), "--quiet", "--out", out], check=True)
         recording = Recording(folder)
         trajectory = Trajectory(pathlib.Path(out) / "trajectory.csv", recording)
-    for scenario in (plain, reset, outage):
+    for scenario in (plain, reset, outage, vision_messages):
         scenario(report, sys.argv[2], recording, trajectory)
     return 1 if report.failures else 0
 

@@ -76,6 +76,15 @@ class Px4:
     def send(self, packet):
         self.link.sendto(packet, ("127.0.0.1", 14580 + self.instance))
 
+    def greet_as_ground_station(self):
+        """From then on what PX4 tells its ground station is received; the onboard link is left to others."""
+        station = common.MAVLink(None, srcSystem=255, srcComponent=190)
+        beat = common.MAVLink_heartbeat_message(common.MAV_TYPE_GCS, common.MAV_AUTOPILOT_INVALID, 0, 0, common.MAV_STATE_ACTIVE, 3)
+        odometry = common.MAVLink_command_long_message(1, 1, common.MAV_CMD_SET_MESSAGE_INTERVAL, 0, common.MAVLINK_MSG_ID_ODOMETRY,
+                                                       33_000, 0, 0, 0, 0, 0)
+        for message in (beat, odometry):
+            self.link.sendto(message.pack(station), ("127.0.0.1", 18570 + self.instance))
+
     def ask(self, *command):
         """A command of PX4's own shell, begun; it may need steps to end."""
         return subprocess.Popen([self.binary.parent / f"px4-{command[0]}", "--instance", str(self.instance), *command[1:]],
