@@ -38,6 +38,7 @@ class MavlinkSink final : public Sink {
 
   std::string_view name() const override;
   Result<void> take(const LiveEvent& event) override;
+  std::string problem() const override;
   Result<void> finish() override;
   MavlinkLinkState state() const;
 

@@ -13,6 +13,7 @@
 // the events loses the oldest of those that wait; how many is told in the status.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "fbvins/core/result.hpp"
@@ -25,8 +26,10 @@ class Sink {
   virtual ~Sink() = default;
   /// For messages: "mavlink udp:127.0.0.1:14540".
   virtual std::string_view name() const = 0;
-  /// An error is reported once; later events still come.
+  /// An error is a failure: reported once, and of the whole flight at its end; later events still come.
   virtual Result<void> take(const LiveEvent& event) = 0;
+  /// Trouble that may pass, in one sentence, for the status: a cable that is not plugged in. Empty: none. From any thread.
+  virtual std::string problem() const { return {}; }
   /// The last call: close what is open.
   virtual Result<void> finish() { return {}; }
 };

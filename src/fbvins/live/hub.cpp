@@ -38,8 +38,11 @@ class Hub::Lane {
   }
 
   SinkReport report() const {
+    std::string passing = sink_->problem();
     const std::lock_guard lock(mutex_);
-    return report_;
+    SinkReport report = report_;
+    report.passing = std::move(passing);
+    return report;
   }
 
   void finish() {

@@ -28,6 +28,7 @@ class Hub {
     std::string name;
     std::int64_t taken = 0, dropped = 0;
     std::string problem;  ///< its first error; empty: none
+    std::string passing;  ///< Sink::problem()
   };
 
   Hub() : Hub(Limits{}) {}

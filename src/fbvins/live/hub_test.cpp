@@ -57,6 +57,13 @@ class Failing final : public Sink {
   }
 };
 
+class Unplugged final : public Sink {
+ public:
+  std::string_view name() const override { return "unplugged"; }
+  Result<void> take(const LiveEvent&) override { return {}; }
+  std::string problem() const override { return "no cable"; }
+};
+
 ImuSample reading(std::int64_t t) { return {Time{t}, Vec3::Zero(), Vec3::Zero()}; }
 
 TEST(Hub, EverySinkGetsEverythingInOrder) {
@@ -97,6 +104,14 @@ TEST(Hub, ImagesThatWaitAreFewForTheirMemory) {
   ASSERT_TRUE(hub.finish());
   EXPECT_EQ(hub.reports()[0].dropped, 18);
   EXPECT_EQ(slow.stamps.size(), 23u);
+}
+
+TEST(Hub, TroubleThatMayPassIsReportedAndIsNoFailure) {
+  Hub hub;
+  hub.add(std::make_unique<Unplugged>());
+  hub.publish(reading(1));
+  EXPECT_EQ(hub.reports()[0].passing, "no cable");
+  EXPECT_TRUE(hub.finish());
 }
 
 TEST(Hub, TheFirstErrorIsReportedAndLaterEventsStillCome) {

@@ -128,8 +128,10 @@ struct LiveSystem::Impl {
     s.counts = ingest.counts();
     s.shutter_to_pose = shutter_to_pose.summary();
     s.pose_age = pose_age.summary();
-    for (const Hub::SinkReport& report : hub.reports())
-      if (!report.problem.empty()) s.problem = report.name + ": " + report.problem;
+    for (const Hub::SinkReport& report : hub.reports()) {
+      const std::string& problem = report.problem.empty() ? report.passing : report.problem;
+      if (!problem.empty()) s.problem = report.name + ": " + problem;
+    }
     if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
     const std::lock_guard lock(pose_mutex);
     s.health = health;

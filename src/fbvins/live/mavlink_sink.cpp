@@ -59,7 +59,6 @@ struct MavlinkSink::Impl {
   std::deque<std::variant<LivePose, LiveStatus>> waiting;
   std::int64_t overrun = 0;
   MavlinkLinkState state;
-  std::string told_problem;
   std::thread worker;  // last: begins when all else is there
 };
 
@@ -90,6 +89,7 @@ void MavlinkSink::Impl::publish(Time now) {
   seen.poses_sent = session.poses();
   seen.frames_received = session.frames_received();
   seen.problem = link.problem();
+  if (!seen.problem.empty()) seen.problem += "; it is tried again twice a second";
   const std::lock_guard lock(mutex);
   state = seen;
   state.frames_dropped += overrun;
@@ -137,11 +137,10 @@ Result<void> MavlinkSink::take(const LiveEvent& event) {
   else return {};
   if (impl_->waiting.size() > kWaiting) impl_->waiting.pop_front(), ++impl_->overrun;
   impl_->bell.ring();
-  if (impl_->told_problem == impl_->state.problem) return {};
-  impl_->told_problem = impl_->state.problem;
-  if (impl_->told_problem.empty()) return {};
-  return Error{ErrorCode::unwritable, impl_->told_problem + "; it is tried again twice a second"};
+  return {};
 }
+
+std::string MavlinkSink::problem() const { return state().problem; }
 
 Result<void> MavlinkSink::finish() {
   impl_->stop();
