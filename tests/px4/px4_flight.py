@@ -226,7 +226,8 @@ def main():
     if "FBVINS_PX4" not in os.environ:
         print("SKIPPED: FBVINS_PX4 does not name a PX4 (bin/px4 of a px4_sitl build), see docs/px4.md")
         return 77
-    folder = pathlib.Path(os.environ.get("FBVINS_DATA", "../shared/data")) / "MH_01_easy_17s"
+    repository = pathlib.Path(__file__).resolve().parents[2]
+    folder = pathlib.Path(os.environ.get("FBVINS_DATA") or repository.parent / "shared" / "data") / "MH_01_easy_17s"
     if not folder.exists():
         print(f"SKIPPED: {folder} is not there; set FBVINS_DATA")
         return 77
