@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "fbvins/io/file_handle.hpp"
+#include "fbvins/core/file_descriptor.hpp"
 
 namespace fbvins {
 namespace {
@@ -21,14 +21,14 @@ std::size_t available(std::uint64_t size, std::uint64_t offset, std::uint64_t co
 
 class FileBytes : public ByteSource {
  public:
-  FileBytes(FileHandle file, std::uint64_t size) : file_(std::move(file)), size_(size) {}
+  FileBytes(FileDescriptor file, std::uint64_t size) : file_(std::move(file)), size_(size) {}
 
   std::uint64_t size() const override { return size_; }
   std::string read(std::uint64_t offset, std::uint64_t count) const override {
     std::string out(available(size_, offset, count), '\0');
     std::size_t done = 0;
     while (done < out.size()) {
-      const ssize_t now = ::pread(file_.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+      const ssize_t now = ::pread(file_.number(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
       if (now < 0 && errno == EINTR) continue;
       if (now <= 0) break;
       done += static_cast<std::size_t>(now);
@@ -38,7 +38,7 @@ class FileBytes : public ByteSource {
   }
 
  private:
-  FileHandle file_;
+  FileDescriptor file_;
   std::uint64_t size_;
 };
 
@@ -58,12 +58,12 @@ class MemoryBytes : public ByteSource {
 }  // namespace
 
 Result<std::shared_ptr<ByteSource>> open_bytes(const std::string& path) {
-  FileHandle file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file)
     return Error{errno == ENOENT ? ErrorCode::not_found : ErrorCode::unreadable,
                  fmt::format("{}: {}", path, std::strerror(errno))};
   struct stat status {};
-  if (::fstat(file.get(), &status) != 0 || !S_ISREG(status.st_mode))
+  if (::fstat(file.number(), &status) != 0 || !S_ISREG(status.st_mode))
     return Error{ErrorCode::unreadable, fmt::format("{}: is not a plain file", path)};
   const auto size = static_cast<std::uint64_t>(status.st_size);
   return std::shared_ptr<ByteSource>(std::make_shared<FileBytes>(std::move(file), size));

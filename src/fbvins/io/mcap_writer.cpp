@@ -49,7 +49,7 @@ void append_channel(std::string& out, std::uint16_t id, std::uint16_t schema, co
 }  // namespace
 
 Result<McapWriter> McapWriter::create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics) {
-  FileHandle file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644));
+  FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644));
   if (!file && errno == EEXIST)
     return Error{ErrorCode::unwritable, fmt::format("{}: is there already, and a record is never written over", path)};
   if (!file) return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written ({})", path, std::strerror(errno))};
@@ -61,7 +61,7 @@ Result<McapWriter> McapWriter::create(const std::string& path, const McapLabel& 
   return writer;
 }
 
-McapWriter::McapWriter(std::string path, FileHandle file, const std::vector<McapTopic>& topics)
+McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<McapTopic>& topics)
     : path_(std::move(path)), file_(std::move(file)), channels_(topics.size()) {
   std::map<std::string, std::uint16_t> schema_of;
   for (std::size_t id = 0; id < topics.size(); ++id) {
@@ -76,11 +76,11 @@ McapWriter::McapWriter(std::string path, FileHandle file, const std::vector<Mcap
 /// A part that did not fit is taken back, so that what follows is found.
 Result<void> McapWriter::write_all(const std::string& bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t now = ::pwrite(file_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(end_ + done));
+    const ssize_t now = ::pwrite(file_.number(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(end_ + done));
     if (now < 0 && errno == EINTR) continue;
     if (now <= 0) {
       const int problem = now < 0 ? errno : ENOSPC;
-      [[maybe_unused]] const int cut = ::ftruncate(file_.get(), static_cast<off_t>(end_));
+      [[maybe_unused]] const int cut = ::ftruncate(file_.number(), static_cast<off_t>(end_));
       return Error{ErrorCode::unwritable, fmt::format("{}: writing failed ({})", path_, std::strerror(problem))};
     }
     done += static_cast<std::size_t>(now);
@@ -215,6 +215,6 @@ Result<void> McapWriter::finish() {
   return written;
 }
 
-void McapWriter::sync() const { ::fdatasync(file_.get()); }
+void McapWriter::sync() const { ::fdatasync(file_.number()); }
 
 }  // namespace fbvins

@@ -17,9 +17,9 @@
 #include <string>
 #include <vector>
 
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
-#include "fbvins/io/file_handle.hpp"
 
 namespace fbvins {
 
@@ -69,7 +69,7 @@ class McapWriter {
     std::uint64_t index_bytes = 0;
   };
 
-  McapWriter(std::string path, FileHandle file, const std::vector<McapTopic>& topics);
+  McapWriter(std::string path, FileDescriptor file, const std::vector<McapTopic>& topics);
   Result<void> write_all(const std::string& bytes);
   Result<void> write_record(const std::string& record);
   void close_chunk();
@@ -83,7 +83,7 @@ class McapWriter {
   std::string places_of_message_indexes(const ChunkPlace& place) const;
 
   std::string path_;
-  FileHandle file_;
+  FileDescriptor file_;
   std::uint64_t end_ = 0;  ///< bytes of the file that are whole
   std::string schemas_, channel_records_;
   int schema_count_ = 0;

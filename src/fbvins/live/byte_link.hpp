@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/live/file_descriptor.hpp"
 
 namespace fbvins {
 

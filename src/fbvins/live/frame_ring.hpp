@@ -15,7 +15,8 @@
 #include <atomic>
 #include <memory>
 
-#include "fbvins/live/file_descriptor.hpp"
+#include "fbvins/core/file_descriptor.hpp"
+#include "fbvins/live/bell.hpp"
 #include "fbvins/live/socket_message.hpp"
 #include "fbvins/types/image.hpp"
 

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "fbvins/core/options.hpp"
+#include "fbvins/live/bell.hpp"
 #include "fbvins/live/byte_link.hpp"
-#include "fbvins/live/file_descriptor.hpp"
 #include "fbvins/live/mavlink_session.hpp"
 
 namespace fbvins {

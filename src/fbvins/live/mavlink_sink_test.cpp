@@ -16,7 +16,7 @@
 #include <functional>
 #include <thread>
 
-#include "fbvins/live/file_descriptor.hpp"
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/mavlink/wire.hpp"
 
 namespace fbvins {

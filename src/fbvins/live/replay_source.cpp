@@ -17,7 +17,8 @@ constexpr double kSlowest = 0.01, kFastest = 100;
 }  // namespace
 
 Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& where, Options options) {
-  const auto at = where.rfind('@');
+  auto at = where.rfind('@');
+  if (at != std::string::npos && where.find('/', at) != std::string::npos) at = std::string::npos;  // part of a folder's name
   double speed = 1;
   if (at != std::string::npos) {
     char* end = nullptr;

@@ -7,8 +7,8 @@
 
 #include <string>
 
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/live/file_descriptor.hpp"
 
 namespace fbvins {
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "fbvins/live/file_descriptor.hpp"
+#include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/live/socket_message.hpp"
 
 namespace fbvins::test {

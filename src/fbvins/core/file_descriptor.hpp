@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Owners of what the kernel lends: a file descriptor, and a bell that wakes a thread in poll().
+// An open file, socket or the like of the operating system, closed when its owner goes.
 #pragma once
 
-#include <sys/eventfd.h>
 #include <unistd.h>
 
-#include <cstdint>
 #include <utility>
 
 namespace fbvins {
@@ -28,25 +26,6 @@ class FileDescriptor {
 
  private:
   int number_ = -1;
-};
-
-/// ring() from any thread makes poll() on fd() return until silence().
-class Bell {
- public:
-  Bell() : event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
-
-  int fd() const { return event_.number(); }
-  void ring() const {
-    const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // full: it rings already
-  }
-  void silence() const {
-    std::uint64_t rung = 0;
-    [[maybe_unused]] const auto taken = ::read(fd(), &rung, sizeof(rung));
-  }
-
- private:
-  FileDescriptor event_;
 };
 
 }  // namespace fbvins

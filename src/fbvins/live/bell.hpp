@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Wakes a thread that waits in poll().
+#pragma once
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cstdint>
+
+#include "fbvins/core/file_descriptor.hpp"
+
+namespace fbvins {
+
+/// ring() from any thread makes poll() on fd() return until silence().
+class Bell {
+ public:
+  Bell() : event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+
+  int fd() const { return event_.number(); }
+  void ring() const {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // full: it rings already
+  }
+  void silence() const {
+    std::uint64_t rung = 0;
+    [[maybe_unused]] const auto taken = ::read(fd(), &rung, sizeof(rung));
+  }
+
+ private:
+  FileDescriptor event_;
+};
+
+}  // namespace fbvins
