@@ -92,7 +92,7 @@ std::string McapWriter::chunk_index(const ChunkPlace& place) const {
 std::string McapWriter::places_of_message_indexes(const ChunkPlace& place) const {
   const std::uint64_t first = place.offset + place.chunk_bytes;
   std::string indexes(place.index_bytes, '\0'), out;
-  const ssize_t read = ::pread(file_.get(), indexes.data(), indexes.size(), static_cast<off_t>(first));
+  const ssize_t read = ::pread(file_.number(), indexes.data(), indexes.size(), static_cast<off_t>(first));
   if (read != static_cast<ssize_t>(indexes.size())) return out;  // an empty map: that is said to be unknown
   ByteCursor in(indexes);
   while (in.left() >= kMcapRecordHead_bytes + sizeof(std::uint16_t)) {
