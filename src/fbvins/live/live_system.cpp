@@ -143,15 +143,15 @@ struct LiveSystem::Impl {
 
   Result<void> finish() {
     if (std::exchange(finished, true)) return result;
-    ingest.close();
-    if (feeder.joinable()) feeder.join();
-    result = system.finish();
     {
       const std::lock_guard lock(end_mutex);
       ended = true;
       end.notify_all();
     }
-    if (watcher.joinable()) watcher.join();
+    if (watcher.joinable()) watcher.join();  // first: that sensors are silent from here on is no fault
+    ingest.close();
+    if (feeder.joinable()) feeder.join();
+    result = system.finish();
     hub.publish(status());
     const Result<void> sinks = hub.finish();
     if (result) result = sinks;
