@@ -2,9 +2,7 @@
 // What `fbvins live --out` writes while it runs: the files of `fbvins run`, and poses at IMU rate. Memory does not grow.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -16,7 +14,7 @@
 namespace fbvins::app {
 
 /// trajectory_tum.txt, trajectory.csv, covariance.csv, statistics.csv, timing.csv; live_tum.txt (W, IMU rate); with loop closure
-/// map_causal_tum.txt and map_bounded_tum.txt (M as it is known at each image).
+/// map_causal_tum.txt and map_bounded_tum.txt (poses in M: with the correction known at each image, and with its smooth form).
 class LiveFiles final : public Sink {
  public:
   static Result<std::unique_ptr<LiveFiles>> create(const std::string& folder, bool with_map, bool new_map);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The messages of `fbvins live --source socket:PATH`, for whoever has sensors. C and C++; needs nothing else of FB-VINS.
+// The messages of `fbvins live --source socket:PATH`, for programs that send sensor data. C and C++; needs no other header of
+// FB-VINS.
 // docs/socket.md tells what is sent when; examples/socket_sender.cpp does it.
 //
 //   int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);          // every message is one packet
