@@ -148,7 +148,7 @@ int run(const Arguments& arguments) {
     if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
-    tally.finish(live->status());
+    tally.last = live->status();
     return done;
   }();
   if (!flown) return fail(flown.error().message);

@@ -2,9 +2,9 @@
 #include "apps/live_summary.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include "apps/evaluation_report.hpp"
+#include "apps/run_summary.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/live/replay_source.hpp"
 
@@ -20,9 +20,7 @@ class TallySink final : public Sink {
     const auto* o = std::get_if<Odometry>(&event);
     if (o == nullptr) return {};
     tally_.with_pose += o->health.has_pose() ? 1 : 0;
-    const bool plain = o->health.reason == HealthReason::none;
-    ++tally_.health[plain ? std::string(to_string(o->health.state))
-                          : fmt::format("{}/{}", to_string(o->health.state), to_string(o->health.reason))];
+    ++tally_.health[label_of(o->health)];
     return {};
   }
 
@@ -35,12 +33,6 @@ std::optional<Evaluation> accuracy(const Trajectory<W>& truth, const std::string
   if (!file) return std::nullopt;
   const auto evaluation = evaluate(truth, file->poses(), {});
   return evaluation ? std::optional(*evaluation) : std::nullopt;
-}
-
-double peak_memory_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
 Json to_json(const LatencySummary& s) {
@@ -60,28 +52,21 @@ LiveSummary summarise(const LiveTally& tally, const std::string& source_name, co
   LiveSummary s{tally, source_name, frontend, {}, {}, peak_memory_mb()};
   const auto* replay = dynamic_cast<const ReplaySource*>(&source);
   if (replay == nullptr || !replay->dataset().has_ground_truth() || folder.empty()) return s;
-  Trajectory<W> truth;
-  for (const TrajectoryPoint& point : replay->dataset().ground_truth()) truth.push_back({point.t, point.T_WB});
+  const Trajectory<W> truth = truth_of(replay->dataset());
   s.at_images = accuracy(truth, folder + "/trajectory_tum.txt");
   s.at_imu_rate = accuracy(truth, folder + "/live_tum.txt");
   return s;
 }
 
 std::string to_json_text(const LiveSummary& s) {
-  const LiveCounts& c = s.tally.last.counts;
   Json result{{"version", FBVINS_VERSION}, {"source", s.source}, {"frontend", s.frontend}};
   result["health"] = Json::object();
   for (const auto& [name, images] : s.tally.health) result["health"][name] = images;
   if (s.at_images) result["accuracy"] = to_json(*s.at_images, Alignment::se3);
   if (s.at_imu_rate) result["accuracy_at_imu_rate"] = to_json(*s.at_imu_rate, Alignment::se3);
-  Json live{{"imu", c.imu}, {"images", c.images}, {"images_estimated", c.images_estimated}};
+  Json live;
+  s.tally.last.counts.visit([&](const char* name, std::int64_t count) { live[name] = count; });
   live["images_with_pose"] = s.tally.with_pose;
-  live["images_dropped"] = c.images_dropped;
-  live["images_incomplete"] = c.images_incomplete;
-  live["imu_late"] = c.imu_late;
-  live["imu_reordered"] = c.imu_reordered;
-  live["clock_leaps"] = c.clock_leaps;
-  live["resets"] = c.resets;
   live["live_poses"] = s.tally.live_poses;
   live["shutter_to_pose_ms"] = to_json(s.tally.last.shutter_to_pose);
   live["pose_age_ms"] = to_json(s.tally.last.pose_age);

@@ -22,7 +22,6 @@ struct LiveTally {
   LiveStatus last;
 
   std::unique_ptr<Sink> make_sink();
-  void finish(const LiveStatus& status) { last = status; }
 };
 
 struct LiveSummary {

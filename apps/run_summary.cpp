@@ -16,9 +16,7 @@ void count_health(const RunRecord& record, RunSummary& summary) {
   std::map<std::string, int> counts;
   const Odometry* last_pose = nullptr;
   for (const Odometry& o : record.odometry) {
-    const bool plain = o.health.reason == HealthReason::none;
-    ++counts[plain ? std::string(to_string(o.health.state))
-                   : fmt::format("{}/{}", to_string(o.health.state), to_string(o.health.reason))];
+    ++counts[label_of(o.health)];
     if (!o.health.has_pose()) continue;
     if (last_pose && o.reset_counter != last_pose->reset_counter) ++summary.restarts;
     last_pose = &o;
@@ -75,12 +73,6 @@ std::string map_text(const MapSummary& m) {
   return text;
 }
 
-double peak_memory_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
-}
-
 Json timing_json(const std::vector<double>& ms) {
   return Json{{"mean", statistics_of(ms).mean}, {"p50", percentile(ms, 0.5)}, {"p99", percentile(ms, 0.99)}};
 }
@@ -97,6 +89,17 @@ std::vector<double> total_ms(const RunSummary& s) {
 }
 
 }  // namespace
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+std::string label_of(const Health& health) {
+  if (health.reason == HealthReason::none) return std::string(to_string(health.state));
+  return fmt::format("{}/{}", to_string(health.state), to_string(health.reason));
+}
 
 Trajectory<W> truth_of(const Dataset& data) {
   Trajectory<W> truth;

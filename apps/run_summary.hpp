@@ -33,6 +33,10 @@ struct RunSummary {
   double peak_memory_mb = 0;
 };
 
+/// "state", or "state/reason".
+std::string label_of(const Health& health);
+/// Of this process so far.
+double peak_memory_mb();
 /// The recording's ground truth as a trajectory; empty where there is none.
 Trajectory<W> truth_of(const Dataset& data);
 RunSummary summarise(const RunRecord& record, const Dataset& data);

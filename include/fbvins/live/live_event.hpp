@@ -39,6 +39,20 @@ struct LiveCounts {
   std::int64_t imu_reordered = 0;      ///< came late, and were put in order
   std::int64_t clock_leaps = 0;        ///< of a sensor's clock, mended
   std::int64_t resets = 0;             ///< restarts of the estimator
+
+  /// Calls f(name, count) for each, in this order.
+  template <class F>
+  void visit(F&& f) const {
+    f("imu", imu);
+    f("images", images);
+    f("images_estimated", images_estimated);
+    f("images_dropped", images_dropped);
+    f("images_incomplete", images_incomplete);
+    f("imu_late", imu_late);
+    f("imu_reordered", imu_reordered);
+    f("clock_leaps", clock_leaps);
+    f("resets", resets);
+  }
 };
 
 /// Percentiles of a time over all frames or readings so far, ms.

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/live_system.hpp"
 
-#include <atomic>
 #include <condition_variable>
-#include <ctime>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/hub.hpp"
 #include "fbvins/live/ingest.hpp"
 #include "fbvins/live/latency_histogram.hpp"
@@ -20,12 +19,6 @@ namespace {
 constexpr Duration kWatchPeriod = Duration::from_seconds(0.02);
 constexpr Duration kStatusPeriod = Duration::from_seconds(1);
 
-Time monotonic_now() {
-  timespec ts{};
-  clock_gettime(CLOCK_MONOTONIC, &ts);
-  return {ts.tv_sec * 1'000'000'000LL + ts.tv_nsec};
-}
-
 }  // namespace
 
 // sensors' threads -> Ingest -[one waiting image, all readings]-> feeder -> System -> Odometry
@@ -33,12 +26,12 @@ Time monotonic_now() {
 //                                                                     all of it -> Hub -> sinks
 struct LiveSystem::Impl {
   Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate, System made)
-      : ingest(options, clock_rate, monotonic_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
+      : ingest(options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
         system(std::move(made)),
         watch(options, system_options.estimator.max_image_gap_s),
         propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), options.smoothing_s,
                    system_options.estimator.gravity_mps2),
-        started(monotonic_now()) {
+        started(host_now()) {
     system.on_odometry([this](const Odometry& o) { on_odometry(o); });
     system.on_map_update([this](const MapUpdate& u) { hub.publish(u); });
   }
@@ -60,7 +53,7 @@ struct LiveSystem::Impl {
 
   void on_odometry(const Odometry& o) {
     const Time image_host_t = ingest.host_of(o.t);
-    shutter_to_pose.add(monotonic_now() - image_host_t);
+    shutter_to_pose.add(host_now() - image_host_t);
     {
       const std::lock_guard lock(pose_mutex);
       propagator.rebase(o);
@@ -90,7 +83,7 @@ struct LiveSystem::Impl {
   }
 
   void watch_sensors() {
-    Time told = monotonic_now();
+    Time told = host_now();
     bool failed = false;
     std::unique_lock lock(end_mutex);
     while (!end.wait_for(lock, std::chrono::nanoseconds(kWatchPeriod.ns), [&] { return ended; })) {
@@ -101,7 +94,7 @@ struct LiveSystem::Impl {
         ingest.close();
         if (on_failure) on_failure();
       }
-      const Time now = monotonic_now();
+      const Time now = host_now();
       const bool due = fails_now || now - told >= kStatusPeriod;
       if (due) told = now;
       look(due);
@@ -114,7 +107,7 @@ struct LiveSystem::Impl {
     bool changed = false;
     {
       const std::lock_guard lock(pose_mutex);
-      const Health now = watch.judge({estimated, estimate_host_t}, arrivals, started, monotonic_now());
+      const Health now = watch.judge({estimated, estimate_host_t}, arrivals, started, host_now());
       changed = !(now == health);
       health = now;
     }
@@ -124,7 +117,7 @@ struct LiveSystem::Impl {
   LiveStatus status() {
     LiveStatus s;
     s.t = ingest.arrivals().newest;
-    s.host_t = monotonic_now();
+    s.host_t = host_now();
     s.counts = ingest.counts();
     s.shutter_to_pose = shutter_to_pose.summary();
     s.pose_age = pose_age.summary();

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <time.h>
 
 #include <array>
 #include <atomic>
@@ -13,6 +12,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/live/bell.hpp"
 #include "fbvins/live/byte_link.hpp"
+#include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/mavlink_session.hpp"
 
 namespace fbvins {
@@ -21,12 +21,6 @@ namespace {
 constexpr int kTick_ms = 20;
 constexpr Duration kTryAgainAfter{500'000'000};
 constexpr std::size_t kWaiting = 64;  // events
-
-Time host_now() {
-  timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return Time{t.tv_sec * std::int64_t{1'000'000'000} + t.tv_nsec};
-}
 
 }  // namespace
 

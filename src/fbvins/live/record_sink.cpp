@@ -19,21 +19,11 @@ std::string text(const LatencySummary& s) {
 }
 
 RosDiagnostic diagnostic_of(const LiveStatus& s) {
-  const LiveCounts& c = s.counts;
   RosDiagnostic out{health_level(s.health), "live", s.problem.empty() ? health_sentence(s.health) : s.problem, {}};
   out.values = {{"state", std::string(to_string(s.health.state))},  {"reason", std::string(to_string(s.health.reason))},
                 {"reset_counter", fmt::to_string(s.reset_counter)}, {"host_ns", fmt::to_string(s.host_t.ns)},
                 {"shutter_to_pose_ms", text(s.shutter_to_pose)},    {"pose_age_ms", text(s.pose_age)}};
-  for (const auto& [name, count] : {std::pair{"imu", c.imu},
-                                    {"images", c.images},
-                                    {"images_estimated", c.images_estimated},
-                                    {"images_dropped", c.images_dropped},
-                                    {"images_incomplete", c.images_incomplete},
-                                    {"imu_late", c.imu_late},
-                                    {"imu_reordered", c.imu_reordered},
-                                    {"clock_leaps", c.clock_leaps},
-                                    {"resets", c.resets}})
-    out.values.emplace_back(name, fmt::to_string(count));
+  s.counts.visit([&](const char* name, std::int64_t count) { out.values.emplace_back(name, fmt::to_string(count)); });
   return out;
 }
 

@@ -13,7 +13,6 @@ nlohmann::ordered_json to_json(const LatencySummary& s) {
 }  // namespace
 
 std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
-  const LiveCounts& c = status.counts;
   nlohmann::ordered_json json{{"t_ns", status.t.ns}, {"host_ns", status.host_t.ns}};
   json["health"] = to_string(status.health.state);
   json["reason"] = to_string(status.health.reason);
@@ -25,15 +24,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
     json["orientation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
     json["velocity_mps"] = {newest.v_WB.x(), newest.v_WB.y(), newest.v_WB.z()};
   }
-  json["counts"] = {{"imu", c.imu},
-                    {"images", c.images},
-                    {"images_estimated", c.images_estimated},
-                    {"images_dropped", c.images_dropped},
-                    {"images_incomplete", c.images_incomplete},
-                    {"imu_late", c.imu_late},
-                    {"imu_reordered", c.imu_reordered},
-                    {"clock_leaps", c.clock_leaps},
-                    {"resets", c.resets}};
+  status.counts.visit([&](const char* name, std::int64_t count) { json["counts"][name] = count; });
   json["shutter_to_pose_ms"] = to_json(status.shutter_to_pose);
   json["pose_age_ms"] = to_json(status.pose_age);
   if (!status.problem.empty()) json["problem"] = status.problem;
