@@ -9,8 +9,10 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/marker_test_files.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_format.hpp"
+#include "fbvins/io/motion_capture.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
@@ -115,6 +117,29 @@ std::vector<std::string> mcap_seeds() {
   return {*read_file(path, 1u << 20u), without_checksums(*read_file(bare_path, 1u << 20u))};
 }
 
+/// Tables of two bodies, one of which is not always seen, and a topic of poses.
+std::vector<std::string> motion_capture_seeds() {
+  test::WrittenFile file;
+  file.bodies = {{"quad", {}}, {"wand", {}}};
+  for (int i = 0; i < 4; ++i)
+    for (test::WrittenBody& body : file.bodies)
+      body.poses.emplace_back(Pose<V, K>(so3_exp(Vec3(0.1 * i, 1, 2)), Vec3(1, 0.1 * i, -2)));
+  file.bodies[1].poses[2].reset();
+  const test::TemporaryFolder folder;
+  const std::string path = folder.path() + "/poses.mcap";
+  auto poses = McapWriter::create(path, {}, {{"/quad", "nav_msgs/msg/Odometry", ""}});
+  require(poses.ok());
+  for (std::int64_t i = 0; i < 3; ++i) {
+    RosOdometry odometry;
+    odometry.t = Time{1000 * i};
+    append_odometry(poses->begin_message(0, odometry.t), odometry);
+    poses->end_message();
+  }
+  require(poses->finish().ok());
+  return {test::motive_csv(file), test::vicon_csv(file, true), test::vicon_csv(file, false), test::qualisys_tsv(file),
+          without_checksums(*read_file(path, 1u << 20u))};
+}
+
 }  // namespace
 
 void fuzz_csv(std::string_view bytes) {
@@ -189,6 +214,20 @@ void fuzz_mcap(std::string_view bytes) {
       require(frame->left->width() == width && frame->left->height() == height);
 }
 
+void fuzz_motion_capture(std::string_view bytes) {
+  const bool mcap = bytes.substr(0, kMcapMagic.size()) == kMcapMagic;
+  const auto file = mcap ? read_marker_topics(bytes_in_memory(std::string(bytes)), "take") : parse_motion_capture(bytes, "take");
+  require_sentence(file);
+  if (!file) return;
+  require(!file->bodies.empty());
+  for (const MarkerBody& body : file->bodies)
+    for (std::size_t i = 0; i < body.track.size(); ++i) {
+      require(i == 0 || body.track[i - 1].t < body.track[i].t);
+      require_rigid(body.track[i].T_VK);
+    }
+  require_sentence(choose_body(*file, "", "take"));
+}
+
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
       {"csv", fuzz_csv, csv_seeds},
@@ -197,6 +236,7 @@ const std::vector<Target>& targets() {
       {"image", fuzz_image, image_seeds},
       {"weights", fuzz_weights, weights_seeds},
       {"mcap", fuzz_mcap, mcap_seeds},
+      {"motion_capture", fuzz_motion_capture, motion_capture_seeds},
 #ifdef FBVINS_WITH_LIVE
       {"socket", fuzz_socket, socket_seeds},
 #endif

@@ -15,6 +15,7 @@ void fuzz_trajectory(std::string_view bytes);
 void fuzz_image(std::string_view bytes);
 void fuzz_weights(std::string_view bytes);
 void fuzz_mcap(std::string_view bytes);
+void fuzz_motion_capture(std::string_view bytes);
 #ifdef FBVINS_WITH_LIVE
 void fuzz_socket(std::string_view bytes);
 std::vector<std::string> socket_seeds();

@@ -37,13 +37,15 @@ std::vector<CsvLine> data_lines(std::string_view text) {
   return lines;
 }
 
-void split_at_commas(std::string_view line, std::vector<std::string_view>& fields) {
+void split_at_commas(std::string_view line, std::vector<std::string_view>& fields) { split_at(',', line, fields); }
+
+void split_at(char separator, std::string_view line, std::vector<std::string_view>& fields) {
   fields.clear();
   while (true) {
-    const auto comma = line.find(',');
-    fields.push_back(trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return;
-    line.remove_prefix(comma + 1);
+    const auto end = line.find(separator);
+    fields.push_back(trim(line.substr(0, end)));
+    if (end == std::string_view::npos) return;
+    line.remove_prefix(end + 1);
   }
 }
 

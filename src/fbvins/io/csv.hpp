@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fbvins/core/result.hpp"
@@ -42,8 +43,9 @@ std::vector<CsvLine> lines_of(std::string_view text);
 /// Those of them that hold data: no comments, no header.
 std::vector<CsvLine> data_lines(std::string_view text);
 
-/// Splits at commas; outer blanks removed. The vector is reused from row to row.
+/// Splits at commas, or at another separator; outer blanks removed. The vector is reused from row to row.
 void split_at_commas(std::string_view line, std::vector<std::string_view>& fields);
+void split_at(char separator, std::string_view line, std::vector<std::string_view>& fields);
 /// Splits at runs of blanks and tabs.
 void split_at_blanks(std::string_view line, std::vector<std::string_view>& fields);
 
@@ -58,10 +60,10 @@ std::vector<bool> longest_increasing(const std::vector<Time>& stamps);
 /// An error if there are no rows or fewer than half of them are good.
 Result<void> judge(const RowCounts& counts, const std::string& file);
 
-/// Reads all rows with parse(fields_or_line, row, problem) -> RowVerdict, `problem` saying what is
+/// Reads all lines with parse(line, row, problem) -> RowVerdict, `problem` saying what is
 /// wrong in words; Row needs a member `Time t`.
 template <class Row, class Parse>
-Result<StampedRows<Row>> read_stamped_rows(std::string_view text, const std::string& file, Parse&& parse) {
+Result<StampedRows<Row>> read_stamped_lines(const std::vector<CsvLine>& data, const std::string& file, Parse&& parse) {
   StampedRows<Row> out;
   RowCounts& counts = out.counts;
   int first_bad_line = 0;
@@ -74,7 +76,7 @@ Result<StampedRows<Row>> read_stamped_rows(std::string_view text, const std::str
   std::vector<Time> stamps;
   std::vector<int> lines;
   std::string problem;
-  for (const CsvLine& line : data_lines(text)) {
+  for (const CsvLine& line : data) {
     ++counts.rows;
     Row row{};
     problem.clear();
@@ -102,6 +104,12 @@ Result<StampedRows<Row>> read_stamped_rows(std::string_view text, const std::str
   }
   if (Result<void> verdict = judge(counts, file); !verdict) return verdict.error();
   return out;
+}
+
+/// The same of a whole file without its header.
+template <class Row, class Parse>
+Result<StampedRows<Row>> read_stamped_rows(std::string_view text, const std::string& file, Parse&& parse) {
+  return read_stamped_lines<Row>(data_lines(text), file, std::forward<Parse>(parse));
 }
 
 }  // namespace fbvins

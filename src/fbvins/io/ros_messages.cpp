@@ -35,6 +35,14 @@ Vec3 get_vector(CdrReader& cdr) {
   return {x, y, z};
 }
 
+std::optional<RosPose> get_pose(CdrReader& cdr, Time t) {
+  RosPose pose{t, Quat::Identity(), get_vector(cdr)};
+  const Vec3 xyz = get_vector(cdr);
+  pose.q = Quat(cdr.get<double>(), xyz.x(), xyz.y(), xyz.z());
+  if (!cdr.ok()) return std::nullopt;
+  return pose;
+}
+
 /// Variance of a single reading.
 RowMajor3 of_readings(double density, double rate_hz) { return density * density * rate_hz * RowMajor3::Identity(); }
 
@@ -151,6 +159,19 @@ std::optional<ImuSample> read_imu(std::string_view bytes) {
   for (int i = 0; i < kCovariance; ++i) cdr.get<double>();
   if (!cdr.ok()) return std::nullopt;
   return sample;
+}
+
+std::optional<RosPose> read_pose(std::string_view bytes) {
+  CdrReader cdr(bytes);
+  const std::optional<Time> t = get_header(cdr);
+  return t ? get_pose(cdr, *t) : std::nullopt;
+}
+
+std::optional<RosPose> read_odometry(std::string_view bytes) {
+  CdrReader cdr(bytes);
+  const std::optional<Time> t = get_header(cdr);
+  cdr.text();  // the body's frame
+  return t ? get_pose(cdr, *t) : std::nullopt;
 }
 
 std::optional<RosImage> read_image(std::string_view bytes) {

@@ -60,6 +60,16 @@ void append_diagnostics(std::string& out, Time t, std::span<const RosDiagnostic>
 /// Nullopt for bytes that are no such message.
 std::optional<ImuSample> read_imu(std::string_view bytes);
 
+/// A stamped pose in whatever frames the message names.
+struct RosPose {
+  Time t;
+  Quat q;  ///< as sent
+  Vec3 p;
+};
+/// PoseStamped; Odometry's pose.
+std::optional<RosPose> read_pose(std::string_view bytes);
+std::optional<RosPose> read_odometry(std::string_view bytes);
+
 struct RosImage {
   Time t;
   std::uint32_t width = 0, height = 0, step = 0;
