@@ -126,26 +126,23 @@ std::string depth_png(const std::vector<float>& depth_m, int width, int height) 
   return encode_png16(mm, width, height);
 }
 
-/// The small files; images follow.
-Result<void> write_texts(const Simulation& s, const fs::path& mav0, const EurocWriterOptions& options) {
+/// Folders and calibrations; what is recorded follows.
+Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool depth) {
   std::error_code error;
   for (const char* folder : {"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"})
     fs::create_directories(mav0 / folder, error);
-  if (options.depth) fs::create_directories(mav0 / "depth0", error);
+  if (depth) fs::create_directories(mav0 / "depth0", error);
   if (error) return cannot_write(mav0);
-  const Pose<B, C0>& left = s.rig.T_BC0;
-  const Pose<B, C1>& right = s.rig.T_BC1;
+  const Pose<B, C0>& left = rig.T_BC0;
+  const Pose<B, C1>& right = rig.T_BC1;
   for (const auto& [path, text] :
-       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(s.rig.left, left.q, left.p, s.rig.image_rate_hz)},
-        {mav0 / "cam1/sensor.yaml", camera_yaml(s.rig.right, right.q, right.p, s.rig.image_rate_hz)},
-        {mav0 / "imu0/sensor.yaml", imu_yaml(s.rig.imu_noise)},
-        {mav0 / "imu0/data.csv", imu_csv(s.imu.samples)},
+       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(rig.left, left.q, left.p, rig.image_rate_hz)},
+        {mav0 / "cam1/sensor.yaml", camera_yaml(rig.right, right.q, right.p, rig.image_rate_hz)},
+        {mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise)},
         {mav0 / "state_groundtruth_estimate0/sensor.yaml",
          "sensor_type: visual-inertial\ncomment: the simulation's exact state\n" + matrix_text(Quat::Identity(), Vec3::Zero())},
-        {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(s.imu.truth)},
         {mav0 / "body.yaml", std::string("comment: simulated by fbvins simulate\n")}})
     if (Result<void> done = write_file(path, text); !done) return done;
-  if (options.landmarks) return write_file(mav0 / "landmarks.csv", landmarks_csv(s));
   return {};
 }
 
@@ -178,28 +175,62 @@ std::string encode_png16(const std::vector<std::uint16_t>& values, int width, in
   return encode(rows, width, 16);
 }
 
-Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
-                         const std::function<void(int done, int all)>& progress) {
-  const fs::path mav0 = fs::path(folder) / "mav0";
-  if (fs::exists(mav0)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", mav0.string())};
-  if (Result<void> done = write_texts(simulation, mav0, options); !done) return done;
-  int count = static_cast<int>(simulation.frames.size());
-  if (options.max_frames > 0) count = std::min(count, options.max_frames);
+struct EurocFolder::State {
+  fs::path mav0;
   std::string left_rows = "#timestamp [ns],filename\n", right_rows = left_rows;
   std::future<Result<void>> writing;
+
+  Result<void> wait() { return writing.valid() ? writing.get() : Result<void>{}; }
+};
+
+Result<EurocFolder> EurocFolder::create(const std::string& folder, const StereoRig& rig, bool depth) {
+  const fs::path mav0 = fs::path(folder) / "mav0";
+  if (fs::exists(mav0)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", mav0.string())};
+  if (Result<void> done = write_calibrations(rig, mav0, depth); !done) return done.error();
+  auto state = std::make_unique<State>();
+  state->mav0 = mav0;
+  return EurocFolder(std::move(state));
+}
+
+EurocFolder::EurocFolder(std::unique_ptr<State> state) : state_(std::move(state)) {}
+EurocFolder::~EurocFolder() = default;
+EurocFolder::EurocFolder(EurocFolder&&) noexcept = default;
+EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
+
+Result<void> EurocFolder::add(DrawnFrame drawn) {
+  state_->left_rows += fmt::format("{0},{0}.png\n", drawn.frame.t.ns);
+  state_->right_rows += fmt::format("{0},{0}.png\n", drawn.right_stamp.ns);
+  if (Result<void> done = state_->wait(); !done) return done;
+  state_->writing =
+      std::async(std::launch::async, [drawn = std::move(drawn), mav0 = state_->mav0] { return write_images(drawn, mav0); });
+  return {};
+}
+
+Result<void> EurocFolder::finish(const SimulatedImu& imu) {
+  if (Result<void> done = state_->wait(); !done) return done;
+  const fs::path& mav0 = state_->mav0;
+  for (const auto& [path, text] : {std::pair{mav0 / "imu0/data.csv", imu_csv(imu.samples)},
+                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(imu.truth)},
+                                   {mav0 / "cam0/data.csv", state_->left_rows},
+                                   {mav0 / "cam1/data.csv", state_->right_rows}})
+    if (Result<void> done = write_file(path, text); !done) return done;
+  return {};
+}
+
+Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
+                         const std::function<void(int done, int all)>& progress) {
+  Result<EurocFolder> recording = EurocFolder::create(folder, simulation.rig, options.depth);
+  if (!recording) return recording.error();
+  if (options.landmarks)
+    if (Result<void> done = write_file(fs::path(folder) / "mav0/landmarks.csv", landmarks_csv(simulation)); !done) return done;
+  int count = static_cast<int>(simulation.frames.size());
+  if (options.max_frames > 0) count = std::min(count, options.max_frames);
   for (int i = 0; i < count; ++i) {
-    DrawnFrame drawn = draw_frame(simulation, static_cast<std::size_t>(i), options.depth);
-    left_rows += fmt::format("{0},{0}.png\n", drawn.frame.t.ns);
-    right_rows += fmt::format("{0},{0}.png\n", drawn.right_stamp.ns);
-    if (writing.valid())
-      if (Result<void> done = writing.get(); !done) return done;
-    writing = std::async(std::launch::async, [drawn = std::move(drawn), &mav0] { return write_images(drawn, mav0); });
+    if (Result<void> done = recording->add(draw_frame(simulation, static_cast<std::size_t>(i), options.depth)); !done)
+      return done;
     if (progress) progress(i + 1, count);
   }
-  if (writing.valid())
-    if (Result<void> done = writing.get(); !done) return done;
-  if (Result<void> done = write_file(mav0 / "cam0/data.csv", left_rows); !done) return done;
-  return write_file(mav0 / "cam1/data.csv", right_rows);
+  return recording->finish(simulation.imu);
 }
 
 }  // namespace fbvins

@@ -20,10 +20,10 @@ Vec2 place_in_pixel(int i) {
 
 }  // namespace
 
-FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, const SplineTrajectory& flight,
+FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig& rig, BodyMotion motion,
                                const Vec3& world_from_flight, std::shared_ptr<const World> world)
     : options_(options),
-      flight_(flight),
+      motion_(std::move(motion)),
       world_from_flight_(world_from_flight),
       world_(std::move(world)),
       bake_(bake_light(*world_, options.world.ambient)),
@@ -50,7 +50,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
     // The middle line is the one that is read at t.
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
     const double first_line = t - 0.5 * line_s * 480;
-    const MotionState m = flight_.at(line_s > 0 ? first_line : t);
+    const MotionState m = motion_(line_s > 0 ? first_line : t);
     Pose<W, C0> T_WC = m.T_WB * eye.T_BC;
     T_WC.p += world_from_flight_;
     const LightState lamps = light_at(options_.light, *world_, t, static_cast<std::uint64_t>(options_.seed));

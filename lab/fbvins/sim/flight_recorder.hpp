@@ -3,15 +3,21 @@
 // One thread calls; frames in order.
 #pragma once
 
+#include <functional>
+
 #include "fbvins/sim/renderer.hpp"
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
 
+/// Where the body is at a time from the start, s; asked for within an exposure's length of an image.
+using BodyMotion = std::function<MotionState(double t_s)>;
+
 class FlightRecorder {
  public:
-  FlightRecorder(const SimulationOptions& options, const StereoRig& rig, const SplineTrajectory& flight,
-                 const Vec3& world_from_flight, std::shared_ptr<const World> world);
+  /// `world_from_flight`: added to the motion's positions.
+  FlightRecorder(const SimulationOptions& options, const StereoRig& rig, BodyMotion motion, const Vec3& world_from_flight,
+                 std::shared_ptr<const World> world);
 
   /// t_s: of the images, from the start of the flight.
   DrawnFrame draw(double t_s, std::int64_t frame, bool with_depth);
@@ -32,7 +38,7 @@ class FlightRecorder {
   Image draw_eye(Eye& eye, double t_s, std::int64_t frame);
 
   SimulationOptions options_;
-  SplineTrajectory flight_;
+  BodyMotion motion_;
   Vec3 world_from_flight_;
   std::shared_ptr<const World> world_;
   LightBake bake_;

@@ -7,29 +7,13 @@
 #include <cmath>
 
 #include "fbvins/core/options.hpp"
-#include "fbvins/core/rng.hpp"
 #include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/kalibr.hpp"
-#include "fbvins/sim/flight_recorder.hpp"
 #include "fbvins/sim/recorded_flight.hpp"
+#include "fbvins/sim/simulation_parts.hpp"
 
 namespace fbvins {
 namespace {
-
-constexpr Time kStart{1'700'000'000'000'000'000};  ///< stamp of a made-up flight's first IMU sample
-constexpr double kMargin_s = 0.05;                 ///< IMU before the first and after the last image
-
-Result<StereoRig> rig_of(const SimulationOptions& o) {
-  StereoRig rig = euroc_rig();
-  if (!o.calibration.empty()) {
-    Result<StereoRig> loaded = load_kalibr(o.calibration);
-    if (!loaded) return loaded.error();
-    rig = *loaded;
-  }
-  rig.image_rate_hz = o.image_rate_hz;
-  rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
-  return rig;
-}
 
 Result<RecordedFlight> recorded_flight(const RecordedOptions& o, double duration_s) {
   Result<TrajectoryFile> file = read_trajectory(o.trajectory);
@@ -44,15 +28,12 @@ Result<RecordedFlight> recorded_flight(const RecordedOptions& o, double duration
   return fly_again(points, *imu, o.crossover_hz);
 }
 
-/// Stamps of the images on the IMU's clock; lost frames are left out.
+/// Stamps of the images on the IMU's clock.
 std::vector<Time> frame_times(const SimulationOptions& o, Time start, double duration_s) {
-  Rng rng(static_cast<std::uint64_t>(o.seed), 61);
   std::vector<Time> times;
-  for (int k = 0;; ++k) {
-    const double t = kMargin_s + k / o.image_rate_hz;
-    if (t > duration_s - kMargin_s) return times;
-    if (rng.uniform() >= o.camera.drop_share) times.push_back(start + Duration::from_seconds(t));
-  }
+  for (FrameTimes frames(o); frames.next_s() <= duration_s - kMargin_s; frames.advance())
+    times.push_back(start + Duration::from_seconds(frames.next_s()));
+  return times;
 }
 
 FloorPlan plan_for(const SimulationOptions& o, const std::vector<Vec3>& path) {
@@ -86,6 +67,37 @@ class DrawingLoader : public FrameLoader {
 
 }  // namespace
 
+Result<StereoRig> simulated_rig(const SimulationOptions& o) {
+  StereoRig rig = euroc_rig();
+  if (!o.calibration.empty()) {
+    Result<StereoRig> loaded = load_kalibr(o.calibration);
+    if (!loaded) return loaded.error();
+    rig = *loaded;
+  }
+  rig.image_rate_hz = o.image_rate_hz;
+  rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
+  return rig;
+}
+
+FrameTimes::FrameTimes(const SimulationOptions& options)
+    : rate_hz_(options.image_rate_hz),
+      drop_share_(options.camera.drop_share),
+      rng_(static_cast<std::uint64_t>(options.seed), 61) {
+  advance();
+}
+
+void FrameTimes::advance() {
+  do ++k_;
+  while (rng_.uniform() < drop_share_);
+}
+
+DrawnFrame draw_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth, Time start) {
+  DrawnFrame drawn = recorder.draw(t_s, frame, with_depth);
+  drawn.frame.t = start + Duration::from_seconds(t_s) - Duration::from_seconds(rig.time_offset_s);
+  drawn.right_stamp = drawn.frame.t + recorder.right_jitter(frame);
+  return drawn;
+}
+
 Result<Simulation> prepare_simulation(const SimulationOptions& o) {
   if (Result<void> valid = validate(o); !valid) return valid.error();
   const bool is_recorded = !o.recorded.trajectory.empty();
@@ -94,12 +106,12 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
                  "world.kind=corridors needs flight.kind=tour: other flights would pass through walls"};
   if (!is_recorded && !o.recorded.imu.empty())
     return Error{ErrorCode::invalid_argument, "recorded.imu is given without recorded.trajectory"};
-  Result<StereoRig> rig = rig_of(o);
+  Result<StereoRig> rig = simulated_rig(o);
   if (!rig) return rig.error();
 
   Simulation s;
   s.rig = *rig;
-  s.start = kStart;
+  s.start = kSimulationStart;
   const auto seed = static_cast<std::uint64_t>(o.seed);
   if (is_recorded) {
     Result<RecordedFlight> recorded = recorded_flight(o.recorded, o.flight.duration_s);
@@ -123,17 +135,14 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
     for (Vec3& p : path) p += s.world_from_flight;
   }
   s.world = std::make_shared<const World>(build_world(o.world, plan_for(o, path), path, seed));
-  s.recorder = std::make_shared<FlightRecorder>(o, s.rig, s.flight, s.world_from_flight, s.world);
+  s.recorder = std::make_shared<FlightRecorder>(
+      o, s.rig, [flight = s.flight](double t) { return flight.at(t); }, s.world_from_flight, s.world);
   return s;
 }
 
 DrawnFrame draw_frame(Simulation& simulation, std::size_t index, bool with_depth) {
-  const Time t = simulation.frames[index];
-  const Duration offset = Duration::from_seconds(simulation.rig.time_offset_s);
-  DrawnFrame drawn = simulation.recorder->draw((t - simulation.start).seconds(), static_cast<std::int64_t>(index), with_depth);
-  drawn.frame.t = t - offset;
-  drawn.right_stamp = drawn.frame.t + simulation.recorder->right_jitter(static_cast<std::int64_t>(index));
-  return drawn;
+  const double t_s = (simulation.frames[index] - simulation.start).seconds();
+  return draw_at(*simulation.recorder, simulation.rig, t_s, static_cast<std::int64_t>(index), with_depth, simulation.start);
 }
 
 DatasetContents contents_of(Simulation simulation, const std::string& name) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "fbvins/sim/simulation.hpp"
@@ -20,6 +21,29 @@ struct EurocWriterOptions {
 /// Folder/mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}; the folder is made, and must not hold a mav0.
 Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
                          const std::function<void(int done, int all)>& progress);
+
+/// The same, frame by frame as a flight goes on; images are written while the next one is drawn.
+///
+///   Result<EurocFolder> recording = EurocFolder::create("out/flight", rig);
+///   recording->add(drawn);
+///   Result<void> done = recording->finish(imu);
+class EurocFolder {
+ public:
+  /// The folder is made, and must not hold a mav0. `depth`: frames bring depth images.
+  static Result<EurocFolder> create(const std::string& folder, const StereoRig& rig, bool depth = false);
+  ~EurocFolder();
+  EurocFolder(EurocFolder&&) noexcept;
+  EurocFolder& operator=(EurocFolder&&) noexcept;
+
+  Result<void> add(DrawnFrame drawn);
+  /// Readings and truth; the recording is complete. Once.
+  Result<void> finish(const SimulatedImu& imu);
+
+ private:
+  struct State;
+  explicit EurocFolder(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
 
 /// Fast PNG: one filter, lowest compression. 8-bit grey, or 16-bit where `deep` is given.
 std::string encode_png(const Image& image);

@@ -4,6 +4,8 @@
 //
 //   SimulatedImu imu = simulate_imu(flight, rig.imu_noise, options, start, seed);
 //   imu.samples, imu.truth   // one state and bias a sample
+//
+// What has no trajectory beforehand asks reading by reading (sensor_station.hpp).
 #pragma once
 
 #include <cstdint>

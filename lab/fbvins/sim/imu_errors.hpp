@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the true motion to readings, one at a time: bias that walks, crooked axes, noise, digits. One owner.
+//
+//   ImuErrors errors(noise, options, seed);
+//   ImuBias bias = errors.bias();                       // of the reading that comes next
+//   ImuSample reading = errors.read(t, motion, shake);
+#pragma once
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/imu_model.hpp"
+
+namespace fbvins {
+
+/// What rotors do to an IMU: how strongly, and vectors of unit variance on each axis.
+struct Shake {
+  double power = 0;  ///< 0: at rest, 1: as the options say
+  Vec3 accel = Vec3::Zero(), gyro = Vec3::Zero();
+};
+
+class ImuErrors {
+ public:
+  ImuErrors(const ImuNoise& noise, const ImuModelOptions& options, std::uint64_t seed);
+
+  const ImuBias& bias() const { return bias_; }
+  /// Readings come at noise.rate_hz.
+  ImuSample read(Time t, const MotionState& motion, const Shake& shake);
+
+ private:
+  ImuNoise noise_;
+  ImuModelOptions options_;
+  // Each error has numbers of its own, so that switching one off leaves the others as they are.
+  Rng white_, walk_, rumble_;
+  ImuBias bias_;
+  Mat3 gyro_axes_, accel_axes_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a recording that is drawn and sensors that are asked step by step have in common. Pure functions but where named.
+#pragma once
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/flight_recorder.hpp"
+#include "fbvins/sim/simulation.hpp"
+
+namespace fbvins {
+
+inline constexpr Time kSimulationStart{1'700'000'000'000'000'000};  ///< stamp of a made-up flight's first IMU sample
+inline constexpr double kMargin_s = 0.05;                           ///< IMU before the first and after the last image
+
+/// The calibration that the options name, with their rate and time offset.
+Result<StereoRig> simulated_rig(const SimulationOptions& options);
+
+/// When images are taken, s from the start; lost frames are left out. One owner.
+class FrameTimes {
+ public:
+  explicit FrameTimes(const SimulationOptions& options);
+  double next_s() const { return kMargin_s + static_cast<double>(k_) / rate_hz_; }
+  void advance();
+
+ private:
+  double rate_hz_, drop_share_;
+  Rng rng_;
+  std::int64_t k_ = -1;
+};
+
+/// The stereo frame of t_s after kSimulationStart or another start; frames in order.
+DrawnFrame draw_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth = false,
+                   Time start = kSimulationStart);
+
+}  // namespace fbvins
