@@ -19,11 +19,11 @@ RANKS = {
     "frontend": 4, "estimator": 4, "loop": 4, "sim": 4,
     "pipeline": 5,
     "live": 6,
-    "config": 7,
+    "config": 7, "flight": 7,
     "experiment": 8,
 }
 # What makes and judges data lives in lab/, and nothing outside sees it.
-LABORATORY = {"sim", "experiment"}
+LABORATORY = {"sim", "flight", "experiment"}
 # Within a rank only these: a camera rig is made of the values that travel.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Low passes of the controller. One owner each.
+#pragma once
+
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+
+/// Butterworth of second order, by the bilinear transform. The first sample is where it starts from.
+class ButterworthFilter {
+ public:
+  /// A cutoff at or above half the rate: what comes in goes out.
+  ButterworthFilter(double rate_hz, double cutoff_hz);
+  Vec3 operator()(const Vec3& x);
+
+ private:
+  double b0_ = 1, b1_ = 0, b2_ = 0, a1_ = 0, a2_ = 0;
+  Vec3 s1_ = Vec3::Zero(), s2_ = Vec3::Zero();
+  bool started_ = false;
+};
+
+/// First order. The first sample is where it starts from.
+class LagFilter {
+ public:
+  LagFilter(double rate_hz, double cutoff_hz);
+  Vec3 operator()(const Vec3& x);
+
+ private:
+  double share_;
+  Vec3 y_ = Vec3::Zero();
+  bool started_ = false;
+};
+
+}  // namespace fbvins
