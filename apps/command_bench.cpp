@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -13,7 +14,7 @@
 #include "apps/terminal.hpp"
 #include "fbvins/experiment/bench_runner.hpp"
 #include "fbvins/experiment/bench_tables.hpp"
-#include "fbvins/experiment/report.hpp"
+#include "fbvins/report/report.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -98,7 +99,7 @@ int bench(Arguments a) {
     reference = *std::move(read);
   }
   a.bench.out = a.out;
-  a.bench.program = std::filesystem::read_symlink("/proc/self/exe").string();
+  a.bench.program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "fbvins").string();
 
   const Result<BenchOutcome> outcome = [&] {
     const BenchProgress progress(a.quiet);
@@ -123,7 +124,7 @@ int bench(Arguments a) {
 void add_bench_command(CLI::App& program, int& exit_code) {
   auto a = std::make_shared<Arguments>();
   a->bench.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  CLI::App* command = program.add_subcommand("bench", "run recordings x frontends x configurations, make tables");
+  CLI::App* command = program.add_subcommand("bench", kBenchDescription);
   command->footer(kExamples);
   command->add_option("MATRIX", a->matrix, "YAML file")->required();
   command->add_option("--out", a->out, "folder for the results (default out/bench-<matrix>)");

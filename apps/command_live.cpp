@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -168,7 +169,7 @@ int run(const Arguments& arguments) {
 
 void add_live_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("live", "sensors in, the pose out while they come");
+  CLI::App* command = program.add_subcommand("live", kLiveDescription);
   command->footer(kExamples);
   command->add_option("--source", arguments->source, "where sensor data come from")->required();
   command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/experiment/report.hpp"
 #include "fbvins/io/output_file.hpp"
+#include "fbvins/report/report.hpp"
 
 namespace fbvins::app {
 namespace {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The subcommands of `fbvins`. Each adds itself to the command line and, when chosen, sets exit_code.
+// The subcommands of `fbvins`, wherever they live (fbvins.cpp, fbvins_live.cpp, fbvins_lab.cpp). Each adds itself to the
+// command line and, when chosen, sets exit_code.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace fbvins::app {
 
@@ -12,6 +15,10 @@ enum ExitCode : int {
   kEstimationFailed = 1,  ///< the input was fine, but no pose came out of it
   kBadInput = 2,          ///< wrong usage, unreadable file, nothing to compare
 };
+
+/// What the help of `fbvins` says of commands that another program holds.
+inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
+inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 
 void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # fbvins_module(NAME [COLD] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
 # One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
-# where they can, other libraries else. COLD: its own code does not compute. What users link are components (FbvinsInstall.cmake).
+# where they can, other libraries else. COLD: compiled with -O1. A cold module instantiates no product or
+# decomposition of Eigen's: the linker may take its copy of a template for all. What users link are components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)

@@ -20,10 +20,11 @@ RANKS = {
     "pipeline": 5,
     "live": 6,
     "config": 7, "flight": 7,
-    "experiment": 8,
+    "report": 8,
+    "experiment": 9,
 }
 # What makes and judges data lives in lab/, and nothing outside sees it.
-LABORATORY = {"sim", "flight", "experiment"}
+LABORATORY = {"sim", "flight", "report", "experiment"}
 # Within a rank only these: a camera rig is made of the values that travel.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')

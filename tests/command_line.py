@@ -6,6 +6,7 @@ usage: command_line.py FBVINS
 """
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -38,14 +39,20 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
-        for command in ([], ["run"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"]):
+        for command in ([], ["run"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["live"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)
 
+    def test_a_command_whose_program_is_not_there(self):
+        alone = self.folder / "fbvins"
+        shutil.copy(PROGRAM, alone)
+        done = subprocess.run([alone, "live"], capture_output=True, text=True, timeout=120, check=False)
+        self.assert_bad_input(done, f"{self.folder}/fbvins-live", "No such file", "./dev build")
+
     def test_wrong_usage(self):
         self.assertEqual(fbvins().returncode, 2)
-        for arguments in (["fly"], ["run"], ["eval", "one"], ["run", "x", "--frontend", "surf"], ["run", "x", "--max-images", "-1"],
+        for arguments in (["no-such-command"], ["run"], ["eval", "one"], ["run", "x", "--frontend", "surf"], ["run", "x", "--max-images", "-1"],
                           ["eval", "a", "b", "--align", "se4"], ["run", "x", "--no-such-option"]):
             self.assert_bad_input(fbvins(*arguments))
 

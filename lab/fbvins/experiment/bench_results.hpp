@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "fbvins/experiment/matrix.hpp"
-#include "fbvins/experiment/run_errors.hpp"
+#include "fbvins/report/run_errors.hpp"
 
 namespace fbvins {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "fbvins/eval/evaluation.hpp"
-#include "fbvins/experiment/run_folder.hpp"
+#include "fbvins/report/run_folder.hpp"
 
 namespace fbvins {
 

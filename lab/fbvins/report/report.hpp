@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "fbvins/core/result.hpp"
-#include "fbvins/experiment/run_folder.hpp"
+#include "fbvins/report/run_folder.hpp"
 
 namespace fbvins {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "fbvins/core/result.hpp"
-#include "fbvins/experiment/csv_table.hpp"
+#include "fbvins/report/csv_table.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/types/odometry.hpp"
 

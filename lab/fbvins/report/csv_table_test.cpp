@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/experiment/csv_table.hpp"
+#include "fbvins/report/csv_table.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `fbvins` program: one file a subcommand, exit codes in commands.hpp.
+#include "apps/command_line.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
-#include "apps/commands.hpp"
 #include "apps/terminal.hpp"
 
+namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples = R"(examples:
@@ -20,27 +26,30 @@ constexpr const char* kExamples = R"(examples:
 exit codes: 0 fine, 1 no pose could be estimated, 2 wrong usage or bad input
 )";
 
+/// Becomes the program that holds the command; returns only where that is not there.
+int become(const HandedOver& command, char** argv) {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::string program = self.parent_path() / command.program;
+  execv(program.c_str(), argv);
+  return fail(fmt::format("the command {} is in a program of its own, {}, and that cannot be started: {}; ./dev build makes it",
+                          command.command, program, std::generic_category().message(errno)));
+}
+
 }  // namespace
 
-int main(int argc, char** argv) {
-  using namespace fbvins::app;
+int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
+                     std::initializer_list<HandedOver> elsewhere) {
   CLI::App program{"FB-VINS: stereo visual-inertial odometry", "fbvins"};
   program.set_version_flag("--version", "fbvins " FBVINS_VERSION);
   program.footer(kExamples);
   program.require_subcommand(1);
   int exit_code = kOk;
-  add_run_command(program, exit_code);
-  add_live_command(program, exit_code);
-  add_eval_command(program, exit_code);
-  add_info_command(program, exit_code);
-  add_config_command(program, exit_code);
-  add_map_command(program, exit_code);
-  add_vocab_command(program, exit_code);
-#ifdef FBVINS_WITH_LAB
-  add_simulate_command(program, exit_code);
-  add_report_command(program, exit_code);
-  add_bench_command(program, exit_code);
-#endif
+  for (const AddCommand add : commands) add(program, exit_code);
+  for (const HandedOver& other : elsewhere) {
+    if (argc > 1 && argv[1] == std::string_view(other.command)) return become(other, argv);
+    program.add_subcommand(other.command, other.description);
+  }
   try {
     if (argc <= 1) {
       std::fputs(program.help().c_str(), stderr);
@@ -54,3 +63,5 @@ int main(int argc, char** argv) {
   }
   return exit_code;
 }
+
+}  // namespace fbvins::app

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/experiment/run_folder.hpp"
+#include "fbvins/report/run_folder.hpp"
 
 #include <fmt/format.h>
 

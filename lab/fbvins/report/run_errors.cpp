@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/experiment/run_errors.hpp"
+#include "fbvins/report/run_errors.hpp"
 
 #include <algorithm>
 #include <cmath>

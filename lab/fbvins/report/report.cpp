@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/experiment/report.hpp"
+#include "fbvins/report/report.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "fbvins/experiment/report_page.hpp"
-#include "fbvins/experiment/run_errors.hpp"
+#include "fbvins/report/report_page.hpp"
+#include "fbvins/report/run_errors.hpp"
 
 namespace fbvins {
 namespace {

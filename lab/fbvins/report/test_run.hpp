@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/experiment/run_folder.hpp"
+#include "fbvins/report/run_folder.hpp"
 
 namespace fbvins {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/experiment/run_errors.hpp"
+#include "fbvins/report/run_errors.hpp"
 
 #include <gtest/gtest.h>
 
-#include "fbvins/experiment/test_run.hpp"
+#include "fbvins/report/test_run.hpp"
 
 namespace fbvins {
 namespace {
