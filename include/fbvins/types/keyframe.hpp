@@ -7,6 +7,7 @@
 
 #include "fbvins/core/ids.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
@@ -25,6 +26,7 @@ struct Keyframe {
   Time t;
   Pose<W, B> T_WB;
   Vec3 v_WB = Vec3::Zero();
+  GaugeState gauge;                     ///< as it was seen, not turned level
   Mat6 pose_covariance = Mat6::Zero();  ///< of (dp in W, dtheta in B), from the start of W
   std::uint32_t reset_counter = 0;      ///< a new value: W is a new frame, nothing joins it to the old
   StereoFrame images;

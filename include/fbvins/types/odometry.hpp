@@ -9,6 +9,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/gauge.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -66,6 +67,7 @@ struct Odometry {
   FrameId id;
   Time t;
   Pose<W, B> T_WB;
+  GaugeState gauge;            ///< the same moment in the estimator's own frame
   Vec3 v_WB = Vec3::Zero();    ///< m/s, in W
   Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;

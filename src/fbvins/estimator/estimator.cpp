@@ -199,6 +199,7 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg);
   out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba);
+  up_sigma_rad_ = up_sigma_rad(*covariance);
 }
 
 void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
@@ -224,8 +225,12 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
     newest_handed_on_ = frame.id;
     Keyframe keyframe = keyframe_of(window_, i, calibration_);
     keyframe.images = window_.take_images(i);
-    if (const std::optional<Mat17> covariance = solution.covariance(frame.id))
+    const std::optional<Mat17> covariance = solution.covariance(frame.id);
+    keyframe.gauge = gauge_state_of(window_, frame.state);
+    if (covariance) {
+      keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
       keyframe.pose_covariance = window_.tilt().levelled_covariance(frame.state, *covariance).topLeftCorner<6, 6>();
+    }
     keyframe.reset_counter = reset_counter_;
     out.push_back(std::move(keyframe));
   }
@@ -250,6 +255,8 @@ void Estimator::fill(Odometry& out) const {
   const NavState state = window_.tilt().levelled(window_.newest().state);
   out.T_WB = state.T_WB;
   out.v_WB = state.v_WB;
+  out.gauge = gauge_state_of(window_, window_.newest().state);
+  out.gauge.up_sigma_rad = up_sigma_rad_;
   out.bias = state.bias;
   out.w_WB_B = last_rate_ - state.bias.gyro_radps;
 }

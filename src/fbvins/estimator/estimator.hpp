@@ -72,6 +72,7 @@ class Estimator {
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
+  double up_sigma_rad_ = 0;  ///< as of the last usable solve
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)

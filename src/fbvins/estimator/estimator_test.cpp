@@ -361,5 +361,28 @@ TEST(Estimator, HandsOnKeyframesInOrderWithWhatTheySee) {
   EXPECT_GT(keyframes, 10);
 }
 
+TEST(Estimator, TheGaugeIsTheWindowsOwnFrameWithUpBeside) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 13);
+  Estimator estimator(flight.rig, exact_noise());
+  int poses = 0;
+  for (int k = 0; k < 60; ++k) {
+    const Estimate estimate = estimator.process(flight.frame(k));
+    for (const Keyframe& keyframe : estimate.keyframes) {
+      EXPECT_LT((keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).angularDistance(keyframe.T_WB.q), 1e-9);
+      EXPECT_GT(keyframe.gauge.up_sigma_rad, 0);
+    }
+    const Odometry& o = estimate.odometry;
+    if (!o.health.has_pose()) continue;
+    ++poses;
+    const StatePrior prior = estimator.prior();  // what the frontend gets is the window's as well
+    EXPECT_EQ(o.gauge.T_GB.p, prior.T_WB.p);
+    EXPECT_EQ(o.gauge.v_GB, prior.v_WB);
+    EXPECT_LT((o.gauge.up_G() + prior.gravity_W.normalized()).norm(), 1e-12);
+    EXPECT_GT(o.gauge.up_sigma_rad, 1e-4);
+    EXPECT_LT(o.gauge.up_sigma_rad, 0.1);
+  }
+  EXPECT_GT(poses, 30);
+}
+
 }  // namespace
 }  // namespace fbvins

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/window_views.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 namespace fbvins {
 
@@ -40,6 +42,19 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
     out.parallax_px = motion[motion.size() / 2];
   }
   return out;
+}
+
+GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state) {
+  GaugeState out;
+  out.T_GB = state.T_WB.cast_frames<G, B>();
+  out.v_GB = state.v_WB;
+  out.q_LG = window.tilt().q().conjugate();
+  return out;
+}
+
+double up_sigma_rad(const Mat17& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Mat2> axes(covariance.bottomRightCorner<2, 2>(), Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
 }
 
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration) {

@@ -20,6 +20,11 @@ struct KeyframeDistance {
 };
 KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px);
 
+/// A state of the window as it is, without how well up is known.
+GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state);
+/// How well up is known about its less known axis, from WindowInformation::covariance().
+double up_sigma_rad(const Mat17& covariance);
+
 /// Levelled, as is what follows.
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);
 /// A frame as a keyframe for loop closure, with what it sees, but without its images.
