@@ -3,10 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/kept_map.hpp"
 #include "apps/live_files.hpp"
 #include "apps/live_summary.hpp"
 #include "apps/run_map.hpp"
@@ -19,6 +21,7 @@
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
 #include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
 
 namespace fbvins::app {
@@ -41,14 +44,14 @@ examples:
   fbvins live --source replay:MH_01_easy --out out/live
   fbvins live --source replay:MH_01_easy@4 --frontend orb --quiet --out out/fast
   fbvins live --source socket:/run/fbvins.sock --out out/live
-  fbvins live --source replay:MH_01_easy --loop --save-map flat.fbm
+  fbvins live --source replay:MH_01_easy --map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
 struct Arguments {
-  std::string source, config, frontend, out, record;
+  std::string source, config, frontend, out, record, kept_map;
   std::vector<std::string> assignments, faults, mavlink;
   DatasetOptions dataset;
   MapArguments map;
@@ -61,6 +64,15 @@ Result<Config> config_of(Arguments arguments) {
   if (!arguments.frontend.empty())
     arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
   return load_config(arguments.config, arguments.assignments);
+}
+
+/// A map to keep is one to load, where it is there, and to save.
+MapArguments map_arguments(const Arguments& arguments) {
+  if (arguments.kept_map.empty()) return arguments.map;
+  MapArguments map = arguments.map;
+  map.save = arguments.kept_map;
+  if (std::filesystem::exists(arguments.kept_map)) map.load = arguments.kept_map;
+  return map;
 }
 
 Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
@@ -84,7 +96,13 @@ Result<void> add_sinks(const Arguments& arguments, const Config& config, const S
     if (!record) return record.error();
     live.add_sink(std::move(*record));
   }
-  if (!arguments.quiet) live.add_sink(std::make_unique<StatusSink>(stdout));
+  if (const char* address = std::getenv("NOTIFY_SOCKET")) {
+    auto sink = ServiceSink::create(address, stderr);
+    if (!sink) return sink.error();
+    live.add_sink(*std::move(sink));
+  } else if (!arguments.quiet) {
+    live.add_sink(std::make_unique<StatusSink>(stdout));
+  }
   for (const std::string& address : arguments.mavlink) {
     auto sink = MavlinkSink::create(address, config.live.mavlink);
     if (!sink) return sink.error();
@@ -142,9 +160,12 @@ int run(const Arguments& arguments) {
   }
   const auto map = make_map(arguments.map, (*source)->rig(), config->loop);
   if (!map) return fail(map.error().message);
+  std::optional<KeptMap> kept;
+  if (*map) kept.emplace(**map, arguments.kept_map);
   LiveTally tally;
   const Result<void> flown = [&]() -> Result<void> {
-    auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = map->get()});
+    auto live =
+        LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = kept ? &*kept : nullptr});
     if (!live) return live.error();
     if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
@@ -189,6 +210,12 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
   command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
+  command
+      ->add_option(
+          "--map", arguments->kept_map,
+          "a map that stays: loaded where the file is there, written every half minute and at the end; with loop closure")
+      ->excludes("--save-map")
+      ->excludes("--load-map");
   command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
   command
       ->add_option("--mavlink", arguments->mavlink,
@@ -201,7 +228,10 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--record", arguments->record, "MCAP file for the flight record; fbvins run takes it as a recording");
   command->add_flag("!--record-no-images", arguments->record_images, "keep images out of the record; it cannot be run then");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  command->callback([arguments, &exit_code] {
+    arguments->map = map_arguments(*arguments);
+    exit_code = run(*arguments);
+  });
 }
 
 }  // namespace fbvins::app

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+# Debian packages by CPack: fbvins (programs, data, service) and libfbvins-dev (what find_package(fbvins) finds). `./dev package`.
+# Dependencies of the programs are found by dpkg-shlibdeps in the built files.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME fbvins)
+set(CPACK_PACKAGE_VENDOR "FB-VINS")
+set(CPACK_PACKAGE_CONTACT "FB-VINS developers <fbvins@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "stereo visual-inertial odometry for drones")
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL runtime devel)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME fbvins)
+set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "FB-VINS: position, velocity and attitude from a stereo camera and an IMU
+ Programs: recordings and live sensors in, poses with covariance and health out; MAVLink, flight records, maps; a systemd service.")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/conffiles ${PROJECT_SOURCE_DIR}/packaging/postinst
+  ${PROJECT_SOURCE_DIR}/packaging/prerm)
+
+set(CPACK_DEBIAN_DEVEL_PACKAGE_NAME libfbvins-dev)
+set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEVEL_DESCRIPTION "FB-VINS: headers and static libraries
+ For programs that say find_package(fbvins COMPONENTS core io loop live sim).")
+set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS "libeigen3-dev, libfmt-dev")
+set(CPACK_DEBIAN_DEVEL_PACKAGE_RECOMMENDS "libceres-dev, libyaml-cpp-dev, libzip-dev, libpng-dev, libturbojpeg0-dev")
+include(CPack)

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tells the service manager that started the program how the flight goes, by systemd's notification protocol (sd_notify(3): one
+// datagram a message to the socket that NOTIFY_SOCKET names): ready, a line for `systemctl status`, a sign of life for the
+// watchdog. A hung estimator gives no sign of life, so that the manager restarts the program; silent sensors are no reason to.
+// The journal gets a line whenever health or problem is another, at most one a second, with its level before it (sd-daemon(3)).
+#pragma once
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "fbvins/core/file_descriptor.hpp"
+#include "fbvins/live/sink.hpp"
+
+namespace fbvins {
+
+class ServiceSink final : public Sink {
+ public:
+  /// `address`: NOTIFY_SOCKET's value, a path, or @ and a name of Linux' abstract namespace. `journal` stays the caller's.
+  static Result<std::unique_ptr<ServiceSink>> create(const std::string& address, std::FILE* journal);
+
+  std::string_view name() const override { return "service manager"; }
+  Result<void> take(const LiveEvent& event) override;
+  Result<void> finish() override;
+
+ private:
+  ServiceSink(FileDescriptor socket, std::string address, std::FILE* journal)
+      : socket_(std::move(socket)), address_(std::move(address)), journal_(journal) {}
+  bool estimator_lives(const LiveStatus& status);
+  Result<void> send(const std::string& message) const;
+  void log(const LiveStatus& status, const std::string& sentence);
+
+  FileDescriptor socket_;
+  std::string address_;
+  std::FILE* journal_;
+  std::string logged_;
+  Time logged_at_;  // CLOCK_MONOTONIC
+  bool ready_ = false;
+  std::int64_t images_ = 0, answers_ = 0;  // arrived and answered when the estimator was last seen to live
+  Time waits_since_;                       // CLOCK_MONOTONIC
+};
+
+}  // namespace fbvins

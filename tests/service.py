@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`fbvins live` as a service manager sees it: a socket in the place of systemd's, a recording as sensors.
+
+usage: service.py FBVINS
+"""
+import os
+import pathlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM = sys.argv[1]
+
+
+class Service(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.scratch.name)
+        cls.flight = cls.folder / "flight"
+        subprocess.run([PROGRAM, "simulate", "normal", "--seconds", "4", "--seed", "1", "--quiet", "--out", cls.flight], check=True, timeout=300)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.scratch.cleanup()
+
+    def start(self, *arguments, speed=""):
+        """The program with a manager's socket; and that socket."""
+        manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.addCleanup(manager.close)
+        address = str(self.folder / f"notify-{time.monotonic_ns()}")
+        manager.bind(address)
+        manager.settimeout(120)
+        program = subprocess.Popen([PROGRAM, "live", "--source", f"replay:{self.flight}{speed}", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True, env=dict(os.environ, NOTIFY_SOCKET=address))
+        self.addCleanup(program.kill)
+        return program, manager
+
+    def test_ready_alive_stopping(self):
+        program, manager = self.start()
+        messages = []
+        while not messages or "STOPPING=1" not in messages[-1]:
+            messages.append(manager.recv(4096).decode())
+        out, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 0, err)
+        self.assertEqual(sum("READY=1\n" in m for m in messages), 1)
+        self.assertIn("READY=1\n", messages[0])
+        self.assertTrue(all("WATCHDOG=1\n" in m for m in messages[:-1]), messages)
+        self.assertTrue(any(m.startswith("STATUS=good") for m in messages), messages)
+        self.assertEqual(out, "", "the status lines are for people; a journal gets changes")
+        self.assertRegex(err, r"(?m)^<6>good$")
+
+    def test_sigterm_ends_it_in_good_order_and_keeps_the_map(self):
+        program, manager = self.start("--laps", "100", "--save-map", str(self.folder / "flat.fbm"))
+        while "STATUS=good" not in manager.recv(4096).decode():
+            pass
+        program.send_signal(signal.SIGTERM)
+        _, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 0, err)
+        self.assertTrue((self.folder / "flat.fbm").exists())
+
+    def test_a_kept_map_outlives_a_killed_program(self):
+        kept = self.folder / "kept.fbm"
+        arguments = ("--map", str(kept), "--laps", "1000")
+        program, manager = self.start(*arguments, speed="@20")
+        while not kept.exists():
+            manager.recv(4096)
+        program.kill()
+        program.communicate(timeout=120)
+        keyframes = self.keyframes_of(kept)
+        self.assertGreater(keyframes, 5)
+        program, manager = self.start(*arguments[:2], speed="@4")
+        _, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 0, err)
+        self.assertGreater(self.keyframes_of(kept), keyframes, "the second flight went on with the first one's map")
+
+    def keyframes_of(self, path):
+        done = subprocess.run([PROGRAM, "map", "info", path], capture_output=True, text=True, timeout=120, check=True)
+        return int(re.search(r"(\d+) keyframes", done.stdout)[1])
+
+    def test_a_manager_that_is_not_there(self):
+        done = subprocess.run([PROGRAM, "live", "--source", f"replay:{self.flight}"], capture_output=True, text=True, timeout=120, check=False,
+                              env=dict(os.environ, NOTIFY_SOCKET=str(self.folder / "none")))
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("NOTIFY_SOCKET=", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0]])
