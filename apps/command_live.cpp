@@ -11,6 +11,7 @@
 #include "apps/kept_map.hpp"
 #include "apps/live_files.hpp"
 #include "apps/live_summary.hpp"
+#include "apps/ros_graph.hpp"
 #include "apps/run_map.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
@@ -36,6 +37,7 @@ source is a recording with truth).
 sources:
   replay:DATASET[@SPEED]     a recording played in wall time
   socket:PATH                another process, over a Unix socket (docs/socket.md); without --calibration it gives its own
+  ros2:LEFT,RIGHT,IMU        topics of ROS 2, in the domain of --ros2 (docs/ros2.md); with --calibration
 faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
   camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
   burst:..:HELD_BACK, leap:..:SECONDS
@@ -51,7 +53,7 @@ examples:
 )";
 
 struct Arguments {
-  std::string source, config, frontend, out, record, kept_map;
+  std::string source, config, frontend, out, record, kept_map, ros2;
   std::vector<std::string> assignments, faults, mavlink;
   DatasetOptions dataset;
   MapArguments map;
@@ -147,11 +149,11 @@ int run(const Arguments& arguments) {
   if (!config) return fail(config.error().message);
   const auto faults = faults_of(arguments);
   if (!faults) return fail(faults.error().message);
-  const auto source = make_source(arguments.source, {.dataset = arguments.dataset,
-                                                     .laps = arguments.laps,
-                                                     .preload = arguments.preload,
-                                                     .say = note,
-                                                     .give_up = stop_is_wanted});
+  const auto graph = RosGraph::join(arguments.ros2, arguments.source);
+  if (!graph) return fail(graph.error().message);
+  const SourceOptions options{
+      .dataset = arguments.dataset, .laps = arguments.laps, .preload = arguments.preload, .say = note, .give_up = stop_is_wanted};
+  const auto source = graph->has_source() ? graph->open_source(options) : make_source(arguments.source, options);
   if (!source) return fail(source.error().message);
   if (!arguments.out.empty()) {
     std::error_code error;
@@ -169,6 +171,7 @@ int run(const Arguments& arguments) {
     if (!live) return live.error();
     if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
+    if (Result<void> added = graph->add_sink(**source, *live); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
     tally.last = live->status();
     return done;
@@ -222,6 +225,8 @@ void add_live_command(CLI::App& program, int& exit_code) {
                    "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
+  command->add_option("--ros2", arguments->ros2,
+                      "publish in ROS 2's graph: DOMAIN[:INTERFACE], this machine alone without an interface");
   command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
       ->take_all()
       ->allow_extra_args(false);

@@ -118,6 +118,17 @@ void append_odometry(std::string& out, const RosOdometry& o) {
   put(cdr, twist_covariance);
 }
 
+void append_path(std::string& out, Time t, const Trajectory<W>& path) {
+  CdrWriter cdr(out);
+  put_header(cdr, t, kOdometryFrame);
+  cdr.count(path.size());
+  for (const StampedPose<W>& pose : path) {
+    put_header(cdr, pose.t, kOdometryFrame);
+    put(cdr, pose.T.p);
+    put(cdr, pose.T.q);
+  }
+}
+
 void append_transforms(std::string& out, Time t, std::span<const RosTransform> transforms) {
   CdrWriter cdr(out);
   cdr.count(transforms.size());

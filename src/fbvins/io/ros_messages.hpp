@@ -17,6 +17,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/types/image.hpp"
+#include "fbvins/types/trajectory.hpp"
 
 namespace fbvins {
 
@@ -41,6 +42,9 @@ struct RosOdometry {
   Mat3 rate_covariance = Mat3::Zero();      ///< of w_WB_B
 };
 void append_odometry(std::string& out, const RosOdometry& odometry);
+
+/// nav_msgs/Path of poses in W.
+void append_path(std::string& out, Time t, const Trajectory<W>& path);
 
 struct RosTransform {
   std::string_view to, from;  ///< frames: takes coordinates in `from` to `to`, ROS's parent

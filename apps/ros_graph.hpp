@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// `fbvins live` in ROS 2's graph: what --ros2 and a source ros2:LEFT,RIGHT,IMU ask for. A program built without CycloneDDS
+// says so to whoever asks.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/live_system.hpp"
+#include "fbvins/live/make_source.hpp"
+
+namespace fbvins {
+class Ros2Node;
+}
+
+namespace fbvins::app {
+
+class RosGraph {
+ public:
+  /// `address`: DOMAIN[:INTERFACE], empty: publish nothing. `source`: the flight's source, of any kind.
+  static Result<RosGraph> join(const std::string& address, const std::string& source);
+
+  bool has_source() const { return !topics_.empty(); }
+  Result<std::unique_ptr<Source>> open_source(const SourceOptions& options) const;
+  Result<void> add_sink(const Source& source, LiveSystem& live) const;
+
+ private:
+  std::shared_ptr<Ros2Node> node_;
+  std::string topics_;
+  bool publishes_ = false;
+};
+
+}  // namespace fbvins::app

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "fbvins/io/ros_messages.hpp"
+#include "fbvins/live/live_event.hpp"
+
+namespace fbvins {
+
+/// The status of a live system as ROS 2's diagnostics have it: level, sentence, counters and latencies as values.
+RosDiagnostic diagnostic_of(const LiveStatus& status);
+
+}  // namespace fbvins

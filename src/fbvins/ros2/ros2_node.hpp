@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// A process in ROS 2's graph, by DDS alone: topics are named and typed as ROS 2's middleware does (rt/<name>,
+// <package>::msg::dds_::<Message>_), messages are the bytes of ros_messages.hpp.
+//
+//   auto node = Ros2Node::join({.domain = 0});
+//   auto odometry = Ros2Publisher::create(*node, "/fbvins/odometry", "nav_msgs/msg/Odometry");
+//   odometry->publish(bytes);
+//
+// Threads: a node from any, a publisher from one at a time, a subscriber's function on a thread of DDS.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "fbvins/core/result.hpp"
+
+struct ddsi_sertype;
+
+namespace fbvins {
+
+/// Which graph, and by which network.
+struct Ros2Address {
+  std::uint32_t domain = 0;    ///< ROS_DOMAIN_ID
+  std::string interface = {};  ///< of the network; empty: this machine alone (loopback)
+};
+/// DOMAIN[:INTERFACE], as in "0" or "42:eth0".
+Result<Ros2Address> parse_ros2_address(const std::string& text);
+
+/// A handle of CycloneDDS, deleted with all that it holds when its owner goes.
+class DdsEntity {
+ public:
+  DdsEntity() = default;
+  explicit DdsEntity(std::int32_t handle) : handle_(handle) {}
+  DdsEntity(DdsEntity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  DdsEntity& operator=(DdsEntity&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~DdsEntity();
+  std::int32_t handle() const { return handle_; }
+
+ private:
+  std::int32_t handle_ = 0;
+};
+
+class Ros2Node {
+ public:
+  static Result<std::shared_ptr<Ros2Node>> join(const Ros2Address& address);
+  std::int32_t participant() const { return participant_.handle(); }
+
+ private:
+  DdsEntity domain_, participant_;
+};
+
+/// Last values only for whoever comes late, or none; how many wait for a slow reader.
+struct Ros2Quality {
+  bool reliable = true;
+  bool latched = false;  ///< ROS's transient_local
+  int depth = 10;
+};
+
+class Ros2Publisher {
+ public:
+  /// `topic` as ROS names it ("/tf"), `type` as ROS names it ("tf2_msgs/msg/TFMessage").
+  static Result<Ros2Publisher> create(std::shared_ptr<Ros2Node> node, const std::string& topic, const std::string& type,
+                                      const Ros2Quality& quality = {});
+  /// `message` with its CDR header. A slow reliable reader holds it up for a tenth of a second at most.
+  Result<void> publish(std::string message) const;
+
+ private:
+  std::shared_ptr<Ros2Node> node_;
+  DdsEntity topic_, writer_;
+  const ddsi_sertype* type_ = nullptr;  // the topic's
+  std::string name_;
+};
+
+class Ros2Subscriber {
+ public:
+  /// The bytes stay where they are as long as `keeper` lives.
+  using OnMessage = std::function<void(std::string_view message, const std::shared_ptr<const void>& keeper)>;
+
+  /// As reliable as the topic's publisher offers; before one is there, best effort.
+  static Result<std::unique_ptr<Ros2Subscriber>> create(std::shared_ptr<Ros2Node> node, const std::string& topic,
+                                                        const std::string& type, int depth, OnMessage on_message);
+  ~Ros2Subscriber();
+  Ros2Subscriber(const Ros2Subscriber&) = delete;
+  Ros2Subscriber& operator=(const Ros2Subscriber&) = delete;
+
+  /// Publishers that deliver to it.
+  int publishers() const;
+  /// Takes up with a publisher of another reliability; to be called now and then by its owner.
+  Result<void> look_around();
+
+ private:
+  Ros2Subscriber() = default;
+  Result<void> listen(bool reliable);
+
+  std::shared_ptr<Ros2Node> node_;
+  std::string name_, type_;
+  int depth_ = 0;
+  bool reliable_ = false;
+  OnMessage on_message_;
+  DdsEntity topic_, offers_, reader_;
+};
+
+}  // namespace fbvins

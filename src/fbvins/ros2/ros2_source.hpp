@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sensors from ROS 2 topics: sensor_msgs/Image of two cameras (mono8) and sensor_msgs/Imu, as reliable as their publishers
+// offer them. Publishers come and go as they like.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "fbvins/live/make_source.hpp"
+#include "fbvins/live/source.hpp"
+#include "fbvins/ros2/ros2_node.hpp"
+#include "fbvins/ros2/stereo_pairs.hpp"
+
+namespace fbvins {
+
+struct Ros2Topics {
+  std::string left, right, imu;
+};
+/// LEFT,RIGHT,IMU: three names of topics, each beginning with /.
+Result<Ros2Topics> parse_ros2_topics(const std::string& text);
+
+class Ros2Source final : public Source {
+ public:
+  /// The calibration is a Kalibr file's (`options.dataset`): topics have none that is complete.
+  static Result<std::unique_ptr<Ros2Source>> open(std::shared_ptr<Ros2Node> node, const Ros2Topics& topics,
+                                                  const SourceOptions& options);
+
+  const StereoRig& rig() const override { return rig_; }
+  Result<void> run(SensorInput& input) override;
+  void stop() override { stopped_ = true; }
+
+ private:
+  Ros2Source(std::shared_ptr<Ros2Node> node, Ros2Topics topics, SourceOptions options, StereoRig rig)
+      : node_(std::move(node)), topics_(std::move(topics)), options_(std::move(options)), rig_(std::move(rig)) {}
+  void take_image(int camera, std::string_view bytes, const std::shared_ptr<const void>& keeper, SensorInput& input);
+  void take_imu(std::string_view bytes, SensorInput& input);
+  void say_once(const std::string& sentence);
+
+  std::shared_ptr<Ros2Node> node_;
+  Ros2Topics topics_;
+  SourceOptions options_;
+  StereoRig rig_;
+  std::atomic<bool> stopped_ = false;
+  std::mutex images_mutex_, say_mutex_;
+  StereoPairs pairs_;
+  std::set<std::string> said_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/ros2/stereo_pairs.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace fbvins {
+namespace {
+
+/// "2 3L 4R": frames by tens of milliseconds, alone where a letter says so.
+class Pairs {
+ public:
+  void left(double tens) { add(0, tens); }
+  void right(double tens) { add(1, tens); }
+  std::string given;
+
+ private:
+  void add(int camera, double tens) {
+    pairs_.add(camera, Time{static_cast<std::int64_t>(tens * 1e7)}, std::make_shared<Image>(1, 1));
+    while (const auto frame = pairs_.next()) {
+      given += (given.empty() ? "" : " ") + std::to_string(frame->t.ns / 10'000'000);
+      if (!frame->right) given += "L";
+      if (!frame->left) given += "R";
+    }
+  }
+  StereoPairs pairs_;
+};
+
+TEST(StereoPairs, PartnersMeetInEitherOrder) {
+  Pairs p;
+  p.left(1), p.right(1), p.right(2), p.left(2), p.left(3), p.right(3.1);
+  EXPECT_EQ(p.given, "1 2 3");
+}
+
+TEST(StereoPairs, OneCameraMayLagByAFrame) {
+  Pairs p;
+  p.left(1), p.left(2), p.right(1), p.left(3), p.right(2), p.right(3);
+  EXPECT_EQ(p.given, "1 2 3");
+}
+
+TEST(StereoPairs, ALostImageLeavesItsPartnerAlone) {
+  Pairs p;
+  p.left(1), p.right(1), p.left(2), p.left(3), p.right(3), p.right(4), p.left(5), p.right(5);
+  EXPECT_EQ(p.given, "1 2L 3 4R 5");
+}
+
+TEST(StereoPairs, ASilentCameraDelaysTheOtherBoundedly) {
+  Pairs p;
+  for (int k = 1; k <= 8; ++k) p.right(k);
+  EXPECT_EQ(p.given, "1R 2R 3R 4R 5R");
+  p.left(8);
+  EXPECT_EQ(p.given, "1R 2R 3R 4R 5R 6R 7R 8");
+}
+
+TEST(StereoPairs, AStampThatGoesBackIsDropped) {
+  Pairs p;
+  p.left(3), p.left(2), p.left(3), p.right(3);
+  EXPECT_EQ(p.given, "3");
+}
+
+}  // namespace
+}  // namespace fbvins

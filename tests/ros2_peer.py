@@ -1,0 +1,212 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`fbvins live` in ROS 2's graph beside another implementation of DDS: CycloneDDS' Python package publishes a flight's images and
+readings and reads what comes back; `rosbags` writes the same values, which must be the same bytes.
+
+usage: ros2_peer.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
+exit 77 (skipped) where cyclonedds and rosbags are not installed, or FBVINS was built without CycloneDDS
+"""
+import csv
+import dataclasses
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from types import new_class
+
+try:
+    import cyclonedds._clayer as clayer  # bytes, not values
+    import numpy as np
+    from cyclonedds import core, domain, pub, qos, sub, topic
+    from cyclonedds.idl import IdlStruct, types
+    from mcap.reader import make_reader
+    from rosbags.typesys import Stores, get_typestore
+    from ruamel.yaml import YAML
+except ImportError as missing:
+    if len(sys.argv) > 2 and pathlib.Path(sys.argv[2]).exists():
+        os.execv(sys.argv[2], [sys.argv[2], __file__, sys.argv[1]])
+    print(f"skipped: cyclonedds and rosbags are not installed ({missing}); ./dev test installs them where PyPI can be reached")
+    sys.exit(77)
+
+DOMAIN = 100 + os.getpid() % 100
+LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
+            "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>")
+IMAGE_RATE_HZ = 30
+SECONDS = 8
+TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
+         "/fbvins/odometry": "nav_msgs/msg/Odometry", "/fbvins/path": "nav_msgs/msg/Path", "/tf": "tf2_msgs/msg/TFMessage",
+         "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+
+
+class Failure(Exception):
+    pass
+
+
+def require(fact, sentence):
+    if not fact:
+        raise Failure(sentence)
+
+
+def bytes_topic(participant, name):
+    """A topic by the names that ROS 2's middleware gives it. Its values are written and taken as bytes."""
+    package, message = TYPES[name].split("/msg/")
+    kind = new_class(message + "_", (IdlStruct,), {"typename": f"{package}.msg.dds_.{message}_"}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
+    return topic.Topic(participant, "rt" + name, dataclasses.dataclass(kind))
+
+
+def reliable(depth):
+    return qos.Qos(qos.Policy.Reliability.Reliable(max_blocking_time=10**9), qos.Policy.History.KeepLast(depth))
+
+
+class Listener(threading.Thread):
+    """Takes all that comes on the flight's topics, as bytes."""
+
+    def __init__(self, participant, names):
+        super().__init__(daemon=True)
+        self.readers = {name: sub.DataReader(participant, bytes_topic(participant, name), qos=reliable(5000)) for name in names}
+        self.messages = {name: [] for name in names}
+        self.ended = threading.Event()
+
+    def run(self):
+        while not self.ended.wait(0.01):
+            for name, reader in self.readers.items():
+                taken = clayer.ddspy_take(reader._ref, core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any, 1000)
+                self.messages[name] += [data for data, info in taken if info.valid_data]
+
+
+def kalibr_files(flight, folder):
+    """The recording's calibration in Kalibr's form."""
+    yaml = YAML(typ="safe")
+
+    def load(sensor):
+        text = (flight / "mav0" / sensor / "sensor.yaml").read_text(encoding="utf-8")
+        return yaml.load("\n".join(line for line in text.splitlines() if not line.startswith("%")))
+
+    chain = {}
+    for camera in ("cam0", "cam1"):
+        s = load(camera)
+        T_BC = np.array(s["T_BS"]["data"], float).reshape(4, 4)
+        chain[camera] = {"camera_model": "pinhole", "intrinsics": s["intrinsics"], "distortion_model": "radtan",
+                         "distortion_coeffs": s["distortion_coefficients"], "resolution": s["resolution"],
+                         "T_cam_imu": np.linalg.inv(T_BC).tolist()}
+    s = load("imu0")
+    imu = {"imu0": {"rostopic": "/imu", "update_rate": s["rate_hz"], "accelerometer_noise_density": s["accelerometer_noise_density"],
+                    "accelerometer_random_walk": s["accelerometer_random_walk"], "gyroscope_noise_density": s["gyroscope_noise_density"],
+                    "gyroscope_random_walk": s["gyroscope_random_walk"]}}
+    for name, value in (("camchain.yaml", chain), ("imu.yaml", imu)):
+        with open(folder / name, "w", encoding="utf-8") as file:
+            YAML().dump(value, file)
+
+
+def wait_until(fact, what, seconds=60):
+    end = time.monotonic() + seconds
+    while not fact():
+        require(time.monotonic() < end, f"{what} did not happen within {seconds} s")
+        time.sleep(0.02)
+
+
+def publish(participant, record):
+    """The record's messages at the pace of their stamps."""
+    writers = {name: pub.DataWriter(participant, bytes_topic(participant, name), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
+    with open(record, "rb") as file:
+        messages = [(channel.topic, message.log_time, message.data) for _, channel, message in make_reader(file).iter_messages(topics=list(writers))]
+    for name, writer in writers.items():
+        wait_until(lambda w=writer: len(w.get_matched_subscriptions()) > 0, f"a subscription of {name}")
+    time.sleep(0.5)  # the other end's readers change to reliable ones when they see these
+    start, first = time.monotonic(), messages[0][1]
+    for name, stamp_ns, data in messages:
+        time.sleep(max(0.0, (stamp_ns - first) * 1e-9 - (time.monotonic() - start)))
+        require(clayer.ddspy_write(writers[name]._ref, data.ljust((len(data) + 3) & ~3, b"\0")) >= 0, f"a message of {name} could not be written")
+    return sum(name == "/camera/left" for name, _, _ in messages)
+
+
+def check_bytes(messages):
+    """What rosbags writes for the values it reads is what was sent."""
+    for name, all_of_it in messages.items():
+        require(all_of_it, f"nothing came on {name}")
+        for data in random.Random(1).sample(all_of_it, min(len(all_of_it), 200)):
+            value = STORE.deserialize_cdr(data, TYPES[name])
+            again = bytes(STORE.serialize_cdr(value, TYPES[name]))
+            require(again == bytes(data[:len(again)]) and not any(data[len(again):]), f"{name}: other bytes than rosbags writes for the same values")
+
+
+def check_values(messages, out):
+    with open(out / "live_tum.txt", encoding="utf-8") as file:
+        poses = {round(float(row[0]) * 1e9): [float(x) for x in row[1:]] for row in csv.reader(file, delimiter=" ") if row[0] != "#"}
+    count = 0
+    for data in messages["/fbvins/odometry"]:
+        m = STORE.deserialize_cdr(data, TYPES["/fbvins/odometry"])
+        require((m.header.frame_id, m.child_frame_id) == ("odom", "body"), "frames of the odometry")
+        p, q = m.pose.pose.position, m.pose.pose.orientation
+        stamp = m.header.stamp.sec * 10**9 + m.header.stamp.nanosec
+        nearest = min((abs(t - stamp), t) for t in poses)
+        require(nearest[0] < 1000, "an odometry message whose pose is in no file")
+        require(np.allclose([p.x, p.y, p.z, q.x, q.y, q.z, q.w], poses[nearest[1]], atol=1e-8), "a pose other than in live_tum.txt")
+        count += 1
+        if count >= 100:
+            break
+    require(len(messages["/fbvins/odometry"]) >= 0.95 * len(poses), "odometry at IMU rate")
+    transforms = STORE.deserialize_cdr(messages["/tf"][-1], TYPES["/tf"]).transforms
+    require([(t.header.frame_id, t.child_frame_id) for t in transforms] == [("odom", "body")], "the transform odom -> body")
+    status = [STORE.deserialize_cdr(data, TYPES["/diagnostics"]).status[0] for data in messages["/diagnostics"]]
+    require(any(s.message == "good" for s in status) and all(any(v.key == "images_dropped" for v in s.values) for s in status), "diagnostics")
+
+
+def fly(program, folder):
+    flight, record, out = folder / "flight", folder / "flight.mcap", folder / "out"
+    subprocess.run([program, "simulate", "normal", "--seconds", str(SECONDS), "--seed", "1", "--quiet", "--set", f"image_rate_hz={IMAGE_RATE_HZ}", "--out", flight],
+                   check=True, timeout=600)
+    subprocess.run([program, "live", "--source", f"replay:{flight}", "--preload", "--quiet", "--record", record], check=True, timeout=600)
+    kalibr_files(flight, folder)
+    os.environ["CYCLONEDDS_URI"] = LOOPBACK
+    participant = domain.DomainParticipant(DOMAIN)
+    listener = Listener(participant, ["/fbvins/odometry", "/fbvins/path", "/tf", "/diagnostics"])
+    listener.start()
+    with open(folder / "log.txt", "w", encoding="utf-8") as log:
+        live = subprocess.Popen([program, "live", "--source", "ros2:/camera/left,/camera/right,/imu", "--ros2", str(DOMAIN), "--calibration", folder / "camchain.yaml",
+                                 "--imu-calibration", folder / "imu.yaml", "--out", out, "--quiet"], stderr=log)
+        try:
+            images = publish(participant, record)
+            time.sleep(1)
+            live.send_signal(signal.SIGINT)
+            require(live.wait(timeout=60) == 0, "fbvins live did not end well: " + (folder / "log.txt").read_text(encoding="utf-8"))
+        finally:
+            live.kill()
+    listener.ended.set()
+    listener.join()
+    said = (folder / "log.txt").read_text(encoding="utf-8")
+    require(said == "", "it said: " + said)
+    counts = json.loads((out / "summary.json").read_text(encoding="utf-8"))["live"]
+    require(counts["images"] == images, f"{images} images were sent and {counts['images']} arrived")
+    require(counts["images_incomplete"] == 0, f"{counts['images_incomplete']} images arrived without their partner")
+    print(f"{images} stereo images at {IMAGE_RATE_HZ} Hz: {counts['images']} arrived, {counts['images_dropped']} dropped; "
+          f"{', '.join(f'{len(m)} messages on {name}' for name, m in listener.messages.items())}")
+    check_bytes(listener.messages)
+    check_values(listener.messages, out)
+
+
+def main():
+    program = sys.argv[1]
+    probe = subprocess.run([program, "live", "--source", "ros2:/a,/b,/c"], capture_output=True, text=True, timeout=60, check=False)
+    if "built without CycloneDDS" in probe.stderr:
+        print("skipped: the program was built without CycloneDDS")
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            fly(program, pathlib.Path(folder))
+        except Failure as failure:
+            print(f"FAIL: {failure}")
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
