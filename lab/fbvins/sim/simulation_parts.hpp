@@ -11,9 +11,6 @@ namespace fbvins {
 inline constexpr Time kSimulationStart{1'700'000'000'000'000'000};  ///< stamp of a made-up flight's first IMU sample
 inline constexpr double kMargin_s = 0.05;                           ///< IMU before the first and after the last image
 
-/// The calibration that the options name, with their rate and time offset.
-Result<StereoRig> simulated_rig(const SimulationOptions& options);
-
 /// When images are taken, s from the start; lost frames are left out. One owner.
 class FrameTimes {
  public:

@@ -71,6 +71,9 @@ Result<SimulationOptions> simulation_preset(const std::string& name);
 /// The rig of EuRoC's calibration (figures, not files).
 StereoRig euroc_rig();
 
+/// The calibration that the options name, with their rate and time offset.
+Result<StereoRig> simulated_rig(const SimulationOptions& options);
+
 /// A stereo frame with what only a simulator knows.
 struct DrawnFrame {
   StereoFrame frame;

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The flight controller: odometry, IMU and barometer in, four motors out. It knows nothing else: where the vehicle truly is never
+// comes near it. The pose between images is the newest estimate propagated by the IMU, as `fbvins live` gives it to any
+// controller.
+//
+//   Autopilot autopilot(mission, settings, rig);
+//   autopilot.add(odometry);                              // when it becomes known
+//   PerRotor commands = autopilot.update(reading);        // every reading
+//   log(autopilot.output());
+//
+// Threads: one owner.
+#pragma once
+
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/flight/controller.hpp"
+#include "fbvins/flight/failsafe.hpp"
+#include "fbvins/flight/floor_level.hpp"
+#include "fbvins/flight/guide.hpp"
+#include "fbvins/flight/inertial_reference.hpp"
+#include "fbvins/flight/mission.hpp"
+#include "fbvins/live/pose_propagator.hpp"
+#include "fbvins/types/loop.hpp"
+
+namespace fbvins {
+
+/// What the autopilot made of one reading.
+struct AutopilotOutput {
+  Time t;
+  FlightMode mode = FlightMode::waiting;
+  FlightReason reason = FlightReason::none;
+  Health health;              ///< the odometry's
+  double estimate_age_s = 0;  ///< since the image of the newest estimate
+  VehicleEstimate estimate;   ///< flown by
+  PathSetpoint setpoint;
+  ControlTrace control;
+  std::size_t step = 0;  ///< of the mission
+};
+
+class Autopilot {
+ public:
+  Autopilot(const Mission& mission, const ControlOptions& options, const StereoRig& rig, const Pose<BodyFlu, B>& mounting);
+
+  void add(const Odometry& odometry);
+  /// Where W is in the map, where there is one: the mission is flown in the map's frame then.
+  void add(const MapUpdate& update);
+  void add_barometer(double height_m) { reference_.correct(height_m); }
+  /// Commands until the next reading.
+  PerRotor update(const ImuSample& reading);
+
+  const AutopilotOutput& output() const { return out_; }
+  /// From W to L; none before take-off.
+  const std::optional<Pose<Local, W>>& local_from_odometry() const { return T_LW_; }
+
+ private:
+  VehicleEstimate in_local(const LivePose& pose) const;
+  void anchor(const LivePose& pose);
+  void level();
+  PerRotor act(double dt_s);
+  void watch_ground(double dt_s);
+
+  Pose<BodyFlu, B> mounting_;
+  double rate_hz_;
+  std::optional<Geofence> fence_;
+  ControlOptions options_;
+  PosePropagator propagator_;
+  CascadeController controller_;
+  Guide guide_;
+  Failsafe failsafe_;
+  InertialReference reference_;
+  FloorLevel floor_;
+  Odometry newest_;  ///< with a pose
+  Pose<M, W> T_MW_;
+  std::optional<Pose<Local, M>> T_LM_;  ///< heading and place alone: where both are level
+  std::optional<Pose<Local, W>> T_LW_;
+  std::uint32_t reset_counter_ = 0;
+  std::optional<Time> last_t_;
+  double spooling_s_ = 0, still_s_ = 0;
+  bool on_ground_ = false;
+  AutopilotOutput out_;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/flight/closed_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <numbers>
+
+#include "fbvins/core/options.hpp"
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/sensor_station.hpp"
+
+namespace fbvins {
+namespace {
+
+/// The IMU before and above the centre of mass.
+const Vec3 kImuOnVehicle_m(0.04, 0, 0.03);
+constexpr double kHistory_s = 0.06;
+constexpr int kCollisionEvery_steps = 10;
+constexpr double kAfterwards_s = 1.0;  ///< flown on after the last step, or stood after landing
+constexpr double kHardLanding_mps = 1.5, kTippedOver = 0.8;
+constexpr double kTimeToSpare_s = 120;
+
+/// Motion of the last moments, a state a millisecond.
+class MotionHistory {
+ public:
+  void add(double t_s, const MotionState& m) {
+    states_.push_back({t_s, m});
+    while (states_.front().t_s < t_s - kHistory_s) states_.pop_front();
+  }
+  MotionState at(double t_s) const {
+    auto after = std::lower_bound(states_.begin(), states_.end(), t_s, [](const Entry& e, double t) { return e.t_s < t; });
+    if (after == states_.begin()) return after->m;
+    if (after == states_.end()) return states_.back().m;
+    const Entry &a = *(after - 1), &b = *after;
+    const double s = (t_s - a.t_s) / (b.t_s - a.t_s);
+    MotionState m = b.m;
+    m.T_WB = {a.m.T_WB.q.slerp(s, b.m.T_WB.q), Vec3((1 - s) * a.m.T_WB.p + s * b.m.T_WB.p)};
+    m.v_WB = (1 - s) * a.m.v_WB + s * b.m.v_WB;
+    m.w_WB_B = (1 - s) * a.m.w_WB_B + s * b.m.w_WB_B;
+    return m;
+  }
+
+ private:
+  struct Entry {
+    double t_s;
+    MotionState m;
+  };
+  std::deque<Entry> states_;
+};
+
+/// Nobody mounts an IMU, or bends legs, as exactly as the autopilot believes.
+Pose<BodyFlu, B> askew(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
+  Rng rng(static_cast<std::uint64_t>(setup.simulation.seed), 73);
+  const double sigma = setup.mounting_error_deg * std::numbers::pi / 180, x = rng.normal(), y = rng.normal(), z = rng.normal();
+  return {(so3_exp(sigma * Vec3(x, y, z)) * mounting.q).normalized(), mounting.p};
+}
+
+double hover_radps(const QuadrotorOptions& o) {
+  return std::sqrt(o.mass_kg * kSimGravity_mps2 / (kRotors * o.thrust_N_per_radps2));
+}
+
+/// Time that the mission takes at a tenth of its speed.
+double longest_flight_s(const Mission& mission) {
+  double seconds = kTimeToSpare_s;
+  const std::vector<PlannedPlace> places = planned_places(mission);
+  const double slowest = std::min({mission.limits.speed_mps, mission.limits.climb_mps, mission.limits.land_mps});
+  for (std::size_t i = 1; i < places.size(); ++i) seconds += 2 * (places[i].p - places[i - 1].p).norm() / slowest;
+  for (const MissionStep& step : mission.steps) seconds += 10 + 2 * step.seconds;
+  return seconds;
+}
+
+class ClosedLoop {
+ public:
+  ClosedLoop(const FlightSetup& setup, const MissionSite& site, SensorStation station, std::unique_ptr<EstimatorLink> link)
+      : setup_(setup),
+        station_(std::move(station)),
+        link_(std::move(link)),
+        mounting_(askew(imu_mounting(station_.rig(), setup.simulation.flight.camera_pitch_deg), setup)),
+        vehicle_(setup.vehicle, standing_at(site.origin_W.head<2>(), site.heading_rad, setup.vehicle)),
+        start_(vehicle_.state().T_WV),
+        wind_(setup.wind, static_cast<std::uint64_t>(setup.simulation.seed)),
+        barometer_(setup.barometer, static_cast<std::uint64_t>(setup.simulation.seed)),
+        collisions_(station_.world(), hull_of(setup.vehicle)),
+        autopilot_(setup.mission, setup.control, station_.rig(),
+                   imu_mounting(station_.rig(), setup.simulation.flight.camera_pitch_deg)),
+        steps_per_reading_(
+            std::max(1, static_cast<int>(std::lround(1 / (Quadrotor::kStep_s * station_.rig().imu_noise.rate_hz))))) {}
+
+  Result<FlightLog> run(const std::function<void(double, FlightMode)>& progress) {
+    if (!setup_.recording.empty()) {
+      Result<EurocFolder> folder = EurocFolder::create(setup_.recording, station_.rig());
+      if (!folder) return folder.error();
+      recording_.emplace(std::move(*folder));
+    }
+    const auto last = static_cast<std::int64_t>(longest_flight_s(setup_.mission) / Quadrotor::kStep_s);
+    for (step_ = 0; !over_ && step_ < last; ++step_) {
+      history_.add(now_s(), vehicle_.motion_of(mounting_));
+      if (Result<void> done = look(); !done) return done.error();
+      if (step_ % steps_per_reading_ == 0) {
+        if (Result<void> done = feel(); !done) return done.error();
+        if (progress) progress(now_s(), autopilot_.output().mode);
+      }
+      vehicle_.step(commands_, wind_.step(Quadrotor::kStep_s, vehicle_.state().T_WV.p.z()));
+      watch();
+    }
+    log_.start = start_;
+    log_.out_of_time = !over_;
+    if (Result<void> done = link_->finish(); !done) return done.error();
+    if (recording_)
+      if (Result<void> done = recording_->finish(log_.imu); !done) return done.error();
+    log_.mode = autopilot_.output().mode;
+    log_.reason = autopilot_.output().reason;
+    return std::move(log_);
+  }
+
+ private:
+  static VehicleHull hull_of(const QuadrotorOptions& o) {
+    return {.radius_m = std::hypot(o.arm_x_m, o.arm_y_m) + o.rotor_radius_m, .half_height_m = 0.12};
+  }
+  double now_s() const { return static_cast<double>(step_) * Quadrotor::kStep_s; }
+  bool failed(MissionFault::What what) const {
+    if (!airborne_s_) return false;
+    const double t = now_s() - *airborne_s_;
+    return std::any_of(setup_.mission.faults.begin(), setup_.mission.faults.end(), [&](const MissionFault& f) {
+      return f.what == what && t >= f.at_s && (f.for_s == 0 || t < f.at_s + f.for_s);
+    });
+  }
+
+  /// Images whose exposure is over.
+  Result<void> look() {
+    while (now_s() > station_.next_image_s() + 0.5 * station_.longest_exposure_s()) {
+      DrawnFrame drawn = station_.draw([this](double t) { return history_.at(t); });
+      ++log_.images;
+      const StereoFrame frame = drawn.frame;
+      if (recording_)
+        if (Result<void> done = recording_->add(std::move(drawn)); !done) return done;
+      if (failed(MissionFault::What::cameras)) continue;
+      if (Result<void> done = link_->push(frame); !done) return done;
+    }
+    return {};
+  }
+
+  /// One reading, and what follows from it.
+  Result<void> feel() {
+    PerRotor shares = vehicle_.state().rotor_radps;
+    for (double& w : shares) w /= hover_radps(setup_.vehicle);
+    const ImuSample reading = station_.read_imu(vehicle_.motion_of(mounting_), shares);
+    log_.imu.samples.push_back(reading);
+    log_.imu.truth.push_back(station_.truth());
+    if (Result<void> done = link_->push(reading); !done) return done;
+    const Duration delay = Duration::from_seconds(setup_.estimate_delay_s + station_.rig().time_offset_s);
+    Result<std::vector<KnownEstimate>> known = link_->known_at(reading.t - delay);
+    if (!known) return known.error();
+    for (const KnownEstimate& estimate : *known) {
+      log_.odometry.push_back(estimate.odometry);
+      if (failed(MissionFault::What::odometry)) continue;
+      autopilot_.add(estimate.odometry);
+      for (const MapUpdate& update : estimate.updates) autopilot_.add(update);
+    }
+    if (now_s() >= next_barometer_s_) {
+      autopilot_.add_barometer(barometer_.read(vehicle_.state().T_WV.p.z()));
+      next_barometer_s_ += 1 / Barometer::kRate_hz;
+    }
+    commands_ = autopilot_.update(reading);
+    if (!airborne_s_ && autopilot_.output().mode == FlightMode::mission) airborne_s_ = now_s();
+    write_row();
+    return {};
+  }
+
+  void write_row() {
+    const QuadrotorState& s = vehicle_.state();
+    const Pose<BodyFlu, W> T_LW = start_.inverse();
+    FlightRow row;
+    row.t_s = now_s();
+    row.truth = (T_LW * s.T_WV).cast_frames<Local, BodyFlu>();
+    row.true_velocity = T_LW.q * s.v_WV;
+    row.autopilot = autopilot_.output();
+    row.rotor_radps = s.rotor_radps;
+    row.battery_V = vehicle_.battery_V();
+    log_.rows.push_back(row);
+  }
+
+  /// Whether it is over: by plan, or because something is in the way.
+  void watch() {
+    const AutopilotOutput& out = autopilot_.output();
+    const QuadrotorState& s = vehicle_.state();
+    const bool done = out.mode == FlightMode::landed || (airborne_s_ && out.step >= setup_.mission.steps.size());
+    afterwards_s_ = done ? afterwards_s_ + Quadrotor::kStep_s : 0;
+    over_ = afterwards_s_ > kAfterwards_s;
+    if (!airborne_s_ || step_ % kCollisionEvery_steps != 0) return;
+    if (const std::optional<Vec3> place = collisions_.touched_at(s.T_WV.p))
+      crash(fmt::format("touched something at ({:.2f}, {:.2f}, {:.2f}) of the world", place->x(), place->y(), place->z()));
+    const double up = (s.T_WV.q * Vec3::UnitZ()).z();
+    if (vehicle_.on_ground() && up < kTippedOver) crash("tipped over on the floor");
+    if (vehicle_.on_ground() && !was_on_ground_ && falling_mps_ > kHardLanding_mps)
+      crash(fmt::format("met the floor at {:.1f} m/s", falling_mps_));
+    was_on_ground_ = vehicle_.on_ground();
+    falling_mps_ = -s.v_WV.z();
+  }
+  void crash(const std::string& what) {
+    if (log_.crash) return;
+    log_.crash = fmt::format("{} after {:.2f} s", what, now_s());
+    over_ = true;
+  }
+
+  const FlightSetup& setup_;
+  SensorStation station_;
+  std::unique_ptr<EstimatorLink> link_;
+  Pose<BodyFlu, B> mounting_;
+  Quadrotor vehicle_;
+  Pose<W, BodyFlu> start_;
+  Wind wind_;
+  Barometer barometer_;
+  CollisionCheck collisions_;
+  Autopilot autopilot_;
+  int steps_per_reading_;
+  MotionHistory history_;
+  std::optional<EurocFolder> recording_;
+  FlightLog log_;
+  PerRotor commands_{};
+  std::int64_t step_ = 0;
+  std::optional<double> airborne_s_;  ///< since when the mission runs
+  double next_barometer_s_ = 0, afterwards_s_ = 0, falling_mps_ = 0;
+  bool was_on_ground_ = true, over_ = false;
+};
+
+}  // namespace
+
+ControlOptions control_for(const QuadrotorOptions& vehicle) {
+  ControlOptions control;
+  const double full_N = kRotors * vehicle.thrust_N_per_radps2 * vehicle.rotor_max_radps * vehicle.rotor_max_radps;
+  control.position.MPC_THR_HOVER = vehicle.mass_kg * kSimGravity_mps2 / full_N;
+  control.THR_MDL_FAC = vehicle.command_is_thrust ? 0 : 1;
+  // Tuned for holding a place indoors: stiffer than PX4's defaults, which are for the wind and GPS of outdoors.
+  control.position.MPC_XY_P = control.position.MPC_Z_P = 1.5;
+  control.position.MPC_XY_VEL_P_ACC = 3.0;
+  control.position.MPC_XY_VEL_I_ACC = 1.5;
+  return control;
+}
+
+Pose<BodyFlu, B> imu_mounting(const StereoRig& rig, double camera_pitch_deg) {
+  return {body_in_vehicle(rig, camera_pitch_deg), kImuOnVehicle_m};
+}
+
+Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double, FlightMode)>& progress) {
+  for (const Result<void>& valid :
+       {validate(setup.vehicle), validate(setup.control), validate(setup.wind), validate(setup.barometer)})
+    if (!valid) return valid.error();
+  const SimulationOptions& o = setup.simulation;
+  const PlaceDefaults defaults{o.world.kind, o.world.margin_m, o.world.height_m, o.flight.extent_x_m, o.flight.extent_y_m};
+  const double standing_m = standing_at({0, 0}, 0, setup.vehicle).T_WV.p.z();
+  const Result<MissionSite> site = site_of(setup.mission, defaults, standing_m);
+  if (!site) return site.error();
+  std::vector<Vec3> path;
+  for (const PlannedPlace& place : planned_places(setup.mission)) path.push_back(site->to_world(place.p));
+  SimulationOptions options = o;
+  options.world.kind = setup.mission.place.kind.empty() ? o.world.kind : setup.mission.place.kind;
+  Result<SensorStation> station = SensorStation::create(options, site->plan, path);
+  if (!station) return station.error();
+  Result<std::unique_ptr<EstimatorLink>> link = EstimatorLink::create(setup.estimator, station->rig());
+  if (!link) return link.error();
+  return ClosedLoop(setup, *site, *std::move(station), *std::move(link)).run(progress);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/flight/mission.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kStep_m = 0.25;  ///< of the places along the way
+/// From the centre to whatever sticks out furthest, and what an estimate and a gust may add.
+constexpr double kWallClearance_m = 0.45, kCeilingClearance_m = 0.3;
+
+FloorPlan plan_of(const Mission& mission, const PlaceDefaults& defaults, const std::vector<Vec3>& path_W) {
+  const MissionPlace& place = mission.place;
+  const std::string kind = place.kind.empty() ? defaults.kind : place.kind;
+  if (kind == "corridors") {
+    const Vec3 size = place.size_m.value_or(Vec3(defaults.extent_x_m, defaults.extent_y_m, defaults.height_m));
+    return corridor_ring(size.x(), size.y(), std::max(size.z(), 2.6));
+  }
+  if (!place.size_m) return room_around(path_W, defaults.margin_m, defaults.height_m);
+  const Vec3 half = 0.5 * *place.size_m;
+  FloorPlan plan;
+  plan.rooms = {{-half.x(), -half.y(), half.x(), half.y()}};
+  plan.height_m = place.size_m->z();
+  return plan;
+}
+
+/// Nothing within the clearance is wall.
+bool is_clear(const FloorPlan& plan, const Vec3& p) {
+  for (int k = 0; k < 16; ++k) {
+    const double angle = k * 3.14159265358979 / 8;
+    if (!plan.inside(p.x() + kWallClearance_m * std::cos(angle), p.y() + kWallClearance_m * std::sin(angle))) return false;
+  }
+  return plan.inside(p.x(), p.y());
+}
+
+std::string place_text(const Vec3& p) { return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z()); }
+
+}  // namespace
+
+std::vector<PlannedPlace> planned_places(const Mission& mission) {
+  std::vector<PlannedPlace> places{{Vec3::Zero(), 0}};
+  const auto go = [&](const Vec3& to, int step) {
+    const Vec3 from = places.back().p;
+    const int n = std::max(1, static_cast<int>(std::ceil((to - from).norm() / kStep_m)));
+    for (int k = 1; k <= n; ++k) places.push_back({from + (to - from) * k / n, step});
+  };
+  for (std::size_t i = 0; i < mission.steps.size(); ++i) {
+    const MissionStep& step = mission.steps[i];
+    const int index = static_cast<int>(i);
+    if (step.kind == MissionStep::Kind::takeoff) go(Vec3(0, 0, step.height_m), index);
+    for (const Vec3& p : step.points) go(p, index);
+    if (step.kind == MissionStep::Kind::land) go(Vec3(places.back().p.x(), places.back().p.y(), 0), index);
+  }
+  return places;
+}
+
+Result<MissionSite> site_of(const Mission& mission, const PlaceDefaults& defaults, double standing_height_m) {
+  MissionSite site;
+  site.origin_W = Vec3(mission.place.start_m.x(), mission.place.start_m.y(), standing_height_m);
+  site.heading_rad = mission.place.heading_rad;
+  const std::vector<PlannedPlace> places = planned_places(mission);
+  std::vector<Vec3> path_W;
+  for (const PlannedPlace& place : places) path_W.push_back(site.to_world(place.p));
+  site.plan = plan_of(mission, defaults, path_W);
+
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const MissionStep& step = mission.steps[static_cast<std::size_t>(places[i].step)];
+    const auto wrong = [&](const std::string& what) {
+      return Error{ErrorCode::invalid_argument,
+                   fmt::format("{}:{}: {} at {}", mission.source, step.line, what, place_text(places[i].p))};
+    };
+    if (!is_clear(site.plan, path_W[i])) return wrong("the way leads through a wall, or too near to one,");
+    if (path_W[i].z() > site.plan.height_m - kCeilingClearance_m) return wrong("the way leads too near to the ceiling");
+    if (mission.geofence && i > 0 && places[i].p.z() > 0 && !mission.geofence->contains(places[i].p))
+      return wrong("the way leads out of the geofence");
+  }
+  return site;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// A barometer as height: noise of its own, and weather and temperature that make it wander. One owner.
+//
+//   Barometer barometer(options, seed);
+//   double height_m = barometer.read(true_height_m);   // every 1 / Barometer::kRate_hz seconds
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+
+struct BarometerOptions {
+  double noise_m = 0.08;
+  double wander_m_rts = 0.02;
+
+  template <class V>
+  void visit(V&& v) {
+    v("noise_m", noise_m, "m", "standard deviation of a reading", 0.0, 10.0);
+    v("wander_m_rts", wander_m_rts, "m/sqrt(s)", "random walk of its zero", 0.0, 10.0);
+  }
+};
+
+class Barometer {
+ public:
+  static constexpr double kRate_hz = 50;
+
+  Barometer(const BarometerOptions& options, std::uint64_t seed) : options_(options), rng_(seed, 72) {
+    zero_m_ = rng_.uniform(-50, 50);  // nobody knows the pressure at the floor
+  }
+  double read(double true_height_m) {
+    zero_m_ += options_.wander_m_rts / std::sqrt(kRate_hz) * rng_.normal();
+    return true_height_m + zero_m_ + options_.noise_m * rng_.normal();
+  }
+
+ private:
+  BarometerOptions options_;
+  Rng rng_;
+  double zero_m_ = 0;
+};
+
+}  // namespace fbvins
