@@ -18,6 +18,7 @@ enum ExitCode : int {
 
 /// What the help of `fbvins` says of commands that another program holds.
 inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
+inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 
 void add_run_command(CLI::App& program, int& exit_code);
@@ -27,6 +28,7 @@ void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);
 void add_report_command(CLI::App& program, int& exit_code);
 void add_bench_command(CLI::App& program, int& exit_code);
+void add_fly_command(CLI::App& program, int& exit_code);
 void add_live_command(CLI::App& program, int& exit_code);
 void add_map_command(CLI::App& program, int& exit_code);
 void add_vocab_command(CLI::App& program, int& exit_code);

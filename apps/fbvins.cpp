@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
       {
           {"live", kLiveDescription, "fbvins-live"},
 #ifdef FBVINS_WITH_LAB
+          {"fly", kFlyDescription, "fbvins-lab"},
           {"bench", kBenchDescription, "fbvins-lab"},
 #endif
       });

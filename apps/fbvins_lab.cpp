@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// fbvins-lab, to which `fbvins` hands experiments.
+// fbvins-lab, to which `fbvins` hands flights and experiments.
 #include "apps/command_line.hpp"
 
-int main(int argc, char** argv) { return fbvins::app::run_command_line(argc, argv, {fbvins::app::add_bench_command}); }
+int main(int argc, char** argv) {
+  using namespace fbvins::app;
+  return run_command_line(argc, argv, {add_fly_command, add_bench_command});
+}

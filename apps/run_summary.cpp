@@ -108,16 +108,22 @@ Trajectory<W> truth_of(const Dataset& data) {
 }
 
 RunSummary summarise(const RunRecord& record, const Dataset& data) {
-  RunSummary s;
-  s.dataset = data.info().name;
-  s.frames = static_cast<int>(record.tracked.size());
-  s.images_bad = data.info().left.images.bad() + data.info().right.images.bad();
-  std::vector<Time> images, poses;
+  std::vector<Time> images;
   for (const FrameEntry& frame : data.frames()) images.push_back(frame.t);
+  RunSummary s = summarise(record, std::move(images), truth_of(data));
+  s.dataset = data.info().name;
+  s.images_bad = data.info().left.images.bad() + data.info().right.images.bad();
+  return s;
+}
+
+RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Trajectory<W>& truth) {
+  RunSummary s;
+  s.frames = static_cast<int>(record.tracked.size());
+  std::vector<Time> poses;
   for (const StampedPose<W>& pose : record.poses()) poses.push_back(pose.t);
   s.coverage = coverage_of(std::move(images), std::move(poses));
   count_health(record, s);
-  if (data.has_ground_truth()) evaluate_against(truth_of(data), record, s);
+  if (!truth.empty()) evaluate_against(truth, record, s);
   else s.no_evaluation = "the recording holds no ground truth";
   for (const TrackedRecord& tracked : record.tracked) {
     s.frontend_ms.push_back(tracked.stats.total_ms());

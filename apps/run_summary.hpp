@@ -40,6 +40,8 @@ double peak_memory_mb();
 /// The recording's ground truth as a trajectory; empty where there is none.
 Trajectory<W> truth_of(const Dataset& data);
 RunSummary summarise(const RunRecord& record, const Dataset& data);
+/// The same where there is no recording: stamps of all images, and the truth if it is known.
+RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Trajectory<W>& truth);
 std::string to_json_text(const RunSummary& summary);
 std::string to_text(const RunSummary& summary);
 

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/flight_report.hpp"
+#include "apps/progress.hpp"
+#include "apps/run_summary.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/config/config_file.hpp"
+#include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/yaml.hpp"
+#include "fbvins/frontend/survival.hpp"
+#include "fbvins/loop/loop_map.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(A simulated quadrotor flies the mission by the poses of the odometry, which sees rendered images and feels a simulated IMU;
+the truth is only written down (docs/flight.md). The same arguments give the same bytes, with --threaded or without.
+Writes what `fbvins run` writes, and flight.csv, flight.json, truth, estimate and setpoint as trajectories.
+
+examples:
+  fbvins fly configs/missions/paper.yaml                         the paper's flight, frontend klt
+  fbvins fly configs/missions/paper.yaml --frontend orb --preset dim --seed 3
+  fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
+  fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
+  fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
+  fbvins report f                                                path, setpoint, modes, effort in one page
+)";
+
+struct Arguments {
+  std::string mission, preset = "normal", vehicle = "indoor330", frontend, out, config, control;
+  std::vector<std::string> assignments;
+  int seed = 1;
+  double wind_mps = -1;
+  bool loop = false, threaded = false, record = false, quiet = false;
+};
+
+struct FlightRun {
+  RunRecord run;
+  FlightLog log;
+};
+
+Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
+  FlightSetup setup;
+  Result<Mission> mission = read_mission(a.mission);
+  if (!mission) return mission.error();
+  Result<SimulationOptions> simulation = simulation_preset(a.preset);
+  if (!simulation) return simulation.error();
+  Result<QuadrotorOptions> vehicle = quadrotor_preset(a.vehicle);
+  if (!vehicle) return vehicle.error();
+  setup.mission = *std::move(mission);
+  setup.simulation = *std::move(simulation);
+  setup.simulation.seed = a.seed;
+  setup.vehicle = *vehicle;
+  setup.control = control_for(*vehicle);
+  if (!a.control.empty())
+    if (Result<void> read = read_yaml_file(a.control, fields_of(setup.control)); !read) return read.error();
+  if (a.wind_mps >= 0) setup.wind.mean_mps = a.wind_mps, setup.wind.gust_mps = a.wind_mps * 2 / 3;
+  setup.estimator.options = config;
+  setup.estimator.mode = a.threaded ? RunMode::threaded : RunMode::deterministic;
+  if (a.record) setup.recording = a.out + "/recording";
+  return setup;
+}
+
+Result<FlightRun> flown(const Arguments& a, const Config& config, FlightSetup setup) {
+  FlightRun flight;
+  SurvivalMeter survival;
+  std::unique_ptr<LoopMap> map;
+  if (a.loop) {
+    Result<StereoRig> rig = simulated_rig(setup.simulation);
+    if (!rig) return rig.error();
+    Result<std::unique_ptr<LoopMap>> made = LoopMap::create(*rig, {.loop = config.loop});
+    if (!made) return made.error();
+    map = *std::move(made);
+    setup.estimator.mapper = map.get();
+  }
+  setup.estimator.on_tracked_frame = [&](const TrackedFrame& f) {
+    flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)});
+  };
+  FlightMode last = FlightMode::landed;
+  Result<FlightLog> log = fly(setup, [&](double t_s, FlightMode mode) {
+    if (!a.quiet && mode != last) note(fmt::format("{:6.2f} s: {}", t_s, to_string(mode)));
+    last = mode;
+  });
+  if (!log) return log.error();
+  flight.log = *std::move(log);
+  flight.run.odometry = flight.log.odometry;
+  flight.run.tracked.resize(std::min(flight.run.tracked.size(), flight.run.odometry.size()));
+  return flight;
+}
+
+/// What a report needs of a run, as `fbvins run` leaves it.
+Result<void> write_as_run(const Arguments& a, const Config& config, const FlightRun& flight, double wall_s) {
+  std::vector<TrajectoryPoint> truth;
+  Trajectory<W> poses;
+  for (const TrueState& s : flight.log.imu.truth) {
+    truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
+    poses.push_back({s.t, s.T_WB});
+  }
+  RunSummary summary = summarise(flight.run, flight.run.images(), poses);
+  summary.dataset = fmt::format("{}-{}-s{}", std::filesystem::path(a.mission).stem().string(), a.preset, a.seed);
+  summary.frontend = config.frontend.kind;
+  summary.mode = a.threaded ? "threaded" : "deterministic";
+  summary.wall_s = wall_s;
+  if (Result<void> done = write_run(flight.run, a.out); !done) return done;
+  if (Result<void> done = write_truth(flight.run.images(), truth, a.out); !done) return done;
+  if (Result<void> done = write_text(a.out + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_text(a.out + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_text(a.out + "/summary.txt", to_text(summary));
+}
+
+int fly_mission(Arguments a) {
+  if (!a.frontend.empty()) a.assignments.insert(a.assignments.begin(), "frontend.kind=" + a.frontend);
+  const Result<Config> config = load_config(a.config, a.assignments);
+  if (!config) return fail(config.error().message);
+  if (a.out.empty())
+    a.out = fmt::format("out/{}-{}-s{}-{}", std::filesystem::path(a.mission).stem().string(), a.preset, a.seed,
+                        config->frontend.kind);
+  const Result<FlightSetup> setup = setup_of(a, *config);
+  if (!setup) return fail(setup.error().message);
+  std::error_code error;
+  std::filesystem::create_directories(a.out, error);
+  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+
+  const auto start = std::chrono::steady_clock::now();
+  const Result<FlightRun> flight = flown(a, *config, *setup);
+  if (!flight) return fail(flight.error().message);
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const FlightSummary summary = summarise(flight->log, setup->mission);
+  const FlightFacts facts{
+      std::filesystem::path(a.mission).stem().string(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop};
+  for (const Result<void>& done : {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out),
+                                   write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
+                                   write_text(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
+    if (!done) return fail(done.error().message);
+  if (!a.quiet) fmt::print("{}results in {}\n", flight_text(facts, flight->log, summary), bold(a.out));
+  return summary.arrived ? kOk : kEstimationFailed;
+}
+
+}  // namespace
+
+void add_fly_command(CLI::App& program, int& exit_code) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("fly", kFlyDescription);
+  command->footer(kExamples);
+  command->add_option("MISSION", a->mission, "YAML file: takeoff, goto, hold, yaw, land")->required();
+  command->add_option("--preset", a->preset, "world and light (see fbvins simulate)")
+      ->check(CLI::IsMember(simulation_presets()))
+      ->capture_default_str();
+  command->add_option("--seed", a->seed, "of world, wind and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--frontend", a->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
+  command->add_option("--out", a->out, "folder for the results (default out/<mission>-<preset>-s<seed>-<frontend>)");
+  command->add_option("--config", a->config, "YAML file that changes the odometry's defaults (see fbvins config)");
+  command->add_option("--set", a->assignments, "one option of the odometry, name=value; may be repeated")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--vehicle", a->vehicle, "what flies")->check(CLI::IsMember(quadrotor_presets()))->capture_default_str();
+  command->add_option("--control", a->control, "YAML file that changes gains and limits, by PX4's names");
+  command->add_option("--wind", a->wind_mps, "mean wind in m/s, gusts of two thirds of it (default 0.3)")
+      ->check(CLI::Range(0.0, 10.0));
+  command->add_flag("--loop", a->loop, "loop closure: the mission is flown in the map's frame");
+  command->add_flag("--record", a->record, "images, IMU and truth too, as a recording in OUT/recording");
+  command->add_flag("--threaded", a->threaded, "frontend and estimator on threads of their own; the same result");
+  command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
+  command->callback([a, &exit_code] { exit_code = fly_mission(*a); });
+}
+
+}  // namespace fbvins::app
