@@ -62,6 +62,14 @@ double hover_radps(const QuadrotorOptions& o) {
   return std::sqrt(o.mass_kg * kSimGravity_mps2 / (kRotors * o.thrust_N_per_radps2));
 }
 
+/// As a recording states it, by matrices: the last bits of a quaternion are its own. So the recording, run again, gives the same
+/// bytes.
+StereoRig as_recorded(StereoRig rig) {
+  rig.T_BC0 = Pose<B, C0>(rig.T_BC0.R(), rig.T_BC0.p);
+  rig.T_BC1 = Pose<B, C1>(rig.T_BC1.R(), rig.T_BC1.p);
+  return rig;
+}
+
 /// Time that the mission takes at a tenth of its speed.
 double longest_flight_s(const Mission& mission) {
   double seconds = kTimeToSpare_s;
@@ -260,7 +268,7 @@ Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double,
   options.world.kind = setup.mission.place.kind.empty() ? o.world.kind : setup.mission.place.kind;
   Result<SensorStation> station = SensorStation::create(options, site->plan, path);
   if (!station) return station.error();
-  Result<std::unique_ptr<EstimatorLink>> link = EstimatorLink::create(setup.estimator, station->rig());
+  Result<std::unique_ptr<EstimatorLink>> link = EstimatorLink::create(setup.estimator, as_recorded(station->rig()));
   if (!link) return link.error();
   return ClosedLoop(setup, *site, *std::move(station), *std::move(link)).run(progress);
 }
