@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "fbvins/report/curves.hpp"
+#include "fbvins/report/flight_curves.hpp"
 #include "fbvins/report/report_page.hpp"
 #include "fbvins/report/run_errors.hpp"
 
@@ -12,39 +14,6 @@ namespace fbvins {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// JSON text of a curve with five digits: a tenth of what a general writer makes.
-std::string curve(const std::vector<double>& values, std::size_t step) {
-  std::string text = "[";
-  for (std::size_t i = 0; i < values.size(); i += step) {
-    if (i > 0) text += ',';
-    text += std::isfinite(values[i]) ? fmt::format("{:.5g}", values[i]) : "null";
-  }
-  return text + "]";
-}
-
-/// An object of curves that share one time axis, thinned out together.
-class Curves {
- public:
-  Curves(std::size_t length, std::size_t max_points) : step_(std::max<std::size_t>(1, (length + max_points - 1) / max_points)) {}
-
-  void add(const std::string& name, const std::vector<double>& values) {
-    if (!values.empty()) text_ += fmt::format("{}\"{}\":{}", text_.empty() ? "" : ",", name, curve(values, step_));
-  }
-  void add(const std::string& name, const std::vector<Vec3>& values) {
-    for (int axis = 0; axis < 3; ++axis) {
-      std::vector<double> one;
-      one.reserve(values.size());
-      for (const Vec3& v : values) one.push_back(v[axis]);
-      add(fmt::format("{}_{}", name, "xyz"[axis]), one);
-    }
-  }
-  std::string text() const { return fmt::format("{{{}}}", text_); }
-
- private:
-  std::size_t step_;
-  std::string text_;
-};
 
 double seconds_since(Time start, Time t) { return (t - start).seconds(); }
 
@@ -187,6 +156,7 @@ std::string run_text(const RunFolder& run, const ReportOptions& options) {
   text += ",\"timing\":" +
           table_curves(run, run.timing,
                        {"pyramid", "track", "stereo", "detect", "geometry", "boost", "prepare", "solve", "marginalise"}, n);
+  if (run.flight) text += ",\"flight\":" + flight_text(*run.flight, run.start(), n);
   return text + "}";
 }
 

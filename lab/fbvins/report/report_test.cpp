@@ -36,6 +36,22 @@ TEST(Report, HoldsTheNumbersOfTheEvaluation) {
   EXPECT_EQ(shown["config"], run.config);
 }
 
+TEST(Report, ShowsAFlight) {
+  RunFolder run = complete_run();
+  FlightFiles flight;
+  flight.summary = Json::parse(R"({"arrived": true})");
+  flight.rows = *CsvTable::parse("#timestamp [ns],true_p_x,mode,mode_reason\n" + std::to_string(run.start().ns) +
+                                     ",1,waiting,none\n" + std::to_string(run.start().ns + 500'000'000) + ",2,mission,none\n" +
+                                     std::to_string(run.start().ns + 1'000'000'000) + ",3,holding,late\n",
+                                 "flight.csv");
+  run.flight = flight;
+  const Json shown = data_of(report_html({run}, nullptr, {}))["runs"][0]["flight"];
+  EXPECT_EQ(shown["curves"]["true_p_x"], Json({1, 2, 3}));
+  EXPECT_EQ(shown["modes"][1], Json({0.5, 1.0, "mission", "none"}));
+  EXPECT_EQ(shown["modes"][2][3], "late");
+  EXPECT_TRUE(shown["summary"]["arrived"]);
+}
+
 TEST(Report, ValuesCannotEndTheScript) {
   const std::string html = report_html({complete_run()}, nullptr, {.title = "<b>&"});
   EXPECT_NE(html.find("<title>&lt;b>&amp;</title>"), std::string::npos);

@@ -122,6 +122,20 @@ Result<std::vector<TrajectoryPoint>> read_truth(const std::string& path) {
   return std::move(file->points);
 }
 
+/// Nothing where there was no flight.
+Result<void> read_flight(const fs::path& folder, RunFolder& run) {
+  if (!fs::exists(folder / "flight.csv") || !fs::exists(folder / "flight.json")) return {};
+  Result<CsvTable> rows = CsvTable::read(folder / "flight.csv");
+  if (!rows) return rows.error();
+  Result<std::string> text = read_file(folder / "flight.json", kLargestText_bytes);
+  if (!text) return text.error();
+  nlohmann::ordered_json summary = nlohmann::ordered_json::parse(*text, nullptr, false);
+  if (summary.is_discarded() || !summary.is_object())
+    return Error{ErrorCode::malformed, (folder / "flight.json").string() + ": this is no summary of a flight"};
+  run.flight = FlightFiles{std::move(summary), *std::move(rows)};
+  return {};
+}
+
 std::string text_at(const nlohmann::ordered_json& json, const char* name) {
   return json.contains(name) && json[name].is_string() ? json[name].get<std::string>() : "";
 }
@@ -152,6 +166,7 @@ Result<RunFolder> read_run_folder(const std::string& path, const std::string& tr
     if (!read) return read.error();
     *table = *std::move(read);
   }
+  if (Result<void> read = read_flight(folder, run); !read) return read.error();
   const fs::path own = folder / "ground_truth.csv";
   if (truth.empty() && !fs::exists(own)) return run;
   Result<std::vector<TrajectoryPoint>> points = read_truth(truth.empty() ? own.string() : truth);

@@ -6,12 +6,14 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fbvins/core/result.hpp"
-#include "fbvins/report/csv_table.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/report/csv_table.hpp"
+#include "fbvins/report/flight_curves.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
@@ -24,6 +26,7 @@ struct RunFolder {
   std::vector<Odometry> odometry;  ///< of trajectory.csv and covariance.csv: no statistics
   std::vector<TrajectoryPoint> truth;
   CsvTable statistics, timing;
+  std::optional<FlightFiles> flight;  ///< where `fbvins fly` flew it
 
   /// Stamp of the first image.
   Time start() const { return odometry.empty() ? Time{} : odometry.front().t; }
