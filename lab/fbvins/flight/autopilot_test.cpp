@@ -51,31 +51,40 @@ Odometry honest_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mount
   return o;
 }
 
-Outcome fly_mission(const std::string& text, const Told& told, double seconds = 40, double tilt_rad = 0) {
-  const Mission mission = *parse_mission(text, "m.yaml");
+struct Circumstances {
+  double seconds = 40;
+  double tilt_rad = 0;  ///< of W, by a bias of the accelerometer
+  QuadrotorState start = standing_at({1, 2}, 0.6, {});
+  std::string vehicle = "indoor330";
+  int seed = 5;
+};
+
+Outcome fly_mission(const Mission& mission, const Told& told, const Circumstances& in = {}) {
+  const auto seed = static_cast<std::uint64_t>(in.seed);
   const StereoRig rig = euroc_rig();
   const Pose<BodyFlu, B> mounting = imu_mounting(rig, 5);
-  const QuadrotorOptions options;
-  Quadrotor vehicle(options, standing_at({1, 2}, 0.6, options));
+  const QuadrotorOptions options = *quadrotor_preset(in.vehicle);
+  Quadrotor vehicle(options, in.start);
   const Pose<W, BodyFlu> start = vehicle.state().T_WV;
   Autopilot autopilot(mission, control_for(options), rig, mounting);
-  ImuErrors imu(rig.imu_noise, {}, 5);
-  RotorShake shake(5);
-  Wind wind({}, 5);
-  Barometer barometer({}, 5);
+  ImuErrors imu(rig.imu_noise, {}, seed);
+  RotorShake shake(seed);
+  Wind wind({}, seed);
+  Barometer barometer({}, seed);
+  const double hover_radps = std::sqrt(options.mass_kg * kSimGravity_mps2 / (4 * options.thrust_N_per_radps2));
   std::deque<std::pair<double, Odometry>> waiting;
   PerRotor commands{};
   Outcome out;
-  for (int step = 0; step < seconds * 1000 && autopilot.output().mode != FlightMode::landed; ++step) {
+  for (int step = 0; step < in.seconds * 1000 && autopilot.output().mode != FlightMode::landed; ++step) {
     const double t = step * 1e-3;
     if (step % 50 == 25) {
       ImuBias believed = imu.bias();
-      believed.accel_mps2 += mounting.q.conjugate() * Vec3(kSimGravity_mps2 * std::sin(tilt_rad), 0, 0);
+      believed.accel_mps2 += mounting.q.conjugate() * Vec3(kSimGravity_mps2 * std::sin(in.tilt_rad), 0, 0);
       // The tilt of W is about the axis to the left of the vehicle that stood there.
-      const Quat tilt = start.q * so3_exp(Vec3(0, tilt_rad, 0)) * start.q.conjugate();
+      const Quat tilt = start.q * so3_exp(Vec3(0, in.tilt_rad, 0)) * start.q.conjugate();
       Odometry o =
           honest_odometry(vehicle, mounting, believed, {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
-      if (tilt_rad != 0) o.pose_covariance.block<3, 3>(3, 3) = 4e-4 * Mat3::Identity();
+      if (in.tilt_rad != 0) o.pose_covariance.block<3, 3>(3, 3) = 4e-4 * Mat3::Identity();
       o.t = Time{static_cast<std::int64_t>(step) * 1'000'000};
       if (std::optional<Odometry> said = told(t, o)) waiting.emplace_back(t + kDelay_s, *said);
     }
@@ -83,7 +92,7 @@ Outcome fly_mission(const std::string& text, const Told& told, double seconds = 
       for (; !waiting.empty() && waiting.front().first <= t; waiting.pop_front()) autopilot.add(waiting.front().second);
       if (step % 20 == 0) autopilot.add_barometer(barometer.read(vehicle.state().T_WV.p.z()));
       PerRotor shares = vehicle.state().rotor_radps;
-      for (double& w : shares) w /= 503;
+      for (double& w : shares) w /= hover_radps;
       const Time stamp{static_cast<std::int64_t>(step) * 1'000'000};
       commands = autopilot.update(imu.read(stamp, vehicle.motion_of(mounting), shake.step(shares, 0.005)));
       FlightRow row;
@@ -103,10 +112,33 @@ Outcome fly_mission(const std::string& text, const Told& told, double seconds = 
 
 std::optional<Odometry> always(double, Odometry o) { return o; }
 
+/// A mission that ships with the project, with neither faults nor images: nothing is in its way.
+Outcome fly_shipped(const std::string& name, const Circumstances& circumstances) {
+  Mission mission = *read_mission(FBVINS_MISSIONS "/" + name + ".yaml");
+  mission.faults.clear();
+  Circumstances in = circumstances;
+  in.start = standing_at(mission.place.start_m, mission.place.heading_rad, *quadrotor_preset(in.vehicle));
+  const Result<MissionSite> site = site_of(mission, {}, in.start.T_WV.p.z());
+  EXPECT_TRUE(site) << site.error().message;
+  std::vector<Vec3> path;
+  for (const PlannedPlace& place : planned_places(mission)) path.push_back(site->to_world(place.p));
+  const World world = build_world({}, site->plan, path, static_cast<std::uint64_t>(in.seed));
+  const CollisionCheck check(world, {});
+  Outcome flight = fly_mission(mission, always, in);
+  for (std::size_t i = 0; i < flight.rows.size(); i += 10) {
+    const std::optional<Vec3> place = check.touched_at(in.start.T_WV * flight.rows[i].truth.p);
+    EXPECT_FALSE(place) << name << " touches something after " << flight.rows[i].t_s << " s";
+    if (place) break;
+  }
+  EXPECT_EQ(flight.mode, FlightMode::landed) << name;
+  EXPECT_EQ(flight.reason, FlightReason::none) << name;
+  return flight;
+}
+
 constexpr const char* kUpAndOver = "steps:\n  - takeoff: 0.6\n  - hold: 1\n  - goto: [0.6, 0.3, 0.6]\n  - hold: 6\n  - land\n";
 
 TEST(Autopilot, FliesAMissionWhereverTheOdometryBegan) {
-  const Outcome flight = fly_mission(kUpAndOver, always);
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), always);
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_EQ(flight.reason, FlightReason::none);
   EXPECT_LT(flight.largest(12, 14, [](const FlightRow& r) { return (r.truth.p - Vec3(0.6, 0.3, 0.6)).norm(); }), 0.06);
@@ -114,14 +146,15 @@ TEST(Autopilot, FliesAMissionWhereverTheOdometryBegan) {
 }
 
 TEST(Autopilot, TheFloorLevelsAnOdometryThatIsNotSureOfUp) {
-  const Outcome flight = fly_mission(kUpAndOver, always, 40, 0.04);
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), always, {.tilt_rad = 0.04});
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_LT(flight.largest(3, 14, [](const FlightRow& r) { return (r.autopilot.estimate.T_LV.p - r.truth.p).norm(); }), 0.012);
 }
 
 TEST(Autopilot, HoldsWhenTheOdometryIsSilentForASecond) {
-  const Outcome flight =
-      fly_mission(kUpAndOver, [](double t, const Odometry& o) { return t > 7 && t < 8 ? std::nullopt : std::optional(o); });
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), [](double t, const Odometry& o) {
+    return t > 7 && t < 8 ? std::nullopt : std::optional(o);
+  });
   EXPECT_TRUE(flight.was(FlightMode::holding));
   EXPECT_FALSE(flight.was(FlightMode::descending));
   EXPECT_EQ(flight.mode, FlightMode::landed);
@@ -130,8 +163,8 @@ TEST(Autopilot, HoldsWhenTheOdometryIsSilentForASecond) {
 }
 
 TEST(Autopilot, ComesDownWhenTheOdometryIsGone) {
-  const Outcome flight =
-      fly_mission(kUpAndOver, [](double t, const Odometry& o) { return t > 8 ? std::nullopt : std::optional(o); });
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"),
+                                     [](double t, const Odometry& o) { return t > 8 ? std::nullopt : std::optional(o); });
   EXPECT_TRUE(flight.was(FlightMode::descending));
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_EQ(flight.reason, FlightReason::lost);
@@ -141,7 +174,7 @@ TEST(Autopilot, ComesDownWhenTheOdometryIsGone) {
 }
 
 TEST(Autopilot, ComesDownWhenTheOdometrySaysThatItIsLost) {
-  const Outcome flight = fly_mission(kUpAndOver, [](double t, Odometry o) {
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), [](double t, Odometry o) {
     if (t > 8) o.health = {HealthState::lost, HealthReason::no_tracks};
     return std::optional(o);
   });
@@ -151,7 +184,7 @@ TEST(Autopilot, ComesDownWhenTheOdometrySaysThatItIsLost) {
 }
 
 TEST(Autopilot, ARestartElsewhereMovesNothing) {
-  const Outcome flight = fly_mission(kUpAndOver, [](double t, Odometry o) {
+  const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), [](double t, Odometry o) {
     if (t > 8) {  // a new W: another origin, another heading
       const Pose<W, W> moved{so3_exp(Vec3(0, 0, 2)), Vec3(10, -4, 2)};
       o.T_WB = moved * o.T_WB;
@@ -166,10 +199,36 @@ TEST(Autopilot, ARestartElsewhereMovesNothing) {
 }
 
 TEST(Autopilot, StaysOnTheGroundWithoutAPose) {
-  const Outcome flight = fly_mission(kUpAndOver, [](double, const Odometry&) { return std::optional<Odometry>(); });
+  const Outcome flight =
+      fly_mission(*parse_mission(kUpAndOver, "m.yaml"), [](double, const Odometry&) { return std::optional<Odometry>(); });
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_EQ(flight.reason, FlightReason::no_pose);
   EXPECT_LT(flight.last_p.norm(), 1e-3);
+}
+
+TEST(Autopilot, TheShippedMissionsLeadThroughNothing) {
+  for (int seed : {1, 2, 3}) {
+    const Outcome paper = fly_shipped("paper", {.seconds = 60, .seed = seed});
+    EXPECT_LT((paper.last_p - Vec3(0.6, 0.3, 0)).norm(), 0.1);
+    (void)fly_shipped("odometry_stops", {.seconds = 90, .seed = seed});
+  }
+  const Outcome tour = fly_shipped("tour", {.seconds = 420});
+  EXPECT_LT(tour.last_p.norm(), 0.1);
+  EXPECT_GT(tour.rows.back().t_s, 240);
+}
+
+TEST(Autopilot, FliesAtThreeMetresASecond) {
+  const Outcome fast = fly_shipped("fast", {.seconds = 90});
+  EXPECT_LT(fast.last_p.norm(), 0.15);
+  EXPECT_GT(fast.largest(0, 90, [](const FlightRow& r) { return r.true_velocity.norm(); }), 2.5);
+  EXPECT_LT(
+      fast.largest(4, fast.rows.back().t_s - 5, [](const FlightRow& r) { return (r.truth.p - r.autopilot.setpoint.p).norm(); }),
+      0.4);
+}
+
+TEST(Autopilot, FliesTheQuadrotorOfSihToo) {
+  const Outcome sih = fly_shipped("paper", {.seconds = 60, .vehicle = "sih"});
+  EXPECT_LT((sih.last_p - Vec3(0.6, 0.3, 0)).norm(), 0.25);
 }
 
 TEST(InertialReference, KnowsHowFastItClimbsByBarometerAndImu) {
