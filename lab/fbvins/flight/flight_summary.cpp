@@ -18,12 +18,12 @@ bool by_poses(FlightMode mode) {
 }
 bool airborne(const FlightRow& row) { return by_poses(row.autopilot.mode) || row.autopilot.mode == FlightMode::descending; }
 
-/// Mean true place of the rows with t in (to - kMeasured_s, to], in the world turned to the mission's axes.
+/// Mean true place of the rows with t in [to - kMeasured_s, to), in the world turned to the mission's axes.
 Vec3 measured(const FlightLog& log, double to_s) {
   Vec3 sum = Vec3::Zero();
   int count = 0;
   for (const FlightRow& row : log.rows)
-    if (row.t_s > to_s - kMeasured_s && row.t_s <= to_s) sum += row.truth.p, ++count;
+    if (row.t_s >= to_s - kMeasured_s && row.t_s < to_s) sum += row.truth.p, ++count;
   const Vec3 start = log.start.q.conjugate() * log.start.p;
   return count > 0 ? Vec3(sum / count + start) : start;
 }
