@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <thread>
 
 #include "apps/commands.hpp"
 #include "apps/kept_map.hpp"
@@ -21,6 +24,7 @@
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
+#include "fbvins/live/sensor_check.hpp"
 #include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
@@ -49,6 +53,7 @@ examples:
   fbvins live --source replay:MH_01_easy --map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
+  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, units
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
@@ -60,6 +65,7 @@ struct Arguments {
   bool record_images = true, quiet = false;
   int laps = 1;
   bool preload = false;
+  double check_s = 0;  ///< look at the sensors for so long, and do not fly
 };
 
 Result<Config> config_of(Arguments arguments) {
@@ -143,6 +149,35 @@ Result<void> write_results(const Arguments& arguments, const Config& config, con
   return write_text(arguments.out + "/summary.txt", to_text(summary));
 }
 
+/// Before the first flight: what comes, how often, by which clock. 1 where something is wrong.
+int check_sensors(Source& source, double seconds) {
+  SensorCheck check(source.rig(), source.clock_rate());
+  std::condition_variable ended;
+  std::mutex mutex;
+  bool over = false;
+  std::jthread timer([&] {
+    std::unique_lock lock(mutex);
+    ended.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return over; });
+    source.stop();
+  });
+  const Result<void> done = [&] {
+    const StopSignal stop([&] { source.stop(); });
+    return source.run(check);
+  }();
+  {
+    const std::lock_guard lock(mutex);
+    over = true;
+    ended.notify_all();
+  }
+  if (!done) return fail(done.error().message);
+  bool fine = true;
+  for (const SensorFinding& finding : check.findings()) {
+    fmt::print("{}  {}\n", finding.fine ? "ok   " : "WRONG", finding.text);
+    fine = fine && finding.fine;
+  }
+  return fine ? kOk : kSensorsWrong;
+}
+
 int run(const Arguments& arguments) {
   block_stop_signals();  // before any thread is made
   const auto config = config_of(arguments);
@@ -160,6 +195,7 @@ int run(const Arguments& arguments) {
     std::filesystem::create_directories(arguments.out, error);
     if (error) return fail(fmt::format("{}: {}", arguments.out, error.message()));
   }
+  if (arguments.check_s > 0) return check_sensors(**source, arguments.check_s);
   const auto map = make_map(arguments.map, (*source)->rig(), config->loop);
   if (!map) return fail(map.error().message);
   std::optional<KeptMap> kept;
@@ -227,6 +263,8 @@ void add_live_command(CLI::App& program, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--ros2", arguments->ros2,
                       "publish in ROS 2's graph: DOMAIN[:INTERFACE], this machine alone without an interface");
+  command->add_option("--check", arguments->check_s, "look at the sensors for so many seconds, say what is wrong, and end")
+      ->check(CLI::PositiveNumber);
   command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
       ->take_all()
       ->allow_extra_args(false);

@@ -13,6 +13,7 @@ namespace fbvins::app {
 enum ExitCode : int {
   kOk = 0,
   kEstimationFailed = 1,  ///< the input was fine, but no pose came out of it
+  kSensorsWrong = 1,      ///< of a look at them
   kBadInput = 2,          ///< wrong usage, unreadable file, nothing to compare
 };
 

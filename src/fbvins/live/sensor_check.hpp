@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// A look at live sensors before they are flown on: rates, gaps, clocks, units, sizes. Nothing is estimated.
+//
+//   SensorCheck check(source.rig(), source.clock_rate());
+//   source.run(check);                                     // for some seconds
+//   for (const SensorFinding& f : check.findings()) ...
+//
+// Threads: as SensorInput, from any.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "fbvins/live/frozen_camera.hpp"
+#include "fbvins/live/host_clock.hpp"
+#include "fbvins/live/source.hpp"
+
+namespace fbvins {
+
+struct SensorFinding {
+  bool fine = true;
+  std::string text;  ///< what was seen, and what to do where it is not fine; one sentence
+};
+
+class SensorCheck final : public SensorInput {
+ public:
+  SensorCheck(const StereoRig& rig, double clock_rate, std::function<Time()> now = host_now)
+      : rig_(rig), clock_rate_(clock_rate), now_(std::move(now)) {}
+
+  void push(const ImuSample& sample) override;
+  void push(StereoFrame frame) override;
+
+  /// In the order in which they are worth reading: images, readings, clocks.
+  std::vector<SensorFinding> findings() const;
+
+ private:
+  /// When one sensor's data came, and by which stamps.
+  struct Arrivals {
+    std::vector<Time> stamps, host;
+    int backwards = 0;
+    void add(Time t, Time host_t);
+    double span_s() const;
+    double period_s() const;  ///< median
+    double largest_gap_s() const;
+    double delay_s() const;  ///< median of host clock minus stamp
+  };
+  void check_images(std::vector<SensorFinding>& findings) const;
+  void check_readings(std::vector<SensorFinding>& findings) const;
+  void check_clocks(std::vector<SensorFinding>& findings) const;
+
+  StereoRig rig_;
+  double clock_rate_;
+  std::function<Time()> now_;
+  mutable std::mutex mutex_;
+  Arrivals images_, readings_;
+  int alone_ = 0, frozen_ = 0;              // images of one camera only; with a camera that repeats itself
+  int other_width_ = 0, other_height_ = 0;  // of an image that is not of the calibration's size
+  FrozenCamera left_, right_;
+  double accel_sum_ = 0, gyro_sum_ = 0;  // of magnitudes, m/s^2 and rad/s
+};
+
+}  // namespace fbvins
