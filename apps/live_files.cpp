@@ -41,7 +41,7 @@ void LiveFiles::take_map(const Odometry& o) {
   const std::optional<MapUpdate>& known = map_->newest;
   const bool localised = known ? known->localised && known->reset_counter == o.reset_counter : new_map_ && o.reset_counter == 0;
   if (!localised) return;
-  map_->causal.write(o.t, (known ? known->T_MW : Pose<M, W>{}) * o.T_WB);
+  map_->causal.write(o.t, known ? known->T_MG * o.gauge.T_GB : Pose<M, W>{} * o.T_WB);
   map_->bounded.write(o.t, (known ? known->T_MW_smooth : Pose<M, W>{}) * o.T_WB);
 }
 

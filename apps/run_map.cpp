@@ -23,7 +23,7 @@ Result<void> check_folder_of(const std::string& path) {
 }
 
 /// T_MB of every frame that has a pose, with the update that was known when the frame came.
-/// Before the first update a new map is where the odometry began; an old one has to be found first.
+/// Before the first update a new map is where the odometry began, and level; an old one has to be found first.
 void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   MapUpdate begin;
   begin.localised = new_map;
@@ -31,17 +31,20 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   auto next = record.updates.begin();
   for (const Odometry& o : run.odometry) {
     for (; next != record.updates.end() && next->applies_from <= o.id; ++next) now = &*next;
-    if (now == &begin) begin.reset_counter = o.reset_counter;
+    if (now == &begin) {
+      begin.reset_counter = o.reset_counter;
+      begin.T_MG = {o.gauge.q_LG, Vec3::Zero()};
+    }
     if (!o.health.has_pose() || !now->localised || now->reset_counter != o.reset_counter) continue;
-    record.causal.push_back({o.t, now->T_MW * o.T_WB});
+    record.causal.push_back({o.t, now->T_MG * o.gauge.T_GB});
     record.bounded.push_back({o.t, now->T_MW_smooth * o.T_WB});
   }
 }
 
-/// Each restart begins a new W: they are corrected one by one.
+/// Each restart begins a new gauge: they are corrected one by one.
 Trajectory<M> corrected(const LoopMap& map, const RunRecord& run) {
   Trajectory<M> all;
-  Trajectory<W> part;
+  Trajectory<G> part;
   std::uint32_t reset_counter = 0;
   const auto flush = [&] {
     const Trajectory<M> done = map.corrected(part);
@@ -51,7 +54,7 @@ Trajectory<M> corrected(const LoopMap& map, const RunRecord& run) {
   for (const Odometry& o : run.odometry) {
     if (!o.health.has_pose()) continue;
     if (o.reset_counter != reset_counter) flush(), reset_counter = o.reset_counter;
-    part.push_back({o.t, o.T_WB});
+    part.push_back({o.t, o.gauge.T_GB});
   }
   flush();
   return all;

@@ -28,7 +28,7 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
 /// What the loop stage said, keyframe by keyframe, and what came out in the end.
 struct MapRecord {
   std::vector<MapUpdate> updates;  ///< without the corrected keyframes
-  Trajectory<M> causal, bounded;   ///< T_MB at each frame, with T_MW as it was known then; with the smooth T_MW
+  Trajectory<M> causal, bounded;   ///< T_MB at each frame, with T_MG as it was known then; with the smooth T_MW
   Trajectory<M> final;             ///< after the last optimisation of the graph
   Trajectory<M> adjusted;          ///< after bundle adjustment, where asked for
   int keyframes_in_map = 0, loops_left_out = 0;

@@ -39,6 +39,21 @@ void evaluate_against(Trajectory<W> truth, const RunRecord& record, RunSummary& 
   if (const auto start = align_start(pairs)) summary.nees = nees(pairs, covariances, *start);
 }
 
+Json adjustment_json(const FinalAdjustmentReport& a) {
+  const auto plausibility = [](const Plausibility& p) {
+    return Json{{"held_out", p.held_out}, {"imu", p.imu}, {"odometry", p.odometry}};
+  };
+  Json json{{"points", a.points},
+            {"sights", a.sights},
+            {"initial_rms_px", a.initial_rms_px},
+            {"final_rms_px", a.final_rms_px},
+            {"before", plausibility(a.before)},
+            {"after", plausibility(a.after)},
+            {"tilt_rad", a.tilt_rad}};
+  if (!a.refused.empty()) json["refused"] = a.refused;
+  return json;
+}
+
 Json map_json(const MapSummary& m) {
   Json json{{"keyframes", m.keyframes}, {"keyframes_in_map", m.keyframes_in_map}, {"loops", m.loops}};
   json["refused"] = m.refused;
@@ -48,11 +63,7 @@ Json map_json(const MapSummary& m) {
   if (m.bounded) json["bounded"] = to_json(*m.bounded, Alignment::se3);
   if (m.final) json["after_the_run"] = to_json(*m.final, Alignment::se3);
   if (m.adjusted) json["after_final_ba"] = to_json(*m.adjusted, Alignment::se3);
-  if (m.adjustment)
-    json["final_ba"] = Json{{"points", m.adjustment->points},
-                            {"sights", m.adjustment->sights},
-                            {"initial_rms_px", m.adjustment->initial_rms_px},
-                            {"final_rms_px", m.adjustment->final_rms_px}};
+  if (m.adjustment) json["final_ba"] = adjustment_json(*m.adjustment);
   return json;
 }
 
@@ -70,6 +81,8 @@ std::string map_text(const MapSummary& m) {
   if (m.adjustment)
     text += fmt::format("final bundle adjustment: {} points, {} sights, {:.2f} -> {:.2f} px\n", m.adjustment->points,
                         m.adjustment->sights, m.adjustment->initial_rms_px, m.adjustment->final_rms_px);
+  if (m.adjustment && !m.adjustment->refused.empty())
+    text += fmt::format("final bundle adjustment refused, the map is as after the run: {}\n", m.adjustment->refused);
   return text;
 }
 

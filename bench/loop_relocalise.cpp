@@ -70,7 +70,7 @@ Start wake_up(const std::string& path, const Dataset& data, const Vocabulary& vo
     if (u.localised && !found) found = u;
   });
   system.on_odometry([&](const Odometry& o) {
-    if (found && in_M.empty() && o.health.has_pose()) in_M.push_back({o.t, found->T_MW * o.T_WB});
+    if (found && in_M.empty() && o.health.has_pose()) in_M.push_back({o.t, found->T_MG * o.gauge.T_GB});
   });
   fly(path, system, from, from + Duration::from_seconds(kGiveUp_s), [&] { return !in_M.empty(); });
   Start start;

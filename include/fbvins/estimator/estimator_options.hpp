@@ -3,6 +3,7 @@
 #pragma once
 
 #include "fbvins/core/options.hpp"
+#include "fbvins/types/imu.hpp"
 
 namespace fbvins {
 
@@ -59,6 +60,15 @@ struct EstimatorOptions {
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
   double max_speed_mps = 30;
+
+  /// The noise that readings are weighed by, from the calibrated one.
+  ImuNoise assumed(ImuNoise noise) const {
+    noise.gyro_noise_density_radps_rthz *= gyro_noise_scale;
+    noise.accel_noise_density_mps2_rthz *= accel_noise_scale;
+    noise.gyro_random_walk_radps2_rthz *= gyro_walk_scale;
+    noise.accel_random_walk_mps3_rthz *= accel_walk_scale;
+    return noise;
+  }
 
   template <class V>
   void visit(V&& v) {

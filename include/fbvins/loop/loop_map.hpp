@@ -20,6 +20,7 @@
 #include "fbvins/core/result.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_report.hpp"
+#include "fbvins/types/gauge.hpp"
 #include "fbvins/types/mapper.hpp"
 #include "fbvins/types/trajectory.hpp"
 
@@ -48,9 +49,9 @@ class LoopMap final : public Mapper {
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
   FinalAdjustmentReport adjust();
 
-  /// Poses of a flight (in one W) as the map has them now: exact at keyframes, blended between them. Empty where the flight
-  /// never found into the map.
-  Trajectory<M> corrected(const Trajectory<W>& in_W) const;
+  /// Poses of a flight (in one gauge: Odometry::gauge.T_GB between two restarts) as the map has them now: exact at keyframes,
+  /// blended between them. Empty where the flight never found into the map.
+  Trajectory<M> corrected(const Trajectory<G>& in_G) const;
   /// Keyframes in the map now.
   int keyframes() const;
   /// Replaces the file as a whole: there is never half of one.

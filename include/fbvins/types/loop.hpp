@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What loop closure tells the world: M is W corrected by places seen again. Loop closure never moves W.
+// What loop closure tells the world: M is the odometry corrected by places seen again. Loop closure never moves W.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/gauge.hpp"
 
 namespace fbvins {
 
@@ -36,14 +37,15 @@ struct LoopStats {
   double total_ms() const { return extract_ms + recognise_ms + verify_ms + optimise_ms; }
 };
 
-/// After every keyframe. T_MB = T_MW * T_WB.
+/// After every keyframe. T_MB = T_MW * T_WB, or without what levels and smooths W: T_MB = T_MG * T_GB (Odometry::gauge).
 struct MapUpdate {
   FrameId frame;         ///< the keyframe
   FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
   Time t;
   bool localised = false;           ///< false: where W is in M is not known (a loaded map, or after a restart)
-  Pose<M, W> T_MW;                  ///< best knowledge now; jumps when a place is recognised
-  Pose<M, W> T_MW_smooth;           ///< the same, moved by a bounded amount a second: to fly by
+  Pose<M, G> T_MG;                  ///< best knowledge now; jumps when a place is recognised. M is level
+  Pose<M, W> T_MW;                  ///< the same for W as it was published when the keyframe was handed on
+  Pose<M, W> T_MW_smooth;           ///< moved towards it by a bounded amount a second: to fly by
   std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this speaks of
   std::uint32_t map_session = 0;    ///< counts frames W that met this map
   std::vector<LoopConstraint> loops;

@@ -3,7 +3,7 @@
 // that odometry and map are not mixed:
 //
 //   Trajectory<W> odometry;                                  // what the estimator says
-//   Trajectory<M> in_map = closer.corrected(odometry);       // what loop closure makes of it
+//   Trajectory<M> in_map = closer.corrected(in_gauge);       // what loop closure makes of a Trajectory<G>, the estimator's own
 #pragma once
 
 #include <vector>

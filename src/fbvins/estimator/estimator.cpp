@@ -15,14 +15,6 @@ constexpr double kRestForStandstill_s = 0.5;
 /// Tilt, velocity and biases hardly move the cost of so short a time as the first: its solve does not stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
-ImuNoise scaled(ImuNoise noise, const EstimatorOptions& o) {
-  noise.gyro_noise_density_radps_rthz *= o.gyro_noise_scale;
-  noise.accel_noise_density_mps2_rthz *= o.accel_noise_scale;
-  noise.gyro_random_walk_radps2_rthz *= o.gyro_walk_scale;
-  noise.accel_random_walk_mps3_rthz *= o.accel_walk_scale;
-  return noise;
-}
-
 WindowWeights weights_of(const EstimatorOptions& o) {
   WindowWeights w;
   w.gravity_mps2 = o.gravity_mps2;
@@ -36,7 +28,7 @@ WindowWeights weights_of(const EstimatorOptions& o) {
 
 Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options)
     : options_(options),
-      imu_noise_(scaled(rig.imu_noise, options)),
+      imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
       calibration_(calibrated_),
       initialiser_(options, imu_noise_),

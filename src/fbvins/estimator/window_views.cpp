@@ -78,6 +78,7 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.t = f.t;
   out.T_WB = level.T_WB;
   out.v_WB = level.v_WB;
+  out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
     const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;
     if (seen == nullptr) continue;

@@ -19,7 +19,7 @@ PlaceMap true_map(int keyframes) {
   map.T_BC0 = rig().T_BC0;
   for (Frame& f : flight(room(1), keyframes, 0, 0, 5)) {
     MapKeyframe k;
-    k.t = f.t, k.T_WB = f.truth, k.T_MB = Pose<M, B>(f.truth.q, f.truth.p), k.place = std::move(f.place);
+    k.t = f.t, k.T_GB = f.truth, k.T_MB = Pose<M, B>(f.truth.q, f.truth.p), k.place = std::move(f.place);
     map.add(std::move(k));
   }
   return map;

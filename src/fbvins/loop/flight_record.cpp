@@ -14,28 +14,28 @@ void FlightRecord::drop(KeyframeId gone) {
   std::erase_if(entries_, [&](const Entry& e) { return e.anchor == gone; });
 }
 
-Trajectory<M> FlightRecord::corrected(const PlaceMap& map, const Trajectory<W>& in_W) const {
+Trajectory<M> FlightRecord::corrected(const PlaceMap& map, const Trajectory<G>& in_G) const {
   struct Knot {
     Time t;
     Pose<M, B> T_MB;
-    Pose<W, B> T_WB;
+    Pose<G, B> T_GB;
   };
   std::vector<Knot> knots;
   for (const Entry& e : entries_) {
     const MapKeyframe* anchor = map.find(e.anchor);
-    const auto at = std::lower_bound(in_W.begin(), in_W.end(), e.t, [](const StampedPose<W>& p, Time t) { return p.t < t; });
-    if (anchor == nullptr || !anchor->placed || at == in_W.end() || at->t != e.t) continue;
+    const auto at = std::lower_bound(in_G.begin(), in_G.end(), e.t, [](const StampedPose<G>& p, Time t) { return p.t < t; });
+    if (anchor == nullptr || !anchor->placed || at == in_G.end() || at->t != e.t) continue;
     knots.push_back({e.t, anchor->T_MB * e.T_anchor_B, at->T});
   }
   Trajectory<M> out;
   if (knots.empty()) return out;
   std::size_t k = 0;
-  for (const StampedPose<W>& p : in_W) {
+  for (const StampedPose<G>& p : in_G) {
     while (k + 1 < knots.size() && knots[k + 1].t <= p.t) ++k;
-    const Pose<M, B> a = knots[k].T_MB * (knots[k].T_WB.inverse() * p.T);
+    const Pose<M, B> a = knots[k].T_MB * (knots[k].T_GB.inverse() * p.T);
     Pose<M, B> T_MB = a;
     if (k + 1 < knots.size() && p.t > knots[k].t) {
-      const Pose<M, B> b = knots[k + 1].T_MB * (knots[k + 1].T_WB.inverse() * p.T);
+      const Pose<M, B> b = knots[k + 1].T_MB * (knots[k + 1].T_GB.inverse() * p.T);
       const double s = (p.t - knots[k].t).seconds() / (knots[k + 1].t - knots[k].t).seconds();
       T_MB = {a.q.slerp(s, b.q), Vec3((1 - s) * a.p + s * b.p)};
     }

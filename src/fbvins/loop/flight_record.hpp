@@ -5,7 +5,7 @@
 //   FlightRecord flight;
 //   flight.add(t, id);
 //   flight.hand_over(gone.id, heir.id, heir.T_MB.inverse() * gone.T_MB);
-//   Trajectory<M> in_map = flight.corrected(map, trajectory_in_W);
+//   Trajectory<M> in_map = flight.corrected(map, trajectory_in_G);
 #pragma once
 
 #include <vector>
@@ -22,9 +22,9 @@ class FlightRecord {
   void hand_over(KeyframeId gone, KeyframeId heir, const Pose<B, B>& T_heir_gone);
   /// What hung on `gone` is lost.
   void drop(KeyframeId gone);
-  /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Keyframes that have no
+  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, blended between them. Keyframes that have no
   /// place in M are passed over; empty where there is no other.
-  Trajectory<M> corrected(const PlaceMap& map, const Trajectory<W>& in_W) const;
+  Trajectory<M> corrected(const PlaceMap& map, const Trajectory<G>& in_G) const;
 
  private:
   struct Entry {

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-Pose<W, B> in_W(double x) { return {Quat::Identity(), Vec3(x, 0, 0)}; }
+Pose<G, B> in_G(double x) { return {Quat::Identity(), Vec3(x, 0, 0)}; }
 
 class Record : public testing::Test {
  protected:
@@ -15,7 +15,7 @@ class Record : public testing::Test {
     for (int i = 0; i < 4; ++i) {
       MapKeyframe k;
       k.t = Time{} + Duration::from_seconds(i);
-      k.T_WB = in_W(i);
+      k.T_GB = in_G(i);
       k.T_MB.p.x() = 1.1 * i;
       flight_.add(k.t, map_.add(k));
     }
@@ -23,13 +23,13 @@ class Record : public testing::Test {
   /// The flight in W, at keyframes, between them and after the last, as the map has it.
   auto corrected() const {
     const auto at = [](double t_s) { return Time{} + Duration::from_seconds(t_s); };
-    return flight_.corrected(map_, {{at(0), in_W(0)},
-                                    {at(0.5), in_W(0.5)},
-                                    {at(1), in_W(1)},
-                                    {at(1.5), in_W(1.5)},
-                                    {at(2), in_W(2)},
-                                    {at(3), in_W(3)},
-                                    {at(4), in_W(4)}});
+    return flight_.corrected(map_, {{at(0), in_G(0)},
+                                    {at(0.5), in_G(0.5)},
+                                    {at(1), in_G(1)},
+                                    {at(1.5), in_G(1.5)},
+                                    {at(2), in_G(2)},
+                                    {at(3), in_G(3)},
+                                    {at(4), in_G(4)}});
   }
   double x_at(std::size_t i) const {
     const auto in_M = corrected();

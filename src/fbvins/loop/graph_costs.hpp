@@ -39,6 +39,12 @@ Eigen::Quaternion<T> orientation(const Quat& start, const T* x) {
   }
 }
 
+/// d(right perturbation of the orientation) / d(x[3..5]) for six degrees of freedom: the turn of (1, x/2).
+inline Mat3 turn_jacobian(const double* x) {
+  const Vec3 half(0.5 * x[3], 0.5 * x[4], 0.5 * x[5]);
+  return (Mat3::Identity() - hat(half)) / (1 + half.squaredNorm());
+}
+
 template <int Dof>
 struct EdgeCost {
   Quat q_a, q_b;
@@ -58,17 +64,20 @@ struct EdgeCost {
   }
 };
 
-/// The vertical of a node with six degrees of freedom against M's z.
+/// The vertical of a node with six degrees of freedom against up in M, which is z turned by (a, b, 0).
 struct GravityCost {
   Quat q;
   Vec3 up_B;
   double per_sigma;
 
   template <class T>
-  bool operator()(const T* a, T* out) const {
-    const Eigen::Matrix<T, 3, 1> up = orientation<6>(q, a) * up_B.cast<T>();
-    out[0] = up.x() * per_sigma;
-    out[1] = up.y() * per_sigma;
+  bool operator()(const T* a, const T* tilt, T* out) const {
+    using V3 = Eigen::Matrix<T, 3, 1>;
+    const V3 up = orientation<6>(q, a) * up_B.cast<T>();
+    const Eigen::Quaternion<T> level(T(1), tilt[0] * T(-0.5), tilt[1] * T(-0.5), T(0));
+    const V3 off = level.normalized() * up;
+    out[0] = off.x() * per_sigma;
+    out[1] = off.y() * per_sigma;
     return true;
   }
 };

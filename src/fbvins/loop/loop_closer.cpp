@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fbvins/core/stage_timer.hpp"
+#include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/final_adjustment.hpp"
 #include "fbvins/loop/map_edges.hpp"
 
@@ -13,7 +14,7 @@ namespace {
 
 /// Roll and pitch of the map and of the odometry differ by about this.
 constexpr double kTiltSigma_rad = 0.005;
-/// Where a new map begins, W is where M is.
+/// A new map begins as the gauge of its first flight, turned level.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
 /// What a first recognition is trusted with before it is weighed itself.
 constexpr double kFoundSigma_m = 0.05, kFoundSigma_rad = 0.01;
@@ -28,6 +29,15 @@ constexpr double kSameBody = 1e-9;
 Pose<B, B> as_body(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0.p}; }
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
+
+/// Null where readings are missing on the way, or keyframes between are.
+std::shared_ptr<const Preintegration> readings_between(Time from, Time to, const KeyframeImu& imu) {
+  if (imu.segments.empty()) return nullptr;
+  Preintegration between(imu.noise, imu.bias);
+  for (const ImuSegment& segment : imu.segments) between.integrate(segment);
+  if (between.begin() != from || between.end() != to) return nullptr;
+  return std::make_shared<const Preintegration>(std::move(between));
+}
 
 PlaceVerifierOptions verification_for(const PlaceMap& map, const PlaceVerifierOptions& options) {
   return map.boosted ? for_boosted(options) : options;
@@ -63,35 +73,69 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
 
 MapUpdate LoopCloser::process(const Keyframe& keyframe) {
   CpuTimer timer;
-  Place place = extractor_.extract(keyframe.images, keyframe.T_WB.R());
+  Place place = extractor_.extract(keyframe.images, (keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).toRotationMatrix());
   const double extract_ms = timer.lap_ms();
-  MapUpdate update = process(std::move(place), keyframe.id, keyframe.t, keyframe.T_WB, keyframe.reset_counter);
+  MapUpdate update = process(std::move(place), keyframe);
   update.stats.extract_ms = extract_ms;
   return update;
 }
 
-void LoopCloser::begin_session(std::uint32_t reset_counter) {
-  session_ = {.number = session_.number + (session_.begun || !map_.empty()), .begun = true, .reset_counter = reset_counter};
+void LoopCloser::begin_session(const Keyframe& keyframe) {
+  session_ = {.number = session_.number + (session_.begun || !map_.empty()),
+              .begun = true,
+              .reset_counter = keyframe.reset_counter,
+              .began_map = map_.empty(),
+              .q_LG = keyframe.gauge.q_LG};
   relocaliser_.forget();
   frame_.forget();
   follower_.forget();
-  if (map_.empty()) frame_.reset({}, kNewMapSigma_m, kNewMapSigma_rad);
+  frame_.level(session_.q_LG);
+  if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-MapKeyframe LoopCloser::query_of(Place place, Time t, const Pose<W, B>& T_WB) {
-  if (session_.T_WB) session_.path_m += (T_WB.p - session_.T_WB->p).norm();
-  session_.T_WB = T_WB;
-  frame_.advance(T_WB, t);
-  return {{}, t, session_.number, T_WB, frame_.T_MW() * T_WB, session_.path_m, 0, frame_.known(), std::move(place)};
+/// Up has become better known. Where the flight began the map, all of M is turned level at once, and nothing in it moves
+/// against anything else; where it has joined an older one, M is level already, and the flight's own keyframes turn.
+void LoopCloser::level(const Quat& q_LG) {
+  const Quat turned = q_LG * session_.q_LG.conjugate();
+  session_.q_LG = q_LG;
+  if (angle_between(turned, Quat::Identity()) == 0) return;
+  map_.level(session_.number, q_LG);
+  if (session_.began_map) {
+    if (!map_.empty()) frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
+  } else {
+    for (MapKeyframe& k : map_.keyframes())
+      if (k.session == session_.number) k.T_MB.q = (frame_.yaw() * turned * frame_.yaw().conjugate() * k.T_MB.q).normalized();
+  }
+  frame_.level(q_LG);
 }
 
-MapUpdate LoopCloser::process(Place place, FrameId frame, Time t, const Pose<W, B>& T_WB, std::uint32_t reset_counter) {
-  if (!session_.begun || reset_counter != session_.reset_counter) begin_session(reset_counter);
+MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
+  const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
+  if (session_.T_GB) session_.path_m += (T_GB.p - session_.T_GB->p).norm();
+  session_.T_GB = T_GB;
+  frame_.advance(T_GB, keyframe.t);
+  return {{},
+          keyframe.t,
+          session_.number,
+          T_GB,
+          frame_.T_MG() * T_GB,
+          session_.path_m,
+          0,
+          frame_.known(),
+          std::move(place),
+          {keyframe.gauge.v_GB, keyframe.imu.bias}};
+}
+
+MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
+  if (!session_.begun || keyframe.reset_counter != session_.reset_counter) begin_session(keyframe);
+  level(keyframe.gauge.q_LG);
+  session_.up_sigma_rad = keyframe.gauge.up_sigma_rad;
+  map_.gravity_mps2 = keyframe.imu.gravity_mps2;
   MapUpdate update;
-  update.frame = frame;
-  update.t = t;
-  update.reset_counter = reset_counter;
-  MapKeyframe query = query_of(std::move(place), t, T_WB);
+  update.frame = keyframe.id;
+  update.t = keyframe.t;
+  update.reset_counter = keyframe.reset_counter;
+  MapKeyframe query = query_of(std::move(place), keyframe);
   CpuTimer timer;
   const std::vector<KeyframeId> candidates = candidates_for(query);
   update.stats.recognise_ms = timer.lap_ms();
@@ -101,7 +145,7 @@ MapUpdate LoopCloser::process(Place place, FrameId frame, Time t, const Pose<W, 
   else relocalise(query, proposals, found);
   update.stats.verify_ms = timer.lap_ms();
   update.stats.candidates = static_cast<int>(candidates.size());
-  add(std::move(query), found, update);
+  add(std::move(query), keyframe.imu, found, update);
   if (optimisation_due()) optimise(update);
   while (const auto id = thinning_.next(map_)) take_out(*id);
   update.stats.optimise_ms = timer.lap_ms();
@@ -109,8 +153,9 @@ MapUpdate LoopCloser::process(Place place, FrameId frame, Time t, const Pose<W, 
   update.localised = frame_.known();
   update.map_session = session_.number;
   if (update.localised) {
-    update.T_MW = frame_.T_MW();
-    update.T_MW_smooth = follower_.follow(update.T_MW, T_WB, t);
+    update.T_MG = frame_.T_MG();
+    update.T_MW = update.T_MG * keyframe.T_WG.inverse();
+    update.T_MW_smooth = follower_.follow(update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
   }
   return update;
 }
@@ -149,7 +194,8 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     MapKeyframe& k = *map_.find(proposal.candidate);
     SeenPose seen = seen_pose(k, proposal.edge);
     // What the lever makes of a different roll and pitch is not drift.
-    const double lever = (k.T_MB.p - seen.T_MB.p).norm() * kTiltSigma_rad;
+    const double tilt_rad = k.session == session_.number ? kTiltSigma_rad : std::hypot(kTiltSigma_rad, session_.up_sigma_rad);
+    const double lever = (k.T_MB.p - seen.T_MB.p).norm() * tilt_rad;
     seen.covariance.diagonal().head<3>().array() += lever * lever;
     if (frame_.mahalanobis2(seen) > gate) {
       ++update.stats.refused;
@@ -160,18 +206,18 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     ++update.stats.accepted;
     ++k.seen_again;
   }
-  query.T_MB = frame_.T_MW() * query.T_WB;
+  query.T_MB = frame_.T_MG() * query.T_GB;
 }
 
 void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found) {
   for (const Proposal& proposal : proposals) {
     const SeenPose seen = seen_pose(*map_.find(proposal.candidate), proposal.edge);
-    const std::optional<Pose<M, W>> T_MW = relocaliser_.consider(query, seen.T_MB, proposal.verified);
-    if (!T_MW) continue;
-    frame_.reset(*T_MW, kFoundSigma_m, kFoundSigma_rad);
+    const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
+    if (!T_MG) continue;
+    frame_.reset(*T_MG, kFoundSigma_m, kFoundSigma_rad);
     frame_.update(seen);
-    join_session(frame_.T_MW());
-    query.T_MB = frame_.T_MW() * query.T_WB;
+    join_session(frame_.T_MG());
+    query.T_MB = frame_.T_MG() * query.T_GB;
     query.placed = true;
     found.push_back(proposal.edge);
     return;
@@ -179,16 +225,17 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
 }
 
 /// What this session saw before it knew where it was now has a place in M.
-void LoopCloser::join_session(const Pose<M, W>& T_MW) {
+void LoopCloser::join_session(const Pose<M, G>& T_MG) {
   for (MapKeyframe& k : map_.keyframes())
-    if (k.session == session_.number) k.T_MB = T_MW * k.T_WB, k.placed = true;
+    if (k.session == session_.number) k.T_MB = T_MG * k.T_GB, k.placed = true;
   relocaliser_.forget();
 }
 
-void LoopCloser::add(MapKeyframe query, const std::vector<MapEdge>& found, MapUpdate& update) {
+void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update) {
   std::optional<MapEdge> odometry;
   if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr)
-    odometry = odometry_edge(*previous, query.T_WB, query.t, options_.drift);
+    odometry = odometry_edge(*previous, query.T_GB, query.t, options_.drift);
+  if (odometry) odometry->imu = readings_between(map_.find(session_.newest)->t, query.t, imu);
   const std::size_t size_before = map_.size();
   const Time t = query.t;
   const BowVector words = query.place.words;
@@ -215,7 +262,7 @@ void LoopCloser::optimise(MapUpdate& update) {
   loops_since_optimised_ = 0;
   if (const MapKeyframe* newest = map_.find(session_.newest); newest != nullptr && frame_.known()) {
     const Mat4 P = frame_.covariance();
-    frame_.reset(newest->T_MB * newest->T_WB.inverse(), std::sqrt(P.topLeftCorner<3, 3>().trace() / 3), std::sqrt(P(3, 3)));
+    frame_.reset(newest->T_MB * newest->T_GB.inverse(), std::sqrt(P.topLeftCorner<3, 3>().trace() / 3), std::sqrt(P(3, 3)));
   }
   update.stats.optimised = true;
   for (const MapKeyframe& k : map_.keyframes()) update.corrected.push_back({k.id, k.t, k.T_MB});

@@ -5,9 +5,9 @@
 //
 //   LoopCloser closer(rig, LoopOptions{}, *vocabulary);
 //   MapUpdate update = closer.process(keyframe);
-//   Pose<M, B> T_MB = update.T_MW * odometry.T_WB;
+//   Pose<M, B> T_MB = update.T_MG * odometry.gauge.T_GB;
 //   closer.finish();
-//   Trajectory<M> in_map = closer.corrected(trajectory_in_W);
+//   Trajectory<M> in_map = closer.corrected(trajectory_in_its_gauge);
 #pragma once
 
 #include <memory>
@@ -31,14 +31,14 @@ namespace fbvins {
 class LoopCloser final : public Mapper {
  public:
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
-  /// Goes on in an old map: M is that map's frame, and W must first be found in it. With boosted descriptors, `stage` makes
-  /// them; vocabulary and map must be of the same kind.
+  /// Goes on in an old map: M is that map's frame, and the flight must first be found in it. With boosted descriptors, `stage`
+  /// makes them; vocabulary and map must be of the same kind.
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   MapUpdate process(const Keyframe& keyframe) override;
-  /// The same from features already extracted (joining maps, replay).
-  MapUpdate process(Place place, FrameId frame, Time t, const Pose<W, B>& T_WB, std::uint32_t reset_counter);
+  /// The same from features already extracted (joining maps, replay); the images are not looked at.
+  MapUpdate process(Place place, const Keyframe& keyframe);
 
   /// A last optimisation over everything.
   PoseGraphReport finish();
@@ -46,18 +46,21 @@ class LoopCloser final : public Mapper {
   FinalAdjustmentReport adjust();
 
   const PlaceMap& map() const { return map_; }
-  /// Poses of a flight (in W) as the map has them now: exact at keyframes, blended between them. Frames of a
+  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, blended between them. Frames of a
   /// session that never found into the map are left out.
-  Trajectory<M> corrected(const Trajectory<W>& in_W) const { return flight_.corrected(map_, in_W); }
+  Trajectory<M> corrected(const Trajectory<G>& in_G) const { return flight_.corrected(map_, in_G); }
 
  private:
-  /// The odometry's present W.
+  /// The odometry's present gauge.
   struct Session {
     std::uint32_t number = 0;  ///< counts those that met this map
     bool begun = false;
     std::uint32_t reset_counter = 0;
+    bool began_map = false;  ///< M is its gauge, turned level
+    Quat q_LG = Quat::Identity();
+    double up_sigma_rad = 0;
     KeyframeId newest = {};
-    std::optional<Pose<W, B>> T_WB = {};  ///< of the newest
+    std::optional<Pose<G, B>> T_GB = {};  ///< of the newest
     double path_m = 0;
   };
   struct Proposal {
@@ -66,14 +69,15 @@ class LoopCloser final : public Mapper {
     MapEdge edge;
   };
 
-  void begin_session(std::uint32_t reset_counter);
-  MapKeyframe query_of(Place place, Time t, const Pose<W, B>& T_WB);
+  void begin_session(const Keyframe& keyframe);
+  void level(const Quat& q_LG);
+  MapKeyframe query_of(Place place, const Keyframe& keyframe);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
-  void join_session(const Pose<M, W>& T_MW);
-  void add(MapKeyframe query, const std::vector<MapEdge>& found, MapUpdate& update);
+  void join_session(const Pose<M, G>& T_MG);
+  void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   bool optimisation_due() const;
   void optimise(MapUpdate& update);
   void take_out(KeyframeId id);

@@ -25,15 +25,15 @@ struct Outcome {
 /// Errors against the truth without alignment: M starts where W starts.
 Outcome run(LoopCloser& closer, const std::vector<Frame>& frames) {
   Outcome o;
-  Trajectory<W> odometry;
-  const Pose<W, B> T0 = frames[0].truth;
-  const Pose<W, W> to_truth = T0 * frames[0].odometry.inverse();
-  const Pose<W, M> M_to_truth(to_truth.q, to_truth.p);
+  Trajectory<G> odometry;
+  const Pose<G, B> T0 = frames[0].truth;
+  const Pose<G, G> to_truth = T0 * frames[0].odometry.inverse();
+  const Pose<G, M> M_to_truth(to_truth.q, to_truth.p);
   for (const Frame& f : frames) {
-    const MapUpdate u = closer.process(f.place, FrameId{f.t.ns / 1000}, f.t, f.odometry, 0);
+    const MapUpdate u = closer.process(f.place, keyframe(FrameId{f.t.ns / 1000}, f.t, f.odometry));
     odometry.push_back({f.t, f.odometry});
     o.accepted += u.stats.accepted, o.refused += u.stats.refused;
-    o.causal_m += (M_to_truth * (u.T_MW * f.odometry).p - f.truth.p).squaredNorm();
+    o.causal_m += (M_to_truth * (u.T_MG * f.odometry).p - f.truth.p).squaredNorm();
     o.W_m += (to_truth * f.odometry.p - f.truth.p).squaredNorm();
   }
   closer.finish();
@@ -52,6 +52,60 @@ TEST(LoopCloser, TakesOutDriftAtOnceAndMoreAfterwards) {
   EXPECT_GT(o.accepted, 200);
   EXPECT_LT(o.causal_m, 0.6 * o.W_m);
   EXPECT_LT(o.after_m, 0.5 * o.W_m);
+}
+
+TEST(LoopCloser, WhatIsLearnedOfUpLaterTurnsTheWholeMapAndBendsNothing) {
+  const auto frames = flight(room(1), 200, 0.004, 0.05, 3);
+  const Quat q_GL = so3_exp(Vec3(0.04, -0.03, 0));
+  LoopCloser level(rig(), {}, vocabulary()), tilted(rig(), {}, vocabulary());
+  Trajectory<G> in_G;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Frame& f = frames[i];
+    Keyframe k = keyframe(FrameId{static_cast<std::int64_t>(i)}, f.t, f.odometry);
+    level.process(f.place, k);
+    // The same flight in a gauge that is not level, which is found out in the first 60 keyframes.
+    k.gauge.T_GB = {q_GL * f.odometry.q, q_GL * f.odometry.p};
+    k.gauge.q_LG = so3_exp(std::min(1.0, static_cast<double>(i) / 60) * so3_log(q_GL.conjugate()));
+    const MapUpdate u = tilted.process(f.place, k);
+    EXPECT_LT((u.T_MW * k.gauge.T_GB.p - u.T_MG * k.gauge.T_GB.p).norm(), 1e-12) << "W is the gauge here";
+    in_G.push_back({f.t, k.gauge.T_GB});
+  }
+  level.finish(), tilted.finish();
+  const Trajectory<M> in_M = tilted.corrected(in_G);
+  const auto &a = level.map().keyframes(), &b = tilted.map().keyframes();
+  ASSERT_EQ(a.size(), b.size());
+  const Quat turned = a[0].T_MB.q * b[0].T_MB.q.conjugate();
+  EXPECT_LT((turned * Vec3::UnitZ() - Vec3::UnitZ()).norm(), 1e-9) << "M is level";
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    sum += (turned * (b[i].T_MB.p - b[0].T_MB.p) - (a[i].T_MB.p - a[0].T_MB.p)).squaredNorm();
+    EXPECT_LT((b[i].T_MB.p - in_M[i].T.p).norm(), 1e-9);
+  }
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(a.size())), 0.003);
+}
+
+TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {
+  LoopCloser first(rig(), {}, vocabulary());
+  run(first, flight(room(1), 250, 0, 0, 2));
+  LoopCloser again(rig(), {}, vocabulary(), first.map());
+  const Quat q_GL = so3_exp(Vec3(-0.03, 0.03, 0)) * about_z(2.0);
+  const auto frames = flight(room(1), 100, 0.001, 0.01, 9, 7.3);
+  double worst_m = 0;
+  int localised = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Frame& f = frames[i];
+    Keyframe k = keyframe(FrameId{static_cast<std::int64_t>(i)}, f.t, {q_GL * f.odometry.q, q_GL * f.odometry.p});
+    if (i > 40) k.gauge.q_LG = Quat::FromTwoVectors(q_GL * Vec3::UnitZ(), Vec3::UnitZ());
+    const MapUpdate u = again.process(f.place, k);
+    if (!u.localised) continue;
+    ++localised;
+    if (i > 50) worst_m = std::max(worst_m, ((u.T_MG * k.gauge.T_GB).p - f.truth.p).norm());
+  }
+  EXPECT_GT(localised, 60);
+  EXPECT_LT(worst_m, 0.05);
+  const Vec3 first_before = first.map().keyframes()[0].T_MB.p;
+  again.finish();
+  EXPECT_EQ(again.map().keyframes()[0].T_MB.p, first_before) << "the old map's frame stays";
 }
 
 TEST(LoopCloser, SameInputSameBytes) {
@@ -81,21 +135,21 @@ TEST(LoopCloser, TwoIdenticalShelvesAreNotOnePlace) {
   std::vector<double> y;  // of every keyframe, by id
   Place first;
   for (int i = 0; i < 140; ++i) {
-    const Pose<W, B> T(Quat::Identity(), Vec3(0, 0.1 * i, 1.4));
+    const Pose<G, B> T(Quat::Identity(), Vec3(0, 0.1 * i, 1.4));
     Place place = seen(w, T, rng);
     if (i == 0) first = place;
     if (i == 35) {
       by_sight.set_query(place);
       fooled += by_sight.verify(first).has_value();
     }
-    const MapUpdate u = closer.process(std::move(place), FrameId{i}, Time{i * 200'000'000LL}, T, 0);
+    const MapUpdate u = closer.process(std::move(place), keyframe(FrameId{i}, Time{i * 200'000'000LL}, T));
     y.push_back(T.p.y());
     for (const LoopConstraint& l : u.loops) {
       const double flown = y[static_cast<std::size_t>(l.to.value)] - y[static_cast<std::size_t>(l.from.value)];
       EXPECT_NEAR(l.T_from_to.p.y(), flown, 0.1);  // the next shelf would be 3.5 m off
       ++true_loops;
     }
-    EXPECT_LT((u.T_MW.p).norm(), 0.05);
+    EXPECT_LT((u.T_MG.p).norm(), 0.05);
   }
   EXPECT_EQ(fooled, 1) << "the shelves must look the same";
   EXPECT_GT(true_loops, 0);
@@ -113,11 +167,11 @@ TEST(LoopCloser, FindsItselfInASavedMapFromAnotherStartAndNeverInAStrangersMap) 
     const Quat turned(Eigen::AngleAxisd(2.0, Vec3::UnitZ()));
     bool localised = false;
     for (const Frame& f : flight(room(world), 60, 0.001, 0.01, 9, 7.3)) {
-      const Pose<W, B> in_other_W(Quat(turned * f.odometry.q), Vec3(turned * f.odometry.p + Vec3(5, -3, 1)));
-      const MapUpdate u = again.process(f.place, FrameId{f.t.ns}, f.t, in_other_W, 0);
+      const Pose<G, B> in_other_W(Quat(turned * f.odometry.q), Vec3(turned * f.odometry.p + Vec3(5, -3, 1)));
+      const MapUpdate u = again.process(f.place, keyframe(FrameId{f.t.ns}, f.t, in_other_W));
       if (!u.localised) continue;
       localised = true;
-      const Pose<M, B> T_MB = u.T_MW * in_other_W;
+      const Pose<M, B> T_MB = u.T_MG * in_other_W;
       EXPECT_LT((T_MB.p - f.truth.p).norm(), 0.1);
     }
     EXPECT_EQ(localised, world == 1);
@@ -133,7 +187,7 @@ TEST(LoopCloser, RoundsInOneRoomDoNotGrowTheMapWithoutBound) {
   const World w = room(1);
   const auto frames = flight(w, 1000, 0.001, 0.01, 4);
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    closer.process(frames[i].place, FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry, 0);
+    closer.process(frames[i].place, keyframe(FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry));
     if (i == 400) after_three = serialise_map(closer.map()).size();
   }
   EXPECT_LT(serialise_map(closer.map()).size(), 1.4 * static_cast<double>(after_three));
@@ -145,8 +199,8 @@ int fly_with_restarts(LoopCloser& closer, const std::vector<Frame>& frames) {
   int localised = 0;
   for (std::size_t i = 0; i < frames.size(); ++i)
     localised += closer
-                     .process(frames[i].place, FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry,
-                              static_cast<std::uint32_t>(i))
+                     .process(frames[i].place, keyframe(FrameId{static_cast<std::int64_t>(i)}, frames[i].t, frames[i].odometry,
+                                                        static_cast<std::uint32_t>(i)))
                      .localised;
   return localised;
 }

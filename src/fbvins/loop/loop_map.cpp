@@ -30,7 +30,7 @@ LoopMap::~LoopMap() = default;
 MapUpdate LoopMap::process(const Keyframe& keyframe) { return closer_->process(keyframe); }
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
-Trajectory<M> LoopMap::corrected(const Trajectory<W>& in_W) const { return closer_->corrected(in_W); }
+Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }
 int LoopMap::keyframes() const { return static_cast<int>(closer_->map().size()); }
 Result<void> LoopMap::save(const std::string& path) const { return save_map(closer_->map(), path); }
 

@@ -35,7 +35,7 @@ Keyframe before_a_wall(int number, double x_m) {
   Keyframe k;
   k.id = FrameId{number};
   k.t = Time{} + Duration::from_seconds(number);
-  k.T_WB.p.y() = x_m;
+  k.gauge.T_GB.p.y() = x_m;
   k.images = {k.t, image(shift_px), image(shift_px + test_room::kFocal * test_room::kBaseline / kDepth_m)};
   return k;
 }
@@ -50,7 +50,7 @@ TEST_F(OpenedMap, IsSavedOpenedAndFoundAgain) {
   }
   (*map)->finish();
   EXPECT_EQ((*map)->keyframes(), 4);
-  EXPECT_EQ((*map)->corrected({{flown[0].t, flown[0].T_WB}, {flown[1].t, flown[1].T_WB}}).size(), 2u);
+  EXPECT_EQ((*map)->corrected({{flown[0].t, flown[0].gauge.T_GB}, {flown[1].t, flown[1].gauge.T_GB}}).size(), 2u);
   ASSERT_TRUE((*map)->save(path_).ok());
 
   auto again = LoopMap::create(test_room::rig(), {.file = path_});
@@ -59,12 +59,12 @@ TEST_F(OpenedMap, IsSavedOpenedAndFoundAgain) {
   bool localised = false;
   for (int i = 0; i < 3; ++i) {
     Keyframe k = before_a_wall(10 + i, 0.05 + 0.1 * i);
-    const Vec3 p_M = k.T_WB.p;
-    k.T_WB.p += Vec3(5, -3, 1);
+    const Vec3 p_M = k.gauge.T_GB.p;
+    k.gauge.T_GB.p += Vec3(5, -3, 1);
     const MapUpdate update = (*again)->process(k);
     if (!update.localised) continue;
     localised = true;
-    EXPECT_LT(((update.T_MW * k.T_WB).p - p_M).norm(), 0.05);
+    EXPECT_LT(((update.T_MG * k.gauge.T_GB).p - p_M).norm(), 0.05);
   }
   EXPECT_TRUE(localised);
 }

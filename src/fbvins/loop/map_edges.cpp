@@ -21,14 +21,14 @@ Mat6 symmetric(const Mat6& m) { return 0.5 * (m + m.transpose()); }
 
 double angle_between(const Quat& a, const Quat& b) { return 2 * std::acos(std::min(1.0, std::abs(a.dot(b)))); }
 
-MapEdge odometry_edge(const MapKeyframe& from, const Pose<W, B>& T_WB, Time t, const DriftOptions& options) {
-  const Pose<B, B> T = from.T_WB.inverse() * T_WB;
+MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, const DriftOptions& options) {
+  const Pose<B, B> T = from.T_GB.inverse() * T_GB;
   const DriftVariance drift = drift_over(options, T.p.norm(), std::abs((t - from.t).seconds()));
   Mat6 information = Mat6::Zero();
   // Variance of yaw in all three: a step is short, and roll and pitch drift less, not more.
   information.diagonal().head<3>().setConstant(1 / (drift.position_m2 + kOdometryFloor_m2));
   information.diagonal().tail<3>().setConstant(1 / (drift.yaw_rad2 + kOdometryFloor_rad2));
-  return {from.id, {}, T, information, MapEdge::Kind::odometry};
+  return {from.id, {}, T, information, MapEdge::Kind::odometry, nullptr};
 }
 
 /// T_BcBq with the covariance of (dp in the candidate's body, dtheta in the query's), from the cameras' T_qc.
@@ -45,7 +45,7 @@ MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const Relative
   cov = compose_covariance(T_BC * T_cq, cov, T_BC.inverse(), Mat6::Zero());
   cov.diagonal().head<3>().array() += kLoopFloor_m * kLoopFloor_m;
   cov.diagonal().tail<3>().array() += kLoopFloor_rad * kLoopFloor_rad;
-  return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop};
+  return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
 }
 
 SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge) {

@@ -16,7 +16,7 @@ namespace fbvins {
 double angle_between(const Quat& a, const Quat& b);
 
 /// From the keyframe before to a pose of the same W; `to` is left open.
-MapEdge odometry_edge(const MapKeyframe& from, const Pose<W, B>& T_WB, Time t, const DriftOptions& drift);
+MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
 
 /// From the candidate to the body that saw it again; `to` is left open. `pose`: of the candidate's camera in the query's.
 MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);

@@ -23,10 +23,10 @@ TEST(AngleBetween, IsTheSameForBothQuaternionsOfARotation) {
 TEST(OdometryEdge, MeasuresTheStepWithTheDriftOfItsLength) {
   MapKeyframe from;
   from.id = KeyframeId{4};
-  from.T_WB = {so3_exp(Vec3(0, 0, 1)), Vec3(1, 2, 3)};
+  from.T_GB = {so3_exp(Vec3(0, 0, 1)), Vec3(1, 2, 3)};
   const Pose<B, B> step(so3_exp(Vec3(0.1, 0, 0.2)), Vec3(0.6, 0, 0.8));
   const DriftOptions drift;
-  const MapEdge edge = odometry_edge(from, from.T_WB * step, from.t, drift);
+  const MapEdge edge = odometry_edge(from, from.T_GB * step, from.t, drift);
   EXPECT_EQ(edge.from, KeyframeId{4});
   EXPECT_EQ(edge.kind, MapEdge::Kind::odometry);
   EXPECT_LT((edge.T_from_to.p - step.p).norm(), 1e-12);

@@ -24,7 +24,7 @@ PlaceMap map_of(int keyframes, std::uint64_t seed) {
   for (int i = 0; i < keyframes; ++i) {
     MapKeyframe k;
     k.t = Time{1000 * i};
-    k.T_WB = {so3_exp(Vec3(0, 0, 0.1 * i)), Vec3(i, 1, 2)};
+    k.T_GB = {so3_exp(Vec3(0, 0, 0.1 * i)), Vec3(i, 1, 2)};
     k.T_MB = {so3_exp(Vec3(0, 0, 0.11 * i)), Vec3(i, 1.1, 2)};
     k.place.up_C0 = Vec3(0, -1, 0);
     for (int f = 0; f < 50; ++f) {

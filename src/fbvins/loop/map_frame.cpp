@@ -12,10 +12,10 @@ namespace {
 /// What an odometry at rest drifts in a second, as standard deviations that grow with the root of time.
 constexpr double kStandstill_m = 0.001, kStandstillYaw_rad = 0.01 * kDegree;
 
-/// T_MW with this yaw that takes the body at T_WB to p_MB.
-Pose<M, W> frame_at(double yaw, const Vec3& p_MB, const Vec3& p_WB) {
-  const Quat q = about_z(yaw);
-  return {q, Vec3(p_MB - q * p_WB)};
+/// The pose with this orientation that takes the body at `p` to p_MB.
+template <class From>
+Pose<M, From> frame_at(const Quat& q, const Vec3& p_MB, const Vec3& p) {
+  return {q, Vec3(p_MB - q * p)};
 }
 
 double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
@@ -32,27 +32,36 @@ Quat about_z(double yaw_rad) { return {std::cos(0.5 * yaw_rad), 0, 0, std::sin(0
 
 double yaw_of(const Quat& q) { return wrapped(2 * std::atan2(q.z(), q.w())); }
 
-void MapFrame::reset(const Pose<M, W>& T_MW, double sigma_m, double sigma_rad) {
-  T_MW_ = {about_z(yaw_of(T_MW.q)), T_MW.p};
-  if (last_) T_MW_ = frame_at(yaw_of(T_MW.q), T_MW * last_->T_WB.p, last_->T_WB.p);
+void MapFrame::put(double yaw_rad, const Vec3& p_MB) {
+  yaw_rad_ = yaw_rad;
+  T_MG_ = frame_at<G>(about_z(yaw_rad) * q_LG_, p_MB, body());
+}
+
+void MapFrame::level(const Quat& q_LG) {
+  q_LG_ = q_LG;
+  put(yaw_rad_, T_MG_ * body());
+}
+
+void MapFrame::reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad) {
+  put(yaw_of(T_MG.q * q_LG_.conjugate()), T_MG * body());
   P_ = Vec4(sigma_m * sigma_m, sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
   known_ = true;
 }
 
-void MapFrame::advance(const Pose<W, B>& T_WB, Time t) {
+void MapFrame::advance(const Pose<G, B>& T_GB, Time t) {
   if (last_ && known_) {
-    const Vec3 step = T_WB.p - last_->T_WB.p;
+    const Vec3 step = T_GB.p - last_->T_GB.p;
     const DriftVariance drift = drift_over(options_, step.norm(), std::abs((t - last_->t).seconds()));
     Mat4 F = Mat4::Identity();  // the yaw swings the step
-    F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MW_.q * step);
+    F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MG_.q * step);
     P_ = F * P_ * F.transpose();
     P_.diagonal() += Vec4(drift.position_m2, drift.position_m2, drift.position_m2, drift.yaw_rad2);
   }
-  last_ = Stamped{t, T_WB};
+  last_ = Stamped{t, T_GB};
 }
 
 Vec4 MapFrame::innovation(const SeenPose& seen) const {
-  const Pose<M, B> predicted = T_MW_ * last_->T_WB;
+  const Pose<M, B> predicted = T_MG_ * last_->T_GB;
   Vec4 v;
   v << seen.T_MB.p - predicted.p, yaw_of(seen.T_MB.q * predicted.q.conjugate());
   return v;
@@ -70,20 +79,19 @@ void MapFrame::update(const SeenPose& seen) {
   const Vec4 d = K * v;
   const Mat4 A = Mat4::Identity() - K;
   P_ = A * P_ * A.transpose() + K * seen.covariance * K.transpose();
-  const Vec3 p_MB = T_MW_ * last_->T_WB.p + d.head<3>();
-  T_MW_ = frame_at(yaw_of(T_MW_.q) + d[3], p_MB, last_->T_WB.p);
+  put(yaw_rad_ + d[3], T_MG_ * body() + d.head<3>());
 }
 
 const Pose<M, W>& MapFrameFollower::follow(const Pose<M, W>& target, const Pose<W, B>& T_WB, Time t) {
   if (!last_) {
-    T_MW_ = target;
+    T_MW_ = frame_at<W>(about_z(yaw_of(target.q)), target * T_WB.p, T_WB.p);
   } else {
     const double dt = std::abs((t - *last_).seconds());
     const Vec3 here = T_MW_ * T_WB.p, gap = target * T_WB.p - here;
     const double yaw = yaw_of(T_MW_.q), turn = wrapped(yaw_of(target.q) - yaw);
     const double reach = max_mps_ * dt, max_turn = max_radps_ * dt;
     const Vec3 step = gap.norm() > reach ? Vec3(gap * (reach / gap.norm())) : gap;
-    T_MW_ = frame_at(yaw + std::clamp(turn, -max_turn, max_turn), here + step, T_WB.p);
+    T_MW_ = frame_at<W>(about_z(yaw + std::clamp(turn, -max_turn, max_turn)), here + step, T_WB.p);
   }
   last_ = t;
   return T_MW_;

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the odometry's frame W lies in the map M right now: a Kalman filter over position and yaw of the body in M,
-// which odometry drift widens and recognised places narrow (docs/derivations/loop.md, L12-L14); and a follower that
-// moves towards it by a bounded amount a second, for those who fly by it. Values; one thread at a time.
+// Where a flight's gauge G lies in the map M right now: a Kalman filter over position and yaw of the body in M, which
+// odometry drift widens and recognised places narrow (docs/derivations/loop.md, L12-L14); its tilt is not filtered, it is
+// what the flight knows of up. And a follower of T_MW that moves by a bounded amount a second, for those who fly by it.
+// Values; one thread at a time.
 //
 //   MapFrame frame(options);
-//   frame.reset(T_MW);
-//   frame.advance(T_WB, t);                       // every keyframe
+//   frame.level(q_LG);
+//   frame.reset(T_MG);
+//   frame.advance(T_GB, t);                       // every keyframe
 //   if (frame.mahalanobis2(seen) < 25) frame.update(seen);
-//   Pose<M, B> T_MB = frame.T_MW() * T_WB;
+//   Pose<M, B> T_MB = frame.T_MG() * T_GB;
 #pragma once
 
 #include <optional>
@@ -15,6 +17,7 @@
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/loop/loop_options.hpp"
+#include "fbvins/types/gauge.hpp"
 
 namespace fbvins {
 
@@ -42,33 +45,45 @@ class MapFrame {
   explicit MapFrame(const DriftOptions& options) : options_(options) {}
 
   bool known() const { return known_; }
-  const Pose<M, W>& T_MW() const { return T_MW_; }
-  /// Of the body's position in M [m] and the yaw of T_MW [rad].
+  const Pose<M, G>& T_MG() const { return T_MG_; }
+  /// The turn about z from G, level, to M.
+  Quat yaw() const { return about_z(yaw_rad_); }
+  /// Of the body's position in M [m] and the yaw of G in M [rad].
   const Mat4& covariance() const { return P_; }
 
   void forget() { known_ = false, last_.reset(); }
-  /// Takes over a frame; `sigma` of position [m], of yaw [rad]. Only the yaw and the position of T_MW are kept.
-  void reset(const Pose<M, W>& T_MW, double sigma_m, double sigma_rad);
+  /// What turns G level is known anew: the body stays where it is in M, and so does the yaw.
+  void level(const Quat& q_LG);
+  /// All of M is turned, the body in it: T takes its points to where they are from now on. Followed by level().
+  void turn(const Pose<M, M>& T) { T_MG_ = T * T_MG_; }
+  /// Takes over a frame; `sigma` of position [m], of yaw [rad]. Of T_MG only what it does beyond levelling G is kept: its
+  /// yaw, and where it puts the body.
+  void reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad);
   /// The odometry went on to here.
-  void advance(const Pose<W, B>& T_WB, Time t);
+  void advance(const Pose<G, B>& T_GB, Time t);
   double mahalanobis2(const SeenPose& seen) const;
   void update(const SeenPose& seen);
 
  private:
   struct Stamped {
     Time t;
-    Pose<W, B> T_WB;
+    Pose<G, B> T_GB;
   };
   Vec4 innovation(const SeenPose& seen) const;
+  /// Where the body is in G; its origin before the odometry has begun.
+  Vec3 body() const { return last_ ? last_->T_GB.p : Vec3(Vec3::Zero()); }
+  void put(double yaw_rad, const Vec3& p_MB);
 
   DriftOptions options_;
   bool known_ = false;
-  Pose<M, W> T_MW_;
+  Quat q_LG_ = Quat::Identity();
+  double yaw_rad_ = 0;
+  Pose<M, G> T_MG_;
   Mat4 P_ = Mat4::Zero();
   std::optional<Stamped> last_;
 };
 
-/// Follows T_MW without a step: at the body, at most `max_mps` and `max_radps`.
+/// Follows T_MG without a step: at the body, at most `max_mps` and `max_radps`.
 class MapFrameFollower {
  public:
   MapFrameFollower(double max_mps, double max_radps) : max_mps_(max_mps), max_radps_(max_radps) {}

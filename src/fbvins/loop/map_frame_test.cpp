@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-Pose<W, B> body_at(const Vec3& p) { return {Quat::Identity(), p}; }
+Pose<G, B> body_at(const Vec3& p) { return {Quat::Identity(), p}; }
 
 TEST(DriftOver, GrowsWithTheRootOfThePathAndALittleAtRest) {
   const DriftOptions drift{.position_m = 0.01, .yaw_rad = 0.002};
@@ -30,10 +30,25 @@ TEST(MapFrame, IsUnknownUntilItIsSetAndKeepsYawAndPositionOnly) {
   EXPECT_FALSE(frame.known());
   frame.reset({so3_exp(Vec3(0.1, 0, 0)) * about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
   EXPECT_TRUE(frame.known());
-  EXPECT_NEAR((frame.T_MW().q * Vec3::UnitZ()).z(), 1, 1e-12);
-  EXPECT_LT((frame.T_MW().p - Vec3(1, 2, 3)).norm(), 1e-12);
+  EXPECT_NEAR((frame.T_MG().q * Vec3::UnitZ()).z(), 1, 1e-12);
+  EXPECT_LT((frame.T_MG().p - Vec3(1, 2, 3)).norm(), 1e-12);
   frame.forget();
   EXPECT_FALSE(frame.known());
+}
+
+TEST(MapFrame, UpLearnedLaterTurnsAboutTheBody) {
+  MapFrame frame({});
+  frame.advance(body_at(Vec3(5, 0, 1)), Time{0});
+  frame.reset({about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
+  const Vec3 p_MB = frame.T_MG() * Vec3(5, 0, 1);
+  const Quat q_LG = so3_exp(Vec3(0.03, -0.02, 0));
+  frame.level(q_LG);
+  EXPECT_LT((frame.T_MG() * Vec3(5, 0, 1) - p_MB).norm(), 1e-12);
+  EXPECT_LT(so3_log(frame.T_MG().q.conjugate() * about_z(0.5) * q_LG).norm(), 1e-9);
+  const Pose<M, M> T(so3_exp(Vec3(0.1, 0, 0)), Vec3(0, 1, 0));
+  frame.turn(T);
+  frame.level(q_LG);
+  EXPECT_LT((frame.T_MG() * Vec3(5, 0, 1) - T * p_MB).norm(), 1e-12);
 }
 
 TEST(MapFrame, FlyingWidensAndAPlaceNarrows) {
@@ -51,7 +66,7 @@ TEST(MapFrame, FlyingWidensAndAPlaceNarrows) {
   frame.update(seen);
   EXPECT_LT(frame.mahalanobis2(seen), far);
   for (int i = 0; i < 4; ++i) EXPECT_LT(frame.covariance()(i, i), flown(i, i));
-  const Vec3 p = frame.T_MW() * Vec3(9, 0, 0);
+  const Vec3 p = frame.T_MG() * Vec3(9, 0, 0);
   EXPECT_GT(p.y(), 0.02);
   EXPECT_LT(p.y(), 0.05);
 }

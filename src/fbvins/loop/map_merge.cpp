@@ -18,7 +18,11 @@ Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOp
     const Pose<M, B> T_MB = T_MC * rig.T_BC0.inverse();
     Place place = k.place;
     place.words = vocabulary.words_of(place.descriptors);  // a file keeps none
-    joined |= closer.process(std::move(place), FrameId{k.id.value}, k.t, {T_MB.q, T_MB.p}, 0).localised;
+    Keyframe flown;
+    flown.id = FrameId{k.id.value};
+    flown.t = k.t;
+    flown.gauge.T_GB = {T_MB.q, T_MB.p};
+    joined |= closer.process(std::move(place), flown).localised;
   }
   if (!joined) return Error{ErrorCode::invalid_argument, "the two maps have no place in common"};
   closer.finish();

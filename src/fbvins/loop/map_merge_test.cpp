@@ -15,7 +15,7 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const auto map_of = [](std::uint64_t world, std::uint64_t seed, double start_s) {
     LoopCloser closer(rig(), {}, vocabulary());
     for (const Frame& f : flight(room(world), 120, 0.001, 0.01, seed, start_s))
-      closer.process(f.place, FrameId{f.t.ns / 1000}, f.t, f.odometry, 0);
+      closer.process(f.place, keyframe(FrameId{f.t.ns / 1000}, f.t, f.odometry));
     closer.finish();
     return closer.map();
   };

@@ -40,10 +40,10 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
       baseline_m_(p_rl_.norm()),
       orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {}
 
-Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_WB) {
+Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
   Place place;
   place.focal_px = focal_px_;
-  place.up_C0 = (R_WB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
+  place.up_C0 = (R_LB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
   if (!images.left) return place;
   orb_.extract(images.left->view(), found_);
   stage_->improve(images.left->width(), images.left->height(), found_);

@@ -4,7 +4,7 @@
 // instance, one thread.
 //
 //   PlaceExtractor extractor(rig, {}, vocabulary);
-//   Place place = extractor.extract(keyframe.images, keyframe.T_WB.R());
+//   Place place = extractor.extract(keyframe.images, R_LB);
 #pragma once
 
 #include <memory>
@@ -26,8 +26,8 @@ class PlaceExtractor {
   PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
                  std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
-  /// Empty when the left image is missing; without depth when the right one is.
-  Place extract(const StereoFrame& images, const Mat3& R_WB);
+  /// `R_LB`: attitude against the level. Empty when the left image is missing; without depth when the right one is.
+  Place extract(const StereoFrame& images, const Mat3& R_LB);
 
  private:
   struct Stereo {

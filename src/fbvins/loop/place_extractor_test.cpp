@@ -48,9 +48,9 @@ TEST(PlaceExtractor, FindsTheDepthOfAWall) {
 }
 
 TEST(PlaceExtractor, KnowsUpFromTheAttitude) {
-  const Quat R_WB = so3_exp(Vec3(0.3, -0.2, 1.0));
-  const Place place = extractor().extract({}, R_WB.toRotationMatrix());
-  EXPECT_LT((R_WB * (test_room::rig().T_BC0.q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);
+  const Quat R_LB = so3_exp(Vec3(0.3, -0.2, 1.0));
+  const Place place = extractor().extract({}, R_LB.toRotationMatrix());
+  EXPECT_LT((R_LB * (test_room::rig().T_BC0.q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);
 }
 
 TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing) {

@@ -4,6 +4,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "fbvins/imu/preintegration.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -14,11 +16,23 @@ auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) 
   return it != keyframes.end() && it->id == id ? &*it : nullptr;
 }
 
+/// An interval this long binds the ends no more than the odometry's relative pose does.
+constexpr double kLongestImu_s = 5;
+
+std::shared_ptr<const Preintegration> joined(const MapEdge& first, const MapEdge& second) {
+  if (!first.imu || !second.imu || first.imu->dt_s() + second.imu->dt_s() > kLongestImu_s) return nullptr;
+  Preintegration both = *first.imu;
+  both.append(*second.imu);
+  return std::make_shared<const Preintegration>(std::move(both));
+}
+
 MapEdge composed(const MapEdge& first, const MapEdge& second, MapEdge::Kind kind) {
   const Mat6 cov =
       compose_covariance(first.T_from_to, first.information.inverse(), second.T_from_to, second.information.inverse());
   const Mat6 information = cov.inverse();
-  return {first.from, second.to, first.T_from_to * second.T_from_to, 0.5 * (information + information.transpose()), kind};
+  return {
+      first.from,           second.to, first.T_from_to * second.T_from_to, 0.5 * (information + information.transpose()), kind,
+      joined(first, second)};
 }
 
 /// The same edge from its other end.
@@ -32,7 +46,7 @@ MapEdge reversed(const MapEdge& e) {
   J.bottomRightCorner<3, 3>() = -R;
   const Mat6 cov = J * e.information.inverse() * J.transpose();
   const Mat6 information = cov.inverse();
-  return {e.to, e.from, inverse, 0.5 * (information + information.transpose()), e.kind};
+  return {e.to, e.from, inverse, 0.5 * (information + information.transpose()), e.kind, nullptr};
 }
 
 }  // namespace
@@ -87,6 +101,18 @@ void PlaceMap::remove(KeyframeId id) {
   keyframes_.erase(keyframes_.begin() + (gone - keyframes_.data()));
 }
 
+Pose<M, M> PlaceMap::turn(const Quat& rotation, const Vec3& pivot_M) {
+  const Pose<M, M> T(rotation, Vec3(pivot_M - rotation * pivot_M));
+  for (MapKeyframe& k : keyframes_)
+    if (k.placed) k.T_MB = T * k.T_MB;
+  return T;
+}
+
+void PlaceMap::level(std::uint32_t session, const Quat& q_LG) {
+  for (MapKeyframe& k : keyframes_)
+    if (k.session == session) k.place.up_C0 = (q_LG * k.T_GB.q * T_BC0.q).conjugate() * Vec3::UnitZ();
+}
+
 PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
   if (keyframes_.empty()) return {};
   PoseGraph graph;
@@ -107,7 +133,7 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
       if (!joined[static_cast<std::size_t>(n)]) joined[static_cast<std::size_t>(n)] = true, open.push_back(n);
   }
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
-    graph.add_node(keyframes_[i].T_MB, keyframes_[i].T_WB.q, i == 0 || !joined[i]);
+    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, i == 0 || !joined[i]);
   for (const MapEdge& e : edges) {
     const int a = index_of(e.from), b = index_of(e.to);
     if (joined[static_cast<std::size_t>(a)]) graph.add_edge({a, b, e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1});

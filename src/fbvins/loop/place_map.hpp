@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map: keyframes that know what they saw, where they are in M, and the relative poses between them.
+// The map: keyframes that know what they saw, where they are in M, and the relative poses between them. These are as they were
+// seen, in the gauge of a flight; M is level, and is turned as a whole when up becomes better known (loop.md, L17).
 // A value; one thread at a time.
 //
 //   PlaceMap map;
@@ -7,25 +8,37 @@
 //   map.edges.push_back({older, id, T_ab, information, MapEdge::Kind::loop});
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/loop/place.hpp"
 #include "fbvins/loop/pose_graph.hpp"
+#include "fbvins/types/gauge.hpp"
+#include "fbvins/types/imu.hpp"
 
 namespace fbvins {
+
+class Preintegration;
+
+/// How a keyframe moved, as the estimator knew it. Not saved.
+struct MapMotion {
+  Vec3 v_GB = Vec3::Zero();  ///< m/s, in the flight's gauge
+  ImuBias bias;
+};
 
 struct MapKeyframe {
   KeyframeId id;
   Time t;
-  std::uint32_t session = 0;  ///< which odometry frame W it was taken in
-  Pose<W, B> T_WB;
+  std::uint32_t session = 0;  ///< which flight's gauge G it was taken in
+  Pose<G, B> T_GB;            ///< as it was seen; never turned level
   Pose<M, B> T_MB;
   double path_m = 0;   ///< flown in this session until here
   int seen_again = 0;  ///< loops that ended here
   bool placed = true;  ///< T_MB means something: its session has found into the map
   Place place;
+  MapMotion motion;
 };
 
 struct MapEdge {
@@ -34,6 +47,8 @@ struct MapEdge {
   Pose<B, B> T_from_to;
   Mat6 information = Mat6::Identity();
   Kind kind = Kind::odometry;
+  std::shared_ptr<const Preintegration>
+      imu;  ///< of an edge of the odometry: the readings on the way, where they are known. Not saved
 };
 
 class PlaceMap {
@@ -50,12 +65,18 @@ class PlaceMap {
   const MapKeyframe* find(KeyframeId id) const;
   MapKeyframe* find(KeyframeId id);
 
+  /// Turns all keyframes that have a place in M about `pivot_M`. Returns the motion.
+  Pose<M, M> turn(const Quat& rotation, const Vec3& pivot_M);
+  /// What a flight has learned of up by now, for all its keyframes; `q_LG` turns its gauge level.
+  void level(std::uint32_t session, const Quat& q_LG);
+
   /// Moves the keyframes of the sessions that hang together with the first keyframe.
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   std::vector<MapEdge> edges;
-  Pose<B, C0> T_BC0;     ///< of the camera that saw the places
-  bool boosted = false;  ///< descriptors are boosted ones, which compare with such only
+  Pose<B, C0> T_BC0;           ///< of the camera that saw the places
+  double gravity_mps2 = 9.81;  ///< of the readings on its edges
+  bool boosted = false;        ///< descriptors are boosted ones, which compare with such only
 
  private:
   std::vector<MapKeyframe> keyframes_;

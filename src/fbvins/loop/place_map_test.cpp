@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/imu/preintegration.hpp"
 
 namespace fbvins {
 namespace {
@@ -17,12 +18,46 @@ PlaceMap chain(int keyframes) {
   Pose<M, B> T_MB;
   for (int i = 0; i < keyframes; ++i) {
     MapKeyframe k;
-    k.T_MB = T_MB, k.T_WB = Pose<W, B>(T_MB.q, T_MB.p);
+    k.T_MB = T_MB, k.T_GB = Pose<G, B>(T_MB.q, T_MB.p);
     map.add(std::move(k));
     if (i > 0) map.edges.push_back({KeyframeId{i - 1}, KeyframeId{i}, step, Mat6::Identity(), MapEdge::Kind::odometry});
     T_MB = T_MB * step;
   }
   return map;
+}
+
+/// Readings of so many seconds from `from_s` on, at rest.
+std::shared_ptr<const Preintegration> rest(double from_s, double seconds) {
+  ImuSegment segment;
+  for (const double s : {from_s, from_s + 0.5 * seconds, from_s + seconds})
+    segment.samples.push_back({Time{} + Duration::from_seconds(s), Vec3::Zero(), Vec3(0, 0, 9.81)});
+  Preintegration imu({}, {});
+  imu.integrate(segment);
+  return std::make_shared<const Preintegration>(imu);
+}
+
+TEST(PlaceMap, ReadingsOfARemovedKeyframesTwoStepsBecomeOne) {
+  PlaceMap map = chain(4);
+  for (int i = 0; i < 3; ++i) map.edges[static_cast<std::size_t>(i)].imu = rest(2 * i, 2);
+  map.remove(KeyframeId{1});
+  ASSERT_TRUE(map.edges.back().imu);
+  EXPECT_NEAR(map.edges.back().imu->dt_s(), 4, 1e-9);
+  map.remove(KeyframeId{2});
+  ASSERT_EQ(map.edges.size(), 1u);
+  EXPECT_FALSE(map.edges.back().imu) << "six seconds say too little";
+}
+
+TEST(PlaceMap, TurnsAsAWhole) {
+  PlaceMap map = chain(3);
+  map.keyframes()[2].placed = false;
+  const Vec3 apart = map.keyframes()[2].T_MB.p;
+  const Pose<B, B> step = map.keyframes()[0].T_MB.inverse() * map.keyframes()[1].T_MB;
+  const Vec3 pivot = map.keyframes()[0].T_MB.p;
+  map.turn(so3_exp(Vec3(0.1, -0.2, 0)), pivot);
+  EXPECT_LT((map.keyframes()[0].T_MB.p - pivot).norm(), 1e-12);
+  EXPECT_LT(((map.keyframes()[0].T_MB.inverse() * map.keyframes()[1].T_MB).p - step.p).norm(), 1e-12);
+  EXPECT_GT((map.keyframes()[1].T_MB.q.vec()).head<2>().norm(), 0.05);
+  EXPECT_EQ(map.keyframes()[2].T_MB.p, apart) << "it has no place in M";
 }
 
 TEST(PlaceMap, NumbersKeyframesAndFindsThem) {

@@ -40,9 +40,9 @@ Vec6 edge_residual(const Pose<M, B>& T_Ma, const Pose<M, B>& T_Mb, const Pose<B,
   return r;
 }
 
-int PoseGraph::add_node(const Pose<M, B>& T_MB, const Quat& q_WB, bool fixed) {
+int PoseGraph::add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed) {
   poses_.push_back(T_MB);
-  up_B_.push_back(q_WB.conjugate() * Vec3::UnitZ());
+  up_B_.push_back(up_B);
   fixed_.push_back(fixed);
   return static_cast<int>(poses_.size()) - 1;
 }
@@ -79,11 +79,13 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
     used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
   }
   const double per_sigma = 1 / kTilt_rad;
+  std::array<double, 2> level{0, 0};
   for (std::size_t i = 0; i < poses_.size() && options.degrees_of_freedom == 6; ++i)
     if (used[i] && !fixed_[i])
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<GravityCost, 2, 6>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}), nullptr,
-          x[i].data());
+          new ceres::AutoDiffCostFunction<GravityCost, 2, 6, 2>(new GravityCost{poses_[i].q, up_B_[i], per_sigma}), nullptr,
+          x[i].data(), level.data());
+  if (problem.HasParameterBlock(level.data())) problem.SetParameterBlockConstant(level.data());
   for (std::size_t i = 0; i < poses_.size(); ++i)
     if (used[i] && fixed_[i]) problem.SetParameterBlockConstant(x[i].data());
   const ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, kMaxIterations);

@@ -6,7 +6,7 @@
 // out. One thread; the same input gives the same bits.
 //
 //   PoseGraph graph;
-//   int a = graph.add_node(T_MB_a, q_WB_a), b = graph.add_node(T_MB_b, q_WB_b);
+//   int a = graph.add_node(T_MB_a, up_a), b = graph.add_node(T_MB_b, up_b);
 //   graph.add_edge({a, b, T_ab, information, true});
 //   PoseGraphReport report = graph.optimise({});
 #pragma once
@@ -36,8 +36,8 @@ struct PoseGraphEdge {
 
 class PoseGraph {
  public:
-  /// R_WB: the odometry's own orientation, of which roll and pitch count.
-  int add_node(const Pose<M, B>& T_MB, const Quat& q_WB, bool fixed = false);
+  /// `up_B`: away from gravity, as the odometry knows it.
+  int add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed = false);
   void add_edge(PoseGraphEdge edge) { edges_.push_back(edge); }
 
   /// Fixed nodes stay; where none is, the first one of each connected part would be free to float: fix one.

@@ -61,7 +61,8 @@ Flight flight(int n, int loops, double false_share, std::uint64_t seed) {
 
 double error_after(const Flight& f, const PoseGraphOptions& options, PoseGraphReport* report = nullptr) {
   PoseGraph graph;
-  for (std::size_t i = 0; i < f.odometry.size(); ++i) graph.add_node(f.odometry[i], f.odometry[i].q, i == 0);
+  for (std::size_t i = 0; i < f.odometry.size(); ++i)
+    graph.add_node(f.odometry[i], f.odometry[i].q.conjugate() * Vec3::UnitZ(), i == 0);
   for (const PoseGraphEdge& e : f.edges) graph.add_edge(e);
   const PoseGraphReport r = graph.optimise(options);
   if (report != nullptr) *report = r;
@@ -106,7 +107,8 @@ INSTANTIATE_TEST_SUITE_P(Dof, PoseGraphDof, testing::Values(4, 6));
 TEST(PoseGraph, FourDegreesOfFreedomKeepRollAndPitch) {
   const Flight f = flight(200, 60, 0, 5);
   PoseGraph graph;
-  for (std::size_t i = 0; i < f.odometry.size(); ++i) graph.add_node(f.odometry[i], f.odometry[i].q, i == 0);
+  for (std::size_t i = 0; i < f.odometry.size(); ++i)
+    graph.add_node(f.odometry[i], f.odometry[i].q.conjugate() * Vec3::UnitZ(), i == 0);
   for (const PoseGraphEdge& e : f.edges) graph.add_edge(e);
   graph.optimise({});
   for (std::size_t i = 0; i < f.odometry.size(); ++i)
@@ -141,7 +143,7 @@ TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
   for (std::size_t i = 0; i < f.odometry.size(); ++i) {
     MapKeyframe k;
     k.t = Time{static_cast<std::int64_t>(i) * 100'000'000};
-    k.T_WB = {f.odometry[i].q, f.odometry[i].p};  // M begins as W
+    k.T_GB = {f.odometry[i].q, f.odometry[i].p};  // M begins as W
     k.T_MB = f.odometry[i];
     map.add(std::move(k));
   }

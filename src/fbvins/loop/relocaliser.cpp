@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// A guess of W in M is forgotten after this.
+/// A guess of G in M is forgotten after this.
 constexpr double kGuessLife_s = 5;
 /// Two keyframes agree to this.
 constexpr double kAgree_m = 0.15, kAgree_rad = 2.5 * kDegree;
@@ -23,15 +23,16 @@ bool beyond_doubt(const VerifiedPose& verified) {
 
 }  // namespace
 
-std::optional<Pose<M, W>> Relocaliser::consider(const MapKeyframe& query, const Pose<M, B>& T_MB, const VerifiedPose& verified) {
+std::optional<Pose<M, G>> Relocaliser::consider(const MapKeyframe& query, const Quat& q_LG, const Pose<M, B>& T_MB,
+                                                const VerifiedPose& verified) {
   std::erase_if(guesses_, [&](const Guess& g) { return (query.t - g.t).seconds() > kGuessLife_s; });
-  const Quat level = about_z(yaw_of((T_MB * query.T_WB.inverse()).q));
-  const Guess guess{query.t, {level, Vec3(T_MB.p - level * query.T_WB.p)}};
+  const Quat q_MG = about_z(yaw_of(T_MB.q * query.T_GB.q.conjugate() * q_LG.conjugate())) * q_LG;
+  const Guess guess{query.t, {q_MG, Vec3(T_MB.p - q_MG * query.T_GB.p)}};
   const bool agreed = std::any_of(guesses_.begin(), guesses_.end(), [&](const Guess& g) {
-    return g.t != guess.t && (g.T_MW * query.T_WB.p - T_MB.p).norm() < kAgree_m &&
-           angle_between(g.T_MW.q, guess.T_MW.q) < kAgree_rad;
+    return g.t != guess.t && (g.T_MG * query.T_GB.p - T_MB.p).norm() < kAgree_m &&
+           angle_between(g.T_MG.q, guess.T_MG.q) < kAgree_rad;
   });
-  if (agreed || beyond_doubt(verified)) return guess.T_MW;
+  if (agreed || beyond_doubt(verified)) return guess.T_MG;
   guesses_.push_back(guess);
   return std::nullopt;
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where W is in M after a restart or in a loaded map: one recognised place may be a look-alike, so two keyframes must
+// Where a flight is in M after a restart or in a loaded map: one recognised place may be a look-alike, so two keyframes must
 // agree, or one must be beyond doubt (docs/derivations/loop.md, Where W lies now). One thread at a time.
 //
 //   Relocaliser relocaliser;
-//   if (auto T_MW = relocaliser.consider(query, T_MB, verified)) frame.reset(*T_MW, ...);
+//   if (auto T_MG = relocaliser.consider(query, q_LG, T_MB, verified)) frame.reset(*T_MG, ...);
 #pragma once
 
 #include <optional>
@@ -16,14 +16,15 @@ namespace fbvins {
 
 class Relocaliser {
  public:
-  /// A place says that the body of `query` is at T_MB. Returns where W is then, once that is certain.
-  std::optional<Pose<M, W>> consider(const MapKeyframe& query, const Pose<M, B>& T_MB, const VerifiedPose& verified);
+  /// A place says that the body of `query` is at T_MB. Returns where its gauge is then, level by `q_LG`, once that is certain.
+  std::optional<Pose<M, G>> consider(const MapKeyframe& query, const Quat& q_LG, const Pose<M, B>& T_MB,
+                                     const VerifiedPose& verified);
   void forget() { guesses_.clear(); }
 
  private:
   struct Guess {
     Time t;
-    Pose<M, W> T_MW;
+    Pose<M, G> T_MG;
   };
   std::vector<Guess> guesses_;
 };

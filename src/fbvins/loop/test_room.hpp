@@ -9,6 +9,7 @@
 #include "fbvins/core/rng.hpp"
 #include "fbvins/loop/place.hpp"
 #include "fbvins/loop/vocabulary_training.hpp"
+#include "fbvins/types/keyframe.hpp"
 
 namespace fbvins::test_room {
 
@@ -62,15 +63,15 @@ inline StereoRig rig() {
   return r;
 }
 
-inline Place seen(const World& w, const Pose<W, B>& T_WB, Rng& rng) {
-  const Pose<W, C0> T_WC = T_WB * rig().T_BC0;
-  const Pose<C0, W> T_CW = T_WC.inverse();
+inline Place seen(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
+  const Pose<G, C0> T_GC = T_GB * rig().T_BC0;
+  const Pose<C0, G> T_CG = T_GC.inverse();
   Place place;
   place.focal_px = kFocal;
-  place.up_C0 = T_WC.q.conjugate() * Vec3::UnitZ();
+  place.up_C0 = T_GC.q.conjugate() * Vec3::UnitZ();
   const double rho_px = 1 / (kFocal * kBaseline);
   for (std::size_t i = 0; i < w.points.size(); ++i) {
-    const Vec3 p = T_CW * w.points[i];
+    const Vec3 p = T_CG * w.points[i];
     if (p.z() < 0.5 || std::abs(p.x() / p.z()) > 0.8 || std::abs(p.y() / p.z()) > 0.5 || rng.below(4) == 0) continue;
     PlaceFeature f;
     f.x = static_cast<float>(p.x() / p.z() + kPixel * rng.normal() / kFocal);
@@ -87,11 +88,49 @@ inline Place seen(const World& w, const Pose<W, B>& T_WB, Rng& rng) {
   return place;
 }
 
+/// Where the body is `s` seconds into the rounds that flight() makes: a smooth function.
+inline Pose<G, B> true_pose(double s) {
+  const double a = 0.35 * s;
+  return {Quat(Eigen::AngleAxisd(a + 0.4 * std::sin(0.5 * s), Vec3::UnitZ())) *
+              so3_exp(Vec3(0.05 * std::sin(s), 0.04 * std::cos(0.8 * s), 0)),
+          Vec3(1.2 * std::cos(a), 0.9 * std::sin(a), 1.4 + 0.3 * std::sin(0.7 * s))};
+}
+
+inline Vec3 true_velocity(double s) {
+  constexpr double h = 1e-4;
+  return (true_pose(s + h).p - true_pose(s - h).p) / (2 * h);
+}
+
+/// What a perfect IMU with these biases reads on the way, by differences of the pose.
+inline ImuSegment readings(Time from, Time to, const ImuBias& bias) {
+  constexpr double h = 1e-3;
+  ImuSegment segment;
+  for (Time t = from; t <= to; t = t + Duration::from_seconds(0.005)) {
+    const double s = t.seconds();
+    const Pose<G, B> T = true_pose(s), before = true_pose(s - h), after = true_pose(s + h);
+    const Vec3 acceleration = (after.p - 2 * T.p + before.p) / (h * h);
+    segment.samples.push_back({t, so3_log(before.q.conjugate() * after.q) / (2 * h) + bias.gyro_radps,
+                               T.q.conjugate() * Vec3(acceleration + Vec3(0, 0, 9.81)) + bias.accel_mps2});
+  }
+  segment.longest_gap = Duration::from_seconds(0.005);
+  return segment;
+}
+
 struct Frame {
   Time t;
-  Pose<W, B> truth, odometry;
+  Pose<G, B> truth, odometry;
   Place place;
 };
+
+/// What the estimator would say of it, in a level gauge.
+inline Keyframe keyframe(FrameId id, Time t, const Pose<G, B>& T_GB, std::uint32_t reset_counter = 0) {
+  Keyframe k;
+  k.id = id;
+  k.t = t;
+  k.gauge.T_GB = T_GB;
+  k.reset_counter = reset_counter;
+  return k;
+}
 
 /// Rounds through the room looking outwards, five keyframes a second; the odometry drifts in position and yaw.
 inline std::vector<Frame> flight(const World& w, int keyframes, double drift_m, double drift_deg, std::uint64_t seed,
@@ -101,10 +140,8 @@ inline std::vector<Frame> flight(const World& w, int keyframes, double drift_m, 
   double yaw = 0;
   Vec3 offset = Vec3::Zero();
   for (int i = 0; i < keyframes; ++i) {
-    const double s = start_s + 0.2 * i, a = 0.35 * s;
-    const Pose<W, B> T(Quat(Eigen::AngleAxisd(a + 0.4 * std::sin(0.5 * s), Vec3::UnitZ())) *
-                           so3_exp(Vec3(0.05 * std::sin(s), 0.04 * std::cos(0.8 * s), 0)),
-                       Vec3(1.2 * std::cos(a), 0.9 * std::sin(a), 1.4 + 0.3 * std::sin(0.7 * s)));
+    const double s = start_s + 0.2 * i;
+    const Pose<G, B> T = true_pose(s);
     const Quat turned(Eigen::AngleAxisd(yaw, Vec3::UnitZ()));
     frames.push_back(
         {Time{static_cast<std::int64_t>(s * 1e9)}, T, {Quat(turned * T.q), Vec3(turned * T.p + offset)}, seen(w, T, rng)});

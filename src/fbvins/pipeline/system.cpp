@@ -7,6 +7,7 @@
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/pipeline/feedback.hpp"
+#include "fbvins/pipeline/keyframe_readings.hpp"
 #include "fbvins/pipeline/packet_maker.hpp"
 #include "fbvins/pipeline/stage_runner.hpp"
 
@@ -34,6 +35,8 @@ struct System::Impl {
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
   Mapper* mapper;
+  KeyframeImu imu_model;  ///< what every keyframe's readings have in common
+  KeyframeReadings readings;
   Feedback feedback;
 
   std::function<void(const TrackedFrame&)> on_tracked_frame;
@@ -53,7 +56,8 @@ struct System::Impl {
         packet_maker(options.input, Duration::from_seconds(rig.time_offset_s)),
         frontend(std::move(parts.frontend)),
         estimator(rig, options.estimator),
-        mapper(parts.mapper) {
+        mapper(parts.mapper),
+        imu_model{{}, {}, options.estimator.assumed(rig.imu_noise), options.estimator.gravity_mps2} {
     if (mode != RunMode::threaded) return;
     start(tracking, [this] { estimation.queue.close(); });
     start(estimation, [this] { mapping.queue.close(); });
@@ -70,21 +74,33 @@ struct System::Impl {
     frame.id = packet.id;
     frame.t = packet.frame.t;
     frame.imu = std::move(packet.imu);
-    if (on_keyframe || mapper != nullptr) frame.images = std::move(packet.frame);
+    if (keyframes_wanted()) frame.images = std::move(packet.frame);
     hand_on(estimation, std::move(frame));
   }
 
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(frame);
     Estimate estimate = estimator.process(frame);
+    if (keyframes_wanted()) complete(estimate, frame.imu);
     if (on_odometry) on_odometry(estimate.odometry);
     if (on_keyframe)
       for (const Keyframe& keyframe : estimate.keyframes) on_keyframe(keyframe);
     // After the callbacks: whoever waits for this frame sees whether one of them threw.
     feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
     if (mapper != nullptr)
-      for (Keyframe& keyframe : estimate.keyframes)
-        hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
+      for (Keyframe& keyframe : estimate.keyframes) hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
+  }
+
+  bool keyframes_wanted() const { return on_keyframe || mapper != nullptr; }
+
+  /// What keyframes carry that the estimator does not know of.
+  void complete(Estimate& estimate, const ImuSegment& imu) {
+    readings.add(imu);
+    const Pose<W, G> T_WG = estimate.odometry.T_WB * estimate.odometry.gauge.T_GB.inverse();
+    for (Keyframe& keyframe : estimate.keyframes) {
+      keyframe.T_WG = T_WG;
+      keyframe.imu = {readings.until(keyframe.t), keyframe.imu.bias, imu_model.noise, imu_model.gravity_mps2};
+    }
   }
 
   void map(MapTask task) {

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/loop/adjustment.hpp"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+constexpr double kNearest_m = 0.1;
+constexpr int kMaxIterations = 25;  // of one solve
+/// Residual from which a sight counts less (Cauchy).
+constexpr double kRobust_sigma = 2;
+/// Sights farther than this from where the solution puts them are wrong matches.
+constexpr double kOutlier_sigma = 3.5;
+/// One track in so many is held out.
+constexpr std::size_t kHeldOut = 8;
+/// Where a flight begins, next to nothing is known of its biases beyond what the odometry says.
+constexpr double kGyroBiasSigma_radps = 0.1, kAccelBiasSigma_mps2 = 1;
+/// Readings over so long a time bind two keyframes less than the odometry between them does.
+constexpr double kLongestAlone_s = 1;
+
+/// Biases at the first keyframe of a flight.
+struct BiasCost {
+  MotionBlock expected;
+  template <class T>
+  bool operator()(const T* motion, T* out) const {
+    for (std::size_t k = 0; k < 6; ++k)
+      out[k] = (motion[3 + k] - T(expected[3 + k])) / T(k < 3 ? kGyroBiasSigma_radps : kAccelBiasSigma_mps2);
+    return true;
+  }
+};
+
+MotionBlock motion_of(const MapKeyframe& k) {
+  const Vec3 v = k.T_MB.q * (k.T_GB.q.conjugate() * k.motion.v_GB);
+  const Vec3 &g = k.motion.bias.gyro_radps, &a = k.motion.bias.accel_mps2;
+  return {v.x(), v.y(), v.z(), g.x(), g.y(), g.z(), a.x(), a.y(), a.z()};
+}
+
+ImuBias bias_of(const MotionBlock& m) { return {{m[3], m[4], m[5]}, {m[6], m[7], m[8]}}; }
+
+std::shared_ptr<const Preintegration> about(const std::shared_ptr<const Preintegration>& imu, const ImuBias& bias) {
+  if (!imu->needs_repropagation(bias)) return imu;
+  auto anew = std::make_shared<Preintegration>(*imu);
+  anew->repropagate(bias);
+  return anew;
+}
+
+double cauchy(double squared) { return kRobust_sigma * kRobust_sigma * std::log1p(squared / (kRobust_sigma * kRobust_sigma)); }
+
+}  // namespace
+
+Adjustment::Adjustment(const PlaceMap& map) : map_(map), has_readings_(map.size(), false) {
+  for (const MapKeyframe& k : map.keyframes()) {
+    start_.poses.push_back({k.T_MB.p.x(), k.T_MB.p.y(), k.T_MB.p.z(), 0, 0, 0});
+    start_.motions.push_back(motion_of(k));
+  }
+  for (const MapEdge& e : map.edges) {
+    const auto a = static_cast<std::size_t>(map.find(e.from) - map.keyframes().data());
+    const auto b = static_cast<std::size_t>(map.find(e.to) - map.keyframes().data());
+    if (!keyframe(a).placed || !keyframe(b).placed) continue;
+    steps_.push_back({a, b, &e});
+    if (e.imu) has_readings_[a] = has_readings_[b] = true;
+  }
+}
+
+void Adjustment::add(const FeatureTrack& track) {
+  const std::optional<PointBlock> point = first_point(track);
+  if (!point) return;
+  std::vector<Sight> sights;
+  for (const FeatureView& view : track) {
+    const MapKeyframe& k = keyframe(view.keyframe);
+    const Vec3 p_C = (k.T_MB * map_.T_BC0).inverse() * Vec3(point->data());
+    if (p_C.z() > kNearest_m) sights.push_back({view.keyframe, start_.points.size(), &k.place.features[view.feature]});
+  }
+  if (sights.size() < 2) return;
+  std::vector<Sight>& to = start_.points.size() % kHeldOut == kHeldOut - 1 ? held_out_ : sights_;
+  to.insert(to.end(), sights.begin(), sights.end());
+  start_.points.push_back(*point);
+}
+
+std::optional<PointBlock> Adjustment::first_point(const FeatureTrack& track) const {
+  for (const FeatureView& view : track) {
+    const MapKeyframe& k = keyframe(view.keyframe);
+    const PlaceFeature& f = k.place.features[view.feature];
+    if (!f.has_point()) continue;
+    const Vec3 p = k.T_MB * map_.T_BC0 * f.p_C0();
+    return PointBlock{p.x(), p.y(), p.z()};
+  }
+  return std::nullopt;
+}
+
+std::size_t Adjustment::points() const {
+  std::set<std::size_t> seen;
+  for (const Sight& s : sights_) seen.insert(s.point);
+  return seen.size();
+}
+
+int Adjustment::solve(AdjustmentState& x) const {
+  ceres::Problem problem;
+  add_sights(problem, sights_, x);
+  add_readings(problem, x);
+  add_edges(problem, x);
+  add_verticals(problem, x);
+  const auto first = std::find_if(x.poses.begin(), x.poses.end(), [&](auto& p) { return problem.HasParameterBlock(p.data()); });
+  problem.SetParameterBlockConstant(first->data());
+  ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, kMaxIterations);
+  // The points go first; they are many, and see one another only through keyframes.
+  solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<double*> blocks;
+  problem.GetParameterBlocks(&blocks);
+  std::set<double*> points;
+  for (PointBlock& p : x.points) points.insert(p.data());
+  for (double* block : blocks) solver.linear_solver_ordering->AddElementToGroup(block, points.contains(block) ? 0 : 1);
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  return summary.num_successful_steps;
+}
+
+void Adjustment::add_sights(ceres::Problem& problem, const std::vector<Sight>& sights, AdjustmentState& x) const {
+  for (const Sight& s : sights)
+    problem.AddResidualBlock(new SightCost(cost_of(s)), new ceres::CauchyLoss(kRobust_sigma), x.poses[s.keyframe].data(),
+                             x.points[s.point].data());
+}
+
+void Adjustment::add_readings(ceres::Problem& problem, AdjustmentState& x) const {
+  std::uint32_t begun = std::numeric_limits<std::uint32_t>::max();
+  for (const auto& [a, b, edge] : steps_) {
+    if (!edge->imu) continue;
+    problem.AddResidualBlock(
+        new ImuCost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, about(edge->imu, bias_of(x.motions[a])), map_.gravity_mps2), nullptr,
+        x.poses[a].data(), x.motions[a].data(), x.poses[b].data(), x.motions[b].data(), x.tilt.data());
+    if (std::exchange(begun, keyframe(a).session) != keyframe(a).session)
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BiasCost, 6, 9>(new BiasCost{start_.motions[a]}), nullptr,
+                               x.motions[a].data());
+  }
+}
+
+/// The odometry where no readings are; a loop is in here as the points that both its ends see.
+void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x) const {
+  std::set<std::pair<std::size_t, std::size_t>> seen_together;
+  for (std::size_t i = 1; i < sights_.size(); ++i)
+    if (sights_[i].point == sights_[i - 1].point) seen_together.insert(std::minmax(sights_[i].keyframe, sights_[i - 1].keyframe));
+  for (const auto& [a, b, edge] : steps_) {
+    const bool loop = edge->kind == MapEdge::Kind::loop;
+    if (loop && seen_together.contains(std::minmax(a, b))) continue;
+    if (edge->imu && edge->imu->dt_s() < kLongestAlone_s) continue;
+    const Mat6 root = Eigen::LLT<Mat6>(edge->information).matrixU();
+    auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<6>, 6, 6, 6>(
+        new EdgeCost<6>{keyframe(a).T_MB.q, keyframe(b).T_MB.q, edge->T_from_to, root});
+    problem.AddResidualBlock(cost, loop ? new ceres::CauchyLoss(kRobust_sigma) : nullptr, x.poses[a].data(), x.poses[b].data());
+  }
+}
+
+/// What the odometry knew of gravity, for keyframes whose readings are not kept.
+void Adjustment::add_verticals(ceres::Problem& problem, AdjustmentState& x) const {
+  constexpr double per_sigma = 1 / kTilt_rad;
+  for (std::size_t i = 0; i < x.poses.size(); ++i) {
+    if (!problem.HasParameterBlock(x.poses[i].data()) || has_readings_[i]) continue;
+    const Vec3 up_B = map_.T_BC0.q * keyframe(i).place.up_C0;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<GravityCost, 2, 6, 2>(new GravityCost{keyframe(i).T_MB.q, up_B, per_sigma}), nullptr,
+        x.poses[i].data(), x.tilt.data());
+  }
+  const bool levelled = std::find(has_readings_.begin(), has_readings_.end(), true) != has_readings_.end();
+  if (!levelled && problem.HasParameterBlock(x.tilt.data())) problem.SetParameterBlockConstant(x.tilt.data());
+}
+
+void Adjustment::drop_outliers(const AdjustmentState& x) {
+  std::erase_if(sights_, [&](const Sight& s) {
+    const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
+    return !r || r->norm() > kOutlier_sigma * std::sqrt(3.0);
+  });
+  std::vector<int> views(x.points.size(), 0);
+  for (const Sight& s : sights_) ++views[s.point];
+  std::erase_if(sights_, [&](const Sight& s) { return views[s.point] < 2; });
+}
+
+double Adjustment::rms_px(const AdjustmentState& x) const {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Sight& s : sights_) {
+    const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
+    if (!r) continue;
+    sum += (r->head<2>() * s.feature->sigma_xy * keyframe(s.keyframe).place.focal_px).squaredNorm();
+    ++count;
+  }
+  return count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count));
+}
+
+/// With the poses held, what else there is takes the values that suit them best: no answer is blamed for those of another.
+Plausibility Adjustment::judged(AdjustmentState x) const {
+  ceres::Problem problem;
+  add_sights(problem, held_out_, x);
+  add_readings(problem, x);
+  for (PoseBlock& pose : x.poses)
+    if (problem.HasParameterBlock(pose.data())) problem.SetParameterBlockConstant(pose.data());
+  ceres::Solver::Summary summary;
+  ceres::Solve(repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, kMaxIterations), &problem, &summary);
+  return {held_out_cost(x), imu_cost(x), odometry_cost(x)};
+}
+
+double Adjustment::held_out_cost(const AdjustmentState& x) const {
+  double sum = 0, degrees = 0;
+  for (const Sight& s : held_out_) {
+    const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
+    sum += cauchy(r ? r->squaredNorm() : 9 * kOutlier_sigma * kOutlier_sigma);
+    degrees += s.feature->has_depth() ? 3 : 2;
+  }
+  const std::size_t points = static_cast<std::size_t>(std::count_if(
+      held_out_.begin(), held_out_.end(), [&](const Sight& s) { return &s == &held_out_[0] || s.point != (&s)[-1].point; }));
+  degrees -= 3.0 * static_cast<double>(points);
+  return degrees > 0 ? sum / degrees : 0;
+}
+
+double Adjustment::imu_cost(const AdjustmentState& x) const {
+  double sum = 0;
+  int steps = 0;
+  for (const auto& [a, b, edge] : steps_) {
+    if (!edge->imu) continue;
+    const ImuCost cost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, about(edge->imu, bias_of(x.motions[a])), map_.gravity_mps2);
+    const double* blocks[] = {x.poses[a].data(), x.motions[a].data(), x.poses[b].data(), x.motions[b].data(), x.tilt.data()};
+    Vec15 r;
+    cost.Evaluate(blocks, r.data(), nullptr);
+    sum += r.squaredNorm(), ++steps;
+  }
+  constexpr int kRows = 15, kUnknowns = 9;  // of a step; its motion was fitted
+  return steps == 0 ? 0 : sum / ((kRows - kUnknowns) * steps);
+}
+
+double Adjustment::odometry_cost(const AdjustmentState& x) const {
+  double sum = 0;
+  int steps = 0;
+  for (const auto& [a, b, edge] : steps_) {
+    if (edge->kind != MapEdge::Kind::odometry) continue;
+    const auto pose = [&](std::size_t i) {
+      return Pose<M, B>(orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()), Vec3(x.poses[i].data()));
+    };
+    const Vec6 r = edge_residual(pose(a), pose(b), edge->T_from_to);
+    sum += r.dot(edge->information * r), ++steps;
+  }
+  return steps == 0 ? 0 : sum / (6 * steps);
+}
+
+void Adjustment::write(const AdjustmentState& x, PlaceMap& map) const {
+  for (std::size_t i = 0; i < x.poses.size(); ++i)
+    map.keyframes()[i].T_MB = {orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()).normalized(), Vec3(x.poses[i].data())};
+  (void)map.turn(turn_of(x.tilt).conjugate(), map.keyframes()[0].T_MB.p);
+  for (std::size_t i = 0; i < x.poses.size(); ++i)
+    if (MapKeyframe& k = map.keyframes()[i]; has_readings_[i])
+      k.place.up_C0 = (k.T_MB.q * map.T_BC0.q).conjugate() * Vec3::UnitZ();
+}
+
+}  // namespace fbvins

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole map as one least-squares problem: keyframes, points that two of them have seen, motions and biases between them and
+// the direction of gravity (docs/derivations/loop.md, L16, L18, L19). Every so many points are held out: they take no part
+// and judge the answer. One thread; the same map in gives the same answer.
+//
+//   Adjustment adjustment(map);
+//   for (const FeatureTrack& track : tracks) adjustment.add(track);
+//   AdjustmentState x = adjustment.start();
+//   adjustment.solve(x);
+//   const Plausibility before = adjustment.judged(adjustment.start()), after = adjustment.judged(x);
+#pragma once
+
+#include <vector>
+
+#include "fbvins/loop/adjustment_costs.hpp"
+#include "fbvins/loop/feature_tracks.hpp"
+
+namespace ceres {
+class Problem;
+}
+
+namespace fbvins {
+
+/// All unknowns: a pose and a motion a keyframe, the points, the tilt of M. Motions without readings mean nothing.
+struct AdjustmentState {
+  std::vector<PoseBlock> poses;
+  std::vector<MotionBlock> motions;
+  std::vector<PointBlock> points;
+  TiltBlock tilt{0, 0};
+};
+
+class Adjustment {
+ public:
+  explicit Adjustment(const PlaceMap& map);
+
+  void add(const FeatureTrack& track);
+  bool empty() const { return sights_.empty(); }
+
+  const AdjustmentState& start() const { return start_; }
+  /// Returns the iterations. The first placed keyframe stays.
+  int solve(AdjustmentState& x) const;
+  /// Sights that do not fit are wrong matches.
+  void drop_outliers(const AdjustmentState& x);
+  Plausibility judged(AdjustmentState x) const;
+  /// The map with the poses of an answer, level.
+  void write(const AdjustmentState& x, PlaceMap& map) const;
+
+  std::size_t points() const;
+  std::size_t sights() const { return sights_.size(); }
+  /// Root of the mean squared distance in the image, over the sights there are now.
+  double rms_px(const AdjustmentState& x) const;
+
+ private:
+  struct Sight {
+    std::size_t keyframe, point;
+    const PlaceFeature* feature;
+  };
+  struct Step {
+    std::size_t from, to;
+    const MapEdge* edge;
+  };
+
+  SightCost cost_of(const Sight& s) const { return {keyframe(s.keyframe).T_MB.q, map_.T_BC0, *s.feature}; }
+  const MapKeyframe& keyframe(std::size_t i) const { return map_.keyframes()[i]; }
+  std::optional<PointBlock> first_point(const FeatureTrack& track) const;
+  void add_sights(ceres::Problem& problem, const std::vector<Sight>& sights, AdjustmentState& x) const;
+  void add_readings(ceres::Problem& problem, AdjustmentState& x) const;
+  void add_edges(ceres::Problem& problem, AdjustmentState& x) const;
+  void add_verticals(ceres::Problem& problem, AdjustmentState& x) const;
+  double held_out_cost(const AdjustmentState& x) const;
+  double imu_cost(const AdjustmentState& x) const;
+  double odometry_cost(const AdjustmentState& x) const;
+
+  const PlaceMap& map_;
+  AdjustmentState start_;
+  std::vector<Sight> sights_, held_out_;
+  std::vector<Step> steps_;         ///< all edges between placed keyframes
+  std::vector<bool> has_readings_;  ///< of a keyframe: on one side of it at least
+};
+
+}  // namespace fbvins

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/pipeline/keyframe_readings.hpp"
+
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+/// Readings older than this bind no keyframes any more; an estimator that does not start takes none.
+constexpr double kLongest_s = 10;
+
+bool joined(const std::vector<ImuSegment>& segments) {
+  for (std::size_t i = 1; i < segments.size(); ++i)
+    if (segments[i].samples.front().t != segments[i - 1].samples.back().t) return false;
+  return true;
+}
+
+}  // namespace
+
+void KeyframeReadings::add(const ImuSegment& segment) {
+  if (segment.empty()) return;
+  segments_.push_back(segment);
+  while ((segment.samples.back().t - segments_.front().samples.front().t).seconds() > kLongest_s) segments_.pop_front();
+}
+
+std::vector<ImuSegment> KeyframeReadings::until(Time t) {
+  std::vector<ImuSegment> out;
+  while (!segments_.empty() && segments_.front().samples.back().t <= t) {
+    out.push_back(std::move(segments_.front()));
+    segments_.pop_front();
+  }
+  const Time from = std::exchange(handed_out_until_, t);
+  const bool whole = !out.empty() && joined(out) && out.front().samples.front().t == from && out.back().samples.back().t == t;
+  return whole ? out : std::vector<ImuSegment>{};
+}
+
+}  // namespace fbvins
