@@ -24,7 +24,7 @@ Autopilot::Autopilot(const Mission& mission, const ControlOptions& options, cons
                      const Pose<BodyFlu, B>& mounting)
     : mounting_(mounting),
       rate_hz_(rig.imu_noise.rate_hz),
-      fence_(mission.geofence),
+      fence_(fence_of(mission)),
       options_(options),
       propagator_(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
       controller_(options, rate_hz_),
@@ -48,8 +48,8 @@ void Autopilot::add(const MapUpdate& update) {
 /// What is known of the floor turns L about the place where the vehicle stood.
 void Autopilot::level() {
   if (!T_LM_) return;
-  const Pose<Local, Local> turned{floor_.correction(newest_), Vec3::Zero()};
-  T_LW_ = turned * *T_LM_ * T_MW_;
+  const Pose<Local, W> T_LW = *T_LM_ * T_MW_;
+  T_LW_ = Pose<Local, Local>{floor_.correction(newest_, T_LW.q), Vec3::Zero()} * T_LW;
 }
 
 VehicleEstimate Autopilot::in_local(const LivePose& pose) const {
@@ -67,7 +67,7 @@ void Autopilot::anchor(const LivePose& pose) {
   const Pose<M, BodyFlu> T_MV = T_MW_ * pose.T_WB * mounting_.inverse();
   const bool in_flight = T_LW_.has_value();
   if (in_flight) floor_.forget();
-  else floor_.stand(heading(T_MV.q));
+  else floor_.stand(newest_);
   const double yaw_L = in_flight ? heading(reference_.estimate().T_LV.q) : 0;
   const Vec3 p_L = in_flight ? reference_.estimate().T_LV.p : Vec3(Vec3::Zero());
   const Quat q_LM = so3_exp(Vec3(0, 0, yaw_L - heading(T_MV.q)));
@@ -80,7 +80,6 @@ PerRotor Autopilot::update(const ImuSample& reading) {
   const double dt_s = last_t_ ? (reading.t - *last_t_).seconds() : 1 / rate_hz_;
   last_t_ = reading.t;
   reference_.predict(reading, dt_s);
-  if (out_.mode == FlightMode::waiting) floor_.rest(reading);
   const bool has_pose = pose.health.has_pose();
   bool restarted = false;
   if (has_pose && pose.reset_counter != reset_counter_) {
@@ -104,7 +103,7 @@ PerRotor Autopilot::update(const ImuSample& reading) {
   seen.on_ground = on_ground_;
   if (T_LW_ && spooling_s_ >= kSpool_s) {
     seen.off_path_m = (out_.estimate.T_LV.p - out_.setpoint.p).norm();
-    seen.outside_fence = fence_ && !fence_->contains(out_.estimate.T_LV.p) && !guide_.landing() && guide_.step() > 0;
+    seen.outside_fence = !fence_.contains(out_.estimate.T_LV.p) && !guide_.landing() && guide_.step() > 0;
   }
   const FlightMode before = out_.mode;
   out_.mode = failsafe_.update(seen, dt_s);

@@ -62,7 +62,7 @@ class Autopilot {
 
   Pose<BodyFlu, B> mounting_;
   double rate_hz_;
-  std::optional<Geofence> fence_;
+  Geofence fence_;
   ControlOptions options_;
   PosePropagator propagator_;
   CascadeController controller_;

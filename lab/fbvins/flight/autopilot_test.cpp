@@ -53,7 +53,7 @@ Odometry honest_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mount
 
 struct Circumstances {
   double seconds = 40;
-  double tilt_rad = 0;  ///< of W, by a bias of the accelerometer
+  double tilt_rad = 0;  ///< of W, and how unsure of up it is
   QuadrotorState start = standing_at({1, 2}, 0.6, {});
   std::string vehicle = "indoor330";
   int seed = 5;
@@ -78,13 +78,11 @@ Outcome fly_mission(const Mission& mission, const Told& told, const Circumstance
   for (int step = 0; step < in.seconds * 1000 && autopilot.output().mode != FlightMode::landed; ++step) {
     const double t = step * 1e-3;
     if (step % 50 == 25) {
-      ImuBias believed = imu.bias();
-      believed.accel_mps2 += mounting.q.conjugate() * Vec3(kSimGravity_mps2 * std::sin(in.tilt_rad), 0, 0);
       // The tilt of W is about the axis to the left of the vehicle that stood there.
       const Quat tilt = start.q * so3_exp(Vec3(0, in.tilt_rad, 0)) * start.q.conjugate();
       Odometry o =
-          honest_odometry(vehicle, mounting, believed, {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
-      if (in.tilt_rad != 0) o.pose_covariance.block<3, 3>(3, 3) = 4e-4 * Mat3::Identity();
+          honest_odometry(vehicle, mounting, imu.bias(), {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
+      o.gauge = {Pose<G, B>(o.T_WB.q, o.T_WB.p), o.v_WB, Quat::Identity(), in.tilt_rad};
       o.t = Time{static_cast<std::int64_t>(step) * 1'000'000};
       if (std::optional<Odometry> said = told(t, o)) waiting.emplace_back(t + kDelay_s, *said);
     }

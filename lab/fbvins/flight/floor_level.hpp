@@ -3,13 +3,14 @@
 // yet takes a bias of its accelerometer for tilt, easily a degree or two, and is off by that share of every way it goes. While
 // the odometry is less sure of up than the floor is, the mission's frame is levelled by the floor. One owner.
 //
-//   floor.rest(reading);                         // while it stands
-//   floor.stand(heading_rad);                    // it takes off
-//   Quat q = floor.correction(odometry);         // from W turned to the mission's heading, to level
+//   floor.stand(odometry);                          // it takes off
+//   Quat q = floor.correction(odometry, q_LW);      // T_LW <- q * T_LW
 //
-// The tilt that the odometry ascribes to the standing vehicle follows from what its accelerometer read there and the bias that it
-// believes in now; so the correction vanishes by itself where the odometry learns that bias in flight, and with it turns W.
+// The direction of the standing vehicle's z is kept in the odometry's gauge, which is never turned; wherever W stands to that by
+// now, the correction is to W as it is. As the odometry gets to know up in flight, the correction fades.
 #pragma once
+
+#include <optional>
 
 #include "fbvins/sim/quadrotor.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -18,22 +19,18 @@ namespace fbvins {
 
 class FloorLevel {
  public:
-  explicit FloorLevel(const Pose<BodyFlu, B>& mounting) : mounting_(mounting) {}
+  explicit FloorLevel(const Pose<BodyFlu, B>& mounting) : z_B_(mounting.q.conjugate() * Vec3::UnitZ()) {}
 
-  void rest(const ImuSample& reading);
-  /// `heading_rad`: of the vehicle in W.
-  void stand(double heading_rad);
-  /// After a restart nothing is known of how it stood.
-  void forget() { standing_ = false; }
+  void stand(const Odometry& odometry) { z_G_ = odometry.gauge.T_GB.q * z_B_; }
+  /// After a restart the gauge is another, and nothing is known of how it stood.
+  void forget() { z_G_.reset(); }
 
-  /// In L, whose x was the vehicle's heading.
-  Quat correction(const Odometry& odometry) const;
+  /// Turns directions of L, which q_LW makes of those of W.
+  Quat correction(const Odometry& odometry, const Quat& q_LW) const;
 
  private:
-  Pose<BodyFlu, B> mounting_;
-  Vec3 accel_V_ = Vec3::Zero();  ///< mean reading, in the vehicle's axes
-  double heading_rad_ = 0;
-  bool started_ = false, standing_ = false;
+  Vec3 z_B_;                 ///< the vehicle's z in the IMU's axes
+  std::optional<Vec3> z_G_;  ///< of the vehicle that stood, in the gauge
 };
 
 }  // namespace fbvins

@@ -83,6 +83,9 @@ struct PlannedPlace {
 };
 std::vector<PlannedPlace> planned_places(const Mission& mission);
 
+/// The mission's own, or a box around its way.
+Geofence fence_of(const Mission& mission);
+
 /// Where L is in the world: the vehicle stands with its centre at `height_m` over the floor.
 struct MissionSite {
   FloorPlan plan;

@@ -37,6 +37,9 @@ bool is_clear(const FloorPlan& plan, const Vec3& p) {
   return plan.inside(p.x(), p.y());
 }
 
+/// Of a fence that nobody has drawn.
+constexpr double kAroundTheWay_m = 1.5;
+
 std::string place_text(const Vec3& p) { return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z()); }
 
 }  // namespace
@@ -56,6 +59,16 @@ std::vector<PlannedPlace> planned_places(const Mission& mission) {
     if (step.kind == MissionStep::Kind::land) go(Vec3(places.back().p.x(), places.back().p.y(), 0), index);
   }
   return places;
+}
+
+Geofence fence_of(const Mission& mission) {
+  if (mission.geofence) return *mission.geofence;
+  Geofence fence{Vec3::Zero(), Vec3::Zero()};
+  for (const PlannedPlace& place : planned_places(mission)) {
+    fence.low = fence.low.cwiseMin(place.p);
+    fence.high = fence.high.cwiseMax(place.p);
+  }
+  return {fence.low - Vec3::Constant(kAroundTheWay_m), fence.high + Vec3::Constant(kAroundTheWay_m)};
 }
 
 Result<MissionSite> site_of(const Mission& mission, const PlaceDefaults& defaults, double standing_height_m) {

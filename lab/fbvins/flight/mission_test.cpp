@@ -91,6 +91,14 @@ TEST(Mission, NoWayLeadsThroughAWall) {
   EXPECT_NE(site_complaint(ring + "  - goto: [12, 8, 1]\n").find("wall"), std::string::npos);
 }
 
+TEST(Mission, WithoutAFenceThereIsOneAroundTheWay) {
+  const Geofence fence = fence_of(*parse_mission("steps:\n  - takeoff: 1\n  - goto: [2, -1, 1.5]\n", "m.yaml"));
+  EXPECT_TRUE(fence.contains({3, -2, 2.5}));
+  EXPECT_FALSE(fence.contains({4, 0, 1}));
+  EXPECT_FALSE(fence.contains({0, 0, 3.5}));
+  EXPECT_EQ(fence_of(*parse_mission(kGood, "m.yaml")).high.x(), 3);
+}
+
 TEST(Mission, PlannedPlacesFollowTheSteps) {
   const Mission mission = *parse_mission("steps:\n  - takeoff: 1\n  - goto: [2, 0, 1]\n  - land\n", "m.yaml");
   const std::vector<PlannedPlace> places = planned_places(mission);
