@@ -21,10 +21,10 @@ constexpr double kRobust_sigma = 2;
 constexpr double kOutlier_sigma = 3.5;
 /// One track in so many is held out.
 constexpr std::size_t kHeldOut = 8;
+/// Over so long a time the odometry's drift stands out from the scatter of single keyframes.
+constexpr double kStretch_s = 3;
 /// Where a flight begins, next to nothing is known of its biases beyond what the odometry says.
 constexpr double kGyroBiasSigma_radps = 0.1, kAccelBiasSigma_mps2 = 1;
-/// Readings over so long a time bind two keyframes less than the odometry between them does.
-constexpr double kLongestAlone_s = 1;
 
 /// Biases at the first keyframe of a flight.
 struct BiasCost {
@@ -102,11 +102,11 @@ std::size_t Adjustment::points() const {
   return seen.size();
 }
 
-int Adjustment::solve(AdjustmentState& x) const {
+int Adjustment::solve(AdjustmentState& x, double drift) const {
   ceres::Problem problem;
   add_sights(problem, sights_, x);
   add_readings(problem, x);
-  add_edges(problem, x);
+  add_edges(problem, x, drift);
   add_verticals(problem, x);
   const auto first = std::find_if(x.poses.begin(), x.poses.end(), [&](auto& p) { return problem.HasParameterBlock(p.data()); });
   problem.SetParameterBlockConstant(first->data());
@@ -142,16 +142,15 @@ void Adjustment::add_readings(ceres::Problem& problem, AdjustmentState& x) const
   }
 }
 
-/// The odometry where no readings are; a loop is in here as the points that both its ends see.
-void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x) const {
+/// The odometry saw each point in every image and not in keyframes alone. A loop is in here as the points that both its ends see.
+void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const {
   std::set<std::pair<std::size_t, std::size_t>> seen_together;
   for (std::size_t i = 1; i < sights_.size(); ++i)
     if (sights_[i].point == sights_[i - 1].point) seen_together.insert(std::minmax(sights_[i].keyframe, sights_[i - 1].keyframe));
   for (const auto& [a, b, edge] : steps_) {
     const bool loop = edge->kind == MapEdge::Kind::loop;
     if (loop && seen_together.contains(std::minmax(a, b))) continue;
-    if (edge->imu && edge->imu->dt_s() < kLongestAlone_s) continue;
-    const Mat6 root = Eigen::LLT<Mat6>(edge->information).matrixU();
+    const Mat6 root = Eigen::LLT<Mat6>(loop ? edge->information : Mat6(edge->information / drift)).matrixU();
     auto* cost = new ceres::AutoDiffCostFunction<EdgeCost<6>, 6, 6, 6>(
         new EdgeCost<6>{keyframe(a).T_MB.q, keyframe(b).T_MB.q, edge->T_from_to, root});
     problem.AddResidualBlock(cost, loop ? new ceres::CauchyLoss(kRobust_sigma) : nullptr, x.poses[a].data(), x.poses[b].data());
@@ -239,13 +238,30 @@ double Adjustment::odometry_cost(const AdjustmentState& x) const {
   int steps = 0;
   for (const auto& [a, b, edge] : steps_) {
     if (edge->kind != MapEdge::Kind::odometry) continue;
-    const auto pose = [&](std::size_t i) {
-      return Pose<M, B>(orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()), Vec3(x.poses[i].data()));
-    };
-    const Vec6 r = edge_residual(pose(a), pose(b), edge->T_from_to);
+    const Vec6 r = edge_residual(pose(x, a), pose(x, b), edge->T_from_to);
     sum += r.dot(edge->information * r), ++steps;
   }
   return steps == 0 ? 0 : sum / (6 * steps);
+}
+
+double Adjustment::drift_found(const AdjustmentState& x) const {
+  double sum = 0;
+  int stretches = 0;
+  Pose<B, B> T;
+  Mat6 covariance = Mat6::Zero();
+  std::optional<std::size_t> begin, end;
+  for (const auto& [a, b, edge] : steps_) {
+    if (edge->kind != MapEdge::Kind::odometry) continue;
+    if (end != a) begin = a, T = {}, covariance.setZero();
+    covariance = compose_covariance(T, covariance, edge->T_from_to, edge->information.inverse());
+    T = T * edge->T_from_to;
+    end = b;
+    if ((keyframe(b).t - keyframe(*begin).t).seconds() < kStretch_s) continue;
+    const Vec6 r = edge_residual(pose(x, *begin), pose(x, b), T);
+    sum += r.dot(covariance.ldlt().solve(r)), ++stretches;
+    end.reset();
+  }
+  return stretches == 0 ? 1 : sum / (6 * stretches);
 }
 
 void Adjustment::write(const AdjustmentState& x, PlaceMap& map) const {

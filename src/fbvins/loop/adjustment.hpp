@@ -37,8 +37,11 @@ class Adjustment {
   bool empty() const { return sights_.empty(); }
 
   const AdjustmentState& start() const { return start_; }
-  /// Returns the iterations. The first placed keyframe stays.
-  int solve(AdjustmentState& x) const;
+  /// Returns the iterations. The first placed keyframe stays. `drift`: variance of the odometry's steps, in units of the drift
+  /// that its edges were given.
+  int solve(AdjustmentState& x, double drift = 1) const;
+  /// The same as an answer finds it, over stretches long enough for drift to show beside the answer's own scatter.
+  double drift_found(const AdjustmentState& x) const;
   /// Sights that do not fit are wrong matches.
   void drop_outliers(const AdjustmentState& x);
   Plausibility judged(AdjustmentState x) const;
@@ -62,10 +65,13 @@ class Adjustment {
 
   SightCost cost_of(const Sight& s) const { return {keyframe(s.keyframe).T_MB.q, map_.T_BC0, *s.feature}; }
   const MapKeyframe& keyframe(std::size_t i) const { return map_.keyframes()[i]; }
+  Pose<M, B> pose(const AdjustmentState& x, std::size_t i) const {
+    return {orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()), Vec3(x.poses[i].data())};
+  }
   std::optional<PointBlock> first_point(const FeatureTrack& track) const;
   void add_sights(ceres::Problem& problem, const std::vector<Sight>& sights, AdjustmentState& x) const;
   void add_readings(ceres::Problem& problem, AdjustmentState& x) const;
-  void add_edges(ceres::Problem& problem, AdjustmentState& x) const;
+  void add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const;
   void add_verticals(ceres::Problem& problem, AdjustmentState& x) const;
   double held_out_cost(const AdjustmentState& x) const;
   double imu_cost(const AdjustmentState& x) const;

@@ -14,6 +14,9 @@ namespace {
 /// Keyframes before it that each keyframe is matched with, and how far from where the map predicts it a match may be.
 constexpr int kNeighbours = 3;
 constexpr double kMatchRadius_px = 8;
+/// The odometry's steps are weighed by what they turn out to err by, which is less than the drift assumed while flying; not less
+/// than this share of its variance.
+constexpr double kLeastDrift = 0.01;
 /// What decides is squared and a mean of thousands: so much more is worse, not chance.
 constexpr double kWorse = 1.02;
 /// Readings that fit to their noise are not asked to fit better, and steps within the odometry's drift are all alike.
@@ -44,7 +47,7 @@ FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matc
   AdjustmentState x = adjustment.start();
   report.iterations = adjustment.solve(x);
   adjustment.drop_outliers(x);
-  report.iterations += adjustment.solve(x);
+  report.iterations += adjustment.solve(x, std::clamp(adjustment.drift_found(x), kLeastDrift, 1.0));
   report.keyframes = static_cast<int>(map.size());
   report.points = static_cast<int>(adjustment.points());
   report.sights = static_cast<int>(adjustment.sights());
