@@ -8,6 +8,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
+#include "apps/mocap_report.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/io/dataset.hpp"
 
@@ -23,12 +24,13 @@ examples:
   fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
   fbvins eval groundtruth.csv estimate.txt --align sim3 --json
   fbvins eval groundtruth.csv estimate.txt --align yaw --interpolate
+  fbvins eval take.csv estimate.txt --hand-eye
 )";
 
 struct Arguments {
   std::string truth, estimate, alignment = "se3", pairs = "all", path = "truth";
   double max_difference_s = 0.01;
-  bool interpolate = false, json = false;
+  bool interpolate = false, json = false, hand_eye = false;
 };
 
 struct Truth {
@@ -61,6 +63,15 @@ Result<Truth> read_truth(const std::string& path) {
   return truth;
 }
 
+/// Motion capture, aligned with the estimate: the IMU's poses by the estimate's clock.
+Result<Truth> read_markers_as_truth(const std::string& path, const Trajectory<W>& estimate) {
+  const auto markers = read_markers(path, "");
+  if (!markers) return markers.error();
+  const auto found = align_hand_eye(markers->clean, estimate, {});
+  if (!found) return Error{found.error().code, fmt::format("{}: {}", path, found.error().message)};
+  return Truth{body_truth(found->kept, found->calibration), {}};
+}
+
 EvaluationOptions options_of(const Arguments& arguments) {
   EvaluationOptions options;
   options.alignment = *alignment_from_string(arguments.alignment);
@@ -74,10 +85,10 @@ EvaluationOptions options_of(const Arguments& arguments) {
 }
 
 int evaluate_files(const Arguments& arguments) {
-  const auto truth = read_truth(arguments.truth);
-  if (!truth) return fail(truth.error().message);
   const auto estimate = read_poses(arguments.estimate);
   if (!estimate) return fail(estimate.error().message);
+  const auto truth = arguments.hand_eye ? read_markers_as_truth(arguments.truth, *estimate) : read_truth(arguments.truth);
+  if (!truth) return fail(truth.error().message);
   const EvaluationOptions options = options_of(arguments);
   const auto evaluation = evaluate(truth->poses, *estimate, options);
   if (!evaluation) return fail(evaluation.error().message);
@@ -113,6 +124,8 @@ void add_eval_command(CLI::App& program, int& exit_code) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--interpolate", arguments->interpolate, "take the truth at the estimate's very stamps instead");
+  command->add_flag("--hand-eye", arguments->hand_eye,
+                    "GROUND_TRUTH is motion capture: align it with the estimate first (fbvins mocap)");
   command->add_option("--pairs", arguments->pairs, "pieces of the relative error: all, or one after the other")
       ->check(CLI::IsMember({"all", "consecutive"}))
       ->capture_default_str();

@@ -21,6 +21,7 @@ enum ExitCode : int {
 inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
 inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
+inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
 
 void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);
@@ -32,6 +33,7 @@ void add_bench_command(CLI::App& program, int& exit_code);
 void add_fly_command(CLI::App& program, int& exit_code);
 void add_live_command(CLI::App& program, int& exit_code);
 void add_map_command(CLI::App& program, int& exit_code);
+void add_mocap_command(CLI::App& program, int& exit_code);
 void add_vocab_command(CLI::App& program, int& exit_code);
 
 }  // namespace fbvins::app

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
 #ifdef FBVINS_WITH_LAB
           {"fly", kFlyDescription, "fbvins-lab"},
           {"bench", kBenchDescription, "fbvins-lab"},
+          {"mocap", kMocapDescription, "fbvins-lab"},
 #endif
       });
 }

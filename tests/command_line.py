@@ -5,6 +5,7 @@
 usage: command_line.py FBVINS
 """
 import json
+import math
 import pathlib
 import shutil
 import subprocess
@@ -17,6 +18,28 @@ PROGRAM = sys.argv[1]
 
 def fbvins(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
+
+
+def times(a, b):
+    """Product of quaternions w x y z."""
+    (w, x, y, z), (v, i, j, k) = a, b
+    return (w * v - x * i - y * j - z * k, w * i + x * v + y * k - z * j, w * j - x * k + y * v + z * i, w * k + x * j - y * i + z * v)
+
+
+def turned(q, p):
+    return times(times(q, (0, *p)), (q[0], -q[1], -q[2], -q[3]))[1:]
+
+
+def tumbling(t):
+    """Attitude and position of a body that is rocked about all axes, at rest for two seconds at both ends of a minute."""
+    u = min(max(min(t - 2, 58 - t) / 4, 0), 1)
+    u = u ** 3 * (10 + u * (6 * u - 15))
+    q = (1, 0, 0, 0)
+    for axis, angle in ((1, 0.4 * math.sin(1.7 * t)), (2, 0.3 * math.sin(2.3 * t + 1)), (3, 0.8 * math.sin(0.9 * t + 0.2 * math.sin(0.4 * t)))):
+        part = [math.cos(u * angle / 2), 0, 0, 0]
+        part[axis] = math.sin(u * angle / 2)
+        q = times(q, part)
+    return q, (u * math.sin(0.8 * t), u * math.cos(0.6 * t), 0.5 * u * math.sin(1.1 * t))
 
 
 class CommandLine(unittest.TestCase):
@@ -39,7 +62,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
-        for command in ([], ["run"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["live"]):
+        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["live"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)
@@ -114,6 +137,45 @@ class CommandLine(unittest.TestCase):
         words = pathlib.Path(__file__).resolve().parents[1] / "data" / "orb_vocabulary.fbv"
         self.assert_bad_input(fbvins(*run, "--load-map", boosted, "--vocabulary", words), "'orb'", "'boosted'")
         self.assert_bad_input(fbvins("map", "merge", self.folder / "a.fbm", boosted, "-o", self.folder / "c.fbm"), "boosted")
+
+    def test_mocap(self):
+        estimate, quad, wand = [], [], []
+        for i in range(1201):
+            q, p = tumbling(i / 20)
+            estimate.append(f"{1.5e9 + i / 20:.9f} " + " ".join(f"{v:.9f}" for v in (*p, *q[1:], q[0])))
+        lever, about_z = (0.03, -0.02, 0.08), (math.sqrt(0.5), 0, 0, math.sqrt(0.5))
+        for i in range(8400):  # begins 7 s before the flight, at 120 Hz, in a volume turned by a quarter
+            q, p = tumbling(i / 120 - 7)
+            p = turned(about_z, [a + b for a, b in zip(p, turned(q, lever))])
+            q = times(about_z, q)
+            if 4000 <= i < 4060:
+                p = (p[0] + 0.8, *p[1:])
+            p = [v + 2e-7 * ((i * factor) % 1000 - 500) for v, factor in zip(p, (7919, 6007, 4409))]  # no measurement repeats itself
+            numbers = (q[1], q[3], -q[2], q[0], p[0], p[2], -p[1])  # y is up; the same turn of the body's own axes stays with it
+            quad.append(",".join(f"{v:.9f}" for v in numbers))
+            wand.append("0,0,0,1,1,1,1")
+        head = ("Format Version,1.23,Take Name,t,Capture Frame Rate,120,Rotation Type,Quaternion,Length Units,Meters,Coordinate Space,Global\n\n"
+                + ",," + ",".join(["Rigid Body"] * 14) + "\n,," + ",".join(["quad"] * 7 + ["wand"] * 7) + "\n,," + ",".join(["1"] * 14) + "\n,,"
+                + ",".join((["Rotation"] * 4 + ["Position"] * 3) * 2) + "\nFrame,Time (Seconds)," + ",".join(["X,Y,Z,W,X,Y,Z"] * 2) + "\n")
+        take = self.write("take.csv", head + "".join(f"{i},{i / 120:.6f},{a},{b}\n" for i, (a, b) in enumerate(zip(quad, wand))))
+        flight = self.write("flight.txt", "\n".join(estimate) + "\n")
+        out = self.folder / "measured"
+        done = fbvins("mocap", take, flight, "--body", "quad", "--expected", "0,0,0", "--out", out)
+        self.assertEqual(done.returncode, 0, done)
+        self.assertIn("8400 poses at 120.00 Hz", done.stdout)
+        self.assertRegex(done.stdout, r"jump by 0\.\d+ m and \d\.\d degrees, 33\.333 s to 33\.825 s")
+        found = [float(v) for v in done.stdout.split("markers on the IMU, m")[1].split()[:3]]
+        self.assertLess(math.dist(found, lever), 0.001, done.stdout)
+        self.assertIn("1499999993.0000", done.stdout)
+        self.assertRegex(done.stdout, r"axial error +-?0\.00[0-3]\d +-?0\.000\d +-?0\.000\d")
+        evaluated = fbvins("eval", flight, out / "truth_tum.txt", "--align", "none", "--json")
+        self.assertLess(json.loads(evaluated.stdout)["ape_m"]["rmse"], 0.01)
+
+        self.assert_bad_input(fbvins("mocap", take, flight), "'quad', 'wand'")
+        self.assert_bad_input(fbvins("mocap", take, flight, "--body", "drone"), "no body 'drone'")
+        self.assert_bad_input(fbvins("mocap", take, flight, "--body", "wand"), "both need 8 s")
+        self.assert_bad_input(fbvins("mocap", flight, take), "take.csv")
+        self.assert_bad_input(fbvins("eval", take, flight, "--hand-eye"), "'quad', 'wand'")
 
     def test_eval(self):
         rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]

@@ -21,6 +21,7 @@ constexpr double kFlip_rad = 0.26, kSwap_m = 0.25, kSwap_medians = 8;
 constexpr double kOutlier_sigmas = 5,
                  kMostOutliers = 0.05;  // of the pairs at a time: more are no outliers but a noise that is not like that
 constexpr int kRounds = 4, kSteps = 8;
+constexpr double kBlock_s = 6;  // stretches of flight that are asked whether they agree
 // What a use of the result bears; a motion that leaves more in some direction does not show it.
 constexpr double kWorstRotation_rad = 0.3 * std::numbers::pi / 180, kWorstLever_m = 0.01, kWorstClock_s = 2e-3;
 // Weak knowledge that keeps directions which the motion does not show in place: 10 m, a turn, 10 s.
@@ -99,8 +100,11 @@ class Solver {
     out.pairs = pairs_;
     out.outliers = outliers_;
     out.scale = 1 / (1 + scale_);
-    const NormalSums sums = with_loose(sum_all(rows()));
-    const Eigen::MatrixXd covariance = sums.A.ldlt().solve(Eigen::MatrixXd::Identity(sums.A.rows(), sums.A.cols()));
+    const Rows all = rows();
+    const NormalSums sums = with_loose(sum_all(all));
+    out.disagreement = disagreement(all);
+    const Eigen::MatrixXd covariance =
+        out.disagreement * sums.A.ldlt().solve(Eigen::MatrixXd::Identity(sums.A.rows(), sums.A.cols()));
     for (std::size_t i = 0; i < unknowns_.size(); ++i)
       for (std::size_t k = 0; k < unknowns_.size(); ++k)
         out.covariance(unknowns_[i], unknowns_[k]) = covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
@@ -164,6 +168,24 @@ class Solver {
       sums.b(at) += information(unknowns_[i]) * value;
     }
     return sums;
+  }
+
+  /// How much more the stretches of the flight pull apart than the noise explains, at least 1: errors of the estimate that come
+  /// with the motion are neither white nor do they wander. Under the model a stretch's gradient has the covariance of its own A.
+  double disagreement(const Rows& all) const {
+    std::vector<NormalSums> blocks;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::vector<NormalSums> parts = whitened_blocks(noise_[kGroup[k]], all[k], kBlock_s);
+      blocks.resize(std::max(blocks.size(), parts.size()));
+      for (std::size_t i = 0; i < parts.size(); ++i) blocks[i] += parts[i];
+    }
+    double sum = 0;
+    for (NormalSums& block : blocks) {
+      block.A.diagonal().array() += 1e-9;
+      sum += block.b.dot(block.A.ldlt().solve(block.b));
+    }
+    const double unknowns = static_cast<double>(unknowns_.size()), free = unknowns * (static_cast<double>(blocks.size()) - 1);
+    return free > 0 ? std::max(1.0, sum / free) : 1;
   }
 
   void step_until_still() {

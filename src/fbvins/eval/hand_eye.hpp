@@ -44,6 +44,8 @@ struct HandEye {
   HandEyeMatrix covariance = HandEyeMatrix::Zero();  ///< zero where something was not estimated
   /// Of the estimate against the markers, along W's axes: horizontal, vertical (m), tilt, heading (rad).
   std::array<SerialNoise, 4> noise;
+  double disagreement =
+      1;  ///< variance between stretches of the flight over what the noise explains; the covariance is multiplied by it
   double scale = 1;  ///< metres of the estimate's path to one of the markers'
   double clock_correlation = 0;
   int pairs = 0, outliers = 0;      ///< poses of the estimate that entered; that did not fit

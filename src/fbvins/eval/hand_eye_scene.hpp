@@ -112,8 +112,10 @@ struct MarkerRecording {
   MarkerCalibration truth;
 };
 
-inline MarkerRecording record(const ExactFlight& flight, Time start, const RecordingFaults& faults, std::uint64_t seed,
-                              double drift = 0, bool level = false) {
+/// Flight: at(seconds) -> Pose<W, B>, duration_s().
+template <class Flight>
+MarkerRecording record(const Flight& flight, Time start, const RecordingFaults& faults, std::uint64_t seed, double drift = 0,
+                       bool level = false) {
   Rng rng(seed, 13);
   MarkerRecording out;
   MarkerCalibration& c = out.truth;

@@ -65,21 +65,14 @@ Point minimise_simplex(const Point& start, Cost&& cost) {
   return std::min_element(s.begin(), s.end(), better)->x;
 }
 
-}  // namespace
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-NormalSums& NormalSums::operator+=(const NormalSums& other) {
-  if (A.size() == 0) return *this = other;
-  A += other.A, b += other.b, c += other.c, log_det_V += other.log_det_V;
-  return *this;
-}
-
-NormalSums whitened_sums(const SerialNoise& noise, const SerialRows& rows, bool keep_innovations) {
-  const Eigen::Index unknowns = rows.rows.cols() - 1;
+/// Innovations of every column over their standard deviation, and the logarithm of V's determinant.
+std::pair<RowMajor, double> whiten(const SerialNoise& noise, const SerialRows& rows) {
   const double white = noise.white * noise.white, wander = noise.wander * noise.wander;
   Eigen::RowVectorXd state = Eigen::RowVectorXd::Zero(rows.rows.cols());
-  decltype(rows.rows) whitened(rows.rows.rows(), rows.rows.cols());
-  NormalSums out;
-  double variance = wander;
+  RowMajor whitened(rows.rows.rows(), rows.rows.cols());
+  double variance = wander, log_det = 0;
   for (Eigen::Index i = 0; i < rows.rows.rows(); ++i) {
     if (i > 0) {
       const double dt = rows.t_s[static_cast<std::size_t>(i)] - rows.t_s[static_cast<std::size_t>(i) - 1];
@@ -92,13 +85,51 @@ NormalSums whitened_sums(const SerialNoise& noise, const SerialRows& rows, bool 
     state += (variance / total) * whitened.row(i);
     whitened.row(i) /= std::sqrt(total);
     variance *= white / total;
-    out.log_det_V += std::log(total);
-    if (keep_innovations) out.innovations.push_back(whitened(i, unknowns));
+    log_det += std::log(total);
   }
-  const Eigen::MatrixXd sums = whitened.transpose() * whitened;
+  return {std::move(whitened), log_det};
+}
+
+NormalSums sums_of(const RowMajor& whitened, Eigen::Index from, Eigen::Index end) {
+  const Eigen::Index unknowns = whitened.cols() - 1;
+  const auto block = whitened.middleRows(from, end - from);
+  const Eigen::MatrixXd sums = block.transpose() * block;
+  NormalSums out;
   out.A = sums.topLeftCorner(unknowns, unknowns);
   out.b = sums.topRightCorner(unknowns, 1);
   out.c = sums(unknowns, unknowns);
+  return out;
+}
+
+}  // namespace
+
+NormalSums& NormalSums::operator+=(const NormalSums& other) {
+  if (A.size() == 0) return *this = other;
+  A += other.A, b += other.b, c += other.c, log_det_V += other.log_det_V;
+  return *this;
+}
+
+NormalSums whitened_sums(const SerialNoise& noise, const SerialRows& rows, bool keep_innovations) {
+  const auto [whitened, log_det_V] = whiten(noise, rows);
+  NormalSums out = sums_of(whitened, 0, whitened.rows());
+  out.log_det_V = log_det_V;
+  if (keep_innovations)
+    for (Eigen::Index i = 0; i < whitened.rows(); ++i) out.innovations.push_back(whitened(i, whitened.cols() - 1));
+  return out;
+}
+
+std::vector<NormalSums> whitened_blocks(const SerialNoise& noise, const SerialRows& rows, double block_s) {
+  const RowMajor whitened = whiten(noise, rows).first;
+  std::vector<NormalSums> out;
+  for (Eigen::Index from = 0; from < whitened.rows();) {
+    Eigen::Index end = from;
+    const auto block = [&](Eigen::Index i) {
+      return std::floor((rows.t_s[static_cast<std::size_t>(i)] - rows.t_s.front()) / block_s);
+    };
+    while (end < whitened.rows() && block(end) == block(from)) ++end;
+    out.push_back(sums_of(whitened, from, end));
+    from = end;
+  }
   return out;
 }
 

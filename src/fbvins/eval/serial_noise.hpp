@@ -39,6 +39,10 @@ struct NormalSums {
 
 NormalSums whitened_sums(const SerialNoise& noise, const SerialRows& rows, bool keep_innovations = false);
 
+/// The same apart for every stretch of `block_s`, whose innovations are independent of one another's where the noise is as
+/// modelled.
+std::vector<NormalSums> whitened_blocks(const SerialNoise& noise, const SerialRows& rows, double block_s);
+
 /// The wandering part of a series, smoothed over all of it.
 std::vector<double> wandering_part(const SerialNoise& noise, const std::vector<double>& t_s, const Eigen::VectorXd& series);
 
