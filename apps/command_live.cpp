@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "apps/commands.hpp"
+#include "apps/imu_state.hpp"
 #include "apps/kept_map.hpp"
 #include "apps/live_files.hpp"
 #include "apps/live_summary.hpp"
@@ -58,7 +59,7 @@ examples:
 )";
 
 struct Arguments {
-  std::string source, config, frontend, out, record, kept_map, ros2;
+  std::string source, config, frontend, out, record, kept_map, ros2, imu_state;
   std::vector<std::string> assignments, faults, mavlink;
   DatasetOptions dataset;
   MapArguments map;
@@ -200,10 +201,13 @@ int run(const Arguments& arguments) {
   if (!map) return fail(map.error().message);
   std::optional<KeptMap> kept;
   if (*map) kept.emplace(**map, arguments.kept_map);
+  const ImuNoise& imu = (*source)->rig().imu_noise;
+  const auto imu_state = load_imu_state(arguments.imu_state, imu);
+  if (!imu_state) return fail(imu_state.error().message);
   LiveTally tally;
   const Result<void> flown = [&]() -> Result<void> {
-    auto live =
-        LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(), {.mapper = kept ? &*kept : nullptr});
+    auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(),
+                                   {.mapper = kept ? &*kept : nullptr, .imu_state = *imu_state});
     if (!live) return live.error();
     if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
@@ -213,6 +217,7 @@ int run(const Arguments& arguments) {
     return done;
   }();
   if (!flown) return fail(flown.error().message);
+  if (Result<void> saved = save_imu_state(arguments.imu_state, tally.imu_state, imu); !saved) return fail(saved.error().message);
   if (*map) {
     (*map)->finish();
     if (Result<void> saved = save_map(arguments.map, **map); !saved) return fail(saved.error().message);
@@ -241,6 +246,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
                       "Kalibr camchain-imucam.yaml instead of the source's own");
   command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
+  command->add_option("--imu-state", arguments->imu_state, kImuStateHelp);
   command->add_option("--max-images", arguments->dataset.max_frames, "of a replay: end after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--laps", arguments->laps, "of a replay: play it this often, one after the other")

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/imu_state.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
@@ -38,7 +39,7 @@ examples:
 )";
 
 struct Arguments {
-  std::string dataset, config, frontend, out, camchain, imu_calibration;
+  std::string dataset, config, frontend, out, camchain, imu_calibration, imu_state;
   std::vector<std::string> assignments;
   MapArguments map;
   int max_images = 0;
@@ -77,12 +78,14 @@ struct Flight {
 Result<Flight> process(const Arguments& arguments, const Config& config, Dataset& data, Progress& progress) {
   const auto map = make_map(arguments.map, data.rig(), config.loop);
   if (!map) return map.error();
+  const auto imu_state = load_imu_state(arguments.imu_state, data.rig().imu_noise);
+  if (!imu_state) return imu_state.error();
   Flight flight;
   if (*map) flight.map.emplace();
   flight.run.tracked.reserve(data.frames().size());
   flight.run.odometry.reserve(data.frames().size());
-  Result<System> system =
-      System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic, {.mapper = map->get()});
+  Result<System> system = System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic,
+                                         {.mapper = map->get(), .imu_state = *imu_state});
   if (!system) return system.error();
   SurvivalMeter survival;
   system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
@@ -99,6 +102,13 @@ Result<Flight> process(const Arguments& arguments, const Config& config, Dataset
   if (flight.map)
     if (Result<void> saved = save_map(arguments.map, **map); !saved) flight.map->not_saved = saved.error().message;
   return flight;
+}
+
+/// As the last frame in good health knew the IMU.
+Result<void> keep_imu_state(const Arguments& arguments, const RunRecord& run, const ImuNoise& imu) {
+  std::optional<ImuState> state;
+  for (auto o = run.odometry.rbegin(); o != run.odometry.rend() && !state; ++o) state = imu_state_of(*o);
+  return save_imu_state(arguments.imu_state, state, imu);
 }
 
 Result<void> write_all(const Flight& flight, const RunSummary& summary, const Config& config, const std::string& folder) {
@@ -138,6 +148,8 @@ int run(const Arguments& arguments) {
     if (Result<void> written = write_truth(flight->run.images(), (*data)->ground_truth(), *folder); !written)
       return fail(written.error().message);
   if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
+  if (Result<void> kept = keep_imu_state(arguments, flight->run, (*data)->rig().imu_noise); !kept)
+    return fail(kept.error().message);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
   if (summary.coverage.with_pose > 0) return kOk;
   warn("no pose could be estimated; the health column of trajectory.csv says why");
@@ -159,6 +171,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");
+  command->add_option("--imu-state", arguments->imu_state, kImuStateHelp);
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--threaded", arguments->threaded, "frontend and estimator on threads of their own; the same result");

@@ -13,8 +13,9 @@
 
 namespace fbvins::app {
 
-/// trajectory_tum.txt, trajectory.csv, covariance.csv, statistics.csv, timing.csv; live_tum.txt (W, IMU rate); with loop closure
-/// map_causal_tum.txt and map_bounded_tum.txt (poses in M: with the correction known at each image, and with its smooth form).
+/// trajectory_tum.txt, trajectory.csv, covariance.csv, gauge.csv, statistics.csv, timing.csv; live_tum.txt (W, IMU rate);
+/// with loop closure map_causal_tum.txt and map_bounded_tum.txt (poses in M: with the correction known at each image, and with
+/// its smooth form).
 class LiveFiles final : public Sink {
  public:
   static Result<std::unique_ptr<LiveFiles>> create(const std::string& folder, bool with_map, bool new_map);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "apps/evaluation_report.hpp"
+#include "apps/imu_state.hpp"
 #include "apps/run_summary.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/live/replay_source.hpp"
@@ -21,6 +22,7 @@ class TallySink final : public Sink {
     if (o == nullptr) return {};
     tally_.with_pose += o->health.has_pose() ? 1 : 0;
     ++tally_.health[label_of(o->health)];
+    if (auto state = imu_state_of(*o)) tally_.imu_state = state;
     return {};
   }
 

@@ -11,6 +11,7 @@
 #include "fbvins/live/live_event.hpp"
 #include "fbvins/live/sink.hpp"
 #include "fbvins/live/source.hpp"
+#include "fbvins/types/imu_state.hpp"
 
 namespace fbvins::app {
 
@@ -20,6 +21,7 @@ struct LiveTally {
   std::int64_t with_pose = 0;                  ///< images
   std::int64_t live_poses = 0;                 ///< at IMU rate
   LiveStatus last;
+  std::optional<ImuState> imu_state;  ///< as of the newest image in good health
 
   std::unique_ptr<Sink> make_sink();
 };

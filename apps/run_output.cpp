@@ -38,6 +38,24 @@ std::string covariance_row(const Odometry& o) {
   return row + "\n";
 }
 
+constexpr const char* kGaugeHeader =
+    "#timestamp [ns],p_GB_x [m],p_GB_y [m],p_GB_z [m],q_GB_w [],q_GB_x [],q_GB_y [],q_GB_z [],"
+    "v_GB_x [m s^-1],v_GB_y [m s^-1],v_GB_z [m s^-1],q_LG_w [],q_LG_x [],q_LG_y [],q_LG_z [],"
+    "up_sigma [rad],tilt_sigma [rad],level\n";
+
+std::string gauge_row(const Odometry& o) {
+  const GaugeState& g = o.gauge;
+  const auto text = [](const auto&... x) {
+    std::string out;
+    ((out += fmt::format(",{:.9f}", x)), ...);
+    return out;
+  };
+  const Pose<G, B>& T = g.T_GB;
+  return fmt::format("{}{}{}{}{}{},{}\n", o.t.ns, text(T.p.x(), T.p.y(), T.p.z()), text(T.q.w(), T.q.x(), T.q.y(), T.q.z()),
+                     text(g.v_GB.x(), g.v_GB.y(), g.v_GB.z()), text(g.q_LG.w(), g.q_LG.x(), g.q_LG.y(), g.q_LG.z()),
+                     text(g.up_sigma_rad, o.tilt_sigma_rad), o.level ? 1 : 0);
+}
+
 std::string frontend_columns(const FrontendStats& s) {
   return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", s.tracked, s.detected, s.stereo, s.lost_flow, s.lost_check,
                      s.lost_epipolar, s.matches.found, s.matches.inliers, s.raw_matches.found, s.raw_matches.inliers, s.expected,
@@ -96,7 +114,7 @@ Result<void> write_text(const std::string& path, const std::string& text) {
 struct RunWriter::State {
   TumWriter tum;
   OdometryCsvWriter csv;
-  OutputFile covariance, statistics, timing;
+  OutputFile covariance, gauge, statistics, timing;
   std::mutex mutex;
   std::deque<TrackedRecord> without_odometry;  ///< frames the estimator has not answered yet
 
@@ -113,15 +131,24 @@ Result<RunWriter> RunWriter::create(const std::string& folder) {
   if (!csv) return csv.error();
   auto covariance = OutputFile::create(folder + "/covariance.csv");
   if (!covariance) return covariance.error();
+  auto gauge = OutputFile::create(folder + "/gauge.csv");
+  if (!gauge) return gauge.error();
   auto statistics = OutputFile::create(folder + "/statistics.csv");
   if (!statistics) return statistics.error();
   auto timing = OutputFile::create(folder + "/timing.csv");
   if (!timing) return timing.error();
   covariance->write(covariance_header());
+  gauge->write(kGaugeHeader);
   statistics->write(kStatisticsHeader);
   timing->write(kTimingHeader);
-  return RunWriter(std::unique_ptr<State>(
-      new State{std::move(*tum), std::move(*csv), std::move(*covariance), std::move(*statistics), std::move(*timing), {}, {}}));
+  return RunWriter(std::unique_ptr<State>(new State{std::move(*tum),
+                                                    std::move(*csv),
+                                                    std::move(*covariance),
+                                                    std::move(*gauge),
+                                                    std::move(*statistics),
+                                                    std::move(*timing),
+                                                    {},
+                                                    {}}));
 }
 
 RunWriter::RunWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -137,7 +164,10 @@ void RunWriter::add(const TrackedRecord& tracked) {
 /// A frame that the estimator has passed by without an answer has a row of zeros.
 void RunWriter::add(const Odometry& o) {
   const std::lock_guard lock(state_->mutex);
-  if (o.health.has_pose()) state_->tum.write(o.t, o.T_WB);
+  if (o.health.has_pose()) {
+    state_->tum.write(o.t, o.T_WB);
+    state_->gauge.write(gauge_row(o));
+  }
   state_->csv.write(o);
   state_->covariance.write(covariance_row(o));
   auto& waiting = state_->without_odometry;
@@ -150,8 +180,8 @@ Result<void> RunWriter::close() {
   for (const TrackedRecord& tracked : state_->without_odometry) state_->write(tracked, {});
   state_->without_odometry.clear();
   Result<void> first;
-  for (Result<void> done :
-       {state_->tum.close(), state_->csv.close(), state_->covariance.close(), state_->statistics.close(), state_->timing.close()})
+  for (Result<void> done : {state_->tum.close(), state_->csv.close(), state_->covariance.close(), state_->gauge.close(),
+                            state_->statistics.close(), state_->timing.close()})
     if (first && !done) first = done;
   return first;
 }

@@ -177,6 +177,26 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("mocap", flight, take), "take.csv")
         self.assert_bad_input(fbvins("eval", take, flight, "--hand-eye"), "'quad', 'wand'")
 
+    def test_imu_state(self):
+        flight, out, state = self.folder / "flight", self.folder / "out", self.folder / "imu.yaml"
+        self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 2, "--quiet").returncode, 0)
+        run = ["run", flight, "--out", out, "--quiet", "--imu-state"]
+
+        def tilt_sigma_at_first_pose():
+            return float((out / "gauge.csv").read_text(encoding="utf-8").splitlines()[1].split(",")[-2])
+
+        self.assertEqual(fbvins(*run, state).returncode, 0)  # the first flight: there is no file yet
+        unknown = tilt_sigma_at_first_pose()
+        state.write_text(state.read_text(encoding="utf-8").replace("accel_bias_covariance: [", "accel_bias_covariance: [1e-4, 0, 0, 1e-4, 0, 1e-4] # "),
+                         encoding="utf-8")
+        kept = state.read_text(encoding="utf-8")
+        self.assertEqual(fbvins(*run, state).returncode, 0)
+        self.assertLess(tilt_sigma_at_first_pose(), 0.5 * unknown)
+        self.assertNotEqual(state.read_text(encoding="utf-8"), kept)
+        self.assert_bad_input(fbvins(*run, self.write("half.yaml", kept[:len(kept) // 2])), "half.yaml")
+        self.assert_bad_input(fbvins(*run, self.write("other.yaml", kept.replace("rate_hz: 200", "rate_hz: 400"))), "other.yaml", "another IMU")
+        self.assert_bad_input(fbvins(*run, self.folder), str(self.folder))
+
     def test_eval(self):
         rows = [f"{1.5e9 + i / 20:.9f} {i * 0.1:.3f} {(i % 7) * 0.1:.3f} {(i % 3) * 0.1:.3f} 0 0 0 1" for i in range(60)]
         truth = self.write("truth.txt", "\n".join(rows) + "\n")

@@ -60,6 +60,7 @@ struct EstimatorOptions {
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
   double max_speed_mps = 30;
+  double max_step_m = 0.0015;
 
   /// The noise that readings are weighed by, from the calibrated one.
   ImuNoise assumed(ImuNoise noise) const {
@@ -89,6 +90,8 @@ struct EstimatorOptions {
     v("max_imu_gap_s", max_imu_gap_s, "s", "longest time without IMU readings bridged by the images", 0.01, 10.0);
     v("min_tracks", min_tracks, "", "fewer landmarks than this in view: degraded", 3, 200);
     v("max_speed_mps", max_speed_mps, "m/s", "faster is implausible and restarts the estimator", 1.0, 1000.0);
+    v("max_step_m", max_step_m, "m",
+      "what corrections may move the published pose by from one image to the next, and turn in proportion; 0: at once", 0.0, 1.0);
   }
 };
 

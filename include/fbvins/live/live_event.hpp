@@ -25,6 +25,8 @@ struct LivePose {
   Vec3 w_WB_B = Vec3::Zero();               ///< rad/s, in B, bias removed
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
+  double tilt_sigma_rad = 0;                ///< as the estimate's
+  bool level = false;                       ///< likewise
   Health health;                            ///< the estimator's, or what the watchdogs see since
   std::uint32_t reset_counter = 0;          ///< +1 whenever W is a new frame
 };

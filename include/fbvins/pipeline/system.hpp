@@ -22,12 +22,14 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/pipeline/system_options.hpp"
 #include "fbvins/types/calibration.hpp"
+#include "fbvins/types/imu_state.hpp"
 #include "fbvins/types/input_counts.hpp"
 #include "fbvins/types/mapper.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -38,10 +40,11 @@ namespace fbvins {
 
 enum class RunMode { deterministic, threaded };
 
-/// What a user may bring instead of the parts that the options name.
+/// What a user may bring: instead of the parts that the options name, or from an earlier flight.
 struct SystemParts {
   std::unique_ptr<Frontend> frontend = {};  ///< instead of `options.frontend.kind`
   Mapper* mapper = nullptr;                 ///< gets every keyframe; not owned, must live longer than the System
+  std::optional<ImuState> imu_state = {};   ///< what an earlier flight knew of this IMU
 };
 
 class System {

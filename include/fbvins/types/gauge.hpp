@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A state in the estimator's own frame, the gauge G, with what is known of up in it. What has to fit what was seen (a map, an
-// adjustment) is built on this; what flies follows the published pose in W (odometry.hpp).
+// adjustment) is built on this; what flies follows the published pose in W (odometry.hpp):
+// G is the frame in which the window saw things, never turned and corrected at once; W is published, level and without leaps;
+// M is W corrected by loop closure.
 //
 //   const Vec3 up_G = keyframe.gauge.up_G();                       // unit vector against gravity
 //   const Quat q_LB = keyframe.gauge.q_LG * keyframe.gauge.T_GB.q; // attitude against the level, as known now

@@ -62,19 +62,27 @@ struct EstimatorStats {
   double total_ms() const { return prepare_ms + solve_ms + marginalise_ms; }
 };
 
-/// One pose of the flight, at an image's stamp.
+/// A mission that needs to know which way is up waits until it is known to so much.
+inline constexpr double kLevelSigma_rad = 0.005;
+
+/// One pose of the flight, at an image's stamp. G is the frame in which the window saw things, never turned and corrected at once;
+/// W is published, level and without leaps; M is W corrected by loop closure. No correction moves T_WB by more than
+/// EstimatorOptions::max_step_m from one image to the next beside the motion, unless `reset_counter` counts up.
 struct Odometry {
   FrameId id;
   Time t;
   Pose<W, B> T_WB;
   GaugeState gauge;            ///< the same moment in the estimator's own frame
-  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W
+  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W: of the motion, without what is being paid off
   Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;
-  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad])
+  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad]), with what is still to be paid off
   Mat3 velocity_covariance = Mat3::Zero();    ///< of v_WB, m^2/s^2
   Mat3 gyro_bias_covariance = Mat3::Zero();   ///< rad^2/s^2
   Mat3 accel_bias_covariance = Mat3::Zero();  ///< m^2/s^4
+  Vec3 up_W = Vec3::UnitZ();    ///< unit, against gravity, as known now; z as soon as levelling is paid off
+  double tilt_sigma_rad = 0;    ///< standard deviation of the attitude's tilt about its less known axis
+  bool level = false;           ///< tilt_sigma_rad is below kLevelSigma_rad
   Health health;
   std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then
   EstimatorStats stats;

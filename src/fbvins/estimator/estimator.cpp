@@ -26,15 +26,16 @@ WindowWeights weights_of(const EstimatorOptions& o) {
 
 }  // namespace
 
-Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options)
+Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before)
     : options_(options),
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
       calibration_(calibrated_),
-      initialiser_(options, imu_noise_),
+      initialiser_(options, imu_noise_, before),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options),
-      window_(options, weights_of(options)) {}
+      window_(options, weights_of(options)),
+      published_(options.max_step_m) {}
 
 StatePrior Estimator::prior() const {
   StatePrior out;
@@ -55,7 +56,7 @@ Estimate Estimator::process(const TrackedFrame& frame) {
   Odometry& odometry = out.odometry;
   odometry.id = frame.id;
   odometry.t = frame.t;
-  if (running_) fill(odometry);
+  if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
   if (odometry.health.state == HealthState::lost) restart();
   health_.pass(frame);
@@ -106,11 +107,12 @@ void Estimator::open_window(const InitialSolution& start) {
     window_.add_frame(std::move(f), start.frames[i].features, calibration_);
   }
   const NavState& first = window_.frames().oldest().state;
-  WindowPrior belief = first_frame_prior(first, options_.up == UpDirection::state);
+  WindowPrior belief = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
   if (options_.estimate_extrinsics || options_.estimate_time_offset)
     belief = with_calibration_belief(std::move(belief), CalibrationBelief{}, calibrated_);
   window_.set_prior(std::move(belief));
   window_.set_pivot(first.T_WB.p);
+  published_.restart();
 }
 
 Frame Estimator::predict(const TrackedFrame& frame) const {
@@ -233,7 +235,7 @@ Health Estimator::judge(const TrackedFrame& frame) {
 }
 
 void Estimator::restart() {
-  const Pose<W, B> last = window_.tilt().levelled(window_.newest().state.T_WB);
+  const Pose<W, B>& last = published_.T_WB();
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last;
   running_ = false;
   failed_solves_ = 0;
@@ -243,14 +245,16 @@ void Estimator::restart() {
   rest_.reset();
 }
 
-void Estimator::fill(Odometry& out) const {
-  const NavState state = window_.tilt().levelled(window_.newest().state);
-  out.T_WB = state.T_WB;
-  out.v_WB = state.v_WB;
-  out.gauge = gauge_state_of(window_, window_.newest().state);
+/// The pose of the newest frame, carried on from the one published before.
+void Estimator::publish(Odometry& out) {
+  const NavState& newest = window_.newest().state;
+  const NavState level = window_.tilt().levelled(newest);
+  published_.follow(motion_of_newest(window_, gravity_W()), level.T_WB);
+  published_.fill(level, out);
+  out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;
-  out.bias = state.bias;
-  out.w_WB_B = last_rate_ - state.bias.gyro_radps;
+  out.bias = level.bias;
+  out.w_WB_B = last_rate_ - level.bias.gyro_radps;
 }
 
 }  // namespace fbvins

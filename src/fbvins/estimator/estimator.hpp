@@ -14,6 +14,7 @@
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
+#include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
@@ -32,7 +33,8 @@ struct Estimate {
 
 class Estimator {
  public:
-  Estimator(const StereoRig& rig, const EstimatorOptions& options);
+  /// `before`: what an earlier flight knew of the IMU.
+  Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before = {});
 
   /// The state at the frame's stamp. Never a silent wrong pose: health says what it is worth.
   Estimate process(const TrackedFrame& frame);
@@ -55,7 +57,7 @@ class Estimator {
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame);
   void restart();
-  void fill(Odometry& out) const;
+  void publish(Odometry& out);
   Vec3 gravity_W() const;
 
   EstimatorOptions options_;
@@ -73,6 +75,7 @@ class Estimator {
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
   double up_sigma_rad_ = 0;  ///< as of the last usable solve
+  PublishedPose published_;
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number
   std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)

@@ -32,20 +32,26 @@ QuadraticPrior inserted(const QuadraticPrior& prior, int at, const Eigen::Matrix
 
 }  // namespace
 
-WindowPrior first_frame_prior(const NavState& state, bool estimate_tilt) {
-  Vec15 sigma;
-  sigma << Vec6::Constant(kChosenSigma), Vec3::Constant(kVelocitySigma_mps), Vec3::Constant(kGyroBiasSigma_radps),
-      Vec3::Constant(kAccelBiasSigma_mps2);
+ImuBiasBelief unknown_biases() {
+  return {{}, kGyroBiasSigma_radps * kGyroBiasSigma_radps * Mat3::Identity(),
+          kAccelBiasSigma_mps2 * kAccelBiasSigma_mps2 * Mat3::Identity()};
+}
+
+WindowPrior first_frame_prior(const NavState& state, const ImuBiasBelief& biases, bool estimate_tilt) {
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
-  prior.quadratic.H = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  prior.quadratic.H = Eigen::MatrixXd::Zero(15, 15);
+  prior.quadratic.H.diagonal() << Vec6::Constant(information(kChosenSigma)), Vec3::Constant(information(kVelocitySigma_mps)),
+      Vec6::Zero();
+  prior.quadratic.H.block<3, 3>(nav::bg, nav::bg) = biases.gyro_covariance.inverse();
+  prior.quadratic.H.block<3, 3>(nav::ba, nav::ba) = biases.accel_covariance.inverse();
   // Heading is about the world's vertical, which in B is R^T z.
   const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
   const double level = information(estimate_tilt ? kLevelSigma : kTiltSigma_rad), heading = information(kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
   Vec15 from_belief = Vec15::Zero();
-  from_belief.tail<6>() << state.bias.gyro_radps, state.bias.accel_mps2;
+  from_belief.tail<6>() << state.bias.gyro_radps - biases.bias.gyro_radps, state.bias.accel_mps2 - biases.bias.accel_mps2;
   prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
   prior.with_tilt = estimate_tilt;
   if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(kTiltSigma_rad) * Mat2::Identity());

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "fbvins/estimator/window_problem.hpp"
+#include "fbvins/types/imu_state.hpp"
 
 namespace fbvins {
 
@@ -16,10 +17,13 @@ struct CalibrationBelief {
   double time_offset_sigma_s = 0.005;
 };
 
-/// Of the first frame: position and heading are a choice of W, biases are near zero, tilt and velocity are wide open: the
+/// Biases of an IMU of which nothing is known: near zero.
+ImuBiasBelief unknown_biases();
+
+/// Of the first frame: position and heading are a choice of W, biases are as believed, tilt and velocity are wide open: the
 /// tilt of W where that is estimated, else that of the frame. The initial solution is where the optimiser starts, not a belief:
 /// it was made from measurements that the window still holds.
-WindowPrior first_frame_prior(const NavState& state, bool estimate_tilt);
+WindowPrior first_frame_prior(const NavState& state, const ImuBiasBelief& biases, bool estimate_tilt);
 
 /// Puts the belief about the calibration before the first frame's: `calibrated` is right within the belief's standard
 /// deviations. The two cameras are held to one another far more firmly than to the IMU: scale hangs on their distance.

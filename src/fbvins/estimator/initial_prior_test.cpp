@@ -21,7 +21,7 @@ double cost_of_turn(const WindowPrior& prior, const Vec3& angle_W) {
 }
 
 TEST(FirstFramePrior, HoldsHeadingAndLeavesTiltOpenWhereUpIsFixed) {
-  const WindowPrior prior = first_frame_prior(tilted(), false);
+  const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), false);
   EXPECT_EQ(prior.quadratic.size(), 15);
   const double angle = 0.01;
   EXPECT_GT(cost_of_turn(prior, angle * Vec3::UnitZ()), 40) << "ten sigmas";
@@ -30,7 +30,7 @@ TEST(FirstFramePrior, HoldsHeadingAndLeavesTiltOpenWhereUpIsFixed) {
 }
 
 TEST(FirstFramePrior, HoldsTheFrameAndLeavesTheTiltOpenWhereUpIsAState) {
-  const WindowPrior prior = first_frame_prior(tilted(), true);
+  const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), true);
   EXPECT_EQ(prior.quadratic.size(), 17);
   for (int axis = 0; axis < 3; ++axis) EXPECT_GT(cost_of_turn(prior, 0.01 * Vec3::Unit(axis)), 40);
   Eigen::VectorXd tilt = Eigen::VectorXd::Zero(17);
@@ -39,15 +39,29 @@ TEST(FirstFramePrior, HoldsTheFrameAndLeavesTheTiltOpenWhereUpIsAState) {
 }
 
 TEST(FirstFramePrior, BelievesBiasesNearZeroAndNotNearTheInitialSolution) {
-  const WindowPrior prior = first_frame_prior(tilted(), true);
+  const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), true);
   Eigen::VectorXd to_zero = Eigen::VectorXd::Zero(17);
   to_zero.tail<6>() << -tilted().bias.gyro_radps, -tilted().bias.accel_mps2;
   EXPECT_LT(prior.quadratic.cost(to_zero), prior.quadratic.cost(Eigen::VectorXd::Zero(17)));
   EXPECT_LT(prior.quadratic.gradient(to_zero).norm(), 1e-9) << "the least";
 }
 
+TEST(FirstFramePrior, BelievesWhatAnEarlierFlightKnewOfTheBiases) {
+  ImuBiasBelief before;
+  before.bias = {Vec3(0.02, 0, 0.01), Vec3(0.3, 0.1, -0.2)};
+  before.gyro_covariance = 1e-6 * Mat3::Identity();
+  before.accel_covariance = Vec3(1e-4, 4e-4, 1e-4).asDiagonal();
+  const WindowPrior prior = first_frame_prior(tilted(), before, true);
+  Eigen::VectorXd there = Eigen::VectorXd::Zero(17);
+  there.tail<6>() << before.bias.gyro_radps - tilted().bias.gyro_radps, before.bias.accel_mps2 - tilted().bias.accel_mps2;
+  EXPECT_LT(prior.quadratic.gradient(there).norm(), 1e-9) << "the least";
+  Eigen::VectorXd a_sigma_off = there;
+  a_sigma_off(2 + nav::ba + 1) += 0.02;
+  EXPECT_NEAR(prior.quadratic.cost(a_sigma_off) - prior.quadratic.cost(there), 0.5, 1e-9);
+}
+
 TEST(CalibrationBelief, ComesBetweenTiltAndFrame) {
-  const WindowPrior frame = first_frame_prior(tilted(), true);
+  const WindowPrior frame = first_frame_prior(tilted(), unknown_biases(), true);
   const Calibration calibrated{{Quat::Identity(), Vec3(0.1, 0, 0)}, {Quat::Identity(), Vec3(0.2, 0, 0)}, 0.0};
   const WindowPrior prior = with_calibration_belief(frame, CalibrationBelief{}, calibrated);
   EXPECT_EQ(prior.calibration_row(), kTiltSize);

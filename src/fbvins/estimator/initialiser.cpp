@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/initialiser.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <unordered_map>
 
+#include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/pose_refinement.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/geometry/heading.hpp"
 #include "fbvins/imu/alignment.hpp"
+#include "fbvins/imu/bias_belief.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
 
@@ -49,8 +53,11 @@ void move_to(const Pose<W, B>& origin, InitialSolution& start) {
 
 }  // namespace
 
-Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise)
-    : gravity_mps2_(options.gravity_mps2), noise_(noise), structure_(options, WindowWeights{.estimate_tilt = false}) {}
+Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before)
+    : gravity_mps2_(options.gravity_mps2),
+      noise_(noise),
+      before_(before),
+      structure_(options, WindowWeights{.estimate_tilt = false}) {}
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                                     const std::optional<Pose<W, B>>& origin) {
@@ -63,9 +70,11 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   }
   remember(frame);
   std::optional<InitialSolution> start;
-  if (rest.seconds() >= RestOptions{}.min_window_s) start = start_from_rest();
-  else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(calibration);
+  const ImuBiasBelief biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
+  if (rest.seconds() >= RestOptions{}.min_window_s) start = start_from_rest(biases);
+  else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
+  if (start) start->biases = biases;
   if (start && origin) move_to(*origin, *start);
   return start;
 }
@@ -88,21 +97,22 @@ void Initialiser::remember(const TrackedFrame& frame) {
   while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
 }
 
-std::optional<InitialSolution> Initialiser::start_from_rest() {
+std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasBelief& biases) {
   std::vector<ImuSample> readings;
   for (const ImuSegment& segment : readings_)
     readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
                     segment.samples.end());  // neighbours share a stamp
-  const RestEstimate rest = initialise_at_rest(readings, 0, noise_, RestOptions{}, gravity_mps2_);
+  for (ImuSample& reading : readings) reading.accel_mps2 -= biases.bias.accel_mps2;
+  RestEstimate rest = initialise_at_rest(readings, 0, noise_, RestOptions{}, gravity_mps2_);
   if (!rest.at_rest) {
     reason_ = HealthReason::waiting_for_motion_or_rest;
     return std::nullopt;
   }
-  InitialSolution out{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true};
-  return out;
+  rest.state.bias.accel_mps2 = biases.bias.accel_mps2;
+  return InitialSolution{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true, {}};
 }
 
-std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& calibration) {
+std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasBelief& biases, const Calibration& calibration) {
   std::vector<Pose<W, B>> poses;
   if (!stereo_structure(calibration, poses)) {
     reason_ = HealthReason::too_few_features;
@@ -114,12 +124,16 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const Calibration& c
     visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());
     if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_[i].imu);
   }
-  AlignmentResult alignment = align_visual_inertial(visual_poses, between, AlignmentOptions{}, gravity_mps2_);
+  AlignmentOptions options;
+  options.accel_bias_mps2 = biases.bias.accel_mps2;
+  options.accel_bias_prior_mps2 =
+      std::min(options.accel_bias_prior_mps2, std::sqrt(biases.accel_covariance.diagonal().maxCoeff()));
+  AlignmentResult alignment = align_visual_inertial(visual_poses, between, options, gravity_mps2_);
   if (!alignment.accepted) {
     reason_ = HealthReason::alignment_refused;
     return std::nullopt;
   }
-  return InitialSolution{{frames_.begin(), frames_.end()}, std::move(alignment.states), false};
+  return InitialSolution{{frames_.begin(), frames_.end()}, std::move(alignment.states), false, {}};
 }
 
 bool Initialiser::refine_structure(const Calibration& calibration) {

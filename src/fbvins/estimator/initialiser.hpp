@@ -13,6 +13,7 @@
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
+#include "fbvins/types/imu_state.hpp"
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
@@ -22,11 +23,13 @@ struct InitialSolution {
   std::vector<TrackedFrame> frames;
   std::vector<NavState> states;
   bool from_rest = false;
+  ImuBiasBelief biases;  ///< what was believed of them before these frames
 };
 
 class Initialiser {
  public:
-  Initialiser(const EstimatorOptions& options, const ImuNoise& noise);
+  /// `before`: what an earlier flight knew of the IMU.
+  Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before = {});
 
   void reset() {
     frames_.clear();
@@ -41,13 +44,14 @@ class Initialiser {
 
  private:
   void remember(const TrackedFrame& frame);
-  std::optional<InitialSolution> start_from_rest();
-  std::optional<InitialSolution> start_in_motion(const Calibration& calibration);
+  std::optional<InitialSolution> start_from_rest(const ImuBiasBelief& biases);
+  std::optional<InitialSolution> start_in_motion(const ImuBiasBelief& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
   bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
 
   double gravity_mps2_;
   ImuNoise noise_;
+  std::optional<ImuState> before_;
   std::deque<TrackedFrame> frames_;
   std::deque<ImuSegment> readings_;  ///< of the last moments, for the judgement of rest
   SlidingWindow structure_;

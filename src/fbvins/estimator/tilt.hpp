@@ -3,7 +3,7 @@
 //
 // W is level when a flight begins, as far as that is known then. The window never turns it: landmarks that have left stay
 // where they are. What is learned of gravity later turns `up` instead, a state of the window like any other; and what
-// leaves the estimator is turned level, about the place where the flight began. A value.
+// leaves the estimator is turned level, about the place where the flight began, step by step (published_pose.hpp). A value.
 //
 //   out.T_WB = window.tilt().levelled(state.T_WB);
 #pragma once

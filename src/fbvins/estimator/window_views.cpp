@@ -57,6 +57,15 @@ double up_sigma_rad(const Mat17& covariance) {
   return std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
 }
 
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W) {
+  const FrameList& frames = window.frames();
+  if (frames.size() < 2) return std::nullopt;
+  const Frame& newest = frames.newest();
+  const NavState& before = frames[frames.size() - 2].state;
+  const NavState after = newest.imu ? newest.imu->predict(before, gravity_W) : newest.state;
+  return before.T_WB.inverse() * after.T_WB;
+}
+
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration) {
   WindowSnapshot out;
   const Tilt& tilt = window.tilt();

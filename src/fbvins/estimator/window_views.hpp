@@ -2,6 +2,8 @@
 // What others want to know of a window: pictures of it, taken without changing it. Pure functions.
 #pragma once
 
+#include <optional>
+
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/types/keyframe.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -24,6 +26,10 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
 GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state);
 /// How well up is known about its less known axis, from WindowInformation::covariance().
 double up_sigma_rad(const Mat17& covariance);
+
+/// The body's way from the frame before to the newest one as the readings between them tell, from the state before as it is known
+/// now; where there are no readings, as the window has it. None for the first frame.
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W);
 
 /// Levelled, as is what follows.
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);

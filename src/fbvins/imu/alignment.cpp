@@ -45,7 +45,12 @@ class LinearProblem {
   int accel_bias() const { return gravity() + gravity_size(); }
   int size() const { return accel_bias() + 3; }
 
-  void add_prior(int at, double sigma) { H_.diagonal().segment<3>(at).array() += 1 / (sigma * sigma); }
+  void add_prior(int at, double sigma, const Vec3& mean = Vec3::Zero()) {
+    const double information = 1 / (sigma * sigma);
+    H_.diagonal().segment<3>(at).array() += information;
+    b_.segment<3>(at) += information * mean;
+    constant_ += information * mean.squaredNorm();
+  }
 
   /// Two vector equations of an interval, weighed (eq. A11-A13). R: orientation R_VB of its beginning.
   void add_interval(int k, const Poses& poses, const Quat& R_VB, double sigma_rad, const Preintegration& between) {
@@ -121,7 +126,7 @@ LinearSolution solve_linear(const Poses& poses, const RotationAlignment& rotatio
   const int n = static_cast<int>(poses.size());
   LinearProblem problem(n, gravity);
   for (int k = 0; k < n; ++k) problem.add_prior(problem.position(k), o.pose_sigma_m);
-  problem.add_prior(problem.accel_bias(), o.accel_bias_prior_mps2);
+  problem.add_prior(problem.accel_bias(), o.accel_bias_prior_mps2, o.accel_bias_mps2);
   for (int k = 0; k + 1 < n; ++k) problem.add_interval(k, poses, rotation.R_VB[k], rotation.sigma_rad[k], between[k]);
   return problem.solve();
 }

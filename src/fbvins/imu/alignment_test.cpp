@@ -145,6 +145,18 @@ TEST(Alignment, AcceptsRestAndKnowsThatTheAccelerometerBiasIsHidden) {
   EXPECT_GT(a.accel_bias_sigma_mps2, 0.5 * options.accel_bias_prior_mps2);
 }
 
+TEST(Alignment, ABiasBelievedFromBeforeMakesTheStartLevel) {
+  Window unknown = make_window(Motion(), 1.0, 14, {}, 5), believed = unknown;
+  const AlignmentResult without = align_visual_inertial(unknown.poses, unknown.between);
+  AlignmentOptions options;
+  options.accel_bias_mps2 = kBias.accel_mps2;
+  options.accel_bias_prior_mps2 = 0.02;
+  const AlignmentResult with = align_visual_inertial(believed.poses, believed.between, options);
+  ASSERT_TRUE(without.accepted && with.accepted);
+  EXPECT_LT(gravity_error(with.states[0], believed.truth[0]), 1e-4);
+  EXPECT_LT(with.gravity_sigma_rad, 0.5 * without.gravity_sigma_rad);
+}
+
 TEST(Alignment, RefusesWithTheRightReason) {
   const auto reason = [](Window w, const AlignmentOptions& o = {}) {
     return align_visual_inertial(w.poses, w.between, o).reason;

@@ -64,6 +64,8 @@ RosDiagnostic diagnostic_of(const Odometry& o) {
            {"frame", fmt::to_string(o.id.value)},
            {"keyframe", s.keyframe ? "yes" : "no"},
            {"standstill", s.standstill ? "yes" : "no"},
+           {"level", o.level ? "yes" : "no"},
+           {"tilt_sigma_rad", fmt::format("{:.6f}", o.tilt_sigma_rad)},
            {"frames_in_window", fmt::to_string(s.frames_in_window)},
            {"landmarks", fmt::to_string(s.landmarks)},
            {"known_landmarks", fmt::to_string(s.known_landmarks)},
@@ -147,8 +149,9 @@ Result<void> FlightRecord::add(const Odometry& o) {
   rate_covariance_ = o.gyro_bias_covariance + reading * Mat3::Identity();
   const RosOdometry message{o.t, o.T_WB, o.v_WB, o.w_WB_B, o.pose_covariance, o.velocity_covariance, rate_covariance_};
   write(kOdometry, o.t, [&](std::string& out) { append_odometry(out, message); });
-  const RosTransform body[] = {{kOdometryFrame, kBodyFrame, o.T_WB.q, o.T_WB.p}};
-  write(kTransforms, o.t, [&](std::string& out) { append_transforms(out, o.t, body); });
+  const Pose<W, G> T_WG = o.T_WB * o.gauge.T_GB.inverse();
+  const RosTransform frames[] = {{kOdometryFrame, kBodyFrame, o.T_WB.q, o.T_WB.p}, {kOdometryFrame, kGaugeFrame, T_WG.q, T_WG.p}};
+  write(kTransforms, o.t, [&](std::string& out) { append_transforms(out, o.t, frames); });
   return flush_if_large();
 }
 

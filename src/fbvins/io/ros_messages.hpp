@@ -21,9 +21,9 @@
 
 namespace fbvins {
 
-// Names of frames in messages: M, W, B, C0, C1 (docs/conventions.md).
-inline constexpr std::string_view kMapFrame = "map", kOdometryFrame = "odom", kBodyFrame = "body", kLeftFrame = "camera_left",
-                                  kRightFrame = "camera_right";
+// Names of frames in messages: M, W, G, B, C0, C1 (docs/conventions.md).
+inline constexpr std::string_view kMapFrame = "map", kOdometryFrame = "odom", kGaugeFrame = "gauge", kBodyFrame = "body",
+                                  kLeftFrame = "camera_left", kRightFrame = "camera_right";
 
 constexpr Time ros_time_end() { return {(std::int64_t{1} << 31) * 1'000'000'000}; }
 

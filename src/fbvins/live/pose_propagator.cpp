@@ -45,6 +45,7 @@ Mat15 transition(const NavState& s, const ImuSample& reading, double dt) {
 }  // namespace
 
 void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSample& to) const {
+  const Vec3 gravity_W = -gravity_mps2_ * estimate_->up_W;  // not along z while the estimator still pays off a tilt
   const double dt = (to.t - from.t).seconds();
   if (dt <= 0) return;
   const auto square = [](double x) { return x * x; };
@@ -54,12 +55,12 @@ void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSamp
   p.P.diagonal().segment<3>(nav::v).array() += dt * square(noise_.accel_noise_density_mps2_rthz);
   p.P.diagonal().segment<3>(nav::bg).array() += dt * square(noise_.gyro_random_walk_radps2_rthz);
   p.P.diagonal().segment<3>(nav::ba).array() += dt * square(noise_.accel_random_walk_mps3_rthz);
-  p.state = propagate(p.state, {{from, to}, {}}, gravity_W_);
+  p.state = propagate(p.state, {{from, to}, {}}, gravity_W);
 }
 
-PosePropagator::Propagated PosePropagator::propagate_all(const Odometry& estimate) const {
-  Propagated p{{estimate.T_WB, estimate.v_WB, estimate.bias}, initial_covariance(estimate)};
-  const Time start = estimate.t + time_offset_;
+PosePropagator::Propagated PosePropagator::propagate_all() const {
+  Propagated p{{estimate_->T_WB, estimate_->v_WB, estimate_->bias}, initial_covariance(*estimate_)};
+  const Time start = estimate_->t + time_offset_;
   if (!readings_.empty() && readings_.front().t > start) {  // nothing is known of before: the first reading is held
     ImuSample held = readings_.front();
     held.t = start;
@@ -83,7 +84,7 @@ void PosePropagator::rebase(const Odometry& estimate) {
     offset_.setZero();
     return;
   }
-  const Propagated now = propagate_all(estimate);
+  const Propagated now = propagate_all();
   if (newest_ && same_world && smoothing_s_ > 0)
     offset_.head<nav::bg>() = newest_->state.boxplus(offset_).boxminus(now.state).head<nav::bg>();
   else offset_.setZero();
@@ -104,6 +105,8 @@ LivePose PosePropagator::add(const ImuSample& reading) {
   pose.estimate_t = estimate_->t;
   pose.health = estimate_->health;
   pose.reset_counter = estimate_->reset_counter;
+  pose.tilt_sigma_rad = estimate_->tilt_sigma_rad;
+  pose.level = estimate_->level;
   if (!newest_) return pose;
   const NavState out = newest_->state.boxplus(offset_);
   pose.T_WB = out.T_WB;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pose at IMU rate: the newest estimate carried on with the readings since its image (eq. P5-P7), with its covariance.
 // A new estimate starts the propagation anew; what it moves the newest pose by is taken back with a time constant, so that the
-// output has no steps. After a restart of the estimator W is new, and the pose changes at once.
+// output has no steps. That is the error of the propagation and what the estimator pays off with this image: its own corrections
+// never come at once (Odometry). After a restart of the estimator W is new, and the pose changes at once.
 //
 //   PosePropagator propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), 0.1);
 //   propagator.rebase(odometry);                  // whenever an image is estimated
@@ -23,7 +24,7 @@ class PosePropagator {
  public:
   /// time_offset: t_imu = t_image + offset.
   PosePropagator(const ImuNoise& noise, Duration time_offset, double smoothing_s, double gravity_mps2 = kGravity_mps2)
-      : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s), gravity_W_(level_gravity(gravity_mps2)) {}
+      : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s), gravity_mps2_(gravity_mps2) {}
 
   void rebase(const Odometry& estimate);
   /// The pose at this reading, with the health of the estimate beneath. Stamps must increase.
@@ -37,13 +38,13 @@ class PosePropagator {
   };
 
   void advance(Propagated& p, const ImuSample& from, const ImuSample& to) const;
-  Propagated propagate_all(const Odometry& estimate) const;
+  Propagated propagate_all() const;
   void decay_offset(double dt_s);
 
   ImuNoise noise_;
   Duration time_offset_;
   double smoothing_s_;
-  Vec3 gravity_W_;
+  double gravity_mps2_;
   std::deque<ImuSample> readings_;  ///< from the last one at or before the estimate's image on
   std::optional<Odometry> estimate_;
   std::optional<Propagated> newest_;  ///< at readings_.back(); none while there is no pose

@@ -61,6 +61,27 @@ TEST(PosePropagator, FollowsTheTruthBetweenImages) {
   EXPECT_LT(largest_rad, 1e-9);
 }
 
+TEST(PosePropagator, GravityIsWhereTheEstimateKnowsItWhileATiltIsPaidOff) {
+  const Motion motion;
+  const Quat tilt = so3_exp(Vec3(0.03, -0.02, 0));
+  PosePropagator propagator({}, {}, 0.1);
+  Odometry estimate = motion.estimate(0);
+  estimate.T_WB = {(tilt * estimate.T_WB.q).normalized(), Vec3(tilt * estimate.T_WB.p)};
+  estimate.v_WB = tilt * estimate.v_WB;
+  estimate.up_W = tilt * Vec3::UnitZ();
+  estimate.tilt_sigma_rad = 0.02;
+  LivePose pose;
+  for (int k = 0; k < 40; ++k) {
+    pose = propagator.add(motion.reading(k * kPeriod_s));
+    if (k == 1) propagator.rebase(estimate);
+  }
+  const NavState truth = motion.state(39 * kPeriod_s);
+  EXPECT_LT((pose.T_WB.p - tilt * truth.T_WB.p).norm(), 1e-4);
+  EXPECT_LT((pose.v_WB - tilt * truth.v_WB).norm(), 1e-3);
+  EXPECT_EQ(pose.tilt_sigma_rad, 0.02);
+  EXPECT_FALSE(pose.level);
+}
+
 TEST(PosePropagator, BiasesAreTakenOffTheReadings) {
   const Motion motion;
   PosePropagator propagator({}, {}, 0.1);

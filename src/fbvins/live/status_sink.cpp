@@ -23,6 +23,8 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
     json["position_m"] = {p.x(), p.y(), p.z()};
     json["orientation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
     json["velocity_mps"] = {newest.v_WB.x(), newest.v_WB.y(), newest.v_WB.z()};
+    json["tilt_sigma_rad"] = newest.tilt_sigma_rad;
+    json["level"] = newest.level;
   }
   status.counts.visit([&](const char* name, std::int64_t count) { json["counts"][name] = count; });
   json["shutter_to_pose_ms"] = to_json(status.shutter_to_pose);

@@ -22,7 +22,11 @@ TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
   EXPECT_EQ(without["reason"], "no_images");
   EXPECT_EQ(without["counts"]["images_dropped"], 7);
   EXPECT_EQ(without["problem"], status.problem);
+  EXPECT_FALSE(without.contains("level"));
   pose.health = status.health;
+  pose.tilt_sigma_rad = 0.01;
+  EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["tilt_sigma_rad"], 0.01);
+  EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["level"], false);
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["position_m"][2], 3);
   EXPECT_EQ(to_json_line(status, pose).find('\n'), std::string::npos);
 }

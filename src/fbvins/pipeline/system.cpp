@@ -55,7 +55,7 @@ struct System::Impl {
       : mode(mode_wanted),
         packet_maker(options.input, Duration::from_seconds(rig.time_offset_s)),
         frontend(std::move(parts.frontend)),
-        estimator(rig, options.estimator),
+        estimator(rig, options.estimator, parts.imu_state),
         mapper(parts.mapper),
         imu_model{{}, {}, options.estimator.assumed(rig.imu_noise), options.estimator.gravity_mps2} {
     if (mode != RunMode::threaded) return;

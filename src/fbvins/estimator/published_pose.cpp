@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/published_pose.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+/// From a to b in the perturbation of poses (conventions, R3 and R4).
+Vec6 difference(const Pose<W, B>& b, const Pose<W, B>& a) {
+  Vec6 d;
+  d << b.p - a.p, so3_log((a.q.conjugate() * b.q).normalized());
+  return d;
+}
+
+Vec3 at_most(const Vec3& owed, double limit) {
+  const double size = owed.norm();
+  return size > limit ? Vec3((limit / size) * owed) : owed;
+}
+
+/// Of the attitude against the level about its less known axis, from the covariance of dtheta in B.
+double tilt_sigma_of(const Quat& q_WB, const Mat3& covariance) {
+  const Mat3 R = q_WB.toRotationMatrix();
+  const Mat2 level = (R * covariance * R.transpose()).topLeftCorner<2, 2>();
+  const Eigen::SelfAdjointEigenSolver<Mat2> axes(level, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
+}
+
+}  // namespace
+
+void PublishedPose::follow(const std::optional<Pose<B, B>>& motion, const Pose<W, B>& level) {
+  if (!started_ || !motion || max_step_m_ <= 0) {
+    started_ = true;
+    T_WB_ = level;
+    owed_.setZero();
+    return;
+  }
+  const Pose<W, B> moved = T_WB_ * *motion;
+  const Vec6 owed = difference(level, moved);
+  T_WB_ = moved.boxplus(at_most(owed.head<3>(), max_step_m_), at_most(owed.tail<3>(), kTurnPerStep_radpm * max_step_m_));
+  owed_ = difference(level, T_WB_);
+}
+
+void PublishedPose::fill(const NavState& level, Odometry& out) {
+  const Quat turn = (T_WB_.q * level.T_WB.q.conjugate()).normalized();  // from level to the published attitude
+  out.T_WB = T_WB_;
+  out.v_WB = turn * level.v_WB;
+  out.up_W = turn * Vec3::UnitZ();
+  if (!out.pose_covariance.isZero(0)) {
+    const Vec3 owed_v = level.v_WB - out.v_WB;
+    out.pose_covariance += owed_ * owed_.transpose();
+    out.velocity_covariance += owed_v * owed_v.transpose();
+    tilt_sigma_rad_ = tilt_sigma_of(T_WB_.q, out.pose_covariance.bottomRightCorner<3, 3>());
+  }
+  out.tilt_sigma_rad = tilt_sigma_rad_;
+  out.level = tilt_sigma_rad_ > 0 && tilt_sigma_rad_ < kLevelSigma_rad;
+}
+
+}  // namespace fbvins

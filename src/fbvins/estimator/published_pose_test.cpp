@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/published_pose.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace {
+
+constexpr double kStep_m = 0.003;
+constexpr double kStep_rad = 0.1 * 3.14159265358979323846 / 180;
+
+/// A body that flies a curve, two metres a second at 20 Hz.
+Pose<W, B> flown(int k) {
+  const double s = 0.05 * k;
+  return {so3_exp(Vec3(0.2 * std::sin(s), 0.1, 0.5 * s)), Vec3(2 * s, std::sin(s), 1)};
+}
+
+Pose<B, B> motion(int k) { return flown(k - 1).inverse() * flown(k); }
+
+NavState at(const Pose<W, B>& T) { return {T, Vec3(2, 0.5, 0), {}}; }
+
+double angle(const Quat& a, const Quat& b) { return so3_log((a.conjugate() * b).normalized()).norm(); }
+
+TEST(PublishedPose, IsTheWindowsWhereNothingIsCorrected) {
+  PublishedPose published(kStep_m);
+  for (int k = 0; k < 50; ++k) {
+    published.follow(motion(k), flown(k));
+    EXPECT_LT((published.T_WB().p - flown(k).p).norm(), 1e-12);
+    EXPECT_LT(angle(published.T_WB().q, flown(k).q), 1e-12);
+  }
+}
+
+/// All that is corrected at frame 10: W was turned by two degrees and moved by 35 mm.
+const Pose<W, W> kCorrection{so3_exp(Vec3(0.03, -0.02, 0)), Vec3(0.02, -0.025, 0.015)};
+
+TEST(PublishedPose, NoFrameShowsMoreThanTheStepBesideTheMotion) {
+  PublishedPose published(kStep_m);
+  double largest_m = 0, largest_rad = 0;
+  for (int k = 0; k < 120; ++k) {
+    const Pose<W, B> before = published.T_WB();
+    published.follow(motion(k), k < 10 ? flown(k) : kCorrection * flown(k));
+    if (k == 0) continue;
+    const Pose<W, B> moved = before * motion(k);
+    largest_m = std::max(largest_m, (published.T_WB().p - moved.p).norm());
+    largest_rad = std::max(largest_rad, angle(moved.q, published.T_WB().q));
+  }
+  EXPECT_NEAR(largest_m, kStep_m, 1e-12) << "it pays what it may";
+  EXPECT_NEAR(largest_rad, kStep_rad, 1e-12);
+  EXPECT_LT((published.T_WB().p - (kCorrection * flown(119)).p).norm(), 1e-9) << "all is paid";
+  EXPECT_LT(angle(published.T_WB().q, (kCorrection * flown(119)).q), 1e-9);
+  EXPECT_LT(published.owed().norm(), 1e-9);
+}
+
+TEST(PublishedPose, TurningLevelDoesNotMoveIt) {
+  PublishedPose published(kStep_m);
+  published.follow({}, flown(0));
+  const Pose<W, B> level{so3_exp(Vec3(0.03, 0, 0)) * flown(1).q, flown(1).p};  // turned about where the body is
+  published.follow(motion(1), level);
+  EXPECT_LT((published.T_WB().p - flown(1).p).norm(), 1e-12);
+  EXPECT_NEAR(angle(published.T_WB().q, level.q), 0.03 - kStep_rad, 1e-9);
+}
+
+TEST(PublishedPose, VelocityIsThatOfTheMotionInTheAxesOfThePose) {
+  PublishedPose published(kStep_m);
+  published.follow({}, flown(0));
+  Odometry o;
+  o.pose_covariance = 1e-6 * Mat6::Identity();
+  o.velocity_covariance = 1e-4 * Mat3::Identity();
+  const NavState level = at(kCorrection * flown(1));
+  published.follow(motion(1), level.T_WB);
+  published.fill(level, o);
+  EXPECT_LT((o.T_WB.q.conjugate() * o.v_WB - level.T_WB.q.conjugate() * level.v_WB).norm(), 1e-12);
+  EXPECT_LT((o.T_WB.q.conjugate() * o.up_W - level.T_WB.q.conjugate() * Vec3::UnitZ()).norm(), 1e-12);
+}
+
+TEST(PublishedPose, CovarianceHoldsWhatIsOwedUntilItIsPaid) {
+  PublishedPose published(kStep_m);
+  published.follow({}, flown(0));
+  double first_sigma = 0, last_sigma = 0;
+  for (int k = 1; k < 60; ++k) {
+    Odometry o;
+    o.pose_covariance = 1e-6 * Mat6::Identity();
+    o.velocity_covariance = 1e-4 * Mat3::Identity();
+    const NavState level = at(kCorrection * flown(k));
+    published.follow(motion(k), level.T_WB);
+    published.fill(level, o);
+    Vec6 error;  // if the window is right
+    error << level.T_WB.p - o.T_WB.p, so3_log((o.T_WB.q.conjugate() * level.T_WB.q).normalized());
+    EXPECT_LE(error.dot(o.pose_covariance.inverse() * error), 1) << k;
+    const Vec3 v_error = level.v_WB - o.v_WB;
+    EXPECT_LE(v_error.dot(o.velocity_covariance.inverse() * v_error), 1) << k;
+    EXPECT_GE(o.tilt_sigma_rad, 1e-3 - 1e-12);
+    EXPECT_EQ(o.level, o.tilt_sigma_rad < kLevelSigma_rad);
+    last_sigma = o.tilt_sigma_rad;
+    if (k == 1) first_sigma = last_sigma;
+  }
+  EXPECT_GT(first_sigma, 0.03);
+  EXPECT_NEAR(last_sigma, 1e-3, 1e-9);
+}
+
+TEST(PublishedPose, ARestartBeginsWhereTheWindowSays) {
+  PublishedPose published(kStep_m);
+  published.follow({}, flown(0));
+  published.restart();
+  published.follow(motion(1), kCorrection * flown(1));
+  EXPECT_EQ(published.T_WB().p, (kCorrection * flown(1)).p);
+  EXPECT_TRUE(published.owed().isZero(0));
+}
+
+TEST(PublishedPose, WithoutAContractAllIsShownAtOnce) {
+  PublishedPose published(0);
+  published.follow({}, flown(0));
+  published.follow(motion(1), kCorrection * flown(1));
+  EXPECT_EQ(published.T_WB().p, (kCorrection * flown(1)).p);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// What leaves the estimator never leaps, and how soon it is level: the whole estimator on simulated tracks and readings.
+#include <gtest/gtest.h>
+
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+double angle(const Quat& a, const Quat& b) { return so3_log((a.conjugate() * b).normalized()).norm(); }
+
+double tilt_error(const Quat& a, const Quat& b) {
+  const Vec3 up_a = a.conjugate() * Vec3::UnitZ(), up_b = b.conjugate() * Vec3::UnitZ();
+  return std::atan2(up_a.cross(up_b).norm(), up_a.dot(up_b));
+}
+
+struct LargestStep {
+  double m = 0, rad = 0;  ///< beside the motion that the readings tell
+  double gauge_m = 0;     ///< that the window itself makes
+  double owed_m = 0;      ///< between what is published and what is known
+  int poses = 0, restarts = 0;
+};
+
+/// Flies and compares each published pose with the one before carried on by the readings.
+LargestStep fly(SimulatedFlight& flight, int frames, const EstimatorOptions& options) {
+  Estimator estimator(flight.rig, options);
+  LargestStep out;
+  std::optional<Odometry> before;
+  for (int k = 0; k < frames; ++k) {
+    const Odometry o = estimator.process(flight.frame(k)).odometry;
+    const FrameList& window = estimator.window().frames();
+    if (before && before->reset_counter == o.reset_counter && o.health.has_pose()) {
+      const NavState& from = window[window.size() - 2].state;
+      const Vec3 gravity_W = estimator.window().tilt().gravity_W(options.gravity_mps2);
+      const Frame& newest = window.newest();
+      const NavState to = newest.imu ? newest.imu->predict(from, gravity_W) : newest.state;
+      const Pose<W, B> moved = before->T_WB * (from.T_WB.inverse() * to.T_WB);
+      out.m = std::max(out.m, (o.T_WB.p - moved.p).norm());
+      out.rad = std::max(out.rad, angle(moved.q, o.T_WB.q));
+      out.gauge_m = std::max(out.gauge_m, (from.T_WB.p - before->gauge.T_GB.p).norm());
+      out.owed_m = std::max(out.owed_m, (estimator.window().tilt().levelled(newest.state.T_WB).p - o.T_WB.p).norm());
+      ++out.poses;
+    }
+    out.restarts = static_cast<int>(o.reset_counter);
+    before.reset();
+    if (o.health.has_pose()) before = o;
+  }
+  return out;
+}
+
+void expect_within(const LargestStep& step, const EstimatorOptions& options) {
+  EXPECT_LE(step.m, options.max_step_m + 1e-12);
+  EXPECT_LE(step.rad, kTurnPerStep_radpm * options.max_step_m + 1e-9);
+}
+
+TEST(StepContract, HoldsWhileWIsLevelled) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 31);
+  flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);  // two and a half degrees
+  const LargestStep step = fly(flight, 200, EstimatorOptions{});
+  expect_within(step, EstimatorOptions{});
+  EXPECT_GT(step.owed_m, 1e-3) << "there was something to pay off";
+  EXPECT_GT(step.poses, 150);
+}
+
+TEST(StepContract, HoldsWhenTheWindowLeapsAfterAGap) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 32);
+  flight.knows_again = true;
+  flight.images = [](int k) { return k < 80 || k >= 110; };
+  const LargestStep step = fly(flight, 200, EstimatorOptions{});
+  expect_within(step, EstimatorOptions{});
+  EXPECT_GT(step.gauge_m, EstimatorOptions{}.max_step_m) << "the window did leap";
+  EXPECT_EQ(step.restarts, 0);
+}
+
+TEST(StepContract, HoldsAfterARestartAsWell) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 33);
+  flight.images = [](int k) { return k < 60 || k >= 130; };
+  const LargestStep step = fly(flight, 260, EstimatorOptions{});
+  expect_within(step, EstimatorOptions{});
+  EXPECT_EQ(step.restarts, 1);
+  EXPECT_GT(step.poses, 120);
+}
+
+TEST(StepContract, NoneIsKeptWhereNoneIsWanted) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 31);
+  flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
+  EstimatorOptions options;
+  options.max_step_m = 0;
+  EXPECT_EQ(fly(flight, 100, options).owed_m, 0);
+}
+
+TEST(Level, IsSaidWhenTheTiltIsKnown) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 34);
+  flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
+  EstimatorOptions exact;  // the simulated IMU is as good as its data sheet
+  exact.gyro_noise_scale = exact.accel_noise_scale = exact.gyro_walk_scale = exact.accel_walk_scale = 1;
+  Estimator estimator(flight.rig, exact);
+  bool was_level = false;
+  int unknown = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Odometry o = estimator.process(flight.frame(k)).odometry;
+    if (!o.health.has_pose()) continue;
+    const double error = tilt_error(o.T_WB.q, flight.truth(k).T_WB.q);
+    EXPECT_LT(error, 4 * o.tilt_sigma_rad) << k;
+    EXPECT_EQ(o.level, o.tilt_sigma_rad < kLevelSigma_rad) << k;
+    EXPECT_TRUE(!o.level || error < 0.015) << k << ": " << error;
+    if (!o.level) ++unknown;
+    was_level = was_level || o.level;
+  }
+  EXPECT_TRUE(was_level);
+  EXPECT_GT(unknown, 10) << "not before";
+}
+
+TEST(ImuState, BiasesOfTheFlightBeforeMakeTheStartLevel) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 35), again(Motion(0.6, 0.5), 35);
+  flight.bias.accel_mps2 = again.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
+  ImuState before;
+  before.belief = {flight.bias, 1e-8 * Mat3::Identity(), 1e-4 * Mat3::Identity()};
+  before.belief.bias.accel_mps2 += Vec3(0.01, 0.01, -0.01);
+  Estimator without(flight.rig, EstimatorOptions{}), with(flight.rig, EstimatorOptions{}, before);
+  for (int k = 0; k < 40; ++k) {
+    const Odometry unknown = without.process(flight.frame(k)).odometry, known = with.process(again.frame(k)).odometry;
+    if (!unknown.health.has_pose() || !known.health.has_pose()) continue;
+    EXPECT_LT(known.tilt_sigma_rad, unknown.tilt_sigma_rad) << k;
+    EXPECT_LT(tilt_error(known.T_WB.q, flight.truth(k).T_WB.q), 0.008) << k;
+  }
+}
+
+}  // namespace
+}  // namespace fbvins

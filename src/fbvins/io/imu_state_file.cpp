@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/imu_state_file.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <charconv>
+#include <filesystem>
+
+#include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/output_file.hpp"
+
+namespace fbvins {
+namespace {
+
+/// No bias that a flight could begin with is larger; the estimator would call it implausible.
+constexpr double kLargestGyroBias_radps = 1;
+constexpr double kLargestAccelBias_mps2 = 5;
+
+std::string list(const double* values, int count) {
+  std::string out;
+  for (int i = 0; i < count; ++i) out += fmt::format("{}{:.17g}", i == 0 ? "[" : ", ", values[i]);
+  return out + "]";
+}
+
+std::string upper(const Mat3& m) {
+  const double values[] = {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
+  return list(values, 6);
+}
+
+Vec3 read_bias(YamlReader& yaml, const char* field, double largest) {
+  const std::vector<double> values = yaml.numbers(yaml.root(), field, 3);
+  const Vec3 bias(values[0], values[1], values[2]);
+  if (!(bias.cwiseAbs().maxCoeff() <= largest))
+    yaml.complain(yaml.root(), field, fmt::format("is more than {} and no bias", largest));
+  return bias;
+}
+
+Mat3 read_covariance(YamlReader& yaml, const char* field) {
+  const std::vector<double> v = yaml.numbers(yaml.root(), field, 6);
+  Mat3 m;
+  m << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
+  const bool covariance =
+      m.allFinite() && Eigen::SelfAdjointEigenSolver<Mat3>(m, Eigen::EigenvaluesOnly).eigenvalues().minCoeff() >= 0;
+  if (!covariance) yaml.complain(yaml.root(), field, "is not a covariance");
+  return m;
+}
+
+bool same(const ImuNoise& a, const ImuNoise& b) {
+  return a.gyro_noise_density_radps_rthz == b.gyro_noise_density_radps_rthz &&
+         a.accel_noise_density_mps2_rthz == b.accel_noise_density_mps2_rthz &&
+         a.gyro_random_walk_radps2_rthz == b.gyro_random_walk_radps2_rthz &&
+         a.accel_random_walk_mps3_rthz == b.accel_random_walk_mps3_rthz && a.rate_hz == b.rate_hz;
+}
+
+}  // namespace
+
+Result<ImuState> parse_imu_state(const std::string& text, const std::string& file, const ImuNoise& imu) {
+  YamlReader yaml(file, text);
+  const YAML::Node root = yaml.root();
+  yaml.only(root,
+            {"imu_state", "t_ns", "imu", "gyro_bias_radps", "accel_bias_mps2", "gyro_bias_covariance", "accel_bias_covariance"});
+  if (const double version = yaml.number(root, "imu_state"); yaml.ok() && version != 1)
+    yaml.complain(root, "imu_state", fmt::format("version {} is not known, only 1", version));
+  const ImuNoise noise = read_imu_noise(yaml, yaml.get(root, "imu"), "rate_hz");
+  if (yaml.ok() && !same(noise, imu)) yaml.complain(root, "imu", "is another IMU than the one of this flight");
+  ImuState state;
+  const std::string t = yaml.word(root, "t_ns");
+  const auto [end, wrong] = std::from_chars(t.data(), t.data() + t.size(), state.t.ns);
+  if (yaml.ok() && (wrong != std::errc() || end != t.data() + t.size()))
+    yaml.complain(root, "t_ns", fmt::format("'{}' is not a time in nanoseconds", t));
+  state.belief.bias = {read_bias(yaml, "gyro_bias_radps", kLargestGyroBias_radps),
+                       read_bias(yaml, "accel_bias_mps2", kLargestAccelBias_mps2)};
+  state.belief.gyro_covariance = read_covariance(yaml, "gyro_bias_covariance");
+  state.belief.accel_covariance = read_covariance(yaml, "accel_bias_covariance");
+  if (!yaml.ok()) return yaml.error();
+  return state;
+}
+
+Result<std::optional<ImuState>> read_imu_state(const std::string& path, const ImuNoise& imu) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) && !error) return std::optional<ImuState>();
+  const auto bytes = open_bytes(path);
+  if (!bytes) return bytes.error();
+  if ((*bytes)->size() > kLargestYaml_bytes)
+    return Error{ErrorCode::malformed, fmt::format("{}: too large for an IMU's state", path)};
+  const Result<ImuState> state = parse_imu_state((*bytes)->read(0, (*bytes)->size()), path, imu);
+  if (!state) return state.error();
+  return std::optional<ImuState>(*state);
+}
+
+std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
+  const ImuBiasBelief& b = state.belief;
+  return fmt::format(
+      "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
+      "imu_state: 1\nt_ns: {}\n"
+      "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
+      "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
+      "gyro_bias_radps: {}\naccel_bias_mps2: {}\ngyro_bias_covariance: {}\naccel_bias_covariance: {}\n",
+      state.t.ns, n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
+      n.accel_random_walk_mps3_rthz, list(b.bias.gyro_radps.data(), 3), list(b.bias.accel_mps2.data(), 3),
+      upper(b.gyro_covariance), upper(b.accel_covariance));
+}
+
+Result<void> write_imu_state(const std::string& path, const ImuState& state, const ImuNoise& imu) {
+  auto file = OutputFile::create(path);
+  if (!file) return file.error();
+  file->write(imu_state_to_yaml(state, imu));
+  return file->close();
+}
+
+}  // namespace fbvins
