@@ -188,15 +188,30 @@ std::size_t columns_of(RotationKind kind) {
   return 0;
 }
 
+namespace {
+
+/// Header rows may contradict one another: every cell that will be asked for must be a column.
+Result<MarkerLayout> checked(Result<MarkerLayout> layout, const std::string& file) {
+  if (!layout) return layout;
+  std::size_t last = layout->time.value_or(layout->frame);
+  for (const BodyColumns& body : layout->bodies)
+    last = std::max({last, body.position + 2, body.rotation + columns_of(layout->rotation) - 1});
+  if (last < layout->columns) return layout;
+  return Error{ErrorCode::malformed,
+               fmt::format("{}: the header names {} columns where its bodies need {}", file, layout->columns, last + 1)};
+}
+
+}  // namespace
+
 std::optional<Result<MarkerLayout>> marker_layout(std::string_view text, const std::string& file) {
   const std::vector<CsvLine> lines = lines_of(text);
   if (lines.empty()) return std::nullopt;
   const std::string_view first = lines.front().text;
   const auto begins = [&](std::string_view word) { return first.substr(0, word.size()) == word; };
-  if (begins("Format Version,")) return motive_layout(lines, file);
-  if (begins("FILE_VERSION\t") || begins("NO_OF_FRAMES\t")) return qualisys_layout(lines, file);
+  if (begins("Format Version,")) return checked(motive_layout(lines, file), file);
+  if (begins("FILE_VERSION\t") || begins("NO_OF_FRAMES\t")) return checked(qualisys_layout(lines, file), file);
   const std::string_view title = first.substr(0, first.find(','));
-  if (lines.size() > 2 && (title == "Objects" || title == "Segments")) return vicon_layout(lines, file);
+  if (lines.size() > 2 && (title == "Objects" || title == "Segments")) return checked(vicon_layout(lines, file), file);
   if (title == "Trajectories" || title == "Devices" || title == "Model Outputs")
     return Result<MarkerLayout>(
         broken(file, lines.front().number, fmt::format("Vicon's table of {} has no poses: export objects or segments", title)));

@@ -149,6 +149,9 @@ TEST(MotionCapture, WhatCannotBeUsedIsSaidInASentence) {
   EXPECT_EQ(sentence(replaced(qualisys_tsv(file), "\t6D", "\t3D")), "take.csv:9: 3D data: export 6D");
   EXPECT_EQ(sentence(replaced(qualisys_tsv(file), "BODY_NAMES", "NAMES")),
             "take.csv:1: there is no body in it (BODY_NAMES): export 6D");
+  EXPECT_EQ(
+      sentence(replaced(motive, "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,X,Y,Z,W,X,Y,Z,,X,Y,Z", "Frame,Time (Seconds),X,Y,Z")),
+      "take.csv: the header names 5 columns where its bodies need 20");
   EXPECT_NE(sentence("a picture, perhaps").find("take.csv"), std::string::npos);
 }
 
