@@ -28,7 +28,7 @@ struct FinalAdjustmentReport {
   double initial_rms_px = 0, final_rms_px = 0;  ///< of position in the image, both over the sights kept in the end
   Plausibility before, after;
   double tilt_rad = 0;       ///< by which the map was turned level
-  std::string refused = {};  ///< why, where the result is less plausible than its beginning: the map is as it was
+  std::string refused = {};  ///< why, where the result is not more plausible than its beginning: the map is as it was
 };
 
 }  // namespace fbvins

@@ -17,16 +17,21 @@ constexpr double kMatchRadius_px = 8;
 /// The odometry's steps are weighed by what they turn out to err by, which is less than the drift assumed while flying; not less
 /// than this share of its variance.
 constexpr double kLeastDrift = 0.01;
+/// Points held out must fit better by this: with less the result is another, and as often worse.
+constexpr double kBetter = 0.985;
 /// What decides is squared and a mean of thousands: so much more is worse, not chance.
 constexpr double kWorse = 1.02;
 /// Readings that fit to their noise are not asked to fit better, and steps within the odometry's drift are all alike.
 constexpr double kImuFits = 1, kDriftLimit = 4;
 
-/// Why the result is less plausible than its beginning; empty where it is not.
+/// Why the result is not more plausible than its beginning; empty where it is.
 std::string objection(const Plausibility& before, const Plausibility& after) {
-  if (after.held_out > kWorse * before.held_out)
-    return fmt::format("points held out fit worse than before: {:.2f} -> {:.2f} squared standard deviations", before.held_out,
+  if (after.held_out > before.held_out)
+    return fmt::format("points held out fit worse than before: {:.3f} -> {:.3f} squared standard deviations", before.held_out,
                        after.held_out);
+  if (after.held_out > kBetter * before.held_out)
+    return fmt::format("points held out hardly fit better than before: {:.3f} -> {:.3f} squared standard deviations",
+                       before.held_out, after.held_out);
   if (after.imu > std::max(kImuFits, kWorse * before.imu))
     return fmt::format("the IMU's readings fit worse than before: {:.2f} -> {:.2f} squared standard deviations", before.imu,
                        after.imu);

@@ -13,7 +13,7 @@
 namespace fbvins {
 
 /// Moves the placed keyframes against one another, and turns the map level about the first one. A map without two views of one
-/// point stays as it is, and so does one whose result would be less plausible than its beginning (`refused` says why).
+/// point stays as it is, and so does one whose result would not be more plausible than its beginning (`refused` says why).
 FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matching);
 
 }  // namespace fbvins
