@@ -48,7 +48,7 @@ struct MapEdge {
   Mat6 information = Mat6::Identity();
   Kind kind = Kind::odometry;
   std::shared_ptr<const Preintegration>
-      imu;  ///< of an edge of the odometry: the readings on the way, where they are known. Not saved
+      imu = {};  ///< of an edge of the odometry: the readings on the way, where they are known. Not saved
 };
 
 class PlaceMap {

@@ -20,7 +20,8 @@ class Pairs {
   void add(int camera, double tens) {
     pairs_.add(camera, Time{static_cast<std::int64_t>(tens * 1e7)}, std::make_shared<Image>(1, 1));
     while (const auto frame = pairs_.next()) {
-      given += (given.empty() ? "" : " ") + std::to_string(frame->t.ns / 10'000'000);
+      if (!given.empty()) given += " ";
+      given += std::to_string(frame->t.ns / 10'000'000);
       if (!frame->right) given += "L";
       if (!frame->left) given += "R";
     }
