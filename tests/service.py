@@ -78,7 +78,7 @@ class Service(unittest.TestCase):
         program, manager = self.start(*arguments[:2], speed="@4")
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
-        self.assertGreater(self.keyframes_of(kept), keyframes, "the second flight went on with the first one's map")
+        self.assertGreaterEqual(self.keyframes_of(kept), keyframes, "the second flight went on with the first one's map; a new one is smaller")
 
     def keyframes_of(self, path):
         done = subprocess.run([PROGRAM, "map", "info", path], capture_output=True, text=True, timeout=120, check=True)
