@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One command line, several programs: `fbvins` holds the commands that read a recording and write results, and hands the
-// others to the program beside it that holds them. Whoever types `fbvins live` need not know; whoever builds `fbvins` builds
-// no more than it runs.
+// others to the program beside it that holds them. The user types `fbvins live` all the same, and a build of `fbvins` alone
+// compiles no more than it runs.
 #pragma once
 
 #include <initializer_list>

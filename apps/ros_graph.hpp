@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `fbvins live` in ROS 2's graph: what --ros2 and a source ros2:LEFT,RIGHT,IMU ask for. A program built without CycloneDDS
-// says so to whoever asks.
+// `fbvins live` in ROS 2's graph: what --ros2 and a source ros2:LEFT,RIGHT,IMU ask for. In a program built without
+// CycloneDDS both are an error.
 #pragma once
 
 #include <memory>

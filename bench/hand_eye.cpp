@@ -22,7 +22,7 @@ namespace {
 constexpr int kRecordings = 20;
 constexpr double kMinute_s = 60;
 
-/// A minute of a ground truth, between whose poses lines are drawn.
+/// A minute of a ground truth, interpolated linearly between its poses.
 class RecordedMinute {
  public:
   RecordedMinute(const Trajectory<W>& truth, Time start, double duration_s)

@@ -51,7 +51,7 @@ class MotionHistory {
   std::deque<Entry> states_;
 };
 
-/// Nobody mounts an IMU, or bends legs, as exactly as the autopilot believes.
+/// The true mounting: the autopilot's, with the error that a real assembly has.
 Pose<BodyFlu, B> askew(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
   Rng rng(static_cast<std::uint64_t>(setup.simulation.seed), 73);
   const double sigma = setup.mounting_error_deg * std::numbers::pi / 180, x = rng.normal(), y = rng.normal(), z = rng.normal();

@@ -37,7 +37,7 @@ bool is_clear(const FloorPlan& plan, const Vec3& p) {
   return plan.inside(p.x(), p.y());
 }
 
-/// Of a fence that nobody has drawn.
+/// Of the default geofence, around the planned path.
 constexpr double kAroundTheWay_m = 1.5;
 
 std::string place_text(const Vec3& p) { return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z()); }

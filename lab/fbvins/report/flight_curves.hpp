@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `fbvins fly` leaves beside a run, for the page: where the vehicle was, where it believed to be and should have been, its
+// What `fbvins fly` leaves beside a run, for the page: where the vehicle was, its estimate and its setpoint, its
 // modes, and what its motors did. Pure functions.
 #pragma once
 

@@ -28,7 +28,7 @@ class Barometer {
   static constexpr double kRate_hz = 50;
 
   Barometer(const BarometerOptions& options, std::uint64_t seed) : options_(options), rng_(seed, 72) {
-    zero_m_ = rng_.uniform(-50, 50);  // nobody knows the pressure at the floor
+    zero_m_ = rng_.uniform(-50, 50);  // the pressure at the floor is unknown
   }
   double read(double true_height_m) {
     zero_m_ += options_.wander_m_rts / std::sqrt(kRate_hz) * rng_.normal();

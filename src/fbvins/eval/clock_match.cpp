@@ -15,7 +15,7 @@ constexpr double kSpan_s = 0.1;  // over which turning is measured: two images
 constexpr double kCoarseStep_s = 0.04, kFineStep_s = 0.01;
 constexpr int kMostSamples = 8000;  // of the coarse search, whose cost is their square
 constexpr double kLargestHole_s = 0.15;
-constexpr double kWeakest = 0.6;     // correlation that is believed
+constexpr double kWeakest = 0.6;     // smallest correlation that is accepted
 constexpr double kAmbiguous = 0.85;  // another offset is as good
 constexpr double kPeakWidth_s = 1.0;
 

@@ -127,7 +127,7 @@ void SensorCheck::check_readings(std::vector<SensorFinding>& findings) const {
   say(metric, fmt::format("mean acceleration {:.2f} m/s^2{}", accel,
                           and_then(metric, in_g ? "it looks like g: multiply by 9.80665"
                                                 : "gravity alone is 9.81: units or axes are wrong")));
-  constexpr double kSpinning_radps = 6;  // on the average over a look: nobody holds a drone so
+  constexpr double kSpinning_radps = 6;  // mean over the look: faster than any drone is held by hand
   const bool calm = gyro < kSpinning_radps;
   say(calm, fmt::format("mean turning rate {:.3f} rad/s{}", gyro, and_then(calm, "it looks like degrees: multiply by pi / 180")));
 }

@@ -56,7 +56,7 @@ class Ros2Node {
   DdsEntity domain_, participant_;
 };
 
-/// Last values only for whoever comes late, or none; how many wait for a slow reader.
+/// Delivery to subscribers: again until received or once; the last values for late ones or none; how many wait for a slow one.
 struct Ros2Quality {
   bool reliable = true;
   bool latched = false;  ///< ROS's transient_local

@@ -100,7 +100,7 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
     append_image(message, Time{k * 50'000'000LL}, kLeftFrame, &image);
     EXPECT_TRUE(to.publish(std::move(message)));
   };
-  // Publishers are found within moments; until then messages are nobody's.
+  // Publishers are found within moments; messages sent before are lost.
   for (int k = 1; !notes.wait([&] { return true; }) || notes.frames.empty() || notes.readings.empty(); ++k) {
     send(*left, k, kWidth, kHeight);
     send(*right, k, kWidth, kHeight);

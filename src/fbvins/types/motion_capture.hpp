@@ -12,7 +12,7 @@
 namespace fbvins {
 
 struct V {};  ///< the motion-capture volume: z up as far as its ground plane was laid level
-struct K {};  ///< the rigid body of markers, fixed to B in a place that nobody measured
+struct K {};  ///< the rigid body of markers, fixed to B in an unmeasured place
 
 struct MarkerPose {
   Time t;  ///< of the motion capture's own clock

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// World, cameras and IMU of a simulation that are asked step by step, for whoever decides while flying where to fly. The same
-// models as `simulate`, but the rotors that shake the IMU are the vehicle's own. The same questions give the same bits.
+// World, cameras and IMU of a simulation that are asked step by step, for a controller that decides in flight where to go. The
+// same models as `simulate`, but the rotors that shake the IMU are the vehicle's own. The same questions give the same bits.
 //
 //   Result<SensorStation> station = SensorStation::create(options, plan, path);
 //   ImuSample reading = station->read_imu(t_s, motion, rotor_radps / hover_radps);
