@@ -7,11 +7,11 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/config_arguments.hpp"
 #include "apps/flight_report.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/config/config_file.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
 #include "fbvins/frontend/survival.hpp"
@@ -35,8 +35,8 @@ examples:
 )";
 
 struct Arguments {
-  std::string mission, preset = "normal", vehicle = "indoor330", frontend, out, config, control;
-  std::vector<std::string> assignments;
+  std::string mission, preset = "normal", vehicle = "indoor330", out, control;
+  ConfigArguments config;
   int seed = 1;
   double wind_mps = -1;
   bool loop = false, threaded = false, record = false, quiet = false;
@@ -117,8 +117,7 @@ Result<void> write_as_run(const Arguments& a, const Config& config, const Flight
 }
 
 int fly_mission(Arguments a) {
-  if (!a.frontend.empty()) a.assignments.insert(a.assignments.begin(), "frontend.kind=" + a.frontend);
-  const Result<Config> config = load_config(a.config, a.assignments);
+  const Result<Config> config = a.config.load();
   if (!config) return fail(config.error().message);
   if (a.out.empty())
     a.out = fmt::format("out/{}-{}-s{}-{}", std::filesystem::path(a.mission).stem().string(), a.preset, a.seed,
@@ -155,12 +154,8 @@ void add_fly_command(CLI::App& program, int& exit_code) {
       ->check(CLI::IsMember(simulation_presets()))
       ->capture_default_str();
   command->add_option("--seed", a->seed, "of world, wind and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
-  command->add_option("--frontend", a->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
   command->add_option("--out", a->out, "folder for the results (default out/<mission>-<preset>-s<seed>-<frontend>)");
-  command->add_option("--config", a->config, "YAML file that changes the odometry's defaults (see fbvins config)");
-  command->add_option("--set", a->assignments, "one option of the odometry, name=value; may be repeated")
-      ->take_all()
-      ->allow_extra_args(false);
+  a->config.add_to(*command);
   command->add_option("--vehicle", a->vehicle, "what flies")->check(CLI::IsMember(quadrotor_presets()))->capture_default_str();
   command->add_option("--control", a->control, "YAML file that changes gains and limits, by PX4's names");
   command->add_option("--wind", a->wind_mps, "mean wind in m/s, gusts of two thirds of it (default 0.3)")

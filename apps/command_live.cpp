@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "apps/commands.hpp"
+#include "apps/config_arguments.hpp"
 #include "apps/imu_state.hpp"
 #include "apps/kept_map.hpp"
 #include "apps/live_files.hpp"
@@ -19,7 +20,6 @@
 #include "apps/run_map.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/config/config_file.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
@@ -59,8 +59,9 @@ examples:
 )";
 
 struct Arguments {
-  std::string source, config, frontend, out, record, kept_map, ros2, imu_state;
-  std::vector<std::string> assignments, faults, mavlink;
+  std::string source, out, record, kept_map, ros2, imu_state;
+  std::vector<std::string> faults, mavlink;
+  ConfigArguments config;
   DatasetOptions dataset;
   MapArguments map;
   bool record_images = true, quiet = false;
@@ -68,12 +69,6 @@ struct Arguments {
   bool preload = false;
   double check_s = 0;  ///< look at the sensors for so long, and do not fly
 };
-
-Result<Config> config_of(Arguments arguments) {
-  if (!arguments.frontend.empty())
-    arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
-  return load_config(arguments.config, arguments.assignments);
-}
 
 /// A map to keep is one to load, where it is there, and to save.
 MapArguments map_arguments(const Arguments& arguments) {
@@ -181,7 +176,7 @@ int check_sensors(Source& source, double seconds) {
 
 int run(const Arguments& arguments) {
   block_stop_signals();  // before any thread is made
-  const auto config = config_of(arguments);
+  const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   const auto faults = faults_of(arguments);
   if (!faults) return fail(faults.error().message);
@@ -237,11 +232,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("live", kLiveDescription);
   command->footer(kExamples);
   command->add_option("--source", arguments->source, "where sensor data come from")->required();
-  command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");
-  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
-      ->take_all()
-      ->allow_extra_args(false);
-  command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
+  arguments->config.add_to(*command);
   command->add_option("--out", arguments->out, "folder for files; without, none are written");
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
                       "Kalibr camchain-imucam.yaml instead of the source's own");

@@ -7,13 +7,13 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/config_arguments.hpp"
 #include "apps/imu_state.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
 #include "apps/run_summary.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/config/config_file.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/pipeline/system.hpp"
 
@@ -39,18 +39,12 @@ examples:
 )";
 
 struct Arguments {
-  std::string dataset, config, frontend, out, camchain, imu_calibration, imu_state;
-  std::vector<std::string> assignments;
+  std::string dataset, out, camchain, imu_calibration, imu_state;
+  ConfigArguments config;
   MapArguments map;
   int max_images = 0;
   bool threaded = false, quiet = false;
 };
-
-Result<Config> config_of(Arguments arguments) {
-  if (!arguments.frontend.empty())
-    arguments.assignments.insert(arguments.assignments.begin(), "frontend.kind=" + arguments.frontend);
-  return load_config(arguments.config, arguments.assignments);
-}
 
 Result<std::unique_ptr<Dataset>> open(const Arguments& arguments) {
   DatasetOptions options;
@@ -121,7 +115,7 @@ Result<void> write_all(const Flight& flight, const RunSummary& summary, const Co
 }
 
 int run(const Arguments& arguments) {
-  const auto config = config_of(arguments);
+  const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   const auto data = open(arguments);
   if (!data) return fail(data.error().message);
@@ -163,11 +157,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("run", "estimate the trajectory of a recording");
   command->footer(kExamples);
   command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
-  command->add_option("--config", arguments->config, "YAML file that changes the defaults (see fbvins config)");
-  command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
-      ->take_all()
-      ->allow_extra_args(false);
-  command->add_option("--frontend", arguments->frontend, "how features are followed")->check(CLI::IsMember(frontend_names()));
+  arguments->config.add_to(*command);
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");

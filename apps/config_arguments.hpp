@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The arguments by which a command is told the odometry's configuration: --config, --frontend, --set.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fbvins/config/config_file.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace fbvins::app {
+
+struct ConfigArguments {
+  std::string file, frontend;
+  std::vector<std::string> assignments;
+
+  void add_to(CLI::App& command);
+  /// The file's options, over them the frontend, over that the assignments.
+  Result<Config> load() const;
+};
+
+}  // namespace fbvins::app
