@@ -44,6 +44,20 @@ inline Vec3 so3_log(const Quat& q) {
   return k * v;
 }
 
+/// The smallest rotation that takes the direction of `from` to that of `to`; about any axis across where they are opposite.
+/// As Eigen's FromTwoVectors, without its singular value decomposition.
+inline Quat so3_between(const Vec3& from, const Vec3& to) {
+  const Vec3 a = from.normalized(), b = to.normalized();
+  const double cosine = b.dot(a);
+  if (cosine < -1 + 1e-12) {
+    const Vec3 axis = a.unitOrthogonal();
+    return Quat(0, axis.x(), axis.y(), axis.z());
+  }
+  const double twice_w = std::sqrt(2 * (1 + cosine));
+  const Vec3 axis = a.cross(b) / twice_w;
+  return Quat(0.5 * twice_w, axis.x(), axis.y(), axis.z());
+}
+
 /// Right Jacobian: Exp(theta + d) ~ Exp(theta) * Exp(Jr(theta) * d).
 inline Mat3 so3_right_jacobian(const Vec3& theta) {
   const double t2 = theta.squaredNorm();

@@ -17,7 +17,7 @@ Quat FloorLevel::correction(const Odometry& odometry, const Quat& q_LW) const {
   const Vec3 up_L = q_LW * (q_WG * *z_G_);
   const double variance = odometry.gauge.up_sigma_rad * odometry.gauge.up_sigma_rad;
   const double weight = variance / (variance + kFloor_rad * kFloor_rad);
-  return so3_exp(weight * so3_log(Quat::FromTwoVectors(up_L, Vec3::UnitZ())));
+  return so3_exp(weight * so3_log(so3_between(up_L, Vec3::UnitZ())));
 }
 
 }  // namespace fbvins

@@ -21,7 +21,7 @@ constexpr double kMix[kRotors][3] = {{-kTilt, -kTilt, -1}, {kTilt, kTilt, -1}, {
 // rotation, then yaw by a share.
 Vec3 rates_for(const AttitudeControlOptions& o, const Quat& q, const AttitudeSetpoint& wanted) {
   const Vec3 z = q * Vec3::UnitZ(), z_wanted = wanted.q_LV * Vec3::UnitZ();
-  Quat reduced = Quat::FromTwoVectors(z, z_wanted) * q;
+  Quat reduced = so3_between(z, z_wanted) * q;
   if (z.dot(z_wanted) < -0.99999) reduced = wanted.q_LV;  // upside down: every way is as short
   Quat yaw_part = reduced.conjugate() * wanted.q_LV;
   if (yaw_part.w() < 0) yaw_part.coeffs() *= -1;

@@ -306,7 +306,7 @@ bool Furnisher::add_tangle(const Vec3& floor_point) {
   for (int i = 10 + static_cast<int>(rng_.below(10)); i > 0; --i) {
     const double low = rng_.uniform(0, 0.6) * height, high = rng_.uniform(0.7, 1.0) * height, thick = rng_.uniform(0.006, 0.02);
     const Vec3 from = within(foot + (crown - foot) * low / height, low), to = within(crown, high);
-    const Quat q = Quat::FromTwoVectors(Vec3::UnitZ(), to - from);
+    const Quat q = so3_between(Vec3::UnitZ(), to - from);
     add_box(world_.facets, {0.5 * (from + to), Vec3(thick, thick, 0.5 * (to - from).norm()), q}, what, tint(), 0.5);
   }
   return true;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/published_pose.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "fbvins/geometry/symmetric.hpp"
 
 namespace fbvins {
 namespace {
@@ -23,8 +24,7 @@ Vec3 at_most(const Vec3& owed, double limit) {
 double tilt_sigma_of(const Quat& q_WB, const Mat3& covariance) {
   const Mat3 R = q_WB.toRotationMatrix();
   const Mat2 level = (R * covariance * R.transpose()).topLeftCorner<2, 2>();
-  const Eigen::SelfAdjointEigenSolver<Mat2> axes(level, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
+  return std::sqrt(std::max(0.0, largest_eigenvalue(level)));
 }
 
 }  // namespace

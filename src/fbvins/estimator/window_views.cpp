@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/window_views.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "fbvins/geometry/symmetric.hpp"
 
 namespace fbvins {
 
@@ -53,8 +54,7 @@ GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state) {
 }
 
 double up_sigma_rad(const Mat17& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Mat2> axes(covariance.bottomRightCorner<2, 2>(), Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, axes.eigenvalues().maxCoeff()));
+  return std::sqrt(std::max(0.0, largest_eigenvalue(covariance.bottomRightCorner<2, 2>())));
 }
 
 std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W) {

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/geometry/five_point.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <cmath>
+#include <utility>
+
+#include "fbvins/geometry/real_roots.hpp"
 
 namespace fbvins {
 namespace {
 
-// Polynomials in x, y, z of degree <= 3. Monomials in graded order: the ten of degree 3 first, so
-// that eliminating them writes each in terms of the ten of lower degree.
+// Polynomials in x, y, z of degree <= 3. Monomials in graded order: the ten of degree 3 first.
 struct Exponent {
   int x, y, z;
 };
@@ -32,6 +36,8 @@ constexpr std::array<std::array<int, 20>, 20> make_product_table() {
 }
 constexpr auto kProduct = make_product_table();
 
+constexpr int kPolishSteps = 2;
+
 using Poly = Eigen::Matrix<double, 20, 1>;
 
 /// Product of polynomials whose lowest monomial index with a coefficient is first_a / first_b
@@ -55,8 +61,19 @@ PolyMatrix linear_family(const Eigen::Matrix<double, 9, 4>& basis) {
   return E;
 }
 
+// The order in which Nister eliminates: of the first ten, x^2 z, x^2, y^2 z, y^2, xyz, xy come last, and what remains is
+// (z^2, z, 1) x, (z^2, z, 1) y and (z^3, z^2, z, 1).
+constexpr std::array<int, 20> kElimination = {0, 6, 1, 3, 2, 10, 7, 13, 4, 11, /**/ 5, 12, 16, 8, 14, 17, 9, 15, 18, 19};
+using Constraints = std::array<std::array<double, 20>, 10>;
+
+std::array<double, 20> in_order_of_elimination(const Poly& p) {
+  std::array<double, 20> out;
+  for (int i = 0; i < 20; ++i) out[i] = p[kElimination[i]];
+  return out;
+}
+
 /// Coefficients of the ten constraints on E, one a row.
-Eigen::Matrix<double, 10, 20> constraints(const PolyMatrix& E) {
+Constraints constraints(const PolyMatrix& E) {
   constexpr int kLinear = 16, kQuadratic = 10;
   PolyMatrix EEt;
   for (int r = 0; r < 3; ++r)
@@ -67,12 +84,12 @@ Eigen::Matrix<double, 10, 20> constraints(const PolyMatrix& E) {
   const Poly half_trace = 0.5 * (EEt[0][0] + EEt[1][1] + EEt[2][2]);
   for (int r = 0; r < 3; ++r) EEt[r][r] -= half_trace;
 
-  Eigen::Matrix<double, 10, 20> rows;
+  Constraints rows;
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) {
       Poly sum = Poly::Zero();
       for (int k = 0; k < 3; ++k) sum += multiply(EEt[r][k], kQuadratic, E[k][c], kLinear);
-      rows.row(3 * r + c) = sum.transpose();
+      rows[3 * r + c] = in_order_of_elimination(sum);
     }
   Poly det = Poly::Zero();
   for (int c = 0; c < 3; ++c) {
@@ -80,8 +97,91 @@ Eigen::Matrix<double, 10, 20> constraints(const PolyMatrix& E) {
     const Poly minor = multiply(E[1][p], kLinear, E[2][q], kLinear) - multiply(E[1][q], kLinear, E[2][p], kLinear);
     det += multiply(minor, kQuadratic, E[0][c], kLinear);
   }
-  rows.row(9) = det.transpose();
+  rows[9] = in_order_of_elimination(det);
   return rows;
+}
+
+/// Gauss-Jordan elimination of the first ten columns, with the largest pivot of each. False where they are degenerate.
+bool eliminate(Constraints& rows) {
+  constexpr double kSmallestPivot = 1e-13;  // of unit vectors' products
+  for (int k = 0; k < 10; ++k) {
+    int pivot = k;
+    for (int r = k + 1; r < 10; ++r)
+      if (std::abs(rows[r][k]) > std::abs(rows[pivot][k])) pivot = r;
+    std::swap(rows[k], rows[pivot]);
+    if (!(std::abs(rows[k][k]) > kSmallestPivot)) return false;
+    const double inverse = 1 / rows[k][k];
+    for (int c = k; c < 20; ++c) rows[k][c] *= inverse;
+    for (int r = 0; r < 10; ++r) {
+      if (r == k) continue;
+      const double factor = rows[r][k];
+      for (int c = k; c < 20; ++c) rows[r][c] -= factor * rows[k][c];
+    }
+  }
+  return true;
+}
+
+/// A polynomial in z, lowest first.
+template <int Degree>
+using InZ = std::array<double, Degree + 1>;
+
+template <std::size_t N, std::size_t M>
+std::array<double, N + M - 1> operator*(const std::array<double, N>& a, const std::array<double, M>& b) {
+  std::array<double, N + M - 1> c{};
+  for (std::size_t i = 0; i < N; ++i)
+    for (std::size_t j = 0; j < M; ++j) c[i + j] += a[i] * b[j];
+  return c;
+}
+
+template <std::size_t N>
+std::array<double, N> operator-(std::array<double, N> a, const std::array<double, N>& b) {
+  for (std::size_t i = 0; i < N; ++i) a[i] -= b[i];
+  return a;
+}
+
+template <std::size_t N>
+double at(const std::array<double, N>& p, double z) {
+  double value = 0;
+  for (std::size_t i = N; i-- > 0;) value = value * z + p[i];
+  return value;
+}
+
+/// x(z) x + y(z) y + one(z) = 0.
+struct LineInZ {
+  InZ<3> x, y;
+  InZ<4> one;
+};
+
+/// The row that begins with z m less z times the row that begins with m.
+LineInZ line(const std::array<double, 20>& with_z, const std::array<double, 20>& without) {
+  LineInZ out{};
+  for (int power = 0; power < 3; ++power) {
+    out.x[power] += with_z[12 - power], out.x[power + 1] -= without[12 - power];
+    out.y[power] += with_z[15 - power], out.y[power + 1] -= without[15 - power];
+  }
+  for (int power = 0; power < 4; ++power) out.one[power] += with_z[19 - power], out.one[power + 1] -= without[19 - power];
+  return out;
+}
+
+/// Where three lines meet: their determinant is zero.
+InZ<10> determinant(const std::array<LineInZ, 3>& l) {
+  const auto minor = [](const LineInZ& p, const LineInZ& q) { return p.x * q.y - q.x * p.y; };
+  InZ<10> sum{};
+  for (int i = 0; i < 3; ++i) {
+    const InZ<10> term = minor(l[(i + 1) % 3], l[(i + 2) % 3]) * l[i].one;
+    for (int k = 0; k <= 10; ++k) sum[k] += term[k];
+  }
+  return sum;
+}
+
+/// (x, y, 1) up to scale, at z.
+Vec3 meeting_point(const std::array<LineInZ, 3>& l, double z) {
+  std::array<Vec3, 3> row;
+  for (int i = 0; i < 3; ++i) row[i] = Vec3(at(l[i].x, z), at(l[i].y, z), at(l[i].one, z)).normalized();
+  Vec3 best = Vec3::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (const Vec3 v = row[i].cross(row[(i + 1) % 3]); v.squaredNorm() > best.squaredNorm()) best = v;
+  return best;
 }
 
 Eigen::Matrix<double, 9, 4> null_space(std::span<const Vec2, 5> a, std::span<const Vec2, 5> b) {
@@ -95,28 +195,47 @@ Eigen::Matrix<double, 9, 4> null_space(std::span<const Vec2, 5> a, std::span<con
   return Q.rightCols<4>();
 }
 
+/// One Newton step of (x, y, z) on the ten constraints, by least squares: what elimination lost in digits comes back.
+void polish(const Constraints& rows, Vec3& xyz) {
+  std::array<double, 20> value{};
+  std::array<Vec3, 20> slope;
+  const auto power = [](double base, int n) { return n == 0 ? 1.0 : n == 1 ? base : n == 2 ? base * base : base * base * base; };
+  for (int i = 0; i < 20; ++i) {
+    const Exponent& e = kMonomials[kElimination[i]];
+    const double px = power(xyz.x(), e.x), py = power(xyz.y(), e.y), pz = power(xyz.z(), e.z);
+    value[i] = px * py * pz;
+    slope[i] = {e.x == 0 ? 0 : e.x * power(xyz.x(), e.x - 1) * py * pz, e.y == 0 ? 0 : e.y * power(xyz.y(), e.y - 1) * px * pz,
+                e.z == 0 ? 0 : e.z * power(xyz.z(), e.z - 1) * px * py};
+  }
+  Mat3 H = Mat3::Zero();
+  Vec3 g = Vec3::Zero();
+  for (const auto& row : rows) {
+    double r = 0;
+    Vec3 J = Vec3::Zero();
+    for (int i = 0; i < 20; ++i) r += row[i] * value[i], J += row[i] * slope[i];
+    H += J * J.transpose();
+    g += r * J;
+  }
+  if (const Vec3 next = xyz - H.inverse() * g; next.allFinite()) xyz = next;
+}
+
 }  // namespace
 
 std::vector<Mat3> five_point(std::span<const Vec2, 5> a, std::span<const Vec2, 5> b) {
   const Eigen::Matrix<double, 9, 4> basis = null_space(a, b);
-  const Eigen::Matrix<double, 10, 20> rows = constraints(linear_family(basis));
-  const Eigen::FullPivLU<Eigen::Matrix<double, 10, 10>> lu(rows.leftCols<10>());
-  if (lu.rcond() < 1e-14) return {};
-  const Eigen::Matrix<double, 10, 10> reduced = lu.solve(rows.rightCols<10>());
-
-  // Multiplication by x on (x2, xy, xz, y2, yz, z2, x, y, z, 1).
-  Eigen::Matrix<double, 10, 10> action = Eigen::Matrix<double, 10, 10>::Zero();
-  action.topRows<6>() = -reduced.topRows<6>();
-  action(6, 0) = action(7, 1) = action(8, 2) = action(9, 6) = 1.0;
-  const Eigen::EigenSolver<Eigen::Matrix<double, 10, 10>> eigen(action);
+  const Constraints equations = constraints(linear_family(basis));
+  Constraints rows = equations;
+  if (!eliminate(rows)) return {};
+  const std::array<LineInZ, 3> lines{line(rows[4], rows[5]), line(rows[6], rows[7]), line(rows[8], rows[9])};
+  const InZ<10> polynomial = determinant(lines);
 
   std::vector<Mat3> solutions;
-  for (int i = 0; i < 10; ++i) {
-    if (std::abs(eigen.eigenvalues()[i].imag()) > 1e-9) continue;
-    const Eigen::Matrix<double, 10, 1> v = eigen.eigenvectors().col(i).real();
-    if (std::abs(v[9]) < 1e-12) continue;
-    const Eigen::Vector4d weights(v[6] / v[9], v[7] / v[9], v[8] / v[9], 1.0);
-    const Eigen::Matrix<double, 9, 1> e = (basis * weights).normalized();
+  for (const double z : real_roots(polynomial)) {
+    const Vec3 xy1 = meeting_point(lines, z);
+    if (!(std::abs(xy1.z()) > 1e-12)) continue;
+    Vec3 xyz(xy1.x() / xy1.z(), xy1.y() / xy1.z(), z);
+    for (int step = 0; step < kPolishSteps; ++step) polish(equations, xyz);
+    const Eigen::Matrix<double, 9, 1> e = (basis * xyz.homogeneous()).normalized();
     if (!e.allFinite()) continue;
     solutions.push_back(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(e.data()));
   }

@@ -14,9 +14,9 @@
 namespace fbvins {
 
 /// All real essential matrices with (b,1)^T E (a,1) = 0 for five matches in normalised coordinates.
-/// Method: E = x E1 + y E2 + z E3 + E4 over the null space of the five equations; the ten cubic
-/// constraints det E = 0 and 2 E E^T E - tr(E E^T) E = 0 give the multiplication matrix of x, whose
-/// eigenvectors are the solutions. Empty when the five matches are degenerate (e.g. no motion).
+/// Method (D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004): E = x E1 + y E2 + z E3 + E4
+/// over the null space of the five equations; the ten cubic constraints det E = 0 and 2 E E^T E - tr(E E^T) E = 0, eliminated,
+/// leave one polynomial of degree ten in z. Empty when the five matches are degenerate (e.g. no motion).
 std::vector<Mat3> five_point(std::span<const Vec2, 5> a, std::span<const Vec2, 5> b);
 
 /// One of the four (R, t), |t| = 1, with E ~ [t]x R: the one whose rotation is smallest (neighbouring

@@ -1,32 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/geometry/p3p.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "fbvins/geometry/real_roots.hpp"
 
 namespace fbvins {
 namespace {
-
-/// Real roots of a[4] v^4 + ... + a[0] through the companion matrix, each polished by Newton's method.
-int real_roots(const std::array<double, 5>& a, std::array<double, 4>& roots) {
-  if (std::abs(a[4]) < 1e-12 * (std::abs(a[0]) + std::abs(a[1]) + std::abs(a[2]) + std::abs(a[3]))) return 0;
-  Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
-  companion.diagonal(-1).setOnes();
-  for (int i = 0; i < 4; ++i) companion(i, 3) = -a[static_cast<std::size_t>(i)] / a[4];
-  const Eigen::Vector4cd values = Eigen::EigenSolver<Eigen::Matrix4d>(companion, false).eigenvalues();
-  int n = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (std::abs(values[i].imag()) > 1e-3 * (1 + std::abs(values[i].real()))) continue;
-    double v = values[i].real();
-    for (int k = 0; k < 2; ++k) {
-      const double f = (((a[4] * v + a[3]) * v + a[2]) * v + a[1]) * v + a[0];
-      const double d = ((4 * a[4] * v + 3 * a[3]) * v + 2 * a[2]) * v + a[1];
-      if (d != 0) v -= f / d;
-    }
-    roots[static_cast<std::size_t>(n++)] = v;
-  }
-  return n;
-}
 
 /// An orthonormal frame on three points.
 Mat3 frame_on(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -52,10 +32,8 @@ P3pSolutions solve_p3p(const std::array<Vec3, 3>& rays, const std::array<Vec3, 3
       (1 + k) * (1 + k) - 4 * ab * cg * cg, 4 * (-k * (1 + k) * cb + 2 * ab * cg * cg * cb - (1 - s) * ca * cg),
       2 * (k * k - 1 + 2 * k * k * cb * cb + 2 * (1 - cc) * ca * ca - 4 * s * ca * cb * cg + 2 * (1 - ab) * cg * cg),
       4 * (k * (1 - k) * cb - (1 - s) * ca * cg + 2 * cc * ca * ca * cb), (k - 1) * (k - 1) - 4 * cc * ca * ca};
-  std::array<double, 4> roots{};
-  const int n = real_roots(quartic, roots);
-  for (int i = 0; i < n; ++i) {
-    const double v = roots[static_cast<std::size_t>(i)], denominator = 2 * (cg - v * ca);
+  for (const double v : real_roots(quartic)) {
+    const double denominator = 2 * (cg - v * ca);
     if (!(v > 0) || std::abs(denominator) < 1e-10) continue;
     const double u = ((k - 1) * v * v - 2 * k * cb * v + 1 + k) / denominator;
     const double d = 1 + u * u - 2 * u * cg;

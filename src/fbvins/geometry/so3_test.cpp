@@ -56,6 +56,18 @@ TEST(So3, RightJacobianMatchesDifferences) {
   }
 }
 
+TEST(So3, TheRotationBetweenTwoDirections) {
+  for (const Vec3& theta : nasty_rotations(3.1)) {
+    const Vec3 from(0.3, -0.7, 1.9), to = 2.5 * (so3_exp(theta) * from);
+    const Quat q = so3_between(from, to);
+    EXPECT_NEAR(q.norm(), 1, 1e-12);
+    EXPECT_LT((q * from.normalized() - to.normalized()).norm(), 1e-9) << theta.transpose();
+    EXPECT_LE(so3_log(q).norm(), so3_log(so3_exp(theta)).norm() + 1e-6) << "smallest";
+  }
+  const Vec3 down = so3_between(Vec3::UnitZ(), -Vec3::UnitZ()) * Vec3::UnitZ();
+  EXPECT_LT((down + Vec3::UnitZ()).norm(), 1e-12);
+}
+
 TEST(So3, InverseOfRightJacobian) {
   for (const Vec3& theta : nasty_rotations(3.1)) {
     EXPECT_LT((so3_right_jacobian(theta) * so3_right_jacobian_inverse(theta) - Mat3::Identity()).norm(), 1e-9)

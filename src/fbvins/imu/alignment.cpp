@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/symmetric.hpp"
 #include "fbvins/imu/alignment_rotation.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
+#include "fbvins/optim/dense_system.hpp"
 
 namespace fbvins {
 namespace {
@@ -88,13 +90,15 @@ class LinearProblem {
 
   LinearSolution solve() const {
     LinearSolution s;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(H_);
-    s.x = solver.solve(b_);
-    s.covariance = solver.solve(Eigen::MatrixXd::Identity(size(), size()));
+    auto x = solve_symmetric(H_, b_);
+    auto covariance = invert_symmetric(H_);
+    if (!x || !covariance) return s;
+    s.x = *std::move(x);
+    s.covariance = *std::move(covariance);
     s.cost = std::max(0.0, constant_ - b_.dot(s.x));
     s.gravity = gravity();
     s.accel_bias = accel_bias();
-    s.solved = solver.info() == Eigen::Success && s.x.allFinite() && s.covariance.allFinite();
+    s.solved = true;
     return s;
   }
 
@@ -188,8 +192,7 @@ void describe_fit(const LinearSolution& s, int n, AlignmentResult& result) {
   result.motion_rms = std::sqrt(s.cost / freedom);
   const double scale = std::max(1.0, result.motion_rms);
   const Mat2 direction = s.covariance.block<2, 2>(s.gravity, s.gravity);
-  const Vec2 eigenvalues = Eigen::SelfAdjointEigenSolver<Mat2>(direction, Eigen::EigenvaluesOnly).eigenvalues();
-  result.gravity_sigma_rad = scale * std::sqrt(std::max(0.0, eigenvalues.maxCoeff()));
+  result.gravity_sigma_rad = scale * std::sqrt(std::max(0.0, largest_eigenvalue(direction)));
   result.accel_bias_sigma_mps2 = scale * std::sqrt(s.covariance.diagonal().segment<3>(s.accel_bias).maxCoeff());
   result.velocity_sigma_mps = scale * std::sqrt(s.covariance.diagonal().segment<3>(s.gravity - 3).maxCoeff());
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/optim/dense_system.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -68,21 +70,22 @@ RotationAlignment align_rotations(const std::vector<Pose<VisualWorld, B>>& poses
   repropagate();
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Normal N = linearise(poses, result.R_VB, result.gyro_bias_radps, between, options);
-    const Eigen::LDLT<Eigen::MatrixXd> solver(N.H);
-    const Eigen::VectorXd d = solver.solve(N.b);
-    if (solver.info() != Eigen::Success || !d.allFinite()) return result;
-    for (int k = 0; k < n; ++k) result.R_VB[k] = (result.R_VB[k] * so3_exp(d.segment<3>(3 * k))).normalized();
-    result.gyro_bias_radps += d.segment<3>(bg);
+    const auto d = solve_symmetric(N.H, N.b);
+    if (!d) return result;
+    for (int k = 0; k < n; ++k) result.R_VB[k] = (result.R_VB[k] * so3_exp(d->segment<3>(3 * k))).normalized();
+    result.gyro_bias_radps += d->segment<3>(bg);
     repropagate();
-    if (d.norm() < 1e-9) break;
+    if (d->norm() < 1e-9) break;
   }
   const Normal N = linearise(poses, result.R_VB, result.gyro_bias_radps, between, options);
-  const Eigen::MatrixXd covariance = N.H.ldlt().solve(Eigen::MatrixXd::Identity(bg + 3, bg + 3));
-  result.gyro_bias_sigma_radps = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
-  for (int k = 0; k < n; ++k) result.sigma_rad.push_back(std::sqrt(covariance.diagonal().segment<3>(3 * k).maxCoeff()));
+  const auto covariance = invert_symmetric(N.H);
+  if (!covariance) return result;
+  const Eigen::VectorXd variance = covariance->diagonal();
+  result.gyro_bias_sigma_radps = std::sqrt(variance.tail<3>().maxCoeff());
+  for (int k = 0; k < n; ++k) result.sigma_rad.push_back(std::sqrt(variance.segment<3>(3 * k).maxCoeff()));
   // 3n pose and 3(n-1) gyro residuals and the prior, less 3n + 3 unknowns (eq. A10).
   result.rms = std::sqrt(N.cost / std::max(1, 3 * (n - 1)));
-  result.solved = covariance.allFinite() && std::isfinite(result.rms);
+  result.solved = std::isfinite(result.rms);
   return result;
 }
 

@@ -90,7 +90,7 @@ std::string_view to_string(RestRefusal reason) {
   return "?";
 }
 
-Quat level_rotation(const Vec3& up_B) { return Quat::FromTwoVectors(up_B, Vec3::UnitZ()).normalized(); }
+Quat level_rotation(const Vec3& up_B) { return so3_between(up_B, Vec3::UnitZ()).normalized(); }
 
 RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, double image_motion_px, const ImuNoise& noise,
                                 const RestOptions& options, double gravity_mps2) {

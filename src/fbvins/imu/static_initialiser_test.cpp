@@ -59,7 +59,7 @@ TEST(StaticInitialiser, CovarianceIsConsistent) {
     NavState truth = rest.state(3.0, bias);
     // truth in the estimate's frame: same origin, and the heading that leaves no rotation about gravity
     const Vec3 up_true_B = truth.T_WB.q.conjugate() * Vec3::UnitZ(), up_B = r.state.T_WB.q.conjugate() * Vec3::UnitZ();
-    truth.T_WB = {(r.state.T_WB.q * Quat::FromTwoVectors(up_true_B, up_B)).normalized(), Vec3::Zero()};
+    truth.T_WB = {(r.state.T_WB.q * so3_between(up_true_B, up_B)).normalized(), Vec3::Zero()};
     truth.v_WB.setZero();
     const Vec15 e = truth.boxminus(r.state);
     nees += e.dot(r.covariance.ldlt().solve(e)) / kRuns;

@@ -95,7 +95,7 @@ TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Frame& f = frames[i];
     Keyframe k = keyframe(FrameId{static_cast<std::int64_t>(i)}, f.t, {q_GL * f.odometry.q, q_GL * f.odometry.p});
-    if (i > 40) k.gauge.q_LG = Quat::FromTwoVectors(q_GL * Vec3::UnitZ(), Vec3::UnitZ());
+    if (i > 40) k.gauge.q_LG = so3_between(q_GL * Vec3::UnitZ(), Vec3::UnitZ());
     const MapUpdate u = again.process(f.place, k);
     if (!u.localised) continue;
     ++localised;

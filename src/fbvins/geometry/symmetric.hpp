@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small symmetric matrices, without a decomposition.
+#pragma once
+
+#include <cmath>
+
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+
+/// The larger eigenvalue: of a covariance, the variance along its worst direction.
+inline double largest_eigenvalue(const Mat2& symmetric) {
+  const double mean = 0.5 * (symmetric(0, 0) + symmetric(1, 1)), half = 0.5 * (symmetric(0, 0) - symmetric(1, 1));
+  return mean + std::hypot(half, symmetric(1, 0));
+}
+
+}  // namespace fbvins
