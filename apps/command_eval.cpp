@@ -113,7 +113,7 @@ int evaluate_files(const Arguments& arguments) {
 
 void add_eval_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("eval", "say how far a trajectory is from the ground truth");
+  CLI::App* command = program.add_subcommand("eval", kEvalDescription);
   command->footer(kExamples);
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();

@@ -115,7 +115,7 @@ int show(const Arguments& arguments) {
 
 void add_info_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("info", "say what is in a recording: rates, gaps, calibration, stamps");
+  CLI::App* command = program.add_subcommand("info", kInfoDescription);
   command->footer(kExamples);
   command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
   command->add_option("--calibration", arguments->calibration, "Kalibr camchain-imucam.yaml instead of the recording's own");

@@ -88,7 +88,7 @@ int export_files(const Arguments& arguments) {
 
 void add_map_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("map", "look at, join and export maps that `run --save-map` wrote");
+  CLI::App* command = program.add_subcommand("map", kMapDescription);
   command->footer(kExamples);
   command->require_subcommand(1);
   CLI::App* looking = command->add_subcommand("info", "what is in a map");

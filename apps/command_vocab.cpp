@@ -94,7 +94,7 @@ int info(const Arguments& arguments) {
 
 void add_vocab_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("vocab", "train or look at a vocabulary of visual words");
+  CLI::App* command = program.add_subcommand("vocab", kVocabDescription);
   command->footer(kExamples);
   command->require_subcommand(1);
   CLI::App* training = command->add_subcommand("train", "from images of any kind, folders are searched");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The subcommands of `fbvins`, wherever they live (fbvins.cpp, fbvins_live.cpp, fbvins_lab.cpp). Each adds itself to the
+// The subcommands of `fbvins`, wherever they live (fbvins.cpp, fbvins_live.cpp, fbvins_tools.cpp,
+// fbvins_lab.cpp). Each adds itself to the
 // command line and, when chosen, sets exit_code.
 #pragma once
 
@@ -19,6 +20,10 @@ enum ExitCode : int {
 
 /// What the help of `fbvins` says of commands that another program holds.
 inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
+inline constexpr const char* kEvalDescription = "say how far a trajectory is from the ground truth";
+inline constexpr const char* kInfoDescription = "say what is in a recording: rates, gaps, calibration, stamps";
+inline constexpr const char* kMapDescription = "look at, join and export maps that `run --save-map` wrote";
+inline constexpr const char* kVocabDescription = "train or look at a vocabulary of visual words";
 inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";

@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `fbvins` program: recordings in, trajectories, figures and pages out. One file a subcommand, exit codes in commands.hpp.
+// The `fbvins` program: recordings in, trajectories, figures and pages out; what else there is, it hands over. One file a
+// subcommand, exit codes in commands.hpp.
 #include "apps/command_line.hpp"
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
-  return run_command_line(
-      argc, argv,
-      {add_run_command, add_eval_command, add_info_command, add_config_command, add_map_command, add_vocab_command,
+  return run_command_line(argc, argv,
+                          {add_run_command, add_config_command,
 #ifdef FBVINS_WITH_LAB
-       add_simulate_command, add_report_command
+                           add_simulate_command, add_report_command
 #endif
-      },
-      {
-          {"live", kLiveDescription, "fbvins-live"},
+                          },
+                          {
+                              {"live", kLiveDescription, "fbvins-live"},
+                              {"eval", kEvalDescription, "fbvins-tools"},
+                              {"info", kInfoDescription, "fbvins-tools"},
+                              {"map", kMapDescription, "fbvins-tools"},
+                              {"mocap", kMocapDescription, "fbvins-tools"},
+                              {"vocab", kVocabDescription, "fbvins-tools"},
 #ifdef FBVINS_WITH_LAB
-          {"fly", kFlyDescription, "fbvins-lab"},
-          {"bench", kBenchDescription, "fbvins-lab"},
-          {"mocap", kMocapDescription, "fbvins-lab"},
+                              {"fly", kFlyDescription, "fbvins-lab"},
+                              {"bench", kBenchDescription, "fbvins-lab"},
 #endif
-      });
+                          });
 }

@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "apps/terminal.hpp"
-#include "fbvins/io/motion_capture.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/mocap/motion_capture.hpp"
 
 namespace fbvins::app {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "fbvins/core/result.hpp"
-#include "fbvins/eval/axis_errors.hpp"
-#include "fbvins/eval/hand_eye.hpp"
+#include "fbvins/mocap/axis_errors.hpp"
+#include "fbvins/mocap/hand_eye.hpp"
 
 namespace fbvins::app {
 

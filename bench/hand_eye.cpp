@@ -12,7 +12,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "fbvins/eval/hand_eye_scene.hpp"
+#include "fbvins/mocap/hand_eye_scene.hpp"
 #include "fbvins/io/trajectory.hpp"
 
 using namespace fbvins;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/hand_eye.hpp"
+#include "fbvins/mocap/hand_eye.hpp"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/eval/clock_match.hpp"
-#include "fbvins/eval/hand_eye_pairs.hpp"
+#include "fbvins/mocap/clock_match.hpp"
+#include "fbvins/mocap/hand_eye_pairs.hpp"
 
 namespace fbvins {
 namespace {

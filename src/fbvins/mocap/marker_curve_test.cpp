@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/marker_curve.hpp"
+#include "fbvins/mocap/marker_curve.hpp"
 
 #include <gtest/gtest.h>
 

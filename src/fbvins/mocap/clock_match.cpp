@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/clock_match.hpp"
+#include "fbvins/mocap/clock_match.hpp"
 
 #include <fmt/format.h>
 

@@ -6,8 +6,8 @@
 
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/mcap_reader.hpp"
-#include "fbvins/io/motion_capture.hpp"
 #include "fbvins/io/ros_messages.hpp"
+#include "fbvins/mocap/motion_capture.hpp"
 
 namespace fbvins {
 namespace {

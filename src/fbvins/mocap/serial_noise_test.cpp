@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/serial_noise.hpp"
+#include "fbvins/mocap/serial_noise.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/axis_errors.hpp"
+#include "fbvins/mocap/axis_errors.hpp"
 
 #include <gtest/gtest.h>
 

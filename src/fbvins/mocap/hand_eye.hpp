@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "fbvins/core/result.hpp"
-#include "fbvins/eval/marker_faults.hpp"
-#include "fbvins/eval/serial_noise.hpp"
+#include "fbvins/mocap/marker_faults.hpp"
+#include "fbvins/mocap/serial_noise.hpp"
 #include "fbvins/types/motion_capture.hpp"
 #include "fbvins/types/trajectory.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/hand_eye.hpp"
+#include "fbvins/mocap/hand_eye.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <numbers>
 
-#include "fbvins/eval/hand_eye_scene.hpp"
+#include "fbvins/mocap/hand_eye_scene.hpp"
 
 namespace fbvins {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/io/marker_layout.hpp"
+#include "fbvins/mocap/marker_layout.hpp"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/eval/hand_eye.hpp"
+#include "fbvins/mocap/hand_eye.hpp"
 
 namespace fbvins::test {
 
@@ -39,7 +39,7 @@ class ExactFlight {
     constexpr double h = 1e-3;
     const Vec3 p = position(t);
     const Vec3 thrust = (position(t + h) - 2 * p + position(t - h)) / (h * h) + Vec3(0, 0, 9.81);
-    const Quat q_tilt = Quat::FromTwoVectors(Vec3::UnitZ(), thrust);
+    const Quat q_tilt = so3_between(Vec3::UnitZ(), thrust);
     const Quat q_WF = q_tilt * Quat(Eigen::AngleAxisd(activity(t) * sum(3, t), Vec3::UnitZ()));
     return {(q_WF * q_FB_).normalized(), p};
   }

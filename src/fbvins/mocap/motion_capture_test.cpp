@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/io/motion_capture.hpp"
+#include "fbvins/mocap/motion_capture.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/io/cdr.hpp"
-#include "fbvins/io/marker_test_files.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 #include "fbvins/io/ros_messages.hpp"
+#include "fbvins/mocap/marker_test_files.hpp"
 
 namespace fbvins {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "fbvins/eval/hand_eye.hpp"
-#include "fbvins/eval/marker_curve.hpp"
+#include "fbvins/mocap/hand_eye.hpp"
+#include "fbvins/mocap/marker_curve.hpp"
 
 namespace fbvins {
 

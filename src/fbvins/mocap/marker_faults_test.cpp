@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/marker_faults.hpp"
+#include "fbvins/mocap/marker_faults.hpp"
 
 #include <gtest/gtest.h>
 

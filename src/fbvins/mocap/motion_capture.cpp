@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/io/motion_capture.hpp"
+#include "fbvins/mocap/motion_capture.hpp"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <numbers>
 
 #include "fbvins/io/file_source.hpp"
-#include "fbvins/io/marker_layout.hpp"
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/numbers.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/mocap/marker_layout.hpp"
 
 namespace fbvins {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/hand_eye_pairs.hpp"
+#include "fbvins/mocap/hand_eye_pairs.hpp"
 
 #include <fmt/format.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/eval/clock_match.hpp"
+#include "fbvins/mocap/clock_match.hpp"
 
 #include <gtest/gtest.h>
 
-#include "fbvins/eval/hand_eye_scene.hpp"
+#include "fbvins/mocap/hand_eye_scene.hpp"
 
 namespace fbvins {
 namespace {
