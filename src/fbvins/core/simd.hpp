@@ -20,3 +20,6 @@
 #ifndef FBVINS_KERNEL
 #define FBVINS_KERNEL
 #endif
+
+/// Helpers of kernels: a function of its own would have only the baseline's copy.
+#define FBVINS_INLINE inline __attribute__((always_inline))

@@ -14,14 +14,24 @@ namespace {
 /// What an observation without a projection costs: a residual of this many sigmas, with no slope.
 constexpr double kUnprojectableSigma = 100.0;
 
-/// G += J^T J for two rows of Columns numbers. Full square: plain loops over fixed lanes.
+/// What one frame sees of a landmark: two rows by the left camera, two by the right one.
+constexpr int kMostSightings = 2;
 template <int Columns>
-inline void add_gram(const double* row0, const double* row1, double* G) {
-  for (int i = 0; i < Columns; ++i)
-    for (int j = 0; j < Columns; ++j) G[i * Columns + j] += row0[i] * row0[j] + row1[i] * row1[j];
+using SightingRows = double[kMostSightings][2][Columns];
+
+/// G = J^T J of the rows of one or two sightings. Full square: plain loops over fixed lanes.
+template <int Columns>
+FBVINS_INLINE void gram(const SightingRows<Columns>& rows, int sightings, double* G) {
+  const double *a = rows[0][0], *b = rows[0][1], *c = rows[1][0], *d = rows[1][1];
+  if (sightings == 1)
+    for (int i = 0; i < Columns; ++i)
+      for (int j = 0; j < Columns; ++j) G[i * Columns + j] = a[i] * a[j] + b[i] * b[j];
+  else
+    for (int i = 0; i < Columns; ++i)
+      for (int j = 0; j < Columns; ++j) G[i * Columns + j] = (a[i] * a[j] + b[i] * b[j]) + (c[i] * c[j] + d[i] * d[j]);
 }
-FBVINS_KERNEL void add_gram_16(const double* row0, const double* row1, double* G) { add_gram<16>(row0, row1, G); }
-FBVINS_KERNEL void add_gram_32(const double* row0, const double* row1, double* G) { add_gram<32>(row0, row1, G); }
+FBVINS_KERNEL void gram_of(const SightingRows<16>& rows, int sightings, double* G) { gram<16>(rows, sightings, G); }
+FBVINS_KERNEL void gram_of(const SightingRows<32>& rows, int sightings, double* G) { gram<32>(rows, sightings, G); }
 
 double belief_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
   const Vec3 r = belief_residual(cameras, w.frames[l.host].state.T_WB, l, w.beliefs[l.belief]);
@@ -76,7 +86,7 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
   Eigen::VectorXd& g = out.g;
   double cost = 0;
   std::array<double, Columns * Columns> G;
-  double rows[2][Columns];
+  SightingRows<Columns> rows;
   std::vector<int> offsets;
   constexpr int kFirstPoseBlock = Columns == 32 ? 3 : 0;
   for (const WindowLandmark& l : w.landmarks) {
@@ -96,7 +106,7 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
       const int target = o->frame;
       const bool same = target == l.host;
       const PairGeometry& pair = pairs(l.host, target);
-      G.fill(0);
+      int sightings = 0;
       for (; o != end && o->frame == target; ++o) {
         Vec3 p_C;
         Vec2 r;
@@ -106,17 +116,18 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
         }
         const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
         cost += robust.cost;
-        fill_jacobian_rows<Columns>(cameras, pair, same, l, x_h, *o, p_C, r, rows);
+        double(&sighting)[2][Columns] = rows[sightings++];
+        fill_jacobian_rows<Columns>(cameras, pair, same, l, x_h, *o, p_C, r, sighting);
         if (robust.weight < 1) {
           const double s = std::sqrt(robust.weight);
           for (int k = 0; k < 2; ++k)
-            for (double& x : rows[k]) x *= s;
+            for (double& x : sighting[k]) x *= s;
         }
-        if constexpr (Columns == 32) add_gram_32(rows[0], rows[1], G.data());
-        else add_gram_16(rows[0], rows[1], G.data());
       }
+      if (sightings == 0) continue;
+      gram_of(rows, sightings, G.data());
 
-      using Gram = Eigen::Matrix<double, Columns, Columns, Eigen::RowMajor>;
+      using Gram = Eigen::Matrix<double, Columns, Columns>;  // symmetric to the last bit
       const Eigen::Map<const Gram> gram(G.data());
       point.V += gram.template block<3, 3>(kPoint, kPoint);
       point.w += gram.template block<3, 1>(kPoint, kResidual);

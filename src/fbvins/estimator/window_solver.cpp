@@ -61,8 +61,7 @@ void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step)
 
 bool WindowInformation::factorise(const WindowLayout& layout, const Eigen::MatrixXd& information) {
   layout_ = layout;
-  llt_.compute(information.selfadjointView<Eigen::Lower>());
-  valid_ = llt_.info() == Eigen::Success;
+  valid_ = factor_.compute(information);
   return valid_;
 }
 
@@ -71,7 +70,7 @@ std::optional<Mat17> WindowInformation::covariance(int frame) const {
   Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(layout_.size(), 17);
   for (int k = 0; k < 15; ++k) unit(layout_.row_of(frame, k), k) = 1;
   for (int k = 0; k < layout_.tilt_size; ++k) unit(layout_.tilt_row() + k, 15 + k) = 1;
-  llt_.matrixL().solveInPlace(unit);
+  factor_.solve_lower(unit);
   std::optional<Mat17> out(std::in_place);
   out->noalias() = unit.transpose() * unit;
   if (!out->allFinite()) return std::nullopt;

@@ -8,11 +8,11 @@
 //   if (solution.summary.usable) use(solution.window.frames, solution.information.covariance(0));
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <optional>
 #include <vector>
 
 #include "fbvins/estimator/window_equations.hpp"
+#include "fbvins/optim/envelope_cholesky.hpp"
 #include "fbvins/optim/levenberg_marquardt.hpp"
 
 namespace fbvins {
@@ -22,14 +22,14 @@ class WindowInformation {
  public:
   /// From the lower triangle; false where it is not positive definite.
   bool factorise(const WindowLayout& layout, const Eigen::MatrixXd& information);
-  Eigen::VectorXd solve(const Eigen::VectorXd& rhs) const { return llt_.solve(rhs); }
+  Eigen::VectorXd solve(const Eigen::VectorXd& rhs) const { return factor_.solve(rhs); }
   /// Of a frame's (p, theta, v, bg, ba) and the tilt (zero where it is not estimated); none where nothing was factorised.
   std::optional<Mat17> covariance(int frame) const;
   void clear() { valid_ = false; }
 
  private:
   WindowLayout layout_;
-  Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)};  // one made of nothing has no state to copy
+  EnvelopeCholesky factor_;
   bool valid_ = false;
 };
 

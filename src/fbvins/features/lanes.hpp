@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "fbvins/core/simd.hpp"
+
 namespace fbvins {
 
 inline constexpr int kLanes = 16;
@@ -13,8 +15,6 @@ using F16 = float __attribute__((vector_size(64)));
 using I16 = std::int32_t __attribute__((vector_size(64)));
 using U16x16 = std::uint16_t __attribute__((vector_size(32)));
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
-
-#define FBVINS_INLINE inline __attribute__((always_inline))
 
 FBVINS_INLINE void load_lanes(const std::uint8_t* p, F16& out) {
   U8x16 bytes;

@@ -23,7 +23,8 @@ struct LmOptions {
   int max_retries = 6;     ///< steps tried at one linearisation, lambda growing tenfold
   double min_step = 1e-6;  ///< converged when the step is smaller
   /// Converged when the cost, half a chi-square, falls by less than this. Absolute, because a prior's
-  /// cost has no meaningful zero; 0.05 is a third of a sigma along the one direction that still moves.
+  /// cost has no meaningful zero; 0.05 is a third of a sigma along the one direction that still moves. Also where the cost
+  /// fell by what the quadratic model promised, but for so little: the model is right there, and so is its minimum.
   double min_decrease = 0.05;
 };
 
@@ -49,11 +50,11 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       return summary;
     }
     bool accepted = false, converged = false;
-    double decrease = 0;
+    double decrease = 0, promised = 0;
     for (int retry = 0; !accepted && !converged && retry < options.max_retries; ++retry) {
       if (problem.solve(lambda)) {
         const double trial = problem.apply_step();
-        const double promised = problem.predicted_decrease();
+        promised = problem.predicted_decrease();
         decrease = cost - trial;
         converged = problem.step_size() < options.min_step || promised < options.min_decrease;
         accepted = std::isfinite(trial) && decrease > 1e-3 * promised;
@@ -71,7 +72,7 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
       summary.usable = i > 0 || converged;
       return summary;
     }
-    if (converged || decrease < options.min_decrease) return summary;
+    if (converged || decrease < options.min_decrease || std::abs(promised - decrease) < options.min_decrease) return summary;
   }
   return summary;
 }

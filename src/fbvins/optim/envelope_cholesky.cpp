@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/optim/envelope_cholesky.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "fbvins/core/simd.hpp"
+
+namespace fbvins {
+namespace {
+
+// Rows of L are made four at a time, from their first number to the diagonal, eight columns at a time.
+constexpr int kRows = 4, kLanes = 8;
+using Lanes = double __attribute__((vector_size(8 * kLanes)));
+
+FBVINS_INLINE void load(const double* p, Lanes& v) { std::memcpy(&v, p, sizeof(v)); }
+
+struct Matrix {
+  double* L;
+  std::ptrdiff_t stride;
+  double* inverse_diagonal;
+};
+
+/// Rows i .. i + 3 in columns k .. k + 7, from what is finished of both: rows of L to the left of k, from `first` on.
+FBVINS_KERNEL bool make_panel(const Matrix& m, int i, int k, int first, int rows) {
+  Lanes a[kRows];
+  for (int r = 0; r < kRows; ++r)
+    for (int c = 0; c < kLanes; ++c) a[r][c] = m.L[(k + c) * m.stride + i + r];
+  for (int j = first; j < k; ++j) {
+    const double* column = m.L + j * m.stride;
+    Lanes v;
+    load(column + k, v);
+    for (int r = 0; r < kRows; ++r) a[r] -= column[i + r] * v;
+  }
+  for (int c = 0; c < kLanes && k + c < i + rows; ++c) {
+    double* column = m.L + (k + c) * m.stride;
+    if (const int r = k + c - i; r >= 0) {  // on the diagonal
+      const double d = a[r][c];
+      if (!(d > 0) || !std::isfinite(d)) return false;
+      column[k + c] = std::sqrt(d);
+      m.inverse_diagonal[k + c] = 1 / column[k + c];
+    }
+    for (int r = std::max(0, k + c + 1 - i); r < kRows; ++r) column[i + r] = a[r][c] * m.inverse_diagonal[k + c];
+    Lanes v;
+    load(column + k, v);
+    for (int r = std::max(0, k + c + 1 - i); r < kRows; ++r) a[r] -= column[i + r] * v;
+  }
+  return true;
+}
+
+FBVINS_KERNEL void subtract_column(const double* column, double factor, int from, int to, double* x) {
+  for (int i = from; i < to; ++i) x[i] -= factor * column[i];
+}
+
+FBVINS_KERNEL double dot(const double* a, const double* b, int count) {  // padded with zeros to whole lanes
+  Lanes sum{};
+  for (int i = 0; i < count; i += kLanes) {
+    Lanes u, v;
+    load(a + i, u);
+    load(b + i, v);
+    sum += u * v;
+  }
+  double s[kLanes];
+  std::memcpy(s, &sum, sizeof(s));
+  return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
+constexpr int padded(int n) { return (n + kLanes - 1) / kLanes * kLanes; }
+
+}  // namespace
+
+bool EnvelopeCholesky::compute(const Eigen::MatrixXd& H) {
+  size_ = static_cast<int>(H.rows());
+  stride_ = padded(size_) + kLanes;
+  L_.assign(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(padded(size_) + kLanes), 0.0);
+  inverse_diagonal_.assign(static_cast<std::size_t>(padded(size_)), 0.0);
+  first_.assign(static_cast<std::size_t>(padded(size_) + kRows), size_);
+  for (int c = 0; c < size_; ++c) {
+    const double* from = H.data() + static_cast<std::ptrdiff_t>(c) * H.outerStride();
+    std::copy(from + c, from + size_, L_.begin() + static_cast<std::ptrdiff_t>(c) * stride_ + c);
+    for (int r = c; r < size_; ++r)
+      if (from[r] != 0 && first_[static_cast<std::size_t>(r)] > c) first_[static_cast<std::size_t>(r)] = c;
+  }
+  const auto first_of = [&](int row, int count) { return *std::min_element(first_.begin() + row, first_.begin() + row + count); };
+  const Matrix m{L_.data(), stride_, inverse_diagonal_.data()};
+  for (int i = 0; i < size_; i += kRows) {
+    const int rows = std::min(kRows, size_ - i), first = std::min(first_of(i, rows), i);
+    for (int k = first / kLanes * kLanes; k < i + rows; k += kLanes) {
+      const int from = std::max(first, std::min(first_of(k, std::min(kLanes, size_ - k)), k));
+      if (!make_panel(m, i, k, from, rows)) return false;
+    }
+  }
+  return true;
+}
+
+void EnvelopeCholesky::forward(double* x, int from) const {
+  for (int k = from; k < size_; ++k) {
+    x[k] *= inverse_diagonal_[static_cast<std::size_t>(k)];
+    if (x[k] != 0) subtract_column(column(k), x[k], k + 1, size_, x);
+  }
+}
+
+Eigen::VectorXd EnvelopeCholesky::solve(Eigen::VectorXd b) const {
+  std::vector<double> x(static_cast<std::size_t>(stride_), 0.0);
+  std::copy(b.data(), b.data() + size_, x.begin());
+  forward(x.data(), 0);
+  for (int k = size_ - 1; k >= 0; --k) {
+    double& value = x[static_cast<std::size_t>(k)];
+    value = (value - dot(column(k) + k + 1, x.data() + k + 1, size_ - k - 1)) * inverse_diagonal_[static_cast<std::size_t>(k)];
+  }
+  std::copy(x.begin(), x.begin() + size_, b.data());
+  return b;
+}
+
+void EnvelopeCholesky::solve_lower(Eigen::MatrixXd& X) const {
+  for (int c = 0; c < X.cols(); ++c) {
+    double* x = X.data() + static_cast<std::ptrdiff_t>(c) * X.outerStride();
+    forward(x, static_cast<int>(std::find_if(x, x + size_, [](double v) { return v != 0; }) - x));
+  }
+}
+
+Eigen::MatrixXd EnvelopeCholesky::lower() const {
+  Eigen::MatrixXd L = Eigen::MatrixXd::Zero(size_, size_);
+  for (int c = 0; c < size_; ++c)
+    for (int r = c; r < size_; ++r) L(r, c) = column(c)[r];
+  return L;
+}
+
+}  // namespace fbvins
