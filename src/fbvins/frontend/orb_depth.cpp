@@ -20,7 +20,7 @@ OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, doub
       by_alignment_(rig, options.min_depth_m) {}
 
 void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats) {
-  by_descriptor_.index(right_features_);
+  if (wants_features()) by_descriptor_.index(right_features_);
   inverse_depths_.clear();
   for (OrbTrack& track : tracks) {
     if (!track.in_sight) continue;
@@ -39,7 +39,7 @@ void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats
 }
 
 std::optional<Vec2> OrbDepth::find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images) {
-  const int k = by_descriptor_.candidate(track.normalised, track.level, track.descriptor);
+  const int k = wants_features() ? by_descriptor_.candidate(track.normalised, track.level, track.descriptor) : -1;
   if (k >= 0) {
     const Keypoint& keypoint = right_features_.keypoints[static_cast<std::size_t>(k)];
     if (!subpixel_) return keypoint.pixel;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tracks in sight found in the right image, and their depth with that: by descriptor along the epipolar band, where
-// that finds nothing by aligning the patch. Buffers are reused; one instance, one thread.
+// The tracks in sight found in the right image, and their depth with that: by aligning the patch along the epipolar line, or,
+// where patches are not followed, by descriptor. Buffers are reused; one instance, one thread.
 //
 //   OrbDepth depth(rig, options);
-//   stats.boost_ms += describer.describe(right_view, depth.right_features());
+//   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features());
 //   depth.match(tracks, images, stats);
 #pragma once
 
@@ -23,7 +23,9 @@ class OrbDepth {
   /// `sigma_px`: standard deviation of an observation in the right image.
   OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
 
-  /// To be filled before match().
+  /// Whether match() goes by descriptor.
+  bool wants_features() const { return !subpixel_ || !fill_in_; }
+  /// Then to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
   /// Median of those matched last, 1/m.

@@ -15,6 +15,10 @@ constexpr double kShortestGap_s = 0.3, kLongestGap_s = 1.4;
 /// Standard deviation of a position that is not refined: descriptors alone are good to a pixel.
 constexpr double kSigmaUnrefined_px = 1.5;
 
+int in_sight(const OrbTracks& tracks) {
+  return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), [](const OrbTrack& t) { return t.in_sight; }));
+}
+
 OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features = options.max_keypoints}; }
 
 }  // namespace
@@ -32,7 +36,8 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       recogniser_(rig.left, options.recognition, extraction(options).levels),
       outliers_(rig.left.focal_px(), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
-      depth_(rig, options, sigma_px_) {}
+      depth_(rig, options, sigma_px_),
+      examination_(!options.subpixel || !options.fill_in) {}
 
 TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out;
@@ -57,18 +62,22 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
 
   view_.t = images_.t();
   view_.T_WC = predictor_.camera_at(view_.t);
-  stats.boost_ms = describer_.describe(packet.frame.left->view(), view_);  // 2.2.1, 2.2.2
   outliers_.begin(view_);
-  stats.detect_ms = timer.lap_ms();
-  if (images_.has_before()) follow(stats);
-  else recogniser_.recognise(tracks_, view_, images_.left(), stats);
+  const ImageView left = packet.frame.left->view();
+  const bool examined = !images_.has_before() || follow(left, stats);
+  if (!images_.has_before()) {
+    examine(left, stats);
+    recogniser_.recognise(tracks_, view_, images_.left(), stats);
+  }
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
-  starter_.start(tracks_, view_, images_.left(), stats);
-  stats.track_ms += timer.lap_ms() - stats.geometry_ms;
+  if (examined) starter_.start(tracks_, view_, images_.left(), stats);
+  examination_.pass(examined, in_sight(tracks_));
+  stats.tracked = in_sight(tracks_) - stats.detected;
+  stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {
-    stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
+    if (depth_.wants_features()) stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
     depth_.match(tracks_, images_, stats);
   }
   out.features = features_of(tracks_, camera_, sigma_px_);
@@ -78,22 +87,36 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   return out;
 }
 
-/// The tracks there are, from the image before into this one (2.1.1, 2.2.3): predicted, matched, refined, checked.
-void OrbFrontend::follow(FrontendStats& stats) {
+/// The tracks there are, from the image before into this one (2.1.1, 2.2.3): predicted, aligned; in an image that is examined the
+/// others matched; checked. Says whether the image was examined.
+bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   const CameraMotion motion = predictor_.between(images_.t_before(), view_.t);
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
   drop_ended();
-  const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, stats);
-  locator_.locate(tracks_, view_, images_, found, stats);
-  recogniser_.recognise(tracks_, view_, images_.left(), stats);
+  locator_.follow(tracks_, view_, images_, stats);
+  const bool examined = examination_.due(in_sight(tracks_));
+  if (examined) {
+    examine(left, stats);
+    const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, stats);
+    locator_.locate(tracks_, view_, images_, found, stats);
+    recogniser_.recognise(tracks_, view_, images_.left(), stats);
+  }
   CpuTimer timer;
   outliers_.judge(tracks_, view_, predictor_, stats);
   drop_ended();
-  matcher_.count_inliers(tracks_, stats);
+  if (examined) matcher_.count_inliers(tracks_, stats);
   thin_out(tracks_, options_.max_features, options_.min_distance_px);
   forget(tracks_, view_.t, options_.memory_s);
   drop_ended();
   stats.geometry_ms = timer.lap_ms();
+  return examined;
+}
+
+/// Keypoints of the left image, described (2.2.1, 2.2.2).
+void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
+  CpuTimer timer;
+  stats.boost_ms += describer_.describe(left, view_);
+  stats.detect_ms += timer.lap_ms();
 }
 
 void OrbFrontend::locate(const LandmarkUpdate& update) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features matched by Hamming distance where the predicted pose
-// expects them, left to right along the epipolar band, checked by epipolar RANSAC, and refined below a
-// pixel by patch alignment. A track that is not seen for a moment (blur, occlusion, a black image) is remembered with
+// The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features, followed from image to image and into the right image by patch
+// alignment where the predicted pose expects them, checked by epipolar RANSAC. Some images are examined: keypoints are
+// extracted, described and matched by Hamming distance, which finds what alignment lost, knows landmarks again and
+// starts tracks where there are holes. A track that is not seen for a moment (blur, occlusion, a black image) is remembered with
 // its descriptor and patch, and continues under its old id when it is seen again; so does, however much later, one whose
 // landmark the estimator has located.
 // Synchronous; one instance is used by one thread at a time; allocates only while it grows.
@@ -15,6 +16,7 @@
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/orb_depth.hpp"
+#include "fbvins/frontend/orb_examination.hpp"
 #include "fbvins/frontend/orb_locator.hpp"
 #include "fbvins/frontend/orb_options.hpp"
 #include "fbvins/frontend/orb_outlier_check.hpp"
@@ -38,7 +40,8 @@ class OrbFrontend final : public Frontend {
 
  private:
   double longest_gap_s() const;
-  void follow(FrontendStats& stats);
+  bool follow(const ImageView& left, FrontendStats& stats);
+  void examine(const ImageView& left, FrontendStats& stats);
   void drop_ended();
 
   OrbFrontendOptions options_;
@@ -48,6 +51,7 @@ class OrbFrontend final : public Frontend {
   MotionPredictor predictor_;
   OrbDescriber describer_;
   OrbView view_;
+
   OrbTracks tracks_;
   OrbTrackMatcher matcher_;
   OrbLocator locator_;
@@ -55,6 +59,7 @@ class OrbFrontend final : public Frontend {
   OrbOutlierCheck outliers_;
   OrbStarter starter_;
   OrbDepth depth_;
+  ExaminationPolicy examination_;
   LandmarkUpdates updates_;
 };
 

@@ -16,6 +16,8 @@ constexpr double kFarthestFillIn_px = 50;
 constexpr double kMaxCreep_px = 0.7;
 /// Largest error of following a track there and back.
 constexpr double kForwardBackward_px = 0.7;
+/// A keypoint this near, times its scale, is the track's.
+constexpr double kSameFeature_px = 2;
 /// Coarsest level on which a position that is known to a pixel or two is aligned.
 constexpr int kNearLevel = 1;
 
@@ -37,7 +39,7 @@ Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const
   miss_x_px_.clear();
   miss_y_px_.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (found[i] < 0 || !tracks[i].was_in_sight) continue;
+    if (found[i] < 0 || !tracks[i].was_in_sight || tracks[i].in_sight) continue;
     const Vec2 miss = keypoint_of(view, found[i])->pixel - tracks[i].px;
     miss_x_px_.push_back(miss.x());
     miss_y_px_.push_back(miss.y());
@@ -46,21 +48,39 @@ Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const
   return {median(miss_x_px_), median(miss_y_px_)};
 }
 
+bool OrbLocator::settle_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
+  const Vec2 before = track.px;
+  if (!px || !settle(track, *px, camera_, view)) return false;
+  if (track.was_in_sight) motion_px_.push_back((track.px - before).norm());
+  return true;
+}
+
+void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats) {
+  motion_px_.clear();
+  if (!choices_.follows()) return;
+  for (OrbTrack& track : tracks) {
+    if (!track.was_in_sight) continue;
+    const OrbPatches& patches = tracks.patches(track);
+    std::optional<Vec2> px = follow_by_alignment(track, patches, track.px, images.left());
+    if (px && !returns(track, *px, images)) px.reset();
+    if (!settle_at(px, track, view)) ++stats.lost_flow;
+  }
+  stats.median_motion_px = median(motion_px_);
+}
+
 void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found,
                         FrontendStats& stats) {
   const Vec2 missed = common_miss(tracks, view, found);
-  motion_px_.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     OrbTrack& track = tracks[i];
-    const Vec2 before = track.px;
     const Keypoint* keypoint = keypoint_of(view, found[i]);
-    const auto px = place(track, tracks.patches(track), keypoint, track.px + missed, images, stats);
-    if (!px || !settle(track, *px, camera_, view)) {
-      if (track.was_in_sight && keypoint == nullptr) ++stats.lost_flow;
+    if (track.in_sight) {
+      if (keypoint != nullptr && (keypoint->pixel - track.px).norm() < kSameFeature_px * keypoint->scale)
+        take_over(track, view, static_cast<std::size_t>(found[i]));
       continue;
     }
-    if (keypoint != nullptr) take_over(track, view, static_cast<std::size_t>(found[i]));
-    if (track.was_in_sight) motion_px_.push_back((track.px - before).norm());
+    const auto px = place(track, tracks.patches(track), keypoint, track.px + missed, images, stats);
+    if (settle_at(px, track, view) && keypoint != nullptr) take_over(track, view, static_cast<std::size_t>(found[i]));
   }
   stats.median_motion_px = median(motion_px_);
 }
@@ -71,8 +91,9 @@ std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches
   if (keypoint != nullptr) {
     px = choices_.subpixel ? refine_match(track, patches, *keypoint, images.left()) : std::optional<Vec2>(keypoint->pixel);
     if (!px) ++stats.lost_check;
-  } else if (track.was_in_sight && choices_.fill_in) {
+  } else if (track.was_in_sight && choices_.fill_in && !choices_.follows()) {
     px = follow_by_alignment(track, patches, expected_px, images.left());
+    if (!px) ++stats.lost_flow;
   }
   if (px && track.was_in_sight && choices_.subpixel && !returns(track, *px, images)) {
     px.reset();

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where each track is in the newest image, to a fraction of a pixel: from the keypoint that its descriptor was matched
-// with, or, without one, from where it is expected, by aligning its patches; and back into the image before as a check.
+// Where each track is in the newest image, to a fraction of a pixel: from where it is expected, by aligning its patches, or
+// from the keypoint that its descriptor was matched with; and back into the image before as a check.
 // Buffers are reused; one instance, one thread.
 //
 //   OrbLocator locator(camera, {.subpixel = true, .fill_in = true});
-//   locator.locate(tracks, view, images, found, stats);
+//   locator.follow(tracks, view, images, stats);             // by alignment alone
+//   locator.locate(tracks, view, images, found, stats);      // the others, and what tracks look like now
 #pragma once
 
 #include <optional>
@@ -20,13 +21,19 @@ class OrbLocator {
   struct Choices {
     bool subpixel = true;  ///< refine positions of keypoints
     bool fill_in = true;   ///< follow tracks without a keypoint
+    /// Tracks can be followed from image to image without keypoints.
+    bool follows() const { return subpixel && fill_in; }
   };
   OrbLocator(const Camera& camera, const Choices& choices) : camera_(camera), choices_(choices) {}
 
-  /// `found`: the keypoint of each track, or -1. Tracks that are found are in sight afterwards, and their keypoints used.
+  /// Tracks that were in sight, if choices.follows(). Those found are in sight afterwards.
+  void follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats);
+  /// `found`: the keypoint of each track, or -1. Tracks that are found are in sight afterwards, and their keypoints used; those
+  /// already in sight take over the descriptor of a keypoint where they are.
   void locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found, FrontendStats& stats);
 
  private:
+  bool settle_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view);
   Vec2 common_miss(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found);
   std::optional<Vec2> place(OrbTrack& track, const OrbPatches& patches, const Keypoint* keypoint, const Vec2& expected_px,
                             const FrameImages& images, FrontendStats& stats);
