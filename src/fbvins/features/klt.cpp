@@ -215,8 +215,7 @@ struct LevelFit {
 
 /// Gauss-Newton iterations on each pyramid level.
 constexpr int kMaxIterations = 15;
-/// Step at which the finest level has converged; coarse levels only have to bring the next one within reach.
-constexpr double kConverged_px = 0.01;
+/// Coarse levels only have to bring the next one within reach.
 constexpr double kConvergedCoarse_px = 0.05;
 /// Smallest normalised cross-correlation of an accepted patch.
 constexpr double kMinCorrelation = 0.75;
@@ -317,7 +316,8 @@ bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) 
   return out.valid;
 }
 
-KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest) {
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
+                    double converged_px) {
   KltResult result;
   result.px = start_px;
   LevelFit fit;
@@ -328,7 +328,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
     fit = LevelFit{};
     fit.px = result.px / scale;
     const bool last = l == finest;
-    align_level(level_patch, image.level(l), last ? kConverged_px : kConvergedCoarse_px, fit);
+    align_level(level_patch, image.level(l), last ? converged_px : std::max(converged_px, kConvergedCoarse_px), fit);
     result.iterations += fit.iterations;
     if (fit.status == KltStatus::ok) result.px = fit.px * scale;
     else if (last) break;

@@ -72,9 +72,13 @@ struct KltResult {
   bool ok() const { return status == KltStatus::ok; }
 };
 
+/// Precision of a position, and of a way back that is only asked whether it leads near where it began.
+inline constexpr double kConverged_px = 0.01, kConvergedCheck_px = 0.1;
+
 /// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it
-/// correlates with the template, or what differs is no more than noise.
-KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest);
+/// correlates with the template, or what differs is no more than noise. `converged_px`: last step on the finest level.
+KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& start_px, int coarsest, int finest,
+                    double converged_px = kConverged_px);
 
 /// Weighted normalised cross-correlation of a template with the image at one place of level `level`
 /// (position in pixels of that level); -1 outside the image.

