@@ -21,6 +21,7 @@ target_compile_options(fbvins_flags INTERFACE
   $<$<BOOL:${FBVINS_WERROR}>:-Werror>)
 
 include(cmake/FbvinsPrecompiled.cmake)
+include(cmake/FbvinsEigen.cmake)
 
 function(fbvins_module NAME)
   cmake_parse_arguments(ARG "COLD" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})

@@ -15,7 +15,15 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME fbvins)
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "FB-VINS: position, velocity and attitude from a stereo camera and an IMU
  Programs: recordings and live sensors in, poses with covariance and health out; MAVLink, flight records, maps; a systemd service.")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+if(CMAKE_CROSSCOMPILING)
+  # dpkg-shlibdeps asks the packages installed here, which are of another architecture: Debian 12's names by hand.
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
+  string(JOIN ", " CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libc6 (>= 2.36)" "libstdc++6 (>= 12)" libgcc-s1 "libfmt9 (>= 9.1.0+ds1)"
+    "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 liblapack3 libblas3
+    libddsc0debian)
+else()
+  set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+endif()
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/conffiles ${PROJECT_SOURCE_DIR}/packaging/postinst
   ${PROJECT_SOURCE_DIR}/packaging/prerm)
 

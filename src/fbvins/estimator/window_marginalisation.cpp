@@ -108,7 +108,9 @@ Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::s
   }
   prior.quadratic = marginalise(information.H, information.g, keep, drop);
   // The gradient was taken at the present estimate; the prior is measured from the first estimates.
-  prior.quadratic = shifted(std::move(prior.quadratic), way_back(problem, prior));
+  // Before the prior is moved from: compilers differ in which argument they evaluate first.
+  const Eigen::VectorXd back = way_back(problem, prior);
+  prior.quadratic = shifted(std::move(prior.quadratic), back);
   return out;
 }
 
