@@ -84,7 +84,8 @@ std::optional<Mat17> WindowSolution::covariance(FrameId frame) const {
 
 bool WindowSolver::step(double lambda, WindowInformation& information) {
   information.clear();
-  reduced_.H = equations_.H;
+  if (reduced_.H.rows() != equations_.H.rows()) reduced_.H.setZero(equations_.H.rows(), equations_.H.cols());
+  reduced_.H.triangularView<Eigen::Lower>() = equations_.H;
   reduced_.g = equations_.g;
   reduced_.H.diagonal() *= 1.0 + lambda;
   reduced_.H.diagonal().array() += kRegularisation;

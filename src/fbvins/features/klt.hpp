@@ -73,7 +73,7 @@ struct KltResult {
 };
 
 /// Precision of a position, and of a way back that is only asked whether it leads near where it began.
-inline constexpr double kConverged_px = 0.01, kConvergedCheck_px = 0.1;
+inline constexpr double kConverged_px = 0.03, kConvergedCheck_px = 0.1;
 
 /// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it
 /// correlates with the template, or what differs is no more than noise. `converged_px`: last step on the finest level.

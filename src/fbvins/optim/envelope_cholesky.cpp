@@ -73,12 +73,15 @@ constexpr int padded(int n) { return (n + kLanes - 1) / kLanes * kLanes; }
 bool EnvelopeCholesky::compute(const Eigen::MatrixXd& H) {
   size_ = static_cast<int>(H.rows());
   stride_ = padded(size_) + kLanes;
-  L_.assign(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(padded(size_) + kLanes), 0.0);
+  L_.resize(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(padded(size_) + kLanes));
   inverse_diagonal_.assign(static_cast<std::size_t>(padded(size_)), 0.0);
   first_.assign(static_cast<std::size_t>(padded(size_) + kRows), size_);
+  std::fill(L_.begin() + static_cast<std::ptrdiff_t>(size_) * stride_, L_.end(), 0.0);
   for (int c = 0; c < size_; ++c) {
     const double* from = H.data() + static_cast<std::ptrdiff_t>(c) * H.outerStride();
-    std::copy(from + c, from + size_, L_.begin() + static_cast<std::ptrdiff_t>(c) * stride_ + c);
+    double* to = L_.data() + static_cast<std::ptrdiff_t>(c) * stride_;
+    std::copy(from + c, from + size_, to + c);
+    std::fill(to + size_, to + stride_, 0.0);
     for (int r = c; r < size_; ++r)
       if (from[r] != 0 && first_[static_cast<std::size_t>(r)] > c) first_[static_cast<std::size_t>(r)] = c;
   }
