@@ -17,6 +17,9 @@ struct RecognitionOptions {
 };
 
 struct OrbFrontendOptions {
+  /// Tracks go from image to image by patch alignment, and only some images are examined for keypoints.
+  bool follows_patches() const { return subpixel && fill_in && !examine_all; }
+
   int max_features = 180;
   int max_keypoints = 500;
   double min_distance_px = 14;
@@ -24,6 +27,7 @@ struct OrbFrontendOptions {
   double search_px = 12;
   bool subpixel = true;
   bool fill_in = true;
+  bool examine_all = false;
   double epipolar_px = 1.0;
   double sigma_px = 0.6;
   double min_depth_m = 0.35;
@@ -39,6 +43,8 @@ struct OrbFrontendOptions {
     v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
+    v("examine_all", examine_all, "",
+      "match descriptors in every image, left to right as well (paper 2.2.3), instead of one image in four and patches between");
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v("min_depth_m", min_depth_m, "m", "nearest point that is looked for in the right image", 0.05, 10.0);

@@ -15,6 +15,7 @@ OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, doub
     : right_camera_(rig.right),
       subpixel_(options.subpixel),
       fill_in_(options.fill_in),
+      by_descriptors_(!options.follows_patches()),
       sigma_px_(sigma_px),
       by_descriptor_(rig, options.min_depth_m, options.stereo_epipolar_px),
       by_alignment_(rig, options.min_depth_m) {}

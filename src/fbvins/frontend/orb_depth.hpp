@@ -24,7 +24,7 @@ class OrbDepth {
   OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
 
   /// Whether match() goes by descriptor.
-  bool wants_features() const { return !subpixel_ || !fill_in_; }
+  bool wants_features() const { return by_descriptors_; }
   /// Then to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
@@ -35,7 +35,7 @@ class OrbDepth {
   std::optional<Vec2> find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
 
   Camera right_camera_;
-  bool subpixel_, fill_in_;
+  bool subpixel_, fill_in_, by_descriptors_;
   double sigma_px_;
   OrbFeatures right_features_;
   OrbStereoMatcher by_descriptor_;

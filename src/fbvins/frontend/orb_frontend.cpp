@@ -32,12 +32,12 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       describer_(extraction(options), std::move(stage)),
       tracks_(options.max_features + kMostOutOfSight),
       matcher_(options.search_px),
-      locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in}),
+      locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in, .follows = options.follows_patches()}),
       recogniser_(rig.left, options.recognition, extraction(options).levels),
       outliers_(rig.left.focal_px(), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
       depth_(rig, options, sigma_px_),
-      examination_(!options.subpixel || !options.fill_in) {}
+      examination_(!options.follows_patches()) {}
 
 TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& prior) {
   TrackedFrame out;

@@ -151,6 +151,21 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   }
 }
 
+TEST(OrbFrontend, ExaminesOneImageInFourOrAllOfThem) {
+  for (const bool all : {false, true}) {
+    OrbFrontendOptions options = small_options();
+    options.examine_all = all;
+    const auto frames = run(packets(), options);
+    int matched = 0;
+    for (std::size_t k = 1; k < frames.size(); ++k) matched += frames[k].stats.matches.found > 0;
+    const int after_first = static_cast<int>(frames.size()) - 1;
+    if (all) EXPECT_EQ(matched, after_first);
+    else EXPECT_LE(matched, after_first / 2);
+    EXPECT_GT(frames.back().features.size(), 25u);
+    EXPECT_LT(median_error_px(frames), 0.12);
+  }
+}
+
 TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
   for (const bool missing : {true, false}) {
     std::vector<SensorPacket> input = packets();

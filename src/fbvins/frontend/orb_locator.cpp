@@ -57,7 +57,7 @@ bool OrbLocator::settle_at(const std::optional<Vec2>& px, OrbTrack& track, const
 
 void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats) {
   motion_px_.clear();
-  if (!choices_.follows()) return;
+  if (!choices_.follows) return;
   for (OrbTrack& track : tracks) {
     if (!track.was_in_sight) continue;
     const OrbPatches& patches = tracks.patches(track);
@@ -91,7 +91,7 @@ std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches
   if (keypoint != nullptr) {
     px = choices_.subpixel ? refine_match(track, patches, *keypoint, images.left()) : std::optional<Vec2>(keypoint->pixel);
     if (!px) ++stats.lost_check;
-  } else if (track.was_in_sight && choices_.fill_in && !choices_.follows()) {
+  } else if (track.was_in_sight && choices_.fill_in && !choices_.follows) {
     px = follow_by_alignment(track, patches, expected_px, images.left());
     if (!px) ++stats.lost_flow;
   }

@@ -3,7 +3,7 @@
 // from the keypoint that its descriptor was matched with; and back into the image before as a check.
 // Buffers are reused; one instance, one thread.
 //
-//   OrbLocator locator(camera, {.subpixel = true, .fill_in = true});
+//   OrbLocator locator(camera, {.subpixel = true, .fill_in = true, .follows = true});
 //   locator.follow(tracks, view, images, stats);             // by alignment alone
 //   locator.locate(tracks, view, images, found, stats);      // the others, and what tracks look like now
 #pragma once
@@ -21,12 +21,11 @@ class OrbLocator {
   struct Choices {
     bool subpixel = true;  ///< refine positions of keypoints
     bool fill_in = true;   ///< follow tracks without a keypoint
-    /// Tracks can be followed from image to image without keypoints.
-    bool follows() const { return subpixel && fill_in; }
+    bool follows = false;  ///< follow() has followed them
   };
   OrbLocator(const Camera& camera, const Choices& choices) : camera_(camera), choices_(choices) {}
 
-  /// Tracks that were in sight, if choices.follows(). Those found are in sight afterwards.
+  /// Tracks that were in sight, if choices.follows. Those found are in sight afterwards.
   void follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats);
   /// `found`: the keypoint of each track, or -1. Tracks that are found are in sight afterwards, and their keypoints used; those
   /// already in sight take over the descriptor of a keypoint where they are.

@@ -50,7 +50,7 @@ struct Scene {
 TEST(OrbLocator, FollowsByAlignmentWhatHasNoKeypoint) {
   Scene scene;
   const std::size_t all = scene.tracks.size();
-  OrbLocator(scene.wall.camera, {}).follow(scene.tracks, scene.view, scene.images, scene.stats);
+  OrbLocator(scene.wall.camera, {.follows = true}).follow(scene.tracks, scene.view, scene.images, scene.stats);
   const std::vector<double> errors = scene.errors_px();
   EXPECT_GT(errors.size(), all * 3 / 4);
   for (const double error : errors) EXPECT_LT(error, 0.3);
