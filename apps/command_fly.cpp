@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -30,6 +31,7 @@ examples:
   fbvins fly configs/missions/paper.yaml --frontend orb --preset dim --seed 3
   fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
+  FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
   fbvins report f                                                path, setpoint, modes, effort in one page
 )";
@@ -39,7 +41,7 @@ struct Arguments {
   ConfigArguments config;
   int seed = 1;
   double wind_mps = -1;
-  bool loop = false, threaded = false, record = false, quiet = false;
+  bool loop = false, threaded = false, record = false, quiet = false, px4 = false;
 };
 
 struct FlightRun {
@@ -66,6 +68,12 @@ Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
   setup.estimator.options = config;
   setup.estimator.mode = a.threaded ? RunMode::threaded : RunMode::deterministic;
   if (a.record) setup.recording = a.out + "/recording";
+  if (a.px4) {
+    const char* binary = std::getenv("FBVINS_PX4");
+    if (binary == nullptr || *binary == '\0')
+      return Error{ErrorCode::invalid_argument, "--px4: FBVINS_PX4 does not name bin/px4 of a px4_sitl build"};
+    setup.px4 = {binary, a.out + "/px4"};
+  }
   return setup;
 }
 
@@ -134,7 +142,7 @@ int fly_mission(Arguments a) {
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const FlightSummary summary = summarise(flight->log, setup->mission);
   const FlightFacts facts{
-      std::filesystem::path(a.mission).stem().string(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop};
+      std::filesystem::path(a.mission).stem().string(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, a.px4};
   for (const Result<void>& done : {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out),
                                    write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
                                    write_text(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
@@ -160,6 +168,7 @@ void add_fly_command(CLI::App& program, int& exit_code) {
   command->add_option("--control", a->control, "YAML file that changes gains and limits, by PX4's names");
   command->add_option("--wind", a->wind_mps, "mean wind in m/s, gusts of two thirds of it (default 0.3)")
       ->check(CLI::Range(0.0, 10.0));
+  command->add_flag("--px4", a->px4, "a real PX4 flies: FBVINS_PX4 names bin/px4 of its px4_sitl build (docs/px4.md)");
   command->add_flag("--loop", a->loop, "loop closure: the mission is flown in the map's frame");
   command->add_flag("--record", a->record, "images, IMU and truth too, as a recording in OUT/recording");
   command->add_flag("--threaded", a->threaded, "frontend and estimator on threads of their own; the same result");

@@ -53,6 +53,7 @@ std::string flight_text(const FlightFacts& facts, const FlightLog& log, const Fl
       "estimate to truth {:.1f} / {:.1f} cm\n",
       s.flown_s, s.top_speed_mps, s.largest_tilt_deg, 100 * s.tracking.rmse, 100 * s.tracking.max, 100 * s.estimation.rmse,
       100 * s.estimation.max);
+  if (facts.px4) text += fmt::format("  PX4: {} resets of its estimator in flight\n", log.controller_resets);
   text += "  ";
   for (std::size_t i = 0; i < s.modes.size(); ++i)
     text += fmt::format("{}{} {:.1f} s", i > 0 ? ", " : "", s.modes[i].first, s.modes[i].second);
@@ -82,6 +83,10 @@ std::string flight_json_text(const FlightFacts& facts, const FlightLog& log, con
   json["flown_s"] = rounded(s.flown_s);
   json["least_battery_V"] = rounded(s.least_battery_V);
   json["images"] = log.images;
+  json["controller"] = facts.px4 ? "px4" : "own";
+  json["controller_resets"] = log.controller_resets;
+  json["events"] = Json::array();
+  for (const ControllerEvent& event : log.events) json["events"].push_back({rounded(event.t_s), event.text});
   json["modes"] = Json::array();
   for (const auto& [name, seconds] : s.modes) json["modes"].push_back({name, rounded(seconds)});
   return json.dump(1) + "\n";

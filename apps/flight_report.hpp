@@ -13,7 +13,7 @@ namespace fbvins::app {
 struct FlightFacts {
   std::string mission, preset, frontend, vehicle;
   int seed = 0;
-  bool loop = false;
+  bool loop = false, px4 = false;
 };
 
 std::string flight_text(const FlightFacts& facts, const FlightLog& log, const FlightSummary& summary);

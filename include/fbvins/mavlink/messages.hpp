@@ -11,6 +11,8 @@
 #include <string>
 #include <variant>
 
+#include "fbvins/mavlink/flight_messages.hpp"
+
 namespace fbvins {
 
 /// MAV_FRAME, MAV_ESTIMATOR_TYPE and MAV_SEVERITY, as far as used here.
@@ -125,6 +127,7 @@ struct StatusTextMessage {
 StatusTextMessage status_text(MavSeverity severity, const std::string& sentence);
 
 using MavlinkMessage = std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage,
-                                    StatusTextMessage>;
+                                    StatusTextMessage, PositionTargetMessage, CommandMessage, CommandAckMessage,
+                                    LandedStateMessage, HilSensorMessage, HilActuatorControlsMessage>;
 
 }  // namespace fbvins

@@ -14,42 +14,32 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/flight/controller.hpp"
-#include "fbvins/flight/failsafe.hpp"
+#include "fbvins/flight/flight_controller.hpp"
 #include "fbvins/flight/floor_level.hpp"
 #include "fbvins/flight/guide.hpp"
 #include "fbvins/flight/inertial_reference.hpp"
 #include "fbvins/flight/mission.hpp"
 #include "fbvins/live/pose_propagator.hpp"
-#include "fbvins/types/loop.hpp"
 
 namespace fbvins {
 
-/// What the autopilot made of one reading.
-struct AutopilotOutput {
-  Time t;
-  FlightMode mode = FlightMode::waiting;
-  FlightReason reason = FlightReason::none;
-  Health health;              ///< the odometry's
-  double estimate_age_s = 0;  ///< since the image of the newest estimate
-  VehicleEstimate estimate;   ///< flown by
-  PathSetpoint setpoint;
-  ControlTrace control;
-  std::size_t step = 0;  ///< of the mission
-};
-
-class Autopilot {
+class Autopilot final : public FlightController {
  public:
   Autopilot(const Mission& mission, const ControlOptions& options, const StereoRig& rig, const Pose<BodyFlu, B>& mounting);
 
-  void add(const Odometry& odometry);
-  /// Where W is in the map, where there is one: the mission is flown in the map's frame then.
-  void add(const MapUpdate& update);
-  void add_barometer(double height_m) { reference_.correct(height_m); }
+  void add(const Odometry& odometry) override;
+  /// The mission is flown in the map's frame then.
+  void add(const MapUpdate& update) override;
+  void add_barometer(double height_m) override { reference_.correct(height_m); }
+  Result<void> take(const ImuSample& reading) override {
+    update(reading);
+    return {};
+  }
   /// Commands until the next reading.
   PerRotor update(const ImuSample& reading);
 
-  const AutopilotOutput& output() const { return out_; }
+  const PerRotor& commands() const override { return out_.control.commands; }
+  const AutopilotOutput& output() const override { return out_; }
   /// From W to L; none before take-off.
   const std::optional<Pose<Local, W>>& local_from_odometry() const { return T_LW_; }
 

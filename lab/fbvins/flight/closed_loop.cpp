@@ -10,6 +10,7 @@
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/rng.hpp"
+#include "fbvins/flight/board_imu.hpp"
 #include "fbvins/sim/sensor_station.hpp"
 
 namespace fbvins {
@@ -80,9 +81,17 @@ double longest_flight_s(const Mission& mission) {
   return seconds;
 }
 
+Result<std::unique_ptr<FlightController>> controller_of(const FlightSetup& setup, const StereoRig& rig) {
+  const Pose<BodyFlu, B> mounting = imu_mounting(rig, setup.simulation.flight.camera_pitch_deg);
+  if (setup.px4.binary.empty())
+    return std::unique_ptr<FlightController>(std::make_unique<Autopilot>(setup.mission, setup.control, rig, mounting));
+  return Px4Controller::create(setup.px4, setup.mission, setup.control, setup.vehicle, rig, mounting);
+}
+
 class ClosedLoop {
  public:
-  ClosedLoop(const FlightSetup& setup, const MissionSite& site, SensorStation station, std::unique_ptr<EstimatorLink> link)
+  ClosedLoop(const FlightSetup& setup, const MissionSite& site, SensorStation station, std::unique_ptr<EstimatorLink> link,
+             std::unique_ptr<FlightController> controller)
       : setup_(setup),
         station_(std::move(station)),
         link_(std::move(link)),
@@ -92,10 +101,11 @@ class ClosedLoop {
         wind_(setup.wind, static_cast<std::uint64_t>(setup.simulation.seed)),
         barometer_(setup.barometer, static_cast<std::uint64_t>(setup.simulation.seed)),
         collisions_(station_.world(), hull_of(setup.vehicle)),
-        autopilot_(setup.mission, setup.control, station_.rig(),
-                   imu_mounting(station_.rig(), setup.simulation.flight.camera_pitch_deg)),
-        steps_per_reading_(
-            std::max(1, static_cast<int>(std::lround(1 / (Quadrotor::kStep_s * station_.rig().imu_noise.rate_hz))))) {}
+        controller_(std::move(controller)),
+        steps_per_reading_(steps_at(station_.rig().imu_noise.rate_hz)) {
+    if (controller_->board_rate_hz() > 0)
+      board_.emplace(controller_->board_rate_hz(), setup.simulation.imu, static_cast<std::uint64_t>(setup.simulation.seed));
+  }
 
   Result<FlightLog> run(const std::function<void(double, FlightMode)>& progress) {
     if (!setup_.recording.empty()) {
@@ -103,15 +113,18 @@ class ClosedLoop {
       if (!folder) return folder.error();
       recording_.emplace(std::move(*folder));
     }
+    if (Result<void> done = warm_up(); !done) return done.error();
     const auto last = static_cast<std::int64_t>(longest_flight_s(setup_.mission) / Quadrotor::kStep_s);
     for (step_ = 0; !over_ && step_ < last; ++step_) {
       history_.add(now_s(), vehicle_.motion_of(mounting_));
       if (Result<void> done = look(); !done) return done.error();
+      if (board_ && step_ % steps_at(controller_->board_rate_hz()) == 0)
+        if (Result<void> done = feel_board(now_s()); !done) return done.error();
       if (step_ % steps_per_reading_ == 0) {
         if (Result<void> done = feel(); !done) return done.error();
-        if (progress) progress(now_s(), autopilot_.output().mode);
+        if (progress) progress(now_s(), controller_->output().mode);
       }
-      vehicle_.step(commands_, wind_.step(Quadrotor::kStep_s, vehicle_.state().T_WV.p.z()));
+      vehicle_.step(controller_->commands(), wind_.step(Quadrotor::kStep_s, vehicle_.state().T_WV.p.z()));
       watch();
     }
     log_.start = start_;
@@ -119,8 +132,10 @@ class ClosedLoop {
     if (Result<void> done = link_->finish(); !done) return done.error();
     if (recording_)
       if (Result<void> done = recording_->finish(log_.imu); !done) return done.error();
-    log_.mode = autopilot_.output().mode;
-    log_.reason = autopilot_.output().reason;
+    log_.mode = controller_->output().mode;
+    log_.reason = controller_->output().reason;
+    log_.events = controller_->events();
+    log_.controller_resets = controller_->resets_in_flight();
     return std::move(log_);
   }
 
@@ -135,6 +150,32 @@ class ClosedLoop {
     return std::any_of(setup_.mission.faults.begin(), setup_.mission.faults.end(), [&](const MissionFault& f) {
       return f.what == what && t >= f.at_s && (f.for_s == 0 || t < f.at_s + f.for_s);
     });
+  }
+
+  static int steps_at(double rate_hz) { return std::max(1, static_cast<int>(std::lround(1 / (Quadrotor::kStep_s * rate_hz)))); }
+  PerRotor rotor_shares() const {
+    PerRotor shares = vehicle_.state().rotor_radps;
+    for (double& w : shares) w /= hover_radps(setup_.vehicle);
+    return shares;
+  }
+
+  /// A flight controller with sensors of its own is on before the rest of the world.
+  Result<void> warm_up() {
+    if (!board_) return {};
+    const double rate_hz = controller_->board_rate_hz();
+    next_barometer_s_ = -controller_->warm_up_s();
+    for (auto n = static_cast<std::int64_t>(next_barometer_s_ * rate_hz); n < 0; ++n)
+      if (Result<void> done = feel_board(static_cast<double>(n) / rate_hz); !done) return done;
+    return {};
+  }
+  Result<void> feel_board(double t_s) {
+    press(t_s);
+    return controller_->take_board(board_->read(t_s, vehicle_, rotor_shares()));
+  }
+  void press(double t_s) {
+    if (t_s < next_barometer_s_) return;
+    controller_->add_barometer(barometer_.read(vehicle_.state().T_WV.p.z()));
+    next_barometer_s_ += 1 / Barometer::kRate_hz;
   }
 
   /// Images whose exposure is over.
@@ -153,9 +194,7 @@ class ClosedLoop {
 
   /// One reading, and what follows from it.
   Result<void> feel() {
-    PerRotor shares = vehicle_.state().rotor_radps;
-    for (double& w : shares) w /= hover_radps(setup_.vehicle);
-    const ImuSample reading = station_.read_imu(vehicle_.motion_of(mounting_), shares);
+    const ImuSample reading = station_.read_imu(vehicle_.motion_of(mounting_), rotor_shares());
     log_.imu.samples.push_back(reading);
     log_.imu.truth.push_back(station_.truth());
     if (Result<void> done = link_->push(reading); !done) return done;
@@ -165,15 +204,12 @@ class ClosedLoop {
     for (const KnownEstimate& estimate : *known) {
       log_.odometry.push_back(estimate.odometry);
       if (failed(MissionFault::What::odometry)) continue;
-      autopilot_.add(estimate.odometry);
-      for (const MapUpdate& update : estimate.updates) autopilot_.add(update);
+      controller_->add(estimate.odometry);
+      for (const MapUpdate& update : estimate.updates) controller_->add(update);
     }
-    if (now_s() >= next_barometer_s_) {
-      autopilot_.add_barometer(barometer_.read(vehicle_.state().T_WV.p.z()));
-      next_barometer_s_ += 1 / Barometer::kRate_hz;
-    }
-    commands_ = autopilot_.update(reading);
-    if (!airborne_s_ && autopilot_.output().mode == FlightMode::mission) airborne_s_ = now_s();
+    press(now_s());
+    if (Result<void> done = controller_->take(reading); !done) return done;
+    if (!airborne_s_ && controller_->output().mode == FlightMode::mission) airborne_s_ = now_s();
     write_row();
     return {};
   }
@@ -185,7 +221,8 @@ class ClosedLoop {
     row.t_s = now_s();
     row.truth = (T_LW * s.T_WV).cast_frames<Local, BodyFlu>();
     row.true_velocity = T_LW.q * s.v_WV;
-    row.autopilot = autopilot_.output();
+    row.autopilot = controller_->output();
+    row.autopilot.control.commands = controller_->commands();
     row.rotor_radps = s.rotor_radps;
     row.battery_V = vehicle_.battery_V();
     log_.rows.push_back(row);
@@ -193,7 +230,7 @@ class ClosedLoop {
 
   /// Whether it is over: by plan, or because something is in the way.
   void watch() {
-    const AutopilotOutput& out = autopilot_.output();
+    const AutopilotOutput& out = controller_->output();
     const QuadrotorState& s = vehicle_.state();
     const bool done = out.mode == FlightMode::landed || (airborne_s_ && out.step >= setup_.mission.steps.size());
     afterwards_s_ = done ? afterwards_s_ + Quadrotor::kStep_s : 0;
@@ -223,12 +260,12 @@ class ClosedLoop {
   Wind wind_;
   Barometer barometer_;
   CollisionCheck collisions_;
-  Autopilot autopilot_;
+  std::unique_ptr<FlightController> controller_;
+  std::optional<BoardImu> board_;
   int steps_per_reading_;
   MotionHistory history_;
   std::optional<EurocFolder> recording_;
   FlightLog log_;
-  PerRotor commands_{};
   std::int64_t step_ = 0;
   std::optional<double> airborne_s_;  ///< since when the mission runs
   double next_barometer_s_ = 0, afterwards_s_ = 0, falling_mps_ = 0;
@@ -270,7 +307,9 @@ Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double,
   if (!station) return station.error();
   Result<std::unique_ptr<EstimatorLink>> link = EstimatorLink::create(setup.estimator, as_recorded(station->rig()));
   if (!link) return link.error();
-  return ClosedLoop(setup, *site, *std::move(station), *std::move(link)).run(progress);
+  Result<std::unique_ptr<FlightController>> controller = controller_of(setup, station->rig());
+  if (!controller) return controller.error();
+  return ClosedLoop(setup, *site, *std::move(station), *std::move(link), *std::move(controller)).run(progress);
 }
 
 }  // namespace fbvins

@@ -5,6 +5,7 @@
 //
 //   Result<FlightLog> flight = fly(setup, [](double t_s, FlightMode mode) { ... });
 //
+// With a real PX4 behind its simulator interface the same world waits for PX4, too; its threads make no promise about bits.
 // Truth goes to the log alone. L here is the true one: where the vehicle truly stood.
 #pragma once
 
@@ -16,6 +17,7 @@
 #include "fbvins/flight/autopilot.hpp"
 #include "fbvins/flight/collision.hpp"
 #include "fbvins/flight/estimator_link.hpp"
+#include "fbvins/flight/px4_controller.hpp"
 #include "fbvins/sim/barometer.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 #include "fbvins/sim/simulation.hpp"
@@ -34,6 +36,7 @@ struct FlightSetup {
   double estimate_delay_s = 0.03;   ///< from an image to its pose in the controller
   double mounting_error_deg = 0.2;  ///< standard deviation on each axis, of what the autopilot does not know
   std::string recording;            ///< folder for a recording; empty: none
+  Px4Setup px4;                     ///< flies instead of the autopilot, where it is named
 };
 
 /// One reading of the IMU.
@@ -56,6 +59,8 @@ struct FlightLog {
   std::optional<std::string> crash;  ///< one sentence
   bool out_of_time = false;
   int images = 0;
+  std::vector<ControllerEvent> events;  ///< what another flight controller said and did
+  int controller_resets = 0;            ///< of its estimator, in flight
 };
 
 Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double t_s, FlightMode mode)>& progress = {});

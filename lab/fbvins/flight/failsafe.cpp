@@ -38,6 +38,7 @@ std::string_view to_string(FlightReason reason) {
     case FlightReason::lost: return "lost";
     case FlightReason::off_path: return "off_path";
     case FlightReason::outside_fence: return "outside_fence";
+    case FlightReason::flight_controller: return "flight_controller";
   }
   return "";
 }

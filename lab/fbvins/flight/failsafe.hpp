@@ -32,6 +32,7 @@ enum class FlightReason {
   lost,       ///< the odometry has no pose, or has been silent for too long
   off_path,   ///< the vehicle does not follow
   outside_fence,
+  flight_controller,  ///< it did so by itself, or would not begin
 };
 
 std::string_view to_string(FlightMode mode);

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// The companion's half of a mission that a PX4 flies: when the odometry is good it streams setpoints, asks for OFFBOARD and arms;
+// then the mission's setpoints, and to land the command for it. What PX4 does by itself is told as a failsafe of its own. No
+// ports and no clock: messages and time come in as arguments. One owner.
+//
+//   Px4Mission mission(steps, 200, px4.system_id(), ahead_s);
+//   mission.hear(frame, now_s);
+//   for (const MavlinkMessage& message : mission.update(live_pose, now_s)) send(message);
+//   log(mission.output());
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fbvins/flight/guide.hpp"
+#include "fbvins/flight/px4_frames.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/mavlink/wire.hpp"
+
+namespace fbvins {
+
+class Px4Mission {
+ public:
+  /// `ahead_s`: PX4's clock less the time that the other arguments are in.
+  Px4Mission(const Mission& mission, double rate_hz, int system_id, double ahead_s);
+
+  void hear(const MavlinkFrame& frame, double now_s);
+  /// With every reading of the odometry's IMU. What is to be sent.
+  std::vector<MavlinkMessage> update(const LivePose& pose, double now_s);
+
+  const AutopilotOutput& output() const { return out_; }
+  const std::vector<ControllerEvent>& events() const { return events_; }
+  /// How often its estimator moved its own frame between arming and landing.
+  int resets_in_flight() const { return resets_in_flight_; }
+
+ private:
+  void hear(const HeartbeatMessage& beat, double now_s);
+  void hear_odometry(const OdometryMessage& odometry, double now_s);
+  void hear(const CommandAckMessage& ack, double now_s);
+  void look(double now_s);
+  void prepare(double now_s);
+  void take_off(double now_s);
+  void guide(double now_s);
+  void command(std::uint16_t number, std::array<float, 7> params, double now_s);
+  void say(double now_s, const std::string& text);
+  bool in_flight() const { return flying_ && out_.mode != FlightMode::landed; }
+
+  Geofence fence_;
+  double dt_s_, ahead_s_;
+  std::uint8_t system_;
+  Guide guide_;
+  Failsafe failsafe_;
+  std::uint32_t reset_counter_ = 0;  ///< of the odometry
+  // What PX4 says of itself.
+  bool armed_ = false, heard_ = false;
+  std::uint32_t px4_mode_ = 0;
+  std::optional<OdometryMessage> odometry_;
+  double odometry_s_ = 0;
+  // What is said to it.
+  Pose<Local, Px4Local> T_LN_;
+  bool flying_ = false;
+  double ready_s_ = 0, next_target_s_ = 0, next_command_s_ = 0;
+  std::vector<MavlinkMessage> outgoing_;
+  std::vector<ControllerEvent> events_;
+  int resets_in_flight_ = 0;
+  AutopilotOutput out_;
+};
+
+}  // namespace fbvins
