@@ -32,6 +32,7 @@ examples:
   fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
   FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
+  fbvins fly --identify --out f && fbvins tune f                 gains from how the vehicle answers
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
   fbvins report f                                                path, setpoint, modes, effort in one page
 )";
@@ -41,7 +42,9 @@ struct Arguments {
   ConfigArguments config;
   int seed = 1;
   double wind_mps = -1;
-  bool loop = false, threaded = false, record = false, quiet = false, px4 = false;
+  bool loop = false, threaded = false, record = false, quiet = false, px4 = false, identify = false;
+
+  std::string mission_name() const { return identify ? "identify" : std::filesystem::path(mission).stem().string(); }
 };
 
 struct FlightRun {
@@ -49,9 +52,18 @@ struct FlightRun {
   FlightLog log;
 };
 
+/// Up, every axis moved in turn, and down again.
+constexpr const char* kIdentify = "steps:\n  - takeoff: 1.2\n  - hold: 3\n  - identify\n  - hold: 2\n  - land\n";
+
+Result<Mission> mission_of(const Arguments& a) {
+  if (a.identify == !a.mission.empty())
+    return Error{ErrorCode::invalid_argument, "either a mission to fly, or --identify for the one that moves every axis"};
+  return a.identify ? parse_mission(kIdentify, a.mission_name()) : read_mission(a.mission);
+}
+
 Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
   FlightSetup setup;
-  Result<Mission> mission = read_mission(a.mission);
+  Result<Mission> mission = mission_of(a);
   if (!mission) return mission.error();
   Result<SimulationOptions> simulation = simulation_preset(a.preset);
   if (!simulation) return simulation.error();
@@ -113,7 +125,7 @@ Result<void> write_as_run(const Arguments& a, const Config& config, const Flight
     poses.push_back({s.t, s.T_WB});
   }
   RunSummary summary = summarise(flight.run, flight.run.images(), poses);
-  summary.dataset = fmt::format("{}-{}-s{}", std::filesystem::path(a.mission).stem().string(), a.preset, a.seed);
+  summary.dataset = fmt::format("{}-{}-s{}", a.mission_name(), a.preset, a.seed);
   summary.frontend = config.frontend.kind;
   summary.mode = a.threaded ? "threaded" : "deterministic";
   summary.wall_s = wall_s;
@@ -124,12 +136,16 @@ Result<void> write_as_run(const Arguments& a, const Config& config, const Flight
   return write_text(a.out + "/summary.txt", to_text(summary));
 }
 
+/// The gains that were flown.
+Result<void> write_control(const FlightSetup& setup, const std::string& out) {
+  ControlOptions control = setup.control;
+  return write_text(out + "/control.yaml", write_yaml(fields_of(control)));
+}
+
 int fly_mission(Arguments a) {
   const Result<Config> config = a.config.load();
   if (!config) return fail(config.error().message);
-  if (a.out.empty())
-    a.out = fmt::format("out/{}-{}-s{}-{}", std::filesystem::path(a.mission).stem().string(), a.preset, a.seed,
-                        config->frontend.kind);
+  if (a.out.empty()) a.out = fmt::format("out/{}-{}-s{}-{}", a.mission_name(), a.preset, a.seed, config->frontend.kind);
   const Result<FlightSetup> setup = setup_of(a, *config);
   if (!setup) return fail(setup.error().message);
   std::error_code error;
@@ -141,11 +157,11 @@ int fly_mission(Arguments a) {
   if (!flight) return fail(flight.error().message);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const FlightSummary summary = summarise(flight->log, setup->mission);
-  const FlightFacts facts{
-      std::filesystem::path(a.mission).stem().string(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, a.px4};
-  for (const Result<void>& done : {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out),
-                                   write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
-                                   write_text(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
+  const FlightFacts facts{a.mission_name(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, a.px4};
+  for (const Result<void>& done :
+       {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out), write_control(*setup, a.out),
+        write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
+        write_text(a.out + "/flight.txt", flight_text(facts, flight->log, summary))})
     if (!done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", flight_text(facts, flight->log, summary), bold(a.out));
   return summary.arrived ? kOk : kEstimationFailed;
@@ -157,7 +173,9 @@ void add_fly_command(CLI::App& program, int& exit_code) {
   auto a = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("fly", kFlyDescription);
   command->footer(kExamples);
-  command->add_option("MISSION", a->mission, "YAML file: takeoff, goto, hold, yaw, land")->required();
+  command->add_option("MISSION", a->mission, "YAML file: takeoff, goto, hold, yaw, identify, land");
+  command->add_flag("--identify", a->identify,
+                    "instead of a mission: moves every axis, so that `fbvins tune` can tell them apart");
   command->add_option("--preset", a->preset, "world and light (see fbvins simulate)")
       ->check(CLI::IsMember(simulation_presets()))
       ->capture_default_str();

@@ -26,6 +26,7 @@ inline constexpr const char* kMapDescription = "look at, join and export maps th
 inline constexpr const char* kVocabDescription = "train or look at a vocabulary of visual words";
 inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
+inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
 
 void add_run_command(CLI::App& program, int& exit_code);
@@ -39,6 +40,7 @@ void add_fly_command(CLI::App& program, int& exit_code);
 void add_live_command(CLI::App& program, int& exit_code);
 void add_map_command(CLI::App& program, int& exit_code);
 void add_mocap_command(CLI::App& program, int& exit_code);
+void add_tune_command(CLI::App& program, int& exit_code);
 void add_vocab_command(CLI::App& program, int& exit_code);
 
 }  // namespace fbvins::app

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
 #ifdef FBVINS_WITH_LAB
                               {"fly", kFlyDescription, "fbvins-lab"},
                               {"bench", kBenchDescription, "fbvins-lab"},
+                              {"tune", kTuneDescription, "fbvins-lab"},
 #endif
                           });
 }

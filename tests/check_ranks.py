@@ -21,10 +21,10 @@ RANKS = {
     "live": 6,
     "config": 7, "ros2": 7, "flight": 7,
     "report": 8,
-    "experiment": 9,
+    "experiment": 9, "tuning": 9,
 }
 # What makes and judges data lives in lab/, and nothing outside sees it.
-LABORATORY = {"sim", "flight", "report", "experiment"}
+LABORATORY = {"sim", "flight", "report", "experiment", "tuning"}
 # Within a rank only these: a camera rig is made of the values that travel.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')

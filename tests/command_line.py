@@ -62,7 +62,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
-        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["live"]):
+        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)
@@ -87,6 +87,8 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("report", self.folder), "summary.json")
         self.assert_bad_input(fbvins("bench", self.folder / "none.yaml"), "none.yaml")
         self.assert_bad_input(fbvins("fly", self.folder / "none.yaml"), "none.yaml")
+        self.assert_bad_input(fbvins("fly"), "--identify")
+        self.assert_bad_input(fbvins("tune", self.folder / "none.ulg"), "none.ulg")
         self.assert_bad_input(fbvins("bench", self.write("m.yaml", "datasets:\n  - {pth: x}\n")), "m.yaml:2: unknown key 'pth'")
 
     def test_config_round_trip(self):

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/flight/excitation.hpp"
 #include "fbvins/sim/flight_path.hpp"
 
 namespace fbvins {
@@ -73,6 +74,10 @@ void Guide::begin_step() {
       break;
     case MissionStep::Kind::hold: length_s_ = step.seconds; break;
     case MissionStep::Kind::yaw: wanted_yaw_rad_ = step.yaw_rad; break;
+    case MissionStep::Kind::identify:
+      length_s_ = excitation_length_s();
+      hover_ = now_;
+      break;
     case MissionStep::Kind::land: landing_ = true; break;
   }
   if (corners.size() < 2) return;
@@ -151,12 +156,16 @@ PathSetpoint Guide::next(double pace, const Vec3& p_L) {
     now_ = down();
   } else if (path_.duration_s() > 0 && !done()) {
     now_ = along_path();
+  } else if (!done() && steps_[step_].kind == MissionStep::Kind::identify) {
+    at_s_ = std::min(at_s_ + pace_ * dt_s_, length_s_);
+    now_ = excited(hover_, at_s_);
   } else {
     at_s_ += pace_ * dt_s_;
     now_.v.setZero();
     now_.a.setZero();
   }
   if (at_s_ >= length_s_) waited_s_ += dt_s_;
+  if (!done() && steps_[step_].kind == MissionStep::Kind::identify) return now_;
   yaw_.turn(wanted_yaw_rad_, limits_.yaw_rate_radps * pace_, dt_s_);
   now_.yaw_rad = yaw_.yaw_rad();
   now_.yaw_rate_radps = yaw_.rate_radps();

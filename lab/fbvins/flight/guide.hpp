@@ -59,7 +59,7 @@ class Guide {
   double dt_s_;
   std::size_t step_ = 0;
   bool landing_ = false;
-  PathSetpoint now_;
+  PathSetpoint now_, hover_;
   SplineTrajectory path_;  ///< of the step, in L; empty where it stays
   double length_s_ = 0;    ///< of the step at full pace
   double at_s_ = 0;        ///< how far it has come

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "fbvins/flight/excitation.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -91,6 +93,28 @@ TEST(Guide, LandsFromAnywhere) {
   EXPECT_LT(s.p.z(), 0);
   EXPECT_NEAR(s.v.x(), 0, 1e-3);
   EXPECT_LT(s.p.x(), from + 1);
+}
+
+TEST(Excitation, SwingsEveryAxisInTurnAboutWhereItHovers) {
+  PathSetpoint hover;
+  hover.p = Vec3(1, 2, 3), hover.yaw_rad = 0.5;
+  constexpr double kDt = 1e-4;
+  Vec3 widest = Vec3::Zero();
+  double turned = 0;
+  for (double t = 0; t < excitation_length_s(); t += 0.003) {
+    const PathSetpoint now = excited(hover, t), next = excited(hover, t + kDt);
+    widest = widest.cwiseMax((now.p - hover.p).cwiseAbs());
+    turned = std::max(turned, std::abs(now.yaw_rad - hover.yaw_rad));
+    // Velocity is that of the place but for the swing's slow change in width.
+    EXPECT_LT(((next.p - now.p) / kDt - now.v).norm(), 0.3) << t;
+    EXPECT_LT(now.a.norm(), 2.0);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_GT(widest[axis], 0.1);
+    EXPECT_LE(widest[axis], 0.25);
+  }
+  EXPECT_GT(turned, 0.2);
+  EXPECT_EQ(excited(hover, excitation_length_s()).p, hover.p);
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ struct MissionPlace {
 };
 
 struct MissionStep {
-  enum class Kind { takeoff, go, hold, yaw, land };
+  enum class Kind { takeoff, go, hold, yaw, identify, land };
   Kind kind = Kind::hold;
   std::vector<Vec3> points;  ///< of go: corners of the way, rounded but the last
   double height_m = 0;       ///< of takeoff

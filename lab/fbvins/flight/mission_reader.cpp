@@ -95,8 +95,10 @@ MissionStep read_step(YamlReader& yaml, const YAML::Node& node) {
   MissionStep step;
   if (node.IsScalar() && node.Scalar() == "land") {
     step.kind = MissionStep::Kind::land;
+  } else if (node.IsScalar() && node.Scalar() == "identify") {
+    step.kind = MissionStep::Kind::identify;
   } else if (!node.IsMap() || node.size() != 1) {
-    yaml.complain(node, "a step is one of takeoff, goto, hold, yaw, land");
+    yaml.complain(node, "a step is one of takeoff, goto, hold, yaw, identify, land");
   } else {
     yaml.only(node, {"takeoff", "goto", "hold", "yaw"});
     if (yaml.has(node, "takeoff")) {
@@ -150,6 +152,7 @@ std::string_view to_string(MissionStep::Kind kind) {
     case MissionStep::Kind::go: return "goto";
     case MissionStep::Kind::hold: return "hold";
     case MissionStep::Kind::yaw: return "yaw";
+    case MissionStep::Kind::identify: return "identify";
     case MissionStep::Kind::land: return "land";
   }
   return "";

@@ -53,6 +53,7 @@ const Px4Parameters& fixed_parameters() {
       {"COM_LOW_BAT_ACT", "0"},
       {"MPC_TKO_RAMP_T", "1"},
       {"SDLOG_MODE", "0"},
+      {"SDLOG_PROFILE", "17"},
   };
   return parameters;
 }

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/run_summary.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/tuning/tune_report.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(Tells from a flight's log how the vehicle answers, axis by axis, and proposes gains under PX4's names (docs/tuning.md).
+The flight should have moved every axis: `fbvins fly --identify` does. A log of `fbvins fly` is its folder; of PX4 a .ulg with
+SDLOG_PROFILE 17 (default and high rate).
+Writes control.yaml (for `fbvins fly --control`), gains.params (for QGroundControl), tuning.txt, tuning.svg (before and after).
+
+examples:
+  fbvins fly --identify --out first && fbvins tune first --out tuned
+  fbvins fly --identify --control tuned/control.yaml --out second && fbvins tune second --out again
+  fbvins tune flight.ulg --phase-margin 55
+)";
+
+struct Arguments {
+  std::string log, out = "out/tuning";
+  TuneOptions options;
+  bool truth = false, quiet = false;
+};
+
+int tune_gains(const Arguments& a) {
+  const Result<LoopLog> log = read_loop_log(a.log, a.truth ? VelocitySource::truth : VelocitySource::estimate);
+  if (!log) return fail(log.error().message);
+  const Result<VehicleFit> fit = fit_vehicle(*log);
+  if (!fit) return fail(fit.error().message);
+  const Tuning tuning = tune(*log, *fit, a.options);
+  std::error_code error;
+  std::filesystem::create_directories(a.out, error);
+  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+  const std::string text = tuning_text(tuning, a.options);
+  for (const Result<void>& done :
+       {write_text(a.out + "/control.yaml", control_yaml(tuning.proposed)),
+        write_text(a.out + "/gains.params", px4_parameter_file(tuning)), write_text(a.out + "/tuning.txt", text),
+        write_text(a.out + "/tuning.svg", tuning_svg(tuning))})
+    if (!done) return fail(done.error().message);
+  if (!a.quiet) fmt::print("{}results in {}\n", text, bold(a.out));
+  return kOk;
+}
+
+}  // namespace
+
+void add_tune_command(CLI::App& program, int& exit_code) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("tune", kTuneDescription);
+  command->footer(kExamples);
+  command->add_option("FLIGHT", a->log, "folder of `fbvins fly`, or a log of PX4 (.ulg)")->required();
+  command->add_option("--phase-margin", a->options.phase_margin_deg, "of every loop, in degrees, at least")
+      ->check(CLI::Range(20.0, 80.0))
+      ->capture_default_str();
+  command->add_option("--out", a->out, "folder for the results")->capture_default_str();
+  command->add_flag("--truth", a->truth, "velocities by motion capture (the simulator's truth) instead of what was flown by");
+  command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
+  command->callback([a, &exit_code] { exit_code = tune_gains(*a); });
+}
+
+}  // namespace fbvins::app

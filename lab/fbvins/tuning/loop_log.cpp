@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/tuning/loop_log.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/yaml.hpp"
+#include "fbvins/report/csv_table.hpp"
+#include "fbvins/tuning/ulog.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr double kShortest_s = 10;
+/// PX4 begins to rate-control with each gyro sample; logs are brought to this pace.
+constexpr double kUlog_hz = 200;
+
+Error wrong(const std::string& source, const std::string& what) {
+  return {ErrorCode::invalid_argument, fmt::format("{}: {}", source, what)};
+}
+
+Result<std::array<std::vector<double>, 3>> axes(const CsvTable& table, const std::string& name, const std::string& source) {
+  std::array<std::vector<double>, 3> all;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::string column = fmt::format("{}_{}", name, "xyz"[i]);
+    all[i] = table.numbers(column);
+    if (all[i].empty())
+      return wrong(source, fmt::format("there is no column '{}': this is no flight.csv of `fbvins fly`", column));
+  }
+  return all;
+}
+
+Result<LoopLog> read_csv(const std::string& folder, VelocitySource velocity) {
+  LoopLog log;
+  log.source = folder + "/flight.csv";
+  const Result<CsvTable> table = CsvTable::read(log.source);
+  if (!table) return table.error();
+  if (Result<void> read = read_yaml_file(folder + "/control.yaml", fields_of(log.control)); !read) return read.error();
+  const std::vector<std::string> mode = table->texts("mode");
+  const auto rate = axes(*table, "rate", log.source), torque = axes(*table, "torque", log.source),
+             asked = axes(*table, "acceleration_setpoint", log.source),
+             v = axes(*table, velocity == VelocitySource::truth ? "true_v" : "estimate_v", log.source);
+  for (const auto* one : {&rate, &torque, &asked, &v})
+    if (!*one) return one->error();
+  const std::vector<Time>& t = table->stamps();
+  for (std::size_t i = 0; i < table->rows(); ++i) {
+    if (mode[i] != "mission") continue;
+    const auto at = [i](const auto& all) { return Vec3((*all)[0][i], (*all)[1][i], (*all)[2][i]); };
+    log.rate.push_back(at(rate)), log.torque.push_back(at(torque));
+    log.acceleration_asked.push_back(at(asked)), log.velocity.push_back(at(v));
+  }
+  if (t.size() > 1) log.rate_hz = std::round(1 / (t[1] - t[0]).seconds());
+  return log;
+}
+
+/// A topic's three fields, turned from forward-right-down or north-east-down, at even times.
+class UlogSignal {
+ public:
+  UlogSignal(const Ulog& log, const std::string& topic, const std::array<std::string, 3>& fields) : t_(log.seconds(topic)) {
+    for (std::size_t i = 0; i < 3; ++i) x_[i] = log.numbers(topic, fields[i]);
+  }
+  bool empty() const {
+    return t_.size() < 2 || std::any_of(x_.begin(), x_.end(), [this](const auto& x) { return x.size() != t_.size(); });
+  }
+  double from_s() const { return t_.front(); }
+  double to_s() const { return t_.back(); }
+  /// The newest that there was; of what is not a number, zero: that loop was not closed.
+  Vec3 at(double t) const {
+    const auto after = std::upper_bound(t_.begin(), t_.end(), t);
+    const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - t_.begin() - 1));
+    const auto clean = [](double x) { return std::isfinite(x) ? x : 0.0; };
+    return {clean(x_[0][i]), -clean(x_[1][i]), -clean(x_[2][i])};
+  }
+
+ private:
+  std::vector<double> t_;
+  std::array<std::vector<double>, 3> x_;
+};
+
+Result<LoopLog> read_ulog(const std::string& path) {
+  const Result<Ulog> ulog = Ulog::read(path);
+  if (!ulog) return ulog.error();
+  LoopLog log;
+  log.source = path;
+  log.rate_hz = kUlog_hz;
+  for (const OptionField& field : fields_of(log.control))
+    if (const auto value = ulog->parameter(std::string(field.name())); value && std::holds_alternative<double*>(field.value))
+      *std::get<double*>(field.value) = *value;
+  const std::array<std::string, 3> xyz{"xyz[0]", "xyz[1]", "xyz[2]"};
+  const UlogSignal rate(*ulog, "vehicle_angular_velocity", xyz), torque(*ulog, "vehicle_torque_setpoint", xyz),
+      velocity(*ulog, "vehicle_local_position", {"vx", "vy", "vz"}),
+      asked(*ulog, "vehicle_local_position_setpoint", {"acceleration[0]", "acceleration[1]", "acceleration[2]"});
+  double from_s = 0, to_s = 1e12;
+  for (const auto& [signal, name] : {std::pair{&rate, "vehicle_angular_velocity"},
+                                     {&torque, "vehicle_torque_setpoint"},
+                                     {&velocity, "vehicle_local_position"},
+                                     {&asked, "vehicle_local_position_setpoint"}}) {
+    if (signal->empty()) return wrong(path, fmt::format("'{}' was not logged (SDLOG_PROFILE: default and high rate)", name));
+    from_s = std::max(from_s, signal->from_s()), to_s = std::min(to_s, signal->to_s());
+  }
+  for (int i = 0; from_s + i / kUlog_hz < to_s; ++i) {
+    const double t = from_s + i / kUlog_hz;
+    log.rate.push_back(rate.at(t)), log.torque.push_back(torque.at(t));
+    log.velocity.push_back(velocity.at(t)), log.acceleration_asked.push_back(asked.at(t));
+  }
+  return log;
+}
+
+}  // namespace
+
+Result<LoopLog> read_loop_log(const std::string& path, VelocitySource velocity) {
+  Result<LoopLog> log = fs::path(path).extension() == ".ulg" ? read_ulog(path)
+                        : fs::is_directory(path)             ? read_csv(path, velocity)
+                                                             : read_csv(fs::path(path).parent_path().string(), velocity);
+  if (!log) return log;
+  if (static_cast<double>(log->rate.size()) < kShortest_s * log->rate_hz)
+    return wrong(log->source, fmt::format("{:.1f} s in flight tell too little; {:.0f} s are the least",
+                                          static_cast<double>(log->rate.size()) / log->rate_hz, kShortest_s));
+  return log;
+}
+
+}  // namespace fbvins
