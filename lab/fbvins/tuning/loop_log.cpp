@@ -69,18 +69,36 @@ class UlogSignal {
   }
   double from_s() const { return t_.front(); }
   double to_s() const { return t_.back(); }
-  /// The newest that there was; of what is not a number, zero: that loop was not closed.
+  /// Between the two samples around it; of what is not a number, zero: that loop was not closed.
   Vec3 at(double t) const {
     const auto after = std::upper_bound(t_.begin(), t_.end(), t);
-    const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - t_.begin() - 1));
+    const auto b = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after - t_.begin(), 1, std::ssize(t_) - 1)), a = b - 1;
+    const double share = std::clamp((t - t_[a]) / std::max(1e-9, t_[b] - t_[a]), 0.0, 1.0);
     const auto clean = [](double x) { return std::isfinite(x) ? x : 0.0; };
-    return {clean(x_[0][i]), -clean(x_[1][i]), -clean(x_[2][i])};
+    const auto value = [&](std::size_t i) { return (1 - share) * clean(x_[i][a]) + share * clean(x_[i][b]); };
+    return {value(0), -value(1), -value(2)};
   }
 
  private:
   std::vector<double> t_;
   std::array<std::vector<double>, 3> x_;
 };
+
+/// On the ground PX4 asks for an acceleration of 100 m/s^2 downwards: what counts is the longest stretch without.
+void keep_flight(LoopLog& log) {
+  constexpr double kFlown_mps2 = 15;
+  std::size_t begin = 0, best_begin = 0, best = 0;
+  for (std::size_t i = 0; i <= log.acceleration_asked.size(); ++i) {
+    const bool flown = i < log.acceleration_asked.size() && log.acceleration_asked[i].norm() < kFlown_mps2;
+    if (flown) continue;
+    if (i - begin > best) best = i - begin, best_begin = begin;
+    begin = i + 1;
+  }
+  for (std::vector<Vec3>* all : {&log.rate, &log.torque, &log.velocity, &log.acceleration_asked}) {
+    const auto from = all->begin() + static_cast<std::ptrdiff_t>(best_begin);
+    *all = std::vector<Vec3>(from, from + static_cast<std::ptrdiff_t>(best));
+  }
+}
 
 Result<LoopLog> read_ulog(const std::string& path) {
   const Result<Ulog> ulog = Ulog::read(path);
@@ -108,6 +126,7 @@ Result<LoopLog> read_ulog(const std::string& path) {
     log.rate.push_back(rate.at(t)), log.torque.push_back(torque.at(t));
     log.velocity.push_back(velocity.at(t)), log.acceleration_asked.push_back(asked.at(t));
   }
+  keep_flight(log);
   return log;
 }
 
