@@ -10,12 +10,9 @@
 #include "apps/config_arguments.hpp"
 #include "apps/imu_state.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_map.hpp"
-#include "apps/run_output.hpp"
-#include "apps/run_summary.hpp"
+#include "apps/run_flight.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/io/dataset.hpp"
-#include "fbvins/pipeline/system.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -39,11 +36,11 @@ examples:
 )";
 
 struct Arguments {
-  std::string dataset, out, camchain, imu_calibration, imu_state;
+  std::string dataset, out, camchain, imu_calibration;
   ConfigArguments config;
-  MapArguments map;
+  FlightArguments flight;
   int max_images = 0;
-  bool threaded = false, quiet = false;
+  bool quiet = false;
 };
 
 Result<std::unique_ptr<Dataset>> open(const Arguments& arguments) {
@@ -63,57 +60,6 @@ Result<std::string> make_folder(const Arguments& arguments, const Config& config
   return folder;
 }
 
-struct Flight {
-  RunRecord run;
-  std::optional<MapRecord> map;  ///< with loop closure
-};
-
-/// Sends the whole recording through the system, and ends the map.
-Result<Flight> process(const Arguments& arguments, const Config& config, Dataset& data, Progress& progress) {
-  const auto map = make_map(arguments.map, data.rig(), config.loop);
-  if (!map) return map.error();
-  const auto imu_state = load_imu_state(arguments.imu_state, data.rig().imu_noise);
-  if (!imu_state) return imu_state.error();
-  Flight flight;
-  if (*map) flight.map.emplace();
-  flight.run.tracked.reserve(data.frames().size());
-  flight.run.odometry.reserve(data.frames().size());
-  Result<System> system = System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic,
-                                         {.mapper = map->get(), .imu_state = *imu_state});
-  if (!system) return system.error();
-  SurvivalMeter survival;
-  system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
-  system->on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
-  system->on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
-  int frames = 0;
-  while (auto event = data.next()) {
-    const bool is_frame = std::holds_alternative<StereoFrame>(*event);
-    if (Result<void> taken = system->push(std::move(*event)); !taken) return taken.error();
-    if (is_frame) progress.update(++frames);
-  }
-  if (Result<void> done = system->finish(); !done) return done.error();
-  if (flight.map) finish_map(arguments.map, **map, flight.run, *flight.map);
-  if (flight.map)
-    if (Result<void> saved = save_map(arguments.map, **map); !saved) flight.map->not_saved = saved.error().message;
-  return flight;
-}
-
-/// As the last frame in good health knew the IMU.
-Result<void> keep_imu_state(const Arguments& arguments, const RunRecord& run, const ImuNoise& imu) {
-  std::optional<ImuState> state;
-  for (auto o = run.odometry.rbegin(); o != run.odometry.rend() && !state; ++o) state = imu_state_of(*o);
-  return save_imu_state(arguments.imu_state, state, imu);
-}
-
-Result<void> write_all(const Flight& flight, const RunSummary& summary, const Config& config, const std::string& folder) {
-  if (Result<void> done = write_run(flight.run, folder); !done) return done;
-  if (flight.map)
-    if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
-  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
-  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_text(folder + "/summary.txt", to_text(summary));
-}
-
 int run(const Arguments& arguments) {
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
@@ -123,27 +69,16 @@ int run(const Arguments& arguments) {
   const auto folder = make_folder(arguments, *config, **data);
   if (!folder) return fail(folder.error().message);
 
-  double wall_s = 0;
   const auto flight = [&] {
     Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
-    auto result = process(arguments, *config, **data, progress);
-    wall_s = progress.elapsed_s();
-    return result;
+    return run_flight(arguments.flight, *config, **data, [&](int frames) { progress.update(frames); });
   }();
   if (!flight) return fail(flight.error().message);
 
-  RunSummary summary = summarise(flight->run, **data);
-  if (flight->map) summary.map = summarise(*flight->map, flight->run, truth_of(**data));
-  summary.frontend = config->frontend.kind;
-  summary.mode = arguments.threaded ? "threaded" : "deterministic";
-  summary.wall_s = wall_s;
-  if (Result<void> written = write_all(*flight, summary, *config, *folder); !written) return fail(written.error().message);
-  if ((*data)->has_ground_truth())
-    if (Result<void> written = write_truth(flight->run.images(), (*data)->ground_truth(), *folder); !written)
-      return fail(written.error().message);
+  const RunSummary summary = summarise(*flight, **data, *config, arguments.flight);
+  if (Result<void> written = write_flight(*flight, summary, *config, (*data)->ground_truth(), *folder); !written)
+    return fail(written.error().message);
   if (flight->map && !flight->map->not_saved.empty()) return fail(flight->map->not_saved);
-  if (Result<void> kept = keep_imu_state(arguments, flight->run, (*data)->rig().imu_noise); !kept)
-    return fail(kept.error().message);
   if (!arguments.quiet) fmt::print("{}results in {}\n", to_text(summary), bold(*folder));
   if (summary.coverage.with_pose > 0) return kOk;
   warn("no pose could be estimated; the health column of trajectory.csv says why");
@@ -161,17 +96,17 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
   command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
   command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");
-  command->add_option("--imu-state", arguments->imu_state, kImuStateHelp);
+  command->add_option("--imu-state", arguments->flight.imu_state, kImuStateHelp);
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--threaded", arguments->threaded, "frontend and estimator on threads of their own; the same result");
-  command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
-  command->add_option("--save-map", arguments->map.save, "file for the map after the run; with loop closure");
-  command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
-  command->add_flag("--final-ba", arguments->map.final_ba,
+  command->add_flag("--threaded", arguments->flight.threaded, "frontend and estimator on threads of their own; the same result");
+  command->add_flag("--loop", arguments->flight.map.loop, "loop closure: a map beside the odometry");
+  command->add_option("--save-map", arguments->flight.map.save, "file for the map after the run; with loop closure");
+  command->add_option("--load-map", arguments->flight.map.load, "map to find oneself in and go on with; with loop closure");
+  command->add_flag("--final-ba", arguments->flight.map.final_ba,
                     "bundle adjustment over the whole map after the run; with loop closure");
-  command->add_flag("--boosted-map", arguments->map.boosted, "a new map of boosted descriptors; with loop closure");
-  command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
+  command->add_flag("--boosted-map", arguments->flight.map.boosted, "a new map of boosted descriptors; with loop closure");
+  command->add_option("--vocabulary", arguments->flight.map.vocabulary, "words for loop closure, instead of those that ship");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

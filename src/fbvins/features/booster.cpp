@@ -2,9 +2,9 @@
 #include "fbvins/features/booster.hpp"
 
 #include <cstdlib>
-#include <filesystem>
 
 #include "fbvins/features/booster_network.hpp"
+#include "fbvins/features/data_file.hpp"
 
 namespace fbvins {
 namespace {
@@ -26,10 +26,9 @@ class BoosterStage final : public DescriptorStage {
 
 std::string booster_weights_path(const std::string& weights) {
   if (weights.find('/') != std::string::npos || weights.ends_with(".safetensors")) return weights;
-  const std::string name = "/" + weights + ".safetensors", installed = FBVINS_INSTALLED_DATA + name;
-  if (const char* folder = std::getenv("FBVINS_WEIGHTS"); folder != nullptr && *folder != '\0') return folder + name;
-  std::error_code ignored;
-  return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
+  const std::string name = weights + ".safetensors";
+  if (const char* folder = std::getenv("FBVINS_WEIGHTS"); folder != nullptr && *folder != '\0') return folder + ("/" + name);
+  return data_file(name);
 }
 
 Result<std::unique_ptr<DescriptorStage>> make_booster_stage(const BoosterOptions& options) {

@@ -4,15 +4,14 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <filesystem>
+
+#include "fbvins/features/data_file.hpp"
 
 namespace fbvins {
 
 std::string shipped_vocabulary(const std::string& kind) {
   if (const char* chosen = std::getenv("FBVINS_VOCABULARY"); chosen != nullptr && *chosen != '\0') return chosen;
-  const std::string name = "/" + kind + "_vocabulary.fbv", installed = FBVINS_INSTALLED_DATA + name;
-  std::error_code ignored;
-  return std::filesystem::exists(installed, ignored) ? installed : FBVINS_SOURCE_DATA + name;
+  return data_file(kind + "_vocabulary.fbv");
 }
 
 Result<Vocabulary> open_vocabulary(const std::string& kind, const std::string& path) {

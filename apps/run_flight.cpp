@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_flight.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "apps/imu_state.hpp"
+#include "fbvins/config/config_file.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins::app {
+namespace {
+
+/// As the last frame in good health knew the IMU.
+Result<void> keep_imu_state(const std::string& path, const RunRecord& run, const ImuNoise& imu) {
+  std::optional<ImuState> state;
+  for (auto o = run.odometry.rbegin(); o != run.odometry.rend() && !state; ++o) state = imu_state_of(*o);
+  return save_imu_state(path, state, imu);
+}
+
+Result<Flight> process(const FlightArguments& arguments, const Config& config, Dataset& data, LoopMap* map,
+                       const std::function<void(int frames)>& on_frame) {
+  const auto imu_state = load_imu_state(arguments.imu_state, data.rig().imu_noise);
+  if (!imu_state) return imu_state.error();
+  Flight flight;
+  if (map != nullptr) flight.map.emplace();
+  flight.run.tracked.reserve(data.frames().size());
+  flight.run.odometry.reserve(data.frames().size());
+  Result<System> system = System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic,
+                                         {.mapper = map, .imu_state = *imu_state});
+  if (!system) return system.error();
+  SurvivalMeter survival;
+  system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
+  system->on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
+  system->on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
+  int frames = 0;
+  while (auto event = data.next()) {
+    const bool is_frame = std::holds_alternative<StereoFrame>(*event);
+    if (Result<void> taken = system->push(std::move(*event)); !taken) return taken.error();
+    if (is_frame) on_frame(++frames);
+  }
+  if (Result<void> done = system->finish(); !done) return done.error();
+  return flight;
+}
+
+}  // namespace
+
+Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data,
+                          const std::function<void(int frames)>& on_frame) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto map = make_map(arguments.map, data.rig(), config.loop);
+  if (!map) return map.error();
+  Result<Flight> flight = process(arguments, config, data, map->get(), on_frame);
+  if (!flight) return flight;
+  if (flight->map) {
+    finish_map(arguments.map, **map, flight->run, *flight->map);
+    if (Result<void> saved = save_map(arguments.map, **map); !saved) flight->map->not_saved = saved.error().message;
+  }
+  if (Result<void> kept = keep_imu_state(arguments.imu_state, flight->run, data.rig().imu_noise); !kept) return kept.error();
+  flight->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return flight;
+}
+
+RunSummary summarise(const Flight& flight, const Dataset& data, const Config& config, const FlightArguments& arguments) {
+  RunSummary summary = summarise(flight.run, data);
+  if (flight.map) summary.map = summarise(*flight.map, flight.run, truth_of(data));
+  summary.frontend = config.frontend.kind;
+  summary.mode = arguments.threaded ? "threaded" : "deterministic";
+  summary.wall_s = flight.wall_s;
+  return summary;
+}
+
+Result<void> write_flight(const Flight& flight, const RunSummary& summary, const Config& config,
+                          const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
+  if (Result<void> done = write_run(flight.run, folder); !done) return done;
+  if (flight.map)
+    if (Result<void> done = write_map_record(*flight.map, folder); !done) return done;
+  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
+  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
+  if (Result<void> done = write_text(folder + "/summary.txt", to_text(summary)); !done) return done;
+  return truth.empty() ? Result<void>{} : write_truth(flight.run.images(), truth, folder);
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording through the odometry, and what is kept of it: what `fbvins run` and fbvins.run() of Python have in common.
+//
+//   Result<Flight> flight = run_flight(arguments, config, dataset, [](int frames) { ... });
+//   RunSummary summary = summarise(*flight, dataset, config, arguments);
+//   Result<void> written = write_flight(*flight, summary, config, dataset.ground_truth(), folder);
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "apps/run_map.hpp"
+#include "apps/run_output.hpp"
+#include "apps/run_summary.hpp"
+#include "fbvins/config/config.hpp"
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins::app {
+
+struct FlightArguments {
+  MapArguments map;
+  std::string imu_state;  ///< file: read where it is there, written at a clean end
+  bool threaded = false;
+};
+
+struct Flight {
+  RunRecord run;
+  std::optional<MapRecord> map;  ///< with loop closure
+  double wall_s = 0;
+};
+
+/// Sends the whole recording through the system, ends the map and saves it. `on_frame` is told how many frames have gone in.
+Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data,
+                          const std::function<void(int frames)>& on_frame);
+
+RunSummary summarise(const Flight& flight, const Dataset& data, const Config& config, const FlightArguments& arguments);
+
+/// All files of a run; the folder is made.
+Result<void> write_flight(const Flight& flight, const RunSummary& summary, const Config& config,
+                          const std::vector<TrajectoryPoint>& truth, const std::string& folder);
+
+}  // namespace fbvins::app

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""FB-VINS: stereo visual-inertial odometry for drones.
+
+    import fbvins
+    run = fbvins.run("MH_01_easy", frontend="orb", loop=True)
+    print(fbvins.evaluate(run.ground_truth, run))
+
+Frames: W is the odometry's world (z up), M the map, G the estimator's own frame, B the body, which is the IMU, C0 and C1 the left and right
+camera (z forward, x right, y down). T_WB takes body coordinates to world. Quaternions are Hamilton, w first. SI units and radians; time
+is int64 nanoseconds of the sensors' clock. Covariances of poses are of (dp in W [m], dtheta in B [rad]).
+"""
+from __future__ import annotations
+
+import functools
+import os
+from typing import TYPE_CHECKING, Callable, Iterable, Mapping, Optional, Tuple, Union
+
+from . import _fbvins
+from ._fbvins import (Camera, Config, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
+                      Recording, Rig, Run, StereoFrame, Trajectory, __version__, orb, simulation_presets)
+from ._fbvins import Booster
+from . import calibration
+
+if TYPE_CHECKING:
+    import numpy
+
+    PathLike = Union[str, "os.PathLike[str]"]
+    AnyConfig = Union[Config, Mapping, PathLike, None]
+    AnyTrajectory = Union[Trajectory, Run, PathLike, Tuple["numpy.ndarray", "numpy.ndarray", "numpy.ndarray"]]
+
+__all__ = ["Booster", "Camera", "Config", "ErrorStatistics", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
+           "MapUpdate", "Odometry", "Recording", "Rig", "Run", "StereoFrame", "System", "Trajectory", "__version__", "boost",
+           "calibration", "config", "evaluate", "load_map", "open", "orb", "run", "simulate", "simulation_presets"]
+
+
+def _assignments(options: Mapping, prefix: str = "") -> Iterable[str]:
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            yield from _assignments(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}={str(value).lower() if isinstance(value, bool) else value}"
+
+
+def config(file: Optional[PathLike] = None, options: Optional[Mapping] = None) -> Config:
+    """The options of odometry, map and live sensors: the defaults, changed by a YAML file (or what a flight record was flown with),
+    then by `options`, such as {"frontend.kind": "orb"} or {"frontend": {"kind": "orb"}}. ValueError for an unknown option."""
+    return Config(os.fspath(file) if file is not None else "", list(_assignments(options or {})))
+
+
+_configured = config  # under a name that no parameter hides
+
+
+def _as_config(value: AnyConfig) -> Config:
+    if isinstance(value, Config):
+        return value
+    if isinstance(value, Mapping):
+        return _configured(options=value)
+    return _configured(value)
+
+
+def _path(value: Optional[PathLike]) -> str:
+    return "" if value is None else os.fspath(value)
+
+
+def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,  # noqa: A001
+         skip_frames: int = 0, max_frames: int = 0) -> Recording:
+    """A recording: a EuRoC folder or zip, or a flight record (MCAP). `calibration` is Kalibr's camchain-imucam.yaml instead of the
+    recording's own, `imu_calibration` its imu.yaml. max_frames 0: all."""
+    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames)
+
+
+def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:
+    """A made-up flight with exact truth, rendered image by image while it is gone through: the same events, whatever the machine.
+    `seconds` 0: the preset's length. simulation_presets() lists the presets."""
+    return _fbvins.simulate(preset, seed, seconds)
+
+
+def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, loop: bool = False, *, config: AnyConfig = None,
+        options: Optional[Mapping] = None, threaded: bool = False, final_ba: bool = False, boosted_map: bool = False,
+        load_map: Optional[PathLike] = None, save_map: Optional[PathLike] = None, vocabulary: Optional[PathLike] = None,
+        imu_state: Optional[PathLike] = None, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
+        max_images: int = 0, progress: Optional[Callable[[int, int], object]] = None) -> Run:
+    """Estimates a whole recording, as `fbvins run` does, with the same bytes.
+
+    recording: a path, or a Recording that nobody has gone through.  frontend: "klt", "orb" or "boost"; None: as configured.
+    loop: a map beside the odometry; load_map, save_map, final_ba, boosted_map imply it.  config: a Config, a file or a dict of options;
+    `options` over that.  imu_state: file of the IMU's biases from flight to flight.  progress(done, all) is called now and then.
+    """
+    if isinstance(recording, Recording):
+        if calibration or imu_calibration or max_images:
+            raise ValueError("calibration and max_images belong to open() where a Recording is given")
+    else:
+        recording = open(recording, calibration=calibration, imu_calibration=imu_calibration, max_frames=max_images)
+    changed = dict(options or {})
+    if frontend is not None:
+        changed["frontend.kind"] = frontend
+    if isinstance(config, Config):
+        if changed:
+            raise ValueError("give options and frontend to config() where a Config is given")
+        effective = config
+    elif isinstance(config, Mapping):
+        effective = _configured(options={**config, **changed})
+    else:
+        effective = _configured(config, changed)
+    return _fbvins.run(recording, effective, threaded, loop, final_ba, boosted_map, _path(load_map), _path(save_map), _path(vocabulary),
+                       _path(imu_state), progress)
+
+
+class Map(_fbvins.Map):
+    __doc__ = _fbvins.Map.__doc__
+
+    def __init__(self, rig: Rig, file: Optional[PathLike] = None, *, vocabulary: Optional[PathLike] = None, boosted: bool = False,
+                 config: AnyConfig = None):
+        """file: a map to find oneself in and go on with; None: a new one, in which M begins where W does."""
+        super().__init__(rig, _path(file), _path(vocabulary), boosted, _as_config(config))
+
+
+def load_map(path: PathLike) -> MapContents:
+    """What is in a map that `fbvins run --save-map` or Map.save() wrote."""
+    return _fbvins.load_map(os.fspath(path))
+
+
+class System(_fbvins.System):
+    __doc__ = _fbvins.System.__doc__
+
+    def __init__(self, config: AnyConfig, rig: Rig, *, threaded: bool = False, map: Optional[Map] = None,  # noqa: A002
+                 on_odometry: Optional[Callable[[Odometry], object]] = None,
+                 on_map_update: Optional[Callable[[MapUpdate], object]] = None, imu_state: Optional[PathLike] = None):
+        """config: a Config, a file, a dict of options or None for the defaults. Without callbacks results wait for poll()."""
+        super().__init__(_as_config(config), rig, threaded, map, on_odometry, on_map_update, _path(imu_state))
+
+
+def _as_trajectory(value: AnyTrajectory) -> Trajectory:
+    if isinstance(value, Trajectory):
+        return value
+    if isinstance(value, Run):
+        return value.trajectory
+    if isinstance(value, (str, os.PathLike)):
+        return Trajectory.read(os.fspath(value))
+    if isinstance(value, tuple) and len(value) == 3:
+        return Trajectory(*value)
+    raise ValueError(f"a Trajectory, a Run, a file or arrays (t, p, q) are expected, not {type(value).__name__}")
+
+
+def evaluate(truth: AnyTrajectory, estimate: AnyTrajectory, align: str = "se3", *, max_difference_s: float = 0.01,
+             interpolate: bool = False) -> Evaluation:
+    """Absolute and relative errors of an estimate, as `fbvins eval` has them; they agree with evo.
+
+    Both: a Trajectory, a Run, a TUM or EuRoC file, or arrays (t, p, q): int64 (N,) ns, float64 (N, 3) m, float64 (N, 4) w first.
+    align: "se3", "yaw", "sim3" or "none". interpolate: the truth at the estimate's very stamps instead of the nearest one.
+    """
+    return _fbvins.evaluate(_as_trajectory(truth), _as_trajectory(estimate), align, max_difference_s, interpolate)
+
+
+@functools.lru_cache(maxsize=8)
+def _booster(weights: str) -> Booster:
+    return Booster(weights)
+
+
+def boost(descriptors: Union[Features, numpy.ndarray], keypoints: Optional[numpy.ndarray] = None,
+          size: Optional[Tuple[int, int]] = None, *, weights: str = "boost-s") -> numpy.ndarray:
+    """Descriptors of one image improved by the learned booster (paper 2.2.2): uint8 (N, 32), compared by Hamming distance with
+    boosted ones only.
+
+    boost(orb(image)), or its parts: descriptors, the int8 (N, 512) margins of Features (uint8 (N, 32) for weights trained on bits),
+    keypoints, float64 (N, 6) as in Features, and size, (width, height) of the image. All of an image's features go in together:
+    the network looks at them as a whole.
+    """
+    network = _booster(weights)
+    if isinstance(descriptors, Features):
+        keypoints, size = descriptors.keypoints, descriptors.size
+        descriptors = descriptors.margins if network.takes_margins else descriptors.descriptors
+    if keypoints is None or size is None:
+        raise ValueError("keypoints and size are needed where descriptors are an array")
+    return network(descriptors, keypoints, *size)

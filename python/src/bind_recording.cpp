@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings and simulations: sensor events in order of time.
+#include <fmt/format.h>
+
+#include "bindings.hpp"
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/sim/simulation.hpp"
+#include "python_types.hpp"
+
+namespace fbvins::python {
+namespace {
+
+Recording open(const std::string& path, const std::string& calibration, const std::string& imu_calibration, int skip, int most) {
+  DatasetOptions options;
+  options.kalibr_camchain = calibration;
+  options.kalibr_imu = imu_calibration;
+  options.skip_frames = skip;
+  options.max_frames = most;
+  return value_or_raise([&] {
+    nb::gil_scoped_release released;
+    return open_dataset(path, options);
+  }());
+}
+
+Recording simulate(const std::string& preset, int seed, double seconds) {
+  auto options = value_or_raise(simulation_preset(preset));
+  options.seed = seed;
+  if (seconds > 0) options.flight.duration_s = seconds;
+  auto contents = [&] {
+    nb::gil_scoped_release released;
+    return fbvins::simulate(options, fmt::format("{}-{}", preset, seed));
+  }();
+  return std::make_unique<Dataset>(value_or_raise(std::move(contents)), DatasetOptions{});
+}
+
+nb::object next(Dataset& data) {
+  auto event = [&] {
+    nb::gil_scoped_release released;
+    return data.next();
+  }();
+  if (!event) throw nb::stop_iteration();
+  return std::visit([](auto&& value) { return nb::cast(std::forward<decltype(value)>(value)); }, std::move(*event));
+}
+
+PyTrajectory truth_of(const Dataset& data) {
+  PyTrajectory truth;
+  for (const TrajectoryPoint& p : data.ground_truth()) truth.poses.push_back({p.t, {p.T_WB.q, p.T_WB.p}});
+  return truth;
+}
+
+nb::object pixels(const std::shared_ptr<const Image>& image) {
+  if (!image) return nb::none();
+  auto* kept = new std::shared_ptr<const Image>(image);
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::shared_ptr<const Image>*>(p); });
+  const std::size_t shape[] = {static_cast<std::size_t>(image->height()), static_cast<std::size_t>(image->width())};
+  return nb::cast(nb::ndarray<nb::numpy, const std::uint8_t>(image->row(0), 2, shape, owner));
+}
+
+}  // namespace
+
+void bind_recording(nb::module_& m) {
+  nb::class_<ImuSample>(m, "ImuSample", "One reading of the IMU, in B.")
+      .def_prop_ro(
+          "t", [](const ImuSample& s) { return s.t.ns; }, "ns of the sensors' clock")
+      .def_prop_ro(
+          "gyro", [](const ImuSample& s) { return to_array(s.gyro_radps); }, "(3,), rad/s")
+      .def_prop_ro(
+          "accel", [](const ImuSample& s) { return to_array(s.accel_mps2); }, "(3,), specific force, m/s^2: +g upwards at rest")
+      .def("__repr__", [](const ImuSample& s) { return fmt::format("<fbvins.ImuSample t={} ns>", s.t.ns); });
+
+  nb::class_<StereoFrame>(m, "StereoFrame", "Two images taken at the same instant.")
+      .def_prop_ro(
+          "t", [](const StereoFrame& f) { return f.t.ns; }, "ns of the cameras' clock")
+      .def_prop_ro(
+          "left", [](const StereoFrame& f) { return pixels(f.left); }, "uint8 (height, width), read-only; None: nothing came")
+      .def_prop_ro(
+          "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: nothing came")
+      .def("__repr__", [](const StereoFrame& f) { return fmt::format("<fbvins.StereoFrame t={} ns>", f.t.ns); });
+
+  nb::class_<Dataset>(m, "Recording",
+                      "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
+                      "It can be gone through once.")
+      .def_prop_ro("rig", &Dataset::rig, "the calibration")
+      .def_prop_ro("name", [](const Dataset& d) { return d.info().name; })
+      .def_prop_ro("format", [](const Dataset& d) { return d.info().format; })
+      .def_prop_ro(
+          "warnings", [](const Dataset& d) { return d.info().warnings; }, "what is broken in it, a sentence each")
+      .def_prop_ro(
+          "image_stamps",
+          [](const Dataset& d) { return column<std::int64_t>(d.frames(), [](const FrameEntry& f) { return f.t.ns; }); },
+          "int64 (N,), ns")
+      .def_prop_ro("ground_truth", &truth_of, "Trajectory of B, empty where there is none")
+      .def(
+          "__len__", [](const Dataset& d) { return d.frames().size(); }, "stereo frames")
+      .def(
+          "__iter__", [](nb::handle self) { return nb::borrow(self); }, nb::sig("def __iter__(self) -> Recording"))
+      .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame"))
+      .def("__repr__", [](const Dataset& d) {
+        return fmt::format("<fbvins.Recording {} ({}), {} stereo frames>", d.info().name, d.info().format, d.frames().size());
+      });
+
+  m.def("open", &open, "path"_a, "calibration"_a = "", "imu_calibration"_a = "", "skip_frames"_a = 0, "max_frames"_a = 0);
+  m.def("simulate", &simulate, "preset"_a = "normal", "seed"_a = 1, "seconds"_a = 0.0);
+  m.def("simulation_presets", &simulation_presets, "Names of the simulator's presets.");
+}
+
+}  // namespace fbvins::python

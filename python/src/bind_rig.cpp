@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras, IMU and how they are joined.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "bindings.hpp"
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/io/kalibr.hpp"
+
+namespace fbvins::python {
+namespace {
+
+Camera make_camera(int width, int height, double fx, double fy, double cx, double cy, const std::string& model,
+                   const std::vector<double>& distortion) {
+  std::vector<double> k = distortion;
+  if (k.empty()) k.resize(4, 0.0);
+  if (k.size() != 4) throw nb::value_error(fmt::format("distortion: 4 numbers are expected, not {}", distortion.size()).c_str());
+  if (width < 1 || height < 1 || !(fx > 0) || !(fy > 0))
+    throw nb::value_error("a camera has a size in pixels and positive focal lengths");
+  if (model == "radtan") return {PinholeRadtan{fx, fy, cx, cy, k[0], k[1], k[2], k[3]}, width, height};
+  if (model == "equidistant") return {KannalaBrandt{fx, fy, cx, cy, k[0], k[1], k[2], k[3]}, width, height};
+  throw nb::value_error(fmt::format("model: 'radtan' or 'equidistant' is expected, not '{}'", model).c_str());
+}
+
+std::vector<double> distortion_of(const Camera& camera) {
+  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model())) return {m->k1, m->k2, m->p1, m->p2};
+  const auto& m = std::get<KannalaBrandt>(camera.model());
+  return {m.k1, m.k2, m.k3, m.k4};
+}
+
+std::vector<double> intrinsics_of(const Camera& camera) {
+  return std::visit([](const auto& m) { return std::vector<double>{m.fx, m.fy, m.cx, m.cy}; }, camera.model());
+}
+
+std::string text_of(const Camera& camera) {
+  const std::vector<double> f = intrinsics_of(camera);
+  return fmt::format("<fbvins.Camera {} {}x{} px, f = ({:.1f}, {:.1f}), c = ({:.1f}, {:.1f})>", camera.model_name(),
+                     camera.width(), camera.height(), f[0], f[1], f[2], f[3]);
+}
+
+StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
+                   double image_rate_hz, double time_offset_s) {
+  StereoRig rig{left,          right,        transform<B, C0>(T_BC0, "T_BC0"), transform<B, C1>(T_BC1, "T_BC1"), imu_noise,
+                image_rate_hz, time_offset_s};
+  const double baseline_m = rig.T_C1C0().p.norm();
+  if (!(baseline_m > 1e-3 && baseline_m < 10))
+    throw nb::value_error(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m).c_str());
+  if (!(image_rate_hz > 0) || !std::isfinite(time_offset_s))
+    throw nb::value_error("image_rate_hz is positive and time_offset_s finite");
+  return rig;
+}
+
+}  // namespace
+
+void bind_rig(nb::module_& m) {
+  nb::class_<Camera>(m, "Camera", "A pinhole camera with distortion. Lengths in pixels.")
+      .def(nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
+           "distortion"_a = std::vector<double>{},
+           "model: 'radtan' (k1, k2, p1, p2; OpenCV's and Kalibr's) or 'equidistant' (k1..k4; Kalibr's, OpenCV's fisheye).")
+      .def_prop_ro("width", &Camera::width, "px")
+      .def_prop_ro("height", &Camera::height, "px")
+      .def_prop_ro("model", &Camera::model_name)
+      .def_prop_ro("intrinsics", &intrinsics_of, "fx, fy, cx, cy in px")
+      .def_prop_ro("distortion", &distortion_of, "four coefficients")
+      .def("__repr__", &text_of);
+
+  nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")
+      .def(
+          "__init__",
+          [](ImuNoise* self, double gyro, double accel, double gyro_walk, double accel_walk, double rate_hz) {
+            for (const double figure : {gyro, accel, gyro_walk, accel_walk, rate_hz})
+              if (!(figure > 0 && std::isfinite(figure)))
+                throw nb::value_error("noise densities, random walks and the rate are positive");
+            new (self) ImuNoise{gyro, accel, gyro_walk, accel_walk, rate_hz};
+          },
+          nb::kw_only(), "gyro_noise_density"_a = ImuNoise{}.gyro_noise_density_radps_rthz,
+          "accel_noise_density"_a = ImuNoise{}.accel_noise_density_mps2_rthz,
+          "gyro_random_walk"_a = ImuNoise{}.gyro_random_walk_radps2_rthz,
+          "accel_random_walk"_a = ImuNoise{}.accel_random_walk_mps3_rthz, "rate_hz"_a = ImuNoise{}.rate_hz)
+      .def_ro("gyro_noise_density", &ImuNoise::gyro_noise_density_radps_rthz, "rad/s/sqrt(Hz)")
+      .def_ro("accel_noise_density", &ImuNoise::accel_noise_density_mps2_rthz, "m/s^2/sqrt(Hz)")
+      .def_ro("gyro_random_walk", &ImuNoise::gyro_random_walk_radps2_rthz, "rad/s^2/sqrt(Hz)")
+      .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
+      .def_ro("rate_hz", &ImuNoise::rate_hz);
+
+  nb::class_<StereoRig>(m, "Rig",
+                        "Two cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera.")
+      .def(nb::new_(&make_rig), "left"_a, "right"_a, "T_BC0"_a, "T_BC1"_a, "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0,
+           "time_offset_s"_a = 0.0,
+           "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset.")
+      .def_ro("left", &StereoRig::left)
+      .def_ro("right", &StereoRig::right)
+      .def_prop_ro(
+          "T_BC0", [](const StereoRig& rig) { return to_array(rig.T_BC0); }, "(4, 4), left camera to IMU, m")
+      .def_prop_ro(
+          "T_BC1", [](const StereoRig& rig) { return to_array(rig.T_BC1); }, "(4, 4), right camera to IMU, m")
+      .def_ro("imu_noise", &StereoRig::imu_noise)
+      .def_ro("image_rate_hz", &StereoRig::image_rate_hz)
+      .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s")
+      .def("__repr__", [](const StereoRig& rig) {
+        return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
+                           rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
+      });
+
+  m.def(
+      "load_kalibr",
+      [](const std::string& camchain, const std::string& imu) {
+        return value_or_raise(load_kalibr(camchain, imu.empty() ? std::nullopt : std::optional(imu)));
+      },
+      "camchain"_a, "imu"_a = "", "The rig of Kalibr's camchain-imucam.yaml and imu.yaml.");
+}
+
+}  // namespace fbvins::python

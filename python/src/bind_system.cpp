@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// The odometry fed from Python. Locks: the GIL is never waited for while the system's own are held by the caller, and never held
+// while the system works.
+#include <fmt/format.h>
+
+#include <deque>
+#include <exception>
+#include <mutex>
+
+#include "bindings.hpp"
+#include "fbvins/config/config.hpp"
+#include "fbvins/io/imu_state_file.hpp"
+#include "fbvins/pipeline/system.hpp"
+#include "python_types.hpp"
+
+namespace fbvins::python {
+namespace {
+
+std::optional<ImuState> imu_state(const std::string& path, const ImuNoise& imu) {
+  return path.empty() ? std::nullopt : value_or_raise(read_imu_state(path, imu));
+}
+
+/// An image in an array's memory: read where it lies, and the array is kept until the last reader is done.
+std::shared_ptr<const Image> image_of(nb::handle object, const char* name, const Camera& camera) {
+  if (object.is_none()) return nullptr;
+  auto array = checked<std::uint8_t>(object, name, {camera.height(), camera.width()});
+  PyObject* kept = array.keeper.release().ptr();
+  std::shared_ptr<const std::uint8_t> keeper(array.data, [kept](const std::uint8_t*) {
+    const nb::gil_scoped_acquire acquired;
+    Py_DECREF(kept);
+  });
+  return std::make_shared<const Image>(camera.width(), camera.height(), std::move(keeper));
+}
+
+class PySystem {
+ public:
+  PySystem(const Config& config, const StereoRig& rig, bool threaded, nb::object map, nb::object on_odometry,
+           nb::object on_map_update, const std::string& state)
+      : rig_(rig), map_(std::move(map)), on_odometry_(std::move(on_odometry)), on_map_update_(std::move(on_map_update)) {
+    LoopMap* mapper = map_.is_none() ? nullptr : nb::cast<PyMap&>(map_).map.get();
+    system_.emplace(value_or_raise(System::create(config, rig, threaded ? RunMode::threaded : RunMode::deterministic,
+                                                  {.mapper = mapper, .imu_state = imu_state(state, rig.imu_noise)})));
+    system_->on_odometry([this](const Odometry& o) { tell(on_odometry_, o, odometry_); });
+    if (mapper != nullptr) system_->on_map_update([this](const MapUpdate& u) { tell(on_map_update_, u, updates_); });
+  }
+  PySystem(const PySystem&) = delete;
+  PySystem& operator=(const PySystem&) = delete;
+  ~PySystem() {
+    nb::gil_scoped_release released;  // threads that end may want to call back
+    system_.reset();
+  }
+
+  void push_imu(nb::handle t, nb::handle gyro, nb::handle accel) {
+    if (!nb::isinstance<nb::int_>(t)) return push_readings(t, gyro, accel);
+    push(ImuSample{Time{nb::cast<std::int64_t>(t)}, vector3(gyro, "gyro"), vector3(accel, "accel")});
+  }
+  void push_images(std::int64_t t, nb::handle left, nb::handle right) {
+    push(StereoFrame{Time{t}, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right)});
+  }
+  void push(SensorEvent event) {
+    done([&] { return system_->push(std::move(event)); });
+  }
+  void finish() {
+    done([&] { return system_->finish(); });
+  }
+
+  std::vector<Odometry> poll() { return take(odometry_); }
+  std::vector<MapUpdate> poll_map() { return take(updates_); }
+  InputCounts counts() const { return system_->input_counts(); }
+  const StereoRig& rig() const { return rig_; }
+
+  /// For Python's collector of cycles.
+  int traverse(visitproc visit, void* arg) const {
+    for (const nb::object* held : {&map_, &on_odometry_, &on_map_update_}) Py_VISIT(held->ptr());
+    return 0;
+  }
+  void forget() {
+    {
+      nb::gil_scoped_release released;
+      (void)system_->finish();
+    }
+    on_odometry_ = on_map_update_ = nb::none();
+  }
+
+ private:
+  void push_readings(nb::handle t, nb::handle gyro, nb::handle accel) {
+    const auto stamps = checked<std::int64_t>(t, "t", {kAny});
+    const auto n = static_cast<std::int64_t>(stamps.rows());
+    const auto rates = checked<double>(gyro, "gyro", {n, 3}), forces = checked<double>(accel, "accel", {n, 3});
+    done([&]() -> Result<void> {
+      for (std::ptrdiff_t i = 0; i < n; ++i) {
+        const double *w = rates.data + 3 * i, *f = forces.data + 3 * i;
+        const ImuSample sample{Time{stamps.data[i]}, Vec3(w[0], w[1], w[2]), Vec3(f[0], f[1], f[2])};
+        if (Result<void> taken = system_->push(sample); !taken) return taken;
+      }
+      return {};
+    });
+  }
+
+  /// Works without the GIL. A failure in a callback is raised as it was there.
+  template <class Work>
+  void done(Work work) {
+    const Result<void> result = [&] {
+      nb::gil_scoped_release released;
+      return work();
+    }();
+    if (result) return;
+    if (failure_) std::rethrow_exception(failure_);
+    raise(result.error());
+  }
+
+  /// On the thread that calls back, without the GIL. What no one is called with waits for poll().
+  template <class T>
+  void tell(const nb::object& callback, const T& value, std::deque<T>& waiting) {
+    if (callback.is_none()) {
+      const std::lock_guard lock(mutex_);
+      waiting.push_back(value);
+      return;
+    }
+    const nb::gil_scoped_acquire acquired;
+    try {
+      callback(value);
+    } catch (nb::python_error&) {
+      failure_ = std::current_exception();
+      throw std::runtime_error("a Python callback raised");
+    }
+  }
+  template <class T>
+  std::vector<T> take(std::deque<T>& waiting) {
+    const std::lock_guard lock(mutex_);
+    std::vector<T> out(waiting.begin(), waiting.end());
+    waiting.clear();
+    return out;
+  }
+
+  StereoRig rig_;
+  nb::object map_, on_odometry_, on_map_update_;
+  std::mutex mutex_;
+  std::deque<Odometry> odometry_;
+  std::deque<MapUpdate> updates_;
+  std::exception_ptr failure_;  // written and read with the GIL
+  std::optional<System> system_;
+};
+
+int traverse(PyObject* self, visitproc visit, void* arg) {
+#if PY_VERSION_HEX >= 0x03090000
+  Py_VISIT(Py_TYPE(self));
+#endif
+  return nb::inst_ready(self) ? nb::inst_ptr<PySystem>(self)->traverse(visit, arg) : 0;
+}
+int clear(PyObject* self) {
+  if (nb::inst_ready(self)) nb::inst_ptr<PySystem>(self)->forget();
+  return 0;
+}
+const PyType_Slot kSlots[] = {
+    {Py_tp_traverse, reinterpret_cast<void*>(&traverse)}, {Py_tp_clear, reinterpret_cast<void*>(&clear)}, {0, nullptr}};
+
+nb::dict counts_of(const PySystem& system) {
+  const InputCounts counts = system.counts();
+  nb::dict out;
+  out["imu_accepted"] = counts.imu.accepted;
+  out["imu_duplicate"] = counts.imu.duplicate;
+  out["imu_backward"] = counts.imu.backward;
+  out["imu_invalid"] = counts.imu.invalid;
+  out["imu_overflow"] = counts.imu.overflow;
+  out["images"] = counts.images;
+  out["images_backward"] = counts.images_backward;
+  return out;
+}
+
+}  // namespace
+
+void bind_system(nb::module_& m) {
+  nb::class_<PySystem>(m, "System", nb::type_slots(kSlots))
+      .def(nb::init<const Config&, const StereoRig&, bool, nb::object, nb::object, nb::object, const std::string&>(), "config"_a,
+           "rig"_a, "threaded"_a = false, "map"_a = nb::none(), "on_odometry"_a = nb::none(), "on_map_update"_a = nb::none(),
+           "imu_state"_a = "")
+      .def(
+          "push_imu", &PySystem::push_imu, "t"_a, "gyro"_a, "accel"_a,
+          nb::sig("def push_imu(self, t: int | numpy.ndarray, gyro: numpy.ndarray, accel: numpy.ndarray) -> None"),
+          "Readings in order of time. One: t in ns, gyro (3,) in rad/s, accel (3,) in m/s^2 (specific force, +g upwards at rest), "
+          "both in B. Or many at once: int64 (N,), float64 (N, 3), float64 (N, 3).")
+      .def(
+          "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none(),
+          nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None) -> None"),
+          "A stereo frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size in C order, None where a "
+          "camera delivered nothing. They are read where they lie, by other threads later: hand over new arrays, do not "
+          "write to them afterwards.")
+      .def(
+          "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
+      .def(
+          "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
+      .def("finish", &PySystem::finish,
+           "Processes what is waiting and ends; nothing comes afterwards but what poll() still holds.")
+      .def("poll", &PySystem::poll, "The Odometry of every image done since the last call; empty where on_odometry is given.")
+      .def("poll_map", &PySystem::poll_map, "The MapUpdates since the last call; empty where on_map_update is given.")
+      .def_prop_ro("input_counts", &counts_of, "What became of readings and images: taken, refused, and why.")
+      .def_prop_ro("rig", &PySystem::rig)
+      .def(
+          "__enter__", [](nb::handle self) { return nb::borrow(self); }, nb::sig("def __enter__(self) -> System"))
+      .def(
+          "__exit__",
+          [](PySystem& s, nb::handle type, nb::handle, nb::handle) {
+            if (type.is_none()) s.finish();
+          },
+          "type"_a.none(), "value"_a.none(), "traceback"_a.none())
+      .attr("__doc__") =
+      "Stereo visual-inertial odometry, fed by push_imu() and push_images() in order of time. One thread at a time pushes. "
+      "threaded: frontend, estimator and map work on threads of their own; the same results. A callback is called with each Odometry "
+      "(MapUpdate) on the thread that made it; what it raises is raised by a push or finish() soon after. In a `with`, "
+      "finish() is called at the end.";
+}
+
+}  // namespace fbvins::python

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// The compiled half of the package `fbvins`; the other is in python/fbvins.
+#include "bindings.hpp"
+
+NB_MODULE(_fbvins, m) {
+  using namespace fbvins::python;
+  m.doc() = "Stereo visual-inertial odometry: the compiled half of fbvins.";
+  m.attr("__version__") = FBVINS_VERSION;
+  bind_rig(m);
+  bind_config(m);
+  bind_recording(m);
+  bind_trajectory(m);
+  bind_odometry(m);
+  bind_map(m);
+  bind_system(m);
+  bind_run(m);
+  bind_features(m);
+}

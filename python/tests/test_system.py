@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+import gc
+import sys
+import threading
+import time
+import weakref
+
+import numpy as np
+import pytest
+
+import fbvins
+
+
+def feed(system, recording):
+    for event in recording:
+        if isinstance(event, fbvins.StereoFrame):
+            system.push_images(event.t, event.left, event.right)
+        else:
+            system.push_imu(event.t, event.gyro, event.accel)
+    system.finish()
+
+
+def test_arrays_pushed_give_the_same_poses_as_a_run(flight):
+    run = fbvins.run(flight, "orb")
+    for threaded in (False, True):
+        recording = fbvins.open(flight)
+        system = fbvins.System({"frontend.kind": "orb"}, recording.rig, threaded=threaded)
+        feed(system, recording)
+        poses = system.poll()
+        assert np.array_equal([o.p for o in poses], run.p) and np.array_equal([o.q for o in poses], run.q)
+        assert system.poll() == []
+    assert system.input_counts["images"] == len(run.t) and system.input_counts["imu_invalid"] == 0
+
+
+def test_readings_come_one_by_one_or_many_at_once(flight):
+    def fly(batch):
+        recording, poses, readings = fbvins.open(flight, max_frames=60), [], []
+        with fbvins.System(None, recording.rig, on_odometry=poses.append) as system:
+            for event in recording:
+                if isinstance(event, fbvins.ImuSample) and batch:
+                    readings.append(event)
+                    continue
+                if readings:
+                    system.push_imu(np.array([r.t for r in readings]), np.array([r.gyro for r in readings]),
+                                    np.array([r.accel for r in readings]))
+                    readings.clear()
+                system.push(event)
+        return np.array([o.p for o in poses])
+
+    assert np.array_equal(fly(batch=False), fly(batch=True))
+
+
+def test_images_are_not_copied_and_are_let_go(flight):
+    recording = fbvins.open(flight, max_frames=30)
+    rig = recording.rig
+    system = fbvins.System(None, rig, threaded=True)
+    kept = []
+    for event in recording:
+        if isinstance(event, fbvins.StereoFrame):
+            left = event.left.copy()
+            kept.append(weakref.ref(left))
+            system.push_images(event.t, left, event.right)
+            del left
+        else:
+            system.push(event)
+    assert any(r() is not None for r in kept), "images in the queue are read where they lie"
+    system.finish()
+    del system
+    gc.collect()
+    assert all(r() is None for r in kept), "an image was kept for ever"
+
+
+def test_the_map_beside_it(flight, tmp_path):
+    recording, updates = fbvins.open(flight), []
+    flat = fbvins.Map(recording.rig)
+    system = fbvins.System({"frontend.kind": "orb"}, recording.rig, map=flat, on_map_update=updates.append, threaded=True)
+    feed(system, recording)
+    flat.finish()
+    flat.save(str(tmp_path / "flat.fbm"))
+    contents = fbvins.load_map(tmp_path / "flat.fbm")
+    assert flat.keyframes == len(contents.keyframes) > 5 and contents.points.shape[1] == 3 and len(contents.points) > 100
+    in_map = flat.corrected([o for o in system.poll() if o.has_pose])
+    assert fbvins.evaluate(recording.ground_truth, in_map).absolute_m.rmse < 0.1
+    assert updates[-1].localised and updates[-1].T_MW.shape == (4, 4)
+    again = fbvins.Map(recording.rig, tmp_path / "flat.fbm")
+    assert again.keyframes == flat.keyframes
+
+
+@pytest.mark.parametrize("threaded", [False, True])
+def test_an_exception_in_a_callback_comes_out_as_it_is(flight, threaded):
+    class Mine(Exception):
+        pass
+
+    def raise_mine(odometry):
+        raise Mine("at frame %d" % odometry.frame)
+
+    recording = fbvins.open(flight, max_frames=20)
+    system = fbvins.System(None, recording.rig, threaded=threaded, on_odometry=raise_mine)
+    with pytest.raises(Mine, match="at frame 0"):
+        feed(system, recording)
+
+
+def test_other_threads_run_while_it_works(flight):
+    recording, ticks, stop = fbvins.open(flight, max_frames=40), [], threading.Event()
+
+    def tick():
+        while not stop.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.001)
+
+    worker = threading.Thread(target=tick)
+    system = fbvins.System({"frontend.kind": "orb"}, recording.rig)
+    worker.start()
+    switch, begin = sys.getswitchinterval(), time.perf_counter()
+    sys.setswitchinterval(100)  # whoever has the GIL keeps it: ticks come only where it is released
+    try:
+        feed(system, recording)
+    finally:
+        sys.setswitchinterval(switch)
+        stop.set()
+        worker.join()
+    during = [t for t in ticks if t > begin]
+    assert len(during) > 20
+
+
+def test_a_system_that_refers_to_itself_is_collected(flight):
+    rig = fbvins.open(flight, max_frames=1).rig
+    system = fbvins.System(None, rig, threaded=True, on_odometry=lambda o: system)
+    gone = weakref.ref(system) if hasattr(system, "__weakref__") else None
+    del system
+    gc.collect()
+    assert gone is None or gone() is None
+
+
+def wrong_images(good):
+    yield "float64", good.astype(float)
+    yield "uint16", good.astype(np.uint16)
+    yield r"\(240, 376\)", np.ascontiguousarray(good[::2, ::2])
+    yield "np.ascontiguousarray", good[:, ::-1]
+    yield "np.ascontiguousarray", np.asfortranarray(good)
+    yield r"\(480, 752, 3\)", np.dstack([good] * 3)
+    yield "list", good.tolist()
+    yield "str", "image.png"
+
+
+def test_wrong_arrays_are_refused_with_what_was_expected(flight):
+    rig = fbvins.open(flight, max_frames=1).rig
+    system = fbvins.System(None, rig)
+    good = np.zeros((rig.left.height, rig.left.width), np.uint8)
+    for message, wrong in wrong_images(good):
+        with pytest.raises(ValueError, match=r"left: a NumPy array of uint8 \(480, 752\) in C order is expected.*" + message):
+            system.push_images(1, wrong, good)
+        with pytest.raises(ValueError, match="right: .*" + message):
+            system.push_images(1, good, wrong)
+    v = np.zeros(3)
+    for gyro in (np.zeros(4), np.zeros(3, np.float32), np.zeros((1, 3)), "gyro"):
+        with pytest.raises(ValueError, match=r"gyro: a NumPy array of float64 \(3,\)"):
+            system.push_imu(0, gyro, v)
+    with pytest.raises(ValueError, match=r"accel: a NumPy array of float64 \(5, 3\)"):
+        system.push_imu(np.arange(5), np.zeros((5, 3)), np.zeros((4, 3)))
+    with pytest.raises(ValueError, match=r"t: a NumPy array of int64 \(N,\)"):
+        system.push_imu(np.arange(5.0), np.zeros((5, 3)), np.zeros((5, 3)))
+    system.push_imu(0, [0, 0, 0], (0, 0, 9.81))
+    system.push_images(10, good, None)
+    with pytest.raises(TypeError):
+        system.push_images(0.5, good, good)
+    system.finish()
+    with pytest.raises(ValueError, match="after finish"):
+        system.push_images(20, good, good)
+
+
+def test_a_rig_of_ones_own(flight):
+    rig = fbvins.open(flight, max_frames=1).rig
+    camera = fbvins.Camera(752, 480, *rig.left.intrinsics, distortion=rig.left.distortion)
+    own = fbvins.Rig(camera, camera, rig.T_BC0, rig.T_BC1, imu_noise=fbvins.ImuNoise(rate_hz=400), time_offset_s=0.002)
+    assert np.array_equal(own.T_BC0, rig.T_BC0) and own.imu_noise.rate_hz == 400 and own.left.model == rig.left.model
+    with pytest.raises(ValueError, match="T_BC1: a rotation and a translation"):
+        fbvins.Rig(camera, camera, rig.T_BC0, 2 * rig.T_BC1)
+    with pytest.raises(ValueError, match="apart"):
+        fbvins.Rig(camera, camera, rig.T_BC0, rig.T_BC0)
+    with pytest.raises(ValueError, match="'radtan' or 'equidistant'"):
+        fbvins.Camera(752, 480, 1, 1, 1, 1, model="fov")
+    fbvins.System(None, own).finish()

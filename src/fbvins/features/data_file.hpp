@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a file lies that ships with the project: weights, vocabularies. A pure function of the machine, any thread.
+//
+//   std::string path = data_file("boost-s.safetensors");
+#pragma once
+
+#include <string>
+
+namespace fbvins {
+
+/// In the folder `data` beside the program or library that this is linked into (a Python package is one), else where it was
+/// installed, else in the sources it was built from. The last is the answer, too, where the file is nowhere.
+std::string data_file(const std::string& name);
+
+}  // namespace fbvins
