@@ -7,8 +7,8 @@
 
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
+#include "apps/open_recording.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/io/dataset.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -19,7 +19,7 @@ constexpr const char* kExamples = R"(examples:
 )";
 
 struct Arguments {
-  std::string dataset, calibration;
+  RecordingArguments recording;
   bool json = false;
 };
 
@@ -102,8 +102,7 @@ int show(const Arguments& arguments) {
   DatasetOptions options;
   options.prefetch_frames = 0;
   options.require_imu = false;
-  options.kalibr_camchain = arguments.calibration;
-  const auto data = open_dataset(arguments.dataset, options);
+  const auto data = open_recording(arguments.recording, options);
   if (!data) return fail(data.error().message);
   for (const std::string& warning : (*data)->info().warnings) warn(warning);
   if (arguments.json) fmt::print("{}\n", describe(**data).dump(2));
@@ -117,8 +116,7 @@ void add_info_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("info", kInfoDescription);
   command->footer(kExamples);
-  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
-  command->add_option("--calibration", arguments->calibration, "Kalibr camchain-imucam.yaml instead of the recording's own");
+  arguments->recording.add_to(*command);
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });
 }

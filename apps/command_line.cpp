@@ -26,8 +26,9 @@ constexpr const char* kExamples = R"(examples:
 exit codes: 0 fine, 1 no pose could be estimated, 2 wrong usage or bad input
 )";
 
-/// Becomes the program that holds the command; returns only where that is not there.
-int become(const HandedOver& command, char** argv) {
+}  // namespace
+
+int hand_over(const HandedOver& command, char** argv) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::string program = self.parent_path() / command.program;
@@ -35,8 +36,6 @@ int become(const HandedOver& command, char** argv) {
   return fail(fmt::format("the command {} is in a program of its own, {}, and that cannot be started: {}; ./dev build makes it",
                           command.command, program, std::generic_category().message(errno)));
 }
-
-}  // namespace
 
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
                      std::initializer_list<HandedOver> elsewhere) {
@@ -47,7 +46,7 @@ int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> co
   int exit_code = kOk;
   for (const AddCommand add : commands) add(program, exit_code);
   for (const HandedOver& other : elsewhere) {
-    if (argc > 1 && argv[1] == std::string_view(other.command)) return become(other, argv);
+    if (argc > 1 && argv[1] == std::string_view(other.command)) return hand_over(other, argv);
     program.add_subcommand(other.command, other.description);
   }
   try {

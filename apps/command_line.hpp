@@ -19,6 +19,9 @@ struct HandedOver {
   const char* program;
 };
 
+/// Becomes the program that holds the command; returns, with an error, only where that is not there.
+int hand_over(const HandedOver& command, char** argv);
+
 /// What main() of each program does: parses, runs the command, returns the exit code.
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
                      std::initializer_list<HandedOver> elsewhere = {});

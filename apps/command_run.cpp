@@ -9,10 +9,10 @@
 #include "apps/commands.hpp"
 #include "apps/config_arguments.hpp"
 #include "apps/imu_state.hpp"
+#include "apps/open_recording.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_flight.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/io/dataset.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -36,20 +36,13 @@ examples:
 )";
 
 struct Arguments {
-  std::string dataset, out, camchain, imu_calibration;
+  RecordingArguments recording;
+  std::string out;
   ConfigArguments config;
   FlightArguments flight;
   int max_images = 0;
   bool quiet = false;
 };
-
-Result<std::unique_ptr<Dataset>> open(const Arguments& arguments) {
-  DatasetOptions options;
-  options.max_frames = arguments.max_images;
-  options.kalibr_camchain = arguments.camchain;
-  options.kalibr_imu = arguments.imu_calibration;
-  return open_dataset(arguments.dataset, options);
-}
 
 Result<std::string> make_folder(const Arguments& arguments, const Config& config, const Dataset& data) {
   const std::string folder =
@@ -63,7 +56,7 @@ Result<std::string> make_folder(const Arguments& arguments, const Config& config
 int run(const Arguments& arguments) {
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
-  const auto data = open(arguments);
+  const auto data = open_recording(arguments.recording, {.max_frames = arguments.max_images});
   if (!data) return fail(data.error().message);
   for (const std::string& warning : (*data)->info().warnings) warn(warning);
   const auto folder = make_folder(arguments, *config, **data);
@@ -91,11 +84,9 @@ void add_run_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("run", "estimate the trajectory of a recording");
   command->footer(kExamples);
-  command->add_option("DATASET", arguments->dataset, "EuRoC folder or zip, or flight record")->required();
+  arguments->recording.add_to(*command);
   arguments->config.add_to(*command);
   command->add_option("--out", arguments->out, "folder for the results (default out/<dataset>-<frontend>)");
-  command->add_option("--calibration", arguments->camchain, "Kalibr camchain-imucam.yaml instead of the recording's own");
-  command->add_option("--imu-calibration", arguments->imu_calibration, "Kalibr imu.yaml, with --calibration");
   command->add_option("--imu-state", arguments->flight.imu_state, kImuStateHelp);
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);

@@ -27,11 +27,13 @@ inline constexpr const char* kVocabDescription = "train or look at a vocabulary 
 inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
+inline constexpr const char* kConvertDescription = "write a recording as ROS bag, flight record or EuRoC folder";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
 
 void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);
 void add_info_command(CLI::App& program, int& exit_code);
+void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);
 void add_report_command(CLI::App& program, int& exit_code);

@@ -2,9 +2,12 @@
 // The `fbvins` program: recordings in, trajectories, figures and pages out; what else there is, it hands over. One file a
 // subcommand, exit codes in commands.hpp.
 #include "apps/command_line.hpp"
+#include "apps/open_recording.hpp"
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
+  constexpr const char* kBags = "fbvins-bags";
+  if (is_for_bags(argc, argv)) return hand_over({argv[1], "", kBags}, argv);
   return run_command_line(argc, argv,
                           {add_run_command, add_config_command,
 #ifdef FBVINS_WITH_LAB
@@ -12,6 +15,7 @@ int main(int argc, char** argv) {
 #endif
                           },
                           {
+                              {"convert", kConvertDescription, kBags},
                               {"live", kLiveDescription, "fbvins-live"},
                               {"eval", kEvalDescription, "fbvins-tools"},
                               {"info", kInfoDescription, "fbvins-tools"},

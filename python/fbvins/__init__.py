@@ -63,10 +63,12 @@ def _path(value: Optional[PathLike]) -> str:
 
 
 def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,  # noqa: A001
-         skip_frames: int = 0, max_frames: int = 0) -> Recording:
-    """A recording: a EuRoC folder or zip, or a flight record (MCAP). `calibration` is Kalibr's camchain-imucam.yaml instead of the
-    recording's own, `imu_calibration` its imu.yaml. max_frames 0: all."""
-    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames)
+         skip_frames: int = 0, max_frames: int = 0, topics: Tuple[str, ...] = ()) -> Recording:
+    """A recording: a EuRoC or TUM-VI folder, an EuRoC zip, a flight record, a ROS 1 or ROS 2 bag, an MCAP file of ROS messages.
+    `calibration` is a file of any format that fbvins.calibration.load() knows, instead of the recording's own. `topics` of a bag, where they are not found:
+    left, right and, if there are several, IMU. max_frames 0: all."""
+    left, right, imu = (tuple(topics) + ("", "", ""))[:3]
+    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, left, right, imu)
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:

@@ -1,13 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigs from calibration files."""
+"""Rigs from the calibration files of other programs."""
 from __future__ import annotations
 
 import os
-from typing import Optional
+from typing import TYPE_CHECKING, Optional, Union
 
 from . import _fbvins
 
+if TYPE_CHECKING:
+    import numpy
 
-def kalibr(camchain, imu: Optional[str] = None) -> _fbvins.Rig:
-    """Kalibr's camchain-imucam.yaml and, for the noise figures, imu.yaml. cam0 is left, cam1 right."""
-    return _fbvins.load_kalibr(os.fspath(camchain), os.fspath(imu) if imu is not None else "")
+    PathLike = Union[str, "os.PathLike[str]"]
+
+
+def load(path: PathLike, imu: Optional[PathLike] = None) -> _fbvins.Rig:
+    """Told apart by content: Kalibr's camchain-imucam.yaml (cam0 is left, cam1 right), OpenVINS's estimator_config.yaml or kalibr_imucam_chain.yaml,
+    Basalt's calibration.json (pinhole, pinhole-radtan8, kb4), VINS-Fusion's configuration with its two camera files (PINHOLE,
+    KANNALA_BRANDT), an EuRoC folder. imu: noise figures as Kalibr writes them, instead of the file's own."""
+    return _fbvins.load_calibration(os.fspath(path), os.fspath(imu) if imu is not None else "")
+
+
+#: The same function under the names of the formats.
+kalibr = openvins = basalt = vins_fusion = euroc = load
+
+
+def ros_camera_info(left: PathLike, right: PathLike, T_BC0: numpy.ndarray, imu_noise: Optional[_fbvins.ImuNoise] = None) -> _fbvins.Rig:
+    """Two files of ROS's camera calibration. They say how the cameras see each other; where the IMU is says T_BC0, float64 (4, 4), which takes
+    coordinates in the left camera to the IMU, m."""
+    rig = _fbvins.load_camera_info(os.fspath(left), os.fspath(right), T_BC0)
+    if imu_noise is None:
+        return rig
+    return _fbvins.Rig(rig.left, rig.right, rig.T_BC0, rig.T_BC1, imu_noise, rig.image_rate_hz, rig.time_offset_s)

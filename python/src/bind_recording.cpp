@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "bindings.hpp"
+#include "fbvins/bags/recording.hpp"
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/sim/simulation.hpp"
 #include "python_types.hpp"
@@ -10,15 +11,13 @@
 namespace fbvins::python {
 namespace {
 
-Recording open(const std::string& path, const std::string& calibration, const std::string& imu_calibration, int skip, int most) {
-  DatasetOptions options;
-  options.kalibr_camchain = calibration;
-  options.kalibr_imu = imu_calibration;
-  options.skip_frames = skip;
-  options.max_frames = most;
+Recording open(const std::string& path, const std::string& calibration, const std::string& imu_calibration, int skip, int most,
+               const std::string& left_topic, const std::string& right_topic, const std::string& imu_topic) {
+  const RecordingOptions options{
+      {.skip_frames = skip, .max_frames = most}, calibration, imu_calibration, left_topic, right_topic, imu_topic};
   return value_or_raise([&] {
     nb::gil_scoped_release released;
-    return open_dataset(path, options);
+    return open_recording(path, options);
   }());
 }
 
@@ -99,7 +98,8 @@ void bind_recording(nb::module_& m) {
         return fmt::format("<fbvins.Recording {} ({}), {} stereo frames>", d.info().name, d.info().format, d.frames().size());
       });
 
-  m.def("open", &open, "path"_a, "calibration"_a = "", "imu_calibration"_a = "", "skip_frames"_a = 0, "max_frames"_a = 0);
+  m.def("open", &open, "path"_a, "calibration"_a = "", "imu_calibration"_a = "", "skip_frames"_a = 0, "max_frames"_a = 0,
+        "left_topic"_a = "", "right_topic"_a = "", "imu_topic"_a = "");
   m.def("simulate", &simulate, "preset"_a = "normal", "seed"_a = 1, "seconds"_a = 0.0);
   m.def("simulation_presets", &simulation_presets, "Names of the simulator's presets.");
 }

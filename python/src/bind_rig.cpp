@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "bindings.hpp"
-#include "fbvins/io/dataset.hpp"
-#include "fbvins/io/kalibr.hpp"
+#include "fbvins/bags/calibration.hpp"
 
 namespace fbvins::python {
 namespace {
@@ -104,11 +103,15 @@ void bind_rig(nb::module_& m) {
       });
 
   m.def(
-      "load_kalibr",
-      [](const std::string& camchain, const std::string& imu) {
-        return value_or_raise(load_kalibr(camchain, imu.empty() ? std::nullopt : std::optional(imu)));
+      "load_calibration",
+      [](const std::string& path, const std::string& imu) { return value_or_raise(load_calibration(path, imu)); }, "path"_a,
+      "imu"_a = "");
+  m.def(
+      "load_camera_info",
+      [](const std::string& left, const std::string& right, nb::handle T_BC0) {
+        return value_or_raise(load_camera_info(left, right, transform<B, C0>(T_BC0, "T_BC0")));
       },
-      "camchain"_a, "imu"_a = "", "The rig of Kalibr's camchain-imucam.yaml and imu.yaml.");
+      "left"_a, "right"_a, "T_BC0"_a);
 }
 
 }  // namespace fbvins::python

@@ -237,6 +237,10 @@ const std::vector<Target>& targets() {
       {"weights", fuzz_weights, weights_seeds},
       {"mcap", fuzz_mcap, mcap_seeds},
       {"motion_capture", fuzz_motion_capture, motion_capture_seeds},
+#ifdef FBVINS_WITH_BAGS
+      {"bag", fuzz_bag, bag_seeds},
+      {"foreign_calibration", fuzz_foreign_calibration, foreign_calibration_seeds},
+#endif
 #ifdef FBVINS_WITH_LIVE
       {"socket", fuzz_socket, socket_seeds},
 #endif

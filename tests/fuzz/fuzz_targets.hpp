@@ -21,6 +21,13 @@ void fuzz_socket(std::string_view bytes);
 std::vector<std::string> socket_seeds();
 #endif
 
+#ifdef FBVINS_WITH_BAGS
+void fuzz_bag(std::string_view bytes);
+std::vector<std::string> bag_seeds();
+void fuzz_foreign_calibration(std::string_view bytes);
+std::vector<std::string> foreign_calibration_seeds();
+#endif
+
 struct Target {
   const char* name;
   void (*run)(std::string_view);

@@ -33,6 +33,10 @@ struct DatasetOptions {
   bool require_imu = true;           ///< false: a recording without imu0 is fine
   std::string kalibr_camchain = "";  ///< replaces the recording's own calibration
   std::string kalibr_imu = "";       ///< replaces its IMU noise; only with kalibr_camchain
+  std::optional<StereoRig> rig = {};  ///< replaces both
+
+  /// The recording's own calibration is not looked at.
+  bool brings_rig() const { return rig || !kalibr_camchain.empty(); }
 
   template <class V>
   void visit(V&& v) {

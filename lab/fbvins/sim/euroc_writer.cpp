@@ -146,16 +146,17 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool
   return {};
 }
 
-/// One frame's files; may run while the next frame is drawn.
+/// One frame's files, of the cameras that delivered; may run while the next frame is drawn.
 Result<void> write_images(const DrawnFrame& drawn, const fs::path& mav0) {
   const std::string left = fmt::format("{}.png", drawn.frame.t.ns), right = fmt::format("{}.png", drawn.right_stamp.ns);
-  if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*drawn.frame.left)); !done) return done;
+  if (drawn.frame.left)
+    if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*drawn.frame.left)); !done) return done;
   if (!drawn.depth_left_m.empty())
     if (Result<void> done = write_file(mav0 / "depth0" / left,
                                        depth_png(drawn.depth_left_m, drawn.frame.left->width(), drawn.frame.left->height()));
         !done)
       return done;
-  return write_file(mav0 / "cam1/data" / right, encode_png(*drawn.frame.right));
+  return drawn.frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*drawn.frame.right)) : Result<void>{};
 }
 
 }  // namespace
@@ -198,8 +199,8 @@ EurocFolder::EurocFolder(EurocFolder&&) noexcept = default;
 EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
 
 Result<void> EurocFolder::add(DrawnFrame drawn) {
-  state_->left_rows += fmt::format("{0},{0}.png\n", drawn.frame.t.ns);
-  state_->right_rows += fmt::format("{0},{0}.png\n", drawn.right_stamp.ns);
+  if (drawn.frame.left) state_->left_rows += fmt::format("{0},{0}.png\n", drawn.frame.t.ns);
+  if (drawn.frame.right) state_->right_rows += fmt::format("{0},{0}.png\n", drawn.right_stamp.ns);
   if (Result<void> done = state_->wait(); !done) return done;
   state_->writing =
       std::async(std::launch::async, [drawn = std::move(drawn), mav0 = state_->mav0] { return write_images(drawn, mav0); });

@@ -78,6 +78,7 @@ class EurocReader {
 
   Result<void> read_calibration() {
     // Recordings without IMU have no imu0, those calibrated from outside may lack its sensor.yaml.
+    if (options_.rig) return out_.rig = *options_.rig, Result<void>{};
     ImuSensor imu;
     if (exists("imu0/sensor.yaml") || (options_.kalibr_camchain.empty() && options_.require_imu)) {
       Result<ImuSensor> read = parse_yaml("imu0/sensor.yaml", parse_euroc_imu);
@@ -227,7 +228,7 @@ class EurocReader {
 
   void describe_frames() {
     describe(out_);
-    if (!options_.kalibr_camchain.empty() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
+    if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
   }
 
   void warn_about_rows(const RowCounts& c, const std::string& file) {

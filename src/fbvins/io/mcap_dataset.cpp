@@ -98,7 +98,7 @@ class RecordReader {
       if (Result<void> done = (this->*step)(); !done) return done.error();
     warn();
     describe(out_);
-    if (!options_.kalibr_camchain.empty() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
+    if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
     out_.loader = std::make_unique<McapLoader>(std::move(bytes_), name_, out_.rig);
     return std::move(out_);
   }
@@ -171,6 +171,7 @@ class RecordReader {
   }
 
   Result<void> read_calibration() {
+    if (options_.rig) return out_.rig = *options_.rig, Result<void>{};
     if (!options_.kalibr_camchain.empty()) {
       const auto& imu = options_.kalibr_imu;
       Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));

@@ -21,8 +21,8 @@ std::string quoted(std::string_view text) {
 
 }  // namespace
 
-Result<McapReader> McapReader::open(std::shared_ptr<const ByteSource> bytes, const std::string& name) {
-  McapReader reader(std::move(bytes), name);
+Result<McapReader> McapReader::open(std::shared_ptr<const ByteSource> bytes, const std::string& name, McapUnpack unpack) {
+  McapReader reader(std::move(bytes), name, std::move(unpack));
   if (reader.bytes_->read(0, kMcapMagic.size()) != kMcapMagic)
     return Error{ErrorCode::malformed, fmt::format("{}: does not begin as an MCAP file does", name)};
   reader.next_ = kMcapMagic.size();
@@ -80,29 +80,50 @@ void McapReader::load_records(std::uint64_t offset, std::uint64_t length) {
   if (length > kLargestChunk_bytes) return complain(offset, fmt::format("{} bytes in one piece are too many", length));
   loaded_ = bytes_->read(offset, length);
   loaded_offset_ = offset;
+  loaded_chunk_ = 0;
   position_ = 0;
   loaded_whole_ = true;
 }
 
+std::optional<McapReader::ChunkHead> McapReader::chunk_head(std::uint64_t offset, std::uint64_t length) const {
+  const std::string bytes = bytes_->read(offset, std::min<std::uint64_t>(length, 100));
+  ByteCursor in(bytes);
+  in.skip(8 + 8);  // first stamp, last stamp
+  ChunkHead head;
+  head.unpacked = in.get<std::uint64_t>();
+  head.checksum = in.get<std::uint32_t>();
+  head.compression = take_mcap_text(in);
+  head.records = in.get<std::uint64_t>();
+  head.length = in.position();
+  return in.ok() ? std::optional(std::move(head)) : std::nullopt;
+}
+
 /// Nothing of a whole chunk is believed unless its checksum says so; one that the file ends in is read as far as it goes.
 void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool whole) {
-  const std::string head = bytes_->read(offset, std::min<std::uint64_t>(length, 100));
-  ByteCursor in(head);
-  in.skip(8 + 8 + 8);  // first stamp, last stamp, uncompressed size
-  const auto checksum = in.get<std::uint32_t>();
-  const std::string_view compression = take_mcap_text(in);
-  const auto records = in.get<std::uint64_t>();
-  if (!in.ok()) return whole ? complain(offset, "this chunk's head is not what it should be") : void();
-  if (!compression.empty())
-    return complain(offset,
-                    fmt::format("this chunk is compressed by '{}', and only uncompressed ones are read", quoted(compression)));
-  const std::uint64_t there = length - in.position();
-  if (whole && records > there) return complain(offset, "this chunk's messages are longer than the chunk");
-  load_records(offset + in.position(), std::min(records, there));
+  const std::optional<ChunkHead> head = chunk_head(offset, length);
+  if (!head) return whole ? complain(offset, "this chunk's head is not what it should be") : void();
+  const std::uint64_t there = length - head->length;
+  if (whole && head->records > there) return complain(offset, "this chunk's messages are longer than the chunk");
+  load_records(offset + head->length, std::min(head->records, there));
   loaded_whole_ = whole;
-  if (!whole || checksum == 0 || crc32_of(loaded_) == checksum) return;
+  if (!head->compression.empty()) {
+    std::optional<std::string> records = unpack_ ? unpack_(head->compression, loaded_, head->unpacked) : std::nullopt;
+    loaded_ = std::move(records).value_or("");
+    loaded_offset_ = 0;
+    loaded_chunk_ = offset;
+    if (!records)
+      return complain(offset, fmt::format("this chunk is compressed by '{}', and {}", quoted(head->compression),
+                                          unpack_ ? "that cannot be read" : "only uncompressed ones are read"));
+  }
+  if (!whole || head->checksum == 0 || crc32_of(loaded_) == head->checksum) return;
   loaded_.clear();
   complain(offset, "this chunk's checksum is wrong");
+}
+
+std::string McapReader::records_of(std::uint64_t chunk) const {
+  const std::optional<ChunkHead> head = chunk_head(chunk, bytes_->size() - std::min(chunk, bytes_->size()));
+  if (!head || !unpack_) return {};
+  return unpack_(head->compression, bytes_->read(chunk + head->length, head->records), head->unpacked).value_or("");
 }
 
 void McapReader::load_attachment(std::uint64_t offset, std::uint64_t length) {
@@ -134,7 +155,7 @@ std::optional<McapMessage> McapReader::next_loaded() {
       return std::nullopt;
     }
     position_ += in.position();
-    if (!loaded_whole_) damage_.end = loaded_offset_ + position_;
+    if (!loaded_whole_ && loaded_chunk_ == 0) damage_.end = loaded_offset_ + position_;
     ByteCursor record(content);
     if (kind == McapRecord::schema) take_schema(record);
     if (kind == McapRecord::channel) take_channel(record, at);
@@ -169,7 +190,7 @@ std::optional<McapMessage> McapReader::take_message(std::string_view content, st
     return std::nullopt;
   }
   return McapMessage{&channel->second, Time{static_cast<std::int64_t>(log_ns)}, content.substr(kMcapMessageHead_bytes),
-                     offset + kMcapMessageHead_bytes};
+                     offset + kMcapMessageHead_bytes, loaded_chunk_};
 }
 
 }  // namespace fbvins

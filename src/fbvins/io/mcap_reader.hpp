@@ -6,10 +6,12 @@
 //   file->damage();   // what could not be read, and where
 //
 // A file that ends too early is read up to its last whole record, in an unfinished chunk too. A chunk whose checksum is wrong
-// is left out, as is what does not fit together; each is counted, the first one with its place. Chunks must not be compressed.
+// is left out, as is what does not fit together; each is counted, the first one with its place. Compressed chunks need somebody
+// who can unpack them.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,8 +34,14 @@ struct McapMessage {
   const McapChannel* channel = nullptr;  ///< lives as long as the reader
   Time log_time;
   std::string_view data;     ///< until next()
-  std::uint64_t offset = 0;  ///< of data in the file
+  std::uint64_t offset = 0;  ///< of data in the file; where `chunk` is not 0, in what records_of(chunk) gives
+  std::uint64_t chunk = 0;   ///< the compressed chunk it lies in
 };
+
+/// What comes out of a chunk of so named a compression, or what of it came out before the damage or the end; nullopt for an
+/// unknown name.
+using McapUnpack =
+    std::function<std::optional<std::string>(std::string_view compression, std::string_view bytes, std::uint64_t size)>;
 
 struct McapAttachment {
   std::string name, data;
@@ -49,18 +57,29 @@ struct McapDamage {
 class McapReader {
  public:
   /// `name` is only for messages. An error where this is not MCAP.
-  static Result<McapReader> open(std::shared_ptr<const ByteSource> bytes, const std::string& name);
+  static Result<McapReader> open(std::shared_ptr<const ByteSource> bytes, const std::string& name, McapUnpack unpack = {});
 
   /// Nullopt at the end.
   std::optional<McapMessage> next();
   /// Those met so far.
   const std::vector<McapAttachment>& attachments() const { return attachments_; }
   const McapDamage& damage() const { return damage_; }
+  /// The records of a compressed chunk again.
+  std::string records_of(std::uint64_t chunk) const;
   /// Counts something that the caller could not use.
   void complain(std::uint64_t offset, const std::string& sentence);
 
  private:
-  McapReader(std::shared_ptr<const ByteSource> bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
+  struct ChunkHead {
+    std::uint32_t checksum = 0;
+    std::string compression;
+    std::uint64_t unpacked = 0, records = 0;  ///< sizes
+    std::size_t length = 0;                   ///< of the head itself
+  };
+
+  McapReader(std::shared_ptr<const ByteSource> bytes, std::string name, McapUnpack unpack)
+      : bytes_(std::move(bytes)), name_(std::move(name)), unpack_(std::move(unpack)) {}
+  std::optional<ChunkHead> chunk_head(std::uint64_t offset, std::uint64_t length) const;
   bool load_next();
   bool cut_off(std::uint64_t at);
   void load_records(std::uint64_t offset, std::uint64_t length);
@@ -73,9 +92,11 @@ class McapReader {
 
   std::shared_ptr<const ByteSource> bytes_;
   std::string name_;
+  McapUnpack unpack_;
   std::uint64_t next_ = 0;           ///< the next record outside of chunks
   std::string loaded_;               ///< records in work
-  std::uint64_t loaded_offset_ = 0;  ///< their place in the file
+  std::uint64_t loaded_offset_ = 0;  ///< their place in the file; 0 where they were unpacked
+  std::uint64_t loaded_chunk_ = 0;   ///< the chunk they were unpacked from
   std::size_t position_ = 0;         ///< in loaded_
   bool loaded_whole_ = true;         ///< false: the file ends inside of them
   std::map<std::uint16_t, std::string> schemas_;

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/open_recording.hpp"
+#include "apps/progress.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/io/flight_record.hpp"
+#include "fbvins/sim/euroc_writer.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(What is written is told by the name: FILE.bag, a ROS 1 bag; FILE.mcap, a flight record, which ROS 2's programs read;
+else an EuRoC folder. Images become 8-bit grey.
+
+examples:
+  fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
+  fbvins convert MH_01_easy.bag mh01 --calibration camchain-imucam.yaml
+  fbvins convert MH_01_easy mh01.mcap
+)";
+
+struct Arguments {
+  RecordingArguments recording;
+  std::string out;
+  bool quiet = false;
+};
+
+/// Takes what comes in order; finish() makes it whole.
+struct Sink {
+  std::function<Result<void>(const SensorEvent&)> add;
+  std::function<Result<void>()> finish;
+};
+
+template <class Writer>
+Sink sink_of(std::shared_ptr<Writer> writer) {
+  return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return writer->add(value); }, event); },
+          [writer] { return writer->finish(); }};
+}
+
+/// EuRoC's readings and truth are written at the end.
+struct EurocSink {
+  EurocFolder folder;
+  SimulatedImu imu;
+
+  Result<void> add(const ImuSample& sample) { return imu.samples.push_back(sample), Result<void>{}; }
+  Result<void> add(const StereoFrame& frame) { return folder.add({.frame = frame, .right_stamp = frame.t, .exposure_s = 0, .depth_left_m = {}}); }
+  Result<void> finish() { return folder.finish(imu); }
+};
+
+Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
+  if (std::filesystem::exists(arguments.out))
+    return Error{ErrorCode::unwritable, fmt::format("{} exists already", arguments.out)};
+  if (arguments.out.ends_with(".bag")) {
+    auto bag = Ros1BagWriter::create(arguments.out, data.rig(), data.frames().front().t);
+    if (!bag) return bag.error();
+    return sink_of(std::make_shared<Ros1BagWriter>(*std::move(bag)));
+  }
+  if (arguments.out.ends_with(".mcap")) {
+    auto record = FlightRecord::create(arguments.out, data.rig());
+    if (!record) return record.error();
+    return sink_of(std::make_shared<FlightRecord>(*std::move(record)));
+  }
+  auto folder = EurocFolder::create(arguments.out, data.rig());
+  if (!folder) return folder.error();
+  auto euroc = std::make_shared<EurocSink>(EurocSink{*std::move(folder), {}});
+  for (const TrajectoryPoint& p : data.ground_truth())
+    euroc->imu.truth.push_back({p.t, p.T_WB, p.v_WB.value_or(Vec3::Zero()), p.bias.value_or(ImuBias{})});
+  return sink_of(std::move(euroc));
+}
+
+int convert(const Arguments& arguments) {
+  const auto data = open_recording(arguments.recording, {.require_imu = false});
+  if (!data) return fail(data.error().message);
+  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  Result<Sink> sink = make_sink(arguments, **data);
+  if (!sink) return fail(sink.error().message);
+  Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
+  int frames = 0;
+  while (auto event = (*data)->next()) {
+    if (Result<void> taken = sink->add(*event); !taken) return fail(taken.error().message);
+    if (std::holds_alternative<StereoFrame>(*event)) progress.update(++frames);
+  }
+  if (Result<void> done = sink->finish(); !done) return fail(done.error().message);
+  if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", frames, bold(arguments.out));
+  return kOk;
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("convert", kConvertDescription);
+  command->footer(kExamples);
+  arguments->recording.add_to(*command);
+  command->add_option("OUT", arguments->out, "FILE.bag, FILE.mcap, or a folder")->required();
+  command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
+  command->callback([arguments, &exit_code] { exit_code = convert(*arguments); });
+}
+
+}  // namespace fbvins::app

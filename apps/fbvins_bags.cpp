@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+// fbvins-bags, to which `fbvins` hands other people's recordings.
+#include "apps/command_line.hpp"
+
+int main(int argc, char** argv) {
+  using namespace fbvins::app;
+  return run_command_line(argc, argv, {add_run_command, add_info_command, add_convert_command});
+}

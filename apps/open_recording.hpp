@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where commands get recordings from. Each program links its own definition: `fbvins` reads EuRoC recordings and flight records
+// (open_recording.cpp), fbvins-bags everybody's (open_foreign_recording.cpp); the former hands what it cannot read to the latter.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/io/dataset.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace fbvins::app {
+
+struct RecordingArguments {
+  std::string path, calibration, imu_calibration;
+  std::vector<std::string> topics;  ///< left, right and, if it is not the only one, IMU
+
+  void add_to(CLI::App& command);
+};
+
+Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options);
+
+/// Whether a command line asks for what only fbvins-bags reads: a bag, a TUM-VI folder, a calibration that is not Kalibr's,
+/// topics.
+bool is_for_bags(int argc, char** argv);
+
+}  // namespace fbvins::app

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/bag_contents.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <deque>
+#include <set>
+
+#include "fbvins/io/calibration_fields.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::string_view kTruthTopic = "/ground_truth";
+
+void take_imu(const BagMessage& message, Encoding encoding, ImuTopic& topic) {
+  const std::optional<ImuSample> sample = imu_of(message.data, encoding);
+  if (!sample) {
+    ++topic.malformed;
+    return;
+  }
+  if (topic.samples.empty()) {
+    MessageFields in(message.data, encoding);
+    in.header();
+    topic.frame = in.frame();
+  }
+  topic.samples.push_back(*sample);
+}
+
+void take_image(const BagMessage& message, const BagTopic& about, ImageTopic& topic) {
+  topic.compressed = about.type == "sensor_msgs/CompressedImage";
+  topic.encoding = about.encoding;
+  const std::optional<Time> t = stamp_of(message.data, about.encoding);
+  if (t) topic.rows.push_back({*t, place_name(message.place)});
+  else ++topic.malformed;
+}
+
+void take_camera(const BagMessage& message, const BagTopic& about, BagContents& out) {
+  if (out.cameras.contains(about.name)) return;
+  Result<BagCamera> camera = camera_of(message.data, about.encoding);
+  if (camera) out.cameras.emplace(about.name, *std::move(camera));
+  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", about.name, camera.error().message);
+}
+
+template <class Map>
+std::vector<std::string> names(const Map& map) {
+  std::vector<std::string> out;
+  for (const auto& [name, value] : map) out.push_back(name);
+  return out;
+}
+
+/// The topic named, or an error with those that there are.
+template <class Map>
+Result<std::string> named_topic(const Map& map, const std::string& name, const char* what) {
+  if (map.contains(name)) return name;
+  return Error{ErrorCode::not_found,
+               fmt::format("there is no {} on '{}'; there are {}", what, name, fmt::join(names(map), ", "))};
+}
+
+/// Two names that differ in these words only.
+std::optional<std::pair<std::string, std::string>> pair_by_words(const std::vector<std::string>& topics) {
+  constexpr std::pair<const char*, const char*> kWords[] = {
+      {"left", "right"},      {"cam0", "cam1"},     {"infra1", "infra2"}, {"Infrared_1", "Infrared_2"},
+      {"camera0", "camera1"}, {"image0", "image1"},
+  };
+  for (const auto& [left, right] : kWords)
+    for (const std::string& topic : topics) {
+      const std::size_t at = topic.find(left);
+      if (at == std::string::npos) continue;
+      std::string partner = topic;
+      partner.replace(at, std::string_view(left).size(), right);
+      if (std::find(topics.begin(), topics.end(), partner) != topics.end()) return std::pair(topic, partner);
+    }
+  return std::nullopt;
+}
+
+Result<std::pair<std::string, std::string>> find_images(const BagContents& contents) {
+  const std::vector<std::string> all = names(contents.images);
+  if (all.size() < 2) return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics, not on two", all.size())};
+  if (auto pair = pair_by_words(all)) return *pair;
+  if (all.size() == 2) return std::pair(all[0], all[1]);
+  return Error{ErrorCode::unsupported,
+               fmt::format("has {} image topics ({}): say which are left and right", all.size(), fmt::join(all, ", "))};
+}
+
+Result<std::string> find_imu(const BagContents& contents) {
+  const std::vector<std::string> all = names(contents.imu);
+  if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
+  if (all.size() == 1) return all.front();
+  return Error{ErrorCode::unsupported, fmt::format("has {} IMU topics ({}): say which it is", all.size(), fmt::join(all, ", "))};
+}
+
+/// The camera_info that belongs to an image topic: beside it or below it.
+const BagCamera* camera_for(const BagContents& contents, std::string topic) {
+  if (topic.ends_with("/compressed")) topic.erase(topic.rfind('/'));
+  for (const std::string& name : {topic + "/camera_info", topic.substr(0, topic.rfind('/') + 1) + "camera_info"})
+    if (const auto found = contents.cameras.find(name); found != contents.cameras.end()) return &found->second;
+  return nullptr;
+}
+
+/// Takes coordinates in `from` to `to`, along the transforms that stay.
+std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
+                                         const std::string& from) {
+  std::map<std::string, Pose<B, B>> found{{to, {}}};
+  std::deque<std::string> open{to};
+  while (!open.empty() && !found.contains(from)) {
+    const std::string at = open.front();
+    open.pop_front();
+    for (const BagTransform& t : transforms) {
+      const Pose<B, B> T(t.q, t.p);
+      if (t.parent == at && found.try_emplace(t.child, found.at(at) * T).second) open.push_back(t.child);
+      if (t.child == at && found.try_emplace(t.parent, found.at(at) * T.inverse()).second) open.push_back(t.parent);
+    }
+  }
+  const auto end = found.find(from);
+  return end == found.end() ? std::nullopt : std::optional(end->second);
+}
+
+}  // namespace
+
+std::string place_name(const MessagePlace& place) { return fmt::format("{}+{}+{}", place.chunk, place.offset, place.length); }
+
+MessagePlace place_of(const std::string& name) {
+  MessagePlace place;
+  const char *at = name.data(), *const end = at + name.size();
+  for (std::uint64_t* number : {&place.chunk, &place.offset, &place.length}) {
+    at = std::from_chars(at, end, *number).ptr;
+    if (at != end) ++at;
+  }
+  return place;
+}
+
+BagContents read_contents(BagReader& bag) {
+  BagContents out;
+  while (const std::optional<BagMessage> message = bag.next()) {
+    const BagTopic about = bag.topics()[message->topic];
+    if (about.type == "sensor_msgs/Imu") take_imu(*message, about.encoding, out.imu[about.name]);
+    else if (about.type == "sensor_msgs/Image" || about.type == "sensor_msgs/CompressedImage")
+      take_image(*message, about, out.images[about.name]);
+    else if (about.type == "sensor_msgs/CameraInfo") take_camera(*message, about, out);
+    else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {
+      for (BagTransform& t : transforms_of(message->data, about.encoding)) out.transforms.push_back(std::move(t));
+    } else if (about.name == kTruthTopic) {
+      if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
+    }
+  }
+  return out;
+}
+
+Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed) {
+  ChosenTopics out;
+  if (named.left.empty() != named.right.empty())
+    return Error{ErrorCode::invalid_argument, "one image topic is named and the other is not"};
+  if (!named.left.empty()) {
+    const auto left = named_topic(contents.images, named.left, "image"),
+               right = named_topic(contents.images, named.right, "image");
+    if (!left) return left.error();
+    if (!right) return right.error();
+    out.left = *left, out.right = *right;
+  } else {
+    const auto images = find_images(contents);
+    if (!images) return images.error();
+    out.left = images->first, out.right = images->second;
+  }
+  const auto imu = named.imu.empty() ? find_imu(contents) : named_topic(contents.imu, named.imu, "IMU");
+  if (imu) out.imu = *imu;
+  else if (imu_needed || !contents.imu.empty()) return imu.error();
+  return out;
+}
+
+Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
+  const BagCamera *left = camera_for(contents, topics.left), *right = camera_for(contents, topics.right);
+  const auto missing = [&](const std::string& what) {
+    return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with it", what)};
+  };
+  if ((!left || !right) && !contents.camera_problem.empty()) return missing(contents.camera_problem);
+  if (!left || !right) return missing(fmt::format("no camera_info for {}", left ? topics.right : topics.left));
+  const auto imu = contents.imu.find(topics.imu);
+  if (imu == contents.imu.end()) return missing("without IMU nothing says where the cameras are on it");
+  const std::string& body = imu->second.frame;
+  StereoRig rig;
+  rig.left = left->camera;
+  rig.right = right->camera;
+  for (const BagCamera* camera : {left, right})
+    if (!find_transform(contents.transforms, body, camera->frame))
+      return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
+  rig.T_BC0 = find_transform(contents.transforms, body, left->frame)->cast_frames<B, C0>();
+  rig.T_BC1 = find_transform(contents.transforms, body, right->frame)->cast_frames<B, C1>();
+  if (Result<void> baseline = check_baseline(rig, "/tf_static"); !baseline) return baseline.error();
+  return rig;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to bags: all that a bag holds but the images, gone through once, and which of its topics a recording is made of.
+// One thread.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fbvins/bags/bag_messages.hpp"
+#include "fbvins/bags/bag_reader.hpp"
+#include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/row_counts.hpp"
+
+namespace fbvins {
+
+struct ImuTopic {
+  std::vector<ImuSample> samples;  ///< as they came
+  std::string frame;
+  int malformed = 0;
+};
+
+struct ImageTopic {
+  std::vector<ImageRow> rows;  ///< as they came; `file` is the message's place
+  bool compressed = false;
+  Encoding encoding = Encoding::ros1;
+  int malformed = 0;
+};
+
+struct BagContents {
+  std::map<std::string, ImuTopic> imu;  ///< by topic
+  std::map<std::string, ImageTopic> images;
+  std::map<std::string, BagCamera> cameras;   ///< first camera_info of each topic
+  std::string camera_problem;                 ///< why the first of those that are not used cannot be
+  std::vector<BagTransform> transforms;       ///< that stay
+  std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
+};
+
+BagContents read_contents(BagReader& bag);
+
+/// A message's place as a FrameEntry names it, and back.
+std::string place_name(const MessagePlace& place);
+MessagePlace place_of(const std::string& name);
+
+struct ChosenTopics {
+  std::string left, right, imu;
+};
+/// Those named, else those that are alone of their kind or say left and right in their names. The error lists what there is.
+Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
+
+/// From camera_info and transforms. The error says what is missing.
+Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);
+
+}  // namespace fbvins

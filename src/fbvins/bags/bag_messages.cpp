@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/bag_messages.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "fbvins/bags/grey_image.hpp"
+#include "fbvins/io/image_decode.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+
+bool is_usable(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargestImuValue; }
+
+std::vector<double> doubles(MessageFields& in, std::size_t count) {
+  std::vector<double> out;
+  for (std::size_t i = 0; i < count && in.ok(); ++i) out.push_back(in.get<double>());
+  return out;
+}
+
+/// More coefficients than ours must be zero.
+bool fits_four(const std::vector<double>& d) {
+  for (std::size_t i = 4; i < d.size(); ++i)
+    if (d[i] != 0) return false;
+  return true;
+}
+
+}  // namespace
+
+std::optional<ImuSample> imu_of(std::string_view bytes, Encoding encoding) {
+  constexpr int kOrientation = 4 + 9, kCovariance = 9;
+  MessageFields in(bytes, encoding);
+  ImuSample sample{in.header()};
+  in.skip_doubles(kOrientation);
+  sample.gyro_radps = in.vector();
+  in.skip_doubles(kCovariance);
+  sample.accel_mps2 = in.vector();
+  in.skip_doubles(kCovariance);
+  if (!in.ok() || !is_usable(sample.gyro_radps) || !is_usable(sample.accel_mps2)) return std::nullopt;
+  return sample;
+}
+
+std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  const Time t = in.header();
+  return in.ok() ? std::optional(t) : std::nullopt;
+}
+
+Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed) {
+  MessageFields in(bytes, encoding);
+  in.header();
+  if (compressed) {
+    in.text();  // the format, which the bytes tell themselves
+    const std::string_view file = in.bytes();
+    if (!in.ok()) return Error{ErrorCode::malformed, "this is no compressed image"};
+    return decode_image(file);
+  }
+  RawImage raw;
+  raw.height = in.get<std::uint32_t>();
+  raw.width = in.get<std::uint32_t>();
+  raw.encoding = in.text();
+  raw.big_endian = in.get<std::uint8_t>() != 0;
+  raw.step = in.get<std::uint32_t>();
+  raw.pixels = in.bytes();
+  if (!in.ok()) return Error{ErrorCode::malformed, "this is no image"};
+  return grey_image(raw);
+}
+
+Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  in.header();
+  const std::string frame(in.frame());
+  const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
+  const std::string model(in.text());
+  const std::vector<double> d = doubles(in, in.get<std::uint32_t>()), k = doubles(in, 9);
+  if (!in.ok() || !(k[0] > 0 && k[4] > 0) || width < 1 || height < 1 || width > kLargestImageSide_px ||
+      height > kLargestImageSide_px)
+    return Error{ErrorCode::malformed, "this is no camera's calibration"};
+  std::vector<double> c = d;
+  c.resize(4, 0.0);
+  const int w = static_cast<int>(width), h = static_cast<int>(height);
+  if ((model == "plumb_bob" || model.empty()) && fits_four(d))
+    return BagCamera{Camera(PinholeRadtan{k[0], k[4], k[2], k[5], c[0], c[1], c[2], c[3]}, w, h), frame};
+  if ((model == "equidistant" || model == "fisheye") && fits_four(d))
+    return BagCamera{Camera(KannalaBrandt{k[0], k[4], k[2], k[5], c[0], c[1], c[2], c[3]}, w, h), frame};
+  return Error{ErrorCode::unsupported,
+               fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob and equidistant with four are known",
+                           model.substr(0, 40), d.size())};
+}
+
+std::vector<BagTransform> transforms_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  std::vector<BagTransform> out;
+  const auto count = in.get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count && in.ok(); ++i) {
+    in.header();
+    BagTransform transform{std::string(in.frame()), std::string(in.text()), Quat::Identity(), in.vector()};
+    transform.q = in.quaternion();
+    if (in.ok() && std::abs(transform.q.norm() - 1) < 1e-3 && transform.p.allFinite()) {
+      transform.q.normalize();
+      out.push_back(std::move(transform));
+    }
+  }
+  return out;
+}
+
+std::optional<TrajectoryPoint> pose_of(std::string_view bytes, Encoding encoding, std::string_view type) {
+  MessageFields in(bytes, encoding);
+  TrajectoryPoint point{in.header(), {}, std::nullopt, std::nullopt};
+  if (type.ends_with("TransformStamped") || type.ends_with("Odometry")) in.text();  // the child's frame
+  point.T_WB.p = in.vector();
+  const Quat q = in.quaternion();
+  if (!in.ok() || !point.T_WB.p.allFinite() || !(std::abs(q.norm() - 1) < 1e-3)) return std::nullopt;
+  point.T_WB.q = q.normalized();
+  return point;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to bags: the messages of ROS 1 and ROS 2 that a recording is made of. Pure functions, any thread; nullopt for bytes
+// that are no such message.
+//
+//   std::optional<ImuSample> sample = imu_of(bytes, Encoding::ros1);
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fbvins/bags/message_fields.hpp"
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/io/trajectory.hpp"
+#include "fbvins/types/image.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+std::optional<ImuSample> imu_of(std::string_view bytes, Encoding encoding);
+
+/// sensor_msgs/Image or, with `compressed`, sensor_msgs/CompressedImage: only its stamp, what follows is not looked at.
+std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding);
+/// The image in 8-bit grey, or a sentence why not: mono8, mono16, bayer_*, rgb8, bgr8, rgba8, bgra8 and yuv422; PNG and JPEG.
+Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed);
+
+/// sensor_msgs/CameraInfo, and the frame it names.
+struct BagCamera {
+  Camera camera;
+  std::string frame;
+};
+/// An error for a model that is not known.
+Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding);
+
+/// One of tf2_msgs/TFMessage's: takes coordinates in `child` to `parent`.
+struct BagTransform {
+  std::string parent, child;
+  Quat q = Quat::Identity();
+  Vec3 p = Vec3::Zero();
+};
+std::vector<BagTransform> transforms_of(std::string_view bytes, Encoding encoding);
+
+/// PoseStamped, TransformStamped, Odometry or PoseWithCovarianceStamped, by the type's name.
+std::optional<TrajectoryPoint> pose_of(std::string_view bytes, Encoding encoding, std::string_view type);
+
+}  // namespace fbvins

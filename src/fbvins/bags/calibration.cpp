@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "fbvins/bags/foreign_calibration.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/kalibr.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file that another one names, beside it.
+std::string beside(const std::string& file, const std::string& name) { return (fs::path(file).parent_path() / name).string(); }
+
+bool holds(const std::string& text, const char* word) { return text.find(word) != std::string::npos; }
+
+Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
+  if (!rig || imu_path.empty()) return rig;
+  const Result<std::string> text = read_file(imu_path, kLargestYaml_bytes);
+  if (!text) return text.error();
+  const Result<ImuNoise> noise = parse_kalibr_imu(*text, imu_path);
+  if (!noise) return noise.error();
+  rig->imu_noise = *noise;
+  return rig;
+}
+
+/// Its estimator_config.yaml names the other two.
+Result<StereoRig> load_openvins(const std::string& path, const std::string& text, const std::string& imu_path) {
+  if (!holds(text, "relative_config_imucam")) return with_imu(parse_openvins_cameras(text, path), imu_path);
+  YamlReader yaml(path, text);
+  const std::string cameras = yaml.word(yaml.root(), "relative_config_imucam"),
+                    imu = yaml.text(yaml.root(), "relative_config_imu");
+  if (!yaml.ok()) return yaml.error();
+  const Result<std::string> chain = read_file(beside(path, cameras), kLargestYaml_bytes);
+  if (!chain) return chain.error();
+  const std::string noise = !imu_path.empty() ? imu_path : imu.empty() ? "" : beside(path, imu);
+  return with_imu(parse_openvins_cameras(*chain, beside(path, cameras)), noise);
+}
+
+Result<StereoRig> load_vins_fusion(const std::string& path, const std::string& text) {
+  YamlReader yaml(path, text);
+  std::string texts[2], names[2];
+  for (int i = 0; i < 2; ++i) {
+    names[i] = beside(path, yaml.word(yaml.root(), fmt::format("cam{}_calib", i)));
+    if (!yaml.ok()) return yaml.error();
+    Result<std::string> camera = read_file(names[i], kLargestYaml_bytes);
+    if (!camera) return camera.error();
+    texts[i] = *std::move(camera);
+  }
+  return parse_vins_fusion({text, path}, {texts[0], names[0]}, {texts[1], names[1]});
+}
+
+Result<StereoRig> load_euroc(const std::string& folder) {
+  const auto files = open_file_source(folder);
+  if (!files) return files.error();
+  const std::vector<std::string> roots = (*files)->folders_holding("cam0/sensor.yaml");
+  if (roots.size() != 1)
+    return Error{ErrorCode::not_found, fmt::format("{}: holds {} files cam0/sensor.yaml, not one", folder, roots.size())};
+  const auto text = [&](const char* name) { return (*files)->read(roots[0] + name, kLargestYaml_bytes); };
+  const auto left_text = text("cam0/sensor.yaml"), right_text = text("cam1/sensor.yaml"), imu_text = text("imu0/sensor.yaml");
+  for (const auto* read : {&left_text, &right_text, &imu_text})
+    if (!*read) return read->error();
+  const auto left = parse_euroc_camera(*left_text, "cam0/sensor.yaml"),
+             right = parse_euroc_camera(*right_text, "cam1/sensor.yaml");
+  const auto imu = parse_euroc_imu(*imu_text, "imu0/sensor.yaml");
+  if (!left) return left.error();
+  if (!right) return right.error();
+  if (!imu) return imu.error();
+  return join_euroc(*left, *right, *imu, folder);
+}
+
+}  // namespace
+
+std::string calibration_format(const std::string& text) {
+  if (holds(text, "body_T_cam0")) return "VINS-Fusion";
+  if (holds(text, "\"value0\"")) return "Basalt";
+  if (holds(text, "T_cam_imu")) return "Kalibr";
+  if (holds(text, "relative_config_imucam") || holds(text, "T_imu_cam")) return "OpenVINS";
+  return "";
+}
+
+bool is_kalibr(const std::string& path) {
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  return text && calibration_format(*text) == "Kalibr";
+}
+
+Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored) || path.ends_with(".zip")) return with_imu(load_euroc(path), imu_path);
+  const Result<std::string> text = read_file(path, kLargestYaml_bytes);
+  if (!text) return text.error();
+  const std::string format = calibration_format(*text);
+  if (format == "OpenVINS") return load_openvins(path, *text, imu_path);
+  if (format == "Basalt") return with_imu(parse_basalt(*text, path), imu_path);
+  if (format == "VINS-Fusion") return with_imu(load_vins_fusion(path, *text), imu_path);
+  return load_kalibr(path, imu_path.empty() ? std::nullopt : std::optional(imu_path));
+}
+
+Result<StereoRig> load_camera_info(const std::string& left_path, const std::string& right_path, const Pose<B, C0>& T_BC0) {
+  const Result<std::string> left = read_file(left_path, kLargestYaml_bytes), right = read_file(right_path, kLargestYaml_bytes);
+  if (!left) return left.error();
+  if (!right) return right.error();
+  return parse_camera_info({*left, left_path}, {*right, right_path}, T_BC0);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: the rig from the calibration files of other programs, told apart by content. Any thread.
+//
+//   Result<StereoRig> rig = load_calibration("calibration.json");              // Basalt
+//   Result<StereoRig> rig = load_calibration("camchain-imucam.yaml", "imu.yaml");
+//
+// Frames: B is the IMU, C0 the left and C1 the right camera; what the formats call T_cam_imu, T_imu_cam or body_T_cam0 is turned
+// to T_BC0 and T_BC1.
+#pragma once
+
+#include <string>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+
+namespace fbvins {
+
+/// Kalibr's camchain-imucam.yaml; OpenVINS's estimator_config.yaml or kalibr_imucam_chain.yaml; Basalt's calibration.json;
+/// VINS-Fusion's configuration with its two camera files; an EuRoC folder with its sensor.yaml files. `imu_path`: noise figures
+/// as Kalibr writes them; without it they are the file's own, where it has any. An error for a camera model that is not known.
+Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path = "");
+
+/// Two files of ROS's camera calibration (camera_info). They say how the cameras see each other, but not where the IMU is: T_BC0
+/// says that.
+Result<StereoRig> load_camera_info(const std::string& left_path, const std::string& right_path, const Pose<B, C0>& T_BC0);
+
+/// Which of them a file's text is: "Kalibr", "OpenVINS", "Basalt", "VINS-Fusion"; empty for none.
+std::string calibration_format(const std::string& text);
+bool is_kalibr(const std::string& path);
+
+}  // namespace fbvins

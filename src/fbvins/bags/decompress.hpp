@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to bags: chunks as ROS and MCAP compress them. Pure functions, any thread.
+//
+//   Unpacked out = unpack("lz4", bytes, size);
+//   if (!out.whole) ...              // out.bytes holds what came out before the damage, or the end
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace fbvins {
+
+struct Unpacked {
+  std::string bytes;
+  bool known = true;  ///< false: a compression of another name
+  bool whole = false;
+};
+
+/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is what should come out, and never more does; 0: as the bytes say, at most
+/// `kLargestUnpacked_bytes`.
+Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size);
+
+inline constexpr std::uint64_t kLargestUnpacked_bytes = std::uint64_t{256} << 20u;
+
+}  // namespace fbvins

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/foreign_calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/image_decode.hpp"
+
+namespace fbvins {
+namespace {
+
+int side_px(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+  return static_cast<int>(yaml.number_between(map, field, 1, kLargestImageSide_px, 1));
+}
+
+/// The map inside of a map; complains where there is none.
+YAML::Node inner(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+  const YAML::Node node = yaml.get(map, field);
+  if (!node.IsMap()) yaml.complain(map, field, "is missing or empty");
+  return node;
+}
+
+/// An element of a list of maps.
+YAML::Node element(YamlReader& yaml, const YAML::Node& map, const std::string& field, std::size_t index) {
+  const YAML::Node list = yaml.get(map, field);
+  if (list.IsSequence() && index < list.size() && (list[index].IsMap() || list[index].IsSequence())) return list[index];
+  yaml.complain(map, field, fmt::format("has no element {}", index));
+  return YAML::Node(YAML::NodeType::Map);
+}
+
+Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig, const std::string& file) {
+  if (!yaml.ok()) return yaml.error();
+  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  return rig;
+}
+
+// OpenVINS
+
+template <class C>
+Pose<B, C> mounting(YamlReader& yaml, const YAML::Node& camera) {
+  if (yaml.has(camera, "T_cam_imu")) return read_transform<C, B>(yaml, camera, "T_cam_imu").inverse();
+  return read_transform<B, C>(yaml, camera, "T_imu_cam");
+}
+
+// Basalt
+
+Camera basalt_camera(YamlReader& yaml, const YAML::Node& root, std::size_t index) {
+  const YAML::Node camera = element(yaml, root, "intrinsics", index);
+  const YAML::Node size = element(yaml, root, "resolution", index);
+  const std::string model = yaml.word(camera, "camera_type");
+  const YAML::Node k = inner(yaml, camera, "intrinsics");
+  const double fx = yaml.positive(k, "fx"), fy = yaml.positive(k, "fy"), cx = yaml.number(k, "cx"), cy = yaml.number(k, "cy");
+  int sides[2] = {1, 1};
+  for (std::size_t i = 0; i < 2 && size.IsSequence() && i < size.size(); ++i)
+    sides[i] = std::clamp(size[i].as<int>(1), 1, kLargestImageSide_px);
+  const auto number = [&](const char* name) { return yaml.number(k, name); };
+  if (!yaml.ok()) return {};
+  if (model == "kb4")
+    return {KannalaBrandt{fx, fy, cx, cy, number("k1"), number("k2"), number("k3"), number("k4")}, sides[0], sides[1]};
+  if (model == "pinhole") return {PinholeRadtan{fx, fy, cx, cy}, sides[0], sides[1]};
+  if (model == "pinhole-radtan8") {
+    for (const char* higher : {"k3", "k4", "k5", "k6"})
+      if (yaml.ok() && number(higher) != 0) yaml.complain(k, higher, "is not 0, and only k1, k2, p1, p2 are known");
+    return {PinholeRadtan{fx, fy, cx, cy, number("k1"), number("k2"), number("p1"), number("p2")}, sides[0], sides[1]};
+  }
+  yaml.complain(camera, "camera_type", fmt::format("'{}' is not supported, only pinhole, pinhole-radtan8 and kb4", model));
+  return {};
+}
+
+template <class C>
+Pose<B, C> basalt_mounting(YamlReader& yaml, const YAML::Node& root, std::size_t index) {
+  const YAML::Node T = element(yaml, root, "T_imu_cam", index);
+  const Quat q(yaml.number(T, "qw"), yaml.number(T, "qx"), yaml.number(T, "qy"), yaml.number(T, "qz"));
+  const Vec3 p(yaml.number(T, "px"), yaml.number(T, "py"), yaml.number(T, "pz"));
+  if (yaml.ok() && !(std::abs(q.norm() - 1) < 1e-3)) yaml.complain(T, "qw", "this quaternion's norm is not 1");
+  return yaml.ok() ? Pose<B, C>(q.normalized(), p) : Pose<B, C>();
+}
+
+/// The largest of three.
+double worst_axis(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+  const std::vector<double> axes = yaml.numbers(map, field, 3);
+  const double worst = *std::max_element(axes.begin(), axes.end());
+  if (yaml.ok() && !(worst > 0)) yaml.complain(map, field, "is not positive");
+  return worst;
+}
+
+// VINS-Fusion
+
+Camera camodocal_camera(YamlReader& yaml) {
+  const YAML::Node& root = yaml.root();
+  const int width = side_px(yaml, root, "image_width"), height = side_px(yaml, root, "image_height");
+  const std::string model = yaml.word(root, "model_type");
+  const YAML::Node p = inner(yaml, root, "projection_parameters");
+  const auto number = [&](const YAML::Node& map, const char* name) { return yaml.number(map, name); };
+  if (!yaml.ok()) return {};
+  if (model == "PINHOLE") {
+    const YAML::Node d = inner(yaml, root, "distortion_parameters");
+    return {PinholeRadtan{yaml.positive(p, "fx"), yaml.positive(p, "fy"), number(p, "cx"), number(p, "cy"), number(d, "k1"),
+                          number(d, "k2"), number(d, "p1"), number(d, "p2")},
+            width, height};
+  }
+  if (model == "KANNALA_BRANDT")
+    return {KannalaBrandt{yaml.positive(p, "mu"), yaml.positive(p, "mv"), number(p, "u0"), number(p, "v0"), number(p, "k2"),
+                          number(p, "k3"), number(p, "k4"), number(p, "k5")},
+            width, height};
+  yaml.complain(root, "model_type", fmt::format("'{}' is not supported, only PINHOLE and KANNALA_BRANDT", model));
+  return {};
+}
+
+template <class C>
+Pose<B, C> body_T_cam(YamlReader& yaml, const char* field) {
+  const YAML::Node T = inner(yaml, yaml.root(), field);
+  return yaml.ok() ? read_transform<B, C>(yaml, T, "data") : Pose<B, C>();
+}
+
+// ROS
+
+struct RosCamera {
+  Camera camera;
+  Mat3 rectification = Mat3::Identity();
+  double shift_m = 0;  ///< of the rectified camera along x, as its projection has it
+};
+
+RosCamera ros_camera(YamlReader& yaml) {
+  const YAML::Node& root = yaml.root();
+  const int width = side_px(yaml, root, "image_width"), height = side_px(yaml, root, "image_height");
+  const std::vector<double> k = yaml.numbers(inner(yaml, root, "camera_matrix"), "data", 9),
+                            R = yaml.numbers(inner(yaml, root, "rectification_matrix"), "data", 9),
+                            P = yaml.numbers(inner(yaml, root, "projection_matrix"), "data", 12);
+  std::vector<double> d = yaml.numbers(inner(yaml, root, "distortion_coefficients"), "data");
+  const std::string model = yaml.word(root, "distortion_model");
+  if (yaml.ok() && !(k[0] > 0 && k[4] > 0 && P[0] > 0))
+    yaml.complain(root, "camera_matrix", "the focal lengths are not positive");
+  if (yaml.ok() && std::any_of(d.begin() + std::min<std::ptrdiff_t>(4, std::ssize(d)), d.end(), [](double x) { return x != 0; }))
+    yaml.complain(root, "distortion_coefficients", "has more than four that are not zero");
+  if (yaml.ok() && model != "plumb_bob" && model != "equidistant")
+    yaml.complain(root, "distortion_model", fmt::format("'{}' is not supported, only plumb_bob and equidistant", model));
+  if (!yaml.ok()) return {};
+  d.resize(4, 0.0);
+  RosCamera out;
+  out.camera = model == "plumb_bob" ? Camera(PinholeRadtan{k[0], k[4], k[2], k[5], d[0], d[1], d[2], d[3]}, width, height)
+                                    : Camera(KannalaBrandt{k[0], k[4], k[2], k[5], d[0], d[1], d[2], d[3]}, width, height);
+  out.rectification << R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8];
+  out.shift_m = P[3] / P[0];
+  return out;
+}
+
+}  // namespace
+
+Result<StereoRig> parse_openvins_cameras(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);
+  const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0"), cam1 = inner(yaml, yaml.root(), "cam1");
+  if (!yaml.ok()) return yaml.error();
+  StereoRig rig;
+  rig.left = read_camera(yaml, cam0, "distortion_coeffs");
+  rig.right = read_camera(yaml, cam1, "distortion_coeffs");
+  rig.T_BC0 = mounting<C0>(yaml, cam0);
+  rig.T_BC1 = mounting<C1>(yaml, cam1);
+  rig.time_offset_s = yaml.number_between(cam0, "timeshift_cam_imu", -10, 10, 0);
+  return finished(yaml, rig, file);
+}
+
+Result<StereoRig> parse_basalt(const std::string& text, const std::string& file) {
+  YamlReader yaml(file, text);  // JSON is YAML
+  const YAML::Node root = inner(yaml, yaml.root(), "value0");
+  if (!yaml.ok()) return yaml.error();
+  StereoRig rig;
+  rig.left = basalt_camera(yaml, root, 0);
+  rig.right = basalt_camera(yaml, root, 1);
+  rig.T_BC0 = basalt_mounting<C0>(yaml, root, 0);
+  rig.T_BC1 = basalt_mounting<C1>(yaml, root, 1);
+  rig.imu_noise.rate_hz = yaml.positive(root, "imu_update_rate");
+  rig.imu_noise.gyro_noise_density_radps_rthz = worst_axis(yaml, root, "gyro_noise_std");
+  rig.imu_noise.accel_noise_density_mps2_rthz = worst_axis(yaml, root, "accel_noise_std");
+  rig.imu_noise.gyro_random_walk_radps2_rthz = worst_axis(yaml, root, "gyro_bias_std");
+  rig.imu_noise.accel_random_walk_mps3_rthz = worst_axis(yaml, root, "accel_bias_std");
+  rig.time_offset_s = 1e-9 * yaml.number_between(root, "cam_time_offset_ns", -1e10, 1e10, 0);
+  return finished(yaml, rig, file);
+}
+
+Result<StereoRig> parse_vins_fusion(const NamedText& configuration, const NamedText& left, const NamedText& right) {
+  YamlReader yaml(configuration.file, configuration.text), left_yaml(left.file, left.text), right_yaml(right.file, right.text);
+  StereoRig rig;
+  rig.left = camodocal_camera(left_yaml);
+  rig.right = camodocal_camera(right_yaml);
+  if (!left_yaml.ok()) return left_yaml.error();
+  if (!right_yaml.ok()) return right_yaml.error();
+  rig.T_BC0 = body_T_cam<C0>(yaml, "body_T_cam0");
+  rig.T_BC1 = body_T_cam<C1>(yaml, "body_T_cam1");
+  constexpr double kRate_hz = 200;
+  const auto density = [&](const char* field) { return yaml.positive(yaml.root(), field) / std::sqrt(kRate_hz); };
+  rig.imu_noise = {density("gyr_n"), density("acc_n"), density("gyr_w"), density("acc_w"), kRate_hz};
+  rig.time_offset_s = yaml.number_between(yaml.root(), "td", -10, 10, 0);
+  return finished(yaml, rig, configuration.file);
+}
+
+Result<StereoRig> parse_camera_info(const NamedText& left, const NamedText& right, const Pose<B, C0>& T_BC0) {
+  YamlReader left_yaml(left.file, left.text), right_yaml(right.file, right.text);
+  const RosCamera c0 = ros_camera(left_yaml), c1 = ros_camera(right_yaml);
+  if (!left_yaml.ok()) return left_yaml.error();
+  if (!right_yaml.ok()) return right_yaml.error();
+  // p_C1 = R1^T (R0 p_C0 + shift): rectified frames differ by a shift along x alone.
+  const Vec3 shift(c1.shift_m - c0.shift_m, 0, 0);
+  const Pose<C1, C0> T_C1C0(Mat3(c1.rectification.transpose() * c0.rectification), Vec3(c1.rectification.transpose() * shift));
+  StereoRig rig;
+  rig.left = c0.camera;
+  rig.right = c1.camera;
+  rig.T_BC0 = T_BC0;
+  rig.T_BC1 = T_BC0 * T_C1C0.inverse();
+  return finished(right_yaml, rig, right.file);
+}
+
+}  // namespace fbvins

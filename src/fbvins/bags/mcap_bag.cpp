@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// MCAP files of ROS messages, packed or not: rosbag2's, Foxglove's and converted ROS 1 bags.
+#include <fmt/format.h>
+
+#include <map>
+
+#include "fbvins/bags/bag_reader.hpp"
+#include "fbvins/bags/decompress.hpp"
+#include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/mcap_reader.hpp"
+
+namespace fbvins {
+namespace {
+
+std::optional<std::string> unpack_chunk(std::string_view compression, std::string_view bytes, std::uint64_t size) {
+  Unpacked out = unpack(compression, bytes, size);
+  if (!out.known) return std::nullopt;
+  return std::move(out.bytes);
+}
+
+class McapBag final : public BagReader {
+ public:
+  McapBag(std::shared_ptr<const ByteSource> bytes, McapReader reader) : bytes_(std::move(bytes)), reader_(std::move(reader)) {}
+
+  std::string format() const override { return "MCAP"; }
+
+  std::optional<BagMessage> next() override {
+    while (const std::optional<McapMessage> message = reader_.next()) {
+      const std::string& encoding = message->channel->message_encoding;
+      if (encoding != "cdr" && encoding != "ros1") continue;
+      return BagMessage{
+          topic_of(*message->channel), message->log_time, message->data, {message->chunk, message->offset, message->data.size()}};
+    }
+    const McapDamage& damage = reader_.damage();
+    damage_ = {damage.parts, damage.first, damage.ends_early};
+    return std::nullopt;
+  }
+
+  std::string read(const MessagePlace& place) override {
+    if (place.chunk == 0) return bytes_->read(place.offset, place.length);
+    if (kept_at_ != place.chunk) kept_ = reader_.records_of(place.chunk), kept_at_ = place.chunk;
+    if (place.offset > kept_.size() || place.length > kept_.size() - place.offset) return {};
+    return kept_.substr(place.offset, place.length);
+  }
+
+ private:
+  std::size_t topic_of(const McapChannel& channel) {
+    const auto [known, is_new] = numbers_.try_emplace(&channel, topics_.size());
+    if (!is_new) return known->second;
+    const BagTopic topic{channel.topic, plain_type(channel.schema_name),
+                         channel.message_encoding == "cdr" ? Encoding::cdr : Encoding::ros1};
+    for (std::size_t i = 0; i < topics_.size(); ++i)
+      if (topics_[i].name == topic.name && topics_[i].type == topic.type && topics_[i].encoding == topic.encoding)
+        return known->second = i;
+    topics_.push_back(topic);
+    return known->second;
+  }
+
+  std::shared_ptr<const ByteSource> bytes_;
+  McapReader reader_;
+  std::map<const McapChannel*, std::size_t> numbers_;
+  std::string kept_;
+  std::uint64_t kept_at_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<BagReader>> read_mcap_bag(std::shared_ptr<const ByteSource> bytes, const std::string& name) {
+  Result<McapReader> reader = McapReader::open(bytes, name, unpack_chunk);
+  if (!reader) return reader.error();
+  return std::unique_ptr<BagReader>(std::make_unique<McapBag>(std::move(bytes), *std::move(reader)));
+}
+
+}  // namespace fbvins

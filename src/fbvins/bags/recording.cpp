@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "fbvins/bags/bag_contents.hpp"
+#include "fbvins/bags/calibration.hpp"
+#include "fbvins/core/options.hpp"
+#include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/dataset_description.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/mcap_dataset.hpp"
+#include "fbvins/io/mcap_reader.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+// IMU samples this long before the first frame delivered are of use for starting up.
+constexpr Duration kImuLeadIn = {1'000'000'000};
+
+class BagLoader : public FrameLoader {
+ public:
+  struct Side {
+    Camera camera;
+    Encoding encoding;
+    bool compressed;
+  };
+  BagLoader(std::unique_ptr<BagReader> bag, std::string name, Side left, Side right)
+      : bag_(std::move(bag)), name_(std::move(name)), left_(std::move(left)), right_(std::move(right)) {}
+
+  LoadedFrame load(const FrameEntry& entry) override {
+    LoadedFrame out;
+    out.frame.t = entry.t;
+    out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
+    out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
+    return out;
+  }
+
+ private:
+  std::shared_ptr<const Image> load_image(const std::string& place, const Side& side, ImageCounts& counts, std::string& problem) {
+    if (place.empty()) return nullptr;
+    const auto blame = [&](int& count, const std::string& sentence) {
+      ++count;
+      if (problem.empty()) problem = fmt::format("{}: image at {}: {}", name_, place, sentence);
+      return nullptr;
+    };
+    Result<Image> image = image_of(bag_->read(place_of(place)), side.encoding, side.compressed);
+    if (!image) return blame(counts.corrupt, image.error().message);
+    const Camera& camera = side.camera;
+    if (image->width() != camera.width() || image->height() != camera.height())
+      return blame(counts.wrong_size, fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(),
+                                                  image->height(), camera.width(), camera.height()));
+    return std::make_shared<const Image>(*std::move(image));
+  }
+
+  std::unique_ptr<BagReader> bag_;
+  std::string name_;
+  Side left_, right_;
+};
+
+/// In order of stamps, each once.
+template <class Row>
+std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
+  counts.rows += static_cast<int>(rows.size());
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t < b.t; });
+  const auto end = std::unique(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t == b.t; });
+  counts.duplicates += static_cast<int>(rows.end() - end);
+  rows.erase(end, rows.end());
+  return rows;
+}
+
+/// Makes a recording of a bag step by step.
+class BagRecording {
+ public:
+  BagRecording(std::string path, const RecordingOptions& options, std::optional<StereoRig> rig)
+      : path_(std::move(path)), options_(options), rig_(std::move(rig)) {}
+
+  Result<DatasetContents> read(std::unique_ptr<BagReader> bag) {
+    contents_ = read_contents(*bag);
+    for (auto step : {&BagRecording::choose, &BagRecording::calibrate, &BagRecording::pair, &BagRecording::cut})
+      if (Result<void> done = (this->*step)(); !done)
+        return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
+    describe_bag(*bag);
+    const auto side = [&](const std::string& topic, const Camera& camera) {
+      const ImageTopic& images = contents_.images.at(topic);
+      return BagLoader::Side{camera, images.encoding, images.compressed};
+    };
+    out_.loader = std::make_unique<BagLoader>(std::move(bag), path_, side(topics_.left, out_.rig.left),
+                                              side(topics_.right, out_.rig.right));
+    return std::move(out_);
+  }
+
+ private:
+  Result<void> choose() {
+    const Result<ChosenTopics> chosen =
+        choose_topics(contents_, {options_.left_topic, options_.right_topic, options_.imu_topic}, options_.dataset.require_imu);
+    if (!chosen) return chosen.error();
+    topics_ = *chosen;
+    return {};
+  }
+
+  Result<void> calibrate() {
+    if (!rig_) {
+      const Result<StereoRig> rig = rig_of(contents_, topics_);
+      if (!rig) return rig.error();
+      rig_ = *rig;
+      out_.info.warnings.emplace_back("the bag says nothing of the IMU's noise: its figures are the defaults");
+    }
+    out_.rig = *rig_;
+    return {};
+  }
+
+  Result<void> pair() {
+    CameraInfo* infos[2] = {&out_.info.left, &out_.info.right};
+    std::vector<ImageRow> rows[2];
+    for (int i = 0; i < 2; ++i) {
+      ImageTopic& topic = contents_.images.at(i == 0 ? topics_.left : topics_.right);
+      infos[i]->rows.malformed = topic.malformed;
+      infos[i]->rows.rows = topic.malformed;
+      rows[i] = in_order(std::move(topic.rows), infos[i]->rows);
+      infos[i]->listed = static_cast<int>(rows[i].size());
+    }
+    PairedFrames paired = pair_frames(rows[0], rows[1], Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms));
+    out_.info.left.unpaired = paired.left_only;
+    out_.info.right.unpaired = paired.right_only;
+    if (paired.left_only == out_.info.left.listed)
+      return Error{ErrorCode::malformed, fmt::format("no stamp on {} lies within {} ms of one on {}", topics_.right,
+                                                     options_.dataset.pair_tolerance_ms, topics_.left)};
+    if (paired.left_only + paired.right_only > 0)
+      out_.info.warnings.push_back(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only,
+                                               paired.right_only, options_.dataset.pair_tolerance_ms));
+    out_.frames = std::move(paired.frames);
+    if (topics_.imu.empty()) return {};
+    ImuTopic& imu = contents_.imu.at(topics_.imu);
+    out_.info.imu_rows.malformed = out_.info.imu_rows.rows = imu.malformed;
+    out_.imu = in_order(std::move(imu.samples), out_.info.imu_rows);
+    return {};
+  }
+
+  Result<void> cut() {
+    auto& frames = out_.frames;
+    const DatasetOptions& o = options_.dataset;
+    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(o.skip_frames, std::ssize(frames)));
+    if (o.max_frames > 0 && std::ssize(frames) > o.max_frames) frames.resize(static_cast<std::size_t>(o.max_frames));
+    if (frames.empty())
+      return Error{ErrorCode::invalid_argument, fmt::format("no frames are left after skipping {}", o.skip_frames)};
+    const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
+    const Time first = frames.front().t + offset, last = frames.back().t + offset;
+    if (!out_.imu.empty() && (out_.imu.back().t < first || out_.imu.front().t > last))
+      return Error{ErrorCode::malformed, fmt::format("the stamps on {} do not overlap the images'", topics_.imu)};
+    if (o.skip_frames > 0) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    return {};
+  }
+
+  void describe_bag(const BagReader& bag) {
+    DatasetInfo& info = out_.info;
+    info.name = fs::path(path_).lexically_normal().stem().string();
+    info.format = fmt::format("{}: {}, {}, {}", bag.format(), topics_.left, topics_.right, topics_.imu);
+    const BagDamage& damage = bag.damage();
+    if (damage.parts > 0)
+      info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
+    if (damage.ends_early) info.warnings.push_back(fmt::format("{}: was cut off; all that is whole is read", path_));
+    RowCounts truth;
+    out_.ground_truth = in_order(std::move(contents_.ground_truth), truth);
+    info.ground_truth_poses = static_cast<int>(out_.ground_truth.size());
+    describe(out_);
+    constexpr double kSameRate = 0.05;  // few calibrations say the cameras' rate: then it is measured
+    if (std::abs(out_.rig.image_rate_hz - info.image_rate_hz) > kSameRate * info.image_rate_hz)
+      out_.rig.image_rate_hz = info.image_rate_hz;
+    if (info.imu_rate_hz > 0 && options_.calibration.empty()) out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
+  }
+
+  std::string path_;
+  const RecordingOptions& options_;
+  std::optional<StereoRig> rig_;
+  BagContents contents_;
+  ChosenTopics topics_;
+  DatasetContents out_;
+};
+
+/// A flight record of ours carries its calibration.
+bool is_flight_record(const std::string& path) {
+  const auto bytes = open_bytes(path);
+  if (!bytes) return false;
+  auto reader = McapReader::open(*bytes, path);
+  if (!reader) return false;
+  (void)reader->next();  // attachments are before the first message
+  return std::any_of(reader->attachments().begin(), reader->attachments().end(),
+                     [](const McapAttachment& a) { return a.name == kCalibrationAttachment; });
+}
+
+/// TUM-VI (vision.in.tum.de/data/datasets/visual-inertial-dataset): an EuRoC folder whose calibration is Kalibr's, in dso/.
+void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
+  std::error_code ignored;
+  if (!options.calibration.empty() || fs::exists(folder / "mav0/cam0/sensor.yaml", ignored)) return;
+  for (const char* name : {"dso/camchain.yaml", "dso/camchain-imucam.yaml"})
+    if (fs::exists(folder / name, ignored)) options.calibration = (folder / name).string();
+  if (!options.calibration.empty() && options.imu_calibration.empty() && fs::exists(folder / "dso/imu_config.yaml", ignored))
+    options.imu_calibration = (folder / "dso/imu_config.yaml").string();
+}
+
+/// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which knows
+/// noise figures to go with it.
+Result<void> take_calibration(bool bag, RecordingOptions& options) {
+  if (options.calibration.empty()) {
+    if (options.imu_calibration.empty()) return {};
+    return Error{ErrorCode::invalid_argument, "a calibration of the IMU is given without one of the cameras"};
+  }
+  const Result<StereoRig> rig = load_calibration(options.calibration, options.imu_calibration);
+  if (!rig) return rig.error();
+  if (bag || !is_kalibr(options.calibration)) return options.dataset.rig = *rig, Result<void>{};
+  options.dataset.kalibr_camchain = options.calibration;
+  options.dataset.kalibr_imu = options.imu_calibration;
+  return {};
+}
+
+}  // namespace
+
+bool is_bag(const std::string& path) {
+  std::error_code ignored;
+  const fs::path p(path);
+  if (fs::is_directory(p, ignored)) {
+    if (fs::exists(p / "metadata.yaml", ignored)) return true;
+    for (const auto& entry : fs::directory_iterator(p, ignored))
+      if (entry.path().extension() == ".db3") return true;
+    return false;
+  }
+  if (p.extension() == ".bag" || p.extension() == ".db3") return true;
+  return is_mcap(path) && !is_flight_record(path);
+}
+
+Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const RecordingOptions& given) {
+  RecordingOptions options = given;
+  if (Result<void> valid = validate(options.dataset); !valid) return valid.error();
+  std::error_code ignored;
+  const bool bag = is_bag(path);
+  if (!bag && fs::is_directory(path, ignored)) find_tum_vi(path, options);
+  if (Result<void> taken = take_calibration(bag, options); !taken) return taken.error();
+  if (!bag) return open_dataset(path, options.dataset);
+  auto reader = open_bag(path);
+  if (!reader) return reader.error();
+  Result<DatasetContents> contents = BagRecording(path, options, options.dataset.rig).read(*std::move(reader));
+  if (!contents) return contents.error();
+  return std::make_unique<Dataset>(*std::move(contents), options.dataset);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/bags/ros1_bag_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <vector>
+
+#include "fbvins/io/little_endian.hpp"
+#include "fbvins/io/ros_messages.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::size_t kChunk_bytes = 768u << 10u;
+constexpr std::size_t kBagHeader_bytes = 4096;
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+
+// Fields of messages, as ROS 1 writes them into connections.
+constexpr const char* kImuFields =
+    "Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
+    "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n";
+constexpr const char* kImageFields =
+    "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n";
+constexpr const char* kCameraFields =
+    "Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] D\nfloat64[9] K\nfloat64[9] R\nfloat64[12] P\n"
+    "uint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n";
+constexpr std::pair<const char*, const char*> kHeader{"std_msgs/Header", "uint32 seq\ntime stamp\nstring frame_id\n"};
+constexpr std::pair<const char*, const char*> kVector{"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"};
+constexpr std::pair<const char*, const char*> kQuaternion{"geometry_msgs/Quaternion",
+                                                          "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"};
+constexpr std::pair<const char*, const char*> kRegion{
+    "sensor_msgs/RegionOfInterest", "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"};
+constexpr std::pair<const char*, const char*> kTransformStamped{
+    "geometry_msgs/TransformStamped", "Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"};
+constexpr std::pair<const char*, const char*> kTransform{
+    "geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"};
+
+/// A type's fields, and below them those of the types it is made of.
+std::string definition(const char* fields, std::initializer_list<std::pair<const char*, const char*>> parts) {
+  std::string out = fields;
+  for (const auto& [name, part] : parts) out += fmt::format("{:=<80}\nMSG: {}\n{}", "", name, part);
+  return out;
+}
+
+struct Topic {
+  std::string name;
+  const char *type, *checksum;
+  std::string definition;
+};
+
+/// In the order of their numbers.
+enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms };
+
+std::vector<Topic> topics() {
+  const std::string imu = definition(kImuFields, {kHeader, kQuaternion, kVector}), image = definition(kImageFields, {kHeader}),
+                    camera = definition(kCameraFields, {kHeader, kRegion}),
+                    transforms = definition("geometry_msgs/TransformStamped[] transforms\n",
+                                            {kTransformStamped, kHeader, kTransform, kVector, kQuaternion});
+  constexpr const char *kImage = "060021388200f6f0f447d0fcd9c64743", *kCamera = "c9a58c1b0b154e0e6da7578cb991d214";
+  return {{"/imu0", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", imu},
+          {"/cam0/image_raw", "sensor_msgs/Image", kImage, image},
+          {"/cam1/image_raw", "sensor_msgs/Image", kImage, image},
+          {"/cam0/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
+          {"/cam1/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
+          {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms}};
+}
+
+// Records: a header of fields, and data.
+
+void add_field(std::string& header, std::string_view name, std::string_view value) {
+  append_le(header, static_cast<std::uint32_t>(name.size() + 1 + value.size()));
+  header.append(name).append("=").append(value);
+}
+template <class Number>
+void add_number(std::string& header, std::string_view name, Number value) {
+  std::string bytes;
+  append_le(bytes, value);
+  add_field(header, name, bytes);
+}
+std::string record(const std::string& header, std::string_view data) {
+  std::string out;
+  append_le(out, static_cast<std::uint32_t>(header.size()));
+  out += header;
+  append_le(out, static_cast<std::uint32_t>(data.size()));
+  return out.append(data);
+}
+std::uint64_t ros_time(Time t) {
+  return static_cast<std::uint64_t>(t.ns / kSecond_ns) | static_cast<std::uint64_t>(t.ns % kSecond_ns) << 32u;
+}
+
+// Messages.
+
+void add_text(std::string& out, std::string_view text) {
+  append_le(out, static_cast<std::uint32_t>(text.size()));
+  out.append(text);
+}
+void add_header(std::string& out, Time t, std::string_view frame) {
+  append_le(out, std::uint32_t{0});
+  append_le(out, ros_time(t));
+  add_text(out, frame);
+}
+void add_doubles(std::string& out, const double* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) append_le(out, values[i]);
+}
+void add_quaternion(std::string& out, const Quat& q) {
+  for (const double value : {q.x(), q.y(), q.z(), q.w()}) append_le(out, value);
+}
+
+std::string imu_message(const ImuSample& sample) {
+  std::string out;
+  std::array<double, 9> unknown{};
+  add_header(out, sample.t, kBodyFrame);
+  add_quaternion(out, Quat::Identity());
+  unknown[0] = -1;  // ROS's sign for: there is no orientation
+  add_doubles(out, unknown.data(), 9);
+  unknown[0] = 0;
+  add_doubles(out, sample.gyro_radps.data(), 3);
+  add_doubles(out, unknown.data(), 9);
+  add_doubles(out, sample.accel_mps2.data(), 3);
+  add_doubles(out, unknown.data(), 9);
+  return out;
+}
+
+std::string image_message(Time t, std::string_view frame, const Image& image) {
+  std::string out;
+  add_header(out, t, frame);
+  append_le(out, static_cast<std::uint32_t>(image.height()));
+  append_le(out, static_cast<std::uint32_t>(image.width()));
+  add_text(out, "mono8");
+  append_le(out, std::uint8_t{0});
+  append_le(out, static_cast<std::uint32_t>(image.width()));
+  const std::size_t row = static_cast<std::size_t>(image.width());
+  append_le(out, static_cast<std::uint32_t>(row * static_cast<std::size_t>(image.height())));
+  for (int y = 0; y < image.height(); ++y) out.append(reinterpret_cast<const char*>(image.row(y)), row);
+  return out;
+}
+
+std::string camera_message(Time t, std::string_view frame, const Camera& camera) {
+  const auto* radtan = std::get_if<PinholeRadtan>(&camera.model());
+  const auto* fisheye = std::get_if<KannalaBrandt>(&camera.model());
+  const std::vector<double> d = radtan ? std::vector{radtan->k1, radtan->k2, radtan->p1, radtan->p2, 0.0}
+                                       : std::vector{fisheye->k1, fisheye->k2, fisheye->k3, fisheye->k4};
+  const std::array<double, 4> f = std::visit([](const auto& m) { return std::array{m.fx, m.fy, m.cx, m.cy}; }, camera.model());
+  const std::array<double, 9> K{f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}, R{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const std::array<double, 12> P{f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0};
+  std::string out;
+  add_header(out, t, frame);
+  append_le(out, static_cast<std::uint32_t>(camera.height()));
+  append_le(out, static_cast<std::uint32_t>(camera.width()));
+  add_text(out, radtan ? "plumb_bob" : "equidistant");
+  append_le(out, static_cast<std::uint32_t>(d.size()));
+  add_doubles(out, d.data(), d.size());
+  add_doubles(out, K.data(), 9);
+  add_doubles(out, R.data(), 9);
+  add_doubles(out, P.data(), 12);
+  return out.append(6 * sizeof(std::uint32_t) + 1, '\0');  // no binning, no region of interest
+}
+
+std::string transforms_message(Time t, const StereoRig& rig) {
+  std::string out;
+  append_le(out, std::uint32_t{2});
+  const auto add = [&](std::string_view frame, const Quat& q, const Vec3& p) {
+    add_header(out, t, kBodyFrame);
+    add_text(out, frame);
+    add_doubles(out, p.data(), 3);
+    add_quaternion(out, q);
+  };
+  add(kLeftFrame, rig.T_BC0.q, rig.T_BC0.p);
+  add(kRightFrame, rig.T_BC1.q, rig.T_BC1.p);
+  return out;
+}
+
+struct ChunkInfo {
+  std::uint64_t at = 0;
+  Time first, last;
+  std::map<std::uint32_t, std::string> entries;  ///< of the index, by connection: time and place of each message
+};
+
+}  // namespace
+
+struct Ros1BagWriter::State {
+  std::string path, partial;
+  std::ofstream file;
+  std::uint64_t written = 0;
+  std::string chunk;
+  ChunkInfo info;
+  std::vector<ChunkInfo> chunks;
+  std::vector<Topic> all = topics();
+  bool finished = false;
+
+  ~State() {
+    if (!finished) std::remove(partial.c_str());
+  }
+
+  void write(std::string_view bytes) {
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    written += bytes.size();
+  }
+  Result<void> good() const {
+    if (file) return {};
+    return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path)};
+  }
+
+  std::string connection(std::uint32_t number) const {
+    const Topic& topic = all[number];
+    std::string header, about;
+    add_number(header, "op", std::uint8_t{7});
+    add_number(header, "conn", number);
+    add_field(header, "topic", topic.name);
+    add_field(about, "topic", topic.name);
+    add_field(about, "type", topic.type);
+    add_field(about, "md5sum", topic.checksum);
+    add_field(about, "message_definition", topic.definition);
+    return record(header, about);
+  }
+
+  Result<void> add(std::uint32_t number, Time t, const std::string& message) {
+    constexpr Time kEnd{(std::int64_t{1} << 32) * kSecond_ns};
+    if (t < Time{0} || t >= kEnd)
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: a stamp of {} ns is none of ROS's", path, t.ns)};
+    std::string& entries = info.entries[number];
+    if (entries.empty()) chunk += connection(number);
+    if (info.entries.size() == 1 && entries.empty()) info.first = info.last = t;
+    info.first = std::min(info.first, t), info.last = std::max(info.last, t);
+    append_le(entries, ros_time(t));
+    append_le(entries, static_cast<std::uint32_t>(chunk.size()));
+    std::string header;
+    add_number(header, "op", std::uint8_t{2});
+    add_number(header, "conn", number);
+    add_number(header, "time", ros_time(t));
+    chunk += record(header, message);
+    if (chunk.size() >= kChunk_bytes) flush();
+    return good();
+  }
+
+  void flush() {
+    if (chunk.empty()) return;
+    std::string header;
+    add_number(header, "op", std::uint8_t{5});
+    add_field(header, "compression", "none");
+    add_number(header, "size", static_cast<std::uint32_t>(chunk.size()));
+    info.at = written;
+    write(record(header, chunk));
+    for (const auto& [number, entries] : info.entries) {
+      std::string index;
+      add_number(index, "op", std::uint8_t{4});
+      add_number(index, "ver", std::uint32_t{1});
+      add_number(index, "conn", number);
+      add_number(index, "count", static_cast<std::uint32_t>(entries.size() / kEntry_bytes));
+      write(record(index, entries));
+    }
+    chunks.push_back(std::move(info));
+    info = {};
+    chunk.clear();
+  }
+
+  void write_index() {
+    const std::uint64_t index_at = written;
+    for (std::uint32_t number = 0; number < all.size(); ++number) write(connection(number));
+    for (const ChunkInfo& c : chunks) {
+      std::string header, counts;
+      add_number(header, "op", std::uint8_t{6});
+      add_number(header, "ver", std::uint32_t{1});
+      add_number(header, "chunk_pos", c.at);
+      add_number(header, "start_time", ros_time(c.first));
+      add_number(header, "end_time", ros_time(c.last));
+      add_number(header, "count", static_cast<std::uint32_t>(c.entries.size()));
+      for (const auto& [number, entries] : c.entries) {
+        append_le(counts, number);
+        append_le(counts, static_cast<std::uint32_t>(entries.size() / kEntry_bytes));
+      }
+      write(record(header, counts));
+    }
+    file.seekp(static_cast<std::streamoff>(kMagic.size()));
+    write(bag_header(index_at));
+  }
+
+  std::string bag_header(std::uint64_t index_at) const {
+    std::string header;
+    add_number(header, "op", std::uint8_t{3});
+    add_number(header, "index_pos", index_at);
+    add_number(header, "conn_count", static_cast<std::uint32_t>(all.size()));
+    add_number(header, "chunk_count", static_cast<std::uint32_t>(chunks.size()));
+    return record(header, std::string(kBagHeader_bytes - header.size() - 8, ' '));
+  }
+
+  static constexpr std::size_t kEntry_bytes = 8 + 4;
+};
+
+Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start) {
+  auto state = std::make_unique<State>();
+  state->path = path;
+  state->partial = path + ".partial";
+  state->file.open(state->partial, std::ios::binary | std::ios::trunc);
+  state->write(kMagic);
+  state->write(state->bag_header(0));
+  if (Result<void> done = state->good(); !done) return done.error();
+  for (const auto& [number, message] : {std::pair{kLeftInfo, camera_message(start, kLeftFrame, rig.left)},
+                                        {kRightInfo, camera_message(start, kRightFrame, rig.right)},
+                                        {kTransforms, transforms_message(start, rig)}})
+    if (Result<void> done = state->add(number, start, message); !done) return done.error();
+  return Ros1BagWriter(std::move(state));
+}
+
+Ros1BagWriter::Ros1BagWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Ros1BagWriter::~Ros1BagWriter() = default;
+Ros1BagWriter::Ros1BagWriter(Ros1BagWriter&&) noexcept = default;
+Ros1BagWriter& Ros1BagWriter::operator=(Ros1BagWriter&&) noexcept = default;
+
+Result<void> Ros1BagWriter::add(const ImuSample& sample) { return state_->add(kImu, sample.t, imu_message(sample)); }
+
+Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
+  if (frame.left)
+    if (Result<void> done = state_->add(kLeft, frame.t, image_message(frame.t, kLeftFrame, *frame.left)); !done) return done;
+  if (!frame.right) return {};
+  return state_->add(kRight, frame.t, image_message(frame.t, kRightFrame, *frame.right));
+}
+
+Result<void> Ros1BagWriter::finish() {
+  state_->flush();
+  state_->write_index();
+  state_->file.close();
+  if (Result<void> done = state_->good(); !done) return done;
+  if (std::rename(state_->partial.c_str(), state_->path.c_str()) != 0)
+    return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", state_->path)};
+  state_->finished = true;
+  return {};
+}
+
+}  // namespace fbvins

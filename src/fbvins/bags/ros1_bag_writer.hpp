@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: a recording as a ROS 1 bag, format 2.0, uncompressed, with its index. One thread.
+//
+//   Result<Ros1BagWriter> bag = Ros1BagWriter::create("flight.bag");
+//   bag->add(sample); bag->add(frame);
+//   Result<void> done = bag->finish();          // the file appears here
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+#include "fbvins/types/image.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class Ros1BagWriter {
+ public:
+  /// With camera_info and /tf_static of the rig at `start`.
+  static Result<Ros1BagWriter> create(const std::string& path, const StereoRig& rig, Time start);
+  ~Ros1BagWriter();
+  Ros1BagWriter(Ros1BagWriter&&) noexcept;
+  Ros1BagWriter& operator=(Ros1BagWriter&&) noexcept;
+
+  // An error for a stamp that ROS cannot hold (before 1970, after 2106), or where the disk is full.
+  Result<void> add(const ImuSample& sample);
+  Result<void> add(const StereoFrame& frame);
+  Result<void> finish();
+
+ private:
+  struct State;
+  explicit Ros1BagWriter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace fbvins

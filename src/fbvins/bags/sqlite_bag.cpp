@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// ROS 2 bags in SQLite: a table of topics and one of messages in each file; messages may be packed one by one.
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <map>
+#include <memory>
+
+#include "fbvins/bags/bag_reader.hpp"
+#include "fbvins/bags/decompress.hpp"
+
+namespace fbvins {
+namespace {
+
+struct CloseDatabase {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+};
+struct EndStatement {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Database = std::unique_ptr<sqlite3, CloseDatabase>;
+using Statement = std::unique_ptr<sqlite3_stmt, EndStatement>;
+
+Statement prepare(sqlite3* database, const char* query) {
+  sqlite3_stmt* statement = nullptr;
+  sqlite3_prepare_v2(database, query, -1, &statement, nullptr);
+  return Statement(statement);
+}
+
+std::string text_of(sqlite3_stmt* statement, int column) {
+  const auto* text = sqlite3_column_text(statement, column);
+  return text == nullptr ? "" : std::string(reinterpret_cast<const char*>(text));
+}
+
+std::string_view bytes_of(sqlite3_stmt* statement, int column) {
+  const void* bytes = sqlite3_column_blob(statement, column);
+  return bytes == nullptr ? std::string_view()
+                          : std::string_view(static_cast<const char*>(bytes),
+                                             static_cast<std::size_t>(sqlite3_column_bytes(statement, column)));
+}
+
+struct File {
+  std::string path;
+  Database database;
+  Statement again;                             ///< a message by its row
+  std::map<std::int64_t, std::size_t> topics;  ///< by their number in this file
+};
+
+class SqliteBag final : public BagReader {
+ public:
+  SqliteBag(std::vector<File> files, bool zstd_messages) : files_(std::move(files)), packed_(zstd_messages) {}
+
+  Result<void> read_topics() {
+    for (File& file : files_) {
+      const Statement topics =
+          prepare(file.database.get(), "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
+      file.again = prepare(file.database.get(), "SELECT data FROM messages WHERE id = ?");
+      if (!topics || !file.again)
+        return Error{ErrorCode::malformed,
+                     fmt::format("{}: is no ROS 2 bag: {}", file.path, sqlite3_errmsg(file.database.get()))};
+      while (sqlite3_step(topics.get()) == SQLITE_ROW)
+        if (text_of(topics.get(), 3) == "cdr")
+          file.topics[sqlite3_column_int64(topics.get(), 0)] =
+              topic_of({text_of(topics.get(), 1), plain_type(text_of(topics.get(), 2)), Encoding::cdr});
+    }
+    return {};
+  }
+
+  std::string format() const override { return "ROS 2 bag (SQLite)"; }
+
+  std::optional<BagMessage> next() override {
+    for (; at_ < files_.size(); ++at_, messages_.reset()) {
+      File& file = files_[at_];
+      // In the order of rows, which is that of writing: it needs no index, and a file that is cut off gives what comes before.
+      if (!messages_) messages_ = prepare(file.database.get(), "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
+      int state = SQLITE_ERROR;
+      while (messages_ && (state = sqlite3_step(messages_.get())) == SQLITE_ROW)
+        if (auto message = message_of(file)) return message;
+      if (state == SQLITE_DONE) continue;
+      damage_.ends_early = true;
+      complain(fmt::format("{}: {}", file.path, sqlite3_errmsg(file.database.get())));
+    }
+    return std::nullopt;
+  }
+
+  std::string read(const MessagePlace& place) override {
+    if (place.chunk >= files_.size()) return {};
+    sqlite3_stmt* again = files_[place.chunk].again.get();
+    sqlite3_reset(again);
+    sqlite3_bind_int64(again, 1, static_cast<std::int64_t>(place.offset));
+    if (sqlite3_step(again) != SQLITE_ROW) return {};
+    const std::string_view bytes = bytes_of(again, 0);
+    return packed_ ? unpack("zstd", bytes, 0).bytes : std::string(bytes);
+  }
+
+ private:
+  std::size_t topic_of(BagTopic topic) {
+    for (std::size_t i = 0; i < topics_.size(); ++i)
+      if (topics_[i].name == topic.name && topics_[i].type == topic.type) return i;
+    topics_.push_back(std::move(topic));
+    return topics_.size() - 1;
+  }
+
+  std::optional<BagMessage> message_of(File& file) {
+    const auto row = sqlite3_column_int64(messages_.get(), 0);
+    const auto topic = file.topics.find(sqlite3_column_int64(messages_.get(), 1));
+    if (topic == file.topics.end()) return std::nullopt;
+    const Time t{sqlite3_column_int64(messages_.get(), 2)};
+    std::string_view data = bytes_of(messages_.get(), 3);
+    if (packed_) {
+      Unpacked out = unpack("zstd", data, 0);
+      if (!out.whole) {
+        complain(fmt::format("{}: the message in row {} cannot be unpacked", file.path, row));
+        return std::nullopt;
+      }
+      unpacked_ = std::move(out.bytes);
+      data = unpacked_;
+    }
+    return BagMessage{topic->second, t, data, {at_, static_cast<std::uint64_t>(row), data.size()}};
+  }
+
+  std::vector<File> files_;
+  bool packed_;
+  std::size_t at_ = 0;
+  Statement messages_;
+  std::string unpacked_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<BagReader>> open_sqlite_bag(const std::vector<std::string>& paths, bool zstd_messages) {
+  std::vector<File> files;
+  for (const std::string& path : paths) {
+    sqlite3* database = nullptr;
+    const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+    files.push_back({path, Database(database), {}, {}});
+    if (opened != SQLITE_OK) return Error{ErrorCode::unreadable, fmt::format("{}: {}", path, sqlite3_errmsg(database))};
+  }
+  auto bag = std::make_unique<SqliteBag>(std::move(files), zstd_messages);
+  if (Result<void> done = bag->read_topics(); !done) return done.error();
+  return std::unique_ptr<BagReader>(std::move(bag));
+}
+
+}  // namespace fbvins

@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""One flight in the formats of other people, written by their own writers (PyPI rosbags and mcap), gives one trajectory.
+
+usage: bags_by_others.py FBVINS PYTHON      exit 77 (skipped) where PYTHON lacks rosbags or mcap
+"""
+import csv
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy as np
+    from mcap.writer import CompressionType, Writer as McapWriter
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+except ImportError as lack:
+    if len(sys.argv) > 2 and os.path.exists(sys.argv[2]) and os.path.realpath(sys.executable) != os.path.realpath(sys.argv[2]) \
+            and not os.environ.get("FBVINS_TRIED"):
+        os.environ["FBVINS_TRIED"] = "1"
+        os.execv(sys.argv[2], [sys.argv[2], *sys.argv])
+    print(f"skipped: {lack.name} is not there; ./dev test installs it (PyPI)")
+    sys.exit(77)
+
+IMAGES = 40
+CUTS = int(os.environ.get("FBVINS_CUTS", "40"))
+TOPICS = ("/cam0/image_raw", "/cam1/image_raw")
+
+
+def rows(path):
+    with open(path, encoding="utf-8", newline="") as file:
+        return [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+
+
+class Flight:
+    """What is in the EuRoC folder, as messages of a kind."""
+
+    def __init__(self, folder, store, ros1):
+        self.folder, self.types, self.ros1 = folder / "mav0", store.types, ros1
+        self.store = store
+
+    def header(self, stamp, frame):
+        time = self.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
+        extra = {"seq": 0} if self.ros1 else {}
+        return self.types["std_msgs/msg/Header"](stamp=time, frame_id=frame, **extra)
+
+    def pack(self, message):
+        serialise = self.store.serialize_ros1 if self.ros1 else self.store.serialize_cdr
+        return bytes(serialise(message, message.__msgtype__))
+
+    def readings(self):
+        vector, zero = self.types["geometry_msgs/msg/Vector3"], np.zeros(9)
+        for row in rows(self.folder / "imu0" / "data.csv"):
+            v = [float(x) for x in row[1:7]]
+            message = self.types["sensor_msgs/msg/Imu"](
+                header=self.header(int(row[0]), "imu"), orientation=self.types["geometry_msgs/msg/Quaternion"](0, 0, 0, 1),
+                orientation_covariance=zero, angular_velocity=vector(*v[:3]), angular_velocity_covariance=zero,
+                linear_acceleration=vector(*v[3:]), linear_acceleration_covariance=zero)
+            yield int(row[0]), "/imu0", "sensor_msgs/msg/Imu", self.pack(message)
+
+    def images(self, encoding):
+        for camera, topic in enumerate(TOPICS):
+            for stamp, name in rows(self.folder / f"cam{camera}" / "data.csv")[:IMAGES]:
+                file = (self.folder / f"cam{camera}" / "data" / name).read_bytes()
+                header = self.header(int(stamp), f"cam{camera}")
+                if encoding == "compressed":
+                    message = self.types["sensor_msgs/msg/CompressedImage"](header=header, format="png", data=np.frombuffer(file, np.uint8))
+                    yield int(stamp), topic + "/compressed", message.__msgtype__, self.pack(message)
+                    continue
+                pixels = decode(file)
+                height, width = pixels.shape
+                data, channels = {"mono8": (pixels, 1), "rgb8": (np.repeat(pixels[..., None], 3, 2), 3),
+                                  "mono16": (pixels.astype("<u2") * 256 + 17, 2)}[encoding]
+                padding = np.zeros((height, 8 if encoding == "mono8" else 0), np.uint8)
+                data = np.hstack([np.ascontiguousarray(data).view(np.uint8).reshape(height, -1), padding])
+                message = self.types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                                                              step=data.shape[1], data=data.reshape(-1))
+                assert data.shape[1] == width * channels + padding.shape[1]
+                yield int(stamp), topic, message.__msgtype__, self.pack(message)
+
+    def messages(self, encoding="mono8"):
+        last = int(rows(self.folder / "cam0" / "data.csv")[IMAGES - 1][0]) + 20_000_000
+        everything = [m for m in self.readings() if m[0] <= last] + list(self.images(encoding))
+        return sorted(everything, key=lambda m: m[0])
+
+
+def decode(file):
+    """A PNG of our simulator's: 8-bit grey, one filter. No imaging library is needed for it."""
+    import struct
+    import zlib
+
+    width, height = struct.unpack(">II", file[16:24])
+    packed, at = b"", 8
+    while at < len(file):
+        length, kind = struct.unpack(">I4s", file[at:at + 8])
+        packed += file[at + 8:at + 8 + length] if kind == b"IDAT" else b""
+        at += 12 + length
+    lines = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, width + 1)
+    assert set(lines[:, 0]) <= {0, 1}, "other filters than none and sub"
+    return np.where(lines[:, :1] == 1, np.cumsum(lines[:, 1:], axis=1, dtype=np.uint32).astype(np.uint8), lines[:, 1:])
+
+
+def write_ros1(path, flight, compression=None, encoding="mono8", late=0):
+    writer = rosbag1.Writer(path)
+    if compression:
+        writer.set_compression(compression)
+    with writer:
+        connections = {}
+        for number, (stamp, topic, kind, data) in enumerate(flight.messages(encoding)):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=flight.store)
+            writer.write(connections[topic], stamp + (number * 7919 % 13) * late, data)
+
+
+def write_ros2(path, flight, plugin, packed=False, encoding="mono8"):
+    writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+    if packed:
+        writer.set_compression(rosbag2.CompressionMode.MESSAGE, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for stamp, topic, kind, data in flight.messages(encoding):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=flight.store)
+            writer.write(connections[topic], stamp, data)
+
+
+def write_mcap(path, flight, encoding="cdr", **options):
+    with open(path, "wb") as stream:
+        writer = McapWriter(stream, chunk_size=2 << 20, **options)
+        writer.start(profile="ros2" if encoding == "cdr" else "ros1")
+        channels = {}
+        for stamp, topic, kind, data in flight.messages():
+            if topic not in channels:
+                name = kind if encoding == "cdr" else kind.replace("/msg/", "/")
+                definition = flight.store.generate_msgdef(kind, ros_version=2 if encoding == "cdr" else 1)[0]
+                schema = writer.register_schema(name, "ros2msg" if encoding == "cdr" else "ros1msg", definition.encode())
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()
+
+
+def kalibr_files(folder, path):
+    """The flight's calibration as Kalibr writes it."""
+    lines = []
+    for camera in ("cam0", "cam1"):
+        text = (folder / "mav0" / camera / "sensor.yaml").read_text()
+        numbers = {name: [float(x) for x in re.search(rf"{name}: *\[(.*?)\]", text, re.DOTALL)[1].split(",")]
+                   for name in ("data", "intrinsics", "distortion_coefficients", "resolution")}
+        T = np.linalg.inv(np.array(numbers["data"]).reshape(4, 4))
+        T[3] = [0, 0, 0, 1]
+        lines += [f"{camera}:", "  T_cam_imu:", *(f"  - {list(map(float, row))}" for row in T), "  camera_model: pinhole", "  distortion_model: radtan",
+                  f"  distortion_coeffs: {numbers['distortion_coefficients']}", f"  intrinsics: {numbers['intrinsics']}",
+                  f"  resolution: {[int(n) for n in numbers['resolution']]}"]
+    path.mkdir()
+    (path / "camchain.yaml").write_text("\n".join(lines) + "\n")
+    imu = (folder / "mav0" / "imu0" / "sensor.yaml").read_text()
+    names = {"gyroscope_noise_density": "gyroscope_noise_density", "gyroscope_random_walk": "gyroscope_random_walk",
+             "accelerometer_noise_density": "accelerometer_noise_density", "accelerometer_random_walk": "accelerometer_random_walk",
+             "rate_hz": "update_rate"}
+    (path / "imu_config.yaml").write_text("".join(f"{new}: {re.search(rf'{old}: *([-+.e0-9]+)', imu)[1]}\n" for old, new in names.items()))
+
+
+def check_tum_vi(program, folder, root):
+    """No sensor.yaml, but Kalibr's files in dso/."""
+    path = root / "tum_vi"
+    shutil.copytree(folder, path)
+    for camera in ("cam0", "cam1", "imu0"):
+        (path / "mav0" / camera / "sensor.yaml").unlink()
+    kalibr_files(folder, path / "dso")
+    expected = trajectory(program, folder, root / "kalibr", "--calibration", path / "dso" / "camchain.yaml", "--imu-calibration",
+                          path / "dso" / "imu_config.yaml")
+    assert trajectory(program, path, root / "tum_vi_out") == expected, "TUM-VI: another trajectory than with these calibrations given"
+    print("tum_vi: the same bytes")
+
+
+def check_converted(program, folder, root, expected):
+    """Into each of the formats and from there into the next, and others read what was written."""
+    steps = [root / "lz4.bag", root / "once.mcap", root / "again.bag", root / "folder"]
+    for before, after in zip(steps, steps[1:]):
+        arguments = [] if before.name == "once.mcap" else ["--calibration", folder]
+        subprocess.run([program, "convert", before, after, "--quiet", *arguments], check=True)
+    assert trajectory(program, root / "once.mcap", root / "once_out") == expected, "once.mcap: another trajectory"
+    for name in ("again.bag", "folder"):
+        assert trajectory(program, root / name, root / "out", "--calibration", folder) == expected, f"{name}: another trajectory"
+    own = trajectory(program, root / "again.bag", root / "out")  # by its camera_info and /tf_static, whose rotations are quaternions
+    assert own.count(b"good") == expected.count(b"good")
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with rosbag1.Reader(root / "again.bag") as bag:
+        assert {c.topic: c.msgcount for c in bag.connections}["/cam0/image_raw"] == IMAGES
+        for connection, stamp, data in bag.messages():
+            if connection.msgtype not in store.types:
+                store.register(get_types_from_msg(connection.msgdef.data, connection.msgtype))
+            message = store.deserialize_ros1(data, connection.msgtype)
+            header = message.transforms[0].header if connection.topic == "/tf_static" else message.header
+            assert header.stamp.sec * 10**9 + header.stamp.nanosec == stamp
+            assert connection.msgtype != "sensor_msgs/msg/Image" or len(message.data) == message.height * message.step
+    print("converted from bag to MCAP to bag to folder: the same bytes, and rosbags reads the bag")
+
+
+def trajectory(program, recording, out, *arguments):
+    done = subprocess.run([program, "run", recording, "--out", out, "--quiet", "--max-images", str(IMAGES), *arguments], check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, f"{recording}: {done.stderr}"
+    return (out / "trajectory.csv").read_bytes()
+
+
+def write_all(root, folder):
+    """Every recording, by name."""
+    one, two = Flight(folder, get_typestore(Stores.ROS1_NOETIC), True), Flight(folder, get_typestore(Stores.ROS2_HUMBLE), False)
+    pack, plugin = rosbag1.Writer.CompressionFormat, rosbag2.StoragePlugin
+    write_ros1(root / "plain.bag", one)
+    write_ros1(root / "bz2.bag", one, pack.BZ2)
+    write_ros1(root / "lz4.bag", one, pack.LZ4)
+    write_ros1(root / "rgb.bag", one, encoding="rgb8")
+    write_ros1(root / "mono16.bag", one, encoding="mono16")
+    write_ros1(root / "compressed_images.bag", one, encoding="compressed")
+    write_ros1(root / "out_of_order.bag", one, pack.LZ4, late=3_000_000)
+    write_ros2(root / "sqlite", two, plugin.SQLITE3)
+    write_ros2(root / "sqlite_packed", two, plugin.SQLITE3, packed=True)
+    write_ros2(root / "ros2_mcap", two, plugin.MCAP)
+    write_mcap(root / "zstd.mcap", two, compression=CompressionType.ZSTD)
+    write_mcap(root / "lz4.mcap", two, compression=CompressionType.LZ4)
+    write_mcap(root / "unchunked.mcap", two, compression=CompressionType.NONE, use_chunking=False, use_summary_offsets=False)
+    write_mcap(root / "ros1.mcap", one, encoding="ros1", compression=CompressionType.ZSTD)
+    return sorted(p for p in root.iterdir() if p.name not in ("flight", "euroc"))
+
+
+def check_cuts(program, recording, folder, root):
+    """Cut off anywhere: what is whole is read, or one sentence says why not."""
+    whole, read = recording.read_bytes(), 0
+    cut = root / ("cut" + recording.suffix)
+    for i in range(CUTS):
+        place = int(np.random.default_rng(i).integers(1, len(whole)))
+        cut.write_bytes(whole[:place])
+        done = subprocess.run([program, "info", cut, "--calibration", folder], check=False, capture_output=True, text=True)
+        assert done.returncode in (0, 2), f"{recording.name} cut at {place}: {done.returncode} {done.stderr}"
+        assert done.returncode == 0 or len(done.stderr.strip().splitlines()) == 1, done.stderr
+        read += done.returncode == 0
+    assert read > 0.8 * CUTS, f"{recording.name}: only {read} of {CUTS} beginnings were read"
+    print(f"{recording.name}: cut at {CUTS} places, {read} read, the others refused with a sentence")
+
+
+def main():
+    program = sys.argv[1]
+    with tempfile.TemporaryDirectory() as name:
+        root = pathlib.Path(name)
+        folder = root / "flight"
+        subprocess.run([program, "simulate", "fast", "--seconds", "3", "--seed", "5", "--max-images", str(IMAGES), "--out", folder, "--quiet"],
+                       check=True)
+        expected = trajectory(program, folder, root / "euroc")
+        assert expected.count(b"\n") == IMAGES + 1 and b"good" in expected
+        recordings = write_all(root, folder)
+        for recording in recordings:
+            same = trajectory(program, recording, root / "out", "--calibration", folder) == expected
+            assert same, f"{recording.name}: another trajectory than from the EuRoC folder"
+            print(f"{recording.name}: the same bytes")
+        check_tum_vi(program, folder, root)
+        check_converted(program, folder, root, expected)
+        for kind in ("lz4.bag", "bz2.bag", "zstd.mcap"):
+            check_cuts(program, root / kind, folder, root)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
