@@ -16,12 +16,12 @@
 #include "apps/kept_map.hpp"
 #include "apps/live_files.hpp"
 #include "apps/live_summary.hpp"
+#include "apps/open_source.hpp"
 #include "apps/ros_graph.hpp"
 #include "apps/run_map.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/live/live_system.hpp"
-#include "fbvins/live/make_source.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
@@ -43,6 +43,9 @@ sources:
   replay:DATASET[@SPEED]     a recording played in wall time
   socket:PATH                another process, over a Unix socket (docs/socket.md); without --calibration it gives its own
   ros2:LEFT,RIGHT,IMU        topics of ROS 2, in the domain of --ros2 (docs/ros2.md); with --calibration
+  d435i[:SERIAL or FILE.bag] a RealSense camera with an IMU, by its factory calibration (docs/d435i.md)
+  v4l2:LEFT,RIGHT,IMU        video devices, or one with two images side by side; the IMU a flight controller's (udp:..., serial:...)
+                             or a process's (socket:...); with --calibration (docs/v4l2.md)
 faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
   camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
   burst:..:HELD_BACK, leap:..:SECONDS
@@ -184,7 +187,7 @@ int run(const Arguments& arguments) {
   if (!graph) return fail(graph.error().message);
   const SourceOptions options{
       .dataset = arguments.dataset, .laps = arguments.laps, .preload = arguments.preload, .say = note, .give_up = stop_is_wanted};
-  const auto source = graph->has_source() ? graph->open_source(options) : make_source(arguments.source, options);
+  const auto source = graph->has_source() ? graph->open_source(options) : open_source(arguments.source, options);
   if (!source) return fail(source.error().message);
   if (!arguments.out.empty()) {
     std::error_code error;

@@ -19,7 +19,7 @@ RANKS = {
     "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4,
     "pipeline": 5,
     "live": 6,
-    "config": 7, "ros2": 7, "flight": 7,
+    "config": 7, "ros2": 7, "v4l2": 7, "realsense": 7, "flight": 7,
     "report": 8,
     "experiment": 9, "tuning": 9,
 }

@@ -53,6 +53,44 @@ struct TimesyncMessage {
   }
 };
 
+/// The flight controller's IMU in forward-right-down.
+struct HighresImuMessage {
+  static constexpr std::uint32_t kId = 105;
+  static constexpr std::uint8_t kCrcExtra = 93;
+  static constexpr std::uint16_t kAccelAndGyro = 0x3f;  ///< of fields_updated
+
+  std::uint64_t time_usec = 0;
+  std::array<float, 3> acc{};   ///< m/s^2
+  std::array<float, 3> gyro{};  ///< rad/s
+  std::array<float, 3> mag{};   ///< gauss
+  float abs_pressure = 0, diff_pressure = 0, pressure_alt = 0, temperature = 0;
+  std::uint16_t fields_updated = 0;
+  std::uint8_t id = 0;  ///< of several IMUs
+
+  template <class V>
+  void wire(V&& v) {
+    v(time_usec), v(acc), v(gyro), v(mag), v(abs_pressure), v(diff_pressure), v(pressure_alt), v(temperature);
+    v(fields_updated), v(id);
+  }
+};
+
+/// The same, coarser.
+struct ScaledImuMessage {
+  static constexpr std::uint32_t kId = 26;
+  static constexpr std::uint8_t kCrcExtra = 170;
+
+  std::uint32_t time_boot_ms = 0;
+  std::array<std::int16_t, 3> acc{};   ///< thousandths of g
+  std::array<std::int16_t, 3> gyro{};  ///< mrad/s
+  std::array<std::int16_t, 3> mag{};   ///< thousandths of a gauss
+  std::int16_t temperature = 0;        ///< hundredths of a degree Celsius
+
+  template <class V>
+  void wire(V&& v) {
+    v(time_boot_ms), v(acc), v(gyro), v(mag), v(temperature);
+  }
+};
+
 struct OdometryMessage {
   static constexpr std::uint32_t kId = 331;
   static constexpr std::uint8_t kCrcExtra = 91;
@@ -126,8 +164,9 @@ struct StatusTextMessage {
 /// What is longer than the message's field is cut off.
 StatusTextMessage status_text(MavSeverity severity, const std::string& sentence);
 
-using MavlinkMessage = std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage,
-                                    StatusTextMessage, PositionTargetMessage, CommandMessage, CommandAckMessage,
-                                    LandedStateMessage, HilSensorMessage, HilActuatorControlsMessage>;
+using MavlinkMessage =
+    std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage, StatusTextMessage,
+                 PositionTargetMessage, CommandMessage, CommandAckMessage, LandedStateMessage, HilSensorMessage,
+                 HilActuatorControlsMessage, HighresImuMessage, ScaledImuMessage>;
 
 }  // namespace fbvins

@@ -6,16 +6,7 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kHeartbeatEvery{1'000'000'000}, kQuestionEvery{100'000'000}, kTextEvery{500'000'000}, kSilence{3'000'000'000};
-constexpr std::size_t kOpenQuestions = 16;
-
-/// True once in a period; a period that was slept through is not caught up on.
-bool due(Time now, Duration period, Time& next) {
-  if (now < next) return false;
-  next = next + period;
-  if (next <= now) next = now + period;
-  return true;
-}
+constexpr Duration kHeartbeatEvery{1'000'000'000}, kTextEvery{500'000'000};
 
 Odometry odometry(const LivePose& pose) {
   Odometry o;
@@ -28,7 +19,8 @@ Odometry odometry(const LivePose& pose) {
 
 }  // namespace
 
-MavlinkSession::MavlinkSession(const MavlinkOptions& options) : options_(options), frames_(options.mounting) {}
+MavlinkSession::MavlinkSession(const MavlinkOptions& options)
+    : options_(options), frames_(options.mounting), peer_(options.system_id) {}
 
 void MavlinkSession::say(const MavlinkMessage& message, Frames& out) {
   const MavlinkAddress us{static_cast<std::uint8_t>(options_.system_id), static_cast<std::uint8_t>(options_.component_id)};
@@ -36,15 +28,15 @@ void MavlinkSession::say(const MavlinkMessage& message, Frames& out) {
 }
 
 std::uint64_t MavlinkSession::stamp_usec(Time host_t) const {
-  const Time t = clock_.known() ? host_t + clock_.value() : host_t;
+  const Time t = clock().known() ? host_t + clock().value() : host_t;
   return static_cast<std::uint64_t>(std::max<std::int64_t>(t.ns, 0) / 1000);
 }
 
 MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
   Frames out;
   // Readings come evenly but for jitter: one that is early by less than half a period of theirs is the one.
-  if (!due(pose.host_t + Duration::from_seconds(0.1 / options_.rate_hz), Duration::from_seconds(1 / options_.rate_hz),
-           next_pose_))
+  if (!is_due(pose.host_t + Duration::from_seconds(0.1 / options_.rate_hz), Duration::from_seconds(1 / options_.rate_hz),
+              next_pose_))
     return out;
   const std::optional<VehicleState> state = frames_.state(odometry(pose));
   const std::uint64_t t_usec = stamp_usec(pose.host_t);
@@ -72,21 +64,15 @@ HeartbeatMessage MavlinkSession::heartbeat() const {
   return beat;
 }
 
-bool MavlinkSession::flight_controller_heard(Time now) const { return flight_controller_ && now - heard_at_ < kSilence; }
-
 MavlinkSession::Frames MavlinkSession::tick(Time now) {
   Frames out;
-  if (due(now, kHeartbeatEvery, next_heartbeat_)) say(heartbeat(), out);
+  if (is_due(now, kHeartbeatEvery, next_heartbeat_)) say(heartbeat(), out);
   if (!flight_controller_heard(now)) {
     told_health_.reset();  // whoever comes back hears it anew
     return out;
   }
-  if (due(now, kQuestionEvery, next_question_)) {
-    questions_.push_back(now);
-    if (questions_.size() > kOpenQuestions) questions_.pop_front();
-    say(TimesyncMessage{0, now.ns}, out);
-  }
-  if (health_ && told_health_ != health_ && due(now, kTextEvery, next_text_)) {
+  if (const auto question = peer_.question(now)) say(*question, out);
+  if (health_ && told_health_ != health_ && is_due(now, kTextEvery, next_text_)) {
     told_health_ = health_;
     say(health_message(*health_), out);
   }
@@ -101,30 +87,14 @@ MavlinkSession::Frames MavlinkSession::receive(std::span<const std::uint8_t> byt
 
 void MavlinkSession::receive(const MavlinkFrame& frame, Time now, Frames& out) {
   if (frame.from.system == options_.system_id && frame.from.component == options_.component_id) return;  // our own, sent back
-  if (const auto* beat = std::get_if<HeartbeatMessage>(&frame.message)) {
-    if (beat->autopilot == HeartbeatMessage::kNoAutopilot || frame.from.system != options_.system_id) return;
-    flight_controller_ = frame.from;
-    heard_at_ = now;
-  } else if (const auto* sync = std::get_if<TimesyncMessage>(&frame.message)) {
-    synchronise(*sync, frame.from, now, out);
-  }
-}
-
-void MavlinkSession::synchronise(const TimesyncMessage& message, const MavlinkAddress& from, Time now, Frames& out) {
-  if (message.tc1 == 0) {
-    if (clock_.known()) say(TimesyncMessage{(now + clock_.value()).ns, message.ts1}, out);
-    return;
-  }
-  // Only the flight controller's answer to a question of ours, and to each but one.
-  const auto asked = std::find(questions_.begin(), questions_.end(), Time{message.ts1});
-  if (from != flight_controller_ || asked == questions_.end()) return;
-  clock_.add(*asked, Time{message.tc1}, now);
-  questions_.erase(asked);
+  peer_.hear(frame, now);
+  const auto* sync = std::get_if<TimesyncMessage>(&frame.message);
+  if (sync != nullptr && sync->tc1 == 0 && clock().known()) say(TimesyncMessage{(now + clock().value()).ns, sync->ts1}, out);
 }
 
 void MavlinkSession::restart() {
   decoder_ = MavlinkDecoder();
-  questions_.clear();
+  peer_.forget_questions();
   told_health_.reset();
 }
 

@@ -2,13 +2,12 @@
 // What is said to a flight controller and when, without threads, ports or clocks of its own: time comes in as an argument.
 #pragma once
 
-#include <deque>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "fbvins/live/mavlink_peer.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
-#include "fbvins/mavlink/clock_offset.hpp"
 #include "fbvins/mavlink/vehicle_frames.hpp"
 #include "fbvins/mavlink/wire.hpp"
 
@@ -33,14 +32,13 @@ class MavlinkSession {
   /// The port was opened anew: what is half read is of no use, and the health is told again.
   void restart();
 
-  bool flight_controller_heard(Time now) const;
-  const ClockOffset& clock() const { return clock_; }
+  bool flight_controller_heard(Time now) const { return peer_.is_heard(now); }
+  const ClockOffset& clock() const { return peer_.clock(); }
   std::int64_t poses() const { return poses_; }
   std::int64_t frames_received() const { return decoder_.counts().frames + decoder_.counts().skipped; }
 
  private:
   void receive(const MavlinkFrame& frame, Time now, Frames& out);
-  void synchronise(const TimesyncMessage& message, const MavlinkAddress& from, Time now, Frames& out);
   void say(const MavlinkMessage& message, Frames& out);
   HeartbeatMessage heartbeat() const;
   std::uint64_t stamp_usec(Time host_t) const;
@@ -48,14 +46,11 @@ class MavlinkSession {
   MavlinkOptions options_;
   VehicleFrames frames_;
   MavlinkDecoder decoder_;
-  ClockOffset clock_;
+  MavlinkPeer peer_;
   std::uint8_t sequence_ = 0;
-  std::optional<MavlinkAddress> flight_controller_;
-  Time heard_at_{};
-  std::deque<Time> questions_;
   std::optional<Health> health_;  // of the newest status
   std::optional<Health> told_health_;
-  Time next_heartbeat_{}, next_question_{}, next_text_{}, next_pose_{};
+  Time next_heartbeat_{}, next_text_{}, next_pose_{};
   std::int64_t poses_ = 0;
 };
 

@@ -13,7 +13,7 @@
 #include "fbvins/live/make_source.hpp"
 #include "fbvins/live/source.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
-#include "fbvins/ros2/stereo_pairs.hpp"
+#include "fbvins/live/stereo_pairs.hpp"
 
 namespace fbvins {
 

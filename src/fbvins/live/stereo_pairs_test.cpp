@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/ros2/stereo_pairs.hpp"
+#include "fbvins/live/stereo_pairs.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/open_source.hpp"
+
+#include "fbvins/v4l2/v4l2_source.hpp"
+#ifdef FBVINS_WITH_REALSENSE
+#include "fbvins/realsense/realsense_source.hpp"
+#endif
+
+namespace fbvins::app {
+namespace {
+
+template <class T>
+Result<std::unique_ptr<Source>> as_source(Result<std::unique_ptr<T>> source) {
+  if (!source) return source.error();
+  return std::unique_ptr<Source>(*std::move(source));
+}
+
+Result<std::unique_ptr<Source>> open_realsense([[maybe_unused]] const std::string& which,
+                                               [[maybe_unused]] const SourceOptions& options) {
+#ifdef FBVINS_WITH_REALSENSE
+  return as_source(RealsenseSource::open(which, options));
+#else
+  return Error{
+      ErrorCode::invalid_argument,
+      "this program was built without librealsense2, which a d435i wants (docs/d435i.md; examples/d435i_bridge.py needs none)"};
+#endif
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options) {
+  const auto colon = name.find(':');
+  const std::string kind = name.substr(0, colon), where = colon == std::string::npos ? "" : name.substr(colon + 1);
+  if (kind == "d435i") return open_realsense(where, options);
+  if (kind == "v4l2") return as_source(V4l2Source::open(where, options));
+  return make_source(name, options);
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A RealSense D435i as a sender for `fbvins live --source socket:PATH`, by Intel's Python package (pip install pyrealsense2 numpy).
+
+usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag]    until Ctrl-C, or the recording's end; a camera that is unplugged is waited for
+"""
+import collections
+import fcntl
+import mmap
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+
+import numpy
+import pyrealsense2 as rs
+
+SLOTS = 16
+IMU_NOISE = (2.44e-4, 1.9393e-5, 1.47e-3, 3.0e-3)  # BMI055's data sheet; random walks assumed. docs/d435i.md
+
+
+def rig(left, right, gyro):
+    """FbvinsSocketRig (docs/socket.md) of the factory's calibration."""
+    def camera(profile):
+        lens, where = profile.get_intrinsics(), profile.get_extrinsics_to(gyro)
+        rotation = numpy.array(where.rotation).reshape(3, 3).T  # it comes column by column
+        pose = numpy.hstack([rotation, numpy.array(where.translation).reshape(3, 1)])
+        if lens.coeffs[4] or (any(lens.coeffs) and lens.model != rs.distortion.brown_conrady):
+            sys.exit(f"the distortion {lens.model} cannot be had; calibrate with Kalibr")
+        return struct.pack("<II20d", 0, 0, lens.fx, lens.fy, lens.ppx, lens.ppy, *lens.coeffs[:4], *pose.flatten())
+    return camera(left) + camera(right) + struct.pack("<7d", *IMU_NOISE, gyro.fps(), left.fps(), 0)
+
+
+def message(kind, body):
+    return struct.pack("<II", kind, 8 + len(body)) + body
+
+
+class Sender:
+    """One connection: hello, readings and frames out; slots that are free again in."""
+
+    def __init__(self, path, width, height, calibration):
+        self.size, self.sequence, self.lock = width * height, 0, threading.Lock()
+        memory = os.memfd_create("images", os.MFD_ALLOW_SEALING)
+        os.ftruncate(memory, SLOTS * 2 * self.size)
+        fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK)
+        self.slots = numpy.frombuffer(mmap.mmap(memory, SLOTS * 2 * self.size), numpy.uint8).reshape(SLOTS, 2, height, width)
+        self.free = set(range(SLOTS))
+        self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.connection.connect(path)
+        hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 0, 1, b"D435i bridge", width, height, SLOTS, 2 * self.size, self.size, 0)
+        socket.send_fds(self.connection, [message(1, hello + calibration)], [memory])
+        os.close(memory)
+        while self.hear(0) != 65:  # welcome
+            pass
+
+    def hear(self, flags=socket.MSG_DONTWAIT):
+        """The type of the next message, or none."""
+        try:
+            said = self.connection.recv(32768, flags)
+        except BlockingIOError:
+            return None
+        kind = struct.unpack_from("<I", said)[0] if said else 4
+        if kind == 4:
+            raise ConnectionError(said[16:].split(b"\0")[0].decode() or "the estimator is gone")
+        if kind == 66:
+            released = struct.unpack_from("<Q", said, 8)[0]
+            self.free |= {slot for slot in range(SLOTS) if released >> slot & 1}
+        return kind
+
+    def reading(self, t_ns, gyro, accel):
+        with self.lock:
+            self.connection.send(message(2, struct.pack("<IIq6d", 1, 0, t_ns, *gyro, *accel)))
+
+    def frame(self, t_ns, left, right):
+        with self.lock:
+            while self.hear() is not None:
+                pass
+            self.sequence += 1
+            if not self.free:
+                return  # the estimator sees from the sequence that there was a frame
+            slot = self.free.pop()
+            self.slots[slot, 0], self.slots[slot, 1] = left, right
+            self.connection.send(message(3, struct.pack("<qQII", t_ns, self.sequence, slot, 3)))
+
+
+class Camera:
+    """The streams of one device: pairs of images, and the accelerometer's value at every reading of the gyroscope."""
+
+    def __init__(self, device, path):
+        self.sensors, chosen = [], {}
+        wanted = {("infrared", 1): rs.format.y8, ("infrared", 2): rs.format.y8, ("gyro", 0): rs.format.motion_xyz32f,
+                  ("accel", 0): rs.format.motion_xyz32f}
+        for sensor in device.query_sensors():
+            mine = {}
+            for profile in sensor.get_stream_profiles():
+                key = (profile.stream_type().name, profile.stream_index() if profile.stream_type() == rs.stream.infrared else 0)
+                if wanted.get(key) == profile.format() and self.distance(profile) < self.distance(mine.get(key)):
+                    mine[key] = profile.as_video_stream_profile() if key[0] == "infrared" else profile.as_motion_stream_profile()
+            for option, value in ((rs.option.emitter_enabled, 0), (rs.option.global_time_enabled, 1), (rs.option.enable_motion_correction, 1)):
+                if mine and sensor.supports(option) and not sensor.is_option_read_only(option):
+                    sensor.set_option(option, value)
+            chosen.update(mine)
+            if mine:
+                self.sensors.append((sensor, list(mine.values())))
+        if chosen.keys() != wanted.keys():
+            raise RuntimeError(f"the camera has no {wanted.keys() - chosen.keys()}")
+        left, right, gyro = (chosen[key] for key in list(wanted)[:3])
+        self.sender = Sender(path, left.width(), left.height(), rig(left, right, gyro))
+        self.images, self.accel, self.gyro = {1: {}, 2: {}}, collections.deque(maxlen=100), collections.deque(maxlen=1000)
+        self.lock, self.failure = threading.Lock(), None
+        for sensor, profiles in self.sensors:
+            sensor.open(profiles)
+            sensor.start(self.take)
+
+    @staticmethod
+    def distance(profile):
+        """From 640 x 480 at 30 Hz; of an IMU the fastest."""
+        if profile is None:
+            return float("inf")
+        if not profile.is_video_stream_profile():
+            return -profile.fps()
+        video = profile.as_video_stream_profile()
+        return abs(video.width() - 640) + abs(video.height() - 480) + abs(video.fps() - 30)
+
+    def take(self, frame):
+        try:
+            with self.lock:
+                profile, t_ns = frame.get_profile(), round(frame.get_timestamp() * 1e3) * 1000
+                if frame.is_video_frame():
+                    self.take_image(profile.stream_index(), t_ns, numpy.asanyarray(frame.get_data()).copy())
+                elif frame.is_motion_frame():
+                    v = frame.as_motion_frame().get_motion_data()
+                    (self.gyro if profile.stream_type() == rs.stream.gyro else self.accel).append((t_ns, numpy.array([v.x, v.y, v.z])))
+                    self.send_readings()
+        except Exception as error:  # the library's threads swallow it
+            self.failure = error
+
+    def take_image(self, camera, t_ns, image):
+        self.images[camera][t_ns] = image
+        if t_ns in self.images[3 - camera]:
+            self.sender.frame(t_ns, self.images[1][t_ns], self.images[2][t_ns])
+            for waiting in self.images.values():
+                for old in [t for t in waiting if t <= t_ns]:
+                    del waiting[old]
+
+    def send_readings(self):
+        while self.gyro and len(self.accel) > 1 and self.accel[-1][0] >= self.gyro[0][0]:
+            t_ns, rate = self.gyro.popleft()
+            while len(self.accel) > 2 and self.accel[1][0] <= t_ns:
+                self.accel.popleft()
+            (t0, before), (t1, after) = self.accel[0], self.accel[1]
+            if t0 <= t_ns <= t1 and t1 - t0 < 50_000_000:
+                self.sender.reading(t_ns, rate, before + (t_ns - t0) / (t1 - t0) * (after - before))
+
+    def stop(self):
+        for sensor, _ in self.sensors:
+            try:
+                sensor.stop()
+                sensor.close()
+            except RuntimeError:  # it is unplugged
+                pass
+        self.sender.connection.close()
+
+
+def find(context, which):
+    return next((d for d in context.query_devices() if which in ("", d.get_info(rs.camera_info.serial_number))), None)
+
+
+def main(path, which=""):
+    context, recorded = rs.context(), which.endswith(".bag")
+    while True:
+        device = context.load_device(which) if recorded else find(context, which)
+        if device is None:
+            time.sleep(0.5)
+            continue
+        over = threading.Event()
+        context.set_devices_changed_callback(lambda event: event.was_removed(device) and over.set())
+        if recorded:
+            device.set_status_changed_callback(lambda status: status == rs.playback_status.stopped and over.set())
+        camera = Camera(device, path)
+        while not over.wait(0.2) and camera.failure is None:
+            pass
+        camera.stop()
+        print(f"the camera is over: {camera.failure or 'unplugged, or the end of its recording'}", file=sys.stderr)
+        if recorded:
+            return
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

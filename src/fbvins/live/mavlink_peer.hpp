@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The flight controller at the other end of a MAVLink connection: whether it is heard, and how far its clock is ahead.
+//
+//   peer.hear(frame, now);                                       // every frame that comes
+//   if (auto question = peer.question(now)) send(*question);     // ten times a second while it is heard
+//   if (peer.clock().known()) ours = theirs - peer.clock().value();
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "fbvins/mavlink/clock_offset.hpp"
+#include "fbvins/mavlink/wire.hpp"
+
+namespace fbvins {
+
+/// Times are of this machine's CLOCK_MONOTONIC.
+class MavlinkPeer {
+ public:
+  /// `system_id`: the vehicle's number; 0: whichever flight controller is heard first.
+  explicit MavlinkPeer(int system_id) : system_id_(system_id) {}
+
+  void hear(const MavlinkFrame& frame, Time now);
+  bool is_heard(Time now) const;
+  /// None before its first heartbeat.
+  const std::optional<MavlinkAddress>& address() const { return address_; }
+  /// What to ask for its time, when that is due.
+  std::optional<TimesyncMessage> question(Time now);
+  /// The port was opened anew: answers to what was asked before tell nothing.
+  void forget_questions() { questions_.clear(); }
+  const ClockOffset& clock() const { return clock_; }
+
+ private:
+  void answer(const TimesyncMessage& message, const MavlinkAddress& from, Time now);
+
+  int system_id_;
+  std::optional<MavlinkAddress> address_;
+  Time heard_at_{}, next_question_{};
+  std::deque<Time> questions_;
+  ClockOffset clock_;
+};
+
+/// True once in a period; a period that was slept through is not caught up on.
+bool is_due(Time now, Duration period, Time& next);
+
+}  // namespace fbvins

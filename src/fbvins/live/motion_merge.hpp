@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// A gyroscope and an accelerometer that are read apart, at rates of their own, as one IMU.
+//
+//   merge.add_gyro(t, radps); merge.add_accel(t, mps2);
+//   while (auto sample = merge.next()) input.push(*sample);
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// One reading leaves for each of the gyroscope's, in order, with the specific force between its neighbours in time (linear);
+/// as soon as the later of these is there. Where the accelerometer is missing for longer than kLongestGap none leave.
+/// One thread at a time.
+class MotionMerge {
+ public:
+  static constexpr Duration kLongestGap{50'000'000};
+
+  /// Stamps of each ascend; one that does not is dropped.
+  void add_gyro(Time t, const Vec3& gyro_radps);
+  void add_accel(Time t, const Vec3& accel_mps2);
+  std::optional<ImuSample> next();
+
+ private:
+  struct Reading {
+    Time t;
+    Vec3 value;
+  };
+  static void add(std::deque<Reading>& readings, Time t, const Vec3& value);
+  std::deque<Reading> gyro_, accel_;
+};
+
+}  // namespace fbvins

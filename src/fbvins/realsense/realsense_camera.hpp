@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// One RealSense camera with an IMU, plugged in or played from a file: its factory calibration, and its streams put into ours.
+// Left and right infrared, emitter off; gyroscope and accelerometer as one IMU, which is B; stamps in the global time that the
+// library gives, one for all streams. What the library throws is an Error here.
+#pragma once
+
+#include <functional>
+#include <librealsense2/rs.hpp>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/live/motion_merge.hpp"
+#include "fbvins/live/source.hpp"
+#include "fbvins/live/stereo_pairs.hpp"
+
+namespace fbvins {
+
+/// The two cameras and the IMU as the device has them; the IMU's noise is the data sheet's. An error where a stream is missing or
+/// its lens is of a kind that cannot be had here.
+Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2::video_stream_profile& right,
+                                const rs2::motion_stream_profile& gyro);
+
+class RealsenseCamera {
+ public:
+  using Say = std::function<void(const std::string&)>;
+
+  /// Chooses streams and sets options; nothing is delivered yet.
+  static Result<std::unique_ptr<RealsenseCamera>> open(rs2::device device, Say say);
+  ~RealsenseCamera() { stop(); }
+
+  /// The factory's; an error where the device tells none that can be had, and Kalibr's is needed.
+  const Result<StereoRig>& rig() const { return rig_; }
+  int width_px() const { return width_px_; }
+  int height_px() const { return height_px_; }
+  const rs2::device& device() const { return device_; }
+  /// Delivers on the library's threads until stop().
+  Result<void> start(SensorInput& input);
+  void stop();
+
+ private:
+  /// A sensor of the device and what is wanted of it.
+  struct Stream {
+    rs2::sensor sensor;
+    std::vector<rs2::stream_profile> profiles = {};
+    bool started = false;
+  };
+  RealsenseCamera(rs2::device device, Say say) : device_(std::move(device)), say_(std::move(say)) {}
+  Result<void> choose();
+  void set_options();
+  void take(const rs2::frame& frame, SensorInput& input);
+  void take_image(const rs2::video_frame& frame, Time t, SensorInput& input);
+  void take_motion(const rs2::motion_frame& frame, Time t, SensorInput& input);
+  void say_once(const std::string& sentence);
+
+  rs2::device device_;
+  Say say_;
+  Result<StereoRig> rig_ = StereoRig{};
+  int width_px_ = 0, height_px_ = 0;
+  std::vector<Stream> streams_;
+  std::mutex mutex_;  // of what follows: each sensor has a thread of its own
+  StereoPairs pairs_;
+  MotionMerge motion_;
+  int clock_ = -1;  ///< the domain that stamps are of
+  std::set<std::string> said_;
+};
+
+/// The serial number, or the name of the file that is played.
+std::string realsense_name(const rs2::device& device);
+
+}  // namespace fbvins

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "fbvins/realsense/realsense_camera.hpp"
+
+namespace fbvins {
+namespace {
+
+// The data sheet of the D435i's inertial sensor (BMI055): 0.014 degrees/s/sqrt(Hz) and 150 micro-g/sqrt(Hz). It has no random
+// walks; these are as large as those of the sensor whose figures are the defaults, which is better: --imu-calibration has yours.
+constexpr double kGyroNoise_radps_rthz = 2.44e-4, kAccelNoise_mps2_rthz = 1.47e-3;
+
+Result<Camera> camera_of(const rs2_intrinsics& lens, const std::string& which) {
+  const float* k = lens.coeffs;
+  if (lens.model == RS2_DISTORTION_KANNALA_BRANDT4)
+    return Camera(KannalaBrandt{lens.fx, lens.fy, lens.ppx, lens.ppy, k[0], k[1], k[2], k[3]}, lens.width, lens.height);
+  // The infrared images of the D400 family are rectified: whatever the model is called, its coefficients are zero.
+  const bool straight = std::all_of(std::begin(lens.coeffs), std::end(lens.coeffs), [](float c) { return c == 0; });
+  const bool brown = lens.model == RS2_DISTORTION_BROWN_CONRADY && k[4] == 0;
+  if (!straight && !brown)
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{}: its distortion ({}, fifth coefficient {}) is none that can be had here; calibrate with Kalibr",
+                             which, rs2_distortion_to_string(lens.model), k[4])};
+  return Camera(PinholeRadtan{lens.fx, lens.fy, lens.ppx, lens.ppy, k[0], k[1], k[2], k[3]}, lens.width, lens.height);
+}
+
+/// As the library has it: columns of the rotation one after the other, p_to = R * p_from + t.
+template <class To, class From>
+Pose<To, From> pose_of(const rs2_extrinsics& e) {
+  Mat3 R;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) R(row, column) = e.rotation[3 * column + row];
+  return {Quat(R).normalized(), Vec3(e.translation[0], e.translation[1], e.translation[2])};
+}
+
+}  // namespace
+
+Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2::video_stream_profile& right,
+                                const rs2::motion_stream_profile& gyro) {
+  StereoRig rig;
+  const auto left_camera = camera_of(left.get_intrinsics(), "left infrared");
+  if (!left_camera) return left_camera.error();
+  const auto right_camera = camera_of(right.get_intrinsics(), "right infrared");
+  if (!right_camera) return right_camera.error();
+  rig.left = *left_camera;
+  rig.right = *right_camera;
+  rig.T_BC0 = pose_of<B, C0>(left.get_extrinsics_to(gyro));
+  rig.T_BC1 = pose_of<B, C1>(right.get_extrinsics_to(gyro));
+  rig.imu_noise.gyro_noise_density_radps_rthz = kGyroNoise_radps_rthz;
+  rig.imu_noise.accel_noise_density_mps2_rthz = kAccelNoise_mps2_rthz;
+  rig.imu_noise.rate_hz = gyro.fps();
+  rig.image_rate_hz = left.fps();
+  return rig;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/realsense/realsense_source.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "fbvins/io/kalibr.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kLookEvery_s = 0.5;
+
+bool is_recording(const std::string& which) { return which.ends_with(".bag"); }
+
+bool fits(const StereoRig& rig, const RealsenseCamera& camera) {
+  return rig.left.width() == camera.width_px() && rig.left.height() == camera.height_px();
+}
+
+}  // namespace
+
+RealsenseSource::RealsenseSource(rs2::context context, std::string which, SourceOptions options)
+    : options_(std::move(options)), context_(std::move(context)), which_(std::move(which)) {}
+
+RealsenseSource::~RealsenseSource() {
+  try {
+    context_.set_devices_changed_callback([](rs2::event_information&) {});
+  } catch (const rs2::error&) {  // nothing more is told then
+  }
+}
+
+Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(const std::string& which, const SourceOptions& options) {
+  try {
+    return open(rs2::context(), which, options);
+  } catch (const rs2::error& e) {
+    return Error{ErrorCode::unreadable, fmt::format("RealSense: {}", e.what())};
+  }
+}
+
+Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(rs2::context context, const std::string& which,
+                                                               const SourceOptions& options) {
+  std::unique_ptr<RealsenseSource> source(new RealsenseSource(std::move(context), which, options));
+  if (Result<void> watched = source->watch(); !watched) return watched.error();
+  if (Result<void> found = source->wait_for_first(); !found) return found.error();
+  if (Result<void> known = source->set_rig(); !known) return known.error();
+  return source;
+}
+
+/// A recording becomes a device of the context; devices that come and go ring.
+Result<void> RealsenseSource::watch() {
+  try {
+    context_.set_devices_changed_callback([this](rs2::event_information& event) {
+      const std::lock_guard lock(mutex_);
+      if (camera_ && event.was_removed(camera_->device())) removed_ = true;
+      changed_.notify_all();
+    });
+    if (!is_recording(which_)) return {};
+    rs2::playback recording = context_.load_device(which_);
+    recording_ = recording;
+    recording.set_status_changed_callback([this](rs2_playback_status status) {
+      const std::lock_guard lock(mutex_);
+      if (status == RS2_PLAYBACK_STATUS_STOPPED) ended_ = true;
+      changed_.notify_all();
+    });
+  } catch (const rs2::error& e) {
+    return Error{ErrorCode::unreadable, fmt::format("RealSense {}: {}", which_, e.what())};
+  }
+  return {};
+}
+
+/// The camera that is meant, where it is plugged in and can be used; what stands against it is said once.
+std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
+  const auto say = [&](const std::string& problem) {
+    if (std::exchange(problem_, problem) != problem) options_.say(problem);
+  };
+  try {
+    // A recording is played by the device that tells its end; the context makes new ones.
+    std::vector<rs2::device> devices;
+    if (is_recording(which_)) devices.push_back(recording_);
+    else
+      for (const rs2::device& device : context_.query_devices()) devices.push_back(device);
+    for (const rs2::device& device : devices) {
+      if (!which_.empty() && realsense_name(device) != which_) continue;
+      auto camera = RealsenseCamera::open(device, options_.say);
+      if (!camera) {
+        say(camera.error().message);
+        continue;
+      }
+      problem_.clear();
+      return *std::move(camera);
+    }
+  } catch (const rs2::error& e) {  // unplugged while it was looked at
+    say(fmt::format("RealSense: {}", e.what()));
+  }
+  return nullptr;
+}
+
+Result<void> RealsenseSource::wait_for_first() {
+  for (bool first = true; true; first = false) {
+    auto camera = find();
+    if (camera) {
+      const std::lock_guard lock(mutex_);
+      camera_ = std::move(camera);
+      return {};
+    }
+    const std::string name = which_.empty() ? "a RealSense camera with an IMU" : "the RealSense camera " + which_;
+    if (options_.give_up() || is_recording(which_))
+      return Error{ErrorCode::not_found, fmt::format("{} is not there{}", name, problem_.empty() ? "" : ": " + problem_)};
+    if (first) options_.say("waiting for " + name);
+    wait(kLookEvery_s);
+  }
+}
+
+Result<void> RealsenseSource::set_rig() {
+  const DatasetOptions& files = options_.dataset;
+  const bool own = files.kalibr_camchain.empty();
+  const auto rig =
+      own ? camera_->rig()
+          : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
+  if (!rig) return rig.error();
+  rig_ = *rig;
+  if (fits(rig_, *camera_)) return {};
+  return Error{ErrorCode::invalid_argument, fmt::format("{} is of {} x {} pixels, the camera delivers {} x {}",
+                                                        own ? "its calibration" : files.kalibr_camchain, rig_.left.width(),
+                                                        rig_.left.height(), camera_->width_px(), camera_->height_px())};
+}
+
+void RealsenseSource::wait(double longest_s) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, std::chrono::duration<double>(longest_s), [&] { return stopped_ || removed_ || ended_; });
+}
+
+Result<void> RealsenseSource::run(SensorInput& input) {
+  const auto over = [&] {
+    const std::lock_guard lock(mutex_);
+    return stopped_ || ended_;
+  };
+  const auto gone = [&] {
+    const std::lock_guard lock(mutex_);
+    return removed_;
+  };
+  while (!over()) {
+    if (!camera_) {
+      wait(kLookEvery_s);
+      auto camera = find();
+      if (!camera) continue;
+      if (!fits(rig_, *camera)) {
+        options_.say("another camera, whose images have another size, is not taken");
+        continue;
+      }
+      const std::lock_guard lock(mutex_);
+      camera_ = std::move(camera);
+    }
+    const std::string name = realsense_name(camera_->device());
+    if (Result<void> started = camera_->start(input); !started) {
+      options_.say(started.error().message);
+    } else {
+      options_.say(fmt::format("RealSense {}: {} x {} pixels", name, camera_->width_px(), camera_->height_px()));
+      while (!over() && !gone()) wait(kLookEvery_s);
+      camera_->stop();
+      if (gone()) options_.say(fmt::format("RealSense {}: unplugged; it is waited for", name));
+    }
+    const std::lock_guard lock(mutex_);
+    camera_.reset();
+    removed_ = false;
+  }
+  return {};
+}
+
+void RealsenseSource::stop() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = true;
+  changed_.notify_all();
+}
+
+}  // namespace fbvins

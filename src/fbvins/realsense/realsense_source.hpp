@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// A RealSense D435i, or any RealSense with two infrared cameras and an IMU (docs/d435i.md).
+//
+//   auto source = RealsenseSource::open("", options);     // any; or its serial number, or a recording of the library's
+//   Result<void> end = (*source)->run(live.input());      // until stop(), or the recording's end
+#pragma once
+
+#include <condition_variable>
+#include <librealsense2/rs.hpp>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "fbvins/live/make_source.hpp"
+#include "fbvins/realsense/realsense_camera.hpp"
+
+namespace fbvins {
+
+class RealsenseSource final : public Source {
+ public:
+  /// `which`: a serial number, a file that ends in .bag, or empty for any camera. Waits for it until `options.give_up`. The rig
+  /// is the device's own; Kalibr's, where `options.dataset` names one. A camera that is unplugged in flight is waited for.
+  static Result<std::unique_ptr<RealsenseSource>> open(const std::string& which, const SourceOptions& options);
+  /// With the devices of `context`.
+  static Result<std::unique_ptr<RealsenseSource>> open(rs2::context context, const std::string& which,
+                                                       const SourceOptions& options);
+  ~RealsenseSource() override;
+
+  const StereoRig& rig() const override { return rig_; }
+  Result<void> run(SensorInput& input) override;
+  void stop() override;
+
+ private:
+  RealsenseSource(rs2::context context, std::string which, SourceOptions options);
+  Result<void> watch();
+  std::unique_ptr<RealsenseCamera> find();
+  Result<void> wait_for_first();
+  Result<void> set_rig();
+  void wait(double longest_s);
+
+  SourceOptions options_;
+  rs2::context context_;
+  std::string which_;
+  StereoRig rig_;
+  rs2::device recording_;  ///< the context forgets it when nobody has it
+  std::unique_ptr<RealsenseCamera> camera_;
+  std::mutex mutex_;  // of what follows
+  std::condition_variable changed_;
+  bool removed_ = false;  ///< the camera in use is unplugged
+  bool ended_ = false;    ///< the recording is
+  bool stopped_ = false;
+  std::string problem_;  ///< last said of a camera that cannot be used
+};
+
+}  // namespace fbvins

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+// On librealsense's software device and its recorder, no camera at hand.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/io/kalibr_test_files.hpp"
+#include "fbvins/live/live_system.hpp"
+#include "fbvins/realsense/realsense_source.hpp"
+#include "fbvins/realsense/realsense_test_device.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr Time kStart{1'700'000'000'000 * kMs};
+
+StereoRig rig() {
+  StereoRig rig;
+  rig.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.right = Camera(PinholeRadtan{380, 381, 320.5, 239.5, 0, 0, 0, 0}, 640, 480);
+  rig.T_BC0 = {Quat::Identity(), Vec3(0.00552, -0.0051, -0.01174)};
+  rig.T_BC1 = {Quat::Identity(), Vec3(0.00552 + 0.05, -0.0051, -0.01174)};
+  rig.image_rate_hz = 30;
+  return rig;
+}
+
+struct Collected final : SensorInput {
+  void push(const ImuSample& sample) override {
+    const std::lock_guard lock(mutex);
+    readings.push_back(sample);
+    changed.notify_all();
+  }
+  void push(StereoFrame frame) override {
+    const std::lock_guard lock(mutex);
+    frames.push_back(std::move(frame));
+    changed.notify_all();
+  }
+  bool wait_for_frames(std::size_t count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, std::chrono::seconds(20), [&] { return frames.size() >= count; });
+  }
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<ImuSample> readings;
+  std::vector<StereoFrame> frames;
+};
+
+/// Camera and IMU for so many images; images say which they are.
+void play(SoftwareCamera& camera, int images, Time start = kStart) {
+  for (int ms = 0; ms < images * 33; ++ms) {
+    const Time t = start + Duration{ms * kMs};
+    if (ms % 5 == 0) camera.gyro(t, Vec3(0.1, 0, 0.001 * ms));
+    if (ms % 4 == 0) camera.accel(t, Vec3(0, -9.8, 0.01 * ms));
+    if (ms % 33 == 0)
+      for (int side : {0, 1}) camera.image(side, t, Image(640, 480, static_cast<std::uint8_t>(2 * (ms / 33) + side)));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+/// Extrinsics of a software device are not among what the recorder writes: Kalibr's files tell them.
+SourceOptions calibrated_by(const KalibrFiles& files) {
+  SourceOptions options;
+  options.dataset.kalibr_camchain = files.camchain();
+  options.dataset.kalibr_imu = files.imu();
+  return options;
+}
+
+/// A recording of the library's own, made by its recorder.
+std::string record(const std::string& name, int images) {
+  const std::string path = (std::filesystem::temp_directory_path() / name).string();
+  std::filesystem::remove(path);
+  SoftwareCamera camera(rig());
+  rs2::recorder recorder(path, camera.device());
+  Collected collected;
+  auto recorded = RealsenseCamera::open(recorder, [](const std::string&) {});
+  EXPECT_TRUE(recorded) << recorded.error().message;
+  EXPECT_TRUE((*recorded)->start(collected));
+  play(camera, images);
+  (*recorded)->stop();
+  return path;
+}
+
+TEST(Realsense, TakesTheDevicesCalibration) {
+  SoftwareCamera device(rig());
+  auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
+  ASSERT_TRUE(camera) << camera.error().message;
+  ASSERT_TRUE((*camera)->rig()) << (*camera)->rig().error().message;
+  const StereoRig &seen = *(*camera)->rig(), wanted = rig();
+  EXPECT_EQ(seen.left.width(), 640);
+  EXPECT_NEAR(std::get<PinholeRadtan>(seen.left.model()).cx, 320.5, 1e-9);
+  EXPECT_LT((seen.T_BC0.p - wanted.T_BC0.p).norm(), 1e-8);
+  EXPECT_LT((seen.T_BC1.p - wanted.T_BC1.p).norm(), 1e-8);
+  EXPECT_EQ(seen.image_rate_hz, 30);
+  EXPECT_EQ(seen.imu_noise.rate_hz, 200);
+  EXPECT_EQ(device.emitter(), 0) << "the emitter is off";
+}
+
+TEST(Realsense, RotationsAreColumnByColumn) {
+  StereoRig turned = rig();
+  turned.T_BC0.q = so3_exp(Vec3(0.3, -0.2, 0.9));
+  SoftwareCamera device(turned);
+  auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_LT((*camera)->rig()->T_BC0.q.angularDistance(turned.T_BC0.q), 1e-6);
+}
+
+TEST(Realsense, RefusesALensThatItCannotHave) {
+  StereoRig bent = rig();
+  bent.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, -0.3, 0.1, 0, 0}, 640, 480);
+  SoftwareCamera device(bent);
+  auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
+  ASSERT_TRUE(camera) << "Brown's model is had: " << camera.error().message;
+  EXPECT_NEAR(std::get<PinholeRadtan>((*camera)->rig()->left.model()).k1, -0.3, 1e-7);
+  rs2::software_device blind;
+  auto sensor = blind.add_sensor("Motion Module");
+  sensor.add_motion_stream({RS2_STREAM_GYRO, 0, 1, 200, RS2_FORMAT_MOTION_XYZ32F, {}});
+  const auto refused = RealsenseCamera::open(blind, [](const std::string&) {});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("no left infrared"), std::string::npos) << refused.error().message;
+}
+
+TEST(Realsense, StreamsBecomePairsAndOneImu) {
+  SoftwareCamera device(rig());
+  Collected got;
+  auto camera = RealsenseCamera::open(device.device(), [](const std::string& s) { ADD_FAILURE() << s; });
+  ASSERT_TRUE(camera);
+  ASSERT_TRUE((*camera)->start(got));
+  play(device, 10);
+  ASSERT_TRUE(got.wait_for_frames(10));
+  (*camera)->stop();
+  EXPECT_EQ(got.frames.size(), 10u);
+  for (std::size_t i = 0; i < got.frames.size(); ++i) {
+    const StereoFrame& frame = got.frames[i];
+    ASSERT_TRUE(frame.left && frame.right);
+    EXPECT_EQ((frame.t - kStart).ns, static_cast<std::int64_t>(i) * 33 * kMs);
+    EXPECT_EQ(frame.left->at(639, 479), 2 * i);
+    EXPECT_EQ(frame.right->at(0, 0), 2 * i + 1);
+  }
+  ASSERT_GT(got.readings.size(), 60u);
+  for (const ImuSample& sample : got.readings) {
+    const double ms = static_cast<double>((sample.t - kStart).ns) / kMs;
+    EXPECT_LT((sample.gyro_radps - Vec3(0.1, 0, 0.001 * ms)).norm(), 1e-6);
+    EXPECT_LT((sample.accel_mps2 - Vec3(0, -9.8, 0.01 * ms)).norm(), 1e-5) << ms;
+  }
+}
+
+TEST(Realsense, LeavesOutStampsOfAnotherClock) {
+  SoftwareCamera device(rig());
+  Collected got;
+  std::vector<std::string> said;
+  auto camera = RealsenseCamera::open(device.device(), [&](const std::string& s) { said.push_back(s); });
+  ASSERT_TRUE(camera && (*camera)->start(got));
+  play(device, 3);
+  device.domain = RS2_TIMESTAMP_DOMAIN_HARDWARE_CLOCK;
+  play(device, 3, Time{5000 * kMs});
+  (*camera)->stop();
+  EXPECT_EQ(got.frames.size(), 3u);
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_NE(said[0].find("two clocks"), std::string::npos);
+}
+
+TEST(Realsense, PlaysARecordingToItsEnd) {
+  const std::string path = record("fbvins_realsense_end.bag", 30);
+  const KalibrFiles files(rig());
+  auto source = RealsenseSource::open(path, calibrated_by(files));
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_LT(((*source)->rig().T_BC1.p - rig().T_BC1.p).norm(), 1e-6);
+  Collected got;
+  ASSERT_TRUE((*source)->run(got));
+  EXPECT_GE(got.frames.size(), 28u);
+  EXPECT_GT(got.readings.size(), 180u);
+  std::filesystem::remove(path);
+}
+
+TEST(Realsense, NamesARecordingThatIsNone) {
+  const auto source = RealsenseSource::open("/no/such.bag", {});
+  ASSERT_FALSE(source);
+  EXPECT_NE(source.error().message.find("/no/such.bag"), std::string::npos) << source.error().message;
+}
+
+TEST(Realsense, GoesOnWhenItIsPluggedInAgain) {
+  const std::string bag = record("fbvins_realsense_plug.bag", 40), camera = bag + ".camera";
+  std::filesystem::rename(bag, camera);  // as a camera of this name, which the test plugs in
+  rs2::context context;
+  rs2::device plugged = context.load_device(camera);
+  std::vector<std::string> said;
+  std::mutex said_mutex;
+  const auto heard = [&](const std::string& what) {
+    const std::lock_guard lock(said_mutex);
+    return std::any_of(said.begin(), said.end(), [&](const std::string& s) { return s.find(what) != std::string::npos; });
+  };
+  const KalibrFiles files(rig());
+  SourceOptions options = calibrated_by(files);
+  options.say = [&](const std::string& s) {
+    const std::lock_guard lock(said_mutex);
+    said.push_back(s);
+  };
+  auto source = RealsenseSource::open(context, camera, options);
+  ASSERT_TRUE(source) << source.error().message;
+  Collected got;
+  std::thread running([&] { EXPECT_TRUE((*source)->run(got)); });
+  EXPECT_TRUE(got.wait_for_frames(5));
+  context.unload_device(camera);
+  for (int i = 0; i < 100 && !heard("unplugged"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_TRUE(heard("unplugged"));
+  std::size_t before = 0;
+  {
+    const std::lock_guard lock(got.mutex);
+    before = got.frames.size();
+  }
+  plugged = context.load_device(camera);
+  EXPECT_TRUE(got.wait_for_frames(before + 5));
+  (*source)->stop();
+  running.join();
+  std::filesystem::remove(camera);
+}
+
+/// A real flight by way of the library: through its recorder and its player, at the pace of the flight.
+TEST(Realsense, FliesARecordedFlight) {
+  const char* data = std::getenv("FBVINS_DATA");
+  const std::string flight = std::string(data != nullptr ? data : FBVINS_SOURCE_DIR "/../shared/data") + "/MH_01_easy_17s";
+  if (!std::filesystem::exists(flight)) GTEST_SKIP() << flight << " is not there";
+  auto dataset = open_dataset(flight);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  SoftwareCamera device((*dataset)->rig());
+  const std::string bag = (std::filesystem::temp_directory_path() / "fbvins_realsense_flight.bag").string();
+  std::filesystem::remove(bag);
+  {
+    rs2::recorder recorder(bag, device.device());
+    auto camera = RealsenseCamera::open(recorder, [](const std::string&) {});
+    ASSERT_TRUE(camera) << camera.error().message;
+    Collected unused;
+    ASSERT_TRUE((*camera)->start(unused));
+    const auto begin = std::chrono::steady_clock::now();
+    std::optional<Time> first;
+    while (auto event = (*dataset)->next()) {
+      const Time t = std::visit([](const auto& e) { return e.t; }, *event);
+      if (!first) first = t;
+      if (t - *first > Duration::from_seconds(12)) break;
+      std::this_thread::sleep_until(begin + std::chrono::nanoseconds((t - *first).ns));
+      if (const auto* sample = std::get_if<ImuSample>(&*event)) {
+        device.gyro(t, sample->gyro_radps);
+        device.accel(t, sample->accel_mps2);
+      } else {
+        const auto& frame = std::get<StereoFrame>(*event);
+        device.image(0, t, *frame.left);
+        device.image(1, t, *frame.right);
+      }
+    }
+    (*camera)->stop();
+  }
+  const KalibrFiles files((*dataset)->rig());
+  auto source = RealsenseSource::open(bag, calibrated_by(files));
+  ASSERT_TRUE(source) << source.error().message;
+  struct Poses final : Sink {
+    explicit Poses(std::vector<Odometry>& poses) : all(poses) {}
+    std::string_view name() const override { return "poses"; }
+    Result<void> take(const LiveEvent& event) override {
+      if (const auto* odometry = std::get_if<Odometry>(&event)) all.push_back(*odometry);
+      return {};
+    }
+    std::vector<Odometry>& all;
+  };
+  std::vector<Odometry> poses;
+  auto live = LiveSystem::create({}, {}, (*source)->rig());
+  ASSERT_TRUE(live) << live.error().message;
+  live->add_sink(std::make_unique<Poses>(poses));
+  ASSERT_TRUE((*source)->run(live->input()));
+  ASSERT_TRUE(live->finish());
+  const auto with_pose = std::count_if(poses.begin(), poses.end(), [](const Odometry& o) { return o.health.has_pose(); });
+  EXPECT_GT(with_pose, 100) << "of " << poses.size();
+  std::filesystem::remove(bag);
+}
+
+}  // namespace
+}  // namespace fbvins

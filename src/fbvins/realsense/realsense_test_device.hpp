@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// A RealSense camera made of librealsense's software device, with streams as a D435i has them.
+#pragma once
+
+#include <algorithm>
+#include <librealsense2/rs.hpp>
+// after rs.hpp, which it builds on
+#include <librealsense2/hpp/rs_internal.hpp>
+#include <string>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+class SoftwareCamera {
+ public:
+  explicit SoftwareCamera(const StereoRig& rig, const std::string& serial = "123456")
+      : stereo_(device_.add_sensor("Stereo Module")), motion_(device_.add_sensor("Motion Module")) {
+    device_.register_info(RS2_CAMERA_INFO_SERIAL_NUMBER, serial);
+    stereo_.add_option(RS2_OPTION_EMITTER_ENABLED, {0, 1, 1, 1});
+    const int rate_hz = static_cast<int>(rig.image_rate_hz), imu_rate_hz = static_cast<int>(rig.imu_noise.rate_hz);
+    left_ = stereo_.add_video_stream(video_stream(1, rig.left, rate_hz));
+    right_ = stereo_.add_video_stream(video_stream(2, rig.right, rate_hz));
+    gyro_ = motion_.add_motion_stream({RS2_STREAM_GYRO, 0, 3, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
+    accel_ = motion_.add_motion_stream({RS2_STREAM_ACCEL, 0, 4, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
+    left_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
+    right_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
+    accel_.register_extrinsics_to(gyro_, extrinsics(Pose<B, B>()));
+  }
+
+  rs2::software_device& device() { return device_; }
+  float emitter() { return stereo_.get_option(RS2_OPTION_EMITTER_ENABLED); }
+
+  void gyro(Time t, const Vec3& v) { motion(gyro_, t, v); }
+  void accel(Time t, const Vec3& v) { motion(accel_, t, v); }
+  void image(int camera, Time t, const Image& image) {
+    const auto size = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
+    auto* pixels = new std::uint8_t[size];
+    std::copy_n(image.row(0), size, pixels);
+    const rs2::stream_profile& profile = camera == 0 ? left_ : right_;
+    stereo_.on_video_frame(
+        {pixels, release<std::uint8_t>, image.width(), 1, milliseconds(t), domain, ++number_, profile.get(), 0});
+  }
+
+  rs2_timestamp_domain domain = RS2_TIMESTAMP_DOMAIN_GLOBAL_TIME;
+
+ private:
+  template <class T>
+  static void release(void* data) {
+    delete[] static_cast<T*>(data);
+  }
+  static double milliseconds(Time t) { return static_cast<double>(t.ns) * 1e-6; }
+  static rs2_video_stream video_stream(int index, const Camera& camera, int rate_hz) {
+    rs2_intrinsics lens{};
+    const auto& k = std::get<PinholeRadtan>(camera.model());
+    lens.width = camera.width(), lens.height = camera.height();
+    lens.fx = static_cast<float>(k.fx), lens.fy = static_cast<float>(k.fy);
+    lens.ppx = static_cast<float>(k.cx), lens.ppy = static_cast<float>(k.cy);
+    lens.model = RS2_DISTORTION_BROWN_CONRADY;
+    const double coefficients[] = {k.k1, k.k2, k.p1, k.p2};
+    for (int i = 0; i < 4; ++i) lens.coeffs[i] = static_cast<float>(coefficients[i]);
+    return {RS2_STREAM_INFRARED, index, index, lens.width, lens.height, rate_hz, 1, RS2_FORMAT_Y8, lens};
+  }
+  template <class To, class From>
+  static rs2_extrinsics extrinsics(const Pose<To, From>& T) {
+    rs2_extrinsics e{};
+    const Mat3 R = T.R();
+    for (int column = 0; column < 3; ++column)
+      for (int row = 0; row < 3; ++row) e.rotation[3 * column + row] = static_cast<float>(R(row, column));
+    for (int i = 0; i < 3; ++i) e.translation[i] = static_cast<float>(T.p[i]);
+    return e;
+  }
+  void motion(const rs2::stream_profile& profile, Time t, const Vec3& v) {
+    auto* values = new float[3]{static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+    motion_.on_motion_frame({values, release<float>, milliseconds(t), domain, ++number_, profile.get()});
+  }
+
+  rs2::software_device device_;
+  rs2::software_sensor stereo_, motion_;
+  rs2::stream_profile left_, right_, gyro_, accel_;
+  int number_ = 0;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/v4l2/imu_feed.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <array>
+#include <atomic>
+
+#include "fbvins/live/bell.hpp"
+#include "fbvins/live/byte_link.hpp"
+#include "fbvins/live/host_clock.hpp"
+#include "fbvins/live/mavlink_imu.hpp"
+#include "fbvins/live/socket_source.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kTick_ms = 20;
+constexpr Duration kTryAgainAfter{500'000'000};
+
+class MavlinkFeed final : public ImuFeed {
+ public:
+  MavlinkFeed(std::string where, LinkAddress address, Say say)
+      : where_(std::move(where)), say_(std::move(say)), link_(std::move(address)) {}
+
+  Result<void> run(SensorInput& input) override {
+    while (!stopped_) {
+      keep_open(host_now());
+      for (const auto& frame : imu_.tick(host_now())) link_.send(frame);
+      link_.flush();
+      std::array<pollfd, 2> watched = {{{bell_.fd(), POLLIN, 0}, {link_.descriptor(), POLLIN, 0}}};
+      ::poll(watched.data(), watched.size(), kTick_ms);
+      const std::vector<std::uint8_t> bytes = link_.receive();
+      for (const ImuSample& sample : imu_.receive(bytes, host_now())) input.push(sample);
+      tell(host_now());
+    }
+    return {};
+  }
+
+  void stop() override {
+    stopped_ = true;
+    bell_.ring();
+  }
+
+ private:
+  void keep_open(Time now) {
+    if (link_.is_open() || now < next_try_) return;
+    next_try_ = now + kTryAgainAfter;
+    if (link_.open()) imu_.restart();
+  }
+  /// What has changed since it was last told.
+  void tell(Time now) {
+    const bool heard = imu_.peer().is_heard(now), known = imu_.peer().clock().known();
+    const std::string state = !link_.is_open() ? link_.problem()
+                              : !heard         ? "no flight controller is heard"
+                              : !known         ? "a flight controller is heard, its clock is not known yet"
+                                               : "the flight controller's IMU";
+    if (state != told_) say_(fmt::format("{}: {}", where_, state));
+    told_ = state;
+  }
+
+  std::string where_, told_;
+  Say say_;
+  ByteLink link_;
+  MavlinkImu imu_;
+  Time next_try_{};
+  const Bell bell_;
+  std::atomic<bool> stopped_ = false;
+};
+
+/// Another process's readings without its images.
+class SocketFeed final : public ImuFeed {
+ public:
+  explicit SocketFeed(std::unique_ptr<SocketSource> source) : source_(std::move(source)) {}
+
+  Result<void> run(SensorInput& input) override {
+    struct ReadingsOnly final : SensorInput {
+      explicit ReadingsOnly(SensorInput& input) : all(input) {}
+      void push(const ImuSample& sample) override { all.push(sample); }
+      void push(StereoFrame) override {}
+      SensorInput& all;
+    } readings(input);
+    return source_->run(readings);
+  }
+  void stop() override { source_->stop(); }
+
+ private:
+  std::unique_ptr<SocketSource> source_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ImuFeed>> ImuFeed::open(const std::string& where, const StereoRig& rig, Say say) {
+  const std::string socket = "socket:";
+  if (where.starts_with(socket)) {
+    auto source = SocketSource::open(where.substr(socket.size()), {.rig = rig, .say = std::move(say)});
+    if (!source) return source.error();
+    return std::unique_ptr<ImuFeed>(std::make_unique<SocketFeed>(*std::move(source)));
+  }
+  Result<LinkAddress> address = parse_link_address(where);
+  if (!address) return address.error();
+  return std::unique_ptr<ImuFeed>(std::make_unique<MavlinkFeed>(where, *std::move(address), std::move(say)));
+}
+
+}  // namespace fbvins

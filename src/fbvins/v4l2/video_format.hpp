@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a video device of Linux puts into its buffers, as grey images. Pure functions, any thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+struct VideoFormat {
+  std::uint32_t fourcc = 0;
+  int width_px = 0, height_px = 0;
+  int row_bytes = 0;  ///< from one row to the next; of no meaning where images are compressed
+};
+
+/// Four characters as V4L2 has them: the first is the lowest byte.
+constexpr std::uint32_t fourcc(const char (&name)[5]) {
+  std::uint32_t code = 0;
+  for (int i = 3; i >= 0; --i) code = code << 8 | static_cast<std::uint8_t>(name[i]);
+  return code;
+}
+std::string fourcc_name(std::uint32_t code);
+
+/// Formats that grey_image() takes, the best first: those that hold the grey values as they are come before compressed ones.
+inline constexpr std::array kVideoFormats = {fourcc("GREY"), fourcc("NV12"), fourcc("YU12"),
+                                             fourcc("YUYV"), fourcc("UYVY"), fourcc("MJPG")};
+
+/// Copies; colour is left out. An error says what is wrong with the bytes: too few of them, or no image.
+Result<Image> grey_image(const VideoFormat& format, std::span<const std::uint8_t> bytes);
+
+/// The two halves of an image of two cameras side by side.
+std::array<Image, 2> split_side_by_side(const Image& both);
+
+}  // namespace fbvins

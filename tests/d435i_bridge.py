@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""examples/d435i_bridge.py between librealsense's software device and `fbvins live`, in wall time (15 s): poses, and a camera that is
+unplugged and plugged in again.
+
+usage: d435i_bridge.py FBVINS    skipped (77) where Python has no pyrealsense2; FBVINS_REALSENSE names a Python that has
+"""
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+try:
+    import numpy
+    import pyrealsense2 as rs
+except ImportError:
+    other = os.environ.get("FBVINS_REALSENSE")
+    if other and other != sys.executable:
+        os.execv(other, [other, *sys.argv])
+    print("SKIPPED: pyrealsense2 and numpy are not there; FBVINS_REALSENSE may name a Python that has them")
+    sys.exit(77)
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[1] / "examples"
+sys.path.insert(0, str(EXAMPLES))
+import d435i_bridge  # noqa: E402
+import socket_sender as world  # noqa: E402  a wall, and cameras that sway in front of it
+
+
+class SoftwareCamera:
+    def __init__(self):
+        self.device = rs.software_device()
+        self.stereo, self.motion = self.device.add_sensor("Stereo Module"), self.device.add_sensor("Motion Module")
+        lens = rs.intrinsics()
+        lens.width, lens.height, lens.fx, lens.fy = world.WIDTH, world.HEIGHT, world.FOCAL_PX, world.FOCAL_PX
+        lens.ppx, lens.ppy, lens.model, lens.coeffs = world.WIDTH / 2, world.HEIGHT / 2, rs.distortion.brown_conrady, [0.0] * 5
+        self.video = [self.stereo.add_video_stream(self.video_stream(index, lens)) for index in (1, 2)]
+        self.gyro, self.accel = (self.motion.add_motion_stream(self.motion_stream(kind, uid))
+                                 for kind, uid in ((rs.stream.gyro, 3), (rs.stream.accel, 4)))
+        for camera, x_m in zip(self.video, (0.0, world.BASELINE_M)):
+            where = rs.extrinsics()
+            where.rotation, where.translation = [1.0, 0, 0, 0, 1, 0, 0, 0, 1], [x_m, 0, 0]
+            camera.register_extrinsics_to(self.gyro, where)
+
+    @staticmethod
+    def video_stream(index, lens):
+        stream = rs.video_stream()
+        stream.type, stream.index, stream.uid, stream.fmt = rs.stream.infrared, index, index, rs.format.y8
+        stream.width, stream.height, stream.fps, stream.bpp, stream.intrinsics = lens.width, lens.height, 20, 1, lens
+        return stream
+
+    @staticmethod
+    def motion_stream(kind, uid):
+        stream = rs.motion_stream()
+        stream.type, stream.uid, stream.fps, stream.fmt = kind, uid, world.IMU_HZ, rs.format.motion_xyz32f
+        return stream
+
+    def fly(self, seconds):
+        rows, start_s, kept = world.wall(), time.time(), []
+        for k in range(int(seconds * world.IMU_HZ)):
+            t_s = k / world.IMU_HZ
+            time.sleep(max(0.0, start_s + t_s - time.time()))
+            x_m, force = world.motion(t_s)
+            self.move(self.accel, start_s + t_s, k, (force, -9.81, 0.0), kept)
+            self.move(self.gyro, start_s + t_s, k, (0.0, 0.0, 0.0), kept)
+            if k % world.READINGS_A_FRAME == 0:
+                for camera, at in zip(self.video, (x_m, x_m + world.BASELINE_M)):
+                    self.show(camera, start_s + t_s, k, world.view(rows, at), kept)
+            del kept[:-400]  # the library reads pixels and numbers where they lie
+
+    def show(self, profile, t_s, number, pixels, kept):
+        frame = rs.software_video_frame()
+        frame.pixels, frame.stride, frame.bpp = numpy.frombuffer(pixels, numpy.uint8), world.WIDTH, 1
+        frame.timestamp, frame.domain, frame.frame_number = t_s * 1e3, rs.timestamp_domain.global_time, number
+        frame.profile = profile.as_video_stream_profile()
+        kept.append(frame)
+        self.stereo.on_video_frame(frame)
+
+    def move(self, profile, t_s, number, values, kept):
+        frame, data = rs.software_motion_frame(), rs.vector()
+        data.x, data.y, data.z = values
+        frame.data, frame.timestamp, frame.domain, frame.frame_number = data, t_s * 1e3, rs.timestamp_domain.global_time, number
+        frame.profile = profile.as_motion_stream_profile()
+        kept.append(frame)
+        self.motion.on_motion_frame(frame)
+
+
+def plug_in(path, seconds):
+    """A camera that is there for so long."""
+    software = SoftwareCamera()
+    bridge = d435i_bridge.Camera(software.device, str(path))
+    flight = threading.Thread(target=software.fly, args=(seconds,))
+    flight.start()
+    flight.join()
+    bridge.stop()
+    assert bridge.failure is None, bridge.failure
+
+
+def main(program):
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = pathlib.Path(folder, "s"), pathlib.Path(folder, "out")
+        live = subprocess.Popen([program, "live", "--source", f"socket:{path}", "--out", out, "--quiet"])
+        try:
+            while not path.exists():
+                assert live.poll() is None
+                time.sleep(0.05)
+            plug_in(path, 7)
+            plug_in(path, 6)
+            time.sleep(0.5)
+            live.send_signal(signal.SIGINT)
+            assert live.wait(timeout=60) == 0, "there are poses"
+        finally:
+            live.kill()
+        poses = (out / "trajectory_tum.txt").read_text(encoding="ascii").splitlines()
+    print(f"{len(poses)} poses of 260 images, two cameras after one another")
+    assert len(poses) > 120, f"{len(poses)} poses of 260 images"
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
