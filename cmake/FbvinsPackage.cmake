@@ -19,7 +19,7 @@ if(CMAKE_CROSSCOMPILING)
   # dpkg-shlibdeps asks the packages installed here, which are of another architecture: Debian 12's names by hand.
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
   string(JOIN ", " CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libc6 (>= 2.36)" "libstdc++6 (>= 12)" libgcc-s1 "libfmt9 (>= 9.1.0+ds1)"
-    "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 liblapack3 libblas3
+    "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libceres3 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 liblapack3 libblas3
     libddsc0debian)
 else()
   set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
