@@ -11,7 +11,7 @@ namespace fbvins {
 /// The larger eigenvalue: of a covariance, the variance along its worst direction.
 inline double largest_eigenvalue(const Mat2& symmetric) {
   const double mean = 0.5 * (symmetric(0, 0) + symmetric(1, 1)), half = 0.5 * (symmetric(0, 0) - symmetric(1, 1));
-  return mean + std::hypot(half, symmetric(1, 0));
+  return mean + std::sqrt(half * half + symmetric(1, 0) * symmetric(1, 0));  // not std::hypot: its bits differ between machines
 }
 
 }  // namespace fbvins
