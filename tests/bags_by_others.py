@@ -19,8 +19,7 @@ try:
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 except ImportError as lack:
-    if len(sys.argv) > 2 and os.path.exists(sys.argv[2]) and os.path.realpath(sys.executable) != os.path.realpath(sys.argv[2]) \
-            and not os.environ.get("FBVINS_TRIED"):
+    if len(sys.argv) > 2 and os.path.exists(sys.argv[2]) and not os.environ.get("FBVINS_TRIED"):
         os.environ["FBVINS_TRIED"] = "1"
         os.execv(sys.argv[2], [sys.argv[2], *sys.argv])
     print(f"skipped: {lack.name} is not there; ./dev test installs it (PyPI)")

@@ -139,7 +139,7 @@ Tuning tune(const LoopLog& log, const VehicleFit& fit, const TuneOptions& option
   const std::size_t slower = fit.velocity[0].plant.delay_s >= fit.velocity[1].plant.delay_s ? 0 : 1, turning = 1 - slower;
   const VelocityPlant &across = fit.velocity[slower].plant, &up = fit.velocity[2].plant;
   const RateGains flown_lean = rate_gains(log.control, static_cast<int>(turning));
-  t.loops[3].name = kNames[3], t.loops[4].name = kNames[4];
+  t.loops[3].name = std::string(kNames[3]), t.loops[4].name = std::string(kNames[4]);
   const VelocityGains xy =
       tune_place(t.loops[3], {across, fit.rate[turning].plant, flown_lean, true, filters},
                  {across, fit.rate[turning].plant, lean[turning], true, filters}, velocity_gains(log.control, 0), options);
