@@ -64,8 +64,10 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   view_.T_WC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
   const ImageView left = packet.frame.left->view();
-  const bool examined = !images_.has_before() || follow(left, stats);
-  if (!images_.has_before()) {
+  bool examined = true;
+  if (images_.has_before()) {
+    examined = follow(left, stats);
+  } else {
     examine(left, stats);
     recogniser_.recognise(tracks_, view_, images_.left(), stats);
   }
