@@ -22,7 +22,7 @@ Result<std::unique_ptr<Source>> open_realsense([[maybe_unused]] const std::strin
 #else
   return Error{
       ErrorCode::invalid_argument,
-      "this program was built without librealsense2, which a d435i wants (docs/d435i.md; examples/d435i_bridge.py needs none)"};
+      "this program was built without librealsense2, which the source d435i needs (docs/d435i.md; examples/d435i_bridge.py needs none)"};
 #endif
 }
 

@@ -10,7 +10,7 @@
 namespace fbvins::app {
 
 /// d435i[:SERIAL or FILE.bag], v4l2:LEFT,RIGHT,IMU, or as make_source() has it. An error where this program was built without
-/// what the source wants.
+/// what the source needs.
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options);
 
 }  // namespace fbvins::app

@@ -45,7 +45,7 @@ class Px4Controller final : public FlightController {
   int resets_in_flight() const override { return mission_.resets_in_flight(); }
 
  private:
-  /// PX4 believes a companion's clock after 500 answers, ten a second.
+  /// PX4 uses the clock offset to a companion once it has 500 TIMESYNC answers, at ten a second.
   static constexpr double kWarmUp_s = 56;
 
   Px4Controller(std::unique_ptr<Px4Process> px4, MavlinkOptions options, const Mission& mission, const StereoRig& rig);

@@ -21,7 +21,7 @@
 #include <thread>
 #include <vector>
 
-extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX wants it declared by whoever uses it
+extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has no header that declares it
 
 namespace fbvins {
 namespace {

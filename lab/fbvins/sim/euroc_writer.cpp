@@ -146,7 +146,7 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool
   return {};
 }
 
-/// One frame's files, of the cameras that delivered; may run while the next frame is drawn.
+/// One frame's files, of the cameras that delivered; may run while the next frame is rendered.
 Result<void> write_images(const DrawnFrame& drawn, const fs::path& mav0) {
   const std::string left = fmt::format("{}.png", drawn.frame.t.ns), right = fmt::format("{}.png", drawn.right_stamp.ns);
   if (drawn.frame.left)

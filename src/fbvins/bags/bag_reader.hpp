@@ -6,7 +6,7 @@
 //   while (auto message = (*bag)->next()) use((*bag)->topics()[message->topic].name, message->data);
 //   std::string again = (*bag)->read(place);
 //
-// A file that ends too early is read as far as it is whole; what cannot be read is left out and counted.
+// A truncated file is read up to its last complete record; what cannot be read is skipped and counted.
 #pragma once
 
 #include <compare>

@@ -141,7 +141,7 @@ class Ros1Bag final : public BagReader {
     std::optional<Chunk> chunk = chunk_at(at);
     if (!chunk || (chunk->records.empty() && !chunk->whole && head.whole))
       return complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", compression.substr(0, 20)));
-    if (!chunk->whole && head.whole) complain_at(at, "this chunk is damaged, and is read as far as it is whole");
+    if (!chunk->whole && head.whole) complain_at(at, "this chunk is damaged and is read up to its last complete record");
     loaded_ = std::move(chunk->records);
     loaded_at_ = at;
     loaded_whole_ = chunk->whole;
