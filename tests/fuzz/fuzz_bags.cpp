@@ -8,18 +8,10 @@
 #include "fbvins/io/mcap_format.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace fbvins::fuzz {
 namespace {
-
-void require(bool fact) {
-  if (!fact) __builtin_trap();
-}
-
-template <class T>
-void require_sentence(const Result<T>& result) {
-  require(result.ok() || (!result.error().message.empty() && result.error().message.find('\n') == std::string::npos));
-}
 
 StereoRig small_rig() {
   StereoRig rig;

@@ -4,13 +4,10 @@
 
 #include "fbvins/live/socket_message.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace fbvins::fuzz {
 namespace {
-
-void require(bool fact) {
-  if (!fact) __builtin_trap();
-}
 
 template <class Struct>
 std::string bytes_of(std::uint32_t type, Struct message, std::size_t size = sizeof(Struct)) {

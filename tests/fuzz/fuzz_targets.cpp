@@ -9,28 +9,17 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_decode.hpp"
-#include "fbvins/mocap/marker_test_files.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_format.hpp"
-#include "fbvins/mocap/motion_capture.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/mocap/marker_test_files.hpp"
+#include "fbvins/mocap/motion_capture.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace fbvins::fuzz {
 namespace {
-
-void require(bool fact) {
-  if (!fact) __builtin_trap();
-}
-
-/// An answer is a value or one sentence.
-template <class T>
-void require_sentence(const Result<T>& result) {
-  if (result) return;
-  require(!result.error().message.empty());
-  require(result.error().message.find('\n') == std::string::npos);
-}
 
 template <class Row>
 void require_increasing(const std::vector<Row>& rows) {

@@ -44,15 +44,20 @@ Match match(const std::vector<FrequencyPoint>& points, const std::function<Compl
           std::sqrt(turns / weight) * kDegrees};
 }
 
-/// The best of a grid, then of a finer one around it.
-template <class Value>
-void refine(const std::function<Match(const Value&)>& judge, const std::function<std::vector<Value>(const Value&, int)>& around,
-            Value& best, Match& found) {
+/// The best plant of a grid, then of a finer one around it, and how well it fits.
+template <class Plant, class Fit>
+void refine(const std::function<Match(const Plant&)>& judge, const std::function<std::vector<Plant>(const Plant&, int)>& around,
+            Fit& fit) {
+  Plant best;
+  Match found = judge(best);
   for (int level = 0; level < 4; ++level)
-    for (const Value& v : around(best, level)) {
-      const Match m = judge(v);
-      if (m.cost < found.cost) found = m, best = v;
+    for (const Plant& p : around(best, level)) {
+      const Match m = judge(p);
+      if (m.cost < found.cost) found = m, best = p;
     }
+  fit.plant = best;
+  fit.plant.gain = found.gain;
+  fit.misfit_db = found.misfit_db, fit.misfit_deg = found.misfit_deg;
 }
 
 std::vector<double> column(const std::vector<Vec3>& all, int axis) {
@@ -78,8 +83,6 @@ Result<RateFit> fit_rate(const std::vector<double>& torque, const std::vector<do
   const auto judge = [&](const RatePlant& p) {
     return match(fit.points, [&](double w) { return plant_of(p, w) * butterworth(w, filters.rate_hz, filters.gyro_cutoff_hz); });
   };
-  RatePlant best;
-  Match found = judge(best);
   const std::function<std::vector<RatePlant>(const RatePlant&, int)> around = [&](const RatePlant& c, int level) {
     std::vector<RatePlant> all;
     const int n = level == 0 ? 12 : 4;
@@ -93,10 +96,7 @@ Result<RateFit> fit_rate(const std::vector<double>& torque, const std::vector<do
         }
     return all;
   };
-  refine<RatePlant>(judge, around, best, found);
-  fit.plant = best;
-  fit.plant.gain = found.gain;
-  fit.misfit_db = found.misfit_db, fit.misfit_deg = found.misfit_deg;
+  refine<RatePlant>(judge, around, fit);
   return fit;
 }
 
@@ -110,8 +110,6 @@ Result<VelocityFit> fit_velocity(const std::vector<double>& asked, const std::ve
     model.plant = p;
     return match(fit.points, [&](double w) { return velocity_plant(model, w); });
   };
-  VelocityPlant best;
-  Match found = judge(best);
   const std::function<std::vector<VelocityPlant>(const VelocityPlant&, int)> around = [](const VelocityPlant& c, int level) {
     std::vector<VelocityPlant> all;
     const double finer = std::pow(4, std::max(0, level - 1)), delay_s = level == 0 ? 0.01 : 0.002 / finer,
@@ -124,10 +122,7 @@ Result<VelocityFit> fit_velocity(const std::vector<double>& asked, const std::ve
       }
     return all;
   };
-  refine<VelocityPlant>(judge, around, best, found);
-  fit.plant = best;
-  fit.plant.gain = found.gain;
-  fit.misfit_db = found.misfit_db, fit.misfit_deg = found.misfit_deg;
+  refine<VelocityPlant>(judge, around, fit);
   return fit;
 }
 

@@ -14,6 +14,7 @@
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
@@ -53,10 +54,8 @@ class BagLoader : public FrameLoader {
     };
     Result<Image> image = image_of(bag_->read(place_of(place)), side.encoding, side.compressed);
     if (!image) return blame(counts.corrupt, image.error().message);
-    const Camera& camera = side.camera;
-    if (image->width() != camera.width() || image->height() != camera.height())
-      return blame(counts.wrong_size, fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(),
-                                                  image->height(), camera.width(), camera.height()));
+    if (const auto sentence = wrong_size(image->width(), image->height(), side.camera))
+      return blame(counts.wrong_size, *sentence);
     return std::make_shared<const Image>(*std::move(image));
   }
 

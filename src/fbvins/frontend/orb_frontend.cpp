@@ -74,8 +74,8 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
   if (examined) starter_.start(tracks_, view_, images_.left(), stats);
-  examination_.pass(examined, in_sight(tracks_));
-  stats.tracked = in_sight(tracks_) - stats.detected;
+  else stats.tracked = in_sight(tracks_);
+  examination_.pass(examined, stats.tracked + stats.detected);
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {

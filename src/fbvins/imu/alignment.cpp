@@ -90,11 +90,10 @@ class LinearProblem {
 
   LinearSolution solve() const {
     LinearSolution s;
-    auto x = solve_symmetric(H_, b_);
-    auto covariance = invert_symmetric(H_);
-    if (!x || !covariance) return s;
-    s.x = *std::move(x);
-    s.covariance = *std::move(covariance);
+    auto solution = solve_and_invert_symmetric(H_, b_);
+    if (!solution) return s;
+    s.x = std::move(solution->x);
+    s.covariance = std::move(solution->inverse);
     s.cost = std::max(0.0, constant_ - b_.dot(s.x));
     s.gravity = gravity();
     s.accel_bias = accel_bias();

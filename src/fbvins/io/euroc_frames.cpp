@@ -58,10 +58,9 @@ class EurocLoader : public FrameLoader {
       else if (problem.empty()) problem = image.error().message;
       return nullptr;
     }
-    if (image->width() != camera.width() || image->height() != camera.height()) {
+    if (const auto sentence = wrong_size(image->width(), image->height(), camera)) {
       ++counts.wrong_size;
-      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width(), image->height(), camera.width(),
-                        camera.height()));
+      blame(*sentence);
       return nullptr;
     }
     return std::make_shared<const Image>(*std::move(image));

@@ -45,4 +45,9 @@ Result<Image> decode_image(std::string_view bytes) {
   return Error{ErrorCode::malformed, "neither PNG nor JPEG"};
 }
 
+std::optional<std::string> wrong_size(std::int64_t width, std::int64_t height, const Camera& camera) {
+  if (width == camera.width() && height == camera.height()) return std::nullopt;
+  return fmt::format("{} x {} pixels where the calibration says {} x {}", width, height, camera.width(), camera.height());
+}
+
 }  // namespace fbvins

@@ -7,8 +7,12 @@
 // A file that is damaged or cut off anywhere is an error: half an image is no image.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string>
 #include <string_view>
 
+#include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/types/image.hpp"
 
@@ -19,5 +23,8 @@ inline constexpr std::int64_t kLargestImage_px = std::int64_t{64} << 20;
 
 /// The message says what is wrong with the bytes, without a file name.
 Result<Image> decode_image(std::string_view bytes);
+
+/// One sentence about an image that is not of its camera's size; none where it is.
+std::optional<std::string> wrong_size(std::int64_t width, std::int64_t height, const Camera& camera);
 
 }  // namespace fbvins

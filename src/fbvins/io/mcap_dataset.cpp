@@ -10,6 +10,7 @@
 
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -66,10 +67,9 @@ class McapLoader : public FrameLoader {
       blame("this image cannot be read any more");
       return nullptr;
     }
-    if (static_cast<int>(image->width) != camera.width() || static_cast<int>(image->height) != camera.height()) {
+    if (const auto sentence = wrong_size(image->width, image->height, camera)) {
       ++counts.wrong_size;
-      blame(fmt::format("{} x {} pixels where the calibration says {} x {}", image->width, image->height, camera.width(),
-                        camera.height()));
+      blame(*sentence);
       return nullptr;
     }
     auto out = std::make_shared<Image>(camera.width(), camera.height());

@@ -17,4 +17,11 @@ std::optional<Eigen::VectorXd> solve_symmetric(const Eigen::MatrixXd& H, const E
 /// H^-1 by LDL^T; the same.
 std::optional<Eigen::MatrixXd> invert_symmetric(const Eigen::MatrixXd& H);
 
+struct SymmetricSolution {
+  Eigen::VectorXd x;        ///< H^-1 b
+  Eigen::MatrixXd inverse;  ///< H^-1
+};
+/// Both from one factor.
+std::optional<SymmetricSolution> solve_and_invert_symmetric(const Eigen::MatrixXd& H, const Eigen::VectorXd& b);
+
 }  // namespace fbvins

@@ -27,6 +27,10 @@ TEST(DenseSystem, SolvesWhatItIsGiven) {
       const auto inverse = invert_symmetric(H);
       ASSERT_TRUE(inverse);
       EXPECT_LT((H * *inverse - Eigen::MatrixXd::Identity(n, n)).norm(), 1e-10);
+      const auto both = solve_and_invert_symmetric(H, H * wanted);
+      ASSERT_TRUE(both);
+      EXPECT_EQ(both->x, *x);
+      EXPECT_EQ(both->inverse, *inverse);
     }
 }
 
@@ -35,6 +39,7 @@ TEST(DenseSystem, NothingFromWhatIsNotFinite) {
   H(2, 2) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(solve_symmetric(H, Eigen::VectorXd::Ones(5)));
   EXPECT_FALSE(invert_symmetric(H));
+  EXPECT_FALSE(solve_and_invert_symmetric(H, Eigen::VectorXd::Ones(5)));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
 #include <cstdlib>
 #include <filesystem>
 #include <mutex>
@@ -13,6 +12,7 @@
 
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/kalibr_test_files.hpp"
+#include "fbvins/live/collected_input.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/realsense/realsense_source.hpp"
 #include "fbvins/realsense/realsense_test_device.hpp"
@@ -21,6 +21,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
+constexpr std::chrono::seconds kPatience{20};
 constexpr Time kStart{1'700'000'000'000 * kMs};
 
 StereoRig rig() {
@@ -32,27 +33,6 @@ StereoRig rig() {
   rig.image_rate_hz = 30;
   return rig;
 }
-
-struct Collected final : SensorInput {
-  void push(const ImuSample& sample) override {
-    const std::lock_guard lock(mutex);
-    readings.push_back(sample);
-    changed.notify_all();
-  }
-  void push(StereoFrame frame) override {
-    const std::lock_guard lock(mutex);
-    frames.push_back(std::move(frame));
-    changed.notify_all();
-  }
-  bool wait_for_frames(std::size_t count) {
-    std::unique_lock lock(mutex);
-    return changed.wait_for(lock, std::chrono::seconds(20), [&] { return frames.size() >= count; });
-  }
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<ImuSample> readings;
-  std::vector<StereoFrame> frames;
-};
 
 /// Camera and IMU for so many images; images say which they are.
 void play(SoftwareCamera& camera, int images, Time start = kStart) {
@@ -80,7 +60,7 @@ std::string record(const std::string& name, int images) {
   std::filesystem::remove(path);
   SoftwareCamera camera(rig());
   rs2::recorder recorder(path, camera.device());
-  Collected collected;
+  CollectedInput collected;
   auto recorded = RealsenseCamera::open(recorder, [](const std::string&) {});
   EXPECT_TRUE(recorded) << recorded.error().message;
   EXPECT_TRUE((*recorded)->start(collected));
@@ -130,12 +110,12 @@ TEST(Realsense, RefusesALensThatItCannotHave) {
 
 TEST(Realsense, StreamsBecomePairsAndOneImu) {
   SoftwareCamera device(rig());
-  Collected got;
+  CollectedInput got;
   auto camera = RealsenseCamera::open(device.device(), [](const std::string& s) { ADD_FAILURE() << s; });
   ASSERT_TRUE(camera);
   ASSERT_TRUE((*camera)->start(got));
   play(device, 10);
-  ASSERT_TRUE(got.wait_for_frames(10));
+  ASSERT_TRUE(got.wait_for_frames(10, kPatience));
   (*camera)->stop();
   EXPECT_EQ(got.frames.size(), 10u);
   for (std::size_t i = 0; i < got.frames.size(); ++i) {
@@ -155,7 +135,7 @@ TEST(Realsense, StreamsBecomePairsAndOneImu) {
 
 TEST(Realsense, LeavesOutStampsOfAnotherClock) {
   SoftwareCamera device(rig());
-  Collected got;
+  CollectedInput got;
   std::vector<std::string> said;
   auto camera = RealsenseCamera::open(device.device(), [&](const std::string& s) { said.push_back(s); });
   ASSERT_TRUE(camera && (*camera)->start(got));
@@ -174,7 +154,7 @@ TEST(Realsense, PlaysARecordingToItsEnd) {
   auto source = RealsenseSource::open(path, calibrated_by(files));
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_LT(((*source)->rig().T_BC1.p - rig().T_BC1.p).norm(), 1e-6);
-  Collected got;
+  CollectedInput got;
   ASSERT_TRUE((*source)->run(got));
   EXPECT_GE(got.frames.size(), 28u);
   EXPECT_GT(got.readings.size(), 180u);
@@ -206,9 +186,9 @@ TEST(Realsense, GoesOnWhenItIsPluggedInAgain) {
   };
   auto source = RealsenseSource::open(context, camera, options);
   ASSERT_TRUE(source) << source.error().message;
-  Collected got;
+  CollectedInput got;
   std::thread running([&] { EXPECT_TRUE((*source)->run(got)); });
-  EXPECT_TRUE(got.wait_for_frames(5));
+  EXPECT_TRUE(got.wait_for_frames(5, kPatience));
   context.unload_device(camera);
   for (int i = 0; i < 100 && !heard("unplugged"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_TRUE(heard("unplugged"));
@@ -218,7 +198,7 @@ TEST(Realsense, GoesOnWhenItIsPluggedInAgain) {
     before = got.frames.size();
   }
   plugged = context.load_device(camera);
-  EXPECT_TRUE(got.wait_for_frames(before + 5));
+  EXPECT_TRUE(got.wait_for_frames(before + 5, kPatience));
   (*source)->stop();
   running.join();
   std::filesystem::remove(camera);
@@ -238,7 +218,7 @@ TEST(Realsense, FliesARecordedFlight) {
     rs2::recorder recorder(bag, device.device());
     auto camera = RealsenseCamera::open(recorder, [](const std::string&) {});
     ASSERT_TRUE(camera) << camera.error().message;
-    Collected unused;
+    CollectedInput unused;
     ASSERT_TRUE((*camera)->start(unused));
     const auto begin = std::chrono::steady_clock::now();
     std::optional<Time> first;

@@ -9,7 +9,6 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -17,6 +16,7 @@
 
 #include "fbvins/io/dataset.hpp"
 #include "fbvins/io/kalibr_test_files.hpp"
+#include "fbvins/live/collected_input.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/mavlink/wire.hpp"
@@ -26,6 +26,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
+constexpr std::chrono::seconds kPatience{10};
 
 void sleep_until(Time t) {
   if (const Duration left = t - host_now(); left.ns > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(left.ns));
@@ -108,26 +109,6 @@ class FakeFlightController {
   std::thread listener_;
 };
 
-struct Collected final : SensorInput {
-  void push(const ImuSample& sample) override {
-    const std::lock_guard lock(mutex);
-    readings.push_back(sample);
-  }
-  void push(StereoFrame frame) override {
-    const std::lock_guard lock(mutex);
-    frames.push_back(std::move(frame));
-    changed.notify_all();
-  }
-  bool wait_for_frames(std::size_t count) {
-    std::unique_lock lock(mutex);
-    return changed.wait_for(lock, std::chrono::seconds(10), [&] { return frames.size() >= count; });
-  }
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<ImuSample> readings;
-  std::vector<StereoFrame> frames;
-};
-
 StereoRig small_rig() {
   StereoRig rig;
   rig.left = rig.right = Camera(PinholeRadtan{100, 100, 31.5, 23.5, 0, 0, 0, 0}, 64, 48);
@@ -186,7 +167,7 @@ bool deliver(FakeVideo& camera, Time t, const std::vector<std::uint8_t>& bytes) 
 TEST(V4l2Source, PutsTwoCamerasTogether) {
   FakeVideo left("/fake/left", {fourcc("MJPG"), fourcc("YUYV")}), right("/fake/right", {fourcc("GREY")});
   Running running("/fake/left,/fake/right,udp:127.0.0.1:9", small_rig());
-  Collected got;
+  CollectedInput got;
   running.start(got);
   for (int i = 0; i < 8; ++i) {
     const Time t = host_now();
@@ -194,7 +175,7 @@ TEST(V4l2Source, PutsTwoCamerasTogether) {
     ASSERT_TRUE(deliver(right, t + Duration{kMs / 2}, filled((64 + 32) * 48, 30 + i)));
     if (i == 3) left.damage_next();
   }
-  ASSERT_TRUE(got.wait_for_frames(8));
+  ASSERT_TRUE(got.wait_for_frames(8, kPatience));
   int pairs = 0;
   for (const StereoFrame& frame : got.frames) {
     if (!frame.left || !frame.right) continue;
@@ -208,13 +189,13 @@ TEST(V4l2Source, PutsTwoCamerasTogether) {
 TEST(V4l2Source, CutsOneCameraInTwo) {
   FakeVideo both("/fake/both", {fourcc("GREY")});
   Running running("/fake/both,udp:127.0.0.1:9", small_rig());
-  Collected got;
+  CollectedInput got;
   running.start(got);
   std::vector<std::uint8_t> bytes = filled((128 + 32) * 48, 1);
   for (std::size_t y = 0; y < 48; ++y)
     std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(y * 160 + 64), 64, std::uint8_t{2});
   ASSERT_TRUE(deliver(both, Time{5}, bytes));
-  ASSERT_TRUE(got.wait_for_frames(1));
+  ASSERT_TRUE(got.wait_for_frames(1, kPatience));
   EXPECT_EQ(got.frames[0].left->at(63, 47), 1);
   EXPECT_EQ(got.frames[0].right->at(0, 0), 2);
 }
@@ -222,15 +203,15 @@ TEST(V4l2Source, CutsOneCameraInTwo) {
 TEST(V4l2Source, WaitsForACameraThatIsUnplugged) {
   auto camera = std::make_unique<FakeVideo>("/fake/both", std::vector{fourcc("GREY")});
   Running running("/fake/both,udp:127.0.0.1:9", small_rig());
-  Collected got;
+  CollectedInput got;
   running.start(got);
   ASSERT_TRUE(deliver(*camera, host_now(), filled(160 * 48, 1)));
-  ASSERT_TRUE(got.wait_for_frames(1));
+  ASSERT_TRUE(got.wait_for_frames(1, kPatience));
   camera.reset();
   EXPECT_TRUE(running.heard("is gone"));
   camera = std::make_unique<FakeVideo>("/fake/both", std::vector{fourcc("GREY")});
   ASSERT_TRUE(deliver(*camera, host_now(), filled(160 * 48, 2)));
-  ASSERT_TRUE(got.wait_for_frames(2));
+  ASSERT_TRUE(got.wait_for_frames(2, kPatience));
 }
 
 TEST(V4l2Source, SaysWhatIsWrong) {
@@ -243,13 +224,13 @@ TEST(V4l2Source, SaysWhatIsWrong) {
       rig.left = rig.right = Camera(PinholeRadtan{100, 100, 60, 23.5, 0, 0, 0, 0}, 128, 48);
       return rig;
     }());
-    Collected got;
+    CollectedInput got;
     running.start(got);
     EXPECT_TRUE(running.heard("delivers 100 x 48 pixels of GREY, wanted are 128 x 48"));
     EXPECT_TRUE(running.heard("has formats RGB3"));
   }
   Running running("/fake/silent,/fake/none,udp:127.0.0.1:9", small_rig());
-  Collected got;
+  CollectedInput got;
   running.start(got);
   EXPECT_TRUE(running.heard("/fake/none: cannot be opened: No such file"));
   ASSERT_TRUE(deliver(silent, Time{1}, filled(96 * 48, 1)));
