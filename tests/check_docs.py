@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What can be checked of documents: links between them lead somewhere, headings included; every health state and reason of the code has its
+entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes.
+
+usage: check_docs.py [REPOSITORY]      exit 1 and one line a fault
+"""
+import pathlib
+import re
+import subprocess
+import sys
+
+LINK = re.compile(r"(?<!\!)\[[^\]]*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)")
+CODE = re.compile(r"```.*?```|`[^`\n]*`", re.S)
+
+
+def slug(heading):
+    """The anchor of a heading, as forges and mkdocs make it."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
+    return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", text))
+
+
+def anchors(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+    return {slug(h) for h in re.findall(r"^#+\s+(.*)$", text, re.M)}
+
+
+def links(root):
+    for page in sorted([*root.glob("*.md"), *root.glob("docs/**/*.md"), *root.glob("training/*.md")]):
+        for match in LINK.finditer(CODE.sub("", page.read_text(encoding="utf-8"))):
+            target = match.group(1) or match.group(2)
+            if re.match(r"[a-z]+:", target):
+                continue
+            path, _, anchor = target.partition("#")
+            to = (page.parent / path).resolve() if path else page
+            if not to.exists():
+                yield f"{page.relative_to(root)}: there is no {target}"
+            elif anchor and to.suffix == ".md" and anchor not in anchors(to):
+                yield f"{page.relative_to(root)}: {path or page.name} has no heading #{anchor}"
+
+
+def health(root):
+    header = (root / "include/fbvins/types/odometry.hpp").read_text(encoding="utf-8")
+    entries = re.findall(r"^### `(\w+)`$", (root / "docs/troubleshooting.md").read_text(encoding="utf-8"), re.M)
+    for name in ("HealthState", "HealthReason"):
+        body = re.sub(r"//.*", "", re.search(rf"enum class {name} \{{(.*?)\}};", header, re.S).group(1))
+        for value in re.findall(r"\w+", body):
+            if entries.count(value) != 1:
+                yield f"docs/troubleshooting.md: {entries.count(value)} entries for the {name} '{value}', not one"
+
+
+def benchmarks(root):
+    done = subprocess.run([sys.executable, root / "bench/benchmarks", "--check"], capture_output=True, text=True)
+    if done.returncode != 0:
+        yield done.stderr.strip()
+
+
+def main():
+    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
+    faults = [*links(root), *health(root), *benchmarks(root)]
+    print("\n".join(faults) or "documents: links, health reasons and benchmarks hold")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
