@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """What can be checked of documents: links between them lead somewhere, headings included; every health state and reason of the code has its
-entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes.
+entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows.
 
 usage: check_docs.py [REPOSITORY]      exit 1 and one line a fault
 """
@@ -53,6 +53,10 @@ def benchmarks(root):
     done = subprocess.run([sys.executable, root / "bench/benchmarks", "--check"], capture_output=True, text=True)
     if done.returncode != 0:
         yield done.stderr.strip()
+    page = (root / "docs/benchmarks.md").read_text(encoding="utf-8")
+    for row in re.findall(r"^\| (?:FB-VINS|OpenVINS|Basalt|VINS-Fusion|ORB-SLAM3)\b.*\|$", (root / "README.md").read_text(encoding="utf-8"), re.M):
+        if row not in page:
+            yield f"README.md: docs/benchmarks.md has no row {row}"
 
 
 def main():
