@@ -62,7 +62,7 @@ FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matc
   report.after = adjustment.judged(x);
   report.refused = objection(report.before, report.after);
   if (!report.refused.empty()) return report;
-  report.tilt_rad = std::hypot(x.tilt[0], x.tilt[1]);
+  report.tilt_rad = std::sqrt(x.tilt[0] * x.tilt[0] + x.tilt[1] * x.tilt[1]);
   adjustment.write(x, map);
   return report;
 }

@@ -194,9 +194,9 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     MapKeyframe& k = *map_.find(proposal.candidate);
     SeenPose seen = seen_pose(k, proposal.edge);
     // What the lever makes of a different roll and pitch is not drift.
-    const double tilt_rad = k.session == session_.number ? kTiltSigma_rad : std::hypot(kTiltSigma_rad, session_.up_sigma_rad);
-    const double lever = (k.T_MB.p - seen.T_MB.p).norm() * tilt_rad;
-    seen.covariance.diagonal().head<3>().array() += lever * lever;
+    double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
+    if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
+    seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
     if (frame_.mahalanobis2(seen) > gate) {
       ++update.stats.refused;
       continue;
