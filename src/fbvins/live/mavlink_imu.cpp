@@ -9,8 +9,9 @@ namespace fbvins {
 namespace {
 
 constexpr Duration kHeartbeatEvery{1'000'000'000}, kWishEvery{1'000'000'000}, kQuiet{1'000'000'000};
-/// A stamp further from its arrival than this is of a clock that is not known yet.
-constexpr Duration kFarthestStamp{500'000'000};
+/// A stamp further ahead of its arrival, or further behind, is of a clock that is not known yet. Behind is more: on a busy
+/// machine readings wait in the port, and they are still good.
+constexpr Duration kFarthestAhead{500'000'000}, kLatest{2'000'000'000};
 /// As fast as the offset follows; beyond kLeap it leaps.
 constexpr double kRamp = 1e-3;
 constexpr Duration kLeap{20'000'000};
@@ -96,7 +97,8 @@ void MavlinkImu::take(const ImuSample& theirs, Time now, std::vector<ImuSample>&
   ImuSample sample = theirs;
   sample.t = theirs.t - offset_.at(now, peer_.clock().value());
   const bool sound = sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite();
-  if (!sound || std::abs((now - sample.t).ns) > kFarthestStamp.ns || sample.t <= newest_) {
+  const Duration late = now - sample.t;
+  if (!sound || late > kLatest || -late.ns > kFarthestAhead.ns || sample.t <= newest_) {
     ++refused_;
     return;
   }

@@ -104,6 +104,20 @@ TEST(MavlinkImu, LearnsTheClockOfAFlightControllerThatRestarted) {
   for (std::size_t i = 1; i < fc.samples.size(); ++i) EXPECT_LT(fc.samples[i - 1].t, fc.samples[i].t);
 }
 
+TEST(MavlinkImu, KeepsReadingsThatWaitedInThePort) {
+  FlightController fc;
+  fc.run(3);
+  const Time then = fc.now();
+  const std::size_t before = fc.samples.size();
+  fc.hear(highres(fc.theirs(then)), then + Duration{1'500 * kMs});
+  ASSERT_EQ(fc.samples.size(), before + 1);
+  EXPECT_LT(std::abs((fc.samples.back().t - then).seconds()), 1e-3);
+  EXPECT_EQ(fc.imu.refused(), 0);
+  fc.hear(highres(fc.theirs(then + Duration{5 * kMs})), then + Duration{4'000 * kMs});
+  EXPECT_EQ(fc.samples.size(), before + 1) << "of another clock";
+  EXPECT_EQ(fc.imu.refused(), 1);
+}
+
 TEST(MavlinkImu, WishesForReadingsUntilTheyCome) {
   FlightController fc;
   fc.reading = [](Time) { return HeartbeatMessage{}; };  // of no autopilot: says nothing
