@@ -13,7 +13,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180;
-constexpr double kFarthest_m = 1000, kLongest_s = 3600;
+constexpr double kFarthest_m = 1000, kLongest_s = 3600, kLargestPlace_m = 200, kLongestWay_m = 100'000;
 constexpr std::uint64_t kLargestMission_bytes = 1 << 20;
 
 void read_limits(YamlReader& yaml, const YAML::Node& node, MissionLimits& limits) {
@@ -27,10 +27,14 @@ void read_limits(YamlReader& yaml, const YAML::Node& node, MissionLimits& limits
   limits.yaw_rate_radps = kRadPerDeg * yaml.number_between(node, "yaw_rate", 5, 120, limits.yaw_rate_radps / kRadPerDeg);
 }
 
-Vec3 point_of(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
-  const std::vector<double> p = yaml.numbers(map, field, 3);
+void check_near(YamlReader& yaml, const YAML::Node& map, const std::string& field, const std::vector<double>& p) {
   for (double x : p)
     if (std::abs(x) > kFarthest_m) yaml.complain(map, field, fmt::format("is further away than {} m", kFarthest_m));
+}
+
+Vec3 point_of(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
+  const std::vector<double> p = yaml.numbers(map, field, 3);
+  check_near(yaml, map, field, p);
   return {p[0], p[1], p[2]};
 }
 
@@ -58,6 +62,8 @@ void read_place(YamlReader& yaml, const YAML::Node& node, MissionPlace& place) {
     yaml.complain(yaml.get(node, "kind"), fmt::format("there is no place '{}'; there are room, hall, corridors", place.kind));
   if (yaml.has(node, "size")) place.size_m = point_of(yaml, node, "size");
   if (place.size_m && place.size_m->minCoeff() < 1) yaml.complain(node, "size", "is too small to fly in");
+  if (place.size_m && place.size_m->maxCoeff() > kLargestPlace_m)
+    yaml.complain(node, "size", fmt::format("is larger than {} m", kLargestPlace_m));
   if (yaml.has(node, "start")) {
     const std::vector<double> p = yaml.numbers(node, "start", 2);
     place.start_m = {p[0], p[1]};
@@ -79,7 +85,8 @@ MissionStep read_goto(YamlReader& yaml, const YAML::Node& map) {
   const YAML::Node via = yaml.get(node, "via");
   if (via.IsDefined()) {
     const std::vector<double> p = yaml.numbers(node, "via");
-    if (p.empty() || p.size() % 3 != 0) yaml.complain(node, "via", "wants points of three numbers");
+    if (p.empty() || p.size() % 3 != 0) yaml.complain(node, "via", "wants points of three numbers, 21 at most");
+    check_near(yaml, node, "via", p);
     for (std::size_t i = 0; i + 2 < p.size(); i += 3) step.points.emplace_back(p[i], p[i + 1], p[i + 2]);
   }
   if (yaml.has(node, "to")) step.points.push_back(point_of(yaml, node, "to"));
@@ -133,14 +140,20 @@ void read_fault(YamlReader& yaml, const YAML::Node& node, Mission& mission) {
 void check_order(YamlReader& yaml, const YAML::Node& steps, const Mission& mission) {
   using Kind = MissionStep::Kind;
   if (mission.steps.empty()) return yaml.complain(steps, "a mission without steps");
+  double way_m = 0;
+  Vec3 from = Vec3::Zero();
   for (std::size_t i = 0; i < mission.steps.size() && yaml.ok(); ++i) {
     const bool first = i == 0, last = i + 1 == mission.steps.size();
     const MissionStep& step = mission.steps[i];
     if (first && step.kind != Kind::takeoff) yaml.complain(steps[i], "a mission begins with takeoff");
     if (!first && step.kind == Kind::takeoff) yaml.complain(steps[i], "it flies already: takeoff is the first step alone");
     if (!last && step.kind == Kind::land) yaml.complain(steps[i], "nothing follows after land");
-    for (const Vec3& p : step.points)
+    for (const Vec3& p : step.points) {
       if (p.z() < 0.1) yaml.complain(steps[i], fmt::format("the way leads to z = {} m, into the floor", p.z()));
+      way_m += (p - from).norm();
+      from = p;
+    }
+    if (way_m > kLongestWay_m) yaml.complain(steps[i], fmt::format("the way is longer than {} km", kLongestWay_m / 1000));
   }
 }
 

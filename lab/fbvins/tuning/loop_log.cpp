@@ -16,7 +16,7 @@ namespace fbvins {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kShortest_s = 10;
+constexpr double kShortest_s = 10, kLongest_s = 24 * 3600;
 /// PX4 begins to rate-control with each gyro sample; logs are brought to this pace.
 constexpr double kUlog_hz = 200;
 
@@ -47,12 +47,16 @@ Result<LoopLog> read_csv(const std::string& folder, VelocitySource velocity) {
              v = axes(*table, velocity == VelocitySource::truth ? "true_v" : "estimate_v", log.source);
   for (const auto* one : {&rate, &torque, &asked, &v})
     if (!*one) return one->error();
+  if (mode.empty()) return wrong(log.source, "there is no column 'mode': this is no flight.csv of `fbvins fly`");
   const std::vector<Time>& t = table->stamps();
+  if (t.size() > 1 && t[1] <= t[0]) return wrong(log.source, "its stamps do not ascend");
   for (std::size_t i = 0; i < table->rows(); ++i) {
     if (mode[i] != "mission") continue;
     const auto at = [i](const auto& all) { return Vec3((*all)[0][i], (*all)[1][i], (*all)[2][i]); };
     log.rate.push_back(at(rate)), log.torque.push_back(at(torque));
     log.acceleration_asked.push_back(at(asked)), log.velocity.push_back(at(v));
+    for (const auto* all : {&log.rate, &log.torque, &log.acceleration_asked, &log.velocity})
+      if (!all->back().allFinite()) return wrong(log.source, fmt::format("row {} holds something that is not a number", i + 1));
   }
   if (t.size() > 1) log.rate_hz = std::round(1 / (t[1] - t[0]).seconds());
   return log;
@@ -107,7 +111,8 @@ Result<LoopLog> read_ulog(const std::string& path) {
   log.source = path;
   log.rate_hz = kUlog_hz;
   for (const OptionField& field : fields_of(log.control))
-    if (const auto value = ulog->parameter(std::string(field.name())); value && std::holds_alternative<double*>(field.value))
+    if (const auto value = ulog->parameter(std::string(field.name()));
+        value && std::isfinite(*value) && std::holds_alternative<double*>(field.value))
       *std::get<double*>(field.value) = *value;
   const std::array<std::string, 3> xyz{"xyz[0]", "xyz[1]", "xyz[2]"};
   const UlogSignal rate(*ulog, "vehicle_angular_velocity", xyz), torque(*ulog, "vehicle_torque_setpoint", xyz),
@@ -121,6 +126,7 @@ Result<LoopLog> read_ulog(const std::string& path) {
     if (signal->empty()) return wrong(path, fmt::format("'{}' was not logged (SDLOG_PROFILE: default and high rate)", name));
     from_s = std::max(from_s, signal->from_s()), to_s = std::min(to_s, signal->to_s());
   }
+  if (to_s - from_s > kLongest_s) return wrong(path, fmt::format("its stamps span {:.0f} h", (to_s - from_s) / 3600));
   for (int i = 0; from_s + i / kUlog_hz < to_s; ++i) {
     const double t = from_s + i / kUlog_hz;
     log.rate.push_back(rate.at(t)), log.torque.push_back(torque.at(t));

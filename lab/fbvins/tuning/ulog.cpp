@@ -15,7 +15,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargest_bytes = 2ULL << 30;
-constexpr std::size_t kHead_bytes = 16, kMessageHead_bytes = 3;
+constexpr std::size_t kHead_bytes = 16, kMessageHead_bytes = 3, kLargestMessage_bytes = 65535;
 constexpr std::string_view kMagic = "ULog\x01\x12\x35";
 constexpr std::string_view kStampField = "timestamp";
 
@@ -122,6 +122,8 @@ Result<void> Ulog::take_format(std::string_view text) {
       type = type.substr(0, bracket);
     }
     const auto* known = std::find_if(kTypes.begin(), kTypes.end(), [&](const Type& t) { return t.name == type; });
+    if (known != kTypes.end() && format.size + known->size * static_cast<std::size_t>(std::max(1, count)) > kLargestMessage_bytes)
+      return broken(fmt::format("'{}' is larger than a message can be", name.substr(0, 40)));
     // Messages within messages come after what is read here; what lies behind one is not found, and not read.
     if (known == kTypes.end()) return {};
     for (int i = 0; i < std::max(1, count); ++i) {
