@@ -23,7 +23,8 @@ namespace {
 
 constexpr const char* kExamples =
     R"(A simulated quadrotor flies the mission by the poses of the odometry, which sees rendered images and feels a simulated IMU;
-the truth is only written down (docs/flight.md). The same arguments give the same bytes, with --threaded or without.
+the truth is only written down (docs/flight.md). The same arguments give the same bytes, with --threaded or without, but for
+--px4 and --wall-clock.
 Writes what `fbvins run` writes, and flight.csv, flight.json, truth, estimate and setpoint as trajectories.
 
 examples:
@@ -32,6 +33,7 @@ examples:
   fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
   FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
+  fbvins fly paper.yaml --wall-clock 0.5                         in wall time at half its pace, through what `fbvins live` runs
   fbvins fly --identify --out f && fbvins tune f                 gains from how the vehicle answers
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
   fbvins report f                                                path, setpoint, modes, effort in one page
@@ -41,7 +43,7 @@ struct Arguments {
   std::string mission, preset = "normal", vehicle = "indoor330", out, control;
   ConfigArguments config;
   int seed = 1;
-  double wind_mps = -1;
+  double wind_mps = -1, wall_rate = 0;
   bool loop = false, threaded = false, record = false, quiet = false, px4 = false, identify = false;
 
   std::string mission_name() const { return identify ? "identify" : std::filesystem::path(mission).stem().string(); }
@@ -78,6 +80,8 @@ Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
     if (Result<void> read = read_yaml_file(a.control, fields_of(setup.control)); !read) return read.error();
   if (a.wind_mps >= 0) setup.wind.mean_mps = a.wind_mps, setup.wind.gust_mps = a.wind_mps * 2 / 3;
   setup.estimator.options = config;
+  setup.wall_rate = a.wall_rate;
+  setup.live = config.live;
   setup.estimator.mode = a.threaded ? RunMode::threaded : RunMode::deterministic;
   if (a.record) setup.recording = a.out + "/recording";
   if (a.px4) {
@@ -186,9 +190,15 @@ void add_fly_command(CLI::App& program, int& exit_code) {
   command->add_option("--control", a->control, "YAML file that changes gains and limits, by PX4's names");
   command->add_option("--wind", a->wind_mps, "mean wind in m/s, gusts of two thirds of it (default 0.3)")
       ->check(CLI::Range(0.0, 10.0));
-  command->add_flag("--px4", a->px4, "a real PX4 flies: FBVINS_PX4 names bin/px4 of its px4_sitl build (docs/px4.md)");
+  CLI::Option* wall = command
+                          ->add_option("--wall-clock", a->wall_rate,
+                                       "fly in wall time through a live system, so many seconds of the flight in one")
+                          ->check(CLI::Range(0.05, 4.0));
+  CLI::Option* px4 =
+      command->add_flag("--px4", a->px4, "a real PX4 flies: FBVINS_PX4 names bin/px4 of its px4_sitl build (docs/px4.md)");
   command->add_flag("--loop", a->loop, "loop closure: the mission is flown in the map's frame");
   command->add_flag("--record", a->record, "images, IMU and truth too, as a recording in OUT/recording");
+  wall->excludes(px4);
   command->add_flag("--threaded", a->threaded, "frontend and estimator on threads of their own; the same result");
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = fly_mission(*a); });

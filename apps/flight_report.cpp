@@ -29,6 +29,22 @@ Json axes_json(const FlightSummary& summary) {
   return axes;
 }
 
+Json wall_json(const WallTime& wall) {
+  const LiveCounts& counts = wall.live.counts;
+  return {{"rate", wall.rate},
+          {"behind_s", rounded(wall.behind_s)},
+          {"images", counts.images},
+          {"images_dropped", counts.images_dropped},
+          {"image_to_estimate_ms", {{"p50", rounded(wall.answer.p50_ms)}, {"p99", rounded(wall.answer.p99_ms)}}}};
+}
+
+std::string wall_text(const WallTime& wall) {
+  const LiveStatus& live = wall.live;
+  return fmt::format(
+      "  in wall time at {:g} of its pace, behind by {:.2f} s at most; {} of {} images dropped, image to estimate {:.0f} ms (p50), {:.0f} ms (p99)\n",
+      wall.rate, wall.behind_s, live.counts.images_dropped, live.counts.images, wall.answer.p50_ms, wall.answer.p99_ms);
+}
+
 }  // namespace
 
 std::string flight_text(const FlightFacts& facts, const FlightLog& log, const FlightSummary& s) {
@@ -54,6 +70,7 @@ std::string flight_text(const FlightFacts& facts, const FlightLog& log, const Fl
       s.flown_s, s.top_speed_mps, s.largest_tilt_deg, 100 * s.tracking.rmse, 100 * s.tracking.max, 100 * s.estimation.rmse,
       100 * s.estimation.max);
   if (facts.px4) text += fmt::format("  PX4: {} resets of its estimator in flight\n", log.controller_resets);
+  if (log.wall_time) text += wall_text(*log.wall_time);
   text += "  ";
   for (std::size_t i = 0; i < s.modes.size(); ++i)
     text += fmt::format("{}{} {:.1f} s", i > 0 ? ", " : "", s.modes[i].first, s.modes[i].second);
@@ -85,6 +102,7 @@ std::string flight_json_text(const FlightFacts& facts, const FlightLog& log, con
   json["images"] = log.images;
   json["controller"] = facts.px4 ? "px4" : "own";
   json["controller_resets"] = log.controller_resets;
+  if (log.wall_time) json["wall_clock"] = wall_json(*log.wall_time);
   json["events"] = Json::array();
   for (const ControllerEvent& event : log.events) json["events"].push_back({rounded(event.t_s), event.text});
   json["modes"] = Json::array();

@@ -5,12 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <numbers>
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/flight/board_imu.hpp"
+#include "fbvins/flight/live_link.hpp"
+#include "fbvins/flight/motion_history.hpp"
 #include "fbvins/sim/sensor_station.hpp"
 
 namespace fbvins {
@@ -18,39 +19,10 @@ namespace {
 
 /// The IMU before and above the centre of mass.
 const Vec3 kImuOnVehicle_m(0.04, 0, 0.03);
-constexpr double kHistory_s = 0.06;
 constexpr int kCollisionEvery_steps = 10;
 constexpr double kAfterwards_s = 1.0;  ///< flown on after the last step, or stood after landing
 constexpr double kHardLanding_mps = 1.5, kTippedOver = 0.8;
 constexpr double kTimeToSpare_s = 120;
-
-/// Motion of the last moments, a state a millisecond.
-class MotionHistory {
- public:
-  void add(double t_s, const MotionState& m) {
-    states_.push_back({t_s, m});
-    while (states_.front().t_s < t_s - kHistory_s) states_.pop_front();
-  }
-  MotionState at(double t_s) const {
-    auto after = std::lower_bound(states_.begin(), states_.end(), t_s, [](const Entry& e, double t) { return e.t_s < t; });
-    if (after == states_.begin()) return after->m;
-    if (after == states_.end()) return states_.back().m;
-    const Entry &a = *(after - 1), &b = *after;
-    const double s = (t_s - a.t_s) / (b.t_s - a.t_s);
-    MotionState m = b.m;
-    m.T_WB = {a.m.T_WB.q.slerp(s, b.m.T_WB.q), Vec3((1 - s) * a.m.T_WB.p + s * b.m.T_WB.p)};
-    m.v_WB = (1 - s) * a.m.v_WB + s * b.m.v_WB;
-    m.w_WB_B = (1 - s) * a.m.w_WB_B + s * b.m.w_WB_B;
-    return m;
-  }
-
- private:
-  struct Entry {
-    double t_s;
-    MotionState m;
-  };
-  std::deque<Entry> states_;
-};
 
 /// The true mounting: the autopilot's, with the error that a real assembly has.
 Pose<BodyFlu, B> askew(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
@@ -88,9 +60,14 @@ Result<std::unique_ptr<FlightController>> controller_of(const FlightSetup& setup
   return Px4Controller::create(setup.px4, setup.mission, setup.control, setup.vehicle, rig, mounting);
 }
 
+Result<std::unique_ptr<OdometryLink>> link_of(const FlightSetup& setup, const StereoRig& rig) {
+  if (setup.wall_rate > 0) return LiveLink::create(setup.estimator, setup.live, rig, setup.wall_rate);
+  return EstimatorLink::create(setup.estimator, rig);
+}
+
 class ClosedLoop {
  public:
-  ClosedLoop(const FlightSetup& setup, const MissionSite& site, SensorStation station, std::unique_ptr<EstimatorLink> link,
+  ClosedLoop(const FlightSetup& setup, const MissionSite& site, SensorStation station, std::unique_ptr<OdometryLink> link,
              std::unique_ptr<FlightController> controller)
       : setup_(setup),
         station_(std::move(station)),
@@ -136,6 +113,7 @@ class ClosedLoop {
     log_.reason = controller_->output().reason;
     log_.events = controller_->events();
     log_.controller_resets = controller_->resets_in_flight();
+    log_.wall_time = link_->wall_time();
     return std::move(log_);
   }
 
@@ -253,7 +231,7 @@ class ClosedLoop {
 
   const FlightSetup& setup_;
   SensorStation station_;
-  std::unique_ptr<EstimatorLink> link_;
+  std::unique_ptr<OdometryLink> link_;
   Pose<BodyFlu, B> mounting_;
   Quadrotor vehicle_;
   Pose<W, BodyFlu> start_;
@@ -305,7 +283,7 @@ Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double,
   options.world.kind = setup.mission.place.kind.empty() ? o.world.kind : setup.mission.place.kind;
   Result<SensorStation> station = SensorStation::create(options, site->plan, path);
   if (!station) return station.error();
-  Result<std::unique_ptr<EstimatorLink>> link = EstimatorLink::create(setup.estimator, as_recorded(station->rig()));
+  Result<std::unique_ptr<OdometryLink>> link = link_of(setup, as_recorded(station->rig()));
   if (!link) return link.error();
   Result<std::unique_ptr<FlightController>> controller = controller_of(setup, station->rig());
   if (!controller) return controller.error();

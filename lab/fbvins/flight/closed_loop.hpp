@@ -5,8 +5,9 @@
 //
 //   Result<FlightLog> flight = fly(setup, [](double t_s, FlightMode mode) { ... });
 //
-// With a real PX4 behind its simulator interface the same world waits for PX4, too; its threads make no promise about bits.
-// Truth goes to the log alone. L here is the true one: where the vehicle truly stood.
+// With a real PX4 behind its simulator interface the same world waits for PX4, too; its threads make no promise about bits. With
+// a rate of wall time nothing waits: sensor data go through a socket into a live system, and estimates come when they come. Truth
+// goes to the log alone. L here is the true one: where the vehicle truly stood.
 #pragma once
 
 #include <functional>
@@ -18,6 +19,7 @@
 #include "fbvins/flight/collision.hpp"
 #include "fbvins/flight/estimator_link.hpp"
 #include "fbvins/flight/px4_controller.hpp"
+#include "fbvins/live/live_options.hpp"
 #include "fbvins/sim/barometer.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 #include "fbvins/sim/simulation.hpp"
@@ -37,6 +39,8 @@ struct FlightSetup {
   double mounting_error_deg = 0.2;  ///< standard deviation on each axis, of what the autopilot does not know
   std::string recording;            ///< folder for a recording; empty: none
   Px4Setup px4;                     ///< flies instead of the autopilot, where it is named
+  double wall_rate = 0;             ///< seconds of the flight in one of this machine's; 0: simulated time waits for the odometry
+  LiveOptions live;                 ///< of wall time
 };
 
 /// One reading of the IMU.
@@ -61,6 +65,7 @@ struct FlightLog {
   int images = 0;
   std::vector<ControllerEvent> events;  ///< what another flight controller said and did
   int controller_resets = 0;            ///< of its estimator, in flight
+  std::optional<WallTime> wall_time;    ///< of a flight in wall time
 };
 
 Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double t_s, FlightMode mode)>& progress = {});

@@ -36,7 +36,7 @@ struct EstimatorLink::Impl {
   }
 };
 
-Result<std::unique_ptr<EstimatorLink>> EstimatorLink::create(const EstimatorSetup& setup, const StereoRig& rig) {
+Result<std::unique_ptr<OdometryLink>> EstimatorLink::create(const EstimatorSetup& setup, const StereoRig& rig) {
   Result<System> system = System::create(setup.options, rig, setup.mode, {.mapper = setup.mapper});
   if (!system) return system.error();
   auto impl = std::make_unique<Impl>(std::move(*system));
@@ -60,7 +60,7 @@ Result<std::unique_ptr<EstimatorLink>> EstimatorLink::create(const EstimatorSetu
       link->arrived.notify_all();
     });
   }
-  return std::unique_ptr<EstimatorLink>(new EstimatorLink(std::move(impl)));
+  return std::unique_ptr<OdometryLink>(new EstimatorLink(std::move(impl)));
 }
 
 EstimatorLink::EstimatorLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
