@@ -26,17 +26,20 @@ changed. Writes results.csv, results.json (machine, version, effective configura
 
 examples:
   fbvins bench configs/table1.yaml --euroc ~/euroc            the paper's Table 1, from real EuRoC
-  fbvins bench configs/table1.yaml --inputs flights           the same flights with drawn images (NAME/imu0.csv, groundtruth.csv)
-  fbvins bench configs/scenarios.yaml --jobs 4 --out scenarios --discard-drawn
+  fbvins bench configs/table1.yaml --inputs flights           the same flights with rendered images (NAME/imu0.csv, groundtruth.csv)
+  fbvins bench configs/scenarios.yaml --jobs 4 --out scenarios --discard-rendered
   fbvins bench configs/scenarios.yaml --out new --reference scenarios/results.csv      exit code 1 where it got worse
+  fbvins bench configs/scenarios.yaml --list                  names of the cells, one a line
+  fbvins bench configs/scenarios.yaml --out new --cell fast-8s-s3-klt     one alone, on any machine that shares the folder;
+                                                              without --cell, when all are done: the tables
 )";
 
 struct Arguments {
-  std::string matrix, out, reference;
+  std::string matrix, out, reference, cell;
   PlanOptions where;
   BenchOptions bench;
   Tolerance tolerance;
-  bool quiet = false;
+  bool list = false, quiet = false;
 };
 
 std::string clock_text(double seconds) {
@@ -84,22 +87,38 @@ Result<void> write_all(const Arguments& a, const std::string& title, const std::
   return write_text(a.out + "/report.html", report_html({}, payload, {.title = title}));
 }
 
+int list_cells(const Plan& plan) {
+  for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.id);
+  return kOk;
+}
+
+int bench_cell(const Plan& plan, const Arguments& a) {
+  const Result<BenchOutcome> outcome = run_cell(plan, a.bench, a.cell);
+  if (!outcome) return fail(outcome.error().message);
+  for (const std::string& problem : outcome->failed) warn(problem);
+  if (!outcome->failed.empty()) return kEstimationFailed;
+  if (!a.quiet) fmt::print("{}: {}\n", a.cell, outcome->run > 0 ? "done" : "was done before");
+  return kOk;
+}
+
 int bench(Arguments a) {
   const Result<Matrix> matrix = read_matrix(a.matrix);
   if (!matrix) return fail(matrix.error().message);
   if (a.out.empty()) a.out = "out/bench-" + std::filesystem::path(a.matrix).stem().string();
-  if (a.where.drawn.empty()) a.where.drawn = a.out + "/drawn";
+  if (a.where.rendered.empty()) a.where.rendered = a.out + "/rendered";
   if (a.where.inputs.empty()) a.where.inputs = std::filesystem::path(a.matrix).parent_path().string();
   const Result<Plan> plan = make_plan(*matrix, a.where);
   if (!plan) return fail(plan.error().message);
+  if (a.list) return list_cells(*plan);
+  a.bench.out = a.out;
+  a.bench.program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "fbvins").string();
+  if (!a.cell.empty()) return bench_cell(*plan, a);
   std::map<std::string, Reference> reference;
   if (!a.reference.empty()) {
     Result<std::map<std::string, Reference>> read = read_reference(a.reference);
     if (!read) return fail(read.error().message);
     reference = *std::move(read);
   }
-  a.bench.out = a.out;
-  a.bench.program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "fbvins").string();
 
   const Result<BenchOutcome> outcome = [&] {
     const BenchProgress progress(a.quiet);
@@ -130,13 +149,20 @@ void add_bench_command(CLI::App& program, int& exit_code) {
   command->add_option("--out", a->out, "folder for the results (default out/bench-<matrix>)");
   command->add_option("--jobs", a->bench.jobs, "processes at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   command->add_option("--euroc", a->where.euroc, "folder with the EuRoC recordings that the matrix names");
-  command->add_option("--inputs", a->where.inputs, "folder with recorded flights to draw along (default: the matrix's)");
-  command->add_option("--drawn", a->where.drawn, "folder for drawn recordings (default OUT/drawn); those there are used");
-  command->add_flag("--discard-drawn", a->bench.discard_drawn, "delete what was drawn as soon as its cells are done");
-  command->add_option("--reference", a->reference, "results.csv of an earlier run to compare with");
+  command->add_option("--inputs", a->where.inputs, "folder with recorded flights to render along (default: the matrix's)");
+  command->add_option("--rendered", a->where.rendered,
+                      "folder for rendered recordings (default OUT/rendered); those there are used");
+  CLI::Option* discard = command->add_flag("--discard-rendered", a->bench.discard_rendered,
+                                           "delete what was rendered as soon as its cells are done");
+  CLI::Option* reference = command->add_option("--reference", a->reference, "results.csv of an earlier run to compare with");
   command->add_option("--tolerance", a->tolerance.share, "share by which an error may grow against the reference")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  CLI::Option* list = command->add_flag("--list", a->list, "run nothing; the names of all cells, one a line");
+  command->add_option("--cell", a->cell, "do this cell alone; any number of processes may share OUT, each cell is done once")
+      ->excludes(list)
+      ->excludes(discard)
+      ->excludes(reference);
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = bench(*a); });
 }

@@ -87,7 +87,7 @@ int simulate_flight(const Arguments& arguments) {
 
 void add_simulate_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("simulate", "draw a made-up recording with exact truth");
+  CLI::App* command = program.add_subcommand("simulate", "render a synthetic recording with exact truth");
   command->footer(kExamples);
   command->add_option("PRESET", arguments->preset, "what it is like (default normal)")
       ->check(CLI::IsMember(simulation_presets()));

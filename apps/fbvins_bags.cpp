@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// fbvins-bags, to which `fbvins` hands other people's recordings.
+// fbvins-bags, to which `fbvins` hands third-party recordings.
 #include "apps/command_line.hpp"
 
 int main(int argc, char** argv) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where commands get recordings from. Each program links its own definition: `fbvins` reads EuRoC recordings and flight records
-// (open_recording.cpp), fbvins-bags everybody's (open_foreign_recording.cpp); the former hands what it cannot read to the latter.
+// (open_recording.cpp), fbvins-bags third-party ones (open_foreign_recording.cpp); the former hands what it cannot read to the latter.
 #pragma once
 
 #include <memory>

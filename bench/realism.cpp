@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much drawn images are like real ones. Draws the preset `normal` along a real recording's trajectory,
+// How much rendered images are like real ones. Renders the preset `normal` along a real recording's trajectory,
 // with its IMU and at its stamps, measures both, and prints a Markdown table.
 //
 //   realism RECORDING [--preset NAME] [--trajectory CSV --imu CSV] [--seeds N] [--set NAME=VALUE] [--jpeg QUALITY]
 //
-// JPEG smooths noise and weak corners away. Where the real images are JPEG, the drawn ones must pass through the same
+// JPEG smooths noise and weak corners away. Where the real images are JPEG, the rendered ones must pass through the same
 // quality before they are compared: --jpeg (92 is what V1_01_easy_keyframes was saved with, from its tables).
 #include <fmt/format.h>
 #include <turbojpeg.h>
@@ -279,7 +279,7 @@ std::shared_ptr<const Image> through_jpeg(const Image& image, int quality) {
   return std::make_shared<const Image>(std::move(copy));
 }
 
-Figures measure_drawn(const SimulationOptions& options, bool consecutive, const std::vector<Time>& stamps, int jpeg_quality) {
+Figures measure_rendered(const SimulationOptions& options, bool consecutive, const std::vector<Time>& stamps, int jpeg_quality) {
   Result<Simulation> simulation = prepare_simulation(options);
   if (!simulation) {
     fmt::print(stderr, "{}\n", simulation.error().message);
@@ -289,7 +289,7 @@ Figures measure_drawn(const SimulationOptions& options, bool consecutive, const 
   for (Time t : stamps)
     if (t > simulation->start + Duration::from_seconds(0.02) && t < simulation->imu.samples.back().t)
       simulation->frames.push_back(t);
-  DatasetContents contents = contents_of(*simulation, "drawn");
+  DatasetContents contents = contents_of(*simulation, "rendered");
   const std::vector<TrajectoryPoint> truth = contents.ground_truth;
   Dataset data(std::move(contents), {});
   Meter meter(simulation->rig, consecutive);
@@ -314,16 +314,16 @@ int compare(const std::string& recording, const SimulationOptions& asked, int se
   std::vector<Time> stamps;
   std::vector<TrajectoryPoint> truth;
   const Figures real = measure_real(recording, consecutive, stamps, truth);
-  Figures drawn;
+  Figures rendered;
   for (int seed = 1; seed <= seeds; ++seed) {
     options.seed = seed;
-    const Figures one = measure_drawn(options, consecutive, stamps, jpeg_quality);
-    for (const std::string& name : one.names()) drawn.add(name, one.mean(name));
+    const Figures one = measure_rendered(options, consecutive, stamps, jpeg_quality);
+    for (const std::string& name : one.names()) rendered.add(name, one.mean(name));
   }
-  fmt::print("| figure | real | drawn, mean of {} worlds | drawn / real |\n|---|---:|---:|---:|\n", seeds);
+  fmt::print("| figure | real | rendered, mean of {} worlds | rendered / real |\n|---|---:|---:|---:|\n", seeds);
   for (const std::string& name : real.names())
-    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |\n", name, real.mean(name), drawn.mean(name),
-               drawn.mean(name) / real.mean(name));
+    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |\n", name, real.mean(name), rendered.mean(name),
+               rendered.mean(name) / real.mean(name));
   return 0;
 }
 
@@ -332,7 +332,7 @@ int compare(const std::string& recording, const SimulationOptions& asked, int se
 
 int main(int argc, char** argv) {
   using namespace fbvins;
-  CLI::App program{"compares drawn images with real ones"};
+  CLI::App program{"compares rendered images with real ones"};
   std::string recording, preset = "normal", trajectory, imu;
   std::vector<std::string> assignments;
   int seeds = 2, jpeg = 0;
@@ -341,7 +341,7 @@ int main(int argc, char** argv) {
   program.add_option("--trajectory", trajectory, "where the recording's own truth is too sparse");
   program.add_option("--imu", imu);
   program.add_option("--seeds", seeds);
-  program.add_option("--jpeg", jpeg, "quality that the drawn images are compressed with first, 0 not at all");
+  program.add_option("--jpeg", jpeg, "quality that the rendered images are compressed with first, 0 not at all");
   program.add_option("--set", assignments)->take_all()->allow_extra_args(false);
   CLI11_PARSE(program, argc, argv);
   Result<SimulationOptions> options = simulation_preset(preset);

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """What can be checked of documents: links between them lead somewhere, headings included; every health state and reason of the code has its
-entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows.
+entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows; the
+version is one.
 
 usage: check_docs.py [REPOSITORY]      exit 1 and one line a fault
 """
@@ -59,10 +60,19 @@ def benchmarks(root):
             yield f"README.md: docs/benchmarks.md has no row {row}"
 
 
+def versions(root):
+    """The version is the same wherever it is named."""
+    named = {file: re.search(pattern, (root / file).read_text(encoding="utf-8"), re.M).group(1)
+             for file, pattern in {"CMakeLists.txt": r"^project\(fbvins VERSION ([0-9.]+)", "pyproject.toml": r'^version = "(.*)"',
+                                   "CITATION.cff": r"^version: (.*)$"}.items()}
+    if len(set(named.values())) != 1:
+        yield f"versions differ: {named}"
+
+
 def main():
     root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
-    faults = [*links(root), *health(root), *benchmarks(root)]
-    print("\n".join(faults) or "documents: links, health reasons and benchmarks hold")
+    faults = [*links(root), *health(root), *benchmarks(root), *versions(root)]
+    print("\n".join(faults) or "documents: links, health reasons, benchmarks and versions hold")
     return 1 if faults else 0
 
 

@@ -72,7 +72,7 @@ def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibrat
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:
-    """A made-up flight with exact truth, rendered image by image while it is gone through: the same events, whatever the machine.
+    """A synthetic flight with exact truth, rendered image by image while it is gone through: the same events, whatever the machine.
     `seconds` 0: the preset's length. simulation_presets() lists the presets."""
     return _fbvins.simulate(preset, seed, seconds)
 

@@ -5,7 +5,7 @@
 //
 //   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG, warped
 //   booster_pairs --images DIR --part train ...                           the first four fifths of each folder
-//   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        made-up pictures, warped
+//   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        synthetic pictures, warped
 //   booster_pairs --rooms 100 --pairs 60 --seed 1 --out pairs.bin         two views of simulated rooms, true geometry
 #include <fmt/format.h>
 
@@ -126,7 +126,7 @@ void write_warped(const Arguments& arguments, const Image& picture, int index, R
 /// Half of the second views are damaged beyond what the simulated camera does.
 Result<void> write_room(const Arguments& arguments, int index, Rng& rng, PairWriter& out) {
   constexpr int kFrames = 40;
-  Result<RoomViews> room = RoomViews::draw(1000 * arguments.seed + index, kFrames);
+  Result<RoomViews> room = RoomViews::render(1000 * arguments.seed + index, kFrames);
   if (!room) return room.error();
   for (int k = 0; k < arguments.pairs; ++k) {
     const auto pair = room->choose(rng);
@@ -181,7 +181,7 @@ int main(int argc, char** argv) {
   app.add_option("--part", arguments.part, "of every folder: all, train (the first four fifths), held-out (the last fifth)")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Part>{{"all", Part::all}, {"train", Part::train}, {"held-out", Part::held_out}}));
-  app.add_option("--leaves", arguments.leaves, "made-up pictures");
+  app.add_option("--leaves", arguments.leaves, "synthetic pictures");
   app.add_option("--rooms", arguments.rooms, "simulated rooms");
   app.add_option("--pairs", arguments.pairs, "pairs a picture, the conditions in turn, or a room");
   app.add_option("--every", arguments.every, "only every n-th file");

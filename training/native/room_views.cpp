@@ -22,15 +22,15 @@ SimulationOptions options_of(int seed, int frames) {
 
 }  // namespace
 
-Result<RoomViews> RoomViews::draw(int seed, int frames) {
+Result<RoomViews> RoomViews::render(int seed, int frames) {
   Result<Simulation> simulation = prepare_simulation(options_of(seed, frames));
   if (!simulation) return simulation.error();
   RoomViews room;
   room.rig_ = simulation->rig;
   for (std::size_t i = 0; i < simulation->frames.size() && i < static_cast<std::size_t>(frames); ++i) {
-    DrawnFrame drawn = draw_frame(*simulation, i, true);
+    RenderedFrame rendered = render_frame(*simulation, i, true);
     const Pose<W, B> T_WB = simulation->flight.pose((simulation->frames[i] - simulation->start).seconds());
-    room.frames_.push_back({*drawn.frame.left, std::move(drawn.depth_left_m), T_WB * room.rig_.T_BC0});
+    room.frames_.push_back({*rendered.frame.left, std::move(rendered.depth_left_m), T_WB * room.rig_.T_BC0});
   }
   return room;
 }

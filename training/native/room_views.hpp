@@ -2,7 +2,7 @@
 // Pairs of views of simulated rooms with true geometry: wide baselines, occlusion, surfaces seen askew, other light at
 // another time, which no homography of one picture shows. Same seed, same bytes.
 //
-//   Result<RoomViews> room = RoomViews::draw(7, 40);    // a preset, a world and a flight by seed; 40 frames
+//   Result<RoomViews> room = RoomViews::render(7, 40);    // a preset, a world and a flight by seed; 40 frames
 //   if (auto pair = room->choose(rng)) room->transfer(pair->from, pair->to, pixel);
 #pragma once
 
@@ -16,7 +16,7 @@ namespace fbvins {
 
 class RoomViews {
  public:
-  static Result<RoomViews> draw(int seed, int frames);
+  static Result<RoomViews> render(int seed, int frames);
 
   struct Pair {
     std::size_t from = 0, to = 0;

@@ -47,7 +47,7 @@ Damage random_damage(Condition condition, Rng& rng);
 /// `picture` (grey 0..255) through that camera.
 Image damage(const ImageView& picture, const Damage& damage, Rng& rng);
 
-/// A made-up picture with the statistics of natural ones: overlapping shapes of all sizes, shaded and textured.
+/// A synthetic picture with the statistics of natural ones: overlapping shapes of all sizes, shaded and textured.
 Image dead_leaves(int width, int height, Rng& rng);
 
 }  // namespace fbvins

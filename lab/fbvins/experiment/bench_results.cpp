@@ -131,7 +131,7 @@ Json results_json(const std::string& title, const std::vector<CellResult>& resul
     if (!r.version.empty()) versions.insert(r.version);
     Json cell{{"cell", r.cell.id},
               {"dataset", r.recording.dataset},
-              {"recording", r.recording.drawn ? "drawn" : "real"},
+              {"recording", r.recording.rendered ? "rendered" : "real"},
               {"seed", r.recording.seed},
               {"frontend", r.cell.frontend},
               {"configuration", r.cell.configuration.name},

@@ -79,21 +79,21 @@ std::string metres(double x) { return std::isfinite(x) ? fmt::format("{:.4f}", x
 std::string number(double x, int decimals) { return std::isfinite(x) ? fmt::format("{:.{}f}", x, decimals) : "-"; }
 
 std::string source_note(const std::vector<CellResult>& results) {
-  int real = 0, along = 0, drawn = 0;
+  int real = 0, along = 0, rendered = 0;
   std::set<std::string> seen;
   for (const CellResult& r : results) {
     if (!seen.insert(r.recording.id).second) continue;
-    if (!r.recording.drawn) ++real;
-    else if (!r.recording.drawn->imu.empty()) ++along;
-    else ++drawn;
+    if (!r.recording.rendered) ++real;
+    else if (!r.recording.rendered->imu.empty()) ++along;
+    else ++rendered;
   }
   std::string note;
   const auto add = [&](int count, const char* what) {
     if (count > 0) note += fmt::format("{}{} {}", note.empty() ? "" : ", ", count, what);
   };
   add(real, real == 1 ? "real recording" : "real recordings");
-  add(along, "with real IMU and trajectory, images drawn by fbvins simulate");
-  add(drawn, "made up by fbvins simulate");
+  add(along, "with real IMU and trajectory, images rendered by fbvins simulate");
+  add(rendered, "synthetic, of fbvins simulate");
   return note;
 }
 
@@ -199,8 +199,8 @@ double mean_nees(const std::vector<StateNees>& all, double StateNees::*member) {
 Json nees_table(const std::vector<Group>& groups) {
   Json table{{"title", "Consistency"},
              {"note",
-              "Normalised error squared, mean over flights and time; 3 is honest for each of these, 1.5 to 6 is the bar, "
-              "more is too sure of itself. In brackets: share of the instants whose mean over the flights lies within "
+              "Normalised error squared, mean over flights and time; 3 is consistent for each of these, 1.5 to 6 is the bar, "
+              "more is overconfident. In brackets: share of the instants whose mean over the flights lies within "
               "the 95 % bounds of chi-square"},
              {"texts", 2}};
   table["head"] = {"scenario", "frontend", "flights"};

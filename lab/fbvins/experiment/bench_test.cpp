@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <sstream>
 
 #include "fbvins/experiment/bench_results.hpp"
@@ -40,7 +41,7 @@ class BenchRunner : public ::testing::Test {
     const Result<Matrix> matrix =
         parse_matrix("datasets:\n  - simulate: {preset: [normal, fast], seeds: 2}\nfrontends: [klt, orb]\n", "m.yaml");
     ASSERT_TRUE(matrix.ok());
-    const Result<Plan> plan = make_plan(*matrix, {.drawn = (folder_ / "drawn").string()});
+    const Result<Plan> plan = make_plan(*matrix, {.rendered = (folder_ / "rendered").string()});
     ASSERT_TRUE(plan.ok());
     plan_ = *plan;
     options_ = {.program = (folder_ / "fbvins").string(), .out = (folder_ / "out").string(), .jobs = 3};
@@ -65,7 +66,7 @@ class BenchRunner : public ::testing::Test {
   std::vector<BenchStep> steps_;
 };
 
-TEST_F(BenchRunner, DrawsOnceAndRunsEachCell) {
+TEST_F(BenchRunner, RendersOnceAndRunsEachCell) {
   const BenchOutcome outcome = run();
   EXPECT_EQ(outcome.run, 8);
   EXPECT_TRUE(outcome.failed.empty());
@@ -95,7 +96,7 @@ TEST_F(BenchRunner, OnlyWhatFailedIsRunAgain) {
   EXPECT_EQ(second.reused, 6);
 }
 
-TEST_F(BenchRunner, CellsOfAFlightThatCannotBeDrawnFail) {
+TEST_F(BenchRunner, CellsOfAFlightThatCannotBeRenderedFail) {
   write("fail", "simulate-normal");
   const BenchOutcome outcome = run();
   EXPECT_EQ(outcome.run, 4);
@@ -129,17 +130,73 @@ TEST_F(BenchRunner, TwoInOneFolderAreRefused) {
   EXPECT_EQ(refusal, options_.out + ": another bench works in this folder");
 }
 
-TEST_F(BenchRunner, DrawnRecordingsCanBeDiscarded) {
-  options_.discard_drawn = true;
+TEST_F(BenchRunner, RenderedRecordingsCanBeDiscarded) {
+  options_.discard_rendered = true;
   run();
   for (const Recording& r : plan_.recordings) EXPECT_FALSE(fs::exists(r.path)) << r.path;
-  EXPECT_EQ(run().reused, 8);  // and nothing is drawn again
+  EXPECT_EQ(run().reused, 8);  // and nothing is rendered again
   EXPECT_EQ(calls().size(), 12u);
+}
+
+TEST_F(BenchRunner, CellsAloneMakeTheWhole) {
+  for (const Cell& cell : plan_.cells) {
+    const Result<BenchOutcome> outcome = run_cell(plan_, options_, cell.id);
+    ASSERT_TRUE(outcome.ok()) << outcome.error().message;
+    EXPECT_EQ(outcome->run, 1) << cell.id;
+  }
+  EXPECT_EQ(run_cell(plan_, options_, plan_.cells[3].id)->reused, 1);
+  EXPECT_EQ(calls().size(), 4u + 8u);  // each recording was rendered once
+  EXPECT_EQ(run().reused, 8);
+}
+
+TEST_F(BenchRunner, ManyAtTheSameCellDoItOnce) {
+  std::vector<std::future<Result<BenchOutcome>>> workers;
+  for (int i = 0; i < 6; ++i)
+    workers.push_back(std::async(std::launch::async, [this] { return run_cell(plan_, options_, plan_.cells[0].id); }));
+  int done = 0, found = 0;
+  for (auto& worker : workers) {
+    const Result<BenchOutcome> outcome = worker.get();
+    ASSERT_TRUE(outcome.ok()) << outcome.error().message;
+    done += outcome->run;
+    found += outcome->reused;
+  }
+  EXPECT_EQ(done, 1);
+  EXPECT_EQ(found, 5);
+  EXPECT_EQ(calls().size(), 2u);
+}
+
+TEST_F(BenchRunner, ACellThatFailsSaysWhyAndIsTriedAgain) {
+  write("fail", "run-normal-s1");
+  const Result<BenchOutcome> first = run_cell(plan_, options_, plan_.cells[0].id);
+  ASSERT_TRUE(first.ok());
+  ASSERT_EQ(first->failed.size(), 1u);
+  EXPECT_EQ(first->failed[0], "normal-s1-klt: exit code 3: it broke");
+  write("fail", "simulate-fast");
+  EXPECT_EQ(run_cell(plan_, options_, "fast-s1-klt")->failed.at(0), "fast-s1: exit code 3: it broke");
+  fs::remove(folder_ / "fail");
+  EXPECT_EQ(run_cell(plan_, options_, plan_.cells[0].id)->run, 1);
+}
+
+TEST_F(BenchRunner, ACellThatIsNotThereIsAnError) {
+  const Result<BenchOutcome> outcome = run_cell(plan_, options_, "slow-s1-klt");
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_EQ(outcome.error().message, "there is no cell 'slow-s1-klt'");
+}
+
+TEST_F(BenchRunner, CellsAloneAndTheWholeExcludeOneAnother) {
+  std::string refusal;
+  const auto second = [&](const BenchStep&) {
+    if (!refusal.empty()) return;
+    const Result<BenchOutcome> outcome = run_cell(plan_, options_, plan_.cells[0].id);
+    refusal = outcome ? "none" : outcome.error().message;
+  };
+  ASSERT_TRUE(run_plan(plan_, options_, second).ok());
+  EXPECT_EQ(refusal, options_.out + ": another bench works in this folder");
 }
 
 CellResult result(const std::string& dataset, int seed, const std::string& frontend, double rmse) {
   CellResult r;
-  r.recording = {dataset + std::to_string(seed), dataset, "", seed, DrawnSpec{}};
+  r.recording = {dataset + std::to_string(seed), dataset, "", seed, RenderSpec{}};
   r.cell = {r.recording.id + "-" + frontend, 0, frontend, {}, 1};
   r.status = "ok";
   Evaluation e;

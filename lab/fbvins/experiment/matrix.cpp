@@ -35,8 +35,8 @@ std::vector<int> seeds_of(YamlReader& yaml, const YAML::Node& map) {
   return seeds.empty() ? std::vector<int>{1} : seeds;
 }
 
-std::string default_name(const DrawnSpec& drawn) {
-  return drawn.seconds > 0 ? fmt::format("{}-{:g}s", drawn.preset, drawn.seconds) : drawn.preset;
+std::string default_name(const RenderSpec& rendered) {
+  return rendered.seconds > 0 ? fmt::format("{}-{:g}s", rendered.preset, rendered.seconds) : rendered.preset;
 }
 
 /// One entry may stand for several presets.
@@ -56,11 +56,11 @@ void read_dataset(YamlReader& yaml, const YAML::Node& node, Matrix& matrix) {
   }
   yaml.only(simulate, {"preset", "trajectory", "imu", "seconds", "seeds", "set"});
   if (!yaml.ok()) return;
-  DrawnSpec drawn;
-  drawn.trajectory = yaml.text(simulate, "trajectory");
-  drawn.imu = yaml.text(simulate, "imu");
-  drawn.seconds = yaml.number_between(simulate, "seconds", 1, 86'400, 0);
-  drawn.settings = yaml.texts(simulate, "set");
+  RenderSpec rendered;
+  rendered.trajectory = yaml.text(simulate, "trajectory");
+  rendered.imu = yaml.text(simulate, "imu");
+  rendered.seconds = yaml.number_between(simulate, "seconds", 1, 86'400, 0);
+  rendered.settings = yaml.texts(simulate, "set");
   spec.seeds = seeds_of(yaml, simulate);
   std::vector<std::string> presets = yaml.texts(simulate, "preset");
   if (presets.empty()) presets.emplace_back("normal");
@@ -68,9 +68,9 @@ void read_dataset(YamlReader& yaml, const YAML::Node& node, Matrix& matrix) {
     return yaml.complain(yaml.get(node, "name"), "several presets cannot share one name");
   for (const std::string& preset : presets) {
     DatasetSpec one = spec;
-    drawn.preset = preset;
-    if (one.name.empty()) one.name = default_name(drawn);
-    one.drawn = drawn;
+    rendered.preset = preset;
+    if (one.name.empty()) one.name = default_name(rendered);
+    one.rendered = rendered;
     matrix.datasets.push_back(std::move(one));
   }
 }
@@ -153,16 +153,16 @@ Result<Plan> make_plan(const Matrix& matrix, const PlanOptions& options) {
     if (!recording.path.empty()) {
       recording.id = folder_name(spec.name);
       plan.recordings.push_back(recording);
-    } else if (!spec.drawn) {
+    } else if (!spec.rendered) {
       return Error{ErrorCode::not_found, fmt::format("{}: give the folder that holds it with --euroc", spec.name)};
     } else {
       for (int seed : spec.seeds) {
         recording.seed = seed;
         recording.id = folder_name(spec.seeds.size() > 1 || seed != 1 ? fmt::format("{}-s{}", spec.name, seed) : spec.name);
-        recording.path = below(options.drawn, recording.id);
-        recording.drawn = spec.drawn;
-        recording.drawn->trajectory = below(options.inputs, spec.drawn->trajectory);
-        recording.drawn->imu = below(options.inputs, spec.drawn->imu);
+        recording.path = below(options.rendered, recording.id);
+        recording.rendered = spec.rendered;
+        recording.rendered->trajectory = below(options.inputs, spec.rendered->trajectory);
+        recording.rendered->imu = below(options.inputs, spec.rendered->imu);
         plan.recordings.push_back(recording);
       }
     }

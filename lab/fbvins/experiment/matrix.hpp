@@ -3,7 +3,7 @@
 // Pure but for looking whether recordings exist; any thread.
 //
 //   Result<Matrix> matrix = read_matrix("configs/scenarios.yaml");
-//   Result<Plan> plan = make_plan(*matrix, {.drawn = "bench/drawn"});
+//   Result<Plan> plan = make_plan(*matrix, {.rendered = "bench/rendered"});
 //   for (const Cell& cell : plan->cells) run(cell);
 #pragma once
 
@@ -15,20 +15,20 @@
 
 namespace fbvins {
 
-/// A flight for `fbvins simulate` to draw.
-struct DrawnSpec {
+/// A flight for `fbvins simulate` to render.
+struct RenderSpec {
   std::string preset = "normal";
-  std::string trajectory, imu;  ///< of a recorded flight, below --inputs; empty: a made-up one
+  std::string trajectory, imu;  ///< of a recorded flight, below --inputs; empty: a synthetic one
   double seconds = 0;           ///< 0: the preset's, or the whole recorded flight
   std::vector<std::string> settings;
 };
 
 struct DatasetSpec {
   std::string name;   ///< of the group: its seeds belong together in tables
-  std::string euroc;  ///< name of a folder or zip below --euroc, taken instead of drawing where it is there
-  std::string path;   ///< of a recording; empty where it is drawn
-  std::optional<DrawnSpec> drawn;
-  std::vector<int> seeds{1};  ///< of the drawing
+  std::string euroc;  ///< name of a folder or zip below --euroc, taken instead of rendering where it is there
+  std::string path;   ///< of a recording; empty where it is rendered
+  std::optional<RenderSpec> rendered;
+  std::vector<int> seeds{1};  ///< of the rendering
 };
 
 struct ConfigurationSpec {
@@ -52,9 +52,9 @@ Result<Matrix> read_matrix(const std::string& path);
 struct Recording {
   std::string id;       ///< name of a folder
   std::string dataset;  ///< the group
-  std::string path;     ///< where it is, or will be once drawn
-  int seed = 0;         ///< of the drawing; 0 for a real one
-  std::optional<DrawnSpec> drawn;
+  std::string path;     ///< where it is, or will be once rendered
+  int seed = 0;         ///< of the rendering; 0 for a real one
+  std::optional<RenderSpec> rendered;
 };
 
 struct Cell {
@@ -71,9 +71,9 @@ struct Plan {
 };
 
 struct PlanOptions {
-  std::string euroc = "";   ///< folder with the user's own recordings
-  std::string inputs = "";  ///< folder that `trajectory` and `imu` are relative to
-  std::string drawn = "";   ///< folder for what is drawn
+  std::string euroc = "";     ///< folder with the user's own recordings
+  std::string inputs = "";    ///< folder that `trajectory` and `imu` are relative to
+  std::string rendered = "";  ///< folder for what is rendered
 };
 
 /// Which recordings and cells there are.

@@ -22,11 +22,11 @@ repetitions: 2
 )",
                                              "m.yaml");
   ASSERT_TRUE(matrix.ok()) << matrix.error().message;
-  const Result<Plan> plan = make_plan(*matrix, {.drawn = "/drawn"});
+  const Result<Plan> plan = make_plan(*matrix, {.rendered = "/rendered"});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   EXPECT_EQ(plan->recordings.size(), 7u);  // one, and two presets of three seeds
   EXPECT_EQ(plan->cells.size(), 7u * 2 * 2 * 2);
-  EXPECT_EQ(plan->recordings[1].path, "/drawn/normal-8s-s1");
+  EXPECT_EQ(plan->recordings[1].path, "/rendered/normal-8s-s1");
   EXPECT_EQ(plan->recordings[6].seed, 3);
   EXPECT_EQ(plan->cells[3].id, "MH_01_easy-klt-entropy-r2");
   std::set<std::string> ids;
@@ -44,12 +44,12 @@ datasets:
 )",
                                              "m.yaml");
   ASSERT_TRUE(matrix.ok()) << matrix.error().message;
-  const Result<Plan> plan = make_plan(*matrix, {.euroc = folder, .inputs = "/in", .drawn = "/drawn"});
+  const Result<Plan> plan = make_plan(*matrix, {.euroc = folder, .inputs = "/in", .rendered = "/rendered"});
   ASSERT_TRUE(plan.ok());
   EXPECT_EQ(plan->recordings[0].path, folder + "/A");
-  EXPECT_FALSE(plan->recordings[0].drawn.has_value());
-  EXPECT_EQ(plan->recordings[1].path, "/drawn/B");
-  EXPECT_EQ(plan->recordings[1].drawn->imu, "/in/B/imu0.csv");
+  EXPECT_FALSE(plan->recordings[0].rendered.has_value());
+  EXPECT_EQ(plan->recordings[1].path, "/rendered/B");
+  EXPECT_EQ(plan->recordings[1].rendered->imu, "/in/B/imu0.csv");
 }
 
 TEST(Matrix, SaysWhatIsWrongAndWhere) {

@@ -159,11 +159,11 @@ class ClosedLoop {
   /// Images whose exposure is over.
   Result<void> look() {
     while (now_s() > station_.next_image_s() + 0.5 * station_.longest_exposure_s()) {
-      DrawnFrame drawn = station_.draw([this](double t) { return history_.at(t); });
+      RenderedFrame rendered = station_.render([this](double t) { return history_.at(t); });
       ++log_.images;
-      const StereoFrame frame = drawn.frame;
+      const StereoFrame frame = rendered.frame;
       if (recording_)
-        if (Result<void> done = recording_->add(std::move(drawn)); !done) return done;
+        if (Result<void> done = recording_->add(std::move(rendered)); !done) return done;
       if (failed(MissionFault::What::cameras)) continue;
       if (Result<void> done = link_->push(frame); !done) return done;
     }

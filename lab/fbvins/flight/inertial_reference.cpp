@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// How fast the accelerometer's idea of down is believed: slow, as flying tilts it.
+/// How fast the accelerometer's idea of down is followed: slow, as flying tilts it.
 constexpr double kLevelling_per_s = 0.1;
 /// Only readings of about one g say where down is.
 constexpr double kNearG_mps2 = 1.5;

@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-/// Normalised errors squared, each of mean 3 when the covariance is honest; not-a-number where it is unusable.
+/// Normalised errors squared, each of mean 3 when the covariance is consistent; not-a-number where it is unusable.
 struct StateNees {
   double position = 0, orientation = 0, velocity = 0, gyro_bias = 0, accel_bias = 0;
 };

@@ -90,7 +90,7 @@ struct Disc {
 };
 void disc(Canvas& canvas, const Disc& disc);
 
-/// A made-up letter: strokes of a 4 x 6 grid.
+/// A synthetic letter: strokes of a 4 x 6 grid.
 void glyph(Canvas& canvas, Rng& rng, int x, int y, int height, float ink);
 
 struct Line {

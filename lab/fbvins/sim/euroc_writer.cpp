@@ -60,7 +60,7 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
 }
 
 std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, double rate_hz) {
-  std::string text = "# Drawn by fbvins simulate.\nsensor_type: camera\ncomment: simulated camera\n\n" + matrix_text(q, p);
+  std::string text = "# Rendered by fbvins simulate.\nsensor_type: camera\ncomment: simulated camera\n\n" + matrix_text(q, p);
   text += fmt::format("\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n", rate_hz, camera.width(), camera.height());
   std::visit(
       [&](const auto& m) {
@@ -147,16 +147,16 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool
 }
 
 /// One frame's files, of the cameras that delivered; may run while the next frame is rendered.
-Result<void> write_images(const DrawnFrame& drawn, const fs::path& mav0) {
-  const std::string left = fmt::format("{}.png", drawn.frame.t.ns), right = fmt::format("{}.png", drawn.right_stamp.ns);
-  if (drawn.frame.left)
-    if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*drawn.frame.left)); !done) return done;
-  if (!drawn.depth_left_m.empty())
-    if (Result<void> done = write_file(mav0 / "depth0" / left,
-                                       depth_png(drawn.depth_left_m, drawn.frame.left->width(), drawn.frame.left->height()));
+Result<void> write_images(const RenderedFrame& rendered, const fs::path& mav0) {
+  const std::string left = fmt::format("{}.png", rendered.frame.t.ns), right = fmt::format("{}.png", rendered.right_stamp.ns);
+  if (rendered.frame.left)
+    if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*rendered.frame.left)); !done) return done;
+  if (!rendered.depth_left_m.empty())
+    if (Result<void> done = write_file(mav0 / "depth0" / left, depth_png(rendered.depth_left_m, rendered.frame.left->width(),
+                                                                         rendered.frame.left->height()));
         !done)
       return done;
-  return drawn.frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*drawn.frame.right)) : Result<void>{};
+  return rendered.frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*rendered.frame.right)) : Result<void>{};
 }
 
 }  // namespace
@@ -198,12 +198,12 @@ EurocFolder::~EurocFolder() = default;
 EurocFolder::EurocFolder(EurocFolder&&) noexcept = default;
 EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
 
-Result<void> EurocFolder::add(DrawnFrame drawn) {
-  if (drawn.frame.left) state_->left_rows += fmt::format("{0},{0}.png\n", drawn.frame.t.ns);
-  if (drawn.frame.right) state_->right_rows += fmt::format("{0},{0}.png\n", drawn.right_stamp.ns);
+Result<void> EurocFolder::add(RenderedFrame rendered) {
+  if (rendered.frame.left) state_->left_rows += fmt::format("{0},{0}.png\n", rendered.frame.t.ns);
+  if (rendered.frame.right) state_->right_rows += fmt::format("{0},{0}.png\n", rendered.right_stamp.ns);
   if (Result<void> done = state_->wait(); !done) return done;
-  state_->writing =
-      std::async(std::launch::async, [drawn = std::move(drawn), mav0 = state_->mav0] { return write_images(drawn, mav0); });
+  state_->writing = std::async(std::launch::async,
+                               [rendered = std::move(rendered), mav0 = state_->mav0] { return write_images(rendered, mav0); });
   return {};
 }
 
@@ -227,7 +227,7 @@ Result<void> write_euroc(Simulation& simulation, const std::string& folder, cons
   int count = static_cast<int>(simulation.frames.size());
   if (options.max_frames > 0) count = std::min(count, options.max_frames);
   for (int i = 0; i < count; ++i) {
-    if (Result<void> done = recording->add(draw_frame(simulation, static_cast<std::size_t>(i), options.depth)); !done)
+    if (Result<void> done = recording->add(render_frame(simulation, static_cast<std::size_t>(i), options.depth)); !done)
       return done;
     if (progress) progress(i + 1, count);
   }

@@ -71,7 +71,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   eye.renderer.radiance(eye.radiance);
 }
 
-Image FlightRecorder::draw_eye(Eye& eye, double t_s, std::int64_t frame) {
+Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
   if (!eye.settled) {
     gather(eye, t_s, 0, 1);
     eye.sensor.settle(eye.radiance);
@@ -81,14 +81,14 @@ Image FlightRecorder::draw_eye(Eye& eye, double t_s, std::int64_t frame) {
   return eye.sensor.expose(eye.radiance, frame);
 }
 
-DrawnFrame FlightRecorder::draw(double t_s, std::int64_t frame, bool with_depth) {
-  DrawnFrame drawn;
-  drawn.exposure_s = left_.sensor.exposure_s();
-  auto right = std::async(std::launch::async, [&] { return draw_eye(right_, t_s, frame); });
-  drawn.frame.left = std::make_shared<const Image>(draw_eye(left_, t_s, frame));
-  if (with_depth) left_.renderer.depth(drawn.depth_left_m);
-  drawn.frame.right = std::make_shared<const Image>(right.get());
-  return drawn;
+RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_depth) {
+  RenderedFrame rendered;
+  rendered.exposure_s = left_.sensor.exposure_s();
+  auto right = std::async(std::launch::async, [&] { return render_eye(right_, t_s, frame); });
+  rendered.frame.left = std::make_shared<const Image>(render_eye(left_, t_s, frame));
+  if (with_depth) left_.renderer.depth(rendered.depth_left_m);
+  rendered.frame.right = std::make_shared<const Image>(right.get());
+  return rendered;
 }
 
 Duration FlightRecorder::right_jitter(std::int64_t frame) const {

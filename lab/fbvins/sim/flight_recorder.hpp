@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two cameras on their flight: draws a stereo frame, left and right on a thread each.
+// The two cameras on their flight: renders a stereo frame, left and right on a thread each.
 // One thread calls; frames in order.
 #pragma once
 
@@ -20,7 +20,7 @@ class FlightRecorder {
                  std::shared_ptr<const World> world);
 
   /// t_s: of the images, from the start of the flight.
-  DrawnFrame draw(double t_s, std::int64_t frame, bool with_depth);
+  RenderedFrame render(double t_s, std::int64_t frame, bool with_depth);
   /// By how much the right image's stamp is off.
   Duration right_jitter(std::int64_t frame) const;
 
@@ -35,7 +35,7 @@ class FlightRecorder {
     bool settled = false;
   };
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
-  Image draw_eye(Eye& eye, double t_s, std::int64_t frame);
+  Image render_eye(Eye& eye, double t_s, std::int64_t frame);
 
   SimulationOptions options_;
   BodyMotion motion_;

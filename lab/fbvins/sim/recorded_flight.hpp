@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recorded trajectory made into one that can be flown again, alone or with its real IMU recording.
 // With the IMU, the trajectory counts below a crossover frequency and the IMU's own integral above it, so
-// that images drawn along the result and the untouched IMU agree. Pure functions.
+// that images rendered along the result and the untouched IMU agree. Pure functions.
 #pragma once
 
 #include <string>

@@ -157,7 +157,7 @@ void Renderer::add(const Instant& instant, const std::vector<Facet>& facets, con
   if (instant.line_s == 0) {
     look(instant, facets);
     distribute(0, tiles_y_);
-    for (int t = 0; t < tiles_x_ * tiles_y_; ++t) draw_tile(t, instant, facets, light, weight);
+    for (int t = 0; t < tiles_x_ * tiles_y_; ++t) render_tile(t, instant, facets, light, weight);
     return;
   }
   for (int row = 0; row < tiles_y_; ++row) {  // each strip from where the camera is when its middle line is read
@@ -167,12 +167,12 @@ void Renderer::add(const Instant& instant, const std::vector<Facet>& facets, con
     strip.q_WC = (instant.q_WC * so3_exp(dt * instant.w_WC_C)).normalized();
     look(strip, facets);
     distribute(row, row + 1);
-    for (int t = row * tiles_x_; t < (row + 1) * tiles_x_; ++t) draw_tile(t, strip, facets, light, weight);
+    for (int t = row * tiles_x_; t < (row + 1) * tiles_x_; ++t) render_tile(t, strip, facets, light, weight);
   }
 }
 
-void Renderer::draw_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light,
-                         float weight) {
+void Renderer::render_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light,
+                           float weight) {
   const Tile& tile = tiles_[static_cast<std::size_t>(index)];
   const std::size_t first = static_cast<std::size_t>(index) * kRays;
   alignas(64) float x[kRays], y[kRays];

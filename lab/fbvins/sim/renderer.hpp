@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws the world through a camera with its real distortion, on the CPU. Every pixel's ray is followed
+// Renders the world through a camera with its real distortion, on the CPU. Every pixel's ray is followed
 // exactly (no remapping of a pinhole image); tiles of 8 x 8 rays meet the few facets that can be
 // seen there, sorted from near to far. One instant a call: motion blur is the sum of several.
 // One Renderer a thread; the same input gives the same bits on every machine with the same libm.
@@ -59,7 +59,7 @@ class Renderer {
   void make_rays(const Camera& camera);
   void look(const Instant& instant, const std::vector<Facet>& facets);
   void distribute(int first_row, int last_row);
-  void draw_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
+  void render_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
   void add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const int* ids, int id,
                          float weight, float* sum) const;
 

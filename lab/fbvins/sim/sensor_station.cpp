@@ -14,7 +14,7 @@ struct SensorStation::Impl {
   SimulationOptions options;
   StereoRig rig;
   std::shared_ptr<const World> world;
-  BodyMotion motion;  ///< of the image that is being drawn
+  BodyMotion motion;  ///< of the image that is being rendered
   FlightRecorder recorder;
   ImuErrors errors;
   RotorShake shake;
@@ -62,12 +62,12 @@ ImuSample SensorStation::read_imu(const MotionState& motion, const std::array<do
   return impl_->errors.read(t, motion, impl_->shake.step(rotors, dt));
 }
 
-DrawnFrame SensorStation::draw(const std::function<MotionState(double t_s)>& motion) {
+RenderedFrame SensorStation::render(const std::function<MotionState(double t_s)>& motion) {
   impl_->motion = motion;
-  DrawnFrame drawn = draw_at(impl_->recorder, impl_->rig, impl_->frames.next_s(), impl_->images++);
+  RenderedFrame rendered = render_at(impl_->recorder, impl_->rig, impl_->frames.next_s(), impl_->images++);
   impl_->motion = {};
   impl_->frames.advance();
-  return drawn;
+  return rendered;
 }
 
 }  // namespace fbvins

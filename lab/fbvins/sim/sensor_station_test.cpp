@@ -52,7 +52,7 @@ TEST(SensorStation, GivesWhatARecordingOfTheSameFlightHolds) {
     ASSERT_EQ(asked->truth().bias.gyro_radps, recording->imu.truth[i].bias.gyro_radps);
   }
   for (std::size_t i = 0; i < 2; ++i) {
-    const DrawnFrame a = asked->draw([&](double t) { return flight.at(t); }), b = draw_frame(*recording, i);
+    const RenderedFrame a = asked->render([&](double t) { return flight.at(t); }), b = render_frame(*recording, i);
     EXPECT_EQ(a.frame.t, b.frame.t);
     EXPECT_EQ(a.right_stamp, b.right_stamp);
     EXPECT_TRUE(std::equal(a.frame.left->row(0), a.frame.left->row(480), b.frame.left->row(0)));
@@ -113,7 +113,7 @@ TEST(SensorStation, FramesGetLostAsInARecording) {
   std::vector<double> intervals;
   double last = asked->next_image_s();
   for (int i = 0; i < 8; ++i) {
-    (void)asked->draw([](double) { return at_rest(); });
+    (void)asked->render([](double) { return at_rest(); });
     intervals.push_back(asked->next_image_s() - last);
     last = asked->next_image_s();
   }

@@ -48,7 +48,7 @@ std::vector<Vec3> path_of(const SplineTrajectory& flight) {
   return path;
 }
 
-/// Draws frames for a Dataset.
+/// Renders frames for a Dataset.
 class DrawingLoader : public FrameLoader {
  public:
   DrawingLoader(Simulation simulation, Duration offset) : simulation_(std::move(simulation)), offset_(offset) {}
@@ -56,7 +56,7 @@ class DrawingLoader : public FrameLoader {
   LoadedFrame load(const FrameEntry& entry) override {
     const auto at = std::lower_bound(simulation_.frames.begin(), simulation_.frames.end(), entry.t + offset_);
     LoadedFrame loaded;
-    loaded.frame = draw_frame(simulation_, static_cast<std::size_t>(at - simulation_.frames.begin())).frame;
+    loaded.frame = render_frame(simulation_, static_cast<std::size_t>(at - simulation_.frames.begin())).frame;
     return loaded;
   }
 
@@ -91,11 +91,12 @@ void FrameTimes::advance() {
   while (rng_.uniform() < drop_share_);
 }
 
-DrawnFrame draw_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth, Time start) {
-  DrawnFrame drawn = recorder.draw(t_s, frame, with_depth);
-  drawn.frame.t = start + Duration::from_seconds(t_s) - Duration::from_seconds(rig.time_offset_s);
-  drawn.right_stamp = drawn.frame.t + recorder.right_jitter(frame);
-  return drawn;
+RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth,
+                        Time start) {
+  RenderedFrame rendered = recorder.render(t_s, frame, with_depth);
+  rendered.frame.t = start + Duration::from_seconds(t_s) - Duration::from_seconds(rig.time_offset_s);
+  rendered.right_stamp = rendered.frame.t + recorder.right_jitter(frame);
+  return rendered;
 }
 
 Result<Simulation> prepare_simulation(const SimulationOptions& o) {
@@ -140,9 +141,9 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
   return s;
 }
 
-DrawnFrame draw_frame(Simulation& simulation, std::size_t index, bool with_depth) {
+RenderedFrame render_frame(Simulation& simulation, std::size_t index, bool with_depth) {
   const double t_s = (simulation.frames[index] - simulation.start).seconds();
-  return draw_at(*simulation.recorder, simulation.rig, t_s, static_cast<std::int64_t>(index), with_depth, simulation.start);
+  return render_at(*simulation.recorder, simulation.rig, t_s, static_cast<std::int64_t>(index), with_depth, simulation.start);
 }
 
 DatasetContents contents_of(Simulation simulation, const std::string& name) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording that is drawn and sensors that are asked step by step have in common. Pure functions but where named.
+// What a recording that is rendered and sensors that are asked step by step have in common. Pure functions but where named.
 #pragma once
 
 #include "fbvins/core/rng.hpp"
@@ -8,7 +8,7 @@
 
 namespace fbvins {
 
-inline constexpr Time kSimulationStart{1'700'000'000'000'000'000};  ///< stamp of a made-up flight's first IMU sample
+inline constexpr Time kSimulationStart{1'700'000'000'000'000'000};  ///< stamp of a synthetic flight's first IMU sample
 inline constexpr double kMargin_s = 0.05;                           ///< IMU before the first and after the last image
 
 /// When images are taken, s from the start; lost frames are left out. One owner.
@@ -25,7 +25,7 @@ class FrameTimes {
 };
 
 /// The stereo frame of t_s after kSimulationStart or another start; frames in order.
-DrawnFrame draw_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth = false,
-                   Time start = kSimulationStart);
+RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth = false,
+                        Time start = kSimulationStart);
 
 }  // namespace fbvins

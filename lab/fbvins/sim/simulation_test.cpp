@@ -48,7 +48,7 @@ TEST(Simulation, SameSeedSameBitsOtherSeedOtherWorld) {
     options.seed = seed;
     auto simulation = prepare_simulation(options);
     EXPECT_TRUE(simulation);
-    return *draw_frame(*simulation, 0).frame.left;
+    return *render_frame(*simulation, 0).frame.left;
   };
   const Image a = first_image(1), b = first_image(1), c = first_image(2);
   EXPECT_TRUE(std::equal(a.row(0), a.row(480), b.row(0)));
@@ -86,8 +86,8 @@ TEST(Simulation, ScenariosDoWhatTheyAreCalled) {
   // Dim: darker and noisier though exposed and amplified to the limits.
   auto dim = prepare_simulation(short_flight("dim"));
   ASSERT_TRUE(dim);
-  const DrawnFrame drawn = draw_frame(*dim, 0);
-  EXPECT_LT(mean(*drawn.frame.left), 75);
+  const RenderedFrame rendered = render_frame(*dim, 0);
+  EXPECT_LT(mean(*rendered.frame.left), 75);
   // Switching: brightness jumps within the flight although exposure follows.
   SimulationOptions options = short_flight("switching");
   options.flight.duration_s = 9;
@@ -95,7 +95,7 @@ TEST(Simulation, ScenariosDoWhatTheyAreCalled) {
   ASSERT_TRUE(lamps);
   double low = 255, high = 0;
   for (std::size_t i = 0; i < lamps->frames.size(); ++i) {
-    const double m = mean(*draw_frame(*lamps, i).frame.left);
+    const double m = mean(*render_frame(*lamps, i).frame.left);
     low = std::min(low, m);
     high = std::max(high, m);
   }
@@ -144,10 +144,10 @@ TEST(Simulation, TheEurocFolderReadsBackToTheSameBits) {
       ++samples;
     } else {
       const auto& frame = std::get<StereoFrame>(*event);
-      const DrawnFrame drawn = draw_frame(*again, frames++);
+      const RenderedFrame rendered = render_frame(*again, frames++);
       ASSERT_TRUE(frame.left && frame.right);
-      EXPECT_TRUE(std::equal(frame.left->row(0), frame.left->row(480), drawn.frame.left->row(0)));
-      EXPECT_TRUE(std::equal(frame.right->row(0), frame.right->row(480), drawn.frame.right->row(0)));
+      EXPECT_TRUE(std::equal(frame.left->row(0), frame.left->row(480), rendered.frame.left->row(0)));
+      EXPECT_TRUE(std::equal(frame.right->row(0), frame.right->row(480), rendered.frame.right->row(0)));
     }
   }
   EXPECT_EQ(frames, 3u);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Consistency: are the errors as large as the estimator's own covariances say? The normalised
 // estimation error squared, e^T P^-1 e, has mean 3 for a position or an orientation and 6 for a
-// pose when they are; larger means too sure of itself (Bar-Shalom, Li, Kirubarajan, 2001, 5.4).
+// pose when they are; larger means overconfident (Bar-Shalom, Li, Kirubarajan, 2001, 5.4).
 // Pure functions, any thread.
 //
-//   NeesSummary s = nees(pairs, covariances, alignment);   // s.position near 3 is honest
+//   NeesSummary s = nees(pairs, covariances, alignment);   // s.position near 3 is consistent
 #pragma once
 
 #include <vector>

@@ -22,10 +22,10 @@ struct EurocWriterOptions {
 Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
                          const std::function<void(int done, int all)>& progress);
 
-/// The same, frame by frame as a flight goes on; images are written while the next one is drawn.
+/// The same, frame by frame as a flight goes on; images are written while the next one is rendered.
 ///
 ///   Result<EurocFolder> recording = EurocFolder::create("out/flight", rig);
-///   recording->add(drawn);
+///   recording->add(rendered);
 ///   Result<void> done = recording->finish(imu);
 class EurocFolder {
  public:
@@ -35,7 +35,7 @@ class EurocFolder {
   EurocFolder(EurocFolder&&) noexcept;
   EurocFolder& operator=(EurocFolder&&) noexcept;
 
-  Result<void> add(DrawnFrame drawn);
+  Result<void> add(RenderedFrame rendered);
   /// Readings and truth; the recording is complete. Once.
   Result<void> finish(const SimulatedImu& imu);
 

@@ -3,7 +3,7 @@
 // shot and read noise, gain, saturation. One ImageSensor a camera; images in order of time.
 //
 //   ImageSensor sensor(options, camera, factor, seed);
-//   double exposure_s = sensor.exposure_s();      // draw the radiance of that long
+//   double exposure_s = sensor.exposure_s();      // render the radiance of that long
 //   Image image = sensor.expose(radiance, frame);
 #pragma once
 
@@ -38,7 +38,7 @@ struct CameraModelOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("time_samples", time_samples, "", "instants drawn and summed over the exposure; they also antialias", 1, 64);
+    v("time_samples", time_samples, "", "instants rendered and summed over the exposure; they also antialias", 1, 64);
     v("line_delay_us", line_delay_us, "us", "rolling shutter: time from line to line, 0 for a global shutter", 0.0, 200.0);
     v("auto_exposure", auto_exposure, "", "exposure follows the images' mean level");
     v("target_level", target_level, "", "mean grey value that the exposure aims at", 5.0, 250.0);

@@ -4,9 +4,9 @@
 //
 //   Result<SensorStation> station = SensorStation::create(options, plan, path);
 //   ImuSample reading = station->read_imu(t_s, motion, rotor_radps / hover_radps);
-//   if (station->image_due(t_s)) frame = station->draw(motion_around_t);
+//   if (station->image_due(t_s)) frame = station->render(motion_around_t);
 //
-// Times are seconds from start(). Threads: one owner; drawing takes one more.
+// Times are seconds from start(). Threads: one owner; rendering takes one more.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ class SensorStation {
   /// No image's exposure reaches further to either side.
   double longest_exposure_s() const;
   /// Takes the image of next_image_s(). `motion`: the body's for the whole exposure. Stamps on the cameras' clock.
-  DrawnFrame draw(const std::function<MotionState(double t_s)>& motion);
+  RenderedFrame render(const std::function<MotionState(double t_s)>& motion);
 
  private:
   struct Impl;

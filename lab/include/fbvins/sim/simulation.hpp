@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A made-up recording with exact truth. Everything follows from the options and the seed.
+// A synthetic recording with exact truth. Everything follows from the options and the seed.
 //
 //   Result<SimulationOptions> options = simulation_preset("normal");
 //   Result<DatasetContents> contents = simulate(*options);
-//   Dataset data(*std::move(contents), {});       // draws images as they are asked for
+//   Dataset data(*std::move(contents), {});       // renders images as they are asked for
 //   while (auto event = data.next()) system.push(std::move(*event));
 //
 // simulate() is a pure function, but for reading a recorded flight's files; the Dataset is used as any other.
@@ -22,7 +22,7 @@
 
 namespace fbvins {
 
-/// A flight that somebody has flown, in place of a made-up one.
+/// A flight that somebody has flown, in place of a synthetic one.
 struct RecordedOptions {
   std::string trajectory = "";
   std::string imu = "";
@@ -31,7 +31,7 @@ struct RecordedOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("trajectory", trajectory, "", "TUM or EuRoC trajectory file to fly along; empty: a made-up flight");
+    v("trajectory", trajectory, "", "TUM or EuRoC trajectory file to fly along; empty: a synthetic flight");
     v("imu", imu, "", "its real IMU recording (EuRoC CSV), then used untouched");
     v("start_s", start_s, "s", "left out at the start", 0.0, 1e6);
     v("crossover_hz", crossover_hz, "Hz", "below it the trajectory counts, above it the IMU", 0.05, 20.0);
@@ -75,7 +75,7 @@ StereoRig euroc_rig();
 Result<StereoRig> simulated_rig(const SimulationOptions& options);
 
 /// A stereo frame with what only a simulator knows.
-struct DrawnFrame {
+struct RenderedFrame {
   StereoFrame frame;
   Time right_stamp;
   double exposure_s = 0;
@@ -84,7 +84,7 @@ struct DrawnFrame {
 
 class FlightRecorder;
 
-/// A recording that is drawn frame by frame.
+/// A recording that is rendered frame by frame.
 struct Simulation {
   StereoRig rig;
   SplineTrajectory flight;
@@ -97,8 +97,8 @@ struct Simulation {
 };
 
 Result<Simulation> prepare_simulation(const SimulationOptions& options);
-/// Draws a frame; frames in order (exposure follows the image before). Stamps on the cameras' clock.
-DrawnFrame draw_frame(Simulation& simulation, std::size_t index, bool with_depth = false);
+/// Renders a frame; frames in order (exposure follows the image before). Stamps on the cameras' clock.
+RenderedFrame render_frame(Simulation& simulation, std::size_t index, bool with_depth = false);
 
 DatasetContents contents_of(Simulation simulation, const std::string& name);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The made-up place: textured parallelograms, lamps, things that move. z up, floor at z = 0.
+// The synthetic place: textured parallelograms, lamps, things that move. z up, floor at z = 0.
 // Immutable once built, any thread.
 //
 //   World world = build_world(options, path, seed);
