@@ -18,7 +18,7 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(What is written is told by the name: FILE.bag, a ROS 1 bag; FILE.mcap, a flight record, which ROS 2's programs read;
+    R"(What is written follows from the name: FILE.bag, a ROS 1 bag; FILE.mcap, a flight record, which ROS 2's programs read;
 else an EuRoC folder. Images become 8-bit grey.
 
 examples:

@@ -22,7 +22,7 @@ constexpr const char* kExamples =
 config.yaml (the effective configuration), summary.json, summary.txt, timing.csv. The same input and
 configuration give the same bytes in the first four, with --threaded as well. Loop closure (--loop, --save-map,
 --load-map, --final-ba) adds map_trajectory_tum.txt (M after the run), map_causal_tum.txt and map_bounded_tum.txt
-(M as it was known at each moment, at once and without steps) and map_updates.csv; the odometry is not touched.
+(M as it was known at each moment, as corrected and without steps) and map_updates.csv; the odometry is not touched.
 
 examples:
   fbvins run MH_01_easy
@@ -32,7 +32,7 @@ examples:
   fbvins run MH_01_easy --config drone.yaml --set estimator.max_iterations=8 --threaded
   fbvins run flight.mcap --config flight.mcap    a flight record of fbvins live, as it was flown
   fbvins run monday --save-map flat.fbm          with loop closure, the map kept
-  fbvins run tuesday --load-map flat.fbm         finds itself in Monday's map and goes on in its frame
+  fbvins run tuesday --load-map flat.fbm         relocalises in Monday's map and goes on in its frame
 )";
 
 struct Arguments {
@@ -93,7 +93,7 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_flag("--threaded", arguments->flight.threaded, "frontend and estimator on threads of their own; the same result");
   command->add_flag("--loop", arguments->flight.map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->flight.map.save, "file for the map after the run; with loop closure");
-  command->add_option("--load-map", arguments->flight.map.load, "map to find oneself in and go on with; with loop closure");
+  command->add_option("--load-map", arguments->flight.map.load, "map to relocalise in and extend; with loop closure");
   command->add_flag("--final-ba", arguments->flight.map.final_ba,
                     "bundle adjustment over the whole map after the run; with loop closure");
   command->add_flag("--boosted-map", arguments->flight.map.boosted, "a new map of boosted descriptors; with loop closure");

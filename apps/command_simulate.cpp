@@ -89,7 +89,7 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("simulate", "render a synthetic recording with exact truth");
   command->footer(kExamples);
-  command->add_option("PRESET", arguments->preset, "what it is like (default normal)")
+  command->add_option("PRESET", arguments->preset, "light, texture, motion or place (default normal)")
       ->check(CLI::IsMember(simulation_presets()));
   command->add_option("--out", arguments->out, "folder for the recording");
   command->add_option("--seed", arguments->seed, "of world, flight and noise")->check(CLI::NonNegativeNumber);
