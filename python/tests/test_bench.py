@@ -13,7 +13,7 @@ from fbvins import bench
 
 MATRIX = """title: Short flights
 datasets:
-  - simulate: {preset: normal, seconds: 3, seeds: 3, set: [image_rate_hz=10]}
+  - simulate: {preset: normal, seconds: 2, seeds: 3, set: [image_rate_hz=10]}
 frontends: [klt, orb]
 """
 #: What differs from run to run.
