@@ -7,6 +7,7 @@
 #include <map>
 
 #include "apps/terminal.hpp"
+#include "fbvins/core/angle.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -37,6 +38,10 @@ void evaluate_against(Trajectory<W> truth, const RunRecord& record, RunSummary& 
     if (covariances.size() < pairs.size() && o.health.has_pose() && o.t == pairs[covariances.size()].estimate.t)
       covariances.push_back(o.pose_covariance);
   if (const auto start = align_start(pairs)) summary.nees = nees(pairs, covariances, *start);
+  if (const auto start = align_start_levelled(pairs)) {
+    summary.nees_levelled = nees(pairs, covariances, start->to_truth);
+    summary.truth_level = *start;
+  }
 }
 
 Json adjustment_json(const FinalAdjustmentReport& a) {
@@ -160,6 +165,13 @@ std::string to_json_text(const RunSummary& s) {
   if (s.evaluation) result["accuracy"] = to_json(*s.evaluation, Alignment::se3);
   else result["no_accuracy"] = s.no_evaluation;
   if (s.nees) result["nees_from_start"] = to_json(*s.nees);
+  if (s.nees_levelled) {
+    result["nees_truth_levelled"] = to_json(*s.nees_levelled);
+    const Similarity& start = s.truth_level.to_truth;
+    result["nees_truth_levelled"]["truth_tilt_rad"] = s.truth_level.truth_tilt_rad;
+    result["nees_truth_levelled"]["to_truth"] = {{"q", {start.q.w(), start.q.x(), start.q.y(), start.q.z()}},
+                                                 {"p", {start.p.x(), start.p.y(), start.p.z()}}};
+  }
   if (s.matches.found > 0)
     result["descriptor_matches"] = {{"found", s.matches.found},
                                     {"inliers", s.matches.inliers},
@@ -189,6 +201,11 @@ std::string to_text(const RunSummary& s) {
     text += fmt::format(
         "NEES (from the first second on; 3, 3, 6 when consistent): position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
         s.nees->mean.position, s.nees->mean.orientation, s.nees->mean.pose);
+  if (s.nees_levelled && s.nees_levelled->count > 0)
+    text += fmt::format(
+        "NEES without the truth's own constant tilt of {:.2f} deg: position {:.1f}, orientation {:.1f}, pose {:.1f}\n",
+        s.truth_level.truth_tilt_rad / kDegree, s.nees_levelled->mean.position, s.nees_levelled->mean.orientation,
+        s.nees_levelled->mean.pose);
   if (s.map) text += map_text(*s.map);
   text += "-- timing (differs from run to run) --\n";
   text +=

@@ -24,7 +24,9 @@ struct RunSummary {
   std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"
   std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
   std::string no_evaluation;                        ///< why there is none
-  std::optional<NeesSummary> nees;                  ///< after yaw-only alignment
+  std::optional<NeesSummary> nees;                  ///< after alignment of the first second's shift and heading
+  std::optional<NeesSummary> nees_levelled;         ///< the same without the truth's own constant tilt
+  LevelledStart truth_level;                        ///< that tilt, and the alignment without it
   std::optional<MapSummary> map;                    ///< with loop closure
   DescriptorMatchCounts matches, raw_matches;       ///< over all frames; none of the klt frontend
   Survival survival;                                ///< over all frames

@@ -47,6 +47,14 @@ Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment
 /// from. An error without any pair.
 Result<Similarity> align_start(const std::vector<PosePair>& pairs);
 
+/// align_start for a truth whose world need not be level: what motion capture and rendered flights have of tilt against their
+/// own IMU is one constant, of up to half a degree, that no estimator can know.
+struct LevelledStart {
+  Similarity to_truth;
+  double truth_tilt_rad = 0;  ///< by how much the truth's z is off the up that the estimate has in the flight's second half
+};
+Result<LevelledStart> align_start_levelled(const std::vector<PosePair>& pairs);
+
 /// The same pairs with the estimate moved.
 std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs);
 

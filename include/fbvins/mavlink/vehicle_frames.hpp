@@ -48,8 +48,8 @@ class VehicleFrames {
   std::optional<Pose<LocalFrd, BodyFrd>> last_;
 };
 
-/// Percent as ODOMETRY has it: positive only where one may fly by this pose.
-std::int8_t odometry_quality(const Health& health);
+/// Percent as ODOMETRY has it: types/quality.hpp where one may fly by this pose, 0 before the start, -1 when lost.
+std::int8_t odometry_quality(const Health& health, const Mat6& pose_covariance);
 
 OdometryMessage odometry_message(const VehicleState& state, std::uint64_t time_usec);
 /// All unknown: what says that there is no pose.

@@ -5,6 +5,7 @@
 
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/scale_uncertainty.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
 
@@ -31,6 +32,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
       calibration_(calibrated_),
+      scale_sigma_(scale_sigma(rig.T_BC0, rig.T_BC1)),
       initialiser_(options, imu_noise_, before),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options),
@@ -191,6 +193,9 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   const Mat15 level = window_.tilt().levelled_covariance(newest.state, *covariance);
   out.pose_covariance = level.topLeftCorner<6, 6>();
   out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);
+  const NavState level_state = window_.tilt().levelled(newest.state);
+  add_scale(level_state.T_WB.p - window_.tilt().pivot_W, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
+  add_scale(level_state.v_WB, scale_sigma_, out.velocity_covariance);
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg);
   out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba);
   up_sigma_rad_ = up_sigma_rad(*covariance);

@@ -63,6 +63,7 @@ class Estimator {
   EstimatorOptions options_;
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
+  double scale_sigma_;                    ///< what the calibration leaves open of the scale (W21)
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;

@@ -98,6 +98,19 @@ Result<Similarity> align_start(const std::vector<PosePair>& pairs) {
   return around_means(moments_of(first), about_z, 1.0);
 }
 
+Result<LevelledStart> align_start_levelled(const std::vector<PosePair>& pairs) {
+  Vec3 up_in_truth = Vec3::Zero();
+  for (std::size_t i = pairs.size() / 2; i < pairs.size(); ++i)
+    up_in_truth += pairs[i].truth.T.q * (pairs[i].estimate.T.q.conjugate() * Vec3::UnitZ());
+  const Quat level = up_in_truth.isZero() ? Quat::Identity() : Quat::FromTwoVectors(up_in_truth, Vec3::UnitZ());
+  std::vector<PosePair> levelled = pairs;
+  for (PosePair& pair : levelled) pair.truth.T = Similarity{1, level, Vec3::Zero()} * pair.truth.T;
+  const Result<Similarity> start = align_start(levelled);
+  if (!start) return start.error();
+  const Quat back = level.conjugate();
+  return LevelledStart{{1, (back * start->q).normalized(), Vec3(back * start->p)}, so3_log(level).norm()};
+}
+
 std::vector<PosePair> apply(const Similarity& similarity, std::vector<PosePair> pairs) {
   for (PosePair& pair : pairs) pair.estimate.T = similarity * pair.estimate.T;
   return pairs;

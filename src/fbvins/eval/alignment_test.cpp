@@ -72,6 +72,18 @@ TEST(Alignment, OfTheStartLeavesWhatComesLaterAsItIs) {
   EXPECT_LT(start->q.angularDistance(heading), 1e-12);
   EXPECT_NEAR(cost(pairs, *start), 0.01 * static_cast<double>(later), 1e-9);
   EXPECT_FALSE(align_start({}));
+  EXPECT_FALSE(align_start_levelled({}));
+}
+
+TEST(Alignment, AConstantTiltOfTheTruthIsFound) {
+  const Quat tilted(Eigen::AngleAxisd(0.01, Vec3(0.6, 0.8, 0)));
+  std::vector<PosePair> pairs = moved_pairs(Quat(Eigen::AngleAxisd(1.1, Vec3::UnitZ())), Vec3(3, -2, 1), 1.0);
+  for (PosePair& pair : pairs) pair.truth.T = Similarity{1, tilted, Vec3(0.2, 0, 0)} * pair.truth.T;
+  const auto start = align_start_levelled(pairs);
+  ASSERT_TRUE(start);
+  EXPECT_NEAR(start->truth_tilt_rad, 0.01, 1e-12);
+  EXPECT_LT(cost(pairs, start->to_truth), 1e-20);
+  EXPECT_GT(cost(pairs, *align_start(pairs)), 1e-3);
 }
 
 TEST(Alignment, IsAMinimumOfItsOwnFamily) {

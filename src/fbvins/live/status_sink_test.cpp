@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fbvins/live/latency_histogram.hpp"
+#include "fbvins/types/quality.hpp"
 
 namespace fbvins {
 namespace {
@@ -27,6 +28,8 @@ TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
   pose.tilt_sigma_rad = 0.01;
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["tilt_sigma_rad"], 0.01);
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["level"], false);
+  EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["quality_percent"],
+            quality_percent(pose.health, pose.pose_covariance));
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["position_m"][2], 3);
   EXPECT_EQ(to_json_line(status, pose).find('\n'), std::string::npos);
 }

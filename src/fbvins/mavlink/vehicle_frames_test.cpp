@@ -7,6 +7,7 @@
 
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
+#include "fbvins/types/quality.hpp"
 
 namespace fbvins {
 namespace {
@@ -176,7 +177,7 @@ TEST(VehicleMessages, OdometryHasTheStateAndTheTriangleByRows) {
   EXPECT_EQ(m.frame_id, 20);
   EXPECT_EQ(m.child_frame_id, 12);
   EXPECT_EQ(m.estimator_type, 3);
-  EXPECT_EQ(m.quality, 100);
+  EXPECT_EQ(m.quality, quality_percent(state.health, state.pose_covariance));
   EXPECT_EQ(m.reset_counter, 2);
   EXPECT_FLOAT_EQ(m.q[0], static_cast<float>(state.T_LF.q.w()));
   EXPECT_FLOAT_EQ(m.z, static_cast<float>(state.T_LF.p.z()));
@@ -207,7 +208,8 @@ TEST(VehicleMessages, VisionMessagesAreInTheLocalFrame) {
 TEST(VehicleMessages, QualityIsPositiveOnlyWhereOneMayFly) {
   for (const HealthState state : {HealthState::initialising, HealthState::good, HealthState::degraded, HealthState::lost}) {
     const Health health{state, HealthReason::none};
-    EXPECT_EQ(odometry_quality(health) > 0, health.has_pose());
+    EXPECT_EQ(odometry_quality(health, 1e-4 * Mat6::Identity()) > 0, health.has_pose());
+    EXPECT_EQ(odometry_quality(health, 1e12 * Mat6::Identity()) > 0, health.has_pose());
   }
   const OdometryMessage none = no_odometry_message({HealthState::lost, HealthReason::no_tracks}, 3, 9);
   EXPECT_EQ(none.quality, -1);

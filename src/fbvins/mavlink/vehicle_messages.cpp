@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fbvins/mavlink/vehicle_frames.hpp"
+#include "fbvins/types/quality.hpp"
 
 namespace fbvins {
 namespace {
@@ -31,14 +32,8 @@ std::uint8_t wrapped(std::uint32_t counter) { return static_cast<std::uint8_t>(c
 
 }  // namespace
 
-std::int8_t odometry_quality(const Health& health) {
-  switch (health.state) {
-    case HealthState::good: return 100;
-    case HealthState::degraded: return 30;
-    case HealthState::initialising: return 0;
-    case HealthState::lost: break;
-  }
-  return -1;
+std::int8_t odometry_quality(const Health& health, const Mat6& pose_covariance) {
+  return health.state == HealthState::lost ? std::int8_t{-1} : static_cast<std::int8_t>(quality_percent(health, pose_covariance));
 }
 
 OdometryMessage odometry_message(const VehicleState& state, std::uint64_t time_usec) {
@@ -53,7 +48,7 @@ OdometryMessage odometry_message(const VehicleState& state, std::uint64_t time_u
   m.pose_covariance = upper_triangle(state.pose_covariance);
   m.velocity_covariance = upper_triangle(with_unknown_rates(state.velocity_covariance));
   m.reset_counter = wrapped(state.reset_counter);
-  m.quality = odometry_quality(state.health);
+  m.quality = odometry_quality(state.health, state.pose_covariance);
   return m;
 }
 
@@ -65,7 +60,7 @@ OdometryMessage no_odometry_message(const Health& health, std::uint32_t reset_co
   m.pose_covariance.fill(kMavUnknown);
   m.velocity_covariance.fill(kMavUnknown);
   m.reset_counter = wrapped(reset_counter);
-  m.quality = std::min<std::int8_t>(odometry_quality(health), 0);
+  m.quality = health.state == HealthState::lost ? -1 : 0;
   return m;
 }
 

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a frontend would tell of a flight through a made-up room, without any image: corners on its walls, and on boxes that
+// move, seen by both cameras with the errors that tracks have: noise, a slow slide of each, and some that slide fast. One that
+// comes back into view may be known again where the estimator's own pose says that it should be.
+// One instance, one flight; the same seed gives the same bytes.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/sim/simulation.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins::bench {
+
+struct TrackOptions {
+  int features = 150;
+  bool recognise = false;
+  int movers = 0;
+  double noise_px = 0.4;
+  double slide_px = 0.04;     ///< of a track, a frame
+  double bad_share = 0.02;    ///< tracks that slide ten times as fast
+  double lost_share = 0.02;   ///< of the tracks, a frame
+  double known_share = 0.15;  ///< of the corners that could be known again, a frame
+  double sigma_px = 0.6;      ///< what the estimator is told
+  double bad_start_s = 0;     ///< so long tracks slide five times as fast, and the cameras squint by a pixel
+  std::uint64_t seed = 1;
+};
+
+class MadeUpTracks {
+ public:
+  MadeUpTracks(const Simulation& flight, const TrackOptions& options) : flight_(flight), o_(options), rng_(options.seed, 77) {
+    Vec3 low = Vec3::Constant(1e9), high = -low;
+    for (double t = 0; t < flight.flight.duration_s(); t += 0.1) {
+      low = low.cwiseMin(flight.flight.pose(t).p);
+      high = high.cwiseMax(flight.flight.pose(t).p);
+    }
+    low -= Vec3(2.5, 2.5, 1.2);
+    high += Vec3(2.5, 2.5, 1.2);
+    const int corners = static_cast<int>(60 * (high - low).head<2>().prod());
+    for (int i = 0; i < std::clamp(corners, 2500, 9000); ++i) {
+      Corner c;
+      for (int k = 0; k < 3; ++k) c.p(k) = rng_.uniform(low(k), high(k));
+      if (rng_.uniform() < 0.75) {  // the others are things in the room, near its edge
+        const int axis = static_cast<int>(rng_.below(3));
+        c.p(axis) = rng_.below(2) ? low(axis) : high(axis);
+      } else {
+        const int axis = static_cast<int>(rng_.below(2));
+        c.p(axis) = rng_.below(2) ? low(axis) + rng_.uniform(0, 1.5) : high(axis) - rng_.uniform(0, 1.5);
+      }
+      corners_.push_back(c);
+    }
+    for (int m = 0; m < o_.movers; ++m) {
+      Mover mover;
+      for (int k = 0; k < 3; ++k) mover.centre(k) = rng_.uniform(low(k) + 0.8, high(k) - 0.8);
+      const double heading = rng_.uniform(0, 2 * std::numbers::pi);
+      mover.along = rng_.uniform(0.5, 1.8) * Vec3(std::cos(heading), std::sin(heading), 0);
+      mover.rate = rng_.uniform(0.3, 0.9);
+      mover.phase = rng_.uniform(0, 6.28);
+      movers_.push_back(mover);
+      for (int i = 0; i < 50; ++i) {
+        Corner c;
+        c.mover = m;
+        for (int k = 0; k < 3; ++k) c.p(k) = rng_.uniform(-kHalf_m, kHalf_m);
+        c.p(static_cast<int>(rng_.below(3))) = rng_.below(2) ? kHalf_m : -kHalf_m;
+        corners_.push_back(c);
+      }
+    }
+  }
+
+  void locate(const LandmarkUpdate& update) {
+    for (const LocatedLandmark& l : update.landmarks) located_[l.track] = l.p_W;
+  }
+
+  /// The k-th image; in order. `prior` is the estimator's, of some image before.
+  TrackedFrame frame(std::size_t k, const StatePrior& prior) {
+    TrackedFrame out;
+    out.id = FrameId{static_cast<std::int64_t>(k)};
+    out.t = flight_.frames[k];
+    out.has_left = out.has_right = true;
+    if (k > 0) out.imu = readings(flight_.frames[k - 1], out.t);
+    const double t_s = (out.t - flight_.start).seconds();
+    const Pose<W, B> T_WB = flight_.flight.pose(t_s);
+    // What W has drifted moves what is expected; taken at the prior's own moment.
+    Pose<W, W> drift;
+    if (prior.valid) {
+      const Pose<W, B> then = flight_.flight.pose((prior.t - flight_.start).seconds());
+      drift = prior.T_WB * then.inverse().cast_frames<B, W>();
+    }
+    motion_px_.clear();
+    see(T_WB, t_s, prior.valid ? &drift : nullptr, out);
+    std::sort(motion_px_.begin(), motion_px_.end());
+    if (!motion_px_.empty()) out.stats.median_motion_px = motion_px_[motion_px_.size() / 2];
+    return out;
+  }
+
+ private:
+  static constexpr double kHalf_m = 0.35;
+  struct Corner {
+    Vec3 p = Vec3::Zero();
+    int mover = -1;
+  };
+  struct Mover {
+    Vec3 centre, along;
+    double rate, phase;
+  };
+  struct Track {
+    TrackId id;
+    Vec2 slide = Vec2::Zero(), step = Vec2::Zero();
+    Vec2 seen_at = Vec2::Zero();
+    Vec3 from = Vec3::Zero();  // where the body was when it was last seen
+    int age = 0;
+    bool followed = false;
+  };
+
+  ImuSegment readings(Time from, Time to) {
+    ImuSegment out;
+    const std::vector<ImuSample>& all = flight_.imu.samples;
+    const auto at = [&](Time t) {
+      auto next = std::lower_bound(all.begin() + 1, all.end() - 1, t, [](const ImuSample& s, Time x) { return s.t < x; });
+      const ImuSample &a = *(next - 1), &b = *next;
+      const double u = (t - a.t).seconds() / (b.t - a.t).seconds();
+      return ImuSample{t, Vec3((1 - u) * a.gyro_radps + u * b.gyro_radps), Vec3((1 - u) * a.accel_mps2 + u * b.accel_mps2)};
+    };
+    out.samples.push_back(at(from));
+    for (auto s = std::upper_bound(all.begin(), all.end(), from, [](Time x, const ImuSample&a) { return x < a.t; });
+         s != all.end() && s->t < to; ++s)
+      out.samples.push_back(*s);
+    out.samples.push_back(at(to));
+    return out;
+  }
+
+  Vec3 position(const Corner& c, double t_s) const {
+    if (c.mover < 0) return c.p;
+    const Mover& m = movers_[static_cast<std::size_t>(c.mover)];
+    return m.centre + std::sin(m.rate * t_s + m.phase) * m.along + c.p;
+  }
+  bool hidden(const Vec3& from, const Vec3& p, double t_s, int mover) const {
+    for (std::size_t m = 0; m < movers_.size(); ++m) {
+      if (static_cast<int>(m) == mover) continue;
+      const Vec3 c = position(Corner{Vec3::Zero(), static_cast<int>(m)}, t_s) - from, ray = p - from;
+      const double along = c.dot(ray) / ray.squaredNorm();
+      if (along > 0 && along < 1 && (c - along * ray).norm() < kHalf_m) return true;
+    }
+    return false;
+  }
+
+  std::optional<Observation> observe(const Camera& camera, const Vec3& p_C, const Vec2& slide) {
+    if (p_C.z() < 0.3) return std::nullopt;
+    const auto px = camera.project(p_C);
+    if (!px || !camera.inside(*px, 16)) return std::nullopt;
+    Observation o;
+    o.pixel = *px + slide + o_.noise_px * Vec2(rng_.normal(), rng_.normal());
+    const auto ray = camera.undistort(o.pixel);
+    if (!ray) return std::nullopt;
+    o.normalised = *ray;
+    Mat2 J;
+    (void)camera.distort(o.normalised, &J);
+    o.sqrt_information = J / o_.sigma_px;
+    return o;
+  }
+
+  /// A track of before may go on under its old id.
+  bool known_again(const Track& track, const Vec3& p_W, const Vec3& body, const Pose<W, W>* drift) {
+    if (!o_.recognise || drift == nullptr || track.age < 4) return false;
+    const auto known = located_.find(track.id);
+    if (known == located_.end() || rng_.uniform() > o_.known_share) return false;
+    const Vec3 now = p_W - body, then = p_W - track.from;
+    if (now.dot(then) < 0.82 * now.norm() * then.norm()) return false;
+    if (now.norm() < 0.6 * then.norm() || then.norm() < 0.6 * now.norm()) return false;
+    return ((*drift) * p_W - known->second).norm() * 458 / now.norm() < 15;  // within the search
+  }
+
+  void see(const Pose<W, B>& T_WB, double t_s, const Pose<W, W>* drift, TrackedFrame& out) {
+    const Pose<C0, W> T_C0W = (T_WB * flight_.rig.T_BC0).inverse();
+    const Pose<C1, W> T_C1W = (T_WB * flight_.rig.T_BC1).inverse();
+    std::vector<std::size_t> fresh;
+    const auto add = [&](Track& track, const Observation& left, const Vec3& p_W) {
+      TrackedFeature f;
+      f.id = track.id;
+      f.age_frames = track.age;
+      f.left = left;
+      const Vec2 squint(t_s < o_.bad_start_s ? 1.0 : 0.0, 0);
+      if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, T_C1W * p_W, track.slide + squint);
+      out.stats.tracked += track.age > 0;
+      out.stats.stereo += f.right.has_value();
+      if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
+      track.seen_at = left.pixel;
+      ++track.age;
+      track.from = T_WB.p;
+      track.followed = true;
+      out.features.push_back(f);
+    };
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      const Vec3 p_W = position(corners_[i], t_s);
+      const Vec3 p_C = T_C0W * p_W;
+      const auto it = tracks_.find(i);
+      const bool followed = it != tracks_.end() && it->second.followed;
+      if (p_C.z() < 0.3 || p_C.z() > 30 || std::abs(p_C.x()) > p_C.z() || std::abs(p_C.y()) > 0.7 * p_C.z() ||
+          hidden(T_WB.p, p_W, t_s, corners_[i].mover)) {
+        if (followed) it->second.followed = false;
+        continue;
+      }
+      if (followed && rng_.uniform() > o_.lost_share) {
+        Track& track = it->second;
+        track.slide += track.step + (t_s < o_.bad_start_s ? 5 : 1) * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
+        const auto left = observe(flight_.rig.left, p_C, track.slide);
+        if (left && track.slide.norm() < 8) add(track, *left, p_W);
+        else track.followed = false;
+        continue;
+      }
+      if (followed) it->second.followed = false;
+      if (it != tracks_.end() && static_cast<int>(out.features.size()) < o_.features &&
+          known_again(it->second, p_W, T_WB.p, drift)) {
+        Track& track = it->second;
+        track.slide = 0.3 * Vec2(rng_.normal(), rng_.normal());
+        const auto left = observe(flight_.rig.left, p_C, track.slide);
+        if (left) {
+          add(track, *left, p_W);
+          ++out.stats.recognised;
+        }
+        continue;
+      }
+      fresh.push_back(i);
+    }
+    while (static_cast<int>(out.features.size()) < o_.features && !fresh.empty()) {
+      const auto n = static_cast<std::size_t>(rng_.below(static_cast<std::uint32_t>(fresh.size())));
+      const std::size_t i = fresh[n];
+      fresh[n] = fresh.back();
+      fresh.pop_back();
+      const Vec3 p_W = position(corners_[i], t_s);
+      const auto left = observe(flight_.rig.left, T_C0W * p_W, Vec2::Zero());
+      if (!left) continue;
+      Track track;
+      track.id = TrackId{next_track_++};
+      if (rng_.uniform() < o_.bad_share) track.step = 10 * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
+      add(tracks_[i] = track, *left, p_W);
+    }
+  }
+
+  const Simulation& flight_;
+  TrackOptions o_;
+  Rng rng_;
+  std::vector<Corner> corners_;
+  std::vector<Mover> movers_;
+  std::map<std::size_t, Track> tracks_;  // of each corner, the last
+  std::map<TrackId, Vec3> located_;
+  std::vector<double> motion_px_;
+  std::int64_t next_track_ = 0;
+};
+
+}  // namespace fbvins::bench

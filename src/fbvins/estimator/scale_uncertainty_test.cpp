@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/scale_uncertainty.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+TEST(ScaleUncertainty, IsAsLargeAsThatOfTheBaseline) {
+  const Pose<B, C0> left{Quat::Identity(), Vec3(0.02, 0.055, 0.01)};
+  const Pose<B, C1> right{Quat::Identity(), Vec3(0.02, -0.055, 0.01)};
+  EXPECT_NEAR(scale_sigma(left, right), 0.0003 / 0.11, 1e-15);
+}
+
+TEST(ScaleUncertainty, ErrorsOfRandomScalesAreAsLargeAsItSays) {
+  Rng rng(3);
+  const Vec3 from_start(8, -3, 1);
+  const double sigma = 0.003;
+  Mat3 covariance = 1e-8 * Mat3::Identity();
+  add_scale(from_start, sigma, covariance);
+  const Mat3 information = covariance.inverse();
+  double sum = 0;
+  constexpr int kFlights = 4000;
+  for (int i = 0; i < kFlights; ++i) {
+    const Vec3 error = sigma * rng.normal() * from_start;
+    sum += error.dot(information * error);
+  }
+  EXPECT_NEAR(sum / kFlights, 1, 0.08);  // one direction
+}
+
+}  // namespace
+}  // namespace fbvins
