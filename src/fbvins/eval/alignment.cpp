@@ -102,7 +102,7 @@ Result<LevelledStart> align_start_levelled(const std::vector<PosePair>& pairs) {
   Vec3 up_in_truth = Vec3::Zero();
   for (std::size_t i = pairs.size() / 2; i < pairs.size(); ++i)
     up_in_truth += pairs[i].truth.T.q * (pairs[i].estimate.T.q.conjugate() * Vec3::UnitZ());
-  const Quat level = up_in_truth.isZero() ? Quat::Identity() : Quat::FromTwoVectors(up_in_truth, Vec3::UnitZ());
+  const Quat level = up_in_truth.isZero() ? Quat::Identity() : so3_between(up_in_truth, Vec3::UnitZ());
   std::vector<PosePair> levelled = pairs;
   for (PosePair& pair : levelled) pair.truth.T = Similarity{1, level, Vec3::Zero()} * pair.truth.T;
   const Result<Similarity> start = align_start(levelled);
