@@ -21,6 +21,7 @@ constexpr const char* kExamples = R"(examples:
   fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
   fbvins report out/MH_01_easy-*                both in one page: report.html
   fbvins info MH_01_easy                        what is in a recording
+  fbvins doctor MH_01_easy                      what is wrong with its setup
   fbvins config                                 options with unit, default, meaning
 
 exit codes: 0 fine, 1 no pose could be estimated, 2 wrong usage or bad input

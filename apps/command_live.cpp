@@ -2,18 +2,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <mutex>
-#include <thread>
 
 #include "apps/commands.hpp"
 #include "apps/config_arguments.hpp"
 #include "apps/imu_state.hpp"
 #include "apps/kept_map.hpp"
+#include "apps/live_check.hpp"
 #include "apps/live_files.hpp"
 #include "apps/live_summary.hpp"
 #include "apps/open_source.hpp"
@@ -25,7 +23,6 @@
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
-#include "fbvins/live/sensor_check.hpp"
 #include "fbvins/live/sensor_faults.hpp"
 #include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
@@ -57,7 +54,7 @@ examples:
   fbvins live --source replay:MH_01_easy --map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
-  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, units
+  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor says
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
@@ -146,35 +143,6 @@ Result<void> write_results(const Arguments& arguments, const Config& config, con
   }
   if (Result<void> done = write_text(arguments.out + "/summary.json", to_json_text(summary)); !done) return done;
   return write_text(arguments.out + "/summary.txt", to_text(summary));
-}
-
-/// Before the first flight: what comes, how often, by which clock. 1 where something is wrong.
-int check_sensors(Source& source, double seconds) {
-  SensorCheck check(source.rig(), source.clock_rate());
-  std::condition_variable ended;
-  std::mutex mutex;
-  bool over = false;
-  std::jthread timer([&] {
-    std::unique_lock lock(mutex);
-    ended.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return over; });
-    source.stop();
-  });
-  const Result<void> done = [&] {
-    const StopSignal stop([&] { source.stop(); });
-    return source.run(check);
-  }();
-  {
-    const std::lock_guard lock(mutex);
-    over = true;
-    ended.notify_all();
-  }
-  if (!done) return fail(done.error().message);
-  bool fine = true;
-  for (const SensorFinding& finding : check.findings()) {
-    fmt::print("{}  {}\n", finding.fine ? "ok   " : "WRONG", finding.text);
-    fine = fine && finding.fine;
-  }
-  return fine ? kOk : kSensorsWrong;
 }
 
 int run(const Arguments& arguments) {

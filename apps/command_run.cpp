@@ -64,7 +64,9 @@ int run(const Arguments& arguments) {
 
   const auto flight = [&] {
     Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
-    return run_flight(arguments.flight, *config, **data, [&](int frames) { progress.update(frames); });
+    return run_flight(
+        arguments.flight, *config, **data,
+        {.on_frame = [&](int frames) { progress.update(frames); }, .on_finding = [](const Finding& f) { warn(to_text(f)); }});
   }();
   if (!flight) return fail(flight.error().message);
 

@@ -22,6 +22,7 @@ enum ExitCode : int {
 inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
 inline constexpr const char* kEvalDescription = "say how far a trajectory is from the ground truth";
 inline constexpr const char* kInfoDescription = "say what is in a recording: rates, gaps, calibration, stamps";
+inline constexpr const char* kDoctorDescription = "say what is wrong with a setup: units, axes, clocks, calibration, images";
 inline constexpr const char* kMapDescription = "look at, join and export maps that `run --save-map` wrote";
 inline constexpr const char* kVocabDescription = "train or look at a vocabulary of visual words";
 inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
@@ -33,6 +34,7 @@ inline constexpr const char* kMocapDescription = "align motion capture with an e
 void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);
 void add_info_command(CLI::App& program, int& exit_code);
+void add_doctor_command(CLI::App& program, int& exit_code);
 void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
                               {"convert", kConvertDescription, kBags},
                               {"live", kLiveDescription, "fbvins-live"},
                               {"eval", kEvalDescription, "fbvins-tools"},
+                              {"doctor", kDoctorDescription, "fbvins-tools"},
                               {"info", kInfoDescription, "fbvins-tools"},
                               {"map", kMapDescription, "fbvins-tools"},
                               {"mocap", kMocapDescription, "fbvins-tools"},

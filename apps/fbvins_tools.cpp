@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// fbvins-tools, to which `fbvins` hands what looks at files: recordings, trajectories, maps, vocabularies, motion capture.
+// fbvins-tools, to which `fbvins` hands what looks at files: recordings and their setup, trajectories, maps, vocabularies, motion capture.
 #include "apps/command_line.hpp"
 
 int main(int argc, char** argv) {
   using namespace fbvins::app;
   return run_command_line(argc, argv,
-                          {add_eval_command, add_info_command, add_map_command, add_mocap_command, add_vocab_command});
+                          {add_doctor_command, add_eval_command, add_info_command, add_map_command, add_mocap_command, add_vocab_command});
 }

@@ -51,7 +51,7 @@ bool is_foreign_calibration(const std::string& path) {
 }  // namespace
 
 bool is_for_bags(int argc, char** argv) {
-  if (argc < 3 || (argv[1] != std::string_view("run") && argv[1] != std::string_view("info"))) return false;
+  if (argc < 3 || (argv[1] != std::string_view("run") && argv[1] != std::string_view("info") && argv[1] != std::string_view("doctor"))) return false;
   for (int i = 2; i < argc; ++i) {
     const std::string_view argument = argv[i], before = argv[i - 1];
     if (argument.starts_with("--topics")) return true;

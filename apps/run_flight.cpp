@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "apps/imu_state.hpp"
+#include "fbvins/checkup/first_seconds.hpp"
 #include "fbvins/config/config_file.hpp"
 #include "fbvins/pipeline/system.hpp"
 
@@ -21,7 +22,7 @@ Result<void> keep_imu_state(const std::string& path, const RunRecord& run, const
 }
 
 Result<Flight> process(const FlightArguments& arguments, const Config& config, Dataset& data, LoopMap* map,
-                       const std::function<void(int frames)>& on_frame) {
+                       const FlightListener& listener) {
   const auto imu_state = load_imu_state(arguments.imu_state, data.rig().imu_noise);
   if (!imu_state) return imu_state.error();
   Flight flight;
@@ -35,24 +36,32 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
   system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
   system->on_odometry([&](const Odometry& o) { flight.run.odometry.push_back(o); });
   system->on_map_update([&](MapUpdate u) { flight.map->updates.push_back((u.corrected.clear(), std::move(u))); });
+  FirstSeconds look(data.rig());
+  bool looking = listener.on_finding != nullptr;
+  const auto end_look = [&] {
+    looking = false;
+    for (const Finding& finding : look.findings()) listener.on_finding(finding);
+  };
   int frames = 0;
   while (auto event = data.next()) {
+    if (looking) look.push(*event);
+    if (looking && look.is_over()) end_look();
     const bool is_frame = std::holds_alternative<StereoFrame>(*event);
     if (Result<void> taken = system->push(std::move(*event)); !taken) return taken.error();
-    if (is_frame) on_frame(++frames);
+    if (is_frame && listener.on_frame) listener.on_frame(++frames);
   }
+  if (looking) end_look();
   if (Result<void> done = system->finish(); !done) return done.error();
   return flight;
 }
 
 }  // namespace
 
-Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data,
-                          const std::function<void(int frames)>& on_frame) {
+Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data, const FlightListener& listener) {
   const auto start = std::chrono::steady_clock::now();
   const auto map = make_map(arguments.map, data.rig(), config.loop);
   if (!map) return map.error();
-  Result<Flight> flight = process(arguments, config, data, map->get(), on_frame);
+  Result<Flight> flight = process(arguments, config, data, map->get(), listener);
   if (!flight) return flight;
   if (flight->map) {
     finish_map(arguments.map, **map, flight->run, *flight->map);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording through the odometry, and what is kept of it: what `fbvins run` and fbvins.run() of Python have in common.
 //
-//   Result<Flight> flight = run_flight(arguments, config, dataset, [](int frames) { ... });
+//   Result<Flight> flight = run_flight(arguments, config, dataset, {.on_frame = [](int frames) { ... }});
 //   RunSummary summary = summarise(*flight, dataset, config, arguments);
 //   Result<void> written = write_flight(*flight, summary, config, dataset.ground_truth(), folder);
 #pragma once
@@ -13,6 +13,7 @@
 #include "apps/run_map.hpp"
 #include "apps/run_output.hpp"
 #include "apps/run_summary.hpp"
+#include "fbvins/checkup/finding.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/io/dataset.hpp"
 
@@ -30,9 +31,14 @@ struct Flight {
   double wall_s = 0;
 };
 
-/// Sends the whole recording through the system, ends the map and saves it. `on_frame` is told how many frames have gone in.
-Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data,
-                          const std::function<void(int frames)>& on_frame);
+/// Who is told of a flight while it goes on; each may be empty.
+struct FlightListener {
+  std::function<void(int frames)> on_frame = {};        ///< how many have gone in
+  std::function<void(const Finding&)> on_finding = {};  ///< what the first seconds show of a wrong setup
+};
+
+/// Sends the whole recording through the system, ends the map and saves it.
+Result<Flight> run_flight(const FlightArguments& arguments, const Config& config, Dataset& data, const FlightListener& listener);
 
 RunSummary summarise(const Flight& flight, const Dataset& data, const Config& config, const FlightArguments& arguments);
 

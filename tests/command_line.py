@@ -62,7 +62,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
-        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"]):
+        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)
@@ -82,6 +82,7 @@ class CommandLine(unittest.TestCase):
     def test_input_that_is_not_there(self):
         self.assert_bad_input(fbvins("run", self.folder / "none"), "none")
         self.assert_bad_input(fbvins("info", self.folder / "none"), "none")
+        self.assert_bad_input(fbvins("doctor", self.folder / "none"), "none")
         self.assert_bad_input(fbvins("eval", self.folder / "none", self.folder / "none"), "none")
         self.assert_bad_input(fbvins("info", self.folder), str(self.folder))
         self.assert_bad_input(fbvins("report", self.folder), "summary.json")
@@ -139,6 +140,30 @@ class CommandLine(unittest.TestCase):
         words = pathlib.Path(__file__).resolve().parents[1] / "data" / "orb_vocabulary.fbv"
         self.assert_bad_input(fbvins(*run, "--load-map", boosted, "--vocabulary", words), "'orb'", "'boosted'")
         self.assert_bad_input(fbvins("map", "merge", self.folder / "a.fbm", boosted, "-o", self.folder / "c.fbm"), "boosted")
+
+    def test_doctor(self):
+        """Silent of a good recording; of one whose accelerometer is in g, and whose images are exchanged, it says so, as the run does."""
+        flight = self.folder / "flight"
+        self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 3, "--quiet").returncode, 0)
+        done = fbvins("doctor", flight)
+        self.assertEqual((done.returncode, done.stdout), (0, ""), done)
+        self.assertIn("measured: ", fbvins("doctor", flight, "--all").stdout)
+        readings = flight / "mav0" / "imu0" / "data.csv"
+        rows = [row.split(",") for row in readings.read_text(encoding="utf-8").splitlines()]
+        readings.write_text("\n".join(",".join(row if row[0].startswith("#") else row[:4] + [str(float(a) / 9.80665) for a in row[4:]])
+                                      for row in rows) + "\n", encoding="utf-8")
+        kept = self.folder / "kept"
+        for what in ("", "sensor.yaml"):  # the folders, and the calibrations back to where they were
+            left, right = flight / "mav0" / "cam0" / what, flight / "mav0" / "cam1" / what
+            left.rename(kept), right.rename(left), kept.rename(right)
+        done = fbvins("doctor", flight, "--json")
+        self.assertEqual(done.returncode, 1, done)
+        kinds = {finding["kind"] for finding in json.loads(done.stdout)["findings"]}
+        self.assertIn("accel_units", kinds)
+        self.assertIn("swapped_images", kinds)
+        said = fbvins("run", flight, "--out", self.folder / "out", "--quiet").stderr
+        self.assertIn("accel_units: ", said)
+        self.assertIn("swapped_images: ", said)
 
     def test_mocap(self):
         estimate, quad, wand = [], [], []

@@ -40,7 +40,7 @@ PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool fi
   PyRun out;
   auto flight = [&] {
     nb::gil_scoped_release released;
-    return app::run_flight(arguments, config, data, look);
+    return app::run_flight(arguments, config, data, {.on_frame = look});
   }();
   out.flight = value_or_raise(std::move(flight));
   if (out.flight.map && !out.flight.map->not_saved.empty()) raise(Error{ErrorCode::unwritable, out.flight.map->not_saved});

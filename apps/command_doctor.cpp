@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/evaluation_report.hpp"
+#include "apps/open_recording.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/doctor/doctor.hpp"
+#include "fbvins/doctor/gather.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(Says what is wrong with a setup: units, signs and axes of the IMU, its clock and mounting against the cameras, the cameras'
+calibration against each other, and the images themselves. Each finding says what was measured and how well, what it
+should be, what to do, and the calibration's line as it should be. Nothing is printed where all is well.
+It looks at the first 40 s of motion; a recording in which the rig is turned and moved about all axes shows most.
+
+examples:
+  fbvins doctor MH_01_easy
+  fbvins doctor flight --calibration camchain-imucam.yaml
+  fbvins doctor flight.mcap --all                what was measured, whether right or wrong, and what could not be judged
+  fbvins doctor flight --json
+
+exit codes: 0 all is well, 1 something is wrong, 2 wrong usage or bad input
+)";
+
+struct Arguments {
+  RecordingArguments recording;
+  bool all = false, json = false;
+};
+
+Json to_json(const Diagnosis& diagnosis) {
+  Json findings = Json::array();
+  for (const Finding& f : diagnosis.findings)
+    findings.push_back({{"kind", std::string(to_string(f.kind))},
+                        {"size", f.size},
+                        {"sigma", f.sigma},
+                        {"unit", f.unit},
+                        {"measured", f.measured},
+                        {"expected", f.expected},
+                        {"advice", f.advice},
+                        {"corrected", f.corrected}});
+  return Json{{"findings", findings}, {"measured", diagnosis.measured}, {"not_judged", diagnosis.not_judged}};
+}
+
+int examine_recording(const Arguments& arguments) {
+  const auto data = open_recording(arguments.recording, {});
+  if (!data) return fail(data.error().message);
+  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  EvidenceGatherer gatherer((*data)->rig());
+  while (auto event = (*data)->next())
+    if (!gatherer.push(*event)) break;
+  const bool kalibr = !arguments.recording.calibration.empty();
+  const Diagnosis diagnosis = examine(gatherer.finish(), kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
+  if (arguments.json) {
+    fmt::print("{}\n", to_json(diagnosis).dump(2));
+  } else {
+    for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
+    if (arguments.all) {
+      for (const std::string& text : diagnosis.measured) fmt::print("measured: {}\n", text);
+      for (const std::string& text : diagnosis.not_judged) fmt::print("not judged: {}\n", text);
+    }
+  }
+  return diagnosis.findings.empty() ? kOk : kSensorsWrong;
+}
+
+}  // namespace
+
+void add_doctor_command(CLI::App& program, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("doctor", kDoctorDescription);
+  command->footer(kExamples);
+  arguments->recording.add_to(*command);
+  command->add_flag("--all", arguments->all, "what was measured, and what could not be judged, too");
+  command->add_flag("--json", arguments->json, "print JSON");
+  command->callback([arguments, &exit_code] { exit_code = examine_recording(*arguments); });
+}
+
+}  // namespace fbvins::app

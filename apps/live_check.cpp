@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/live_check.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "apps/commands.hpp"
+#include "apps/stop_signal.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/doctor/doctor.hpp"
+#include "fbvins/doctor/gather.hpp"
+#include "fbvins/live/sensor_check.hpp"
+
+namespace fbvins::app {
+namespace {
+
+/// Stereo images kept for the doctor: fifteen seconds at twenty a second, 200 MB of VGA.
+constexpr int kMostImages = 300;
+
+/// Sensor data for a look at how they arrive, kept for the doctor, who looks when all have come: nothing waits for him.
+class CheckedInput final : public SensorInput {
+ public:
+  explicit CheckedInput(SensorCheck& check) : check_(check) {}
+  void push(const ImuSample& sample) override {
+    check_.push(sample);
+    const std::lock_guard lock(mutex_);
+    events_.emplace_back(sample);
+  }
+  void push(StereoFrame frame) override {
+    check_.push(frame);
+    const std::lock_guard lock(mutex_);
+    if (images_++ >= kMostImages) return;
+    frame.left = own(frame.left);
+    frame.right = own(frame.right);
+    events_.emplace_back(std::move(frame));
+  }
+  /// After the source has ended.
+  Diagnosis diagnosis(const StereoRig& rig) const {
+    EvidenceGatherer gatherer(rig);
+    for (const SensorEvent& event : events_) gatherer.push(event);
+    return examine(gatherer.finish(), CalibrationStyle::kalibr);
+  }
+
+ private:
+  /// A driver's buffers are few, and not to be held.
+  static std::shared_ptr<const Image> own(const std::shared_ptr<const Image>& image) {
+    if (!image || !image->foreign()) return image;
+    auto copy = std::make_shared<Image>(*image);
+    copy->row(0);
+    return copy;
+  }
+  SensorCheck& check_;
+  std::mutex mutex_;
+  std::vector<SensorEvent> events_;
+  int images_ = 0;
+};
+
+}  // namespace
+
+int check_sensors(Source& source, double seconds) {
+  SensorCheck check(source.rig(), source.clock_rate());
+  CheckedInput input(check);
+  std::condition_variable ended;
+  std::mutex mutex;
+  bool over = false;
+  std::jthread timer([&] {
+    std::unique_lock lock(mutex);
+    ended.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return over; });
+    source.stop();
+  });
+  const Result<void> done = [&] {
+    const StopSignal stop([&] { source.stop(); });
+    return source.run(input);
+  }();
+  {
+    const std::lock_guard lock(mutex);
+    over = true;
+    ended.notify_all();
+  }
+  if (!done) return fail(done.error().message);
+  bool fine = true;
+  for (const SensorFinding& finding : check.findings()) {
+    fmt::print("{}  {}\n", finding.fine ? "ok   " : "WRONG", finding.text);
+    fine = fine && finding.fine;
+  }
+  for (const Finding& finding : input.diagnosis(source.rig()).findings) {
+    fmt::print("WRONG  {}\n", to_text(finding));
+    fine = false;
+  }
+  return fine ? kOk : kSensorsWrong;
+}
+
+}  // namespace fbvins::app

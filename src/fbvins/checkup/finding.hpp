@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is wrong with a setup: what was measured and how well, what it should be, what to do. Values.
+//
+//   for (const Finding& finding : findings) fmt::print("{}\n", to_text(finding));
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fbvins {
+
+enum class FindingKind {
+  // the IMU alone
+  gyro_units,
+  accel_units,
+  gyro_axes,
+  accel_axes,
+  gyro_scale,
+  saturation,
+  vibration,
+  imu_stamps,
+  // camera and IMU
+  clocks_apart,
+  time_offset,
+  imu_camera_rotation,
+  imu_camera_disagree,
+  // the pair of cameras
+  swapped_images,
+  same_image_twice,
+  stereo_sync,
+  right_camera_turned,
+  baseline_direction,
+  baseline_length,
+  epipolar_error,
+  no_stereo,
+  // a lens
+  focal_length,
+  principal_point,
+  distortion,
+  // the images
+  image_stamps,
+  frozen_images,
+  blur,
+  rolling_shutter,
+  projector_dots,
+  fixed_in_view,
+};
+
+/// As in docs/doctor.md, which says more of each.
+std::string_view to_string(FindingKind kind);
+
+struct Finding {
+  FindingKind kind = FindingKind::gyro_units;
+  double size = 0;   ///< how wrong, in `unit`
+  double sigma = 0;  ///< standard deviation of size; 0 where it was counted
+  std::string unit;
+  std::string measured;   ///< a sentence without its full stop, with the uncertainty
+  std::string expected;   ///< the same: what it should be
+  std::string advice;     ///< the same: what to do
+  std::string corrected;  ///< lines of the calibration file, corrected; empty where no line is wrong
+};
+
+/// "KIND: measured; expected; advice" and the corrected lines, indented.
+std::string to_text(const Finding& finding);
+
+}  // namespace fbvins

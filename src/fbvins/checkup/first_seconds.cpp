@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/checkup/first_seconds.hpp"
+
+#include <utility>
+
+#include "fbvins/checkup/reading_units.hpp"
+#include "fbvins/checkup/stamps.hpp"
+#include "fbvins/checkup/stereo_order.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kLook_s = 5;
+/// Of the stereo images, those that are looked into.
+constexpr std::size_t kKept = 3;
+
+}  // namespace
+
+void FirstSeconds::push(const SensorEvent& event) {
+  if (is_over()) return;
+  if (const auto* sample = std::get_if<ImuSample>(&event)) {
+    samples_.push_back(*sample);
+    return;
+  }
+  const StereoFrame& frame = std::get<StereoFrame>(event);
+  images_.push_back(frame.t);
+  const double due_s = kLook_s * static_cast<double>(kept_.size()) / kKept;
+  if (kept_.size() < kKept && (frame.t - images_.front()).seconds() >= due_s) kept_.push_back(frame);
+}
+
+bool FirstSeconds::is_over() const { return !images_.empty() && (images_.back() - images_.front()).seconds() >= kLook_s; }
+
+std::vector<Finding> FirstSeconds::findings() const {
+  std::vector<Finding> findings = check_reading_units(samples_);
+  for (Finding& finding : check_stamps(samples_, images_, rig_)) findings.push_back(std::move(finding));
+  if (auto finding = check_stereo_order(stereo_order(rig_, kept_))) findings.push_back(std::move(*finding));
+  return findings;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The doctor's short form: what the first seconds of a recording tell without an estimate. Costs a few milliseconds.
+// One thread calls.
+//
+//   FirstSeconds look(rig);
+//   while (auto event = data.next()) { look.push(*event); if (look.is_over()) report(look.findings()); ... }
+#pragma once
+
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/checkup/finding.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+class FirstSeconds {
+ public:
+  explicit FirstSeconds(const StereoRig& rig) : rig_(rig) {}
+
+  void push(const SensorEvent& event);
+  /// Enough has been seen; what comes later is not looked at.
+  bool is_over() const;
+  /// Units, stamps, left and right exchanged. Also after a recording shorter than that.
+  std::vector<Finding> findings() const;
+
+ private:
+  StereoRig rig_;
+  std::vector<ImuSample> samples_;
+  std::vector<Time> images_;
+  std::vector<StereoFrame> kept_;  ///< a few, spread over the time
+};
+
+}  // namespace fbvins

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/checkup/reading_units.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "fbvins/frontend/median.hpp"
+#include "fbvins/imu/nav_state.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kPart_s = 0.5;
+constexpr std::size_t kFewestParts = 4;
+/// Gravity may look this much stronger or weaker: 3 % of an accelerometer's scale, a bias of 0.5 m/s^2, a second of climbing.
+constexpr double kGravityTolerance = 0.15;
+/// Half of all readings turn faster than this: no vehicle that a camera could follow.
+constexpr double kSpinning_radps = 6;
+
+struct Unit {
+  double gravity;  ///< in this unit
+  const char* looks_like;
+  const char* advice;
+};
+constexpr Unit kUnits[] = {
+    {1.0, "g", "multiply the accelerometer's readings by 9.80665"},
+    {1000.0, "thousandths of g", "multiply the accelerometer's readings by 0.00980665"},
+    {9810.0, "mm/s^2", "multiply the accelerometer's readings by 0.001"},
+    {981.0, "cm/s^2", "multiply the accelerometer's readings by 0.01"},
+    {32.17, "feet/s^2", "multiply the accelerometer's readings by 0.3048"},
+};
+
+bool near_to(double value, double wanted) { return std::abs(value / wanted - 1) < kGravityTolerance; }
+
+void check_accelerometer(std::span<const ImuSample> samples, std::vector<Finding>& findings) {
+  const GravitySeen seen = gravity_seen(samples);
+  if (seen.sigma_mps2 == 0 || near_to(seen.norm_mps2, kGravity_mps2)) return;
+  Finding finding;
+  finding.kind = FindingKind::accel_units;
+  finding.size = seen.norm_mps2 / kGravity_mps2, finding.sigma = seen.sigma_mps2 / kGravity_mps2;
+  finding.unit = "of gravity";
+  finding.measured = fmt::format("the accelerometer's mean reading is {:.4g} +- {:.2g}", seen.norm_mps2, seen.sigma_mps2);
+  finding.expected = "gravity alone is 9.81 m/s^2";
+  finding.advice = seen.norm_mps2 < 0.3 * kGravity_mps2
+                       ? "gravity seems to have been taken out: give the readings as the sensor has them"
+                       : "find out the unit of the readings, and give m/s^2";
+  for (const Unit& unit : kUnits)
+    if (near_to(seen.norm_mps2, unit.gravity)) finding.advice = fmt::format("it looks like {}: {}", unit.looks_like, unit.advice);
+  findings.push_back(std::move(finding));
+}
+
+void check_gyroscope(std::span<const ImuSample> samples, std::vector<Finding>& findings) {
+  std::vector<double> rates;
+  rates.reserve(samples.size());
+  for (const ImuSample& sample : samples) rates.push_back(sample.gyro_radps.norm());
+  const double typical = median(rates);
+  if (typical < kSpinning_radps) return;
+  Finding finding;
+  finding.kind = FindingKind::gyro_units;
+  finding.size = 180 / std::numbers::pi;
+  finding.unit = "times too large";
+  finding.measured = fmt::format("half of the gyroscope's readings are above {:.1f}", typical);
+  finding.expected = fmt::format("nothing that a camera follows turns by {} rad/s for long", kSpinning_radps);
+  finding.advice = "it looks like degrees: multiply the gyroscope's readings by pi / 180";
+  findings.push_back(std::move(finding));
+}
+
+}  // namespace
+
+GravitySeen gravity_seen(std::span<const ImuSample> samples) {
+  std::vector<double> norms;
+  Vec3 sum = Vec3::Zero();
+  int count = 0;
+  for (std::size_t i = 0, first = 0; i < samples.size(); ++i) {
+    sum += samples[i].accel_mps2;
+    ++count;
+    if ((samples[i].t - samples[first].t).seconds() < kPart_s) continue;
+    norms.push_back((sum / count).norm());
+    sum.setZero();
+    count = 0;
+    first = i;
+  }
+  if (norms.size() < kFewestParts) return {};
+  const double typical = median(norms);
+  std::vector<double> off;
+  for (const double norm : norms) off.push_back(std::abs(norm - typical));
+  return {typical, std::max(1.48 * median(off) / std::sqrt(static_cast<double>(norms.size())), 1e-9)};
+}
+
+std::vector<Finding> check_reading_units(std::span<const ImuSample> samples) {
+  std::vector<Finding> findings;
+  if (samples.size() < 2 || (samples.back().t - samples.front().t).seconds() < kFewestParts * kPart_s) return findings;
+  check_accelerometer(samples, findings);
+  check_gyroscope(samples, findings);
+  return findings;
+}
+
+}  // namespace fbvins

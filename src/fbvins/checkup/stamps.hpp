@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the stamps of images and readings tell. Pure functions, any thread.
+//
+//   for (Finding& finding : check_stamps(samples, image_stamps, rig)) report(finding);
+#pragma once
+
+#include <span>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/checkup/finding.hpp"
+#include "fbvins/core/time.hpp"
+
+namespace fbvins {
+
+/// Rate and repetition of readings, regularity of images, and whether both tell the same time.
+std::vector<Finding> check_stamps(std::span<const ImuSample> samples, std::span<const Time> images, const StereoRig& rig);
+
+}  // namespace fbvins

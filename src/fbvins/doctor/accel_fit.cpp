@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/accel_fit.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/doctor/axes.hpp"
+#include "fbvins/doctor/block_fit.hpp"
+#include "fbvins/imu/preintegration.hpp"
+#include "fbvins/imu/propagation.hpp"
+
+namespace fbvins {
+namespace {
+
+// Unknowns: the matrix before the readings, row by row, and the accelerometer's bias.
+constexpr int kMatrix = 9, kUnknowns = 12;
+using Vec9 = Eigen::Matrix<double, kMatrix, 1>;
+using VecA = Eigen::Matrix<double, kUnknowns, 1>;
+using MatA = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using Mat3A = Eigen::Matrix<double, 3, kUnknowns>;
+
+constexpr double kWindow_s = 2;
+constexpr std::size_t kFewestPairs = 8, kFewestWindows = 4;
+/// Below this share the readings explain the accelerations that were seen; above, nothing is said of them.
+constexpr double kMostUnexplained = 0.5;
+constexpr double kLeastAcceleration_mps2 = 0.15;
+
+/// Readings summed over a pair, as a linear function of the unknowns.
+struct PairDeltas {
+  Quat q;
+  Mat3A v, p;
+};
+
+PairDeltas deltas_of(const ImuSegment& segment, const ImuNoise& noise, const Vec3& gyro_bias) {
+  PairDeltas out;
+  out.q = integrate_gyro(segment, gyro_bias);
+  for (int k = 0; k < kUnknowns; ++k) {
+    ImuSegment one = segment;
+    for (ImuSample& sample : one.samples)
+      sample.accel_mps2 = k < kMatrix ? Vec3(sample.accel_mps2(k % 3) * Vec3::Unit(k / 3)) : Vec3(Vec3::Unit(k - kMatrix));
+    Preintegration sum(noise, {gyro_bias, Vec3::Zero()});
+    sum.integrate(one);
+    out.v.col(k) = sum.delta_v();
+    out.p.col(k) = sum.delta_p();
+  }
+  return out;
+}
+
+/// Half the squared disagreement of the unknowns a: a^T H a / 2 - b^T a + c / 2, velocity and gravity of each window at their
+/// best.
+struct Agreement {
+  MatA H = MatA::Zero();
+  VecA b = VecA::Zero();
+  double c = 0;
+
+  void operator+=(const Agreement& other) { H += other.H, b += other.b, c += other.c; }
+};
+
+struct Window {
+  std::size_t first, last;  ///< pairs [first, last)
+};
+
+std::vector<Window> windows_of(const std::vector<FramePair>& pairs, const ImuSeries& imu, Duration offset) {
+  std::vector<Window> windows;
+  std::size_t first = 0;
+  const auto close = [&](std::size_t last) {
+    if (last - first >= kFewestPairs) windows.push_back({first, last});
+    first = last;
+  };
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (k > first && pairs[k].frame_a != pairs[k - 1].frame_b) close(k);
+    if (!imu.covers(pairs[k].a + offset, pairs[k].b + offset)) {
+      close(k);
+      first = k + 1;
+      continue;
+    }
+    if ((pairs[k].b - pairs[first].a).seconds() > kWindow_s) close(k + 1);
+  }
+  if (first < pairs.size()) close(pairs.size());
+  return windows;
+}
+
+Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
+                       const Pose<B, C0>& T_BC0, double scale) {
+  using Mat36 = Eigen::Matrix<double, 3, 6>;
+  using Mat6A = Eigen::Matrix<double, 6, kUnknowns>;
+  Mat6 N = Mat6::Zero();
+  Mat6A M = Mat6A::Zero();
+  Vec6 m = Vec6::Zero();
+  Agreement out;
+  Quat R = Quat::Identity();       // of the pair's first frame in the window's
+  Mat3A velocity = Mat3A::Zero();  // gained so far
+  double elapsed_s = 0;
+  for (std::size_t k = window.first; k < window.last; ++k) {
+    const double dt = pairs[k].dt_s();
+    const Mat3 E = deltas[k].q.toRotationMatrix(), R_now = R.toRotationMatrix();
+    const Vec3 y = R_now * (T_BC0.R() * pairs[k].p_CaCb + (T_BC0.p - E * T_BC0.p) * scale);
+    const Mat3A X = dt * velocity + R_now * deltas[k].p;
+    Mat36 Z;
+    Z << dt * Mat3::Identity(), (elapsed_s * dt + 0.5 * dt * dt) * Mat3::Identity();
+    N += Z.transpose() * Z;
+    M += Z.transpose() * X;
+    m += Z.transpose() * y;
+    out.H += X.transpose() * X;
+    out.b += X.transpose() * y;
+    out.c += y.squaredNorm();
+    velocity += R_now * deltas[k].v;
+    elapsed_s += dt;
+    R = (R * deltas[k].q).normalized();
+  }
+  const Mat6 inverse = N.inverse();
+  out.H -= M.transpose() * inverse * M;
+  out.b -= M.transpose() * inverse * m;
+  out.c -= m.dot(inverse * m);
+  return out;
+}
+
+Vec9 row_by_row(const Mat3& A) {
+  Vec9 a;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) a(3 * i + j) = A(i, j);
+  return a;
+}
+
+struct Explained {
+  double scale = 0, unexplained = 1;
+};
+Explained explained_by(const Mat3& axes, const Agreement& all) {
+  using Mat4 = Eigen::Matrix4d;
+  using Vec4 = Eigen::Vector4d;
+  Eigen::Matrix<double, kUnknowns, 4> chosen = Eigen::Matrix<double, kUnknowns, 4>::Zero();
+  chosen.block<kMatrix, 1>(0, 0) = row_by_row(axes);
+  chosen.bottomRightCorner<3, 3>().setIdentity();
+  Mat4 H = chosen.transpose() * all.H * chosen;
+  H.diagonal().tail<3>().array() += 1e-6 * H.diagonal().tail<3>().sum();  // a rig that does not turn shows no bias
+  const Vec4 b = chosen.transpose() * all.b, x = H.ldlt().solve(b);
+  if (!x.allFinite() || !(x(0) > 0)) return {};
+  return {x(0), 1 - b.dot(x) / all.c};
+}
+
+struct Summed {
+  Agreement all;
+  std::array<Agreement, BlockFit::kStretches> stretch;
+};
+
+Summed sum_up(const std::vector<Window>& windows, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
+              const Pose<B, C0>& T_BC0, double scale) {
+  Summed out;
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const Agreement one = agreement_of(windows[w], pairs, deltas, T_BC0, scale);
+    out.stretch[w * BlockFit::kStretches / windows.size()] += one;
+    out.all += one;
+  }
+  return out;
+}
+
+/// Jackknife over the stretches.
+double scale_sigma(const Summed& sums, const Mat3& axes) {
+  std::vector<double> without;
+  for (const Agreement& stretch : sums.stretch) {
+    if (stretch.c == 0) continue;
+    Agreement rest = sums.all;
+    rest.H -= stretch.H, rest.b -= stretch.b, rest.c -= stretch.c;
+    without.push_back(explained_by(axes, rest).scale);
+  }
+  double mean = 0, square = 0;
+  const auto n = static_cast<double>(without.size());
+  for (const double s : without) mean += s / n;
+  for (const double s : without) square += (s - mean) * (s - mean);
+  return std::sqrt((n - 1) / n * square);
+}
+
+/// Root mean square of what is not steady in the seen motion, as an acceleration.
+double acceleration_of(const Summed& sums, const std::vector<Window>& windows, const std::vector<FramePair>& pairs) {
+  // A displacement of c^(1/2) over a window comes of an acceleration of about so much over its half.
+  double count = 0, dt2 = 0;
+  for (const Window& w : windows)
+    for (std::size_t k = w.first; k < w.last; ++k) count += 1, dt2 += std::pow(pairs[k].dt_s(), 2);
+  const double per_pair_m = std::sqrt(sums.all.c / std::max(count, 1.0));
+  return per_pair_m / (std::sqrt(dt2 / std::max(count, 1.0)) * 0.25 * kWindow_s);
+}
+
+}  // namespace
+
+AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries& imu, const StereoRig& rig,
+                           const AccelStart& start) {
+  AccelFit fit;
+  const Duration offset = Duration::from_seconds(start.offset_s);
+  const std::vector<Window> windows = windows_of(pairs, imu, offset);
+  if (windows.size() < kFewestWindows) return fit;
+  std::vector<PairDeltas> deltas(pairs.size());
+  for (const Window& w : windows)
+    for (std::size_t k = w.first; k < w.last; ++k)
+      deltas[k] = deltas_of(imu.segment(pairs[k].a + offset, pairs[k].b + offset), rig.imu_noise, start.gyro_bias_radps);
+  Summed sums = sum_up(windows, pairs, deltas, rig.T_BC0, 1);
+  Explained best;
+  for (const Mat3& axes : signed_permutations()) {
+    const Explained one = explained_by(axes, sums.all);
+    if (one.unexplained < best.unexplained) best = one, fit.axes = axes;
+  }
+  if (best.scale > 0) sums = sum_up(windows, pairs, deltas, rig.T_BC0, best.scale);  // the lever arm is in metres of the readings
+  best = explained_by(fit.axes, sums.all);
+  fit.unexplained = best.unexplained;
+  fit.unexplained_as_named = explained_by(Mat3::Identity(), sums.all).unexplained;
+  fit.scale = best.scale;
+  fit.scale_sigma = scale_sigma(sums, fit.axes);
+  fit.acceleration_mps2 = acceleration_of(sums, windows, pairs);
+  fit.seen = best.scale > 0 && fit.unexplained < kMostUnexplained && fit.acceleration_mps2 > kLeastAcceleration_mps2;
+  return fit;
+}
+
+}  // namespace fbvins

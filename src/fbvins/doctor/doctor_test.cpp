@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// The doctor on made-up evidence: silent where all is well, and each wrong setup named with its size.
+#include "fbvins/doctor/doctor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "fbvins/doctor/made_up_evidence.hpp"
+#include "fbvins/doctor/spoilers.hpp"
+
+namespace fbvins {
+namespace {
+
+const Evidence& good() {
+  static const Evidence evidence = test::MadeUpEvidence({}).make();
+  return evidence;
+}
+
+std::string all_of(const Diagnosis& diagnosis) {
+  std::string text;
+  for (const Finding& finding : diagnosis.findings) text += to_text(finding) + "\n";
+  for (const std::string& line : diagnosis.measured) text += line + "\n";
+  for (const std::string& line : diagnosis.not_judged) text += "not judged: " + line + "\n";
+  return text;
+}
+
+const Finding* find(const Diagnosis& diagnosis, FindingKind kind) {
+  for (const Finding& finding : diagnosis.findings)
+    if (finding.kind == kind) return &finding;
+  return nullptr;
+}
+
+/// The evidence that a spoilt recording leaves: the gatherer's working rig is right but for the length of the baseline.
+Evidence spoilt(const Spoiler& spoiler) {
+  Evidence evidence = good();
+  if (spoiler.rig) spoiler.rig(evidence.rig);
+  const double longer = evidence.rig.T_C1C0().p.norm() / evidence.working_rig.T_C1C0().p.norm();
+  for (SeenFrame& frame : evidence.frames)
+    for (SeenFeature& feature : frame.features) feature.inverse_depth /= longer;
+  if (spoiler.reading)
+    for (ImuSample& sample : evidence.imu) spoiler.reading(sample);
+  return evidence;
+}
+
+void expect_named(const std::string& name) {
+  for (const Spoiler& spoiler : spoilers(good().rig)) {
+    if (spoiler.name != name) continue;
+    const Diagnosis diagnosis = examine(spoilt(spoiler));
+    const Finding* finding = find(diagnosis, spoiler.kind);
+    ASSERT_NE(finding, nullptr) << name << "\n" << all_of(diagnosis);
+    EXPECT_EQ(diagnosis.findings.size(), 1u) << name << "\n" << all_of(diagnosis);
+    if (spoiler.size != 0) {
+      EXPECT_NEAR(finding->size, spoiler.size, spoiler.tolerance) << all_of(diagnosis);
+    }
+    return;
+  }
+  FAIL() << "there is no spoiler '" << name << "'";
+}
+
+TEST(Doctor, IsSilentWhereAllIsWell) {
+  const Diagnosis diagnosis = examine(good());
+  EXPECT_TRUE(diagnosis.findings.empty()) << all_of(diagnosis);
+  EXPECT_TRUE(diagnosis.not_judged.empty()) << all_of(diagnosis);
+}
+
+TEST(Doctor, NamesUnits) {
+  expect_named("gyroscope in degrees");
+  expect_named("gyroscope converted twice");
+  expect_named("accelerometer in g");
+}
+
+TEST(Doctor, NamesAxes) {
+  expect_named("gyroscope: y with the wrong sign");
+  expect_named("gyroscope: axes (y, z, x)");
+  expect_named("accelerometer: x and z exchanged");
+}
+
+TEST(Doctor, MeasuresTheMounting) {
+  expect_named("IMU mounted the other way round");
+  expect_named("mounting wrong by 5 degrees about y");
+}
+
+TEST(Doctor, MeasuresTheTimeOffset) {
+  expect_named("readings stamped +100 ms");
+  expect_named("readings stamped +6 ms");
+  expect_named("readings stamped since power-on");
+}
+
+TEST(Doctor, MeasuresThePairOfCameras) {
+  expect_named("right camera turned 1 degree about x");
+  expect_named("baseline 10 % too long");
+}
+
+TEST(Doctor, MeasuresALens) { expect_named("left focal length 5 % too long"); }
+
+TEST(Doctor, MeasuresARightImageThatIsLate) {
+  const Diagnosis diagnosis = examine(test::MadeUpEvidence({.right_late_s = 0.02}).make());
+  const Finding* finding = find(diagnosis, FindingKind::stereo_sync);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
+}
+
+TEST(Doctor, MeasuresARollingShutter) {
+  const Diagnosis diagnosis = examine(test::MadeUpEvidence({.rolling_s = 0.02}).make());
+  const Finding* finding = find(diagnosis, FindingKind::rolling_shutter);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
+}
+
+TEST(Doctor, SaysWhatCannotBeJudged) {
+  Evidence evidence = good();
+  for (SeenFrame& frame : evidence.frames) frame.features = evidence.frames.front().features;  // at rest
+  const Diagnosis diagnosis = examine(evidence);
+  EXPECT_TRUE(diagnosis.findings.empty()) << all_of(diagnosis);
+  EXPECT_FALSE(diagnosis.not_judged.empty());
+}
+
+TEST(Doctor, GivesTheCorrectedLine) {
+  Evidence evidence = good();
+  for (ImuSample& sample : evidence.imu) sample.t = sample.t + Duration::from_seconds(0.05);
+  const Diagnosis diagnosis = examine(evidence, CalibrationStyle::kalibr);
+  const Finding* finding = find(diagnosis, FindingKind::time_offset);
+  ASSERT_NE(finding, nullptr) << all_of(diagnosis);
+  const std::size_t at = finding->corrected.find("timeshift_cam_imu: ");
+  ASSERT_NE(at, std::string::npos) << finding->corrected;
+  EXPECT_NEAR(std::stod(finding->corrected.substr(at + 19)), 0.05, 1e-3);
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the doctor keeps of a recording's images: where features were seen, not what they looked like. Values.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+/// A feature of a left image.
+struct SeenFeature {
+  std::int64_t id = 0;
+  Vec2 px = Vec2::Zero();    ///< raw image
+  double inverse_depth = 0;  ///< 1/m along z of C0, by the working rig; 0 where it was not matched
+  bool bright_dot = false;   ///< looks like the spot of a projector
+};
+
+struct SeenFrame {
+  Time t;
+  bool has_depths = false;            ///< its features were looked for in the right image
+  Mat2 gradients = Mat2::Zero();      ///< mean of grad grad^T without the noise's part, (grey/px)^2
+  std::vector<SeenFeature> features;  ///< by ascending id
+};
+
+/// The same point in both raw images, found without the calibration.
+struct StereoPoint {
+  Vec2 left = Vec2::Zero(), right = Vec2::Zero();
+};
+struct StereoView {
+  Time t;
+  std::vector<StereoPoint> points;
+};
+
+/// Images that are the image before, and pairs that are one image twice, to the last bit.
+struct RepeatedImages {
+  int frames = 0, left = 0, right = 0, same_pair = 0;
+};
+
+struct Evidence {
+  StereoRig rig;          ///< as calibrated; its cameras exchanged where the images were
+  StereoRig working_rig;  ///< with what the first seconds showed of the stereo pair: good enough for depths
+  StereoOrder order;      ///< of the first seconds' images
+  bool swapped = false;   ///< left and right images were exchanged before anything else was looked at
+  std::vector<ImuSample> imu;
+  std::vector<Time> stamps;  ///< of all stereo images
+  std::vector<SeenFrame> frames;
+  std::vector<StereoView> stereo;
+  RepeatedImages repeated;
+};
+
+}  // namespace fbvins

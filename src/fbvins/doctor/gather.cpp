@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/gather.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/doctor/free_stereo.hpp"
+#include "fbvins/doctor/stereo_fit.hpp"
+#include "fbvins/features/shi_tomasi.hpp"
+#include "fbvins/frontend/klt_follower.hpp"
+#include "fbvins/frontend/klt_stereo.hpp"
+#include "fbvins/frontend/median.hpp"
+#include "fbvins/frontend/track_table.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Images held back at the start, and of these every how manieth is matched left to right.
+constexpr double kPrelude_s = 2;
+constexpr std::size_t kMostHeld = 60, kFewestHeldViews = 6;
+/// Between two images whose stereo matches count, and between two whose features get depths.
+constexpr double kStereoStep_s = 0.25, kDepthStep_s = 0.1;
+/// Enough of a rig in motion, and when to stop waiting for motion.
+constexpr double kMoving_s = 40, kLongest_s = 120;
+/// Features move by this much between images with depths where a rig is in motion, px.
+constexpr double kMoving_px = 1.5;
+constexpr int kFeatures = 150;
+constexpr double kDistance_px = 22, kNearest_m = 0.25, kLongestGap_s = 0.6;
+
+bool same(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Image>& b) {
+  if (!a || !b || a->empty() || a->width() != b->width() || a->height() != b->height()) return false;
+  for (int y = 0; y < a->height(); ++y)
+    if (!std::equal(a->row(y), a->row(y) + a->width(), b->row(y))) return false;
+  return true;
+}
+
+/// A spot of light: much brighter than all that is four pixels away, and nothing around it is.
+bool is_bright_dot(const PyramidLevel& image, const Vec2& px) {
+  const int x = static_cast<int>(std::lround(px.x())), y = static_cast<int>(std::lround(px.y()));
+  constexpr int kRing = 4;
+  if (x < kRing + 1 || y < kRing + 1 || x >= image.width - kRing - 1 || y >= image.height - kRing - 1) return false;
+  int peak = 0;
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) peak = std::max<int>(peak, image.row(y + dy)[x + dx]);
+  int brightest = 0, darkest = 255;
+  for (int i = -kRing; i <= kRing; ++i)
+    for (const int value :
+         {image.row(y - kRing)[x + i], image.row(y + kRing)[x + i], image.row(y + i)[x - kRing], image.row(y + i)[x + kRing]})
+      brightest = std::max<int>(brightest, value), darkest = std::min<int>(darkest, value);
+  return peak - brightest > 12 && peak - brightest > 0.4 * (brightest - darkest);
+}
+
+/// Mean of grad grad^T over a grid, less what noise adds.
+Mat2 gradients_of(const PyramidLevel& image) {
+  Mat2 sum = Mat2::Zero();
+  int count = 0;
+  for (int y = 2; y < image.height - 2; y += 3)
+    for (int x = 2; x < image.width - 2; x += 3) {
+      const Vec2 g(0.5 * (image.row(y)[x + 1] - image.row(y)[x - 1]), 0.5 * (image.row(y + 1)[x] - image.row(y - 1)[x]));
+      sum += g * g.transpose();
+      ++count;
+    }
+  const double noise = estimate_noise(image);
+  return sum / std::max(count, 1) - 0.5 * noise * noise * Mat2::Identity();
+}
+
+}  // namespace
+
+struct EvidenceGatherer::State {
+  explicit State(const StereoRig& rig) : images(rig, kKltLevels), follower(rig.left), tracks(kFeatures), detector(kDistance_px) {
+    evidence.rig = evidence.working_rig = rig;
+  }
+
+  void count_repeated(const StereoFrame& frame);
+  void end_prelude();
+  void look(StereoFrame frame);
+  void follow();
+  void detect();
+  void match(SeenFrame& seen);
+  void note(SeenFrame& seen);
+  bool enough() const {
+    return moving_s >= kMoving_s ||
+           (!evidence.stamps.empty() && (evidence.stamps.back() - evidence.stamps.front()).seconds() > kLongest_s);
+  }
+
+  Evidence evidence;
+  std::vector<StereoFrame> held;
+  bool prelude = true;
+  StereoFrame before;
+  FrameImages images;
+  KltFollower follower;
+  TrackTable<KltTrack, KltPatches> tracks;
+  ShiTomasiDetector detector;
+  FreeStereo free_stereo;
+  std::optional<KltStereoMatcher> stereo;
+  Time last_view, last_depths;
+  double moving_s = 0;
+};
+
+void EvidenceGatherer::State::count_repeated(const StereoFrame& frame) {
+  ++evidence.repeated.frames;
+  evidence.repeated.left += same(frame.left, before.left);
+  evidence.repeated.right += same(frame.right, before.right);
+  evidence.repeated.same_pair += same(frame.left, frame.right);
+  before = frame;
+}
+
+/// What the held images say of the pair of cameras; from here on depths can be told.
+void EvidenceGatherer::State::end_prelude() {
+  prelude = false;
+  std::vector<StereoFrame> few;
+  const std::size_t step = std::max<std::size_t>(held.size() / kFewestHeldViews, 1);
+  for (std::size_t i = 0; i < held.size(); i += step) few.push_back(held[i]);
+  evidence.order = stereo_order(evidence.rig, few);
+  evidence.swapped = evidence.order.swapped();
+  if (evidence.swapped) {
+    for (StereoFrame& frame : held) std::swap(frame.left, frame.right);
+    for (StereoFrame& frame : few) std::swap(frame.left, frame.right);
+  }
+  std::vector<StereoView> views;
+  Pyramid left, right;
+  for (const StereoFrame& frame : few) {
+    if (!frame.left || !frame.right) continue;
+    left.build(frame.left->view(), kKltLevels);
+    right.build(frame.right->view(), kKltLevels);
+    views.push_back({frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, left, right)});
+  }
+  const StereoFit fit = fit_stereo(views, evidence.rig, nullptr, {});
+  evidence.working_rig = fit.rig;
+  stereo.emplace(evidence.working_rig, kNearest_m);
+  std::vector<StereoFrame> first = std::move(held);
+  for (StereoFrame& frame : first) look(std::move(frame));
+}
+
+void EvidenceGatherer::State::look(StereoFrame frame) {
+  FrontendStats stats;
+  images.take(frame, stats);
+  if (images.forget_before_gap(kLongestGap_s)) {
+    tracks.end_all(Fate::lost);
+    tracks.drop_ended();
+  }
+  if (images.left().empty()) return;
+  if (images.has_before()) follow();
+  detect();
+  SeenFrame seen;
+  seen.t = frame.t;
+  seen.gradients = gradients_of(images.left().level(0));
+  const double slack_s = 0.3 * kDepthStep_s;
+  const bool has_right = !images.right().empty();
+  if (has_right && (evidence.frames.empty() || (frame.t - last_depths).seconds() > kDepthStep_s - slack_s)) {
+    match(seen);
+    last_depths = frame.t;
+  }
+  if (has_right && (evidence.stereo.empty() || (frame.t - last_view).seconds() > kStereoStep_s - slack_s)) {
+    evidence.stereo.push_back(
+        {frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, images.left(), images.right())});
+    last_view = frame.t;
+  }
+  note(seen);
+  images.advance();
+}
+
+void EvidenceGatherer::State::follow() {
+  FrontendStats stats;
+  std::vector<double> motion_px;
+  for (KltTrack& track : tracks) {
+    if (!follower.follow(track, tracks.patches(track), {}, 0, images, stats)) track.fate = Fate::lost;
+    else motion_px.push_back((track.px - track.previous_px).norm());
+  }
+  tracks.drop_ended();
+  if (median(motion_px) > kMoving_px * (images.t() - images.t_before()).seconds() / kDepthStep_s)
+    moving_s += (images.t() - images.t_before()).seconds();
+}
+
+void EvidenceGatherer::State::detect() {
+  std::vector<Vec2> occupied;
+  for (const KltTrack& track : tracks) occupied.push_back(track.px);
+  for (const Corner& corner : detector.detect(images.left(), occupied, kFeatures - static_cast<int>(tracks.size()))) {
+    const auto normalised = evidence.rig.left.undistort(corner.px);
+    if (!normalised || tracks.full()) continue;
+    KltPatches& patches = tracks.free_patches();
+    if (!patches.newest.cut(images.left(), corner.px, 0, kKltLevels - 1)) continue;
+    KltTrack track;
+    track.px = corner.px;
+    track.normalised = *normalised;
+    follower.set_anchor(track, patches, images.left());
+    tracks.start(track);
+  }
+}
+
+void EvidenceGatherer::State::match(SeenFrame& seen) {
+  seen.has_depths = true;
+  for (KltTrack& track : tracks) {
+    const auto ray = evidence.working_rig.left.undistort(track.px);
+    const bool matched = ray && [&] {
+      const StereoMatch found =
+          stereo->match(tracks.patches(track).newest, track.px, *ray, track.inverse_depth, images.left(), images.right());
+      if (found.failure == StereoFailure::none) track.inverse_depth = found.inverse_depth;
+      return found.failure == StereoFailure::none;
+    }();
+    if (!matched) track.inverse_depth.reset();
+  }
+}
+
+void EvidenceGatherer::State::note(SeenFrame& seen) {
+  for (const KltTrack& track : tracks)
+    seen.features.push_back({track.id.value, track.px, seen.has_depths ? track.inverse_depth.value_or(0) : 0,
+                             is_bright_dot(images.left().level(0), track.px)});
+  std::sort(seen.features.begin(), seen.features.end(), [](const SeenFeature& a, const SeenFeature& b) { return a.id < b.id; });
+  evidence.frames.push_back(std::move(seen));
+}
+
+EvidenceGatherer::EvidenceGatherer(const StereoRig& rig) : state_(std::make_unique<State>(rig)) {}
+EvidenceGatherer::~EvidenceGatherer() = default;
+
+bool EvidenceGatherer::push(const SensorEvent& event) {
+  State& s = *state_;
+  if (const auto* sample = std::get_if<ImuSample>(&event)) {
+    s.evidence.imu.push_back(*sample);
+    return true;
+  }
+  if (s.enough()) return false;
+  StereoFrame frame = std::get<StereoFrame>(event);
+  s.evidence.stamps.push_back(frame.t);
+  s.count_repeated(frame);
+  if (!s.prelude) {
+    if (s.evidence.swapped) std::swap(frame.left, frame.right);
+    s.look(std::move(frame));
+    return !s.enough();
+  }
+  s.held.push_back(std::move(frame));
+  if (s.held.size() >= kMostHeld || (s.held.back().t - s.held.front().t).seconds() >= kPrelude_s) s.end_prelude();
+  return true;
+}
+
+Evidence EvidenceGatherer::finish() {
+  if (state_->prelude && !state_->held.empty()) state_->end_prelude();
+  return std::move(state_->evidence);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/image_health.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/frontend/median.hpp"
+
+namespace fbvins {
+namespace {
+
+/// One frozen image may be a dropped one made good by a driver; a share of them is a fault.
+constexpr double kMostRepeated = 0.005;
+constexpr double kMostSamePair = 0.1;
+
+void check_camera(int repeated, int frames, const char* camera, std::vector<Finding>& findings) {
+  if (repeated < 2 || repeated < kMostRepeated * frames) return;
+  Finding finding;
+  finding.kind = FindingKind::frozen_images;
+  finding.size = repeated, finding.unit = "images";
+  finding.measured = fmt::format("{} of {} {} images are the one before, to the last bit", repeated, frames, camera);
+  finding.expected = "no two images of a camera are the same";
+  finding.advice =
+      "the camera hangs or the driver repeats images under new stamps: look at cable and USB bandwidth, and drop what is repeated";
+  findings.push_back(std::move(finding));
+}
+
+}  // namespace
+
+std::vector<Finding> check_repeated(const RepeatedImages& repeated) {
+  std::vector<Finding> findings;
+  check_camera(repeated.left, repeated.frames, "left", findings);
+  check_camera(repeated.right, repeated.frames, "right", findings);
+  if (repeated.same_pair > kMostSamePair * repeated.frames) {
+    Finding finding;
+    finding.kind = FindingKind::same_image_twice;
+    finding.size = repeated.same_pair, finding.unit = "images";
+    finding.measured = fmt::format("in {} of {} stereo images left and right are one image, to the last bit", repeated.same_pair,
+                                   repeated.frames);
+    finding.expected = "two cameras";
+    finding.advice = "one topic or folder is named for both cameras";
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+namespace {
+
+constexpr double kApart_s = 0.5, kOthersMove_px = 5, kStays_px = 0.6;
+constexpr double kMostFixed = 0.15, kMostDots = 0.4;
+constexpr int kFewestPairs = 8;
+
+double upper_quartile(std::vector<double> v) {
+  if (v.empty()) return 0;
+  const auto at = v.begin() + static_cast<std::ptrdiff_t>(3 * v.size() / 4);
+  std::nth_element(v.begin(), at, v.end());
+  return *at;
+}
+
+/// Motions of the features across the baseline's direction, in which depth does not move them.
+std::vector<double> motions_across(const SeenFrame& a, const SeenFrame& b, const Vec2& across) {
+  std::vector<double> out;
+  auto there = b.features.begin();
+  for (const SeenFeature& feature : a.features) {
+    while (there != b.features.end() && there->id < feature.id) ++there;
+    if (there != b.features.end() && there->id == feature.id) out.push_back(std::abs((there->px - feature.px).dot(across)));
+  }
+  return out;
+}
+
+}  // namespace
+
+FixedFeatures measure_fixed(const Evidence& evidence) {
+  FixedFeatures out;
+  const Vec3 baseline = evidence.rig.T_C1C0().p.normalized();
+  const Vec2 across = Vec2(-baseline.y(), baseline.x()).normalized();
+  double fixed = 0, moving = 0, dots = 0, features = 0;
+  std::size_t a = 0;
+  for (std::size_t b = 0; b < evidence.frames.size(); ++b) {
+    for (const SeenFeature& feature : evidence.frames[b].features) dots += feature.bright_dot, features += 1;
+    if ((evidence.frames[b].t - evidence.frames[a].t).seconds() < kApart_s) continue;
+    const std::vector<double> motions = motions_across(evidence.frames[a], evidence.frames[b], across);
+    a = b;
+    if (motions.size() < 20 || upper_quartile(motions) < kOthersMove_px) continue;
+    ++out.pairs;
+    for (const double motion : motions) (motion < kStays_px ? fixed : moving) += 1;
+  }
+  out.share = fixed / std::max(fixed + moving, 1.0);
+  out.dots = dots / std::max(features, 1.0);
+  return out;
+}
+
+std::optional<Finding> check_fixed(const FixedFeatures& fixed) {
+  Finding finding;
+  if (fixed.dots > kMostDots) {
+    finding.kind = FindingKind::projector_dots;
+    finding.size = fixed.dots, finding.unit = "of the features";
+    finding.measured = fmt::format("{:.0f} % of the features are small bright spots", 100 * fixed.dots);
+    finding.expected = "few: a pattern of spots moves with the camera and hides the scene";
+    finding.advice = "switch the camera's infrared projector off (emitter_enabled: 0)";
+    return finding;
+  }
+  if (fixed.pairs < kFewestPairs || fixed.share < kMostFixed) return std::nullopt;
+  finding.kind = FindingKind::fixed_in_view;
+  finding.size = fixed.share, finding.unit = "of the features";
+  finding.measured =
+      fmt::format("{:.0f} % of the features stay where they are in the image while the others move", 100 * fixed.share);
+  finding.expected = "few";
+  finding.advice = "something of the vehicle is in view, or on the lens: move the camera, or clean it";
+  return finding;
+}
+
+namespace {
+
+constexpr double kSlowest_pxps = 30, kLongestStep_s = 0.2, kCoherent = 0.8;
+constexpr int kFewestImages = 60;
+/// Length of motion that halves the gradients along it, at the sharpness of common lenses.
+constexpr double kHalves_px = 2.0;
+constexpr double kLongestExposure_s = 0.06, kExposureStep_s = 0.5e-3;
+constexpr double kMostBlur_px = 6, kSignificant = 4;
+
+struct MovingImage {
+  double log_ratio;     ///< of the gradients along and across the motion
+  double cosine, sine;  ///< of twice the direction of motion
+  double speed_pxps;
+};
+
+std::vector<MovingImage> moving_images(const Evidence& evidence) {
+  std::vector<MovingImage> out;
+  for (std::size_t k = 1; k < evidence.frames.size(); ++k) {
+    const SeenFrame &a = evidence.frames[k - 1], &b = evidence.frames[k];
+    const double dt = (b.t - a.t).seconds();
+    if (dt <= 0 || dt > kLongestStep_s) continue;
+    Vec2 sum = Vec2::Zero();
+    double lengths = 0;
+    int count = 0;
+    auto there = b.features.begin();
+    for (const SeenFeature& feature : a.features) {
+      while (there != b.features.end() && there->id < feature.id) ++there;
+      if (there == b.features.end() || there->id != feature.id) continue;
+      sum += there->px - feature.px;
+      lengths += (there->px - feature.px).norm();
+      ++count;
+    }
+    if (count < 15 || sum.norm() < kCoherent * lengths || lengths / count / dt < kSlowest_pxps) continue;
+    const Vec2 along = sum.normalized(), across(-along.y(), along.x());
+    const double g_along = along.dot(b.gradients * along), g_across = across.dot(b.gradients * across);
+    if (!(g_along > 0) || !(g_across > 0)) continue;
+    out.push_back({std::log(g_along / g_across), along.x() * along.x() - along.y() * along.y(), 2 * along.x() * along.y(),
+                   lengths / count / dt});
+  }
+  return out;
+}
+
+/// The exposure that explains the ratios best beside the scene's own preference of a direction.
+double exposure_of(const std::vector<MovingImage>& images, std::size_t skip_first, std::size_t skip_last) {
+  double best = 0, least = 1e300;
+  for (double exposure = 0; exposure <= kLongestExposure_s; exposure += kExposureStep_s) {
+    Mat2 H = 1e-9 * Mat2::Identity();
+    Vec2 g = Vec2::Zero();
+    double square = 0;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      if (i >= skip_first && i < skip_last) continue;
+      const Vec2 J(images[i].cosine, images[i].sine);
+      const double y = images[i].log_ratio + std::log(1 + exposure * images[i].speed_pxps / kHalves_px);
+      H += J * J.transpose();
+      g += y * J;
+      square += y * y;
+    }
+    const double cost = square - g.dot(H.inverse() * g);
+    if (cost < least) least = cost, best = exposure;
+  }
+  return best;
+}
+
+}  // namespace
+
+Blur measure_blur(const Evidence& evidence) {
+  Blur blur;
+  const std::vector<MovingImage> images = moving_images(evidence);
+  blur.images = static_cast<int>(images.size());
+  if (blur.images < kFewestImages) return blur;
+  blur.exposure_s = exposure_of(images, 0, 0);
+  constexpr std::size_t kParts = 8;
+  double mean = 0, square = 0;
+  std::array<double, kParts> without{};
+  for (std::size_t part = 0; part < kParts; ++part) {
+    without[part] = exposure_of(images, part * images.size() / kParts, (part + 1) * images.size() / kParts);
+    mean += without[part] / kParts;
+  }
+  for (const double e : without) square += (e - mean) * (e - mean);
+  blur.sigma_s = std::max(std::sqrt((kParts - 1.0) / kParts * square), kExposureStep_s);
+  std::vector<double> speeds;
+  for (const MovingImage& image : images) speeds.push_back(image.speed_pxps);
+  std::sort(speeds.begin(), speeds.end());
+  blur.speed_pxps = speeds[speeds.size() * 9 / 10];
+  return blur;
+}
+
+std::optional<Finding> check_blur(const Blur& blur) {
+  if (blur.length_px() < kMostBlur_px || blur.exposure_s < kSignificant * blur.sigma_s) return std::nullopt;
+  Finding finding;
+  finding.kind = FindingKind::blur;
+  finding.size = 1e3 * blur.exposure_s, finding.sigma = 1e3 * blur.sigma_s, finding.unit = "ms";
+  finding.measured = fmt::format(
+      "images are blurred along their motion as by an exposure of {:.1f} +- {:.1f} ms: {:.0f} px in the fastest tenth of them",
+      finding.size, finding.sigma, blur.length_px());
+  finding.expected = fmt::format("at most {:.0f} px", kMostBlur_px);
+  finding.advice = fmt::format("limit the exposure to {:.0f} ms and let the gain go up, or give more light",
+                               std::max(1e3 * 0.5 * kMostBlur_px / blur.speed_pxps, 1.0));
+  return finding;
+}
+
+}  // namespace fbvins

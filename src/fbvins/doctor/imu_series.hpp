@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The readings of a recording, asked for any interval and as often as one likes. A value; const members from any thread.
+//
+//   ImuSeries imu(samples);
+//   if (imu.covers(a, b)) Vec3 turned = imu.turned(a, b);      // rad, the integral of the rate
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fbvins/core/time.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class ImuSeries {
+ public:
+  /// Readings whose stamps do not ascend are left out.
+  explicit ImuSeries(std::span<const ImuSample> samples);
+
+  const std::vector<ImuSample>& samples() const { return samples_; }
+  bool empty() const { return samples_.size() < 2; }
+  /// There are readings from a to b, without a gap.
+  bool covers(Time a, Time b) const;
+  /// Interpolated; the nearest reading outside.
+  ImuSample at(Time t) const;
+  /// Integral of the turning rate from a to b, rad in B: the rotation vector, where the axis stays nearly the same.
+  Vec3 turned(Time a, Time b) const { return integral(b) - integral(a); }
+  /// The readings between, with both ends interpolated.
+  ImuSegment segment(Time a, Time b) const;
+  /// The same with other gyroscope axes or units: gyro * rate.
+  ImuSeries with_gyro(const Mat3& gyro) const;
+
+ private:
+  std::size_t first_after(Time t) const;
+  Vec3 integral(Time t) const;
+
+  std::vector<ImuSample> samples_;
+  std::vector<Vec3> integral_;  // of the rate, from the first reading to each
+};
+
+}  // namespace fbvins

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// The doctor's instruments, one by one.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "fbvins/doctor/axes.hpp"
+#include "fbvins/doctor/block_fit.hpp"
+#include "fbvins/doctor/image_health.hpp"
+#include "fbvins/doctor/imu_health.hpp"
+#include "fbvins/doctor/imu_series.hpp"
+#include "fbvins/doctor/made_up_evidence.hpp"
+#include "fbvins/imu/propagation.hpp"
+
+namespace fbvins {
+namespace {
+
+std::vector<ImuSample> readings(double seconds) {
+  const test::Motion motion(0.3, 0.3);
+  std::vector<ImuSample> samples;
+  for (Time t{1'000'000'000}; t.seconds() < 1 + seconds; t = t + Duration{5'000'000}) samples.push_back(motion.sample(t));
+  return samples;
+}
+
+TEST(Axes, AreFortyEight) {
+  std::set<std::string> texts;
+  for (const Mat3& P : signed_permutations()) {
+    texts.insert(axes_text(P));
+    EXPECT_NEAR(std::abs(P.determinant()), 1, 1e-12);
+    EXPECT_EQ(nearest_axes(P * so3_exp(Vec3(0.1, -0.2, 0.15)).toRotationMatrix()), P);
+  }
+  EXPECT_EQ(texts.size(), 48u);
+  EXPECT_EQ(axes_text(Mat3::Identity()), "x, y, z");
+}
+
+TEST(BlockFit, SolvesForWhatIsFreeAndKnowsHowWell) {
+  // y = 2 u + 3 w + noise, in stretches of 40; the same 60 times, to see how far solutions scatter.
+  Rng rng(1);
+  double square = 0, said = 0;
+  constexpr int kTimes = 60;
+  for (int time = 0; time < kTimes; ++time) {
+    BlockFit fit(Eigen::Vector2d(100, 100), 0.5);
+    for (int stretch = 0; stretch < BlockFit::kStretches; ++stretch)
+      for (int i = 0; i < 40; ++i) {
+        Eigen::VectorXd J(2);
+        J << rng.normal(), rng.normal();
+        const double r = -(2 * J(0) + 3 * J(1) + 0.5 * rng.normal());
+        fit.add(stretch, J * J.transpose(), J * r);
+      }
+    const std::vector<int> both{0, 1}, one{1};
+    const auto solution = fit.solve(both);
+    ASSERT_TRUE(solution);
+    square += std::pow(solution->x(0) - 2, 2) / kTimes;
+    said += solution->covariance(0, 0) / kTimes;
+    const auto alone = fit.solve(one);
+    ASSERT_TRUE(alone);
+    EXPECT_EQ(alone->x(0), 0);
+    EXPECT_LT(alone->decrease, solution->decrease);
+  }
+  EXPECT_NEAR(said / square, 1, 0.5);
+}
+
+TEST(ImuSeries, TurnsAsTheIntegralOfItsReadings) {
+  const ImuSeries imu(readings(4));
+  const Time a{2'003'000'000}, b{2'091'000'000};
+  EXPECT_TRUE(imu.covers(a, b));
+  EXPECT_FALSE(imu.covers(a, Time{7'000'000'000}));
+  const Vec3 exact = so3_log(integrate_gyro(imu.segment(a, b), Vec3::Zero()));
+  EXPECT_LT((imu.turned(a, b) - exact).norm(), 2e-3 * exact.norm());
+}
+
+TEST(ImuSeries, AGapIsNotCovered) {
+  auto samples = readings(4);
+  samples.erase(samples.begin() + 300, samples.begin() + 330);
+  EXPECT_FALSE(ImuSeries(samples).covers(samples[290].t, samples[310].t));
+}
+
+TEST(ImuHealth, SeesReadingsAtTheEndOfTheirRange) {
+  auto samples = readings(4);
+  EXPECT_FALSE(check_saturation(samples));
+  for (ImuSample& sample : samples) sample.accel_mps2 = (3 * sample.accel_mps2).cwiseMin(19.6).cwiseMax(-19.6);
+  EXPECT_TRUE(check_saturation(samples));
+}
+
+TEST(ImuHealth, MeasuresVibration) {
+  auto samples = readings(10);
+  EXPECT_FALSE(check_vibration(samples));
+  for (ImuSample& sample : samples)
+    sample.accel_mps2.x() += 8 * std::numbers::sqrt2 * std::sin(2 * std::numbers::pi * 62 * sample.t.seconds());
+  const Vibration seen = measure_vibration(samples);
+  EXPECT_NEAR(seen.rms_mps2, 8, 0.4);
+  EXPECT_NEAR(seen.peak_hz, 62, 0.5);
+  EXPECT_GT(seen.peak_share, 0.9);
+  EXPECT_TRUE(check_vibration(samples));
+}
+
+TEST(ImageHealth, SeesRepeatedImages) {
+  EXPECT_TRUE(check_repeated({.frames = 300}).empty());
+  const auto frozen = check_repeated({.frames = 300, .right = 30});
+  ASSERT_EQ(frozen.size(), 1u);
+  EXPECT_EQ(frozen.front().kind, FindingKind::frozen_images);
+  const auto one = check_repeated({.frames = 300, .same_pair = 300});
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_EQ(one.front().kind, FindingKind::same_image_twice);
+}
+
+TEST(ImageHealth, SeesWhatHangsInView) {
+  Evidence evidence = test::MadeUpEvidence({}).make();
+  EXPECT_FALSE(check_fixed(measure_fixed(evidence)));
+  for (SeenFrame& frame : evidence.frames) {
+    const std::size_t seen = frame.features.size();
+    for (std::size_t i = 0; i < seen / 3; ++i)
+      frame.features.push_back({static_cast<std::int64_t>(1000 + i), Vec2(10.0 * static_cast<double>(i), 400), 0, false});
+  }
+  const auto finding = check_fixed(measure_fixed(evidence));
+  ASSERT_TRUE(finding);
+  EXPECT_EQ(finding->kind, FindingKind::fixed_in_view);
+  for (SeenFrame& frame : evidence.frames)
+    for (std::size_t i = 0; i < frame.features.size(); i += 2) frame.features[i].bright_dot = true;
+  EXPECT_EQ(check_fixed(measure_fixed(evidence))->kind, FindingKind::projector_dots);
+}
+
+}  // namespace
+}  // namespace fbvins

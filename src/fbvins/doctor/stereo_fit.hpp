@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the two cameras' views say of their calibration: the epipolar error of matches that were found without it, and the one
+// change of the calibration, then the next, that explains most of it. Method: docs/doctor.md. Pure functions, any thread.
+//
+//   StereoFit fit = fit_stereo(views, rig, &imu, pairs);
+//   for (const StereoChange& change : fit.changes) report(change);
+//   use(fit.rig);                                         // with the changes
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fbvins/checkup/finding.hpp"
+#include "fbvins/doctor/evidence.hpp"
+#include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/doctor/turn_fit.hpp"
+
+namespace fbvins {
+
+inline constexpr int kRegions = 3;  ///< of the image, along each side
+
+/// Medians of the signed epipolar distance, px, by region of the left image, row by row.
+using RegionErrors = std::array<double, kRegions * kRegions>;
+
+struct StereoChange {
+  FindingKind kind = FindingKind::right_camera_turned;
+  WhichLens lens = WhichLens::right;  ///< whose, where it is one of a lens
+  Eigen::VectorXd amount;             ///< what was added: rad, px, seconds, or logarithm of a factor
+  Eigen::MatrixXd covariance;
+  double explained_px = 0;  ///< root mean square of the epipolar error that it explains
+};
+
+struct StereoFit {
+  int matches = 0;
+  double error_px = 0;       ///< typical (1.48 median) epipolar error by the calibration
+  double remaining_px = 0;   ///< after the changes
+  RegionErrors regions{};    ///< by the calibration
+  RegionErrors remaining{};  ///< after the changes
+  std::vector<StereoChange> changes;
+  StereoRig rig;  ///< the calibration with all changes; the baseline's length is nothing that this fit sees
+};
+
+/// `imu`, if given and right, and the motions of `pairs` tell a right image that is exposed late or early by how the rig moved.
+StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
+                     std::span<const FramePair> pairs);
+
+/// The baseline p_C1C0 with its direction changed by a `baseline_direction`.
+Vec3 turned_baseline(const Vec3& p_C1C0, const Eigen::Vector2d& amount);
+
+}  // namespace fbvins
