@@ -9,6 +9,7 @@
 #include "apps/imu_state.hpp"
 #include "fbvins/checkup/first_seconds.hpp"
 #include "fbvins/config/config_file.hpp"
+#include "fbvins/features/booster.hpp"
 #include "fbvins/pipeline/system.hpp"
 
 namespace fbvins::app {
@@ -76,6 +77,7 @@ RunSummary summarise(const Flight& flight, const Dataset& data, const Config& co
   RunSummary summary = summarise(flight.run, data);
   if (flight.map) summary.map = summarise(*flight.map, flight.run, truth_of(data));
   summary.frontend = config.frontend.kind;
+  if (summary.frontend == "boost") summary.booster_weights = booster_weights_path(config.frontend.boost.booster.weights);
   summary.mode = arguments.threaded ? "threaded" : "deterministic";
   summary.wall_s = flight.wall_s;
   return summary;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <filesystem>
 #include <map>
 
 #include "apps/terminal.hpp"
@@ -157,6 +158,7 @@ RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Tr
 
 std::string to_json_text(const RunSummary& s) {
   Json result{{"version", FBVINS_VERSION}, {"dataset", s.dataset}, {"frontend", s.frontend}, {"frames", s.frames}};
+  if (!s.booster_weights.empty()) result["booster_weights"] = std::filesystem::path(s.booster_weights).filename().string();
   result["images_bad"] = s.images_bad;
   result["coverage"] = to_json(s.coverage);
   result["restarts"] = s.restarts;
@@ -192,6 +194,7 @@ std::string to_json_text(const RunSummary& s) {
 
 std::string to_text(const RunSummary& s) {
   std::string text = fmt::format("{} with {} (fbvins " FBVINS_VERSION ")\n", s.dataset, s.frontend);
+  if (!s.booster_weights.empty()) text += fmt::format("booster weights {}\n", s.booster_weights);
   text += to_line(s.coverage);
   text += fmt::format("restarts {}, frames by health:", s.restarts);
   for (const auto& [name, frames] : s.health) text += fmt::format(" {} {}", name, frames);

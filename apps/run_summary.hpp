@@ -15,6 +15,7 @@ namespace fbvins::app {
 
 struct RunSummary {
   std::string frontend;
+  std::string booster_weights;  ///< the file, of the boost frontend
   std::string mode;     ///< deterministic or threaded
   std::string dataset;  ///< its name, not where it lies
   int frames = 0;       ///< stereo frames that reached the frontend
