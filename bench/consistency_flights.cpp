@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flies the estimator alone, on made-up tracks (made_up_tracks.hpp) along real or simulated trajectories with real or simulated
-// IMU readings: how far off it is, and whether it knows.
+// Flies the estimator alone, on synthetic tracks (synthetic_tracks.hpp) along real or simulated trajectories with real or
+// simulated IMU readings: how far off it is, and whether it knows.
 //
 //   consistency_flights --trajectory V1_02/groundtruth.csv --imu V1_02/imu0.csv --start 10 --seconds 60 --recognise
 //   consistency_flights normal --seed 4 --movers 8
@@ -8,8 +8,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <string>
 
-#include "bench/made_up_tracks.hpp"
+#include "bench/synthetic_tracks.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/eval/nees.hpp"
@@ -18,11 +19,10 @@ namespace fbvins::bench {
 namespace {
 
 struct Wanted {
-  std::string preset = "normal", out;
+  std::string preset = "normal";
   SimulationOptions simulation;
   TrackOptions tracks;
   bool known = true;
-  double perturb = 0;
 };
 
 const TrueState& truth_at(const Simulation& s, Time t) {
@@ -33,68 +33,76 @@ const TrueState& truth_at(const Simulation& s, Time t) {
 
 double squared(const Vec3& e, const Mat3& P) { return e.dot(P.ldlt().solve(e)); }
 
+/// What is compared with the truth, pose by pose.
+class Comparison {
+ public:
+  explicit Comparison(const Simulation& flight) : flight_(flight) {}
+
+  void take(const Odometry& o) {
+    known_ += o.stats.known_landmarks;
+    ms_ += o.stats.total_ms();
+    resets_ = o.reset_counter;
+    if (!o.health.has_pose()) return;
+    truth_.push_back({o.t, true_pose(o.t)});
+    estimate_.push_back({o.t, o.T_WB});
+    covariances_.push_back(o.pose_covariance);
+    const ImuBias& bias = truth_at(flight_, o.t).bias;
+    gyro_bias_ += squared(o.bias.gyro_radps - bias.gyro_radps, o.gyro_bias_covariance);
+    accel_bias_ += squared(o.bias.accel_mps2 - bias.accel_mps2, o.accel_bias_covariance);
+  }
+
+  /// One line: errors after SE3 alignment, NEES with the truth level, means over the poses.
+  Result<std::string> summary() const {
+    const std::vector<PosePair> pairs = associate(truth_, estimate_, {});
+    const Result<Similarity> se3 = align(pairs, Alignment::se3);
+    if (!se3) return se3.error();
+    const Result<LevelledStart> start = align_start_levelled(pairs);
+    if (!start) return start.error();
+    const ErrorStatistics errors = statistics_of(absolute_errors_m(apply(*se3, pairs)));
+    const NeesSummary honest = nees(pairs, covariances_, start->to_truth);
+    const auto n = static_cast<double>(pairs.size());
+    return fmt::format("rmse {:.4f} max {:.4f} nees {:.1f} {:.1f} bias {:.1f} {:.1f} known {:.1f} ms {:.2f} resets {}",
+                       errors.rmse, errors.max, honest.mean.position, honest.mean.orientation, gyro_bias_ / n, accel_bias_ / n,
+                       known_ / n, ms_ / n, resets_);
+  }
+
+ private:
+  Pose<W, B> true_pose(Time t) const { return flight_.flight.pose((t - flight_.start).seconds()); }
+
+  const Simulation& flight_;
+  Trajectory<W> truth_, estimate_;
+  std::vector<Mat6> covariances_;
+  double gyro_bias_ = 0, accel_bias_ = 0;  // sums of normalised errors squared
+  double known_ = 0, ms_ = 0;
+  std::uint32_t resets_ = 0;
+};
+
 int fly(const Wanted& wanted) {
-  Result<Simulation> made = prepare_simulation(wanted.simulation);
-  if (!made) {
-    fmt::print(stderr, "{}\n", made.error().message);
+  const Result<Simulation> flight = prepare_simulation(wanted.simulation);
+  if (!flight) {
+    fmt::print(stderr, "{}\n", flight.error().message);
     return 1;
   }
-  Simulation& flight = *made;
-  if (wanted.perturb > 0) {
-    Rng rng(wanted.tracks.seed, 99);
-    for (ImuSample& s : flight.imu.samples)
-      for (int k = 0; k < 3; ++k) s.accel_mps2(k) *= 1 + wanted.perturb * rng.normal();
-  }
-  MadeUpTracks tracks(flight, wanted.tracks);
+  SyntheticTracks tracks(*flight, wanted.tracks);
   EstimatorOptions options;
   options.known_landmarks.enabled = wanted.known;
-  Estimator estimator(flight.rig, options);
-  Trajectory<W> truth, estimate;
-  std::vector<Mat6> covariances;
+  Estimator estimator(flight->rig, options);
+  Comparison comparison(*flight);
   StatePrior before, prior;
-  double bias_g = 0, bias_a = 0;
-  int known = 0, resets = 0;
-  double ms = 0;
-  FILE* file = wanted.out.empty() ? nullptr : std::fopen(wanted.out.c_str(), "w");
-  for (std::size_t k = 0; k < flight.frames.size(); ++k) {
-    const TrackedFrame frame = tracks.frame(k, before);
-    const Estimate e = estimator.process(frame);
+  for (std::size_t k = 0; k < flight->frames.size(); ++k) {
+    const Estimate e = estimator.process(tracks.frame(k, before));
     before = prior;  // two images late, as in a System
     prior = estimator.prior();
     tracks.locate(e.landmarks);
-    const Odometry& o = e.odometry;
-    known += o.stats.known_landmarks;
-    ms += o.stats.total_ms();
-    resets = static_cast<int>(o.reset_counter);
-    if (!o.health.has_pose()) continue;
-    const double t_s = (o.t - flight.start).seconds();
-    truth.push_back({o.t, flight.flight.pose(t_s)});
-    estimate.push_back({o.t, o.T_WB});
-    covariances.push_back(o.pose_covariance);
-    const ImuBias& b = truth_at(flight, o.t).bias;
-    bias_g += squared(o.bias.gyro_radps - b.gyro_radps, o.gyro_bias_covariance);
-    bias_a += squared(o.bias.accel_mps2 - b.accel_mps2, o.accel_bias_covariance);
-    if (file) {
-      const Vec3 p = flight.flight.pose(t_s).p;
-      fmt::print(file, "{:.3f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{}\n", t_s, o.T_WB.p.x(), o.T_WB.p.y(), o.T_WB.p.z(),
-                 p.x(), p.y(), p.z(), o.stats.known_landmarks);
-    }
+    comparison.take(e.odometry);
   }
-  if (file) std::fclose(file);
-  const std::vector<PosePair> pairs = associate(truth, estimate, {});
-  const auto se3 = align(pairs, Alignment::se3);
-  if (!se3) return 1;
-  const auto errors = statistics_of(absolute_errors_m(apply(*se3, pairs)));
-  const LevelledStart start = *align_start_levelled(pairs);
-  const NeesSummary honest = nees(pairs, covariances, start.to_truth);
-  const auto n = static_cast<double>(pairs.size());
-  fmt::print("rmse {:.4f} max {:.4f} nees {:.1f} {:.1f} bias {:.1f} {:.1f} known {:.1f} ms {:.2f} resets {}\n", errors.rmse,
-             errors.max, honest.mean.position, honest.mean.orientation, bias_g / n, bias_a / n, known / n, ms / n, resets);
-  return 0;
+  const Result<std::string> summary = comparison.summary();
+  fmt::print(summary ? stdout : stderr, "{}\n", summary ? *summary : summary.error().message);
+  return summary ? 0 : 1;
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("fly the estimator on made-up tracks");
+  CLI::App app("fly the estimator on synthetic tracks");
   Wanted w;
   double seconds = 30, start = 0;
   int seed = 1;
@@ -104,13 +112,11 @@ int run(int argc, char** argv) {
   app.add_option("--imu", imu, "and its readings");
   app.add_option("--start", start, "[s]");
   app.add_option("--seconds", seconds, "length");
-  app.add_option("--seed", seed, "of everything made up");
+  app.add_option("--seed", seed, "of room, tracks and noise");
   app.add_option("--movers", w.tracks.movers, "boxes that move");
   app.add_option("--bad-start", w.tracks.bad_start_s, "so long [s] tracks are bad");
-  app.add_option("--perturb", w.perturb, "relative noise on the accelerometer");
   app.add_flag("--recognise", w.tracks.recognise, "corners are known again");
   app.add_flag("!--forget", w.known, "no landmark is remembered");
-  app.add_option("--out", w.out, "CSV of positions");
   CLI11_PARSE(app, argc, argv);
   const auto preset = simulation_preset(w.preset);
   if (!preset) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a frontend would tell of a flight through a made-up room, without any image: corners on its walls, and on boxes that
+// What a frontend would tell of a flight through a synthetic room, without any image: corners on its walls, and on boxes that
 // move, seen by both cameras with the errors that tracks have: noise, a slow slide of each, and some that slide fast. One that
 // comes back into view may be known again where the estimator's own pose says that it should be.
 // One instance, one flight; the same seed gives the same bytes.
@@ -31,9 +31,9 @@ struct TrackOptions {
   std::uint64_t seed = 1;
 };
 
-class MadeUpTracks {
+class SyntheticTracks {
  public:
-  MadeUpTracks(const Simulation& flight, const TrackOptions& options) : flight_(flight), o_(options), rng_(options.seed, 77) {
+  SyntheticTracks(const Simulation& flight, const TrackOptions& options) : flight_(flight), o_(options), rng_(options.seed, 77) {
     Vec3 low = Vec3::Constant(1e9), high = -low;
     for (double t = 0; t < flight.flight.duration_s(); t += 0.1) {
       low = low.cwiseMin(flight.flight.pose(t).p);
