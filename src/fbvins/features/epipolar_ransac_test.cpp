@@ -21,13 +21,13 @@ struct Scene {
 Scene make_scene(const Mat3& R_ba, const Vec3& t_ba, int n, double outlier_share, double noise, Rng& rng) {
   Scene scene;
   while (static_cast<int>(scene.a.size()) < n) {
-    const Vec3 ray(rng.uniform(-0.7, 0.7), rng.uniform(-0.45, 0.45), 1.0);
+    const Vec3 ray{rng.uniform(-0.7, 0.7), rng.uniform(-0.45, 0.45), 1.0};
     const Vec3 p_b = R_ba * (rng.uniform(2.0, 8.0) * ray) + t_ba;
     if (p_b.z() < 0.5) continue;
     const bool good = static_cast<double>(scene.a.size()) >= outlier_share * n;
-    const Vec2 noise_b(noise * rng.normal(), noise * rng.normal());
+    const Vec2 noise_b{noise * rng.normal(), noise * rng.normal()};
     scene.a.push_back(ray.hnormalized());
-    scene.b.push_back(good ? Vec2(p_b.hnormalized() + noise_b) : Vec2(rng.uniform(-0.7, 0.7), rng.uniform(-0.45, 0.45)));
+    scene.b.push_back(good ? Vec2(p_b.hnormalized() + noise_b) : Vec2{rng.uniform(-0.7, 0.7), rng.uniform(-0.45, 0.45)});
     scene.good.push_back(good);
   }
   return scene;
@@ -64,14 +64,22 @@ TEST_P(WithOutliers, KnownRotation) {
   EXPECT_GT(std::abs(result.t_ba.dot(kMove.normalized())), 0.995);
 }
 
+/// In the mean of scenes: of single ones one in twenty is not repaired at 20 % outliers, one in four at 60 %.
 TEST_P(WithOutliers, RotationWrongByTwoPixelsIsRepaired) {
-  Rng rng(12);
-  const Scene s = make_scene(kTurn, kMove, 150, GetParam(), 0.3 * kPixel, rng);
+  constexpr int kScenes = 50;
+  double kept_good = 0, kept_bad = 0, angle = 0;
   const Mat3 biased = kTurn * so3_exp(Vec3(0.002, -0.001, 0.004)).toRotationMatrix();
-  const EpipolarResult result = ransac_epipolar(s.a, s.b, biased, {}, rng);
-  EXPECT_GT(rates(s, result).kept_good, 0.95);
-  EXPECT_LT(rates(s, result).kept_bad, 0.10);
-  EXPECT_LT(angle_deg(result.R_ba, kTurn), 0.22);
+  for (int seed = 1; seed <= kScenes; ++seed) {
+    Rng rng(static_cast<std::uint64_t>(seed));
+    const Scene s = make_scene(kTurn, kMove, 150, GetParam(), 0.3 * kPixel, rng);
+    const EpipolarResult result = ransac_epipolar(s.a, s.b, biased, {}, rng);
+    kept_good += rates(s, result).kept_good / kScenes;
+    kept_bad += rates(s, result).kept_bad / kScenes;
+    angle += angle_deg(result.R_ba, kTurn) / kScenes;
+  }
+  EXPECT_GT(kept_good, 0.97);
+  EXPECT_LT(kept_bad, 0.10);
+  EXPECT_LT(angle, 0.2);
 }
 
 TEST_P(WithOutliers, UnknownRotation) {
