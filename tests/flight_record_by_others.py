@@ -8,8 +8,10 @@ exit 77 (skipped) where they are not installed
 """
 import csv
 import io
+import math
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
@@ -28,7 +30,8 @@ except ImportError as missing:
 TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
          "/camera/left/camera_info": "sensor_msgs/msg/CameraInfo", "/camera/right/camera_info": "sensor_msgs/msg/CameraInfo",
          "/odometry": "nav_msgs/msg/Odometry", "/odometry/live": "nav_msgs/msg/Odometry", "/tf": "tf2_msgs/msg/TFMessage",
-         "/tf_static": "tf2_msgs/msg/TFMessage", "/health": "diagnostic_msgs/msg/DiagnosticArray"}
+         "/tf_static": "tf2_msgs/msg/TFMessage", "/health": "diagnostic_msgs/msg/DiagnosticArray",
+         "/landmarks": "sensor_msgs/msg/PointCloud2", "/marks": "rcl_interfaces/msg/Log"}
 
 
 class Failure(Exception):
@@ -130,6 +133,23 @@ def check_health(record):
     require(int({v.key: v.value for v in by_name["live"][-1].values}["imu"]) > 500, "the live counts are not there")
 
 
+def check_landmarks(record):
+    """A cloud a frame: every landmark has a place, every feature a pixel, many have both."""
+    clouds = [m for _, _, _, m in messages(indexed(record), "/landmarks")]
+    bodies = {stamp_ns(m.header): m.pose.pose.position for _, _, _, m in messages(indexed(record), "/odometry")}
+    require(len(clouds) >= len(bodies), f"{len(clouds)} clouds for {len(bodies)} poses")
+    cloud = next(m for m in reversed(clouds) if stamp_ns(m.header) in bodies)
+    require([f.name for f in cloud.fields] == ["x", "y", "z", "track", "u", "v", "age", "depth"], f"fields: {cloud.fields}")
+    require(cloud.header.frame_id == "odom" and len(cloud.data) == cloud.width * cloud.point_step == cloud.row_step, "sizes differ")
+    points = list(struct.iter_unpack("<3fI4f", bytes(cloud.data)))
+    body = bodies[stamp_ns(cloud.header)]
+    both = [p for p in points if math.isfinite(p[0]) and math.isfinite(p[4])]
+    require(len(both) > 20, f"{len(both)} of {len(points)} landmarks are in the image")
+    for x, y, z, _, u, v, age, depth in both:
+        require(0 <= u < 752 and 0 <= v < 480 and age >= 0, f"a feature at {u}, {v}, {age} images old")
+        require(0 <= depth <= math.dist((x, y, z), (body.x, body.y, body.z)) + 0.5, f"a depth of {depth} m to {x}, {y}, {z}")
+
+
 def check_broken_off(record):
     """Streamed, as a recovery tool does: up to the last whole chunk."""
     whole = len(list(NonSeekingReader(io.BytesIO(record), validate_crcs=True).iter_messages(log_time_order=False)))
@@ -163,6 +183,7 @@ def main():
             check_poses(record, live)
             check_images(record, next(flight.rglob("cam0")).parent)
             check_health(record)
+            check_landmarks(record)
             check_broken_off(record)
         except Failure as failure:
             print(failure)

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <string>
 #include <variant>
+#include <vector>
 
+#include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/image.hpp"
@@ -75,7 +77,32 @@ struct LiveStatus {
   std::string problem;             ///< of a sink or a source, in one sentence; empty: none
 };
 
+/// What was seen in an image, and where the window has it: to be looked at. Before the image's Odometry, for sinks that want it.
+struct LiveView {
+  struct Feature {
+    TrackId track;
+    Vec2 pixel = Vec2::Zero();  ///< in the raw left image
+    int age_frames = 0;         ///< 0: detected in this image
+    double depth_m = 0;         ///< along the left camera's axis; 0: not known
+  };
+  struct Landmark {
+    TrackId track;
+    Vec3 p_W = Vec3::Zero();  ///< m, as seen from the published pose
+  };
+  Time t;                           ///< of the image
+  double shutter_to_pose_ms = 0;    ///< from the image's stamp to the estimator's answer
+  std::vector<Feature> features;    ///< in the newest image
+  std::vector<Landmark> landmarks;  ///< of the window; without a pose none
+  std::vector<Vec3> keyframes_W;    ///< the window's, oldest first; likewise
+};
+
+/// Somebody wants to find this moment again.
+struct LiveMark {
+  Time t;  ///< newest stamp of any sensor
+  std::string text;
+};
+
 /// Sensor events are those that the estimator consumes, in its order.
-using LiveEvent = std::variant<ImuSample, StereoFrame, Odometry, LivePose, MapUpdate, LiveStatus>;
+using LiveEvent = std::variant<ImuSample, StereoFrame, Odometry, LivePose, MapUpdate, LiveStatus, LiveView, LiveMark>;
 
 }  // namespace fbvins

@@ -14,6 +14,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
@@ -42,6 +43,8 @@ class LiveSystem {
   void on_failure(std::function<void()> callback);
 
   SensorInput& input();
+  /// Tells the sinks that somebody wants to find this moment again. From any thread.
+  void mark(std::string text);
   /// From any thread.
   LiveStatus status() const;
   /// Works off what is waiting, ends the sinks. The first failure of a stage, else the first of a sink.

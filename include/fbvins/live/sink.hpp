@@ -28,6 +28,8 @@ class Sink {
   virtual std::string_view name() const = 0;
   /// An error is a failure: reported once, and of the whole flight at its end; later events still come.
   virtual Result<void> take(const LiveEvent& event) = 0;
+  /// Asked once: does it want a LiveView with every image? They cost the estimator's thread some ten microseconds each.
+  virtual bool wants_views() const { return false; }
   /// Trouble that may pass, in one sentence, for the status: a cable that is not plugged in. Empty: none. From any thread.
   virtual std::string problem() const { return {}; }
   /// The last call: close what is open.

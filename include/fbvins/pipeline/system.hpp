@@ -60,6 +60,8 @@ class System {
   void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
   /// Keyframes as they become final, with their images.
   void on_keyframe(std::function<void(const Keyframe&)> callback);
+  /// The window after every image, before its odometry, from the estimator's thread; W is as the window has it, level.
+  void on_window(std::function<void(const WindowSnapshot&)> callback);
   /// One for every image, with or without a pose: `health` tells.
   void on_odometry(std::function<void(const Odometry&)> callback);
   /// After every keyframe that the mapper has seen.

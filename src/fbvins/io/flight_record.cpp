@@ -20,7 +20,9 @@ enum Topic : std::size_t {
   kLiveOdometry,
   kTransforms,
   kFixedTransforms,
-  kHealth
+  kHealth,
+  kLandmarks,
+  kMarks
 };
 
 constexpr std::size_t kLargeChunk_bytes = 1'000'000;
@@ -37,11 +39,13 @@ std::vector<McapTopic> topics() {
       topic(kRightTopic, "sensor_msgs/msg/Image"),
       topic("/camera/left/camera_info", "sensor_msgs/msg/CameraInfo"),
       topic("/camera/right/camera_info", "sensor_msgs/msg/CameraInfo"),
-      topic("/odometry", "nav_msgs/msg/Odometry"),
+      topic(kOdometryTopic, "nav_msgs/msg/Odometry"),
       topic("/odometry/live", "nav_msgs/msg/Odometry"),
       topic("/tf", "tf2_msgs/msg/TFMessage"),
       topic("/tf_static", "tf2_msgs/msg/TFMessage"),
-      topic("/health", "diagnostic_msgs/msg/DiagnosticArray"),
+      topic(kHealthTopic, "diagnostic_msgs/msg/DiagnosticArray"),
+      topic(kLandmarksTopic, "sensor_msgs/msg/PointCloud2"),
+      topic(kMarksTopic, "rcl_interfaces/msg/Log"),
   };
 }
 
@@ -166,6 +170,18 @@ Result<void> FlightRecord::add_live(RosOdometry odometry) {
   if (Result<void> good = check_stamp(odometry.t); !good) return good;
   odometry.rate_covariance = rate_covariance_;
   write(kLiveOdometry, odometry.t, [&](std::string& out) { append_odometry(out, odometry); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add_landmarks(Time t, std::span<const RosLandmark> landmarks) {
+  if (Result<void> good = check_stamp(t); !good) return good;
+  write(kLandmarks, t, [&](std::string& out) { append_landmarks(out, t, landmarks); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add_mark(Time t, std::string_view text) {
+  if (Result<void> good = check_stamp(t); !good) return good;
+  write(kMarks, t, [&](std::string& out) { append_log(out, t, "mark", text.empty() ? "mark" : text); });
   return flush_if_large();
 }
 

@@ -23,6 +23,8 @@
 namespace fbvins {
 
 inline constexpr std::string_view kImuTopic = "/imu", kLeftTopic = "/camera/left", kRightTopic = "/camera/right";
+inline constexpr std::string_view kOdometryTopic = "/odometry", kHealthTopic = "/health", kLandmarksTopic = "/landmarks",
+                                  kMarksTopic = "/marks";
 /// Attachments at the start.
 inline constexpr std::string_view kCalibrationAttachment = "calibration.yaml", kConfigurationAttachment = "config.yaml";
 
@@ -48,6 +50,9 @@ class FlightRecord {
   Result<void> add(const MapUpdate& update);
   /// At an IMU reading; its rate is taken to be as good as that of the newest Odometry.
   Result<void> add_live(RosOdometry odometry);
+  /// What was seen in an image and where it lies; needs no Odometry.
+  Result<void> add_landmarks(Time t, std::span<const RosLandmark> landmarks);
+  Result<void> add_mark(Time t, std::string_view text);
   Result<void> add_health(Time t, const RosDiagnostic& diagnostic);
 
   /// Lets all that was added reach the file.

@@ -40,6 +40,12 @@ constexpr RosType kTypes[] = {
     {"sensor_msgs/CameraInfo",
      "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\n"
      "float64[12] p\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n"},
+    {"sensor_msgs/PointField", "string name\nuint32 offset\nuint8 datatype\nuint32 count\n"},
+    {"sensor_msgs/PointCloud2",
+     "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\nuint32 point_step\n"
+     "uint32 row_step\nuint8[] data\nbool is_dense\n"},
+    {"rcl_interfaces/Log",
+     "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"},
     {"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
     {"diagnostic_msgs/DiagnosticStatus",
      "byte level\nstring name\nstring message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values\n"},

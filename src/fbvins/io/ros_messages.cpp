@@ -140,6 +140,57 @@ void append_transforms(std::string& out, Time t, std::span<const RosTransform> t
   }
 }
 
+namespace {
+
+struct PointField {
+  const char* name;
+  std::uint8_t type;  ///< 6: uint32, 7: float32
+};
+constexpr PointField kLandmarkFields[] = {{"x", 7}, {"y", 7}, {"z", 7},   {"track", 6},
+                                          {"u", 7}, {"v", 7}, {"age", 7}, {"depth", 7}};
+constexpr std::uint32_t kLandmark_bytes = 4 * std::size(kLandmarkFields);
+
+}  // namespace
+
+void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks) {
+  const auto count = static_cast<std::uint32_t>(landmarks.size());
+  CdrWriter cdr(out);
+  put_header(cdr, t, kOdometryFrame);
+  cdr.put(std::uint32_t{1});
+  cdr.put(count);
+  cdr.count(std::size(kLandmarkFields));
+  for (std::uint32_t offset = 0; const PointField& field : kLandmarkFields) {
+    cdr.text(field.name);
+    cdr.put(offset);
+    cdr.put(field.type);
+    cdr.put(std::uint32_t{1});
+    offset += 4;
+  }
+  cdr.put(std::uint8_t{0});  // not big-endian
+  cdr.put(kLandmark_bytes);
+  cdr.put(kLandmark_bytes * count);
+  cdr.count(kLandmark_bytes * count);
+  for (const RosLandmark& l : landmarks) {
+    for (const float x : l.p_W) cdr.put(x);
+    cdr.put(l.track);
+    for (const float number : {l.pixel[0], l.pixel[1], l.age_frames, l.depth_m}) cdr.put(number);
+  }
+  cdr.put(std::uint8_t{0});  // some are not numbers
+}
+
+void append_log(std::string& out, Time t, std::string_view name, std::string_view text) {
+  constexpr std::uint8_t kInfo = 20;
+  CdrWriter cdr(out);
+  cdr.put(static_cast<std::int32_t>(t.ns / kSecond_ns));
+  cdr.put(static_cast<std::uint32_t>(t.ns % kSecond_ns));
+  cdr.put(kInfo);
+  cdr.text(name);
+  cdr.text(text);
+  cdr.text("");  // file
+  cdr.text("");  // function
+  cdr.put(std::uint32_t{0});
+}
+
 void append_diagnostics(std::string& out, Time t, std::span<const RosDiagnostic> diagnostics) {
   CdrWriter cdr(out);
   put_header(cdr, t, "");

@@ -7,6 +7,7 @@
 // Stamps are whole nanoseconds from 0 to ros_time_end(), where ROS's seconds overflow (2038).
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -52,6 +53,20 @@ struct RosTransform {
   Vec3 p;
 };
 void append_transforms(std::string& out, Time t, std::span<const RosTransform> transforms);
+
+/// A point of sensor_msgs/PointCloud2 in W, with what the left camera's newest image shows of it. What is not known is NaN: where
+/// a feature's landmark lies, where the image has a landmark.
+struct RosLandmark {
+  std::uint32_t track = 0;
+  std::array<float, 3> p_W{};    ///< m
+  std::array<float, 2> pixel{};  ///< in the raw image, px
+  float age_frames = 0;
+  float depth_m = 0;
+};
+void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks);
+
+/// rcl_interfaces/Log of level INFO.
+void append_log(std::string& out, Time t, std::string_view name, std::string_view text);
 
 /// Level: 0 fine, 1 warning, 2 error.
 struct RosDiagnostic {

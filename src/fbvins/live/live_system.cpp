@@ -12,6 +12,7 @@
 #include "fbvins/live/latency_histogram.hpp"
 #include "fbvins/live/pose_propagator.hpp"
 #include "fbvins/live/sensor_watch.hpp"
+#include "fbvins/live/view_maker.hpp"
 
 namespace fbvins {
 namespace {
@@ -31,7 +32,9 @@ struct LiveSystem::Impl {
         watch(options, system_options.estimator.max_image_gap_s),
         propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), options.smoothing_s,
                    system_options.estimator.gravity_mps2),
+        views(rig.T_BC0),
         started(host_now()) {
+    system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
     system.on_odometry([this](const Odometry& o) { on_odometry(o); });
     system.on_map_update([this](const MapUpdate& u) { hub.publish(u); });
   }
@@ -51,9 +54,20 @@ struct LiveSystem::Impl {
     hub.publish(pose);
   }
 
+  void on_frame(const TrackedFrame& frame) {
+    if (on_tracked_frame) on_tracked_frame(frame);
+    if (views_wanted) views.add(frame);
+  }
+
+  void want_views() {
+    if (std::exchange(views_wanted, true)) return;
+    system.on_window([this](const WindowSnapshot& window) { views.add(window); });
+  }
+
   void on_odometry(const Odometry& o) {
     const Time image_host_t = ingest.host_of(o.t);
-    shutter_to_pose.add(host_now() - image_host_t);
+    const Duration latency = host_now() - image_host_t;
+    shutter_to_pose.add(latency);
     {
       const std::lock_guard lock(pose_mutex);
       propagator.rebase(o);
@@ -63,6 +77,7 @@ struct LiveSystem::Impl {
       ++images_estimated;
       if (o.health.has_pose()) estimate_host_t = image_host_t;
     }
+    if (views_wanted) hub.publish(views.view_of(o, latency.seconds() * 1e3));
     hub.publish(o);
     look(false);
   }
@@ -163,6 +178,9 @@ struct LiveSystem::Impl {
   std::uint32_t reset_counter = 0;
   std::int64_t images_estimated = 0, resets = 0;
 
+  ViewMaker views;  ///< of the estimator's thread
+  bool views_wanted = false;
+  std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void()> on_failure;
   LatencyHistogram shutter_to_pose, pose_age;
   Time started;
@@ -186,9 +204,12 @@ LiveSystem::~LiveSystem() = default;
 LiveSystem::LiveSystem(LiveSystem&&) noexcept = default;
 LiveSystem& LiveSystem::operator=(LiveSystem&&) noexcept = default;
 
-void LiveSystem::add_sink(std::unique_ptr<Sink> sink) { impl_->hub.add(std::move(sink)); }
+void LiveSystem::add_sink(std::unique_ptr<Sink> sink) {
+  if (sink->wants_views()) impl_->want_views();
+  impl_->hub.add(std::move(sink));
+}
 void LiveSystem::on_tracked_frame(std::function<void(const TrackedFrame&)> callback) {
-  impl_->system.on_tracked_frame(std::move(callback));
+  impl_->on_tracked_frame = std::move(callback);
 }
 
 void LiveSystem::on_failure(std::function<void()> callback) { impl_->on_failure = std::move(callback); }
@@ -198,6 +219,7 @@ SensorInput& LiveSystem::input() {
   return impl_->ingest;
 }
 
+void LiveSystem::mark(std::string text) { impl_->hub.publish(LiveMark{impl_->ingest.arrivals().newest, std::move(text)}); }
 LiveStatus LiveSystem::status() const { return impl_->status(); }
 Result<void> LiveSystem::finish() { return impl_->finish(); }
 

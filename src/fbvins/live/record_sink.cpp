@@ -2,7 +2,10 @@
 #include "fbvins/live/record_sink.hpp"
 
 #include <chrono>
+#include <limits>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "fbvins/live/live_diagnostic.hpp"
 
@@ -13,6 +16,28 @@ namespace {
 constexpr std::chrono::milliseconds kFlushPeriod{100};
 /// The disk itself has all that is older than this, should the power fail.
 constexpr int kFlushesPerSync = 10;
+
+/// Features and landmarks of the same track in one.
+std::vector<RosLandmark> landmarks_of(const LiveView& view) {
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+  std::vector<RosLandmark> out;
+  std::unordered_map<TrackId, std::size_t> places;
+  for (const LiveView::Feature& f : view.features) {
+    places.emplace(f.track, out.size());
+    out.push_back({static_cast<std::uint32_t>(f.track.value),
+                   {kUnknown, kUnknown, kUnknown},
+                   {static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())},
+                   static_cast<float>(f.age_frames),
+                   static_cast<float>(f.depth_m)});
+  }
+  for (const LiveView::Landmark& l : view.landmarks) {
+    const auto [place, is_new] = places.emplace(l.track, out.size());
+    if (is_new) out.push_back({static_cast<std::uint32_t>(l.track.value), {}, {kUnknown, kUnknown}, kUnknown, kUnknown});
+    const Eigen::Vector3f p = l.p_W.cast<float>();
+    out[place->second].p_W = {p.x(), p.y(), p.z()};
+  }
+  return out;
+}
 
 /// Adds one event to a record.
 struct Adder {
@@ -25,6 +50,11 @@ struct Adder {
   Result<void> operator()(const LivePose& pose) const {
     if (!pose.health.has_pose()) return {};
     return record.add_live({pose.t, pose.T_WB, pose.v_WB, pose.w_WB_B, pose.pose_covariance, pose.velocity_covariance});
+  }
+  Result<void> operator()(const LiveView& view) const { return record.add_landmarks(view.t, landmarks_of(view)); }
+  Result<void> operator()(const LiveMark& mark) const {
+    if (mark.t.ns == 0) return {};
+    return record.add_mark(mark.t, mark.text);
   }
   Result<void> operator()(const LiveStatus& status) const {
     if (status.t.ns == 0) return {};  // no sensor has spoken yet: there is no time to write it at

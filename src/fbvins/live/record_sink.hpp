@@ -27,6 +27,7 @@ class RecordSink final : public Sink {
   ~RecordSink() override;
 
   std::string_view name() const override { return name_; }
+  bool wants_views() const override { return true; }
   Result<void> take(const LiveEvent& event) override;
   Result<void> finish() override;
 

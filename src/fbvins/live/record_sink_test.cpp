@@ -85,6 +85,9 @@ TEST_F(RecordSinkTest, EveryEventHasItsTopic) {
   LiveStatus status;
   status.t = at(60);
   take(status);
+  take(LiveView{});
+  take(LiveMark{});  // before any sensor
+  take(LiveMark{at(70), "here"});
   ASSERT_TRUE(sink->finish());
   const std::map<std::string, int> expected = {{"/imu", 1},
                                                {"/camera/left", 2},
@@ -95,7 +98,9 @@ TEST_F(RecordSinkTest, EveryEventHasItsTopic) {
                                                {"/health", 3},
                                                {"/odometry", 1},
                                                {"/odometry/live", 1},
-                                               {"/tf", 2}};
+                                               {"/tf", 2},
+                                               {"/landmarks", 1},
+                                               {"/marks", 1}};
   EXPECT_EQ(topics(), expected);
 }
 

@@ -41,6 +41,7 @@ struct System::Impl {
 
   std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void(const Keyframe&)> on_keyframe;
+  std::function<void(const WindowSnapshot&)> on_window;
   std::function<void(const Odometry&)> on_odometry;
   std::function<void(const MapUpdate&)> on_map_update;
 
@@ -82,6 +83,7 @@ struct System::Impl {
     if (on_tracked_frame) on_tracked_frame(frame);
     Estimate estimate = estimator.process(frame);
     if (keyframes_wanted()) complete(estimate, frame.imu);
+    if (on_window) on_window(estimator.snapshot());
     if (on_odometry) on_odometry(estimate.odometry);
     if (on_keyframe)
       for (const Keyframe& keyframe : estimate.keyframes) on_keyframe(keyframe);
@@ -181,6 +183,7 @@ void System::on_tracked_frame(std::function<void(const TrackedFrame&)> callback)
   impl_->on_tracked_frame = std::move(callback);
 }
 void System::on_keyframe(std::function<void(const Keyframe&)> callback) { impl_->on_keyframe = std::move(callback); }
+void System::on_window(std::function<void(const WindowSnapshot&)> callback) { impl_->on_window = std::move(callback); }
 void System::on_odometry(std::function<void(const Odometry&)> callback) { impl_->on_odometry = std::move(callback); }
 void System::on_map_update(std::function<void(const MapUpdate&)> callback) { impl_->on_map_update = std::move(callback); }
 

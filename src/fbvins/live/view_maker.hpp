@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: joins what the frontend saw in an image with where the window has it. One thread, in the order of the calls.
+//
+//   views.add(tracked_frame);
+//   views.add(window_snapshot);
+//   hub.publish(views.view_of(odometry, shutter_to_pose_ms));
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class ViewMaker {
+ public:
+  explicit ViewMaker(const Pose<B, C0>& T_BC0) : T_BC0_(T_BC0) {}
+
+  void add(const TrackedFrame& frame);
+  void add(WindowSnapshot window) { window_ = std::move(window); }
+  /// Features only where the image is the one that was added last.
+  LiveView view_of(const Odometry& odometry, double shutter_to_pose_ms);
+
+ private:
+  Pose<B, C0> T_BC0_;
+  Time t_;
+  std::vector<LiveView::Feature> features_;
+  WindowSnapshot window_;
+};
+
+}  // namespace fbvins
