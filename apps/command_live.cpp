@@ -19,6 +19,7 @@
 #include "apps/run_map.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
+#include "apps/web_page.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/live/record_sink.hpp"
@@ -54,12 +55,13 @@ examples:
   fbvins live --source replay:MH_01_easy --map flat.fbm
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
+  fbvins live --source replay:MH_01_easy --web 8080
   fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor says
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
 struct Arguments {
-  std::string source, out, record, kept_map, ros2, imu_state;
+  std::string source, out, record, kept_map, ros2, imu_state, web;
   std::vector<std::string> faults, mavlink;
   ConfigArguments config;
   DatasetOptions dataset;
@@ -117,6 +119,33 @@ Result<void> add_sinks(const Arguments& arguments, const Config& config, const S
   if (!files) return files.error();
   live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
   live.add_sink(std::move(*files));
+  return {};
+}
+
+/// Why a page's button cannot save the map; empty: it can.
+std::string cannot_save_map(const Arguments& arguments) {
+  if (!arguments.map.wanted()) return "this flight has no map: start it with --map FILE";
+  if (arguments.map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
+  return {};
+}
+
+/// The page and its buttons, where one is wanted.
+Result<void> add_page(const Arguments& arguments, const Config& config, LiveSystem& live, KeptMap* map) {
+  if (arguments.web.empty()) return {};
+  auto page = open_live_page({.where = arguments.web,
+                              .source = arguments.source,
+                              .frontend = config.frontend.kind,
+                              .cannot_save_map = cannot_save_map(arguments),
+                              .mark = [&live](std::string text) { live.mark(std::move(text)); },
+                              .save_map = [map] { map->request_save(); }});
+  if (!page) return page.error();
+  if (map) {
+    const std::string& file = arguments.map.save;
+    map->on_request(file, [file, tell = page->tell](const Result<void>& saved) {
+      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
+    });
+  }
+  live.add_sink(std::move(page->sink));
   return {};
 }
 
@@ -178,6 +207,7 @@ int run(const Arguments& arguments) {
     if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
     if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
     if (Result<void> added = graph->add_sink(**source, *live); !added) return added;
+    if (Result<void> added = add_page(arguments, *config, *live, kept ? &*kept : nullptr); !added) return added;
     const Result<void> done = fly(**source, *live, *faults);
     tally.last = live->status();
     return done;
@@ -231,6 +261,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--ros2", arguments->ros2,
                       "publish in ROS 2's graph: DOMAIN[:INTERFACE], this machine alone without an interface");
+  command->add_option("--web", arguments->web, kWebHelp);
   command->add_option("--check", arguments->check_s, "look at the sensors for so many seconds, say what is wrong, and end")
       ->check(CLI::PositiveNumber);
   command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")

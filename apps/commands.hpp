@@ -20,6 +20,7 @@ enum ExitCode : int {
 
 /// What the help of `fbvins` says of commands that another program holds.
 inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
+inline constexpr const char* kViewDescription = "show a finished flight in the browser";
 inline constexpr const char* kEvalDescription = "say how far a trajectory is from the ground truth";
 inline constexpr const char* kInfoDescription = "say what is in a recording: rates, gaps, calibration, stamps";
 inline constexpr const char* kDoctorDescription = "say what is wrong with a setup: units, axes, clocks, calibration, images";
@@ -42,6 +43,7 @@ void add_report_command(CLI::App& program, int& exit_code);
 void add_bench_command(CLI::App& program, int& exit_code);
 void add_fly_command(CLI::App& program, int& exit_code);
 void add_live_command(CLI::App& program, int& exit_code);
+void add_view_command(CLI::App& program, int& exit_code);
 void add_map_command(CLI::App& program, int& exit_code);
 void add_mocap_command(CLI::App& program, int& exit_code);
 void add_tune_command(CLI::App& program, int& exit_code);

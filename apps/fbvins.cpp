@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
                           {
                               {"convert", kConvertDescription, kBags},
                               {"live", kLiveDescription, "fbvins-live"},
+                              {"view", kViewDescription, "fbvins-live"},
                               {"eval", kEvalDescription, "fbvins-tools"},
                               {"doctor", kDoctorDescription, "fbvins-tools"},
                               {"info", kInfoDescription, "fbvins-tools"},

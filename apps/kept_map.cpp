@@ -9,6 +9,7 @@ constexpr Duration kWritePeriod{30'000'000'000};
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
   MapUpdate update = map_.process(keyframe);
+  if (wanted_.exchange(false) && told_) told_(map_.save(requested_file_));
   if (file_.empty()) return update;
   if (written_ == Time{}) written_ = keyframe.t;
   if (keyframe.t - written_ < kWritePeriod) return update;

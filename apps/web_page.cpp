@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/web_page.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <utility>
+
+#include "apps/stop_signal.hpp"
+#include "apps/terminal.hpp"
+
+#ifdef FBVINS_WITH_WEB
+#include "fbvins/web/finished_flight.hpp"
+#include "fbvins/web/flight_player.hpp"
+#include "fbvins/web/page_files.hpp"
+#include "fbvins/web/web_sink.hpp"
+#endif
+
+namespace fbvins::app {
+
+#ifdef FBVINS_WITH_WEB
+
+namespace {
+
+/// The page at `where`, [ADDRESS:]PORT; its address is said on stderr. The token is made by chance, unless FBVINS_WEB_TOKEN has
+/// one.
+Result<std::unique_ptr<WebSink>> open_page(const std::string& where, WebFlight flight, WebActions actions) {
+  auto address = parse_web_address(where);
+  if (!address) return address.error();
+  PageFiles files = page_files();
+  if (files.empty())
+    return Error{ErrorCode::invalid_argument, "this program was built without its page: build it again where npm is installed"};
+  WebOptions options{.address = *address};
+  if (const char* token = std::getenv("FBVINS_WEB_TOKEN")) {
+    options.token = token;
+    if (!token_usable(options.token))
+      return Error{ErrorCode::invalid_argument, "FBVINS_WEB_TOKEN: wanted are eight or more letters, digits, - and _"};
+  } else if (!address->loopback()) {
+    auto made = make_token();
+    if (!made) return made.error();
+    options.token = *std::move(made);
+  }
+  flight.program = "fbvins " FBVINS_VERSION;
+  auto sink = WebSink::create(options, std::move(files), std::move(flight), std::move(actions));
+  if (sink) note(fmt::format("the page is {}", (*sink)->url()));
+  return sink;
+}
+
+}  // namespace
+
+Result<void> show_finished_flight(const std::string& path, const std::string& recording, const std::string& where) {
+  const auto flight = open_finished_flight(path, recording);
+  if (!flight) return flight.error();
+  FlightPlayer player(**flight);
+  auto sink = open_page(where, player.description(), {.replay = [&](const WebCommand& command) { player.command(command); }});
+  if (!sink) return sink.error();
+  const StopSignal stop([&] { player.stop(); });
+  player.play(**sink);
+  return (*sink)->finish();
+}
+
+Result<LivePage> open_live_page(LivePageOptions options) {
+  WebFlight flight{.source = std::move(options.source), .frontend = std::move(options.frontend)};
+  flight.can_mark = true;
+  flight.cannot_save_map = std::move(options.cannot_save_map);
+  auto sink =
+      open_page(options.where, std::move(flight), {.mark = std::move(options.mark), .save_map = std::move(options.save_map)});
+  if (!sink) return sink.error();
+  LivePage page;
+  page.tell = [to = sink->get()](const std::string& sentence, bool bad) { to->tell(sentence, bad); };
+  page.sink = *std::move(sink);
+  return page;
+}
+
+#else
+
+namespace {
+Error without_boost() { return {ErrorCode::invalid_argument, "this program was built without Boost, which serves the page"}; }
+}  // namespace
+
+Result<LivePage> open_live_page(LivePageOptions) { return without_boost(); }
+Result<void> show_finished_flight(const std::string&, const std::string&, const std::string&) { return without_boost(); }
+
+#endif
+
+}  // namespace fbvins::app

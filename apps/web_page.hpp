@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page of `fbvins live --web` and `fbvins view`. In a program built without Boost, or without npm to bring the page's
+// libraries, asking for it is an error.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/live/sink.hpp"
+
+namespace fbvins::app {
+
+inline constexpr const char* kWebHelp =
+    "serve a page that shows the flight: [ADDRESS:]PORT; this machine alone without an address, and with a token otherwise "
+    "(docs/web.md)";
+
+/// `fbvins view`: until SIGINT or SIGTERM.
+Result<void> show_finished_flight(const std::string& flight, const std::string& recording, const std::string& where);
+
+/// A live flight's page as a sink; `tell` may be used, from any thread, as long as the sink lives.
+struct LivePage {
+  std::unique_ptr<Sink> sink;
+  std::function<void(const std::string& sentence, bool bad)> tell;
+};
+struct LivePageOptions {
+  std::string where, source, frontend;
+  std::string cannot_save_map;  ///< why not; empty: it can
+  std::function<void(std::string)> mark;
+  std::function<void()> save_map;
+};
+Result<LivePage> open_live_page(LivePageOptions options);
+
+}  // namespace fbvins::app

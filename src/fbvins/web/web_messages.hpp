@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: what a page is told, encoded once for all viewers (docs/web.md). Pure functions, any thread.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fbvins/live/live_event.hpp"
+#include "fbvins/web/flight_history.hpp"
+#include "fbvins/web/viewer_queue.hpp"
+
+namespace fbvins {
+
+/// What a page is told of the flight as a whole, before anything else.
+struct WebFlight {
+  std::string program = "fbvins";  ///< with its version
+  std::string source = {}, frontend = {};
+  bool replay = false;    ///< a finished flight that is played: it can be wound back and forth
+  double duration_s = 0;  ///< of a replay
+  bool can_mark = false;
+  std::string cannot_save_map = {};     ///< why not, in one sentence; empty: it can
+  std::vector<PathPoint> whole_path{};  ///< of a replay
+};
+
+SharedMessage hello_message(const WebFlight& flight, Time start);
+SharedMessage history_message(const FlightHistory& history);
+SharedMessage state_message(double t_s, const Odometry& odometry, const LiveView* view, const FlightHistory& history);
+SharedMessage status_message(double t_s, const LiveStatus& status, const LivePose& newest);
+SharedMessage map_message(double t_s, const MapUpdate& update, int loops);
+SharedMessage mark_message(const FlightMark& mark);
+/// Something a person should read, by whoever did what was asked for.
+SharedMessage note_message(const std::string& text, bool bad);
+/// A replay: where it is and whether it goes on.
+SharedMessage replay_message(double t_s, bool playing);
+/// A replay: what was told of the flight is void, and follows again.
+SharedMessage rewound_message();
+SharedMessage end_message();
+
+/// JPEG with the features of that very image, whose full size is given.
+SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int height_px,
+                            const std::vector<LiveView::Feature>& features);
+/// Replaces the window's landmarks, or (`cloud`) adds to those seen before.
+SharedMessage points_message(double t_s, const std::vector<LiveView::Landmark>& points, bool cloud);
+
+struct WebCommand {
+  enum class Kind { mark, save_map, seek, play, pause };
+  Kind kind;
+  std::string text = {};  ///< of a mark
+  double t_s = 0;         ///< to seek
+};
+/// Nullopt for what is no command.
+std::optional<WebCommand> parse_command(std::string_view text);
+
+}  // namespace fbvins

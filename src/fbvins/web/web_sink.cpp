@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/web/web_sink.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kPicturePeriod = 190ms, kPointsPeriod = 190ms;
+/// Faster cameras are thinned out.
+constexpr auto kStatePeriod = 30ms;
+/// For viewers to get what was sent last.
+constexpr auto kFarewell = 3s;
+
+/// Is it time again? Then the next time is a period later.
+bool due(Clock::time_point& when, Clock::duration period) {
+  const auto now = Clock::now();
+  if (now < when) return false;
+  when = now + period;
+  return true;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<WebSink>> WebSink::create(const WebOptions& options, PageFiles files, WebFlight flight,
+                                                 WebActions actions) {
+  std::unique_ptr<WebSink> sink(new WebSink(options, std::move(flight), std::move(actions)));
+  auto server = WebServer::start(options, std::move(files),
+                                 {.greet = [to = sink.get()] { return to->greeting(); },
+                                  .command = [to = sink.get()](std::string_view text) { to->on_command(text); }});
+  if (!server) return server.error();
+  sink->server_ = *std::move(server);
+  return sink;
+}
+
+WebSink::WebSink(const WebOptions& options, WebFlight flight, WebActions actions)
+    : options_(options), actions_(std::move(actions)), flight_(std::move(flight)) {}
+
+std::string WebSink::url() const {
+  const WebAddress& address = options_.address;
+  std::string host = address.host.find(':') == std::string::npos ? address.host : "[" + address.host + "]";
+  if (host == "0.0.0.0" || host == "[::]") {
+    std::array<char, 256> name{};
+    host = gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
+  }
+  // After the # nothing leaves the browser: no log and no other server gets to see the token.
+  return fmt::format("http://{}:{}/{}{}", host, port(), options_.token.empty() ? "" : "#token=", options_.token);
+}
+
+double WebSink::since_start_s(Time t) {
+  const std::lock_guard lock(mutex_);
+  if (!start_) start_ = t;
+  return (t - *start_).seconds();
+}
+
+void WebSink::set_start(Time start) {
+  const std::lock_guard lock(mutex_);
+  start_ = start;
+}
+
+std::vector<SharedMessage> WebSink::greeting() {
+  const std::lock_guard lock(mutex_);
+  std::vector<SharedMessage> messages{hello_message(flight_, start_.value_or(Time{}))};
+  for (SharedMessage& message : flight_so_far()) messages.push_back(std::move(message));
+  return messages;
+}
+
+std::vector<SharedMessage> WebSink::flight_so_far() const {
+  std::vector<SharedMessage> messages{history_message(history_), points_message(0, history_.cloud().points(), true)};
+  for (const SharedMessage& last : {last_status_, last_map_, last_points_, last_image_, last_state_, last_replay_})
+    if (last) messages.push_back(last);
+  return messages;
+}
+
+/// With the mutex held.
+void WebSink::send(SharedMessage message) {
+  if (!silent_) server_->send(std::move(message));
+}
+
+void WebSink::on_command(std::string_view text) {
+  const std::optional<WebCommand> command = parse_command(text);
+  if (!command) return;
+  using Kind = WebCommand::Kind;
+  if (command->kind == Kind::mark && flight_.can_mark) actions_.mark(command->text);
+  else if (command->kind == Kind::save_map && flight_.cannot_save_map.empty()) actions_.save_map();
+  else if (flight_.replay) actions_.replay(*command);
+}
+
+Result<void> WebSink::take(const LiveEvent& event) {
+  if (const auto* frame = std::get_if<StereoFrame>(&event)) show(*frame);
+  else if (const auto* view = std::get_if<LiveView>(&event)) view_ = *view;
+  else if (const auto* odometry = std::get_if<Odometry>(&event)) show(*odometry);
+  else if (const auto* pose = std::get_if<LivePose>(&event)) newest_ = *pose;
+  else if (const auto* update = std::get_if<MapUpdate>(&event)) show(*update);
+  else if (const auto* status = std::get_if<LiveStatus>(&event)) show(*status);
+  else if (const auto* mark = std::get_if<LiveMark>(&event)) show(*mark);
+  return {};
+}
+
+/// Encoded at once rather than kept: its memory may be the sensor's. One waits for its odometry, and the next one for that.
+void WebSink::show(const StereoFrame& frame) {
+  if (!frame.left || picture_ || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
+  picture_ = {frame.t, encoder_.encode(*frame.left), frame.left->width(), frame.left->height()};
+}
+
+void WebSink::show(const Odometry& o) {
+  const double t_s = since_start_s(o.t);
+  const LiveView* view = view_ && view_->t == o.t ? &*view_ : nullptr;
+  const bool looked_at = viewers() > 0 || flight_.replay;  // a replay that stands still has to say where
+  const bool send_state = looked_at && !silent_ && due(state_due_, kStatePeriod);
+  {
+    const std::lock_guard lock(mutex_);
+    history_.add(t_s, o, view);
+    if (silent_) untold_ = o;
+    else if (send_state) send(last_state_ = state_message(t_s, o, view, history_));
+  }
+  if (picture_ && picture_->t <= o.t) send_picture(t_s);
+  if (view && looked_at && !silent_ && due(points_due_, kPointsPeriod)) {
+    const SharedMessage points = points_message(t_s, view->landmarks, false);
+    const std::lock_guard lock(mutex_);
+    send(last_points_ = points);
+  }
+}
+
+/// The features are those of the very image, or none.
+void WebSink::send_picture(double t_s) {
+  const Picture picture = *std::exchange(picture_, std::nullopt);
+  const bool same = view_ && view_->t == picture.t;
+  const SharedMessage message = image_message(t_s, picture.jpeg, picture.width_px, picture.height_px,
+                                              same ? view_->features : std::vector<LiveView::Feature>{});
+  const std::lock_guard lock(mutex_);
+  send(last_image_ = message);
+}
+
+void WebSink::show(const MapUpdate& update) {
+  loops_ += static_cast<int>(update.loops.size());
+  const SharedMessage message = map_message(since_start_s(update.t), update, loops_);
+  const std::lock_guard lock(mutex_);
+  send(last_map_ = message);
+}
+
+void WebSink::show(const LiveStatus& status) {
+  if (status.t.ns == 0) return;  // no sensor has spoken yet
+  const SharedMessage message = status_message(since_start_s(status.t), status, newest_);
+  const std::lock_guard lock(mutex_);
+  history_.dropped_images(status.counts.images_dropped);
+  send(last_status_ = message);
+}
+
+void WebSink::show(const LiveMark& mark) {
+  if (mark.t.ns == 0) return;
+  const double t_s = since_start_s(mark.t);
+  const std::lock_guard lock(mutex_);
+  history_.add(t_s, mark);
+  send(mark_message(history_.marks().back()));
+}
+
+void WebSink::tell(const std::string& sentence, bool bad) { server_->send(note_message(sentence, bad)); }
+
+void WebSink::show_replay(double t_s, bool playing) {
+  const std::lock_guard lock(mutex_);
+  send(last_replay_ = replay_message(t_s, playing));
+}
+
+void WebSink::begin_again() {
+  const std::lock_guard lock(mutex_);
+  silent_ = true;
+  history_.clear();
+  last_state_ = last_status_ = last_map_ = last_points_ = last_image_ = last_replay_ = nullptr;
+  picture_.reset();
+  view_.reset();
+  loops_ = 0;
+}
+
+void WebSink::caught_up() {
+  const std::lock_guard lock(mutex_);
+  silent_ = false;
+  state_due_ = points_due_ = picture_due_ = {};  // the next image is shown, however soon it comes
+  const bool same = untold_ && view_ && view_->t == untold_->t;
+  const LiveView* view = same ? &*view_ : nullptr;
+  const double t_s = untold_ ? (untold_->t - *start_).seconds() : 0;
+  if (untold_) last_state_ = state_message(t_s, *untold_, view, history_);
+  if (view) last_points_ = points_message(t_s, view->landmarks, false);
+  untold_.reset();
+  send(rewound_message());
+  for (SharedMessage& message : flight_so_far()) send(std::move(message));
+}
+
+Result<void> WebSink::finish() {
+  server_->send(end_message());
+  server_->drain(kFarewell);
+  server_->stop();  // what its actions speak to may soon be gone
+  return {};
+}
+
+}  // namespace fbvins

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page of `fbvins live --web` and `fbvins view`: what comes over the stream goes to the parts that show it.
+import { CameraView } from "./camera.js";
+import { clearFigures, showMap, showState, showStatus } from "./figures.js";
+import { Player } from "./player.js";
+import { Plots } from "./plots.js";
+import { NoScene, Scene } from "./scene.js";
+import { Stream } from "./stream.js";
+import { Timeline } from "./timeline.js";
+import { STATES, clock, healthSentence } from "./words.js";
+
+const NOTE_MS = 6000;
+const element = id => document.getElementById(id);
+
+const camera = new CameraView();
+const plots = new Plots();
+const timeline = new Timeline(element("timeline"), element("changes"));
+const scene = makeScene();
+let newest_s = -Infinity;  // of what the path and the plots have
+
+function makeScene() {
+  try {
+    const made = new Scene(element("scene"),
+      scale => { element("ellipsoid-words").textContent = `position uncertainty, 3σ${scale > 1 ? `, drawn ×${scale}` : ""}`; },
+      cell => { element("grid-words").textContent = `grid ${cell} m`; });
+    made.clear();
+    return made;
+  } catch {
+    element("no-webgl").hidden = false;
+    return new NoScene();
+  }
+}
+
+function showHealth(state, words, title = STATES[state] ?? "Connecting") {
+  element("health").dataset.state = state;
+  element("health-state").textContent = title;
+  element("health-words").textContent = words;
+}
+
+function note(text, bad = false, lasts = true) {
+  const place = element("note");
+  place.textContent = text;
+  place.classList.toggle("bad", bad);
+  place.hidden = false;
+  clearTimeout(note.timer);
+  if (!lasts) note.timer = setTimeout(() => { place.hidden = true; }, NOTE_MS);
+}
+
+function clear() {
+  newest_s = -Infinity;
+  for (const part of [camera, plots, timeline, scene]) part.clear();
+  clearFigures();
+}
+
+const on = {
+  hello(message) {
+    clear();
+    document.title = `${message.replay ? "Replay" : "Live"}: ${message.source}`;
+    const name = message.source.replace(/\/?([^/]*\/)*(?=[^/])/, "");  // without the folders
+    const kind = /^\w+:/.exec(message.source)?.[0] ?? "";
+    element("source").textContent = `${name.startsWith(kind) ? "" : kind}${name}${message.frontend ? `, ${message.frontend}` : ""}`;
+    element("source").title = `${message.program}: ${message.source}`;
+    element("mark").disabled = !message.can_mark;
+    element("mark").hidden = message.replay;
+    element("save-map").hidden = message.replay;
+    element("save-map").disabled = !message.can_save_map;
+    element("save-map").title = message.cannot_save_map || "Writes the map after the next keyframe";
+    showHealth("none", "No image has come yet.", "Waiting");
+    if (!message.replay) return;
+    timeline.total_s = message.duration_s;
+    player.open(message.duration_s);
+    scene.showWhole(message.whole_path);
+    for (const [, x, y, z, reset] of message.whole_path) scene.addPath([x, y, z], reset, "none");
+    scene.fit(false);
+    scene.clear();
+  },
+  history(message) {
+    for (const [t_s, state, reason] of message.health) timeline.add(t_s, state, reason);
+    for (const [t_s, text] of message.marks) timeline.addMark(t_s, text);
+    for (const row of message.series) plots.add(row);
+    for (const [t_s, x, y, z, reset] of message.path) {
+      scene.addPath([x, y, z], reset, timeline.stateAt(t_s));
+      newest_s = t_s;
+    }
+    scene.pathChanged();
+  },
+  state(message) {
+    const { t_s } = message;
+    element("clock").textContent = clock(t_s);
+    element("clock").dataset.image = message.image;
+    player.at(t_s);
+    showState(message);
+    showHealth(message.health, healthSentence(message));
+    timeline.add(t_s, message.health, message.reason);
+    plots.add([t_s, message.latency_ms, message.dropped, message.features, message.landmarks, message.sigma_m]);
+    if (!message.position_m) return;
+    if (t_s > newest_s) {
+      scene.addPath(message.position_m, message.reset_counter, message.health);
+      scene.pathChanged();
+      newest_s = t_s;
+    }
+    scene.showPose(message.position_m, message.orientation_wxyz, message.position_covariance_m2);
+    if (message.keyframes_m) scene.showKeyframes(message.keyframes_m);
+  },
+  status({ t_s, status }) {
+    showStatus(status);
+    // Between images the watchdogs speak: sensors are silent.
+    if (status.health !== element("health").dataset.state) {
+      showHealth(status.health, healthSentence({ health: status.health, reason: status.reason, sigma_m: NaN }));
+      timeline.add(t_s, status.health, status.reason);
+    }
+    if (status.problem) note(status.problem, true);
+    else if (element("note").classList.contains("bad")) element("note").hidden = true;
+  },
+  map(message) {
+    showMap(message);
+    if (message.corrected_m) scene.showMapped(message.corrected_m);
+  },
+  mark({ t_s, text }) {
+    timeline.addMark(t_s, text);
+    note(`Marked ${clock(t_s)}`, false, false);
+  },
+  note({ text, bad }) { note(text, bad, bad); },
+  replay(message) { player.show(message); },
+  rewound() { clear(); },
+  image(message) { camera.show(message); },
+  points(message) { scene.showPoints(message, true); },
+  cloud(message) { scene.showPoints(message, false); },
+  end() {
+    on.ended = true;
+    note("The flight has ended. This page shows its last state, and the next flight when the program runs again.");
+  },
+};
+
+const stream = new Stream({
+  open() { on.ended = false; element("note").hidden = true; },
+  message(message) { on[message.type]?.(message); },
+  lost() {
+    if (on.ended) return;
+    showHealth("none", "No connection to the program; trying again every two seconds.", "Not connected");
+  },
+  refused() {
+    showHealth("none", "The program wants a token.", "Not connected");
+    element("token-dialog").showModal();
+  },
+});
+const player = new Player(stream);
+
+element("token-dialog").addEventListener("close", () => stream.useToken(element("token").value));
+element("mark").addEventListener("click", () => stream.send({ do: "mark", text: "" }));
+element("save-map").addEventListener("click", () => { stream.send({ do: "save_map" }); note("The map will be saved after the next keyframe.", false, false); });
+element("follow").addEventListener("click", event => {
+  scene.follows = !scene.follows;
+  event.currentTarget.setAttribute("aria-pressed", String(scene.follows));
+});
+for (const [id, fromAbove] of [["from-above", true], ["fit", false]]) {
+  element(id).addEventListener("click", () => {
+    scene.follows = false;
+    element("follow").setAttribute("aria-pressed", "false");
+    scene.fit(fromAbove);
+  });
+}

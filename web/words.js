@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What states and reasons mean to somebody who has not read the documentation, and how figures are written.
+
+export const STATES = {
+  good: "Good", degraded: "Degraded", lost: "Lost", initialising: "Starting",
+};
+
+const REASONS = {
+  none: "",
+  waiting_for_motion_or_rest: "waiting until the vehicle rests or moves enough",
+  too_few_features: "the images show too few features",
+  alignment_refused: "the start did not fit together; trying again",
+  few_tracks: "few features can be followed",
+  no_tracks: "no feature can be followed",
+  no_images: "no images come",
+  imu_gap: "the IMU is silent",
+  implausible_bias: "the IMU's bias became implausible",
+  implausible_speed: "the speed became implausible",
+  solver_failed: "the solver failed",
+  one_camera: "only one camera delivers",
+};
+
+export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }
+
+export function healthSentence(state) {
+  const why = reasonWords(state.reason);
+  switch (state.health) {
+    case "good": return `Position known to ±${length(3 * state.sigma_m)} (3σ).`;
+    case "degraded": return `${sentence(why || "worse than it could be")} Position ±${length(3 * state.sigma_m)} (3σ).`;
+    case "lost": return `${sentence(why || "no trustworthy pose")} There is no pose; it starts again.`;
+    default: return sentence(why || "no pose yet");
+  }
+}
+
+function sentence(words) { return words.charAt(0).toUpperCase() + words.slice(1) + "."; }
+
+/// A length in the unit that suits it.
+export function length(metres) {
+  if (!Number.isFinite(metres)) return "–";
+  if (metres < 0.1) return `${(100 * metres).toFixed(1)} cm`;
+  return metres < 1 ? `${(100 * metres).toFixed(0)} cm` : `${metres.toFixed(1)} m`;
+}
+
+/// Minutes and seconds.
+export function clock(seconds, digits = 1) {
+  const whole = Math.max(0, Math.floor(seconds * 10 ** digits) / 10 ** digits);
+  const minutes = Math.floor(whole / 60);
+  const rest = (whole - 60 * minutes).toFixed(digits);
+  return `${minutes}:${rest.padStart(digits ? 3 + digits : 2, "0")}`;
+}
+
+/// Whole numbers with thin groups of three.
+export function count(number) { return String(number ?? "–").replace(/\B(?=(\d{3})+$)/g, "\u202f"); }
+
+/// Degrees about x, y, z of a body whose attitude is this quaternion: yaw about z, then pitch about y, then roll about x.
+export function rollPitchYaw([w, x, y, z]) {
+  const degrees = 180 / Math.PI;
+  const roll = Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y));
+  const pitch = Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - z * x))));
+  const yaw = Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+  return [roll, pitch, yaw].map(angle => angle * degrees);
+}
