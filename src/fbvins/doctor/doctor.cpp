@@ -338,12 +338,21 @@ std::string regions_text(const RegionErrors& regions) {
   return text;
 }
 
+bool begins_with_delay(const StereoFit& fit) {
+  return !fit.changes.empty() && fit.changes.front().kind == FindingKind::stereo_sync;
+}
+
 void Examination::stereo() {
   StereoRig rig = evidence_.rig;
   rig.time_offset_s = offset_s_;
   rig.T_BC1 = rig_.T_BC1;
   rig.T_BC0 = rig_.T_BC0;
-  const StereoFit fit = fit_stereo(evidence_.stereo, rig, turns_agree_ ? &imu_ : nullptr, pairs_);
+  const ImuSeries* imu = turns_agree_ ? &imu_ : nullptr;
+  StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_);
+  // The pairs' motions rest on depths, which a right image that is late spoils: its turning alone tells of it, too.
+  if (!fit.changes.empty() && !begins_with_delay(fit))
+    if (StereoFit by_turning = fit_stereo(evidence_.stereo, rig, imu, {}); begins_with_delay(by_turning))
+      fit = std::move(by_turning);
   const auto views = static_cast<double>(std::max<std::size_t>(evidence_.stereo.size(), 1));
   out_.measured.push_back(
       fmt::format("epipolar error of {} matches in {} images: {:.2f} px, by region {}; after {} changes {:.2f}", fit.matches,

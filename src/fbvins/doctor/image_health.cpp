@@ -51,7 +51,7 @@ std::vector<Finding> check_repeated(const RepeatedImages& repeated) {
 namespace {
 
 constexpr double kApart_s = 0.5, kOthersMove_px = 5, kStays_px = 0.6;
-constexpr double kMostFixed = 0.15, kMostDots = 0.4;
+constexpr double kMostFixed = 0.15, kMostDots = 0.2;
 constexpr int kFewestPairs = 8;
 
 double upper_quartile(std::vector<double> v) {

@@ -288,7 +288,7 @@ std::vector<Spoiler> of_the_calibration(const StereoRig& rig) {
       {"right lens without distortion", FindingKind::distortion, 0, 0, [](StereoRig& r) { forget_distortion(r.right); }, {}, {}},
       baseline("baseline 9 % too short", 0.91, rig),
       baseline("baseline 10 % too long", 1.10, rig),
-      baseline("baseline in the wrong unit's neighbour: twice", 2, rig),
+      baseline("baseline twice as long", 2, rig),
       {"rate of the IMU twice as high", FindingKind::imu_stamps, 0, 0, [](StereoRig& r) { r.imu_noise.rate_hz *= 2; }, {}, {}},
   };
 }

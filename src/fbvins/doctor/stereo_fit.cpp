@@ -267,6 +267,12 @@ std::optional<BlockSolution> converge(const std::vector<Match>& matches, const S
   return last;
 }
 
+/// Nobody's lens is half as long again as he thinks: such a fit is of errors that no calibration has.
+bool plausible(const VectorXd& x) {
+  constexpr double kMostLogFocal = 0.3;
+  return std::max({std::abs(x(kLeft)), std::abs(x(kRight)), std::abs(x(kBoth))}) < kMostLogFocal;
+}
+
 struct Candidate {
   const Group* group = nullptr;
   VectorXd x;
@@ -284,7 +290,7 @@ std::optional<Candidate> best_group(const std::vector<Match>& matches, const Ste
     Candidate candidate{&group, x, free, {}, 0};
     candidate.free.insert(candidate.free.end(), group.unknowns.begin(), group.unknowns.end());
     auto solution = converge(matches, rig, candidate.free, candidate.x);
-    if (!solution) continue;
+    if (!solution || !plausible(candidate.x)) continue;
     candidate.solution = std::move(*solution);
     candidate.error_px = capped_error(matches, Hypothesis(rig, candidate.x));
     const std::size_t n = group.unknowns.size(), n_best = best ? best->group->unknowns.size() : n;
