@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/examination.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "fbvins/checkup/reading_units.hpp"
+#include "fbvins/checkup/stamps.hpp"
+#include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/imu/nav_state.hpp"
+
+namespace fbvins {
+
+using doctor::kUnitTolerance;
+
+Diagnosis Examination::run() {
+  readings();
+  images();
+  if (has(FindingKind::same_image_twice)) {
+    out_.not_judged.push_back("all that two cameras are needed for: there is one");
+    out_.rig = rig_;
+    return std::move(out_);
+  }
+  turns();
+  stereo();
+  if (turns_agree_) motion();
+  if (motion_agrees_) accelerations();
+  out_.rig = rig_;
+  return std::move(out_);
+}
+
+void Examination::readings() {
+  for (Finding& finding : check_reading_units(evidence_.imu)) {
+    if (finding.kind == FindingKind::accel_units) {
+      const double gravity = finding.size * kGravity_mps2;
+      accel_unit_ = kGravity_mps2 / gravity;
+      for (const double unit : {1.0, 1000.0})
+        if (std::abs(gravity / unit - 1) < kUnitTolerance) accel_unit_ = 9.80665 / unit;
+    }
+    // Too fast to be followed is said of a gyroscope only where the images do not say more.
+    if (finding.kind != FindingKind::gyro_units) out_.findings.push_back(std::move(finding));
+  }
+  for (Finding& finding : check_stamps(evidence_.imu, evidence_.stamps, evidence_.rig))
+    out_.findings.push_back(std::move(finding));
+  if (accel_unit_ == 1) {
+    keep(check_saturation(evidence_.imu));
+    keep(check_vibration(evidence_.imu));
+  }
+  const GravitySeen gravity = gravity_seen(evidence_.imu);
+  const Vibration vibration = measure_vibration(evidence_.imu);
+  out_.measured.push_back(fmt::format(
+      "gravity by the accelerometer: {:.3f} +- {:.3f}; vibration above {:.0f} Hz: {:.2f} m/s^2, strongest at {:.0f} Hz",
+      gravity.norm_mps2, gravity.sigma_mps2, kVibrationFrom_hz, vibration.rms_mps2, vibration.peak_hz));
+}
+
+void Examination::images() {
+  for (Finding& finding : check_repeated(evidence_.repeated)) out_.findings.push_back(std::move(finding));
+  if (evidence_.swapped) keep(check_stereo_order(evidence_.order));
+  const FixedFeatures fixed = measure_fixed(evidence_);
+  const Blur blur = measure_blur(evidence_);
+  keep(check_fixed(fixed));
+  keep(check_blur(blur));
+  out_.measured.push_back(fmt::format("features that stay in place: {:.1f} % ({} pairs); that look like spots: {:.1f} %",
+                                      100 * fixed.share, fixed.pairs, 100 * fixed.dots));
+  out_.measured.push_back(fmt::format("blur: exposure {:.1f} +- {:.1f} ms by {} images, {:.1f} px at {:.0f} px/s",
+                                      1e3 * blur.exposure_s, 1e3 * blur.sigma_s, blur.images, blur.length_px(), blur.speed_pxps));
+}
+
+Diagnosis examine(const Evidence& evidence, CalibrationStyle style) { return Examination(evidence, style).run(); }
+
+}  // namespace fbvins

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to the doctor: one examination, step by step. What a step finds wrong is corrected for those that come after.
+//   examination.cpp          order, readings by themselves, images by themselves
+//   examination_imu.cpp      the IMU against what the images show
+//   examination_cameras.cpp  lenses and the pair of cameras
+#pragma once
+
+#include <algorithm>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fbvins/doctor/doctor.hpp"
+
+namespace fbvins {
+
+namespace doctor {
+inline constexpr double kDegrees = 180 / std::numbers::pi;  ///< in a radian
+/// A ratio of units is taken for one that people mix up when it is this near.
+inline constexpr double kUnitTolerance = 0.15;
+/// Standard deviations from which a difference is a finding, where it is of practical size as well.
+inline constexpr double kSignificant = 5;
+}  // namespace doctor
+
+class Examination {
+ public:
+  Examination(const Evidence& evidence, CalibrationStyle style)
+      : evidence_(evidence), style_(style), imu_(evidence.imu), rig_(evidence.rig), pairs_(pair_frames(evidence)) {}
+
+  Diagnosis run();
+
+ private:
+  Finding& found(FindingKind kind, double size, double sigma, std::string unit) {
+    Finding finding;
+    finding.kind = kind, finding.size = size, finding.sigma = sigma, finding.unit = std::move(unit);
+    out_.findings.push_back(std::move(finding));
+    return out_.findings.back();
+  }
+  void keep(std::optional<Finding> finding) {
+    if (finding) out_.findings.push_back(std::move(*finding));
+  }
+  bool has(FindingKind kind) const {
+    return std::any_of(out_.findings.begin(), out_.findings.end(), [&](const Finding& f) { return f.kind == kind; });
+  }
+
+  void readings();
+  void images();
+  void turns();
+  void gyro_unit(const TurnFit& fit);
+  void gyro_axes(const TurnFit& fit);
+  bool accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const;
+  void motion();
+  void time_offset(const MotionFit& fit);
+  void rotation(const MotionFit& fit);
+  void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
+  void stereo();
+  void stereo_change(const StereoChange& change);
+  void accelerations();
+
+  const Evidence& evidence_;
+  CalibrationStyle style_;
+  ImuSeries imu_;  // in rad/s and the body's axes, as far as was found out
+  StereoRig rig_;  // the calibration, corrected as far as was found out
+  std::vector<FramePair> pairs_;
+  double accel_unit_ = 1;  // m/s^2 of a reading of one
+  double offset_s_ = 0;
+  Vec3 gyro_bias_ = Vec3::Zero();
+  bool turns_agree_ = false, motion_agrees_ = false;
+  Diagnosis out_;
+};
+
+}  // namespace fbvins

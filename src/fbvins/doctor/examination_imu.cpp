@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// The IMU against what the images show: turning, motion, acceleration.
+#include "fbvins/doctor/examination.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "fbvins/doctor/axes.hpp"
+
+namespace fbvins {
+namespace {
+
+using doctor::kDegrees;
+using doctor::kSignificant;
+using doctor::kUnitTolerance;
+
+/// Below this the readings say something else than the images, whatever is done to them.
+constexpr double kAgreement = 0.7;
+/// The second of the three axes must have been turned about by this much for axes to be told, rad in a tenth of a second.
+constexpr double kLeastSecondAxis_rad = 2.5e-3;
+constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kBaselinePractical = 0.03;
+
+double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
+
+}  // namespace
+
+void Examination::turns() {
+  offset_s_ = rig_.time_offset_s;
+  if (has(FindingKind::clocks_apart)) return;
+  const TurnFit fit = fit_turns(pairs_, imu_, rig_);
+  out_.measured.push_back(fmt::format(
+      "turning seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",
+      fit.turning_rad, pairs_.size(), fit.spread.x(), fit.spread.y(), fit.spread.z(), fit.correlation, 1e3 * fit.offset_s,
+      fit.scale));
+  if (!fit.seen) {
+    out_.not_judged.push_back(
+        "gyroscope, axes, rotation and time between camera and IMU: the rig hardly turned, or its images show too few features");
+    return;
+  }
+  if (fit.correlation < kAgreement) {
+    if (fit.spread.y() < kLeastSecondAxis_rad) {
+      out_.not_judged.push_back("gyroscope, axes, rotation and time between camera and IMU: the rig turned too little");
+      return;
+    }
+    Finding& finding = found(FindingKind::imu_camera_disagree, fit.correlation, 0, "correlation");
+    finding.measured = fmt::format(
+        "the turning that the images show and the gyroscope's agree by a correlation of {:.2f} at best, whatever the axes, the unit, and the time between the clocks (up to 5 s)",
+        fit.correlation);
+    finding.expected = "above 0.9";
+    finding.advice = "the clocks are farther apart, or drift, or this is not the IMU of these cameras";
+    return;
+  }
+  turns_agree_ = true;
+  offset_s_ = fit.offset_s;
+  gyro_unit(fit);
+  if (fit.spread.y() < kLeastSecondAxis_rad) {
+    out_.not_judged.push_back("axes of the IMU and its rotation against the camera: the rig turned about one axis only");
+    turns_agree_ = false;
+    return;
+  }
+  gyro_axes(fit);
+}
+
+void Examination::gyro_unit(const TurnFit& fit) {
+  if (std::abs(fit.scale - 1) < 2 * kUnitTolerance) return;
+  double factor = fit.scale;
+  std::string advice = fmt::format("multiply the gyroscope's readings by {:.4g}", factor);
+  for (const auto& [unit, name] :
+       {std::pair{1 / kDegrees, "they look like degrees: multiply the gyroscope's readings by pi / 180"},
+        std::pair{kDegrees,
+                  "they were converted from degrees although they were none: multiply the gyroscope's readings by 180 / pi"}})
+    if (std::abs(factor / unit - 1) < 2 * kUnitTolerance) factor = unit, advice = name;
+  Finding& finding = found(FindingKind::gyro_units, 1 / fit.scale, (1 - fit.correlation) / fit.scale, "times too large");
+  finding.measured = fmt::format("the gyroscope's readings are {:.4g} +- {:.2g} times the turning that the images show",
+                                 finding.size, finding.sigma);
+  finding.expected = "1, in rad/s";
+  finding.advice = advice;
+  imu_ = imu_.with_gyro(factor * Mat3::Identity());
+}
+
+/// Whether the accelerometer, too, fits when the whole IMU is turned as the gyroscope says.
+bool Examination::accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const {
+  StereoRig turned = rig_;
+  turned.T_BC0 = {Mat3(R_CB.transpose()), rig_.T_BC0.p};
+  const AccelFit as_mounted = fit_accelerations(pairs_, imu_, turned, {fit.offset_s, Vec3::Zero()});
+  const AccelFit as_named = fit_accelerations(pairs_, imu_.with_gyro(axes), rig_, {fit.offset_s, Vec3::Zero()});
+  return as_mounted.unexplained_as_named <= as_named.unexplained_as_named;
+}
+
+void Examination::gyro_axes(const TurnFit& fit) {
+  const Mat3 R_CB_calibrated = rig_.T_BC0.R().transpose();
+  const Mat3 N = R_CB_calibrated.transpose() * fit.R_CB;  // of readings, in the body's axes as calibrated
+  const Mat3 P = nearest_axes(N);
+  const double rest = angle_of(N * P.transpose());
+  const bool right_way = P == Mat3::Identity();
+  if (right_way && !fit.mirrored) {
+    // A few degrees are measured to the last digit by the motion fit, from the calibration on.
+    if (rest > 0.35) rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
+    return;
+  }
+  const bool mounted = !fit.mirrored && (rest > 0.17 || accelerometer_turned_too(P, fit.R_CB, fit));
+  if (mounted) {
+    const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
+    rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
+    rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
+    return;  // the motion fit says by how much
+  }
+  Finding& finding = found(FindingKind::gyro_axes, kDegrees * rest, kDegrees * (1 - fit.correlation), "deg from these axes");
+  finding.measured =
+      fmt::format("the gyroscope fits the images with its axes named ({}) (correlation {:.3f})", axes_text(P), fit.correlation);
+  finding.expected = "(x, y, z), and the accelerometer's axes are the body's";
+  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the turning rate", axes_text(P));
+  imu_ = imu_.with_gyro(P);
+}
+
+void Examination::motion() {
+  const MotionFit fit = fit_motion(pairs_, imu_, {rig_, offset_s_});
+  if (!fit.usable) {
+    out_.not_judged.push_back("rotation and time between camera and IMU: too few images with readings around them");
+    return;
+  }
+  motion_agrees_ = true;
+  out_.measured.push_back(fmt::format(
+      "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); a feature's path errs by {:.2f} px, then {:.2f}",
+      1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegrees * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
+      kDegrees * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
+  for (const MotionChange& change : fit.changes)
+    out_.measured.push_back(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
+                                        change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
+  time_offset(fit);
+  rotation(fit);
+  offset_s_ = fit.offset_s;
+  gyro_bias_ = fit.gyro_bias_radps;
+  for (const MotionChange& change : fit.changes) {
+    const Eigen::VectorXd sigma = change.covariance.diagonal().cwiseSqrt();
+    if (change.kind == FindingKind::gyro_scale) {
+      Finding& finding = found(change.kind, 100 * (std::exp(-change.amount(0)) - 1), 100 * sigma(0), "%");
+      finding.measured = fmt::format("the gyroscope's readings are {:.1f} +- {:.1f} % too large", finding.size, finding.sigma);
+      finding.expected = "within 1 % of the turning that the images show";
+      finding.advice =
+          fmt::format("multiply the gyroscope's readings by {:.4f}, or look up its range", std::exp(change.amount(0)));
+    } else if (change.kind == FindingKind::rolling_shutter) {
+      Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
+      finding.measured =
+          fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first", finding.size, finding.sigma);
+      finding.expected = "0: all lines at once";
+      finding.advice = "use a global shutter; rolling shutters are not modelled";
+    } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
+               change.kind == FindingKind::distortion) {
+      lens(change.kind, WhichLens::left, change.amount, sigma, change.explained_px);
+    }
+  }
+}
+
+void Examination::time_offset(const MotionFit& fit) {
+  const double wrong_s = fit.offset_s - evidence_.rig.time_offset_s;
+  if (std::abs(wrong_s) < kTimePractical_s || std::abs(wrong_s) < kSignificant * fit.offset_sigma_s) return;
+  Finding& finding = found(FindingKind::time_offset, 1e3 * wrong_s, 1e3 * fit.offset_sigma_s, "ms");
+  finding.measured = fmt::format("the IMU's stamps are {:.2f} +- {:.2f} ms {} the images'", std::abs(finding.size), finding.sigma,
+                                 finding.size > 0 ? "late against" : "ahead of");
+  finding.expected = fmt::format("{:.1f} ms by the calibration (t_imu = t_image + {:.5f} s)", 1e3 * evidence_.rig.time_offset_s,
+                                 evidence_.rig.time_offset_s);
+  finding.advice = "stamp both at the moment of measuring, or give the offset to the calibration";
+  finding.corrected = time_line(fit.offset_s, style_);
+  rig_.time_offset_s = fit.offset_s;
+}
+
+void Examination::rotation(const MotionFit& fit) {
+  const Mat3 wrong = evidence_.rig.T_BC0.R() * fit.R_CB;
+  const double sigma = fit.rotation_sigma_rad.maxCoeff(), angle = angle_of(wrong);
+  if (angle < kRotationPractical_rad || angle < kSignificant * sigma) return;
+  const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
+  rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
+  rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
+  const Vec3 axis = so3_log(Quat(wrong)).normalized();
+  Finding& finding = found(FindingKind::imu_camera_rotation, kDegrees * angle, kDegrees * sigma, "deg");
+  finding.measured = fmt::format(
+      "the IMU is turned by {:.2f} +- {:.2f} deg against where the calibration has it, about ({:.2f}, {:.2f}, {:.2f}) of the IMU",
+      finding.size, finding.sigma, axis.x(), axis.y(), axis.z());
+  finding.expected = "less than 1 deg";
+  finding.advice = "correct the cameras' mounting (the translations are the old ones), or mount the IMU as calibrated";
+  finding.corrected = mounting_lines(rig_, style_, true);
+}
+
+void Examination::accelerations() {
+  const AccelFit fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
+  out_.measured.push_back(fmt::format(
+      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % as its axes are named: {}); scale {:.4f} +- {:.4f}",
+      fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
+      fit.scale_sigma));
+  if (!fit.seen) {
+    out_.not_judged.push_back("axes of the accelerometer, length of the baseline: the rig hardly accelerated");
+    return;
+  }
+  if (fit.axes != Mat3::Identity() && fit.unexplained_as_named > 2 * fit.unexplained + 0.05) {
+    Finding& finding = found(FindingKind::accel_axes, 100 * fit.unexplained_as_named, 0, "% unexplained");
+    finding.measured = fmt::format(
+        "with the accelerometer's axes as named {:.0f} % of the acceleration that the images show is unexplained, with ({}) {:.0f} %",
+        finding.size, axes_text(fit.axes), 100 * fit.unexplained);
+    finding.expected = "(x, y, z), as the gyroscope's";
+    finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
+  } else if (fit.axes != Mat3::Identity()) {
+    return;
+  }
+  const double factor = accel_unit_ / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
+  if (std::abs(factor - 1) < kBaselinePractical || std::abs(factor - 1) < kSignificant * sigma) return;
+  const double length = rig_.T_C1C0().p.norm();
+  Finding& finding = found(FindingKind::baseline_length, 1e3 * length * (1 - factor), 1e3 * length * sigma, "mm");
+  finding.measured =
+      fmt::format("the accelerometer says that the baseline is {:.1f} +- {:.1f} mm long", 1e3 * length * factor, finding.sigma);
+  finding.expected = fmt::format("{:.1f} mm by the calibration", 1e3 * length);
+  finding.advice = "correct the right camera's place (the board's squares were given a wrong size, or the camera was moved)";
+  Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
+  T_C1C0.p *= factor;
+  rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();
+  finding.corrected = mounting_lines(rig_, style_, false);
+}
+
+}  // namespace fbvins
