@@ -304,8 +304,7 @@ StereoChange change_of(const Candidate& best, double explained_px) {
   StereoChange change;
   change.kind = best.group->kind, change.lens = best.group->lens, change.explained_px = explained_px;
   const auto n = static_cast<Eigen::Index>(best.group->unknowns.size());
-  change.amount.resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) change.amount(i) = best.x(best.group->unknowns[static_cast<std::size_t>(i)]);
+  change.amount = best.x(best.group->unknowns);
   change.covariance = best.solution.covariance.bottomRightCorner(n, n);
   return change;
 }
