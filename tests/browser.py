@@ -112,7 +112,8 @@ class Page:
             time.sleep(0.05)
 
     def picture(self, path):
-        data = self.call("Page.captureScreenshot", format="png")["data"]
+        """A JPEG of what is seen."""
+        data = self.call("Page.captureScreenshot", format="jpeg", quality=85)["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))
 

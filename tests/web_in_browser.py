@@ -4,7 +4,8 @@
 work, it asks nobody else for anything.
 
 usage: web_in_browser.py FBVINS      exit 77 where there is no Chromium, or no page in the program
-FBVINS_WEB_PICTURES=FOLDER keeps pictures of the pages.
+FBVINS_WEB_PICTURES=FOLDER keeps pictures of the pages; those of docs/web.md, best taken while nothing else runs:
+  FBVINS_WEB_PICTURES=$PWD/docs/images ctest --test-dir build -R web_in_browser
 """
 import csv
 import json
@@ -144,8 +145,8 @@ class WebInBrowser(unittest.TestCase):
         if PICTURES:
             page.click("fit")
             time.sleep(1)
-            page.picture(f"{PICTURES}/web_desktop.png")
-            phone.picture(f"{PICTURES}/web_phone.png")
+            page.picture(f"{PICTURES}/web_desktop.jpg")
+            phone.picture(f"{PICTURES}/web_phone.jpg")
         self.assertEqual(phone.faults(), [])
         phone.call("Page.navigate", url="about:blank")
         program.send_signal(signal.SIGINT)

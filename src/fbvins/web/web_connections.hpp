@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: what the server's connections share. All of it belongs to the server's thread, but for the two counts.
+#pragma once
+
+#include <atomic>
+#include <boost/asio/ip/tcp.hpp>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "fbvins/web/viewer_queue.hpp"
+#include "fbvins/web/web_server.hpp"
+
+namespace fbvins {
+
+/// Lives as long as any connection.
+struct WebShared {
+  WebOptions options;
+  PageFiles files;
+  WebServer::Callbacks callbacks;
+  std::string machine;          ///< this machine's name
+  std::size_t connections = 0;  ///< open now
+  std::atomic<int> viewers{0}, dropped{0};
+};
+
+/// Counts a connection while it lives.
+class WebPlace {
+ public:
+  explicit WebPlace(std::shared_ptr<WebShared> shared) : shared_(std::move(shared)) { ++shared_->connections; }
+  ~WebPlace() { --shared_->connections; }
+  WebPlace(const WebPlace&) = delete;
+  WebPlace& operator=(const WebPlace&) = delete;
+  WebShared& operator*() const { return *shared_; }
+  WebShared* operator->() const { return shared_.get(); }
+
+ private:
+  std::shared_ptr<WebShared> shared_;
+};
+
+/// A connection that gets the stream of messages.
+class WebViewer {
+ public:
+  virtual ~WebViewer() = default;
+  virtual void send(const SharedMessage& message) = 0;
+  /// Nothing waits for it.
+  virtual bool idle() const = 0;
+  /// To be called once a second: drops a viewer that takes nothing.
+  virtual void judge() = 0;
+  virtual void close() = 0;
+};
+using WebViewers = std::set<std::shared_ptr<WebViewer>>;
+
+/// Answers a connection's requests until it ends or becomes one of `viewers`, which outlive it.
+void receive_visitor(boost::asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers);
+
+}  // namespace fbvins

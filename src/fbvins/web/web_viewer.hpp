@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: a connection that has asked for the stream. The server's thread.
+#pragma once
+
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <memory>
+
+#include "fbvins/web/web_connections.hpp"
+
+namespace fbvins {
+
+/// Shakes hands; from then on it is one of `viewers`, until it ends, whatever ends it.
+void accept_viewer(boost::beast::tcp_stream&& stream, const boost::beast::http::request<boost::beast::http::empty_body>& request,
+                   std::shared_ptr<WebPlace> place, WebViewers& viewers);
+
+}  // namespace fbvins
