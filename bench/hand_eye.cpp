@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well markers and clocks are found from a minute of flight: twenty recordings of motion capture with gaps, another body and
-// a flip in each, against exact truth.
+// a flip in each, against exact truth; and what twenty recordings would show if their errors were as the covariances say.
 //
 //   hand_eye lively | gentle                     flights and odometry's errors made up (hand_eye_scene.hpp)
 //   hand_eye TRUTH ESTIMATE [ESTIMATE...]        minutes of real estimates, with markers made from their ground truth
@@ -11,16 +11,17 @@
 #include <cmath>
 #include <numbers>
 #include <string_view>
+#include <vector>
 
-#include "fbvins/mocap/hand_eye_scene.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/mocap/hand_eye_scene.hpp"
 
 using namespace fbvins;
 
 namespace {
 
 constexpr int kRecordings = 20;
-constexpr double kMinute_s = 60;
+constexpr double kMinute_s = 60, kLeverBar_mm = 2;
 
 /// A minute of a ground truth, interpolated linearly between its poses.
 class RecordedMinute {
@@ -65,7 +66,8 @@ class Table {
                1e3 * std::sqrt(P.topLeftCorner<3, 3>().trace()), sizes(1), degrees * std::sqrt(P.block<3, 3>(3, 3).trace()),
                sizes(2), 1e3 * std::sqrt(P(6, 6)), nees);
     worst_ = worst_.cwiseMax(sizes), squares_ += sizes.cwiseAbs2(), nees_ += nees, ++count_;
-    within_ += sizes(0) <= 2;
+    within_ += sizes(0) <= kLeverBar_mm;
+    lever_factors_.push_back(1e3 * Mat3(P.topLeftCorner<3, 3>().llt().matrixL()));
   }
 
   void finish() const {
@@ -73,9 +75,31 @@ class Table {
     fmt::print(
         "\n{} recordings, {} refused. RMS {:.2f} mm, {:.3f} deg, {:.3f} ms; worst {:.2f} mm, {:.3f} deg, {:.3f} ms; lever arm within 2 mm in {}; mean NEES {:.2f} of 7\n",
         count_, refused_, rms(0), rms(1), rms(2), worst_(0), worst_(1), worst_(2), within_, nees_ / count_);
+    print_expected();
   }
 
  private:
+  /// What these recordings would show again and again if lever arms erred as their covariances say: what their information
+  /// allows.
+  void print_expected() const {
+    constexpr int kTimes = 10000;
+    Rng rng(1, 1);
+    std::vector<double> worst_mm(kTimes, 0.0);
+    double squares = 0;
+    for (double& worst : worst_mm)
+      for (const Mat3& factor : lever_factors_) {
+        const double size = (factor * test::normal3(rng)).norm();
+        worst = std::max(worst, size), squares += size * size;
+      }
+    std::sort(worst_mm.begin(), worst_mm.end());
+    const auto within = std::upper_bound(worst_mm.begin(), worst_mm.end(), kLeverBar_mm) - worst_mm.begin();
+    fmt::print(
+        "lever arm as the covariances say: RMS {:.2f} mm, worst of {} in the median {:.2f} mm, all within {} mm {:.0f} times of 100\n",
+        std::sqrt(squares / (kTimes * count_)), count_, worst_mm[kTimes / 2], kLeverBar_mm,
+        100.0 * static_cast<double>(within) / kTimes);
+  }
+
+  std::vector<Mat3> lever_factors_;  ///< square roots of covariances, mm
   Vec3 worst_ = Vec3::Zero(), squares_ = Vec3::Zero();
   double nees_ = 0;
   int count_ = 0, refused_ = 0, within_ = 0;
