@@ -6,6 +6,7 @@ px4_sitl build).
 
 usage: px4_flight.py FBVINS MAVLINK_SESSION_TEXT [PYTHON]    PYTHON: one that has pymavlink and numpy, when this one has not
 """
+import contextlib
 import os
 import pathlib
 import re
@@ -158,14 +159,11 @@ class Report:
 
 def fly(program, recording, trajectory, deliver, ask_at, options=(), parameters=None):
     with tempfile.TemporaryDirectory() as folder:
-        px4, companion = Px4(os.environ["FBVINS_PX4"], folder, parameters), Companion(program, options)
-        flight = Flight(px4, companion, recording, trajectory, deliver)
-        flight.ask_at = dict(ask_at)
-        try:
+        with contextlib.closing(Companion(program, options)) as companion, \
+                contextlib.closing(Px4(os.environ["FBVINS_PX4"], folder, parameters)) as px4:
+            flight = Flight(px4, companion, recording, trajectory, deliver)
+            flight.ask_at = dict(ask_at)
             flight.run()
-        finally:
-            px4.close()
-            companion.close()
         flight.answers = {command: process.communicate()[0] for command, process in flight.answers.items()}
     return flight
 
