@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor on made-up evidence: silent where all is well, and each wrong setup named with its size.
+// The doctor on synthetic evidence: silent where all is well, and each wrong setup named with its size.
 #include "fbvins/doctor/doctor.hpp"
 
 #include <gtest/gtest.h>
@@ -32,11 +32,13 @@ const Finding* find(const Diagnosis& diagnosis, FindingKind kind) {
   return nullptr;
 }
 
-/// The evidence that a spoilt recording leaves: the gatherer's working rig is right but for the length of the baseline.
+/// The evidence that a spoilt recording leaves: the gatherer's working rig is right but for the baseline's length.
 Evidence spoilt(const Spoiler& spoiler) {
   Evidence evidence = good();
   if (spoiler.rig) spoiler.rig(evidence.rig);
   const double longer = evidence.rig.T_C1C0().p.norm() / evidence.working_rig.T_C1C0().p.norm();
+  Vec3& p_BC1 = evidence.working_rig.T_BC1.p;
+  p_BC1 = evidence.working_rig.T_BC0.p + longer * (p_BC1 - evidence.working_rig.T_BC0.p);
   for (SeenFrame& frame : evidence.frames)
     for (SeenFeature& feature : frame.features) feature.inverse_depth /= longer;
   if (spoiler.reading)
@@ -100,6 +102,15 @@ TEST(Doctor, MeasuresARightImageThatIsLate) {
   const Finding* finding = find(diagnosis, FindingKind::stereo_sync);
   ASSERT_NE(finding, nullptr) << all_of(diagnosis);
   EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
+}
+
+TEST(Doctor, NamesRightImagesThatComeWholeImagesLate) {
+  Evidence evidence = good();
+  evidence.step = {.lag = 1, .as_stamped_px = 5, .in_step_px = 0.3, .period_s = 0.05};
+  const Diagnosis diagnosis = examine(evidence);
+  ASSERT_EQ(diagnosis.findings.size(), 1u) << all_of(diagnosis);
+  EXPECT_EQ(diagnosis.findings.front().kind, FindingKind::stereo_sync);
+  EXPECT_EQ(diagnosis.findings.front().size, -50);
 }
 
 TEST(Doctor, MeasuresARollingShutter) {

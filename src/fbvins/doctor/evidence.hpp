@@ -40,11 +40,20 @@ struct RepeatedImages {
   int frames = 0, left = 0, right = 0, same_pair = 0;
 };
 
+/// Which right image belongs to which left one, by the first seconds in motion.
+struct StereoStep {
+  int lag = 0;               ///< the right image that belongs to a left one comes so many images later
+  double as_stamped_px = 0;  ///< epipolar error by the calibration, of images with the same stamp
+  double in_step_px = 0;     ///< and of images `lag` apart
+  double period_s = 0;       ///< of the images
+};
+
 struct Evidence {
   StereoRig rig;          ///< as calibrated; its cameras exchanged where the images were
   StereoRig working_rig;  ///< with what the first seconds showed of the stereo pair: good enough for depths
   StereoOrder order;      ///< of the first seconds' images
   bool swapped = false;   ///< left and right images were exchanged before anything else was looked at
+  StereoStep step;        ///< and right images given to the left ones that they belong to
   std::vector<ImuSample> imu;
   std::vector<Time> stamps;  ///< of all stereo images
   std::vector<SeenFrame> frames;

@@ -8,6 +8,7 @@
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/doctor/depths.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
 namespace fbvins {
@@ -18,10 +19,11 @@ Diagnosis Examination::run() {
   readings();
   images();
   if (has(FindingKind::same_image_twice)) {
-    out_.not_judged.push_back("all that two cameras are needed for: there is one");
+    not_judged("all that two cameras are needed for: there is one");
     out_.rig = rig_;
     return std::move(out_);
   }
+  pairs_ = pair_frames(evidence_);
   turns();
   stereo();
   if (turns_agree_) motion();
@@ -29,6 +31,8 @@ Diagnosis Examination::run() {
   out_.rig = rig_;
   return std::move(out_);
 }
+
+void Examination::not_judged(std::string_view what) { out_.not_judged.emplace_back(what); }
 
 void Examination::readings() {
   for (Finding& finding : check_reading_units(evidence_.imu)) {
@@ -49,22 +53,35 @@ void Examination::readings() {
   }
   const GravitySeen gravity = gravity_seen(evidence_.imu);
   const Vibration vibration = measure_vibration(evidence_.imu);
-  out_.measured.push_back(fmt::format(
+  measured(fmt::format(
       "gravity by the accelerometer: {:.3f} +- {:.3f}; vibration above {:.0f} Hz: {:.2f} m/s^2, strongest at {:.0f} Hz",
       gravity.norm_mps2, gravity.sigma_mps2, kVibrationFrom_hz, vibration.rms_mps2, vibration.peak_hz));
+}
+
+void Examination::right_images_late() {
+  const StereoStep& step = evidence_.step;
+  if (step.lag == 0) return;
+  Finding& finding = found(FindingKind::stereo_sync, -1e3 * step.lag * step.period_s, 0, "ms");
+  finding.measured = fmt::format(
+      "the right image that belongs to a left one comes {} images {}: matches of the same stamp lie {:.1f} px from their epipolar lines, of those images {:.1f} px",
+      std::abs(step.lag), step.lag > 0 ? "later" : "earlier", step.as_stamped_px, step.in_step_px);
+  finding.expected = "the same stamp for what was exposed at the same moment";
+  finding.advice = "pair the images by the cameras' frame counters or trigger stamps, not by arrival";
 }
 
 void Examination::images() {
   for (Finding& finding : check_repeated(evidence_.repeated)) out_.findings.push_back(std::move(finding));
   if (evidence_.swapped) keep(check_stereo_order(evidence_.order));
-  const FixedFeatures fixed = measure_fixed(evidence_);
+  right_images_late();
+  const FixedFeatures fixed = measure_fixed(evidence_, imu_);
   const Blur blur = measure_blur(evidence_);
   keep(check_fixed(fixed));
+  if (has(FindingKind::fixed_in_view)) evidence_ = without(fixed.ids, std::move(evidence_));
   keep(check_blur(blur));
-  out_.measured.push_back(fmt::format("features that stay in place: {:.1f} % ({} pairs); that look like spots: {:.1f} %",
-                                      100 * fixed.share, fixed.pairs, 100 * fixed.dots));
-  out_.measured.push_back(fmt::format("blur: exposure {:.1f} +- {:.1f} ms by {} images, {:.1f} px at {:.0f} px/s",
-                                      1e3 * blur.exposure_s, 1e3 * blur.sigma_s, blur.images, blur.length_px(), blur.speed_pxps));
+  measured(fmt::format("features that stay in place: {:.1f} % ({} pairs); that look like spots: {:.1f} %", 100 * fixed.share,
+                       fixed.pairs, 100 * fixed.dots));
+  measured(fmt::format("blur: exposure {:.1f} +- {:.1f} ms by {} images, {:.1f} px at {:.0f} px/s", 1e3 * blur.exposure_s,
+                       1e3 * blur.sigma_s, blur.images, blur.length_px(), blur.speed_pxps));
 }
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style) { return Examination(evidence, style).run(); }

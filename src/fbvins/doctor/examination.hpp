@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,8 +27,8 @@ inline constexpr double kSignificant = 5;
 
 class Examination {
  public:
-  Examination(const Evidence& evidence, CalibrationStyle style)
-      : evidence_(evidence), style_(style), imu_(evidence.imu), rig_(evidence.rig), pairs_(pair_frames(evidence)) {}
+  Examination(Evidence evidence, CalibrationStyle style)
+      : evidence_(std::move(evidence)), style_(style), imu_(evidence_.imu), rig_(evidence_.rig) {}
 
   Diagnosis run();
 
@@ -38,6 +39,9 @@ class Examination {
     out_.findings.push_back(std::move(finding));
     return out_.findings.back();
   }
+  // Not a push_back of a literal in place, which GCC 12 warns of wrongly (-Wstringop-overflow).
+  void not_judged(std::string_view what);
+  void measured(std::string sentence) { out_.measured.push_back(std::move(sentence)); }
   void keep(std::optional<Finding> finding) {
     if (finding) out_.findings.push_back(std::move(*finding));
   }
@@ -47,6 +51,7 @@ class Examination {
 
   void readings();
   void images();
+  void right_images_late();
   void turns();
   void gyro_unit(const TurnFit& fit);
   void gyro_axes(const TurnFit& fit);
@@ -55,19 +60,21 @@ class Examination {
   void time_offset(const MotionFit& fit);
   void rotation(const MotionFit& fit);
   void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
+  void focal_of_both(const MotionFit& fit);
   void stereo();
   void stereo_change(const StereoChange& change);
   void accelerations();
 
-  const Evidence& evidence_;
+  Evidence evidence_;
   CalibrationStyle style_;
   ImuSeries imu_;  // in rad/s and the body's axes, as far as was found out
   StereoRig rig_;  // the calibration, corrected as far as was found out
   std::vector<FramePair> pairs_;
-  double accel_unit_ = 1;  // m/s^2 of a reading of one
+  std::optional<std::pair<double, double>> focal_of_both_;  // logarithm, and px explained, by the pair of cameras
+  double accel_unit_ = 1;                                   // m/s^2 of a reading of one
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
-  bool turns_agree_ = false, motion_agrees_ = false;
+  bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;
   Diagnosis out_;
 };
 

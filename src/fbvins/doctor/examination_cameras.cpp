@@ -9,7 +9,9 @@
 #include <string>
 #include <string_view>
 
+#include "fbvins/doctor/depths.hpp"
 #include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/doctor/stereo_problem.hpp"
 
 namespace fbvins {
 namespace {
@@ -18,6 +20,8 @@ using doctor::kDegrees;
 
 /// Epipolar error that no single change explains.
 constexpr double kMostEpipolar_px = 1.2;
+/// How well a calibrated gyroscope's scale is known.
+constexpr double kGyroScale = 0.01;
 
 /// "the ... focal length".
 std::string_view name_of(WhichLens which) {
@@ -67,11 +71,23 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
   }
   if (which != WhichLens::left) {
     rig_.right = changed(rig_.right, change);
-    finding.corrected += (finding.corrected.empty() ? "" : "\n") + line(rig_.right, false, style_);
+    if (!finding.corrected.empty()) finding.corrected += '\n';
+    finding.corrected += line(rig_.right, false, style_);
   }
   finding.expected = fmt::format("less than features are seen to; this explains {:.1f} px", explained_px);
   finding.advice = "calibrate the lens again, at the size and focus that are used";
   out_.findings.push_back(std::move(finding));
+}
+
+/// A pair of cameras shows a focal length that is wrong for both by the lenses' distortion alone: the gyroscope is the better
+/// ruler.
+void Examination::focal_of_both(const MotionFit& fit) {
+  if (!focal_of_both_ || !fit.log_focal) return;
+  const auto [by_pair, explains_px] = *focal_of_both_;
+  std::erase_if(out_.findings, [](const Finding& finding) { return finding.kind == FindingKind::focal_length; });
+  for (Camera* camera : {&rig_.left, &rig_.right}) *camera = changed(*camera, {.log_focal = -by_pair});
+  lens(FindingKind::focal_length, WhichLens::both, Eigen::VectorXd::Constant(1, by_pair + *fit.log_focal),
+       Eigen::VectorXd::Constant(1, std::hypot(fit.log_focal_sigma, kGyroScale)), explains_px);
 }
 
 void Examination::stereo() {
@@ -79,29 +95,29 @@ void Examination::stereo() {
   rig.time_offset_s = offset_s_;
   rig.T_BC1 = rig_.T_BC1;
   rig.T_BC0 = rig_.T_BC0;
-  const ImuSeries* imu = turns_agree_ ? &imu_ : nullptr;
+  // Where right images are so late that no depths are left to see turning by, the gyroscope is taken as it is.
+  const ImuSeries* imu = turns_agree_ || !turns_seen_ ? &imu_ : nullptr;
   StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_);
   // The pairs' motions rest on depths, which a right image that is late spoils: its turning alone tells of it, too.
   if (!fit.changes.empty() && !begins_with_delay(fit))
     if (StereoFit by_turning = fit_stereo(evidence_.stereo, rig, imu, {}); begins_with_delay(by_turning))
       fit = std::move(by_turning);
   const auto views = static_cast<double>(std::max<std::size_t>(evidence_.stereo.size(), 1));
-  out_.measured.push_back(
-      fmt::format("epipolar error of {} matches in {} images: {:.2f} px, by region {}; after {} changes {:.2f}", fit.matches,
-                  views, fit.error_px, regions_text(fit.regions), fit.changes.size(), fit.remaining_px));
+  measured(fmt::format("epipolar error of {} matches in {} images: {:.2f} px, by region {}; after {} changes {:.2f}", fit.matches,
+                       views, fit.error_px, regions_text(fit.regions), fit.changes.size(), fit.remaining_px));
   for (const StereoChange& change : fit.changes)
-    out_.measured.push_back(fmt::format("  stereo: {} ({}) {} +- {} explains {:.2f} px", to_string(change.kind),
-                                        name_of(change.lens), change.amount.norm(),
-                                        change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
+    measured(fmt::format("  stereo: {} ({}) {} +- {} explains {:.2f} px", to_string(change.kind), name_of(change.lens),
+                         change.amount.norm(), change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
   if (has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots)) {
-    out_.not_judged.push_back("the pair of cameras: what hangs in view would be taken for points of the scene");
+    not_judged("the pair of cameras: what hangs in view would be taken for points of the scene");
     return;
   }
   if (fit.changes.empty() && fit.error_px == 0) {
-    out_.not_judged.push_back("the pair of cameras: too few points are seen in both images");
+    not_judged("the pair of cameras: too few points are seen in both images");
     return;
   }
   for (const StereoChange& change : fit.changes) stereo_change(change);
+  pairs_ = pair_frames(with_depths_by(rig_, evidence_));
   if (fit.remaining_px > kMostEpipolar_px && !has(FindingKind::stereo_sync)) {
     Finding& finding = found(FindingKind::epipolar_error, fit.remaining_px, 0, "px");
     finding.measured = fmt::format("matches lie {:.2f} px from their epipolar lines, by region of the left image {}",
@@ -139,6 +155,8 @@ void Examination::stereo_change(const StereoChange& change) {
     finding.advice = "trigger both cameras together; cameras that run freely cannot be used";
   } else {
     lens(change.kind, change.lens, change.amount, sigma, change.explained_px);
+    if (change.kind == FindingKind::focal_length && change.lens == WhichLens::both)
+      focal_of_both_ = {change.amount(0), change.explained_px};
   }
 }
 

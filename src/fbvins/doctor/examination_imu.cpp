@@ -30,18 +30,23 @@ void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   if (has(FindingKind::clocks_apart)) return;
   const TurnFit fit = fit_turns(pairs_, imu_, rig_);
-  out_.measured.push_back(fmt::format(
+  measured(fmt::format(
       "turning seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",
       fit.turning_rad, pairs_.size(), fit.spread.x(), fit.spread.y(), fit.spread.z(), fit.correlation, 1e3 * fit.offset_s,
       fit.scale));
+  turns_seen_ = fit.seen;
   if (!fit.seen) {
-    out_.not_judged.push_back(
+    not_judged(
         "gyroscope, axes, rotation and time between camera and IMU: the rig hardly turned, or its images show too few features");
     return;
   }
   if (fit.correlation < kAgreement) {
+    if (has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots)) {
+      not_judged("gyroscope, axes, rotation and time between camera and IMU: what hangs in view hides the turning");
+      return;
+    }
     if (fit.spread.y() < kLeastSecondAxis_rad) {
-      out_.not_judged.push_back("gyroscope, axes, rotation and time between camera and IMU: the rig turned too little");
+      not_judged("gyroscope, axes, rotation and time between camera and IMU: the rig turned too little");
       return;
     }
     Finding& finding = found(FindingKind::imu_camera_disagree, fit.correlation, 0, "correlation");
@@ -56,7 +61,7 @@ void Examination::turns() {
   offset_s_ = fit.offset_s;
   gyro_unit(fit);
   if (fit.spread.y() < kLeastSecondAxis_rad) {
-    out_.not_judged.push_back("axes of the IMU and its rotation against the camera: the rig turned about one axis only");
+    not_judged("axes of the IMU and its rotation against the camera: the rig turned about one axis only");
     turns_agree_ = false;
     return;
   }
@@ -116,21 +121,22 @@ void Examination::gyro_axes(const TurnFit& fit) {
 }
 
 void Examination::motion() {
-  const MotionFit fit = fit_motion(pairs_, imu_, {rig_, offset_s_});
+  const MotionFit fit = fit_motion(pairs_, imu_, {rig_, offset_s_, focal_of_both_.has_value()});
   if (!fit.usable) {
-    out_.not_judged.push_back("rotation and time between camera and IMU: too few images with readings around them");
+    not_judged("rotation and time between camera and IMU: too few images with readings around them");
     return;
   }
   motion_agrees_ = true;
-  out_.measured.push_back(fmt::format(
+  measured(fmt::format(
       "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); a feature's path errs by {:.2f} px, then {:.2f}",
       1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegrees * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
       kDegrees * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
   for (const MotionChange& change : fit.changes)
-    out_.measured.push_back(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
-                                        change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
+    measured(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
+                         change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
   time_offset(fit);
   rotation(fit);
+  focal_of_both(fit);
   offset_s_ = fit.offset_s;
   gyro_bias_ = fit.gyro_bias_radps;
   for (const MotionChange& change : fit.changes) {
@@ -147,6 +153,8 @@ void Examination::motion() {
           fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first", finding.size, finding.sigma);
       finding.expected = "0: all lines at once";
       finding.advice = "use a global shutter; rolling shutters are not modelled";
+    } else if (change.kind == FindingKind::focal_length && fit.log_focal) {
+      continue;
     } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
                change.kind == FindingKind::distortion) {
       lens(change.kind, WhichLens::left, change.amount, sigma, change.explained_px);
@@ -186,12 +194,12 @@ void Examination::rotation(const MotionFit& fit) {
 
 void Examination::accelerations() {
   const AccelFit fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
-  out_.measured.push_back(fmt::format(
+  measured(fmt::format(
       "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % as its axes are named: {}); scale {:.4f} +- {:.4f}",
       fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
       fit.scale_sigma));
   if (!fit.seen) {
-    out_.not_judged.push_back("axes of the accelerometer, length of the baseline: the rig hardly accelerated");
+    not_judged("axes of the accelerometer, length of the baseline: the rig hardly accelerated");
     return;
   }
   if (fit.axes != Mat3::Identity() && fit.unexplained_as_named > 2 * fit.unexplained + 0.05) {

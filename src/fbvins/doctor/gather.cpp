@@ -7,6 +7,7 @@
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/free_stereo.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
+#include "fbvins/doctor/stereo_step.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
@@ -16,7 +17,7 @@
 namespace fbvins {
 namespace {
 
-/// Images held back at the start, and of these every how manieth is matched left to right.
+/// Images held back until there is motion, and of these every how manieth is matched left to right.
 constexpr double kPrelude_s = 2;
 constexpr std::size_t kMostHeld = 60, kFewestHeldViews = 6;
 /// Between two images whose stereo matches count, and between two whose features get depths.
@@ -73,6 +74,7 @@ struct EvidenceGatherer::State {
   }
 
   void count_repeated(const StereoFrame& frame);
+  void put_in_order();
   void end_prelude();
   void look(StereoFrame frame);
   void follow();
@@ -93,6 +95,7 @@ struct EvidenceGatherer::State {
   TrackTable<KltTrack, KltPatches> tracks;
   ShiTomasiDetector detector;
   FreeStereo free_stereo;
+  StereoRealigner realigner;
   std::optional<KltStereoMatcher> stereo;
   Time last_view, last_depths;
   double moving_s = 0;
@@ -106,18 +109,36 @@ void EvidenceGatherer::State::count_repeated(const StereoFrame& frame) {
   before = frame;
 }
 
+namespace {
+
+std::vector<StereoFrame> few_of(const std::vector<StereoFrame>& frames) {
+  std::vector<StereoFrame> few;
+  const std::size_t step = std::max<std::size_t>(frames.size() / kFewestHeldViews, 1);
+  for (std::size_t i = 0; i < frames.size(); i += step) few.push_back(frames[i]);
+  return few;
+}
+
+}  // namespace
+
+/// Which image belongs where: left and right exchanged, or right ones that come later.
+void EvidenceGatherer::State::put_in_order() {
+  evidence.order = stereo_order(evidence.rig, few_of(held));
+  evidence.swapped = evidence.order.swapped();
+  if (evidence.swapped)
+    for (StereoFrame& frame : held) std::swap(frame.left, frame.right);
+  evidence.step = stereo_step(evidence.rig, held, free_stereo);
+  realigner = StereoRealigner(evidence.step.lag);
+  std::vector<StereoFrame> in_step;
+  for (StereoFrame& frame : held)
+    if (auto whole = realigner.push(std::move(frame))) in_step.push_back(std::move(*whole));
+  held = std::move(in_step);
+}
+
 /// What the held images say of the pair of cameras; from here on depths can be told.
 void EvidenceGatherer::State::end_prelude() {
   prelude = false;
-  std::vector<StereoFrame> few;
-  const std::size_t step = std::max<std::size_t>(held.size() / kFewestHeldViews, 1);
-  for (std::size_t i = 0; i < held.size(); i += step) few.push_back(held[i]);
-  evidence.order = stereo_order(evidence.rig, few);
-  evidence.swapped = evidence.order.swapped();
-  if (evidence.swapped) {
-    for (StereoFrame& frame : held) std::swap(frame.left, frame.right);
-    for (StereoFrame& frame : few) std::swap(frame.left, frame.right);
-  }
+  put_in_order();
+  const std::vector<StereoFrame> few = few_of(held);
   std::vector<StereoView> views;
   Pyramid left, right;
   for (const StereoFrame& frame : few) {
@@ -226,11 +247,14 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
   s.count_repeated(frame);
   if (!s.prelude) {
     if (s.evidence.swapped) std::swap(frame.left, frame.right);
-    s.look(std::move(frame));
+    if (auto whole = s.realigner.push(std::move(frame))) s.look(std::move(*whole));
     return !s.enough();
   }
   s.held.push_back(std::move(frame));
-  if (s.held.size() >= kMostHeld || (s.held.back().t - s.held.front().t).seconds() >= kPrelude_s) s.end_prelude();
+  if (s.held.size() < kMostHeld && (s.held.back().t - s.held.front().t).seconds() < kPrelude_s) return true;
+  if (nearly_same(s.held.front(), s.held.back()))
+    s.held.erase(s.held.begin(), s.held.begin() + static_cast<std::ptrdiff_t>(s.held.size() / 2));
+  else s.end_prelude();
   return true;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Looks at a recording's images as they come and keeps what the doctor asks of them. Nothing of the calibration but the
-// cameras' models is believed: tracks are followed without the IMU, left and right are matched by descriptor without an
+// cameras' models is assumed: tracks are followed without the IMU, left and right are matched by descriptor without an
 // epipolar line. The first seconds of images are held back until they have told which images are left and where the right camera
 // looks. One thread calls; the same events give the same evidence.
 //

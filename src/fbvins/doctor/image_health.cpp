@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "fbvins/frontend/median.hpp"
 
@@ -50,47 +51,89 @@ std::vector<Finding> check_repeated(const RepeatedImages& repeated) {
 
 namespace {
 
-constexpr double kApart_s = 0.5, kOthersMove_px = 5, kStays_px = 0.6;
+/// Images are compared that are so far apart, or nearer where features move a lot: fast ones are not followed for long.
+constexpr double kApart_s = 0.5, kOthersMove_px = 5, kOthersMoveALot_px = 10, kStays_px = 0.6;
+/// Share of the features that must move, and their number where the readings say that the rig turned by so many pixels: then all
+/// of the scene has to move, and not only what walks about in it.
+constexpr double kLeastMoving = 0.25, kTurned_px = 20;
+constexpr std::size_t kFewestMoving = 8, kFewestFeatures = 20;
 constexpr double kMostFixed = 0.15, kMostDots = 0.2;
 constexpr int kFewestPairs = 8;
 
-double upper_quartile(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto at = v.begin() + static_cast<std::ptrdiff_t>(3 * v.size() / 4);
-  std::nth_element(v.begin(), at, v.end());
-  return *at;
-}
+struct Moved {
+  std::int64_t id;
+  double px;
+};
 
 /// Motions of the features across the baseline's direction, in which depth does not move them.
-std::vector<double> motions_across(const SeenFrame& a, const SeenFrame& b, const Vec2& across) {
-  std::vector<double> out;
+std::vector<Moved> motions_across(const SeenFrame& a, const SeenFrame& b, const Vec2& across) {
+  std::vector<Moved> out;
   auto there = b.features.begin();
   for (const SeenFeature& feature : a.features) {
     while (there != b.features.end() && there->id < feature.id) ++there;
-    if (there != b.features.end() && there->id == feature.id) out.push_back(std::abs((there->px - feature.px).dot(across)));
+    if (there != b.features.end() && there->id == feature.id)
+      out.push_back({feature.id, std::abs((there->px - feature.px).dot(across))});
   }
   return out;
 }
 
+bool others_move(const std::vector<Moved>& motions, double least_px, double turned_px) {
+  const auto moving =
+      static_cast<std::size_t>(std::count_if(motions.begin(), motions.end(), [&](const Moved& m) { return m.px > least_px; }));
+  if (motions.size() < kFewestFeatures || moving < kFewestMoving) return false;
+  return turned_px > kTurned_px || static_cast<double>(moving) > kLeastMoving * static_cast<double>(motions.size());
+}
+
+/// Of the pairs of images in which a feature was seen.
+struct Stays {
+  int stayed = 0, moved = 0;
+  /// Time and again: near the point that the rig flies to a feature of the scene stays for a moment.
+  bool fixed() const { return stayed >= 2 && stayed > 9 * moved; }
+};
+
+FixedFeatures sum_up(const std::map<std::int64_t, Stays>& features, int pairs) {
+  FixedFeatures out;
+  out.pairs = pairs;
+  double fixed = 0, all = 0;
+  for (const auto& [id, stays] : features) {
+    all += stays.stayed + stays.moved;
+    if (!stays.fixed()) continue;
+    fixed += stays.stayed;
+    out.ids.insert(id);
+  }
+  out.share = fixed / std::max(all, 1.0);
+  return out;
+}
+
+double share_of_dots(const Evidence& evidence) {
+  double dots = 0, features = 0;
+  for (const SeenFrame& frame : evidence.frames)
+    for (const SeenFeature& feature : frame.features) dots += feature.bright_dot, features += 1;
+  return dots / std::max(features, 1.0);
+}
+
 }  // namespace
 
-FixedFeatures measure_fixed(const Evidence& evidence) {
-  FixedFeatures out;
+FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu) {
   const Vec3 baseline = evidence.rig.T_C1C0().p.normalized();
   const Vec2 across = Vec2(-baseline.y(), baseline.x()).normalized();
-  double fixed = 0, moving = 0, dots = 0, features = 0;
+  const double focal_px = evidence.rig.left.focal_px();
+  std::map<std::int64_t, Stays> features;
+  int pairs = 0;
   std::size_t a = 0;
   for (std::size_t b = 0; b < evidence.frames.size(); ++b) {
-    for (const SeenFeature& feature : evidence.frames[b].features) dots += feature.bright_dot, features += 1;
-    if ((evidence.frames[b].t - evidence.frames[a].t).seconds() < kApart_s) continue;
-    const std::vector<double> motions = motions_across(evidence.frames[a], evidence.frames[b], across);
-    a = b;
-    if (motions.size() < 20 || upper_quartile(motions) < kOthersMove_px) continue;
-    ++out.pairs;
-    for (const double motion : motions) (motion < kStays_px ? fixed : moving) += 1;
+    const SeenFrame &first = evidence.frames[a], &second = evidence.frames[b];
+    const bool far = (second.t - first.t).seconds() > kApart_s;
+    const std::vector<Moved> motions = motions_across(first, second, across);
+    const double turned_px = imu.covers(first.t, second.t) ? focal_px * imu.turned(first.t, second.t).norm() : 0;
+    const bool tells = others_move(motions, far ? kOthersMove_px : kOthersMoveALot_px, turned_px);
+    if (far || tells) a = b;
+    if (!tells) continue;
+    ++pairs;
+    for (const Moved& m : motions) ++(m.px < kStays_px ? features[m.id].stayed : features[m.id].moved);
   }
-  out.share = fixed / std::max(fixed + moving, 1.0);
-  out.dots = dots / std::max(features, 1.0);
+  FixedFeatures out = sum_up(features, pairs);
+  out.dots = share_of_dots(evidence);
   return out;
 }
 

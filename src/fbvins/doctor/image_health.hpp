@@ -2,11 +2,14 @@
 // What is wrong with the images themselves: repeated ones, things that hang in view, blur. Pure functions, any thread.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "fbvins/checkup/finding.hpp"
 #include "fbvins/doctor/evidence.hpp"
+#include "fbvins/doctor/imu_series.hpp"
 
 namespace fbvins {
 
@@ -14,11 +17,13 @@ namespace fbvins {
 std::vector<Finding> check_repeated(const RepeatedImages& repeated);
 
 struct FixedFeatures {
-  double share = 0;  ///< of the features that stay where they are while the others move
-  double dots = 0;   ///< of all features, those that look like spots of light
-  int pairs = 0;     ///< of images in which others moved enough to tell
+  double share = 0;                 ///< of the features that stay where they are while the others move
+  double dots = 0;                  ///< of all features, those that look like spots of light
+  int pairs = 0;                    ///< of images in which others moved enough to tell
+  std::set<std::int64_t> ids = {};  ///< of those that stayed
 };
-FixedFeatures measure_fixed(const Evidence& evidence);
+/// The readings tell only whether the rig turned at all: a few features that move count for more then.
+FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu);
 std::optional<Finding> check_fixed(const FixedFeatures& fixed);
 
 struct Blur {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "fbvins/checkup/finding.hpp"
@@ -16,8 +17,9 @@
 namespace fbvins {
 
 struct MotionStart {
-  StereoRig rig;        ///< T_BC0 and left lens as far as known
-  double offset_s = 0;  ///< t_imu = t_image + offset, as far as known
+  StereoRig rig;               ///< T_BC0 and left lens as far as known
+  double offset_s = 0;         ///< t_imu = t_image + offset, as far as known
+  bool focal_doubted = false;  ///< it is estimated even where it explains little, and the gyroscope's scale is right
 };
 
 struct MotionChange {
@@ -37,6 +39,9 @@ struct MotionFit {
   /// Offset and rotation, whether they were changes or not.
   double offset_sigma_s = 0;
   Vec3 rotation_sigma_rad = Vec3::Zero();
+  /// Logarithm of what the focal length is to be multiplied by, where it was doubted.
+  std::optional<double> log_focal = {};
+  double log_focal_sigma = 0;
   std::vector<MotionChange> changes;
 };
 

@@ -8,10 +8,12 @@
 
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
+#include "fbvins/doctor/depths.hpp"
 #include "fbvins/doctor/image_health.hpp"
 #include "fbvins/doctor/imu_health.hpp"
 #include "fbvins/doctor/imu_series.hpp"
 #include "fbvins/doctor/made_up_evidence.hpp"
+#include "fbvins/doctor/stereo_step.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
@@ -108,18 +110,69 @@ TEST(ImageHealth, SeesRepeatedImages) {
 
 TEST(ImageHealth, SeesWhatHangsInView) {
   Evidence evidence = test::MadeUpEvidence({}).make();
-  EXPECT_FALSE(check_fixed(measure_fixed(evidence)));
+  EXPECT_FALSE(check_fixed(measure_fixed(evidence, ImuSeries(evidence.imu))));
   for (SeenFrame& frame : evidence.frames) {
     const std::size_t seen = frame.features.size();
     for (std::size_t i = 0; i < seen / 3; ++i)
       frame.features.push_back({static_cast<std::int64_t>(1000 + i), Vec2(10.0 * static_cast<double>(i), 400), 0, false});
   }
-  const auto finding = check_fixed(measure_fixed(evidence));
+  const auto finding = check_fixed(measure_fixed(evidence, ImuSeries(evidence.imu)));
   ASSERT_TRUE(finding);
   EXPECT_EQ(finding->kind, FindingKind::fixed_in_view);
   for (SeenFrame& frame : evidence.frames)
     for (std::size_t i = 0; i < frame.features.size(); i += 2) frame.features[i].bright_dot = true;
-  EXPECT_EQ(check_fixed(measure_fixed(evidence))->kind, FindingKind::projector_dots);
+  EXPECT_EQ(check_fixed(measure_fixed(evidence, ImuSeries(evidence.imu)))->kind, FindingKind::projector_dots);
+}
+
+StereoFrame numbered(int number) {
+  StereoFrame frame;
+  frame.t = Time{number};
+  auto left = std::make_shared<Image>(1, 1), right = std::make_shared<Image>(1, 1);
+  left->at(0, 0) = right->at(0, 0) = static_cast<std::uint8_t>(number);
+  frame.left = left, frame.right = right;
+  return frame;
+}
+
+TEST(StereoStep, GivesEachLeftImageTheRightOneThatBelongsToIt) {
+  for (const int lag : {-2, 0, 1}) {
+    StereoRealigner realigner(lag);
+    int frames = 0;
+    for (int k = 10; k < 20; ++k)
+      if (const auto frame = realigner.push(numbered(k))) {
+        ++frames;
+        EXPECT_EQ(frame->t.ns, frame->left->at(0, 0));
+        EXPECT_EQ(frame->right->at(0, 0), frame->left->at(0, 0) + lag);
+      }
+    EXPECT_EQ(frames, 10 - std::abs(lag));
+  }
+}
+
+/// Of all features with depths by both.
+template <class Take>
+void compare_depths(const Evidence& a, const Evidence& b, Take&& take) {
+  int features = 0;
+  for (std::size_t f = 0; f < a.frames.size(); ++f)
+    for (std::size_t i = 0; i < a.frames[f].features.size(); ++i) {
+      const SeenFeature &one = a.frames[f].features[i], &other = b.frames[f].features[i];
+      if (one.inverse_depth > 0 && other.inverse_depth > 0) take(one.px, one.inverse_depth, other.inverse_depth), ++features;
+    }
+  EXPECT_GT(features, 1000);
+}
+
+TEST(Depths, AreThoseOfTheNewCalibration) {
+  const Evidence good = test::MadeUpEvidence({}).make();
+  StereoRig longer = good.rig, turned = good.rig;
+  longer.T_BC1.p = longer.T_BC0.p + 1.2 * (longer.T_BC1.p - longer.T_BC0.p);
+  compare_depths(good, with_depths_by(longer, good),
+                 [](const Vec2&, double before, double after) { EXPECT_NEAR(after, before / 1.2, 1e-6); });
+  turned.T_BC1 = {Mat3(turned.T_BC1.R() * so3_exp(Vec3(0, 0.01, 0)).toRotationMatrix()), turned.T_BC1.p};
+  const Vec2 centre(good.rig.left.width() / 2.0, good.rig.left.height() / 2.0);
+  compare_depths(good, with_depths_by(turned, good), [&](const Vec2& px, double before, double after) {
+    // 0.01 rad of turning is a disparity of 0.01 times the focal length, and the baseline is 0.11 m.
+    if ((px - centre).norm() < 80) {
+      EXPECT_NEAR(std::abs(after - before), 0.01 / 0.11, 0.01);
+    }
+  });
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the camera turned from frame to frame, and what has to be done to the gyroscope's readings to say the same: their unit,
-// their axes, the time between the clocks. Nothing of these is believed beforehand. Pure functions, any thread.
+// their axes, the time between the clocks. None of these is assumed beforehand. Pure functions, any thread.
 //
 //   std::vector<FramePair> pairs = pair_frames(evidence);
 //   TurnFit fit = fit_turns(pairs, imu, rig);

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to the doctor: which single change of a calibration explains an error best, then which beside it. A change is a group
+// of unknowns that are set free together. A Fit is a value with
+//   VectorXd x; std::vector<int> free;                  where it stands, and which unknowns are estimated
+//   std::optional<BlockSolution> converge();            Gauss-Newton from x; none where it cannot be solved
+//   bool plausible() const;                             somebody's calibration may be that wrong
+//   double capped_error() const;                        px
+//   static constexpr double kAsGood;                    a group of more unknowns must leave less than this share of the error
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "fbvins/checkup/finding.hpp"
+#include "fbvins/doctor/block_fit.hpp"
+#include "fbvins/doctor/lens_change.hpp"
+
+namespace fbvins {
+
+struct ChangeGroup {
+  FindingKind kind;
+  WhichLens lens;
+  std::vector<int> unknowns;
+  double practical;  ///< norm of the amount below which a change is not worth a word
+};
+
+inline bool is_free(std::span<const int> free, int unknown) { return std::find(free.begin(), free.end(), unknown) != free.end(); }
+
+/// `free` with those of `more` that are not in it.
+inline std::vector<int> with(std::vector<int> free, std::span<const int> more) {
+  for (const int i : more)
+    if (!is_free(free, i)) free.push_back(i);
+  return free;
+}
+
+/// An amount and its covariance; significant by the one of its numbers that is most standard deviations from zero.
+struct Amount {
+  Eigen::VectorXd value;
+  Eigen::MatrixXd covariance;
+  double sigmas() const {
+    double most = 0;
+    for (Eigen::Index i = 0; i < value.size(); ++i)
+      most = std::max(most, std::abs(value(i)) / std::sqrt(std::max(covariance(i, i), 1e-30)));
+    return most;
+  }
+};
+
+/// What a fit says of a group that it has set free.
+template <class Fit>
+Amount amount_of(const ChangeGroup& group, const Fit& fit, const BlockSolution& solution) {
+  std::vector<int> places;
+  for (const int unknown : group.unknowns)
+    places.push_back(static_cast<int>(std::find(fit.free.begin(), fit.free.end(), unknown) - fit.free.begin()));
+  return {fit.x(group.unknowns), solution.covariance(places, places)};
+}
+
+template <class Fit>
+struct Candidate {
+  const ChangeGroup* group;
+  Fit fit;
+  BlockSolution solution;
+  double error_px;
+};
+
+/// The group whose unknowns, set free beside those that are, leave the smallest error.
+template <class Fit>
+std::optional<Candidate<Fit>> best_candidate(const Fit& so_far, std::span<const ChangeGroup> groups) {
+  std::optional<Candidate<Fit>> best;
+  for (const ChangeGroup& group : groups) {
+    if (is_free(so_far.free, group.unknowns.front())) continue;
+    Candidate<Fit> candidate{&group, so_far, {}, 0};
+    candidate.fit.free = with(so_far.free, group.unknowns);
+    auto solution = candidate.fit.converge();
+    if (!solution || !candidate.fit.plausible()) continue;
+    candidate.solution = std::move(*solution);
+    candidate.error_px = candidate.fit.capped_error();
+    const std::size_t n = group.unknowns.size(), n_best = best ? best->group->unknowns.size() : n;
+    const double handicap = n < n_best ? Fit::kAsGood : n > n_best ? 1 / Fit::kAsGood : 1;
+    if (!best || candidate.error_px * handicap < best->error_px) best.emplace(std::move(candidate));
+  }
+  return best;
+}
+
+/// Of the root mean square errors before and after.
+inline double explained_px(double before, double after) { return std::sqrt(std::max(before * before - after * after, 0.0)); }
+
+}  // namespace fbvins

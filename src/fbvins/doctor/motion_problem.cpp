@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/motion_problem.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fbvins/doctor/lens_change.hpp"
+#include "fbvins/frontend/median.hpp"
+#include "fbvins/imu/propagation.hpp"
+#include "fbvins/optim/robust_loss.hpp"
+
+namespace fbvins {
+
+using namespace doctor::motion;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace doctor::motion {
+
+Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
+    : camera(changed(start.rig.left, {x(kFocal), {x(kCentre), x(kCentre + 1)}, {x(kRadial), x(kRadial + 1)}})),
+      R_CB(start.rig.T_BC0.R().transpose() * so3_exp(Vec3(x.segment<3>(kRotation))).toRotationMatrix()),
+      offset(Duration::from_seconds(start.offset_s + x(kTime))),
+      bias(x.segment<3>(kBias)),
+      scale(std::exp(x(kScale))),
+      rolling_s(x(kRolling)) {}
+
+}  // namespace doctor::motion
+
+namespace {
+
+constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.1, 0.3, 50, 50, 0.2, 0.2};
+constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
+
+constexpr int kIterations = 4;
+constexpr double kCap_px = 3, kHuberSigmas = 2, kLeastSigma_px = 0.03;
+constexpr std::size_t kFeaturesOfAPair = 40;
+constexpr double kDifference_m = 1e-4;
+/// Weight, for each feature, of a translation's staying where it is: what nothing is seen of stays there.
+constexpr double kTranslationPrior = 1e-4;
+
+/// A pair's turn as one hypothesis has it.
+struct PredictedTurn {
+  Mat3 R_ba;
+  Vec3 rate_a, rate_b;  ///< in C, rad/s
+
+  PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu) {
+    const Time a = pair.a + h.offset, b = pair.b + h.offset;
+    const Vec3 turn_B = h.scale * so3_log(integrate_gyro(imu.segment(a, b), h.bias));
+    R_ba = so3_exp(-(h.R_CB * turn_B)).toRotationMatrix();
+    rate_a = h.R_CB * (imu.at(a).gyro_radps - h.bias);
+    rate_b = h.R_CB * (imu.at(b).gyro_radps - h.bias);
+  }
+};
+
+Vec3 small_turn(const Vec3& theta, const Vec3& v) { return v + theta.cross(v); }
+
+/// X_b = R_ba (x_a - rho p_CaCb), each image line at its own time.
+std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
+                             const Vec3& p_ab) {
+  const double height = h.camera.height();
+  const double late_a = h.rolling_s * (feature.a_px.y() / height - 0.5), late_b = h.rolling_s * (feature.b_px.y() / height - 0.5);
+  const Vec3 X_a = small_turn(late_a * turn.rate_a, ray_a.homogeneous()) - feature.inverse_depth * p_ab;
+  const Vec3 X_b = small_turn(-late_b * turn.rate_b, turn.R_ba * X_a);
+  if (X_b.z() < 0.05) return std::nullopt;
+  return Vec2(h.camera.distort(X_b.hnormalized()) - feature.b_px);
+}
+
+/// Of a feature by the pair's translation.
+bool by_translation(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray,
+                    const Vec3& p_ab, const Vec2& r, Eigen::Matrix<double, 2, 3>& J) {
+  for (int i = 0; i < 3; ++i) {
+    const auto there = residual(h, turn, feature, ray, p_ab + kDifference_m * Vec3::Unit(i));
+    if (!there) return false;
+    J.col(i) = (*there - r) / kDifference_m;
+  }
+  return true;
+}
+
+/// The translation that fits best under a hypothesis, from where it was.
+void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double sigma) {
+  const PredictedTurn turn(h, pair, imu);
+  for (int iteration = 0; iteration < 3; ++iteration) {
+    Mat3 H = kTranslationPrior * static_cast<double>(pair.features.size()) * Mat3::Identity();
+    Vec3 g = Vec3::Zero();
+    for (const PairedFeature& feature : pair.features) {
+      const auto ray = h.camera.undistort(feature.a_px);
+      const auto r = ray ? residual(h, turn, feature, *ray, pair.p_CaCb) : std::nullopt;
+      Eigen::Matrix<double, 2, 3> J;
+      if (!r || !by_translation(h, turn, feature, *ray, pair.p_CaCb, *r, J)) continue;
+      const double weight = huber(r->squaredNorm(), kHuberSigmas * sigma).weight;
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * *r;
+    }
+    const Vec3 step = -H.ldlt().solve(g);
+    if (!step.allFinite()) return;
+    pair.p_CaCb += step;
+  }
+}
+
+/// A hypothesis with one unknown moved by its step, and a pair's turn by it.
+struct Moved {
+  int unknown;
+  Hypothesis there;
+};
+
+std::vector<Moved> moved_from(const MotionStart& start, const VectorXd& x, std::span<const int> free) {
+  std::vector<Moved> moved;
+  for (const int i : free) {
+    VectorXd y = x;
+    y(i) += kStep[static_cast<std::size_t>(i)];
+    moved.push_back({i, Hypothesis(start, y)});
+  }
+  return moved;
+}
+
+/// Normal equations of one pair in the free unknowns, its translation eliminated.
+struct PairSystem {
+  MatrixXd H;
+  VectorXd g;
+
+  PairSystem(const FramePair& pair, const Hypothesis& at, std::span<const Moved> moved, const ImuSeries& imu, double sigma)
+      : n_(static_cast<Eigen::Index>(moved.size())), H_(MatrixXd::Zero(n_ + 3, n_ + 3)), g_(VectorXd::Zero(n_ + 3)) {
+    const PredictedTurn turn(at, pair, imu);
+    std::vector<PredictedTurn> turns;
+    for (const Moved& m : moved) turns.emplace_back(m.there, pair, imu);
+    for (const PairedFeature& feature : pair.features) add(feature, pair.p_CaCb, at, turn, moved, turns, sigma);
+    eliminate(kTranslationPrior * static_cast<double>(pair.features.size()));
+  }
+
+ private:
+  void add(const PairedFeature& feature, const Vec3& p_ab, const Hypothesis& at, const PredictedTurn& turn,
+           std::span<const Moved> moved, const std::vector<PredictedTurn>& turns, double sigma) {
+    const auto ray = at.camera.undistort(feature.a_px);
+    const auto r = ray ? residual(at, turn, feature, *ray, p_ab) : std::nullopt;
+    if (!r) return;
+    MatrixXd J(2, n_ + 3);
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const Hypothesis& there = moved[k].there;
+      const auto ray_there = moved[k].unknown >= kFocal ? there.camera.undistort(feature.a_px) : ray;
+      const auto r_there = ray_there ? residual(there, turns[k], feature, *ray_there, p_ab) : std::nullopt;
+      if (!r_there) return;
+      J.col(static_cast<Eigen::Index>(k)) = (*r_there - *r) / kStep[static_cast<std::size_t>(moved[k].unknown)];
+    }
+    Eigen::Matrix<double, 2, 3> J_p;
+    if (!by_translation(at, turn, feature, *ray, p_ab, *r, J_p)) return;
+    J.rightCols<3>() = J_p;
+    const double weight = huber(r->squaredNorm(), kHuberSigmas * sigma).weight;
+    H_ += weight * J.transpose() * J;
+    g_ += weight * J.transpose() * *r;
+  }
+  void eliminate(double prior) {
+    const Mat3 H_pp = Mat3(H_.bottomRightCorner<3, 3>()) + prior * Mat3::Identity();
+    const MatrixXd gain = H_.topRightCorner(n_, 3) * H_pp.inverse();
+    H = H_.topLeftCorner(n_, n_) - gain * H_.bottomLeftCorner(3, n_);
+    g = g_.head(n_) - gain * g_.tail<3>();
+  }
+
+  Eigen::Index n_;
+  MatrixXd H_;
+  VectorXd g_;
+};
+
+}  // namespace
+
+MotionProblem::MotionProblem(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start)
+    : x(VectorXd::Zero(kUnknowns)), imu_(&imu), start_(start) {
+  const Duration room = Duration::from_seconds(0.1), offset = Duration::from_seconds(start.offset_s);
+  for (const FramePair& pair : pairs) {
+    if (!imu.covers(pair.a + offset - room, pair.b + offset + room)) continue;
+    FramePair thin = pair;
+    thin.features.clear();
+    const std::size_t step = (pair.features.size() + kFeaturesOfAPair - 1) / kFeaturesOfAPair;
+    for (std::size_t i = 0; i < pair.features.size(); i += step) thin.features.push_back(pair.features[i]);
+    pairs_.push_back(std::move(thin));
+  }
+}
+
+namespace {
+
+template <class Take>
+void for_each_residual(const std::vector<FramePair>& pairs, const ImuSeries& imu, const Hypothesis& h, Take&& take) {
+  for (const FramePair& pair : pairs) {
+    const PredictedTurn turn(h, pair, imu);
+    for (const PairedFeature& feature : pair.features) {
+      const auto ray = h.camera.undistort(feature.a_px);
+      const auto r = ray ? residual(h, turn, feature, *ray, pair.p_CaCb) : std::nullopt;
+      take(r ? r->norm() : kCap_px);
+    }
+  }
+}
+
+}  // namespace
+
+double MotionProblem::typical_error() const {
+  std::vector<double> norms;
+  for_each_residual(pairs_, *imu_, hypothesis(), [&](double norm) { norms.push_back(norm); });
+  return 0.85 * median(norms);  // of a Rayleigh distribution
+}
+
+double MotionProblem::capped_error() const {
+  double sum = 0;
+  int count = 0;
+  for_each_residual(pairs_, *imu_, hypothesis(), [&](double norm) {
+    sum += std::pow(std::min(norm, kCap_px), 2);
+    ++count;
+  });
+  return std::sqrt(sum / std::max(count, 1));
+}
+
+BlockFit MotionProblem::linearise() {
+  const Hypothesis at = hypothesis();
+  const std::vector<Moved> moved = moved_from(start_, x, free);
+  const double sigma = std::max(typical_error(), kLeastSigma_px);
+  BlockFit fit(Eigen::Map<const VectorXd>(kPriorSigma.data(), kUnknowns), sigma);
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    settle(at, pairs_[k], *imu_, sigma);
+    const PairSystem system(pairs_[k], at, moved, *imu_, sigma);
+    MatrixXd H = MatrixXd::Zero(kUnknowns, kUnknowns);
+    VectorXd g = VectorXd::Zero(kUnknowns);
+    H(free, free) = system.H;
+    g(free) = system.g;
+    fit.add(static_cast<int>(k * BlockFit::kStretches / pairs_.size()), H, g);
+  }
+  return fit;
+}
+
+std::optional<BlockSolution> MotionProblem::converge() {
+  std::optional<BlockSolution> last;
+  for (int i = 0; i < kIterations; ++i) {
+    last = linearise().solve(free);
+    if (!last) return std::nullopt;
+    x += last->x;
+  }
+  const Hypothesis at = hypothesis();
+  const double sigma = std::max(typical_error(), kLeastSigma_px);
+  for (FramePair& pair : pairs_) settle(at, pair, *imu_, sigma);
+  return last;
+}
+
+}  // namespace fbvins

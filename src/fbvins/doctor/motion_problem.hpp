@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to the doctor: the paths of features from image to image, predicted by the gyroscope's turn, as a least-squares problem
+// in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s), logarithm of its
+// scale, time from an image's first line to its last (s), and of the left lens logarithm of the focal length, principal point
+// (px), radial coefficients.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/doctor/block_fit.hpp"
+#include "fbvins/doctor/imu_series.hpp"
+#include "fbvins/doctor/motion_fit.hpp"
+
+namespace fbvins {
+
+namespace doctor::motion {
+enum : int {
+  kRotation = 0,
+  kTime = 3,
+  kBias = 4,
+  kScale = 7,
+  kRolling = 8,
+  kFocal = 9,
+  kCentre = 10,
+  kRadial = 12,
+  kUnknowns = 14
+};
+
+/// The start, moved by x, made once for all pairs.
+struct Hypothesis {
+  Camera camera;
+  Mat3 R_CB;
+  Duration offset;
+  Vec3 bias;
+  double scale, rolling_s;
+
+  Hypothesis(const MotionStart& start, const Eigen::VectorXd& x);
+};
+}  // namespace doctor::motion
+
+/// A Fit of change_search.hpp. The readings outlive it. Each pair's translation is eliminated, and kept for the next step.
+class MotionProblem {
+ public:
+  static constexpr double kAsGood = 1;
+
+  /// Of the pairs with readings around them, features thinned out.
+  MotionProblem(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
+
+  std::size_t pairs() const { return pairs_.size(); }
+  std::optional<BlockSolution> converge();
+  bool plausible() const { return true; }
+  /// Of one coordinate of a feature, px.
+  double typical_error() const;
+  double capped_error() const;
+  doctor::motion::Hypothesis hypothesis() const { return {start_, x}; }
+
+  Eigen::VectorXd x;
+  std::vector<int> free;
+
+ private:
+  BlockFit linearise();
+
+  std::vector<FramePair> pairs_;
+  const ImuSeries* imu_;
+  MotionStart start_;
+};
+
+}  // namespace fbvins
