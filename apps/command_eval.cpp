@@ -9,6 +9,7 @@
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
 #include "apps/mocap_report.hpp"
+#include "apps/open_recording.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/io/dataset.hpp"
 
@@ -16,19 +17,21 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV) or a recording that
-holds one, which also tells the share of images with a pose. The stamps of both are matched as evo does:
+    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV), a recording that
+holds one, which also tells the share of images with a pose, or a bag with a topic of PoseStamped,
+TransformStamped or Odometry; ESTIMATE may be one, too. The stamps of both are matched as evo does:
 the nearest, at most --max-diff apart.
 
 examples:
   fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
   fbvins eval groundtruth.csv estimate.txt --align sim3 --json
   fbvins eval groundtruth.csv estimate.txt --align yaw --interpolate
+  fbvins eval flight.bag estimate.txt --topic /vicon/quad/pose
   fbvins eval take.csv estimate.txt --hand-eye
 )";
 
 struct Arguments {
-  std::string truth, estimate, alignment = "se3", pairs = "all", path = "truth";
+  std::string truth, estimate, alignment = "se3", pairs = "all", path = "truth", topic;
   double max_difference_s = 0.01;
   bool interpolate = false, json = false, hand_eye = false;
 };
@@ -38,16 +41,15 @@ struct Truth {
   std::vector<Time> images;  ///< empty when the truth came from a file
 };
 
-Result<Trajectory<W>> read_poses(const std::string& path) {
-  auto file = read_trajectory(path);
-  if (!file) return file.error();
-  if (file->counts.bad() > 0) warn(fmt::format("{} rows left out, the first: {}", file->counts.bad(), file->counts.first_bad));
-  return file->poses();
+/// A folder of somebody's bag is one as well.
+bool is_euroc(const std::string& path) {
+  if (path.ends_with(".zip")) return true;
+  return std::filesystem::is_directory(path) && !std::filesystem::exists(path + "/metadata.yaml");
 }
 
-Result<Truth> read_truth(const std::string& path) {
-  if (!std::filesystem::is_directory(path) && !path.ends_with(".zip")) {
-    auto poses = read_poses(path);
+Result<Truth> read_truth(const std::string& path, const std::string& topic) {
+  if (!is_euroc(path)) {
+    auto poses = open_poses(path, topic);
     if (!poses) return poses.error();
     return Truth{std::move(*poses), {}};
   }
@@ -85,9 +87,10 @@ EvaluationOptions options_of(const Arguments& arguments) {
 }
 
 int evaluate_files(const Arguments& arguments) {
-  const auto estimate = read_poses(arguments.estimate);
+  const auto estimate = open_poses(arguments.estimate, "");
   if (!estimate) return fail(estimate.error().message);
-  const auto truth = arguments.hand_eye ? read_markers_as_truth(arguments.truth, *estimate) : read_truth(arguments.truth);
+  const auto truth =
+      arguments.hand_eye ? read_markers_as_truth(arguments.truth, *estimate) : read_truth(arguments.truth, arguments.topic);
   if (!truth) return fail(truth.error().message);
   const EvaluationOptions options = options_of(arguments);
   const auto evaluation = evaluate(truth->poses, *estimate, options);
@@ -117,6 +120,7 @@ void add_eval_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
+  command->add_option("--topic", arguments->topic, "of poses, where GROUND_TRUTH is a bag with several");
   command->add_option("--align", arguments->alignment, "how the estimate is laid over the truth first")
       ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))
       ->capture_default_str();

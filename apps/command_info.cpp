@@ -30,10 +30,11 @@ std::vector<double> row_major(const auto& pose) {
 }
 
 std::vector<double> parameters_of(const Camera& camera) {
-  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model()))
-    return {m->fx, m->fy, m->cx, m->cy, m->k1, m->k2, m->p1, m->p2};
-  const auto& m = std::get<KannalaBrandt>(camera.model());
-  return {m.fx, m.fy, m.cx, m.cy, m.k1, m.k2, m.k3, m.k4};
+  const std::array<double, 4> f = camera.intrinsics();
+  std::vector<double> out(f.begin(), f.end());
+  const std::vector<double> k = camera.distortion();
+  out.insert(out.end(), k.begin(), k.end());
+  return out;
 }
 
 Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info) {

@@ -51,21 +51,30 @@ bool is_foreign_calibration(const std::string& path) {
 }  // namespace
 
 bool is_for_bags(int argc, char** argv) {
-  if (argc < 3 || (argv[1] != std::string_view("run") && argv[1] != std::string_view("info") && argv[1] != std::string_view("doctor"))) return false;
+  constexpr std::string_view kCommands[] = {"run", "info", "doctor", "eval"};
+  if (argc < 3 || std::find(std::begin(kCommands), std::end(kCommands), std::string_view(argv[1])) == std::end(kCommands))
+    return false;
   for (int i = 2; i < argc; ++i) {
     const std::string_view argument = argv[i], before = argv[i - 1];
     if (argument.starts_with("--topics")) return true;
     if (argument.starts_with("--calibration=") && is_foreign_calibration(std::string(argument.substr(14)))) return true;
     if (before == "--calibration" && is_foreign_calibration(argv[i])) return true;
-    if (!argument.starts_with("-") && (i == 2 || !before.starts_with("--")) && is_foreign_recording(argv[i])) return true;
+    if (!argument.starts_with("-") && before != "--out" && is_foreign_recording(argv[i])) return true;
   }
   return false;
+}
+
+Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {
+  if (topic.empty()) return read_pose_file(path);
+  return Error{ErrorCode::invalid_argument, path + ": is no bag, which alone has topics"};
 }
 
 Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options) {
   DatasetOptions with = options;
   with.kalibr_camchain = arguments.calibration;
   with.kalibr_imu = arguments.imu_calibration;
+  with.start_s = arguments.start_s;
+  with.duration_s = arguments.duration_s;
   return open_dataset(arguments.path, with);
 }
 

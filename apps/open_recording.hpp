@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where commands get recordings from. Each program links its own definition: `fbvins` reads EuRoC recordings and flight records
-// (open_recording.cpp), fbvins-bags third-party ones (open_foreign_recording.cpp); the former hands what it cannot read to the latter.
+// (open_recording.cpp), fbvins-bags third-party ones (open_foreign_recording.cpp); the former hands what it cannot read to the
+// latter.
 #pragma once
 
 #include <memory>
@@ -9,6 +10,7 @@
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/types/trajectory.hpp"
 
 namespace CLI {
 class App;
@@ -18,12 +20,18 @@ namespace fbvins::app {
 
 struct RecordingArguments {
   std::string path, calibration, imu_calibration;
-  std::vector<std::string> topics;  ///< left, right and, if it is not the only one, IMU
+  std::vector<std::string> topics;     ///< left, right and, if it is not the only one, IMU
+  double start_s = 0, duration_s = 0;  ///< DatasetOptions
 
   void add_to(CLI::App& command);
 };
 
 Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options);
+
+/// Of TUM or EuRoC; rows left out are warned of.
+Result<Trajectory<W>> read_pose_file(const std::string& path);
+/// The poses of a file: TUM, EuRoC; of a bag in fbvins-bags, from `topic` or its only one.
+Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic);
 
 /// Whether a command line asks for what only fbvins-bags reads: a bag, a TUM-VI folder, a calibration that is not Kalibr's,
 /// topics.

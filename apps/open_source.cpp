@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/open_source.hpp"
 
+#include "fbvins/live/replay_source.hpp"
 #include "fbvins/v4l2/v4l2_source.hpp"
+#ifdef FBVINS_WITH_BAGS
+#include "fbvins/bags/recording.hpp"
+#endif
 #ifdef FBVINS_WITH_REALSENSE
 #include "fbvins/realsense/realsense_source.hpp"
 #endif
@@ -26,6 +30,15 @@ Result<std::unique_ptr<Source>> open_realsense([[maybe_unused]] const std::strin
 #endif
 }
 
+#ifdef FBVINS_WITH_BAGS
+/// Recordings and calibrations of all formats.
+Result<std::unique_ptr<Dataset>> open_any(const std::string& path, const DatasetOptions& dataset) {
+  RecordingOptions options{.dataset = dataset, .calibration = dataset.kalibr_camchain, .imu_calibration = dataset.kalibr_imu};
+  options.dataset.kalibr_camchain = options.dataset.kalibr_imu = "";
+  return open_recording(path, options);
+}
+#endif
+
 }  // namespace
 
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options) {
@@ -33,6 +46,11 @@ Result<std::unique_ptr<Source>> open_source(const std::string& name, const Sourc
   const std::string kind = name.substr(0, colon), where = colon == std::string::npos ? "" : name.substr(colon + 1);
   if (kind == "d435i") return open_realsense(where, options);
   if (kind == "v4l2") return as_source(V4l2Source::open(where, options));
+#ifdef FBVINS_WITH_BAGS
+  if (kind == "replay" && !where.empty())
+    return as_source(ReplaySource::open(
+        where, {.dataset = options.dataset, .laps = options.laps, .preload = options.preload, .open_file = open_any}));
+#endif
   return make_source(name, options);
 }
 

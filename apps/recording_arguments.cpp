@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
 #include "apps/open_recording.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
 
@@ -11,6 +15,15 @@ void RecordingArguments::add_to(CLI::App& command) {
                      "instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");
   command.add_option("--imu-calibration", imu_calibration, "Kalibr imu.yaml, with --calibration");
   command.add_option("--topics", topics, "of a bag, where they are not found: LEFT,RIGHT[,IMU]")->delimiter(',')->expected(2, 3);
+  command.add_option("--start", start_s, "seconds of the recording to leave out")->check(CLI::NonNegativeNumber);
+  command.add_option("--duration", duration_s, "seconds of it to take from there, 0 for all")->check(CLI::NonNegativeNumber);
+}
+
+Result<Trajectory<W>> read_pose_file(const std::string& path) {
+  auto file = read_trajectory(path);
+  if (!file) return file.error();
+  if (file->counts.bad() > 0) warn(fmt::format("{} rows left out, the first: {}", file->counts.bad(), file->counts.first_bad));
+  return file->poses();
 }
 
 }  // namespace fbvins::app

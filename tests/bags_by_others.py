@@ -5,6 +5,7 @@
 usage: bags_by_others.py FBVINS PYTHON      exit 77 (skipped) where PYTHON lacks rosbags or mcap
 """
 import csv
+import json
 import os
 import pathlib
 import re
@@ -200,6 +201,75 @@ def check_converted(program, folder, root, expected):
     print("converted from bag to MCAP to bag to folder: the same bytes, and rosbags reads the bag")
 
 
+def check_parts(program, recordings, folder):
+    """A second of each from half a second on: the same images as of the folder."""
+    def part(recording):
+        text = subprocess.run([program, "info", recording, "--calibration", folder, "--start", "0.5", "--duration", "1", "--json"], check=True,
+                              capture_output=True, text=True).stdout
+        return [json.loads(text)[name] for name in ("frames", "first_image_ns", "last_image_ns")]
+    expected = part(folder)
+    assert expected[0] == 20, expected
+    for recording in recordings:
+        assert part(recording) == expected, f"{recording.name}: {part(recording)} is not {expected}"
+    print(f"a part of each of {len(recordings)} by time: the same images")
+
+
+def poses(flight, kind):
+    """The folder's truth as messages of a kind."""
+    types = flight.types
+    for row in rows(flight.folder / "state_groundtruth_estimate0" / "data.csv"):
+        stamp, (x, y, z, qw, qx, qy, qz) = int(row[0]), map(float, row[1:8])
+        header, q = flight.header(stamp, "world"), types["geometry_msgs/msg/Quaternion"](qx, qy, qz, qw)
+        pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](x, y, z), q)
+        vector, many = types["geometry_msgs/msg/Vector3"], np.zeros(36)
+        if kind == "PoseStamped":
+            message = types["geometry_msgs/msg/PoseStamped"](header, pose)
+        elif kind == "TransformStamped":
+            message = types["geometry_msgs/msg/TransformStamped"](header, "quad", types["geometry_msgs/msg/Transform"](vector(x, y, z), q))
+        else:
+            twist = types["geometry_msgs/msg/TwistWithCovariance"](types["geometry_msgs/msg/Twist"](vector(0, 0, 0), vector(0, 0, 0)), many)
+            message = types["nav_msgs/msg/Odometry"](header, "quad", types["geometry_msgs/msg/PoseWithCovariance"](pose, many), twist)
+        yield stamp, message.__msgtype__, flight.pack(message)
+
+
+def check_eval(program, folder, root):
+    """Truth on a bag's topic of poses gives the figures of the folder's."""
+    def figures(truth, *arguments):
+        done = subprocess.run([program, "eval", truth, root / "euroc" / "trajectory_tum.txt", "--json", *arguments], check=False,
+                              capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return {name: value for name, value in json.loads(done.stdout).items() if name != "coverage"}
+    expected = figures(folder)
+    for kind in ("PoseStamped", "TransformStamped", "Odometry"):
+        for ros1 in (True, False):
+            flight = Flight(folder, get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE), ros1)
+            path = root / f"{kind}{'.bag' if ros1 else ''}"
+            with rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
+                connections = {}
+                for stamp, name, data in poses(flight, kind):
+                    for topic in ("/truth", "/other"):
+                        if topic not in connections:
+                            connections[topic] = writer.add_connection(topic, name, typestore=flight.store)
+                    writer.write(connections["/truth"], stamp, data)
+                writer.write(connections["/other"], stamp, data)
+            assert figures(path, "--topic", "/truth") == expected, f"{path.name}: other figures than with the folder's truth"
+            refused = subprocess.run([program, "eval", path, root / "euroc" / "trajectory_tum.txt"], check=False, capture_output=True, text=True)
+            assert refused.returncode == 2 and "/other, /truth: say which with --topic" in refused.stderr, refused.stderr
+    print("truth on topics of PoseStamped, TransformStamped, Odometry: the same figures")
+
+
+def check_live(program, folder, root):
+    """A bag played in wall time."""
+    for name in ("lz4.bag", "sqlite"):
+        out = root / f"live_{name}"
+        done = subprocess.run([program, "live", "--source", f"replay:{root / name}@0.5", "--calibration", folder, "--out", out, "--quiet"], check=False,
+                              capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        stamps = {row[0] for row in rows(out / "trajectory.csv")}
+        assert len(stamps) > IMAGES / 2 and stamps <= {row[0] for row in rows(root / "euroc" / "trajectory.csv")}, len(stamps)
+    print("played by fbvins live: lz4.bag, sqlite")
+
+
 def trajectory(program, recording, out, *arguments):
     done = subprocess.run([program, "run", recording, "--out", out, "--quiet", "--max-images", str(IMAGES), *arguments], check=False,
                           capture_output=True, text=True)
@@ -257,6 +327,9 @@ def main():
             same = trajectory(program, recording, root / "out", "--calibration", folder) == expected
             assert same, f"{recording.name}: another trajectory than from the EuRoC folder"
             print(f"{recording.name}: the same bytes")
+        check_parts(program, recordings, folder)
+        check_eval(program, folder, root)
+        check_live(program, folder, root)
         check_tum_vi(program, folder, root)
         check_converted(program, folder, root, expected)
         for kind in ("lz4.bag", "bz2.bag", "zstd.mcap"):

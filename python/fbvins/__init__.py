@@ -63,12 +63,14 @@ def _path(value: Optional[PathLike]) -> str:
 
 
 def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,  # noqa: A001
-         skip_frames: int = 0, max_frames: int = 0, topics: Tuple[str, ...] = ()) -> Recording:
+         skip_frames: int = 0, max_frames: int = 0, topics: Tuple[str, ...] = (), start_s: float = 0.0,
+         duration_s: float = 0.0) -> Recording:
     """A recording: a EuRoC or TUM-VI folder, an EuRoC zip, a flight record, a ROS 1 or ROS 2 bag, an MCAP file of ROS messages.
     `calibration` is a file of any format that fbvins.calibration.load() knows, instead of the recording's own. `topics` of a bag, where they are not found:
-    left, right and, if there are several, IMU. max_frames 0: all."""
+    left, right and, if there are several, IMU. max_frames 0: all. Only what is stamped from start_s seconds after the first stereo frame on, for duration_s
+    seconds (0: to the end)."""
     left, right, imu = (tuple(topics) + ("", "", ""))[:3]
-    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, left, right, imu)
+    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, left, right, imu)
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:

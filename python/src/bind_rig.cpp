@@ -3,37 +3,39 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 
 #include "bindings.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/camera/lens_numbers.hpp"
 
 namespace fbvins::python {
 namespace {
 
 Camera make_camera(int width, int height, double fx, double fy, double cx, double cy, const std::string& model,
                    const std::vector<double>& distortion) {
-  std::vector<double> k = distortion;
-  if (k.empty()) k.resize(4, 0.0);
-  if (k.size() != 4) throw nb::value_error(fmt::format("distortion: 4 numbers are expected, not {}", distortion.size()).c_str());
+  static const std::map<std::string, std::pair<std::string, std::size_t>> kModels = {{"radtan", {"pinhole-radtan", 4}},
+                                                                                     {"equidistant", {"pinhole-equidistant", 4}},
+                                                                                     {"ds", {"ds", 2}},
+                                                                                     {"eucm", {"eucm", 2}},
+                                                                                     {"omni", {"omni-radtan", 5}}};
+  const auto known = kModels.find(model);
+  if (known == kModels.end())
+    throw nb::value_error(
+        fmt::format("model: 'radtan', 'equidistant', 'ds', 'eucm' or 'omni' is expected, not '{}'", model).c_str());
+  const auto& [name, count] = known->second;
+  const std::vector<double> k = distortion.empty() && count == 4 ? std::vector<double>(4, 0.0) : distortion;
+  if (k.size() != count)
+    throw nb::value_error(fmt::format("distortion: {} numbers are expected, not {}", count, distortion.size()).c_str());
   if (width < 1 || height < 1 || !(fx > 0) || !(fy > 0))
     throw nb::value_error("a camera has a size in pixels and positive focal lengths");
-  if (model == "radtan") return {PinholeRadtan{fx, fy, cx, cy, k[0], k[1], k[2], k[3]}, width, height};
-  if (model == "equidistant") return {KannalaBrandt{fx, fy, cx, cy, k[0], k[1], k[2], k[3]}, width, height};
-  throw nb::value_error(fmt::format("model: 'radtan' or 'equidistant' is expected, not '{}'", model).c_str());
-}
-
-std::vector<double> distortion_of(const Camera& camera) {
-  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model())) return {m->k1, m->k2, m->p1, m->p2};
-  const auto& m = std::get<KannalaBrandt>(camera.model());
-  return {m.k1, m.k2, m.k3, m.k4};
-}
-
-std::vector<double> intrinsics_of(const Camera& camera) {
-  return std::visit([](const auto& m) { return std::vector<double>{m.fx, m.fy, m.cx, m.cy}; }, camera.model());
+  const std::optional<LensModel> lens = lens_of(name, {fx, fy, cx, cy}, k);
+  if (!lens) throw nb::value_error(fmt::format("distortion: {}", outside_of_model(model, k)).c_str());
+  return {*lens, width, height};
 }
 
 std::string text_of(const Camera& camera) {
-  const std::vector<double> f = intrinsics_of(camera);
+  const std::array<double, 4> f = camera.intrinsics();
   return fmt::format("<fbvins.Camera {} {}x{} px, f = ({:.1f}, {:.1f}), c = ({:.1f}, {:.1f})>", camera.model_name(),
                      camera.width(), camera.height(), f[0], f[1], f[2], f[3]);
 }
@@ -45,6 +47,10 @@ StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb
   const double baseline_m = rig.T_C1C0().p.norm();
   if (!(baseline_m > 1e-3 && baseline_m < 10))
     throw nb::value_error(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m).c_str());
+  for (const auto& [camera, side] : {std::pair(&left, "left"), {&right, "right"}})
+    if (camera->sees_backwards())
+      throw nb::value_error(
+          fmt::format("the {} camera sees more than 180 degrees from edge to edge: crop its images", side).c_str());
   if (!(image_rate_hz > 0) || !std::isfinite(time_offset_s))
     throw nb::value_error("image_rate_hz is positive and time_offset_s finite");
   return rig;
@@ -53,15 +59,17 @@ StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb
 }  // namespace
 
 void bind_rig(nb::module_& m) {
-  nb::class_<Camera>(m, "Camera", "A pinhole camera with distortion. Lengths in pixels.")
-      .def(nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
-           "distortion"_a = std::vector<double>{},
-           "model: 'radtan' (k1, k2, p1, p2; OpenCV's and Kalibr's) or 'equidistant' (k1..k4; Kalibr's, OpenCV's fisheye).")
+  nb::class_<Camera>(m, "Camera", "A camera: size, lens. Lengths in pixels.")
+      .def(
+          nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
+          "distortion"_a = std::vector<double>{},
+          "model and its distortion: 'radtan' (k1, k2, p1, p2; OpenCV's and Kalibr's), 'equidistant' (k1..k4; Kalibr's, OpenCV's\n"
+          "fisheye), 'ds' (xi, alpha), 'eucm' (alpha, beta) or 'omni' (xi, k1, k2, p1, p2; Kalibr's omni with radtan, MEI).")
       .def_prop_ro("width", &Camera::width, "px")
       .def_prop_ro("height", &Camera::height, "px")
       .def_prop_ro("model", &Camera::model_name)
-      .def_prop_ro("intrinsics", &intrinsics_of, "fx, fy, cx, cy in px")
-      .def_prop_ro("distortion", &distortion_of, "four coefficients")
+      .def_prop_ro("intrinsics", &Camera::intrinsics, "fx, fy, cx, cy in px")
+      .def_prop_ro("distortion", &Camera::distortion, "the model's numbers, in the order above")
       .def("__repr__", &text_of);
 
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")

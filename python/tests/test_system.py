@@ -178,6 +178,13 @@ def test_a_rig_of_ones_own(flight):
         fbvins.Rig(camera, camera, rig.T_BC0, 2 * rig.T_BC1)
     with pytest.raises(ValueError, match="apart"):
         fbvins.Rig(camera, camera, rig.T_BC0, rig.T_BC0)
-    with pytest.raises(ValueError, match="'radtan' or 'equidistant'"):
+    with pytest.raises(ValueError, match="'radtan', 'equidistant', 'ds', 'eucm' or 'omni'"):
         fbvins.Camera(752, 480, 1, 1, 1, 1, model="fov")
+    wide = fbvins.Camera(512, 512, 158, 158, 255, 257, model="ds", distortion=[-0.17, 0.59])
+    assert wide.model == "ds" and wide.distortion == [-0.17, 0.59] and wide.intrinsics == [158, 158, 255, 257]
+    with pytest.raises(ValueError, match="alpha is 1.5, not between 0 and 1"):
+        fbvins.Camera(512, 512, 158, 158, 255, 257, model="ds", distortion=[-0.17, 1.5])
+    with pytest.raises(ValueError, match="left camera sees more than 180 degrees"):
+        backwards = fbvins.Camera(512, 512, 100, 100, 255, 257, model="eucm", distortion=[0.63, 1.04])
+        fbvins.Rig(backwards, wide, rig.T_BC0, rig.T_BC1)
     fbvins.System(None, own).finish()

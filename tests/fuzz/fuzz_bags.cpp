@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <filesystem>
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/foreign_calibration.hpp"
+#include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/mcap_format.hpp"
+#include "fbvins/io/mcap_writer.hpp"
+#include "fbvins/io/ros_messages.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
 #include "tests/fuzz/require.hpp"
@@ -20,6 +28,56 @@ StereoRig small_rig() {
   return rig;
 }
 
+/// In CDR: 1 an IMU's reading, 2 and 3 an image, 4 a camera's calibration.
+std::string small_message(int kind, Time t) {
+  static const Image image(8, 6, std::uint8_t{7});
+  std::string out;
+  if (kind == 1) append_imu(out, ImuSample{t}, {});
+  else if (kind == 4) append_camera_info(out, t, "left", Camera(DoubleSphere{9, 9, 4, 3, -0.2, 0.6}, 8, 6));
+  else append_image(out, t, "left", &image);
+  return out;
+}
+
+std::string small_mcap(const std::string& path) {
+  auto bag = McapWriter::create(path, {},
+                                {{"/imu", "sensor_msgs/msg/Imu", ""},
+                                 {"/left", "sensor_msgs/msg/Image", ""},
+                                 {"/right", "sensor_msgs/msg/Image", ""},
+                                 {"/left/camera_info", "sensor_msgs/msg/CameraInfo", ""}});
+  require(bag.ok());
+  for (std::int64_t i = 0; i < 3; ++i) {
+    for (const std::size_t topic : {0, 1, 2, 3}) {
+      bag->begin_message(topic, Time{1000 * i}) += small_message(static_cast<int>(topic) + 1, Time{1000 * i});
+      bag->end_message();
+    }
+    require(bag->flush().ok());
+  }
+  require(bag->finish().ok());
+  std::string bytes = *read_file(path, 1u << 20u);
+  // Without checksums: else whatever is changed inside of a chunk would be left out with it.
+  for (std::size_t at = kMcapMagic.size(); at + kMcapRecordHead_bytes < bytes.size();) {
+    const auto kind = static_cast<McapRecord>(bytes[at]);
+    const auto length = ByteCursor(std::string_view(bytes).substr(at + 1)).get<std::uint64_t>();
+    if (kind == McapRecord::chunk) overwrite_le(bytes, at + kMcapRecordHead_bytes + 24, std::uint32_t{0});
+    if (kind == McapRecord::footer) break;
+    at += kMcapRecordHead_bytes + length;
+  }
+  return bytes;
+}
+
+void read_all(BagReader& bag) {
+  const BagContents contents = read_contents(bag);
+  for (const auto& [name, topic] : contents.images)
+    for (const ImageRow& row : topic.rows) {
+      const MessagePlace place = place_of(row.file);
+      require(place_name(place) == row.file);
+      require_sentence(image_of(bag.read(place), topic.encoding, topic.compressed));
+    }
+  const auto topics = choose_topics(contents, {}, true);
+  require_sentence(topics);
+  if (topics) require_sentence(rig_of(contents, *topics));
+}
+
 }  // namespace
 
 std::vector<std::string> bag_seeds() {
@@ -30,26 +88,101 @@ std::vector<std::string> bag_seeds() {
   for (std::int64_t i = 0; i < 3; ++i)
     require(bag->add(ImuSample{Time{1000 * i}}).ok() && bag->add(StereoFrame{Time{1000 * i}, image, image}).ok());
   require(bag->finish().ok());
-  return {*read_file(path, 1u << 20u), std::string(kMcapMagic)};
+  const std::string bag_bytes = *read_file(path, 1u << 20u), mcap = small_mcap(folder.path() + "/flight.mcap");
+  return {bag_bytes,
+          test::packed_ros1(bag_bytes, "lz4"),
+          test::packed_ros1(bag_bytes, "bz2"),
+          mcap,
+          test::packed_mcap(mcap, "lz4"),
+          test::packed_mcap(mcap, "zstd"),
+          std::string(kMcapMagic)};
 }
 
-/// All that a bag holds is read, and each message again by its place.
+/// All that a bag holds is read, and each message again by its place; then a part of it by time.
 void fuzz_bag(std::string_view bytes) {
   const bool mcap = bytes.substr(0, kMcapMagic.size()) == kMcapMagic;
-  auto source = bytes_in_memory(std::string(bytes));
-  auto bag = mcap ? read_mcap_bag(std::move(source), "bag") : read_ros1_bag(std::move(source), "bag");
+  const auto open = [&] {
+    auto source = bytes_in_memory(std::string(bytes));
+    return mcap ? read_mcap_bag(std::move(source), "bag") : read_ros1_bag(std::move(source), "bag");
+  };
+  auto bag = open();
   require_sentence(bag);
   if (!bag) return;
-  const BagContents contents = read_contents(**bag);
-  for (const auto& [name, topic] : contents.images)
-    for (const ImageRow& row : topic.rows) {
-      const MessagePlace place = place_of(row.file);
-      require(place_name(place) == row.file);
-      require_sentence(image_of((*bag)->read(place), topic.encoding, topic.compressed));
-    }
-  const auto topics = choose_topics(contents, {}, true);
-  require_sentence(topics);
-  if (topics) require_sentence(rig_of(contents, *topics));
+  read_all(**bag);
+  auto part = open();
+  (*part)->only({1000}, {2000});
+  read_contents(**part);
+}
+
+std::vector<std::string> sqlite_bag_seeds() {
+  const test::TemporaryFolder folder;
+  std::vector<std::string> out;
+  for (
+      const char* schema :
+      {"CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);"
+       "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);",
+       "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL, "
+       "offered_qos_profiles TEXT NOT NULL DEFAULT ''); CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
+       "timestamp INTEGER NOT NULL, data BLOB NOT NULL); CREATE INDEX timestamp_idx ON messages (timestamp ASC);"}) {
+    const std::string path = folder.path() + "/bag.db3";
+    std::filesystem::remove(path);
+    sqlite3* database = nullptr;
+    require(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
+    const auto run = [&](const std::string& sql) {
+      require(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == 0);
+    };
+    run("PRAGMA page_size = 512");
+    run(schema);
+    run("INSERT INTO topics(id, name, type, serialization_format) VALUES (1, '/imu', 'sensor_msgs/msg/Imu', 'cdr'), "
+        "(2, '/left', 'sensor_msgs/msg/Image', 'cdr'), (3, '/right', 'sensor_msgs/msg/Image', 'cdr')");
+    for (std::int64_t i = 0; i < 3; ++i)
+      for (const int topic : {1, 2, 3}) {
+        std::string hex;
+        for (const char c : small_message(topic, Time{1000 * i})) hex += fmt::format("{:02x}", static_cast<unsigned char>(c));
+        run(fmt::format("INSERT INTO messages(topic_id, timestamp, data) VALUES ({}, {}, x'{}')", topic, 1000 * i, hex));
+      }
+    sqlite3_close(database);
+    out.push_back(*read_file(path, 1u << 20u));
+  }
+  return out;
+}
+
+/// The library wants a file: one in memory.
+void fuzz_sqlite_bag(std::string_view bytes) {
+  static const int file = ::memfd_create("bag.db3", 0);
+  static const std::string path = fmt::format("/proc/self/fd/{}", file);
+  require(::ftruncate(file, 0) == 0 && ::pwrite(file, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
+  for (const bool part : {false, true}) {
+    auto bag = open_sqlite_bag({path}, part);
+    require_sentence(bag);
+    if (!bag) return;
+    if (part) (*bag)->only({1000}, {2000});
+    read_all(**bag);
+  }
+}
+
+std::vector<std::string> message_seeds() {
+  std::vector<std::string> out;
+  for (const int kind : {1, 2, 3, 4}) out.push_back("c" + small_message(kind, Time{1000}));
+  // In ROS 1's order a header begins with its number, and nothing is aligned.
+  out.push_back("1" + std::string(400, '\0'));
+  return out;
+}
+
+/// Any message's bytes read as each of those that a recording is made of; the first byte picks ROS 1's encoding or ROS 2's.
+void fuzz_message(std::string_view bytes) {
+  if (bytes.empty()) return;
+  const Encoding encoding = bytes[0] == '1' ? Encoding::ros1 : Encoding::cdr;
+  bytes.remove_prefix(1);
+  if (const auto sample = imu_of(bytes, encoding)) require(sample->gyro_radps.allFinite() && sample->accel_mps2.allFinite());
+  stamp_of(bytes, encoding);
+  for (const bool compressed : {false, true}) require_sentence(image_of(bytes, encoding, compressed));
+  const auto camera = camera_of(bytes, encoding);
+  require_sentence(camera);
+  if (camera) require(camera->camera.width() > 0 && camera->camera.focal_px() > 0);
+  for (const BagTransform& transform : transforms_of(bytes, encoding)) require(std::abs(transform.q.norm() - 1) < 1e-9);
+  for (const char* type : {"geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped", "nav_msgs/Odometry"})
+    if (const auto point = pose_of(bytes, encoding, type)) require(point->T_WB.p.allFinite());
 }
 
 std::vector<std::string> foreign_calibration_seeds() {
@@ -57,6 +190,7 @@ std::vector<std::string> foreign_calibration_seeds() {
       "cam0:\n  T_imu_cam: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n  camera_model: pinhole\n  distortion_coeffs: [0, 0, 0, 0]\n"
       "  distortion_model: radtan\n  intrinsics: [4, 4, 3, 2]\n  resolution: [8, 6]\ncam1:\n  T_imu_cam: 5\n",
       R"({"value0": {"T_imu_cam": [{"px": 0, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}, {"px": 0.1, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}], "intrinsics": [{"camera_type": "kb4", "intrinsics": {"fx": 4, "fy": 4, "cx": 3, "cy": 2, "k1": 0, "k2": 0, "k3": 0, "k4": 0}}, {"camera_type": "pinhole", "intrinsics": {"fx": 4, "fy": 4, "cx": 3, "cy": 2}}], "resolution": [[8, 6], [8, 6]], "imu_update_rate": 200, "accel_noise_std": [1, 1, 1], "gyro_noise_std": [1, 1, 1], "accel_bias_std": [1, 1, 1], "gyro_bias_std": [1, 1, 1]}})",
+      R"({"value0": {"T_imu_cam": [{"px": 0, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}, {"px": 0.1, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}], "intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 4, "fy": 4, "cx": 3, "cy": 2, "xi": -0.2, "alpha": 0.6}}, {"camera_type": "eucm", "intrinsics": {"fx": 4, "fy": 4, "cx": 3, "cy": 2, "alpha": 0.6, "beta": 1.1}}], "resolution": [[8, 6], [8, 6]], "imu_update_rate": 200, "accel_noise_std": [1, 1, 1], "gyro_noise_std": [1, 1, 1], "accel_bias_std": [1, 1, 1], "gyro_bias_std": [1, 1, 1]}})",
       "%YAML:1.0\n---\nmodel_type: PINHOLE\nimage_width: 8\nimage_height: 6\ndistortion_parameters:\n   k1: 0\n   k2: 0\n   p1: 0\n   p2: 0\n"
       "projection_parameters:\n   fx: 4\n   fy: 4\n   cx: 3\n   cy: 2\n",
       "image_width: 8\nimage_height: 6\ncamera_matrix:\n  data: [4, 0, 3, 0, 4, 2, 0, 0, 1]\ndistortion_model: plumb_bob\n"

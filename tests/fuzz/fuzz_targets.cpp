@@ -228,6 +228,8 @@ const std::vector<Target>& targets() {
       {"motion_capture", fuzz_motion_capture, motion_capture_seeds},
 #ifdef FBVINS_WITH_BAGS
       {"bag", fuzz_bag, bag_seeds},
+      {"sqlite_bag", fuzz_sqlite_bag, sqlite_bag_seeds},
+      {"message", fuzz_message, message_seeds},
       {"foreign_calibration", fuzz_foreign_calibration, foreign_calibration_seeds},
 #endif
 #ifdef FBVINS_WITH_LIVE

@@ -24,6 +24,10 @@ std::vector<std::string> socket_seeds();
 #ifdef FBVINS_WITH_BAGS
 void fuzz_bag(std::string_view bytes);
 std::vector<std::string> bag_seeds();
+void fuzz_sqlite_bag(std::string_view bytes);
+std::vector<std::string> sqlite_bag_seeds();
+void fuzz_message(std::string_view bytes);
+std::vector<std::string> message_seeds();
 void fuzz_foreign_calibration(std::string_view bytes);
 std::vector<std::string> foreign_calibration_seeds();
 #endif

@@ -9,57 +9,55 @@
 // Values: const members may be called from any thread.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
-#include <variant>
+#include <vector>
 
+#include "fbvins/camera/lens_models.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
 
-/// Pinhole with two radial and two tangential coefficients (Brown), OpenCV's and Kalibr's "radtan".
-struct PinholeRadtan {
-  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
-  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;
-};
-
-/// Kannala-Brandt with four coefficients, Kalibr's "equidistant", OpenCV's fisheye.
-struct KannalaBrandt {
-  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
-  double k1 = 0, k2 = 0, k3 = 0, k4 = 0;
-};
-
 class Camera {
  public:
   Camera() = default;
-  Camera(std::variant<PinholeRadtan, KannalaBrandt> model, int width, int height);
+  Camera(LensModel model, int width, int height);
 
   int width() const { return width_; }
   int height() const { return height_; }
-  const std::variant<PinholeRadtan, KannalaBrandt>& model() const { return model_; }
+  const LensModel& model() const { return model_; }
+  /// pinhole-radtan, pinhole-equidistant, ds, eucm or omni-radtan.
   std::string model_name() const;
+  /// fx, fy, cx, cy, px.
+  std::array<double, 4> intrinsics() const;
+  /// What the model has beyond them, in the order of its struct.
+  std::vector<double> distortion() const;
   /// Mean focal length, px.
   double focal_px() const;
 
   /// Pixel of normalised coordinates (x/z, y/z).
   /// J_pixel_normalised, if given, receives d(pixel)/d(normalised).
   Vec2 distort(const Vec2& normalised, Mat2* J_pixel_normalised = nullptr) const;
-  /// Normalised coordinates of a pixel, by Newton's method on distort(); nullopt where the model
-  /// cannot be inverted (beyond the monotonic part of the distortion).
+  /// Normalised coordinates of a pixel, in closed form (ds, eucm) or by Newton's method on distort(); nullopt where the
+  /// model cannot be inverted (beyond the monotonic part of the distortion, or a ray that looks backwards).
   std::optional<Vec2> undistort(const Vec2& pixel) const;
   /// Pixel of a point in the camera's frame; nullopt behind the camera or outside the model's domain.
   /// Does not check the image's borders.
   std::optional<Vec2> project(const Vec3& p_C) const;
   /// Largest |(x/z, y/z)| at which the radial distortion still grows outwards: the model's domain.
   double max_normalised_radius() const { return max_radius_; }
+  /// Whether neither of two opposite edges' middles has a ray in front of the camera, and not because of a polynomial that
+  /// turns: the lens sees more than 180 degrees across or down the image.
+  bool sees_backwards() const;
   bool inside(const Vec2& pixel, double border_px = 0) const {
     return pixel.x() >= border_px && pixel.y() >= border_px && pixel.x() <= width_ - 1 - border_px &&
            pixel.y() <= height_ - 1 - border_px;
   }
 
  private:
-  std::variant<PinholeRadtan, KannalaBrandt> model_;
+  LensModel model_;
   int width_ = 0;
   int height_ = 0;
   double max_radius_ = 0;

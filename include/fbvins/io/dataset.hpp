@@ -8,8 +8,8 @@
 //   while (auto event = data.next()) system.push(std::move(*event));
 //
 // Order: every IMU sample up to the first one at or after an image (stamp + time offset), then the
-// image. After the last image the remaining samples, unless max_frames cut the recording short. A flight record comes in the
-// order in which it was recorded.
+// image. After the last image the remaining samples, unless max_frames or duration_s cut the recording short. A flight record
+// comes in the order in which it was recorded.
 #pragma once
 
 #include <memory>
@@ -26,13 +26,15 @@
 namespace fbvins {
 
 struct DatasetOptions {
-  int skip_frames = 0;               ///< stereo frames left out at the start
-  int max_frames = 0;                ///< 0: all
-  double pair_tolerance_ms = 3.0;    ///< stamps of left and right may differ by this
-  int prefetch_frames = 8;           ///< decoded ahead; 0: decode when asked, without a thread
-  bool require_imu = true;           ///< false: a recording without imu0 is fine
-  std::string kalibr_camchain = "";  ///< replaces the recording's own calibration
-  std::string kalibr_imu = "";       ///< replaces its IMU noise; only with kalibr_camchain
+  int skip_frames = 0;                ///< stereo frames left out at the start
+  int max_frames = 0;                 ///< 0: all
+  double start_s = 0;                 ///< stereo frames stamped less than this after the first one are left out
+  double duration_s = 0;              ///< those stamped this or more after start_s, too; 0: none
+  double pair_tolerance_ms = 3.0;     ///< stamps of left and right may differ by this
+  int prefetch_frames = 8;            ///< decoded ahead; 0: decode when asked, without a thread
+  bool require_imu = true;            ///< false: a recording without imu0 is fine
+  std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
+  std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
 
   /// The recording's own calibration is not looked at.
@@ -42,6 +44,8 @@ struct DatasetOptions {
   void visit(V&& v) {
     v("skip_frames", skip_frames, "", "stereo frames left out at the start", 0, 1'000'000'000);
     v("max_frames", max_frames, "", "stereo frames delivered at most, 0 for all", 0, 1'000'000'000);
+    v("start_s", start_s, "s", "what comes before, counted from the first stereo frame, is left out", 0.0, 1e9);
+    v("duration_s", duration_s, "s", "what comes later, counted from start_s, is left out; 0: nothing", 0.0, 1e9);
     v("pair_tolerance_ms", pair_tolerance_ms, "ms", "largest difference of the stamps of left and right", 0.0, 1000.0);
     v("prefetch_frames", prefetch_frames, "", "stereo frames decoded ahead on another thread", 0, 1000);
     v("require_imu", require_imu, "", "refuse recordings without IMU");

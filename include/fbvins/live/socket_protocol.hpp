@@ -40,14 +40,19 @@ typedef struct FbvinsSocketHeader {
 } FbvinsSocketHeader;
 
 /// FbvinsSocketCamera::model
-enum { FBVINS_SOCKET_RADTAN = 0, FBVINS_SOCKET_EQUIDISTANT = 1 };
+enum {
+  FBVINS_SOCKET_RADTAN = 0,
+  FBVINS_SOCKET_EQUIDISTANT = 1,
+  FBVINS_SOCKET_DOUBLE_SPHERE = 2,
+  FBVINS_SOCKET_EXTENDED_UNIFIED = 3
+};
 
 typedef struct FbvinsSocketCamera {
   uint32_t model;
   uint32_t reserved;
   double focal_px[2];    ///< fx, fy
   double centre_px[2];   ///< cx, cy; the centre of the top-left pixel is (0, 0)
-  double distortion[4];  ///< k1 k2 p1 p2 (radtan), k1 k2 k3 k4 (equidistant)
+  double distortion[4];  ///< k1 k2 p1 p2 (radtan), k1 k2 k3 k4 (equidistant), xi alpha (ds), alpha beta (eucm)
   double T_BC[12];       ///< three rows of four, R | p: p_B = R * p_C + p; B is the IMU
 } FbvinsSocketCamera;
 

@@ -2,6 +2,7 @@
 #include "fbvins/sim/euroc_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <png.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <fstream>
 #include <future>
 
+#include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/output_file.hpp"
 
 namespace fbvins {
@@ -60,21 +62,13 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
 }
 
 std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, double rate_hz) {
-  std::string text = "# Rendered by fbvins simulate.\nsensor_type: camera\ncomment: simulated camera\n\n" + matrix_text(q, p);
-  text += fmt::format("\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n", rate_hz, camera.width(), camera.height());
-  std::visit(
-      [&](const auto& m) {
-        using Model = std::decay_t<decltype(m)>;
-        text += fmt::format("intrinsics: [{}, {}, {}, {}]\n", m.fx, m.fy, m.cx, m.cy);
-        if constexpr (std::is_same_v<Model, PinholeRadtan>)
-          text += fmt::format("distortion_model: radial-tangential\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2,
-                              m.p1, m.p2);
-        else
-          text +=
-              fmt::format("distortion_model: equidistant\ndistortion_coefficients: [{}, {}, {}, {}]\n", m.k1, m.k2, m.k3, m.k4);
-      },
-      camera.model());
-  return text;
+  const KalibrCamera c = kalibr_camera(camera);
+  return "# Rendered by fbvins simulate.\nsensor_type: camera\ncomment: simulated camera\n\n" + matrix_text(q, p) +
+         fmt::format(
+             "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
+             "distortion_coefficients: [{}]\n",
+             rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
+             c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", "));
 }
 
 std::string imu_yaml(const ImuNoise& n) {

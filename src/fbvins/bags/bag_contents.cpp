@@ -189,7 +189,7 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
       return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
   rig.T_BC0 = find_transform(contents.transforms, body, left->frame)->cast_frames<B, C0>();
   rig.T_BC1 = find_transform(contents.transforms, body, right->frame)->cast_frames<B, C1>();
-  if (Result<void> baseline = check_baseline(rig, "/tf_static"); !baseline) return baseline.error();
+  if (Result<void> good = check_rig(rig, "/tf_static"); !good) return good.error();
   return rig;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fbvins/bags/grey_image.hpp"
+#include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/image_decode.hpp"
 
 namespace fbvins {
@@ -79,13 +80,13 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
   if (!in.ok() || !(k[0] > 0 && k[4] > 0) || width < 1 || height < 1 || width > kLargestImageSide_px ||
       height > kLargestImageSide_px)
     return Error{ErrorCode::malformed, "this is no camera's calibration"};
+  const bool plumb_bob = model == "plumb_bob" || model.empty(), equidistant = model == "equidistant" || model == "fisheye";
   std::vector<double> c = d;
-  c.resize(4, 0.0);
-  const int w = static_cast<int>(width), h = static_cast<int>(height);
-  if ((model == "plumb_bob" || model.empty()) && fits_four(d))
-    return BagCamera{Camera(PinholeRadtan{k[0], k[4], k[2], k[5], c[0], c[1], c[2], c[3]}, w, h), frame};
-  if ((model == "equidistant" || model == "fisheye") && fits_four(d))
-    return BagCamera{Camera(KannalaBrandt{k[0], k[4], k[2], k[5], c[0], c[1], c[2], c[3]}, w, h), frame};
+  if ((plumb_bob || equidistant) && fits_four(d)) c.resize(4, 0.0);
+  // Other names are those of our own bags.
+  const std::string name = plumb_bob ? "pinhole-radtan" : equidistant ? "pinhole-equidistant" : model;
+  if (const auto lens = lens_of(name, {k[0], k[4], k[2], k[5]}, c))
+    return BagCamera{Camera(*lens, static_cast<int>(width), static_cast<int>(height)), frame};
   return Error{ErrorCode::unsupported,
                fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob and equidistant with four are known",
                            model.substr(0, 40), d.size())};

@@ -6,7 +6,9 @@
 //   while (auto message = (*bag)->next()) use((*bag)->topics()[message->topic].name, message->data);
 //   std::string again = (*bag)->read(place);
 //
-// A truncated file is read up to its last complete record; what cannot be read is skipped and counted.
+// A truncated file is read up to its last complete record; what cannot be read is skipped and counted. With only() next() leaves
+// out what was recorded outside of an interval, and goes over it without reading it where the file says what lies where: by the
+// index of each chunk in ROS 1 bags and MCAP files (the one at the end of the file is not needed), by SQLite's own.
 #pragma once
 
 #include <compare>
@@ -51,6 +53,10 @@ struct BagDamage {
 
 class BagReader {
  public:
+  struct Window {
+    Duration from, to;  ///< counted from the first message
+  };
+
   virtual ~BagReader() = default;
 
   virtual std::string format() const = 0;
@@ -58,17 +64,34 @@ class BagReader {
   const std::vector<BagTopic>& topics() const { return topics_; }
   const BagDamage& damage() const { return damage_; }
 
-  virtual std::optional<BagMessage> next() = 0;
+  /// Before the first next(): only what was recorded in [from, to) of the file's first message, but also the first message of
+  /// each topic, and transforms that stay.
+  void only(Duration from, Duration to) { window_ = {from, to}; }
+  std::optional<BagMessage> next();
   /// The bytes of a message that next() has shown; empty where they cannot be read any more.
   virtual std::string read(const MessagePlace& place) = 0;
 
  protected:
+  /// The next message of those that were not gone over.
+  virtual std::optional<BagMessage> advance() = 0;
+  /// Whether a part of the file with messages of these topics from `first` to `last` can be gone over.
+  bool can_leave_out(Time first, Time last, const std::vector<std::size_t>& topics);
+  const std::optional<Window>& window() const { return window_; }
+  static bool stays(const BagTopic& topic) { return topic.name.ends_with("tf_static"); }
+
   void complain(std::string sentence) {
     if (damage_.parts++ == 0) damage_.first = std::move(sentence);
   }
 
   std::vector<BagTopic> topics_;
   BagDamage damage_;
+
+ private:
+  bool is_in_window(Time first, Time last);
+
+  std::optional<Window> window_;
+  std::optional<Time> origin_;  ///< of the first message
+  std::vector<bool> begun_;     ///< topics whose first message has been shown
 };
 
 /// "sensor_msgs/msg/Imu" and "sensor_msgs/Imu" are one.

@@ -72,6 +72,12 @@ bool unpack_bz2(std::string_view in, Room& room) {
   }
 }
 
+/// What a frame says of its content's size; 0 where it says nothing.
+std::uint64_t size_in_frame(std::string_view in) {
+  const unsigned long long size = ZSTD_getFrameContentSize(in.data(), in.size());
+  return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;
+}
+
 bool unpack_zstd(std::string_view in, Room& room) {
   const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(), ZSTD_freeDStream);
   ZSTD_inBuffer input{in.data(), in.size(), 0};
@@ -95,6 +101,7 @@ Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint6
                      : compression == "zstd" ? unpack_zstd
                                              : nullptr;
   if (work == nullptr) return {{}, false, false};
+  if (compression == "zstd" && size == 0) size = size_in_frame(bytes);
   if (size > kLargestUnpacked_bytes) return {};
   Room room(size == 0 ? kLargestUnpacked_bytes : size);
   const bool ended = work(bytes, room);

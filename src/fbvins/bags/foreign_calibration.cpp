@@ -33,7 +33,7 @@ YAML::Node element(YamlReader& yaml, const YAML::Node& map, const std::string& f
 
 Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig, const std::string& file) {
   if (!yaml.ok()) return yaml.error();
-  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }
 
@@ -66,7 +66,16 @@ Camera basalt_camera(YamlReader& yaml, const YAML::Node& root, std::size_t index
       if (yaml.ok() && number(higher) != 0) yaml.complain(k, higher, "is not 0, and only k1, k2, p1, p2 are known");
     return {PinholeRadtan{fx, fy, cx, cy, number("k1"), number("k2"), number("p1"), number("p2")}, sides[0], sides[1]};
   }
-  yaml.complain(camera, "camera_type", fmt::format("'{}' is not supported, only pinhole, pinhole-radtan8 and kb4", model));
+  if (model == "ds" || model == "eucm") {
+    const std::vector<double> own =
+        model == "ds" ? std::vector{number("xi"), number("alpha")} : std::vector{number("alpha"), number("beta")};
+    if (const std::string problem = yaml.ok() ? outside_of_model(model, own) : ""; !problem.empty())
+      yaml.complain(k, model == "ds" ? "xi" : "alpha", problem);
+    if (!yaml.ok()) return {};
+    return {*lens_of(model, {fx, fy, cx, cy}, own), sides[0], sides[1]};
+  }
+  yaml.complain(camera, "camera_type",
+                fmt::format("'{}' is not supported, only pinhole, pinhole-radtan8, kb4, ds and eucm", model));
   return {};
 }
 
@@ -106,7 +115,16 @@ Camera camodocal_camera(YamlReader& yaml) {
     return {KannalaBrandt{yaml.positive(p, "mu"), yaml.positive(p, "mv"), number(p, "u0"), number(p, "v0"), number(p, "k2"),
                           number(p, "k3"), number(p, "k4"), number(p, "k5")},
             width, height};
-  yaml.complain(root, "model_type", fmt::format("'{}' is not supported, only PINHOLE and KANNALA_BRANDT", model));
+  if (model == "MEI") {
+    const YAML::Node d = inner(yaml, root, "distortion_parameters"), mirror = inner(yaml, root, "mirror_parameters");
+    const double xi = number(mirror, "xi");
+    if (const std::string problem = yaml.ok() ? outside_of_model("omni", {xi}) : ""; !problem.empty())
+      yaml.complain(mirror, "xi", problem);
+    return {UnifiedRadtan{yaml.positive(p, "gamma1"), yaml.positive(p, "gamma2"), number(p, "u0"), number(p, "v0"), xi,
+                          number(d, "k1"), number(d, "k2"), number(d, "p1"), number(d, "p2")},
+            width, height};
+  }
+  yaml.complain(root, "model_type", fmt::format("'{}' is not supported, only PINHOLE, KANNALA_BRANDT and MEI", model));
   return {};
 }
 

@@ -90,8 +90,42 @@ TEST(ForeignCalibration, BasaltIsJsonWithPosesAndNoise) {
   EXPECT_EQ(rig->imu_noise.accel_noise_density_mps2_rthz, 0.016);
   EXPECT_EQ(rig->imu_noise.gyro_random_walk_radps2_rthz, 0.0001);
   EXPECT_NEAR(rig->time_offset_s, 0.002, 1e-15);
-  EXPECT_EQ(parse_basalt(basalt("ds"), "c.json").error().message,
-            "c.json:1: camera_type: 'ds' is not supported, only pinhole, pinhole-radtan8 and kb4");
+  EXPECT_EQ(parse_basalt(basalt("fov"), "c.json").error().message,
+            "c.json:1: camera_type: 'fov' is not supported, only pinhole, pinhole-radtan8, kb4, ds and eucm");
+}
+
+TEST(ForeignCalibration, BasaltsWideLensesAreRead) {
+  const std::string kb4 = R"("k1": 0.01, "k2": 0.02, "k3": -0.03, "k4": 0.004)";
+  const auto with = [&](const std::string& model, const std::string& numbers) {
+    std::string text = basalt(model);
+    for (std::size_t at = 0; (at = text.find(kb4)) != std::string::npos;) text.replace(at, kb4.size(), numbers);
+    return parse_basalt(text, "c.json");
+  };
+  const auto ds = with("ds", R"("xi": -0.172, "alpha": 0.593)"), eucm = with("eucm", R"("alpha": 0.63, "beta": 1.04)");
+  expect_rig(ds);
+  EXPECT_EQ(std::get<DoubleSphere>(ds->left.model()).xi, -0.172);
+  EXPECT_EQ(std::get<DoubleSphere>(ds->right.model()).alpha, 0.593);
+  expect_rig(eucm);
+  EXPECT_EQ(std::get<ExtendedUnified>(eucm->right.model()).beta, 1.04);
+  EXPECT_EQ(eucm->left.focal_px(), 0.5 * (380.5 + 380.25));
+  EXPECT_NE(with("ds", R"("xi": -1.2, "alpha": 0.6)").error().message.find("xi is -1.2, not between -1 and 1"),
+            std::string::npos);
+  EXPECT_NE(with("eucm", R"("alpha": 1.2, "beta": 1)").error().message.find("alpha is 1.2, not between 0 and 1"),
+            std::string::npos);
+}
+
+TEST(ForeignCalibration, ALensOfMoreThan180DegreesIsRefused) {
+  std::string text = basalt("kb4");
+  const auto replace_all = [&](const std::string& from, const std::string& to) {
+    for (std::size_t at = 0; (at = text.find(from)) != std::string::npos;) text.replace(at, from.size(), to);
+  };
+  replace_all("380.5", "150");
+  replace_all("380.25", "150");
+  replace_all(R"("k1": 0.01, "k2": 0.02, "k3": -0.03)", R"("k1": 0, "k2": 0, "k3": 0)");
+  EXPECT_EQ(
+      parse_basalt(text, "c.json").error().message,
+      "c.json: the left camera sees more than 180 degrees from edge to edge; only what is in front of a camera can be used: "
+      "crop the images, and take what is cut off at the left and the top off cx and cy");
 }
 
 TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
@@ -102,9 +136,17 @@ TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
   EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k4, 0.04);
   EXPECT_EQ(rig->right.focal_px(), 380.5);
   EXPECT_NEAR(rig->imu_noise.accel_noise_density_mps2_rthz, 0.1 / std::sqrt(200), 1e-12);
-  const std::string mei = "model_type: MEI\nimage_width: 752\nimage_height: 480\nprojection_parameters:\n   xi: 1\n";
-  EXPECT_EQ(parse_vins_fusion({text, name}, {mei, left}, {mei, right}).error().message,
-            "left.yaml:1: model_type: 'MEI' is not supported, only PINHOLE and KANNALA_BRANDT");
+  const std::string mei =
+      "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nimage_height: 480\nmirror_parameters:\n   xi: 0.9\ndistortion_parameters:\n"
+      "   k1: -0.02\n   k2: 0.06\n   p1: 0.001\n   p2: 0.002\nprojection_parameters:\n   gamma1: 830\n   gamma2: 829\n   u0: 370\n   v0: "
+      "240\n";
+  const auto with_mei = parse_vins_fusion({text, name}, {mei, left}, {kPinhole, right});
+  expect_rig(with_mei);
+  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).xi, 0.9);
+  EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).p2, 0.002);
+  const std::string other = "model_type: SCARAMUZZA\nimage_width: 752\nimage_height: 480\nprojection_parameters:\n   xi: 1\n";
+  EXPECT_EQ(parse_vins_fusion({text, name}, {other, left}, {other, right}).error().message,
+            "left.yaml:1: model_type: 'SCARAMUZZA' is not supported, only PINHOLE, KANNALA_BRANDT and MEI");
 }
 
 /// A pair turned against each other, as ROS writes it: both rectified to the frame whose x axis is the baseline.

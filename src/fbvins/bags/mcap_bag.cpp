@@ -20,21 +20,16 @@ std::optional<std::string> unpack_chunk(std::string_view compression, std::strin
 
 class McapBag final : public BagReader {
  public:
-  McapBag(std::shared_ptr<const ByteSource> bytes, McapReader reader) : bytes_(std::move(bytes)), reader_(std::move(reader)) {}
+  McapBag(std::shared_ptr<const ByteSource> bytes, McapReader reader) : bytes_(std::move(bytes)), reader_(std::move(reader)) {
+    reader_.pass_over([this](Time first, Time last, const std::vector<const McapChannel*>& channels) {
+      std::vector<std::size_t> topics;
+      for (const McapChannel* channel : channels)
+        if (is_message_of_ros(*channel)) topics.push_back(topic_of(*channel));
+      return can_leave_out(first, last, topics);
+    });
+  }
 
   std::string format() const override { return "MCAP"; }
-
-  std::optional<BagMessage> next() override {
-    while (const std::optional<McapMessage> message = reader_.next()) {
-      const std::string& encoding = message->channel->message_encoding;
-      if (encoding != "cdr" && encoding != "ros1") continue;
-      return BagMessage{
-          topic_of(*message->channel), message->log_time, message->data, {message->chunk, message->offset, message->data.size()}};
-    }
-    const McapDamage& damage = reader_.damage();
-    damage_ = {damage.parts, damage.first, damage.ends_early};
-    return std::nullopt;
-  }
 
   std::string read(const MessagePlace& place) override {
     if (place.chunk == 0) return bytes_->read(place.offset, place.length);
@@ -43,7 +38,23 @@ class McapBag final : public BagReader {
     return kept_.substr(place.offset, place.length);
   }
 
+ protected:
+  std::optional<BagMessage> advance() override {
+    while (const std::optional<McapMessage> message = reader_.next()) {
+      if (!is_message_of_ros(*message->channel)) continue;
+      return BagMessage{
+          topic_of(*message->channel), message->log_time, message->data, {message->chunk, message->offset, message->data.size()}};
+    }
+    const McapDamage& damage = reader_.damage();
+    damage_ = {damage.parts, damage.first, damage.ends_early};
+    return std::nullopt;
+  }
+
  private:
+  static bool is_message_of_ros(const McapChannel& channel) {
+    return channel.message_encoding == "cdr" || channel.message_encoding == "ros1";
+  }
+
   std::size_t topic_of(const McapChannel& channel) {
     const auto [known, is_new] = numbers_.try_emplace(&channel, topics_.size());
     if (!is_new) return known->second;

@@ -25,6 +25,9 @@ namespace fs = std::filesystem;
 
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
+// Messages are recorded later than they are stamped, some of them by seconds.
+constexpr Duration kRecordingDelay = {2'000'000'000};
+constexpr Duration kForever = {std::int64_t{1} << 62};
 
 class BagLoader : public FrameLoader {
  public:
@@ -82,6 +85,11 @@ class BagRecording {
       : path_(std::move(path)), options_(options), rig_(std::move(rig)) {}
 
   Result<DatasetContents> read(std::unique_ptr<BagReader> bag) {
+    const DatasetOptions& o = options_.dataset;
+    if (o.start_s > 0 || o.duration_s > 0) {
+      const Duration start = Duration::from_seconds(o.start_s), end = start + Duration::from_seconds(o.duration_s);
+      bag->only(start - kImuLeadIn - kRecordingDelay, o.duration_s > 0 ? end + kRecordingDelay : kForever);
+    }
     contents_ = read_contents(*bag);
     for (auto step : {&BagRecording::choose, &BagRecording::calibrate, &BagRecording::pair, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
@@ -144,17 +152,14 @@ class BagRecording {
   }
 
   Result<void> cut() {
-    auto& frames = out_.frames;
     const DatasetOptions& o = options_.dataset;
-    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(o.skip_frames, std::ssize(frames)));
-    if (o.max_frames > 0 && std::ssize(frames) > o.max_frames) frames.resize(static_cast<std::size_t>(o.max_frames));
-    if (frames.empty())
-      return Error{ErrorCode::invalid_argument, fmt::format("no frames are left after skipping {}", o.skip_frames)};
+    auto& frames = out_.frames;
+    if (Result<void> cut = cut_frames(o, frames); !cut) return cut;
     const Duration offset = Duration::from_seconds(out_.rig.time_offset_s);
     const Time first = frames.front().t + offset, last = frames.back().t + offset;
     if (!out_.imu.empty() && (out_.imu.back().t < first || out_.imu.front().t > last))
       return Error{ErrorCode::malformed, fmt::format("the stamps on {} do not overlap the images'", topics_.imu)};
-    if (o.skip_frames > 0) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    if (begins_later(o)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     return {};
   }
 

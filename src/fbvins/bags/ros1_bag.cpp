@@ -3,6 +3,7 @@
 // The index at the end is not needed: all records are gone through in order.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "fbvins/bags/bag_reader.hpp"
@@ -15,6 +16,11 @@ namespace {
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint32_t kLargestHeader_bytes = 1u << 20u;
 enum Op : std::uint8_t { kMessage = 2, kBagHeader = 3, kIndex = 4, kChunk = 5, kChunkInfo = 6, kConnection = 7 };
+
+/// Seconds in the low half, nanoseconds in the high one.
+Time time_of(std::uint64_t stamp) {
+  return {static_cast<std::int64_t>(stamp & 0xffffffffu) * 1'000'000'000 + static_cast<std::int64_t>(stamp >> 32u)};
+}
 
 /// The fields of a record's header: name=value, each with its length.
 class Fields {
@@ -55,13 +61,6 @@ class Ros1Bag final : public BagReader {
 
   std::string format() const override { return "ROS 1 bag"; }
 
-  std::optional<BagMessage> next() override {
-    while (true) {
-      if (auto message = next_loaded()) return message;
-      if (!load_next()) return std::nullopt;
-    }
-  }
-
   std::string read(const MessagePlace& place) override {
     if (kept_at_ != place.chunk) {
       const std::optional<Chunk> chunk = chunk_at(place.chunk);
@@ -71,6 +70,14 @@ class Ros1Bag final : public BagReader {
     }
     if (place.offset > kept_.size() || place.length > kept_.size() - place.offset) return {};
     return kept_.substr(place.offset, place.length);
+  }
+
+ protected:
+  std::optional<BagMessage> advance() override {
+    while (true) {
+      if (auto message = next_loaded()) return message;
+      if (!load_next()) return std::nullopt;
+    }
   }
 
  private:
@@ -127,8 +134,29 @@ class Ros1Bag final : public BagReader {
     if (!head->whole) damage_.ends_early = true;
     if (op == kIndex || op == kChunkInfo) indexed_ = true;
     if (op == kConnection && head->whole) take_connection(head->fields, bytes_->read(head->data, head->length));
-    if (op == kChunk) load_chunk(at, *head);
+    if (op == kChunk && !(window() && head->whole && lies_outside(*head))) load_chunk(at, *head);
     return true;
+  }
+
+  /// By the index of each of its connections, which follows a chunk. One without, or with a connection not met yet, is read.
+  bool lies_outside(const Head& chunk) {
+    constexpr std::size_t kEntry_bytes = 12;  // seconds, nanoseconds, place
+    std::vector<std::size_t> topics;
+    std::optional<std::pair<Time, Time>> span;
+    for (std::uint64_t at = chunk.data + chunk.length;;) {
+      const std::optional<Head> head = head_at(at);
+      if (!head || head->fields.number<std::uint8_t>("op") != kIndex) break;
+      const auto known = connections_.find(head->fields.number<std::uint32_t>("conn").value_or(~0u));
+      if (!head->whole || known == connections_.end()) return false;
+      topics.push_back(known->second);
+      const std::string entries = bytes_->read(head->data, head->length);
+      for (ByteCursor in(entries); in.left() >= kEntry_bytes; in.skip(sizeof(std::uint32_t))) {
+        const Time t = time_of(in.get<std::uint64_t>());
+        span = span ? std::pair(std::min(span->first, t), std::max(span->second, t)) : std::pair(t, t);
+      }
+      at = head->data + head->length;
+    }
+    return span && can_leave_out(span->first, span->second, topics);
   }
 
   bool ended() {
@@ -170,9 +198,7 @@ class Ros1Bag final : public BagReader {
         complain_at(loaded_at_, "a message in this chunk is of no known connection");
         continue;
       }
-      const std::int64_t seconds = static_cast<std::int64_t>(*time & 0xffffffffu),
-                         nanoseconds = static_cast<std::int64_t>(*time >> 32u);
-      return BagMessage{known->second, Time{seconds * 1'000'000'000 + nanoseconds}, data, {loaded_at_, data_at, length}};
+      return BagMessage{known->second, time_of(*time), data, {loaded_at_, data_at, length}};
     }
     return std::nullopt;
   }

@@ -141,20 +141,17 @@ std::string image_message(Time t, std::string_view frame, const Image& image) {
 }
 
 std::string camera_message(Time t, std::string_view frame, const Camera& camera) {
-  const auto* radtan = std::get_if<PinholeRadtan>(&camera.model());
-  const auto* fisheye = std::get_if<KannalaBrandt>(&camera.model());
-  const std::vector<double> d = radtan ? std::vector{radtan->k1, radtan->k2, radtan->p1, radtan->p2, 0.0}
-                                       : std::vector{fisheye->k1, fisheye->k2, fisheye->k3, fisheye->k4};
-  const std::array<double, 4> f = std::visit([](const auto& m) { return std::array{m.fx, m.fy, m.cx, m.cy}; }, camera.model());
+  const RosLens lens = ros_lens(camera);
+  const std::array<double, 4> f = camera.intrinsics();
   const std::array<double, 9> K{f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}, R{1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::array<double, 12> P{f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0};
   std::string out;
   add_header(out, t, frame);
   append_le(out, static_cast<std::uint32_t>(camera.height()));
   append_le(out, static_cast<std::uint32_t>(camera.width()));
-  add_text(out, radtan ? "plumb_bob" : "equidistant");
-  append_le(out, static_cast<std::uint32_t>(d.size()));
-  add_doubles(out, d.data(), d.size());
+  add_text(out, lens.model);
+  append_le(out, static_cast<std::uint32_t>(lens.coefficients.size()));
+  add_doubles(out, lens.coefficients.data(), lens.coefficients.size());
   add_doubles(out, K.data(), 9);
   add_doubles(out, R.data(), 9);
   add_doubles(out, P.data(), 12);

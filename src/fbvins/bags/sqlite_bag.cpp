@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
 #include "fbvins/bags/bag_reader.hpp"
 #include "fbvins/bags/decompress.hpp"
+#include "fbvins/bags/whole_pages.hpp"
 
 namespace fbvins {
 namespace {
@@ -68,21 +70,6 @@ class SqliteBag final : public BagReader {
 
   std::string format() const override { return "ROS 2 bag (SQLite)"; }
 
-  std::optional<BagMessage> next() override {
-    for (; at_ < files_.size(); ++at_, messages_.reset()) {
-      File& file = files_[at_];
-      // In the order of rows, which is that of writing: it needs no index, and a file that is cut off gives what comes before.
-      if (!messages_) messages_ = prepare(file.database.get(), "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
-      int state = SQLITE_ERROR;
-      while (messages_ && (state = sqlite3_step(messages_.get())) == SQLITE_ROW)
-        if (auto message = message_of(file)) return message;
-      if (state == SQLITE_DONE) continue;
-      damage_.ends_early = true;
-      complain(fmt::format("{}: {}", file.path, sqlite3_errmsg(file.database.get())));
-    }
-    return std::nullopt;
-  }
-
   std::string read(const MessagePlace& place) override {
     if (place.chunk >= files_.size()) return {};
     sqlite3_stmt* again = files_[place.chunk].again.get();
@@ -93,12 +80,57 @@ class SqliteBag final : public BagReader {
     return packed_ ? unpack("zstd", bytes, 0).bytes : std::string(bytes);
   }
 
+ protected:
+  std::optional<BagMessage> advance() override {
+    for (; at_ < files_.size(); ++at_, messages_.reset()) {
+      File& file = files_[at_];
+      // In the order of rows, which is that of writing: it needs no index, and a file that is cut off gives what comes before.
+      const bool by_time = !messages_ && window();
+      if (!messages_) messages_ = by_time ? messages_in_window(file) : all_messages(file);
+      int state = messages_ ? sqlite3_step(messages_.get()) : SQLITE_ERROR;
+      if (by_time && state != SQLITE_ROW && state != SQLITE_DONE) {  // what it is picked by is damaged
+        messages_ = all_messages(file);
+        state = messages_ ? sqlite3_step(messages_.get()) : SQLITE_ERROR;
+      }
+      for (; state == SQLITE_ROW; state = sqlite3_step(messages_.get()))
+        if (auto message = message_of(file)) return message;
+      if (state == SQLITE_DONE) continue;
+      damage_.ends_early = true;
+      complain(fmt::format("{}: {}", file.path, sqlite3_errmsg(file.database.get())));
+    }
+    return std::nullopt;
+  }
+
  private:
   std::size_t topic_of(BagTopic topic) {
     for (std::size_t i = 0; i < topics_.size(); ++i)
       if (topics_[i].name == topic.name && topics_[i].type == topic.type) return i;
     topics_.push_back(std::move(topic));
     return topics_.size() - 1;
+  }
+
+  static Statement all_messages(const File& file) {
+    return prepare(file.database.get(), "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
+  }
+
+  Statement messages_in_window(const File& file) {
+    if (!origin_ns_) {
+      const Statement first = prepare(file.database.get(), "SELECT timestamp FROM messages ORDER BY id LIMIT 1");
+      if (first && sqlite3_step(first.get()) == SQLITE_ROW) origin_ns_ = sqlite3_column_int64(first.get(), 0);
+    }
+    // Other rows' data is not read: it lies on pages of its own.
+    Statement some =
+        prepare(file.database.get(),
+                "SELECT id, topic_id, timestamp, data FROM messages WHERE timestamp BETWEEN ? AND ? OR topic_id IN "
+                "(SELECT id FROM topics WHERE name LIKE '%tf_static') OR id IN (SELECT min(id) FROM messages GROUP BY "
+                "topic_id) ORDER BY id");
+    constexpr std::int64_t kFar_ns = std::int64_t{1} << 61;  // a sum of these still fits
+    const auto bind = [&](int column, Duration since_origin) {
+      const std::int64_t origin_ns = std::clamp(origin_ns_.value_or(0), -kFar_ns, kFar_ns);
+      sqlite3_bind_int64(some.get(), column, origin_ns + std::clamp(since_origin.ns, -kFar_ns, kFar_ns));
+    };
+    if (some) bind(1, window()->from), bind(2, window()->to);
+    return some;
   }
 
   std::optional<BagMessage> message_of(File& file) {
@@ -123,6 +155,7 @@ class SqliteBag final : public BagReader {
   bool packed_;
   std::size_t at_ = 0;
   Statement messages_;
+  std::optional<std::int64_t> origin_ns_;  ///< of the first message
   std::string unpacked_;
 };
 
@@ -132,8 +165,10 @@ Result<std::unique_ptr<BagReader>> open_sqlite_bag(const std::vector<std::string
   std::vector<File> files;
   for (const std::string& path : paths) {
     sqlite3* database = nullptr;
-    const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+    const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, whole_pages_vfs());
     files.push_back({path, Database(database), {}, {}});
+    // A file that is shorter than it says is refused otherwise.
+    if (opened == SQLITE_OK) sqlite3_exec(database, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
     if (opened != SQLITE_OK) return Error{ErrorCode::unreadable, fmt::format("{}: {}", path, sqlite3_errmsg(database))};
   }
   auto bag = std::make_unique<SqliteBag>(std::move(files), zstd_messages);

@@ -4,57 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/camera/lenses.hpp"
+
 namespace fbvins {
 namespace {
 
 // Rays further than this from the axis (89.4 degrees) are outside of every model here.
 constexpr double kLargestRadius = 100.0;
-
-struct Radial {
-  double value;       ///< distorted radius of an undistorted radius
-  double derivative;  ///< d(value)/d(radius)
-};
-
-Radial radial(const PinholeRadtan& m, double r) {
-  const double s = r * r;
-  return {r * (1.0 + s * (m.k1 + s * m.k2)), 1.0 + s * (3.0 * m.k1 + s * 5.0 * m.k2)};
-}
-
-Radial radial(const KannalaBrandt& m, double r) {
-  const double theta = std::atan(r);
-  const double s = theta * theta;
-  const double value = theta * (1.0 + s * (m.k1 + s * (m.k2 + s * (m.k3 + s * m.k4))));
-  const double slope = 1.0 + s * (3.0 * m.k1 + s * (5.0 * m.k2 + s * (7.0 * m.k3 + s * 9.0 * m.k4)));
-  return {value, slope / (1.0 + r * r)};
-}
-
-/// Distorted coordinates on the unit plane, with d(distorted)/d(normalised).
-Vec2 distort_unit(const PinholeRadtan& m, const Vec2& n, Mat2* J) {
-  const double x = n.x(), y = n.y();
-  const double xx = x * x, yy = y * y, xy = x * y, s = xx + yy;
-  const double a = 1.0 + s * (m.k1 + s * m.k2);
-  if (J) {
-    const double b = 2.0 * m.k1 + 4.0 * s * m.k2;  // (da/dr) / r
-    const double off_diagonal = b * xy + 2.0 * m.p1 * x + 2.0 * m.p2 * y;
-    *J << a + b * xx + 2.0 * m.p1 * y + 6.0 * m.p2 * x, off_diagonal,  //
-        off_diagonal, a + b * yy + 6.0 * m.p1 * y + 2.0 * m.p2 * x;
-  }
-  return {a * x + 2.0 * m.p1 * xy + m.p2 * (s + 2.0 * xx), a * y + m.p1 * (s + 2.0 * yy) + 2.0 * m.p2 * xy};
-}
-
-Vec2 distort_unit(const KannalaBrandt& m, const Vec2& n, Mat2* J) {
-  const double s = n.squaredNorm();
-  const double r = std::sqrt(s);
-  // Near the axis value/r = 1 + (k1 - 1/3) r^2 + O(r^4): the quotients below lose their digits there.
-  const bool near_axis = r < 1e-4;
-  const Radial f = radial(m, r);
-  const double a = near_axis ? 1.0 + (m.k1 - 1.0 / 3.0) * s : f.value / r;
-  if (J) {
-    const double b = near_axis ? 2.0 * (m.k1 - 1.0 / 3.0) : (f.derivative - a) / s;  // (da/dr) / r
-    *J = a * Mat2::Identity() + b * n * n.transpose();
-  }
-  return a * n;
-}
 
 /// Where the radial distortion stops growing; kLargestRadius if it never does.
 template <class Model>
@@ -96,15 +52,43 @@ double invert_radial(const Model& m, double target, double largest) {
   return r;
 }
 
+/// Solves distort_unit(n) = target by Newton's method, from where the radial part alone would have it.
+template <class Model>
+std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, double max_radius) {
+  const double distorted_radius = target.norm();
+  Vec2 n = target;
+  if (distorted_radius > 1e-12) n *= invert_radial(m, distorted_radius, max_radius) / distorted_radius;
+  Mat2 J;
+  for (int i = 0; i < 20; ++i) {
+    const Vec2 error = distort_unit(m, n, &J) - target;
+    if (!(J.determinant() > 0) || !(n.squaredNorm() <= max_radius * max_radius)) return std::nullopt;
+    if (error.squaredNorm() < 1e-26) return n;
+    const Vec2 step = J.inverse() * error;
+    n -= step;
+    // Far out the last digits of distort_unit keep the error above the absolute bound.
+    if (step.squaredNorm() <= 1e-28 * n.squaredNorm()) return n.norm() <= max_radius ? std::optional<Vec2>(n) : std::nullopt;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
-Camera::Camera(std::variant<PinholeRadtan, KannalaBrandt> model, int width, int height)
-    : model_(std::move(model)), width_(width), height_(height) {
+Camera::Camera(LensModel model, int width, int height) : model_(std::move(model)), width_(width), height_(height) {
   max_radius_ = std::visit([](const auto& m) { return largest_radius(m); }, model_);
 }
 
 std::string Camera::model_name() const {
-  return std::holds_alternative<PinholeRadtan>(model_) ? "pinhole-radtan" : "pinhole-equidistant";
+  constexpr const char* kNames[] = {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"};
+  static_assert(std::size(kNames) == std::variant_size_v<LensModel>);
+  return kNames[model_.index()];
+}
+
+std::array<double, 4> Camera::intrinsics() const {
+  return std::visit([](const auto& m) { return std::array{m.fx, m.fy, m.cx, m.cy}; }, model_);
+}
+
+std::vector<double> Camera::distortion() const {
+  return std::visit([](const auto& m) { return coefficients(m); }, model_);
 }
 
 double Camera::focal_px() const {
@@ -128,24 +112,23 @@ std::optional<Vec2> Camera::undistort(const Vec2& pixel) const {
   return std::visit(
       [&](const auto& m) -> std::optional<Vec2> {
         const Vec2 target((pixel.x() - m.cx) / m.fx, (pixel.y() - m.cy) / m.fy);
-        const double distorted_radius = target.norm();
-        if (!std::isfinite(distorted_radius)) return std::nullopt;
-        Vec2 n = target;
-        if (distorted_radius > 1e-12) n *= invert_radial(m, distorted_radius, max_radius_) / distorted_radius;
-        Mat2 J;
-        for (int i = 0; i < 20; ++i) {
-          const Vec2 error = distort_unit(m, n, &J) - target;
-          if (!(J.determinant() > 0) || !(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
-          if (error.squaredNorm() < 1e-26) return n;
-          const Vec2 step = J.inverse() * error;
-          n -= step;
-          // Far out the last digits of distort_unit keep the error above the absolute bound.
-          if (step.squaredNorm() <= 1e-28 * n.squaredNorm())
-            return n.norm() <= max_radius_ ? std::optional<Vec2>(n) : std::nullopt;
+        if (!std::isfinite(target.norm())) return std::nullopt;
+        if constexpr (requires { undistort_unit(m, target); }) {
+          const std::optional<Vec2> n = undistort_unit(m, target);
+          return n && n->norm() <= max_radius_ ? n : std::nullopt;
+        } else {
+          return undistort_by_newton(m, target, max_radius_);
         }
-        return std::nullopt;
       },
       model_);
+}
+
+bool Camera::sees_backwards() const {
+  if (max_radius_ < kLargestRadius) return false;
+  const double right = width_ - 1, bottom = height_ - 1;
+  const auto backwards = [&](double u, double v) { return !undistort({u, v}); };
+  return (backwards(0, 0.5 * bottom) && backwards(right, 0.5 * bottom)) ||
+         (backwards(0.5 * right, 0) && backwards(0.5 * right, bottom));
 }
 
 std::optional<Vec2> Camera::project(const Vec3& p_C) const {

@@ -2,6 +2,9 @@
 #include "fbvins/doctor/calibration_lines.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "fbvins/camera/lens_numbers.hpp"
 
 namespace fbvins {
 namespace {
@@ -35,19 +38,18 @@ std::string mounting_lines(const StereoRig& rig, CalibrationStyle style, bool bo
 }
 
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style) {
-  return std::visit(
-      [&](const auto& m) {
-        return fmt::format("{}intrinsics: [{:.3f}, {:.3f}, {:.3f}, {:.3f}]", file_of(left, style), m.fx, m.fy, m.cx, m.cy);
-      },
-      camera.model());
+  const std::vector<double> numbers = kalibr_camera(camera).intrinsics;
+  std::string out;
+  for (std::size_t i = 0; i < numbers.size(); ++i)  // the last four are px, what is before them bends the rays
+    out += fmt::format("{}{:.{}f}", i > 0 ? ", " : "", numbers[i], i + 4 < numbers.size() ? 6 : 3);
+  return fmt::format("{}intrinsics: [{}]", file_of(left, style), out);
 }
 
 std::string distortion_line(const Camera& camera, bool left, CalibrationStyle style) {
+  const std::vector<double> numbers = kalibr_camera(camera).coefficients;
+  if (numbers.empty()) return intrinsics_line(camera, left, style);
   const char* field = style == CalibrationStyle::euroc ? "distortion_coefficients" : "distortion_coeffs";
-  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model()))
-    return fmt::format("{}{}: [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", file_of(left, style), field, m->k1, m->k2, m->p1, m->p2);
-  const auto& m = std::get<KannalaBrandt>(camera.model());
-  return fmt::format("{}{}: [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", file_of(left, style), field, m.k1, m.k2, m.k3, m.k4);
+  return fmt::format("{}{}: [{:.6f}]", file_of(left, style), field, fmt::join(numbers, ", "));
 }
 
 std::string time_line(double offset_s, CalibrationStyle style) {

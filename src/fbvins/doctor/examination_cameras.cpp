@@ -59,10 +59,11 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
     finding.measured = fmt::format("the {} principal point lies ({:.1f} +- {:.1f}, {:.1f} +- {:.1f}) px from the calibration's",
                                    camera, amount(0), sigma(0), amount(1), sigma(1));
   } else {
+    const RadialNames names = radial_names(which == WhichLens::right ? rig_.right : rig_.left);
     change.radial = amount;
-    finding.size = amount(0), finding.sigma = sigma(0), finding.unit = "of k1";
-    finding.measured = fmt::format("the {} distortion is not the calibration's: k1 {:+.3f} +- {:.3f}, k2 {:+.3f} +- {:.3f}",
-                                   camera, amount(0), sigma(0), amount(1), sigma(1));
+    finding.size = amount(0), finding.sigma = sigma(0), finding.unit = fmt::format("of {}", names.first);
+    finding.measured = fmt::format("the {} distortion is not the calibration's: {} {:+.3f} +- {:.3f}, {} {:+.3f} +- {:.3f}",
+                                   camera, names.first, amount(0), sigma(0), names.second, amount(1), sigma(1));
   }
   const auto line = kind == FindingKind::distortion ? distortion_line : intrinsics_line;
   if (which != WhichLens::right) {

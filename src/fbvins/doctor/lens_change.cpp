@@ -2,8 +2,23 @@
 #include "fbvins/doctor/lens_change.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace fbvins {
+
+namespace {
+
+std::pair<double*, double*> radial_numbers(DoubleSphere& m) { return {&m.xi, &m.alpha}; }
+std::pair<double*, double*> radial_numbers(ExtendedUnified& m) { return {&m.alpha, &m.beta}; }
+std::pair<double*, double*> radial_numbers(auto& m) { return {&m.k1, &m.k2}; }
+
+}  // namespace
+
+RadialNames radial_names(const Camera& camera) {
+  if (std::holds_alternative<DoubleSphere>(camera.model())) return {"xi", "alpha"};
+  if (std::holds_alternative<ExtendedUnified>(camera.model())) return {"alpha", "beta"};
+  return {"k1", "k2"};
+}
 
 Camera changed(const Camera& camera, const LensChange& change) {
   auto model = camera.model();
@@ -13,8 +28,9 @@ Camera changed(const Camera& camera, const LensChange& change) {
         m.fy *= std::exp(change.log_focal);
         m.cx += change.centre_px.x();
         m.cy += change.centre_px.y();
-        m.k1 += change.radial.x();
-        m.k2 += change.radial.y();
+        const auto [first, second] = radial_numbers(m);
+        *first += change.radial.x();
+        *second += change.radial.y();
       },
       model);
   return {model, camera.width(), camera.height()};

@@ -101,8 +101,7 @@ Spoiler baseline(std::string name, double factor, const StereoRig& rig) {
 }
 void forget_distortion(Camera& camera) {
   auto model = camera.model();
-  std::visit([](auto& m) { m.k1 = m.k2 = 0; }, model);
-  if (auto* m = std::get_if<PinholeRadtan>(&model)) m->p1 = m->p2 = 0;
+  std::visit([](auto& m) { m = {m.fx, m.fy, m.cx, m.cy}; }, model);
   camera = Camera(model, camera.width(), camera.height());
 }
 

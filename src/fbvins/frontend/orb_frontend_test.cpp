@@ -34,9 +34,10 @@ class World {
   double angle(int k) const { return 0.2 * kFramePeriod_s * k; }
 
   std::shared_ptr<const Image> render(int k, double offset_x, std::uint64_t noise_seed) const {
+    const Camera& camera = offset_x > 0 ? rig.right : rig.left;
     const Eigen::Rotation2Dd R(angle(k));
     const Vec2 centre = position(k).head<2>() + R * Vec2(offset_x, 0);
-    const auto warp = [&](const Vec2& px) { return Vec2((centre + R * (*rig.left.undistort(px) * kDepth_m)) * 230 / kDepth_m); };
+    const auto warp = [&](const Vec2& px) { return Vec2((centre + R * (*camera.undistort(px) * kDepth_m)) * 230 / kDepth_m); };
     return std::make_shared<const Image>(render_texture(kWidth, kHeight, texture, warp, 120, 35, 1.0, noise_seed));
   }
 
@@ -61,7 +62,8 @@ class World {
     return position(k).head<2>() + Eigen::Rotation2Dd(angle(k)) * Vec2(normalised * kDepth_m);
   }
 
-  StereoRig rig = make_rig();
+  explicit World(const StereoRig& seen_by = make_rig()) : rig(seen_by) {}
+  StereoRig rig;
 
  private:
   NoiseTexture texture{11, 30};
@@ -88,8 +90,9 @@ OrbFrontendOptions small_options() {
   return options;
 }
 
-std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbFrontendOptions& options = small_options()) {
-  OrbFrontend frontend(world().rig, options);
+std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbFrontendOptions& options = small_options(),
+                              const StereoRig& rig = world().rig) {
+  OrbFrontend frontend(rig, options);
   std::vector<TrackedFrame> out;
   for (const SensorPacket& p : input) out.push_back(frontend.process(p, StatePrior{}));
   return out;
@@ -116,6 +119,30 @@ TEST(OrbFrontend, FollowsAWallBelowATenthOfAPixel) {
   EXPECT_EQ(frames[0].stats.tracked, 0);
   for (std::size_t k = 1; k < frames.size(); ++k) EXPECT_GT(frames[k].stats.tracked, 40) << k;
   EXPECT_LT(median_error_px(frames), 0.1);
+}
+
+/// Lenses of some 110 degrees across, the left one unlike the right one.
+TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
+  const LensModel double_sphere = DoubleSphere{150, 150, 187.5, 119.5, -0.17, 0.59},
+                  extended = ExtendedUnified{160, 160, 187.5, 119.5, 0.63, 1.04},
+                  unified = UnifiedRadtan{270, 270, 187.5, 119.5, 0.8, -0.05, 0.01, 0.0005, 0.0005};
+  for (const auto& [left, right] : {std::pair(double_sphere, extended), {extended, unified}, {unified, double_sphere}}) {
+    StereoRig rig = make_rig();
+    rig.left = Camera(left, kWidth, kHeight), rig.right = Camera(right, kWidth, kHeight);
+    const World wall(rig);
+    std::vector<SensorPacket> input;
+    for (int k = 0; k < 6; ++k) input.push_back(wall.packet(k));
+    const auto frames = run(input, small_options(), rig);
+    for (std::size_t k = 1; k < frames.size(); ++k) EXPECT_GT(frames[k].stats.tracked, 40) << rig.left.model_name() << k;
+    EXPECT_LT(median_error_px(frames), 0.15) << rig.left.model_name();
+    std::vector<double> depths_m;
+    for (const TrackedFrame& frame : frames)
+      for (const TrackedFeature& f : frame.features)
+        if (f.right) depths_m.push_back(0.11 / (f.left.normalised - f.right->normalised).x());
+    ASSERT_GT(depths_m.size(), 150u) << rig.left.model_name();
+    std::nth_element(depths_m.begin(), depths_m.begin() + std::ssize(depths_m) / 2, depths_m.end());
+    EXPECT_NEAR(depths_m[depths_m.size() / 2], kDepth_m, 0.03) << rig.left.model_name();
+  }
 }
 
 TEST(OrbFrontend, SubpixelRefinementIsWhatGivesThat) {

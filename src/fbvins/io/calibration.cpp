@@ -47,7 +47,7 @@ Result<StereoRig> join_euroc(const CameraSensor& left, const CameraSensor& right
   rig.T_BC1 = (imu.T_BS.inverse() * right.T_BS).cast_frames<B, C1>();
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
-  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }
 

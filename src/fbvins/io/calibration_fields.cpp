@@ -26,6 +26,14 @@ std::vector<double> read_coefficients(YamlReader& yaml, const YAML::Node& map, c
   return k;
 }
 
+/// How many numbers Kalibr writes before fu, fv, pu, pv: ds xi, alpha; eucm alpha, beta; omni xi. None of an unknown model.
+std::optional<std::size_t> numbers_before_focal(const std::string& model) {
+  if (model == "pinhole") return 0;
+  if (model == "omni") return 1;
+  if (model == "ds" || model == "eucm") return 2;
+  return std::nullopt;
+}
+
 }  // namespace
 
 RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
@@ -45,22 +53,39 @@ RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, con
 }
 
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field) {
-  if (const std::string model = yaml.word(map, "camera_model"); yaml.ok() && model != "pinhole")
-    yaml.complain(map, "camera_model", fmt::format("'{}' is not supported, only pinhole", model));
-  const std::vector<double> f = yaml.numbers(map, "intrinsics", 4);
+  const std::string model = yaml.word(map, "camera_model");
+  const std::optional<std::size_t> before = numbers_before_focal(model);
+  if (!before) {
+    yaml.complain(map, "camera_model", fmt::format("'{}' is not supported, only pinhole, ds, eucm and omni", model));
+    return {};
+  }
+  std::vector<double> own = yaml.numbers(map, "intrinsics", *before + 4);
+  const std::vector<double> f(own.end() - 4, own.end());
+  own.resize(*before);
   if (!(f[0] > 0 && f[1] > 0)) yaml.complain(map, "intrinsics", "the focal lengths are not positive");
   const std::vector<double> size = yaml.numbers(map, "resolution", 2);
   const int width = read_side(yaml, map, size[0]), height = read_side(yaml, map, size[1]);
   const std::string distortion = yaml.word(map, "distortion_model");
-  if (distortion == "none") return {PinholeRadtan{f[0], f[1], f[2], f[3]}, width, height};
-  const std::vector<double> k = read_coefficients(yaml, map, coefficients_field);
-  const bool radtan = distortion == "radial-tangential" || distortion == "radtan";
-  if (!radtan && distortion != "equidistant")
+  const bool none = distortion == "none", radtan = distortion == "radial-tangential" || distortion == "radtan",
+             equidistant = distortion == "equidistant";
+  const bool known = none || (radtan && (model == "pinhole" || model == "omni")) || (equidistant && model == "pinhole");
+  if (!known)
     yaml.complain(map, "distortion_model",
-                  fmt::format("'{}' is not supported, only radial-tangential, radtan, equidistant and none", distortion));
+                  fmt::format("'{}' is not supported, only {}", distortion,
+                              model == "pinhole" ? "radial-tangential, radtan, equidistant and none"
+                              : model == "omni"  ? "radtan and none"
+                                                 : "none"));
+  const std::vector<double> k =
+      none || !yaml.ok() ? std::vector<double>(4, 0.0) : read_coefficients(yaml, map, coefficients_field);
+  if (const std::string problem = yaml.ok() ? outside_of_model(model, own) : ""; !problem.empty())
+    yaml.complain(map, "intrinsics", problem);
   if (!yaml.ok()) return {};
-  if (radtan) return {PinholeRadtan{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3]}, width, height};
-  return {KannalaBrandt{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3]}, width, height};
+  own.insert(own.end(), model == "omni" || model == "pinhole" ? k.begin() : k.end(), k.end());
+  const std::string name = model == "omni"      ? "omni-radtan"
+                           : model != "pinhole" ? model
+                           : equidistant        ? "pinhole-equidistant"
+                                                : "pinhole-radtan";
+  return {*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height};
 }
 
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field) {
@@ -73,11 +98,19 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
   return noise;
 }
 
-Result<void> check_baseline(const StereoRig& rig, const std::string& file) {
+Result<void> check_rig(const StereoRig& rig, const std::string& file) {
   const double baseline_m = rig.T_C1C0().p.norm();
-  if (baseline_m > 1e-3 && baseline_m < 10.0) return {};
-  return Error{ErrorCode::malformed,
-               fmt::format("{}: the two cameras are {:.3g} m apart, not between 1 mm and 10 m", file, baseline_m)};
+  if (!(baseline_m > 1e-3 && baseline_m < 10.0))
+    return Error{ErrorCode::malformed,
+                 fmt::format("{}: the two cameras are {:.3g} m apart, not between 1 mm and 10 m", file, baseline_m)};
+  for (const auto& [camera, side] : {std::pair(&rig.left, "left"), {&rig.right, "right"}})
+    if (camera->sees_backwards())
+      return Error{
+          ErrorCode::unsupported,
+          fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
+                      "can be used: crop the images, and take what is cut off at the left and the top off cx and cy",
+                      file, side)};
+  return {};
 }
 
 }  // namespace fbvins

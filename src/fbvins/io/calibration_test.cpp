@@ -72,6 +72,38 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
   }
 }
 
+TEST(Calibration, KalibrsWideLensesHaveTheirNumbersBeforeTheFocalLengths) {
+  const auto rig_with = [](const char* model, const char* numbers, const char* distortion) {
+    std::string camera = kalibr_camera("T_cam_imu", kLeft.inverse());
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      camera.replace(camera.find(from), from.size(), to);
+    };
+    replace("camera_model: pinhole", fmt::format("camera_model: {}", model));
+    replace("intrinsics: [", fmt::format("intrinsics: [{}, ", numbers));
+    replace("distortion_coeffs: [0.1, 0.2, 0.3, 0.4]\n  distortion_model: equidistant", distortion);
+    return parse_kalibr_camchain("cam0:\n" + camera + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse()), "chain.yaml");
+  };
+  constexpr const char *kNone = "distortion_coeffs: []\n  distortion_model: none",
+                       *kRadtan = "distortion_coeffs: [-0.3, 0.1, 0.001, 0.002]\n  distortion_model: radtan";
+  const auto ds = rig_with("ds", "-0.2, 0.59", kNone), eucm = rig_with("eucm", "0.6, 1.1", kNone),
+             omni = rig_with("omni", "0.8", kRadtan), plain = rig_with("omni", "1", kNone);
+  for (const auto* rig : {&ds, &eucm, &omni, &plain}) {
+    ASSERT_TRUE(*rig) << rig->error().message;
+    EXPECT_EQ((*rig)->left.intrinsics(), (std::array{458.6, 457.2, 367.2, 248.3}));
+  }
+  EXPECT_EQ(ds->left.model_name(), "ds");
+  EXPECT_EQ(ds->left.distortion(), (std::vector{-0.2, 0.59}));
+  EXPECT_EQ(std::get<ExtendedUnified>(eucm->left.model()).beta, 1.1);
+  EXPECT_EQ(omni->left.distortion(), (std::vector{0.8, -0.3, 0.1, 0.001, 0.002}));
+  EXPECT_EQ(plain->left.distortion(), (std::vector{1.0, 0.0, 0.0, 0.0, 0.0}));
+  EXPECT_NE(rig_with("ds", "1.5, 0.5", kNone).error().message.find("intrinsics: xi is 1.5, not between -1 and 1"),
+            std::string::npos);
+  EXPECT_NE(rig_with("eucm", "0.6, -1", kNone).error().message.find("beta is -1, not between 0 and 100"), std::string::npos);
+  EXPECT_NE(rig_with("omni", "-0.1", kRadtan).error().message.find("xi is -0.1, not between 0 and 10"), std::string::npos);
+  EXPECT_NE(rig_with("ds", "0.1, 0.5", kRadtan).error().message.find("distortion_model: 'radtan' is not supported, only none"),
+            std::string::npos);
+}
+
 TEST(Calibration, KalibrSaysWhatIsWrong) {
   const std::string good =
       "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());

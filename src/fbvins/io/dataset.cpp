@@ -13,7 +13,7 @@ namespace fbvins {
 Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
     : contents_(std::move(contents)),
       prefetcher_(std::make_unique<FramePrefetcher>(contents_.frames, *contents_.loader, options.prefetch_frames)),
-      deliver_rest_(options.max_frames == 0) {}
+      deliver_rest_(options.max_frames == 0 && options.duration_s == 0) {}
 
 Dataset::~Dataset() = default;
 

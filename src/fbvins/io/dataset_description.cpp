@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -41,6 +43,21 @@ void describe_imu(const std::vector<ImuSample>& imu, DatasetInfo& info) {
 }
 
 }  // namespace
+
+Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& frames) {
+  if (frames.empty()) return Error{ErrorCode::malformed, "there are no frames"};
+  const Time first = frames.front().t + Duration::from_seconds(options.start_s);
+  std::erase_if(frames, [&](const FrameEntry& f) {
+    return f.t < first || (options.duration_s > 0 && f.t >= first + Duration::from_seconds(options.duration_s));
+  });
+  frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(options.skip_frames, std::ssize(frames)));
+  if (options.max_frames > 0 && std::ssize(frames) > options.max_frames)
+    frames.resize(static_cast<std::size_t>(options.max_frames));
+  if (!frames.empty()) return {};
+  if (options.start_s > 0)
+    return Error{ErrorCode::invalid_argument, fmt::format("no frames are left after {} s", options.start_s)};
+  return Error{ErrorCode::invalid_argument, fmt::format("no frames are left after skipping {}", options.skip_frames)};
+}
 
 void describe(DatasetContents& contents) {
   DatasetInfo& info = contents.info;

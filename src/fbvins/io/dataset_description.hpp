@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: counts, rates and gaps of what a format's reader has found.
+// Private to io: which part of a recording is asked for; counts, rates and gaps of what a format's reader has found.
 #pragma once
 
 #include "fbvins/io/dataset.hpp"
@@ -8,5 +8,11 @@ namespace fbvins {
 
 /// Fills in what `contents.info` says of its frames and IMU samples, with a warning for each long gap. Needs a frame.
 void describe(DatasetContents& contents);
+
+/// Leaves the frames that the options ask for; an error where there is none.
+Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& frames);
+
+/// Whether readings before the first frame that is left are those of a part left out.
+inline bool begins_later(const DatasetOptions& options) { return options.skip_frames > 0 || options.start_s > 0; }
 
 }  // namespace fbvins

@@ -135,17 +135,9 @@ class EurocReader {
       warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
                        options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
-    cut_frames();
-    if (out_.frames.empty())
-      return Error{ErrorCode::invalid_argument,
-                   fmt::format("{}: no frames are left after skipping {}", named("cam0/data.csv"), options_.skip_frames)};
+    if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
+      return Error{cut.error().code, fmt::format("{}: {}", named("cam0/data.csv"), cut.error().message)};
     return find_images();
-  }
-
-  void cut_frames() {
-    auto& frames = out_.frames;
-    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(options_.skip_frames, std::ssize(frames)));
-    if (options_.max_frames > 0 && std::ssize(frames) > options_.max_frames) frames.resize(options_.max_frames);
   }
 
   /// Forgets names of files that are not there, and frames of which nothing is there.
@@ -191,7 +183,7 @@ class EurocReader {
                    fmt::format("{}: stamps {} to {} s do not overlap the images' {} to {} s", named("imu0/data.csv"),
                                format_seconds(out_.imu.front().t), format_seconds(out_.imu.back().t), format_seconds(first),
                                format_seconds(last))};
-    if (options_.skip_frames > 0) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
+    if (begins_later(options_)) std::erase_if(out_.imu, [&](const ImuSample& s) { return s.t < first - kImuLeadIn; });
     return {};
   }
 

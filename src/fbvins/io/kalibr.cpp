@@ -48,7 +48,7 @@ Result<StereoRig> parse_kalibr_camchain(const std::string& text, const std::stri
   rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
   rig.time_offset_s = read_time_offset_s(yaml, cam0, cam1);
   if (!yaml.ok()) return yaml.error();
-  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }
 

@@ -190,13 +190,9 @@ class RecordReader {
   }
 
   Result<void> cut() {
-    auto& frames = out_.frames;
-    frames.erase(frames.begin(), frames.begin() + std::min<std::ptrdiff_t>(options_.skip_frames, std::ssize(frames)));
-    if (options_.max_frames > 0 && std::ssize(frames) > options_.max_frames) frames.resize(options_.max_frames);
-    if (frames.empty())
-      return Error{ErrorCode::invalid_argument,
-                   fmt::format("{}: no frames are left after skipping {}", name_, options_.skip_frames)};
-    if (options_.skip_frames > 0) cut_lead_in();
+    if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
+      return Error{cut.error().code, fmt::format("{}: {}", name_, cut.error().message)};
+    if (begins_later(options_)) cut_lead_in();
     return {};
   }
 

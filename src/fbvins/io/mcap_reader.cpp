@@ -64,7 +64,8 @@ bool McapReader::load_next() {
   }
   const bool whole = length <= there;
   next_ = whole ? at + kMcapRecordHead_bytes + length : bytes_->size();
-  if (kind == McapRecord::chunk) load_chunk(at + kMcapRecordHead_bytes, std::min(length, there), whole);
+  if (kind == McapRecord::chunk && !(pass_over_ && whole && is_passed_over(at + kMcapRecordHead_bytes, next_)))
+    load_chunk(at + kMcapRecordHead_bytes, std::min(length, there), whole);
   if (!whole) {
     damage_.ends_early = true;
     damage_.end = at;
@@ -74,6 +75,26 @@ bool McapReader::load_next() {
     load_records(at, kMcapRecordHead_bytes + length);
   if (kind == McapRecord::attachment) load_attachment(at + kMcapRecordHead_bytes, length);
   return true;  // other kinds are passed over
+}
+
+/// `behind` is where the chunk ends, and the indexes of its channels begin.
+bool McapReader::is_passed_over(std::uint64_t chunk, std::uint64_t behind) const {
+  const std::string stamps = bytes_->read(chunk, 2 * sizeof(std::uint64_t));
+  std::vector<const McapChannel*> channels;
+  for (std::uint64_t at = behind;;) {
+    const std::string bytes = bytes_->read(at, kMcapRecordHead_bytes + sizeof(std::uint16_t));
+    ByteCursor in(bytes);
+    const auto kind = static_cast<McapRecord>(in.get<std::uint8_t>());
+    const auto length = in.get<std::uint64_t>();
+    const auto known = channels_.find(in.get<std::uint16_t>());
+    if (!in.ok() || kind != McapRecord::message_index || length > bytes_->size()) break;
+    if (known == channels_.end()) return false;
+    channels.push_back(&known->second);
+    at += kMcapRecordHead_bytes + length;
+  }
+  ByteCursor in(stamps);
+  const Time first{static_cast<std::int64_t>(in.get<std::uint64_t>())}, last{static_cast<std::int64_t>(in.get<std::uint64_t>())};
+  return in.ok() && !channels.empty() && pass_over_(first, last, channels);
 }
 
 void McapReader::load_records(std::uint64_t offset, std::uint64_t length) {

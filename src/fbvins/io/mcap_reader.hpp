@@ -43,6 +43,9 @@ struct McapMessage {
 using McapUnpack =
     std::function<std::optional<std::string>(std::string_view compression, std::string_view bytes, std::uint64_t size)>;
 
+/// Whether a chunk with messages of these channels from `first` to `last` is passed over.
+using McapPassOver = std::function<bool(Time first, Time last, const std::vector<const McapChannel*>& channels)>;
+
 struct McapAttachment {
   std::string name, data;
 };
@@ -59,6 +62,8 @@ class McapReader {
   /// `name` is only for messages. An error where this is not MCAP.
   static Result<McapReader> open(std::shared_ptr<const ByteSource> bytes, const std::string& name, McapUnpack unpack = {});
 
+  /// Asked about each chunk that an index of its messages follows and whose channels have all been met.
+  void pass_over(McapPassOver decide) { pass_over_ = std::move(decide); }
   /// Nullopt at the end.
   std::optional<McapMessage> next();
   /// Those met so far.
@@ -81,6 +86,7 @@ class McapReader {
       : bytes_(std::move(bytes)), name_(std::move(name)), unpack_(std::move(unpack)) {}
   std::optional<ChunkHead> chunk_head(std::uint64_t offset, std::uint64_t length) const;
   bool load_next();
+  bool is_passed_over(std::uint64_t chunk, std::uint64_t behind) const;
   bool cut_off(std::uint64_t at);
   void load_records(std::uint64_t offset, std::uint64_t length);
   void load_chunk(std::uint64_t offset, std::uint64_t length, bool whole);
@@ -93,6 +99,7 @@ class McapReader {
   std::shared_ptr<const ByteSource> bytes_;
   std::string name_;
   McapUnpack unpack_;
+  McapPassOver pass_over_;
   std::uint64_t next_ = 0;           ///< the next record outside of chunks
   std::string loaded_;               ///< records in work
   std::uint64_t loaded_offset_ = 0;  ///< their place in the file; 0 where they were unpacked

@@ -9,22 +9,18 @@ namespace fbvins {
 namespace {
 
 /// 17 digits name a double without loss.
-std::string list(std::initializer_list<double> values) {
+std::string list(const std::vector<double>& values) {
   std::string out;
-  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "[" : ", ", value);
-  return out + "]";
+  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "" : ", ", value);
+  return "[" + out + "]";
 }
 
 std::string camera_text(const char* name, const Camera& camera) {
-  const auto text = [&](const auto& m, const char* distortion, const std::string& coefficients) {
-    return fmt::format(
-        "{}:\n  camera_model: pinhole\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
-        "  distortion_coefficients: {}\n",
-        name, camera.width(), camera.height(), list({m.fx, m.fy, m.cx, m.cy}), distortion, coefficients);
-  };
-  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model())) return text(*m, "radtan", list({m->k1, m->k2, m->p1, m->p2}));
-  const auto& m = std::get<KannalaBrandt>(camera.model());
-  return text(m, "equidistant", list({m.k1, m.k2, m.k3, m.k4}));
+  const KalibrCamera c = kalibr_camera(camera);
+  return fmt::format(
+      "{}:\n  camera_model: {}\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
+      "  distortion_coefficients: {}\n",
+      name, c.model, camera.width(), camera.height(), list(c.intrinsics), c.distortion, list(c.coefficients));
 }
 
 template <class To, class From>
@@ -72,7 +68,7 @@ Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");
   if (!yaml.ok()) return yaml.error();
-  if (Result<void> baseline = check_baseline(rig, file); !baseline) return baseline.error();
+  if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }
 

@@ -14,9 +14,10 @@ namespace {
 StereoRig awkward_rig(Rng& rng, bool fisheye) {
   const auto odd = [&] { return rng.normal() / 3.0; };
   StereoRig rig;
-  const double f = 400.0 + odd(), c = 100.0 + odd(), k1 = odd(), k2 = 1e-7 * odd(), k3 = odd(), k4 = odd();
-  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 481);
-  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 481);
+  const double f = 400.0 + odd(), c = 100.0 + odd(), k1 = std::abs(odd()), k2 = 1e-7 * odd(), k3 = std::abs(odd()),
+               k4 = std::abs(odd());
+  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 161);
+  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 161);
   rig.right = Camera(PinholeRadtan{f / 7, f / 11, c / 3, c / 13, k2, k1, k4, k3}, 752, 480);
   const double x = odd(), y = odd(), z = odd();
   rig.T_BC0 = {so3_exp(Vec3(x, y, z)), Vec3(z, x, y)};
@@ -34,8 +35,7 @@ bool same(const Model& a, const Model& b) {
 
 bool same_camera(const Camera& a, const Camera& b) {
   if (a.width() != b.width() || a.height() != b.height() || a.model().index() != b.model().index()) return false;
-  if (const auto* m = std::get_if<PinholeRadtan>(&a.model())) return same(*m, std::get<PinholeRadtan>(b.model()));
-  return same(std::get<KannalaBrandt>(a.model()), std::get<KannalaBrandt>(b.model()));
+  return std::visit([&](const auto& m) { return same(m, std::get<std::decay_t<decltype(m)>>(b.model())); }, a.model());
 }
 
 TEST(RigText, GivesBackTheSameBits) {
@@ -52,6 +52,21 @@ TEST(RigText, GivesBackTheSameBits) {
     EXPECT_EQ(back->image_rate_hz, rig.image_rate_hz);
     EXPECT_EQ(back->time_offset_s, rig.time_offset_s);
     EXPECT_EQ(back->left.max_normalised_radius(), rig.left.max_normalised_radius());
+  }
+}
+
+TEST(RigText, GivesBackTheBitsOfWideLenses) {
+  Rng rng(12);
+  StereoRig rig = awkward_rig(rng, true);
+  for (const auto& [left, right] : {std::pair<LensModel, LensModel>{DoubleSphere{300.1 / 3, 301, 250, 251, -0.1 / 3, 0.59 / 3},
+                                                                    ExtendedUnified{300, 301 / 3.0, 2, 3, 0.1 / 3, 1.04 / 3}},
+                                    {UnifiedRadtan{300.1 / 3, 301, 250, 251, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
+                                     DoubleSphere{300, 301, 250, 251, 0.3, 0.5}}}) {
+    rig.left = Camera(left, 320, 240), rig.right = Camera(right, 320, 240);
+    const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_TRUE(same_camera(back->left, rig.left));
+    EXPECT_TRUE(same_camera(back->right, rig.right));
   }
 }
 

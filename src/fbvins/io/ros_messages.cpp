@@ -74,21 +74,27 @@ void append_image(std::string& out, Time t, std::string_view frame, const Image*
   for (int y = 0; y < view.height; ++y) cdr.raw(view.row(y), static_cast<std::size_t>(view.width));
 }
 
+RosLens ros_lens(const Camera& camera) {
+  std::string name = camera.model_name();
+  std::vector<double> k = camera.distortion();
+  if (name == "pinhole-equidistant") return {"equidistant", std::move(k)};
+  if (name != "pinhole-radtan") return {std::move(name), std::move(k)};
+  k.push_back(0.0);  // k3
+  return {"plumb_bob", std::move(k)};
+}
+
 void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera) {
-  const auto* radtan = std::get_if<PinholeRadtan>(&camera.model());
-  const auto* fisheye = std::get_if<KannalaBrandt>(&camera.model());
-  const std::vector<double> d = radtan ? std::vector{radtan->k1, radtan->k2, radtan->p1, radtan->p2, 0.0}
-                                       : std::vector{fisheye->k1, fisheye->k2, fisheye->k3, fisheye->k4};
+  const RosLens lens = ros_lens(camera);
+  const std::array<double, 4> f = camera.intrinsics();
   RowMajor3 K = RowMajor3::Identity();
-  K(0, 0) = radtan ? radtan->fx : fisheye->fx, K(0, 2) = radtan ? radtan->cx : fisheye->cx;
-  K(1, 1) = radtan ? radtan->fy : fisheye->fy, K(1, 2) = radtan ? radtan->cy : fisheye->cy;
+  K(0, 0) = f[0], K(1, 1) = f[1], K(0, 2) = f[2], K(1, 2) = f[3];
   CdrWriter cdr(out);
   put_header(cdr, t, frame);
   cdr.put(static_cast<std::uint32_t>(camera.height()));
   cdr.put(static_cast<std::uint32_t>(camera.width()));
-  cdr.text(radtan ? "plumb_bob" : "equidistant");
-  cdr.count(d.size());
-  cdr.array(d);
+  cdr.text(lens.model);
+  cdr.count(lens.coefficients.size());
+  cdr.array(lens.coefficients);
   put(cdr, K);
   put(cdr, RowMajor3(RowMajor3::Identity()));  // the images are not rectified
   for (int row = 0; row < 3; ++row) {

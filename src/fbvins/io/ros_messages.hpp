@@ -31,6 +31,12 @@ constexpr Time ros_time_end() { return {(std::int64_t{1} << 31) * 1'000'000'000}
 void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise);
 /// mono8. Null: an image without pixels.
 void append_image(std::string& out, Time t, std::string_view frame, const Image* image);
+/// What camera_info calls a lens: ROS's own names where it has them, else Camera::model_name() and Camera::distortion().
+struct RosLens {
+  std::string model;
+  std::vector<double> coefficients;
+};
+RosLens ros_lens(const Camera& camera);
 void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera);
 
 /// A pose with its derivatives, in our conventions; the message has ROS's: velocities in the body, angles about the axes of W.

@@ -31,7 +31,7 @@ Result<std::unique_ptr<Source>> make_source(const std::string& name, const Sourc
   const auto colon = name.find(':');
   const std::string kind = name.substr(0, colon), where = colon == std::string::npos ? "" : name.substr(colon + 1);
   if (kind == "replay" && !where.empty()) {
-    auto source = ReplaySource::open(where, {options.dataset, options.laps, options.preload});
+    auto source = ReplaySource::open(where, {.dataset = options.dataset, .laps = options.laps, .preload = options.preload});
     if (!source) return source.error();
     return std::unique_ptr<Source>(std::move(*source));
   }

@@ -28,7 +28,7 @@ Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& wher
                    fmt::format("replay:{}: after @ comes a speed from {} to {}", where, kSlowest, kFastest)};
   }
   options.dataset.prefetch_frames = kDecodedAhead;
-  auto data = open_dataset(where.substr(0, at), options.dataset);
+  auto data = options.open_file(where.substr(0, at), options.dataset);
   if (!data) return data.error();
   return std::unique_ptr<ReplaySource>(new ReplaySource(where.substr(0, at), std::move(options), std::move(*data), speed));
 }
@@ -45,7 +45,7 @@ Result<void> ReplaySource::run(SensorInput& input) {
     if (lap > 0) {
       later = *newest_ - *first_ + Duration::from_seconds(1 / data_->rig().image_rate_hz);
       if (!options_.preload) {
-        auto again = open_dataset(path_, options_.dataset);
+        auto again = options_.open_file(path_, options_.dataset);
         if (!again) return again.error();
         data_ = std::move(*again);
       }

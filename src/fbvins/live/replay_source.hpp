@@ -22,8 +22,10 @@ class ReplaySource final : public Source {
  public:
   struct Options {
     DatasetOptions dataset;
-    int laps = 1;          ///< how often it is played; stamps go on from lap to lap, and the scene leaps back
+    int laps = 1;  ///< how often it is played; stamps go on from lap to lap, and the scene leaps back
     bool preload = false;  ///< everything is decoded before the clock starts: a camera costs no decoding, and memory is there
+    /// Recordings of more formats than open_dataset() knows.
+    std::function<Result<std::unique_ptr<Dataset>>(const std::string&, const DatasetOptions&)> open_file = open_dataset;
   };
 
   /// `where`: DATASET or DATASET@SPEED.

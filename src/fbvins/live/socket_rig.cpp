@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
+#include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/live/socket_message.hpp"
 
 namespace fbvins {
@@ -30,7 +32,13 @@ Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_p
     return Camera(PinholeRadtan{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
   if (c.model == FBVINS_SOCKET_EQUIDISTANT)
     return Camera(KannalaBrandt{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
-  return malformed(fmt::format("the {} camera has no model {}", side, c.model));
+  const bool double_sphere = c.model == FBVINS_SOCKET_DOUBLE_SPHERE;
+  if (!double_sphere && c.model != FBVINS_SOCKET_EXTENDED_UNIFIED)
+    return malformed(fmt::format("the {} camera has no model {}", side, c.model));
+  if (const std::string problem = outside_of_model(double_sphere ? "ds" : "eucm", {k[0], k[1]}); !problem.empty())
+    return malformed(fmt::format("of the {} camera {}", side, problem));
+  if (double_sphere) return Camera(DoubleSphere{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
+  return Camera(ExtendedUnified{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
 }
 
 template <class C>
@@ -57,10 +65,15 @@ Result<void> check_figures(const FbvinsSocketRig& rig) {
 
 FbvinsSocketCamera camera_message(const Camera& camera, const Quat& q_BC, const Vec3& p_BC) {
   FbvinsSocketCamera out{};
-  if (const auto* m = std::get_if<PinholeRadtan>(&camera.model()))
-    out = {FBVINS_SOCKET_RADTAN, 0, {m->fx, m->fy}, {m->cx, m->cy}, {m->k1, m->k2, m->p1, m->p2}, {}};
-  else if (const auto* e = std::get_if<KannalaBrandt>(&camera.model()))
-    out = {FBVINS_SOCKET_EQUIDISTANT, 0, {e->fx, e->fy}, {e->cx, e->cy}, {e->k1, e->k2, e->k3, e->k4}, {}};
+  // In the order of LensModel.
+  constexpr std::uint32_t kModels[] = {FBVINS_SOCKET_RADTAN, FBVINS_SOCKET_EQUIDISTANT, FBVINS_SOCKET_DOUBLE_SPHERE,
+                                       FBVINS_SOCKET_EXTENDED_UNIFIED};
+  const std::array<double, 4> f = camera.intrinsics();
+  const std::vector<double> k = camera.distortion();
+  assert(camera.model().index() < std::size(kModels) && k.size() <= std::size(out.distortion));
+  out.model = kModels[camera.model().index()];
+  out.focal_px[0] = f[0], out.focal_px[1] = f[1], out.centre_px[0] = f[2], out.centre_px[1] = f[3];
+  std::copy(k.begin(), k.end(), out.distortion);
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> T_BC(out.T_BC);
   T_BC.leftCols<3>() = q_BC.toRotationMatrix();
   T_BC.col(3) = p_BC;

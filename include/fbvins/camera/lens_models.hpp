@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lenses as numbers: fx, fy, cx, cy in px, then what bends the rays. With n = (x/z, y/z) and s = |n|^2, a pixel is
+// (fx u + cx, fy v + cy) of the distorted (u, v) that each model states. What they compute is in src/fbvins/camera.
+#pragma once
+
+#include <variant>
+
+namespace fbvins {
+
+/// Pinhole with two radial and two tangential coefficients (Brown), OpenCV's and Kalibr's "radtan".
+struct PinholeRadtan {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0;
+};
+
+/// Kannala-Brandt with four coefficients, Kalibr's "equidistant", OpenCV's fisheye, Basalt's "kb4".
+struct KannalaBrandt {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double k1 = 0, k2 = 0, k3 = 0, k4 = 0;
+};
+
+/// Double sphere, "ds" of Kalibr and Basalt (Usenko, Demmel, Cremers 2018, section 3.5): d1 = sqrt(s + 1), w = xi d1 + 1,
+/// d2 = sqrt(s + w^2), (u, v) = n / (alpha d2 + (1 - alpha) w); xi in (-1, 1), alpha in [0, 1].
+struct DoubleSphere {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double xi = 0, alpha = 0;
+};
+
+/// Extended unified, "eucm" of Kalibr and Basalt (Khomutenko, Garcia, Martinet 2016): d = sqrt(beta s + 1),
+/// (u, v) = n / (alpha d + 1 - alpha); alpha in [0, 1], beta > 0.
+struct ExtendedUnified {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double alpha = 0, beta = 1;
+};
+
+/// Unified projection with Brown's distortion behind it (Mei, Rives 2007), "omni" with "radtan" of Kalibr, "MEI" of camodocal:
+/// n / (xi sqrt(s + 1) + 1), distorted as PinholeRadtan does; xi >= 0.
+struct UnifiedRadtan {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px
+  double xi = 0, k1 = 0, k2 = 0, p1 = 0, p2 = 0;
+};
+
+using LensModel = std::variant<PinholeRadtan, KannalaBrandt, DoubleSphere, ExtendedUnified, UnifiedRadtan>;
+
+}  // namespace fbvins
