@@ -50,7 +50,7 @@ Json adjustment_json(const FinalAdjustmentReport& a) {
     return Json{{"held_out", p.held_out}, {"imu", p.imu}, {"odometry", p.odometry}};
   };
   Json json{{"points", a.points},
-            {"observations", a.sights},
+            {"observations", a.observations},
             {"initial_rms_px", a.initial_rms_px},
             {"final_rms_px", a.final_rms_px},
             {"before", plausibility(a.before)},
@@ -86,7 +86,7 @@ std::string map_text(const MapSummary& m) {
   line("after bundle adjustment:", m.adjusted);
   if (m.adjustment)
     text += fmt::format("final bundle adjustment: {} points, {} observations, {:.2f} -> {:.2f} px\n", m.adjustment->points,
-                        m.adjustment->sights, m.adjustment->initial_rms_px, m.adjustment->final_rms_px);
+                        m.adjustment->observations, m.adjustment->initial_rms_px, m.adjustment->final_rms_px);
   if (m.adjustment && !m.adjustment->refused.empty())
     text += fmt::format("final bundle adjustment refused, the map is as after the run: {}\n", m.adjustment->refused);
   return text;

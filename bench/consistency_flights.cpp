@@ -115,7 +115,7 @@ int run(int argc, char** argv) {
   app.add_option("--seed", seed, "of room, tracks and noise");
   app.add_option("--movers", w.tracks.movers, "boxes that move");
   app.add_option("--bad-start", w.tracks.bad_start_s, "so long [s] tracks are bad");
-  app.add_flag("--recognise", w.tracks.recognise, "corners are known again");
+  app.add_flag("--recognise", w.tracks.recognise, "corners are re-observed");
   app.add_flag("!--forget", w.known, "no landmark is remembered");
   CLI11_PARSE(app, argc, argv);
   const auto preset = simulation_preset(w.preset);

@@ -2,7 +2,7 @@
 // How well markers and clocks are found from a minute of flight: twenty recordings of motion capture with gaps, another body and
 // a flip in each, against exact truth; and what twenty recordings would show if their errors were as the covariances say.
 //
-//   hand_eye lively | gentle                     flights and odometry's errors made up (hand_eye_scene.hpp)
+//   hand_eye lively | gentle                     synthetic flights and odometry errors (hand_eye_scene.hpp)
 //   hand_eye TRUTH ESTIMATE [ESTIMATE...]        minutes of real estimates, with markers made from their ground truth
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a frontend would tell of a flight through a synthetic room, without any image: corners on its walls, and on boxes that
 // move, seen by both cameras with the errors that tracks have: noise, a slow slide of each, and some that slide fast. One that
-// comes back into view may be known again where the estimator's own pose says that it should be.
+// comes back into view may be re-observed where the estimator's own pose says that it should be.
 // One instance, one flight; the same seed gives the same bytes.
 #pragma once
 
@@ -25,7 +25,7 @@ struct TrackOptions {
   double slide_px = 0.04;     ///< of a track, a frame
   double bad_share = 0.02;    ///< tracks that slide ten times as fast
   double lost_share = 0.02;   ///< of the tracks, a frame
-  double known_share = 0.15;  ///< of the corners that could be known again, a frame
+  double known_share = 0.15;  ///< of the corners that could be re-observed, a frame
   double sigma_px = 0.6;      ///< what the estimator is told
   double bad_start_s = 0;     ///< so long tracks slide five times as fast, and the cameras squint by a pixel
   std::uint64_t seed = 1;

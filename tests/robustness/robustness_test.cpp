@@ -173,7 +173,7 @@ TEST_P(RealFlight, TimeOffsetIsFoundInFlight) {
   // In 17 s four fifths of it and more are found.
   EXPECT_LT(on.calibration.time_offset_s, -0.0035);
   EXPECT_GT(on.calibration.time_offset_s, -0.007);
-  // Where landmarks are known again 5 ms hardly show in the trajectory: 5 mm with and without.
+  // Where landmarks are re-observed 5 ms hardly show in the trajectory: 5 mm with and without.
   EXPECT_LT(on.rmse_m(), 1.2 * off.rmse_m());
 }
 

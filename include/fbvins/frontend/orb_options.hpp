@@ -4,7 +4,7 @@
 
 namespace fbvins {
 
-/// Landmarks known again after they were out of view.
+/// Landmarks re-observed after they were out of view.
 struct RecognitionOptions {
   bool enabled = true;
   int capacity = 3000;
@@ -39,7 +39,7 @@ struct OrbFrontendOptions {
     v("max_features", max_features, "", "features followed at once", 10, 2000);
     v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, for tracks to be found among", 10, 10000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
-    v("memory_s", memory_s, "s", "how long a feature out of sight is looked for where it should be", 0.0, 10.0);
+    v("memory_s", memory_s, "s", "how long a feature that left the view is searched for at its predicted place", 0.0, 10.0);
     v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
@@ -48,7 +48,7 @@ struct OrbFrontendOptions {
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
     v("min_depth_m", min_depth_m, "m", "nearest point that is looked for in the right image", 0.05, 10.0);
-    v.group("recognition", recognition, "landmarks known again after they were out of view");
+    v.group("recognition", recognition, "landmarks re-observed after they were out of view");
   }
 };
 

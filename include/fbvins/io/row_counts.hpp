@@ -6,7 +6,7 @@
 
 namespace fbvins {
 
-/// Damage is counted, never believed.
+/// Damage is counted, never used.
 struct RowCounts {
   int rows = 0;           ///< data rows in the file
   int malformed = 0;      ///< wrong number of columns, not a number, stamp out of range

@@ -17,15 +17,15 @@ struct PoseGraphReport {
 /// What poses say to measurements they were not fitted to, or not to these alone: means of squared standard deviations, 1 where
 /// the noise is as assumed, and smaller is better.
 struct Plausibility {
-  double held_out = 0;  ///< sights of points that took no part, robust
+  double held_out = 0;  ///< observations of points that took no part, robust
   double imu = 0;       ///< the readings, with the motions, biases and gravity that suit the poses best; 0 without readings
   double odometry = 0;  ///< the steps between keyframes against the odometry and its drift
 };
 
 /// Of the bundle adjustment over all keyframes and points.
 struct FinalAdjustmentReport {
-  int keyframes = 0, points = 0, sights = 0, iterations = 0;
-  double initial_rms_px = 0, final_rms_px = 0;  ///< of position in the image, both over the sights kept in the end
+  int keyframes = 0, points = 0, observations = 0, iterations = 0;
+  double initial_rms_px = 0, final_rms_px = 0;  ///< of position in the image, both over the observations kept in the end
   Plausibility before, after;
   double tilt_rad = 0;       ///< by which the map was turned level
   std::string refused = {};  ///< why, where the result is not more plausible than its beginning: the map is as it was

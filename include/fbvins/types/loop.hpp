@@ -31,7 +31,7 @@ struct LoopStats {
   int keyframes = 0;   ///< in the map
   int candidates = 0;  ///< places looked at closely for this keyframe
   int accepted = 0;    ///< of them that became constraints
-  int refused = 0;     ///< verified by sight, but the odometry knows better
+  int refused = 0;     ///< verified by the images, but inconsistent with the odometry
   bool optimised = false;
   double extract_ms = 0, recognise_ms = 0, verify_ms = 0, optimise_ms = 0;
   double total_ms() const { return extract_ms + recognise_ms + verify_ms + optimise_ms; }

@@ -73,14 +73,14 @@ struct Odometry {
   Time t;
   Pose<W, B> T_WB;
   GaugeState gauge;            ///< the same moment in the estimator's own frame
-  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W: of the motion, without what is being paid off
+  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W: of the motion, without the pending correction
   Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;
-  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad]), with what is still to be paid off
+  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad]), with the pending correction
   Mat3 velocity_covariance = Mat3::Zero();    ///< of v_WB, m^2/s^2
   Mat3 gyro_bias_covariance = Mat3::Zero();   ///< rad^2/s^2
   Mat3 accel_bias_covariance = Mat3::Zero();  ///< m^2/s^4
-  Vec3 up_W = Vec3::UnitZ();    ///< unit, against gravity, as known now; z as soon as levelling is paid off
+  Vec3 up_W = Vec3::UnitZ();    ///< unit, against gravity, as known now; z once the levelling is applied
   double tilt_sigma_rad = 0;    ///< standard deviation of the attitude's tilt about its less known axis
   bool level = false;           ///< tilt_sigma_rad is below kLevelSigma_rad
   Health health;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The companion's half with a made-up PX4 that obeys at once and is where its setpoint is.
+// The companion's half with a simulated PX4 that obeys at once and is where its setpoint is.
 #include "fbvins/flight/px4_mission.hpp"
 
 #include <gtest/gtest.h>

@@ -34,7 +34,7 @@ class KnownLandmarks {
   void clear();
   /// The window is held to the map by these, around the newest position.
   void hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use);
-  /// Covariance of (dp in W, dtheta in B) of a pose: of the window alone, and with what it owes to the map (K4-K6).
+  /// Covariance of (dp in W, dtheta in B) of a pose: of the window alone, and with that of the remembered landmarks (K4-K6).
   Mat6 with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
   /// Landmarks remembered from now on have in common what this pose, their host's, is uncertain of.
   void anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance);

@@ -15,9 +15,9 @@ Vec6 difference(const Pose<W, B>& b, const Pose<W, B>& a) {
   return d;
 }
 
-Vec3 at_most(const Vec3& owed, double limit) {
-  const double size = owed.norm();
-  return size > limit ? Vec3((limit / size) * owed) : owed;
+Vec3 at_most(const Vec3& pending, double limit) {
+  const double size = pending.norm();
+  return size > limit ? Vec3((limit / size) * pending) : pending;
 }
 
 /// Of the attitude against the level about its less known axis, from the covariance of dtheta in B.
@@ -33,13 +33,13 @@ void PublishedPose::follow(const std::optional<Pose<B, B>>& motion, const Pose<W
   if (!started_ || !motion || max_step_m_ <= 0) {
     started_ = true;
     T_WB_ = level;
-    owed_.setZero();
+    pending_.setZero();
     return;
   }
   const Pose<W, B> moved = T_WB_ * *motion;
-  const Vec6 owed = difference(level, moved);
-  T_WB_ = moved.boxplus(at_most(owed.head<3>(), max_step_m_), at_most(owed.tail<3>(), kTurnPerStep_radpm * max_step_m_));
-  owed_ = difference(level, T_WB_);
+  const Vec6 pending = difference(level, moved);
+  T_WB_ = moved.boxplus(at_most(pending.head<3>(), max_step_m_), at_most(pending.tail<3>(), kTurnPerStep_radpm * max_step_m_));
+  pending_ = difference(level, T_WB_);
 }
 
 void PublishedPose::fill(const NavState& level, Odometry& out) {
@@ -48,9 +48,9 @@ void PublishedPose::fill(const NavState& level, Odometry& out) {
   out.v_WB = turn * level.v_WB;
   out.up_W = turn * Vec3::UnitZ();
   if (!out.pose_covariance.isZero(0)) {
-    const Vec3 owed_v = level.v_WB - out.v_WB;
-    out.pose_covariance += owed_ * owed_.transpose();
-    out.velocity_covariance += owed_v * owed_v.transpose();
+    const Vec3 pending_v = level.v_WB - out.v_WB;
+    out.pose_covariance += pending_ * pending_.transpose();
+    out.velocity_covariance += pending_v * pending_v.transpose();
     tilt_sigma_rad_ = tilt_sigma_of(T_WB_.q, out.pose_covariance.bottomRightCorner<3, 3>());
   }
   out.tilt_sigma_rad = tilt_sigma_rad_;

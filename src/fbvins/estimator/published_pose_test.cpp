@@ -48,7 +48,7 @@ TEST(PublishedPose, NoFrameShowsMoreThanTheStepBesideTheMotion) {
   EXPECT_NEAR(largest_rad, kStep_rad, 1e-12);
   EXPECT_LT((published.T_WB().p - (kCorrection * flown(119)).p).norm(), 1e-9) << "all is paid";
   EXPECT_LT(angle(published.T_WB().q, (kCorrection * flown(119)).q), 1e-9);
-  EXPECT_LT(published.owed().norm(), 1e-9);
+  EXPECT_LT(published.pending().norm(), 1e-9);
 }
 
 TEST(PublishedPose, TurningLevelDoesNotMoveIt) {
@@ -104,7 +104,7 @@ TEST(PublishedPose, ARestartBeginsWhereTheWindowSays) {
   published.restart();
   published.follow(motion(1), kCorrection * flown(1));
   EXPECT_EQ(published.T_WB().p, (kCorrection * flown(1)).p);
-  EXPECT_TRUE(published.owed().isZero(0));
+  EXPECT_TRUE(published.pending().isZero(0));
 }
 
 TEST(PublishedPose, WithoutAContractAllIsShownAtOnce) {

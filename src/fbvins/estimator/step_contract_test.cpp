@@ -21,7 +21,7 @@ double tilt_error(const Quat& a, const Quat& b) {
 struct LargestStep {
   double m = 0, rad = 0;  ///< beside the motion that the readings tell
   double gauge_m = 0;     ///< that the window itself makes
-  double owed_m = 0;      ///< between what is published and what is known
+  double pending_m = 0;   ///< between what is published and what is known
   int poses = 0, restarts = 0;
 };
 
@@ -42,7 +42,7 @@ LargestStep fly(SimulatedFlight& flight, int frames, const EstimatorOptions& opt
       out.m = std::max(out.m, (o.T_WB.p - moved.p).norm());
       out.rad = std::max(out.rad, angle(moved.q, o.T_WB.q));
       out.gauge_m = std::max(out.gauge_m, (from.T_WB.p - before->gauge.T_GB.p).norm());
-      out.owed_m = std::max(out.owed_m, (estimator.window().tilt().levelled(newest.state.T_WB).p - o.T_WB.p).norm());
+      out.pending_m = std::max(out.pending_m, (estimator.window().tilt().levelled(newest.state.T_WB).p - o.T_WB.p).norm());
       ++out.poses;
     }
     out.restarts = static_cast<int>(o.reset_counter);
@@ -62,7 +62,7 @@ TEST(StepContract, HoldsWhileWIsLevelled) {
   flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);  // two and a half degrees
   const LargestStep step = fly(flight, 200, EstimatorOptions{});
   expect_within(step, EstimatorOptions{});
-  EXPECT_GT(step.owed_m, 1e-3) << "there was something to pay off";
+  EXPECT_GT(step.pending_m, 1e-3) << "there was something to correct";
   EXPECT_GT(step.poses, 150);
 }
 
@@ -90,7 +90,7 @@ TEST(StepContract, NoneIsKeptWhereNoneIsWanted) {
   flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
   EstimatorOptions options;
   options.max_step_m = 0;
-  EXPECT_EQ(fly(flight, 100, options).owed_m, 0);
+  EXPECT_EQ(fly(flight, 100, options).pending_m, 0);
 }
 
 TEST(Level, IsSaidWhenTheTiltIsKnown) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a made-up window of six frames and fifty landmarks, noisy, off its optimum, with outliers.
+// For tests: a synthetic window of six frames and fifty landmarks, noisy, off its optimum, with outliers.
 #pragma once
 
 #include <memory>

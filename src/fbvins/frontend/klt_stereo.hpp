@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-/// A match nearer to the right image's edge is not believed.
+/// A match nearer to the right image's edge is not used.
 inline constexpr double kRightBorder_px = 2;
 
 enum class StereoFailure { none, flow, check, epipolar };

@@ -280,7 +280,7 @@ class Sweep {
     bool told = false, again = false;
   };
   std::map<TrackId, Known> known;
-  int forgotten = 0;  // landmarks told of that cannot be known again, summed over frames
+  int forgotten = 0;  // landmarks told of that cannot be re-observed, summed over frames
 
   int count(bool Known::*what) const {
     return static_cast<int>(std::count_if(known.begin(), known.end(), [&](const auto& k) { return k.second.*what; }));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks known again after they were out of view (docs/derivations/known_landmarks.md, K7): tracks that end are remembered,
+// Landmarks re-observed after they were out of view (docs/derivations/known_landmarks.md, K7): tracks that end are remembered,
 // and begin again under their old id where descriptor, patch and the others' places agree.
 // Buffers are reused; one instance, one thread.
 //

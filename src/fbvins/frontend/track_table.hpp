@@ -19,7 +19,7 @@
 
 namespace fbvins {
 
-/// Whether a track is still one. One whose feature went out of view may be known again; a lost one was wrong.
+/// Whether a track is still one. One whose feature went out of view may be re-observed; a lost one was wrong.
 enum class Fate : std::uint8_t { goes_on, out_of_view, lost };
 
 struct TrackState {

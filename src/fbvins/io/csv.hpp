@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of numbers with a stamp, read so that damage is counted, never believed and never fatal
+// Rows of numbers with a stamp, read so that damage is counted, never used and never fatal
 // while most rows are good. Pure functions, any thread.
 //
 //   Result<StampedRows<ImuSample>> imu = read_stamped_rows<ImuSample>(text, "imu0/data.csv", parse_imu_row);

@@ -23,7 +23,7 @@ Result<Image> decode_jpeg(std::string_view bytes) {
   if (tjDecompressHeader3(handle.tj, data, bytes.size(), &width, &height, &subsampling, &colours) != 0) return failure();
   if (Result<void> size = check_image_size(width, height); !size) return size.error();
   Image image(width, height);
-  // A warning means that the rest of the image is made up.
+  // A warning means that the rest of the image is invented.
   constexpr int kFlags = TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   if (tjDecompress2(handle.tj, data, bytes.size(), image.row(0), width, width, height, TJPF_GRAY, kFlags) != 0) return failure();
   return image;

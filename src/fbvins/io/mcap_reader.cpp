@@ -119,7 +119,7 @@ std::optional<McapReader::ChunkHead> McapReader::chunk_head(std::uint64_t offset
   return in.ok() ? std::optional(std::move(head)) : std::nullopt;
 }
 
-/// Nothing of a whole chunk is believed unless its checksum says so; one that the file ends in is read as far as it goes.
+/// Nothing of a whole chunk is used unless its checksum says so; one that the file ends in is read as far as it goes.
 void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool whole) {
   const std::optional<ChunkHead> head = chunk_head(offset, length);
   if (!head) return whole ? complain(offset, "this chunk's head is not what it should be") : void();

@@ -45,7 +45,7 @@ Mat15 transition(const NavState& s, const ImuSample& reading, double dt) {
 }  // namespace
 
 void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSample& to) const {
-  const Vec3 gravity_W = -gravity_mps2_ * estimate_->up_W;  // not along z while the estimator still pays off a tilt
+  const Vec3 gravity_W = -gravity_mps2_ * estimate_->up_W;  // not along z while a tilt is still being corrected
   const double dt = (to.t - from.t).seconds();
   if (dt <= 0) return;
   const auto square = [](double x) { return x * x; };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pose at IMU rate: the newest estimate carried on with the readings since its image (eq. P5-P7), with its covariance.
 // A new estimate starts the propagation anew; what it moves the newest pose by is taken back with a time constant, so that the
-// output has no steps. That is the error of the propagation and what the estimator pays off with this image: its own corrections
+// output has no steps. That is the error of the propagation and what the estimator corrects with this image: its own corrections
 // never come at once (Odometry). After a restart of the estimator W is new, and the pose changes at once.
 //
 //   PosePropagator propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), 0.1);

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kNearest_m = 0.1;
 constexpr int kMaxIterations = 25;  // of one solve
-/// Residual from which a sight counts less (Cauchy).
+/// Residual from which an observation counts less (Cauchy).
 constexpr double kRobust_sigma = 2;
-/// Sights farther than this from where the solution puts them are wrong matches.
+/// Observations farther than this from where the solution puts them are wrong matches.
 constexpr double kOutlier_sigma = 3.5;
 /// One track in so many is held out.
 constexpr std::size_t kHeldOut = 8;
@@ -73,15 +73,15 @@ Adjustment::Adjustment(const PlaceMap& map) : map_(map), has_readings_(map.size(
 void Adjustment::add(const FeatureTrack& track) {
   const std::optional<PointBlock> point = first_point(track);
   if (!point) return;
-  std::vector<Sight> sights;
+  std::vector<Observation> observations;
   for (const FeatureView& view : track) {
     const MapKeyframe& k = keyframe(view.keyframe);
     const Vec3 p_C = (k.T_MB * map_.T_BC0).inverse() * Vec3(point->data());
-    if (p_C.z() > kNearest_m) sights.push_back({view.keyframe, start_.points.size(), &k.place.features[view.feature]});
+    if (p_C.z() > kNearest_m) observations.push_back({view.keyframe, start_.points.size(), &k.place.features[view.feature]});
   }
-  if (sights.size() < 2) return;
-  std::vector<Sight>& to = start_.points.size() % kHeldOut == kHeldOut - 1 ? held_out_ : sights_;
-  to.insert(to.end(), sights.begin(), sights.end());
+  if (observations.size() < 2) return;
+  std::vector<Observation>& to = start_.points.size() % kHeldOut == kHeldOut - 1 ? held_out_ : observations_;
+  to.insert(to.end(), observations.begin(), observations.end());
   start_.points.push_back(*point);
 }
 
@@ -98,13 +98,13 @@ std::optional<PointBlock> Adjustment::first_point(const FeatureTrack& track) con
 
 std::size_t Adjustment::points() const {
   std::set<std::size_t> seen;
-  for (const Sight& s : sights_) seen.insert(s.point);
+  for (const Observation& s : observations_) seen.insert(s.point);
   return seen.size();
 }
 
 int Adjustment::solve(AdjustmentState& x, double drift) const {
   ceres::Problem problem;
-  add_sights(problem, sights_, x);
+  add_observations(problem, observations_, x);
   add_readings(problem, x);
   add_edges(problem, x, drift);
   add_verticals(problem, x);
@@ -123,9 +123,10 @@ int Adjustment::solve(AdjustmentState& x, double drift) const {
   return summary.num_successful_steps;
 }
 
-void Adjustment::add_sights(ceres::Problem& problem, const std::vector<Sight>& sights, AdjustmentState& x) const {
-  for (const Sight& s : sights)
-    problem.AddResidualBlock(new SightCost(cost_of(s)), new ceres::CauchyLoss(kRobust_sigma), x.poses[s.keyframe].data(),
+void Adjustment::add_observations(ceres::Problem& problem, const std::vector<Observation>& observations,
+                                  AdjustmentState& x) const {
+  for (const Observation& s : observations)
+    problem.AddResidualBlock(new ObservationCost(cost_of(s)), new ceres::CauchyLoss(kRobust_sigma), x.poses[s.keyframe].data(),
                              x.points[s.point].data());
 }
 
@@ -145,8 +146,9 @@ void Adjustment::add_readings(ceres::Problem& problem, AdjustmentState& x) const
 /// The odometry saw each point in every image and not in keyframes alone. A loop is in here as the points that both its ends see.
 void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const {
   std::set<std::pair<std::size_t, std::size_t>> seen_together;
-  for (std::size_t i = 1; i < sights_.size(); ++i)
-    if (sights_[i].point == sights_[i - 1].point) seen_together.insert(std::minmax(sights_[i].keyframe, sights_[i - 1].keyframe));
+  for (std::size_t i = 1; i < observations_.size(); ++i)
+    if (observations_[i].point == observations_[i - 1].point)
+      seen_together.insert(std::minmax(observations_[i].keyframe, observations_[i - 1].keyframe));
   for (const auto& [a, b, edge] : steps_) {
     const bool loop = edge->kind == MapEdge::Kind::loop;
     if (loop && seen_together.contains(std::minmax(a, b))) continue;
@@ -172,19 +174,19 @@ void Adjustment::add_verticals(ceres::Problem& problem, AdjustmentState& x) cons
 }
 
 void Adjustment::drop_outliers(const AdjustmentState& x) {
-  std::erase_if(sights_, [&](const Sight& s) {
+  std::erase_if(observations_, [&](const Observation& s) {
     const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
     return !r || r->norm() > kOutlier_sigma * std::sqrt(3.0);
   });
   std::vector<int> views(x.points.size(), 0);
-  for (const Sight& s : sights_) ++views[s.point];
-  std::erase_if(sights_, [&](const Sight& s) { return views[s.point] < 2; });
+  for (const Observation& s : observations_) ++views[s.point];
+  std::erase_if(observations_, [&](const Observation& s) { return views[s.point] < 2; });
 }
 
 double Adjustment::rms_px(const AdjustmentState& x) const {
   double sum = 0;
   std::size_t count = 0;
-  for (const Sight& s : sights_) {
+  for (const Observation& s : observations_) {
     const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
     if (!r) continue;
     sum += (r->head<2>() * s.feature->sigma_xy * keyframe(s.keyframe).place.focal_px).squaredNorm();
@@ -196,7 +198,7 @@ double Adjustment::rms_px(const AdjustmentState& x) const {
 /// With the poses held, what else there is takes the values that suit them best: no answer is blamed for those of another.
 Plausibility Adjustment::judged(AdjustmentState x) const {
   ceres::Problem problem;
-  add_sights(problem, held_out_, x);
+  add_observations(problem, held_out_, x);
   add_readings(problem, x);
   for (PoseBlock& pose : x.poses)
     if (problem.HasParameterBlock(pose.data())) problem.SetParameterBlockConstant(pose.data());
@@ -207,13 +209,15 @@ Plausibility Adjustment::judged(AdjustmentState x) const {
 
 double Adjustment::held_out_cost(const AdjustmentState& x) const {
   double sum = 0, degrees = 0;
-  for (const Sight& s : held_out_) {
+  for (const Observation& s : held_out_) {
     const auto r = cost_of(s).residual(x.poses[s.keyframe], x.points[s.point]);
     sum += cauchy(r ? r->squaredNorm() : 9 * kOutlier_sigma * kOutlier_sigma);
     degrees += s.feature->has_depth() ? 3 : 2;
   }
-  const std::size_t points = static_cast<std::size_t>(std::count_if(
-      held_out_.begin(), held_out_.end(), [&](const Sight& s) { return &s == &held_out_[0] || s.point != (&s)[-1].point; }));
+  const std::size_t points =
+      static_cast<std::size_t>(std::count_if(held_out_.begin(), held_out_.end(), [&](const Observation& s) {
+        return &s == &held_out_[0] || s.point != (&s)[-1].point;
+      }));
   degrees -= 3.0 * static_cast<double>(points);
   return degrees > 0 ? sum / degrees : 0;
 }

@@ -34,7 +34,7 @@ class Adjustment {
   explicit Adjustment(const PlaceMap& map);
 
   void add(const FeatureTrack& track);
-  bool empty() const { return sights_.empty(); }
+  bool empty() const { return observations_.empty(); }
 
   const AdjustmentState& start() const { return start_; }
   /// Returns the iterations. The first placed keyframe stays. `drift`: variance of the odometry's steps, in units of the drift
@@ -42,19 +42,19 @@ class Adjustment {
   int solve(AdjustmentState& x, double drift = 1) const;
   /// The same as an answer finds it, over stretches long enough for drift to show beside the answer's own scatter.
   double drift_found(const AdjustmentState& x) const;
-  /// Sights that do not fit are wrong matches.
+  /// Observations that do not fit are wrong matches.
   void drop_outliers(const AdjustmentState& x);
   Plausibility judged(AdjustmentState x) const;
   /// The map with the poses of an answer, level.
   void write(const AdjustmentState& x, PlaceMap& map) const;
 
   std::size_t points() const;
-  std::size_t sights() const { return sights_.size(); }
-  /// Root of the mean squared distance in the image, over the sights there are now.
+  std::size_t observations() const { return observations_.size(); }
+  /// Root of the mean squared distance in the image, over the observations there are now.
   double rms_px(const AdjustmentState& x) const;
 
  private:
-  struct Sight {
+  struct Observation {
     std::size_t keyframe, point;
     const PlaceFeature* feature;
   };
@@ -63,13 +63,13 @@ class Adjustment {
     const MapEdge* edge;
   };
 
-  SightCost cost_of(const Sight& s) const { return {keyframe(s.keyframe).T_MB.q, map_.T_BC0, *s.feature}; }
+  ObservationCost cost_of(const Observation& s) const { return {keyframe(s.keyframe).T_MB.q, map_.T_BC0, *s.feature}; }
   const MapKeyframe& keyframe(std::size_t i) const { return map_.keyframes()[i]; }
   Pose<M, B> pose(const AdjustmentState& x, std::size_t i) const {
     return {orientation<6>(keyframe(i).T_MB.q, x.poses[i].data()), Vec3(x.poses[i].data())};
   }
   std::optional<PointBlock> first_point(const FeatureTrack& track) const;
-  void add_sights(ceres::Problem& problem, const std::vector<Sight>& sights, AdjustmentState& x) const;
+  void add_observations(ceres::Problem& problem, const std::vector<Observation>& observations, AdjustmentState& x) const;
   void add_readings(ceres::Problem& problem, AdjustmentState& x) const;
   void add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const;
   void add_verticals(ceres::Problem& problem, AdjustmentState& x) const;
@@ -79,7 +79,7 @@ class Adjustment {
 
   const PlaceMap& map_;
   AdjustmentState start_;
-  std::vector<Sight> sights_, held_out_;
+  std::vector<Observation> observations_, held_out_;
   std::vector<Step> steps_;         ///< all edges between placed keyframes
   std::vector<bool> has_readings_;  ///< of a keyframe: on one side of it at least
 };

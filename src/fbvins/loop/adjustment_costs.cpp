@@ -32,7 +32,7 @@ void fill(const Mat15& J, const double* pose, double* by_pose, double* by_motion
 
 Quat turn_of(const TiltBlock& tilt) { return so3_exp(Vec3(tilt[0], tilt[1], 0)); }
 
-bool SightCost::Evaluate(double const* const* x, double* residual, double** jacobians) const {
+bool ObservationCost::Evaluate(double const* const* x, double* residual, double** jacobians) const {
   const Vec3 p_MB(x[0][0], x[0][1], x[0][2]), p_M(x[1][0], x[1][1], x[1][2]);
   const Mat3 R_BM = orientation<6>(q_MB_, x[0]).toRotationMatrix().transpose(), R_CB = T_BC0_.R().transpose();
   const Vec3 p_B = R_BM * (p_M - p_MB), p_C = R_CB * (p_B - T_BC0_.p);
@@ -55,7 +55,7 @@ bool SightCost::Evaluate(double const* const* x, double* residual, double** jaco
   return true;
 }
 
-std::optional<Vec3> SightCost::residual(const PoseBlock& pose, const PointBlock& point) const {
+std::optional<Vec3> ObservationCost::residual(const PoseBlock& pose, const PointBlock& point) const {
   const double* x[] = {pose.data(), point.data()};
   Vec3 r;
   return Evaluate(x, r.data(), nullptr) ? std::optional(r) : std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the final adjustment minimises beside the edges of graph_costs.hpp: sights of points, and the readings of the IMU from
-// keyframe to keyframe (docs/derivations/loop.md, L16, L18). Blocks: pose (p in M, turn about a starting orientation), point
+// What the final adjustment minimises beside the edges of graph_costs.hpp: observations of points, and the readings of the IMU
+// from keyframe to keyframe (docs/derivations/loop.md, L16, L18). Blocks: pose (p in M, turn about a starting orientation), point
 // (in M), motion (v in M, gyroscope bias, accelerometer bias), tilt (a, b: up in M is Exp(a, b, 0) z).
 #pragma once
 
@@ -21,9 +21,10 @@ using MotionBlock = std::array<double, 9>;
 using TiltBlock = std::array<double, 2>;
 
 /// (x, y, inverse depth) of a point in the camera of a keyframe less where it was seen, in standard deviations.
-class SightCost final : public ceres::SizedCostFunction<3, 6, 3> {
+class ObservationCost final : public ceres::SizedCostFunction<3, 6, 3> {
  public:
-  SightCost(const Quat& q_MB, const Pose<B, C0>& T_BC0, const PlaceFeature& seen) : q_MB_(q_MB), T_BC0_(T_BC0), seen_(seen) {}
+  ObservationCost(const Quat& q_MB, const Pose<B, C0>& T_BC0, const PlaceFeature& seen)
+      : q_MB_(q_MB), T_BC0_(T_BC0), seen_(seen) {}
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override;
   /// Nothing for a point behind the camera.
   std::optional<Vec3> residual(const PoseBlock& pose, const PointBlock& point) const;

@@ -40,21 +40,22 @@ void check_cost(const ceres::CostFunction& cost, std::vector<std::vector<double>
   }
 }
 
-TEST(SightCost, ItsJacobianIsItsDerivative) {
+TEST(ObservationCost, ItsJacobianIsItsDerivative) {
   const Pose<B, C0> camera(so3_exp(Vec3(-1.2, 1.1, -1.3)), Vec3(0.05, -0.02, 0.1));
   const Pose<M, B> T_MB(so3_exp(Vec3(0.3, -0.2, 0.7)), Vec3(1, 2, 3));
   const Vec3 p_M = T_MB * (camera * Vec3(0.4, -0.3, 2.5));
   PlaceFeature seen;
   seen.x = 0.15f, seen.y = -0.1f, seen.inverse_depth = 0.41f, seen.sigma_xy = 0.5f, seen.sigma_inverse_depth = 0.2f;
-  check_cost(SightCost(T_MB.q, camera, seen), {{1, 2, 3, 0.02, -0.03, 0.01}, {p_M.x() + 0.05, p_M.y() - 0.03, p_M.z() + 0.02}});
+  check_cost(ObservationCost(T_MB.q, camera, seen),
+             {{1, 2, 3, 0.02, -0.03, 0.01}, {p_M.x() + 0.05, p_M.y() - 0.03, p_M.z() + 0.02}});
   seen.inverse_depth = -1;
-  check_cost(SightCost(T_MB.q, camera, seen), {{1, 2, 3, 0, 0, 0}, {p_M.x(), p_M.y(), p_M.z()}});
+  check_cost(ObservationCost(T_MB.q, camera, seen), {{1, 2, 3, 0, 0, 0}, {p_M.x(), p_M.y(), p_M.z()}});
 }
 
-TEST(SightCost, IsZeroWhereThePointWasSeenAndNothingBehindTheCamera) {
+TEST(ObservationCost, IsZeroWhereThePointWasSeenAndNothingBehindTheCamera) {
   PlaceFeature seen;
   seen.x = 0.25f, seen.y = -0.5f, seen.inverse_depth = 0.5f, seen.sigma_xy = 0.01f, seen.sigma_inverse_depth = 0.01f;
-  const SightCost cost(Quat::Identity(), {}, seen);
+  const ObservationCost cost(Quat::Identity(), {}, seen);
   const auto r = cost.residual({0, 0, 0, 0, 0, 0}, {0.5, -1, 2});
   ASSERT_TRUE(r);
   EXPECT_LT(r->norm(), 1e-9);

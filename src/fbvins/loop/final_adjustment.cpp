@@ -55,7 +55,7 @@ FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matc
   report.iterations += adjustment.solve(x, std::clamp(adjustment.drift_found(x), kLeastDrift, 1.0));
   report.keyframes = static_cast<int>(map.size());
   report.points = static_cast<int>(adjustment.points());
-  report.sights = static_cast<int>(adjustment.sights());
+  report.observations = static_cast<int>(adjustment.observations());
   report.initial_rms_px = adjustment.rms_px(adjustment.start());
   report.final_rms_px = adjustment.rms_px(x);
   report.before = adjustment.judged(adjustment.start());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The best map there is time for once the flight is over: all keyframes and all points that two of them have seen, moved
-// together until every sight fits, and the IMU's readings between keyframes where they are known (docs/derivations/loop.md,
+// together until every observation fits, and the IMU's readings between keyframes where they are known (docs/derivations/loop.md,
 // L16, L18, L19). Offline; one thread; the same map in gives the same map out.
 //
 //   FinalAdjustmentReport report = adjust_map(map, options.verification);

@@ -106,7 +106,7 @@ TEST(FinalAdjustment, TheReadingsLevelTheMap) {
   }
 }
 
-TEST(FinalAdjustment, AResultThatSightsHeldOutDenyIsRefusedAndTheMapStays) {
+TEST(FinalAdjustment, AResultThatHeldOutObservationsDenyIsRefusedAndTheMapStays) {
   Mapped m = mapped_with_readings(5, Quat::Identity(), true);  // of another moment of the flight
   const std::string before = serialise_map(m.map);
   const FinalAdjustmentReport report = adjust_map(m.map, {});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keyframe -> MapUpdate: recognises places, verifies them by sight and against the odometry's own uncertainty,
+// Keyframe -> MapUpdate: recognises places, verifies them by their images and against the odometry's own uncertainty,
 // corrects the map frame at once and the whole map now and then (docs/derivations/loop.md).
 // A plain synchronous stage; one instance is used by one thread at a time.
 //

@@ -102,7 +102,7 @@ std::size_t MavlinkDecoder::step(std::span<const std::uint8_t> bytes, std::vecto
     frames.push_back({head->from, head->sequence, message});
   });
   if (good) return ++counts_.frames, head->frame_size;
-  // A frame whose checksum cannot be judged is believed where another follows it, or nothing yet.
+  // A frame whose checksum cannot be judged is accepted where another follows it, or nothing yet.
   if (!known && (bytes.size() == head->frame_size || begins_frame(bytes[head->frame_size])))
     return ++counts_.skipped, head->frame_size;
   if (known) ++counts_.bad_checksum;

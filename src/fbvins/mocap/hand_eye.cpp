@@ -26,7 +26,7 @@ constexpr double kBlock_s = 6;  // stretches of flight that are asked whether th
 constexpr double kWorstRotation_rad = 0.3 * std::numbers::pi / 180, kWorstLever_m = 0.01, kWorstClock_s = 2e-3;
 // Weak knowledge that keeps directions which the motion does not show in place: 10 m, a turn, 10 s.
 constexpr double kLoosePosition = 1e-2, kLooseRotation = 0.1, kLooseClock = 1e-2;
-// What stereo odometry is believed of itself: a scale to 1 %, and of its drift in heading any share in the path.
+// What is assumed of stereo odometry: a scale to 1 %, and of its drift in heading any share in the path.
 constexpr double kScaleInformation = 1e4, kBendInformation = 1;
 
 // Places of the unknowns.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras and a flight controller that are made up here, in wall time.
+// Cameras and a flight controller that are simulated here, in wall time.
 #include "fbvins/v4l2/v4l2_source.hpp"
 
 #include <arpa/inet.h>

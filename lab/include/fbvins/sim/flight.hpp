@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Made-up flights: hover, waypoints within a quadrotor's limits, aggressive, hand-held, take-off, tour.
+// Synthetic flights: hover, waypoints within a quadrotor's limits, aggressive, hand-held, take-off, tour.
 // The world has z up and the floor at z = 0; V is the vehicle: x forward, y left, z up.
 // Pure functions, any thread; the same options and seed give the same bits.
 //
