@@ -27,6 +27,7 @@ from losses import contrastive, fast_ap_and_boost, hamming  # noqa: E402
 from model import SIZES, Booster, geometry_of, hard_bits  # noqa: E402
 from weights import round_weights, save_weights  # noqa: E402
 
+FEWEST_KEYPOINTS = 20  # of a view that is trained on
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
 
 
@@ -188,7 +189,9 @@ def train(a):
     files = [open_pairs(p) for p in pairs]
     held = open_pairs(held)[:a.evaluate_pairs] if held else None
     where = np.concatenate([[(f, i) for i in range(len(m))] for f, m in enumerate(files)])
-    chance = np.concatenate([np.asarray(a.share, float)[m["condition"]] for m in files])
+    # a view of a bare wall teaches nothing, and one without keypoints has no summary to share
+    seen = np.concatenate([np.minimum(m["a"]["count"], m["b"]["count"]) >= FEWEST_KEYPOINTS for m in files])
+    chance = np.concatenate([np.asarray(a.share, float)[m["condition"]] for m in files]) * seen
     chance /= chance.sum()
 
     size = SIZES[a.size]
@@ -251,7 +254,8 @@ def train(a):
             sys.exit(f"the loss of step {step} is {float(loss)}: lower --rate or look at the pairs")
         optimiser.zero_grad()
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+        if not torch.isfinite(torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)):
+            sys.exit(f"the gradient of step {step} is not a number: lower --rate or look at the pairs")
         optimiser.step()
         recent.append(float(loss))
         step += 1

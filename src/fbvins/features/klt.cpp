@@ -38,16 +38,21 @@ struct Place {
   float fx, fy;
 };
 
+/// Of numbers that an int can hold: the baseline of x86-64 has no instruction for std::floor.
+int floor_of(double x) {
+  const int truncated = static_cast<int>(x);
+  return truncated - (x < truncated ? 1 : 0);
+}
+
 /// False when the patch (with `margin` samples around) would leave the padded level.
 bool place_patch(const PyramidLevel& level, double x, double y, int margin, Place& place) {
   const double left = x - 0.5 * (kP - 1), top = y - 0.5 * (kP - 1);
-  const int lowest = -kPyramidBorder + margin;
-  if (!(left >= lowest && top >= lowest)) return false;
-  const double fl = std::floor(left), ft = std::floor(top);
-  if (left + kP + margin + 1 > level.width + kPyramidBorder || top + kP + margin + 1 > level.height + kPyramidBorder)
-    return false;
-  place = {level.row(static_cast<int>(ft)) + static_cast<std::ptrdiff_t>(fl), level.stride, static_cast<float>(left - fl),
-           static_cast<float>(top - ft)};
+  const int lowest = -kPyramidBorder + margin, reach = kP + margin + 1;
+  const bool inside = left >= lowest && top >= lowest && left + reach <= level.width + kPyramidBorder &&
+                      top + reach <= level.height + kPyramidBorder;
+  if (!inside) return false;
+  const int fl = floor_of(left), ft = floor_of(top);
+  place = {level.row(ft) + fl, level.stride, static_cast<float>(left - fl), static_cast<float>(top - ft)};
   return true;
 }
 
@@ -58,33 +63,54 @@ FBVINS_INLINE void blend_row(const std::uint8_t* p, float fx, F16& out) {
   out = a + (b - a) * fx;
 }
 
-struct PatchSums {
-  float gx, gy, t, one, square;
+/// Projections of an image patch onto a template's gradients and grey values.
+struct Projections {
+  float gx, gy, t;
 };
 
-/// Projections of the image patch onto the template's rows, and its own first two moments.
+/// What a correlation is made of: the projection onto the grey values, and the patch's own first two moments.
+struct PatchMoments {
+  float t, one, square;
+};
+
 FBVINS_KERNEL
 void project_patch(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wgx, const float* wgy,
-                   const float* wt, const float* w, PatchSums& sums) {
-  F16 sgx = {}, sgy = {}, st = {}, s1 = {}, s2 = {}, upper, lower;
+                   const float* wt, Projections& out) {
+  F16 sgx = {}, sgy = {}, st = {}, upper, lower;
   blend_row(p, fx, upper);
   for (int y = 0; y < kP; ++y) {
     blend_row(p + (y + 1) * stride, fx, lower);
     const F16 value = upper + (lower - upper) * fy;
     upper = lower;
-    F16 a, b, c, d;
+    F16 a, b, c;
     load_lanes(wgx + y * kP, a);
     load_lanes(wgy + y * kP, b);
     load_lanes(wt + y * kP, c);
-    load_lanes(w + y * kP, d);
     sgx += a * value;
     sgy += b * value;
+    st += c * value;
+  }
+  out = {sum_lanes(sgx), sum_lanes(sgy), sum_lanes(st)};
+}
+
+FBVINS_KERNEL
+void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wt, const float* w,
+                   PatchMoments& out) {
+  F16 st = {}, s1 = {}, s2 = {}, upper, lower;
+  blend_row(p, fx, upper);
+  for (int y = 0; y < kP; ++y) {
+    blend_row(p + (y + 1) * stride, fx, lower);
+    const F16 value = upper + (lower - upper) * fy;
+    upper = lower;
+    F16 c, d;
+    load_lanes(wt + y * kP, c);
+    load_lanes(w + y * kP, d);
     st += c * value;
     const F16 weighted = d * value;
     s1 += weighted;
     s2 += weighted * value;
   }
-  sums = {sum_lanes(sgx), sum_lanes(sgy), sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
+  out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
 }
 
 struct TemplateMoments {
@@ -111,18 +137,30 @@ void sample_grid(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float f
   }
 }
 
-/// Bilinear samples of a block along a linear map: sample (x, y) lies at (u0 + x ux + y uy, v0 + x vx + y vy).
+/// Bilinear samples of a block along a linear map: sample (x, y) lies at (u0 + x ux + y uy, v0 + x vx + y vy). Places and
+/// weights of a row are computed as lanes, its pixels fetched one by one.
+FBVINS_KERNEL
 void sample_warped(const std::uint8_t* block, int side, float u0, float v0, float ux, float uy, float vx, float vy, float* grid) {
+  constexpr int kRow = (kGrid + kLanes - 1) / kLanes * kLanes;
+  float fu[kRow], fv[kRow];
+  std::int32_t at[kRow], p00[kRow], p01[kRow], p10[kRow], p11[kRow];
   for (int y = 0; y < kGrid; ++y) {
-    for (int x = 0; x < kGrid; ++x) {
+    for (int x = 0; x < kRow; ++x) {
       const float u = u0 + static_cast<float>(x) * ux + static_cast<float>(y) * uy;
       const float v = v0 + static_cast<float>(x) * vx + static_cast<float>(y) * vy;
-      const int iu = static_cast<int>(u), iv = static_cast<int>(v);
-      const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
-      const std::uint8_t* p = block + iv * side + iu;
-      const float top = p[0] + static_cast<float>(p[1] - p[0]) * fu;
-      const float bottom = p[side] + static_cast<float>(p[side + 1] - p[side]) * fu;
-      grid[y * kGridStride + x] = top + (bottom - top) * fv;
+      const auto iu = static_cast<std::int32_t>(u), iv = static_cast<std::int32_t>(v);
+      fu[x] = u - static_cast<float>(iu);
+      fv[x] = v - static_cast<float>(iv);
+      at[x] = iv * side + iu;
+    }
+    for (int x = 0; x < kGrid; ++x) {
+      const std::uint8_t* p = block + at[x];
+      p00[x] = p[0], p01[x] = p[1], p10[x] = p[side], p11[x] = p[side + 1];
+    }
+    for (int x = 0; x < kGrid; ++x) {
+      const float top = static_cast<float>(p00[x]) + static_cast<float>(p01[x] - p00[x]) * fu[x];
+      const float bottom = static_cast<float>(p10[x]) + static_cast<float>(p11[x] - p10[x]) * fu[x];
+      grid[y * kGridStride + x] = top + (bottom - top) * fv[x];
     }
   }
 }
@@ -207,7 +245,7 @@ bool finish_template(const float* grid, KltLevelTemplate& out) {
 
 struct LevelFit {
   Vec2 px;
-  PatchSums sums{};
+  Place compared{};  ///< where the template was last laid over the image: a step before px
   float gain = 1;
   int iterations = 0;
   KltStatus status = KltStatus::ok;
@@ -232,16 +270,17 @@ constexpr double kMaxTravel_px = 10;
 void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, double convergence_px, LevelFit& fit) {
   const Vec2 start = fit.px;
   for (int i = 0; i < kMaxIterations; ++i) {
-    Place place;
-    if (!place_patch(image, fit.px.x(), fit.px.y(), 0, place)) {
+    if (!place_patch(image, fit.px.x(), fit.px.y(), 0, fit.compared)) {
       fit.status = KltStatus::outside;
       return;
     }
-    project_patch(place.p, place.stride, place.fx, place.fy, patch.wgx, patch.wgy, patch.wt, kWindow.w, fit.sums);
+    Projections sums;
+    const Place& place = fit.compared;
+    project_patch(place.p, place.stride, place.fx, place.fy, patch.wgx, patch.wgy, patch.wt, sums);
     ++fit.iterations;
-    const float asx = patch.ihxx * fit.sums.gx + patch.ihxy * fit.sums.gy;
-    const float asy = patch.ihxy * fit.sums.gx + patch.ihyy * fit.sums.gy;
-    fit.gain = fit.sums.t / patch.energy - patch.ctx * asx - patch.cty * asy;
+    const float asx = patch.ihxx * sums.gx + patch.ihxy * sums.gy;
+    const float asy = patch.ihxy * sums.gx + patch.ihyy * sums.gy;
+    fit.gain = sums.t / patch.energy - patch.ctx * asx - patch.cty * asy;
     if (!(fit.gain * kMaxGain > 1 && fit.gain < kMaxGain)) {
       fit.status = KltStatus::diverged;
       return;
@@ -258,10 +297,16 @@ void align_level(const KltLevelTemplate& patch, const PyramidLevel& image, doubl
   }
 }
 
-float correlation_of(const PatchSums& sums, float energy) {
-  const float variance = sums.square - sums.one * sums.one;
-  if (!(variance > 1e-3f)) return 0;
-  return sums.t / std::sqrt(variance * energy);
+struct Likeness {
+  float correlation, variance;  ///< with the template; of the image patch
+};
+
+Likeness likeness_at(const Place& place, const KltLevelTemplate& patch) {
+  PatchMoments m;
+  patch_moments(place.p, place.stride, place.fx, place.fy, patch.wt, kWindow.w, m);
+  const float variance = m.square - m.one * m.one;
+  if (!(variance > 1e-3f)) return {0, std::max(0.0f, variance)};
+  return {m.t / std::sqrt(variance * patch.energy), variance};
 }
 
 }  // namespace
@@ -341,11 +386,10 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
     result.status = KltStatus::outside;
     return result;
   }
-  const float energy = patch.levels[static_cast<std::size_t>(finest)].energy;
-  result.correlation = correlation_of(fit.sums, energy);
+  const Likeness likeness = likeness_at(fit.compared, patch.levels[static_cast<std::size_t>(finest)]);
+  result.correlation = likeness.correlation;
   result.gain = fit.gain;
-  const float variance = std::max(0.0f, fit.sums.square - fit.sums.one * fit.sums.one);
-  result.residual = std::sqrt(std::max(0.0f, variance * (1 - result.correlation * result.correlation)));
+  result.residual = std::sqrt(std::max(0.0f, likeness.variance * (1 - result.correlation * result.correlation)));
   if (result.correlation < kMinCorrelation && !(result.correlation > kSomeCorrelation && result.residual < kMaxResidualNoise))
     result.status = KltStatus::poor_match;
   return result;
@@ -354,9 +398,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
 float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px) {
   Place place;
   if (!patch.valid || !place_patch(level, px.x(), px.y(), 0, place)) return -1;
-  PatchSums sums;
-  project_patch(place.p, place.stride, place.fx, place.fy, patch.wgx, patch.wgy, patch.wt, kWindow.w, sums);
-  return correlation_of(sums, patch.energy);
+  return likeness_at(place, patch).correlation;
 }
 
 }  // namespace fbvins

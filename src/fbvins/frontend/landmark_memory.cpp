@@ -16,15 +16,27 @@ constexpr double kNearest_m = 0.1;
 
 }  // namespace
 
-void LandmarkMemory::clear() { landmarks_.clear(); }
+void LandmarkMemory::clear() {
+  landmarks_.clear();
+  oldest_first_.clear();
+  waiting_.clear();
+}
 
 void LandmarkMemory::keep(RememberedLandmark landmark) {
   if (capacity_ == 0) return;
-  const TrackId track = landmark.track;
-  landmarks_.insert_or_assign(track, std::move(landmark));
-  if (static_cast<int>(landmarks_.size()) <= capacity_) return;
-  landmarks_.erase(std::min_element(landmarks_.begin(), landmarks_.end(),
-                                    [](const auto& a, const auto& b) { return a.second.kept < b.second.kept; }));
+  const Kept kept{landmark.kept, landmark.track};
+  take_out(landmark.track);
+  oldest_first_.insert(kept);
+  if (!landmark.p_W) waiting_.push_back(kept);
+  landmarks_.emplace(kept.second, std::move(landmark));
+  if (static_cast<int>(landmarks_.size()) > capacity_) take_out(oldest_first_.begin()->second);
+}
+
+void LandmarkMemory::take_out(TrackId track) {
+  const auto it = landmarks_.find(track);
+  if (it == landmarks_.end()) return;
+  oldest_first_.erase({it->second.kept, track});
+  landmarks_.erase(it);
 }
 
 void LandmarkMemory::locate(TrackId track, const Vec3& p_W) {
@@ -33,8 +45,12 @@ void LandmarkMemory::locate(TrackId track, const Vec3& p_W) {
 }
 
 void LandmarkMemory::forget_unlocated(Time now) {
-  std::erase_if(landmarks_,
-                [&](const auto& entry) { return !entry.second.p_W && (now - entry.second.kept).seconds() > kWaitForPosition_s; });
+  while (!waiting_.empty() && (now - waiting_.front().first).seconds() > kWaitForPosition_s) {
+    const auto [kept, track] = waiting_.front();
+    waiting_.pop_front();
+    const auto it = landmarks_.find(track);
+    if (it != landmarks_.end() && it->second.kept == kept && !it->second.p_W) take_out(track);
+  }
 }
 
 void LandmarkMemory::expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const {

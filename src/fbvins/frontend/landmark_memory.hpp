@@ -11,8 +11,11 @@
 //   memory.take_out(track);                           // found: it is a track again
 #pragma once
 
+#include <deque>
 #include <map>
 #include <optional>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
@@ -60,7 +63,7 @@ class LandmarkMemory {
   /// Located landmarks that a left camera at T_WC sees from about where they were seen from before. `levels`: of the
   /// scale pyramid that keypoints come from.
   void expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const;
-  void take_out(TrackId track) { landmarks_.erase(track); }
+  void take_out(TrackId track);
   /// Landmarks that the estimator has not located long after it must have let go of them.
   void forget_unlocated(Time now);
 
@@ -68,8 +71,12 @@ class LandmarkMemory {
   std::size_t size() const { return landmarks_.size(); }
 
  private:
+  using Kept = std::pair<Time, TrackId>;
+
   int capacity_;
   std::map<TrackId, RememberedLandmark> landmarks_;  // in order, so that the same ones are found in the same order everywhere
+  std::set<Kept> oldest_first_;                      // all of them
+  std::deque<Kept> waiting_;                         // those without a position when kept, oldest first
 };
 
 }  // namespace fbvins
