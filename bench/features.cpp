@@ -32,7 +32,7 @@ namespace {
 struct Arguments {
   std::vector<std::string> photos;
   std::string keyframes;
-  std::vector<std::string> weights = {"boost-s", "boost-b"};
+  std::vector<std::string> weights = {"boost-s"};
   int every = 1, features = 500, seed = 4242;
   bool time = false;
 };

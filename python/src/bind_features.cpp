@@ -116,7 +116,7 @@ void bind_features(nb::module_& m) {
 
   nb::class_<Booster>(m, "Booster", "The network that improves descriptors (paper 2.2.2), loaded once. Any thread may call.")
       .def(nb::init<const std::string&, bool>(), "weights"_a = "boost-s", "exact"_a = false,
-           "weights: 'boost-s', 'boost-b' or a .safetensors file. exact: single precision instead of whole numbers.")
+           "weights: 'boost-s', which ships, or a .safetensors file. exact: single precision instead of whole numbers.")
       .def("__call__", &Booster::boost, "descriptors"_a, "keypoints"_a, "width"_a, "height"_a, "uint8 (N, 32).")
       .def_prop_ro("takes_margins", &Booster::takes_margins, "descriptors are Features.margins; False: Features.descriptors");
 }

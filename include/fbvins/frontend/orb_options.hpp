@@ -21,7 +21,7 @@ struct OrbFrontendOptions {
   bool follows_patches() const { return subpixel && fill_in && !examine_all; }
 
   int max_features = 180;
-  int max_keypoints = 500;
+  int max_keypoints = 400;
   double min_distance_px = 14;
   double memory_s = 1.0;
   double search_px = 12;

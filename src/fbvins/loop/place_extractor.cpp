@@ -10,13 +10,14 @@ namespace {
 
 constexpr int kLevels = 6;       // of the scale pyramid
 constexpr int kSearchLevel = 2;  // of the image pyramid, for the search along the epipolar curve
+constexpr int kAlignLevel = 1;   // coarsest of the alignment that follows it
 /// Nearest point searched for in the right image.
 constexpr double kMinDepth_m = 0.4;
 constexpr double kMinSearchCorrelation = 0.7;
 /// The curve is nearly straight on the search level: it is projected at the ends of so many pieces.
 constexpr int kPieces = 6;
 /// Of the search level: the patch is 16 wide, so a peak is a few steps wide.
-constexpr double kStep_px = 1.4;
+constexpr double kStep_px = 2.0;
 constexpr int kMaxStepsOfAPiece = 64;
 /// Largest distance from the epipolar curve after refinement.
 constexpr double kEpipolar_px = 1.0;
@@ -99,10 +100,11 @@ std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
 }
 
 std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px, const Vec2& left_normalised) {
-  if (!patch_.cut(left_, left_px, 0, std::min(kSearchLevel, left_.levels() - 1))) return std::nullopt;
+  const int search_level = std::min(kSearchLevel, left_.levels() - 1);
+  if (!patch_.cut(left_, left_px, search_level, search_level)) return std::nullopt;
   const auto start = search(left_normalised);
-  if (!start) return std::nullopt;
-  const KltResult found = klt_align(patch_, right_, *start, 1, 0);
+  if (!start || !patch_.cut(left_, left_px, 0, kAlignLevel)) return std::nullopt;
+  const KltResult found = klt_align(patch_, right_, *start, kAlignLevel, 0);
   if (!found.ok() || !rig_.right.inside(found.px, 2)) return std::nullopt;
   const auto right = rig_.right.undistort(found.px);
   if (!right) return std::nullopt;
