@@ -113,7 +113,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn("estimator.max_iterations = ", text)
         self.assertNotIn("estimator.keyframes.leaving", text)
         self.assertIn("estimator.keyframes.leaving = oldest   oldest|entropy", everything)
-        self.assertIn("frontend.kind = klt   klt|orb", text)
+        self.assertIn("frontend.kind = boost   klt|orb", text)
         self.assertNotIn("\033", text)
 
     def test_loop_closure(self):

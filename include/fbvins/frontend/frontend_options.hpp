@@ -19,8 +19,10 @@
 
 namespace fbvins {
 
-/// All there are; the first is the default.
+/// All there are, the cheapest first.
 std::vector<std::string> frontend_names();
+/// The one that runs where none is named.
+std::string default_frontend();
 /// The same as the choices of an option: "klt|orb|boost".
 const std::string& frontend_choices();
 /// One line about all of them, for the option.
@@ -37,7 +39,7 @@ struct BoostFrontendOptions {
 };
 
 struct FrontendOptions {
-  std::string kind = frontend_names().front();
+  std::string kind = default_frontend();
   KltFrontendOptions klt;
   OrbFrontendOptions orb;
   BoostFrontendOptions boost;

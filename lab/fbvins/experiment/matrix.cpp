@@ -119,7 +119,7 @@ Result<Matrix> parse_matrix(const std::string& text, const std::string& source) 
     if (std::find(known.begin(), known.end(), name) == known.end())
       yaml.complain(yaml.get(root, "frontends"),
                     fmt::format("there is no frontend '{}'; there are {}", name, fmt::join(known, ", ")));
-  if (matrix.frontends.empty()) matrix.frontends.push_back(known.front());
+  if (matrix.frontends.empty()) matrix.frontends.push_back(default_frontend());
   matrix.repetitions = static_cast<int>(yaml.number_between(root, "repetitions", 1, 1000, 1));
   const YAML::Node datasets = yaml.get(root, "datasets"), configurations = yaml.get(root, "configurations");
   if (!datasets.IsDefined() || !datasets.IsSequence() || datasets.size() == 0) yaml.complain(root, "a list 'datasets' is needed");

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <iterator>
 #include <string_view>
 
 #include "fbvins/features/booster.hpp"
@@ -34,7 +35,7 @@ struct Registration {
   Made (*make)(const StereoRig&, const FrontendOptions&);
 };
 
-/// The one place that knows all frontends. The first is the default.
+/// The one place that knows all frontends. The last is the default.
 constexpr Registration kFrontends[] = {
     {"klt", "corners followed by Lucas-Kanade", make_klt},
     {"orb", "descriptors matched from image to image", make_orb},
@@ -48,6 +49,8 @@ std::vector<std::string> frontend_names() {
   for (const Registration& r : kFrontends) names.emplace_back(r.name);
   return names;
 }
+
+std::string default_frontend() { return std::string(std::end(kFrontends)[-1].name); }
 
 const std::string& frontend_choices() {
   static const std::string choices = fmt::format("{}", fmt::join(frontend_names(), "|"));
