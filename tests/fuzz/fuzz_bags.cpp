@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/foreign_calibration.hpp"
@@ -142,16 +142,29 @@ std::vector<std::string> sqlite_bag_seeds() {
         run(fmt::format("INSERT INTO messages(topic_id, timestamp, data) VALUES ({}, {}, x'{}')", topic, 1000 * i, hex));
       }
     sqlite3_close(database);
+    auto bag = open_sqlite_bag({path}, false);
+    require(bag.ok() && read_contents(**bag).images.size() == 2);
     out.push_back(*read_file(path, 1u << 20u));
   }
   return out;
 }
 
-/// The library wants a file: one in memory.
+/// The library wants a file with a name.
+class NamedFile {
+ public:
+  ~NamedFile() { std::filesystem::remove(path_); }
+  const std::string& with(std::string_view bytes) const {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
+    return path_;
+  }
+
+ private:
+  std::string path_ = (std::filesystem::temp_directory_path() / fmt::format("fbvins_fuzz_{}.db3", ::getpid())).string();
+};
+
 void fuzz_sqlite_bag(std::string_view bytes) {
-  static const int file = ::memfd_create("bag.db3", 0);
-  static const std::string path = fmt::format("/proc/self/fd/{}", file);
-  require(::ftruncate(file, 0) == 0 && ::pwrite(file, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
+  static const NamedFile file;
+  const std::string& path = file.with(bytes);
   for (const bool part : {false, true}) {
     auto bag = open_sqlite_bag({path}, part);
     require_sentence(bag);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
@@ -42,7 +43,7 @@ void take_camera(const BagMessage& message, const BagTopic& about, BagContents& 
   if (out.cameras.contains(about.name)) return;
   Result<BagCamera> camera = camera_of(message.data, about.encoding);
   if (camera) out.cameras.emplace(about.name, *std::move(camera));
-  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", about.name, camera.error().message);
+  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", quoted(about.name), camera.error().message);
 }
 
 template <class Map>
@@ -56,8 +57,8 @@ std::vector<std::string> names(const Map& map) {
 template <class Map>
 Result<std::string> named_topic(const Map& map, const std::string& name, const char* what) {
   if (map.contains(name)) return name;
-  return Error{ErrorCode::not_found,
-               fmt::format("there is no {} on '{}'; there are {}", what, name, fmt::join(names(map), ", "))};
+  return Error{ErrorCode::not_found, fmt::format("there is no {} on '{}'; there are {}", what, name,
+                                                 printable(fmt::format("{}", fmt::join(names(map), ", "))))};
 }
 
 /// Two names that differ in these words only.
@@ -82,15 +83,16 @@ Result<std::pair<std::string, std::string>> find_images(const BagContents& conte
   if (all.size() < 2) return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics, not on two", all.size())};
   if (auto pair = pair_by_words(all)) return *pair;
   if (all.size() == 2) return std::pair(all[0], all[1]);
-  return Error{ErrorCode::unsupported,
-               fmt::format("has {} image topics ({}): say which are left and right", all.size(), fmt::join(all, ", "))};
+  return Error{ErrorCode::unsupported, fmt::format("has {} image topics ({}): say which are left and right", all.size(),
+                                                   printable(fmt::format("{}", fmt::join(all, ", "))))};
 }
 
 Result<std::string> find_imu(const BagContents& contents) {
   const std::vector<std::string> all = names(contents.imu);
   if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
   if (all.size() == 1) return all.front();
-  return Error{ErrorCode::unsupported, fmt::format("has {} IMU topics ({}): say which it is", all.size(), fmt::join(all, ", "))};
+  return Error{ErrorCode::unsupported, fmt::format("has {} IMU topics ({}): say which it is", all.size(),
+                                                   printable(fmt::format("{}", fmt::join(all, ", "))))};
 }
 
 /// The camera_info that belongs to an image topic: beside it or below it.
@@ -174,7 +176,7 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopi
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
   const BagCamera *left = camera_for(contents, topics.left), *right = camera_for(contents, topics.right);
   const auto missing = [&](const std::string& what) {
-    return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with it", what)};
+    return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with it", printable(what))};
   };
   if ((!left || !right) && !contents.camera_problem.empty()) return missing(contents.camera_problem);
   if (!left || !right) return missing(fmt::format("no camera_info for {}", left ? topics.right : topics.left));

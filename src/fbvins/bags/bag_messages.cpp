@@ -8,6 +8,7 @@
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
@@ -89,7 +90,7 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
     return BagCamera{Camera(*lens, static_cast<int>(width), static_cast<int>(height)), frame};
   return Error{ErrorCode::unsupported,
                fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob and equidistant with four are known",
-                           model.substr(0, 40), d.size())};
+                           quoted(model), d.size())};
 }
 
 std::vector<BagTransform> transforms_of(std::string_view bytes, Encoding encoding) {

@@ -10,6 +10,7 @@
 
 #include "fbvins/bags/bag_messages.hpp"
 #include "fbvins/bags/bag_reader.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
@@ -26,7 +27,7 @@ Result<std::string> choose(const std::map<std::string, Trajectory<W>>& topics, c
   if (named.empty() && topics.size() == 1) return topics.begin()->first;
   if (named.empty() && topics.contains(kTruthTopic)) return std::string(kTruthTopic);
   std::vector<std::string> names;
-  for (const auto& [name, poses] : topics) names.push_back(name);
+  for (const auto& [name, poses] : topics) names.push_back(printable(name));
   if (names.empty()) return Error{ErrorCode::not_found, "holds no poses (PoseStamped, TransformStamped or Odometry)"};
   return Error{ErrorCode::not_found,
                named.empty() ? fmt::format("has poses on {}: say which with --topic", fmt::join(names, ", "))

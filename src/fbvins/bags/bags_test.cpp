@@ -136,6 +136,12 @@ TEST_F(Bags, TopicsThatCannotBeFoundAreListed) {
   EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
 }
 
+TEST(BagContents, NamesOfTopicsDoNotBreakASentence) {
+  BagContents contents;
+  contents.images["/a\n"], contents.images["/b"], contents.images["/c"];
+  EXPECT_EQ(choose_topics(contents, {}, true).error().message, "has 3 image topics (/a?, /b, /c): say which are left and right");
+}
+
 std::string grey_of(std::string_view encoding, std::uint32_t width, std::uint32_t step, std::string_view pixels,
                     bool big_endian = false) {
   const auto image = grey_image({width, static_cast<std::uint32_t>(pixels.size() / step), step, encoding, big_endian, pixels});
@@ -164,6 +170,7 @@ TEST(GreyImage, EveryEncodingBecomesBrightness) {
   EXPECT_EQ(grey_of("rgba8", 1, 4, "aaaZ"), "a");
   EXPECT_EQ(grey_of("yuv422", 2, 4, "uavb"), "ab");
   EXPECT_EQ(grey_of("jpeg2000", 1, 1, "a"), "images encoded as 'jpeg2000' cannot be read");
+  EXPECT_EQ(grey_of("a\nb", 1, 1, "a"), "images encoded as 'a?b' cannot be read");  // one sentence on one line
   EXPECT_EQ(grey_of("mono8", 3, 2, "abcd"), "this image holds fewer pixels than it says");
 }
 

@@ -52,8 +52,11 @@ void fill(Writer& writer, int readings) {
       const auto left = image(rng), right = image(rng);
       ASSERT_TRUE(writer.add(StereoFrame{t, left, right}));
     }
-    if constexpr (requires { writer.flush(); })  // ends a chunk
-      if (i % 100 == 99) ASSERT_TRUE(writer.flush());
+    if constexpr (requires { writer.flush(); }) {  // ends a chunk
+      if (i % 100 == 99) {
+        ASSERT_TRUE(writer.flush());
+      }
+    }
   }
   ASSERT_TRUE(writer.finish());
 }

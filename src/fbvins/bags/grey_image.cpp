@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
@@ -71,7 +72,7 @@ Result<Image> grey_image(const RawImage& raw) {
   const auto* format =
       std::find_if(std::begin(kFormats), std::end(kFormats), [&](const Format& f) { return f.name == raw.encoding; });
   if (format == std::end(kFormats))
-    return Error{ErrorCode::unsupported, fmt::format("images encoded as '{}' cannot be read", raw.encoding.substr(0, 40))};
+    return Error{ErrorCode::unsupported, fmt::format("images encoded as '{}' cannot be read", quoted(raw.encoding))};
   if (raw.width < 1 || raw.height < 1 || raw.width > kLargestImageSide_px || raw.height > kLargestImageSide_px)
     return Error{ErrorCode::unsupported, fmt::format("an image of {} x {} pixels", raw.width, raw.height)};
   const std::uint64_t row_bytes = std::uint64_t{raw.width} * static_cast<std::uint64_t>(format->bytes_per_pixel);

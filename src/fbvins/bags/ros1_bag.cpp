@@ -9,6 +9,7 @@
 #include "fbvins/bags/bag_reader.hpp"
 #include "fbvins/bags/decompress.hpp"
 #include "fbvins/io/byte_source.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
@@ -168,7 +169,7 @@ class Ros1Bag final : public BagReader {
     const std::string compression = head.fields.text("compression");
     std::optional<Chunk> chunk = chunk_at(at);
     if (!chunk || (chunk->records.empty() && !chunk->whole && head.whole))
-      return complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", compression.substr(0, 20)));
+      return complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", quoted(compression)));
     if (!chunk->whole && head.whole) complain_at(at, "this chunk is damaged and is read up to its last complete record");
     loaded_ = std::move(chunk->records);
     loaded_at_ = at;

@@ -5,19 +5,13 @@
 
 #include <algorithm>
 
+#include "fbvins/io/quoted.hpp"
+
 namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargestChunk_bytes = std::uint64_t{256} << 20u;
 constexpr std::uint64_t kLargestAttachment_bytes = std::uint64_t{4} << 20u;  // larger ones are not ours to read
-
-/// Other people's text in a sentence: short and printable.
-std::string quoted(std::string_view text) {
-  std::string out(text.substr(0, 40));
-  std::replace_if(
-      out.begin(), out.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return out;
-}
 
 }  // namespace
 

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to io: other people's text inside of a sentence of ours.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+namespace fbvins {
+
+/// Printable, on one line.
+inline std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
+/// The same, and short.
+inline std::string quoted(std::string_view text) { return printable(std::string(text.substr(0, 40))); }
+
+}  // namespace fbvins
