@@ -23,7 +23,7 @@ TransformStamped or Odometry; ESTIMATE may be one, too. The stamps of both are m
 the nearest, at most --max-diff apart.
 
 examples:
-  fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
+  fbvins eval MH_01_easy out/MH_01_easy-boost/trajectory_tum.txt
   fbvins eval groundtruth.csv estimate.txt --align sim3 --json
   fbvins eval groundtruth.csv estimate.txt --align yaw --interpolate
   fbvins eval flight.bag estimate.txt --topic /vicon/quad/pose

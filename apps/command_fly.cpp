@@ -28,7 +28,7 @@ the truth is only written down (docs/flight.md). The same arguments give the sam
 Writes what `fbvins run` writes, and flight.csv, flight.json, truth, estimate and setpoint as trajectories.
 
 examples:
-  fbvins fly configs/missions/paper.yaml                         the paper's flight, frontend klt
+  fbvins fly configs/missions/paper.yaml                         the paper's flight
   fbvins fly configs/missions/paper.yaml --frontend orb --preset dim --seed 3
   fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains

@@ -15,10 +15,10 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples = R"(examples:
-  fbvins run MH_01_easy                         estimate a flight, write out/MH_01_easy-klt
+  fbvins run MH_01_easy                         estimate a flight, write out/MH_01_easy-boost
   fbvins run MH_01_easy.zip --frontend orb      the other frontend, straight from the zip
   fbvins live --source replay:MH_01_easy        the same flight in wall time, poses at IMU rate
-  fbvins eval MH_01_easy out/MH_01_easy-klt/trajectory_tum.txt
+  fbvins eval MH_01_easy out/MH_01_easy-boost/trajectory_tum.txt
   fbvins report out/MH_01_easy-*                both in one page: report.html
   fbvins info MH_01_easy                        what is in a recording
   fbvins doctor MH_01_easy                      what is wrong with its setup

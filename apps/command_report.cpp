@@ -18,8 +18,8 @@ constexpr const char* kExamples =
     R"(RUN is a folder that `fbvins run` wrote. The page needs nothing but itself: open it from disk, send it, print it.
 
 examples:
-  fbvins report out/MH_01_easy-klt out/MH_01_easy-orb -o report.html      both, one over the other
-  fbvins report out/flight-klt --truth groundtruth.csv                    where the run knew no truth
+  fbvins report out/MH_01_easy-boost out/MH_01_easy-klt -o report.html      both, one over the other
+  fbvins report out/flight-boost --truth groundtruth.csv                    where the run knew no truth
 )";
 
 struct Arguments {

@@ -20,8 +20,9 @@ namespace {
 /// An initial solution is made from so many images, at least so far apart.
 constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
-/// Stereo features needed in each of them.
-constexpr int kMinFeatures = 20;
+/// Stereo features needed in each of them. At rest position and speed are known without them: enough to follow will do, as the
+/// floor in front of a landed drone shows few.
+constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
 constexpr std::size_t kFramesPerRefinement = 3;
@@ -63,7 +64,8 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
                                                     const std::optional<Pose<W, B>>& origin) {
   // A break in images or readings makes what came before useless: frames must follow one another.
   const bool broken = !frames_.empty() && frame.imu.empty();
-  if (stereo_features(frame) < kMinFeatures || broken) {
+  const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
+  if (stereo_features(frame) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
     reason_ = HealthReason::too_few_features;
     reset();
     if (!broken) return std::nullopt;
@@ -71,7 +73,7 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   remember(frame);
   std::optional<InitialSolution> start;
   const ImuBiasBelief biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
-  if (rest.seconds() >= RestOptions{}.min_window_s) start = start_from_rest(biases);
+  if (at_rest) start = start_from_rest(biases);
   else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
   if (start) start->biases = biases;

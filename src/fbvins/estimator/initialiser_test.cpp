@@ -75,6 +75,28 @@ TEST(Initialiser, WaitsForFeaturesInBothCameras) {
   EXPECT_EQ(s.reason, HealthReason::too_few_features);
 }
 
+/// As many features with a right pixel as are left when the rest is taken away.
+TrackedFrame with_features(TrackedFrame frame, std::size_t most) {
+  std::erase_if(frame.features, [](const TrackedFeature& f) { return !f.right; });
+  frame.features.resize(std::min(most, frame.features.size()));
+  return frame;
+}
+
+TEST(Initialiser, FewFeaturesWillDoAtRestAndNotInMotion) {
+  for (const bool rests : {true, false}) {
+    SimulatedFlight flight(rests ? Motion(0, 0) : Motion(0.6, 0.3), 56);
+    Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
+    const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
+    bool started = false;
+    for (int k = 0; k < 40 && !started; ++k) {
+      const TrackedFrame frame = with_features(flight.frame(k), 12);
+      ASSERT_EQ(frame.features.size(), 12u);
+      started = initialiser.process(frame, Duration::from_seconds(rests ? 0.05 * k : 0), calibration, std::nullopt).has_value();
+    }
+    EXPECT_EQ(started, rests);
+  }
+}
+
 TEST(Initialiser, BeginsAnewAfterABreakInTheReadings) {
   SimulatedFlight flight(Motion(0.6, 0.3), 55);
   flight.readings = [](int k) { return k != 6; };
