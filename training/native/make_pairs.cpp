@@ -5,6 +5,7 @@
 //
 //   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG, warped
 //   booster_pairs --images DIR --part train ...                           the first four fifths of each folder
+//   booster_pairs --images DIR --only "low light and blur" ...            all pairs damaged in one way
 //   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        synthetic pictures, warped
 //   booster_pairs --rooms 100 --pairs 60 --seed 1 --out pairs.bin         two views of simulated rooms, true geometry
 #include <fmt/format.h>
@@ -61,7 +62,7 @@ void record(const OrbFeatures& features, const Image& image, ViewRecord& out) {
 
 struct Arguments {
   std::vector<std::string> folders;
-  std::string out;
+  std::string out, only;
   Part part = Part::all;
   int leaves = 0, rooms = 0, pairs = 10, seed = 1, features = 500, every = 1;
 };
@@ -114,10 +115,16 @@ Rng rng_of(const Arguments& arguments, int picture) {
   return Rng(static_cast<std::uint64_t>(arguments.seed), static_cast<std::uint64_t>(picture) + 1);
 }
 
-/// Pairs of one picture, the conditions in turn.
+/// The condition of a picture's k-th pair: all in turn, or the one asked for.
+Condition condition_of(const Arguments& arguments, int k) {
+  const auto only = std::find(kConditionNames.begin(), kConditionNames.end(), arguments.only);
+  return static_cast<Condition>(only == kConditionNames.end() ? k % static_cast<int>(kConditionNames.size())
+                                                              : static_cast<int>(only - kConditionNames.begin()));
+}
+
 void write_warped(const Arguments& arguments, const Image& picture, int index, Rng& rng, PairWriter& out) {
   for (int k = 0; k < arguments.pairs; ++k) {
-    const auto condition = static_cast<Condition>(k % static_cast<int>(kConditionNames.size()));
+    const Condition condition = condition_of(arguments, k);
     const WarpedPair views = make_warped_pair(picture.view(), condition, rng);
     out.write(index, condition, views.a, views.b, [&](const Vec2& px) { return std::optional<Vec2>(transfer(views.H_ba, px)); });
   }
@@ -184,6 +191,8 @@ int main(int argc, char** argv) {
   app.add_option("--leaves", arguments.leaves, "synthetic pictures");
   app.add_option("--rooms", arguments.rooms, "simulated rooms");
   app.add_option("--pairs", arguments.pairs, "pairs a picture, the conditions in turn, or a room");
+  app.add_option("--only", arguments.only, "pairs of pictures of this condition alone")
+      ->check(CLI::IsMember(std::vector<std::string>(fbvins::kConditionNames.begin(), fbvins::kConditionNames.end())));
   app.add_option("--every", arguments.every, "only every n-th file");
   app.add_option("--features", arguments.features, "features a view, up to 500");
   app.add_option("--seed", arguments.seed);

@@ -22,7 +22,7 @@ struct FastCorner {
 
 /// Working memory of detect_fast, reused from call to call.
 struct FastBuffers {
-  std::vector<std::uint8_t> rows;
+  std::vector<std::uint8_t> rows, limits;
 };
 
 /// Corners stronger than `floor` that are the strongest of their 3x3 neighbourhood, row by row, at least `border`
@@ -32,5 +32,17 @@ void detect_fast(const PyramidLevel& level, int border, int floor, FastBuffers& 
 /// strength[x] for `count` pixels of a row from `centre` on; writes up to the next multiple of 32.
 /// Strength: over all arcs of 9 of the 16 circle pixels, the largest smallest difference to the centre.
 void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t* strength);
+
+/// Pixels whose strengths are computed at a time.
+inline constexpr int kFastBlock = 32;
+
+/// The same, but 0 may stand for what is not above the limit of its block of kFastBlock pixels.
+void fast_strength_row_above(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
+                             std::uint8_t* strength);
+
+/// Strengths of a row that beat their 3x3 neighbourhood and their column's limit, 0 elsewhere; of equal ones the first in reading
+/// order stays.
+void keep_local_maxima(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int count,
+                       const std::uint8_t* limits, std::uint8_t* kept);
 
 }  // namespace fbvins

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/features/fast_cells.hpp"
 #include "fbvins/features/scale_pyramid.hpp"
 
 namespace fbvins {
@@ -84,6 +86,45 @@ TEST(Fast, DetectsLocalMaximaOfTheDefinition) {
     }
   EXPECT_GT(expected.size(), 20u);
   EXPECT_EQ(found, expected);
+}
+
+/// All corners, and of each cell the strongest of them.
+std::vector<FastCorner> strongest_of_cells(const PyramidLevel& level, int border, int floor) {
+  FastBuffers buffers;
+  std::vector<FastCorner> all, out;
+  detect_fast(level, border, floor, buffers, all);
+  const auto cell = [&](const FastCorner& c) { return std::pair(c.y / kFastCell_px, c.x / kFastCell_px); };
+  std::stable_sort(all.begin(), all.end(), [&](const FastCorner& a, const FastCorner& b) {
+    return cell(a) != cell(b) ? cell(a) < cell(b) : a.strength > b.strength;
+  });
+  for (std::size_t i = 0, rank = 0; i < all.size(); ++i) {
+    rank = i > 0 && cell(all[i]) == cell(all[i - 1]) ? rank + 1 : 0;
+    if (static_cast<int>(rank) < kFastPerCell) out.push_back(all[i]);
+  }
+  return out;
+}
+
+TEST(Fast, CellsKeepTheStrongestOfAllCorners) {
+  FastCells cells;
+  std::vector<FastCorner> found;
+  for (const std::uint64_t seed : {7, 8, 9})
+    for (const int range : {8, 40, 247})
+      for (const int border : {4, 12, 33}) {
+        Image image = random_image(seed, 201, 133, range);
+        Rng rng(seed);  // plain noise has corners everywhere, of all strengths
+        for (int y = 40; y < 133; ++y)
+          for (int x = 60; x < 150; ++x) image.at(x, y) = static_cast<std::uint8_t>(rng.below(256));
+        ScalePyramid pyramid;
+        pyramid.build(image.view(), 1, 1.2);
+        cells.detect(pyramid.level(0), border, 6, found);
+        const std::vector<FastCorner> expected = strongest_of_cells(pyramid.level(0), border, 6);
+        ASSERT_EQ(found.size(), expected.size());
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          ASSERT_EQ(found[i].x, expected[i].x) << i;
+          ASSERT_EQ(found[i].y, expected[i].y) << i;
+          ASSERT_EQ(found[i].strength, expected[i].strength) << i;
+        }
+      }
 }
 
 TEST(Fast, FlatAndTinyImagesHaveNone) {

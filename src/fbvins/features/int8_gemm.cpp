@@ -7,36 +7,48 @@
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/features/int8_kernels.hpp"
+#include "fbvins/features/lanes.hpp"
 
 namespace fbvins {
 namespace {
 
 /// Adding and taking away 1.5 * 2^23 rounds to the nearest whole number, in one instruction each.
 constexpr float kRounder = 12582912.0f;
+/// Of a block of sums.
+constexpr int kColumns = 16 * kInt8BlocksTogether;
 
-FBVINS_KERNEL
-float largest_magnitude(const float* x, int n) {
-  float lanes[16] = {};
+FBVINS_INLINE float largest_magnitude(const float* x, int n) {
+  F16 lanes{}, v;
   int i = 0;
-  for (; i + 16 <= n; i += 16)
-    for (int l = 0; l < 16; ++l) {
-      const float m = std::fabs(x[i + l]);
-      lanes[l] = m > lanes[l] ? m : lanes[l];
-    }
+  for (; i + kLanes <= n; i += kLanes) {
+    load_lanes(x + i, v);
+    v = v < 0.0f ? -v : v;
+    lanes = v > lanes ? v : lanes;
+  }
   float most = 0;
   for (; i < n; ++i) most = std::max(most, std::fabs(x[i]));
-  for (const float m : lanes) most = std::max(most, m);
+  for (int l = 0; l < kLanes; ++l) most = std::max(most, lanes[l]);
   return most;
 }
 
+/// Each row by its own largest magnitude.
 FBVINS_KERNEL
-void round_to_int8(const float* x, int n, float factor, std::int8_t* out) {
-  for (int i = 0; i < n; ++i) out[i] = static_cast<std::int8_t>((x[i] * factor + kRounder) - kRounder);
+void quantise_rows(const float* x, int rows, int columns, std::int8_t* out, float* scale) {
+  for (int r = 0; r < rows; ++r, x += columns, out += columns) {
+    const float most = largest_magnitude(x, columns), factor = most > 0 ? 127.0f / most : 0.0f;
+    for (int i = 0; i < columns; ++i) out[i] = static_cast<std::int8_t>((x[i] * factor + kRounder) - kRounder);
+    scale[r] = most / 127.0f;
+  }
 }
 
+/// A block of sums, kColumns from row to row, to `n` columns of kInt8RowBlock rows of the product, which are `stride` apart.
 FBVINS_KERNEL
-void rescale(const std::int32_t* sums, const float* column_scale, const float* start, float row_scale, int n, float* out) {
-  for (int i = 0; i < n; ++i) out[i] = static_cast<float>(sums[i]) * (row_scale * column_scale[i]) + start[i];
+void rescale(const std::int32_t* sums, const float* column_scale, const float* bias, const float* row_scale, int n, float* out,
+             std::ptrdiff_t stride) {
+  for (int r = 0; r < kInt8RowBlock; ++r, sums += kColumns, out += stride) {
+    const float* start = bias != nullptr ? bias : out;
+    for (int i = 0; i < n; ++i) out[i] = static_cast<float>(sums[i]) * (row_scale[r] * column_scale[i]) + start[i];
+  }
 }
 
 FBVINS_KERNEL
@@ -82,12 +94,7 @@ void QuantisedRows::resize(int rows, int columns) {
 
 void QuantisedRows::quantise(const float* x, int rows, int columns) {
   resize(rows, columns);
-  for (int r = 0; r < rows; ++r) {
-    const float* row = x + static_cast<std::ptrdiff_t>(r) * columns;
-    const float most = largest_magnitude(row, columns);
-    round_to_int8(row, columns, most > 0 ? 127.0f / most : 0.0f, values.data() + static_cast<std::ptrdiff_t>(r) * columns);
-    scale[static_cast<std::size_t>(r)] = most / 127.0f;
-  }
+  quantise_rows(x, rows, columns, values.data(), scale.data());
 }
 
 void QuantisedRows::quantise_rest(const float* x, const QuantisedRows& coarse) {
@@ -115,7 +122,6 @@ void QuantisedRows::set_signs(const std::int8_t* whole, int rows, int columns, i
 }
 
 void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int8Kernel kernel, Start start) {
-  constexpr int kColumns = 16 * kInt8BlocksTogether;
   const auto sums_of = int8_kernel(kernel);
   alignas(64) std::int32_t sums[kInt8RowBlock * kColumns];
   for (int n = 0; n < w.outputs; n += kColumns) {
@@ -124,11 +130,9 @@ void multiply(const QuantisedRows& rows, const PackedWeights& w, float* out, Int
     for (int r = 0; r < rows.count; r += kInt8RowBlock) {
       sums_of(rows.values.data() + static_cast<std::ptrdiff_t>(r) * w.inputs, weights, w.offset.data() + n, w.inputs, blocks,
               sums);
-      for (int i = 0; i < kInt8RowBlock; ++i) {
-        float* row = out + static_cast<std::ptrdiff_t>(r + i) * w.outputs + n;
-        rescale(sums + i * kColumns, w.scale.data() + n, start == Start::from_bias ? w.bias.data() + n : row,
-                rows.scale[static_cast<std::size_t>(r + i)], 16 * blocks, row);
-      }
+      rescale(sums, w.scale.data() + n, start == Start::from_bias ? w.bias.data() + n : nullptr,
+              rows.scale.data() + static_cast<std::ptrdiff_t>(r), 16 * blocks,
+              out + static_cast<std::ptrdiff_t>(r) * w.outputs + n, w.outputs);
     }
   }
 }

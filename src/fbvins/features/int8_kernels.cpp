@@ -84,23 +84,39 @@ __attribute__((target("avx2"))) void sums_avx2(const std::int8_t* values, const 
 
 #define FBVINS_VNNI __attribute__((target("avx512f,avx512bw,avx512vnni")))
 
+/// sum += a (bytes without sign) . w (with), four at a time. In so many words, for GCC 12 copies each sum twice around its
+/// intrinsic, and into memory for lack of registers.
+#define FBVINS_ADD_PRODUCTS(sum, a, w) __asm__("vpdpbusd %2, %1, %0" : "+v"(sum) : "v"(a), "v"(w))
+
 template <int Blocks>
 FBVINS_VNNI void sums_vnni_of(const std::int8_t* values, const std::int8_t* weights, const std::int32_t* offset, int inputs,
                               std::int32_t* sums) {
+  static_assert(kRows == 4);
   const __m512i sign = _mm512_set1_epi8(static_cast<char>(0x80));
-  __m512i sum[kRows][Blocks];
-  for (int b = 0; b < Blocks; ++b)
-    for (int r = 0; r < kRows; ++r) sum[r][b] = _mm512_loadu_si512(offset + 16 * b);
+  __m512i sum0[Blocks], sum1[Blocks], sum2[Blocks], sum3[Blocks];
+#pragma GCC unroll 4
+  for (int b = 0; b < Blocks; ++b) sum0[b] = sum1[b] = sum2[b] = sum3[b] = _mm512_loadu_si512(offset + 16 * b);
   for (int g = 0; g < inputs / 4; ++g) {
-    __m512i w[Blocks];
-    for (int b = 0; b < Blocks; ++b) w[b] = _mm512_loadu_si512(weights + b * 16 * inputs + 64 * g);
-    for (int r = 0; r < kRows; ++r) {
-      const __m512i a = _mm512_xor_si512(_mm512_set1_epi32(four_bytes(values + r * inputs + 4 * g)), sign);  // plus 128
-      for (int b = 0; b < Blocks; ++b) sum[r][b] = _mm512_dpbusd_epi32(sum[r][b], a, w[b]);
+    __m512i a[kRows];
+#pragma GCC unroll 4
+    for (int r = 0; r < kRows; ++r)
+      a[r] = _mm512_xor_si512(_mm512_set1_epi32(four_bytes(values + r * inputs + 4 * g)), sign);  // plus 128
+#pragma GCC unroll 4
+    for (int b = 0; b < Blocks; ++b) {
+      const __m512i w = _mm512_loadu_si512(weights + b * 16 * inputs + 64 * g);
+      FBVINS_ADD_PRODUCTS(sum0[b], a[0], w);
+      FBVINS_ADD_PRODUCTS(sum1[b], a[1], w);
+      FBVINS_ADD_PRODUCTS(sum2[b], a[2], w);
+      FBVINS_ADD_PRODUCTS(sum3[b], a[3], w);
     }
   }
-  for (int r = 0; r < kRows; ++r)
-    for (int b = 0; b < Blocks; ++b) _mm512_storeu_si512(sums + r * 16 * kTogether + 16 * b, sum[r][b]);
+#pragma GCC unroll 4
+  for (int b = 0; b < Blocks; ++b) {
+    _mm512_storeu_si512(sums + 16 * b, sum0[b]);
+    _mm512_storeu_si512(sums + 16 * kTogether + 16 * b, sum1[b]);
+    _mm512_storeu_si512(sums + 2 * 16 * kTogether + 16 * b, sum2[b]);
+    _mm512_storeu_si512(sums + 3 * 16 * kTogether + 16 * b, sum3[b]);
+  }
 }
 
 FBVINS_VNNI void sums_vnni(const std::int8_t* values, const std::int8_t* weights, const std::int32_t* offset, int inputs,

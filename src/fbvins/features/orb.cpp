@@ -7,11 +7,6 @@
 namespace fbvins {
 namespace {
 
-/// Corners of a cell whose Harris score is computed; the rest is weaker on FAST already.
-constexpr int kScoredPerCell = 4;
-constexpr int kMostPerCell = 4;
-/// Side of a grid cell, on each level.
-constexpr int kCell_px = 32;
 /// FAST threshold at the noise floor, grey values: a cell goes no lower.
 constexpr int kMinThreshold = 6;
 
@@ -32,7 +27,7 @@ void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
   for (int l = 0; l < pyramid_.levels(); ++l) {
     const PyramidLevel& level = pyramid_.level(l);
     carried += level_share_[static_cast<std::size_t>(l)] * options_.max_features;
-    detect_fast(level, kOrbBorder, kMinThreshold, fast_, corners_);
+    fast_.detect(level, kOrbBorder, kMinThreshold, corners_);
     select(level, static_cast<int>(carried));
     carried -= static_cast<double>(chosen_.size());
     describe(l, out);
@@ -40,30 +35,15 @@ void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
 }
 
 void OrbExtractor::select(const PyramidLevel& level, int quota) {
-  keep_strongest_of_cells(level);
-  for (Candidate& c : candidates_) c.harris = harris_score(level, c.x, c.y);
-  std::erase_if(candidates_, [](const Candidate& c) { return !(c.harris > 0); });  // edges
-  take_in_rounds(quota);
-}
-
-/// The cell's threshold sinks from corner to corner until the cell has its share or the floor is reached.
-void OrbExtractor::keep_strongest_of_cells(const PyramidLevel& level) {
-  const int columns = (level.width + kCell_px - 1) / kCell_px;
-  const int rows = (level.height + kCell_px - 1) / kCell_px;
-  const auto cells = static_cast<std::size_t>(columns * rows);
-  cell_count_.assign(cells, 0);
-  candidates_.assign(cells * kScoredPerCell, Candidate{});
-  for (const FastCorner& corner : corners_) {
-    const int cell = (corner.y / kCell_px) * columns + corner.x / kCell_px;
-    Candidate* first = &candidates_[static_cast<std::size_t>(cell) * kScoredPerCell];
-    std::int32_t& count = cell_count_[static_cast<std::size_t>(cell)];
-    if (count == kScoredPerCell && first[count - 1].strength >= corner.strength) continue;
-    int place = std::min(count, kScoredPerCell - 1);
-    for (; place > 0 && first[place - 1].strength < corner.strength; --place) first[place] = first[place - 1];
-    first[place] = {corner.x, corner.y, cell, corner.strength, 0.0f};
-    count = std::min(count + 1, kScoredPerCell);
+  const int columns = (level.width + kFastCell_px - 1) / kFastCell_px;
+  candidates_.clear();
+  // of a cell's corners that are weaker on FAST no Harris score is computed
+  for (const FastCorner& c : corners_) {
+    const float harris = harris_score(level, c.x, c.y);
+    if (!(harris > 0)) continue;  // an edge
+    candidates_.push_back({c.x, c.y, (c.y / kFastCell_px) * columns + c.x / kFastCell_px, harris});
   }
-  std::erase_if(candidates_, [](const Candidate& c) { return c.strength == 0; });
+  take_in_rounds(quota);
 }
 
 /// First every cell's best, then every cell's second best; within the last round the best of the image.
@@ -74,7 +54,7 @@ void OrbExtractor::take_in_rounds(int quota) {
   std::stable_sort(candidates_.begin(), candidates_.end(),
                    [&](const Candidate& a, const Candidate& b) { return a.cell != b.cell ? a.cell < b.cell : better(a, b); });
   chosen_.clear();
-  for (int round = 0; round < kMostPerCell && static_cast<int>(chosen_.size()) < quota; ++round) {
+  for (int round = 0; round < kFastPerCell && static_cast<int>(chosen_.size()) < quota; ++round) {
     const std::size_t before = chosen_.size();
     for (std::size_t i = 0, rank = 0; i < candidates_.size(); ++i) {
       rank = i > 0 && candidates_[i].cell == candidates_[i - 1].cell ? rank + 1 : 0;

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "fbvins/features/fast.hpp"
+#include "fbvins/features/fast_cells.hpp"
 #include "fbvins/features/keypoint.hpp"
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/features/scale_pyramid.hpp"
@@ -42,12 +42,10 @@ class OrbExtractor {
   struct Candidate {
     std::int16_t x, y;
     std::int32_t cell;
-    std::uint8_t strength;
     float harris;
   };
 
   void select(const PyramidLevel& level, int quota);
-  void keep_strongest_of_cells(const PyramidLevel& level);
   void take_in_rounds(int quota);
   void describe(int l, OrbFeatures& out);
 
@@ -56,10 +54,9 @@ class OrbExtractor {
   std::vector<double> level_share_;
   ScalePyramid pyramid_;
   Pyramid half_;  // of one level
-  FastBuffers fast_;
+  FastCells fast_;
   std::vector<FastCorner> corners_;
   std::vector<Candidate> candidates_, chosen_;
-  std::vector<std::int32_t> cell_count_;
   std::vector<std::uint8_t> smooth_, smooth_half_, scratch_;
 };
 

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The strongest FAST corners of each cell of a level: those that detect_fast() finds, without computing the strength where a
+// cell already has its share of stronger ones. One instance, one thread; buffers are reused.
+//
+//   FastCells cells;
+//   cells.detect(level, 12, 6, corners);
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fbvins/features/fast.hpp"
+
+namespace fbvins {
+
+/// Side of a cell, and the corners kept of one.
+inline constexpr int kFastCell_px = 32, kFastPerCell = 4;
+
+class FastCells {
+ public:
+  /// Cell by cell, the strongest first, of equal ones the first in reading order. `border` and `floor` as for detect_fast().
+  void detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out);
+
+ private:
+  struct Cell {
+    int count = 0;
+    FastCorner strongest[kFastPerCell];
+  };
+
+  void fill(int y);
+  void collect(int y);
+  void keep(int x, int y, std::uint8_t strength);
+
+  // of the level in work
+  PyramidLevel level_{};
+  int border_ = 0, count_ = 0, columns_ = 0;
+  std::uint8_t floor_ = 0;
+  std::size_t pitch_ = 0;
+  std::vector<std::uint8_t> rows_;         // three of strengths, one of what is left of them
+  std::vector<std::uint8_t> limits_;       // of each column: weaker corners are of no use to its cell
+  std::vector<std::uint8_t> cell_limits_;  // of each cell of a row of them
+  std::vector<std::uint8_t> skip_;         // of each block of a row
+  std::vector<Cell> cells_;
+};
+
+}  // namespace fbvins
