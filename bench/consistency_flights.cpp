@@ -59,11 +59,11 @@ class Comparison {
     const Result<LevelledStart> start = align_start_levelled(pairs);
     if (!start) return start.error();
     const ErrorStatistics errors = statistics_of(absolute_errors_m(apply(*se3, pairs)));
-    const NeesSummary honest = nees(pairs, covariances_, start->to_truth);
+    const NeesSummary nees_levelled = nees(pairs, covariances_, start->to_truth);
     const auto n = static_cast<double>(pairs.size());
     return fmt::format("rmse {:.4f} max {:.4f} nees {:.1f} {:.1f} bias {:.1f} {:.1f} known {:.1f} ms {:.2f} resets {}",
-                       errors.rmse, errors.max, honest.mean.position, honest.mean.orientation, gyro_bias_ / n, accel_bias_ / n,
-                       known_ / n, ms_ / n, resets_);
+                       errors.rmse, errors.max, nees_levelled.mean.position, nees_levelled.mean.orientation, gyro_bias_ / n,
+                       accel_bias_ / n, known_ / n, ms_ / n, resets_);
   }
 
  private:
@@ -116,7 +116,7 @@ int run(int argc, char** argv) {
   app.add_option("--movers", w.tracks.movers, "boxes that move");
   app.add_option("--bad-start", w.tracks.bad_start_s, "so long [s] tracks are bad");
   app.add_flag("--recognise", w.tracks.recognise, "corners are re-observed");
-  app.add_flag("!--forget", w.known, "no landmark is remembered");
+  app.add_flag("!--forget", w.known, "landmarks that left the window are forgotten");
   CLI11_PARSE(app, argc, argv);
   const auto preset = simulation_preset(w.preset);
   if (!preset) {

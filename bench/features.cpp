@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the booster brings to matching, and what it costs. Prints Markdown tables:
+// What the booster gains in matching, and what it costs. Prints Markdown tables:
 // held-out photographs through random homographies and damages, pairs of real keyframes with known poses, times.
 //
 //   fbvins_features_bench --photos DIR [--every N]        correct mutual nearest neighbours at 3 px, raw and boosted, by
@@ -265,7 +265,7 @@ int run(const Arguments& arguments) {
 }  // namespace fbvins
 
 int main(int argc, char** argv) {
-  CLI::App app("What the booster brings to matching, and what it costs.");
+  CLI::App app("What the booster gains in matching, and what it costs.");
   fbvins::Arguments arguments;
   app.add_option("--photos", arguments.photos, "folders of photographs");
   app.add_option("--every", arguments.every, "only every n-th photograph")->check(CLI::PositiveNumber);

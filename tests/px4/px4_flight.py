@@ -30,7 +30,7 @@ from px4_simulator import Px4  # noqa: E402
 BAR_M = 0.05
 STEP_US = 5000
 START_US = 1_000_000
-STANDING_S = 58  # PX4 believes a companion's clock after 500 answers, ten a second
+STANDING_S = 58  # PX4 trusts a companion's clock after 500 answers, ten a second
 CABLE_US = 60_000  # from the shutter to the flight controller
 HOST_AHEAD_NS = 7_000_000_000_000  # the companion's clock is another one
 

@@ -74,14 +74,14 @@ SystemOptions config_for(const std::string& frontend) {
 }
 
 Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter,
-          const std::function<void(StereoRig&)>& believe) {
+          const std::function<void(StereoRig&)>& miscalibrate) {
   auto data = open_dataset(recording(name).string());
   if (!data) throw std::runtime_error(data.error().message);
   Flown flown;
   flown.images = static_cast<int>((*data)->frames().size());
   flown.start = (*data)->frames().front().t;
   StereoRig rig = (*data)->rig();
-  if (believe) believe(rig);
+  if (miscalibrate) miscalibrate(rig);
   Result<System> system = System::create(config, rig);
   if (!system) throw std::runtime_error(system.error().message);
   system->on_odometry([&](const Odometry& o) { flown.odometry.push_back(o); });

@@ -47,7 +47,7 @@ inline std::filesystem::path recording(const std::string& name) {
 }
 
 Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter = nullptr,
-          const std::function<void(StereoRig&)>& believe = nullptr);
+          const std::function<void(StereoRig&)>& miscalibrate = nullptr);
 
 SystemOptions config_for(const std::string& frontend);
 

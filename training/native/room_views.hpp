@@ -24,7 +24,7 @@ class RoomViews {
   const Image& image(std::size_t frame) const { return frames_[frame].image; }
   /// Two frames of which the second sees 15 to 95 % of what the first sees; none when many draws find no such frames.
   std::optional<Pair> choose(Rng& rng) const;
-  /// Where the surface at a pixel of frame `from` is in frame `to`; none where it is out of sight or nothing is there.
+  /// Where the surface at a pixel of frame `from` is in frame `to`; none where it is occluded or nothing is there.
   std::optional<Vec2> transfer(std::size_t from, std::size_t to, const Vec2& px) const;
 
  private:

@@ -7,7 +7,7 @@
 namespace fbvins {
 
 /// Biases and how well they are known.
-struct ImuBiasBelief {
+struct ImuBiasEstimate {
   ImuBias bias;
   Mat3 gyro_covariance = Mat3::Zero();   ///< rad^2/s^2
   Mat3 accel_covariance = Mat3::Zero();  ///< m^2/s^4
@@ -15,7 +15,7 @@ struct ImuBiasBelief {
 
 struct ImuState {
   Time t;  ///< of the last image, on the sensors' clock
-  ImuBiasBelief belief;
+  ImuBiasEstimate biases;
 };
 
 }  // namespace fbvins

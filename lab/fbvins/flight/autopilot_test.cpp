@@ -20,7 +20,7 @@ namespace {
 constexpr double kDelay_s = 0.03;
 
 /// What the odometry says of an image, or nothing.
-using Told = std::function<std::optional<Odometry>(double t_s, Odometry honest)>;
+using Told = std::function<std::optional<Odometry>(double t_s, Odometry truth)>;
 
 struct Outcome {
   std::vector<FlightRow> rows;
@@ -39,8 +39,7 @@ struct Outcome {
 };
 
 /// The odometry's W: turned and moved against the world, and tilted by what a bias of the accelerometer looks like.
-Odometry honest_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mounting, const ImuBias& bias,
-                         const Pose<W, W>& T_WoW) {
+Odometry true_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mounting, const ImuBias& bias, const Pose<W, W>& T_WoW) {
   const MotionState m = vehicle.motion_of(mounting);
   Odometry o;
   o.T_WB = T_WoW * m.T_WB;
@@ -81,7 +80,7 @@ Outcome fly_mission(const Mission& mission, const Told& told, const Circumstance
       // The tilt of W is about the axis to the left of the vehicle that stood there.
       const Quat tilt = start.q * so3_exp(Vec3(0, in.tilt_rad, 0)) * start.q.conjugate();
       Odometry o =
-          honest_odometry(vehicle, mounting, imu.bias(), {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
+          true_odometry(vehicle, mounting, imu.bias(), {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
       o.gauge = {Pose<G, B>(o.T_WB.q, o.T_WB.p), o.v_WB, Quat::Identity(), in.tilt_rad};
       o.t = Time{static_cast<std::int64_t>(step) * 1'000'000};
       if (std::optional<Odometry> said = told(t, o)) waiting.emplace_back(t + kDelay_s, *said);

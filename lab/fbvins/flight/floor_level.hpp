@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the floor tells of up. A vehicle that stands on its legs is level to a fifth of a degree; an odometry that has not turned
-// yet takes a bias of its accelerometer for tilt, easily a degree or two, and is off by that share of every way it goes. While
-// the odometry is less sure of up than the floor is, the mission's frame is levelled by the floor. One owner.
+// The floor as a measurement of the vertical. A vehicle that stands on its legs is level to a fifth of a degree; an odometry that
+// has not turned yet takes a bias of its accelerometer for tilt, easily a degree or two, and its positions are off by that share
+// of every distance. While the odometry's tilt is less certain than the floor's, the mission's frame is levelled by the floor.
+// One owner.
 //
 //   floor.stand(odometry);                          // it takes off
 //   Quat q = floor.correction(odometry, q_LW);      // T_LW <- q * T_LW
 //
-// The direction of the standing vehicle's z is kept in the odometry's gauge, which is never turned; wherever W stands to that by
-// now, the correction is to W as it is. As the odometry gets to know up in flight, the correction fades.
+// The direction of the standing vehicle's z is kept in the odometry's gauge, which is never turned, and carried
+// into the present W. As the odometry's tilt becomes certain in flight, the correction fades.
 #pragma once
 
 #include <optional>

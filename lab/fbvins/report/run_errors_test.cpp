@@ -30,7 +30,7 @@ TEST(RunErrors, AnExactEstimateInAnotherWorldHasNone) {
   }
 }
 
-TEST(RunErrors, HonestNoiseHasThreePerVector) {
+TEST(RunErrors, ConsistentNoiseHasThreePerVector) {
   // 199 flights of noise with three degrees of freedom each: the mean's standard deviation is 0.17.
   const StateNees mean = mean_of(run_errors(circling_run(1)));
   for (double value : {mean.position, mean.orientation, mean.velocity, mean.gyro_bias, mean.accel_bias})

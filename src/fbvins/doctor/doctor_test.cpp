@@ -7,14 +7,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "fbvins/doctor/made_up_evidence.hpp"
 #include "fbvins/doctor/spoilers.hpp"
+#include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
 namespace {
 
 const Evidence& good() {
-  static const Evidence evidence = test::MadeUpEvidence({}).make();
+  static const Evidence evidence = test::SyntheticEvidence({}).make();
   return evidence;
 }
 
@@ -98,7 +98,7 @@ TEST(Doctor, MeasuresThePairOfCameras) {
 TEST(Doctor, MeasuresALens) { expect_named("left focal length 5 % too long"); }
 
 TEST(Doctor, MeasuresARightImageThatIsLate) {
-  const Diagnosis diagnosis = examine(test::MadeUpEvidence({.right_late_s = 0.02}).make());
+  const Diagnosis diagnosis = examine(test::SyntheticEvidence({.right_late_s = 0.02}).make());
   const Finding* finding = find(diagnosis, FindingKind::stereo_sync);
   ASSERT_NE(finding, nullptr) << all_of(diagnosis);
   EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
@@ -114,7 +114,7 @@ TEST(Doctor, NamesRightImagesThatComeWholeImagesLate) {
 }
 
 TEST(Doctor, MeasuresARollingShutter) {
-  const Diagnosis diagnosis = examine(test::MadeUpEvidence({.rolling_s = 0.02}).make());
+  const Diagnosis diagnosis = examine(test::SyntheticEvidence({.rolling_s = 0.02}).make());
   const Finding* finding = find(diagnosis, FindingKind::rolling_shutter);
   ASSERT_NE(finding, nullptr) << all_of(diagnosis);
   EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);

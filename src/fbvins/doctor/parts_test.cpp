@@ -12,8 +12,8 @@
 #include "fbvins/doctor/image_health.hpp"
 #include "fbvins/doctor/imu_health.hpp"
 #include "fbvins/doctor/imu_series.hpp"
-#include "fbvins/doctor/made_up_evidence.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
+#include "fbvins/doctor/synthetic_evidence.hpp"
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
@@ -109,7 +109,7 @@ TEST(ImageHealth, SeesRepeatedImages) {
 }
 
 TEST(ImageHealth, SeesWhatHangsInView) {
-  Evidence evidence = test::MadeUpEvidence({}).make();
+  Evidence evidence = test::SyntheticEvidence({}).make();
   EXPECT_FALSE(check_fixed(measure_fixed(evidence, ImuSeries(evidence.imu))));
   for (SeenFrame& frame : evidence.frames) {
     const std::size_t seen = frame.features.size();
@@ -160,7 +160,7 @@ void compare_depths(const Evidence& a, const Evidence& b, Take&& take) {
 }
 
 TEST(Depths, AreThoseOfTheNewCalibration) {
-  const Evidence good = test::MadeUpEvidence({}).make();
+  const Evidence good = test::SyntheticEvidence({}).make();
   StereoRig longer = good.rig, turned = good.rig;
   longer.T_BC1.p = longer.T_BC0.p + 1.2 * (longer.T_BC1.p - longer.T_BC0.p);
   compare_depths(good, with_depths_by(longer, good),

@@ -37,8 +37,8 @@ double angle_to(const Calibration& calibration, const StereoRig& truth) {
 }
 double shift_to(const Calibration& calibration, const StereoRig& truth) { return (truth.T_BC0.p - calibration.T_BC0.p).norm(); }
 
-Calibration fly(SimulatedFlight& flight, const StereoRig& believed, const EstimatorOptions& options) {
-  Estimator estimator(believed, options);
+Calibration fly(SimulatedFlight& flight, const StereoRig& calibrated, const EstimatorOptions& options) {
+  Estimator estimator(calibrated, options);
   Health last;
   for (int k = 0; k < kFrames; ++k) last = estimator.process(flight.frame(k)).odometry.health;
   EXPECT_EQ(last.state, HealthState::good);
@@ -82,8 +82,8 @@ TEST(OnlineCalibration, HoldsTheCamerasToOneAnother) {
 TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   SimulatedFlight flight(Motion(0.6, 0.5), 48);
   const Calibration calibrated{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
-  const CalibrationBelief belief;
-  const WindowPrior prior = with_calibration_belief(first_frame_prior(NavState{}, unknown_biases(), true), belief, calibrated);
+  const CalibrationPrior sigmas;
+  const WindowPrior prior = with_calibration_prior(first_frame_prior(NavState{}, unknown_biases(), true), sigmas, calibrated);
   ASSERT_EQ(prior.quadratic.size(), kTiltSize + kCalibrationSize + 15);
   const auto cost = [&](const StereoRig& rig) {
     Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
@@ -92,24 +92,24 @@ TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   };
   // Turned together by one standard deviation about an axis through the IMU: the left camera's rotation, and its position
   // on the lever arm; nothing of what lies between the cameras.
-  const StereoRig turned = loose_mount(flight.rig, belief.rotation_sigma_rad, 0);
-  const double moved = (turned.T_BC0.p - flight.rig.T_BC0.p).norm() / belief.position_sigma_m;
+  const StereoRig turned = loose_mount(flight.rig, sigmas.rotation_sigma_rad, 0);
+  const double moved = (turned.T_BC0.p - flight.rig.T_BC0.p).norm() / sigmas.position_sigma_m;
   EXPECT_NEAR(cost(turned), 0.5 * (1 + moved * moved), 0.02);
   // The right camera alone, along the baseline.
   StereoRig stretched = flight.rig;
-  stretched.T_BC1.p += belief.stereo_position_sigma_m * (flight.rig.T_BC1.p - flight.rig.T_BC0.p).normalized();
+  stretched.T_BC1.p += sigmas.stereo_position_sigma_m * (flight.rig.T_BC1.p - flight.rig.T_BC0.p).normalized();
   EXPECT_NEAR(cost(stretched), 0.5, 1e-6);
   StereoRig squinting = flight.rig;
-  squinting.T_BC1.q = squinting.T_BC1.q * so3_exp(belief.stereo_rotation_sigma_rad * Vec3::UnitY());
+  squinting.T_BC1.q = squinting.T_BC1.q * so3_exp(sigmas.stereo_rotation_sigma_rad * Vec3::UnitY());
   EXPECT_NEAR(cost(squinting), 0.5, 1e-6);
 }
 
 TEST(OnlineCalibration, TouchesNothingWhenOff) {
   SimulatedFlight flight(Motion(0.6, 0.5), 46);
-  const StereoRig believed = loose_mount(flight.rig, 0.002, 0.001);
-  const Calibration found = fly(flight, believed, exact_noise());
-  EXPECT_EQ(angle_to(found, believed), 0);
-  EXPECT_EQ(shift_to(found, believed), 0);
+  const StereoRig calibrated = loose_mount(flight.rig, 0.002, 0.001);
+  const Calibration found = fly(flight, calibrated, exact_noise());
+  EXPECT_EQ(angle_to(found, calibrated), 0);
+  EXPECT_EQ(shift_to(found, calibrated), 0);
   EXPECT_EQ(found.time_offset_s, 0);
 }
 

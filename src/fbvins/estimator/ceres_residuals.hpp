@@ -102,16 +102,16 @@ struct Reprojection : ResidualOf<Reprojection> {
 };
 
 /// The landmark's distance from where it was (K1), from its definition. Of x = (landmark, calibration, host).
-struct Belief : ResidualOf<Belief> {
+struct LandmarkPriorResidual : ResidualOf<LandmarkPriorResidual> {
   Reprojection seen;
-  LandmarkBelief belief;
+  LandmarkPrior prior;
   template <class T>
   void fill(T const* const* x, T* r) const {
     const Moved<T> h(seen.host, x[2]);
-    const Vec<T> away = h.q * seen.in_host_body(x[0], x[1]) + h.p - belief.p_W.cast<T>();
+    const Vec<T> away = h.q * seen.in_host_body(x[0], x[1]) + h.p - prior.p_W.cast<T>();
     for (int k = 0; k < 3; ++k) {
       r[k] = T(0);
-      for (int i = 0; i < 3; ++i) r[k] += belief.sqrt_information(k, i) * away(i);
+      for (int i = 0; i < 3; ++i) r[k] += prior.sqrt_information(k, i) * away(i);
     }
   }
 };

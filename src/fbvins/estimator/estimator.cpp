@@ -109,10 +109,10 @@ void Estimator::open_window(const InitialSolution& start) {
     window_.add_frame(std::move(f), start.frames[i].features, calibration_);
   }
   const NavState& first = window_.frames().oldest().state;
-  WindowPrior belief = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
+  WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
   if (options_.estimate_extrinsics || options_.estimate_time_offset)
-    belief = with_calibration_belief(std::move(belief), CalibrationBelief{}, calibrated_);
-  window_.set_prior(std::move(belief));
+    prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
+  window_.set_prior(std::move(prior));
   window_.set_pivot(first.T_WB.p);
   published_.restart();
 }
@@ -158,14 +158,15 @@ const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
   CpuTimer timer;
   window_.describe(calibration_, solution_.window);
   solver_.solve(solution_, lm);
-  if (!solution_.summary.usable && window_.refuse_beliefs(solution_.window) > 0) {  // one of them can make every step worse
+  if (!solution_.summary.usable &&
+      window_.refuse_landmark_priors(solution_.window) > 0) {  // one of them can make every step worse
     window_.describe(calibration_, solution_.window);
     solver_.solve(solution_, lm);
   }
   const WindowProblem& solved = solution_.window;
   const LmSummary& summary = solution_.summary;
   if (summary.usable) {
-    window_.refuse_beliefs(solved);
+    window_.refuse_landmark_priors(solved);
     window_.accept(solved);
     calibration_ = solved.calibration;
     fill_covariances(solution_, out);
@@ -174,7 +175,7 @@ const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
   failed_solves_ = summary.usable ? 0 : failed_solves_ + 1;
   out.stats.frames_in_window = window_.frames().size();
   out.stats.landmarks = static_cast<int>(solved.landmarks.size());
-  out.stats.known_landmarks = static_cast<int>(solved.beliefs.size());
+  out.stats.known_landmarks = static_cast<int>(solved.landmark_priors.size());
   out.stats.observations = static_cast<int>(solved.observations.size());
   out.stats.iterations += summary.iterations;
   out.stats.initial_cost = summary.initial_cost;
@@ -188,7 +189,7 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   std::optional<Mat17> covariance = solution.covariance(newest.id);
   if (!covariance) return;
   KnownLandmarks& known = window_.known();
-  known.hold_to(newest.state.T_WB.p, solution.window.beliefs);
+  known.hold_to(newest.state.T_WB.p, solution.window.landmark_priors);
   covariance->topLeftCorner<6, 6>() = known.with_map(newest.state.T_WB, covariance->topLeftCorner<6, 6>());
   const Mat15 level = window_.tilt().levelled_covariance(newest.state, *covariance);
   out.pose_covariance = level.topLeftCorner<6, 6>();

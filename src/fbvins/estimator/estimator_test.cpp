@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The estimator as a whole on simulated tracks and readings: accuracy, honesty, and what it does when
+// The estimator as a whole on simulated tracks and readings: accuracy, consistency, and what it does when
 // sensors stop or lie.
 #include "fbvins/estimator/estimator.hpp"
 
@@ -118,13 +118,13 @@ double mean_normalised_error(bool known_landmarks) {
   return sum / n;
 }
 
-TEST(Estimator, CovarianceIsHonest) {
+TEST(Estimator, CovarianceIsConsistent) {
   const double nees = mean_normalised_error(false);  // half to twice
   EXPECT_GT(nees, 3.0);
   EXPECT_LT(nees, 12.0);
 }
 
-TEST(Estimator, CovarianceIsNoLessThanHonestWithLandmarksKnown) {
+TEST(Estimator, CovarianceIsNotOverconfidentWithLandmarksKnown) {
   // A landmark that leaves in view is held at once by where it was: what it was seen by is counted twice, and the covariance
   // allows for it (K4), even where it hardly matters.
   const double nees = mean_normalised_error(true);
@@ -150,7 +150,7 @@ TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
     }
   }
   EXPECT_LT(with, 0.6 * without);
-  // Here points are known again exactly; the belief allows for patches that are not quite the same (6 when consistent).
+  // Here points are re-observed exactly; the prior allows for patches that are not quite the same (6 when consistent).
   EXPECT_GT(nees / n, 1.0);
   EXPECT_LT(nees / n, 12.0);
 }
@@ -178,7 +178,7 @@ TEST(Estimator, PriorKnowsNothingOfPositionAndHeadingBeyondTheGauge) {
     for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
     const WindowPrior& prior = estimator.window().prior();
     ASSERT_FALSE(prior.empty());
-    // The four directions of W9 at the first estimates, up being where it is believed to be.
+    // The four directions of W9 at the first estimates, up being where the state has it.
     const Vec3 up_W = estimator.window().tilt().q() * Vec3::UnitZ();
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
     for (std::size_t i = 0; i < prior.frames.size(); ++i) {

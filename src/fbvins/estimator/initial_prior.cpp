@@ -32,12 +32,13 @@ QuadraticPrior inserted(const QuadraticPrior& prior, int at, const Eigen::Matrix
 
 }  // namespace
 
-ImuBiasBelief unknown_biases() {
-  return {{}, kGyroBiasSigma_radps * kGyroBiasSigma_radps * Mat3::Identity(),
+ImuBiasEstimate unknown_biases() {
+  return {{},
+          kGyroBiasSigma_radps * kGyroBiasSigma_radps * Mat3::Identity(),
           kAccelBiasSigma_mps2 * kAccelBiasSigma_mps2 * Mat3::Identity()};
 }
 
-WindowPrior first_frame_prior(const NavState& state, const ImuBiasBelief& biases, bool estimate_tilt) {
+WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& biases, bool estimate_tilt) {
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
@@ -50,15 +51,15 @@ WindowPrior first_frame_prior(const NavState& state, const ImuBiasBelief& biases
   const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
   const double level = information(estimate_tilt ? kLevelSigma : kTiltSigma_rad), heading = information(kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
-  Vec15 from_belief = Vec15::Zero();
-  from_belief.tail<6>() << state.bias.gyro_radps - biases.bias.gyro_radps, state.bias.accel_mps2 - biases.bias.accel_mps2;
-  prior.quadratic = shifted(std::move(prior.quadratic), from_belief);
+  Vec15 from_mean = Vec15::Zero();
+  from_mean.tail<6>() << state.bias.gyro_radps - biases.bias.gyro_radps, state.bias.accel_mps2 - biases.bias.accel_mps2;
+  prior.quadratic = shifted(std::move(prior.quadratic), from_mean);
   prior.with_tilt = estimate_tilt;
   if (estimate_tilt) prior.quadratic = inserted(prior.quadratic, 0, information(kTiltSigma_rad) * Mat2::Identity());
   return prior;
 }
 
-WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& belief, const Calibration& calibrated) {
+WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& sigmas, const Calibration& calibrated) {
   // Of T_C0C1 = T_BC0^-1 T_BC1, over T_BC0 (dp, dtheta), T_BC1 (dp, dtheta):
   // dp = R_0^T (dp_1 - dp_0) + p_01 x dtheta_0, dtheta = dtheta_1 - R_01^T dtheta_0.
   const Mat3 R_0 = calibrated.T_BC0.R(), R_01 = R_0.transpose() * calibrated.T_BC1.R();
@@ -70,14 +71,14 @@ WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& 
   J.block<3, 3>(3, 3) = -R_01.transpose();
   J.block<3, 3>(3, 9).setIdentity();
   Vec6 between;
-  between << Vec3::Constant(information(belief.stereo_position_sigma_m)),
-      Vec3::Constant(information(belief.stereo_rotation_sigma_rad));
+  between << Vec3::Constant(information(sigmas.stereo_position_sigma_m)),
+      Vec3::Constant(information(sigmas.stereo_rotation_sigma_rad));
 
   Eigen::Matrix<double, kCalibrationSize, kCalibrationSize> H = decltype(H)::Zero();
   H.topLeftCorner<12, 12>() = J.transpose() * between.asDiagonal() * J;
-  H.diagonal().head<3>().array() += information(belief.position_sigma_m);
-  H.diagonal().segment<3>(3).array() += information(belief.rotation_sigma_rad);
-  H(kTimeOffsetIndex, kTimeOffsetIndex) = information(belief.time_offset_sigma_s);
+  H.diagonal().head<3>().array() += information(sigmas.position_sigma_m);
+  H.diagonal().segment<3>(3).array() += information(sigmas.rotation_sigma_rad);
+  H(kTimeOffsetIndex, kTimeOffsetIndex) = information(sigmas.time_offset_sigma_s);
 
   prior.quadratic = inserted(prior.quadratic, prior.calibration_row(), H);
   prior.with_calibration = true;

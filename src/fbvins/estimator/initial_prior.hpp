@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is believed before any measurement: of the first frame's state, and of the calibration where it is estimated.
+// Priors before any measurement: of the first frame's state, and of the calibration where it is estimated.
 // Pure functions.
 #pragma once
 
@@ -9,7 +9,7 @@
 namespace fbvins {
 
 /// How far the calibration may be off, where it is estimated: standard deviations.
-struct CalibrationBelief {
+struct CalibrationPrior {
   double rotation_sigma_rad = 0.02;         ///< of the cameras to the IMU
   double position_sigma_m = 0.01;           ///< of the cameras in the IMU's frame
   double stereo_rotation_sigma_rad = 2e-4;  ///< between the cameras
@@ -18,15 +18,15 @@ struct CalibrationBelief {
 };
 
 /// Biases of an IMU of which nothing is known: near zero.
-ImuBiasBelief unknown_biases();
+ImuBiasEstimate unknown_biases();
 
-/// Of the first frame: position and heading are a choice of W, biases are as believed, tilt and velocity are wide open: the
-/// tilt of W where that is estimated, else that of the frame. The initial solution is where the optimiser starts, not a belief:
+/// Of the first frame: position and heading are a choice of W, biases as given, tilt and velocity are wide open: the
+/// tilt of W where that is estimated, else that of the frame. The initial solution is where the optimiser starts, not a prior:
 /// it was made from measurements that the window still holds.
-WindowPrior first_frame_prior(const NavState& state, const ImuBiasBelief& biases, bool estimate_tilt);
+WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& biases, bool estimate_tilt);
 
-/// Puts the belief about the calibration before the first frame's: `calibrated` is right within the belief's standard
-/// deviations. The two cameras are held to one another far more firmly than to the IMU: scale hangs on their distance.
-WindowPrior with_calibration_belief(WindowPrior prior, const CalibrationBelief& belief, const Calibration& calibrated);
+/// Puts the prior of the calibration before that of the first frame: its mean is `calibrated`, its standard deviations are those
+/// given. The two cameras are held to one another far more firmly than to the IMU: scale hangs on their distance.
+WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& sigmas, const Calibration& calibrated);
 
 }  // namespace fbvins

@@ -38,7 +38,7 @@ TEST(FirstFramePrior, HoldsTheFrameAndLeavesTheTiltOpenWhereUpIsAState) {
   EXPECT_LT(prior.quadratic.cost(tilt), 1e-3);
 }
 
-TEST(FirstFramePrior, BelievesBiasesNearZeroAndNotNearTheInitialSolution) {
+TEST(FirstFramePrior, HasBiasesNearZeroAndNotNearTheInitialSolution) {
   const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), true);
   Eigen::VectorXd to_zero = Eigen::VectorXd::Zero(17);
   to_zero.tail<6>() << -tilted().bias.gyro_radps, -tilted().bias.accel_mps2;
@@ -46,8 +46,8 @@ TEST(FirstFramePrior, BelievesBiasesNearZeroAndNotNearTheInitialSolution) {
   EXPECT_LT(prior.quadratic.gradient(to_zero).norm(), 1e-9) << "the least";
 }
 
-TEST(FirstFramePrior, BelievesWhatAnEarlierFlightKnewOfTheBiases) {
-  ImuBiasBelief before;
+TEST(FirstFramePrior, HasTheBiasesOfAnEarlierFlight) {
+  ImuBiasEstimate before;
   before.bias = {Vec3(0.02, 0, 0.01), Vec3(0.3, 0.1, -0.2)};
   before.gyro_covariance = 1e-6 * Mat3::Identity();
   before.accel_covariance = Vec3(1e-4, 4e-4, 1e-4).asDiagonal();
@@ -60,10 +60,10 @@ TEST(FirstFramePrior, BelievesWhatAnEarlierFlightKnewOfTheBiases) {
   EXPECT_NEAR(prior.quadratic.cost(a_sigma_off) - prior.quadratic.cost(there), 0.5, 1e-9);
 }
 
-TEST(CalibrationBelief, ComesBetweenTiltAndFrame) {
+TEST(CalibrationPrior, ComesBetweenTiltAndFrame) {
   const WindowPrior frame = first_frame_prior(tilted(), unknown_biases(), true);
   const Calibration calibrated{{Quat::Identity(), Vec3(0.1, 0, 0)}, {Quat::Identity(), Vec3(0.2, 0, 0)}, 0.0};
-  const WindowPrior prior = with_calibration_belief(frame, CalibrationBelief{}, calibrated);
+  const WindowPrior prior = with_calibration_prior(frame, CalibrationPrior{}, calibrated);
   EXPECT_EQ(prior.calibration_row(), kTiltSize);
   EXPECT_EQ(prior.frames_row(), kTiltSize + kCalibrationSize);
   EXPECT_EQ(prior.quadratic.H.bottomRightCorner(15, 15), frame.quadratic.H.bottomRightCorner(15, 15));

@@ -9,8 +9,8 @@
 #include "fbvins/estimator/pose_refinement.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/geometry/heading.hpp"
+#include "fbvins/imu/aged_bias.hpp"
 #include "fbvins/imu/alignment.hpp"
-#include "fbvins/imu/bias_belief.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
 
@@ -72,7 +72,7 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   }
   remember(frame);
   std::optional<InitialSolution> start;
-  const ImuBiasBelief biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
+  const ImuBiasEstimate biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
   if (at_rest) start = start_from_rest(biases);
   else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
@@ -99,7 +99,7 @@ void Initialiser::remember(const TrackedFrame& frame) {
   while (static_cast<int>(frames_.size()) > kFrames) frames_.pop_front();
 }
 
-std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasBelief& biases) {
+std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimate& biases) {
   std::vector<ImuSample> readings;
   for (const ImuSegment& segment : readings_)
     readings.insert(readings.end(), segment.samples.begin() + (readings.empty() ? 0 : 1),
@@ -114,7 +114,7 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasBelief&
   return InitialSolution{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true, {}};
 }
 
-std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasBelief& biases, const Calibration& calibration) {
+std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {
   std::vector<Pose<W, B>> poses;
   if (!stereo_structure(calibration, poses)) {
     reason_ = HealthReason::too_few_features;

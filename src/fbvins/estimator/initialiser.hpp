@@ -23,7 +23,7 @@ struct InitialSolution {
   std::vector<TrackedFrame> frames;
   std::vector<NavState> states;
   bool from_rest = false;
-  ImuBiasBelief biases;  ///< what was believed of them before these frames
+  ImuBiasEstimate biases;  ///< known before these frames
 };
 
 class Initialiser {
@@ -44,8 +44,8 @@ class Initialiser {
 
  private:
   void remember(const TrackedFrame& frame);
-  std::optional<InitialSolution> start_from_rest(const ImuBiasBelief& biases);
-  std::optional<InitialSolution> start_in_motion(const ImuBiasBelief& biases, const Calibration& calibration);
+  std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
+  std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
   bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
 

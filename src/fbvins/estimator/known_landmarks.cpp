@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-/// What was seen of a landmark before it was remembered is in the window's prior and in its belief (K4).
+/// What was seen of a landmark before it was remembered is in the prior of the window and in its own (K4).
 constexpr double kTimesCounted = 2;
 /// Standard deviation of the depth, as a share of it, of landmarks worth remembering.
 constexpr double kMaxRelativeDepthSigma = 0.05;
@@ -17,7 +17,7 @@ constexpr double kMaxRelativeDepthSigma = 0.05;
 }  // namespace
 
 void KnownLandmarks::clear() {
-  beliefs_.clear();
+  priors_.clear();
   order_.clear();
   anchors_.clear();
   first_anchor_ = 0;
@@ -28,47 +28,47 @@ void KnownLandmarks::clear() {
 }
 
 void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information) {
-  if (beliefs_.contains(track)) return;
+  if (priors_.contains(track)) return;
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
   const double relative_sigma = depth * std::sqrt(covariance(2, 2));
   if (!(relative_sigma < kMaxRelativeDepthSigma)) return;  // neither NaN
 
-  LandmarkBelief belief;
+  LandmarkPrior prior;
   const Vec3 p_C = depth * Vec3(alpha_beta_rho.x(), alpha_beta_rho.y(), 1);
-  belief.p_W = T_WC * p_C;
+  prior.p_W = T_WC * p_C;
   Mat3 J;  // of p_W by (alpha, beta, rho)
   J << depth * T_WC.R().leftCols<2>(), -depth * (T_WC.R() * p_C);
   Mat3 covariance_W = J * covariance * J.transpose();  // (K3)
   covariance_W.diagonal().array() += options_.position_sigma_m * options_.position_sigma_m;
-  belief.sqrt_information = Mat3(covariance_W.inverse()).llt().matrixU();
-  if (!belief.p_W.allFinite() || !belief.sqrt_information.allFinite()) return;
+  prior.sqrt_information = Mat3(covariance_W.inverse()).llt().matrixU();
+  if (!prior.p_W.allFinite() || !prior.sqrt_information.allFinite()) return;
 
   if (anchors_.empty() || anchors_.back().p_W != next_.p_W) anchors_.push_back(next_);
-  belief.anchor = first_anchor_ + static_cast<std::int64_t>(anchors_.size()) - 1;
-  beliefs_.emplace(track, belief);
+  prior.anchor = first_anchor_ + static_cast<std::int64_t>(anchors_.size()) - 1;
+  priors_.emplace(track, prior);
   order_.push_back(track);
-  new_.push_back({track, belief.p_W});
+  new_.push_back({track, prior.p_W});
   make_room();
 }
 
 void KnownLandmarks::make_room() {
   while (static_cast<int>(order_.size()) > options_.capacity) {
-    beliefs_.erase(order_.front());
+    priors_.erase(order_.front());
     order_.pop_front();
   }
   if (order_.empty()) return;
-  for (const std::int64_t needed = beliefs_.at(order_.front()).anchor; first_anchor_ < needed; ++first_anchor_)
+  for (const std::int64_t needed = priors_.at(order_.front()).anchor; first_anchor_ < needed; ++first_anchor_)
     anchors_.pop_front();
 }
 
 void KnownLandmarks::forget(TrackId track) {
-  if (beliefs_.erase(track) > 0) std::erase(order_, track);
+  if (priors_.erase(track) > 0) std::erase(order_, track);
 }
 
-std::optional<LandmarkBelief> KnownLandmarks::find(TrackId track) const {
-  const auto it = beliefs_.find(track);
-  return it == beliefs_.end() ? std::nullopt : std::optional<LandmarkBelief>(it->second);
+std::optional<LandmarkPrior> KnownLandmarks::find(TrackId track) const {
+  const auto it = priors_.find(track);
+  return it == priors_.end() ? std::nullopt : std::optional<LandmarkPrior>(it->second);
 }
 
 /// A map in error by (dp, dtheta) at the anchor is in error by dp - [p - p_anchor]x dtheta at p (K5).
@@ -78,12 +78,12 @@ Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
   return T * anchor.covariance * T.transpose();
 }
 
-void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use) {
+void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use) {
   in_use_ = !in_use.empty();
   if (!in_use_ || anchors_.empty()) return;  // still to what it was held to last
   Anchor mean{p_W, Mat6::Zero()};
-  for (const LandmarkBelief& belief : in_use) {                                       // (K6)
-    const std::int64_t i = std::max<std::int64_t>(belief.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
+  for (const LandmarkPrior& prior : in_use) {                                        // (K6)
+    const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
     mean.covariance += carried(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
   }
   held_to_ = mean;

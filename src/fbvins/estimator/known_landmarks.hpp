@@ -6,11 +6,11 @@
 // landmarks of a moment, as an anchor, and is part of what W is uncertain of from then on.
 // Synchronous; one instance, one thread. At most `capacity` landmarks: the oldest are forgotten.
 //
-//   known.hold_to(T_WB.p, beliefs_in_use);                         // after each solve
+//   known.hold_to(T_WB.p, priors_in_use);                         // after each solve
 //   covariance = known.with_map(T_WB, covariance);                 // of any pose of the window
 //   known.anchor(T_WB_leaving, covariance);                        // before a keyframe leaves
 //   known.remember(track, T_WC, point, V);                         // when a landmark leaves
-//   landmark.belief = known.find(track);                           // when a track appears
+//   landmark.prior = known.find(track);                           // when a track appears
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "fbvins/estimator/estimator_options.hpp"
-#include "fbvins/estimator/landmark_belief.hpp"
+#include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -33,7 +33,7 @@ class KnownLandmarks {
 
   void clear();
   /// The window is held to the map by these, around the newest position.
-  void hold_to(const Vec3& p_W, std::span<const LandmarkBelief> in_use);
+  void hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use);
   /// Covariance of (dp in W, dtheta in B) of a pose: of the window alone, and with that of the remembered landmarks (K4-K6).
   Mat6 with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
   /// Landmarks remembered from now on have in common what this pose, their host's, is uncertain of.
@@ -41,12 +41,12 @@ class KnownLandmarks {
   /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. The first time counts,
   /// it has drifted least; not one whose depth is too uncertain.
   void remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information);
-  std::optional<LandmarkBelief> find(TrackId track) const;
+  std::optional<LandmarkPrior> find(TrackId track) const;
   void forget(TrackId track);
   /// Those remembered since the last call.
   std::vector<LocatedLandmark> take_new() { return std::exchange(new_, {}); }
 
-  std::size_t size() const { return beliefs_.size(); }
+  std::size_t size() const { return priors_.size(); }
 
  private:
   struct Anchor {
@@ -57,7 +57,7 @@ class KnownLandmarks {
   void make_room();
 
   KnownLandmarkOptions options_;
-  std::unordered_map<TrackId, LandmarkBelief> beliefs_;
+  std::unordered_map<TrackId, LandmarkPrior> priors_;
   std::deque<TrackId> order_;      // as remembered
   std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest

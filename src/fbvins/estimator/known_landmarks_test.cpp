@@ -19,11 +19,11 @@ TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
   options.position_sigma_m = 0.003;
   KnownLandmarks known(options);
   known.remember(TrackId{7}, kCamera, kPoint, kInformation);
-  const auto belief = known.find(TrackId{7});
-  ASSERT_TRUE(belief.has_value());
+  const auto prior = known.find(TrackId{7});
+  ASSERT_TRUE(prior.has_value());
   const Vec3 p_C(0.4, -0.2, 2.0);
-  EXPECT_LT((belief->p_W - kCamera * p_C).norm(), 1e-12);
-  const Mat3 covariance = (belief->sqrt_information.transpose() * belief->sqrt_information).inverse();
+  EXPECT_LT((prior->p_W - kCamera * p_C).norm(), 1e-12);
+  const Mat3 covariance = (prior->sqrt_information.transpose() * prior->sqrt_information).inverse();
   const Mat3 in_camera = kCamera.R().transpose() * covariance * kCamera.R();
   // Along the ray: sigma of 1/depth times depth squared; beside it the ray's own, at this depth; and 3 mm everywhere.
   const Vec3 ray = p_C / p_C.z();

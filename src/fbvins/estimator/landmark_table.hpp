@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
-#include "fbvins/estimator/landmark_belief.hpp"
+#include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
@@ -32,9 +32,9 @@ struct Landmark {
   FrameId host;
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
-  std::optional<LandmarkBelief> belief;  ///< of one that was known before
-  int strikes = 0;                       ///< times an observation of it was thrown out
-  std::vector<Sighting> sightings;       ///< oldest first; one without any is removed
+  std::optional<LandmarkPrior> prior;  ///< of one that was known before
+  int strikes = 0;                     ///< times an observation of it was thrown out
+  std::vector<Sighting> sightings;     ///< oldest first; one without any is removed
 
   bool seen_in(FrameId frame) const { return sighting_in(frame) != nullptr; }
   const Sighting* sighting_in(FrameId frame) const;

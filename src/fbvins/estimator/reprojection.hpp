@@ -65,7 +65,7 @@ struct WindowLandmark {
   int first_observation = 0;  ///< its observations are neighbours, sorted by frame
   int observation_count = 0;
   Vec3 alpha_beta_rho = Vec3::Zero();
-  int belief = -1;  ///< index into WindowProblem::beliefs of one that was known before
+  int prior = -1;  ///< index into WindowProblem::landmark_priors of one that was known before
 };
 
 /// Columns of the stacked Jacobian of one observation.

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "fbvins/core/rng.hpp"
-#include "fbvins/estimator/landmark_belief.hpp"
+#include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/geometry/jacobian_check.hpp"
 
 namespace fbvins {
@@ -96,15 +96,15 @@ TEST(Reprojection, BehindTheCameraThereIsNone) {
   EXPECT_FALSE(reproject(cameras, pair, x_h, s.landmark.alpha_beta_rho.z(), s.o, p_C, r));
 }
 
-TEST(LandmarkBelief, JacobiansAreDerivatives) {
+TEST(LandmarkPrior, JacobiansAreDerivatives) {
   Seen s;
-  LandmarkBelief belief;
-  belief.p_W = Vec3(2, 2, 4);
-  belief.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
+  LandmarkPrior prior;
+  prior.p_W = Vec3(2, 2, 4);
+  prior.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
   const auto residual = [&](const Seen& at) {
-    return belief_residual(CameraGeometry(at.calibration), at.host, at.landmark, belief);
+    return landmark_prior_residual(CameraGeometry(at.calibration), at.host, at.landmark, prior);
   };
-  const BeliefJacobian analytic(CameraGeometry(s.calibration), s.host, s.landmark, belief);
+  const LandmarkPriorJacobian analytic(CameraGeometry(s.calibration), s.host, s.landmark, prior);
   Eigen::MatrixXd J(3, 15);
   J << analytic.host, analytic.point, analytic.extrinsic;
   const auto check = check_jacobian(

@@ -45,7 +45,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
   for (const TrackedFeature& feature : features) {
     if (landmarks_.banned(feature.id)) continue;
     auto [landmark, is_new] = landmarks_.of_track(feature.id);
-    if (is_new) landmark.belief = known_.find(feature.id);
+    if (is_new) landmark.prior = known_.find(feature.id);
     Sighting sighting{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
     if (landmark.sightings.empty()) {
       landmark.host = newest.id;
@@ -56,7 +56,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
     landmark.sightings.push_back(sighting);
     if (landmark.triangulated) continue;
     landmark.triangulated = triangulate(landmark, frames_, calibration);
-    if (landmark.triangulated && landmark.belief) refuse_distant_belief(landmark, calibration);
+    if (landmark.triangulated && landmark.prior) refuse_distant_prior(landmark, calibration);
   }
 }
 
@@ -69,7 +69,7 @@ void SlidingWindow::describe(const Calibration& calibration, WindowProblem& out)
   out.prior = prior_;
   out.landmarks.clear();
   out.observations.clear();
-  out.beliefs.clear();
+  out.landmark_priors.clear();
 
   // Landmarks seen by most frames first, when there are too many; filed order among equals.
   std::vector<const Landmark*> chosen;
@@ -93,9 +93,9 @@ void SlidingWindow::describe(const Calibration& calibration, WindowProblem& out)
       if (s.right) out.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;
-    if (landmark->belief) {
-      l.belief = static_cast<int>(out.beliefs.size());
-      out.beliefs.push_back(*landmark->belief);
+    if (landmark->prior) {
+      l.prior = static_cast<int>(out.landmark_priors.size());
+      out.landmark_priors.push_back(*landmark->prior);
     }
     out.landmarks.push_back(l);
   }

@@ -38,8 +38,8 @@ class SlidingWindow {
   void set_pivot(const Vec3& p_W) { tilt_.pivot_W = p_W; }
   const WindowPrior& prior() const { return prior_; }
   void set_prior(WindowPrior prior);
-  /// Moves the linearisation point of the prior to the present states; what it believes stays. Only
-  /// while it is linear by nature: the belief about the first frame, not yet the memory of measurements.
+  /// Moves the linearisation point of the prior to the present states; its mean and covariance stay. Only
+  /// while it is linear by nature: the prior of the first frame, not yet one made of measurements.
   void restart_first_estimates();
 
   /// Appends a frame and files the sightings of its features; triangulates what can be.
@@ -52,8 +52,8 @@ class SlidingWindow {
   void describe(const Calibration& calibration, WindowProblem& out) const;
   /// Takes a solution back: the frames and landmarks it names that are still here.
   void accept(const WindowProblem& solved);
-  /// Landmarks far from where they are believed to be are others, or have been moved: they count as new ones. Returns how many.
-  int refuse_beliefs(const WindowProblem& solved);
+  /// Landmarks far from their prior are others, or have been moved: they count as new ones. Returns how many.
+  int refuse_landmark_priors(const WindowProblem& solved);
   /// Removes observations far off in a solution, and landmarks that are left with too little. Returns how many observations.
   int remove_outliers(const WindowProblem& solved);
 
@@ -67,10 +67,10 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
-  /// Positions are remembered in a W that is not turned: where W is level by decree, it is not known to be until later.
+  /// Positions are remembered in a W that is not turned: where W is turned level (UpDirection::fixed), positions in it change.
   bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
-  void refuse_distant_belief(Landmark& landmark, const Calibration& calibration);
-  void disbelieve(Landmark& landmark);
+  void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
+  void drop_prior(Landmark& landmark);
   void strike(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
   void forget_sightings(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);

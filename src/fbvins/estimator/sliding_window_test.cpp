@@ -267,17 +267,17 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreKnownFromThenOn) {
   ASSERT_NE(s.landmark(1), nullptr) << "in view: starts anew from the newest frames";
   EXPECT_EQ(s.landmark(1)->host, FrameId{2});
   EXPECT_EQ(s.landmark(1)->sightings.size(), 3u);
-  ASSERT_TRUE(s.landmark(1)->belief.has_value());
-  EXPECT_LT((s.landmark(1)->belief->p_W - s.points_W[1]).norm(), 1e-6);
+  ASSERT_TRUE(s.landmark(1)->prior.has_value());
+  EXPECT_LT((s.landmark(1)->prior->p_W - s.points_W[1]).norm(), 1e-6);
   const auto known = s.window.known().find(TrackId{0});
   ASSERT_TRUE(known.has_value());
   EXPECT_LT((known->p_W - s.points_W[0]).norm(), 1e-6);
   EXPECT_EQ(s.window.known().take_new().size(), s.points_W.size());
 
   s.add(5, {s.feature(0, 5)});  // seen again under its old track
-  ASSERT_TRUE(s.landmark(0)->belief.has_value());
+  ASSERT_TRUE(s.landmark(0)->prior.has_value());
   s.add(6, {s.feature(0, 6)});
-  EXPECT_EQ(s.window.refuse_beliefs(s.describe()), 0);
+  EXPECT_EQ(s.window.refuse_landmark_priors(s.describe()), 0);
 }
 
 TEST(SlidingWindow, NothingIsKnownOfLandmarksInAWorldThatTurns) {
@@ -295,21 +295,21 @@ TEST(SlidingWindow, NothingIsKnownOfLandmarksInAWorldThatTurns) {
   EXPECT_EQ(s.window.known().size(), 0u);
 }
 
-TEST(SlidingWindow, ALandmarkElsewhereThanBelievedIsAnother) {
+TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);
   s.points_W[0] += Vec3(0, 0.8, 0);  // nowhere near: refused as soon as its depth is known
   s.add(5, {s.feature(0, 5), s.feature(1, 5), s.feature(2, 5)});
-  EXPECT_FALSE(s.landmark(0)->belief.has_value());
+  EXPECT_FALSE(s.landmark(0)->prior.has_value());
   EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
 
   WindowProblem solved = s.describe();  // near, but the solve took it away
-  ASSERT_FALSE(solved.beliefs.empty());
-  const int believed = solved.landmarks[0].belief >= 0 ? 0 : 1;
-  solved.landmarks[believed].alpha_beta_rho.y() += 0.1;
-  const LandmarkId id = solved.landmarks[believed].id;
-  EXPECT_EQ(s.window.refuse_beliefs(solved), 1);
-  EXPECT_FALSE(s.window.landmarks().find(id)->belief.has_value());
+  ASSERT_FALSE(solved.landmark_priors.empty());
+  const int known = solved.landmarks[0].prior >= 0 ? 0 : 1;
+  solved.landmarks[known].alpha_beta_rho.y() += 0.1;
+  const LandmarkId id = solved.landmarks[known].id;
+  EXPECT_EQ(s.window.refuse_landmark_priors(solved), 1);
+  EXPECT_FALSE(s.window.landmarks().find(id)->prior.has_value());
 }
 
 TEST(SlidingWindow, ShowsItself) {

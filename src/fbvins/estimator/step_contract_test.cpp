@@ -119,8 +119,8 @@ TEST(ImuState, BiasesOfTheFlightBeforeMakeTheStartLevel) {
   SimulatedFlight flight(Motion(0.6, 0.5), 35), again(Motion(0.6, 0.5), 35);
   flight.bias.accel_mps2 = again.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
   ImuState before;
-  before.belief = {flight.bias, 1e-8 * Mat3::Identity(), 1e-4 * Mat3::Identity()};
-  before.belief.bias.accel_mps2 += Vec3(0.01, 0.01, -0.01);
+  before.biases = {flight.bias, 1e-8 * Mat3::Identity(), 1e-4 * Mat3::Identity()};
+  before.biases.bias.accel_mps2 += Vec3(0.01, 0.01, -0.01);
   Estimator without(flight.rig, EstimatorOptions{}), with(flight.rig, EstimatorOptions{}, before);
   for (int k = 0; k < 40; ++k) {
     const Odometry unknown = without.process(flight.frame(k)).odometry, known = with.process(again.frame(k)).odometry;

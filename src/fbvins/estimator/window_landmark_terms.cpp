@@ -33,17 +33,17 @@ FBVINS_INLINE void gram(const SightingRows<Columns>& rows, int sightings, double
 FBVINS_KERNEL void gram_of(const SightingRows<16>& rows, int sightings, double* G) { gram<16>(rows, sightings, G); }
 FBVINS_KERNEL void gram_of(const SightingRows<32>& rows, int sightings, double* G) { gram<32>(rows, sightings, G); }
 
-double belief_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
-  const Vec3 r = belief_residual(cameras, w.frames[l.host].state.T_WB, l, w.beliefs[l.belief]);
+double landmark_prior_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
+  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_WB, l, w.landmark_priors[l.prior]);
   return huber(r.squaredNorm(), w.weights.huber_sigma).cost;
 }
 
-double add_belief(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l, int host_block,
-                  PointBlock& point, NormalEquations& out) {
-  const LandmarkBelief& belief = w.beliefs[l.belief];
-  const Vec3 r = belief_residual(cameras, w.frames[l.host].state.T_WB, l, belief);
+double add_landmark_prior(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l, int host_block,
+                          PointBlock& point, NormalEquations& out) {
+  const LandmarkPrior& prior = w.landmark_priors[l.prior];
+  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_WB, l, prior);
   const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
-  const BeliefJacobian J(cameras, w.linearisation_point(l.host).T_WB, l, belief);
+  const LandmarkPriorJacobian J(cameras, w.linearisation_point(l.host).T_WB, l, prior);
   const int host = out.layout.pose_row(l.host);
   out.H.block<6, 6>(host, host) += robust.weight * J.host.transpose() * J.host;
   out.g.segment<6>(host) += robust.weight * J.host.transpose() * r;
@@ -100,7 +100,7 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
       return static_cast<int>(std::lower_bound(offsets.begin() + kFirstPoseBlock, offsets.end(), row) - offsets.begin());
     };
     const int host_block = block_of(host_row);
-    if (l.belief >= 0) cost += add_belief(w, cameras, l, host_block, point, out);
+    if (l.prior >= 0) cost += add_landmark_prior(w, cameras, l, host_block, point, out);
 
     for (const WindowObservation* o = begin; o != end;) {
       const int target = o->frame;
@@ -172,7 +172,7 @@ double landmark_cost(const WindowProblem& w, const PairTable& pairs) {
       const bool ok = reproject(cameras, pairs(l.host, o.frame), x_h, l.alpha_beta_rho.z(), o, p_C, r);
       cost += huber(ok ? r.squaredNorm() : kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
     }
-    if (l.belief >= 0) cost += belief_cost(w, cameras, l);
+    if (l.prior >= 0) cost += landmark_prior_cost(w, cameras, l);
   }
   return cost;
 }

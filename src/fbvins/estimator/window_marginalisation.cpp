@@ -17,7 +17,7 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
   out.prior = problem.prior;
   out.landmarks.clear();
   out.observations.clear();
-  out.beliefs = problem.beliefs;
+  out.landmark_priors = problem.landmark_priors;
   for (int i = 0; i < out.frame_count(); ++i) {
     if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
     if (i != leaving) out.frames[i].standstill = false;

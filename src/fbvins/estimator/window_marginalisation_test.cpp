@@ -44,7 +44,7 @@ Scene make_scene(bool with_prior) {
   p.observations = kept;
   if (!with_prior) p.prior = {};
   for (WindowFrame& f : p.frames) f.standstill = false;  // it knows the world's axes: velocity zero is absolute
-  for (WindowLandmark& l : p.landmarks) l.belief = -1;   // knows where the world is
+  for (WindowLandmark& l : p.landmarks) l.prior = -1;    // knows where the world is
   return s;
 }
 

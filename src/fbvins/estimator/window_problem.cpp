@@ -32,8 +32,8 @@ Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObserva
   return Vec2::Constant(std::numeric_limits<double>::infinity());
 }
 
-Vec3 WindowProblem::distance_to_belief(const WindowLandmark& l) const {
-  return belief_residual(CameraGeometry(calibration), frames[l.host].state.T_WB, l, beliefs[l.belief]);
+Vec3 WindowProblem::distance_to_prior(const WindowLandmark& l) const {
+  return landmark_prior_residual(CameraGeometry(calibration), frames[l.host].state.T_WB, l, landmark_priors[l.prior]);
 }
 
 Eigen::VectorXd WindowProblem::prior_displacement() const {

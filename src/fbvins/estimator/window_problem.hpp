@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
-#include "fbvins/estimator/landmark_belief.hpp"
+#include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/estimator/reprojection.hpp"
 #include "fbvins/estimator/tilt.hpp"
 #include "fbvins/imu/nav_state.hpp"
@@ -66,7 +66,7 @@ struct WindowProblem {
   std::vector<WindowFrame> frames;
   std::vector<WindowLandmark> landmarks;
   std::vector<WindowObservation> observations;
-  std::vector<LandmarkBelief> beliefs;
+  std::vector<LandmarkPrior> landmark_priors;
   Tilt tilt;
   Calibration calibration;
   WindowPrior prior;
@@ -84,8 +84,8 @@ struct WindowProblem {
 
   /// Whitened reprojection residual of an observation at the current estimate; infinite behind the camera.
   Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
-  /// Whitened distance of a landmark that has a belief from it, at the current estimate.
-  Vec3 distance_to_belief(const WindowLandmark& landmark) const;
+  /// Whitened distance of a landmark that has a prior from it, at the current estimate.
+  Vec3 distance_to_prior(const WindowLandmark& landmark) const;
   /// Of what the prior is about, from where it is measured.
   Eigen::VectorXd prior_displacement() const;
 };

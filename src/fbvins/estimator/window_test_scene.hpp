@@ -85,15 +85,15 @@ inline Window make_window(bool calibrating) {
     const Vec3 p_C(rng.uniform(-0.6, 0.6) * depth, rng.uniform(-0.4, 0.4) * depth, depth);
     add_landmark(w, w.problem.frames[host].state.T_WB * (w.problem.calibration.T_BC0 * p_C), host, rng);
   }
-  Rng belief_rng(18);
+  Rng prior_rng(18);
   for (int k = 0; k < kLandmarks; k += 3) {  // of every third it is known where it was, a few sigmas off
     WindowLandmark& l = w.problem.landmarks[k];
-    LandmarkBelief belief;
+    LandmarkPrior prior;
     const Vec3 p_B = point_in_host(CameraGeometry(w.problem.calibration), l);
-    belief.p_W = w.problem.frames[l.host].state.T_WB * p_B + noise3(belief_rng, 0.05);
-    belief.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
-    l.belief = static_cast<int>(w.problem.beliefs.size());
-    w.problem.beliefs.push_back(belief);
+    prior.p_W = w.problem.frames[l.host].state.T_WB * p_B + noise3(prior_rng, 0.05);
+    prior.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
+    l.prior = static_cast<int>(w.problem.landmark_priors.size());
+    w.problem.landmark_priors.push_back(prior);
   }
   for (WindowFrame& f : w.problem.frames) {
     Vec15 d;

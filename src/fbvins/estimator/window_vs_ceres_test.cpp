@@ -127,11 +127,11 @@ class CeresTwin {
       if (!seen->same_frame) blocks.insert(blocks.end(), {frame(l.host), frame(seen->o.frame)});
       add(std::move(seen), 2, blocks, new ceres::HuberLoss(p.weights.huber_sigma));
     }
-    if (l.belief < 0) return;
-    auto belief = std::make_unique<Belief>();
-    belief->seen.host = p.frames[l.host].state, belief->seen.calibration = p.calibration;
-    belief->belief = p.beliefs[l.belief];
-    add(std::move(belief), 3, {landmark, calibration_block(), frame(l.host)}, new ceres::HuberLoss(p.weights.huber_sigma));
+    if (l.prior < 0) return;
+    auto residual = std::make_unique<LandmarkPriorResidual>();
+    residual->seen.host = p.frames[l.host].state, residual->seen.calibration = p.calibration;
+    residual->prior = p.landmark_priors[l.prior];
+    add(std::move(residual), 3, {landmark, calibration_block(), frame(l.host)}, new ceres::HuberLoss(p.weights.huber_sigma));
   }
 
   std::vector<WindowFrame> frames_of_window_;

@@ -21,7 +21,7 @@ Mat6 some_covariance() {
 }
 
 /// Estimates whose errors are drawn from the covariance, in a world turned against the truth's.
-std::vector<PosePair> drawn(const Mat6& covariance, const Pose<AnyWorld, AnyWorld>& T_truth_estimate, int n) {
+std::vector<PosePair> sampled(const Mat6& covariance, const Pose<AnyWorld, AnyWorld>& T_truth_estimate, int n) {
   const Mat6 L = covariance.llt().matrixL();
   Rng rng(12);
   std::vector<PosePair> pairs;
@@ -34,10 +34,10 @@ std::vector<PosePair> drawn(const Mat6& covariance, const Pose<AnyWorld, AnyWorl
   return pairs;
 }
 
-TEST(Nees, HonestCovarianceGivesItsDegreesOfFreedom) {
+TEST(Nees, ConsistentCovarianceGivesItsDegreesOfFreedom) {
   const Mat6 P = some_covariance();
   const Similarity S{1, so3_exp(Vec3(0, 0, 1.2)), Vec3(4, 5, 6)};
-  const auto pairs = drawn(P, Pose<AnyWorld, AnyWorld>{S.q, S.p}, 4000);
+  const auto pairs = sampled(P, Pose<AnyWorld, AnyWorld>{S.q, S.p}, 4000);
   const NeesSummary s = nees(pairs, std::vector<Mat6>(pairs.size(), P), S);
   EXPECT_EQ(s.count, 4000);
   EXPECT_NEAR(s.mean.position, 3, 0.15);
@@ -50,7 +50,7 @@ TEST(Nees, HonestCovarianceGivesItsDegreesOfFreedom) {
 
 TEST(Nees, OverconfidenceShows) {
   const Mat6 P = some_covariance();
-  const auto pairs = drawn(P, {}, 1000);
+  const auto pairs = sampled(P, {}, 1000);
   const NeesSummary s = nees(pairs, std::vector<Mat6>(pairs.size(), Mat6(P / 4)), {});
   EXPECT_NEAR(s.mean.pose, 24, 1.5);
   EXPECT_LT(s.share_within_95.pose, 0.5);
@@ -58,7 +58,7 @@ TEST(Nees, OverconfidenceShows) {
 
 TEST(Nees, CovarianceThatIsNoneIsCountedNotUsed) {
   const Mat6 P = some_covariance();
-  const auto pairs = drawn(P, {}, 3);
+  const auto pairs = sampled(P, {}, 3);
   Mat6 nan = P;
   nan(0, 0) = std::nan("");
   const NeesSummary s = nees(pairs, {P, Mat6::Zero(), nan}, {});

@@ -3,7 +3,7 @@
 // Buffers are reused; one instance, one thread. Numbers are drawn from one seeded row, so the order of calls counts.
 //
 //   EpipolarCheck check(camera.focal_px(), 1);
-//   check.gather(tracks, [](const Track& t) { return t.in_sight ? &t.previous_normalised : nullptr; });
+//   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
 //   EpipolarResult result = check.judge(tracks, motion.R_ba, 0.7, stats);      // those that break it are lost
 #pragma once
 

@@ -10,13 +10,13 @@ namespace fbvins {
 /// `sigma_px`: standard deviation of the position in the raw image.
 Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised, double sigma_px);
 
-/// The tracks in sight, in their order.
+/// The tracks observed in the newest image, in their order.
 template <class Tracks>
 std::vector<TrackedFeature> features_of(const Tracks& tracks, const Camera& left, double sigma_px) {
   std::vector<TrackedFeature> features;
   features.reserve(tracks.size());
   for (const auto& track : tracks) {
-    if (!track.in_sight) continue;
+    if (!track.observed) continue;
     TrackedFeature feature;
     feature.id = track.id;
     feature.left = observe(left, track.px, track.normalised, sigma_px);

@@ -25,7 +25,7 @@ TEST(FeaturesOf, AreThoseOfTheTracksInSight) {
     tracks[i].id = TrackId{static_cast<std::int64_t>(i)};
     tracks[i].px = kCamera.distort(tracks[i].normalised);
   }
-  tracks[1].in_sight = false;
+  tracks[1].observed = false;
   tracks[2].age_frames = 7;
   tracks[2].right = observe(kCamera, Vec2(100, 50), Vec2(-0.2, -0.3), 1);
   const std::vector<TrackedFeature> features = features_of(tracks, kCamera, 1);

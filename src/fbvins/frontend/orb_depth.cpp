@@ -24,7 +24,7 @@ void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats
   if (wants_features()) by_descriptor_.index(right_features_);
   inverse_depths_.clear();
   for (OrbTrack& track : tracks) {
-    if (!track.in_sight) continue;
+    if (!track.observed) continue;
     const auto px = find(track, tracks.patches(track), images);
     if (!px) continue;
     const auto normalised = right_camera_.undistort(*px);

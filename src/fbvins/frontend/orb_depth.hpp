@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tracks in sight found in the right image, and their depth with that: by aligning the patch along the epipolar line, or,
+// The observed tracks found in the right image, and their depth with that: by aligning the patch along the epipolar line, or,
 // where patches are not followed, by descriptor. Buffers are reused; one instance, one thread.
 //
 //   OrbDepth depth(rig, options);

@@ -6,12 +6,12 @@
 namespace fbvins {
 namespace {
 
-/// Images examined of so many that follow one another, `in_sight` tracks in each.
-int examined_of(ExaminationPolicy& policy, int images, int in_sight) {
+/// Images examined of so many that follow one another, `observed` tracks in each.
+int examined_of(ExaminationPolicy& policy, int images, int observed) {
   int examined = 0;
   for (int i = 0; i < images; ++i) {
-    const bool due = policy.due(in_sight);
-    policy.pass(due, in_sight);
+    const bool due = policy.due(observed);
+    policy.pass(due, observed);
     examined += due;
   }
   return examined;

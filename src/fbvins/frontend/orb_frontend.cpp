@@ -15,8 +15,8 @@ constexpr double kShortestGap_s = 0.3, kLongestGap_s = 1.4;
 /// Standard deviation of a position that is not refined: descriptors alone are good to a pixel.
 constexpr double kSigmaUnrefined_px = 1.5;
 
-int in_sight(const OrbTracks& tracks) {
-  return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), [](const OrbTrack& t) { return t.in_sight; }));
+int count_observed(const OrbTracks& tracks) {
+  return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), [](const OrbTrack& t) { return t.observed; }));
 }
 
 OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features = options.max_keypoints}; }
@@ -30,7 +30,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       images_(rig, kOrbAlignmentLevels),
       predictor_(rig.T_BC0),
       describer_(extraction(options), std::move(stage)),
-      tracks_(options.max_features + kMostOutOfSight),
+      tracks_(options.max_features + kMostUnobserved),
       matcher_(options.search_px),
       locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in, .follows = options.follows_patches()}),
       recogniser_(rig.left, options.recognition, extraction(options).levels),
@@ -74,7 +74,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   cut_patches(tracks_, images_.left(), camera_);
   drop_ended();
   if (examined) starter_.start(tracks_, view_, images_.left(), stats);
-  else stats.tracked = in_sight(tracks_);
+  else stats.tracked = count_observed(tracks_);
   examination_.pass(examined, stats.tracked + stats.detected);
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
@@ -96,7 +96,7 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
   drop_ended();
   locator_.follow(tracks_, view_, images_, stats);
-  const bool examined = examination_.due(in_sight(tracks_));
+  const bool examined = examination_.due(count_observed(tracks_));
   if (examined) {
     examine(left, stats);
     const std::vector<int>& found = matcher_.match(tracks_, view_, motion.has_translation, stats);

@@ -39,7 +39,7 @@ Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const
   miss_x_px_.clear();
   miss_y_px_.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (found[i] < 0 || !tracks[i].was_in_sight || tracks[i].in_sight) continue;
+    if (found[i] < 0 || !tracks[i].was_observed || tracks[i].observed) continue;
     const Vec2 miss = keypoint_of(view, found[i])->pixel - tracks[i].px;
     miss_x_px_.push_back(miss.x());
     miss_y_px_.push_back(miss.y());
@@ -51,7 +51,7 @@ Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const
 bool OrbLocator::settle_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
   const Vec2 before = track.px;
   if (!px || !settle(track, *px, camera_, view)) return false;
-  if (track.was_in_sight) motion_px_.push_back((track.px - before).norm());
+  if (track.was_observed) motion_px_.push_back((track.px - before).norm());
   return true;
 }
 
@@ -59,7 +59,7 @@ void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImage
   motion_px_.clear();
   if (!choices_.follows) return;
   for (OrbTrack& track : tracks) {
-    if (!track.was_in_sight) continue;
+    if (!track.was_observed) continue;
     const OrbPatches& patches = tracks.patches(track);
     std::optional<Vec2> px = follow_by_alignment(track, patches, track.px, images.left());
     if (px && !returns(track, *px, images)) px.reset();
@@ -74,7 +74,7 @@ void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& ima
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     OrbTrack& track = tracks[i];
     const Keypoint* keypoint = keypoint_of(view, found[i]);
-    if (track.in_sight) {
+    if (track.observed) {
       if (keypoint != nullptr && (keypoint->pixel - track.px).norm() < kSameFeature_px * keypoint->scale)
         take_over(track, view, static_cast<std::size_t>(found[i]));
       continue;
@@ -91,11 +91,11 @@ std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches
   if (keypoint != nullptr) {
     px = choices_.subpixel ? refine_match(track, patches, *keypoint, images.left()) : std::optional<Vec2>(keypoint->pixel);
     if (!px) ++stats.lost_check;
-  } else if (track.was_in_sight && choices_.fill_in && !choices_.follows) {
+  } else if (track.was_observed && choices_.fill_in && !choices_.follows) {
     px = follow_by_alignment(track, patches, expected_px, images.left());
     if (!px) ++stats.lost_flow;
   }
-  if (px && track.was_in_sight && choices_.subpixel && !returns(track, *px, images)) {
+  if (px && track.was_observed && choices_.subpixel && !returns(track, *px, images)) {
     px.reset();
     ++stats.lost_check;
   }
@@ -105,7 +105,7 @@ std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches
 /// From a keypoint to the place that shows the track's reference patch.
 std::optional<Vec2> OrbLocator::refine_match(OrbTrack& track, const OrbPatches& patches, const Keypoint& keypoint,
                                              const Pyramid& left) {
-  if (!track.was_in_sight) {
+  if (!track.was_observed) {
     const KltResult fine = refiner_.refine(patches.reference, left, keypoint.pixel, camera_, track.normalised);
     return refiner_.accept(fine, keypoint.pixel, keypoint.scale) ? std::optional<Vec2>(fine.px) : std::nullopt;
   }

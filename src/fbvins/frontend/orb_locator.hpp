@@ -25,10 +25,10 @@ class OrbLocator {
   };
   OrbLocator(const Camera& camera, const Choices& choices) : camera_(camera), choices_(choices) {}
 
-  /// Tracks that were in sight, if choices.follows. Those found are in sight afterwards.
+  /// Tracks that were observed before, if choices.follows. Those found are observed afterwards.
   void follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats);
-  /// `found`: the keypoint of each track, or -1. Tracks that are found are in sight afterwards, and their keypoints used; those
-  /// already in sight take over the descriptor of a keypoint where they are.
+  /// `found`: the keypoint of each track, or -1. Tracks that are found are observed afterwards, and their keypoints used; those
+  /// already observed take over the descriptor of a keypoint where they are.
   void locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found, FrontendStats& stats);
 
  private:

@@ -42,7 +42,7 @@ struct Scene {
   std::vector<double> errors_px() const {
     std::vector<double> errors;
     for (std::size_t i = 0; i < tracks.size(); ++i)
-      if (tracks[i].in_sight) errors.push_back((tracks[i].px - started_px[i] - wall.shift(kStep_m)).norm());
+      if (tracks[i].observed) errors.push_back((tracks[i].px - started_px[i] - wall.shift(kStep_m)).norm());
     return errors;
   }
 };
@@ -75,7 +75,7 @@ TEST(OrbLocator, RefinesAKeypointAndTakesItsDescriptor) {
   ASSERT_GT(near, 10);
   OrbLocator(scene.wall.camera, {}).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (found[i] < 0 || !scene.tracks[i].in_sight) continue;
+    if (found[i] < 0 || !scene.tracks[i].observed) continue;
     EXPECT_EQ(scene.tracks[i].descriptor, scene.view.descriptor(static_cast<std::size_t>(found[i])));
     EXPECT_EQ(scene.view.used[static_cast<std::size_t>(found[i])], 1);
   }
@@ -89,7 +89,7 @@ TEST(OrbLocator, AKeypointOfSomethingElseIsNotTaken) {
     if ((scene.view.features.keypoints[k].pixel - scene.tracks[0].px).norm() > 40) found[0] = static_cast<int>(k);
   ASSERT_GE(found[0], 0);
   OrbLocator(scene.wall.camera, {.fill_in = false}).locate(scene.tracks, scene.view, scene.images, found, scene.stats);
-  EXPECT_FALSE(scene.tracks[0].in_sight);
+  EXPECT_FALSE(scene.tracks[0].observed);
   EXPECT_EQ(scene.stats.lost_check, 1);
 }
 

@@ -11,7 +11,7 @@ void OrbOutlierCheck::judge(OrbTracks& tracks, const OrbView& view, const Motion
     const CameraMotion motion = predictor.between(t_[static_cast<std::size_t>(then) % OrbTrack::kHistory], view.t);
     std::optional<Mat3> R_now_then;
     if (motion.has_rotation) R_now_then = motion.R_ba;
-    epipolar_.gather(tracks, [&](const OrbTrack& track) { return track.in_sight ? track.sighting(then) : nullptr; });
+    epipolar_.gather(tracks, [&](const OrbTrack& track) { return track.observed ? track.sighting(then) : nullptr; });
     (void)epipolar_.judge(tracks, R_now_then, threshold_px_, stats);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outliers among the tracks in sight (paper 2.2.3): against the image before, and against one some images back, because
+// Outliers among the observed tracks (paper 2.2.3): against the image before, and against one some images back, because
 // where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
 // One instance, one thread.
 //

@@ -38,7 +38,7 @@ void OrbStarter::start(OrbTracks& tracks, OrbView& view, const Pyramid& left, Fr
   occupied_.clear();
   count_.fill(0);
   for (const OrbTrack& track : tracks) {
-    if (!track.in_sight) continue;
+    if (!track.observed) continue;
     occupied_.push_back(track.px);
     ++count_[cell_of(track.px)];
   }

@@ -35,8 +35,8 @@ void predict_one(OrbTrack& track, PatchReference& reference, const Camera& camer
 
 void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth) {
   for (OrbTrack& track : tracks) {
-    track.was_in_sight = track.in_sight;
-    track.in_sight = false;
+    track.was_observed = track.observed;
+    track.observed = false;
     track.right.reset();
     track.previous_normalised = track.normalised;
     track.previous_px = track.px;
@@ -50,7 +50,7 @@ bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView
   if (!normalised) return false;
   track.px = px;
   track.normalised = *normalised;
-  track.in_sight = true;
+  track.observed = true;
   track.last_seen = view.t;
   if (view.T_WC) track.seen_from_W = view.T_WC->p;
   ++track.age_frames;
@@ -64,7 +64,7 @@ void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
   std::vector<Vec2> kept;
   kept.reserve(tracks.size());
   for (OrbTrack& track : tracks) {
-    if (!track.in_sight) continue;
+    if (!track.observed) continue;
     const bool crowded =
         std::any_of(kept.begin(), kept.end(), [&](const Vec2& other) { return (other - track.px).squaredNorm() < closest2; });
     if (crowded || static_cast<int>(kept.size()) == most) track.fate = Fate::lost;
@@ -75,17 +75,17 @@ void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
 void forget(OrbTracks& tracks, Time now, double memory_s) {
   int remembered = 0;
   for (OrbTrack& track : tracks) {
-    if (track.in_sight) continue;
+    if (track.observed) continue;
     const double patience_s = track.inverse_depth ? memory_s : kMemoryWithoutDepth * memory_s;
     const bool too_long = (now - track.last_seen).seconds() > patience_s;
-    if (too_long || track.age_frames < kFewestFrames || remembered == kMostOutOfSight) track.fate = Fate::out_of_view;
+    if (too_long || track.age_frames < kFewestFrames || remembered == kMostUnobserved) track.fate = Fate::out_of_view;
     else ++remembered;
   }
 }
 
 void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera) {
   for (OrbTrack& track : tracks) {
-    if (!track.in_sight) continue;
+    if (!track.observed) continue;
     OrbPatches& patches = tracks.patches(track);
     if (!patches.newest.cut(left, track.px, 0, kOrbAlignmentLevels - 1)) track.fate = Fate::lost;
     else if (track.renew_reference) patches.reference.take(left, track.px, camera, track.normalised);

@@ -3,7 +3,7 @@
 // (blur, occlusion, a black image) stays in the table with its descriptor and patch, and is looked for where it should be.
 // Functions without state.
 //
-//   predict(tracks, camera, motion, depth);         // to where they should be; out of sight until found
+//   predict(tracks, camera, motion, depth);         // to where they should be; not observed until found
 //   if (settle(track, px, camera, view)) ...        // found
 //   thin_out(tracks, 180, 14);
 //   forget(tracks, view.t, 1.0);
@@ -23,8 +23,8 @@ namespace fbvins {
 
 /// Levels of the pyramid that patches are aligned on.
 inline constexpr int kOrbAlignmentLevels = 3;
-/// Tracks remembered at most while they are out of sight.
-inline constexpr int kMostOutOfSight = 200;
+/// Tracks kept at most without an observation in the newest image.
+inline constexpr int kMostUnobserved = 200;
 
 struct OrbTrack : TrackState {
   /// Images over which outliers are looked for, the newest included.
@@ -38,13 +38,13 @@ struct OrbTrack : TrackState {
   Descriptor raw;         ///< the same before it was improved
   int level = 0;          ///< of the scale pyramid, as last seen
   Time last_seen;
-  bool was_in_sight = false;            ///< in the image before
+  bool was_observed = false;            ///< in the image before
   bool renew_reference = false;         ///< it no longer looks like the patch it began with
   std::array<Sighting, kHistory> seen;  ///< of image i at i % kHistory
-  std::optional<Vec3> seen_from_W;      ///< camera when it was last in sight, m
+  std::optional<Vec3> seen_from_W;      ///< camera when it was last observed, m
   std::optional<Vec3> p_W;              ///< where the estimator has left its landmark, once it has, m
 
-  void see(std::int64_t image) { seen[static_cast<std::size_t>(image) % kHistory] = {normalised, in_sight ? image : -1}; }
+  void see(std::int64_t image) { seen[static_cast<std::size_t>(image) % kHistory] = {normalised, observed ? image : -1}; }
   /// Where it was seen in that image; null if it was not.
   const Vec2* sighting(std::int64_t image) const {
     const Sighting& s = seen[static_cast<std::size_t>(image) % kHistory];
@@ -53,7 +53,7 @@ struct OrbTrack : TrackState {
 };
 
 struct OrbPatches {
-  KltTemplate newest;        ///< of the last image it was seen in; only for tracks in sight
+  KltTemplate newest;        ///< of the last image it was seen in; only for observed tracks
   PatchReference reference;  ///< where the track began or was renewed
 };
 
@@ -66,9 +66,9 @@ bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView
 /// Two tracks that have come together are one: the older stays. Then no more than wanted, the older first, which is also
 /// their order afterwards.
 void thin_out(OrbTracks& tracks, int most, double min_distance_px);
-/// Tracks out of sight for too long, and the oldest of too many.
+/// Tracks that were not observed for too long, and the oldest of too many.
 void forget(OrbTracks& tracks, Time now, double memory_s);
-/// What tracks in sight look like now; one at the border is lost.
+/// What observed tracks look like now; one at the border is lost.
 void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera);
 
 }  // namespace fbvins

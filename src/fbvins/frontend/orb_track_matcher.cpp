@@ -8,8 +8,8 @@ namespace {
 
 /// Search radius when only the rotation or nothing is known.
 constexpr double kSearchBlind_px = 50;
-/// Of a track that was out of sight, searched for without its neighbours' help: a descriptor must say more.
-constexpr int kOutOfSightDistance_bits = 45;
+/// Of a track that was not observed in the image before, searched for without its neighbours' help: a descriptor must say more.
+constexpr int kReturningDistance_bits = 45;
 /// Of descriptors as extracted, for comparison with improved ones.
 constexpr int kRawDistance_bits = 60;
 /// A match this near to where its track turned out to be is right.
@@ -26,7 +26,7 @@ const std::vector<int>& OrbTrackMatcher::match(const OrbTracks& tracks, const Or
     query.level = track.level;
     query.descriptor = track.descriptor;
     query.radius_px = well_predicted ? search_px_ : kSearchBlind_px;
-    if (!track.was_in_sight) query.max_distance_bits = kOutOfSightDistance_bits;
+    if (!track.was_observed) query.max_distance_bits = kReturningDistance_bits;
     queries_.push_back(query);
   }
   matcher_.match(queries_, view.features, view.grid, found_);
@@ -61,7 +61,7 @@ int OrbTrackMatcher::inliers(const OrbTracks& tracks, const Matches& matches) {
     const auto match = std::find_if(next, matches.end(), [&](const auto& m) { return m.first == track.id; });
     if (match == matches.end()) continue;
     next = match + 1;
-    if (track.in_sight && (track.px - match->second).norm() < kInlier_px) ++count;
+    if (track.observed && (track.px - match->second).norm() < kInlier_px) ++count;
   }
   return count;
 }

@@ -47,7 +47,7 @@ TEST(OrbTrackMatcher, FindsTracksWhereTheyAreExpected) {
     ++matched;
     const Vec2 px = scene.view.features.keypoints[static_cast<std::size_t>(found[i])].pixel;
     EXPECT_LT((px - scene.tracks[i].px).norm(), 12);
-    scene.tracks[i].in_sight = true;
+    scene.tracks[i].observed = true;
   }
   EXPECT_GT(matched, 10);
   EXPECT_EQ(scene.stats.matches.found, matched);

@@ -29,7 +29,7 @@ TEST(OrbTrack, IsPredictedWhereItsDepthSaysAndLeavesWithTheImage) {
   EXPECT_NEAR((tracks[0].px - Vec2(100, 90) - wall.shift(0.3)).norm(), 0, 1e-9);
   EXPECT_EQ(tracks[1].px, Vec2(100, 50));
   EXPECT_EQ(tracks[0].previous_px, Vec2(100, 90));
-  EXPECT_TRUE(tracks[0].was_in_sight && !tracks[0].in_sight);
+  EXPECT_TRUE(tracks[0].was_observed && !tracks[0].observed);
   EXPECT_EQ(tracks[0].fate, Fate::goes_on);
   EXPECT_EQ(tracks[2].fate, Fate::out_of_view) << "120 px to the left of the image";
 }
@@ -50,7 +50,7 @@ TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasSeen) {
   OrbTrack track;
   for (const std::int64_t image : {10, 11, 12}) {
     track.normalised = Vec2(static_cast<double>(image), 0);
-    track.in_sight = image != 11;
+    track.observed = image != 11;
     track.see(image);
   }
   ASSERT_NE(track.sighting(10), nullptr);
@@ -65,11 +65,11 @@ TEST(OrbTrack, SettlesInsideTheImageOnly) {
   view.t = Time{7};
   view.T_WC = Pose<W, C0>(Quat::Identity(), Vec3(1, 2, 3));
   OrbTrack track = track_at(wall.camera, Vec2(100, 90));
-  track.in_sight = false;
+  track.observed = false;
   EXPECT_FALSE(settle(track, Vec2(kPatchBorder_px - 1, 90), wall.camera, view));
-  EXPECT_FALSE(track.in_sight);
+  EXPECT_FALSE(track.observed);
   EXPECT_TRUE(settle(track, Vec2(110, 95), wall.camera, view));
-  EXPECT_TRUE(track.in_sight);
+  EXPECT_TRUE(track.observed);
   EXPECT_EQ(track.age_frames, 6);
   EXPECT_EQ(track.last_seen, view.t);
   EXPECT_EQ(*track.seen_from_W, Vec3(1, 2, 3));
@@ -83,22 +83,22 @@ TEST(ThinOut, KeepsTheOlderOfTwoThatHaveComeTogetherAndNoMoreThanWanted) {
   tracks.start(track_at(wall.camera, Vec2(50, 90), 3));
   tracks.start(track_at(wall.camera, Vec2(104.5, 94), 2));
   tracks.start(track_at(wall.camera, Vec2(105, 90), 8));
-  tracks[4].in_sight = false;
+  tracks[4].observed = false;
   thin_out(tracks, 2, 10);
   tracks.drop_ended();
   ASSERT_EQ(tracks.size(), 3u);
   EXPECT_EQ(tracks[0].age_frames, 9);
-  EXPECT_EQ(tracks[1].age_frames, 8) << "out of sight it is in nobody's way";
+  EXPECT_EQ(tracks[1].age_frames, 8) << "unobserved, it is in nobody's way";
   EXPECT_EQ(tracks[2].age_frames, 3);
 }
 
 TEST(Forget, IsPatientWithTracksWhoseDepthIsKnown) {
   const TestWall wall;
   const Time now{2'000'000'000};
-  const auto fate = [&](double seen_ago_s, bool depth, int age_frames, bool in_sight = false) {
+  const auto fate = [&](double seen_ago_s, bool depth, int age_frames, bool observed = false) {
     OrbTracks tracks(1);
     OrbTrack track = track_at(wall.camera, Vec2(100, 90), age_frames);
-    track.in_sight = in_sight;
+    track.observed = observed;
     track.last_seen = now - Duration::from_seconds(seen_ago_s);
     if (depth) track.inverse_depth = 0.3;
     tracks.start(track);
@@ -110,7 +110,7 @@ TEST(Forget, IsPatientWithTracksWhoseDepthIsKnown) {
   EXPECT_EQ(fate(0.2, false, 5), Fate::goes_on);
   EXPECT_EQ(fate(0.4, false, 5), Fate::out_of_view);
   EXPECT_EQ(fate(0.1, true, 1), Fate::out_of_view) << "seen once only";
-  EXPECT_EQ(fate(1.1, true, 5, true), Fate::goes_on) << "in sight";
+  EXPECT_EQ(fate(1.1, true, 5, true), Fate::goes_on) << "observed";
 }
 
 }  // namespace

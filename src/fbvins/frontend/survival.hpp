@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many of the features that were in sight a second ago are in sight now: what tracking, and finding again after
+// How many of the features observed a second ago are observed now: what tracking, and finding again after
 // occlusion or blur, bring together. One instance, one thread; frames in order of time.
 //
 //   SurvivalMeter meter;
@@ -14,8 +14,8 @@
 namespace fbvins {
 
 struct Survival {
-  long then = 0;  ///< features in sight a second ago
-  long now = 0;   ///< those of them in sight now
+  long then = 0;  ///< features observed a second ago
+  long now = 0;   ///< those of them observed now
   Survival& operator+=(const Survival& other) {
     then += other.then, now += other.now;
     return *this;

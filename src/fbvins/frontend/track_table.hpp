@@ -25,14 +25,14 @@ enum class Fate : std::uint8_t { goes_on, out_of_view, lost };
 struct TrackState {
   TrackId id;
   std::size_t slot = 0;            ///< of its patches
-  Vec2 px = Vec2::Zero();          ///< in the newest left image; where it is expected, while out of sight
+  Vec2 px = Vec2::Zero();          ///< in the newest left image; where it is expected, while it is not observed
   Vec2 normalised = Vec2::Zero();  ///< the same in C0
   Vec2 previous_px = Vec2::Zero();
   Vec2 previous_normalised = Vec2::Zero();
   std::optional<double> inverse_depth;  ///< 1/m along z of C0, from the last stereo match
   std::optional<Observation> right;     ///< match in the newest right image
   int age_frames = 0;
-  bool in_sight = true;  ///< has an observation in the newest image
+  bool observed = true;  ///< has an observation in the newest image
   Fate fate = Fate::goes_on;
 };
 

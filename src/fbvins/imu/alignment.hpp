@@ -29,7 +29,7 @@ struct AlignmentOptions {
   double pose_sigma_m = 2e-3;           ///< noise of each visual position
   double pose_sigma_rad = 1.5e-3;       ///< noise of each visual orientation
   double gyro_bias_prior_radps = 0.3;   ///< sigma about zero
-  Vec3 accel_bias_mps2 = Vec3::Zero();  ///< believed
+  Vec3 accel_bias_mps2 = Vec3::Zero();  ///< mean of its prior
   double accel_bias_prior_mps2 = 0.1;   ///< sigma about that
   double max_gravity_error_mps2 = 0.8;  ///< of the norm, solved without constraint
   double max_gravity_sigma_rad = 0.05;  ///< about 3 degrees

@@ -88,7 +88,7 @@ TEST(Alignment, HoldsWithNoisyReadingsAndNoisyPoses) {
 }
 
 // Errors of gyro bias and gravity against the standard deviations claimed, biases drawn near the prior.
-TEST(Alignment, ItsStandardDeviationsAreHonest) {
+TEST(Alignment, ItsStandardDeviationsAreConsistent) {
   double gyro = 0, gravity = 0;
   int n = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
@@ -145,15 +145,15 @@ TEST(Alignment, AcceptsRestAndKnowsThatTheAccelerometerBiasIsHidden) {
   EXPECT_GT(a.accel_bias_sigma_mps2, 0.5 * options.accel_bias_prior_mps2);
 }
 
-TEST(Alignment, ABiasBelievedFromBeforeMakesTheStartLevel) {
-  Window unknown = make_window(Motion(), 1.0, 14, {}, 5), believed = unknown;
+TEST(Alignment, ABiasKnownFromBeforeMakesTheStartLevel) {
+  Window unknown = make_window(Motion(), 1.0, 14, {}, 5), known = unknown;
   const AlignmentResult without = align_visual_inertial(unknown.poses, unknown.between);
   AlignmentOptions options;
   options.accel_bias_mps2 = kBias.accel_mps2;
   options.accel_bias_prior_mps2 = 0.02;
-  const AlignmentResult with = align_visual_inertial(believed.poses, believed.between, options);
+  const AlignmentResult with = align_visual_inertial(known.poses, known.between, options);
   ASSERT_TRUE(without.accepted && with.accepted);
-  EXPECT_LT(gravity_error(with.states[0], believed.truth[0]), 1e-4);
+  EXPECT_LT(gravity_error(with.states[0], known.truth[0]), 1e-4);
   EXPECT_LT(with.gravity_sigma_rad, 0.5 * without.gravity_sigma_rad);
 }
 

@@ -70,10 +70,10 @@ Result<ImuState> parse_imu_state(const std::string& text, const std::string& fil
   const auto [end, wrong] = std::from_chars(t.data(), t.data() + t.size(), state.t.ns);
   if (yaml.ok() && (wrong != std::errc() || end != t.data() + t.size()))
     yaml.complain(root, "t_ns", fmt::format("'{}' is not a time in nanoseconds", t));
-  state.belief.bias = {read_bias(yaml, "gyro_bias_radps", kLargestGyroBias_radps),
+  state.biases.bias = {read_bias(yaml, "gyro_bias_radps", kLargestGyroBias_radps),
                        read_bias(yaml, "accel_bias_mps2", kLargestAccelBias_mps2)};
-  state.belief.gyro_covariance = read_covariance(yaml, "gyro_bias_covariance");
-  state.belief.accel_covariance = read_covariance(yaml, "accel_bias_covariance");
+  state.biases.gyro_covariance = read_covariance(yaml, "gyro_bias_covariance");
+  state.biases.accel_covariance = read_covariance(yaml, "accel_bias_covariance");
   if (!yaml.ok()) return yaml.error();
   return state;
 }
@@ -91,7 +91,7 @@ Result<std::optional<ImuState>> read_imu_state(const std::string& path, const Im
 }
 
 std::string imu_state_to_yaml(const ImuState& state, const ImuNoise& n) {
-  const ImuBiasBelief& b = state.belief;
+  const ImuBiasEstimate& b = state.biases;
   return fmt::format(
       "# Biases of an IMU at the end of a flight (fbvins --imu-state), for the next one; covariances as upper triangles.\n"
       "imu_state: 1\nt_ns: {}\n"

@@ -12,9 +12,9 @@ namespace {
 ImuState state() {
   ImuState s;
   s.t = Time{1403636580838555648};
-  s.belief.bias = {Vec3(1.0 / 3, -0.02, 0.03), Vec3(0.1, 2.0 / 7, -0.3)};
-  s.belief.gyro_covariance << 2e-8, 1e-9, 0, 1e-9, 3e-8, 0, 0, 0, 4e-8;
-  s.belief.accel_covariance << 1e-4, 1e-5, -1e-5, 1e-5, 2e-4, 0, -1e-5, 0, 3e-4;
+  s.biases.bias = {Vec3(1.0 / 3, -0.02, 0.03), Vec3(0.1, 2.0 / 7, -0.3)};
+  s.biases.gyro_covariance << 2e-8, 1e-9, 0, 1e-9, 3e-8, 0, 0, 0, 4e-8;
+  s.biases.accel_covariance << 1e-4, 1e-5, -1e-5, 1e-5, 2e-4, 0, -1e-5, 0, 3e-4;
   return s;
 }
 
@@ -36,10 +36,10 @@ TEST(ImuStateFile, GivesBackTheSameBits) {
   const Result<ImuState> read = parse_imu_state(text(), "imu.yaml", {});
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->t, state().t);
-  EXPECT_EQ(read->belief.bias.gyro_radps, state().belief.bias.gyro_radps);
-  EXPECT_EQ(read->belief.bias.accel_mps2, state().belief.bias.accel_mps2);
-  EXPECT_EQ(read->belief.gyro_covariance, state().belief.gyro_covariance);
-  EXPECT_EQ(read->belief.accel_covariance, state().belief.accel_covariance);
+  EXPECT_EQ(read->biases.bias.gyro_radps, state().biases.bias.gyro_radps);
+  EXPECT_EQ(read->biases.bias.accel_mps2, state().biases.bias.accel_mps2);
+  EXPECT_EQ(read->biases.gyro_covariance, state().biases.gyro_covariance);
+  EXPECT_EQ(read->biases.accel_covariance, state().biases.accel_covariance);
 }
 
 TEST(ImuStateFile, AFileOfAnotherImuIsRefused) {

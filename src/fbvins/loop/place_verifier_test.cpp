@@ -61,7 +61,7 @@ Place view(const Cloud& c, const Pose<W, C0>& T_WC, double px, std::uint64_t see
 
 const Pose<W, C0> kThere(so3_exp(Vec3(0.1, -0.35, 0.05)), Vec3(0.9, -0.2, 0.5));
 
-TEST(PlaceVerifier, FindsThePoseAndItsInformationIsHonest) {
+TEST(PlaceVerifier, FindsThePoseAndItsInformationIsConsistent) {
   const Cloud c = cloud(500, 1);
   PlaceVerifier verifier({});
   double nees = 0;

@@ -25,7 +25,7 @@ VerifiedPose seen_with(int inliers, int visible) {
   return v;
 }
 
-TEST(Relocaliser, TwoKeyframesThatAgreeAreBelieved) {
+TEST(Relocaliser, TwoKeyframesThatAgreeAreAccepted) {
   Relocaliser relocaliser;
   const MapKeyframe first = query(0, Vec3(1, 0, 1)), second = query(1, Vec3(2, 1, 1));
   EXPECT_FALSE(relocaliser.consider(first, kLevel, kTruth * first.T_GB, seen_with(40, 100)));

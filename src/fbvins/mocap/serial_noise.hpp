@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors that are correlated in time: white noise plus a part that wanders and slowly forgets (Ornstein-Uhlenbeck), and least
-// squares that is honest about them. Pure functions, any thread.
+// squares that weighs them accordingly. Pure functions, any thread.
 //
 //   NormalSums sums = whitened_sums(noise, stamps_s, rows);    // rows: Jacobian | residual, in order of time
 //   SerialNoise fitted = fit_serial_noise(...);                // by restricted likelihood

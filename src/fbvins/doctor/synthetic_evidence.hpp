@@ -11,7 +11,7 @@
 
 namespace fbvins::test {
 
-struct MadeUpSetup {
+struct SyntheticSetup {
   double seconds = 14;
   double late_s = 0;        ///< readings are stamped so late
   double right_late_s = 0;  ///< right images are exposed so late
@@ -20,7 +20,7 @@ struct MadeUpSetup {
 };
 
 /// EuRoC's kind of rig: 90 degrees wide, 11 cm, the camera's x along the body's -y.
-inline StereoRig made_up_rig() {
+inline StereoRig synthetic_rig() {
   StereoRig rig;
   rig.left = Camera(PinholeRadtan{.fx = 458, .fy = 457, .cx = 367, .cy = 248, .k1 = -0.28, .k2 = 0.07}, 752, 480);
   rig.right = Camera(PinholeRadtan{.fx = 457, .fy = 456, .cx = 379, .cy = 255, .k1 = -0.28, .k2 = 0.07}, 752, 480);
@@ -30,9 +30,9 @@ inline StereoRig made_up_rig() {
   return rig;
 }
 
-class MadeUpEvidence {
+class SyntheticEvidence {
  public:
-  explicit MadeUpEvidence(const MadeUpSetup& setup) : setup_(setup), rig_(made_up_rig()) {
+  explicit SyntheticEvidence(const SyntheticSetup& setup) : setup_(setup), rig_(synthetic_rig()) {
     for (int i = 0; i < 700; ++i) {  // on the walls of a room of 8 x 8 x 4 m
       Vec3 p(rng_.uniform(-4, 4), 0, 0);
       p.y() = rng_.uniform(-4, 4), p.z() = rng_.uniform(-2, 2);
@@ -94,7 +94,7 @@ class MadeUpEvidence {
     ++evidence.repeated.frames;
   }
 
-  MadeUpSetup setup_;
+  SyntheticSetup setup_;
   StereoRig rig_;
   Motion motion_{0.35, 0.25};
   Rng rng_{3};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sliding window's books, part two: what is not believed any more, and what is remembered.
+// The sliding window's books, part two: observations and priors that are refused, landmarks that are remembered.
 #include <algorithm>
 #include <utility>
 
@@ -9,9 +9,9 @@ namespace fbvins {
 namespace {
 
 /// W may have drifted since a landmark was seen, but not by more than this many times what tells it from others.
-constexpr double kFarFromBelief = 5;
-/// A landmark further off its belief than this is another one.
-constexpr double kBeliefOutlier_sigma = 6;
+constexpr double kFarFromPrior = 5;
+/// A landmark further from its prior than this is another one.
+constexpr double kPriorOutlier_sigma = 6;
 /// Observations further off than this in a solution are removed.
 constexpr double kOutlier_sigma = 4;
 
@@ -58,31 +58,31 @@ void SlidingWindow::strike(Landmark& landmark, const WindowProblem& solved, cons
   }
 }
 
-int SlidingWindow::refuse_beliefs(const WindowProblem& solved) {
+int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
   int refused = 0;
   for (const WindowLandmark& l : solved.landmarks) {
-    if (l.belief < 0 || solved.distance_to_belief(l).norm() <= kBeliefOutlier_sigma) continue;
-    if (Landmark* landmark = landmarks_.find(l.id)) disbelieve(*landmark);
+    if (l.prior < 0 || solved.distance_to_prior(l).norm() <= kPriorOutlier_sigma) continue;
+    if (Landmark* landmark = landmarks_.find(l.id)) drop_prior(*landmark);
     ++refused;
   }
   return refused;
 }
 
 /// One that is nowhere near is another one, and would spoil the whole solve.
-void SlidingWindow::refuse_distant_belief(Landmark& landmark, const Calibration& calibration) {
+void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
   const WindowLandmark numbers{.alpha_beta_rho = landmark.alpha_beta_rho};
   const Pose<W, B>& host = frames_.at(landmark.host).state.T_WB;
-  const double distance_sigma = belief_residual(CameraGeometry(calibration), host, numbers, *landmark.belief).norm();
-  if (distance_sigma < kFarFromBelief * kBeliefOutlier_sigma) return;
-  disbelieve(landmark);
+  const double distance_sigma = landmark_prior_residual(CameraGeometry(calibration), host, numbers, *landmark.prior).norm();
+  if (distance_sigma < kFarFromPrior * kPriorOutlier_sigma) return;
+  drop_prior(landmark);
 }
 
-void SlidingWindow::disbelieve(Landmark& landmark) {
-  landmark.belief.reset();
+void SlidingWindow::drop_prior(Landmark& landmark) {
+  landmark.prior.reset();
   known_.forget(landmark.track);
 }
 
-/// Of those still in view the position now found holds what comes: they are known again at once.
+/// Of those still in view the position now found holds what comes: they are re-observed at once.
 void SlidingWindow::remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving,
                              std::span<const Mat3> information) {
   if (!remembers_landmarks()) return;
@@ -91,7 +91,7 @@ void SlidingWindow::remember(const WindowProblem& problem, std::span<const Leavi
     Landmark& landmark = *landmarks_.find(numbers.id);
     const Pose<W, C0> T_WC = problem.frames[numbers.host].state.T_WB * problem.calibration.T_BC0;
     known_.remember(landmark.track, T_WC, numbers.alpha_beta_rho, information[k]);
-    landmark.belief = known_.find(landmark.track);
+    landmark.prior = known_.find(landmark.track);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/imu/bias_belief.hpp"
+#include "fbvins/imu/aged_bias.hpp"
 
 #include <algorithm>
 
@@ -17,12 +17,12 @@ constexpr double square(double x) { return x * x; }
 
 }  // namespace
 
-ImuBiasBelief aged(const ImuState& state, Time now, const ImuNoise& noise) {
+ImuBiasEstimate aged(const ImuState& state, Time now, const ImuNoise& noise) {
   const double age_s = (now - state.t).seconds();
   const auto wandered = [&](double walk, double wander) {
     return age_s < 0 ? square(wander) : std::min(square(walk) * age_s, square(wander));
   };
-  ImuBiasBelief out = state.belief;
+  ImuBiasEstimate out = state.biases;
   out.gyro_covariance.diagonal().array() +=
       square(kGyroRepeatability_radps) + wandered(noise.gyro_random_walk_radps2_rthz, kGyroWander_radps);
   out.accel_covariance.diagonal().array() +=

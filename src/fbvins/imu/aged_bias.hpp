@@ -6,8 +6,8 @@
 
 namespace fbvins {
 
-/// The belief at `now`: what was known, a new power-on, and the walk since, which does not go on for ever. A clock that has
+/// The estimate at `now`: what was known, a new power-on, and the walk since, which does not go on for ever. A clock that has
 /// been set back tells no age: the longest is assumed.
-ImuBiasBelief aged(const ImuState& state, Time now, const ImuNoise& noise);
+ImuBiasEstimate aged(const ImuState& state, Time now, const ImuNoise& noise);
 
 }  // namespace fbvins
