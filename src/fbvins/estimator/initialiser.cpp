@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/pose_refinement.hpp"
@@ -23,6 +24,8 @@ constexpr double kMinSpacing_s = 0.045;
 /// Stereo features needed in each of them. At rest position and speed are known without them: enough to follow will do, as the
 /// floor in front of a landed drone shows few.
 constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
+/// At rest a track that is further than this from where it was first seen is on something that moves.
+constexpr double kStill_px = 1.5;
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
 constexpr std::size_t kFramesPerRefinement = 3;
@@ -40,6 +43,17 @@ int stereo_features(const TrackedFrame& frame) {
   int n = 0;
   for (const TrackedFeature& f : frame.features) n += f.right.has_value();
   return n;
+}
+
+/// A vehicle at rest sees what moves: tracks that have left where they were first seen are left out.
+void leave_out_moving(std::vector<TrackedFrame>& frames) {
+  std::unordered_map<TrackId, Vec2> first;
+  std::unordered_set<TrackId> moving;
+  for (const TrackedFrame& frame : frames)
+    for (const TrackedFeature& f : frame.features)
+      if ((f.left.pixel - first.try_emplace(f.id, f.left.pixel).first->second).norm() > kStill_px) moving.insert(f.id);
+  for (TrackedFrame& frame : frames)
+    std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
 }
 
 /// Turns and shifts W so that the first state has the origin's position and heading.
@@ -111,7 +125,9 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
     return std::nullopt;
   }
   rest.state.bias.accel_mps2 = biases.bias.accel_mps2;
-  return InitialSolution{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true, {}};
+  InitialSolution start{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true, {}};
+  leave_out_moving(start.frames);
+  return start;
 }
 
 std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {

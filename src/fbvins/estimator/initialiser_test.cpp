@@ -97,6 +97,19 @@ TEST(Initialiser, FewFeaturesWillDoAtRestAndNotInMotion) {
   }
 }
 
+/// Somebody walks by: every third feature moves by two pixels an image.
+TEST(Initialiser, AtRestLeavesOutWhatMoves) {
+  SimulatedFlight flight(Motion(0, 0), 57);
+  flight.outlier = [](int k, std::int64_t id) { return id % 3 == 0 ? Vec2(2.0 * k, 0) : Vec2(0, 0); };
+  const Started s = start(flight, 40, {}, 0.05);
+  ASSERT_TRUE(s.solution.has_value());
+  EXPECT_TRUE(s.solution->from_rest);
+  for (const TrackedFrame& frame : s.solution->frames) {
+    EXPECT_GT(frame.features.size(), 30u);
+    for (const TrackedFeature& f : frame.features) EXPECT_NE(f.id.value % 3, 0);
+  }
+}
+
 TEST(Initialiser, BeginsAnewAfterABreakInTheReadings) {
   SimulatedFlight flight(Motion(0.6, 0.3), 55);
   flight.readings = [](int k) { return k != 6; };

@@ -21,6 +21,7 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       predictor_(rig.T_BC0),
       tracks_(options.max_features),
       follower_(rig.left),
+      motion_(rig.left.focal_px()),
       epipolar_(rig.left.focal_px(), kSeed),
       detector_(options.min_distance_px),
       stereo_(rig, options.min_depth_m) {}
@@ -80,6 +81,8 @@ void KltFrontend::follow_tracks(const CameraMotion& motion, FrontendStats& stats
 void KltFrontend::reject_outliers(const CameraMotion& motion, FrontendStats& stats) {
   std::optional<Mat3> R_ba;
   if (motion.has_rotation) R_ba = motion.R_ba;
+  motion_.gather(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
+  motion_.judge(tracks_, motion, (images_.t() - images_.t_before()).seconds(), stats);
   epipolar_.gather(tracks_, [](const KltTrack& track) { return &track.previous_normalised; });
   const EpipolarResult result = epipolar_.judge(tracks_, R_ba, options_.epipolar_px, stats);
   reject_slow_outliers(result.R_ba, stats);

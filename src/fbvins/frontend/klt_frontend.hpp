@@ -19,6 +19,7 @@
 #include "fbvins/frontend/klt_stereo.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/median.hpp"
+#include "fbvins/frontend/motion_check.hpp"
 
 namespace fbvins {
 
@@ -44,6 +45,7 @@ class KltFrontend final : public Frontend {
   MotionPredictor predictor_;
   TrackTable<KltTrack, KltPatches> tracks_;
   KltFollower follower_;
+  MotionCheck motion_;
   EpipolarCheck epipolar_;
   ShiTomasiDetector detector_;
   KltStereoMatcher stereo_;

@@ -11,13 +11,15 @@
 #include <array>
 
 #include "fbvins/frontend/epipolar_check.hpp"
+#include "fbvins/frontend/motion_check.hpp"
 #include "fbvins/frontend/orb_track.hpp"
 
 namespace fbvins {
 
 class OrbOutlierCheck {
  public:
-  OrbOutlierCheck(double focal_px, double threshold_px) : threshold_px_(threshold_px), epipolar_(focal_px, kSeed) {}
+  OrbOutlierCheck(double focal_px, double threshold_px)
+      : threshold_px_(threshold_px), motion_(focal_px), epipolar_(focal_px, kSeed) {}
 
   void begin(const OrbView& view) { t_[static_cast<std::size_t>(view.index) % OrbTrack::kHistory] = view.t; }
   /// Also notes where tracks are seen in this image.
@@ -27,6 +29,7 @@ class OrbOutlierCheck {
   static constexpr std::uint64_t kSeed = 2;
 
   double threshold_px_;
+  MotionCheck motion_;
   EpipolarCheck epipolar_;
   std::array<Time, OrbTrack::kHistory> t_;  // of image i at i % kHistory
 };

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/motion_check.hpp"
+
+#include <Eigen/Dense>
+
+namespace fbvins {
+namespace {
+
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+/// What the prediction may be off between two images: rotation, and velocity.
+constexpr double kRotationSigma_rad = 1e-3, kVelocitySigma_mps = 0.02;
+/// A prediction further off than this is wrong, and judges nobody.
+constexpr double kFurthest_sigma = 6;
+/// Noise of a track, and the residual at which its weight has fallen to a quarter.
+constexpr double kNoise_px = 0.5, kScale_px = 1.5;
+constexpr int kIterations = 3;
+/// A track that is further off moves by itself.
+constexpr double kMoving_px = 1.0;
+/// Fewer tracks say nothing; a prediction that a smaller share of them follows is wrong.
+constexpr std::size_t kFewest = 20;
+constexpr double kLeastShare = 0.25;
+
+}  // namespace
+
+/// J: by a turn and a shift of the camera's motion, both in the camera now.
+Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Jacobian* J) const {
+  const Vec3 p = motion.R_ba * point.before.homogeneous() + point.inverse_depth * motion.p_ba;
+  const Vec2 seen = p.head<2>() / p.z();
+  if (J) {
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << 1, 0, -seen.x(), 0, 1, -seen.y();
+    projection *= focal_px_ / p.z();
+    J->leftCols<3>() = -projection * hat(p);
+    J->rightCols<3>() = projection * point.inverse_depth;
+  }
+  return focal_px_ * (seen - point.now);
+}
+
+/// Gauss-Newton from the prediction, which is also the prior. Weights that fall with the residual (Geman and McClure) leave those
+/// out that are far from it. Nothing where the prediction cannot be that far off.
+std::optional<CameraMotion> MotionCheck::corrected(const CameraMotion& predicted, double dt_s) const {
+  const double shift_sigma_m = kVelocitySigma_mps * dt_s;
+  Vec6 prior;
+  prior << Vec3::Constant(1 / (kRotationSigma_rad * kRotationSigma_rad)), Vec3::Constant(1 / (shift_sigma_m * shift_sigma_m));
+  CameraMotion motion = predicted;
+  Vec6 total = Vec6::Zero();
+  for (int i = 0; i < kIterations; ++i) {
+    Mat6 H = prior.asDiagonal();
+    Vec6 g = prior.cwiseProduct(total);
+    for (const Point& point : points_) {
+      Jacobian J;
+      const Vec2 r = residual_px(motion, point, &J);
+      const double falling = 1 / (1 + r.squaredNorm() / (kScale_px * kScale_px));
+      const double weight = falling * falling / (kNoise_px * kNoise_px);
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * r;
+    }
+    const Vec6 step = -H.ldlt().solve(g);
+    const Mat3 turn = so3_exp(step.head<3>()).toRotationMatrix();
+    motion.R_ba = turn * motion.R_ba;
+    motion.p_ba = turn * motion.p_ba + step.tail<3>();
+    total += step;
+  }
+  if (total.dot(prior.cwiseProduct(total)) > kFurthest_sigma * kFurthest_sigma) return std::nullopt;
+  return motion;
+}
+
+const std::vector<std::size_t>& MotionCheck::moving(const CameraMotion& predicted, double dt_s) {
+  moving_.clear();
+  if (!predicted.has_rotation || !predicted.has_translation || !(dt_s > 0) || points_.size() < kFewest) return moving_;
+  const std::optional<CameraMotion> motion = corrected(predicted, dt_s);
+  if (!motion) return moving_;
+  for (std::size_t k = 0; k < points_.size(); ++k)
+    if (!(residual_px(*motion, points_[k]).norm() < kMoving_px)) moving_.push_back(k);
+  const auto following = static_cast<double>(points_.size() - moving_.size());
+  if (following < kLeastShare * static_cast<double>(points_.size())) moving_.clear();
+  return moving_;
+}
+
+}  // namespace fbvins

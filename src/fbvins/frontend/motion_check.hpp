@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tracks on things that move: however many agree with one another, they disagree with how the camera moved by the estimator's
+// state and the IMU. The prediction may be slightly off; the tracks first correct it, within its own uncertainty.
+// Buffers are reused; one instance, one thread.
+//
+//   MotionCheck check(camera.focal_px());
+//   check.gather(tracks, [](const Track& t) { return t.in_sight ? &t.previous_normalised : nullptr; });
+//   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);      // those on moving things
+//   are lost
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "fbvins/frontend/prediction.hpp"
+#include "fbvins/frontend/track_table.hpp"
+
+namespace fbvins {
+
+class MotionCheck {
+ public:
+  explicit MotionCheck(double focal_px) : focal_px_(focal_px) {}
+
+  /// `before(track)`: pointer to the normalised position in the image before; null leaves the track out, as an unknown depth
+  /// does.
+  template <class Tracks, class Before>
+  void gather(const Tracks& tracks, Before&& before) {
+    chosen_.clear();
+    points_.clear();
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      const Vec2* position = before(tracks[i]);
+      if (position == nullptr || tracks[i].fate != Fate::goes_on || !tracks[i].inverse_depth) continue;
+      chosen_.push_back(i);
+      points_.push_back({*position, tracks[i].normalised, *tracks[i].inverse_depth});
+    }
+  }
+
+  /// Nothing happens where the motion has no translation, or explains too few tracks: then it is the state that is wrong.
+  template <class Tracks>
+  void judge(Tracks& tracks, const CameraMotion& predicted, double dt_s, FrontendStats& stats) {
+    for (const std::size_t k : moving(predicted, dt_s)) {
+      tracks[chosen_[k]].fate = Fate::lost;
+      ++stats.lost_check;
+    }
+  }
+
+ private:
+  struct Point {
+    Vec2 before, now;      // normalised
+    double inverse_depth;  // before, 1/m
+  };
+  using Jacobian = Eigen::Matrix<double, 2, 6>;
+  Vec2 residual_px(const CameraMotion& motion, const Point& point, Jacobian* J = nullptr) const;
+  std::optional<CameraMotion> corrected(const CameraMotion& predicted, double dt_s) const;
+  const std::vector<std::size_t>& moving(const CameraMotion& predicted, double dt_s);
+
+  double focal_px_;
+  std::vector<std::size_t> chosen_;  // tracks of points_
+  std::vector<Point> points_;
+  std::vector<std::size_t> moving_;  // points_ that move by themselves
+};
+
+}  // namespace fbvins

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/motion_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/core/rng.hpp"
+
+namespace fbvins {
+namespace {
+
+struct Track : TrackState {};
+struct Patches {};
+
+constexpr double kFocal_px = 450, kNoise_px = 0.2, kDt_s = 0.05;
+
+/// Points two to six metres away before a camera that flies sideways at 0.4 m/s; the first ones are on something that walks.
+struct Crowd {
+  CameraMotion motion;
+  TrackTable<Track, Patches> tracks{100};
+  int walking;
+
+  Crowd(int points, int walkers, double walking_mps) : walking(walkers) {
+    motion.R_ba = so3_exp(Vec3(0.01, -0.02, 0.005)).toRotationMatrix();
+    motion.p_ba = Vec3(-0.4 * kDt_s, 0, 0.005);
+    motion.has_rotation = motion.has_translation = true;
+    Rng rng(11);
+    for (int i = 0; i < points; ++i) {
+      const double x = rng.uniform(-2, 2), y = rng.uniform(-1.5, 1.5);
+      const Vec3 p(x, y, rng.uniform(2, 6));
+      const Vec3 walked = p + Vec3(i < walking ? walking_mps * kDt_s : 0, 0, 0);
+      const double noise_x = rng.normal(), noise_y = rng.normal();
+      Track track;
+      track.previous_normalised = p.hnormalized();
+      track.normalised = (motion.R_ba * walked + motion.p_ba).hnormalized() + kNoise_px / kFocal_px * Vec2(noise_x, noise_y);
+      track.inverse_depth = 1 / p.z();
+      tracks.start(track);
+    }
+  }
+  /// How many of the first and of the others are lost.
+  std::pair<int, int> lost(const CameraMotion& predicted) {
+    MotionCheck check(kFocal_px);
+    FrontendStats stats;
+    check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+    check.judge(tracks, predicted, kDt_s, stats);
+    std::pair<int, int> out{0, 0};
+    for (std::size_t i = 0; i < tracks.size(); ++i)
+      if (tracks[i].fate == Fate::lost) ++(static_cast<int>(i) < walking ? out.first : out.second);
+    EXPECT_EQ(stats.lost_check, out.first + out.second);
+    return out;
+  }
+};
+
+TEST(MotionCheck, FindsAMajorityThatMovesTogether) {
+  Crowd crowd(100, 55, 0.8);
+  CameraMotion predicted = crowd.motion;
+  predicted.p_ba += 0.01 * kDt_s * Vec3(1, -1, 1);
+  predicted.R_ba = so3_exp(Vec3(5e-4, 5e-4, -5e-4)).toRotationMatrix() * predicted.R_ba;
+  const auto [walking, still] = crowd.lost(predicted);
+  EXPECT_EQ(walking, 55);
+  EXPECT_EQ(still, 0);
+}
+
+TEST(MotionCheck, CorrectsWhatThePredictionIsOff) {
+  Crowd crowd(100, 0, 0);
+  CameraMotion predicted = crowd.motion;
+  predicted.R_ba = so3_exp(Vec3(2e-3, -2e-3, 0)).toRotationMatrix() * predicted.R_ba;  // more than a pixel
+  EXPECT_EQ(crowd.lost(predicted).second, 0);
+}
+
+TEST(MotionCheck, DoesNotJudgeByAStateThatFewTracksFollow) {
+  Crowd crowd(100, 0, 0);
+  CameraMotion predicted = crowd.motion;
+  predicted.p_ba += Vec3(0.05, 0, 0);  // a metre a second too fast
+  EXPECT_EQ(crowd.lost(predicted).second, 0);
+}
+
+TEST(MotionCheck, NeedsAStateAndEnoughTracks) {
+  Crowd crowd(100, 30, 0.8);
+  CameraMotion rotation_only = crowd.motion;
+  rotation_only.has_translation = false;
+  EXPECT_EQ(crowd.lost(rotation_only).first, 0);
+  Crowd few(15, 5, 0.8);
+  EXPECT_EQ(few.lost(few.motion).first, 0);
+}
+
+TEST(MotionCheck, LeavesOutTracksWithoutDepth) {
+  Crowd crowd(100, 30, 0.8);
+  crowd.tracks[0].inverse_depth.reset();
+  EXPECT_EQ(crowd.lost(crowd.motion).first, 29);
+}
+
+}  // namespace
+}  // namespace fbvins
