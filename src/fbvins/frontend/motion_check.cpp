@@ -2,6 +2,7 @@
 #include "fbvins/frontend/motion_check.hpp"
 
 #include <Eigen/Dense>
+#include <cmath>
 
 namespace fbvins {
 namespace {
@@ -16,7 +17,7 @@ constexpr double kFurthest_sigma = 6;
 /// Noise of a track, and the residual at which its weight has fallen to a quarter.
 constexpr double kNoise_px = 0.5, kScale_px = 1.5;
 constexpr int kIterations = 3;
-/// A track that is further off moves by itself.
+/// (T4): a track that is further off moves by itself.
 constexpr double kMoving_px = 1.0;
 /// Fewer tracks say nothing; a prediction that a smaller share of them follows is wrong.
 constexpr std::size_t kFewest = 20;
@@ -24,7 +25,7 @@ constexpr double kLeastShare = 0.25;
 
 }  // namespace
 
-/// J: by a turn and a shift of the camera's motion, both in the camera now.
+/// (T1), (T2). J: by a turn and a shift of the camera's motion, both in the camera now.
 Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Jacobian* J) const {
   const Vec3 p = motion.R_ba * point.before.homogeneous() + point.inverse_depth * motion.p_ba;
   const Vec2 seen = p.head<2>() / p.z();
@@ -38,10 +39,14 @@ Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Ja
   return focal_px_ * (seen - point.now);
 }
 
-/// Gauss-Newton from the prediction, which is also the prior. Weights that fall with the residual (Geman and McClure) leave those
-/// out that are far from it. Nothing where the prediction cannot be that far off.
+/// (T5): a depth that is a pixel of disparity off moves the track by as much for each baseline that the camera has moved.
+double MotionCheck::noise_scale(const CameraMotion& motion) const { return std::hypot(1.0, motion.p_ba.norm() / baseline_m_); }
+
+/// (T3): Gauss-Newton from the prediction, which is also the prior. Weights that fall with the residual (Geman and McClure) leave
+/// those out that are far from it. Nothing where the prediction cannot be that far off.
 std::optional<CameraMotion> MotionCheck::corrected(const CameraMotion& predicted, double dt_s) const {
   const double shift_sigma_m = kVelocitySigma_mps * dt_s;
+  const double scale_px = kScale_px * noise_scale(predicted), noise_px = kNoise_px * noise_scale(predicted);
   Vec6 prior;
   prior << Vec3::Constant(1 / (kRotationSigma_rad * kRotationSigma_rad)), Vec3::Constant(1 / (shift_sigma_m * shift_sigma_m));
   CameraMotion motion = predicted;
@@ -52,8 +57,8 @@ std::optional<CameraMotion> MotionCheck::corrected(const CameraMotion& predicted
     for (const Point& point : points_) {
       Jacobian J;
       const Vec2 r = residual_px(motion, point, &J);
-      const double falling = 1 / (1 + r.squaredNorm() / (kScale_px * kScale_px));
-      const double weight = falling * falling / (kNoise_px * kNoise_px);
+      const double falling = 1 / (1 + r.squaredNorm() / (scale_px * scale_px));
+      const double weight = falling * falling / (noise_px * noise_px);
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * r;
     }
@@ -72,8 +77,9 @@ const std::vector<std::size_t>& MotionCheck::moving(const CameraMotion& predicte
   if (!predicted.has_rotation || !predicted.has_translation || !(dt_s > 0) || points_.size() < kFewest) return moving_;
   const std::optional<CameraMotion> motion = corrected(predicted, dt_s);
   if (!motion) return moving_;
+  const double moving_px = kMoving_px * noise_scale(*motion);
   for (std::size_t k = 0; k < points_.size(); ++k)
-    if (!(residual_px(*motion, points_[k]).norm() < kMoving_px)) moving_.push_back(k);
+    if (!(residual_px(*motion, points_[k]).norm() < moving_px)) moving_.push_back(k);
   const auto following = static_cast<double>(points_.size() - moving_.size());
   if (following < kLeastShare * static_cast<double>(points_.size())) moving_.clear();
   return moving_;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tracks on things that move: however many agree with one another, they disagree with how the camera moved by the estimator's
-// state and the IMU. The prediction may be slightly off; the tracks first correct it, within its own uncertainty.
+// state and the IMU (docs/derivations/moving.md). The prediction may be slightly off; the tracks first correct it.
 // Buffers are reused; one instance, one thread.
 //
-//   MotionCheck check(camera.focal_px());
+//   MotionCheck check(camera.focal_px(), baseline_m);
 //   check.gather(tracks, [](const Track& t) { return t.in_sight ? &t.previous_normalised : nullptr; });
-//   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);      // those on moving things
-//   are lost
+//   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);   // lost: those on moving things
 #pragma once
 
 #include <cstddef>
@@ -20,7 +19,8 @@ namespace fbvins {
 
 class MotionCheck {
  public:
-  explicit MotionCheck(double focal_px) : focal_px_(focal_px) {}
+  /// `baseline_m` of the stereo pair, which depths come from.
+  MotionCheck(double focal_px, double baseline_m) : focal_px_(focal_px), baseline_m_(baseline_m) {}
 
   /// `before(track)`: pointer to the normalised position in the image before; null leaves the track out, as an unknown depth
   /// does.
@@ -55,7 +55,9 @@ class MotionCheck {
   std::optional<CameraMotion> corrected(const CameraMotion& predicted, double dt_s) const;
   const std::vector<std::size_t>& moving(const CameraMotion& predicted, double dt_s);
 
-  double focal_px_;
+  double noise_scale(const CameraMotion& motion) const;
+
+  double focal_px_, baseline_m_;
   std::vector<std::size_t> chosen_;  // tracks of points_
   std::vector<Point> points_;
   std::vector<std::size_t> moving_;  // points_ that move by themselves

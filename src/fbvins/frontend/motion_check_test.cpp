@@ -38,7 +38,7 @@ struct Crowd {
   }
   /// How many of the first and of the others are lost.
   std::pair<int, int> lost(const CameraMotion& predicted) {
-    MotionCheck check(kFocal_px);
+    MotionCheck check(kFocal_px, 0.11);
     FrontendStats stats;
     check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
     check.judge(tracks, predicted, kDt_s, stats);

@@ -15,7 +15,7 @@ TEST(OrbOutlierCheck, FindsASlowSlideOverSeveralImages) {
   for (int i = 0; i < 60; ++i) points.emplace_back(rng.uniform(-2, 2), rng.uniform(-1.5, 1.5), rng.uniform(3, 6));
   OrbTracks tracks(60);
   for (std::size_t i = 0; i < points.size(); ++i) tracks.start({});
-  OrbOutlierCheck check(kFocal_px, kThreshold_px);
+  OrbOutlierCheck check(kFocal_px, 0.11, kThreshold_px);
   MotionPredictor predictor(Pose<B, C0>{});
   OrbView view;
   FrontendStats stats;
