@@ -5,7 +5,7 @@
 //
 //   MotionCheck check(camera.focal_px(), baseline_m);
 //   check.gather(tracks, [](const Track& t) { return t.in_sight ? &t.previous_normalised : nullptr; });
-//   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);   // lost: those on moving things
+//   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);  // those that move are lost
 #pragma once
 
 #include <cstddef>
