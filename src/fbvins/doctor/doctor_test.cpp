@@ -95,7 +95,10 @@ TEST(Doctor, MeasuresThePairOfCameras) {
   expect_named("baseline 10 % too long");
 }
 
-TEST(Doctor, MeasuresALens) { expect_named("left focal length 5 % too long"); }
+TEST(Doctor, MeasuresALens) {
+  expect_named("left focal length 5 % too long");
+  expect_named("both focal lengths 8 % too long");
+}
 
 TEST(Doctor, MeasuresARightImageThatIsLate) {
   const Diagnosis diagnosis = examine(test::SyntheticEvidence({.right_late_s = 0.02}).make());

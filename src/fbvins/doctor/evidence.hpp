@@ -7,6 +7,7 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/doctor/gradient_energies.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -21,8 +22,8 @@ struct SeenFeature {
 
 struct SeenFrame {
   Time t;
-  bool has_depths = false;            ///< its features were looked for in the right image
-  Mat2 gradients = Mat2::Zero();      ///< mean of grad grad^T without the noise's part, (grey/px)^2
+  bool has_depths = false;  ///< its features were looked for in the right image
+  GradientEnergies gradients;
   std::vector<SeenFeature> features;  ///< by ascending id
 };
 

@@ -8,6 +8,7 @@
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/doctor/blur.hpp"
 #include "fbvins/doctor/depths.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
@@ -28,6 +29,7 @@ Diagnosis Examination::run() {
   stereo();
   if (turns_agree_) motion();
   if (motion_agrees_) accelerations();
+  blur();
   out_.rig = rig_;
   return std::move(out_);
 }
@@ -74,14 +76,20 @@ void Examination::images() {
   if (evidence_.swapped) keep(check_stereo_order(evidence_.order));
   right_images_late();
   const FixedFeatures fixed = measure_fixed(evidence_, imu_);
-  const Blur blur = measure_blur(evidence_);
   keep(check_fixed(fixed));
   if (has(FindingKind::fixed_in_view)) evidence_ = without(fixed.ids, std::move(evidence_));
-  keep(check_blur(blur));
   measured(fmt::format("features that stay in place: {:.1f} % ({} pairs); that look like spots: {:.1f} %", 100 * fixed.share,
                        fixed.pairs, 100 * fixed.dots));
-  measured(fmt::format("blur: exposure {:.1f} +- {:.1f} ms by {} images, {:.1f} px at {:.0f} px/s", 1e3 * blur.exposure_s,
+}
+
+void Examination::blur() {
+  if (turns_seen_ && !turns_agree_) return not_judged("blur: the turning that it comes of is not known");
+  StereoRig rig = rig_;
+  rig.time_offset_s = offset_s_;
+  const Blur blur = measure_blur(evidence_, imu_, rig);
+  measured(fmt::format("blur: an exposure of {:.1f} +- {:.1f} ms by {} images, {:.1f} px at {:.0f} px/s", 1e3 * blur.exposure_s,
                        1e3 * blur.sigma_s, blur.images, blur.length_px(), blur.speed_pxps));
+  keep(check_blur(blur));
 }
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style) { return Examination(evidence, style).run(); }

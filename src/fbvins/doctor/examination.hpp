@@ -3,6 +3,7 @@
 //   examination.cpp          order, readings by themselves, images by themselves
 //   examination_imu.cpp      the IMU against what the images show
 //   examination_cameras.cpp  lenses and the pair of cameras
+//   examination_focal.cpp    the focal length that both lenses have in common
 #pragma once
 
 #include <algorithm>
@@ -14,6 +15,8 @@
 #include <vector>
 
 #include "fbvins/doctor/doctor.hpp"
+#include "fbvins/doctor/motion_fit.hpp"
+#include "fbvins/doctor/stereo_fit.hpp"
 
 namespace fbvins {
 
@@ -51,6 +54,7 @@ class Examination {
 
   void readings();
   void images();
+  void blur();
   void right_images_late();
   void turns();
   void gyro_unit(const TurnFit& fit);
@@ -60,7 +64,9 @@ class Examination {
   void time_offset(const MotionFit& fit);
   void rotation(const MotionFit& fit);
   void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
-  void focal_of_both(const MotionFit& fit);
+  MotionFit with_common_focal(MotionFit fit);
+  void use_common_focal(double log_focal, double sigma, double explained_px, const StereoFit& pair);
+  StereoFit pair_fit(StereoRig rig, bool focal_known);
   void stereo();
   void stereo_change(const StereoChange& change);
   void accelerations();
@@ -70,8 +76,15 @@ class Examination {
   ImuSeries imu_;  // in rad/s and the body's axes, as far as was found out
   StereoRig rig_;  // the calibration, corrected as far as was found out
   std::vector<FramePair> pairs_;
-  std::optional<std::pair<double, double>> focal_of_both_;  // logarithm, and px explained, by the pair of cameras
-  double accel_unit_ = 1;                                   // m/s^2 of a reading of one
+  /// What the pair of cameras has shown, for the motion to be weighed against.
+  struct PairShown {
+    StereoRig before;  // the rig until then
+    std::size_t first_finding = 0;
+    std::vector<StereoChange> changes;
+    bool judged = false;
+  };
+  PairShown pair_;
+  double accel_unit_ = 1;  // m/s^2 of a reading of one
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
   bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;

@@ -20,8 +20,6 @@ using doctor::kDegrees;
 
 /// Epipolar error that no single change explains.
 constexpr double kMostEpipolar_px = 1.2;
-/// How well a calibrated gyroscope's scale is known.
-constexpr double kGyroScale = 0.01;
 
 /// "the ... focal length".
 std::string_view name_of(WhichLens which) {
@@ -80,29 +78,21 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
   out_.findings.push_back(std::move(finding));
 }
 
-/// A pair of cameras shows a focal length that is wrong for both by the lenses' distortion alone: the gyroscope is the better
-/// ruler.
-void Examination::focal_of_both(const MotionFit& fit) {
-  if (!focal_of_both_ || !fit.log_focal) return;
-  const auto [by_pair, explains_px] = *focal_of_both_;
-  std::erase_if(out_.findings, [](const Finding& finding) { return finding.kind == FindingKind::focal_length; });
-  for (Camera* camera : {&rig_.left, &rig_.right}) *camera = changed(*camera, {.log_focal = -by_pair});
-  lens(FindingKind::focal_length, WhichLens::both, Eigen::VectorXd::Constant(1, by_pair + *fit.log_focal),
-       Eigen::VectorXd::Constant(1, std::hypot(fit.log_focal_sigma, kGyroScale)), explains_px);
+StereoFit Examination::pair_fit(StereoRig rig, bool focal_known) {
+  rig.time_offset_s = offset_s_;
+  // Where right images are so late that no depths are left to see turning by, the gyroscope is taken as it is.
+  const ImuSeries* imu = turns_agree_ || !turns_seen_ ? &imu_ : nullptr;
+  StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_, focal_known);
+  // The pairs' motions rest on depths, which a right image that is late spoils: its turning alone tells of it, too.
+  if (!fit.changes.empty() && !begins_with_delay(fit))
+    if (StereoFit by_turning = fit_stereo(evidence_.stereo, rig, imu, {}, focal_known); begins_with_delay(by_turning))
+      fit = std::move(by_turning);
+  return fit;
 }
 
 void Examination::stereo() {
-  StereoRig rig = evidence_.rig;
-  rig.time_offset_s = offset_s_;
-  rig.T_BC1 = rig_.T_BC1;
-  rig.T_BC0 = rig_.T_BC0;
-  // Where right images are so late that no depths are left to see turning by, the gyroscope is taken as it is.
-  const ImuSeries* imu = turns_agree_ || !turns_seen_ ? &imu_ : nullptr;
-  StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_);
-  // The pairs' motions rest on depths, which a right image that is late spoils: its turning alone tells of it, too.
-  if (!fit.changes.empty() && !begins_with_delay(fit))
-    if (StereoFit by_turning = fit_stereo(evidence_.stereo, rig, imu, {}); begins_with_delay(by_turning))
-      fit = std::move(by_turning);
+  const StereoFit fit = pair_fit(rig_, false);
+  pair_ = {.before = rig_, .first_finding = out_.findings.size(), .changes = fit.changes};
   const auto views = static_cast<double>(std::max<std::size_t>(evidence_.stereo.size(), 1));
   measured(fmt::format("epipolar error of {} matches in {} images: {:.2f} px, by region {}; after {} changes {:.2f}", fit.matches,
                        views, fit.error_px, regions_text(fit.regions), fit.changes.size(), fit.remaining_px));
@@ -117,6 +107,7 @@ void Examination::stereo() {
     not_judged("the pair of cameras: too few points are seen in both images");
     return;
   }
+  pair_.judged = true;
   for (const StereoChange& change : fit.changes) stereo_change(change);
   pairs_ = pair_frames(with_depths_by(rig_, evidence_));
   if (fit.remaining_px > kMostEpipolar_px && !has(FindingKind::stereo_sync)) {
@@ -156,8 +147,6 @@ void Examination::stereo_change(const StereoChange& change) {
     finding.advice = "trigger both cameras together; cameras that run freely cannot be used";
   } else {
     lens(change.kind, change.lens, change.amount, sigma, change.explained_px);
-    if (change.kind == FindingKind::focal_length && change.lens == WhichLens::both)
-      focal_of_both_ = {change.amount(0), change.explained_px};
   }
 }
 

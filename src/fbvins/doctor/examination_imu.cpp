@@ -8,6 +8,7 @@
 #include <string>
 
 #include "fbvins/doctor/axes.hpp"
+#include "fbvins/doctor/imu_health.hpp"
 
 namespace fbvins {
 namespace {
@@ -20,6 +21,10 @@ using doctor::kUnitTolerance;
 constexpr double kAgreement = 0.7;
 /// The second of the three axes must have been turned about by this much for axes to be told, rad in a tenth of a second.
 constexpr double kLeastSecondAxis_rad = 2.5e-3;
+/// Smaller factors are a wrong range or a wrong lens, not a wrong unit.
+constexpr double kMostScale = 1.7;
+/// Share of the readings from which on what is left of the turning says little of scale and axes.
+constexpr double kMostCutOff = 0.2;
 constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kBaselinePractical = 0.03;
 
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
@@ -29,6 +34,11 @@ double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 void Examination::turns() {
   offset_s_ = rig_.time_offset_s;
   if (has(FindingKind::clocks_apart)) return;
+  if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
+    turns_seen_ = true;
+    not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are cut off too often");
+    return;
+  }
   const TurnFit fit = fit_turns(pairs_, imu_, rig_);
   measured(fmt::format(
       "turning seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",
@@ -69,7 +79,7 @@ void Examination::turns() {
 }
 
 void Examination::gyro_unit(const TurnFit& fit) {
-  if (std::abs(fit.scale - 1) < 2 * kUnitTolerance) return;
+  if (fit.scale < kMostScale && fit.scale > 1 / kMostScale) return;  // the motion fit says which it is, scale or lens
   double factor = fit.scale;
   std::string advice = fmt::format("multiply the gyroscope's readings by {:.4g}", factor);
   for (const auto& [unit, name] :
@@ -121,7 +131,7 @@ void Examination::gyro_axes(const TurnFit& fit) {
 }
 
 void Examination::motion() {
-  const MotionFit fit = fit_motion(pairs_, imu_, {rig_, offset_s_, focal_of_both_.has_value()});
+  const MotionFit fit = with_common_focal(fit_motion(pairs_, imu_, {rig_, offset_s_, false}));
   if (!fit.usable) {
     not_judged("rotation and time between camera and IMU: too few images with readings around them");
     return;
@@ -136,7 +146,6 @@ void Examination::motion() {
                          change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
   time_offset(fit);
   rotation(fit);
-  focal_of_both(fit);
   offset_s_ = fit.offset_s;
   gyro_bias_ = fit.gyro_bias_radps;
   for (const MotionChange& change : fit.changes) {
@@ -157,7 +166,9 @@ void Examination::motion() {
       continue;
     } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
                change.kind == FindingKind::distortion) {
-      lens(change.kind, WhichLens::left, change.amount, sigma, change.explained_px);
+      // A lens that is wrong alone bends epipolar lines.
+      const bool both = change.kind != FindingKind::principal_point && pair_.judged && pair_.changes.empty();
+      lens(change.kind, both ? WhichLens::both : WhichLens::left, change.amount, sigma, change.explained_px);
     }
   }
 }

@@ -52,20 +52,6 @@ bool is_bright_dot(const PyramidLevel& image, const Vec2& px) {
   return peak - brightest > 12 && peak - brightest > 0.4 * (brightest - darkest);
 }
 
-/// Mean of grad grad^T over a grid, less what noise adds.
-Mat2 gradients_of(const PyramidLevel& image) {
-  Mat2 sum = Mat2::Zero();
-  int count = 0;
-  for (int y = 2; y < image.height - 2; y += 3)
-    for (int x = 2; x < image.width - 2; x += 3) {
-      const Vec2 g(0.5 * (image.row(y)[x + 1] - image.row(y)[x - 1]), 0.5 * (image.row(y + 1)[x] - image.row(y - 1)[x]));
-      sum += g * g.transpose();
-      ++count;
-    }
-  const double noise = estimate_noise(image);
-  return sum / std::max(count, 1) - 0.5 * noise * noise * Mat2::Identity();
-}
-
 }  // namespace
 
 struct EvidenceGatherer::State {
@@ -74,6 +60,8 @@ struct EvidenceGatherer::State {
   }
 
   void count_repeated(const StereoFrame& frame);
+  std::vector<StereoView> views_of_few();
+  bool as_named_after_all();
   void put_in_order();
   void end_prelude();
   void look(StereoFrame frame);
@@ -120,10 +108,34 @@ std::vector<StereoFrame> few_of(const std::vector<StereoFrame>& frames) {
 
 }  // namespace
 
+/// The held images' matches, found without the calibration.
+std::vector<StereoView> EvidenceGatherer::State::views_of_few() {
+  std::vector<StereoView> views;
+  Pyramid left, right;
+  for (const StereoFrame& frame : few_of(held)) {
+    if (!frame.left || !frame.right) continue;
+    left.build(frame.left->view(), kKltLevels);
+    right.build(frame.right->view(), kKltLevels);
+    views.push_back({frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, left, right)});
+  }
+  return views;
+}
+
+/// Where a lens or a camera has moved far, points lie on the wrong side as they do when the images are exchanged. Then the
+/// calibration must be changed more to fit the exchanged images than to fit them as they are named.
+bool EvidenceGatherer::State::as_named_after_all() {
+  std::vector<StereoView> views = views_of_few();
+  const StereoFit as_named = fit_stereo(views, evidence.rig, nullptr, {});
+  for (StereoView& view : views)
+    for (StereoPoint& point : view.points) std::swap(point.left, point.right);
+  const StereoFit as_swapped = fit_stereo(views, evidence.rig, nullptr, {});
+  return as_named.changes.size() < as_swapped.changes.size() && as_named.remaining_px < 2 * as_swapped.remaining_px;
+}
+
 /// Which image belongs where: left and right exchanged, or right ones that come later.
 void EvidenceGatherer::State::put_in_order() {
   evidence.order = stereo_order(evidence.rig, few_of(held));
-  evidence.swapped = evidence.order.swapped();
+  evidence.swapped = evidence.order.swapped() && !as_named_after_all();
   if (evidence.swapped)
     for (StereoFrame& frame : held) std::swap(frame.left, frame.right);
   evidence.step = stereo_step(evidence.rig, held, free_stereo);
@@ -138,16 +150,7 @@ void EvidenceGatherer::State::put_in_order() {
 void EvidenceGatherer::State::end_prelude() {
   prelude = false;
   put_in_order();
-  const std::vector<StereoFrame> few = few_of(held);
-  std::vector<StereoView> views;
-  Pyramid left, right;
-  for (const StereoFrame& frame : few) {
-    if (!frame.left || !frame.right) continue;
-    left.build(frame.left->view(), kKltLevels);
-    right.build(frame.right->view(), kKltLevels);
-    views.push_back({frame.t, free_stereo.match(evidence.rig, *frame.left, *frame.right, left, right)});
-  }
-  const StereoFit fit = fit_stereo(views, evidence.rig, nullptr, {});
+  const StereoFit fit = fit_stereo(views_of_few(), evidence.rig, nullptr, {});
   evidence.working_rig = fit.rig;
   stereo.emplace(evidence.working_rig, kNearest_m);
   std::vector<StereoFrame> first = std::move(held);
@@ -166,7 +169,7 @@ void EvidenceGatherer::State::look(StereoFrame frame) {
   detect();
   SeenFrame seen;
   seen.t = frame.t;
-  seen.gradients = gradients_of(images.left().level(0));
+  seen.gradients = gradient_energies(images.left());
   const double slack_s = 0.3 * kDepthStep_s;
   const bool has_right = !images.right().empty();
   if (has_right && (evidence.frames.empty() || (frame.t - last_depths).seconds() > kDepthStep_s - slack_s)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with the images themselves: repeated ones, things that hang in view, blur. Pure functions, any thread.
+// What is wrong with the images themselves: repeated ones, things that hang in view. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +25,5 @@ struct FixedFeatures {
 /// The readings tell only whether the rig turned at all: a few features that move count for more then.
 FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu);
 std::optional<Finding> check_fixed(const FixedFeatures& fixed);
-
-struct Blur {
-  double exposure_s = 0, sigma_s = 0;  ///< that the loss of sharpness along the motion tells
-  double speed_pxps = 0;               ///< exceeded in a tenth of the images
-  int images = 0;                      ///< that moved enough and in one direction
-  double length_px() const { return exposure_s * speed_pxps; }
-};
-Blur measure_blur(const Evidence& evidence);
-std::optional<Finding> check_blur(const Blur& blur);
 
 }  // namespace fbvins

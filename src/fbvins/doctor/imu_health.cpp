@@ -72,6 +72,10 @@ std::optional<Finding> check_saturation(std::span<const ImuSample> samples) {
   return finding;
 }
 
+double cut_off_share_of_gyro(std::span<const ImuSample> samples) {
+  return samples.empty() ? 0 : clipped(samples, true) / static_cast<double>(samples.size());
+}
+
 Vibration measure_vibration(std::span<const ImuSample> samples) {
   Vibration out;
   const double rate = rate_of(samples);

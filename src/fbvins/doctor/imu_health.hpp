@@ -11,6 +11,8 @@
 namespace fbvins {
 
 std::optional<Finding> check_saturation(std::span<const ImuSample> samples);
+/// Readings of the gyroscope's axes that stand at the end of their range, over the number of readings.
+double cut_off_share_of_gyro(std::span<const ImuSample> samples);
 
 struct Vibration {
   double rms_mps2 = 0;    ///< of what is faster than kVibrationFrom_hz, all axes

@@ -188,6 +188,57 @@ Spoiler vehicle_in_view() {
           }};
 }
 
+/// Image velocity by a turning rate, of pixels every kFlowGrid_px, px/s per rad/s.
+constexpr int kFlowGrid_px = 16;
+std::vector<Eigen::Matrix<double, 2, 3>> flow_of(const Camera& camera) {
+  std::vector<Eigen::Matrix<double, 2, 3>> flow;
+  for (int y = kFlowGrid_px / 2; y < camera.height() + kFlowGrid_px; y += kFlowGrid_px)
+    for (int x = kFlowGrid_px / 2; x < camera.width() + kFlowGrid_px; x += kFlowGrid_px) {
+      flow.emplace_back(Eigen::Matrix<double, 2, 3>::Zero());
+      const auto ray = camera.undistort(Vec2(x, y));
+      if (!ray) continue;
+      for (int i = 0; i < 3; ++i) {
+        const Vec3 turned = ray->homogeneous() - 1e-4 * Vec3::Unit(i).cross(ray->homogeneous());
+        flow.back().col(i) = 1e4 * (camera.distort(turned.hnormalized()) - Vec2(x, y));
+      }
+    }
+  return flow;
+}
+
+/// Each pixel is the mean along the way that the camera's turning takes it during the exposure.
+void smear(Image& image, const std::vector<Eigen::Matrix<double, 2, 3>>& flow, const Vec3& turn_C) {
+  const Image sharp = image;
+  const int columns = (image.width() + kFlowGrid_px + kFlowGrid_px / 2 - 1) / kFlowGrid_px;
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) {
+      const Vec2 way = flow[static_cast<std::size_t>(y / kFlowGrid_px * columns + x / kFlowGrid_px)] * turn_C;
+      const int steps = std::clamp(static_cast<int>(std::ceil(way.norm())), 1, 60);
+      int sum = 0;
+      for (int i = 0; i <= steps; ++i) {
+        const Vec2 at = Vec2(x, y) + (static_cast<double>(i) / steps - 0.5) * way;
+        sum += sharp.at(std::clamp(static_cast<int>(std::lround(at.x())), 0, image.width() - 1),
+                        std::clamp(static_cast<int>(std::lround(at.y())), 0, image.height() - 1));
+      }
+      image.at(x, y) = static_cast<std::uint8_t>(sum / (steps + 1));
+    }
+}
+
+/// By the newest reading before an image.
+Spoiler exposed_longer(const StereoRig& rig, double ms) {
+  auto rate_B = std::make_shared<Vec3>(Vec3::Zero());
+  return {fmt::format("exposed for {:.0f} ms longer", ms),
+          FindingKind::blur,
+          0,
+          0,
+          {},
+          [rate_B](ImuSample& sample) { *rate_B = sample.gyro_radps; },
+          [=, left = flow_of(rig.left), right = flow_of(rig.right)](StereoFrame& frame) {
+            const Vec3 turn_B = 1e-3 * ms * *rate_B;
+            frame.left = with(frame.left, [&](Image& image) { smear(image, left, rig.T_BC0.R().transpose() * turn_B); });
+            frame.right = with(frame.right, [&](Image& image) { smear(image, right, rig.T_BC1.R().transpose() * turn_B); });
+          }};
+}
+
 /// Half of what comes from the fastest readings is cut off.
 Spoiler clipped_gyro(double range) {
   return {fmt::format("gyroscope of {:.1f} rad/s", range),
@@ -307,6 +358,7 @@ std::vector<Spoiler> of_the_images(const StereoRig& rig) {
        }});
   all.push_back(dots(rig));
   all.push_back(vehicle_in_view());
+  all.push_back(exposed_longer(rig, 30));
   return all;
 }
 

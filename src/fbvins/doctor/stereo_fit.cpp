@@ -36,6 +36,18 @@ const std::vector<ChangeGroup>& groups() {
   return all;
 }
 
+bool is_common_focal(const ChangeGroup& group) {
+  return group.kind == FindingKind::focal_length && group.lens == WhichLens::both;
+}
+const std::vector<ChangeGroup>& groups_without_common_focal() {
+  static const std::vector<ChangeGroup> all = [] {
+    std::vector<ChangeGroup> made = groups();
+    std::erase_if(made, is_common_focal);
+    return made;
+  }();
+  return all;
+}
+
 std::vector<Match> thinned(std::vector<Match> matches) {
   const std::size_t step = (matches.size() + kMostMatches - 1) / kMostMatches;
   if (step <= 1) return matches;
@@ -74,7 +86,7 @@ double epipolar_error_px(const StereoView& view, const StereoRig& rig) {
 }
 
 StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
-                     std::span<const FramePair> pairs) {
+                     std::span<const FramePair> pairs, bool focal_known) {
   StereoFit fit;
   fit.rig = rig;
   const std::vector<Match> matches = thinned(gather(views, rig, imu, pairs));
@@ -85,7 +97,7 @@ StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, co
   fit.regions = by_region(matches, problem.hypothesis(), rig.left);
   double capped = problem.capped_error();
   while (fit.changes.size() < kMostChanges) {
-    auto best = best_candidate(problem, groups());
+    auto best = best_candidate(problem, focal_known ? groups_without_common_focal() : groups());
     if (!best) break;
     const double explained = explained_px(capped, best->error_px);
     const Amount amount = amount_of(*best->group, best->fit, best->solution);

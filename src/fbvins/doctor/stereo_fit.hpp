@@ -43,8 +43,9 @@ struct StereoFit {
 };
 
 /// `imu`, if given and right, and the motions of `pairs` tell a right image that is exposed late or early by how the rig moved.
+/// With `focal_known` the focal length that both lenses have in common is right.
 StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
-                     std::span<const FramePair> pairs);
+                     std::span<const FramePair> pairs, bool focal_known = false);
 
 /// Typical (1.48 median) epipolar error of a view's matches by a calibration, px.
 double epipolar_error_px(const StereoView& view, const StereoRig& rig);

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// The focal length that two lenses have in common. A pair of cameras hardly shows it, the gyroscope does; and what the pair
+// does show of it looks like other changes, so that the pair is looked at again with each estimate.
+#include "fbvins/doctor/examination.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/doctor/depths.hpp"
+#include "fbvins/doctor/lens_change.hpp"
+
+namespace fbvins {
+namespace {
+
+using doctor::kSignificant;
+
+constexpr double kPractical = 0.02, kSettled = 1e-3;
+constexpr int kRounds = 8;
+/// How well a calibrated gyroscope's scale is known.
+constexpr double kGyroScale = 0.01;
+
+bool is_common_focal(const StereoChange& change) {
+  return change.kind == FindingKind::focal_length && change.lens == WhichLens::both;
+}
+
+struct Doubt {
+  double log_focal, explained_px;
+};
+
+/// By the pair of cameras, or by the motion: of the left lens, which is all that it sees.
+std::optional<Doubt> doubt(const std::vector<StereoChange>& by_pair, const MotionFit& by_motion) {
+  for (const StereoChange& change : by_pair)
+    if (is_common_focal(change)) return Doubt{change.amount(0), change.explained_px};
+  for (const MotionChange& change : by_motion.changes)
+    if (change.kind == FindingKind::focal_length) return Doubt{change.amount(0), change.explained_px};
+  return std::nullopt;
+}
+
+StereoRig with_focal(StereoRig rig, double log_focal) {
+  for (Camera* camera : {&rig.left, &rig.right}) *camera = changed(*camera, {.log_focal = log_focal});
+  return rig;
+}
+
+}  // namespace
+
+/// The motion by the focal length that fits it best, where that is in doubt, and the findings about the pair that go with it.
+MotionFit Examination::with_common_focal(MotionFit fit) {
+  const auto doubted = pair_.judged && fit.usable ? doubt(pair_.changes, fit) : std::nullopt;
+  if (!doubted) return fit;
+  double log_focal = doubted->log_focal;
+  StereoFit pair;
+  MotionFit by_focal;
+  std::vector<FramePair> pairs;
+  for (int round = 0; round < kRounds; ++round) {
+    pair = pair_fit(with_focal(pair_.before, log_focal), true);
+    pairs = pair_frames(with_depths_by(pair.rig, evidence_));
+    by_focal = fit_motion(pairs, imu_, {pair.rig, offset_s_, true});
+    if (!by_focal.log_focal) return fit;
+    log_focal += *by_focal.log_focal;
+    if (std::abs(*by_focal.log_focal) < kSettled) break;
+  }
+  // Of one lens alone it shows in the pair: with the wrong focal length for both more is wrong than was.
+  const auto others = std::count_if(pair_.changes.begin(), pair_.changes.end(),
+                                    [](const StereoChange& change) { return !is_common_focal(change); });
+  if (static_cast<std::ptrdiff_t>(pair.changes.size()) > others) return fit;
+  pairs_ = std::move(pairs);
+  use_common_focal(log_focal, std::hypot(by_focal.log_focal_sigma, kGyroScale), doubted->explained_px, pair);
+  return by_focal;
+}
+
+void Examination::use_common_focal(double log_focal, double sigma, double explained_px, const StereoFit& pair) {
+  out_.findings.resize(pair_.first_finding);
+  rig_ = pair_.before;
+  if (std::abs(log_focal) > kPractical && std::abs(log_focal) > kSignificant * sigma)
+    lens(FindingKind::focal_length, WhichLens::both, Eigen::VectorXd::Constant(1, log_focal), Eigen::VectorXd::Constant(1, sigma),
+         explained_px);
+  for (const StereoChange& change : pair.changes) stereo_change(change);
+}
+
+}  // namespace fbvins
