@@ -4,7 +4,7 @@
 // Buffers are reused; one instance, one thread.
 //
 //   MotionCheck check(camera.focal_px(), baseline_m);
-//   check.gather(tracks, [](const Track& t) { return t.in_sight ? &t.previous_normalised : nullptr; });
+//   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
 //   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);  // those that move are lost
 #pragma once
 

@@ -7,7 +7,7 @@ void OrbOutlierCheck::judge(OrbTracks& tracks, const OrbView& view, const Motion
   for (OrbTrack& track : tracks) track.see(view.index);
   const Time before = t_[static_cast<std::size_t>(view.index - 1) % OrbTrack::kHistory];
   if (view.index > 0) {
-    motion_.gather(tracks, [&](const OrbTrack& track) { return track.in_sight ? track.sighting(view.index - 1) : nullptr; });
+    motion_.gather(tracks, [&](const OrbTrack& track) { return track.observed ? track.sighting(view.index - 1) : nullptr; });
     motion_.judge(tracks, predictor.between(before, view.t), (view.t - before).seconds(), stats);
   }
   for (const int lag : {1, static_cast<int>(OrbTrack::kHistory) - 1}) {
