@@ -5,8 +5,8 @@ namespace fbvins {
 
 void OrbOutlierCheck::judge(OrbTracks& tracks, const OrbView& view, const MotionPredictor& predictor, FrontendStats& stats) {
   for (OrbTrack& track : tracks) track.see(view.index);
-  const Time before = t_[static_cast<std::size_t>(view.index - 1) % OrbTrack::kHistory];
   if (view.index > 0) {
+    const Time before = t_[static_cast<std::size_t>(view.index - 1) % OrbTrack::kHistory];
     motion_.gather(tracks, [&](const OrbTrack& track) { return track.observed ? track.sighting(view.index - 1) : nullptr; });
     motion_.judge(tracks, predictor.between(before, view.t), (view.t - before).seconds(), stats);
   }
