@@ -113,6 +113,22 @@ void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float
   out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
 }
 
+/// The same of the pixels from p on, nothing interpolated.
+FBVINS_KERNEL
+void pixel_moments(const std::uint8_t* p, std::ptrdiff_t stride, const float* wt, const float* w, PatchMoments& out) {
+  F16 st = {}, s1 = {}, s2 = {}, value, c, d;
+  for (int y = 0; y < kP; ++y) {
+    load_lanes(p + y * stride, value);
+    load_lanes(wt + y * kP, c);
+    load_lanes(w + y * kP, d);
+    st += c * value;
+    const F16 weighted = d * value;
+    s1 += weighted;
+    s2 += weighted * value;
+  }
+  out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
+}
+
 struct TemplateMoments {
   float t, gx, gy, tt, tgx, tgy, gxx, gxy, gyy;
 };
@@ -301,12 +317,16 @@ struct Likeness {
   float correlation, variance;  ///< with the template; of the image patch
 };
 
-Likeness likeness_at(const Place& place, const KltLevelTemplate& patch) {
-  PatchMoments m;
-  patch_moments(place.p, place.stride, place.fx, place.fy, patch.wt, kWindow.w, m);
+Likeness likeness_of(const PatchMoments& m, const KltLevelTemplate& patch) {
   const float variance = m.square - m.one * m.one;
   if (!(variance > 1e-3f)) return {0, std::max(0.0f, variance)};
   return {m.t / std::sqrt(variance * patch.energy), variance};
+}
+
+Likeness likeness_at(const Place& place, const KltLevelTemplate& patch) {
+  PatchMoments m;
+  patch_moments(place.p, place.stride, place.fx, place.fy, patch.wt, kWindow.w, m);
+  return likeness_of(m, patch);
 }
 
 }  // namespace
@@ -399,6 +419,14 @@ float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, 
   Place place;
   if (!patch.valid || !place_patch(level, px.x(), px.y(), 0, place)) return -1;
   return likeness_at(place, patch).correlation;
+}
+
+float klt_correlation_about(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px) {
+  Place place;
+  if (!patch.valid || !place_patch(level, px.x() + 0.5, px.y() + 0.5, 0, place)) return -1;
+  PatchMoments m;
+  pixel_moments(place.p, place.stride, patch.wt, kWindow.w, m);
+  return likeness_of(m, patch).correlation;
 }
 
 }  // namespace fbvins

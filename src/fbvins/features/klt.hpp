@@ -84,4 +84,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
 /// (position in pixels of that level); -1 outside the image.
 float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px);
 
+/// The same up to half a pixel off, where nothing need be interpolated: for a search.
+float klt_correlation_about(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px);
+
 }  // namespace fbvins

@@ -90,7 +90,7 @@ std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
       const int steps = std::clamp(static_cast<int>((*to - *from).norm() / (kStep_px * scale)) + 1, 1, kMaxStepsOfAPiece);
       for (int i = 0; i < steps; ++i) {
         const Vec2 px = *from + (*to - *from) * (static_cast<double>(i) / steps);
-        const float correlation = klt_correlation(patch, right_.level(l), px / scale);
+        const float correlation = klt_correlation_about(patch, right_.level(l), px / scale);
         if (correlation > best) best = correlation, best_px = px;
       }
     }
