@@ -116,16 +116,75 @@ def write_ros1(path, flight, compression=None, encoding="mono8", late=0):
             writer.write(connections[topic], stamp + (number * 7919 % 13) * late, data)
 
 
-def write_ros2(path, flight, plugin, packed=False, encoding="mono8"):
+def matrices(folder):
+    """T_BC0 and T_BC1 of the flight."""
+    texts = [(folder / "mav0" / camera / "sensor.yaml").read_text() for camera in ("cam0", "cam1")]
+    return [np.array([float(x) for x in re.search(r"data: *\[(.*?)\]", text, re.DOTALL)[1].split(",")]).reshape(4, 4) for text in texts]
+
+
+def quaternion(R):
+    w = np.sqrt(1 + np.trace(R)) / 2
+    return (R[2, 1] - R[1, 2]) / (4 * w), (R[0, 2] - R[2, 0]) / (4 * w), (R[1, 0] - R[0, 1]) / (4 * w), w
+
+
+def write_librealsense(path, flight):
+    """As librealsense records: gyroscope and accelerometer are topics of their own, stamps of recording begin at zero, no frames are named, a stream's
+    transform takes the left camera's coordinates to its own. What is left out are messages that nobody reads."""
+    types, prefix = flight.types, "/device_0/sensor_"
+    topics = {TOPICS[0]: prefix + "0/Infrared_1/image/data", TOPICS[1]: prefix + "0/Infrared_2/image/data"}
+    T_BC0, T_BC1 = matrices(flight.folder.parent)
+    streams = {prefix + "0/Infrared_1": np.eye(4), prefix + "0/Infrared_2": np.linalg.inv(T_BC1) @ T_BC0, prefix + "2/Gyro_0": T_BC0,
+               prefix + "2/Accel_0": T_BC0}
+    messages = [(1, f"{stream}/tf/0", types["geometry_msgs/msg/Transform"](types["geometry_msgs/msg/Vector3"](*T[:3, 3]),
+                 types["geometry_msgs/msg/Quaternion"](*quaternion(T[:3, :3])))) for stream, T in streams.items()]
+    everything = flight.messages()
+    start = everything[0][0]
+    for stamp, topic, kind, data in everything:
+        message = flight.store.deserialize_ros1(data, kind)
+        message.header.frame_id = "1"
+        if topic in topics:
+            message.encoding = "8UC1"
+            messages.append((stamp - start + 2, topics[topic], message))
+            continue
+        zero = types["geometry_msgs/msg/Vector3"](0, 0, 0)
+        for name, gyro, accel in (("Gyro_0", message.angular_velocity, zero), ("Accel_0", zero, message.linear_acceleration)):
+            apart = types["sensor_msgs/msg/Imu"](**{**vars(message), "angular_velocity": gyro, "linear_acceleration": accel})
+            messages.append((stamp - start + 2, f"{prefix}2/{name}/imu/data", apart))
+    with rosbag1.Writer(path) as writer:
+        connections = {}
+        for stamp, topic, message in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, message.__msgtype__, typestore=flight.store)
+            writer.write(connections[topic], stamp, flight.pack(message))
+
+
+def write_ros2(path, flight, plugin, packed=False, encoding="mono8", messages=None):
     writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     if packed:
         writer.set_compression(rosbag2.CompressionMode.MESSAGE, rosbag2.CompressionFormat.ZSTD)
     with writer:
         connections = {}
-        for stamp, topic, kind, data in flight.messages(encoding):
+        for stamp, topic, kind, data in messages or flight.messages(encoding):
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=flight.store)
             writer.write(connections[topic], stamp, data)
+
+
+def write_split(path, flight):
+    """As rosbag2 splits what it records: files one after the other, named in the metadata in their order."""
+    everything = flight.messages()
+    path.mkdir()
+    names = []
+    for part in range(3):
+        messages = everything[part * len(everything) // 3:(part + 1) * len(everything) // 3]
+        bag = path.parent / f"{path.name}_part"
+        write_ros2(bag, flight, rosbag2.StoragePlugin.MCAP, messages=messages)
+        names.append(f"{path.name}_{9 + part}.mcap")  # 9, 10, 11: not in the order of letters
+        next(bag.glob("*.mcap")).rename(path / names[-1])
+        metadata = (bag / "metadata.yaml").read_text()
+        shutil.rmtree(bag)
+    listed = "".join(f"\n  - {name}" for name in names)
+    (path / "metadata.yaml").write_text(re.sub(r"(relative_file_paths:)(\n *- .*)+", r"\1" + listed, metadata))
 
 
 def write_mcap(path, flight, encoding="cdr", **options):
@@ -288,9 +347,11 @@ def write_all(root, folder):
     write_ros1(root / "mono16.bag", one, encoding="mono16")
     write_ros1(root / "compressed_images.bag", one, encoding="compressed")
     write_ros1(root / "out_of_order.bag", one, pack.LZ4, late=3_000_000)
+    write_librealsense(root / "librealsense.bag", one)
     write_ros2(root / "sqlite", two, plugin.SQLITE3)
     write_ros2(root / "sqlite_packed", two, plugin.SQLITE3, packed=True)
     write_ros2(root / "ros2_mcap", two, plugin.MCAP)
+    write_split(root / "ros2_split", two)
     write_mcap(root / "zstd.mcap", two, compression=CompressionType.ZSTD)
     write_mcap(root / "lz4.mcap", two, compression=CompressionType.LZ4)
     write_mcap(root / "unchunked.mcap", two, compression=CompressionType.NONE, use_chunking=False, use_summary_offsets=False)

@@ -14,6 +14,7 @@
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 #include "fbvins/io/ros_messages.hpp"
+#include "fbvins/io/yaml_reader.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
 #include "tests/fuzz/require.hpp"
@@ -194,6 +195,7 @@ void fuzz_message(std::string_view bytes) {
   require_sentence(camera);
   if (camera) require(camera->camera.width() > 0 && camera->camera.focal_px() > 0);
   for (const BagTransform& transform : transforms_of(bytes, encoding)) require(std::abs(transform.q.norm() - 1) < 1e-9);
+  if (const auto transform = transform_of(bytes, encoding)) require(std::abs(transform->q.norm() - 1) < 1e-9);
   for (const char* type : {"geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped", "nav_msgs/Odometry"})
     if (const auto point = pose_of(bytes, encoding, type)) require(point->T_WB.p.allFinite());
 }
@@ -212,15 +214,16 @@ std::vector<std::string> foreign_calibration_seeds() {
 }
 
 void fuzz_foreign_calibration(std::string_view bytes) {
-  const std::string text(bytes), file = "c.yaml";
-  const std::string vins =
+  static const YamlReader vins(
+      "vins.yaml",
       "body_T_cam0:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nbody_T_cam1:\n"
-      "  data: [1, 0, 0, 0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nacc_n: 1\ngyr_n: 1\nacc_w: 1\ngyr_w: 1\n";
-  require_sentence(parse_openvins_cameras(text, file));
-  require_sentence(parse_basalt(text, file));
-  require_sentence(parse_vins_fusion({vins, file}, {text, file}, {text, file}));
-  require_sentence(parse_vins_fusion({text, file}, {text, file}, {text, file}));
-  require_sentence(parse_camera_info({text, file}, {text, file}, {}));
+      "  data: [1, 0, 0, 0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nacc_n: 1\ngyr_n: 1\nacc_w: 1\ngyr_w: 1\n");
+  const YamlReader yaml("c.yaml", std::string(bytes));
+  require_sentence(parse_openvins_cameras(yaml));
+  require_sentence(parse_basalt(yaml));
+  require_sentence(parse_vins_fusion(vins, yaml, yaml));
+  require_sentence(parse_vins_fusion(yaml, yaml, yaml));
+  require_sentence(parse_camera_info(yaml, yaml, {}));
 }
 
 }  // namespace fbvins::fuzz

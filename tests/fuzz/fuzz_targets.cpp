@@ -13,6 +13,7 @@
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
+#include "fbvins/io/yaml_reader.hpp"
 #include "fbvins/mocap/marker_test_files.hpp"
 #include "fbvins/mocap/motion_capture.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
@@ -144,8 +145,8 @@ void fuzz_csv(std::string_view bytes) {
 }
 
 void fuzz_calibration(std::string_view bytes) {
-  const std::string text(bytes);
-  const auto camera = parse_euroc_camera(text, "sensor.yaml");
+  const YamlReader yaml("c.yaml", std::string(bytes));
+  const auto camera = parse_euroc_camera(yaml);
   require_sentence(camera);
   if (camera) {
     require_rigid(camera->T_BS);
@@ -154,14 +155,14 @@ void fuzz_calibration(std::string_view bytes) {
     if (const auto ray = camera->camera.undistort({camera->camera.width() / 3.0, 5.0}))
       require((camera->camera.distort(*ray) - Vec2(camera->camera.width() / 3.0, 5.0)).norm() < 1.0);
   }
-  const auto imu = parse_euroc_imu(text, "sensor.yaml");
+  const auto imu = parse_euroc_imu(yaml);
   require_sentence(imu);
   if (imu) require(imu->noise.gyro_noise_density_radps_rthz > 0);
-  const auto rig = parse_kalibr_camchain(text, "camchain.yaml");
+  const auto rig = parse_kalibr_camchain(yaml);
   require_sentence(rig);
   if (rig) require_rigid(rig->T_BC0);
   if (rig) require_rigid(rig->T_BC1);
-  require_sentence(parse_kalibr_imu(text, "imu.yaml"));
+  require_sentence(parse_kalibr_imu(yaml));
 }
 
 void fuzz_trajectory(std::string_view bytes) {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <deque>
-#include <set>
+#include <span>
 
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/quoted.hpp"
@@ -17,16 +17,25 @@ namespace {
 
 constexpr std::string_view kTruthTopic = "/ground_truth";
 
-void take_imu(const BagMessage& message, Encoding encoding, ImuTopic& topic) {
-  const std::optional<ImuSample> sample = imu_of(message.data, encoding);
+/// librealsense names no frames, and its streams by topics: /device_0/sensor_0/Infrared_1/image/data. Empty for other topics.
+std::string realsense_stream(const std::string& topic) {
+  if (!topic.starts_with("/device_")) return "";
+  std::size_t end = 0;
+  for (int names = 0; names < 3 && end != std::string::npos; ++names) end = topic.find('/', end + 1);
+  return end == std::string::npos ? "" : topic.substr(0, end);
+}
+
+void take_imu(const BagMessage& message, const BagTopic& about, ImuTopic& topic) {
+  const std::optional<ImuSample> sample = imu_of(message.data, about.encoding);
   if (!sample) {
     ++topic.malformed;
     return;
   }
   if (topic.samples.empty()) {
-    MessageFields in(message.data, encoding);
+    MessageFields in(message.data, about.encoding);
     in.header();
-    topic.frame = in.frame();
+    topic.frame = realsense_stream(about.name);
+    if (topic.frame.empty()) topic.frame = in.frame();
   }
   topic.samples.push_back(*sample);
 }
@@ -42,8 +51,19 @@ void take_image(const BagMessage& message, const BagTopic& about, ImageTopic& to
 void take_camera(const BagMessage& message, const BagTopic& about, BagContents& out) {
   if (out.cameras.contains(about.name)) return;
   Result<BagCamera> camera = camera_of(message.data, about.encoding);
+  if (camera && !realsense_stream(about.name).empty()) camera->frame = realsense_stream(about.name);
   if (camera) out.cameras.emplace(about.name, *std::move(camera));
   else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", quoted(about.name), camera.error().message);
+}
+
+/// Of librealsense: .../Infrared_1/tf/0 takes coordinates of group 0's reference to those of the stream.
+void take_stream_transform(const BagMessage& message, const BagTopic& about, BagContents& out) {
+  const std::string stream = realsense_stream(about.name);
+  auto transform = transform_of(message.data, about.encoding);
+  if (stream.empty() || !transform || about.name.compare(stream.size(), 4, "/tf/") != 0) return;
+  transform->parent = stream;
+  transform->child = stream.substr(0, stream.find('/', 1)) + about.name.substr(stream.size());
+  out.transforms.push_back(*std::move(transform));
 }
 
 template <class Map>
@@ -61,27 +81,36 @@ Result<std::string> named_topic(const Map& map, const std::string& name, const c
                                                  printable(fmt::format("{}", fmt::join(names(map), ", "))))};
 }
 
-/// Two names that differ in these words only.
-std::optional<std::pair<std::string, std::string>> pair_by_words(const std::vector<std::string>& topics) {
-  constexpr std::pair<const char*, const char*> kWords[] = {
-      {"left", "right"},      {"cam0", "cam1"},     {"infra1", "infra2"}, {"Infrared_1", "Infrared_2"},
-      {"camera0", "camera1"}, {"image0", "image1"},
-  };
-  for (const auto& [left, right] : kWords)
-    for (const std::string& topic : topics) {
-      const std::size_t at = topic.find(left);
-      if (at == std::string::npos) continue;
-      std::string partner = topic;
-      partner.replace(at, std::string_view(left).size(), right);
-      if (std::find(topics.begin(), topics.end(), partner) != topics.end()) return std::pair(topic, partner);
-    }
+using Words = std::pair<const char*, const char*>;
+constexpr Words kCameras[] = {{"left", "right"},      {"cam0", "cam1"},    {"infra1", "infra2"}, {"Infrared_1", "Infrared_2"},
+                              {"camera0", "camera1"}, {"image0", "image1"}};
+constexpr Words kMotion[] = {{"Gyro", "Accel"}, {"gyro", "accel"}};
+
+/// The name that differs from `topic` in these words only; empty where there is none.
+std::string partner_by_words(const std::string& topic, const std::vector<std::string>& topics, std::span<const Words> all) {
+  for (const auto& [one, other] : all) {
+    const std::size_t at = topic.find(one);
+    if (at == std::string::npos) continue;
+    std::string partner = topic;
+    partner.replace(at, std::string_view(one).size(), other);
+    if (std::find(topics.begin(), topics.end(), partner) != topics.end()) return partner;
+  }
+  return "";
+}
+
+std::optional<std::pair<std::string, std::string>> pair_by_words(const std::vector<std::string>& topics,
+                                                                 std::span<const Words> all) {
+  for (const Words& words : all)
+    for (const std::string& topic : topics)
+      if (const std::string partner = partner_by_words(topic, topics, {&words, 1}); !partner.empty())
+        return std::pair(topic, partner);
   return std::nullopt;
 }
 
 Result<std::pair<std::string, std::string>> find_images(const BagContents& contents) {
   const std::vector<std::string> all = names(contents.images);
   if (all.size() < 2) return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics, not on two", all.size())};
-  if (auto pair = pair_by_words(all)) return *pair;
+  if (auto pair = pair_by_words(all, kCameras)) return *pair;
   if (all.size() == 2) return std::pair(all[0], all[1]);
   return Error{ErrorCode::unsupported, fmt::format("has {} image topics ({}): say which are left and right", all.size(),
                                                    printable(fmt::format("{}", fmt::join(all, ", "))))};
@@ -91,14 +120,16 @@ Result<std::string> find_imu(const BagContents& contents) {
   const std::vector<std::string> all = names(contents.imu);
   if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
   if (all.size() == 1) return all.front();
+  if (const auto pair = pair_by_words(all, kMotion); pair && all.size() == 2) return pair->first;
   return Error{ErrorCode::unsupported, fmt::format("has {} IMU topics ({}): say which it is", all.size(),
                                                    printable(fmt::format("{}", fmt::join(all, ", "))))};
 }
 
-/// The camera_info that belongs to an image topic: beside it or below it.
+/// The camera_info that belongs to an image topic: beside it or below it, or where librealsense has it.
 const BagCamera* camera_for(const BagContents& contents, std::string topic) {
   if (topic.ends_with("/compressed")) topic.erase(topic.rfind('/'));
-  for (const std::string& name : {topic + "/camera_info", topic.substr(0, topic.rfind('/') + 1) + "camera_info"})
+  for (const std::string& name : {topic + "/camera_info", topic.substr(0, topic.rfind('/') + 1) + "camera_info",
+                                  realsense_stream(topic) + "/info/camera_info"})
     if (const auto found = contents.cameras.find(name); found != contents.cameras.end()) return &found->second;
   return nullptr;
 }
@@ -139,10 +170,11 @@ BagContents read_contents(BagReader& bag) {
   BagContents out;
   while (const std::optional<BagMessage> message = bag.next()) {
     const BagTopic about = bag.topics()[message->topic];
-    if (about.type == "sensor_msgs/Imu") take_imu(*message, about.encoding, out.imu[about.name]);
+    if (about.type == "sensor_msgs/Imu") take_imu(*message, about, out.imu[about.name]);
     else if (about.type == "sensor_msgs/Image" || about.type == "sensor_msgs/CompressedImage")
       take_image(*message, about, out.images[about.name]);
     else if (about.type == "sensor_msgs/CameraInfo") take_camera(*message, about, out);
+    else if (about.type == "geometry_msgs/Transform") take_stream_transform(*message, about, out);
     else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {
       for (BagTransform& t : transforms_of(message->data, about.encoding)) out.transforms.push_back(std::move(t));
     } else if (about.name == kTruthTopic) {
@@ -168,8 +200,10 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopi
     out.left = images->first, out.right = images->second;
   }
   const auto imu = named.imu.empty() ? find_imu(contents) : named_topic(contents.imu, named.imu, "IMU");
-  if (imu) out.imu = *imu;
-  else if (imu_needed || !contents.imu.empty()) return imu.error();
+  if (imu) {
+    out.imu = *imu;
+    out.accel = partner_by_words(*imu, names(contents.imu), kMotion);
+  } else if (imu_needed || !contents.imu.empty()) return imu.error();
   return out;
 }
 

@@ -44,8 +44,10 @@ MessagePlace place_of(const std::string& name);
 
 struct ChosenTopics {
   std::string left, right, imu;
+  std::string accel;  ///< of an accelerometer that is read apart: then `imu` is the gyroscope's; found beside it, not named
 };
-/// Those named, else those that are alone of their kind or say left and right in their names. The error lists what there is.
+/// Those named, else those that are alone of their kind or say left and right, gyroscope and accelerometer in their names. The
+/// error lists what there is.
 Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
 
 /// From camera_info and transforms. The error says what is missing.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "fbvins/bags/grey_image.hpp"
@@ -21,6 +22,20 @@ std::vector<double> doubles(MessageFields& in, std::size_t count) {
   std::vector<double> out;
   for (std::size_t i = 0; i < count && in.ok(); ++i) out.push_back(in.get<double>());
   return out;
+}
+
+/// Translation, then rotation.
+std::optional<BagTransform> read_transform(MessageFields& in) {
+  const Vec3 p = in.vector();
+  const Quat q = in.quaternion();
+  if (!in.ok() || !(std::abs(q.norm() - 1) < 1e-3) || !p.allFinite()) return std::nullopt;
+  return BagTransform{"", "", q.normalized(), p};
+}
+
+/// librealsense's names of lens models. Rectified images, which is what its infrared ones are, have none of these distortions.
+bool is_straight(std::string_view model, const std::vector<double>& d) {
+  return (model == "None" || model.ends_with("Brown Conrady")) &&
+         std::all_of(d.begin(), d.end(), [](double x) { return x == 0; });
 }
 
 /// More coefficients than ours must be zero.
@@ -81,7 +96,8 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
   if (!in.ok() || !(k[0] > 0 && k[4] > 0) || width < 1 || height < 1 || width > kLargestImageSide_px ||
       height > kLargestImageSide_px)
     return Error{ErrorCode::malformed, "this is no camera's calibration"};
-  const bool plumb_bob = model == "plumb_bob" || model.empty(), equidistant = model == "equidistant" || model == "fisheye";
+  const bool plumb_bob = model == "plumb_bob" || model.empty() || model == "Brown Conrady" || is_straight(model, d),
+             equidistant = model == "equidistant" || model == "fisheye" || model == "Kannala Brandt4";
   std::vector<double> c = d;
   if ((plumb_bob || equidistant) && fits_four(d)) c.resize(4, 0.0);
   // Other names are those of our own bags.
@@ -93,18 +109,19 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
                            quoted(model), d.size())};
 }
 
+std::optional<BagTransform> transform_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  return read_transform(in);
+}
+
 std::vector<BagTransform> transforms_of(std::string_view bytes, Encoding encoding) {
   MessageFields in(bytes, encoding);
   std::vector<BagTransform> out;
   const auto count = in.get<std::uint32_t>();
   for (std::uint32_t i = 0; i < count && in.ok(); ++i) {
     in.header();
-    BagTransform transform{std::string(in.frame()), std::string(in.text()), Quat::Identity(), in.vector()};
-    transform.q = in.quaternion();
-    if (in.ok() && std::abs(transform.q.norm() - 1) < 1e-3 && transform.p.allFinite()) {
-      transform.q.normalize();
-      out.push_back(std::move(transform));
-    }
+    const std::string parent(in.frame()), child(in.text());
+    if (auto transform = read_transform(in)) out.push_back({parent, child, transform->q, transform->p});
   }
   return out;
 }

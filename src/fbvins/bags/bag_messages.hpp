@@ -34,13 +34,15 @@ struct BagCamera {
 /// An error for a model that is not known.
 Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding);
 
-/// One of tf2_msgs/TFMessage's: takes coordinates in `child` to `parent`.
+/// Takes coordinates in `child` to `parent`.
 struct BagTransform {
   std::string parent, child;
   Quat q = Quat::Identity();
   Vec3 p = Vec3::Zero();
 };
 std::vector<BagTransform> transforms_of(std::string_view bytes, Encoding encoding);
+/// A geometry_msgs/Transform, which names no frames.
+std::optional<BagTransform> transform_of(std::string_view bytes, Encoding encoding);
 
 /// PoseStamped, TransformStamped, Odometry or PoseWithCovarianceStamped, by the type's name.
 std::optional<TrajectoryPoint> pose_of(std::string_view bytes, Encoding encoding, std::string_view type);

@@ -16,6 +16,13 @@ std::optional<BagMessage> BagReader::next() {
   return std::nullopt;
 }
 
+std::size_t BagReader::number_of(BagTopic topic) {
+  const auto known = std::find(topics_.begin(), topics_.end(), topic);
+  if (known != topics_.end()) return static_cast<std::size_t>(known - topics_.begin());
+  topics_.push_back(std::move(topic));
+  return topics_.size() - 1;
+}
+
 bool BagReader::can_leave_out(Time first, Time last, const std::vector<std::size_t>& topics) {
   if (!window_ || is_in_window(first, last)) return false;
   begun_.resize(topics_.size(), false);

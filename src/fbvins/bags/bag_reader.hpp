@@ -4,7 +4,7 @@
 //
 //   Result<std::unique_ptr<BagReader>> bag = open_bag("flight.bag");
 //   while (auto message = (*bag)->next()) use((*bag)->topics()[message->topic].name, message->data);
-//   std::string again = (*bag)->read(place);
+//   std::string_view again = (*bag)->read(place);
 //
 // A truncated file is read up to its last complete record; what cannot be read is skipped and counted. With only() next() leaves
 // out what was recorded outside of an interval, and goes over it without reading it where the file says what lies where: by the
@@ -30,6 +30,7 @@ struct BagTopic {
   std::string name;
   std::string type;  ///< "sensor_msgs/Imu": without the "/msg" of ROS 2
   Encoding encoding = Encoding::ros1;
+  bool operator==(const BagTopic&) const = default;
 };
 
 /// Where a message lies: in which chunk (a place in the file, or a row of a table), and in it.
@@ -68,8 +69,8 @@ class BagReader {
   /// each topic, and transforms that stay.
   void only(Duration from, Duration to) { window_ = {from, to}; }
   std::optional<BagMessage> next();
-  /// The bytes of a message that next() has shown; empty where they cannot be read any more.
-  virtual std::string read(const MessagePlace& place) = 0;
+  /// The bytes of a message that next() has shown, until the next read(); empty where they cannot be read any more.
+  virtual std::string_view read(const MessagePlace& place) = 0;
 
  protected:
   /// The next message of those that were not gone over.
@@ -78,6 +79,9 @@ class BagReader {
   bool can_leave_out(Time first, Time last, const std::vector<std::size_t>& topics);
   const std::optional<Window>& window() const { return window_; }
   static bool stays(const BagTopic& topic) { return topic.name.ends_with("tf_static"); }
+
+  /// The topic's number in topics_, where it is put if it is new: several publishers of a topic are one.
+  std::size_t number_of(BagTopic topic);
 
   void complain(std::string sentence) {
     if (damage_.parts++ == 0) damage_.first = std::move(sentence);

@@ -136,6 +136,77 @@ TEST_F(Bags, TopicsThatCannotBeFoundAreListed) {
   EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
 }
 
+/// Messages one after the other, in ROS 1's encoding.
+class ListedMessages final : public BagReader {
+ public:
+  void add(const std::string& topic, const std::string& type, std::string data) {
+    topics_.push_back({topic, type, Encoding::ros1});
+    data_.push_back(std::move(data));
+  }
+  std::string format() const override { return "list"; }
+  std::string_view read(const MessagePlace& place) override { return data_[place.offset]; }
+
+ protected:
+  std::optional<BagMessage> advance() override {
+    if (at_ == data_.size()) return std::nullopt;
+    const std::size_t i = at_++;
+    return BagMessage{i, Time{1}, data_[i], {0, i, data_[i].size()}};
+  }
+
+ private:
+  std::vector<std::string> data_;
+  std::size_t at_ = 0;
+};
+
+template <class Number>
+std::string raw(std::initializer_list<Number> numbers) {
+  return {reinterpret_cast<const char*>(numbers.begin()), numbers.size() * sizeof(Number)};
+}
+
+/// A version stands where other writers name a frame.
+std::string header(std::uint32_t stamp_ns) {
+  std::string out = raw<std::uint32_t>({7, 1, stamp_ns, 1});
+  out.push_back('1');
+  return out;
+}
+
+/// A D435i as librealsense records it: a stream's transform takes the coordinates of its group's first stream, which is the left
+/// camera's, to its own.
+TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
+  const std::string device = "/device_0/", left = device + "sensor_0/Infrared_1", right = device + "sensor_0/Infrared_2",
+                    gyro = device + "sensor_2/Gyro_0", accel = device + "sensor_2/Accel_0";
+  ListedMessages bag;
+  const auto transform = [&](const std::string& stream, const Vec3& p, const Quat& q) {
+    bag.add(stream + "/tf/0", "geometry_msgs/Transform", raw<double>({p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}));
+  };
+  const Quat turned(Eigen::AngleAxisd(0.1, Vec3::UnitY()));
+  for (const std::string& stream : {left, right}) {
+    std::string info = header(0) + raw<std::uint32_t>({480, 848, 13}) + "Brown Conrady" + raw<std::uint32_t>({5});
+    info += raw<double>({0, 0, 0, 0, 0, 425, 0, 424, 0, 426, 240, 0, 0, 1}) + std::string(21 * 8, '\0');
+    bag.add(stream + "/info/camera_info", "sensor_msgs/CameraInfo", info);
+    bag.add(stream + "/image/data", "sensor_msgs/Image", header(5) + raw<std::uint32_t>({0, 0, 0}));
+    transform(stream, stream == left ? Vec3(0, 0, 0) : Vec3(-0.05, 0, 0), Quat::Identity());
+  }
+  bag.add(device + "sensor_0/Depth_0/image/data", "sensor_msgs/Image", header(5) + raw<std::uint32_t>({0, 0, 0}));
+  for (const std::string& stream : {gyro, accel}) {
+    bag.add(stream + "/imu/data", "sensor_msgs/Imu", header(5) + std::string(37 * 8, '\0'));
+    transform(stream, {-0.0055, 0.0051, 0.0117}, turned);
+  }
+  const BagContents contents = read_contents(bag);
+  const auto topics = choose_topics(contents, {}, true);
+  ASSERT_TRUE(topics) << topics.error().message;
+  EXPECT_EQ(topics->left, left + "/image/data");
+  EXPECT_EQ(topics->right, right + "/image/data");
+  EXPECT_EQ(topics->imu, gyro + "/imu/data");
+  EXPECT_EQ(topics->accel, accel + "/imu/data");
+  const auto rig = rig_of(contents, *topics);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->left.intrinsics(), (std::array{425.0, 426.0, 424.0, 240.0}));
+  const Vec3 p_C0(1, 2, 3);
+  EXPECT_LT((rig->T_BC0 * p_C0 - (turned * p_C0 + Vec3(-0.0055, 0.0051, 0.0117))).norm(), 1e-12);
+  EXPECT_LT((rig->T_C1C0() * p_C0 - Vec3(0.95, 2, 3)).norm(), 1e-12);
+}
+
 TEST(BagContents, NamesOfTopicsDoNotBreakASentence) {
   BagContents contents;
   contents.images["/a\n"], contents.images["/b"], contents.images["/c"];

@@ -25,7 +25,7 @@ Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
   if (!rig || imu_path.empty()) return rig;
   const Result<std::string> text = read_file(imu_path, kLargestYaml_bytes);
   if (!text) return text.error();
-  const Result<ImuNoise> noise = parse_kalibr_imu(*text, imu_path);
+  const Result<ImuNoise> noise = parse_kalibr_imu({imu_path, *text});
   if (!noise) return noise.error();
   rig->imu_noise = *noise;
   return rig;
@@ -33,28 +33,28 @@ Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
 
 /// Its estimator_config.yaml names the other two.
 Result<StereoRig> load_openvins(const std::string& path, const std::string& text, const std::string& imu_path) {
-  if (!holds(text, "relative_config_imucam")) return with_imu(parse_openvins_cameras(text, path), imu_path);
   YamlReader yaml(path, text);
+  if (!holds(text, "relative_config_imucam")) return with_imu(parse_openvins_cameras(std::move(yaml)), imu_path);
   const std::string cameras = yaml.word(yaml.root(), "relative_config_imucam"),
                     imu = yaml.text(yaml.root(), "relative_config_imu");
   if (!yaml.ok()) return yaml.error();
   const Result<std::string> chain = read_file(beside(path, cameras), kLargestYaml_bytes);
   if (!chain) return chain.error();
   const std::string noise = !imu_path.empty() ? imu_path : imu.empty() ? "" : beside(path, imu);
-  return with_imu(parse_openvins_cameras(*chain, beside(path, cameras)), noise);
+  return with_imu(parse_openvins_cameras({beside(path, cameras), *chain}), noise);
 }
 
 Result<StereoRig> load_vins_fusion(const std::string& path, const std::string& text) {
   YamlReader yaml(path, text);
-  std::string texts[2], names[2];
-  for (int i = 0; i < 2; ++i) {
-    names[i] = beside(path, yaml.word(yaml.root(), fmt::format("cam{}_calib", i)));
+  std::vector<YamlReader> cameras;
+  for (const char* field : {"cam0_calib", "cam1_calib"}) {
+    const std::string name = beside(path, yaml.word(yaml.root(), field));
     if (!yaml.ok()) return yaml.error();
-    Result<std::string> camera = read_file(names[i], kLargestYaml_bytes);
+    Result<std::string> camera = read_file(name, kLargestYaml_bytes);
     if (!camera) return camera.error();
-    texts[i] = *std::move(camera);
+    cameras.emplace_back(name, *std::move(camera));
   }
-  return parse_vins_fusion({text, path}, {texts[0], names[0]}, {texts[1], names[1]});
+  return parse_vins_fusion(std::move(yaml), cameras[0], cameras[1]);
 }
 
 Result<StereoRig> load_euroc(const std::string& folder) {
@@ -67,9 +67,9 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   const auto left_text = text("cam0/sensor.yaml"), right_text = text("cam1/sensor.yaml"), imu_text = text("imu0/sensor.yaml");
   for (const auto* read : {&left_text, &right_text, &imu_text})
     if (!*read) return read->error();
-  const auto left = parse_euroc_camera(*left_text, "cam0/sensor.yaml"),
-             right = parse_euroc_camera(*right_text, "cam1/sensor.yaml");
-  const auto imu = parse_euroc_imu(*imu_text, "imu0/sensor.yaml");
+  const auto left = parse_euroc_camera({"cam0/sensor.yaml", *left_text}),
+             right = parse_euroc_camera({"cam1/sensor.yaml", *right_text});
+  const auto imu = parse_euroc_imu({"imu0/sensor.yaml", *imu_text});
   if (!left) return left.error();
   if (!right) return right.error();
   if (!imu) return imu.error();
@@ -98,7 +98,7 @@ Result<StereoRig> load_calibration(const std::string& path, const std::string& i
   if (!text) return text.error();
   const std::string format = calibration_format(*text);
   if (format == "OpenVINS") return load_openvins(path, *text, imu_path);
-  if (format == "Basalt") return with_imu(parse_basalt(*text, path), imu_path);
+  if (format == "Basalt") return with_imu(parse_basalt({path, *text}), imu_path);
   if (format == "VINS-Fusion") return with_imu(load_vins_fusion(path, *text), imu_path);
   return load_kalibr(path, imu_path.empty() ? std::nullopt : std::optional(imu_path));
 }
@@ -107,7 +107,7 @@ Result<StereoRig> load_camera_info(const std::string& left_path, const std::stri
   const Result<std::string> left = read_file(left_path, kLargestYaml_bytes), right = read_file(right_path, kLargestYaml_bytes);
   if (!left) return left.error();
   if (!right) return right.error();
-  return parse_camera_info({*left, left_path}, {*right, right_path}, T_BC0);
+  return parse_camera_info({left_path, *left}, {right_path, *right}, T_BC0);
 }
 
 }  // namespace fbvins

@@ -192,10 +192,9 @@ class CountedBytes final : public ByteSource {
  public:
   CountedBytes(std::string bytes, std::uint64_t& count) : bytes_(bytes_in_memory(std::move(bytes))), count_(&count) {}
   std::uint64_t size() const override { return bytes_->size(); }
-  std::string read(std::uint64_t offset, std::uint64_t count) const override {
-    std::string out = bytes_->read(offset, count);
+  void fill(std::string& out, std::uint64_t offset, std::uint64_t count) const override {
+    bytes_->fill(out, offset, count);
     *count_ += out.size();
-    return out;
   }
 
  private:

@@ -11,16 +11,20 @@
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kStep_bytes = 1u << 20u;
+constexpr std::uint64_t kFirstRatio = 8;  // of room to what is unpacked
+constexpr std::uint64_t kFirst_bytes = 4096;
 
 /// Room that grows as output comes, so that a wrong size costs nothing.
 class Room {
  public:
-  explicit Room(std::uint64_t most) : most_(most) {}
+  Room(std::string bytes, std::uint64_t first, std::uint64_t most) : bytes_(std::move(bytes)), most_(most) {
+    const std::uint64_t there = bytes_.size();
+    bytes_.resize(std::min(most, std::max(first, there)));
+  }
   /// False: full.
   bool grow() {
     if (used_ == most_) return false;
-    bytes_.resize(std::min<std::uint64_t>(most_, bytes_.size() + kStep_bytes + bytes_.size() / 2));
+    bytes_.resize(std::min<std::uint64_t>(most_, 2 * bytes_.size()));
     return bytes_.size() > used_;
   }
   char* begin() { return bytes_.data() + used_; }
@@ -94,8 +98,11 @@ bool unpack_zstd(std::string_view in, Room& room) {
 
 }  // namespace
 
-Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size) {
-  if (compression.empty() || compression == "none") return {std::string(bytes), true, size == 0 || bytes.size() == size};
+Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room) {
+  if (is_plain(compression)) {
+    room.assign(bytes);
+    return {std::move(room), true, size == 0 || bytes.size() == size};
+  }
   auto* const work = compression == "lz4"    ? unpack_lz4
                      : compression == "bz2"  ? unpack_bz2
                      : compression == "zstd" ? unpack_zstd
@@ -103,9 +110,9 @@ Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint6
   if (work == nullptr) return {{}, false, false};
   if (compression == "zstd" && size == 0) size = size_in_frame(bytes);
   if (size > kLargestUnpacked_bytes) return {};
-  Room room(size == 0 ? kLargestUnpacked_bytes : size);
-  const bool ended = work(bytes, room);
-  Unpacked out{room.take(), true, ended};
+  Room out_room(std::move(room), kFirst_bytes + kFirstRatio * bytes.size(), size == 0 ? kLargestUnpacked_bytes : size);
+  const bool ended = work(bytes, out_room);
+  Unpacked out{out_room.take(), true, ended};
   if (size != 0 && out.bytes.size() != size) out.whole = false;
   return out;
 }

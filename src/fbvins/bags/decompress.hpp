@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to bags: chunks as ROS and MCAP compress them. Pure functions, any thread.
 //
-//   Unpacked out = unpack("lz4", bytes, size);
+//   Unpacked out = unpack("lz4", bytes, size, std::move(room));
 //   if (!out.whole) ...              // out.bytes holds what came out before the damage, or the end
+//   room = std::move(out.bytes);     // large rooms are dear: filled with zeros when they are new, and given back page by page
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,10 @@ struct Unpacked {
 };
 
 /// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is what should come out, and never more does; 0: as the bytes say, at most
-/// `kLargestUnpacked_bytes`.
-Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size);
+/// `kLargestUnpacked_bytes`. What `room` held is lost.
+Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room = {});
+
+inline bool is_plain(std::string_view compression) { return compression.empty() || compression == "none"; }
 
 inline constexpr std::uint64_t kLargestUnpacked_bytes = std::uint64_t{256} << 20u;
 

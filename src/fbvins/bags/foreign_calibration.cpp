@@ -31,9 +31,9 @@ YAML::Node element(YamlReader& yaml, const YAML::Node& map, const std::string& f
   return YAML::Node(YAML::NodeType::Map);
 }
 
-Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig, const std::string& file) {
+Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig) {
   if (!yaml.ok()) return yaml.error();
-  if (Result<void> good = check_rig(rig, file); !good) return good.error();
+  if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;
 }
 
@@ -168,8 +168,7 @@ RosCamera ros_camera(YamlReader& yaml) {
 
 }  // namespace
 
-Result<StereoRig> parse_openvins_cameras(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<StereoRig> parse_openvins_cameras(YamlReader yaml) {
   const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0"), cam1 = inner(yaml, yaml.root(), "cam1");
   if (!yaml.ok()) return yaml.error();
   StereoRig rig;
@@ -178,11 +177,10 @@ Result<StereoRig> parse_openvins_cameras(const std::string& text, const std::str
   rig.T_BC0 = mounting<C0>(yaml, cam0);
   rig.T_BC1 = mounting<C1>(yaml, cam1);
   rig.time_offset_s = yaml.number_between(cam0, "timeshift_cam_imu", -10, 10, 0);
-  return finished(yaml, rig, file);
+  return finished(yaml, rig);
 }
 
-Result<StereoRig> parse_basalt(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);  // JSON is YAML
+Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML
   const YAML::Node root = inner(yaml, yaml.root(), "value0");
   if (!yaml.ok()) return yaml.error();
   StereoRig rig;
@@ -196,30 +194,28 @@ Result<StereoRig> parse_basalt(const std::string& text, const std::string& file)
   rig.imu_noise.gyro_random_walk_radps2_rthz = worst_axis(yaml, root, "gyro_bias_std");
   rig.imu_noise.accel_random_walk_mps3_rthz = worst_axis(yaml, root, "accel_bias_std");
   rig.time_offset_s = 1e-9 * yaml.number_between(root, "cam_time_offset_ns", -1e10, 1e10, 0);
-  return finished(yaml, rig, file);
+  return finished(yaml, rig);
 }
 
-Result<StereoRig> parse_vins_fusion(const NamedText& configuration, const NamedText& left, const NamedText& right) {
-  YamlReader yaml(configuration.file, configuration.text), left_yaml(left.file, left.text), right_yaml(right.file, right.text);
+Result<StereoRig> parse_vins_fusion(YamlReader yaml, YamlReader left, YamlReader right) {
   StereoRig rig;
-  rig.left = camodocal_camera(left_yaml);
-  rig.right = camodocal_camera(right_yaml);
-  if (!left_yaml.ok()) return left_yaml.error();
-  if (!right_yaml.ok()) return right_yaml.error();
+  rig.left = camodocal_camera(left);
+  rig.right = camodocal_camera(right);
+  if (!left.ok()) return left.error();
+  if (!right.ok()) return right.error();
   rig.T_BC0 = body_T_cam<C0>(yaml, "body_T_cam0");
   rig.T_BC1 = body_T_cam<C1>(yaml, "body_T_cam1");
   constexpr double kRate_hz = 200;
   const auto density = [&](const char* field) { return yaml.positive(yaml.root(), field) / std::sqrt(kRate_hz); };
   rig.imu_noise = {density("gyr_n"), density("acc_n"), density("gyr_w"), density("acc_w"), kRate_hz};
   rig.time_offset_s = yaml.number_between(yaml.root(), "td", -10, 10, 0);
-  return finished(yaml, rig, configuration.file);
+  return finished(yaml, rig);
 }
 
-Result<StereoRig> parse_camera_info(const NamedText& left, const NamedText& right, const Pose<B, C0>& T_BC0) {
-  YamlReader left_yaml(left.file, left.text), right_yaml(right.file, right.text);
-  const RosCamera c0 = ros_camera(left_yaml), c1 = ros_camera(right_yaml);
-  if (!left_yaml.ok()) return left_yaml.error();
-  if (!right_yaml.ok()) return right_yaml.error();
+Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pose<B, C0>& T_BC0) {
+  const RosCamera c0 = ros_camera(left), c1 = ros_camera(right);
+  if (!left.ok()) return left.error();
+  if (!right.ok()) return right.error();
   // p_C1 = R1^T (R0 p_C0 + shift): rectified frames differ by a shift along x alone.
   const Vec3 shift(c1.shift_m - c0.shift_m, 0, 0);
   const Pose<C1, C0> T_C1C0(Mat3(c1.rectification.transpose() * c0.rectification), Vec3(c1.rectification.transpose() * shift));
@@ -228,7 +224,7 @@ Result<StereoRig> parse_camera_info(const NamedText& left, const NamedText& righ
   rig.right = c1.camera;
   rig.T_BC0 = T_BC0;
   rig.T_BC1 = T_BC0 * T_C1C0.inverse();
-  return finished(right_yaml, rig, right.file);
+  return finished(right, rig);
 }
 
 }  // namespace fbvins

@@ -1,31 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: the text of other programs' calibration files to values, checked. Pure functions, any thread.
+// Private to bags: other programs' calibration files to values, checked. Pure functions.
 #pragma once
-
-#include <string>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 
 namespace fbvins {
 
-struct NamedText {
-  const std::string& text;
-  const std::string& file;  ///< only for messages
-};
+class YamlReader;
 
 /// kalibr_imucam_chain.yaml: Kalibr's, but T_imu_cam takes camera to IMU coordinates. Noise figures stay at their defaults.
-Result<StereoRig> parse_openvins_cameras(const std::string& text, const std::string& file);
+Result<StereoRig> parse_openvins_cameras(YamlReader yaml);
 
 /// calibration.json (github.com/VladyslavUsenko/basalt, doc/Calibration.md): cameras of the models pinhole, pinhole-radtan8
 /// without its higher coefficients, and kb4.
-Result<StereoRig> parse_basalt(const std::string& text, const std::string& file);
+Result<StereoRig> parse_basalt(YamlReader yaml);
 
 /// The estimator's configuration and its cameras' files (camodocal): PINHOLE and KANNALA_BRANDT. Its noise is that of single
 /// readings at 200 Hz.
-Result<StereoRig> parse_vins_fusion(const NamedText& configuration, const NamedText& left, const NamedText& right);
+Result<StereoRig> parse_vins_fusion(YamlReader configuration, YamlReader left, YamlReader right);
 
 /// camera_info as camera_calibration writes it: C1 against C0 comes from rectification and projection.
-Result<StereoRig> parse_camera_info(const NamedText& left, const NamedText& right, const Pose<B, C0>& T_BC0);
+Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pose<B, C0>& T_BC0);
 
 }  // namespace fbvins

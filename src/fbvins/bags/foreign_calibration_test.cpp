@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
 namespace {
@@ -76,21 +77,21 @@ std::string vins_fusion() {
 }
 
 TEST(ForeignCalibration, OpenVinsHasCamerasInTheImu) {
-  const auto rig =
-      parse_openvins_cameras("%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft) + "cam1:\n" + openvins_camera(kRight), "chain.yaml");
+  const auto rig = parse_openvins_cameras(
+      {"chain.yaml", "%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft) + "cam1:\n" + openvins_camera(kRight)});
   expect_rig(rig);
   EXPECT_EQ(rig->time_offset_s, -0.004);
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.4);
 }
 
 TEST(ForeignCalibration, BasaltIsJsonWithPosesAndNoise) {
-  const auto rig = parse_basalt(basalt(), "calibration.json");
+  const auto rig = parse_basalt({"calibration.json", basalt()});
   expect_rig(rig);
   EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k3, -0.03);
   EXPECT_EQ(rig->imu_noise.accel_noise_density_mps2_rthz, 0.016);
   EXPECT_EQ(rig->imu_noise.gyro_random_walk_radps2_rthz, 0.0001);
   EXPECT_NEAR(rig->time_offset_s, 0.002, 1e-15);
-  EXPECT_EQ(parse_basalt(basalt("fov"), "c.json").error().message,
+  EXPECT_EQ(parse_basalt({"c.json", basalt("fov")}).error().message,
             "c.json:1: camera_type: 'fov' is not supported, only pinhole, pinhole-radtan8, kb4, ds and eucm");
 }
 
@@ -99,7 +100,7 @@ TEST(ForeignCalibration, BasaltsWideLensesAreRead) {
   const auto with = [&](const std::string& model, const std::string& numbers) {
     std::string text = basalt(model);
     for (std::size_t at = 0; (at = text.find(kb4)) != std::string::npos;) text.replace(at, kb4.size(), numbers);
-    return parse_basalt(text, "c.json");
+    return parse_basalt({"c.json", text});
   };
   const auto ds = with("ds", R"("xi": -0.172, "alpha": 0.593)"), eucm = with("eucm", R"("alpha": 0.63, "beta": 1.04)");
   expect_rig(ds);
@@ -123,14 +124,14 @@ TEST(ForeignCalibration, ALensOfMoreThan180DegreesIsRefused) {
   replace_all("380.25", "150");
   replace_all(R"("k1": 0.01, "k2": 0.02, "k3": -0.03)", R"("k1": 0, "k2": 0, "k3": 0)");
   EXPECT_EQ(
-      parse_basalt(text, "c.json").error().message,
+      parse_basalt({"c.json", text}).error().message,
       "c.json: the left camera sees more than 180 degrees from edge to edge; only what is in front of a camera can be used: "
       "crop the images, and take what is cut off at the left and the top off cx and cy");
 }
 
 TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
   const std::string text = vins_fusion(), name = "config.yaml", left = "left.yaml", right = "right.yaml";
-  const auto rig = parse_vins_fusion({text, name}, {kPinhole, left}, {kFisheye, right});
+  const auto rig = parse_vins_fusion({name, text}, {left, kPinhole}, {right, kFisheye});
   expect_rig(rig);
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).k1, -0.28);
   EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k4, 0.04);
@@ -140,12 +141,12 @@ TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
       "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nimage_height: 480\nmirror_parameters:\n   xi: 0.9\ndistortion_parameters:\n"
       "   k1: -0.02\n   k2: 0.06\n   p1: 0.001\n   p2: 0.002\nprojection_parameters:\n   gamma1: 830\n   gamma2: 829\n   u0: 370\n   v0: "
       "240\n";
-  const auto with_mei = parse_vins_fusion({text, name}, {mei, left}, {kPinhole, right});
+  const auto with_mei = parse_vins_fusion({name, text}, {left, mei}, {right, kPinhole});
   expect_rig(with_mei);
   EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).xi, 0.9);
   EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).p2, 0.002);
   const std::string other = "model_type: SCARAMUZZA\nimage_width: 752\nimage_height: 480\nprojection_parameters:\n   xi: 1\n";
-  EXPECT_EQ(parse_vins_fusion({text, name}, {other, left}, {other, right}).error().message,
+  EXPECT_EQ(parse_vins_fusion({name, text}, {left, other}, {right, other}).error().message,
             "left.yaml:1: model_type: 'SCARAMUZZA' is not supported, only PINHOLE, KANNALA_BRANDT and MEI");
 }
 
@@ -168,7 +169,7 @@ TEST(ForeignCalibration, CameraInfoSaysHowTheCamerasSeeEachOther) {
         rows, 430 * shift);
   };
   const std::string left = file(R0, 0), right = file(R1, -baseline_C0.norm()), a = "left.yaml", b = "right.yaml";
-  const auto rig = parse_camera_info({left, a}, {right, b}, kLeft);
+  const auto rig = parse_camera_info({a, left}, {b, right}, kLeft);
   expect_rig(rig);
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p1, 0.01);
 }

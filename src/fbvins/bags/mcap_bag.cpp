@@ -31,11 +31,14 @@ class McapBag final : public BagReader {
 
   std::string format() const override { return "MCAP"; }
 
-  std::string read(const MessagePlace& place) override {
-    if (place.chunk == 0) return bytes_->read(place.offset, place.length);
+  std::string_view read(const MessagePlace& place) override {
+    if (place.chunk == 0) {
+      bytes_->fill(message_, place.offset, place.length);
+      return message_;
+    }
     if (kept_at_ != place.chunk) kept_ = reader_.records_of(place.chunk), kept_at_ = place.chunk;
     if (place.offset > kept_.size() || place.length > kept_.size() - place.offset) return {};
-    return kept_.substr(place.offset, place.length);
+    return std::string_view(kept_).substr(place.offset, place.length);
   }
 
  protected:
@@ -56,21 +59,17 @@ class McapBag final : public BagReader {
   }
 
   std::size_t topic_of(const McapChannel& channel) {
-    const auto [known, is_new] = numbers_.try_emplace(&channel, topics_.size());
-    if (!is_new) return known->second;
-    const BagTopic topic{channel.topic, plain_type(channel.schema_name),
-                         channel.message_encoding == "cdr" ? Encoding::cdr : Encoding::ros1};
-    for (std::size_t i = 0; i < topics_.size(); ++i)
-      if (topics_[i].name == topic.name && topics_[i].type == topic.type && topics_[i].encoding == topic.encoding)
-        return known->second = i;
-    topics_.push_back(topic);
+    const auto [known, is_new] = numbers_.try_emplace(&channel);
+    if (is_new)
+      known->second = number_of(
+          {channel.topic, plain_type(channel.schema_name), channel.message_encoding == "cdr" ? Encoding::cdr : Encoding::ros1});
     return known->second;
   }
 
   std::shared_ptr<const ByteSource> bytes_;
   McapReader reader_;
   std::map<const McapChannel*, std::size_t> numbers_;
-  std::string kept_;
+  std::string kept_, message_;  ///< records of the chunk that read() last looked into, and a message that lies in no packed one
   std::uint64_t kept_at_ = 0;
 };
 

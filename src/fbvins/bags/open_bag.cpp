@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "fbvins/bags/bag_reader.hpp"
+#include "fbvins/bags/bag_series.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
@@ -55,10 +56,13 @@ Result<std::unique_ptr<BagReader>> open_folder(const fs::path& folder) {
   }
   if (files.empty()) return Error{ErrorCode::not_found, fmt::format("{}: holds no file of a ROS 2 bag", folder.string())};
   if (!files.front().ends_with(".mcap")) return open_sqlite_bag(files, packed);
-  if (files.size() > 1)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: a bag of {} MCAP files; give one of them", folder.string(), files.size())};
-  return open_file(files.front());
+  std::vector<std::unique_ptr<BagReader>> parts;
+  for (const std::string& file : files) {
+    auto part = open_file(file);
+    if (!part) return part.error();
+    parts.push_back(*std::move(part));
+  }
+  return join_bags(std::move(parts));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/core/options.hpp"
+#include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -78,6 +79,20 @@ std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
   return rows;
 }
 
+/// Of a gyroscope and an accelerometer that are read apart, both in order of stamps: a reading for each of the gyroscope's.
+std::vector<ImuSample> merged(const std::vector<ImuSample>& gyro, const std::vector<ImuSample>& accel) {
+  MotionMerge merge;
+  std::vector<ImuSample> out;
+  auto next = accel.begin();
+  for (const ImuSample& reading : gyro) {
+    merge.add_gyro(reading.t, reading.gyro_radps);
+    for (; next != accel.end() && (next == accel.begin() || std::prev(next)->t < reading.t); ++next)
+      merge.add_accel(next->t, next->accel_mps2);
+    while (const auto sample = merge.next()) out.push_back(*sample);
+  }
+  return out;
+}
+
 /// Makes a recording of a bag step by step.
 class BagRecording {
  public:
@@ -106,8 +121,8 @@ class BagRecording {
 
  private:
   Result<void> choose() {
-    const Result<ChosenTopics> chosen =
-        choose_topics(contents_, {options_.left_topic, options_.right_topic, options_.imu_topic}, options_.dataset.require_imu);
+    const Result<ChosenTopics> chosen = choose_topics(
+        contents_, {options_.left_topic, options_.right_topic, options_.imu_topic, {}}, options_.dataset.require_imu);
     if (!chosen) return chosen.error();
     topics_ = *chosen;
     return {};
@@ -145,10 +160,16 @@ class BagRecording {
                                                paired.right_only, options_.dataset.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
     if (topics_.imu.empty()) return {};
-    ImuTopic& imu = contents_.imu.at(topics_.imu);
-    out_.info.imu_rows.malformed = out_.info.imu_rows.rows = imu.malformed;
-    out_.imu = in_order(std::move(imu.samples), out_.info.imu_rows);
+    out_.imu = readings_on(topics_.imu);
+    if (!topics_.accel.empty()) out_.imu = merged(out_.imu, readings_on(topics_.accel));
     return {};
+  }
+
+  std::vector<ImuSample> readings_on(const std::string& topic) {
+    ImuTopic& imu = contents_.imu.at(topic);
+    out_.info.imu_rows.malformed += imu.malformed;
+    out_.info.imu_rows.rows += imu.malformed;
+    return in_order(std::move(imu.samples), out_.info.imu_rows);
   }
 
   Result<void> cut() {
@@ -167,6 +188,7 @@ class BagRecording {
     DatasetInfo& info = out_.info;
     info.name = fs::path(path_).lexically_normal().stem().string();
     info.format = fmt::format("{}: {}, {}, {}", bag.format(), topics_.left, topics_.right, topics_.imu);
+    if (!topics_.accel.empty()) info.format += fmt::format(" with {}", topics_.accel);
     const BagDamage& damage = bag.damage();
     if (damage.parts > 0)
       info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: everybody's recordings as Datasets: ROS 1 bags (also librealsense's), ROS 2 bags (SQLite and MCAP), MCAP files of ROS messages,
-// TUM-VI and EuRoC folders, flight records. Any thread, one a Dataset.
+// Private: everybody's recordings as Datasets: ROS 1 bags (also librealsense's), ROS 2 bags (SQLite and MCAP), MCAP files of ROS
+// messages, TUM-VI and EuRoC folders, flight records. Any thread, one a Dataset.
 //
 //   auto data = open_recording("flight.bag", {});
 //   if (!data) return report(data.error().message);        // "flight.bag: has 3 image topics (/a, /b, /c): say which ..."

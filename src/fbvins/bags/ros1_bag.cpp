@@ -62,15 +62,15 @@ class Ros1Bag final : public BagReader {
 
   std::string format() const override { return "ROS 1 bag"; }
 
-  std::string read(const MessagePlace& place) override {
+  std::string_view read(const MessagePlace& place) override {
     if (kept_at_ != place.chunk) {
-      const std::optional<Chunk> chunk = chunk_at(place.chunk);
-      if (!chunk) return {};
-      kept_ = chunk->records;
+      const std::optional<Head> head = head_at(place.chunk);
+      if (!head) return {};
+      unpack_chunk(*head, kept_);
       kept_at_ = place.chunk;
     }
     if (place.offset > kept_.size() || place.length > kept_.size() - place.offset) return {};
-    return kept_.substr(place.offset, place.length);
+    return std::string_view(kept_).substr(place.offset, place.length);
   }
 
  protected:
@@ -85,10 +85,6 @@ class Ros1Bag final : public BagReader {
   struct Head {
     Fields fields;
     std::uint64_t data = 0, length = 0;
-    bool whole = false;
-  };
-  struct Chunk {
-    std::string records;
     bool whole = false;
   };
 
@@ -111,12 +107,18 @@ class Ros1Bag final : public BagReader {
     return head;
   }
 
-  std::optional<Chunk> chunk_at(std::uint64_t at) const {
-    const std::optional<Head> head = head_at(at);
-    if (!head) return std::nullopt;
-    const std::string packed = bytes_->read(head->data, head->length);
-    Unpacked out = unpack(head->fields.text("compression"), packed, head->fields.number<std::uint32_t>("size").value_or(0));
-    return Chunk{std::move(out.bytes), out.whole && head->whole};
+  /// Returns whether they are all there. Rooms are used again and again: new ones of this size would cost more than unpacking.
+  bool unpack_chunk(const Head& chunk, std::string& records) {
+    const std::string compression = chunk.fields.text("compression");
+    const auto size = chunk.fields.number<std::uint32_t>("size").value_or(0);
+    if (is_plain(compression)) {
+      bytes_->fill(records, chunk.data, chunk.length);
+      return chunk.whole && (size == 0 || records.size() == size);
+    }
+    bytes_->fill(packed_, chunk.data, chunk.length);
+    Unpacked out = unpack(compression, packed_, size, std::move(records));
+    records = std::move(out.bytes);
+    return chunk.whole && out.whole;
   }
 
   /// Goes on to the next record outside of chunks; false at the end of the file.
@@ -166,15 +168,13 @@ class Ros1Bag final : public BagReader {
   }
 
   void load_chunk(std::uint64_t at, const Head& head) {
-    const std::string compression = head.fields.text("compression");
-    std::optional<Chunk> chunk = chunk_at(at);
-    if (!chunk || (chunk->records.empty() && !chunk->whole && head.whole))
-      return complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", quoted(compression)));
-    if (!chunk->whole && head.whole) complain_at(at, "this chunk is damaged and is read up to its last complete record");
-    loaded_ = std::move(chunk->records);
+    loaded_whole_ = unpack_chunk(head, loaded_);
     loaded_at_ = at;
-    loaded_whole_ = chunk->whole;
     position_ = 0;
+    if (loaded_whole_ || !head.whole) return;
+    if (loaded_.empty())
+      complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", quoted(head.fields.text("compression"))));
+    else complain_at(at, "this chunk is damaged and is read up to its last complete record");
   }
 
   std::optional<BagMessage> next_loaded() {
@@ -209,21 +209,14 @@ class Ros1Bag final : public BagReader {
     const Fields about(data);
     if (!id || !about.ok() || connections_.contains(*id)) return;
     const std::string topic = fields.text("topic"), type = about.text("type");
-    connections_.emplace(*id, topic_of({topic.empty() ? about.text("topic") : topic, type, Encoding::ros1}));
-  }
-
-  /// Several publishers of a topic are one.
-  std::size_t topic_of(BagTopic topic) {
-    for (std::size_t i = 0; i < topics_.size(); ++i)
-      if (topics_[i].name == topic.name && topics_[i].type == topic.type) return i;
-    topics_.push_back(std::move(topic));
-    return topics_.size() - 1;
+    connections_.emplace(*id, number_of({topic.empty() ? about.text("topic") : topic, type, Encoding::ros1}));
   }
 
   std::shared_ptr<const ByteSource> bytes_;
   std::string name_;
   std::uint64_t next_;
   std::string loaded_, kept_;  ///< records of the chunk in work, and of the one read() last looked into
+  std::string packed_;         ///< the last one's bytes in the file
   std::uint64_t loaded_at_ = 0, kept_at_ = 0;
   bool loaded_whole_ = true, indexed_ = false;
   std::size_t position_ = 0;

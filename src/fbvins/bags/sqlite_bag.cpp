@@ -63,21 +63,23 @@ class SqliteBag final : public BagReader {
       while (sqlite3_step(topics.get()) == SQLITE_ROW)
         if (text_of(topics.get(), 3) == "cdr")
           file.topics[sqlite3_column_int64(topics.get(), 0)] =
-              topic_of({text_of(topics.get(), 1), plain_type(text_of(topics.get(), 2)), Encoding::cdr});
+              number_of({text_of(topics.get(), 1), plain_type(text_of(topics.get(), 2)), Encoding::cdr});
     }
     return {};
   }
 
   std::string format() const override { return "ROS 2 bag (SQLite)"; }
 
-  std::string read(const MessagePlace& place) override {
+  std::string_view read(const MessagePlace& place) override {
     if (place.chunk >= files_.size()) return {};
     sqlite3_stmt* again = files_[place.chunk].again.get();
     sqlite3_reset(again);
     sqlite3_bind_int64(again, 1, static_cast<std::int64_t>(place.offset));
     if (sqlite3_step(again) != SQLITE_ROW) return {};
     const std::string_view bytes = bytes_of(again, 0);
-    return packed_ ? unpack("zstd", bytes, 0).bytes : std::string(bytes);
+    if (!packed_) return bytes;
+    read_ = unpack("zstd", bytes, 0, std::move(read_)).bytes;
+    return read_;
   }
 
  protected:
@@ -102,13 +104,6 @@ class SqliteBag final : public BagReader {
   }
 
  private:
-  std::size_t topic_of(BagTopic topic) {
-    for (std::size_t i = 0; i < topics_.size(); ++i)
-      if (topics_[i].name == topic.name && topics_[i].type == topic.type) return i;
-    topics_.push_back(std::move(topic));
-    return topics_.size() - 1;
-  }
-
   static Statement all_messages(const File& file) {
     return prepare(file.database.get(), "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
   }
@@ -140,12 +135,12 @@ class SqliteBag final : public BagReader {
     const Time t{sqlite3_column_int64(messages_.get(), 2)};
     std::string_view data = bytes_of(messages_.get(), 3);
     if (packed_) {
-      Unpacked out = unpack("zstd", data, 0);
+      Unpacked out = unpack("zstd", data, 0, std::move(unpacked_));
+      unpacked_ = std::move(out.bytes);
       if (!out.whole) {
         complain(fmt::format("{}: the message in row {} cannot be unpacked", file.path, row));
         return std::nullopt;
       }
-      unpacked_ = std::move(out.bytes);
       data = unpacked_;
     }
     return BagMessage{topic->second, t, data, {at_, static_cast<std::uint64_t>(row), data.size()}};
@@ -156,7 +151,7 @@ class SqliteBag final : public BagReader {
   std::size_t at_ = 0;
   Statement messages_;
   std::optional<std::int64_t> origin_ns_;  ///< of the first message
-  std::string unpacked_;
+  std::string unpacked_, read_;            ///< the messages that next() and read() have shown last
 };
 
 }  // namespace

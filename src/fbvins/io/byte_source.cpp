@@ -24,8 +24,8 @@ class FileBytes : public ByteSource {
   FileBytes(FileDescriptor file, std::uint64_t size) : file_(std::move(file)), size_(size) {}
 
   std::uint64_t size() const override { return size_; }
-  std::string read(std::uint64_t offset, std::uint64_t count) const override {
-    std::string out(available(size_, offset, count), '\0');
+  void fill(std::string& out, std::uint64_t offset, std::uint64_t count) const override {
+    out.resize(available(size_, offset, count));
     std::size_t done = 0;
     while (done < out.size()) {
       const ssize_t now = ::pread(file_.number(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
@@ -34,7 +34,6 @@ class FileBytes : public ByteSource {
       done += static_cast<std::size_t>(now);
     }
     out.resize(done);
-    return out;
   }
 
  private:
@@ -46,9 +45,10 @@ class MemoryBytes : public ByteSource {
  public:
   explicit MemoryBytes(std::string bytes) : bytes_(std::move(bytes)) {}
   std::uint64_t size() const override { return bytes_.size(); }
-  std::string read(std::uint64_t offset, std::uint64_t count) const override {
+  void fill(std::string& out, std::uint64_t offset, std::uint64_t count) const override {
     const std::size_t there = available(bytes_.size(), offset, count);
-    return there == 0 ? std::string() : bytes_.substr(offset, there);
+    if (there == 0) out.clear();
+    else out.assign(bytes_, offset, there);
   }
 
  private:

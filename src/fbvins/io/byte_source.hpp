@@ -15,7 +15,13 @@ class ByteSource {
   virtual ~ByteSource() = default;
   virtual std::uint64_t size() const = 0;
   /// Up to `count` bytes from `offset`; fewer where the source ends or cannot be read.
-  virtual std::string read(std::uint64_t offset, std::uint64_t count) const = 0;
+  std::string read(std::uint64_t offset, std::uint64_t count) const {
+    std::string out;
+    fill(out, offset, count);
+    return out;
+  }
+  /// Same, into a string whose room is used again: what it held is not worth keeping.
+  virtual void fill(std::string& out, std::uint64_t offset, std::uint64_t count) const = 0;
 };
 
 /// Of a plain file, its size taken now.

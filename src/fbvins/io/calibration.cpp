@@ -5,33 +5,30 @@
 
 namespace fbvins {
 
-Result<CameraSensor> parse_euroc_camera(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<CameraSensor> parse_euroc_camera(YamlReader yaml) {
   CameraSensor sensor;
   // EuRoC nests the 16 numbers under T_BS: data; other writers put them directly under T_BS.
   sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients");
   sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
   if (!yaml.ok()) return yaml.error();
-  Result<Pose<B, B>> mounting = parse_euroc_mounting(text, file);
+  Result<Pose<B, B>> mounting = parse_euroc_mounting(std::move(yaml));
   if (!mounting) return mounting.error();
   sensor.T_BS = mounting->cast_frames<B, C0>();
   return sensor;
 }
 
-Result<ImuSensor> parse_euroc_imu(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<ImuSensor> parse_euroc_imu(YamlReader yaml) {
   ImuSensor sensor;
   sensor.noise = read_imu_noise(yaml, yaml.root(), "rate_hz");
   if (!yaml.ok()) return yaml.error();
   if (!yaml.has(yaml.root(), "T_BS")) return sensor;
-  Result<Pose<B, B>> mounting = parse_euroc_mounting(text, file);
+  Result<Pose<B, B>> mounting = parse_euroc_mounting(std::move(yaml));
   if (!mounting) return mounting.error();
   sensor.T_BS = *mounting;
   return sensor;
 }
 
-Result<Pose<B, B>> parse_euroc_mounting(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml) {
   const YAML::Node T_BS = yaml.get(yaml.root(), "T_BS");
   const Pose<B, B> pose =
       yaml.has(T_BS, "data") ? read_transform<B, B>(yaml, T_BS, "data") : read_transform<B, B>(yaml, yaml.root(), "T_BS");

@@ -7,6 +7,8 @@
 
 #include <fstream>
 
+#include "fbvins/io/yaml_reader.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -40,7 +42,7 @@ void expect_same(const P& a, const Q& b, double tolerance) {
 }
 
 TEST(Calibration, EurocMountingTakesSensorToBody) {
-  auto camera = parse_euroc_camera(euroc_camera(kLeft), "cam0");
+  auto camera = parse_euroc_camera({"cam0", euroc_camera(kLeft)});
   ASSERT_TRUE(camera) << camera.error().message;
   expect_same(camera->T_BS, kLeft, 1e-14);
   EXPECT_EQ(camera->rate_hz, 30);
@@ -49,7 +51,7 @@ TEST(Calibration, EurocMountingTakesSensorToBody) {
 }
 
 TEST(Calibration, OurBodyIsTheImuEvenWhereTheFilesIsNot) {
-  const auto left = parse_euroc_camera(euroc_camera(kLeft), "cam0"), right = parse_euroc_camera(euroc_camera(kRight), "cam1");
+  const auto left = parse_euroc_camera({"cam0", euroc_camera(kLeft)}), right = parse_euroc_camera({"cam1", euroc_camera(kRight)});
   ImuSensor imu;
   imu.T_BS = Pose<B, B>(so3_exp({0.3, 0.2, 0.1}), {1, 2, 3});
   const auto rig = join_euroc(*left, *right, imu, "x");
@@ -63,7 +65,7 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
   const std::string direct = cam0 + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
   const std::string chained = cam0 + "cam1:\n" + kalibr_camera("T_cn_cnm1", kRight.inverse() * kLeft);
   for (const std::string& text : {direct, chained}) {
-    const auto rig = parse_kalibr_camchain(text, "chain.yaml");
+    const auto rig = parse_kalibr_camchain({"chain.yaml", text});
     ASSERT_TRUE(rig) << rig.error().message;
     expect_same(rig->T_BC0, kLeft, 1e-14);
     expect_same(rig->T_BC1, kRight, 1e-14);
@@ -81,7 +83,7 @@ TEST(Calibration, KalibrsWideLensesHaveTheirNumbersBeforeTheFocalLengths) {
     replace("camera_model: pinhole", fmt::format("camera_model: {}", model));
     replace("intrinsics: [", fmt::format("intrinsics: [{}, ", numbers));
     replace("distortion_coeffs: [0.1, 0.2, 0.3, 0.4]\n  distortion_model: equidistant", distortion);
-    return parse_kalibr_camchain("cam0:\n" + camera + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse()), "chain.yaml");
+    return parse_kalibr_camchain({"chain.yaml", "cam0:\n" + camera + "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse())});
   };
   constexpr const char *kNone = "distortion_coeffs: []\n  distortion_model: none",
                        *kRadtan = "distortion_coeffs: [-0.3, 0.1, 0.001, 0.002]\n  distortion_model: radtan";
@@ -110,7 +112,7 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   const auto message = [&](const std::string& from, const std::string& to) {
     std::string text = good;
     text.replace(text.find(from), from.size(), to);
-    const auto rig = parse_kalibr_camchain(text, "c.yaml");
+    const auto rig = parse_kalibr_camchain({"c.yaml", text});
     return rig ? std::string("accepted") : rig.error().message;
   };
   EXPECT_EQ(message("cam1:", "cam2:"), "c.yaml: cam1: is missing or empty");
@@ -122,10 +124,10 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   EXPECT_EQ(message("0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 0.5, 1.0"), "c.yaml:3: T_cam_imu: its last row is not 0 0 0 1");
   EXPECT_EQ(message("  rostopic: /cam/image_raw\n", "  timeshift_cam_imu: 99\n"),
             "c.yaml:13: timeshift_cam_imu: 99 s is more than 10 s");
-  EXPECT_EQ(parse_kalibr_camchain(good + "  timeshift_cam_imu: 0.01\n", "c.yaml").error().message,
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", good + "  timeshift_cam_imu: 0.01\n"}).error().message,
             "c.yaml:27: timeshift_cam_imu: differs from cam0's by 10.0 ms");
-  EXPECT_EQ(parse_kalibr_camchain("cam0: 5\ncam1: 6\n", "c.yaml").error().message, "c.yaml:1: cam0: is missing or empty");
-  EXPECT_EQ(parse_kalibr_camchain("- 1\n- 2\n", "c.yaml").error().message, "c.yaml: holds no fields");
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", "cam0: 5\ncam1: 6\n"}).error().message, "c.yaml:1: cam0: is missing or empty");
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", "- 1\n- 2\n"}).error().message, "c.yaml: holds no fields");
   EXPECT_EQ(load_kalibr("/nowhere/c.yaml").error().message, "/nowhere/c.yaml: no such file");
 }
 
@@ -137,18 +139,18 @@ TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
   for (std::size_t start = 0; start < flat.size(); start = flat.find('\n', start) + 1)
     nested += "  " + flat.substr(start, flat.find('\n', start) + 1 - start);
   for (const std::string& text : {flat, nested}) {
-    const auto noise = parse_kalibr_imu(text, "imu.yaml");
+    const auto noise = parse_kalibr_imu({"imu.yaml", text});
     ASSERT_TRUE(noise) << noise.error().message;
     EXPECT_EQ(noise->accel_noise_density_mps2_rthz, 0.01);
     EXPECT_EQ(noise->gyro_random_walk_radps2_rthz, 4.0e-06);
     EXPECT_EQ(noise->rate_hz, 200);
   }
-  EXPECT_EQ(parse_kalibr_imu("imu0: {}\n", "imu.yaml").error().message, "imu.yaml: gyroscope_noise_density: is missing");
+  EXPECT_EQ(parse_kalibr_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml: gyroscope_noise_density: is missing");
 }
 
 TEST(Calibration, DeepNestingIsAnErrorNotACrash) {
-  EXPECT_FALSE(parse_kalibr_camchain(std::string(100000, '['), "deep.yaml"));
-  EXPECT_FALSE(parse_kalibr_camchain(std::string(100000, '{'), "deep.yaml"));
+  EXPECT_FALSE(parse_kalibr_camchain({"deep.yaml", std::string(100000, '[')}));
+  EXPECT_FALSE(parse_kalibr_camchain({"deep.yaml", std::string(100000, '{')}));
 }
 
 }  // namespace

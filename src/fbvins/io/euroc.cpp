@@ -70,10 +70,10 @@ class EurocReader {
   void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
 
   template <class Parser>
-  auto parse_yaml(const std::string& file, Parser parser) const -> decltype(parser(std::string(), std::string())) {
+  auto parse_yaml(const std::string& file, Parser parser) const -> decltype(parser(std::declval<YamlReader>())) {
     Result<std::string> yaml = text(file, kLargestYaml_bytes);
     if (!yaml) return yaml.error();
-    return parser(*yaml, named(file));
+    return parser({named(file), *std::move(yaml)});
   }
 
   Result<void> read_calibration() {

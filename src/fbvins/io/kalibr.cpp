@@ -35,8 +35,7 @@ double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::
 
 }  // namespace
 
-Result<StereoRig> parse_kalibr_camchain(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
   const YAML::Node cam0 = yaml.get(yaml.root(), "cam0"), cam1 = yaml.get(yaml.root(), "cam1");
   for (const char* name : {"cam0", "cam1"})
     if (!yaml.get(yaml.root(), name).IsMap()) yaml.complain(yaml.root(), name, "is missing or empty");
@@ -48,12 +47,11 @@ Result<StereoRig> parse_kalibr_camchain(const std::string& text, const std::stri
   rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
   rig.time_offset_s = read_time_offset_s(yaml, cam0, cam1);
   if (!yaml.ok()) return yaml.error();
-  if (Result<void> good = check_rig(rig, file); !good) return good.error();
+  if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;
 }
 
-Result<ImuNoise> parse_kalibr_imu(const std::string& text, const std::string& file) {
-  YamlReader yaml(file, text);
+Result<ImuNoise> parse_kalibr_imu(YamlReader yaml) {
   const YAML::Node nested = yaml.get(yaml.root(), "imu0");
   const ImuNoise noise = read_imu_noise(yaml, nested.IsDefined() ? nested : yaml.root(), "update_rate");
   if (!yaml.ok()) return yaml.error();
@@ -63,11 +61,11 @@ Result<ImuNoise> parse_kalibr_imu(const std::string& text, const std::string& fi
 Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path) {
   Result<std::string> camchain = read_file(camchain_path, kLargestYaml_bytes);
   if (!camchain) return camchain.error();
-  Result<StereoRig> rig = parse_kalibr_camchain(*camchain, camchain_path);
+  Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *std::move(camchain)});
   if (!rig || !imu_path) return rig;
   Result<std::string> imu = read_file(*imu_path, kLargestYaml_bytes);
   if (!imu) return imu.error();
-  Result<ImuNoise> noise = parse_kalibr_imu(*imu, *imu_path);
+  Result<ImuNoise> noise = parse_kalibr_imu({*imu_path, *std::move(imu)});
   if (!noise) return noise.error();
   rig->imu_noise = *noise;
   return rig;

@@ -29,6 +29,7 @@ class YamlReader {
   YamlReader(std::string file, std::string text, Root root = Root::fields);
 
   bool ok() const { return error_.message.empty(); }
+  const std::string& file() const { return file_; }
   const Error& error() const { return error_; }
 
   /// The member of a map; an undefined node if it or the map is not there.

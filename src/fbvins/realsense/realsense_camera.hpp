@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/live/motion_merge.hpp"
+#include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/live/source.hpp"
 #include "fbvins/live/stereo_pairs.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/live/motion_merge.hpp"
+#include "fbvins/imu/motion_merge.hpp"
 
 namespace fbvins {
 namespace {
