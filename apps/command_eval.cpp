@@ -121,7 +121,7 @@ void add_eval_command(CLI::App& program, int& exit_code) {
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
   command->add_option("--topic", arguments->topic, "of poses, where GROUND_TRUTH is a bag with several");
-  command->add_option("--align", arguments->alignment, "how the estimate is laid over the truth first")
+  command->add_option("--align", arguments->alignment, "alignment of the estimate with the truth, before errors are taken")
       ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))
       ->capture_default_str();
   command->add_option("--max-diff", arguments->max_difference_s, "largest difference of matched stamps, s")

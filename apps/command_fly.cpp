@@ -22,8 +22,8 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(A simulated quadrotor flies the mission by the poses of the odometry, which sees rendered images and feels a simulated IMU;
-the truth is only written down (docs/flight.md). The same arguments give the same bytes, with --threaded or without, but for
+    R"(A simulated quadrotor flies the mission by the poses of the odometry, from rendered images and a simulated IMU;
+the truth is only recorded (docs/flight.md). The same arguments give the same bytes, with --threaded or without, but for
 --px4 and --wall-clock.
 Writes what `fbvins run` writes, and flight.csv, flight.json, truth, estimate and setpoint as trajectories.
 
@@ -34,7 +34,7 @@ examples:
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
   FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
   fbvins fly paper.yaml --wall-clock 0.5                         in wall time at half its pace, through what `fbvins live` runs
-  fbvins fly --identify --out f && fbvins tune f                 gains from how the vehicle answers
+  fbvins fly --identify --out f && fbvins tune f                 gains from the vehicle's response
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
   fbvins report f                                                path, setpoint, modes, effort in one page
 )";

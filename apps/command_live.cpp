@@ -32,7 +32,7 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Takes sensor data as they come and says the pose at IMU rate. Ends with its source, or at Ctrl-C. Without --quiet one
+    R"(Takes sensor data as they come and gives the pose at IMU rate. Ends with its source, or at Ctrl-C. Without --quiet one
 JSON object a line tells the state, whenever health changes and once a second. --out writes the files of `fbvins run` while
 the flight goes on, live_tum.txt (poses at IMU rate) and summary.json (latency, what was dropped, health; accuracy where the
 source is a recording with truth).
@@ -246,7 +246,7 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_flag("--preload", arguments->preload, "of a replay: decode all images before the clock starts");
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
-  command->add_option("--load-map", arguments->map.load, "map to find oneself in and go on with; with loop closure");
+  command->add_option("--load-map", arguments->map.load, "map to relocalise in and extend; with loop closure");
   command
       ->add_option(
           "--map", arguments->kept_map,

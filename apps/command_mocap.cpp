@@ -15,8 +15,8 @@ namespace {
 
 constexpr const char* kExamples =
     R"(MOCAP_FILE is an export of OptiTrack Motive (CSV), Vicon (CSV) or Qualisys (TSV, 6D), an MCAP with poses, or a TUM or
-EuRoC file; ESTIMATE a trajectory file or the folder of a run. Where the markers are on the IMU, how the two worlds lie and
-how the clocks go is found from the flight itself (docs/mocap.md), which must tilt and turn.
+EuRoC file; ESTIMATE a trajectory file or the folder of a run. The markers' place on the IMU, the pose
+of one world in the other and the clocks' offset are estimated from the flight itself (docs/mocap.md), which must tilt and turn.
 
 examples:
   fbvins mocap take.csv out/flight-orb --body quad

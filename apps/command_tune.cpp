@@ -14,7 +14,7 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Tells from a flight's log how the vehicle answers, axis by axis, and proposes gains under PX4's names (docs/tuning.md).
+    R"(Identifies the vehicle's response from a flight's log, axis by axis, and proposes gains under PX4's names (docs/tuning.md).
 The flight should have moved every axis: `fbvins fly --identify` does. A log of `fbvins fly` is its folder; of PX4 a .ulg with
 SDLOG_PROFILE 17 (default and high rate).
 Writes control.yaml (for `fbvins fly --control`), gains.params (for QGroundControl), tuning.txt, tuning.svg (before and after).

@@ -50,8 +50,9 @@ void Examination::turns() {
         "gyroscope, axes, rotation and time between camera and IMU: the rig hardly turned, or its images show too few features");
     return;
   }
-  if (fit.correlation < kAgreement) {
-    if (has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots)) {
+  const bool hidden = has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots);
+  if (fit.correlation < kAgreement || (hidden && std::abs(fit.scale - 1) > kUnitTolerance)) {
+    if (hidden) {
       not_judged("gyroscope, axes, rotation and time between camera and IMU: what hangs in view hides the turning");
       return;
     }
