@@ -21,7 +21,7 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       predictor_(rig.T_BC0),
       tracks_(options.max_features),
       follower_(rig.left),
-      motion_(rig.left.focal_px(), rig.T_C1C0().p.norm()),
+      motion_(rig.left, rig.T_C1C0().p.norm()),
       epipolar_(rig.left.focal_px(), kSeed),
       detector_(options.min_distance_px),
       stereo_(rig, options.min_depth_m) {}

@@ -32,15 +32,17 @@ Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Ja
   if (J) {
     Eigen::Matrix<double, 2, 3> projection;
     projection << 1, 0, -seen.x(), 0, 1, -seen.y();
-    projection *= focal_px_ / p.z();
-    J->leftCols<3>() = -projection * hat(p);
-    J->rightCols<3>() = projection * point.inverse_depth;
+    const Eigen::Matrix<double, 2, 3> dr_dp = point.J_pixel_normalised * projection / p.z();
+    J->leftCols<3>() = -dr_dp * hat(p);
+    J->rightCols<3>() = dr_dp * point.inverse_depth;
   }
-  return focal_px_ * (seen - point.now);
+  return point.J_pixel_normalised * (seen - point.now);
 }
 
 /// (T5): a depth that is a pixel of disparity off moves the track by as much for each baseline that the camera has moved.
-double MotionCheck::noise_scale(const CameraMotion& motion) const { return std::hypot(1.0, motion.p_ba.norm() / baseline_m_); }
+double MotionCheck::noise_scale(const CameraMotion& motion) const {
+  return std::sqrt(1 + motion.p_ba.squaredNorm() / (baseline_m_ * baseline_m_));
+}
 
 /// (T3): Gauss-Newton from the prediction, which is also the prior. Weights that fall with the residual (Geman and McClure) leave
 /// those out that are far from it. Nothing where the prediction cannot be that far off.

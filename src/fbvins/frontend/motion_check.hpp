@@ -3,7 +3,7 @@
 // state and the IMU (docs/derivations/moving.md). The prediction may be slightly off; the tracks first correct it.
 // Buffers are reused; one instance, one thread.
 //
-//   MotionCheck check(camera.focal_px(), baseline_m);
+//   MotionCheck check(camera, baseline_m);
 //   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
 //   check.judge(tracks, predictor.between(t_before, t_now), (t_now - t_before).seconds(), stats);  // those that move are lost
 #pragma once
@@ -20,7 +20,7 @@ namespace fbvins {
 class MotionCheck {
  public:
   /// `baseline_m` of the stereo pair, which depths come from.
-  MotionCheck(double focal_px, double baseline_m) : focal_px_(focal_px), baseline_m_(baseline_m) {}
+  MotionCheck(const Camera& camera, double baseline_m) : camera_(camera), baseline_m_(baseline_m) {}
 
   /// `before(track)`: pointer to the normalised position in the image before; null leaves the track out, as an unknown depth
   /// does.
@@ -32,7 +32,8 @@ class MotionCheck {
       const Vec2* position = before(tracks[i]);
       if (position == nullptr || tracks[i].fate != Fate::goes_on || !tracks[i].inverse_depth) continue;
       chosen_.push_back(i);
-      points_.push_back({*position, tracks[i].normalised, *tracks[i].inverse_depth});
+      Point& point = points_.emplace_back(Point{*position, tracks[i].normalised, *tracks[i].inverse_depth});
+      camera_.distort(point.now, &point.J_pixel_normalised);
     }
   }
 
@@ -49,15 +50,16 @@ class MotionCheck {
   struct Point {
     Vec2 before, now;      // normalised
     double inverse_depth;  // before, 1/m
+    Mat2 J_pixel_normalised = Mat2::Identity();
   };
   using Jacobian = Eigen::Matrix<double, 2, 6>;
   Vec2 residual_px(const CameraMotion& motion, const Point& point, Jacobian* J = nullptr) const;
   std::optional<CameraMotion> corrected(const CameraMotion& predicted, double dt_s) const;
   const std::vector<std::size_t>& moving(const CameraMotion& predicted, double dt_s);
-
   double noise_scale(const CameraMotion& motion) const;
 
-  double focal_px_, baseline_m_;
+  Camera camera_;
+  double baseline_m_;
   std::vector<std::size_t> chosen_;  // tracks of points_
   std::vector<Point> points_;
   std::vector<std::size_t> moving_;  // points_ that move by themselves

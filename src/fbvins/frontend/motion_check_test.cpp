@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
@@ -12,6 +15,7 @@ struct Track : TrackState {};
 struct Patches {};
 
 constexpr double kFocal_px = 450, kNoise_px = 0.2, kDt_s = 0.05;
+const Camera kPinhole(PinholeRadtan{.fx = kFocal_px, .fy = kFocal_px, .cx = 376, .cy = 240}, 752, 480);
 
 /// Points two to six metres away before a camera that flies sideways at 0.4 m/s; the first ones are on something that walks.
 struct Crowd {
@@ -38,7 +42,7 @@ struct Crowd {
   }
   /// How many of the first and of the others are lost.
   std::pair<int, int> lost(const CameraMotion& predicted) {
-    MotionCheck check(kFocal_px, 0.11);
+    MotionCheck check(kPinhole, 0.11);
     FrontendStats stats;
     check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
     check.judge(tracks, predicted, kDt_s, stats);
@@ -87,6 +91,30 @@ TEST(MotionCheck, LeavesOutTracksWithoutDepth) {
   Crowd crowd(100, 30, 0.8);
   crowd.tracks[0].inverse_depth.reset();
   EXPECT_EQ(crowd.lost(crowd.motion).first, 29);
+}
+
+/// Towards the edge of a wide lens a pixel is a long way in the plane of normalised coordinates.
+TEST(MotionCheck, MeasuresInPixelsOfTheLens) {
+  const Camera fisheye(KannalaBrandt{.fx = 250, .fy = 250, .cx = 376, .cy = 240}, 752, 480);
+  TrackTable<Track, Patches> tracks(100);
+  Rng rng(12);
+  for (int i = 0; i < 60; ++i) {
+    const double angle = rng.uniform(0, 2 * std::numbers::pi), radius_px = rng.uniform(0, 330);
+    const double noise_x = rng.normal(), noise_y = rng.normal();
+    const Vec2 px = Vec2(376, 240) + radius_px * Vec2(std::cos(angle), std::sin(angle));
+    Track track;
+    track.previous_normalised = *fisheye.undistort(px);
+    track.normalised = *fisheye.undistort(px + kNoise_px * Vec2(noise_x, noise_y));
+    track.inverse_depth = 0.3;
+    tracks.start(track);
+  }
+  CameraMotion still;
+  still.has_rotation = still.has_translation = true;
+  MotionCheck check(fisheye, 0.11);
+  FrontendStats stats;
+  check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+  check.judge(tracks, still, kDt_s, stats);
+  EXPECT_EQ(stats.lost_check, 0);
 }
 
 }  // namespace

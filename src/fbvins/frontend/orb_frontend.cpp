@@ -34,7 +34,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       matcher_(options.search_px),
       locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in, .follows = options.follows_patches()}),
       recogniser_(rig.left, options.recognition, extraction(options).levels),
-      outliers_(rig.left.focal_px(), rig.T_C1C0().p.norm(), options.epipolar_px),
+      outliers_(rig.left, rig.T_C1C0().p.norm(), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
       depth_(rig, options, sigma_px_),
       examination_(!options.follows_patches()) {}

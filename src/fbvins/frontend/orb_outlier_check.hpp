@@ -3,7 +3,7 @@
 // where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
 // One instance, one thread.
 //
-//   OrbOutlierCheck check(camera.focal_px(), baseline_m, 1.0);
+//   OrbOutlierCheck check(camera, baseline_m, 1.0);
 //   check.begin(view);                                   // every image, also one without tracks
 //   check.judge(tracks, view, predictor, stats);  // those that break the constraint are lost
 #pragma once
@@ -18,8 +18,8 @@ namespace fbvins {
 
 class OrbOutlierCheck {
  public:
-  OrbOutlierCheck(double focal_px, double baseline_m, double threshold_px)
-      : threshold_px_(threshold_px), motion_(focal_px, baseline_m), epipolar_(focal_px, kSeed) {}
+  OrbOutlierCheck(const Camera& camera, double baseline_m, double threshold_px)
+      : threshold_px_(threshold_px), motion_(camera, baseline_m), epipolar_(camera.focal_px(), kSeed) {}
 
   void begin(const OrbView& view) { t_[static_cast<std::size_t>(view.index) % OrbTrack::kHistory] = view.t; }
   /// Also notes where tracks are seen in this image.

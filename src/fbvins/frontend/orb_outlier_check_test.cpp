@@ -15,7 +15,8 @@ TEST(OrbOutlierCheck, FindsASlowSlideOverSeveralImages) {
   for (int i = 0; i < 60; ++i) points.emplace_back(rng.uniform(-2, 2), rng.uniform(-1.5, 1.5), rng.uniform(3, 6));
   OrbTracks tracks(60);
   for (std::size_t i = 0; i < points.size(); ++i) tracks.start({});
-  OrbOutlierCheck check(kFocal_px, 0.11, kThreshold_px);
+  const Camera camera(PinholeRadtan{.fx = kFocal_px, .fy = kFocal_px, .cx = 320, .cy = 240}, 640, 480);
+  OrbOutlierCheck check(camera, 0.11, kThreshold_px);
   MotionPredictor predictor(Pose<B, C0>{});
   OrbView view;
   FrontendStats stats;
