@@ -15,10 +15,10 @@ constexpr double kRotationSigma_rad = 1e-3, kVelocitySigma_mps = 0.02;
 /// A prediction further off than this is wrong, and judges nobody.
 constexpr double kFurthest_sigma = 6;
 /// Noise of a track, and the residual at which its weight has fallen to a quarter.
-constexpr double kNoise_px = 0.5, kScale_px = 1.5;
+constexpr double kNoise_px = 0.4, kScale_px = 1.2;
 constexpr int kIterations = 3;
 /// (T4): a track that is further off moves by itself.
-constexpr double kMoving_px = 1.0;
+constexpr double kMoving_px = 0.8;
 /// Fewer tracks say nothing; a prediction that a smaller share of them follows is wrong.
 constexpr std::size_t kFewest = 20;
 constexpr double kLeastShare = 0.25;
