@@ -93,6 +93,17 @@ void project_patch(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float
   out = {sum_lanes(sgx), sum_lanes(sgy), sum_lanes(st)};
 }
 
+/// What a row of samples adds to the moments of a patch.
+FBVINS_INLINE void add_row(const F16& value, const float* wt, const float* w, F16& st, F16& s1, F16& s2) {
+  F16 c, d;
+  load_lanes(wt, c);
+  load_lanes(w, d);
+  st += c * value;
+  const F16 weighted = d * value;
+  s1 += weighted;
+  s2 += weighted * value;
+}
+
 FBVINS_KERNEL
 void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float fy, const float* wt, const float* w,
                    PatchMoments& out) {
@@ -102,13 +113,7 @@ void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float
     blend_row(p + (y + 1) * stride, fx, lower);
     const F16 value = upper + (lower - upper) * fy;
     upper = lower;
-    F16 c, d;
-    load_lanes(wt + y * kP, c);
-    load_lanes(w + y * kP, d);
-    st += c * value;
-    const F16 weighted = d * value;
-    s1 += weighted;
-    s2 += weighted * value;
+    add_row(value, wt + y * kP, w + y * kP, st, s1, s2);
   }
   out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
 }
@@ -116,15 +121,10 @@ void patch_moments(const std::uint8_t* p, std::ptrdiff_t stride, float fx, float
 /// The same of the pixels from p on, nothing interpolated.
 FBVINS_KERNEL
 void pixel_moments(const std::uint8_t* p, std::ptrdiff_t stride, const float* wt, const float* w, PatchMoments& out) {
-  F16 st = {}, s1 = {}, s2 = {}, value, c, d;
+  F16 st = {}, s1 = {}, s2 = {}, value;
   for (int y = 0; y < kP; ++y) {
     load_lanes(p + y * stride, value);
-    load_lanes(wt + y * kP, c);
-    load_lanes(w + y * kP, d);
-    st += c * value;
-    const F16 weighted = d * value;
-    s1 += weighted;
-    s2 += weighted * value;
+    add_row(value, wt + y * kP, w + y * kP, st, s1, s2);
   }
   out = {sum_lanes(st), sum_lanes(s1), sum_lanes(s2)};
 }
