@@ -52,7 +52,7 @@ struct FrontendStats {
   int detected = 0;       ///< new features
   int stereo = 0;         ///< features matched left-right
   int lost_flow = 0;      ///< lost by the tracker or matcher
-  int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check
+  int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check, or found on a moving thing
   int lost_epipolar = 0;  ///< lost by RANSAC on the epipolar constraint
   int expected = 0;       ///< landmarks out of view until now that this image should show
   int recognised = 0;     ///< of these, tracks again under their old id

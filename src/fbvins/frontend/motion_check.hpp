@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracks on things that move: however many agree with one another, they disagree with how the camera moved by the estimator's
-// state and the IMU (docs/derivations/moving.md). The prediction may be slightly off; the tracks first correct it.
+// Finds tracks on moving things. However many of them agree with one another, they disagree with the motion of the camera that
+// the estimator's state and the IMU predict (docs/derivations/moving.md). The prediction may be slightly off; the tracks correct
+// it first.
 // Buffers are reused; one instance, one thread.
 //
 //   MotionCheck check(camera, baseline_m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outliers among the observed tracks (paper 2.2.3): against the image before, and against one some images back, because
-// where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
+// Outliers among the observed tracks (paper 2.2.3): on moving things (motion_check.hpp), then by the epipolar constraint
+// against the image before, and against one some images back, because where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
 // One instance, one thread.
 //
 //   OrbOutlierCheck check(camera, baseline_m, 1.0);

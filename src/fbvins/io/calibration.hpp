@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration files to values, checked. Pure functions; a file is parsed once, whoever reads how much of it.
+// Calibration files to values, checked. Pure functions; each file is parsed once, however many parts of it are read.
 //
 // Frames: EuRoC's T_BS takes sensor to body coordinates; Kalibr's T_cam_imu takes IMU to camera
 // coordinates and is inverted here. Our B is the IMU.
