@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/sim/ray_kernels.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #include "fbvins/core/simd.hpp"
@@ -28,11 +30,29 @@ FBVINS_KERNEL void intersect(const float* x, const float* y, const float* m, con
   }
 }
 
-FBVINS_KERNEL void divide(Hits& hits) {
+FBVINS_KERNEL void shift(const float* ray_x, const float* ray_y, float dx, float dy, float* x, float* y) {
+  for (int i = 0; i < kRays; ++i) {
+    x[i] = ray_x[i] + dx;
+    y[i] = ray_y[i] + dy;
+  }
+}
+
+FBVINS_KERNEL void divide(Hits& hits, float* depth) {
   for (int i = 0; i < kRays; ++i) {
     const float z = 1.0f / hits.w[i];
     hits.u[i] *= z;
     hits.v[i] *= z;
+    depth[i] = hits.id[i] >= 0 ? z : 0.0f;
+  }
+}
+
+FBVINS_KERNEL void add_spot(const float* x, const float* y, const Hits& hits, int id, const float* towards, float strength,
+                            float* sum) {
+  const float tx = towards[0], ty = towards[1], tz = towards[2];
+  for (int i = 0; i < kRays; ++i) {
+    const float c = (tx * x[i] + ty * y[i] + tz) / std::sqrt(x[i] * x[i] + y[i] * y[i] + 1.0f);
+    const float distance = 1.0f - 40.0f * (1.0f - c), near = distance > 0 ? distance : 0.0f;
+    sum[i] += hits.id[i] == id ? strength * near * near * near : 0.0f;
   }
 }
 
@@ -75,20 +95,40 @@ inline float blend(std::uint32_t word, float fx, float fy) {
 
 }  // namespace
 
-void select(const Hits& hits, int id, Lanes& lanes) {
+namespace {
+
+FBVINS_KERNEL int count(const Hits& hits, int id) {
   int n = 0;
-  for (int i = 0; i < kRays; ++i) {
+  for (int i = 0; i < kRays; ++i) n += hits.id[i] == id ? 1 : 0;
+  return n;
+}
+
+FBVINS_KERNEL void add(const float* radiance, float weight, float* sum) {
+  for (int i = 0; i < kBlock; ++i) sum[i] += weight * radiance[i];
+}
+
+}  // namespace
+
+void select(const Hits& hits, int id, Lanes& lanes) {
+  lanes.count = count(hits, id);
+  if (lanes.count == 0) return;
+  if (lanes.count == kRays) {
+    std::copy_n(hits.w, kRays, lanes.w);
+    std::copy_n(hits.u, kRays, lanes.u);
+    std::copy_n(hits.v, kRays, lanes.v);
+    return;
+  }
+  int n = 0;
+  for (int i = 0; n < lanes.count; ++i) {
     lanes.ray[n] = i;
     n += hits.id[i] == id ? 1 : 0;
   }
-  lanes.count = n;
   for (int k = 0; k < n; ++k) {
     const int i = lanes.ray[k];
     lanes.w[k] = hits.w[i], lanes.u[k] = hits.u[i], lanes.v[k] = hits.v[i];
   }
   // The last block is filled up with a ray that exists: what it looks up is valid, and nobody adds it.
-  for (int k = n; n > 0 && k % kBlock != 0; ++k)
-    lanes.w[k] = lanes.w[n - 1], lanes.u[k] = lanes.u[n - 1], lanes.v[k] = lanes.v[n - 1];
+  for (int k = n; k % kBlock != 0; ++k) lanes.w[k] = lanes.w[n - 1], lanes.u[k] = lanes.u[n - 1], lanes.v[k] = lanes.v[n - 1];
 }
 
 namespace {
@@ -143,7 +183,9 @@ void shade(const Lanes& lanes, const Look& look, float weight, float* sum) {
   for (int first = 0; first < lanes.count; first += kBlock) {
     alignas(64) float radiance[kBlock];
     shade_block(lanes.w + first, lanes.u + first, lanes.v + first, look, radiance);
-    for (int k = first; k < lanes.count && k < first + kBlock; ++k) sum[lanes.ray[k]] += weight * radiance[k - first];
+    if (lanes.count == kRays) add(radiance, weight, sum + first);
+    else
+      for (int k = first; k < lanes.count && k < first + kBlock; ++k) sum[lanes.ray[k]] += weight * radiance[k - first];
   }
 }
 

@@ -19,8 +19,14 @@ struct Hits {
 /// Keeps, for each ray (x, y, 1), the nearer of the hit so far and this facet's.
 void intersect(const float* x, const float* y, const float* m, const float* a, const float* b, int id, Hits& hits);
 
-/// u and v become coordinates in [0, 1].
-void divide(Hits& hits);
+/// The rays of a tile, moved by (dx, dy) on the plane z = 1.
+void shift(const float* ray_x, const float* ray_y, float dx, float dy, float* x, float* y);
+
+/// u and v become coordinates in [0, 1]; the depth of each ray, 0 where it hit nothing.
+void divide(Hits& hits, float* depth);
+
+/// Adds a spot of light in the direction `towards` (a unit vector) to the rays (x, y, 1) that hit `id`.
+void add_spot(const float* x, const float* y, const Hits& hits, int id, const float* towards, float strength, float* sum);
 
 /// How one facet looks.
 struct Look {
@@ -35,7 +41,7 @@ struct Look {
   float emission;
 };
 
-/// The rays that hit `id`, packed: only they cost look-ups.
+/// The rays that hit `id`, packed: only they cost look-ups. `ray` says which they are unless they are all.
 struct Lanes {
   alignas(64) float w[kRays];
   alignas(64) float u[kRays];

@@ -178,10 +178,7 @@ void Renderer::render_tile(int index, const Instant& instant, const std::vector<
   alignas(64) float x[kRays], y[kRays];
   const float sx = static_cast<float>(instant.shift_px.x()), sy = static_cast<float>(instant.shift_px.y());
   const float step_x = tile.dx[0] * sx + tile.dx[1] * sy, step_y = tile.dy[0] * sx + tile.dy[1] * sy;
-  for (int i = 0; i < kRays; ++i) {
-    x[i] = ray_x_[first + i] + step_x;
-    y[i] = ray_y_[first + i] + step_y;
-  }
+  rays::shift(&ray_x_[first], &ray_y_[first], step_x, step_y, x, y);
   if (instant.line_s != 0)
     for (int i = 0; i < kRays; ++i) {
       const Vec3 w = instant.w_WC_C * ((i / kTile - 3.5) * instant.line_s);
@@ -196,8 +193,7 @@ void Renderer::render_tile(int index, const Instant& instant, const std::vector<
     const View& view = views_[static_cast<std::size_t>(k)];
     rays::intersect(x, y, view.m, view.a, view.b, k, hits);
   }
-  rays::divide(hits);
-  for (int i = 0; i < kRays; ++i) depth_[first + i] = hits.id[i] >= 0 ? 1.0f / hits.w[i] : 0.0f;
+  rays::divide(hits, &depth_[first]);
 
   float* sum = sum_.data() + first;
   rays::Lanes lanes;
@@ -225,13 +221,13 @@ void Renderer::render_tile(int index, const Instant& instant, const std::vector<
     look.brightness = f.tint * lit.scale;
     look.emission = f.emission;
     rays::shade(lanes, look, weight, sum);
-    if (f.gloss > 0) add_mirror_images(instant, f, x, y, hits.id, k, weight, sum);
+    if (f.gloss > 0) add_mirror_images(instant, f, x, y, hits, k, weight, sum);
   }
 }
 
 /// A glossy surface shows each lamp as a blurred spot around its mirror image.
-void Renderer::add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const int* ids,
-                                 int id, float weight, float* sum) const {
+void Renderer::add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y,
+                                 const rays::Hits& hits, int id, float weight, float* sum) const {
   const Vec3 n = facet.normal();
   for (const Lamp& lamp : world_.lamps) {
     const double height = n.dot(lamp.p - facet.corner);
@@ -240,30 +236,24 @@ void Renderer::add_mirror_images(const Instant& instant, const Facet& facet, con
     const double r = d.norm();
     if (r > 9) continue;
     const Vec3 towards = d / r;
-    const float tx = static_cast<float>(towards.x()), ty = static_cast<float>(towards.y()), tz = static_cast<float>(towards.z());
-    const float strength = weight * facet.gloss * static_cast<float>(lamp.power / (r * r));
-    for (int i = 0; i < kRays; ++i) {
-      const float c = (tx * x[i] + ty * y[i] + tz) / std::sqrt(x[i] * x[i] + y[i] * y[i] + 1.0f);
-      const float near = std::max(0.0f, 1.0f - 40.0f * (1.0f - c));
-      sum[i] += ids[i] == id ? strength * near * near * near : 0.0f;
-    }
+    float unit[3];
+    store(unit, towards);
+    rays::add_spot(x, y, hits, id, unit, weight * facet.gloss * static_cast<float>(lamp.power / (r * r)), sum);
   }
 }
 
-void Renderer::radiance(std::vector<float>& image) const {
+/// What the tiles hold, as an image.
+void Renderer::untile(const std::vector<float>& tiled, std::vector<float>& image) const {
   image.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x)
-      image[static_cast<std::size_t>(y) * width_ + x] =
-          sum_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
+    for (int tx = 0; tx < tiles_x_; ++tx) {
+      const float* in = tiled.data() + (static_cast<std::size_t>(y / kTile) * tiles_x_ + tx) * kRays + (y % kTile) * kTile;
+      std::copy_n(in, std::min(kTile, width_ - tx * kTile), image.data() + static_cast<std::size_t>(y) * width_ + tx * kTile);
+    }
 }
 
-void Renderer::depth(std::vector<float>& image) const {
-  image.resize(static_cast<std::size_t>(width_) * height_);
-  for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x)
-      image[static_cast<std::size_t>(y) * width_ + x] =
-          depth_[(static_cast<std::size_t>(y / kTile) * tiles_x_ + x / kTile) * kRays + (y % kTile) * kTile + x % kTile];
-}
+void Renderer::radiance(std::vector<float>& image) const { untile(sum_, image); }
+
+void Renderer::depth(std::vector<float>& image) const { untile(depth_, image); }
 
 }  // namespace fbvins

@@ -18,6 +18,10 @@
 
 namespace fbvins {
 
+namespace rays {
+struct Hits;
+}
+
 /// Where a camera is while (part of) an image is taken.
 struct Instant {
   Quat q_WC = Quat::Identity();
@@ -60,8 +64,9 @@ class Renderer {
   void look(const Instant& instant, const std::vector<Facet>& facets);
   void distribute(int first_row, int last_row);
   void render_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
-  void add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const int* ids, int id,
-                         float weight, float* sum) const;
+  void add_mirror_images(const Instant& instant, const Facet& facet, const float* x, const float* y, const rays::Hits& hits,
+                         int id, float weight, float* sum) const;
+  void untile(const std::vector<float>& tiled, std::vector<float>& image) const;
 
   const World& world_;
   int width_, height_, tiles_x_, tiles_y_;
