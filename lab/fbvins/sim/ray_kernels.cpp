@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "fbvins/core/simd.hpp"
 #include "fbvins/sim/texture.hpp"
@@ -92,10 +91,6 @@ inline float blend(std::uint32_t word, float fx, float fy) {
   const float top = p + fx * (q - p), low = r + fx * (s - r);
   return top + fy * (low - top);
 }
-
-}  // namespace
-
-namespace {
 
 FBVINS_KERNEL int count(const Hits& hits, int id) {
   int n = 0;
