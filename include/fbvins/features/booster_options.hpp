@@ -15,7 +15,7 @@ struct BoosterOptions {
   template <class V>
   void visit(V&& v) {
     v("weights", weights, "", "the shipped weights, boost-s, or the path of a .safetensors file");
-    v("precision", precision, "int8|float32", "whole numbers, fast; or single precision, for comparison");
+    v("precision", precision, "int8|float32", "8-bit integers, fast; or single precision, for comparison");
   }
 };
 

@@ -16,8 +16,8 @@
 
 namespace fbvins {
 
-/// The file that `weights` means: a path as it is, a name in the folder of FBVINS_WEIGHTS, where the project was
-/// installed, or in its sources.
+/// The file that the option `weights` names: a path is taken as it is; a name is looked up in the folder $FBVINS_WEIGHTS
+/// where that is set, else by data_file().
 std::string booster_weights_path(const std::string& weights);
 
 Result<std::unique_ptr<DescriptorStage>> make_booster_stage(const BoosterOptions& options);

@@ -114,7 +114,7 @@ void gate(const float* query, const float* summary, int rows, int width, float* 
       F16 q, s;
       load_lanes(query + static_cast<std::ptrdiff_t>(row) * width + c, q);
       load_lanes(summary + c, s);
-      // of minus the magnitude, so that nothing overflows
+      // exp of minus the magnitude cannot overflow
       F16 e = q > 0.0f ? -q : q;
       exp_of_negative(e);
       const F16 larger = 1.0f / (1.0f + e);

@@ -18,7 +18,7 @@ void add(float* x, const float* y, int n);
 /// Each row to mean 0 and variance 1, then times weight plus bias.
 void normalise_rows(float* x, int rows, int width, const float* weight, const float* bias);
 
-/// summary[c] = sum_row softmax_row(key[row][c]) value[row][c] (eq. 7-8); key is destroyed. scratch holds 2 width.
+/// summary[c] = sum_row softmax_row(key[row][c]) value[row][c] (eq. 7-8); scratch holds 2 * width numbers.
 void summarise(float* key, const float* value, int rows, int width, float* summary, float* scratch);
 
 /// out[row][c] = sigmoid(query[row][c]) summary[c]

@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-/// A product with fewer inputs is not worth rounding.
+/// Products with fewer inputs stay in single precision: quantising them would save nothing.
 constexpr int kFewestInputs = 16;
 
 double log_score(const Keypoint& k) { return std::log1p(std::max(double{k.score}, 0.0)); }
@@ -93,7 +93,7 @@ void BoosterNetwork::run(int width, int height, std::span<const Keypoint> keypoi
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) take_signs(y_.data() + 256 * i, descriptors[i].bits.data());
 }
 
-/// The input through two layers into z (eq. 6, the descriptor's part), and past everything else.
+/// The input through two layers into z (eq. 6, the descriptor's part), and through the skip connection past all layers.
 void BoosterNetwork::encode(std::span<const Margins> margins) {
   const auto* values = reinterpret_cast<const std::int8_t*>(margins.data());
   if (descriptor1_.whole_numbers) {

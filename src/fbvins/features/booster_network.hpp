@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The booster's forward pass (paper 2.2.2, eq. 6-8; docs/derivations/booster.md): margins or bits, and geometry, of all
-// keypoints of one image in, better bits out. In whole numbers (fast, the same bits with every kernel) or single precision (the
+// keypoints of one image in, better bits out. In 8-bit integers (fast, the same bits with every kernel) or single precision (the
 // reference). One instance, one thread; allocates only while it grows.
 //
 //   BoosterNetwork network(*weights, BoosterPrecision::int8, best_int8_kernel());
@@ -38,7 +38,7 @@ class BoosterNetwork {
     std::vector<float> weight_t, bias;
     int outputs = 0, inputs = 0;
     bool whole_numbers = false;
-    bool fine = false;  // what its input loses in 8 bits is made good with 8 more
+    bool fine = false;  // the input's rounding error is multiplied as well, in 8 more bits
   };
   struct Layer {
     Linear query, key, value, out, up, down;
@@ -46,7 +46,7 @@ class BoosterNetwork {
   };
 
   Linear prepare(const LinearWeights& weights, bool fine = false) const;
-  /// x to out; quantises x unless `again`: the rows of the last call are those of this one.
+  /// out = linear(x). `again`: x is that of the previous call, so its quantised rows are used once more.
   void apply(const Linear& linear, const std::vector<float>& x, std::vector<float>& out, bool again = false);
   void encode(std::span<const Margins> margins);
   void encode_geometry();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The booster against the training framework's forward pass (stored vectors, training/store_vectors.py), whole numbers
-// against single precision, and weights that do not fit.
+// The booster against the training framework's forward pass (stored vectors, training/store_vectors.py), 8-bit integers
+// against single precision, and weights files that do not fit.
 #include "fbvins/features/booster.hpp"
 
 #include <gtest/gtest.h>
@@ -125,7 +125,7 @@ TEST_P(ShippedWeights, GiveTheSameBitsWithEveryKernelAndEveryTime) {
     if (!int8_kernel_works(kernel)) continue;
     BoosterNetwork network(*weights, BoosterPrecision::int8, kernel);
     EXPECT_EQ(boost(network, features.size()), expected) << name_of(kernel);
-    EXPECT_EQ(boost(network, 50), fewer) << name_of(kernel) << ": what a run before left behind shows";
+    EXPECT_EQ(boost(network, 50), fewer) << name_of(kernel) << ": state of an earlier run shows";
     EXPECT_EQ(boost(network, features.size()), expected) << name_of(kernel);
   }
 }

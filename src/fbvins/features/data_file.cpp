@@ -7,7 +7,7 @@
 namespace fbvins {
 namespace {
 
-/// The folder of the program or shared library that holds this function; "." where the name tells none.
+/// The folder of the program or shared library that holds this function; "." where its name has no folder.
 std::string own_folder() {
   Dl_info self{};
   if (dladdr(reinterpret_cast<const void*>(&own_folder), &self) == 0 || self.dli_fname == nullptr) return ".";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a file lies that ships with the project: weights, vocabularies. A pure function of the machine, any thread.
+// Where a file lies that ships with the project: weights, vocabularies. Reads the file system only; any thread.
 //
 //   std::string path = data_file("boost-s.safetensors");
 #pragma once
@@ -9,7 +9,7 @@
 namespace fbvins {
 
 /// In the folder `data` beside the program or library that this is linked into (a Python package is one), else where it was
-/// installed, else in the sources it was built from. The last is the answer, too, where the file is nowhere.
+/// installed, else in the sources it was built from; this path is returned, too, where the file does not exist.
 std::string data_file(const std::string& name);
 
 }  // namespace fbvins

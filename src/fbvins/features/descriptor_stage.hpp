@@ -21,8 +21,8 @@ class DescriptorStage {
   /// (width x height in px, to normalise positions). The number and order of features stay.
   virtual void improve(int width, int height, OrbFeatures& features) = 0;
 
-  /// False where improve() leaves descriptors as they are: then there is nothing to compare. True: features come from an
-  /// extractor that was asked for margins, without which descriptors stay what they were.
+  /// False where improve() leaves descriptors as they are. True: the features must come from an extractor that was asked for
+  /// margins, without which the descriptors stay what they were.
   virtual bool changes_descriptors() const = 0;
 };
 

@@ -76,7 +76,7 @@ bool refine_step(Model& model, const Matches& m, double threshold) {
     ++used;
   }
   if (used < 5) return false;
-  // Damping relative to the noise: directions the data does not see (no parallax) stay put.
+  // Damping: directions that the matches do not determine (no parallax) stay where they are.
   H.diagonal().array() += 1e-6 * used;
   const Vec5 d = -H.ldlt().solve(g);
   if (!d.allFinite()) return false;
@@ -103,7 +103,7 @@ void consider(const Model& model, const Matches& m, double threshold, std::optio
   }
 }
 
-/// The last word: steps at the final threshold while they lower the cost.
+/// Final refinement: steps at the final threshold while they lower the cost.
 void settle(const Matches& m, double threshold, Candidate& best) {
   for (int i = 0; i < 10; ++i) {
     Model next = best.model;
@@ -134,7 +134,7 @@ std::array<int, N> draw(int n, Rng& rng) {
   return picked;
 }
 
-/// Samples of two: the translation is normal to both planes through the turned ray and its match.
+/// Samples of two: the translation lies in both planes through the rotated ray and its match.
 int search_translation(const Matches& m, const Mat3& R, const EpipolarOptions& options, Rng& rng,
                        std::optional<Candidate>& best) {
   for (int axis = 0; axis < 3; ++axis) consider({R, Vec3::Unit(axis)}, m, options.threshold, best);
@@ -197,7 +197,7 @@ std::pair<Mat3, int> search_rotation_only(const Matches& m, const EpipolarOption
 int search_essential(const Matches& m, const EpipolarOptions& options, Rng& rng, std::optional<Candidate>& best) {
   const auto [R_only, explained] = search_rotation_only(m, options, rng);
   for (int axis = 0; axis < 3; ++axis) consider({R_only, Vec3::Unit(axis)}, m, options.threshold, best);
-  // All but a few explained by turning: five-point samples would only meet their degenerate case.
+  // A rotation explains nearly all: five-point samples would be degenerate.
   if (explained > 0.95 * m.size()) return 0;
   int needed = options.max_iterations, iteration = 0;
   for (; iteration < needed; ++iteration) {

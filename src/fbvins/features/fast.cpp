@@ -62,8 +62,8 @@ FBVINS_INLINE void strength_of_block(const std::uint8_t* centre, const Circle& c
   larger(best, best_dark, best);
 }
 
-/// No less than the strengths: each arc of nine has one or the other of opposite pixels, here `first`, `first` + 4 and what is
-/// opposite.
+/// An upper bound of the strengths: each arc of nine holds at least one of two opposite pixels, here `first` or `first` + 8, and
+/// `first` + 4 or `first` + 12.
 FBVINS_INLINE void bound_of_block(const std::uint8_t* centre, const Circle& circle, int first, U8x32& bound) {
   U8x32 c, bright[4], dark[4];
   load(centre, c);

@@ -36,7 +36,7 @@ void fast_strength_row(const std::uint8_t* centre, std::ptrdiff_t stride, int co
 /// Pixels whose strengths are computed at a time.
 inline constexpr int kFastBlock = 32;
 
-/// The same, but 0 may stand for what is not above the limit of its block of kFastBlock pixels.
+/// The same, but a strength that does not exceed the limit of its block of kFastBlock pixels may be written as 0.
 void fast_strength_row_above(const std::uint8_t* centre, std::ptrdiff_t stride, int count, const std::uint8_t* limits,
                              std::uint8_t* strength);
 

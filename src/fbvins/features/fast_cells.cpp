@@ -43,8 +43,8 @@ void FastCells::detect(const PyramidLevel& level, int border, int floor, std::ve
   for (const Cell& cell : cells_) out.insert(out.end(), cell.strongest, cell.strongest + cell.count);
 }
 
-/// Strengths of a row; nothing where all that they are compared with must be stronger to count. The last row of a cell and the
-/// first are compared with one another, and of the lower cell nothing is known then.
+/// Strengths of row y, skipping blocks in which no pixel can exceed the limits of the cells that it belongs to or is compared in. The
+/// last row of a cell and the first row of the next are compared with one another, before the lower cell has a limit: there the floor counts.
 void FastCells::fill(int y) {
   const bool last = y % kSide == kSide - 1 || y % kSide == 0;
   // a block and the pixels beside it touch these cells
@@ -73,8 +73,8 @@ void FastCells::collect(int y) {
   }
 }
 
-/// The cell's threshold sinks from corner to corner until the cell has its share or the floor is reached: the other way round,
-/// it rises with the weakest of a full cell.
+/// Inserts a corner into its cell, the strongest first. Once the cell is full, its weakest corner is the limit that others must
+/// exceed.
 void FastCells::keep(int x, int y, std::uint8_t strength) {
   const int column = x / kSide;
   Cell& cell = cells_[static_cast<std::size_t>((y / kSide) * columns_ + column)];

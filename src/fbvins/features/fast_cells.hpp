@@ -36,10 +36,10 @@ class FastCells {
   int border_ = 0, count_ = 0, columns_ = 0;
   std::uint8_t floor_ = 0;
   std::size_t pitch_ = 0;
-  std::vector<std::uint8_t> rows_;         // three of strengths, one of what is left of them
-  std::vector<std::uint8_t> limits_;       // of each column: weaker corners are of no use to its cell
-  std::vector<std::uint8_t> cell_limits_;  // of each cell of a row of them
-  std::vector<std::uint8_t> skip_;         // of each block of a row
+  std::vector<std::uint8_t> rows_;         // three rows of strengths, one of local maxima
+  std::vector<std::uint8_t> limits_;       // of each column: its cell takes only corners stronger than this
+  std::vector<std::uint8_t> cell_limits_;  // of each cell in the row of cells at work
+  std::vector<std::uint8_t> skip_;         // of each block of a row: strengths up to this need not be computed
   std::vector<Cell> cells_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 /// Adding and taking away 1.5 * 2^23 rounds to the nearest whole number, in one instruction each.
 constexpr float kRounder = 12582912.0f;
-/// Of a block of sums.
+/// Columns of a block of sums.
 constexpr int kColumns = 16 * kInt8BlocksTogether;
 
 FBVINS_INLINE float largest_magnitude(const float* x, int n) {
@@ -31,7 +31,7 @@ FBVINS_INLINE float largest_magnitude(const float* x, int n) {
   return most;
 }
 
-/// Each row by its own largest magnitude.
+/// Each row is scaled by its own largest magnitude.
 FBVINS_KERNEL
 void quantise_rows(const float* x, int rows, int columns, std::int8_t* out, float* scale) {
   for (int r = 0; r < rows; ++r, x += columns, out += columns) {

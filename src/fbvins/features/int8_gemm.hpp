@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Products of a matrix of numbers with fixed weights in whole numbers: every row of the left side is scaled to -127..127
-// by its largest number, every column of weights once and for all, and the sums of products are exact 32-bit integers.
+// Products of a matrix with fixed weights in 8-bit integers: each row of the matrix is scaled to -127..127 by its largest
+// magnitude, the weights of each output once, when they are packed, and sums of products are exact 32-bit integers.
 // So the kernels (AVX-512 VNNI, AVX2, NEON dot product, portable; chosen at run time) give the same bits.
 // Weights are read-only after packing; one QuantisedRows a thread; nothing is allocated once buffers have grown.
 //
@@ -21,7 +21,7 @@ Int8Kernel best_int8_kernel();
 bool int8_kernel_works(Int8Kernel kernel);
 const char* name_of(Int8Kernel kernel);
 
-/// Columns of weights in blocks of sixteen outputs by four inputs.
+/// Weights in blocks of sixteen outputs by four inputs.
 struct PackedWeights {
   int outputs = 0;                   ///< multiple of 16
   int inputs = 0;                    ///< multiple of 4
@@ -37,11 +37,11 @@ class QuantisedRows {
  public:
   /// x is [count][inputs], inputs a multiple of 4.
   void quantise(const float* x, int count, int inputs);
-  /// What is left of x when `coarse`, made of it, is taken away.
+  /// Quantises the rounding error that `coarse`, which was made of x, has left.
   void quantise_rest(const float* x, const QuantisedRows& coarse);
-  /// Takes numbers that are whole already, [count][inputs], worth `unit` each; exact.
+  /// Takes integers as they are, [count][inputs], each standing for that many `unit`; exact.
   void set_values(const std::int8_t* whole, int count, int inputs, float unit);
-  /// Takes +1 of those above zero and -1 of the others; exact. Rows begin `stride` numbers apart.
+  /// Takes +1 for numbers above zero and -1 for the others; exact. Rows begin `stride` numbers apart.
   void set_signs(const std::int8_t* whole, int count, int inputs, int stride);
 
   int count = 0, inputs = 0;

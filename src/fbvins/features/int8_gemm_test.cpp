@@ -22,7 +22,7 @@ struct Shape {
   int rows, inputs, outputs;
 };
 
-/// Weights that are whole numbers already, the largest of each row 127: nothing is lost in packing.
+/// Integer weights, the largest of each row 127: packing does not round them.
 std::vector<float> whole_weights(int outputs, int inputs, Rng& rng) {
   std::vector<float> out(static_cast<std::size_t>(outputs * inputs));
   for (float& v : out) v = static_cast<float>(static_cast<int>(rng.below(255)) - 127);

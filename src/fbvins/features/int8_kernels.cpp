@@ -43,7 +43,7 @@ std::int32_t four_bytes(const std::int8_t* p) {
   return v;
 }
 
-/// |a| times w with a's sign: both factors fit what vpmaddubsw takes, and 2 * 127 * 127 fits its 16 bits.
+/// |a| times (w with a's sign): vpmaddubsw takes an unsigned and a signed factor, and 2 * 127 * 127 fits its 16 bits.
 template <int Blocks>
 __attribute__((target("avx2"))) void sums_avx2_of(const std::int8_t* values, const std::int8_t* weights, int inputs,
                                                   std::int32_t* sums) {
@@ -84,8 +84,8 @@ __attribute__((target("avx2"))) void sums_avx2(const std::int8_t* values, const 
 
 #define FBVINS_VNNI __attribute__((target("avx512f,avx512bw,avx512vnni")))
 
-/// sum += a (bytes without sign) . w (with), four at a time. In so many words, for GCC 12 copies each sum twice around its
-/// intrinsic, and into memory for lack of registers.
+/// sum += a (unsigned bytes) . w (signed bytes), four at a time. In assembly, because GCC 12 copies each sum twice around the
+/// intrinsic and spills it to memory.
 #define FBVINS_ADD_PRODUCTS(sum, a, w) __asm__("vpdpbusd %2, %1, %0" : "+v"(sum) : "v"(a), "v"(w))
 
 template <int Blocks>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The innermost loops of int8_gemm, a function an instruction set; all give the same integers. Pure functions.
+// The innermost loops of int8_gemm, one function for each instruction set; all give the same integers. Pure functions.
 //
 //   int8_kernel(best_int8_kernel())(values, weights, offset, inputs, blocks, sums);
 #pragma once

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A point that can be recognised: where it is, how large, how turned, and 256 bits of what it looks like.
+// A feature of an image: position, scale, orientation and a descriptor of 256 bits.
 #pragma once
 
 #include <array>
@@ -48,7 +48,7 @@ inline int hamming_distance(const Descriptor& a, const Descriptor& b) {
 struct OrbFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
-  std::vector<Margins> margins;  ///< of the descriptors as extracted, whatever became of them since; only where asked for
+  std::vector<Margins> margins;  ///< of the descriptors as extracted, before any stage changed them; only where asked for
 
   std::size_t size() const { return keypoints.size(); }
   void clear() {

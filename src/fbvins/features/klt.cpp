@@ -38,7 +38,7 @@ struct Place {
   float fx, fy;
 };
 
-/// Of numbers that an int can hold: the baseline of x86-64 has no instruction for std::floor.
+/// std::floor of numbers that fit an int: baseline x86-64 has no instruction for it.
 int floor_of(double x) {
   const int truncated = static_cast<int>(x);
   return truncated - (x < truncated ? 1 : 0);

@@ -38,7 +38,7 @@ struct alignas(64) KltLevelTemplate {
 };
 
 /// The pixels around a feature in the frame where it was first seen well. Aligning to them in every later
-/// frame, through the warp that the motion since then predicts, keeps a long track from creeping away.
+/// frame, through the warp that the motion since then predicts, keeps a long track from drifting.
 struct KltAnchor {
   static constexpr int kSide = 48;
   std::array<std::uint8_t, kSide * kSide> pixels;
@@ -72,7 +72,7 @@ struct KltResult {
   bool ok() const { return status == KltStatus::ok; }
 };
 
-/// Precision of a position, and of a way back that is only asked whether it leads near where it began.
+/// Last step of a converged alignment; larger in the backward check, which only asks whether the feature comes back near its start.
 inline constexpr double kConverged_px = 0.03, kConvergedCheck_px = 0.1;
 
 /// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it
@@ -84,7 +84,7 @@ KltResult klt_align(const KltTemplate& patch, const Pyramid& image, const Vec2& 
 /// (position in pixels of that level); -1 outside the image.
 float klt_correlation(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px);
 
-/// The same up to half a pixel off, where nothing need be interpolated: for a search.
+/// The same at the nearest place, at most half a pixel off in x and y, that needs no interpolation: for a search.
 float klt_correlation_about(const KltLevelTemplate& patch, const PyramidLevel& level, const Vec2& px);
 
 }  // namespace fbvins

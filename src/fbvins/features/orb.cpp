@@ -37,7 +37,7 @@ void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
 void OrbExtractor::select(const PyramidLevel& level, int quota) {
   const int columns = (level.width + kFastCell_px - 1) / kFastCell_px;
   candidates_.clear();
-  // of a cell's corners that are weaker on FAST no Harris score is computed
+  // Only a cell's strongest corners by FAST are here: of the others no Harris score is computed.
   for (const FastCorner& c : corners_) {
     const float harris = harris_score(level, c.x, c.y);
     if (!(harris > 0)) continue;  // an edge

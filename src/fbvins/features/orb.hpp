@@ -32,7 +32,7 @@ inline constexpr int kOrbBorder = 12;
 
 class OrbExtractor {
  public:
-  /// `margins`: of interest to a stage that changes descriptors only, and computed for it only.
+  /// `margins`: compute Margins as well, which only a stage that changes descriptors needs.
   explicit OrbExtractor(const OrbOptions& options, bool margins = false);
 
   /// Replaces `out` by the features of the image (none for an empty one).
@@ -69,7 +69,7 @@ Vec2 centroid_direction(const PyramidLevel& level, int x, int y);
 /// Differences of grey values (second minus first point) of the pairs of orb_pattern().
 using Comparisons = std::array<std::int16_t, 256>;
 
-/// Of the pattern (eq. 5) around a pixel of a smoothed level, turned to a direction, a unit vector.
+/// Of the pattern (eq. 5) around a pixel of a smoothed level, its x axis turned to `direction`, a unit vector.
 Comparisons compare(const PyramidLevel& smooth, const Vec2& pixel, const Vec2& direction);
 
 Descriptor bits_of(const Comparisons& difference);

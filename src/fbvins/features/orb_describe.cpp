@@ -101,7 +101,7 @@ void turn_pattern(const PatternLanes& lanes, float c, float s, float x, float y,
   }
 }
 
-/// To Margins. What is decided at all keeps its sign.
+/// Differences to margins; one that is not zero keeps its sign.
 FBVINS_KERNEL
 void scale_differences(const std::int16_t* difference, std::int8_t* margin) {
   std::int32_t squares = 0;

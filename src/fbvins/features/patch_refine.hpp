@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions below a pixel for descriptor matches: the patch where a track began (its reference) is warped by the
+// Sub-pixel positions for descriptor matches: the patch where a track began (its reference) is warped by the
 // motion since then and aligned, invariant to gain and offset, from the matched keypoint on. All positions of a
 // track are thus measured against the same pixels and agree with one another to a fraction of a pixel.
 // Values; a PatchRefiner holds scratch memory and serves one thread at a time.

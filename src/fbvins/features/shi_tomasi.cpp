@@ -18,7 +18,7 @@ constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is se
 constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not deliver enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
 constexpr int kBorder_px = 10;               // no corner is nearer to the image's edge
-/// Smallest response of a corner in a noiseless image, (grey/px)^2; else this many times that of the noise.
+/// Smallest response of a corner, (grey/px)^2, and as a multiple of the noise's own response; the larger counts.
 constexpr double kMinResponse = 0.4;
 constexpr double kNoiseFactor = 5.0;
 /// Response per unit of noise variance: Sobel / 8 has 12/64 of the noise's variance, and the
@@ -174,7 +174,7 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   int& next = next_cell_[empty ? 0 : 1];
   const int cells = static_cast<int>(occupancy_.size());
   const int budget = existing.size() < kTooFewFeatures ? cells : std::max(kFewestCells, empty ? wanted : 0);
-  // Crowded is better than few.
+  // Features close together are better than too few.
   const double distance_px = (empty ? 1.0 : kCrowding) * min_distance_px_;
   int searched = 0;
   for (int i = 0; i < cells && searched < budget; ++i) {

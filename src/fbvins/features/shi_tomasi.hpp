@@ -21,7 +21,7 @@ struct Corner {
   float response = 0;      ///< smaller eigenvalue of the mean structure tensor, (grey/px)^2
 };
 
-/// Standard deviation of the pixel noise, grey values: median response to a mask that is blind to planes
+/// Standard deviation of the pixel noise, grey values: lower quartile of the response to a mask that is blind to planes
 /// and straight edges (Immerkaer 1996), on a sparse grid.
 double estimate_noise(const PyramidLevel& image);
 

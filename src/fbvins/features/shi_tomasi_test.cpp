@@ -44,7 +44,7 @@ TEST(ShiTomasi, LeavesCellsAloneThatHaveFeatures) {
   EXPECT_TRUE(detector.detect(pyramid, existing, 0).empty());
 }
 
-TEST(ShiTomasi, FindsTheCornerOfASquareBelowAPixel) {
+TEST(ShiTomasi, FindsTheCornerOfASquare) {
   Image image(120, 120, 40);
   for (int y = 60; y < 120; ++y)
     for (int x = 60; x < 120; ++x) image.at(x, y) = 200;
