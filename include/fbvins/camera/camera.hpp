@@ -32,7 +32,7 @@ class Camera {
   std::string model_name() const;
   /// fx, fy, cx, cy, px.
   std::array<double, 4> intrinsics() const;
-  /// What the model has beyond them, in the order of its struct.
+  /// The model's other parameters, in the order of its struct.
   std::vector<double> distortion() const;
   /// Mean focal length, px.
   double focal_px() const;
@@ -48,8 +48,8 @@ class Camera {
   std::optional<Vec2> project(const Vec3& p_C) const;
   /// Largest |(x/z, y/z)| at which the radial distortion still grows outwards: the model's domain.
   double max_normalised_radius() const { return max_radius_; }
-  /// Whether neither of two opposite edges' middles has a ray in front of the camera, and not because of a polynomial that
-  /// turns: the lens sees more than 180 degrees across or down the image.
+  /// Whether the lens sees more than 180 degrees across or down the image: the middles of two opposite edges look backwards.
+  /// False for a polynomial that stops growing within the image, which has no rays there, either.
   bool sees_backwards() const;
   bool inside(const Vec2& pixel, double border_px = 0) const {
     return pixel.x() >= border_px && pixel.y() >= border_px && pixel.x() <= width_ - 1 - border_px &&

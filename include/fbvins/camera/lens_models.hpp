@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lenses as numbers: fx, fy, cx, cy in px, then what bends the rays. With n = (x/z, y/z) and s = |n|^2, a pixel is
-// (fx u + cx, fy v + cy) of the distorted (u, v) that each model states. What they compute is in src/fbvins/camera.
+// Parameters of the lens models: fx, fy, cx, cy in px, then the distortion's. With n = (x/z, y/z) and s = |n|^2, a pixel is
+// (fx u + cx, fy v + cy) of the distorted (u, v) that each model states. The formulas are in src/fbvins/camera/lenses.hpp.
 #pragma once
 
 #include <variant>
@@ -33,7 +33,7 @@ struct ExtendedUnified {
   double alpha = 0, beta = 1;
 };
 
-/// Unified projection with Brown's distortion behind it (Mei, Rives 2007), "omni" with "radtan" of Kalibr, "MEI" of camodocal:
+/// Unified projection followed by Brown's distortion (Mei, Rives 2007), "omni" with "radtan" of Kalibr, "MEI" of camodocal:
 /// n / (xi sqrt(s + 1) + 1), distorted as PinholeRadtan does; xi >= 0.
 struct UnifiedRadtan {
   double fx = 1, fy = 1, cx = 0, cy = 0;  ///< px

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Result<T>: a value, or an Error that says in one sentence what the outside world got wrong.
-// For files, calibrations, sockets, weights. A bug is an assertion; trouble in estimation is a Health.
+// Result<T>: a value, or an Error that says in one sentence what is wrong with an input from outside the program:
+// a file, calibration, socket, set of weights. A bug is an assertion; trouble in estimation is a Health.
 //
 //   Result<Config> config = load_config("drone.yaml");
 //   if (!config) { report(config.error().message); return 2; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotation about the vertical, the part of an attitude that gravity does not tell.
+// Rotation about the vertical, the part of an attitude that gravity does not determine.
 #pragma once
 
 #include "fbvins/geometry/so3.hpp"

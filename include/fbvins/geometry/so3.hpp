@@ -44,7 +44,7 @@ inline Vec3 so3_log(const Quat& q) {
   return k * v;
 }
 
-/// The smallest rotation that takes the direction of `from` to that of `to`; about any axis across where they are opposite.
+/// The smallest rotation that takes the direction of `from` to that of `to`; where they are opposite, about some normal axis.
 /// As Eigen's FromTwoVectors, without its singular value decomposition.
 inline Quat so3_between(const Vec3& from, const Vec3& to) {
   const Vec3 a = from.normalized(), b = to.normalized();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the cameras sit on the IMU, as the estimator has it: the rig's calibration, refined where that is asked for.
+// Camera-IMU extrinsics and time offset as the estimator holds them: the rig's calibration, refined if that is switched on.
 #pragma once
 
 #include "fbvins/geometry/pose.hpp"

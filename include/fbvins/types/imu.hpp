@@ -12,14 +12,14 @@ namespace fbvins {
 struct ImuSample {
   Time t;
   Vec3 gyro_radps = Vec3::Zero();  ///< angular rate, rad/s
-  Vec3 accel_mps2 = Vec3::Zero();  ///< specific force (at rest: +g upwards), m/s^2
+  Vec3 accel_mps2 = Vec3::Zero();  ///< specific force (at rest: g, upwards), m/s^2
 };
 
 /// The readings between two images: first.t and last.t are the two image stamps (interpolated),
 /// those between are the sensor's own. Empty for the first image and where the IMU is missing.
 struct ImuSegment {
   std::vector<ImuSample> samples;
-  Duration longest_gap;  ///< largest distance between neighbouring real readings inside
+  Duration longest_gap;  ///< longest time between neighbouring readings that overlaps the segment
 
   bool empty() const { return samples.size() < 2; }
 };

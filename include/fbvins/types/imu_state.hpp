@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a flight knew of its IMU when it ended, for the next one to begin with.
+// The IMU's biases as estimated at the end of a flight: the prior with which the next one starts.
 #pragma once
 
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
 
-/// Biases and how well they are known.
+/// Biases with their covariance.
 struct ImuBiasEstimate {
   ImuBias bias;
   Mat3 gyro_covariance = Mat3::Zero();   ///< rad^2/s^2

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What loop closure tells the world: M is the odometry corrected by places seen again. Loop closure never moves W.
+// What loop closure publishes: M is the odometry corrected by places seen again. Loop closure never moves W.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// Where one keyframe's body is as seen from another's.
+/// Relative pose of the body at two keyframes.
 struct LoopConstraint {
   KeyframeId from, to;  ///< `to` is the newer one
   Pose<B, B> T_from_to;
@@ -20,7 +20,7 @@ struct LoopConstraint {
   int inliers = 0;
 };
 
-/// A keyframe where the map has it now.
+/// A keyframe's pose in the map after the update.
 struct CorrectedKeyframe {
   KeyframeId id;
   Time t;
@@ -29,15 +29,15 @@ struct CorrectedKeyframe {
 
 struct LoopStats {
   int keyframes = 0;   ///< in the map
-  int candidates = 0;  ///< places looked at closely for this keyframe
-  int accepted = 0;    ///< of them that became constraints
+  int candidates = 0;  ///< places compared with this keyframe in detail
+  int accepted = 0;    ///< candidates that became constraints
   int refused = 0;     ///< verified by the images, but inconsistent with the odometry
   bool optimised = false;
   double extract_ms = 0, recognise_ms = 0, verify_ms = 0, optimise_ms = 0;
   double total_ms() const { return extract_ms + recognise_ms + verify_ms + optimise_ms; }
 };
 
-/// After every keyframe. T_MB = T_MW * T_WB, or without what levels and smooths W: T_MB = T_MG * T_GB (Odometry::gauge).
+/// After every keyframe. T_MB = T_MW * T_WB, or without the levelling and smoothing of W: T_MB = T_MG * T_GB (Odometry::gauge).
 struct MapUpdate {
   FrameId frame;         ///< the keyframe
   FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
@@ -45,9 +45,9 @@ struct MapUpdate {
   bool localised = false;           ///< false: where W is in M is not known (a loaded map, or after a restart)
   Pose<M, G> T_MG;                  ///< best knowledge now; jumps when a place is recognised. M is level
   Pose<M, W> T_MW;                  ///< the same for W as it was published when the keyframe was handed on
-  Pose<M, W> T_MW_smooth;           ///< moved towards it by a bounded amount a second: to fly by
-  std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this speaks of
-  std::uint32_t map_session = 0;    ///< counts frames W that met this map
+  Pose<M, W> T_MW_smooth;           ///< follows T_MW at a bounded speed: for a controller
+  std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this refers to
+  std::uint32_t map_session = 0;    ///< counts the odometry frames W that were joined to this map
   std::vector<LoopConstraint> loops;
   std::vector<CorrectedKeyframe> corrected;  ///< all keyframes, when the graph was optimised
   LoopStats stats;

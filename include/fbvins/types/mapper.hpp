@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the odometry hands its keyframes to. Loop closure is one; the odometry knows no more of it than this.
+// Receiver of the odometry's keyframes. Loop closure is one; the odometry knows it by this interface only.
 //
 //   MapUpdate update = mapper.process(keyframe);
 //   Pose<M, B> T_MB = update.T_MW * odometry.T_WB;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator tells the world.
+// What the estimator publishes.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace fbvins {
 enum class HealthState {
   initialising,  ///< no pose yet
   good,
-  degraded,  ///< a pose, but worse than its sensors could give; the reason says why
+  degraded,  ///< a pose, but less accurate than usual; the reason says why
   lost,      ///< no trustworthy pose; a restart follows
 };
 
@@ -50,7 +50,7 @@ struct Health {
 struct EstimatorStats {
   int frames_in_window = 0;
   int landmarks = 0;
-  int known_landmarks = 0;  ///< of these, held to where they were when they left the window
+  int known_landmarks = 0;  ///< of these, re-observed: with a prior from when they left the window
   int observations = 0;
   int iterations = 0;
   int outliers = 0;  ///< observations removed after this frame's solve
@@ -62,26 +62,26 @@ struct EstimatorStats {
   double total_ms() const { return prepare_ms + solve_ms + marginalise_ms; }
 };
 
-/// A mission that needs to know which way is up waits until it is known to so much.
+/// Tilt uncertainty below which an attitude counts as gravity-aligned (Odometry::level): missions that need it wait for it.
 inline constexpr double kLevelSigma_rad = 0.005;
 
-/// One pose of the flight, at an image's stamp. G is the frame in which the window saw things, never turned and corrected at once;
-/// W is published, level and without leaps; M is W corrected by loop closure. No correction moves T_WB by more than
-/// EstimatorOptions::max_step_m from one image to the next beside the motion, unless `reset_counter` counts up.
+/// One pose of the flight, at an image's stamp. G is the frame of the window, never turned and corrected at once; W is published,
+/// gravity-aligned and without leaps; M is W corrected by loop closure. No correction moves T_WB by more than
+/// EstimatorOptions::max_step_m from one image to the next, in addition to the motion, unless `reset_counter` counts up.
 struct Odometry {
   FrameId id;
   Time t;
   Pose<W, B> T_WB;
   GaugeState gauge;            ///< the same moment in the estimator's own frame
-  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W: of the motion, without the pending correction
+  Vec3 v_WB = Vec3::Zero();    ///< m/s, in W: of the motion, without the rate at which a pending correction is applied
   Vec3 w_WB_B = Vec3::Zero();  ///< rad/s, in B, bias removed
   ImuBias bias;
-  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad]), with the pending correction
+  Mat6 pose_covariance = Mat6::Zero();        ///< of (dp in W [m], dtheta in B [rad]), including the pending correction
   Mat3 velocity_covariance = Mat3::Zero();    ///< of v_WB, m^2/s^2
   Mat3 gyro_bias_covariance = Mat3::Zero();   ///< rad^2/s^2
   Mat3 accel_bias_covariance = Mat3::Zero();  ///< m^2/s^4
-  Vec3 up_W = Vec3::UnitZ();    ///< unit, against gravity, as known now; z once the levelling is applied
-  double tilt_sigma_rad = 0;    ///< standard deviation of the attitude's tilt about its less known axis
+  Vec3 up_W = Vec3::UnitZ();    ///< unit vector opposite to gravity, as estimated; z once the levelling is applied
+  double tilt_sigma_rad = 0;    ///< standard deviation of the attitude's tilt about its less certain axis
   bool level = false;           ///< tilt_sigma_rad is below kLevelSigma_rad
   Health health;
   std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then

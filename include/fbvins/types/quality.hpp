@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One number for how far a pose may be relied on.
+// How reliable a pose is, as one number.
 //
 //   if (quality_percent(odometry.health, odometry.pose_covariance) < 50) slow_down();
 #pragma once
@@ -11,13 +11,13 @@
 
 namespace fbvins {
 
-/// A position that is uncertain by so much has half the quality; standard deviation of its length, m.
+/// Position uncertainty at which the quality is 50: square root of the trace of the position's covariance, m.
 inline constexpr double kHalfQualitySigma_m = 0.1;
-/// At most while the health is degraded.
+/// Upper limit while the health is degraded.
 inline constexpr int kMostDegradedQuality_percent = 30;
 
-/// 1 to 100 where there is a pose, 0 where there is none. It falls with the standard deviation of the published position and
-/// nothing else, so that it ranks poses as the covariance does (docs/experiments/consistency.md: how it ranks their errors).
+/// 1 to 100 where there is a pose, 0 where there is none. While the health is good it depends on the standard deviation of the
+/// published position alone and ranks poses as the covariance does (docs/experiments/consistency.md: how it ranks their errors).
 /// `pose_covariance` is of (position [m], attitude [rad]), in any axes.
 inline int quality_percent(const Health& health, const Mat6& pose_covariance) {
   if (!health.has_pose()) return 0;

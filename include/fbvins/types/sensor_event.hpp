@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording or a live sensor hands over, one at a time and in order of time.
+// What a recording or a live sensor delivers, one at a time and in order of time.
 #pragma once
 
 #include <variant>

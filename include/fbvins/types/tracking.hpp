@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the frontend tells the estimator, and the two values that come back.
+// What the frontend gives the estimator, and the two values that are fed back.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ struct TrackedFeature {
   int age_frames = 0;                ///< 0 when detected in this frame
 };
 
-/// Matches of tracks by descriptor, and how many lie where the track, checked, turned out to be.
+/// Matches of tracks by descriptor, and how many agree with the verified position of the track.
 struct DescriptorMatchCounts {
   int found = 0, inliers = 0;
   DescriptorMatchCounts& operator+=(const DescriptorMatchCounts& other) {
@@ -54,8 +54,8 @@ struct FrontendStats {
   int lost_flow = 0;      ///< lost by the tracker or matcher
   int lost_check = 0;     ///< lost by the forward-backward, ratio or mutual check, or found on a moving thing
   int lost_epipolar = 0;  ///< lost by RANSAC on the epipolar constraint
-  int expected = 0;       ///< landmarks out of view until now that this image should show
-  int recognised = 0;     ///< of these, tracks again under their old id
+  int expected = 0;       ///< landmarks that were out of view and that this image should show
+  int recognised = 0;     ///< of these, re-observed: tracked again under their old id
   double mean_brightness_left = 0;
   double mean_brightness_right = 0;
   double median_motion_px = 0;  ///< of the features continued, in the raw left image
@@ -73,10 +73,10 @@ struct TrackedFrame {
   bool has_left = false, has_right = false;  ///< a usable image of that camera came
   ImuSegment imu;  ///< since the frame before
   FrontendStats stats;
-  StereoFrame images;  ///< null unless keyframes are wanted: they carry them on
+  StereoFrame images;  ///< null unless keyframes are wanted, which carry the images
 };
 
-/// A landmark that has left the window, where it was estimated to be.
+/// A landmark that has left the window, with its last estimated position.
 struct LocatedLandmark {
   TrackId track;
   Vec3 p_W = Vec3::Zero();  ///< m
@@ -86,12 +86,12 @@ struct LocatedLandmark {
 /// be skipped and a position must not: updates are numbered without gaps, and each is delivered once, in order.
 struct LandmarkUpdate {
   std::int64_t sequence = 0;        ///< counts from 0
-  std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, and positions of before are void
+  std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, and earlier positions are void
   std::vector<LocatedLandmark> landmarks;
 };
 
-/// The newest estimate, fed back to the frontend for guided matching; one may be skipped. Its W is the window's, which is not
-/// turned when it proves not to be level: `gravity_W` tells.
+/// The newest estimate, fed back to the frontend for guided matching; one may be skipped. Its W is the window's own frame (G),
+/// which is never levelled: `gravity_W` is the vertical in it.
 struct StatePrior {
   Time t;
   Pose<W, B> T_WB;

@@ -2,8 +2,8 @@
 // A trajectory: the poses of the body in one frame, in order of time, nothing else. The frame is part of the type, so
 // that odometry and map are not mixed:
 //
-//   Trajectory<W> odometry;                                  // what the estimator says
-//   Trajectory<M> in_map = closer.corrected(in_gauge);       // what loop closure makes of a Trajectory<G>, the estimator's own
+//   Trajectory<W> odometry;                                  // as the estimator publishes it
+//   Trajectory<M> in_map = closer.corrected(in_gauge);       // a Trajectory<G>, in the estimator's own frame, after loop closure
 #pragma once
 
 #include <vector>

@@ -9,14 +9,14 @@
 namespace fbvins {
 namespace {
 
-// Rays further than this from the axis (89.4 degrees) are outside of every model here.
+// Rays farther than this from the axis (89.4 degrees) are outside the domain of every model.
 constexpr double kLargestRadius = 100.0;
 
-/// Where the radial distortion stops growing; kLargestRadius if it never does.
+/// Radius at which the radial distortion stops growing; kLargestRadius if it never does.
 template <class Model>
 double largest_radius(const Model& m) {
-  // Steps of equal angle (0.1 degree), then bisection: a polynomial that turns for less than a step
-  // has no usable part beyond it anyway.
+  // Steps of equal angle (0.1 degree), then bisection. A polynomial that decreases for less than a step is taken as
+  // growing there.
   constexpr int kSteps = 900;
   double lo = 0;
   for (int i = 1; i <= kSteps; ++i) {
@@ -34,8 +34,8 @@ double largest_radius(const Model& m) {
   return kLargestRadius;
 }
 
-/// Solves radial(r) = target on [0, largest] by Newton kept inside a shrinking bracket; the end of
-/// the bracket where there is no solution (the 2-D iteration that follows then leaves the domain).
+/// Solves radial(r) = target on [0, largest] by Newton's method inside a shrinking bracket. Gives the end of the
+/// bracket where there is no solution (the 2-D iteration that follows then leaves the domain).
 template <class Model>
 double invert_radial(const Model& m, double target, double largest) {
   double lo = 0, hi = largest;
@@ -52,7 +52,7 @@ double invert_radial(const Model& m, double target, double largest) {
   return r;
 }
 
-/// Solves distort_unit(n) = target by Newton's method, from where the radial part alone would have it.
+/// Solves distort_unit(n) = target by Newton's method, starting from the solution for the radial part alone.
 template <class Model>
 std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, double max_radius) {
   const double distorted_radius = target.norm();
@@ -65,7 +65,7 @@ std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, doub
     if (error.squaredNorm() < 1e-26) return n;
     const Vec2 step = J.inverse() * error;
     n -= step;
-    // Far out the last digits of distort_unit keep the error above the absolute bound.
+    // Far from the axis rounding in distort_unit keeps the error above the absolute bound.
     if (step.squaredNorm() <= 1e-28 * n.squaredNorm()) return n.norm() <= max_radius ? std::optional<Vec2>(n) : std::nullopt;
   }
   return std::nullopt;
@@ -137,7 +137,7 @@ std::optional<Vec2> Camera::project(const Vec3& p_C) const {
   if (!(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
   Mat2 J;
   const Vec2 pixel = distort(n, &J);
-  // The tangential part can fold the plane inside of the radial bound.
+  // Tangential distortion can fold the plane even within the radial bound.
   if (!(J.determinant() > 0)) return std::nullopt;
   return pixel;
 }

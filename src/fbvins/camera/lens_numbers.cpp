@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-// Far beyond any lens; a xi of 1 is a parabolic mirror, a beta of 1 the unified model.
+// Far beyond any lens: xi = 1 is a parabolic mirror, beta = 1 the unified model.
 constexpr double kLargestXi = 10, kLargestBeta = 100;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: lenses as files name them and list their numbers. Pure functions, any thread.
+// Private: names and order of lens parameters in calibration files. Pure functions, any thread.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ KalibrCamera kalibr_camera(const Camera& camera);
 std::optional<LensModel> lens_of(std::string_view model_name, const std::array<double, 4>& intrinsics,
                                  const std::vector<double>& distortion);
 
-/// What is wrong with the numbers that a model has before its focal lengths, or nothing.
+/// Why Kalibr's model does not allow its own parameters (those listed before the focal lengths); empty if it does.
 std::string outside_of_model(const std::string& model, const std::vector<double>& own);
 
 }  // namespace fbvins

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to camera: each lens on the unit plane. For a model m:
-//   radial(m, r)             distorted radius of a radius, without tangential part, and its derivative
+// Private to camera: the lens models on the unit plane. For a model m:
+//   radial(m, r)             distorted radius of a radius, without tangential distortion, and its derivative
 //   distort_unit(m, n, J)    (u, v) of n = (x/z, y/z), with d(u, v)/dn
-//   undistort_unit(m, uv)    the inverse, of models that have one in closed form; nullopt where the ray does not look forward
-//   coefficients(m)          its numbers behind fx, fy, cx, cy
+//   undistort_unit(m, uv)    the inverse, of models that have one in closed form; nullopt where the ray does not point forward
+//   coefficients(m)          its parameters after fx, fy, cx, cy
 // A radially symmetric model is (u, v) = a(s) n with s = |n|^2, and its Jacobian a I + b n n^T with b = 2 da/ds.
 #pragma once
 
@@ -51,7 +51,7 @@ inline Vec2 distort_unit(const PinholeRadtan& m, const Vec2& n, Mat2* J) {
 inline Vec2 distort_unit(const KannalaBrandt& m, const Vec2& n, Mat2* J) {
   const double s = n.squaredNorm();
   const double r = std::sqrt(s);
-  // Near the axis value/r = 1 + (k1 - 1/3) r^2 + O(r^4): the quotients below lose their digits there.
+  // Near the axis value/r = 1 + (k1 - 1/3) r^2 + O(r^4), where the quotients below would cancel.
   const bool near_axis = r < 1e-4;
   const Radial f = radial(m, r);
   const double a = near_axis ? 1.0 + (m.k1 - 1.0 / 3.0) * s : f.value / r;
@@ -80,7 +80,7 @@ inline Vec2 scaled(const Scaling& f, const Vec2& n, Mat2* J) {
 inline Scaling scaling(const DoubleSphere& m, double s) {
   const double d1 = std::sqrt(s + 1.0), w = m.xi * d1 + 1.0, d2 = std::sqrt(s + w * w);
   const double D = m.alpha * d2 + (1.0 - m.alpha) * w;
-  if (!(D > 0)) return {0, 0};  // outside of the model's domain: the radius does not grow any more
+  if (!(D > 0)) return {0, 0};  // outside the model's domain; a derivative of zero ends it in Camera
   const double a = 1.0 / D, slope = m.xi / d1;
   return {a, -a * a * (m.alpha * (1.0 + w * slope) / d2 + (1.0 - m.alpha) * slope)};
 }
@@ -117,7 +117,7 @@ inline Vec2 distort_unit(const UnifiedRadtan& m, const Vec2& n, Mat2* J) {
   return second;
 }
 
-/// Usenko et al., equations 46 to 50: the ray meets the second sphere at a height m_z, then the first one.
+/// Usenko et al., equations 46 to 50: the ray meets the second sphere at height m_z, then the first one.
 inline std::optional<Vec2> undistort_unit(const DoubleSphere& m, const Vec2& uv) {
   const double s = uv.squaredNorm(), root = 1.0 - (2.0 * m.alpha - 1.0) * s;
   if (!(root >= 0)) return std::nullopt;

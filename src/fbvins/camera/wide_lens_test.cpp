@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Double sphere, extended unified and unified with distortion: lenses whose rays also look backwards.
+// Double sphere, extended unified and unified with distortion: models that also describe rays pointing backwards.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,10 +38,10 @@ Vec2 as_defined(const UnifiedRadtan& m, const Vec3& p) {
 }
 Vec2 as_defined(const auto&, const Vec3&) { return Vec2::Constant(NAN); }
 
-/// A direction up to `largest` from the axis, rad, seen from 0.1 to 10 m.
+/// A point up to `largest` off the axis, rad, at 0.1 to 10 m.
 Vec3 random_point(Rng& rng, double largest) {
-  const double about = rng.uniform(0, 6.2831), off_axis = rng.uniform(0, largest), far_m = rng.uniform(0.1, 10);
-  return far_m * Vec3(std::sin(off_axis) * std::cos(about), std::sin(off_axis) * std::sin(about), std::cos(off_axis));
+  const double azimuth = rng.uniform(0, 6.2831), off_axis = rng.uniform(0, largest), range_m = rng.uniform(0.1, 10);
+  return range_m * Vec3(std::sin(off_axis) * std::cos(azimuth), std::sin(off_axis) * std::sin(azimuth), std::cos(off_axis));
 }
 
 TEST(WideLens, ProjectsAsItIsDefined) {
@@ -106,7 +106,7 @@ TEST(WideLens, JacobianIsTheDerivativeOfDistort) {
 }
 
 /// At xi = 0 the double sphere is the unified model, which is the extended one at beta = 1, and Mei's without distortion.
-TEST(WideLens, TheModelsAgreeWhereTheyAreOne) {
+TEST(WideLens, TheModelsAgreeWhereTheyCoincide) {
   const double alpha = 0.4, xi = alpha / (1 - alpha), f = 200 / (1 - alpha);
   const Camera cameras[] = {{DoubleSphere{200, 200, 320, 240, 0, alpha}, 640, 480},
                             {ExtendedUnified{200, 200, 320, 240, alpha, 1}, 640, 480},
@@ -134,7 +134,7 @@ TEST(WideLens, AnImageThatSeesBackwardsAtItsEdgesIsKnown) {
   EXPECT_TRUE(Camera(ExtendedUnified{100, 100, 256, 256, 0.63, 1.04}, 512, 512).sees_backwards());
   EXPECT_TRUE(Camera(KannalaBrandt{150, 150, 256, 256, 0, 0, 0, 0}, 512, 512).sees_backwards());   // 1.7 rad to each side
   EXPECT_FALSE(Camera(KannalaBrandt{190, 190, 256, 256, 0, 0, 0, 0}, 512, 512).sees_backwards());  // 1.35 rad
-  // A barrel whose polynomial turns has no rays at its edges, either, but is no lens of 180 degrees.
+  // A barrel distortion whose polynomial stops growing has no rays at the edges, either, but is no lens of 180 degrees.
   EXPECT_FALSE(Camera(PinholeRadtan{200, 200, 320, 240, -0.3, 0, 0, 0}, 640, 480).sees_backwards());
 }
 

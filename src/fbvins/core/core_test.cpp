@@ -34,7 +34,7 @@ TEST(Result, HoldsValueOrError) {
   EXPECT_EQ(bad.error().message, "no file");
 }
 
-TEST(Rng, SameSeedSameNumbersAndKnownFirstValue) {
+TEST(Rng, SameSeedGivesTheSameNumberAnotherSeedAnother) {
   Rng a(42), b(42), c(43);
   const auto first = a.next_u32();
   EXPECT_EQ(first, b.next_u32());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An open file, socket or the like of the operating system, closed when its owner goes.
+// Owner of a file descriptor of the operating system (file, socket, device), which it closes.
 #pragma once
 
 #include <unistd.h>

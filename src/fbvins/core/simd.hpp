@@ -10,7 +10,7 @@
 #if __clang_major__ >= 14 && !__has_feature(address_sanitizer) && !__has_feature(thread_sanitizer)
 #define FBVINS_KERNEL __attribute__((target_clones("avx2", "default")))
 #endif
-#elif __GNUC__ < 12  // knows no levels of the architecture yet
+#elif __GNUC__ < 12  // does not know the x86-64-v3 and -v4 levels
 #define FBVINS_KERNEL __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define FBVINS_KERNEL __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
@@ -21,5 +21,5 @@
 #define FBVINS_KERNEL
 #endif
 
-/// Helpers of kernels: a function of its own would have only the baseline's copy.
+/// For helpers of kernels: without inlining they would be compiled for the baseline only.
 #define FBVINS_INLINE inline __attribute__((always_inline))

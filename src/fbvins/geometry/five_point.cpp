@@ -61,8 +61,8 @@ PolyMatrix linear_family(const Eigen::Matrix<double, 9, 4>& basis) {
   return E;
 }
 
-// The order in which Nister eliminates: of the first ten, x^2 z, x^2, y^2 z, y^2, xyz, xy come last, and what remains is
-// (z^2, z, 1) x, (z^2, z, 1) y and (z^3, z^2, z, 1).
+// Nister's order of elimination: x^2 z, x^2, y^2 z, y^2, xyz, xy are the last of the ten eliminated monomials; the ten that
+// remain are (z^2, z, 1) x, (z^2, z, 1) y and (z^3, z^2, z, 1).
 constexpr std::array<int, 20> kElimination = {0, 6, 1, 3, 2, 10, 7, 13, 4, 11, /**/ 5, 12, 16, 8, 14, 17, 9, 15, 18, 19};
 using Constraints = std::array<std::array<double, 20>, 10>;
 
@@ -103,7 +103,7 @@ Constraints constraints(const PolyMatrix& E) {
 
 /// Gauss-Jordan elimination of the first ten columns, with the largest pivot of each. False where they are degenerate.
 bool eliminate(Constraints& rows) {
-  constexpr double kSmallestPivot = 1e-13;  // of unit vectors' products
+  constexpr double kSmallestPivot = 1e-13;  // entries are products of components of unit vectors
   for (int k = 0; k < 10; ++k) {
     int pivot = k;
     for (int r = k + 1; r < 10; ++r)
@@ -146,13 +146,13 @@ double at(const std::array<double, N>& p, double z) {
   return value;
 }
 
-/// x(z) x + y(z) y + one(z) = 0.
+/// The line x(z) x + y(z) y + one(z) = 0 in the (x, y) plane.
 struct LineInZ {
   InZ<3> x, y;
   InZ<4> one;
 };
 
-/// The row that begins with z m less z times the row that begins with m.
+/// The row whose leading monomial is z m, minus z times the row whose leading monomial is m: the leading terms cancel.
 LineInZ line(const std::array<double, 20>& with_z, const std::array<double, 20>& without) {
   LineInZ out{};
   for (int power = 0; power < 3; ++power) {
@@ -163,7 +163,7 @@ LineInZ line(const std::array<double, 20>& with_z, const std::array<double, 20>&
   return out;
 }
 
-/// Where three lines meet: their determinant is zero.
+/// Determinant of three lines; zero where they meet in one point.
 InZ<10> determinant(const std::array<LineInZ, 3>& l) {
   const auto minor = [](const LineInZ& p, const LineInZ& q) { return p.x * q.y - q.x * p.y; };
   InZ<10> sum{};
@@ -174,7 +174,7 @@ InZ<10> determinant(const std::array<LineInZ, 3>& l) {
   return sum;
 }
 
-/// (x, y, 1) up to scale, at z.
+/// The point (x, y, 1), up to scale, in which the lines meet at z.
 Vec3 meeting_point(const std::array<LineInZ, 3>& l, double z) {
   std::array<Vec3, 3> row;
   for (int i = 0; i < 3; ++i) row[i] = Vec3(at(l[i].x, z), at(l[i].y, z), at(l[i].one, z)).normalized();
@@ -195,7 +195,7 @@ Eigen::Matrix<double, 9, 4> null_space(std::span<const Vec2, 5> a, std::span<con
   return Q.rightCols<4>();
 }
 
-/// One Newton step of (x, y, z) on the ten constraints, by least squares: what elimination lost in digits comes back.
+/// One Gauss-Newton step of (x, y, z) on the ten constraints, to recover the digits lost in the elimination.
 void polish(const Constraints& rows, Vec3& xyz) {
   std::array<double, 20> value{};
   std::array<Vec3, 20> slope;

@@ -19,8 +19,8 @@ namespace fbvins {
 /// leave one polynomial of degree ten in z. Empty when the five matches are degenerate (e.g. no motion).
 std::vector<Mat3> five_point(std::span<const Vec2, 5> a, std::span<const Vec2, 5> b);
 
-/// One of the four (R, t), |t| = 1, with E ~ [t]x R: the one whose rotation is smallest (neighbouring
-/// images). The sign of t is not decided: the epipolar constraint does not see it.
+/// One of the four (R, t), |t| = 1, with E ~ [t]x R: the one with the smaller rotation (neighbouring
+/// images). The sign of t is arbitrary: the epipolar constraint does not determine it.
 struct RotationTranslation {
   Mat3 R_ba = Mat3::Identity();
   Vec3 t_ba = Vec3::UnitX();

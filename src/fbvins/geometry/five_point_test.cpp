@@ -81,7 +81,7 @@ TEST(FivePoint, DecompositionRebuildsTheMatrix) {
   }
 }
 
-TEST(FivePoint, DecompositionChoosesTheSmallerTurn) {
+TEST(FivePoint, DecompositionChoosesTheSmallerRotation) {
   const Mat3 R_ba = so3_exp(Vec3(0.03, -0.05, 0.08)).toRotationMatrix();
   const Vec3 t_ba(0.25, -0.05, 0.1);
   EXPECT_LT((decompose_essential(hat(t_ba) * R_ba).R_ba - R_ba).norm(), 1e-8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: compares an analytic Jacobian with central differences and names the block that is wrong.
+// For tests: compares an analytic Jacobian with central differences and names the block that differs most.
 //
 //   const auto check = check_jacobian(
 //       [&](const Eigen::VectorXd& d) { return residual(state.boxplus(d)); }, J,
@@ -18,7 +18,7 @@
 
 namespace fbvins {
 
-/// A run of rows or columns with a name; the blocks of a side follow one another.
+/// A named range of rows or columns; the blocks are consecutive and cover the matrix.
 struct JacobianBlock {
   std::string name;
   int size = 0;
@@ -30,7 +30,7 @@ struct JacobianCheck {
   std::string message;  ///< names the worst block: "d r_theta / d rotation: ..."
 };
 
-/// f of a perturbation about zero; differences of fourth order with the given step.
+/// Derivative of f at zero by central differences of fourth order with the given step.
 inline Eigen::MatrixXd numeric_jacobian(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& f, int columns,
                                         double step = 1e-3) {
   Eigen::MatrixXd J;

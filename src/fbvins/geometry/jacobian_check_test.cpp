@@ -31,7 +31,7 @@ Eigen::MatrixXd right_jacobian() {
 
 const std::vector<JacobianBlock> kRows = {{"point", 3}, {"range", 1}}, kColumns = {{"position", 3}, {"rotation", 3}};
 
-TEST(JacobianCheck, AcceptsARightJacobian) {
+TEST(JacobianCheck, AcceptsACorrectJacobian) {
   const JacobianCheck check = check_jacobian(residual, right_jacobian(), kRows, kColumns, 1e-9);
   EXPECT_TRUE(check.ok) << check.message;
 }

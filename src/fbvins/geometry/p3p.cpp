@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// An orthonormal frame on three points.
+/// An orthonormal frame spanned by three points: x from a to b, z normal to their plane.
 Mat3 frame_on(const Vec3& a, const Vec3& b, const Vec3& c) {
   Mat3 F;
   F.col(0) = (b - a).normalized();

@@ -10,7 +10,7 @@ namespace {
 
 using Coefficients = std::array<double, kMaxDegree + 1>;
 
-constexpr double kBorder = 1 + 0x1p-20;  // between roots found directly and inverted: a little past one, which is a common root
+constexpr double kBorder = 1 + 0x1p-20;  // larger roots are found as inverses; a little above 1, because 1 is a common root
 constexpr int kMaxIterations = 64;       // bisection alone would need 54 to the last bit
 
 struct ValueAndSlope {
@@ -26,8 +26,8 @@ ValueAndSlope evaluate(const Coefficients& c, int degree, double x) {
   return at;
 }
 
-/// The root between low and high, where the polynomial is monotonic and changes its sign: Newton's steps, halves where they
-/// leave.
+/// The root between low and high, where the polynomial is monotonic and changes its sign: Newton steps, or bisection where
+/// one would leave the bracket.
 double bracketed_root(const Coefficients& c, int degree, double low, double high, double value_at_low) {
   double x = 0.5 * (low + high);
   for (int i = 0; i < kMaxIterations; ++i) {
@@ -47,7 +47,7 @@ double bracketed_root(const Coefficients& c, int degree, double low, double high
 /// Roots in [-kBorder, kBorder], ascending.
 RealRoots roots_within_border(const Coefficients& c, int degree) {
   RealRoots roots;
-  for (int order = degree - 1; order >= 0; --order) {  // of the derivative of this order; none left is the polynomial itself
+  for (int order = degree - 1; order >= 0; --order) {  // order of the derivative; 0 is the polynomial itself
     const int n = degree - order;
     Coefficients d{};
     for (int i = 0; i <= n; ++i) {

@@ -20,7 +20,7 @@ struct RealRoots {
 };
 
 /// Roots of c[0] + c[1] x + ... + c[n] x^n, n <= kMaxDegree, at which the sign changes, to the last few bits; a root at
-/// which it only touches zero is found or not as rounding has it. Method: between neighbouring roots of the derivative a
+/// which it only touches zero may be missed by rounding. Method: between neighbouring roots of the derivative a
 /// polynomial is monotonic, so that one sign change brackets one root; derivatives first, from degree one up. Roots
 /// beyond +-1 are the inverses of those of the reversed polynomial within. None for the zero polynomial.
 RealRoots real_roots(std::span<const double> coefficients);

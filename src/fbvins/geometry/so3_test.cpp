@@ -62,7 +62,7 @@ TEST(So3, TheRotationBetweenTwoDirections) {
     const Quat q = so3_between(from, to);
     EXPECT_NEAR(q.norm(), 1, 1e-12);
     EXPECT_LT((q * from.normalized() - to.normalized()).norm(), 1e-9) << theta.transpose();
-    EXPECT_LE(so3_log(q).norm(), so3_log(so3_exp(theta)).norm() + 1e-6) << "smallest";
+    EXPECT_LE(so3_log(q).norm(), so3_log(so3_exp(theta)).norm() + 1e-6) << "not the smallest rotation";
   }
   const Vec3 down = so3_between(Vec3::UnitZ(), -Vec3::UnitZ()) * Vec3::UnitZ();
   EXPECT_LT((down + Vec3::UnitZ()).norm(), 1e-12);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small symmetric matrices, without a decomposition.
+// Eigenvalues of small symmetric matrices in closed form.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Symmetric systems of any size, solved in one place: each use of Eigen's decomposition of its own costs seconds of compilation.
-// Pure functions.
+// Symmetric systems of any size, solved in one place, because each source file that instantiates Eigen's decomposition
+// takes seconds longer to compile. Pure functions.
 //
 //   const auto x = solve_symmetric(H, b);
 //   if (x) use(*x);
@@ -11,10 +11,10 @@
 
 namespace fbvins {
 
-/// H^-1 b by LDL^T; none where something is not finite.
+/// H^-1 b by LDL^T; none where the result is not finite.
 std::optional<Eigen::VectorXd> solve_symmetric(const Eigen::MatrixXd& H, const Eigen::VectorXd& b);
 
-/// H^-1 by LDL^T; the same.
+/// H^-1 by LDL^T; none where the result is not finite.
 std::optional<Eigen::MatrixXd> invert_symmetric(const Eigen::MatrixXd& H);
 
 struct SymmetricSolution {

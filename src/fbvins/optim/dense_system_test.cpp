@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// Well conditioned, with both signs on the diagonal of its factor where `indefinite`.
+/// Well conditioned; with eigenvalues of both signs where `indefinite`.
 Eigen::MatrixXd symmetric(int n, bool indefinite) {
   Eigen::MatrixXd H(n, n);
   for (int i = 0; i < n; ++i)

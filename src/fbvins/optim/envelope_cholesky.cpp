@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-// Rows of L are made four at a time, from their first number to the diagonal, eight columns at a time.
+// Rows of L are computed four at a time, from their first non-zero entry to the diagonal, eight columns at a time.
 constexpr int kRows = 4, kLanes = 8;
 using Lanes = double __attribute__((vector_size(8 * kLanes)));
 
@@ -22,7 +22,7 @@ struct Matrix {
   double* inverse_diagonal;
 };
 
-/// Rows i .. i + 3 in columns k .. k + 7, from what is finished of both: rows of L to the left of k, from `first` on.
+/// L in rows i .. i + 3 and columns k .. k + 7, from the finished columns `first` .. k - 1. False without a positive pivot.
 FBVINS_KERNEL bool make_panel(const Matrix& m, int i, int k, int first, int rows) {
   Lanes a[kRows];
   for (int r = 0; r < kRows; ++r)

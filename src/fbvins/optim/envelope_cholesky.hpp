@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cholesky factor of a symmetric positive definite matrix whose rows begin with zeros: what lies before a row's first
-// number costs nothing. A window's speeds and biases, each coupled to its neighbours only, come before its poses: a quarter
-// of the dense work is left. The same bits on every instruction set. A value; keeps its memory.
+// Cholesky factor of a symmetric positive definite matrix whose rows begin with zeros: the zeros before a row's first non-zero
+// entry cost nothing. A window's velocities and biases, each coupled to its neighbours only, come before its poses: a quarter
+// of the dense work is left. The same bits on every instruction set. A value; reuses its memory.
 //
 //   EnvelopeCholesky factor;
 //   if (factor.compute(H)) x = factor.solve(b);          // of H, the lower triangle is read
@@ -18,7 +18,7 @@ class EnvelopeCholesky {
   bool compute(const Eigen::MatrixXd& H);
   /// H^-1 b.
   Eigen::VectorXd solve(Eigen::VectorXd b) const;
-  /// L^-1 X in place, by column from its first number that is not zero on.
+  /// L^-1 X in place; each column from its first non-zero entry on.
   void solve_lower(Eigen::MatrixXd& X) const;
   /// L, for tests.
   Eigen::MatrixXd lower() const;
@@ -30,7 +30,7 @@ class EnvelopeCholesky {
   int size_ = 0, stride_ = 0;
   std::vector<double> L_;  ///< column by column, rows padded to whole lanes
   std::vector<double> inverse_diagonal_;
-  std::vector<int> first_;  ///< column of each row's first number
+  std::vector<int> first_;  ///< column of each row's first non-zero entry
 };
 
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-/// Positive definite: a chain of `links` blocks of nine, then `dense` rows coupled to all from a link of their own on.
+/// Positive definite: a chain of `links` blocks of nine, then `dense` rows, each coupled to all columns from some block on.
 Eigen::MatrixXd like_a_window(int links, int dense, Rng& rng) {
   const int n = 9 * links + dense;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
@@ -34,7 +34,7 @@ TEST(EnvelopeCholesky, FactorsAsADenseOneDoes) {
   }
 }
 
-TEST(EnvelopeCholesky, SolvesAndKeepsItsMemoryFromSizeToSize) {
+TEST(EnvelopeCholesky, SolvesWhenReusedForOtherSizes) {
   Rng rng(2);
   EnvelopeCholesky factor;
   for (const int links : {11, 2, 5, 11}) {
@@ -62,7 +62,7 @@ TEST(EnvelopeCholesky, RefusesWhatIsNotPositiveDefinite) {
       EXPECT_FALSE(factor.compute(H)) << bad << " " << value;
     }
   }
-  EXPECT_TRUE(factor.compute(like_a_window(5, 20, rng))) << "and is fit for the next";
+  EXPECT_TRUE(factor.compute(like_a_window(5, 20, rng))) << "usable again after a refusal";
 }
 
 }  // namespace

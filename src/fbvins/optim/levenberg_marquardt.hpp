@@ -23,8 +23,8 @@ struct LmOptions {
   int max_retries = 6;     ///< steps tried at one linearisation, lambda growing tenfold
   double min_step = 1e-6;  ///< converged when the step is smaller
   /// Converged when the cost, half a chi-square, falls by less than this. Absolute, because a prior's
-  /// cost has no meaningful zero; 0.05 is a third of a sigma along the one direction that still moves. Also where the cost
-  /// fell by what the quadratic model promised, but for so little: the model is right there, and so is its minimum.
+  /// cost has no meaningful zero; 0.05 is a third of a sigma along one direction. Also converged when the decrease
+  /// differs from the predicted one by less than this: the quadratic model is accurate there, and so is its minimum.
   double min_decrease = 0.05;
 };
 

@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-/// Rosenbrock's valley as two residuals: (1 - x, 10 (y - x^2)).
+/// The Rosenbrock function as two residuals: (1 - x, 10 (y - x^2)).
 struct Rosenbrock {
   Eigen::Vector2d x{-1.2, 1.0}, saved, step;
   Eigen::Matrix2d H;
@@ -40,7 +40,7 @@ struct Rosenbrock {
   void undo_step() { x = saved; }
 };
 
-TEST(LevenbergMarquardt, FindsTheEndOfRosenbrocksValley) {
+TEST(LevenbergMarquardt, FindsTheMinimumOfTheRosenbrockFunction) {
   Rosenbrock problem;
   const LmSummary summary =
       minimise(problem, {.max_iterations = 100, .initial_lambda = 1e-4, .min_step = 1e-12, .min_decrease = 0});

@@ -32,7 +32,7 @@ QuadraticPrior marginalise(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, c
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (Hdd + Hdd.transpose()));
   const double threshold = 1e-12 * eigen.eigenvalues().tail(1)(0);
   const Eigen::VectorXd root = eigen.eigenvalues().unaryExpr([&](double e) { return e > threshold ? 1.0 / std::sqrt(e) : 0.0; });
-  // half^T half = Hdd^-1, so that the products below stay symmetric and positive.
+  // half^T half = Hdd^-1: a product of that form is symmetric and positive semidefinite in spite of rounding.
   const Eigen::MatrixXd half = root.asDiagonal() * eigen.eigenvectors().transpose() * scale.asDiagonal();
   const Eigen::MatrixXd coupling = half * pick(H, drop, keep);
   out.H.noalias() -= coupling.transpose() * coupling;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What remains of variables that left an optimisation: a quadratic in those that stay.
+// Marginalisation: what variables that leave an optimisation say of those that stay, as a quadratic prior.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ struct QuadraticPrior {
 
 /// Eliminates the variables `drop` (Schur complement); the result is over `keep`, in its order.
 /// Directions of `drop` without information are left out (pseudo-inverse, relative threshold
-/// 1e-12 after scaling to unit diagonal), so that they pass nothing on.
+/// 1e-12 after scaling to unit diagonal): no information passes through them.
 QuadraticPrior marginalise(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, const std::vector<int>& keep,
                            const std::vector<int>& drop);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Huber's loss on the norm of a whitened residual.
+// Huber loss of the norm of a whitened residual.
 #pragma once
 
 #include <cmath>

@@ -9,8 +9,8 @@
 namespace fbvins {
 namespace {
 
-/// One run of neighbouring blocks: rows [row, row + length) of the dense system.
-/// H(rows, col) -= y0 * w0 + y1 * w1 + y2 * w2.
+/// Subtracts W_k V^-1 W_l^T for all pairs of one point's blocks from the lower triangle of H.
+/// y: its columns W V^-1 (6 count x 3), w: its W^T (3 x 6 count).
 FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const int* offsets, int count, const double* y,
                                            const double* w) {
   const int length = 6 * count;
@@ -22,7 +22,7 @@ FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const i
       const double w0 = w[18 * b + 3 * j], w1 = w[18 * b + 3 * j + 1], w2 = w[18 * b + 3 * j + 2];
       double* column = H + (offsets[b] + j) * ld;
       for (int a = b; a < count;) {
-        int end = a + 1;  // blocks that follow one another in the system are one long run
+        int end = a + 1;  // blocks that are adjacent in the system are done in one long run
         while (end < count && offsets[end] == offsets[end - 1] + 6) ++end;
         double* out = column + offsets[a];
         const int begin = 6 * a, n = 6 * (end - a);

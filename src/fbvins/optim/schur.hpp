@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// Normal equations of one point. `coupling` is 3 x (6 n), blocks in ascending order of offset.
+/// Normal equations of one point; its coupling is PointBlocks::coupling(), blocks in ascending order of offset.
 struct PointBlock {
   Eigen::Matrix3d V;
   Eigen::Vector3d w;
@@ -42,8 +42,8 @@ class PointBlocks {
   /// V is damped by lambda times its diagonal, its third element by `third_damping` as well. False if some V is not
   /// positive definite.
   bool eliminate(double lambda, Eigen::MatrixXd& H, Eigen::VectorXd& g, double third_damping = 0);
-  /// The step of each point for a step of the dense system; also sums g^T dx and dx^T D dx
-  /// (D the diagonal damping), for the model's predicted decrease.
+  /// The step of each point for a step of the dense system: dx = -V^-1 (w + sum W_k^T dx_k), with the V^-1 that
+  /// eliminate() damped.
   void back_substitute(const Eigen::VectorXd& step, std::vector<Eigen::Vector3d>& point_steps) const;
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a motion-capture system says of one rigid body. Values.
+// What a motion-capture system measures of one rigid body. Values.
 //
-//   Pose<V, K> T_VK = T_VW * T_WB * T_BK;   // what it measures, from the odometry (docs/mocap.md)
+//   Pose<V, K> T_VK = T_VW * T_WB * T_BK;   // its measurement, predicted from the odometry (docs/mocap.md)
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@
 
 namespace fbvins {
 
-struct V {};  ///< the motion-capture volume: z up as far as its ground plane was laid level
-struct K {};  ///< the rigid body of markers, fixed to B in an unmeasured place
+struct V {};  ///< the motion-capture volume: z up as far as its ground plane was calibrated level
+struct K {};  ///< the rigid body of markers, fixed to B at an unknown pose
 
 struct MarkerPose {
   Time t;  ///< of the motion capture's own clock
