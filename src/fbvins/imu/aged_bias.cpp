@@ -6,10 +6,10 @@
 namespace fbvins {
 namespace {
 
-// From one power-on to the next, as between the recordings of EuRoC's machine halls, which are minutes and days apart.
+// Repeatability from one power-on to the next, as between EuRoC's machine hall recordings, which are minutes to days apart.
 constexpr double kGyroRepeatability_radps = 1e-3;
 constexpr double kAccelRepeatability_mps2 = 0.02;
-// As far as biases wander, temperature and age together, however long ago it was.
+// Limit of the random walk, with temperature and ageing, however long ago the estimate was made.
 constexpr double kGyroWander_radps = 5e-3;
 constexpr double kAccelWander_mps2 = 0.05;
 

@@ -25,7 +25,7 @@ TEST(AgedBias, TheMeanStaysAndTheVarianceGrowsWithTime) {
   const ImuBiasEstimate soon = aged(state(), kEnd + Duration::from_seconds(10), {});
   EXPECT_EQ(soon.bias.accel_mps2, state().biases.bias.accel_mps2);
   EXPECT_EQ(soon.bias.gyro_radps, state().biases.bias.gyro_radps);
-  EXPECT_GT(accel_sigma(0), std::sqrt(state().biases.accel_covariance(0, 0)));  // even a power-on at once
+  EXPECT_GT(accel_sigma(0), std::sqrt(state().biases.accel_covariance(0, 0)));  // the power-on alone adds variance
   EXPECT_GT(accel_sigma(60), accel_sigma(10));
   EXPECT_NEAR(std::pow(accel_sigma(100), 2) - std::pow(accel_sigma(0), 2), 100 * std::pow(3e-3, 2), 1e-12);
 }
@@ -35,7 +35,7 @@ TEST(AgedBias, ItDoesNotGrowForEver) {
   EXPECT_LT(accel_sigma(1e7), 0.06);
 }
 
-TEST(AgedBias, AClockSetBackTellsNoAge) { EXPECT_EQ(accel_sigma(-5), accel_sigma(1e6)); }
+TEST(AgedBias, AClockSetBackMeansTheLargestVariance) { EXPECT_EQ(accel_sigma(-5), accel_sigma(1e6)); }
 
 }  // namespace
 }  // namespace fbvins

@@ -54,7 +54,7 @@ class LinearProblem {
     constant_ += information * mean.squaredNorm();
   }
 
-  /// Two vector equations of an interval, weighed (eq. A11-A13). R: orientation R_VB of its beginning.
+  /// Two vector equations of an interval, whitened (eq. A11-A13). R_VB: orientation at its beginning.
   void add_interval(int k, const Poses& poses, const Quat& R_VB, double sigma_rad, const Preintegration& between) {
     const double dt = between.dt_s();
     const Mat3 Rt = R_VB.toRotationMatrix().transpose();
@@ -102,8 +102,8 @@ class LinearProblem {
   }
 
  private:
-  /// Multiplies by the inverse Cholesky factor of the covariance of (p, v): the readings' and that of the
-  /// orientation which turns the deltas (eq. A12).
+  /// Multiplies by the inverse Cholesky factor of the covariance of (p, v): of the readings and of the
+  /// orientation that rotates the deltas (eq. A12).
   static void whiten(const Preintegration& between, double sigma_rad, Vec6Rows& A, Vec6& r) {
     const Mat15& P = between.covariance();
     Mat6 S;
@@ -196,7 +196,7 @@ void describe_fit(const LinearSolution& s, int n, AlignmentResult& result) {
   result.velocity_sigma_mps = scale * std::sqrt(s.covariance.diagonal().segment<3>(s.gravity - 3).maxCoeff());
 }
 
-/// Everything turned into W (eq. A19, A20).
+/// Transforms poses and velocities to W (eq. A19, A20).
 void to_world(const Poses& poses, const LinearSolution& s, const Vec3& gravity_V, AlignmentResult& result) {
   const int n = static_cast<int>(poses.size());
   const Vec3 up_B0 = poses[0].q.conjugate() * Vec3(-gravity_V);

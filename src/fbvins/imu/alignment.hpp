@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Visual-inertial alignment in motion (paper 2.2.4; docs/derivations/alignment.md, eq. A6-A20):
 // from metric body poses in an arbitrary visual world and the readings between them, the gyro bias,
-// the direction of gravity, the velocities and, as far as they show, the accelerometer bias.
+// the direction of gravity, the velocities and, as far as it is observable, the accelerometer bias.
 //
 //   std::vector<Pose<VisualWorld, B>> poses = ...;    // from stereo, n of them
 //   std::vector<Preintegration> between = ...;        // n - 1, consecutive
@@ -50,7 +50,7 @@ enum class AlignmentRefusal {
   gyro_bias_unobservable,
   gyro_bias_implausible,
   rotation_inconsistent,  ///< gyro and visual rotations disagree
-  gravity_magnitude,      ///< not that of the earth: wrong scale, wrong poses, wrong readings
+  gravity_magnitude,      ///< not that of the earth: wrong scale, poses or readings
   gravity_unobservable,
   accel_bias_implausible,
   motion_inconsistent,  ///< accelerometer and visual positions disagree
@@ -74,14 +74,14 @@ struct AlignmentResult {
   double gravity_information_min = 0;  ///< smallest eigenvalue of the unconstrained 3x3 information
   double gravity_condition = 0;        ///< its condition number
   double gyro_bias_sigma_radps = 0;    ///< worst axis
-  double accel_bias_sigma_mps2 = 0;    ///< worst axis; the prior's where motion shows nothing
+  double accel_bias_sigma_mps2 = 0;    ///< worst axis; that of the prior where motion does not observe it
   double velocity_sigma_mps = 0;       ///< of the last velocity, worst axis
   double rotation_rms = 0;             ///< in sigmas
   double motion_rms = 0;               ///< in sigmas
 };
 
 /// between[k] joins poses[k] and poses[k + 1]. On acceptance all intervals are repropagated at the bias
-/// found; on refusal at some bias.
+/// found; on refusal at an unspecified bias.
 AlignmentResult align_visual_inertial(const std::vector<Pose<VisualWorld, B>>& poses, std::vector<Preintegration>& between,
                                       const AlignmentOptions& options = {}, double gravity_mps2 = kGravity_mps2);
 

@@ -26,7 +26,7 @@ Normal linearise(const std::vector<Pose<VisualWorld, B>>& poses, const std::vect
   const double pose_weight = 1 / (o.pose_sigma_rad * o.pose_sigma_rad);
   for (int k = 0; k < n; ++k) {
     const Vec3 r = so3_log(poses[k].q.conjugate() * R_VB[k]);
-    N.H.block<3, 3>(3 * k, 3 * k) += pose_weight * Mat3::Identity();  // Jr^-1 is the identity to the size of the noise
+    N.H.block<3, 3>(3 * k, 3 * k) += pose_weight * Mat3::Identity();  // Jr^-1(r) ~ I for residuals of the noise's size
     N.b.segment<3>(3 * k) -= pose_weight * r;
     N.cost += pose_weight * r.squaredNorm();
   }

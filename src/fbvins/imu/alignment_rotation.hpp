@@ -14,7 +14,7 @@ struct RotationAlignment {
   double gyro_bias_sigma_radps = 0;  ///< worst axis
   double rms = 0;                    ///< residual in sigmas
   std::vector<Quat> R_VB;            ///< visual orientations, corrected by the gyro
-  std::vector<double> sigma_rad;     ///< what is left of their noise, one a pose
+  std::vector<double> sigma_rad;     ///< standard deviation of R_VB, worst axis, one per pose
 };
 
 /// Gauss-Newton on the gyro bias and small corrections of all orientations; repropagates `between`.

@@ -135,7 +135,7 @@ TEST(Alignment, DoesNotDependOnTheBiasTheIntervalsCameWith) {
   EXPECT_LT(so3_log(a.R_WV.conjugate() * b.R_WV).norm(), 1e-6);
 }
 
-TEST(Alignment, AcceptsRestAndKnowsThatTheAccelerometerBiasIsHidden) {
+TEST(Alignment, AcceptsRestAndReportsTheAccelerometerBiasAsUnobserved) {
   Window w = make_window(Motion(0, 0), 0, 14, {true, 5e-4, 3e-4}, 4);
   AlignmentOptions options;
   const AlignmentResult a = align_visual_inertial(w.poses, w.between, options);
@@ -176,7 +176,7 @@ TEST(Alignment, RefusesWithTheRightReason) {
   nan.poses[3].p.x() = std::nan("");
   EXPECT_EQ(reason(nan), AlignmentRefusal::bad_input);
 
-  Window scaled = good;  // visual scale off by half with strong motion
+  Window scaled = good;  // visual scale three times too large
   for (auto& T : scaled.poses) T.p *= 3;
   EXPECT_NE(reason(scaled), AlignmentRefusal::none);
 
@@ -189,7 +189,7 @@ TEST(Alignment, RefusesWithTheRightReason) {
   EXPECT_EQ(reason(bent), AlignmentRefusal::rotation_inconsistent);
 }
 
-TEST(Alignment, RefusesWhatPosesThisCoarseCannotShow) {
+TEST(Alignment, RefusesWhatCoarsePosesCannotObserve) {
   AlignmentOptions coarse;
   coarse.pose_sigma_m = 0.3;
   Window w = make_window(Motion(), 0, 10, {true, 2e-3, 1e-3}, 2);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One test a sentence of docs/conventions.md, under the sentence's number.
+// One test for each sentence of docs/conventions.md, named after the sentence's number.
 #include <gtest/gtest.h>
 
 #include <concepts>
@@ -133,7 +133,7 @@ TEST(Conventions, I4_TheResidualIsStatesLessReadings) {
   Preintegration p(ImuNoise{}, {});
   p.integrate(constant(Vec3::Zero(), Vec3(0, 0, 9.81)));
   NavState i, j;
-  j.T_WB.p.x() = 0.1;  // one metre tenth further than the readings say
+  j.T_WB.p.x() = 0.1;  // a tenth of a metre farther than the readings say
   EXPECT_NEAR(imu_residual(i, j, p, level_gravity())(nav::p), 0.1, 1e-12);
 }
 

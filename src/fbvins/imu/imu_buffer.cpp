@@ -31,7 +31,7 @@ bool ImuBuffer::push(const ImuSample& sample) {
     ++(sample.t == *newest_ ? counts_.duplicate : counts_.backward);
     return false;
   }
-  if (size() >= options_.capacity) {  // a tenth at a time, so that a full buffer does not move at each reading
+  if (size() >= options_.capacity) {  // a tenth at once, so that a full buffer is not shifted at each reading
     const int surplus = std::max(1, options_.capacity / 10);
     samples_.erase(samples_.begin(), samples_.begin() + surplus);
     counts_.overflow += surplus;
@@ -73,7 +73,7 @@ ImuSample ImuBuffer::at(Time t) const {
 }
 
 Duration ImuBuffer::longest_gap(Time from, Time to) const {
-  // The neighbours outside count too: a gap that an image stamp cuts in two is still one gap.
+  // The neighbours outside count, too: a gap that an image stamp cuts in two is still one gap.
   Duration longest{};
   if (samples_.front().t > from) longest = std::min(samples_.front().t, to) - from;
   if (samples_.back().t < to) longest = std::max(longest, to - std::max(samples_.back().t, from));

@@ -15,7 +15,7 @@ namespace fbvins::test {
 /// Each axis of the position and of the rotation vector is a sum of two sines.
 class Motion {
  public:
-  /// position_m, rotation_rad: size of the swing; 0 and 0 is rest with the orientation `level` * Exp(offset).
+  /// position_m, rotation_rad: amplitudes; 0 and 0 is rest with the orientation Exp(tilt_rad).
   explicit Motion(double position_m = 0.4, double rotation_rad = 0.3, const Vec3& tilt_rad = Vec3(0.3, -0.5, 1.0))
       : position_m_(position_m), rotation_rad_(rotation_rad), tilt_(so3_exp(tilt_rad)) {}
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A gyroscope and an accelerometer that are read apart, at rates of their own, as one IMU.
+// Merges a gyroscope and an accelerometer that are read separately, at different rates, into one IMU.
 //
 //   merge.add_gyro(t, radps); merge.add_accel(t, mps2);
 //   while (auto sample = merge.next()) input.push(*sample);
@@ -12,8 +12,8 @@
 
 namespace fbvins {
 
-/// One reading leaves for each of the gyroscope's, in order, with the specific force between its neighbours in time (linear);
-/// as soon as the later of these is there. Where the accelerometer is missing for longer than kLongestGap none leave.
+/// Gives one reading for each of the gyroscope's, in order, with the specific force interpolated linearly between its neighbours
+/// in time, as soon as the later of these has arrived. None where the accelerometer was silent for longer than kLongestGap.
 /// One thread at a time.
 class MotionMerge {
  public:

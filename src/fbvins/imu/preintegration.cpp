@@ -19,7 +19,7 @@ void add_white_acceleration(double q, double dt, Mat9& noise) {
   noise.block<3, 3>(nav::v, nav::v).diagonal().array() += q * dt;
 }
 
-/// Covariance of what the signal may have done unseen during a step inside an IMU gap: eq. P13.
+/// Covariance of the unknown deviation from a linear signal during a step inside an IMU gap: eq. P13.
 void add_gap(const ImuGapModel& model, double gap_s, double dt, Mat9& noise) {
   const double ratio = std::min(1.0, gap_s / model.long_gap_s);
   const double w = model.gyro_sigma_radps * ratio * ratio * dt;
@@ -136,7 +136,7 @@ void Preintegration::step(const Reading& from, const Reading& to) {
   covariance_.diagonal().segment<3>(nav::bg).array() += squared(noise_.gyro_random_walk_radps2_rthz) * dt;
   covariance_.diagonal().segment<3>(nav::ba).array() += squared(noise_.accel_random_walk_mps3_rthz) * dt;
 
-  // Deltas last: the lines above use those of the step's beginning (eq. P6, P7).
+  // Deltas last: the lines above need their values at the beginning of the step (eq. P6, P7).
   const Vec3 s0 = R0 * a0, s1 = R1 * a1;
   deltas_.p += dt * deltas_.v + p0 * s0 + p1 * s1;
   deltas_.v += h * (s0 + s1);

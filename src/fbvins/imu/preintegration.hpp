@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings between two instants i and j summed into one relative motion, with its covariance
+// Preintegration: the readings between two instants i and j as one relative motion, with its covariance
 // and its derivatives by the biases (docs/derivations/preintegration.md, eq. P1-P16; paper 2.1.2).
 //
 //   Preintegration between(noise, bias);
@@ -28,7 +28,7 @@ struct ImuDeltas {
 /// How far a bias may move before the first-order correction is replaced by integrating anew.
 struct RepropagationThreshold {
   double gyro_rad = 2e-3;  ///< |d bg| * dt: the second-order error is about half its square
-  double accel_mps = 0.2;  ///< |d ba| * dt: exact on its own, crosses with the gyro's
+  double accel_mps = 0.2;  ///< |d ba| * dt: exact alone; only its product with the gyro's is of second order
 };
 
 /// What is assumed of the signal where readings are missing (eq. P13).
@@ -44,7 +44,7 @@ class Preintegration {
   Preintegration(const ImuNoise& noise, const ImuBias& linearisation_bias);
 
   /// Adds readings. The first sample must be the last one of the segment before. An empty segment
-  /// adds nothing; a step longer than the sensor's period is bridged linearly and its covariance inflated.
+  /// adds nothing; over a gap (ImuGapModel) the signal is taken as linear and the covariance inflated.
   void integrate(const ImuSegment& segment);
 
   /// Joins the consecutive interval `later`, integrating its raw readings with this one's bias.
@@ -60,7 +60,7 @@ class Preintegration {
   double dt_s() const { return dt().seconds(); }
   Time begin() const { return empty() ? Time{} : readings_.front().t; }
   Time end() const { return empty() ? Time{} : readings_.back().t; }
-  /// The longest time without a reading that touches this interval; 0 when there was none.
+  /// The longest gap that overlaps this interval; 0 when there was none.
   double longest_gap_s() const { return longest_gap_s_; }
 
   const ImuDeltas& deltas() const { return deltas_; }  ///< at the linearisation bias

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state carried along a segment of readings, without covariance: for prediction between images.
+// Propagation of the state over a segment of readings, without covariance: for prediction between images.
 //
 //   NavState now = propagate(state, frame.imu, gravity_W);
 //

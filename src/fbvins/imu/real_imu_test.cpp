@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Alignment and static initialisation on real readings (EuRoC), against its ground truth.
-// Data: $FBVINS_DATA, default ../shared/data; skipped where absent. Read by hand: io/ is of the same rank.
+// Data: $FBVINS_DATA, default ../shared/data; skipped where absent. Parsed here, because io/ has the same rank.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -139,7 +139,7 @@ TEST(RealImu, FindsRestOnV101) {
   }
 }
 
-// A hand that holds the drone is not rest, whatever the images say; the last 2.5 s are.
+// A drone held by hand is not at rest, whatever the images say; in the last 2.5 s it is.
 TEST(RealImu, MH01IsNotAtRestUntilItsEnd) {
   const auto imu = read_imu(data_folder() + "/MH_01_easy_17s/mav0/imu0/data.csv");
   if (imu.empty()) GTEST_SKIP() << "no data at " << data_folder();

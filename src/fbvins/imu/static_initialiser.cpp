@@ -24,8 +24,8 @@ Spread measure(const std::vector<ImuSample>& window, double block_s) {
       sum.head<3>() += window[k].gyro_radps;
       sum.tail<3>() += window[k].accel_mps2;
     }
-    const bool rump = (window.back().t - begin).seconds() < 0.5 * block_s;
-    if (!rump || blocks.empty()) blocks.push_back(sum / n);
+    const bool too_short = (window.back().t - begin).seconds() < 0.5 * block_s;  // the rest of the window
+    if (!too_short || blocks.empty()) blocks.push_back(sum / n);
   }
   Vec6 mean = Vec6::Zero(), variance = Vec6::Zero();
   for (const Vec6& b : blocks) mean += b / static_cast<double>(blocks.size());
@@ -40,15 +40,15 @@ double longest_step_s(const std::vector<ImuSample>& window) {
   return longest.seconds();
 }
 
-/// Uncertainty of the resting state (eq. A3-A5).
+/// Covariance of the state at rest (eq. A3-A5).
 Mat15 covariance_at_rest(const Vec3& up_B, double window_s, const ImuNoise& noise, const RestOptions& o, double g) {
   const auto squared = [](double x) { return x * x; };
   const double accel_noise = squared(noise.accel_noise_density_mps2_rthz) / window_s;
   const double gyro_noise = squared(noise.gyro_noise_density_radps_rthz) / window_s;
   const double bias = squared(o.accel_bias_sigma_mps2);
-  const Mat3 tilt_accel = hat(up_B) / g;  // tilt that an error of the specific force feigns, eq. A3
+  const Mat3 tilt_accel = hat(up_B) / g;  // tilt error by error of the specific force, eq. A3
   const Mat3 yaw = squared(o.yaw_sigma_rad) * up_B * up_B.transpose();
-  const double tilt_floor = squared(1e-4);  // vibration and the like; keeps the matrix regular
+  const double tilt_floor = squared(1e-4);  // vibration and the like; keeps the matrix invertible
   Mat15 P = Mat15::Zero();
   P.diagonal().segment<3>(nav::p).setConstant(squared(o.position_sigma_m));
   P.block<3, 3>(nav::theta, nav::theta) = (bias + accel_noise) * tilt_accel * tilt_accel.transpose() + yaw;
@@ -58,7 +58,7 @@ Mat15 covariance_at_rest(const Vec3& up_B, double window_s, const ImuNoise& nois
   P.diagonal().segment<3>(nav::v).setConstant(squared(o.velocity_sigma_mps));
   P.diagonal().segment<3>(nav::bg).setConstant(gyro_noise + squared(1e-4));
   P.diagonal().segment<3>(nav::ba).setConstant(bias);
-  const Mat15 symmetric = 0.5 * (P + P.transpose());  // to the last bit
+  const Mat15 symmetric = 0.5 * (P + P.transpose());  // exactly, in spite of rounding
   return symmetric;
 }
 

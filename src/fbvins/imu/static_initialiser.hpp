@@ -17,7 +17,7 @@
 namespace fbvins {
 
 /// Spread is measured on means over blocks of block_s: an idling rotor shakes the readings by 1 m/s^2
-/// and yet goes nowhere, while a hand that holds the camera moves slowly and far.
+/// without moving the body, while a hand-held body moves slowly and far.
 struct RestOptions {
   double min_window_s = 0.4;  ///< shortest window of readings that can prove rest
   double block_s = 0.1;
@@ -31,7 +31,7 @@ struct RestOptions {
   double accel_bias_sigma_mps2 = 0.1;  ///< prior; it makes roll and pitch uncertain
   double position_sigma_m = 1e-3;      ///< of the prior that fixes the frame
   double yaw_sigma_rad = 1e-3;         ///< likewise
-  double velocity_sigma_mps = 0.02;    ///< left at rest
+  double velocity_sigma_mps = 0.02;    ///< of the velocity at rest
 };
 
 enum class RestRefusal { none, too_short, imu_gap, image_moves, gyro_spread, accel_spread, gyro_mean, accel_mean };

@@ -32,7 +32,7 @@ TEST(StaticInitialiser, FindsTiltAndGyroBiasAtRest) {
   const RestEstimate r = initialise_at_rest(window(rest, 1), 0.1, {});
   ASSERT_TRUE(r.at_rest) << to_string(r.reason);
   EXPECT_LT((r.state.bias.gyro_radps - kBias.gyro_radps).norm(), 1e-3);
-  const double explained = kBias.accel_mps2.norm() / kGravity_mps2;  // what the unseen bias may feign
+  const double explained = kBias.accel_mps2.norm() / kGravity_mps2;  // tilt error that the unknown bias may cause
   EXPECT_LT(tilt_error(r.state, rest.state(3.0)), explained + 1e-3);
   EXPECT_EQ(r.state.v_WB.norm(), 0);
 }
@@ -42,8 +42,8 @@ TEST(StaticInitialiser, HeadingIsZero) {
   EXPECT_NEAR(so3_log(r.state.T_WB.q).z(), 0, 1e-12);
 }
 
-// Random accelerometer biases drawn from the prior: the normalised error is chi-square with 8 useful
-// degrees (two of tilt, three of each bias), heading, position and velocity being exact here.
+// Random accelerometer biases drawn from the prior: the normalised error is chi-square with 8
+// degrees of freedom (two of tilt, three of each bias), heading, position and velocity being exact here.
 TEST(StaticInitialiser, CovarianceIsConsistent) {
   RestOptions options;
   const Motion rest(0, 0);
@@ -94,7 +94,7 @@ TEST(StaticInitialiser, RefusesWhatItCannotJudge) {
   EXPECT_EQ(initialise_at_rest({}, 0, {}).reason, RestRefusal::too_short);
 }
 
-// An idling rotor: 60 Hz, 1.5 m/s^2 and 0.1 rad/s, goes nowhere.
+// An idling rotor: 60 Hz, 1.5 m/s^2 and 0.1 rad/s, without motion.
 TEST(StaticInitialiser, AcceptsVibrationAtRest) {
   std::vector<ImuSample> samples = window(Motion(0, 0), 1);
   for (ImuSample& s : samples) {

@@ -10,7 +10,7 @@ namespace fbvins {
 namespace {
 
 /// Subtracts W_k V^-1 W_l^T for all pairs of one point's blocks from the lower triangle of H.
-/// y: its columns W V^-1 (6 count x 3), w: its W^T (3 x 6 count).
+/// y is W V^-1 (6 count x 3), w is W^T (3 x 6 count), both column-major.
 FBVINS_KERNEL void subtract_outer_products(double* H, std::ptrdiff_t ld, const int* offsets, int count, const double* y,
                                            const double* w) {
   const int length = 6 * count;
