@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-// Unknowns: the matrix before the readings, row by row, and the accelerometer's bias.
+// Unknowns: the matrix that multiplies the readings, row by row, and the accelerometer's bias.
 constexpr int kMatrix = 9, kUnknowns = 12;
 using Vec9 = Eigen::Matrix<double, kMatrix, 1>;
 using VecA = Eigen::Matrix<double, kUnknowns, 1>;
@@ -23,11 +23,11 @@ using Mat3A = Eigen::Matrix<double, 3, kUnknowns>;
 
 constexpr double kWindow_s = 2;
 constexpr std::size_t kFewestPairs = 8, kFewestWindows = 4;
-/// Below this share the readings explain the accelerations that were seen; above, nothing is said of them.
+/// The accelerometer is judged only where its readings leave less than this share of the seen acceleration unexplained.
 constexpr double kMostUnexplained = 0.5;
 constexpr double kLeastAcceleration_mps2 = 0.15;
 
-/// Readings summed over a pair, as a linear function of the unknowns.
+/// Preintegrated readings of a pair: delta_q, and delta_v and delta_p as linear functions of the unknowns.
 struct PairDeltas {
   Quat q;
   Mat3A v, p;
@@ -48,8 +48,8 @@ PairDeltas deltas_of(const ImuSegment& segment, const ImuNoise& noise, const Vec
   return out;
 }
 
-/// Half the squared disagreement of the unknowns a: a^T H a / 2 - b^T a + c / 2, velocity and gravity of each window at their
-/// best.
+/// Half of the sum of squared residuals as a function of the unknowns a: a^T H a / 2 - b^T a + c / 2. Velocity and gravity of
+/// each window are eliminated.
 struct Agreement {
   MatA H = MatA::Zero();
   VecA b = VecA::Zero();
@@ -134,7 +134,7 @@ Explained explained_by(const Mat3& axes, const Agreement& all) {
   chosen.block<kMatrix, 1>(0, 0) = row_by_row(axes);
   chosen.bottomRightCorner<3, 3>().setIdentity();
   Mat4 H = chosen.transpose() * all.H * chosen;
-  H.diagonal().tail<3>().array() += 1e-6 * H.diagonal().tail<3>().sum();  // a rig that does not turn shows no bias
+  H.diagonal().tail<3>().array() += 1e-6 * H.diagonal().tail<3>().sum();  // without rotation the bias is not observable
   const Vec4 b = chosen.transpose() * all.b, x = H.ldlt().solve(b);
   if (!x.allFinite() || !(x(0) > 0)) return {};
   return {x(0), 1 - b.dot(x) / all.c};
@@ -172,9 +172,9 @@ double scale_sigma(const Summed& sums, const Mat3& axes) {
   return std::sqrt((n - 1) / n * square);
 }
 
-/// Root mean square of what is not steady in the seen motion, as an acceleration.
+/// Acceleration of the seen motion, root mean square, from what a constant velocity and gravity do not explain of it.
 double acceleration_of(const Summed& sums, const std::vector<Window>& windows, const std::vector<FramePair>& pairs) {
-  // A displacement of c^(1/2) over a window comes of an acceleration of about so much over its half.
+  // An acceleration a changes the velocity by about a * kWindow_s / 4 in a window, and a pair's displacement by dt times that.
   double count = 0, dt2 = 0;
   for (const Window& w : windows)
     for (std::size_t k = w.first; k < w.last; ++k) count += 1, dt2 += std::pow(pairs[k].dt_s(), 2);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The accelerometer against what the cameras saw of the rig's accelerations: its axes, and how long the baseline must be for the
-// two to agree. In windows of some seconds velocity and gravity are free, so that neither level nor units of gravity enter;
-// the accelerometer's bias is free for the whole recording.
+// Compares the accelerometer with the accelerations that the cameras saw: its axes, and the length of the baseline for which
+// the two agree. Velocity and gravity are estimated in each window of some seconds, so that neither attitude nor gravity's unit
+// matters; the accelerometer's bias is one for the whole recording.
 // Pure functions, any thread.
 //
 //   AccelFit fit = fit_accelerations(pairs, imu, rig, {offset_s, gyro_bias});
@@ -20,12 +20,12 @@ struct AccelStart {
 };
 
 struct AccelFit {
-  bool seen = false;                  ///< the rig accelerated enough
-  double scale = 1, scale_sigma = 0;  ///< seen acceleration over read one, along the axes below
-  Mat3 axes = Mat3::Identity();       ///< of the 48 ways to name and sign three axes the one that fits: f_B = axes * reading
+  bool seen = false;                  ///< the rig accelerated enough, and the readings explain it
+  double scale = 1, scale_sigma = 0;  ///< seen over measured acceleration, with the axes below
+  Mat3 axes = Mat3::Identity();       ///< signed permutation that fits best: f_B = axes * reading
   double unexplained = 0;             ///< share of the seen acceleration (mean square) that the readings do not explain
-  double unexplained_as_named = 0;    ///< the same with the axes as they are named
-  double acceleration_mps2 = 0;       ///< seen, root mean square without its mean over a window
+  double unexplained_as_named = 0;    ///< the same with the axes as delivered
+  double acceleration_mps2 = 0;       ///< seen, root mean square, without each window's mean
 };
 
 /// `rig`: T_BC0 as corrected.

@@ -27,7 +27,7 @@ Mat3 nearest_axes(const Mat3& R) {
   double closest = -4;
   for (const Mat3& P : signed_permutations()) {
     const double cosine = (P.transpose() * R).trace();
-    // Of a reflection only reflections are near.
+    // A reflection is compared with reflections only, a rotation with rotations.
     if (P.determinant() * R.determinant() > 0 && cosine > closest + 1e-9) closest = cosine, nearest = P;
   }
   return nearest;

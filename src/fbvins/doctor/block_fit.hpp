@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A least-squares problem summed up in blocks, one a stretch of the recording, and solved for any subset of its unknowns: which
-// single change explains most is asked of one linearisation, and how well it is known is what the stretches say of it
-// one without another (a jackknife), which also sees errors that repeat from image to image. Value; any thread.
+// Normal equations summed up in blocks, one for each stretch of the recording, and solved for any subset of the unknowns: one
+// linearisation tells which single change explains most. Covariances are the jackknife's over the stretches, leaving out one
+// at a time, which also sees errors that are correlated from image to image. Value; any thread.
 //
-//   BlockFit fit(unknowns, prior_sigmas);
-//   for (...) fit.add(stretch, H, g, cost);
+//   BlockFit fit(prior_sigma, residual_sigma);
+//   for (...) fit.add(stretch, H, g);
 //   BlockSolution s = fit.solve({0, 1, 2});      // x[0..2] and their covariance; the others stay 0
 #pragma once
 
@@ -16,7 +16,7 @@
 namespace fbvins {
 
 struct BlockSolution {
-  Eigen::VectorXd x;           ///< one an unknown; 0 where it was not free
+  Eigen::VectorXd x;           ///< of all unknowns; 0 for those that were not free
   Eigen::MatrixXd covariance;  ///< of the free ones, in their order, by the jackknife
   double decrease = 0;         ///< of half the sum of squares, to second order
 };
@@ -25,7 +25,7 @@ class BlockFit {
  public:
   static constexpr int kStretches = 12;
 
-  /// Standard deviations within which unknowns stay that nothing is seen of.
+  /// `prior_sigma`: of each unknown, about 0, so that one that is not observable stays there. `residual_sigma`: of one residual.
   BlockFit(const Eigen::VectorXd& prior_sigma, double residual_sigma);
 
   /// Half of the sum of squares is cost + g^T x + x^T H x / 2 for what belongs to `stretch`, 0 <= stretch < kStretches.

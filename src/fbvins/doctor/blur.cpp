@@ -17,14 +17,14 @@ namespace {
 using Energies = GradientEnergies;
 constexpr int kDirections = Energies::kDirections;
 
-/// Half of the time over which a turning rate is taken; that from which an image is said to move; images asked, and wanted.
+/// Half of the time over which the angular rate is averaged; image velocity from which an image counts; most and fewest images.
 constexpr Duration kHalf{7'500'000};
 constexpr double kSlowest_pxps = 50;
 constexpr std::size_t kMostImages = 400;
 constexpr int kFewestImages = 40;
 /// Blur of sharp edges at the two scales, px of the image: lens, pixels, pyramid and the gradient's own filter.
 constexpr double kFineEdge_px = 1.1, kCoarseEdge_px = 3.6;
-/// A direction counts where it holds this share of a cell's mean energy, and the cell this much contrast.
+/// A direction counts if it has this share of its cell's mean energy; a cell, if its mean coarse energy is this large.
 constexpr double kCoarseShare = 0.15, kFineShare = 0.01, kLeastEnergy = 4;
 /// Exposures tried, each a quarter longer than the one before.
 constexpr double kShortest_s = 1e-3, kStep = 1.24;
@@ -56,7 +56,7 @@ double lost_sharpness(double blur_px) {
   return std::log(kept_energy(blur_px / kFineEdge_px) / kept_energy(blur_px / kCoarseEdge_px));
 }
 
-/// The same, looked up.
+/// The same from a table.
 class LostSharpness {
  public:
   LostSharpness() {
@@ -80,7 +80,7 @@ void subtract_mean(const std::array<bool, kDirections>& used, ByDirection& value
   for (double& value : values) value -= sum / std::max(count, 1.0);
 }
 
-/// Image velocity of the cells' centres by a turning rate of the camera, px/s per rad/s.
+/// Derivative of the image velocity at the cells' centres by the camera's angular rate, px/s per rad/s.
 using Flow = Eigen::Matrix<double, 2, 3>;
 std::vector<std::optional<Flow>> flows(const Camera& camera) {
   constexpr double kSmall = 1e-4;
@@ -151,7 +151,7 @@ Samples gather(const Evidence& evidence, const ImuSeries& imu, const StereoRig& 
   return out;
 }
 
-/// How badly an exposure explains the samples, by part; what the directions have in common in all of them is the scene's.
+/// Squared residuals of an exposure, by part of the recording. What a direction has in all images is the scene's, and is removed.
 std::array<double, kParts> misfit(const std::vector<Sample>& samples, double exposure_s, const LostSharpness& lost) {
   std::vector<ByDirection> rest;
   std::array<std::vector<double>, kDirections> of_direction;
@@ -174,10 +174,10 @@ std::array<double, kParts> misfit(const std::vector<Sample>& samples, double exp
   return sums;
 }
 
-/// Of the exposures tried, none at all the first of them.
+/// The exposures that are tried; the first is 0.
 double exposure_at(double index) { return index < 0.5 ? 0 : kShortest_s * std::pow(kStep, index - 1); }
 
-/// Where the misfit, without one part, is least.
+/// The exposure with the smallest misfit, leaving out one part (jackknife); kParts: none.
 double best_exposure(const std::array<std::array<double, kParts>, kExposures + 1>& misfits, std::size_t without) {
   std::array<double, kExposures + 1> sums{};
   for (std::size_t i = 0; i < sums.size(); ++i)

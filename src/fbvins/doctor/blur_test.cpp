@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exposure of images that are smeared along the turning of the camera.
+// The exposure of images with motion blur from the camera's rotation.
 #include "fbvins/doctor/blur.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ Image discs(double stretch) {
   return scene;
 }
 
-/// The scene from (x0, y0) on, moved by `way` while it is exposed.
+/// The scene from (x0, y0) on, moved by `way` during the exposure.
 Image exposed(const Image& scene, int x0, int y0, const Vec2& way) {
   Image image(kWidth, kHeight);
   const int steps = 1 + static_cast<int>(way.norm());

@@ -40,7 +40,7 @@ std::string mounting_lines(const StereoRig& rig, CalibrationStyle style, bool bo
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style) {
   const std::vector<double> numbers = kalibr_camera(camera).intrinsics;
   std::string out;
-  for (std::size_t i = 0; i < numbers.size(); ++i)  // the last four are px, what is before them bends the rays
+  for (std::size_t i = 0; i < numbers.size(); ++i)  // the last four are in px, those before them are the model's own
     out += fmt::format("{}{:.{}f}", i > 0 ? ", " : "", numbers[i], i + 4 < numbers.size() ? 6 : 3);
   return fmt::format("{}intrinsics: [{}]", file_of(left, style), out);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines of a calibration file with other numbers, as EuRoC and Kalibr write them. Pure functions.
+// Corrected lines of a calibration file, in EuRoC's or Kalibr's format. Pure functions.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace fbvins {
 
 enum class CalibrationStyle { euroc, kalibr };
 
-/// Where a camera sits, of both cameras: T_BS in cam0 and cam1's sensor.yaml, or T_cam_imu.
+/// Extrinsics of the right or of both cameras: T_BS in cam0's and cam1's sensor.yaml, or T_cam_imu.
 std::string mounting_lines(const StereoRig& rig, CalibrationStyle style, bool both);
 /// Focal lengths and principal point.
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to the doctor: which single change of a calibration explains an error best, then which beside it. A change is a group
-// of unknowns that are set free together. A Fit is a value with
-//   VectorXd x; std::vector<int> free;                  where it stands, and which unknowns are estimated
+// Private to the doctor: which single change of a calibration explains an error best, then which one in addition. A change is a
+// group of unknowns that are estimated together. A Fit is a value with
+//   VectorXd x; std::vector<int> free;                  the current estimate, and which unknowns are estimated
 //   std::optional<BlockSolution> converge();            Gauss-Newton from x; none where it cannot be solved
-//   bool plausible() const;                             somebody's calibration may be that wrong
+//   bool plausible() const;                             whether a real calibration can be that wrong
 //   double capped_error() const;                        px
 //   static constexpr double kAsGood;                    a group of more unknowns must leave less than this share of the error
 #pragma once
@@ -25,7 +25,7 @@ struct ChangeGroup {
   FindingKind kind;
   WhichLens lens;
   std::vector<int> unknowns;
-  double practical;  ///< norm of the amount below which a change is not worth a word
+  double practical;  ///< smallest norm of the amount that is reported
 };
 
 inline bool is_free(std::span<const int> free, int unknown) { return std::find(free.begin(), free.end(), unknown) != free.end(); }
@@ -37,7 +37,7 @@ inline std::vector<int> with(std::vector<int> free, std::span<const int> more) {
   return free;
 }
 
-/// An amount and its covariance; significant by the one of its numbers that is most standard deviations from zero.
+/// An amount and its covariance. Its significance is that of its most significant component.
 struct Amount {
   Eigen::VectorXd value;
   Eigen::MatrixXd covariance;
@@ -49,7 +49,7 @@ struct Amount {
   }
 };
 
-/// What a fit says of a group that it has set free.
+/// A fit's estimate of a group that is free in it.
 template <class Fit>
 Amount amount_of(const ChangeGroup& group, const Fit& fit, const BlockSolution& solution) {
   std::vector<int> places;
@@ -66,7 +66,7 @@ struct Candidate {
   double error_px;
 };
 
-/// The group whose unknowns, set free beside those that are, leave the smallest error.
+/// The group whose unknowns, estimated in addition to those that are free, leave the smallest error.
 template <class Fit>
 std::optional<Candidate<Fit>> best_candidate(const Fit& so_far, std::span<const ChangeGroup> groups) {
   std::optional<Candidate<Fit>> best;
@@ -85,7 +85,7 @@ std::optional<Candidate<Fit>> best_candidate(const Fit& so_far, std::span<const 
   return best;
 }
 
-/// Of the root mean square errors before and after.
+/// Root mean square of the error that a change explains, from those before and after.
 inline double explained_px(double before, double after) { return std::sqrt(std::max(before * before - after * after, 0.0)); }
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to the doctor: evidence as another calibration has it. Pure functions, any thread.
+// Private to the doctor: evidence adapted to another calibration. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace fbvins {
 
-/// Depths by `rig` of the same matches whose depths the working rig told; `rig` becomes the working rig.
+/// The same matches with their depths triangulated by `rig`, which becomes the working rig.
 Evidence with_depths_by(const StereoRig& rig, Evidence evidence);
 
 /// Without the features of these ids.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with a setup, by a recording of it: units, axes, clocks, mounting, lenses, images (docs/doctor.md). One module of
-// pure functions each; this one asks them in the order in which an answer rests on those before, and leaves out what rests
-// on something that is broken. Pure function, any thread.
+// Finds out from a recording what is wrong with a setup: units, axes, clocks, extrinsics, lenses, images (docs/doctor.md). Each
+// has its own file of pure functions; this one calls them in the order in which each needs the results before it, and leaves
+// out what needs a result that is missing. Pure function, any thread.
 //
 //   EvidenceGatherer gatherer(rig);
 //   while (auto event = data.next()) if (!gatherer.push(*event)) break;
@@ -26,9 +26,9 @@ namespace fbvins {
 
 struct Diagnosis {
   std::vector<Finding> findings;
-  std::vector<std::string> measured;    ///< one sentence each, whether right or wrong
+  std::vector<std::string> measured;    ///< one sentence for each measurement, whether right or wrong
   std::vector<std::string> not_judged;  ///< what the recording does not show, and why
-  StereoRig rig;                        ///< with all that was found corrected
+  StereoRig rig;                        ///< the calibration with all findings corrected
 };
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style = CalibrationStyle::euroc);

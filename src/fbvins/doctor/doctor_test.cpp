@@ -32,7 +32,7 @@ const Finding* find(const Diagnosis& diagnosis, FindingKind kind) {
   return nullptr;
 }
 
-/// The evidence that a spoilt recording leaves: the gatherer's working rig is right but for the baseline's length.
+/// Evidence of a recording with an injected fault: the gatherer's working rig is right but for the baseline's length.
 Evidence spoilt(const Spoiler& spoiler) {
   Evidence evidence = good();
   if (spoiler.rig) spoiler.rig(evidence.rig);

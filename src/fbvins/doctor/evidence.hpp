@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the doctor keeps of a recording's images: where features were seen, not what they looked like. Values.
+// What the doctor keeps of a recording: feature positions and statistics, but no images. Values.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ namespace fbvins {
 struct SeenFeature {
   std::int64_t id = 0;
   Vec2 px = Vec2::Zero();    ///< raw image
-  double inverse_depth = 0;  ///< 1/m along z of C0, by the working rig; 0 where it was not matched
+  double inverse_depth = 0;  ///< 1/m, along z of C0, by the working rig; 0 where it was not matched
   bool bright_dot = false;   ///< looks like the spot of a projector
 };
 
 struct SeenFrame {
   Time t;
-  bool has_depths = false;  ///< its features were looked for in the right image
+  bool has_depths = false;  ///< its features were searched in the right image
   GradientEnergies gradients;
   std::vector<SeenFeature> features;  ///< by ascending id
 };
@@ -36,25 +36,25 @@ struct StereoView {
   std::vector<StereoPoint> points;
 };
 
-/// Images that are the image before, and pairs that are one image twice, to the last bit.
+/// Counts of images that equal the one before, and of pairs whose two images are equal, to the last bit.
 struct RepeatedImages {
   int frames = 0, left = 0, right = 0, same_pair = 0;
 };
 
-/// Which right image belongs to which left one, by the first seconds in motion.
+/// Which right image belongs to which left one, from the first seconds in motion.
 struct StereoStep {
-  int lag = 0;               ///< the right image that belongs to a left one comes so many images later
+  int lag = 0;               ///< the right image that belongs to a left one comes this many images later
   double as_stamped_px = 0;  ///< epipolar error by the calibration, of images with the same stamp
-  double in_step_px = 0;     ///< and of images `lag` apart
+  double in_step_px = 0;     ///< the same of images `lag` apart
   double period_s = 0;       ///< of the images
 };
 
 struct Evidence {
-  StereoRig rig;          ///< as calibrated; its cameras exchanged where the images were
-  StereoRig working_rig;  ///< with what the first seconds showed of the stereo pair: good enough for depths
+  StereoRig rig;          ///< as calibrated
+  StereoRig working_rig;  ///< corrected by a stereo fit to the first seconds: good enough for depths
   StereoOrder order;      ///< of the first seconds' images
-  bool swapped = false;   ///< left and right images were exchanged before anything else was looked at
-  StereoStep step;        ///< and right images given to the left ones that they belong to
+  bool swapped = false;   ///< left and right images were exchanged, and all that follows has them in order
+  StereoStep step;        ///< right images that were late or early are in order as well
   std::vector<ImuSample> imu;
   std::vector<Time> stamps;  ///< of all stereo images
   std::vector<SeenFrame> frames;

@@ -20,7 +20,7 @@ Diagnosis Examination::run() {
   readings();
   images();
   if (has(FindingKind::same_image_twice)) {
-    not_judged("all that two cameras are needed for: there is one");
+    not_judged("everything that needs two cameras: left and right are the same images");
     out_.rig = rig_;
     return std::move(out_);
   }
@@ -44,7 +44,7 @@ void Examination::readings() {
       for (const double unit : {1.0, 1000.0})
         if (std::abs(gravity / unit - 1) < kUnitTolerance) accel_unit_ = 9.80665 / unit;
     }
-    // Too fast to be followed is said of a gyroscope only where the images do not say more.
+    // The gyroscope's unit is judged by the images, in turns().
     if (finding.kind != FindingKind::gyro_units) out_.findings.push_back(std::move(finding));
   }
   for (Finding& finding : check_stamps(evidence_.imu, evidence_.stamps, evidence_.rig))
@@ -65,7 +65,7 @@ void Examination::right_images_late() {
   if (step.lag == 0) return;
   Finding& finding = found(FindingKind::stereo_sync, -1e3 * step.lag * step.period_s, 0, "ms");
   finding.measured = fmt::format(
-      "the right image that belongs to a left one comes {} images {}: matches of the same stamp lie {:.1f} px from their epipolar lines, of those images {:.1f} px",
+      "the right image that belongs to a left one comes {} images {}: matches lie {:.1f} px from their epipolar lines with images of the same stamp, {:.1f} px with those",
       std::abs(step.lag), step.lag > 0 ? "later" : "earlier", step.as_stamped_px, step.in_step_px);
   finding.expected = "the same stamp for what was exposed at the same moment";
   finding.advice = "pair the images by the cameras' frame counters or trigger stamps, not by arrival";
@@ -78,12 +78,12 @@ void Examination::images() {
   const FixedFeatures fixed = measure_fixed(evidence_, imu_);
   keep(check_fixed(fixed));
   if (has(FindingKind::fixed_in_view)) evidence_ = without(fixed.ids, std::move(evidence_));
-  measured(fmt::format("features that stay in place: {:.1f} % ({} pairs); that look like spots: {:.1f} %", 100 * fixed.share,
-                       fixed.pairs, 100 * fixed.dots));
+  measured(fmt::format("features that stay in place: {:.1f} % ({} pairs of images); that look like bright spots: {:.1f} %",
+                       100 * fixed.share, fixed.pairs, 100 * fixed.dots));
 }
 
 void Examination::blur() {
-  if (turns_seen_ && !turns_agree_) return not_judged("blur: the turning that it comes of is not known");
+  if (turns_seen_ && !turns_agree_) return not_judged("blur: the rotation that causes it is not known");
   StereoRig rig = rig_;
   rig.time_offset_s = offset_s_;
   const Blur blur = measure_blur(evidence_, imu_, rig);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to the doctor: one examination, step by step. What a step finds wrong is corrected for those that come after.
+// Private to the doctor: one examination, step by step. What a step finds wrong is corrected for the steps after it.
 //   examination.cpp          order, readings by themselves, images by themselves
 //   examination_imu.cpp      the IMU against what the images show
 //   examination_cameras.cpp  lenses and the pair of cameras
@@ -22,9 +22,9 @@ namespace fbvins {
 
 namespace doctor {
 inline constexpr double kDegrees = 180 / std::numbers::pi;  ///< in a radian
-/// A ratio of units is taken for one that people mix up when it is this near.
+/// A ratio this near to that of two units that are often confused is taken for it.
 inline constexpr double kUnitTolerance = 0.15;
-/// Standard deviations from which a difference is a finding, where it is of practical size as well.
+/// Standard deviations from which a difference of practical size is a finding.
 inline constexpr double kSignificant = 5;
 }  // namespace doctor
 
@@ -42,7 +42,7 @@ class Examination {
     out_.findings.push_back(std::move(finding));
     return out_.findings.back();
   }
-  // Not a push_back of a literal in place, which GCC 12 warns of wrongly (-Wstringop-overflow).
+  // Not inline: GCC 12 then gives a false warning (-Wstringop-overflow).
   void not_judged(std::string_view what);
   void measured(std::string sentence) { out_.measured.push_back(std::move(sentence)); }
   void keep(std::optional<Finding> finding) {
@@ -73,18 +73,18 @@ class Examination {
 
   Evidence evidence_;
   CalibrationStyle style_;
-  ImuSeries imu_;  // in rad/s and the body's axes, as far as was found out
-  StereoRig rig_;  // the calibration, corrected as far as was found out
+  ImuSeries imu_;  // in rad/s and the body's axes, by the findings so far
+  StereoRig rig_;  // the calibration, corrected by the findings so far
   std::vector<FramePair> pairs_;
-  /// What the pair of cameras has shown, for the motion to be weighed against.
+  /// Result of the stereo fit, with which that of the motion fit is combined.
   struct PairShown {
-    StereoRig before;  // the rig until then
+    StereoRig before;  // the rig before it
     std::size_t first_finding = 0;
     std::vector<StereoChange> changes;
     bool judged = false;
   };
   PairShown pair_;
-  double accel_unit_ = 1;  // m/s^2 of a reading of one
+  double accel_unit_ = 1;  // m/s^2 for a reading of 1
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
   bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;

@@ -73,17 +73,17 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
     if (!finding.corrected.empty()) finding.corrected += '\n';
     finding.corrected += line(rig_.right, false, style_);
   }
-  finding.expected = fmt::format("less than features are seen to; this explains {:.1f} px", explained_px);
+  finding.expected = fmt::format("less than the accuracy of features; this explains {:.1f} px", explained_px);
   finding.advice = "calibrate the lens again, at the size and focus that are used";
   out_.findings.push_back(std::move(finding));
 }
 
 StereoFit Examination::pair_fit(StereoRig rig, bool focal_known) {
   rig.time_offset_s = offset_s_;
-  // Where right images are so late that no depths are left to see turning by, the gyroscope is taken as it is.
+  // Where right images are so late that there are no depths to see rotation with, the gyroscope is taken as it is.
   const ImuSeries* imu = turns_agree_ || !turns_seen_ ? &imu_ : nullptr;
   StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_, focal_known);
-  // The pairs' motions rest on depths, which a right image that is late spoils: its turning alone tells of it, too.
+  // The pairs' motions need depths, which late right images make wrong; rotation alone, without the pairs, shows the delay, too.
   if (!fit.changes.empty() && !begins_with_delay(fit))
     if (StereoFit by_turning = fit_stereo(evidence_.stereo, rig, imu, {}, focal_known); begins_with_delay(by_turning))
       fit = std::move(by_turning);
@@ -100,7 +100,7 @@ void Examination::stereo() {
     measured(fmt::format("  stereo: {} ({}) {} +- {} explains {:.2f} px", to_string(change.kind), name_of(change.lens),
                          change.amount.norm(), change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
   if (has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots)) {
-    not_judged("the pair of cameras: what hangs in view would be taken for points of the scene");
+    not_judged("the pair of cameras: features that are fixed in view would be taken for points of the scene");
     return;
   }
   if (fit.changes.empty() && fit.error_px == 0) {
@@ -128,8 +128,8 @@ void Examination::stereo_change(const StereoChange& change) {
         fmt::format("{} {:.2f} +- {:.2f} deg from the calibration's; this explains {:.1f} px of the epipolar error",
                     turned ? "the right camera is turned by" : "the direction from left to right camera is", finding.size,
                     finding.sigma, change.explained_px);
-    finding.expected = "less than features are seen to";
-    finding.advice = "a camera has moved: calibrate the pair again, and stiffen its mount";
+    finding.expected = "less than the accuracy of features";
+    finding.advice = "a camera has moved: calibrate the pair again, and make its mount stiffer";
     Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
     if (turned) {
       const Quat turn = so3_exp(Vec3(change.amount));

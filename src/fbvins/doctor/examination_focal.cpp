@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The focal length that two lenses have in common. A pair of cameras hardly shows it, the gyroscope does; and what the pair
-// does show of it looks like other changes, so that the pair is looked at again with each estimate.
+// The focal length that two lenses have in common. The stereo pair hardly observes it, the gyroscope does. In the stereo fit its
+// error looks like other changes, so that the pair is fitted again with each estimate.
 #include "fbvins/doctor/examination.hpp"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ struct Doubt {
   double log_focal, explained_px;
 };
 
-/// By the pair of cameras, or by the motion: of the left lens, which is all that it sees.
+/// From the stereo fit, or from the motion fit, which sees the left lens alone.
 std::optional<Doubt> doubt(const std::vector<StereoChange>& by_pair, const MotionFit& by_motion) {
   for (const StereoChange& change : by_pair)
     if (is_common_focal(change)) return Doubt{change.amount(0), change.explained_px};
@@ -43,7 +43,7 @@ StereoRig with_focal(StereoRig rig, double log_focal) {
 
 }  // namespace
 
-/// The motion by the focal length that fits it best, where that is in doubt, and the findings about the pair that go with it.
+/// The motion fit with the common focal length that fits it best, where that is in doubt; replaces the findings about the pair.
 MotionFit Examination::with_common_focal(MotionFit fit) {
   const auto doubted = pair_.judged && fit.usable ? doubt(pair_.changes, fit) : std::nullopt;
   if (!doubted) return fit;
@@ -59,7 +59,7 @@ MotionFit Examination::with_common_focal(MotionFit fit) {
     log_focal += *by_focal.log_focal;
     if (std::abs(*by_focal.log_focal) < kSettled) break;
   }
-  // Of one lens alone it shows in the pair: with the wrong focal length for both more is wrong than was.
+  // If one lens alone is wrong, the pair shows it: corrected for both, it needs more changes than before.
   const auto others = std::count_if(pair_.changes.begin(), pair_.changes.end(),
                                     [](const StereoChange& change) { return !is_common_focal(change); });
   if (static_cast<std::ptrdiff_t>(pair.changes.size()) > others) return fit;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The IMU against what the images show: turning, motion, acceleration.
+// The IMU compared with the images: rotation, motion, acceleration.
 #include "fbvins/doctor/examination.hpp"
 
 #include <fmt/format.h>
@@ -17,13 +17,13 @@ using doctor::kDegrees;
 using doctor::kSignificant;
 using doctor::kUnitTolerance;
 
-/// Below this the readings say something else than the images, whatever is done to them.
+/// Below this correlation the readings do not agree with the images for any axes, unit and time offset.
 constexpr double kAgreement = 0.7;
-/// The second of the three axes must have been turned about by this much for axes to be told, rad in a tenth of a second.
+/// Least rotation about the second principal axis for which axes can be told, rad in a tenth of a second.
 constexpr double kLeastSecondAxis_rad = 2.5e-3;
-/// Smaller factors are a wrong range or a wrong lens, not a wrong unit.
+/// A smaller factor is a wrong range or a wrong lens, not a wrong unit.
 constexpr double kMostScale = 1.7;
-/// Share of the readings from which on what is left of the turning says little of scale and axes.
+/// Share of saturated readings beyond which the rest says little about scale and axes.
 constexpr double kMostCutOff = 0.2;
 constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kBaselinePractical = 0.03;
 
@@ -36,12 +36,12 @@ void Examination::turns() {
   if (has(FindingKind::clocks_apart)) return;
   if (cut_off_share_of_gyro(evidence_.imu) > kMostCutOff) {
     turns_seen_ = true;
-    not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are cut off too often");
+    not_judged("gyroscope, axes, rotation and time between camera and IMU: the gyroscope's readings are saturated too often");
     return;
   }
   const TurnFit fit = fit_turns(pairs_, imu_, rig_);
   measured(fmt::format(
-      "turning seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",
+      "rotation seen: {:.4f} rad in a tenth of a second ({} pairs; by axis {:.4f} {:.4f} {:.4f}); correlation with the gyroscope {:.4f} at {:.1f} ms, scale {:.4f}",
       fit.turning_rad, pairs_.size(), fit.spread.x(), fit.spread.y(), fit.spread.z(), fit.correlation, 1e3 * fit.offset_s,
       fit.scale));
   turns_seen_ = fit.seen;
@@ -53,7 +53,7 @@ void Examination::turns() {
   const bool hidden = has(FindingKind::fixed_in_view) || has(FindingKind::projector_dots);
   if (fit.correlation < kAgreement || (hidden && std::abs(fit.scale - 1) > kUnitTolerance)) {
     if (hidden) {
-      not_judged("gyroscope, axes, rotation and time between camera and IMU: what hangs in view hides the turning");
+      not_judged("gyroscope, axes, rotation and time between camera and IMU: features that are fixed in view hide the rotation");
       return;
     }
     if (fit.spread.y() < kLeastSecondAxis_rad) {
@@ -62,7 +62,7 @@ void Examination::turns() {
     }
     Finding& finding = found(FindingKind::imu_camera_disagree, fit.correlation, 0, "correlation");
     finding.measured = fmt::format(
-        "the turning that the images show and the gyroscope's agree by a correlation of {:.2f} at best, whatever the axes, the unit, and the time between the clocks (up to 5 s)",
+        "the rotation that the images show and the gyroscope's correlate by {:.2f} at best, for any axes, unit and time offset (up to 5 s)",
         fit.correlation);
     finding.expected = "above 0.9";
     finding.advice = "the clocks are farther apart, or drift, or this is not the IMU of these cameras";
@@ -80,23 +80,23 @@ void Examination::turns() {
 }
 
 void Examination::gyro_unit(const TurnFit& fit) {
-  if (fit.scale < kMostScale && fit.scale > 1 / kMostScale) return;  // the motion fit says which it is, scale or lens
+  if (fit.scale < kMostScale && fit.scale > 1 / kMostScale) return;  // the motion fit tells whether it is the scale or the lens
   double factor = fit.scale;
   std::string advice = fmt::format("multiply the gyroscope's readings by {:.4g}", factor);
   for (const auto& [unit, name] :
        {std::pair{1 / kDegrees, "they look like degrees: multiply the gyroscope's readings by pi / 180"},
         std::pair{kDegrees,
-                  "they were converted from degrees although they were none: multiply the gyroscope's readings by 180 / pi"}})
+                  "they were in rad/s already and were converted from degrees: multiply the gyroscope's readings by 180 / pi"}})
     if (std::abs(factor / unit - 1) < 2 * kUnitTolerance) factor = unit, advice = name;
   Finding& finding = found(FindingKind::gyro_units, 1 / fit.scale, (1 - fit.correlation) / fit.scale, "times too large");
-  finding.measured = fmt::format("the gyroscope's readings are {:.4g} +- {:.2g} times the turning that the images show",
+  finding.measured = fmt::format("the gyroscope's readings are {:.4g} +- {:.2g} times the rotation that the images show",
                                  finding.size, finding.sigma);
   finding.expected = "1, in rad/s";
   finding.advice = advice;
   imu_ = imu_.with_gyro(factor * Mat3::Identity());
 }
 
-/// Whether the accelerometer, too, fits when the whole IMU is turned as the gyroscope says.
+/// Whether the accelerometer fits better with the whole IMU rotated than with the gyroscope's axes mixed up.
 bool Examination::accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const {
   StereoRig turned = rig_;
   turned.T_BC0 = {Mat3(R_CB.transpose()), rig_.T_BC0.p};
@@ -112,7 +112,7 @@ void Examination::gyro_axes(const TurnFit& fit) {
   const double rest = angle_of(N * P.transpose());
   const bool right_way = P == Mat3::Identity();
   if (right_way && !fit.mirrored) {
-    // A few degrees are measured to the last digit by the motion fit, from the calibration on.
+    // A smaller rotation is left to the motion fit, which is more precise and starts at the calibration.
     if (rest > 0.35) rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
     return;
   }
@@ -121,13 +121,13 @@ void Examination::gyro_axes(const TurnFit& fit) {
     const auto T_C0C1 = rig_.T_BC0.inverse() * rig_.T_BC1;
     rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
     rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
-    return;  // the motion fit says by how much
+    return;  // the motion fit tells by how much
   }
   Finding& finding = found(FindingKind::gyro_axes, kDegrees * rest, kDegrees * (1 - fit.correlation), "deg from these axes");
   finding.measured =
       fmt::format("the gyroscope fits the images with its axes named ({}) (correlation {:.3f})", axes_text(P), fit.correlation);
   finding.expected = "(x, y, z), and the accelerometer's axes are the body's";
-  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the turning rate", axes_text(P));
+  finding.advice = fmt::format("hand on ({}) as (x, y, z) of the angular rate", axes_text(P));
   imu_ = imu_.with_gyro(P);
 }
 
@@ -139,7 +139,7 @@ void Examination::motion() {
   }
   motion_agrees_ = true;
   measured(fmt::format(
-      "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); a feature's path errs by {:.2f} px, then {:.2f}",
+      "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); error of a predicted feature {:.2f} px, after the changes {:.2f}",
       1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegrees * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
       kDegrees * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
   for (const MotionChange& change : fit.changes)
@@ -154,7 +154,7 @@ void Examination::motion() {
     if (change.kind == FindingKind::gyro_scale) {
       Finding& finding = found(change.kind, 100 * (std::exp(-change.amount(0)) - 1), 100 * sigma(0), "%");
       finding.measured = fmt::format("the gyroscope's readings are {:.1f} +- {:.1f} % too large", finding.size, finding.sigma);
-      finding.expected = "within 1 % of the turning that the images show";
+      finding.expected = "within 1 % of the rotation that the images show";
       finding.advice =
           fmt::format("multiply the gyroscope's readings by {:.4f}, or look up its range", std::exp(change.amount(0)));
     } else if (change.kind == FindingKind::rolling_shutter) {
@@ -167,7 +167,7 @@ void Examination::motion() {
       continue;
     } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
                change.kind == FindingKind::distortion) {
-      // A lens that is wrong alone bends epipolar lines.
+      // If one lens alone were wrong, the stereo pair would show it.
       const bool both = change.kind != FindingKind::principal_point && pair_.judged && pair_.changes.empty();
       lens(change.kind, both ? WhichLens::both : WhichLens::left, change.amount, sigma, change.explained_px);
     }
@@ -196,18 +196,18 @@ void Examination::rotation(const MotionFit& fit) {
   rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
   const Vec3 axis = so3_log(Quat(wrong)).normalized();
   Finding& finding = found(FindingKind::imu_camera_rotation, kDegrees * angle, kDegrees * sigma, "deg");
-  finding.measured = fmt::format(
-      "the IMU is turned by {:.2f} +- {:.2f} deg against where the calibration has it, about ({:.2f}, {:.2f}, {:.2f}) of the IMU",
-      finding.size, finding.sigma, axis.x(), axis.y(), axis.z());
+  finding.measured =
+      fmt::format("the IMU is rotated by {:.2f} +- {:.2f} deg from the calibration, about ({:.2f}, {:.2f}, {:.2f}) of the IMU",
+                  finding.size, finding.sigma, axis.x(), axis.y(), axis.z());
   finding.expected = "less than 1 deg";
-  finding.advice = "correct the cameras' mounting (the translations are the old ones), or mount the IMU as calibrated";
+  finding.advice = "correct the cameras' extrinsics (the translations are unchanged), or mount the IMU as calibrated";
   finding.corrected = mounting_lines(rig_, style_, true);
 }
 
 void Examination::accelerations() {
   const AccelFit fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
   measured(fmt::format(
-      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % as its axes are named: {}); scale {:.4f} +- {:.4f}",
+      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % with its axes as delivered, best: {}); scale {:.4f} +- {:.4f}",
       fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
       fit.scale_sigma));
   if (!fit.seen) {
@@ -217,7 +217,7 @@ void Examination::accelerations() {
   if (fit.axes != Mat3::Identity() && fit.unexplained_as_named > 2 * fit.unexplained + 0.05) {
     Finding& finding = found(FindingKind::accel_axes, 100 * fit.unexplained_as_named, 0, "% unexplained");
     finding.measured = fmt::format(
-        "with the accelerometer's axes as named {:.0f} % of the acceleration that the images show is unexplained, with ({}) {:.0f} %",
+        "with the accelerometer's axes as delivered {:.0f} % of the acceleration that the images show is unexplained, with ({}) {:.0f} %",
         finding.size, axes_text(fit.axes), 100 * fit.unexplained);
     finding.expected = "(x, y, z), as the gyroscope's";
     finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
@@ -231,7 +231,8 @@ void Examination::accelerations() {
   finding.measured =
       fmt::format("the accelerometer says that the baseline is {:.1f} +- {:.1f} mm long", 1e3 * length * factor, finding.sigma);
   finding.expected = fmt::format("{:.1f} mm by the calibration", 1e3 * length);
-  finding.advice = "correct the right camera's place (the board's squares were given a wrong size, or the camera was moved)";
+  finding.advice =
+      "correct the right camera's position (the calibration board's squares were given a wrong size, or the camera was moved)";
   Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
   T_C1C0.p *= factor;
   rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();

@@ -10,10 +10,10 @@ namespace {
 
 constexpr OrbOptions kOrb{.max_features = 600, .levels = 4};
 constexpr HammingOptions kMatching{.max_distance = 50, .max_ratio = 0.8, .mutual = true};
-/// A descriptor's keypoint is this well localised; alignment that leads farther away has found something else.
+/// Accuracy of a keypoint; patch alignment that ends farther away has found something else.
 constexpr double kNear_px = 3;
 constexpr double kBack_px = 0.5;
-/// Largest epipolar error of a match from the geometry of most: a wrong lens bends lines by this much, a wrong match by more.
+/// Largest epipolar error of an inlier: a wrong lens model causes up to this much, a wrong match more.
 constexpr double kLoose_px = 8;
 constexpr int kCoarsest = 1;
 

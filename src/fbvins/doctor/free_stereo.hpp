@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of the left image found in the right one wherever they are: by descriptor over the whole image, then patch alignment.
+// Stereo matches without an epipolar constraint: by descriptor over the whole image, then patch alignment.
 // Buffers are reused; one instance, one thread.
 //
 //   FreeStereo stereo;
-//   std::vector<StereoPoint> points = stereo.match(left, right);
+//   std::vector<StereoPoint> points = stereo.match(rig, left_image, right_image, left_pyramid, right_pyramid);
 #pragma once
 
 #include <vector>
@@ -18,7 +18,7 @@ namespace fbvins {
 class FreeStereo {
  public:
   FreeStereo();
-  /// Those that agree with some epipolar geometry of the whole image, loosely: whichever it is.
+  /// The inliers of one essential matrix, with a loose threshold. Of `rig` only the camera models are used.
   std::vector<StereoPoint> match(const StereoRig& rig, const Image& left_image, const Image& right_image, const Pyramid& left,
                                  const Pyramid& right);
 

@@ -17,14 +17,14 @@
 namespace fbvins {
 namespace {
 
-/// Images held back until there is motion, and of these every how manieth is matched left to right.
+/// Images held back until the rig moves: for how long, how many at most, and how many of them at least are matched in stereo.
 constexpr double kPrelude_s = 2;
 constexpr std::size_t kMostHeld = 60, kFewestHeldViews = 6;
 /// Between two images whose stereo matches count, and between two whose features get depths.
 constexpr double kStereoStep_s = 0.25, kDepthStep_s = 0.1;
-/// Enough of a rig in motion, and when to stop waiting for motion.
+/// Enough time in motion, and when to stop waiting for it.
 constexpr double kMoving_s = 40, kLongest_s = 120;
-/// Features move by this much between images with depths where a rig is in motion, px.
+/// Median motion of features between images with depths from which the rig is in motion.
 constexpr double kMoving_px = 1.5;
 constexpr int kFeatures = 150;
 constexpr double kDistance_px = 22, kNearest_m = 0.25, kLongestGap_s = 0.6;
@@ -36,7 +36,7 @@ bool same(const std::shared_ptr<const Image>& a, const std::shared_ptr<const Ima
   return true;
 }
 
-/// A spot of light: much brighter than all that is four pixels away, and nothing around it is.
+/// A spot of light: much brighter than all pixels four away from it, which are alike.
 bool is_bright_dot(const PyramidLevel& image, const Vec2& px) {
   const int x = static_cast<int>(std::lround(px.x())), y = static_cast<int>(std::lround(px.y()));
   constexpr int kRing = 4;
@@ -108,7 +108,7 @@ std::vector<StereoFrame> few_of(const std::vector<StereoFrame>& frames) {
 
 }  // namespace
 
-/// The held images' matches, found without the calibration.
+/// Matches of some of the held images, found without the extrinsics.
 std::vector<StereoView> EvidenceGatherer::State::views_of_few() {
   std::vector<StereoView> views;
   Pyramid left, right;
@@ -121,8 +121,8 @@ std::vector<StereoView> EvidenceGatherer::State::views_of_few() {
   return views;
 }
 
-/// Where a lens or a camera has moved far, points lie on the wrong side as they do when the images are exchanged. Then the
-/// calibration must be changed more to fit the exchanged images than to fit them as they are named.
+/// A lens or camera far from its calibration can look like exchanged images. Then fitting the images as named takes fewer changes
+/// of the calibration than fitting them exchanged.
 bool EvidenceGatherer::State::as_named_after_all() {
   std::vector<StereoView> views = views_of_few();
   const StereoFit as_named = fit_stereo(views, evidence.rig, nullptr, {});
@@ -132,7 +132,7 @@ bool EvidenceGatherer::State::as_named_after_all() {
   return as_named.changes.size() < as_swapped.changes.size() && as_named.remaining_px < 2 * as_swapped.remaining_px;
 }
 
-/// Which image belongs where: left and right exchanged, or right ones that come later.
+/// Undoes an exchange of left and right, and gives right images that are late or early to their left ones.
 void EvidenceGatherer::State::put_in_order() {
   evidence.order = stereo_order(evidence.rig, few_of(held));
   evidence.swapped = evidence.order.swapped() && !as_named_after_all();
@@ -146,7 +146,7 @@ void EvidenceGatherer::State::put_in_order() {
   held = std::move(in_step);
 }
 
-/// What the held images say of the pair of cameras; from here on depths can be told.
+/// Fits the stereo pair to the held images; from here on features have depths.
 void EvidenceGatherer::State::end_prelude() {
   prelude = false;
   put_in_order();

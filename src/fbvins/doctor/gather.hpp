@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at a recording's images as they come and keeps what the doctor asks of them. Nothing of the calibration but the
-// cameras' models is assumed: tracks are followed without the IMU, left and right are matched by descriptor without an
-// epipolar line. The first seconds of images are held back until they have told which images are left and where the right camera
-// looks. One thread calls; the same events give the same evidence.
+// Processes a recording's images as they come and keeps the evidence that the doctor needs. Of the calibration only the camera
+// models are assumed: features are tracked without the IMU, and matched from left to right by descriptor without an epipolar
+// line. The first seconds of images are held back until they have told which images are left ones and how the right camera is
+// oriented. One thread calls; the same events give the same evidence.
 //
 //   EvidenceGatherer gatherer(rig);
 //   while (auto event = data.next()) if (!gatherer.push(*event)) break;      // enough
@@ -21,7 +21,7 @@ class EvidenceGatherer {
   explicit EvidenceGatherer(const StereoRig& rig);
   ~EvidenceGatherer();
 
-  /// False once enough has been seen; later events are not looked at.
+  /// False once enough has been seen; later events are ignored.
   bool push(const SensorEvent& event);
   Evidence finish();
 

@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-/// One frozen image may be a dropped one made good by a driver; a share of them is a fault.
+/// A single repeated image may be a driver's substitute for a lost one; a share of them is a fault.
 constexpr double kMostRepeated = 0.005;
 constexpr double kMostSamePair = 0.1;
 
@@ -51,10 +51,10 @@ std::vector<Finding> check_repeated(const RepeatedImages& repeated) {
 
 namespace {
 
-/// Images are compared that are so far apart, or nearer where features move a lot: fast ones are not followed for long.
+/// Images are compared that are this far apart, or closer if features move a lot: fast ones are not tracked for long.
 constexpr double kApart_s = 0.5, kOthersMove_px = 5, kOthersMoveALot_px = 10, kStays_px = 0.6;
-/// Share of the features that must move, and their number where the readings say that the rig turned by so many pixels: then all
-/// of the scene has to move, and not only what walks about in it.
+/// Least share of the features that must move; where the gyroscope says that the rig rotated by kTurned_px a least number is
+/// enough: then the whole scene moves in the image, and not only things that move in the scene.
 constexpr double kLeastMoving = 0.25, kTurned_px = 20;
 constexpr std::size_t kFewestMoving = 8, kFewestFeatures = 20;
 constexpr double kMostFixed = 0.15, kMostDots = 0.2;
@@ -65,7 +65,7 @@ struct Moved {
   double px;
 };
 
-/// Motions of the features across the baseline's direction, in which depth does not move them.
+/// Motions of the features perpendicular to the baseline, along which a projector's spots move with the depth of the scene.
 std::vector<Moved> motions_across(const SeenFrame& a, const SeenFrame& b, const Vec2& across) {
   std::vector<Moved> out;
   auto there = b.features.begin();
@@ -84,10 +84,10 @@ bool others_move(const std::vector<Moved>& motions, double least_px, double turn
   return turned_px > kTurned_px || static_cast<double>(moving) > kLeastMoving * static_cast<double>(motions.size());
 }
 
-/// Of the pairs of images in which a feature was seen.
+/// Pairs of images in which a feature stayed, and in which it moved.
 struct Stays {
   int stayed = 0, moved = 0;
-  /// Time and again: near the point that the rig flies to a feature of the scene stays for a moment.
+  /// Twice at least: near the focus of expansion a feature of the scene stays for a moment, too.
   bool fixed() const { return stayed >= 2 && stayed > 9 * moved; }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with the images themselves: repeated ones, things that hang in view. Pure functions, any thread.
+// What is wrong with the images themselves: repeated ones, things that are fixed in view. Pure functions, any thread.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace fbvins {
 
-/// Images repeated to the last bit, and one image as both left and right.
+/// Images repeated to the last bit, and the same image as left and right.
 std::vector<Finding> check_repeated(const RepeatedImages& repeated);
 
 struct FixedFeatures {
   double share = 0;                 ///< of the features that stay where they are while the others move
   double dots = 0;                  ///< of all features, those that look like spots of light
-  int pairs = 0;                    ///< of images in which others moved enough to tell
+  int pairs = 0;                    ///< of images in which others moved enough to judge by
   std::set<std::int64_t> ids = {};  ///< of those that stayed
 };
-/// The readings tell only whether the rig turned at all: a few features that move count for more then.
+/// `imu` tells only how far the rig rotated: if far enough, few moving features are enough to judge by.
 FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu);
 std::optional<Finding> check_fixed(const FixedFeatures& fixed);
 

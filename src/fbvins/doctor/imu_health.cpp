@@ -14,15 +14,15 @@
 namespace fbvins {
 namespace {
 
-/// A range's end is met again and again, for several readings each time; the top of a smooth motion once, and noise never.
+/// A saturated axis repeats its extreme value for several readings, several times; a smooth motion's peak does so once at most.
 constexpr int kFewestRuns = 2, kRunLength = 3;
-/// A signal of fewer steps of its own resolution than this repeats itself anyway.
+/// A signal that spans fewer steps of its resolution than this repeats values anyway.
 constexpr double kFewestSteps = 50;
-/// Half of gravity's strength: beyond, aliasing and rectification move the bias of accelerometers of this class.
+/// Half of gravity; beyond, aliasing and rectification shift the bias of accelerometers of this class.
 constexpr double kMostVibration_mps2 = 5;
 constexpr int kBlock = 512;
 
-/// How many readings of an axis stand at its largest value (of the readings times sign) in runs; 0 where runs are few.
+/// How many readings of an axis are in runs at its largest value (of sign times the readings); 0 where runs are few.
 int clipped(std::span<const double> values, double sign) {
   double high = -1e300, low = 1e300, step = 1e300;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -66,9 +66,9 @@ std::optional<Finding> check_saturation(std::span<const ImuSample> samples) {
   finding.kind = FindingKind::saturation;
   finding.size = gyro + accel, finding.unit = "readings";
   finding.measured =
-      fmt::format("{} readings of the gyroscope and {} of the accelerometer stand at the end of their range", gyro, accel);
+      fmt::format("{} readings of the gyroscope and {} of the accelerometer are at the end of their range", gyro, accel);
   finding.expected = "none";
-  finding.advice = "set the IMU to a larger range, or mount it softer";
+  finding.advice = "set the IMU to a larger range, or mount it more softly";
   return finding;
 }
 
@@ -103,7 +103,7 @@ Vibration measure_vibration(std::span<const ImuSample> samples) {
     if (power[k] > power[peak]) peak = k;
   }
   if (used == 0 || !(total > 0)) return out;
-  // Two sides of the spectrum; the window keeps 3/8 of the power.
+  // Factor 2 for the negative frequencies; the Hann window keeps 3/8 of the power.
   out.rms_mps2 = std::sqrt(2 * total / used / (0.375 * kBlock * kBlock));
   out.peak_hz = static_cast<double>(peak) * rate / kBlock;
   const std::size_t reach = std::max<std::size_t>(peak / 20, 1);
@@ -120,7 +120,7 @@ std::optional<Finding> check_vibration(std::span<const ImuSample> samples) {
   finding.size = seen.rms_mps2, finding.unit = "m/s^2";
   finding.sigma = seen.rms_mps2 / std::sqrt(static_cast<double>(samples.size()) / 10);
   finding.measured = fmt::format(
-      "above {:.0f} Hz the accelerometer shakes by {:.1f} +- {:.1f} m/s^2 (root mean square), {:.0f} % of it near {:.0f} Hz",
+      "above {:.0f} Hz the accelerometer vibrates by {:.1f} +- {:.1f} m/s^2 (root mean square), {:.0f} % of it near {:.0f} Hz",
       kVibrationFrom_hz, finding.size, finding.sigma, 100 * seen.peak_share, seen.peak_hz);
   finding.expected = fmt::format("at most {:.0f} m/s^2", kMostVibration_mps2);
   finding.advice = "balance the propellers, mount the IMU softly, and switch on its low-pass filter";

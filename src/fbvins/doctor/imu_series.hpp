@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of a recording, asked for any interval and as often as one likes. A value; const members from any thread.
+// The readings of a recording, with their integrals over any interval. A value; const members from any thread.
 //
 //   ImuSeries imu(samples);
 //   if (imu.covers(a, b)) Vec3 turned = imu.turned(a, b);      // rad, the integral of the rate
@@ -22,13 +22,13 @@ class ImuSeries {
   bool empty() const { return samples_.size() < 2; }
   /// There are readings from a to b, without a gap.
   bool covers(Time a, Time b) const;
-  /// Interpolated; the nearest reading outside.
+  /// Interpolated; before the first and after the last reading, that reading.
   ImuSample at(Time t) const;
-  /// Integral of the turning rate from a to b, rad in B: the rotation vector, where the axis stays nearly the same.
+  /// Integral of the angular rate from a to b, rad in B: the rotation vector, if the axis stays nearly the same.
   Vec3 turned(Time a, Time b) const { return integral(b) - integral(a); }
-  /// The readings between, with both ends interpolated.
+  /// The readings from a to b, with both ends interpolated.
   ImuSegment segment(Time a, Time b) const;
-  /// The same with other gyroscope axes or units: gyro * rate.
+  /// The same readings with every angular rate multiplied by `gyro` (other axes or units).
   ImuSeries with_gyro(const Mat3& gyro) const;
 
  private:

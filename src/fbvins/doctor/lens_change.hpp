@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera whose calibration is a little otherwise. Pure functions, any thread.
+// A camera with a slightly different calibration. Pure functions, any thread.
 #pragma once
 
 #include "fbvins/camera/camera.hpp"
 
 namespace fbvins {
 
-/// Whose lens: both change alike where a calibration was made at another size, or was left out.
+/// Whose lens; both change alike where the calibration is of another image size, or is missing.
 enum class WhichLens { left, right, both };
 
 struct LensChange {
-  double log_focal = 0;           ///< fx and fy times its exponential
+  double log_focal = 0;           ///< fx and fy are multiplied by its exponential
   Vec2 centre_px = Vec2::Zero();  ///< added to the principal point
-  Vec2 radial = Vec2::Zero();     ///< added to the two numbers of RadialNames
+  Vec2 radial = Vec2::Zero();     ///< added to the two parameters of RadialNames
 };
 
-/// The two numbers of a lens that bend its rays most.
+/// Names of the two parameters with the largest radial effect.
 struct RadialNames {
   const char* first;
   const char* second;

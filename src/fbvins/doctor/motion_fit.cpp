@@ -24,7 +24,7 @@ const std::vector<ChangeGroup>& groups() {
   };
   return all;
 }
-/// Where the focal length is doubted the gyroscope is not: a rig that turns little about its optical axis shows one of the two.
+/// Where the focal length is in doubt the gyroscope's scale is fixed: without rotation about the optical axis they look alike.
 const std::vector<ChangeGroup>& groups_without_scale() {
   static const std::vector<ChangeGroup> all = [] {
     std::vector<ChangeGroup> made = groups();
@@ -37,7 +37,7 @@ constexpr double kSignificant = 5;
 constexpr int kRounds = 5;
 constexpr std::size_t kFewestPairs = 30;
 const std::vector<int> kAlwaysFree{kBias, kBias + 1, kBias + 2};
-/// Wanted with their standard deviations, whether they were changes or not.
+/// Reported with their standard deviations, whether they are changes or not.
 const std::vector<int> kAlwaysSaid{kTime, kRotation, kRotation + 1, kRotation + 2};
 const std::vector<int> kFocalAlone{kFocal};
 
@@ -46,7 +46,7 @@ struct FoundChange {
   double explained_px;
 };
 
-/// Sets free what explains most, then what explains most beside it, as long as it is significant.
+/// Frees the group that explains most, then the one that explains most in addition, as long as it is significant.
 std::vector<FoundChange> search(MotionProblem& problem, bool focal_doubted) {
   std::vector<FoundChange> found;
   double capped = problem.capped_error();
@@ -77,7 +77,7 @@ MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, 
   if (start.focal_doubted) problem.free = with(problem.free, kFocalAlone);
   const auto last = problem.converge();
   if (!last) return fit;
-  // Changes found early are known better beside those found later.
+  // The last solution has all changes in it: those found early are estimated better together with the later ones.
   for (const auto& [group, explained] : found) {
     const Amount amount = amount_of(*group, problem, *last);
     fit.changes.push_back({group->kind, amount.value, amount.covariance, explained});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Camera against gyroscope to the last digit: every feature's path from image to image against the turn that the readings tell
-// through the calibration, and the one change of the calibration, then the next, that explains what is left. Method:
+// Precise comparison of camera and gyroscope: every feature is predicted from one image to the next with the gyroscope's rotation
+// and the calibration. Finds the single change of the calibration that explains most of the error, then the next. Method:
 // docs/doctor.md. Pure functions, any thread.
 //
 //   MotionFit fit = fit_motion(pairs, imu, {rig, offset_s});
@@ -19,27 +19,27 @@ namespace fbvins {
 struct MotionStart {
   StereoRig rig;               ///< T_BC0 and left lens as far as known
   double offset_s = 0;         ///< t_imu = t_image + offset, as far as known
-  bool focal_doubted = false;  ///< it is estimated even where it explains little, and the gyroscope's scale is right
+  bool focal_doubted = false;  ///< estimate it even where it explains little, and take the gyroscope's scale as right
 };
 
 struct MotionChange {
   FindingKind kind = FindingKind::time_offset;
-  Eigen::VectorXd amount;  ///< what was added to the start: s, rad (R_CB Exp(amount)), logarithm of a factor, px
+  Eigen::VectorXd amount;  ///< added to the start: s, rad (R_CB Exp(amount)), logarithm of a factor, px
   Eigen::MatrixXd covariance;
   double explained_px = 0;
 };
 
 struct MotionFit {
   bool usable = false;
-  double error_px = 0, remaining_px = 0;  ///< typical error of a feature's path at the start, and after the changes
-  /// Of the start, with the changes; those that were not found significant are small.
+  double error_px = 0, remaining_px = 0;  ///< typical error of a predicted feature at the start, and after the changes
+  /// The start with the estimated corrections, also where they are not significant.
   Mat3 R_CB = Mat3::Identity();
   double offset_s = 0;
   Vec3 gyro_bias_radps = Vec3::Zero();
-  /// Offset and rotation, whether they were changes or not.
+  /// Of offset and rotation, whether they are changes or not.
   double offset_sigma_s = 0;
   Vec3 rotation_sigma_rad = Vec3::Zero();
-  /// Logarithm of what the focal length is to be multiplied by, where it was doubted.
+  /// Logarithm of the factor by which to multiply the focal length, where it was in doubt.
   std::optional<double> log_focal = {};
   double log_focal_sigma = 0;
   std::vector<MotionChange> changes;

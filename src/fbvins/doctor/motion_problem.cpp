@@ -38,10 +38,10 @@ constexpr int kIterations = 4;
 constexpr double kCap_px = 3, kHuberSigmas = 2, kLeastSigma_px = 0.03;
 constexpr std::size_t kFeaturesOfAPair = 40;
 constexpr double kDifference_m = 1e-4;
-/// Weight, for each feature, of a translation's staying where it is: what nothing is seen of stays there.
+/// Weight, per feature, of a prior that keeps a translation where it is, for components that are not observable.
 constexpr double kTranslationPrior = 1e-4;
 
-/// A pair's turn as one hypothesis has it.
+/// A pair's rotation under one hypothesis.
 struct PredictedTurn {
   Mat3 R_ba;
   Vec3 rate_a, rate_b;  ///< in C, rad/s
@@ -57,7 +57,7 @@ struct PredictedTurn {
 
 Vec3 small_turn(const Vec3& theta, const Vec3& v) { return v + theta.cross(v); }
 
-/// X_b = R_ba (x_a - rho p_CaCb), each image line at its own time.
+/// Reprojection error in b: X_b = R_ba (x_a - rho p_CaCb), each image line at its own time. None behind the camera.
 std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray_a,
                              const Vec3& p_ab) {
   const double height = h.camera.height();
@@ -68,7 +68,7 @@ std::optional<Vec2> residual(const Hypothesis& h, const PredictedTurn& turn, con
   return Vec2(h.camera.distort(X_b.hnormalized()) - feature.b_px);
 }
 
-/// Of a feature by the pair's translation.
+/// Derivative of a feature's residual r by the pair's translation, by differences; false where it has none.
 bool by_translation(const Hypothesis& h, const PredictedTurn& turn, const PairedFeature& feature, const Vec2& ray,
                     const Vec3& p_ab, const Vec2& r, Eigen::Matrix<double, 2, 3>& J) {
   for (int i = 0; i < 3; ++i) {
@@ -79,7 +79,7 @@ bool by_translation(const Hypothesis& h, const PredictedTurn& turn, const Paired
   return true;
 }
 
-/// The translation that fits best under a hypothesis, from where it was.
+/// Sets the pair's translation to the best one under a hypothesis, starting at the present one.
 void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double sigma) {
   const PredictedTurn turn(h, pair, imu);
   for (int iteration = 0; iteration < 3; ++iteration) {
@@ -100,7 +100,7 @@ void settle(const Hypothesis& h, FramePair& pair, const ImuSeries& imu, double s
   }
 }
 
-/// A hypothesis with one unknown moved by its step, and a pair's turn by it.
+/// A hypothesis with one unknown moved by its step, for derivatives.
 struct Moved {
   int unknown;
   Hypothesis there;

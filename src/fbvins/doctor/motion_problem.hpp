@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to the doctor: the paths of features from image to image, predicted by the gyroscope's turn, as a least-squares problem
-// in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s), logarithm of its
-// scale, time from an image's first line to its last (s), and of the left lens logarithm of the focal length, principal point
-// (px), radial coefficients.
+// Private to the doctor: errors of features predicted from image to image with the gyroscope's rotation, as a least-squares
+// problem in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s) and
+// logarithm of its scale, time from an image's first line to its last (s), and of the left lens logarithm of the focal length,
+// principal point (px), radial coefficients.
 #pragma once
 
 #include <optional>
@@ -27,7 +27,7 @@ enum : int {
   kUnknowns = 14
 };
 
-/// The start, moved by x, made once for all pairs.
+/// The setup of the start, changed by x; made once for all pairs.
 struct Hypothesis {
   Camera camera;
   Mat3 R_CB;
@@ -39,18 +39,18 @@ struct Hypothesis {
 };
 }  // namespace doctor::motion
 
-/// A Fit of change_search.hpp. The readings outlive it. Each pair's translation is eliminated, and kept for the next step.
+/// A Fit of change_search.hpp. `imu` must outlive it. Each pair's translation is eliminated, and kept for the next step.
 class MotionProblem {
  public:
   static constexpr double kAsGood = 1;
 
-  /// Of the pairs with readings around them, features thinned out.
+  /// Takes the pairs with readings around them, and of each at most some forty features.
   MotionProblem(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
 
   std::size_t pairs() const { return pairs_.size(); }
   std::optional<BlockSolution> converge();
   bool plausible() const { return true; }
-  /// Of one coordinate of a feature, px.
+  /// Robust standard deviation of one coordinate of a residual, px.
   double typical_error() const;
   double capped_error() const;
   doctor::motion::Hypothesis hypothesis() const { return {start_, x}; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor's instruments, one by one.
+// The doctor's parts, one by one.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -168,7 +168,7 @@ TEST(Depths, AreThoseOfTheNewCalibration) {
   turned.T_BC1 = {Mat3(turned.T_BC1.R() * so3_exp(Vec3(0, 0.01, 0)).toRotationMatrix()), turned.T_BC1.p};
   const Vec2 centre(good.rig.left.width() / 2.0, good.rig.left.height() / 2.0);
   compare_depths(good, with_depths_by(turned, good), [&](const Vec2& px, double before, double after) {
-    // 0.01 rad of turning is a disparity of 0.01 times the focal length, and the baseline is 0.11 m.
+    // A rotation by 0.01 rad changes the disparity by 0.01 times the focal length, and the baseline is 0.11 m.
     if ((px - centre).norm() < 80) {
       EXPECT_NEAR(std::abs(after - before), 0.01 / 0.11, 0.01);
     }

@@ -15,7 +15,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kTenth = 0.1;  // sizes are asked for within this share
+constexpr double kTenth = 0.1;  // tolerance of sizes
 constexpr double kTimeTolerance_ms = 1, kRotationTolerance_deg = 0.5;
 
 Mat3 axes(int x, int y, int z) {
@@ -188,7 +188,7 @@ Spoiler vehicle_in_view() {
           }};
 }
 
-/// Image velocity by a turning rate, of pixels every kFlowGrid_px, px/s per rad/s.
+/// Derivative of the image velocity by the angular rate, on a grid of kFlowGrid_px, px/s per rad/s.
 constexpr int kFlowGrid_px = 16;
 std::vector<Eigen::Matrix<double, 2, 3>> flow_of(const Camera& camera) {
   std::vector<Eigen::Matrix<double, 2, 3>> flow;
@@ -205,7 +205,7 @@ std::vector<Eigen::Matrix<double, 2, 3>> flow_of(const Camera& camera) {
   return flow;
 }
 
-/// Each pixel is the mean along the way that the camera's turning takes it during the exposure.
+/// Motion blur: each pixel becomes the mean along its path under the camera's rotation `turn_C`, rad, during the exposure.
 void smear(Image& image, const std::vector<Eigen::Matrix<double, 2, 3>>& flow, const Vec3& turn_C) {
   const Image sharp = image;
   const int columns = (image.width() + kFlowGrid_px + kFlowGrid_px / 2 - 1) / kFlowGrid_px;
@@ -223,7 +223,7 @@ void smear(Image& image, const std::vector<Eigen::Matrix<double, 2, 3>>& flow, c
     }
 }
 
-/// By the newest reading before an image.
+/// Blur by the rate of the newest reading before an image.
 Spoiler exposed_longer(const StereoRig& rig, double ms) {
   auto rate_B = std::make_shared<Vec3>(Vec3::Zero());
   return {fmt::format("exposed for {:.0f} ms longer", ms),
@@ -239,7 +239,7 @@ Spoiler exposed_longer(const StereoRig& rig, double ms) {
           }};
 }
 
-/// Half of what comes from the fastest readings is cut off.
+/// Readings saturate at +-`range`, rad/s.
 Spoiler clipped_gyro(double range) {
   return {fmt::format("gyroscope of {:.1f} rad/s", range),
           FindingKind::saturation,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wrong setups, made of good recordings: what users do to a rig, a driver or a calibration. For tests and for the tables of
-// docs/doctor.md. Pure values; a spoiler's `frame` keeps state, so that each recording takes a fresh one from spoilers().
+// Injects faults into good recordings: mistakes made with a rig, a driver or a calibration. For tests and the tables of
+// docs/doctor.md. A spoiler is one such fault. Its functions may keep state: take a fresh one from spoilers() for each recording.
 //
 //   for (const Spoiler& spoiler : spoilers(rig)) {
-//     StereoRig wrong = spoiler.spoilt(rig);
-//     spoiler.reading(sample); spoiler.frame(frame);      // where set
+//     spoiler.rig(wrong_rig);
+//     spoiler.reading(sample); spoiler.frame(frame);      // each where it is set
 //   }
 #pragma once
 
@@ -20,15 +20,15 @@ namespace fbvins {
 
 struct Spoiler {
   std::string name;
-  FindingKind kind;      ///< what the doctor should say
-  double size = 0;       ///< and how large, in that finding's unit; 0 where it is not asked
-  double tolerance = 0;  ///< the size may be off by this
+  FindingKind kind;      ///< what the doctor should find
+  double size = 0;       ///< and how large, in that finding's unit; 0: not checked
+  double tolerance = 0;  ///< largest difference from `size`
   std::function<void(StereoRig&)> rig = {};
   std::function<void(ImuSample&)> reading = {};
   std::function<void(StereoFrame&)> frame = {};
 };
 
-/// `rig` as calibrated.
+/// All faults, for a recording with this rig.
 std::vector<Spoiler> spoilers(const StereoRig& rig);
 
 }  // namespace fbvins

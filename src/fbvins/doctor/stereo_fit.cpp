@@ -13,9 +13,9 @@ namespace {
 
 using namespace doctor::stereo;
 
-/// A change must explain this much of the epipolar error (root mean square): half of what a feature is localised to.
+/// A change must explain this much of the epipolar error (root mean square): half of the accuracy of a feature.
 constexpr double kPractical_px = 0.3;
-/// And be this many of its standard deviations.
+/// And be larger than this many of its standard deviations.
 constexpr double kSignificant = 5;
 constexpr int kMostChanges = 3;
 constexpr std::size_t kFewestMatches = 150, kMostMatches = 3000;
@@ -105,7 +105,7 @@ StereoFit fit_stereo(std::span<const StereoView> views, const StereoRig& rig, co
     fit.changes.push_back({best->group->kind, best->group->lens, amount.value, amount.covariance, explained});
     capped = best->error_px;
     problem = std::move(best->fit);
-    // What a late image does is told to first order only: its remains look like anything.
+    // The effect of a late image is modelled to first order only: what is left of it looks like other changes.
     if (best->group->kind == FindingKind::stereo_sync) break;
   }
   const Hypothesis after = problem.hypothesis();

@@ -27,7 +27,7 @@ const Unknowns kPriorSigma = of_all(0.3, 0.3, (Eigen::Matrix<double, kOfLens, 1>
 /// Steps of the numeric derivatives.
 const Unknowns kStep = of_all(1e-5, 1e-5, (Eigen::Matrix<double, kOfLens, 1>() << 1e-5, 1e-2, 1e-2, 1e-5, 1e-5).finished(), 1e-4);
 
-/// Whether an unknown changes where the rays of a camera are.
+/// Whether an unknown changes the rays of a camera's pixels.
 bool bends_left(int unknown) { return unknown >= kLeft && unknown < kDelay && (unknown < kRight || unknown >= kBoth); }
 bool bends_right(int unknown) { return unknown >= kRight && unknown < kDelay; }
 
@@ -35,7 +35,7 @@ constexpr int kIterations = 12;
 constexpr double kHardly = 1e-3, kLost_px = 60;
 constexpr double kHuberSigmas = 2, kLeastSigma_px = 0.05;
 constexpr double kCap_px = 4;
-/// Before and after an image, for how its turning changes.
+/// Half of the interval over which the angular acceleration at an image is taken.
 constexpr Duration kHalfStep{20'000'000};
 
 Vec3 tangent(const Vec3& t, int i) {
@@ -49,7 +49,7 @@ LensChange lens_of(const VectorXd& x, int first) {
   return {lens(kFocal), {lens(kCentre), lens(kCentre + 1)}, {lens(kRadial), lens(kRadial + 1)}};
 }
 
-/// The right camera's motion at an image, as Match has it; none where it is not known.
+/// The right camera's motion at an image, as in Match; 0 where it is not known.
 struct RightMotion {
   Vec3 rate = Vec3::Zero(), change = Vec3::Zero(), velocity = Vec3::Zero();
 };
@@ -64,7 +64,7 @@ RightMotion right_motion(Time t, const StereoRig& rig, const ImuSeries& imu, std
   const auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const FramePair& p) { return p.a <= t && t < p.b; });
   if (pair == pairs.end()) return out;
   const Pose<C1, C0> T_C1C0 = rig.T_C1C0();
-  // The mean of the pair, and what turning adds at the other end of the baseline.
+  // The left camera's mean velocity, and what rotation adds at the other end of the baseline.
   const Vec3 of_left = T_C1C0.R() * pair->p_CaCb / pair->dt_s(), lever = -T_C1C0.p;
   out.velocity = (of_left + out.rate.cross(lever)) / T_C1C0.p.norm();
   return out;
@@ -116,7 +116,7 @@ double typical_error_px(std::span<const Match> matches, const Hypothesis& at) {
 
 namespace {
 
-/// Mean distance, none counting for more than a match that cannot be undistorted at all.
+/// Mean distance, capped at that of a match that cannot be undistorted.
 double mean_error(std::span<const Match> matches, const Hypothesis& at) {
   double sum = 0;
   for (const Match& match : matches) sum += std::min(std::abs(at.error_px(match).value_or(kLost_px)), kLost_px);
@@ -139,7 +139,7 @@ std::vector<Moved> moved_from(const StereoRig& rig, const VectorXd& x, std::span
   return moved;
 }
 
-/// A match's error and its derivatives; none where a lens does not reach it.
+/// A match's error and its derivatives; false where a ray cannot be undistorted.
 bool linearise(const Match& match, const Hypothesis& at, std::span<const Moved> moved, double& r, VectorXd& J) {
   const auto a = at.left.undistort(match.left), b = at.right.undistort(match.right);
   if (!a || !b) return false;
@@ -164,7 +164,7 @@ Vec3 turned_baseline(const Vec3& p_C1C0, const Eigen::Vector2d& amount) {
   return so3_exp(amount(0) * tangent(direction, 0) + amount(1) * tangent(direction, 1)) * p_C1C0;
 }
 
-/// At x by the unknowns that are free; residuals with the weights that their size at x gives them.
+/// Normal equations at x in the free unknowns, with the Huber weights of the residuals at x.
 BlockFit StereoProblem::linearise() const {
   const Hypothesis at = hypothesis();
   const std::vector<Moved> moved = moved_from(*rig_, x, free);
@@ -184,7 +184,7 @@ BlockFit StereoProblem::linearise() const {
   return fit;
 }
 
-/// Goes along the step, as far as that makes the error smaller. False once it hardly does.
+/// Backtracking along the step. False once the error hardly decreases.
 bool StereoProblem::step_down(const VectorXd& step, double& error) {
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const VectorXd there = x + share * step;
@@ -207,7 +207,7 @@ std::optional<BlockSolution> StereoProblem::converge() {
   return last;
 }
 
-/// Nobody's lens is half as long again as he thinks: such a fit is of errors that no calibration has.
+/// No focal length is wrong by a third: such a fit explains something else than a wrong calibration.
 bool StereoProblem::plausible() const {
   constexpr double kMostLogFocal = 0.3;
   return std::max({std::abs(x(kLeft)), std::abs(x(kRight)), std::abs(x(kBoth))}) < kMostLogFocal;

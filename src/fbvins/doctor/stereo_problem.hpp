@@ -31,18 +31,18 @@ enum : int { kFocal = 0, kCentre = 1, kRadial = 3 };  // of a lens
 struct Match {
   Vec2 left, right;
   int stretch;
-  Vec3 rate_C1, change_C1;  ///< turning at the image, rad/s, and how it changes, rad/s^2
-  Vec3 velocity_C1;         ///< of the right camera, baselines a second
+  Vec3 rate_C1, change_C1;  ///< angular rate at the image, rad/s, and acceleration, rad/s^2
+  Vec3 velocity_C1;         ///< of the right camera, in baselines per second
 };
 
-/// The views' matches, each with the right camera's motion where `imu` and `pairs` tell it.
+/// The views' matches, each with the right camera's motion where `imu` and `pairs` give it.
 std::vector<Match> gather(std::span<const StereoView> views, const StereoRig& rig, const ImuSeries* imu,
                           std::span<const FramePair> pairs);
 
-/// The rig at some unknowns, made once for all matches.
+/// The rig changed by x, made once for all matches.
 struct Hypothesis {
   Camera left, right;
-  Mat3 R;  ///< of C0 in C1
+  Mat3 R;  ///< R_C1C0
   Vec3 t;  ///< direction of p_C1C0
   double delay, focal;
 
@@ -51,7 +51,7 @@ struct Hypothesis {
   double error_px(const Vec2& ray_left, const Vec2& ray_right, const Match& match) const;
 };
 
-/// 1.48 median.
+/// 1.48 times the median: a robust standard deviation.
 double typical_error_px(std::span<const Match> matches, const Hypothesis& at);
 }  // namespace doctor::stereo
 
@@ -68,7 +68,7 @@ class StereoProblem {
 
   std::optional<BlockSolution> converge();
   bool plausible() const;
-  /// Root mean square with no error counting for more than the cap, so that wrong matches add the same to every hypothesis.
+  /// Root mean square of the errors, each capped, so that wrong matches add the same to every hypothesis, px.
   double capped_error() const;
   doctor::stereo::Hypothesis hypothesis() const { return {*rig_, x}; }
 

@@ -16,9 +16,9 @@ namespace {
 
 constexpr int kMostLag = 3;
 constexpr std::size_t kViews = 8, kFewestMatches = 15;
-/// Below this nothing is wrong that whole images could mend; a lag must leave less, and this share of the error as stamped.
+/// Below kFits_px there is no lag. A lag must leave less than that, and than kMuchBetter of the error as stamped.
 constexpr double kFits_px = 1, kMuchBetter = 0.35;
-/// What a view in which nothing fits counts for.
+/// Largest error that a view counts with.
 constexpr double kCap_px = 20;
 
 double period_of(std::span<const StereoFrame> frames) {
@@ -27,7 +27,7 @@ double period_of(std::span<const StereoFrame> frames) {
   return median(steps);
 }
 
-/// Mean of the views' epipolar errors, so that those count in which the rig turned. None where no view shows enough.
+/// Mean of the views' epipolar errors, as a lag shows only in views in which the rig rotates. None with fewer than 3 views.
 std::optional<double> error_at(int lag, const StereoRig& rig, std::span<const StereoFrame> frames, FreeStereo& stereo) {
   double sum = 0;
   int views = 0;

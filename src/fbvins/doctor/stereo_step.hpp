@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Right images that come whole images late or early: a queue too many in a driver, or messages paired by arrival. Told by the
-// epipolar error of a rig in motion, which is small for one lag alone. One thread.
+// Right images that are late or early by whole images: one queue too many in a driver, or messages paired by arrival. Found by
+// the epipolar error of a rig in motion, which is small for one lag alone. One thread.
 //
 //   evidence.step = stereo_step(rig, held, free_stereo);
 //   StereoRealigner realigner(evidence.step.lag);
-//   if (auto frame = realigner.push(frame)) look(*frame);
+//   if (auto in_step = realigner.push(frame)) look(*in_step);
 #pragma once
 
 #include <deque>
@@ -17,10 +17,10 @@
 
 namespace fbvins {
 
-/// By consecutive `frames`. The lag is 0 where images of the same stamp fit, or where none fits much better.
+/// From consecutive `frames`. The lag is 0 where images of the same stamp fit, or where no lag fits much better.
 StereoStep stereo_step(const StereoRig& rig, std::span<const StereoFrame> frames, FreeStereo& stereo);
 
-/// Nothing but noise is different between two images, up to a small motion.
+/// Whether two left images differ by no more than noise, on average.
 bool nearly_same(const StereoFrame& a, const StereoFrame& b);
 
 class StereoRealigner {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: what a good recording leaves the doctor with, without images: features of a room of points, seen by a rig on a
-// motion known in closed form.
+// For tests: the evidence of a good recording, without images: features of a room of points, seen by a rig on a motion known in
+// closed form.
 #pragma once
 
 #include <cmath>
@@ -13,8 +13,8 @@ namespace fbvins::test {
 
 struct SyntheticSetup {
   double seconds = 14;
-  double late_s = 0;        ///< readings are stamped so late
-  double right_late_s = 0;  ///< right images are exposed so late
+  double late_s = 0;        ///< delay of the readings' stamps
+  double right_late_s = 0;  ///< delay of the right images' exposure
   double rolling_s = 0;     ///< from an image's first line to its last
   double pixel_sigma_px = 0.15;
 };

@@ -17,7 +17,7 @@ constexpr std::size_t kFewestFeatures = 20;
 constexpr double kHuber_px = 1.0;
 constexpr int kIterations = 12;
 
-/// Residual of a feature and its derivative by (turn, p) of the pair; none behind the camera.
+/// Residual of a feature and its derivative by (turn, p) of the pair; false behind the camera.
 bool residual(const Camera& camera, const PairedFeature& feature, const Vec2& ray_a, const Mat3& R_ba, const Vec3& p_ab, Vec2& r,
               Eigen::Matrix<double, 2, 6>& J) {
   // In units of the depth in a: X_b = R_ba (x_a - rho p_CaCb).
@@ -33,7 +33,7 @@ bool residual(const Camera& camera, const PairedFeature& feature, const Vec2& ra
   return true;
 }
 
-/// The motion of a pair by Gauss-Newton from standing still. False where the features do not fit one motion.
+/// The motion of a pair by Gauss-Newton, starting at none. False where the features do not fit one motion.
 bool estimate_motion(const Camera& camera, FramePair& pair) {
   std::vector<Vec2> rays;
   std::vector<PairedFeature> features;
@@ -87,7 +87,7 @@ std::vector<PairedFeature> in_both(const SeenFrame& a, const SeenFrame& b) {
   return both;
 }
 
-/// The turns of camera and readings, each less its mean turning rate: the gyroscope's bias is none of this fit's business.
+/// Angular rates of camera and gyroscope, each without its mean, so that the gyroscope's bias does not matter.
 struct Turns {
   std::vector<Vec3> seen, read;
 };
@@ -114,8 +114,8 @@ Similarity similarity(const Turns& turns) {
   const Eigen::JacobiSVD<Mat3> svd(C, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Vec3 s = svd.singularValues();
   const bool improper = svd.matrixU().determinant() * svd.matrixV().determinant() < 0;
-  // With the smallest singular value taken the other way what remains unexplained grows; where it grows little, nothing was
-  // turned about that axis, and the handedness cannot be told.
+  // Without the reflection (Umeyama's sign) more remains unexplained; if hardly more, there was no rotation about that axis, and
+  // the handedness cannot be told.
   const double with = s.sum(), without = s.x() + s.y() - s.z();
   const double left_with = 1 - with * with / (seen2 * read2), left_without = 1 - without * without / (seen2 * read2);
   out.mirrored = improper && left_without > 2 * left_with + 0.01;
@@ -172,10 +172,10 @@ std::vector<FramePair> pair_frames(const Evidence& evidence) {
 
 namespace {
 
-/// Where the clocks may be apart: first near by, and farther away where nothing fits there.
+/// Ranges of the time offset: the near one first, the far one where nothing fits there.
 constexpr double kNear_s = 0.6, kFar_s = 5, kGrid_s = 4e-3;
 constexpr std::size_t kFewestPairs = 30;
-/// A camera sees a tenth of a degree of turning in a tenth of a second; below three times that nothing is said.
+/// A camera resolves a rotation of a tenth of a degree between images; below three times that nothing is judged.
 constexpr double kLeastTurning_rad = 5e-3;
 constexpr double kSurelyCorrelated = 0.9;
 
