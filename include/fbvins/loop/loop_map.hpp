@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map beside the odometry: recognises places, says where W lies in M, and is saved and loaded.
+// A map beside the odometry: recognises places, estimates the pose of W in M, and is saved and loaded.
 //
-//   auto map = LoopMap::create(rig, {.file = "monday.fbm"});                           // to go on with; {}: a new map
+//   auto map = LoopMap::create(rig, {.file = "monday.fbm"});                           // to continue; {}: a new map
 //   if (!map) return report(map.error().message);
 //   auto system = System::create(options, rig, RunMode::threaded, {.mapper = map->get()});
 //   system->on_map_update([&](const MapUpdate& u) { T_MW = u.T_MW; });                 // T_MB = T_MW * T_WB
@@ -29,9 +29,9 @@ namespace fbvins {
 class LoopCloser;
 
 struct MapOptions {
-  std::string file = {};        ///< a map to find oneself in and go on with; empty: a new one, in which M begins where W does
-  std::string vocabulary = {};  ///< words, instead of those that ship
-  bool boosted = false;         ///< a new map of descriptors that the network improves; an old map knows its kind itself
+  std::string file = {};        ///< a map to relocalise in and continue; empty: a new one, in which M begins where W does
+  std::string vocabulary = {};  ///< file of visual words, instead of those that ship
+  bool boosted = false;         ///< a new map of descriptors that the network improves; a loaded map has its own kind
   LoopOptions loop = {};
 };
 
@@ -50,11 +50,11 @@ class LoopMap final : public Mapper {
   FinalAdjustmentReport adjust();
 
   /// Poses of a flight (in one gauge: Odometry::gauge.T_GB between two restarts) as the map has them now: exact at keyframes,
-  /// blended between them. Empty where the flight never found into the map.
+  /// interpolated between them. Empty where the flight was never localised in the map.
   Trajectory<M> corrected(const Trajectory<G>& in_G) const;
   /// Keyframes in the map now.
   int keyframes() const;
-  /// Replaces the file as a whole: there is never half of one.
+  /// Replaces the file atomically: there is never half of one.
   Result<void> save(const std::string& path) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of loop closure. What no one sets is a named constant beside the code that uses it.
+// Options of loop closure. What need not be set is a named constant beside the code that uses it.
 #pragma once
 
 #include "fbvins/core/angle.hpp"
@@ -36,8 +36,8 @@ struct DriftOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("position_m", position_m, "m", "standard deviation of position after a metre of flight; grows with its root", 1e-5, 1.0);
-    v("yaw_rad", yaw_rad, "rad", "standard deviation of yaw after a metre of flight; grows with its root", 1e-6, 0.2);
+    v("position_m", position_m, "m", "standard deviation of position after a metre; grows with the root of the path", 1e-5, 1.0);
+    v("yaw_rad", yaw_rad, "rad", "standard deviation of yaw after a metre; grows with the root of the path", 1e-6, 0.2);
   }
 };
 
@@ -56,13 +56,13 @@ struct LoopOptions {
   template <class V>
   void visit(V&& v) {
     v("max_keyframes", max_keyframes, "", "keyframes of the map at most", 20, 1000000);
-    v("thin_above", thin_above, "", "keyframes above which redundant ones are taken out", 10, 1000000);
-    v("max_distance_m", max_distance_m, "m", "places farther than this from where we should be are not looked at", 0.1, 1000.0);
-    v("gate_sigma", gate_sigma, "", "a recognised place farther from the odometry's own idea than this is refused", 1.0, 100.0);
+    v("thin_above", thin_above, "", "keyframes above which redundant ones are removed", 10, 1000000);
+    v("max_distance_m", max_distance_m, "m", "places farther than this from the predicted position are not tried", 0.1, 1000.0);
+    v("gate_sigma", gate_sigma, "", "a recognised place farther than this from the odometry's prediction is refused", 1.0, 100.0);
     v("follow_mps", follow_mps, "m/s", "fastest motion of the smooth T_MW", 0.001, 100.0);
     v("follow_radps", follow_radps, "rad/s", "fastest turn of the smooth T_MW", 1e-4, 20.0);
     v.group("extraction", extraction, "features of a keyframe");
-    v.group("verification", verification, "is it the same place");
+    v.group("verification", verification, "whether two keyframes show the same place");
     v.group("drift", drift, "how fast odometry drifts");
   }
 };

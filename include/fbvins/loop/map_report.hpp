@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the two ways of ending a map say of themselves. Values.
+// Reports of the two optimisations that finish a map. Values.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ struct PoseGraphReport {
   double initial_cost = 0, final_cost = 0;
 };
 
-/// What poses say to measurements they were not fitted to, or not to these alone: means of squared standard deviations, 1 where
-/// the noise is as assumed, and smaller is better.
+/// How well poses fit measurements that they were not, or not only, fitted to: mean squared residuals in standard deviations, 1
+/// where the noise is as assumed, and smaller is better.
 struct Plausibility {
-  double held_out = 0;  ///< observations of points that took no part, robust
+  double held_out = 0;  ///< observations of points held out of the adjustment, robust
   double imu = 0;       ///< the readings, with the motions, biases and gravity that suit the poses best; 0 without readings
   double odometry = 0;  ///< the steps between keyframes against the odometry and its drift
 };
@@ -28,7 +28,7 @@ struct FinalAdjustmentReport {
   double initial_rms_px = 0, final_rms_px = 0;  ///< of position in the image, both over the observations kept in the end
   Plausibility before, after;
   double tilt_rad = 0;       ///< by which the map was turned level
-  std::string refused = {};  ///< why, where the result is not more plausible than its beginning: the map is as it was
+  std::string refused = {};  ///< why the result does not fit better than the start, and the map is as it was; empty: accepted
 };
 
 }  // namespace fbvins

@@ -43,8 +43,9 @@ void FastCells::detect(const PyramidLevel& level, int border, int floor, std::ve
   for (const Cell& cell : cells_) out.insert(out.end(), cell.strongest, cell.strongest + cell.count);
 }
 
-/// Strengths of row y, skipping blocks in which no pixel can exceed the limits of the cells that it belongs to or is compared in. The
-/// last row of a cell and the first row of the next are compared with one another, before the lower cell has a limit: there the floor counts.
+/// Strengths of row y, skipping blocks in which no pixel can exceed the limits of the cells that it belongs to or is compared in.
+/// The last row of a cell and the first row of the next are compared with one another, before the lower cell has a limit: there
+/// the floor counts.
 void FastCells::fill(int y) {
   const bool last = y % kSide == kSide - 1 || y % kSide == 0;
   // a block and the pixels beside it touch these cells

@@ -72,7 +72,7 @@ struct KltResult {
   bool ok() const { return status == KltStatus::ok; }
 };
 
-/// Last step of a converged alignment; larger in the backward check, which only asks whether the feature comes back near its start.
+/// Last step of a converged alignment; and of the backward check, which only asks whether the feature comes back near its start.
 inline constexpr double kConverged_px = 0.03, kConvergedCheck_px = 0.1;
 
 /// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it

@@ -15,15 +15,15 @@ namespace {
 
 constexpr double kNearest_m = 0.1;
 constexpr int kMaxIterations = 25;  // of one solve
-/// Residual from which an observation counts less (Cauchy).
+/// Scale of the Cauchy loss.
 constexpr double kRobust_sigma = 2;
-/// Observations farther than this from where the solution puts them are wrong matches.
+/// Observations of which the root mean square of the three rows exceeds this are wrong matches.
 constexpr double kOutlier_sigma = 3.5;
 /// One track in so many is held out.
 constexpr std::size_t kHeldOut = 8;
-/// Over so long a time the odometry's drift stands out from the scatter of single keyframes.
+/// Time over which the odometry's drift exceeds the scatter of single keyframes.
 constexpr double kStretch_s = 3;
-/// Where a flight begins, next to nothing is known of its biases beyond what the odometry says.
+/// Weak prior on the biases at the start of a flight, at the odometry's estimates.
 constexpr double kGyroBiasSigma_radps = 0.1, kAccelBiasSigma_mps2 = 1;
 
 /// Biases at the first keyframe of a flight.
@@ -45,7 +45,7 @@ MotionBlock motion_of(const MapKeyframe& k) {
 
 ImuBias bias_of(const MotionBlock& m) { return {{m[3], m[4], m[5]}, {m[6], m[7], m[8]}}; }
 
-std::shared_ptr<const Preintegration> about(const std::shared_ptr<const Preintegration>& imu, const ImuBias& bias) {
+std::shared_ptr<const Preintegration> linearised_at(const std::shared_ptr<const Preintegration>& imu, const ImuBias& bias) {
   if (!imu->needs_repropagation(bias)) return imu;
   auto anew = std::make_shared<Preintegration>(*imu);
   anew->repropagate(bias);
@@ -135,15 +135,16 @@ void Adjustment::add_readings(ceres::Problem& problem, AdjustmentState& x) const
   for (const auto& [a, b, edge] : steps_) {
     if (!edge->imu) continue;
     problem.AddResidualBlock(
-        new ImuCost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, about(edge->imu, bias_of(x.motions[a])), map_.gravity_mps2), nullptr,
-        x.poses[a].data(), x.motions[a].data(), x.poses[b].data(), x.motions[b].data(), x.tilt.data());
+        new ImuCost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, linearised_at(edge->imu, bias_of(x.motions[a])), map_.gravity_mps2),
+        nullptr, x.poses[a].data(), x.motions[a].data(), x.poses[b].data(), x.motions[b].data(), x.tilt.data());
     if (std::exchange(begun, keyframe(a).session) != keyframe(a).session)
       problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BiasCost, 6, 9>(new BiasCost{start_.motions[a]}), nullptr,
                                x.motions[a].data());
   }
 }
 
-/// The odometry saw each point in every image and not in keyframes alone. A loop is in here as the points that both its ends see.
+/// Odometry edges stay beside the observations, because the odometry saw each point in every image and not in keyframes alone.
+/// A loop whose ends share a track is in the problem by its points already.
 void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const {
   std::set<std::pair<std::size_t, std::size_t>> seen_together;
   for (std::size_t i = 1; i < observations_.size(); ++i)
@@ -159,7 +160,7 @@ void Adjustment::add_edges(ceres::Problem& problem, AdjustmentState& x, double d
   }
 }
 
-/// What the odometry knew of gravity, for keyframes whose readings are not kept.
+/// The vertical as the odometry estimated it, for keyframes whose readings are not kept.
 void Adjustment::add_verticals(ceres::Problem& problem, AdjustmentState& x) const {
   constexpr double per_sigma = 1 / kTilt_rad;
   for (std::size_t i = 0; i < x.poses.size(); ++i) {
@@ -195,7 +196,7 @@ double Adjustment::rms_px(const AdjustmentState& x) const {
   return count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count));
 }
 
-/// With the poses held, what else there is takes the values that suit them best: no answer is blamed for those of another.
+/// With the poses held, all other unknowns are fitted to them, so that poses alone are compared.
 Plausibility Adjustment::judged(AdjustmentState x) const {
   ceres::Problem problem;
   add_observations(problem, held_out_, x);
@@ -227,7 +228,8 @@ double Adjustment::imu_cost(const AdjustmentState& x) const {
   int steps = 0;
   for (const auto& [a, b, edge] : steps_) {
     if (!edge->imu) continue;
-    const ImuCost cost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, about(edge->imu, bias_of(x.motions[a])), map_.gravity_mps2);
+    const ImuCost cost(keyframe(a).T_MB.q, keyframe(b).T_MB.q, linearised_at(edge->imu, bias_of(x.motions[a])),
+                       map_.gravity_mps2);
     const double* blocks[] = {x.poses[a].data(), x.motions[a].data(), x.poses[b].data(), x.motions[b].data(), x.tilt.data()};
     Vec15 r;
     cost.Evaluate(blocks, r.data(), nullptr);

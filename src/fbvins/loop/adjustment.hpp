@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A whole map as one least-squares problem: keyframes, points that two of them have seen, motions and biases between them and
-// the direction of gravity (docs/derivations/loop.md, L16, L18, L19). Every so many points are held out: they take no part
-// and judge the answer. One thread; the same map in gives the same answer.
+// the direction of gravity (docs/derivations/loop.md, L16, L18, L19). Every eighth point is held out of the
+// problem, to validate its solution. One thread; the same map in gives the same solution.
 //
 //   Adjustment adjustment(map);
 //   for (const FeatureTrack& track : tracks) adjustment.add(track);
@@ -21,7 +21,7 @@ class Problem;
 
 namespace fbvins {
 
-/// All unknowns: a pose and a motion a keyframe, the points, the tilt of M. Motions without readings mean nothing.
+/// All unknowns: pose and motion of each keyframe, the points, the tilt of M. Motions of keyframes without readings are unused.
 struct AdjustmentState {
   std::vector<PoseBlock> poses;
   std::vector<MotionBlock> motions;
@@ -40,12 +40,12 @@ class Adjustment {
   /// Returns the iterations. The first placed keyframe stays. `drift`: variance of the odometry's steps, in units of the drift
   /// that its edges were given.
   int solve(AdjustmentState& x, double drift = 1) const;
-  /// The same as an answer finds it, over stretches long enough for drift to show beside the answer's own scatter.
+  /// That variance as a solution shows it, over stretches long enough for drift to exceed the solution's own scatter.
   double drift_found(const AdjustmentState& x) const;
-  /// Observations that do not fit are wrong matches.
+  /// Removes observations that do not fit a solution: they are wrong matches.
   void drop_outliers(const AdjustmentState& x);
-  Plausibility judged(AdjustmentState x) const;
-  /// The map with the poses of an answer, level.
+  Plausibility judged(AdjustmentState x) const;  ///< of the poses of x; all else is fitted to them (L19)
+  /// Writes the poses of a solution into the map and turns it level.
   void write(const AdjustmentState& x, PlaceMap& map) const;
 
   std::size_t points() const;
@@ -81,7 +81,7 @@ class Adjustment {
   AdjustmentState start_;
   std::vector<Observation> observations_, held_out_;
   std::vector<Step> steps_;         ///< all edges between placed keyframes
-  std::vector<bool> has_readings_;  ///< of a keyframe: on one side of it at least
+  std::vector<bool> has_readings_;  ///< of a keyframe: an edge to or from it has readings
 };
 
 }  // namespace fbvins

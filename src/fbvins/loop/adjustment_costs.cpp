@@ -10,7 +10,7 @@ using RowMajor = Eigen::Matrix<double, Rows, Columns, Eigen::RowMajor>;
 /// No step leads nearer to a camera's plane than this, or behind it.
 constexpr double kNearest_m = 0.05;
 
-/// The IMU knows a world in which the body moves, not which one: here it is M.
+/// The IMU's residual is written for W; the same formulas hold in M, which takes its place here.
 NavState state_of(const Quat& start, const double* pose, const double* motion) {
   NavState s;
   s.T_WB = {orientation<6>(start, pose), Vec3(pose[0], pose[1], pose[2])};

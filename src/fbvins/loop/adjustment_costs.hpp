@@ -20,7 +20,7 @@ using PointBlock = std::array<double, 3>;
 using MotionBlock = std::array<double, 9>;
 using TiltBlock = std::array<double, 2>;
 
-/// (x, y, inverse depth) of a point in the camera of a keyframe less where it was seen, in standard deviations.
+/// (x, y, inverse depth) of a point in the camera of a keyframe minus those observed, in standard deviations.
 class ObservationCost final : public ceres::SizedCostFunction<3, 6, 3> {
  public:
   ObservationCost(const Quat& q_MB, const Pose<B, C0>& T_BC0, const PlaceFeature& seen)

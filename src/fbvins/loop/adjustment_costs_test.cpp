@@ -85,14 +85,14 @@ class Readings : public testing::Test {
   }
 };
 
-TEST_F(Readings, SayNothingAgainstTheTruth) {
+TEST_F(Readings, HaveNoResidualAtTheTruth) {
   const Quat q_i = motion_.state(1).T_WB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state(1.25).T_WB.q;
   const ImuCost cost(q_i, q_j, between(bias_), kGravity);
   const std::vector<double> x[] = {pose(from_, q_i), motion(from_), pose(to_, q_j), motion(to_), {0, 0}};
   const double* blocks[] = {x[0].data(), x[1].data(), x[2].data(), x[3].data(), x[4].data()};
   Vec15 r;
   ASSERT_TRUE(cost.Evaluate(blocks, r.data(), nullptr));
-  EXPECT_LT(r.norm(), 0.1) << "standard deviations; what is left is the readings' own period";
+  EXPECT_LT(r.norm(), 0.1) << "in standard deviations; what is left is due to the readings' sampling";
   const std::vector<double> tilted{0.02, 0};
   blocks[4] = tilted.data();
   ASSERT_TRUE(cost.Evaluate(blocks, r.data(), nullptr));
@@ -103,7 +103,7 @@ TEST_F(Readings, TheirJacobianIsItsDerivative) {
   const Quat q_i = motion_.state(1).T_WB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state(1.25).T_WB.q;
   std::vector<std::vector<double>> x = {pose(from_, q_i), motion(from_), pose(to_, q_j), motion(to_), {0.03, -0.02}};
   x[2][0] += 0.01, x[2][4] += 0.02, x[3][1] -= 0.05, x[1][7] += 0.1;
-  // A noise of unit weight: the residual is not to be dwarfed by its scale.
+  // Noise of unit weight, so that its scale does not hide errors of the Jacobian.
   ImuNoise loud;
   loud.gyro_noise_density_radps_rthz = loud.accel_noise_density_mps2_rthz = 1;
   loud.gyro_random_walk_radps2_rthz = loud.accel_random_walk_mps3_rthz = 1;

@@ -37,7 +37,7 @@ class MappedFile {
 /// moment leaves the old file or the new one, whole.
 Result<void> write_file_atomically(const std::string& path, std::string_view bytes);
 
-/// 64 bits that notice damage (not malice): four multiplicative hashes side by side.
+/// Checksum against damage, not against tampering: four multiplicative hashes side by side.
 std::uint64_t checksum64(std::span<const std::byte> bytes);
 
 }  // namespace fbvins

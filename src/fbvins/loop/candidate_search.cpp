@@ -9,23 +9,23 @@
 namespace fbvins {
 namespace {
 
-/// Places looked at closely for a keyframe, out of so many of the most similar.
+/// Candidates to verify for a keyframe, out of so many of the most similar.
 constexpr std::size_t kCandidates = 3;
 constexpr int kMostSimilar = 40;
-/// Keyframes younger than this are the odometry's business.
+/// Keyframes younger than this make no loop: the odometry connects them.
 constexpr double kMinAge_s = 2;
-/// Places seen from a direction that differs more are not looked at.
+/// Keyframes that look in a direction that differs more are no candidates.
 constexpr double kMaxAngle_rad = 65 * kDegree;
 /// The search reaches so many standard deviations of the position farther.
 constexpr double kReach_sigma = 3;
-/// Keyframes this near in time show one place; where nothing else tells, each speaks for its neighbours with this share
-/// of its own similarity.
+/// Keyframes this near in time show one place; where no pose is predicted, each adds this share of its similarity to that
+/// of its neighbours.
 constexpr double kGroup_s = 3;
 constexpr float kNeighbourShare = 0.25f;
 
 double seconds_between(const MapKeyframe& a, const MapKeyframe& b) { return std::abs((a.t - b.t).seconds()); }
 
-/// Several similar neighbours speak for a place.
+/// Several similar neighbours support a place.
 std::vector<IndexHit> supported_by_neighbours(const PlaceMap& map, const std::vector<IndexHit>& hits) {
   std::vector<IndexHit> grouped = hits;
   for (IndexHit& a : grouped)

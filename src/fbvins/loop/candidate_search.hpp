@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which keyframes of the map are worth a close look for a new one: the most similar by words, one of each place. One
-// thread at a time.
+// Candidates of the map for the place of a new keyframe: those most similar by words, one of each place. One thread
+// at a time.
 //
 //   CandidateSearch search(vocabulary.words(), T_BC0, 4.0);
 //   search.add(id, place.words);
@@ -23,9 +23,9 @@ class CandidateSearch {
   void add(KeyframeId id, const BowVector& words) { index_.add(id, words); }
   void remove(KeyframeId id, const BowVector& words) { index_.remove(id, words); }
 
-  /// Of those that could have been taken around `query.T_MB`, whose position is known to `sigma_m`, looking the same way.
+  /// Among keyframes near `query.T_MB`, whose position has the standard deviation `sigma_m`, that look in a similar direction.
   std::vector<KeyframeId> around(const PlaceMap& map, const MapKeyframe& query, double sigma_m);
-  /// Of all that have a place in M.
+  /// Among all that have a place in M.
   std::vector<KeyframeId> anywhere(const PlaceMap& map, const MapKeyframe& query);
 
  private:

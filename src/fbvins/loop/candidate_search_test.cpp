@@ -36,12 +36,12 @@ TEST_F(Search, FindsTheMostSimilarOnesAroundHereThatLookTheSameWay) {
   const KeyframeId good = add(0, Vec3(1, 0, 0), 0.3, 0.5f), better = add(10, Vec3(0, 2, 0), -0.5, 0.9f);
   add(20, Vec3(4.5, 0, 0), 0, 0.9f);                      // too far
   add(30, Vec3(0, 0, 0), 1.3, 0.9f);                      // looks elsewhere
-  const KeyframeId young = add(99, Vec3(0, 0, 0), 0, 1);  // the odometry's business
+  const KeyframeId young = add(99, Vec3(0, 0, 0), 0, 1);  // too recent: the odometry connects it
   EXPECT_EQ(search_.around(map_, query(100), 0), (std::vector{better, good}));
   EXPECT_EQ(search_.around(map_, query(200), 0), (std::vector{young, better, good}));
 }
 
-TEST_F(Search, ReachesFartherWhereThePositionIsVague) {
+TEST_F(Search, ReachesFartherWhereThePositionIsUncertain) {
   const KeyframeId far = add(0, Vec3(6, 0, 0), 0, 0.5f);
   EXPECT_TRUE(search_.around(map_, query(100), 0.5).empty());
   EXPECT_EQ(search_.around(map_, query(100), 1.0), std::vector{far});
@@ -55,7 +55,7 @@ TEST_F(Search, NeighboursInTimeAreOnePlaceOfThreeAtMost) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(found[i].value / 3, static_cast<std::int64_t>(i));
 }
 
-TEST_F(Search, AnywhereNeighboursSpeakForAPlace) {
+TEST_F(Search, AnywhereNeighboursSupportAPlace) {
   const KeyframeId alone = add(0, Vec3(50, 0, 0), 2, 0.6f);
   const KeyframeId first = add(10, Vec3(90, 0, 0), 2, 0.5f);
   add(10.5, Vec3(90, 0, 0), 2, 0.5f);

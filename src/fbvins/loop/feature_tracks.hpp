@@ -13,7 +13,7 @@
 
 namespace fbvins {
 
-/// A feature of a keyframe, both by their position in the map's lists.
+/// A feature of a keyframe, both by their index in the map's lists.
 struct FeatureView {
   std::size_t keyframe = 0, feature = 0;
 };

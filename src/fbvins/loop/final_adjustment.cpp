@@ -14,17 +14,17 @@ namespace {
 /// Keyframes before it that each keyframe is matched with, and how far from where the map predicts it a match may be.
 constexpr int kNeighbours = 3;
 constexpr double kMatchRadius_px = 8;
-/// The odometry's steps are weighed by what they turn out to err by, which is less than the drift assumed while flying; not less
-/// than this share of its variance.
+/// Odometry edges are weighted by the drift that the first solve finds, which is less than the one assumed while flying; at least
+/// this share of its variance.
 constexpr double kLeastDrift = 0.01;
-/// Points held out must fit better by this: with less the result is another, and as often worse.
+/// Held-out points must fit better by this factor: results that gained less were as often worse as better.
 constexpr double kBetter = 0.985;
-/// What decides is squared and a mean of thousands: so much more is worse, not chance.
+/// The criteria are means of thousands of squared residuals: an increase by this factor is not chance.
 constexpr double kWorse = 1.02;
-/// Readings that fit to their noise are not asked to fit better, and steps within the odometry's drift are all alike.
+/// Readings that fit to their noise need not fit better, nor steps within twice the standard deviation of the drift.
 constexpr double kImuFits = 1, kDriftLimit = 4;
 
-/// Why the result is not more plausible than its beginning; empty where it is.
+/// Why the result does not fit better than the start; empty where it does.
 std::string objection(const Plausibility& before, const Plausibility& after) {
   if (after.held_out > before.held_out)
     return fmt::format("points held out fit worse than before: {:.3f} -> {:.3f} squared standard deviations", before.held_out,

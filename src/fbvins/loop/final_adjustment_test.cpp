@@ -61,7 +61,7 @@ TEST(FinalAdjustment, WrongDepthsDoNotBendIt) {
   EXPECT_LT(error_m(m), 1.5 * error_m(clean) + 0.001);
 }
 
-/// The same with the IMU, in a gauge that is not level, of which the estimator knows nothing: it takes M for level.
+/// The same with the IMU, in a gauge that is not level, which the estimator does not know: it takes M for level.
 Mapped mapped_with_readings(std::uint64_t seed, const Quat& q_GL, bool false_readings = false) {
   Mapped m{flight(room(1), 140, 0.004, 0.05, seed), {}};
   const ImuBias bias{{0.01, -0.02, 0.015}, {0.2, -0.1, 0.3}};
@@ -106,7 +106,7 @@ TEST(FinalAdjustment, TheReadingsLevelTheMap) {
   }
 }
 
-TEST(FinalAdjustment, AResultThatHeldOutObservationsDenyIsRefusedAndTheMapStays) {
+TEST(FinalAdjustment, AResultThatFitsNoBetterIsRefusedAndTheMapStays) {
   Mapped m = mapped_with_readings(5, Quat::Identity(), true);  // of another moment of the flight
   const std::string before = serialise_map(m.map);
   const FinalAdjustmentReport report = adjust_map(m.map, {});

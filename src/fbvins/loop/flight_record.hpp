@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every keyframe that flew past, each hung on one that is still in the map: from it the poses of the whole flight follow
-// the map, though the map lets go of keyframes. One thread at a time.
+// Every keyframe of the flight, each attached to one that is still in the map, so that the poses of the whole flight follow
+// the map although keyframes are removed from it. One thread at a time.
 //
 //   FlightRecord flight;
 //   flight.add(t, id);
@@ -18,12 +18,12 @@ namespace fbvins {
 class FlightRecord {
  public:
   void add(Time t, KeyframeId id) { entries_.push_back({t, id, {}}); }
-  /// What hung on `gone` hangs on `heir` from now on.
+  /// Attaches what was attached to `gone` to `heir`.
   void hand_over(KeyframeId gone, KeyframeId heir, const Pose<B, B>& T_heir_gone);
-  /// What hung on `gone` is lost.
+  /// Drops what was attached to `gone`.
   void drop(KeyframeId gone);
-  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, blended between them. Keyframes that have no
-  /// place in M are passed over; empty where there is no other.
+  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, interpolated between them. Keyframes that
+  /// have no place in M are passed over; empty where there is no other.
   Trajectory<M> corrected(const PlaceMap& map, const Trajectory<G>& in_G) const;
 
  private:

@@ -41,7 +41,7 @@ class Record : public testing::Test {
   FlightRecord flight_;
 };
 
-TEST_F(Record, IsExactAtKeyframesBlendedBetweenThemAndGoesOnAfterTheLast) {
+TEST_F(Record, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
   ASSERT_EQ(corrected().size(), 7u);
   EXPECT_NEAR(x_at(0), 0, 1e-12);
   EXPECT_NEAR(x_at(4), 2.2, 1e-12);
@@ -49,7 +49,7 @@ TEST_F(Record, IsExactAtKeyframesBlendedBetweenThemAndGoesOnAfterTheLast) {
   EXPECT_NEAR(x_at(6), 3.3 + 1, 1e-12);
 }
 
-TEST_F(Record, WhatHungOnAKeyframeFollowsItsHeir) {
+TEST_F(Record, PosesOfARemovedKeyframeFollowItsHeir) {
   const Pose<B, B> T_heir_gone(Quat::Identity(), Vec3(1.1, 0, 0));
   flight_.hand_over(KeyframeId{2}, KeyframeId{1}, T_heir_gone);
   map_.remove(KeyframeId{2});

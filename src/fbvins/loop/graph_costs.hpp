@@ -19,7 +19,7 @@ inline ceres::Solver::Options repeatable_solver(ceres::LinearSolverType type, in
   solver.num_threads = 1;
   solver.max_num_iterations = max_iterations;
   solver.function_tolerance = 1e-5;
-  solver.max_solver_time_in_seconds = 1e9;  // never the clock
+  solver.max_solver_time_in_seconds = 1e9;  // never limited by time
   solver.logging_type = ceres::SILENT;
   return solver;
 }
@@ -39,7 +39,7 @@ Eigen::Quaternion<T> orientation(const Quat& start, const T* x) {
   }
 }
 
-/// d(right perturbation of the orientation) / d(x[3..5]) for six degrees of freedom: the turn of (1, x/2).
+/// d(right perturbation of the orientation) / d(x[3..5]) for six degrees of freedom: of the rotation (1, x/2), normalised.
 inline Mat3 turn_jacobian(const double* x) {
   const Vec3 half(0.5 * x[3], 0.5 * x[4], 0.5 * x[5]);
   return (Mat3::Identity() - hat(half)) / (1 + half.squaredNorm());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which keyframes share words with an image: for every word the keyframes that hold it. A query touches only the
-// words of the image, so it grows with the map as slowly as the words get crowded. One thread at a time.
+// words of the image, so its cost grows with the keyframes per word only. One thread at a time.
 //
 //   InvertedIndex index(vocabulary.words());
 //   index.add(KeyframeId{0}, words);

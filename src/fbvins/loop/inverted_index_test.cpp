@@ -20,7 +20,7 @@ BowVector image(Rng& rng) {
   return bow;
 }
 
-TEST(InvertedIndex, SaysWhatComparingWithEveryImageSays) {
+TEST(InvertedIndex, AgreesWithComparingWithEveryImage) {
   Rng rng(1);
   InvertedIndex index(kWords);
   std::vector<BowVector> images;
@@ -33,7 +33,7 @@ TEST(InvertedIndex, SaysWhatComparingWithEveryImageSays) {
     EXPECT_GE(hits[i == 0 ? 0 : i - 1].similarity, hits[i].similarity);
   }
   EXPECT_EQ(index.query(query, 3).size(), 3u);
-  EXPECT_EQ(index.query(query, 3)[0].keyframe, hits[0].keyframe) << "nothing stays behind from the query before";
+  EXPECT_EQ(index.query(query, 3)[0].keyframe, hits[0].keyframe) << "a query leaves no state behind";
 }
 
 TEST(InvertedIndex, EqualOnesComeInOrderOfId) {

@@ -12,25 +12,25 @@
 namespace fbvins {
 namespace {
 
-/// Roll and pitch of the map and of the odometry differ by about this.
+/// Standard deviation of the difference between the map's and the odometry's roll and pitch.
 constexpr double kTiltSigma_rad = 0.005;
 /// A new map begins as the gauge of its first flight, turned level.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
-/// What a first recognition is trusted with before it is weighed itself.
+/// Prior of T_MG at relocalisation, before the recognised pose is applied as a measurement.
 constexpr double kFoundSigma_m = 0.05, kFoundSigma_rad = 0.01;
-/// A feature is looked for around where it is predicted: so far at least, three standard deviations farther (of a point at
-/// a typical depth), and not at all by prediction where that is too wide.
+/// Search radius around a predicted feature: the narrowest plus three standard deviations (for a point at a typical depth);
+/// from the widest on the prediction is not used.
 constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDepth_m = 2, kWidestPrediction_px = 45;
-/// Loops until the graph is optimised; a large map waits for this share of its size.
+/// New loops after which the graph is optimised; in a large map one for every kOptimiseShare keyframes.
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
-/// Differences of two rigs' bodies (m and rad together) below this are of rounding.
+/// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
 constexpr double kSameBody = 1e-9;
 
 Pose<B, B> as_body(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0.p}; }
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
 
-/// Null where readings are missing on the way, or keyframes between are.
+/// Null where readings are missing on the way, or keyframes in between.
 std::shared_ptr<const Preintegration> readings_between(Time from, Time to, const KeyframeImu& imu) {
   if (imu.segments.empty()) return nullptr;
   Preintegration between(imu.noise, imu.bias);
@@ -59,7 +59,7 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
       frame_(options.drift),
       follower_(options.follow_mps, options.follow_radps),
       thinning_(options.thin_above, options.max_keyframes) {
-  // Places hang on the camera; another rig's body lies elsewhere.
+  // Places belong to the camera; another rig may have its body elsewhere.
   const Pose<B, B> T_old_new = as_body(map_.T_BC0) * as_body(T_BC0_).inverse();
   const bool moved = !map_.empty() && T_old_new.p.norm() + angle_between(T_old_new.q, Quat::Identity()) > kSameBody;
   for (MapKeyframe& k : map_.keyframes()) {
@@ -93,8 +93,8 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-/// Up has become better known. Where the flight began the map, all of M is turned level at once, and nothing in it moves
-/// against anything else; where it has joined an older one, M is level already, and the flight's own keyframes turn.
+/// Gravity has become better known. Where the flight began the map, all of M is turned level at once, which changes no
+/// relative pose; where it has joined an older one, M is level already, and the flight's own keyframes turn.
 void LoopCloser::level(const Quat& q_LG) {
   const Quat turned = q_LG * session_.q_LG.conjugate();
   session_.q_LG = q_LG;
@@ -193,7 +193,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
   for (const Proposal& proposal : proposals) {
     MapKeyframe& k = *map_.find(proposal.candidate);
     SeenPose seen = seen_pose(k, proposal.edge);
-    // What the lever makes of a different roll and pitch is not drift.
+    // The error that different roll and pitch cause through the lever arm is not drift.
     double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
     if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
     seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
@@ -224,7 +224,7 @@ void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& pro
   }
 }
 
-/// What this session saw before it knew where it was now has a place in M.
+/// Gives the session's keyframes from before the relocalisation their poses in M.
 void LoopCloser::join_session(const Pose<M, G>& T_MG) {
   for (MapKeyframe& k : map_.keyframes())
     if (k.session == session_.number) k.T_MB = T_MG * k.T_GB, k.placed = true;
@@ -272,7 +272,7 @@ PoseGraphReport LoopCloser::finish() { return map_.optimise({options_.degrees_of
 
 FinalAdjustmentReport LoopCloser::adjust() { return adjust_map(map_, verification_for(map_, options_.verification)); }
 
-/// Poses that hung on the keyframe hang on its heir from now on; without one they go too.
+/// Poses attached to the keyframe are attached to its heir; without one they are dropped.
 void LoopCloser::take_out(KeyframeId id) {
   const MapKeyframe& gone = *map_.find(id);
   if (const MapKeyframe* heir = heir_of(map_, gone); heir != nullptr)

@@ -31,7 +31,7 @@ namespace fbvins {
 class LoopCloser final : public Mapper {
  public:
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
-  /// Goes on in an old map: M is that map's frame, and the flight must first be found in it. With boosted descriptors, `stage`
+  /// Continues an old map: M is that map's frame, and the flight must first be localised in it. With boosted descriptors, `stage`
   /// makes them; vocabulary and map must be of the same kind.
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
@@ -46,14 +46,14 @@ class LoopCloser final : public Mapper {
   FinalAdjustmentReport adjust();
 
   const PlaceMap& map() const { return map_; }
-  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, blended between them. Frames of a
-  /// session that never found into the map are left out.
+  /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, interpolated between them. Frames of a
+  /// session that was never localised in the map are left out.
   Trajectory<M> corrected(const Trajectory<G>& in_G) const { return flight_.corrected(map_, in_G); }
 
  private:
-  /// The odometry's present gauge.
+  /// The part of the flight in the odometry's present gauge: since its last restart.
   struct Session {
-    std::uint32_t number = 0;  ///< counts those that met this map
+    std::uint32_t number = 0;  ///< counts the sessions of this map
     bool begun = false;
     std::uint32_t reset_counter = 0;
     bool began_map = false;  ///< M is its gauge, turned level

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stage on flights through a synthetic room of points: drift is taken out, look-alikes are refused, maps are met
-// again, memory stays bounded, bits repeat.
+// The stage on flights through a synthetic room of points: drift is corrected, look-alikes are refused, flights relocalise
+// in maps, memory stays bounded, bits repeat.
 #include "fbvins/loop/loop_closer.hpp"
 
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ TEST(LoopCloser, TakesOutDriftAtOnceAndMoreAfterwards) {
   EXPECT_LT(o.after_m, 0.5 * o.W_m);
 }
 
-TEST(LoopCloser, WhatIsLearnedOfUpLaterTurnsTheWholeMapAndBendsNothing) {
+TEST(LoopCloser, BetterKnownGravityTurnsTheWholeMapAndBendsNothing) {
   const auto frames = flight(room(1), 200, 0.004, 0.05, 3);
   const Quat q_GL = so3_exp(Vec3(0.04, -0.03, 0));
   LoopCloser level(rig(), {}, vocabulary()), tilted(rig(), {}, vocabulary());
@@ -63,7 +63,7 @@ TEST(LoopCloser, WhatIsLearnedOfUpLaterTurnsTheWholeMapAndBendsNothing) {
     const Frame& f = frames[i];
     Keyframe k = keyframe(FrameId{static_cast<std::int64_t>(i)}, f.t, f.odometry);
     level.process(f.place, k);
-    // The same flight in a gauge that is not level, which is found out in the first 60 keyframes.
+    // The same flight in a gauge that is not level; its tilt becomes known over the first 60 keyframes.
     k.gauge.T_GB = {q_GL * f.odometry.q, q_GL * f.odometry.p};
     k.gauge.q_LG = so3_exp(std::min(1.0, static_cast<double>(i) / 60) * so3_log(q_GL.conjugate()));
     const MapUpdate u = tilted.process(f.place, k);

@@ -34,7 +34,7 @@ MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, c
 /// T_BcBq with the covariance of (dp in the candidate's body, dtheta in the query's), from the cameras' T_qc.
 MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose) {
   const CameraFromCamera& T_qc = pose.T_qc;
-  const Pose<B, B> T_cq(T_qc.inverse().q, T_qc.inverse().p);  // of cameras; frames are told apart by the formulas here
+  const Pose<B, B> T_cq(T_qc.inverse().q, T_qc.inverse().p);  // of cameras, though the types say bodies: see the formulas
   Mat6 J = Mat6::Zero();
   J.topLeftCorner<3, 3>() = -T_qc.R().transpose();
   J.topRightCorner<3, 3>() = hat(T_cq.p);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges of the map from what was measured: the odometry between two keyframes, a place seen again; and what a place seen
-// again says of where the body is in M (docs/derivations/loop.md, L13). Pure functions.
+// Edges of the map from what was measured: the odometry between two keyframes, or a recognised place; and the pose of the body
+// in M that a recognised place implies (docs/derivations/loop.md, L13). Pure functions.
 //
 //   MapEdge edge = loop_edge(T_BC0, candidate.id, verified.pose);
 //   if (frame.mahalanobis2(seen_pose(candidate, edge)) < gate) map.edges.push_back(edge);
@@ -15,13 +15,13 @@ namespace fbvins {
 /// Angle of the rotation that takes one attitude to the other, rad.
 double angle_between(const Quat& a, const Quat& b);
 
-/// From the keyframe before to a pose of the same W; `to` is left open.
+/// From the keyframe before to a pose in the same gauge; `to` is left open.
 MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
 
-/// From the candidate to the body that saw it again; `to` is left open. `pose`: of the candidate's camera in the query's.
+/// From the candidate to the query's body; `to` is left open. `pose`: of the candidate's camera in the query's.
 MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);
 
-/// Where the body at the end of `edge` is, as `from` says.
+/// Pose in M of the body at the end of `edge`, from that of `from`.
 SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge);
 
 }  // namespace fbvins

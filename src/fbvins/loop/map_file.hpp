@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kMapVersion = 1;
 
 /// Bytes of a map as in the file: the same map gives the same bytes.
 std::string serialise_map(const PlaceMap& map);
-/// `name` is only for messages. Every damage is an error with a sentence.
+/// `name` is for messages only. Damaged bytes are an error that says what is wrong.
 Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& name);
 
 Result<void> save_map(const PlaceMap& map, const std::string& path);

@@ -137,7 +137,7 @@ TEST_F(MapFile, AKillAtAnyMomentLeavesTheOldOrTheNewFileWhole) {
     for (const auto& entry : fs::directory_iterator(folder_))
       if (entry.path().extension() == ".part") ++killed_midway, fs::remove(entry.path());
   }
-  EXPECT_GT(killed_midway, 0) << "no kill fell into a write: the test shows nothing";
+  EXPECT_GT(killed_midway, 0) << "no kill hit a write: the test shows nothing";
 }
 
 TEST_F(MapFile, ExportsPointsAndKeyframes) {

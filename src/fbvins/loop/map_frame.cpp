@@ -52,7 +52,7 @@ void MapFrame::advance(const Pose<G, B>& T_GB, Time t) {
   if (last_ && known_) {
     const Vec3 step = T_GB.p - last_->T_GB.p;
     const DriftVariance drift = drift_over(options_, step.norm(), std::abs((t - last_->t).seconds()));
-    Mat4 F = Mat4::Identity();  // the yaw swings the step
+    Mat4 F = Mat4::Identity();  // a yaw error turns the step
     F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MG_.q * step);
     P_ = F * P_ * F.transpose();
     P_.diagonal() += Vec4(drift.position_m2, drift.position_m2, drift.position_m2, drift.yaw_rad2);

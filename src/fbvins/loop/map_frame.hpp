@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a flight's gauge G lies in the map M right now: a Kalman filter over position and yaw of the body in M, which
-// odometry drift widens and recognised places narrow (docs/derivations/loop.md, L12-L14); its tilt is not filtered, it is
-// what the flight knows of up. And a follower of T_MW that moves by a bounded amount a second, for those who fly by it.
+// The present pose of a flight's gauge G in the map M: a Kalman filter over position and yaw of the body in M, predicted with
+// the odometry's drift and updated by recognised places (docs/derivations/loop.md, L12-L14); its tilt is not filtered but
+// the flight's own estimate of gravity. And a follower of T_MW of limited speed, for controllers that fly in M.
 // Values; one thread at a time.
 //
 //   MapFrame frame(options);
 //   frame.level(q_LG);
-//   frame.reset(T_MG);
+//   frame.reset(T_MG, 0.05, 0.01);
 //   frame.advance(T_GB, t);                       // every keyframe
 //   if (frame.mahalanobis2(seen) < 25) frame.update(seen);
 //   Pose<M, B> T_MB = frame.T_MG() * T_GB;
@@ -30,13 +30,13 @@ struct DriftVariance {
 };
 DriftVariance drift_over(const DriftOptions& options, double metres, double seconds);
 
-/// A pose of the body in M as some place says, with the covariance of (position, yaw).
+/// A pose of the body in M from a recognised place, with the covariance of (position, yaw).
 struct SeenPose {
   Pose<M, B> T_MB;
   Mat4 covariance = Mat4::Identity();
 };
 
-/// Rotation about z of a rotation that is nearly one, rad; and the rotation about z by that much.
+/// Yaw of a rotation that is nearly about z, rad; and the rotation about z by an angle.
 double yaw_of(const Quat& q);
 Quat about_z(double yaw_rad);
 
@@ -52,14 +52,14 @@ class MapFrame {
   const Mat4& covariance() const { return P_; }
 
   void forget() { known_ = false, last_.reset(); }
-  /// What turns G level is known anew: the body stays where it is in M, and so does the yaw.
+  /// Takes a new estimate of q_LG, which turns G level: the body stays where it is in M, and so does the yaw.
   void level(const Quat& q_LG);
-  /// All of M is turned, the body in it: T takes its points to where they are from now on. Followed by level().
+  /// All of M is turned, the body with it: T takes old coordinates in M to new ones. Call level() afterwards.
   void turn(const Pose<M, M>& T) { T_MG_ = T * T_MG_; }
-  /// Takes over a frame; `sigma` of position [m], of yaw [rad]. Of T_MG only what it does beyond levelling G is kept: its
-  /// yaw, and where it puts the body.
+  /// Sets the frame, with standard deviations of position and of yaw. Of T_MG only the yaw and where it puts the body are
+  /// kept: its tilt follows from q_LG.
   void reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad);
-  /// The odometry went on to here.
+  /// Predicts: the odometry's next pose.
   void advance(const Pose<G, B>& T_GB, Time t);
   double mahalanobis2(const SeenPose& seen) const;
   void update(const SeenPose& seen);
@@ -83,7 +83,7 @@ class MapFrame {
   std::optional<Stamped> last_;
 };
 
-/// Follows T_MG without a step: at the body, at most `max_mps` and `max_radps`.
+/// Follows T_MW without a step: at the body, at most `max_mps` and `max_radps`.
 class MapFrameFollower {
  public:
   MapFrameFollower(double max_mps, double max_radps) : max_mps_(max_mps), max_radps_(max_radps) {}

@@ -36,7 +36,7 @@ TEST(MapFrame, IsUnknownUntilItIsSetAndKeepsYawAndPositionOnly) {
   EXPECT_FALSE(frame.known());
 }
 
-TEST(MapFrame, UpLearnedLaterTurnsAboutTheBody) {
+TEST(MapFrame, BetterKnownGravityTurnsItAboutTheBody) {
   MapFrame frame({});
   frame.advance(body_at(Vec3(5, 0, 1)), Time{0});
   frame.reset({about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
@@ -51,7 +51,7 @@ TEST(MapFrame, UpLearnedLaterTurnsAboutTheBody) {
   EXPECT_LT((frame.T_MG() * Vec3(5, 0, 1) - T * p_MB).norm(), 1e-12);
 }
 
-TEST(MapFrame, FlyingWidensAndAPlaceNarrows) {
+TEST(MapFrame, FlyingWidensTheCovarianceAndAPlaceNarrowsIt) {
   MapFrame frame({.position_m = 0.01, .yaw_rad = 0.002});
   frame.advance(body_at(Vec3::Zero()), Time{0});
   frame.reset({}, 0.01, 0.001);
@@ -59,8 +59,8 @@ TEST(MapFrame, FlyingWidensAndAPlaceNarrows) {
   frame.advance(body_at(Vec3(9, 0, 0)), Time{1'000'000'000});
   const Mat4 flown = frame.covariance();
   EXPECT_GT(flown(0, 0), before(0, 0) + 8 * 0.01 * 0.01);
-  EXPECT_GT(flown(1, 1), flown(0, 0)) << "the yaw swings the step sideways";
-  EXPECT_NEAR(flown(1, 3), 9 * before(3, 3), 1e-6) << "and the two errors hang together";
+  EXPECT_GT(flown(1, 1), flown(0, 0)) << "a yaw error turns the step sideways";
+  EXPECT_NEAR(flown(1, 3), 9 * before(3, 3), 1e-6) << "and the two errors are correlated";
   SeenPose seen{{about_z(0.01), Vec3(9, 0.05, 0)}, 1e-4 * Mat4::Identity()};
   const double far = frame.mahalanobis2(seen);
   frame.update(seen);
@@ -82,7 +82,7 @@ TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
 
 TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
   MapFrameFollower follower(0.2, 0.05);
-  const Pose<W, B> T_WB(Quat::Identity(), Vec3(30, 0, 0));  // far from the origin: yaw must not swing the body
+  const Pose<W, B> T_WB(Quat::Identity(), Vec3(30, 0, 0));  // far from the origin: a change of yaw must not move the body
   (void)follower.follow({}, T_WB, Time{0});
   const Pose<M, W> target(so3_exp(Vec3(0, 0, 0.05)), Vec3(0.5, -1, 0));
   Vec3 before = T_WB.p;

@@ -6,14 +6,14 @@ namespace fbvins {
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary) {
   if (first.boosted != second.boosted)
     return Error{ErrorCode::invalid_argument, "one map holds boosted descriptors, the other raw ones"};
-  StereoRig rig;  // only the place of the left camera matters: nothing is extracted
+  StereoRig rig;  // only the left camera's extrinsics matter: nothing is extracted
   rig.T_BC0 = first.T_BC0;
   LoopOptions merging = options;
   merging.degrees_of_freedom = 6;
   LoopCloser closer(rig, merging, vocabulary, std::move(first));
   bool joined = false;
   for (const MapKeyframe& k : second.keyframes()) {
-    // Its map is flown once more as odometry, already corrected; the body may sit elsewhere on the other rig.
+    // The poses of its map serve as odometry, already corrected; the body may sit elsewhere on the other rig.
     const Pose<M, C0> T_MC = k.T_MB * second.T_BC0;
     const Pose<M, B> T_MB = T_MC * rig.T_BC0.inverse();
     Place place = k.place;

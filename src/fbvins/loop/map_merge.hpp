@@ -9,7 +9,7 @@
 
 namespace fbvins {
 
-/// `second` is flown through again in the frame of `first`; then everything is optimised with six degrees of
+/// The keyframes of `second` are processed as a flight that continues `first`; then everything is optimised with six degrees of
 /// freedom. An error where they have no place in common.
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary);
 

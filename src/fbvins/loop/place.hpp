@@ -34,8 +34,8 @@ struct Place {
   std::vector<Descriptor> descriptors;
   std::vector<PlaceFeature> features;  ///< feature i has descriptor i
   BowVector words;
-  Vec3 up_C0 = Vec3::UnitZ();  ///< away from gravity, as the odometry knows it by now
-  double focal_px = 460;       ///< what a pixel is in normalised units
+  Vec3 up_C0 = Vec3::UnitZ();  ///< the vertical, upwards, as the odometry estimates it at present
+  double focal_px = 460;       ///< pixels per unit of normalised coordinates
 
   std::size_t size() const { return features.size(); }
 };

@@ -25,7 +25,7 @@ constexpr double kEpipolar_px = 1.0;
 constexpr double kNearerThanSearched = 1.1;
 /// Standard deviations: of a keypoint, times the scale of its level, and of a disparity.
 constexpr double kKeypoint_px = 0.7, kDisparity_px = 0.25;
-/// Disparities down to this are infinitely far rather than wrong.
+/// Negative disparities down to this are taken for points at infinity, not for wrong matches.
 constexpr double kInfinity_px = 1.0;
 
 }  // namespace
@@ -76,7 +76,7 @@ std::optional<Vec2> PlaceExtractor::project(const Vec2& left_normalised, double 
   return rig_.right.project(R_rl_ * left_normalised.homogeneous() + inverse_depth * p_rl_);
 }
 
-/// Best place along the epipolar curve on a coarse level.
+/// Position of the best correlation along the epipolar curve, on a coarse level.
 std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
   const int l = std::min(kSearchLevel, right_.levels() - 1);
   const KltLevelTemplate& patch = patch_.levels[static_cast<std::size_t>(l)];

@@ -26,7 +26,7 @@ class PlaceExtractor {
   PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
                  std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
-  /// `R_LB`: attitude against the level. Empty when the left image is missing; without depth when the right one is.
+  /// `R_LB`: gravity-aligned attitude of the body. Empty when the left image is missing; without depth when the right one is.
   Place extract(const StereoFrame& images, const Mat3& R_LB);
 
  private:

@@ -47,7 +47,7 @@ TEST(PlaceExtractor, FindsTheDepthOfAWall) {
   EXPECT_GT(right, 0.95 * with_depth);
 }
 
-TEST(PlaceExtractor, KnowsUpFromTheAttitude) {
+TEST(PlaceExtractor, TakesTheVerticalFromTheAttitude) {
   const Quat R_LB = so3_exp(Vec3(0.3, -0.2, 1.0));
   const Place place = extractor().extract({}, R_LB.toRotationMatrix());
   EXPECT_LT((R_LB * (test_room::rig().T_BC0.q * place.up_C0) - Vec3::UnitZ()).norm(), 1e-12);

@@ -16,7 +16,7 @@ auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) 
   return it != keyframes.end() && it->id == id ? &*it : nullptr;
 }
 
-/// An interval this long binds the ends no more than the odometry's relative pose does.
+/// Readings over a longer interval constrain its ends no better than the odometry's relative pose does.
 constexpr double kLongestImu_s = 5;
 
 std::shared_ptr<const Preintegration> joined(const MapEdge& first, const MapEdge& second) {
@@ -37,7 +37,7 @@ MapEdge composed(const MapEdge& first, const MapEdge& second, MapEdge::Kind kind
 
 /// The same edge from its other end.
 MapEdge reversed(const MapEdge& e) {
-  // T^-1: dp' = -R^T dp + hat(R^T p) ... with dtheta now in the old `from`.
+  // Of T^-1, with p' its position: dp' = -R^T dp + hat(p') dtheta, dtheta' = -R dtheta.
   const Mat3 R = e.T_from_to.R();
   Mat6 J = Mat6::Zero();
   const Pose<B, B> inverse = e.T_from_to.inverse();
@@ -85,14 +85,15 @@ void PlaceMap::remove(KeyframeId id) {
   MapEdge turned;
   if (before != edges.end()) bridge = &*before;
   else if (after != edges.end()) turned = reversed(*after), bridge = &turned;
-  // An heir that has loops enough gets no more: the graph must not grow with every round in the same room.
+  // A neighbour that has enough loops gets no more: the graph must not grow with every round in the same room.
   constexpr int kEnoughLoops = 6;
-  int heirs = 0;
+  int loops_of_neighbour = 0;
   if (bridge != nullptr)
-    for (const MapEdge& e : edges) heirs += e.kind == MapEdge::Kind::loop && (e.from == bridge->from || e.to == bridge->from);
+    for (const MapEdge& e : edges)
+      loops_of_neighbour += e.kind == MapEdge::Kind::loop && (e.from == bridge->from || e.to == bridge->from);
   if (bridge != nullptr)
     for (const MapEdge& e : edges) {
-      if (e.kind != MapEdge::Kind::loop || (e.from != id && e.to != id) || heirs++ >= kEnoughLoops) continue;
+      if (e.kind != MapEdge::Kind::loop || (e.from != id && e.to != id) || loops_of_neighbour++ >= kEnoughLoops) continue;
       const MapEdge moved = composed(*bridge, e.from == id ? e : reversed(e), MapEdge::Kind::loop);
       if (moved.from != moved.to) added.push_back(moved);
     }
@@ -117,7 +118,7 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
   if (keyframes_.empty()) return {};
   PoseGraph graph;
   const auto index_of = [&](KeyframeId id) { return static_cast<int>(find(id) - keyframes_.data()); };
-  // What hangs together with the first keyframe; another part has no place in M yet and stays as it is.
+  // Keyframes connected to the first one; the others have no place in M yet and stay as they are.
   std::vector<std::vector<int>> neighbours(keyframes_.size());
   for (const MapEdge& e : edges) {
     neighbours[static_cast<std::size_t>(index_of(e.from))].push_back(index_of(e.to));

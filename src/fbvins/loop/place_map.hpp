@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map: keyframes that know what they saw, where they are in M, and the relative poses between them. These are as they were
-// seen, in the gauge of a flight; M is level, and is turned as a whole when up becomes better known (loop.md, L17).
+// The map: keyframes with their features and poses in M, and relative poses between them. Relative poses are as estimated, in
+// the gauge of a flight; M is level, and is turned as a whole when gravity becomes better known (loop.md, L17).
 // A value; one thread at a time.
 //
 //   PlaceMap map;
@@ -22,7 +22,7 @@ namespace fbvins {
 
 class Preintegration;
 
-/// How a keyframe moved, as the estimator knew it. Not saved.
+/// Velocity and biases at a keyframe as estimated in flight. Not saved.
 struct MapMotion {
   Vec3 v_GB = Vec3::Zero();  ///< m/s, in the flight's gauge
   ImuBias bias;
@@ -32,11 +32,11 @@ struct MapKeyframe {
   KeyframeId id;
   Time t;
   std::uint32_t session = 0;  ///< which flight's gauge G it was taken in
-  Pose<G, B> T_GB;            ///< as it was seen; never turned level
+  Pose<G, B> T_GB;            ///< as estimated in flight; never turned level
   Pose<M, B> T_MB;
   double path_m = 0;   ///< flown in this session until here
   int seen_again = 0;  ///< loops that ended here
-  bool placed = true;  ///< T_MB means something: its session has found into the map
+  bool placed = true;  ///< T_MB is known: its session has been localised in the map
   Place place;
   MapMotion motion;
 };
@@ -47,15 +47,15 @@ struct MapEdge {
   Pose<B, B> T_from_to;
   Mat6 information = Mat6::Identity();
   Kind kind = Kind::odometry;
-  std::shared_ptr<const Preintegration>
-      imu = {};  ///< of an edge of the odometry: the readings on the way, where they are known. Not saved
+  /// Of an edge of the odometry: the readings on the way, where they are known. Not saved.
+  std::shared_ptr<const Preintegration> imu = {};
 };
 
 class PlaceMap {
  public:
-  /// Numbers it and keeps it.
+  /// Adds it, under a new id unless it has one.
   KeyframeId add(MapKeyframe keyframe);
-  /// Takes it out; its neighbours are joined directly: composed odometry, loops handed to the keyframe before it.
+  /// Removes it; its neighbours are joined directly: composed odometry, loops moved to the keyframe before it.
   void remove(KeyframeId id);
 
   bool empty() const { return keyframes_.empty(); }
@@ -67,10 +67,10 @@ class PlaceMap {
 
   /// Turns all keyframes that have a place in M about `pivot_M`. Returns the motion.
   Pose<M, M> turn(const Quat& rotation, const Vec3& pivot_M);
-  /// What a flight has learned of up by now, for all its keyframes; `q_LG` turns its gauge level.
+  /// Sets the verticals of all keyframes of a session from `q_LG`, which turns its gauge level.
   void level(std::uint32_t session, const Quat& q_LG);
 
-  /// Moves the keyframes of the sessions that hang together with the first keyframe.
+  /// Optimises the keyframes that edges connect to the first one.
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   std::vector<MapEdge> edges;

@@ -44,7 +44,7 @@ TEST(PlaceMap, ReadingsOfARemovedKeyframesTwoStepsBecomeOne) {
   EXPECT_NEAR(map.edges.back().imu->dt_s(), 4, 1e-9);
   map.remove(KeyframeId{2});
   ASSERT_EQ(map.edges.size(), 1u);
-  EXPECT_FALSE(map.edges.back().imu) << "six seconds say too little";
+  EXPECT_FALSE(map.edges.back().imu) << "six seconds constrain too little";
 }
 
 TEST(PlaceMap, TurnsAsAWhole) {
@@ -57,7 +57,7 @@ TEST(PlaceMap, TurnsAsAWhole) {
   EXPECT_LT((map.keyframes()[0].T_MB.p - pivot).norm(), 1e-12);
   EXPECT_LT(((map.keyframes()[0].T_MB.inverse() * map.keyframes()[1].T_MB).p - step.p).norm(), 1e-12);
   EXPECT_GT((map.keyframes()[1].T_MB.q.vec()).head<2>().norm(), 0.05);
-  EXPECT_EQ(map.keyframes()[2].T_MB.p, apart) << "it has no place in M";
+  EXPECT_EQ(map.keyframes()[2].T_MB.p, apart) << "it is not placed in M";
 }
 
 TEST(PlaceMap, NumbersKeyframesAndFindsThem) {
@@ -100,7 +100,7 @@ TEST(PlaceMap, LoopsMoveToTheNeighbourAndSayTheSame) {
   EXPECT_EQ(loops, 2);
 }
 
-TEST(PlaceMap, OptimisingMovesWhatHangsTogetherWithTheFirstOnly) {
+TEST(PlaceMap, OptimisingMovesOnlyWhatIsConnectedToTheFirst) {
   PlaceMap map = chain(4);
   map.edges.pop_back();  // the last one is on its own
   map.keyframes()[2].T_MB.p.x() += 0.3;
@@ -112,7 +112,7 @@ TEST(PlaceMap, OptimisingMovesWhatHangsTogetherWithTheFirstOnly) {
   EXPECT_EQ(map.keyframes()[0].T_MB.p, first);
 }
 
-TEST(ComposeCovariance, IsWhatSamplesSay) {
+TEST(ComposeCovariance, AgreesWithSamples) {
   Rng rng(3);
   const Pose<B, B> ab(so3_exp(Vec3(0.3, -0.2, 0.5)), Vec3(1, 2, -0.5)), bc(so3_exp(Vec3(-0.4, 0.1, 0.2)), Vec3(0.5, -1, 2));
   Vec6 sigma_ab, sigma_bc;

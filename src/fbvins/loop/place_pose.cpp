@@ -17,7 +17,7 @@ constexpr double kMissedGoodSample = 1e-4;
 constexpr int kMinMatches = 6;
 /// Largest reprojection error of an inlier of a sample at the finest scale.
 constexpr double kInlier_px = 3.0;
-/// Standard deviation of a keypoint of the finest scale: what others are compared with.
+/// Standard deviation of a keypoint of the finest scale, to which others are compared.
 constexpr double kFinestKeypoint_px = 0.7;
 /// A point nearer to the camera's plane than this is behind it.
 constexpr double kNearest_m = 0.05;
@@ -26,7 +26,7 @@ constexpr double kHuber_sigma = 2.0, kGross_sigma = 10;
 /// A match farther from the refined pose than this is an outlier; with depth its squared residual has a third row.
 constexpr double kOutlier_sigma = 3.4, kThreeRowsOverTwo = 1.25;
 constexpr int kRefinements = 8;
-/// Keeps the normal equations solvable; far below what one match says.
+/// Keeps the normal equations solvable; far below the information of one match.
 constexpr double kDamping = 1e-6;
 /// A step (m and rad together) this long has diverged, one this short has arrived.
 constexpr double kDivergedStep = 5, kArrivedStep = 1e-6;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where one image was taken as seen from another: matches of two places -> relative pose with information.
-// RANSAC on three points, then maximum likelihood over all inliers, in which the errors of both views count
+// Relative pose of two images, with its information, from matches of two places.
+// RANSAC on three points, then maximum likelihood over all inliers, which takes the errors of both views into account
 // (docs/derivations/loop.md, L3-L6). Pure functions; the Rng makes them repeatable.
 //
 //   Rng rng(1);
-//   auto pose = ransac_pose(query, candidate, matches, rng);       // no idea where
+//   auto pose = ransac_pose(query, candidate, matches, rng);       // without a prior
 //   RelativePose fine = refine_pose(query, candidate, matches, *pose);
 #pragma once
 

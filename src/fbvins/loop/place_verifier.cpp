@@ -24,7 +24,7 @@ constexpr int kSpreadGrid = 4, kMinCells = 5;
 /// The other direction must find this share of the inliers needed, and the same pose to within this.
 constexpr double kMutualShare = 0.5, kMutual_m = 0.1, kMutual_rad = 0.03;
 constexpr std::uint64_t kSeed = 1;        // of RANSAC
-constexpr int kFarthestBoosted_bit = 60;  // 97 % of true pairs, docs/results.md
+constexpr int kFarthestBoosted_bit = 60;  // 97 % of true pairs, docs/experiments/booster.md
 
 }  // namespace
 
@@ -107,8 +107,8 @@ std::optional<VerifiedPose> PlaceVerifier::collect(const Place& candidate, Camer
   return accepted() ? std::optional(last_) : std::nullopt;
 }
 
-/// Each point of the candidate looks around where it should be; of those that want the same feature the most similar
-/// gets it.
+/// Each point of the candidate is searched for around where it should be; of points that match the same feature the most
+/// similar keeps it.
 void PlaceVerifier::match_guided(const Place& candidate, const CameraFromCamera& T_qc, double radius_px) {
   const Mat3 R = T_qc.R();
   const Vec2 cell((high_.x() - low_.x()) / kColumns, (high_.y() - low_.y()) / kRows);

@@ -2,7 +2,7 @@
 // Is this the same place, and where was it seen from? Descriptors propose matches, RANSAC or a prediction proposes a
 // pose, a guided second matching collects what that pose explains, and the refined pose is accepted only if enough
 // of what should be visible was found, spread over the image (docs/derivations/loop.md, L3-L7).
-// Knows nothing of the flight: whether the odometry allows the pose is the loop closer's question.
+// Knows nothing of the flight: the loop closer checks the pose against the odometry.
 // Buffers are reused; one instance, one thread.
 //
 //   PlaceVerifier verifier({});
@@ -18,7 +18,7 @@
 
 namespace fbvins {
 
-/// Boosted descriptors of one point lie nearer to one another than raw ones: no match is farther than suits them.
+/// Boosted descriptors of one point lie nearer to one another than raw ones: the largest distance of a match is smaller.
 PlaceVerifierOptions for_boosted(PlaceVerifierOptions options);
 
 /// A guess of the pose, and how far a feature may be from where it predicts it.
@@ -40,8 +40,8 @@ class PlaceVerifier {
 
   /// Keeps a reference to `query` until the next call.
   void set_query(const Place& query);
-  /// From nothing (descriptor matches and RANSAC), once each way: repeated patterns (tiles, curtains) give confident
-  /// poses that differ between the two ways.
+  /// Without a prior (descriptor matches and RANSAC), in both directions: repeated patterns (tiles, curtains) give poses
+  /// with many inliers that differ between the two.
   std::optional<VerifiedPose> verify(const Place& candidate);
   /// Near a predicted pose.
   std::optional<VerifiedPose> verify(const Place& candidate, const PosePrediction& prediction);

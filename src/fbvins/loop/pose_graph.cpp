@@ -16,7 +16,7 @@ namespace {
 constexpr int kMaxIterations = 12;  // of one solve
 /// Residual of a loop beyond which it counts little; loops that count less than this are false.
 constexpr double kOutlier_sigma = 4.0, kRejectedWeight = 0.1;
-/// Each round of graduated non-convexity bends the loss by this.
+/// Factor by which each round of graduated non-convexity reduces mu.
 constexpr double kMuStep = 2.0;
 /// A loop that counts for nothing still keeps its block of the problem definite.
 constexpr double kMinWeight = 1e-6;
@@ -54,8 +54,8 @@ double PoseGraph::chi2(const PoseGraphEdge& edge, const PoseGraphOptions& option
   return r.dot(weighted_information(e, options) * r);
 }
 
-/// With four degrees of freedom a node cannot tilt: what the odometry's roll and pitch may be wrong by is added to the
-/// covariance of loops, in rotation and with the lever of their length.
+/// With four degrees of freedom a node cannot tilt: the error of the odometry's roll and pitch is added to the covariance of
+/// loops, in rotation and, times their length, in position (L9).
 Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOptions& options) const {
   const double weight = e.loop ? std::max(e.weight, kMinWeight) : 1.0;
   if (!e.loop || options.degrees_of_freedom == 6) return weight * e.information;

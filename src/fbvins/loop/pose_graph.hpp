@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Keyframes as nodes, relative poses as edges; least squares over all of them (docs/derivations/loop.md, L8-L11).
-// Four degrees of freedom a node by default: roll and pitch are known from gravity, to within a tolerance that
-// loops are told of. With six, gravity is a measurement of every node. Edges marked as loops may be
+// Four degrees of freedom a node by default: roll and pitch are known from gravity, to within an error that
+// the covariance of loops contains. With six, gravity is a measurement of every node. Edges marked as loops may be
 // wrong: graduated non-convexity (H. Yang et al., RA-L 2020, with Geman-McClure) finds weights that leave false ones
 // out. One thread; the same input gives the same bits.
 //
@@ -19,7 +19,7 @@
 
 namespace fbvins {
 
-/// Standard deviation of roll and pitch as the odometry knows them.
+/// Standard deviation of roll and pitch as the odometry estimates them.
 inline constexpr double kTilt_rad = 0.4 * kDegree;
 
 struct PoseGraphOptions {
@@ -36,11 +36,11 @@ struct PoseGraphEdge {
 
 class PoseGraph {
  public:
-  /// `up_B`: away from gravity, as the odometry knows it.
+  /// `up_B`: the vertical, upwards, as the odometry estimates it.
   int add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed = false);
   void add_edge(PoseGraphEdge edge) { edges_.push_back(edge); }
 
-  /// Fixed nodes stay; where none is, the first one of each connected part would be free to float: fix one.
+  /// Fixed nodes stay. Fix one in each connected part: without it the gauge is free.
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   const std::vector<Pose<M, B>>& poses() const { return poses_; }
@@ -53,7 +53,7 @@ class PoseGraph {
   int solve(const PoseGraphOptions& options, PoseGraphReport& report);
 
   std::vector<Pose<M, B>> poses_;
-  std::vector<Vec3> up_B_;  ///< the vertical as the odometry knew it
+  std::vector<Vec3> up_B_;  ///< the vertical as the odometry estimated it
   std::vector<bool> fixed_;
   std::vector<PoseGraphEdge> edges_;
 };

@@ -26,7 +26,7 @@ Mat6 information(double sigma_m, double sigma_rad) {
 
 Vec3 noise(Rng& rng, double sigma) { return sigma * Vec3(rng.normal(), rng.normal(), rng.normal()); }
 
-/// Rounds in a room; `loops` true ones and as many false ones as that share says.
+/// Rounds in a room, with `loops` true loops and false ones that make up `false_share` of all.
 Flight flight(int n, int loops, double false_share, std::uint64_t seed) {
   constexpr double kStep_m = 0.01, kStep_rad = 0.002, kLoop_m = 0.01, kLoop_rad = 0.004;
   Rng rng(seed);
@@ -41,7 +41,7 @@ Flight flight(int n, int loops, double false_share, std::uint64_t seed) {
     const auto& a = f.truth[static_cast<std::size_t>(i) - 1];
     const auto& b = f.truth[static_cast<std::size_t>(i)];
     const Pose<B, B> step = a.inverse() * b;
-    // The drift turns about the vertical only: what the odometry cannot see.
+    // The drift turns about the vertical only, which the odometry cannot observe.
     const Quat turned = so3_exp(b.q.conjugate() * Vec3(0, 0, kStep_rad * rng.normal()));
     const Pose<B, B> measured((step.q * turned).normalized(), Vec3(step.p + noise(rng, kStep_m)));
     f.edges.push_back({i - 1, i, measured, information(kStep_m, kStep_rad), false, 1});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a flight is in M after a restart or in a loaded map: one recognised place may be a look-alike, so two keyframes must
-// agree, or one must be beyond doubt (docs/derivations/loop.md, Where W lies now). One thread at a time.
+// Finds the pose of a flight in M after a restart or in a loaded map: one recognised place may be a look-alike, so two keyframes
+// must agree, or one must be beyond doubt (docs/derivations/loop.md, Where W lies now). One thread at a time.
 //
 //   Relocaliser relocaliser;
 //   if (auto T_MG = relocaliser.consider(query, q_LG, T_MB, verified)) frame.reset(*T_MG, ...);
@@ -16,7 +16,7 @@ namespace fbvins {
 
 class Relocaliser {
  public:
-  /// A place says that the body of `query` is at T_MB. Returns where its gauge is then, level by `q_LG`, once that is certain.
+  /// A recognised place puts the body of `query` at T_MB. Returns the pose of its gauge, level by `q_LG`, once that is certain.
   std::optional<Pose<M, G>> consider(const MapKeyframe& query, const Quat& q_LG, const Pose<M, B>& T_MB,
                                      const VerifiedPose& verified);
   void forget() { guesses_.clear(); }

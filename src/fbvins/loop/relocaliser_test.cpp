@@ -75,7 +75,7 @@ TEST(Relocaliser, AGaugeThatIsNotLevelIsTurnedLevel) {
   const Pose<M, G> truth(about_z(1.1) * q_LG, Vec3(3, -2, 0.5));
   const MapKeyframe k = query(0, Vec3(1, 0, 1));
   Pose<M, B> T_MB = truth * k.T_GB;
-  T_MB.q = so3_exp(Vec3(0.005, 0, 0)) * T_MB.q;  // sight errs in roll, gravity knows better
+  T_MB.q = so3_exp(Vec3(0.005, 0, 0)) * T_MB.q;  // the visual pose errs in roll, q_LG does not
   const auto T_MG = Relocaliser().consider(k, q_LG, T_MB, seen_with(120, 300));
   ASSERT_TRUE(T_MG);
   EXPECT_LT(so3_log(T_MG->q.conjugate() * truth.q).norm(), 1e-3);

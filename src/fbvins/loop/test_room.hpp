@@ -101,7 +101,7 @@ inline Vec3 true_velocity(double s) {
   return (true_pose(s + h).p - true_pose(s - h).p) / (2 * h);
 }
 
-/// What a perfect IMU with these biases reads on the way, by differences of the pose.
+/// Readings of a noise-free IMU with these biases on the way, by differences of the pose.
 inline ImuSegment readings(Time from, Time to, const ImuBias& bias) {
   constexpr double h = 1e-3;
   ImuSegment segment;
@@ -122,7 +122,7 @@ struct Frame {
   Place place;
 };
 
-/// What the estimator would say of it, in a level gauge.
+/// The estimator's keyframe at this pose, in a level gauge.
 inline Keyframe keyframe(FrameId id, Time t, const Pose<G, B>& T_GB, std::uint32_t reset_counter = 0) {
   Keyframe k;
   k.id = id;

@@ -15,8 +15,8 @@ constexpr std::size_t kKeepNewest = 20;
 /// A place recognised from so near, and from so near a direction, adds nothing.
 constexpr double kRedundant_m = 0.20, kRedundant_rad = 12 * kDegree;
 
-/// The one whose neighbours in time are nearest to one another (m and rad together) says least. Never the first, which
-/// holds M.
+/// The one whose neighbours in time are nearest to one another (m and rad together) adds least. Never the first, which
+/// defines M.
 KeyframeId least_of(const std::vector<MapKeyframe>& k) {
   std::size_t least = 1;
   double smallest = std::numeric_limits<double>::max();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which keyframes a map lets go of: above `thin_above` those that others replace, above `max_keyframes` those that say
-// least (docs/derivations/loop.md, Thinning). One thread at a time.
+// Which keyframes are removed from a map: above `thin_above` redundant ones, above `max_keyframes` those that add least
+// (docs/derivations/loop.md, Thinning). One thread at a time.
 //
 //   Thinning thinning(600, 3000);
 //   thinning.note(id, loops, map.size());                  // every keyframe, with the loops that end there
-//   while (auto id = thinning.next(map)) map.remove(*id);  // must be removed before the next question
+//   while (auto id = thinning.next(map)) map.remove(*id);  // must be removed before the next call
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ class Thinning {
  public:
   Thinning(int thin_above, int max_keyframes) : thin_above_(thin_above), max_keyframes_(max_keyframes) {}
 
-  /// Remembers `id` as redundant where one of the loops shows that its place was taken from nearly there before. The fuller
+  /// Remembers `id` as redundant where one of the loops shows an earlier keyframe of nearly the same pose. The fuller
   /// the map (`size`, without `id`), the less is new.
   void note(KeyframeId id, std::span<const MapEdge> loops, std::size_t size);
   /// The next one that should go, if any.
@@ -30,8 +30,8 @@ class Thinning {
   std::vector<KeyframeId> redundant_;
 };
 
-/// Who takes over the poses that hang on a keyframe of the map: a neighbour of its session, else the last one before it
-/// that knows where it is in M too. Null for a session's only keyframe while that is not known.
+/// The keyframe that takes over the poses attached to `gone`: a neighbour of its session, else the last one before it that
+/// has a place in M, if `gone` has one. Null for a session's only keyframe that has none.
 const MapKeyframe* heir_of(const PlaceMap& map, const MapKeyframe& gone);
 
 }  // namespace fbvins

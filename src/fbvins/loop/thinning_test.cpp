@@ -65,7 +65,7 @@ TEST(Thinning, EndsWithAMapOfTwo) {
   for (; steps < 10; ++steps) {
     const auto id = thinning.next(map);
     if (!id) break;
-    EXPECT_NE(*id, KeyframeId{0}) << "the first keyframe holds M";
+    EXPECT_NE(*id, KeyframeId{0}) << "the first keyframe defines M";
     map.remove(*id);
   }
   EXPECT_EQ(steps, 3);

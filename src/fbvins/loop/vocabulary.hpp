@@ -37,16 +37,16 @@ struct VocabularyNode {
   std::int32_t first_child = 0;  ///< 0 for a leaf
   std::int32_t children = 0;
   std::int32_t word = -1;  ///< of a leaf
-  float idf = 0;           ///< of a leaf: log(images / images with this word)
+  float idf = 0;           ///< of a leaf: inverse document frequency (L1)
 };
 
 class Vocabulary {
  public:
   static constexpr std::uint32_t kVersion = 1;
 
-  /// An error for a missing, foreign, damaged or newer file.
+  /// An error for a file that is missing, damaged, of another kind or of another version.
   static Result<Vocabulary> open(const std::string& path);
-  /// From trained nodes; kind says what was described: "orb", "boosted".
+  /// From trained nodes; kind of the descriptors: "orb", "boosted".
   static Vocabulary from_nodes(std::string kind, std::vector<VocabularyNode> nodes, std::vector<Descriptor> descriptors);
   /// Atomic: the old or the new file, never half of one.
   Result<void> save(const std::string& path) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the vocabularies that ship with the project lie. Pure functions of the machine, any thread.
+// Where the vocabularies that ship with the project lie. Only files are read; any thread.
 //
 //   Result<Vocabulary> vocabulary = open_vocabulary(kRawDescriptors);
 #pragma once
@@ -13,7 +13,7 @@ namespace fbvins {
 /// Kinds of descriptors that words are made of.
 inline constexpr const char *kRawDescriptors = "orb", *kBoostedDescriptors = "boosted";
 
-/// $FBVINS_VOCABULARY if set, else where it was installed, else the source tree this was built from.
+/// $FBVINS_VOCABULARY if set, else by data_file(): beside the program, installed, or in the sources.
 std::string shipped_vocabulary(const std::string& kind = kRawDescriptors);
 
 /// The one that ships for this kind of descriptors, or the one at `path`, which must be of that kind.
