@@ -29,7 +29,7 @@ struct DatasetOptions {
   int skip_frames = 0;                ///< stereo frames left out at the start
   int max_frames = 0;                 ///< 0: all
   double start_s = 0;                 ///< stereo frames stamped less than this after the first one are left out
-  double duration_s = 0;              ///< those stamped this or more after start_s, too; 0: none
+  double duration_s = 0;              ///< those stamped this much or more after start_s, too; 0: none
   double pair_tolerance_ms = 3.0;     ///< stamps of left and right may differ by this
   int prefetch_frames = 8;            ///< decoded ahead; 0: decode when asked, without a thread
   bool require_imu = true;            ///< false: a recording without imu0 is fine
@@ -37,7 +37,7 @@ struct DatasetOptions {
   std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
 
-  /// The recording's own calibration is not looked at.
+  /// Whether the recording's own calibration is replaced.
   bool brings_rig() const { return rig || !kalibr_camchain.empty(); }
 
   template <class V>
@@ -57,8 +57,8 @@ struct DatasetOptions {
 /// One stereo frame as listed, before its images are read.
 struct FrameEntry {
   Time t;
-  std::string left_file, right_file;           ///< names known to the loader; empty where that camera has none; both: so recorded
-  std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; without it stamps decide
+  std::string left_file, right_file;           ///< names known to the loader; empty: no image; both empty: recorded without any
+  std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; none: stamps decide
 };
 
 /// One stereo frame as read.
@@ -80,7 +80,7 @@ struct DatasetContents {
   StereoRig rig;
   DatasetInfo info;
   std::vector<TrajectoryPoint> ground_truth;
-  std::vector<ImuSample> imu;      ///< increasing stamps, but as they came where frames tell what is before them
+  std::vector<ImuSample> imu;      ///< increasing stamps; in the order recorded where frames have imu_before
   std::vector<FrameEntry> frames;  ///< the same
   std::unique_ptr<FrameLoader> loader;
 };

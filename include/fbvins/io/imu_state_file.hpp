@@ -13,7 +13,7 @@
 
 namespace fbvins {
 
-/// `imu` is the IMU at hand: a file whose noise figures are others is of another IMU, and an error, as is one that is not whole.
+/// `imu` is the IMU in use: a file with other noise figures belongs to another IMU and is an error, as is an incomplete one.
 /// `file` is only for messages.
 Result<ImuState> parse_imu_state(const std::string& text, const std::string& file, const ImuNoise& imu);
 /// None where there is no such file.

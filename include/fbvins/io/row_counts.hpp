@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What became of the data rows of one file. A value.
+// How many data rows of a file were usable. A value.
 #pragma once
 
 #include <string>
 
 namespace fbvins {
 
-/// Damage is counted, never used.
+/// Unusable rows are counted and left out.
 struct RowCounts {
   int rows = 0;           ///< data rows in the file
   int malformed = 0;      ///< wrong number of columns, not a number, stamp out of range

@@ -31,7 +31,7 @@ struct TrajectoryFile {
   RowCounts counts;                     ///< what was left out
   int without_pose = 0;                 ///< rows of an odometry CSV whose health says that there is no pose
 
-  /// In the frame that the file is said to be in; it cannot tell.
+  /// In the frame that the caller names; the file does not say.
   template <class Frame = W>
   Trajectory<Frame> poses() const {
     Trajectory<Frame> out;

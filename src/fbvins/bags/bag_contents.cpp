@@ -73,7 +73,7 @@ std::vector<std::string> names(const Map& map) {
   return out;
 }
 
-/// The topic named, or an error with those that there are.
+/// The topic named, or an error that lists those there are.
 template <class Map>
 Result<std::string> named_topic(const Map& map, const std::string& name, const char* what) {
   if (map.contains(name)) return name;
@@ -134,7 +134,7 @@ const BagCamera* camera_for(const BagContents& contents, std::string topic) {
   return nullptr;
 }
 
-/// Takes coordinates in `from` to `to`, along the transforms that stay.
+/// Takes coordinates in `from` to `to`, along the static transforms.
 std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transforms, const std::string& to,
                                          const std::string& from) {
   std::map<std::string, Pose<B, B>> found{{to, {}}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: all that a bag holds but the images, gone through once, and which of its topics a recording is made of.
+// Private to bags: all that a bag holds except the images, read in one pass, and the choice of a recording's topics.
 // One thread.
 #pragma once
 
@@ -15,13 +15,13 @@
 namespace fbvins {
 
 struct ImuTopic {
-  std::vector<ImuSample> samples;  ///< as they came
+  std::vector<ImuSample> samples;  ///< in recorded order
   std::string frame;
   int malformed = 0;
 };
 
 struct ImageTopic {
-  std::vector<ImageRow> rows;  ///< as they came; `file` is the message's place
+  std::vector<ImageRow> rows;  ///< in recorded order; `file` is the message's place
   bool compressed = false;
   Encoding encoding = Encoding::ros1;
   int malformed = 0;
@@ -31,8 +31,8 @@ struct BagContents {
   std::map<std::string, ImuTopic> imu;  ///< by topic
   std::map<std::string, ImageTopic> images;
   std::map<std::string, BagCamera> cameras;   ///< first camera_info of each topic
-  std::string camera_problem;                 ///< why the first of those that are not used cannot be
-  std::vector<BagTransform> transforms;       ///< that stay
+  std::string camera_problem;                 ///< why the first unusable one cannot be used
+  std::vector<BagTransform> transforms;       ///< the static ones
   std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
 };
 
@@ -44,9 +44,9 @@ MessagePlace place_of(const std::string& name);
 
 struct ChosenTopics {
   std::string left, right, imu;
-  std::string accel;  ///< of an accelerometer that is read apart: then `imu` is the gyroscope's; found beside it, not named
+  std::string accel;  ///< of an accelerometer apart: `imu` is the gyroscope's then; found by its name, never given
 };
-/// Those named, else those that are alone of their kind or say left and right, gyroscope and accelerometer in their names. The
+/// Those named, else those that are alone of their kind or whose names say left and right, gyroscope and accelerometer. The
 /// error lists what there is.
 Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
 

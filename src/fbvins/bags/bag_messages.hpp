@@ -21,7 +21,7 @@ namespace fbvins {
 
 std::optional<ImuSample> imu_of(std::string_view bytes, Encoding encoding);
 
-/// sensor_msgs/Image or, with `compressed`, sensor_msgs/CompressedImage: only its stamp, what follows is not looked at.
+/// sensor_msgs/Image or, with `compressed`, sensor_msgs/CompressedImage: only its stamp; the rest is not read.
 std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding);
 /// The image in 8-bit grey, or a sentence why not: mono8, mono16, bayer_*, rgb8, bgr8, rgba8, bgra8 and yuv422; PNG and JPEG.
 Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed);

@@ -6,9 +6,9 @@
 //   while (auto message = (*bag)->next()) use((*bag)->topics()[message->topic].name, message->data);
 //   std::string_view again = (*bag)->read(place);
 //
-// A truncated file is read up to its last complete record; what cannot be read is skipped and counted. With only() next() leaves
-// out what was recorded outside of an interval, and goes over it without reading it where the file says what lies where: by the
-// index of each chunk in ROS 1 bags and MCAP files (the one at the end of the file is not needed), by SQLite's own.
+// A truncated file is read up to its last complete record; what cannot be read is skipped and counted. With only(), next() leaves
+// out what was recorded outside of an interval, without reading it where an index tells: that of each chunk in ROS 1 bags and
+// MCAP files (the one at the end of the file is not needed), or SQLite's own.
 #pragma once
 
 #include <compare>
@@ -33,7 +33,7 @@ struct BagTopic {
   bool operator==(const BagTopic&) const = default;
 };
 
-/// Where a message lies: in which chunk (a place in the file, or a row of a table), and in it.
+/// Where a message lies: its chunk (by its offset in the file) and offset there; in SQLite the number of the file, and the row.
 struct MessagePlace {
   std::uint64_t chunk = 0, offset = 0, length = 0;
   auto operator<=>(const MessagePlace&) const = default;
@@ -61,26 +61,26 @@ class BagReader {
   virtual ~BagReader() = default;
 
   virtual std::string format() const = 0;
-  /// Those met so far.
+  /// Those read so far.
   const std::vector<BagTopic>& topics() const { return topics_; }
   const BagDamage& damage() const { return damage_; }
 
-  /// Before the first next(): only what was recorded in [from, to) of the file's first message, but also the first message of
-  /// each topic, and transforms that stay.
+  /// Before the first next(): only what was recorded in [from, to), counted from the file's first message, but also the first
+  /// message of each topic, and static transforms.
   void only(Duration from, Duration to) { window_ = {from, to}; }
   std::optional<BagMessage> next();
-  /// The bytes of a message that next() has shown, until the next read(); empty where they cannot be read any more.
+  /// The bytes of a message that next() has returned, until the next read(); empty where they cannot be read again.
   virtual std::string_view read(const MessagePlace& place) = 0;
 
  protected:
-  /// The next message of those that were not gone over.
+  /// The next message that is not skipped.
   virtual std::optional<BagMessage> advance() = 0;
-  /// Whether a part of the file with messages of these topics from `first` to `last` can be gone over.
+  /// Whether a part of the file with messages of these topics from `first` to `last` can be skipped.
   bool can_leave_out(Time first, Time last, const std::vector<std::size_t>& topics);
   const std::optional<Window>& window() const { return window_; }
   static bool stays(const BagTopic& topic) { return topic.name.ends_with("tf_static"); }
 
-  /// The topic's number in topics_, where it is put if it is new: several publishers of a topic are one.
+  /// The topic's index in topics_, to which it is added if it is new: several publishers of a topic are one.
   std::size_t number_of(BagTopic topic);
 
   void complain(std::string sentence) {
@@ -95,7 +95,7 @@ class BagReader {
 
   std::optional<Window> window_;
   std::optional<Time> origin_;  ///< of the first message
-  std::vector<bool> begun_;     ///< topics whose first message has been shown
+  std::vector<bool> begun_;     ///< topics whose first message has been returned
 };
 
 /// "sensor_msgs/msg/Imu" and "sensor_msgs/Imu" are one.

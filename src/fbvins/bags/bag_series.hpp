@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: the files that a recorder has split one recording into, as one bag. Its own parts are read one after the
+// Private to bags: the files that a recorder has split one recording into, as one bag. The parts are read one after the
 // other.
 //
 //   std::unique_ptr<BagReader> bag = join_bags(std::move(parts));
@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// In the order of recording; at least one. With only() all parts are gone through: each would count from its own first message.
+/// In the order of recording; at least one. With only() all parts are read: each would count from its own first message.
 std::unique_ptr<BagReader> join_bags(std::vector<std::unique_ptr<BagReader>> parts);
 
 }  // namespace fbvins

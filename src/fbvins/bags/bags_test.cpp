@@ -163,7 +163,7 @@ std::string raw(std::initializer_list<Number> numbers) {
   return {reinterpret_cast<const char*>(numbers.begin()), numbers.size() * sizeof(Number)};
 }
 
-/// A version stands where other writers name a frame.
+/// librealsense writes a version where other writers name a frame.
 std::string header(std::uint32_t stamp_ns) {
   std::string out = raw<std::uint32_t>({7, 1, stamp_ns, 1});
   out.push_back('1');

@@ -128,7 +128,7 @@ std::size_t readings_of(const BagContents& contents) {
   return count;
 }
 
-/// What is read of a beginning of a recording: no reading that is not in the whole one, and each image that is listed.
+/// Reads the beginning of a recording: it has no reading that the whole one lacks, and each image listed can be decoded.
 std::size_t read_beginning(BagReader& bag) {
   const BagContents contents = read_contents(bag);
   for (const auto& [name, topic] : contents.imu)
@@ -139,8 +139,8 @@ std::size_t read_beginning(BagReader& bag) {
   return readings_of(contents);
 }
 
-/// `lost`: readings that the part of a file which the cut is in may hold, in files that are read from their beginning; of a table
-/// whose pages are linked no share can be promised.
+/// `lost`: most readings that may be lost with the chunk or record that is cut. None for SQLite: a file of linked pages that is
+/// cut off guarantees no share.
 void expect_beginnings(const char* name, const std::string& whole, const Open& open, std::optional<std::size_t> lost,
                        std::size_t all_readings = kReadings) {
   Rng rng(1, 2);

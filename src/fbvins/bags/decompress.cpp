@@ -11,10 +11,10 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kFirstRatio = 8;  // of room to what is unpacked
+constexpr std::uint64_t kFirstRatio = 8;  // of the first output buffer to the packed bytes
 constexpr std::uint64_t kFirst_bytes = 4096;
 
-/// Room that grows as output comes, so that a wrong size costs nothing.
+/// Buffer that grows with the output, so that a wrong size costs no memory.
 class Room {
  public:
   Room(std::string bytes, std::uint64_t first, std::uint64_t most) : bytes_(std::move(bytes)), most_(most) {
@@ -76,7 +76,7 @@ bool unpack_bz2(std::string_view in, Room& room) {
   }
 }
 
-/// What a frame says of its content's size; 0 where it says nothing.
+/// Size of the content as the frame says; 0 where it says none.
 std::uint64_t size_in_frame(std::string_view in) {
   const unsigned long long size = ZSTD_getFrameContentSize(in.data(), in.size());
   return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;

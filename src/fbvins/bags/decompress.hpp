@@ -3,7 +3,7 @@
 //
 //   Unpacked out = unpack("lz4", bytes, size, std::move(room));
 //   if (!out.whole) ...              // out.bytes holds what came out before the damage, or the end
-//   room = std::move(out.bytes);     // large rooms are dear: filled with zeros when they are new, and given back page by page
+//   room = std::move(out.bytes);     // reused: a large new string costs time, for zeroing it and for its pages
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ struct Unpacked {
   bool whole = false;
 };
 
-/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is what should come out, and never more does; 0: as the bytes say, at most
-/// `kLargestUnpacked_bytes`. What `room` held is lost.
+/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is that of the output, which is never larger; 0: as the bytes say, at most
+/// `kLargestUnpacked_bytes`. The memory of `room` is reused.
 Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room = {});
 
 inline bool is_plain(std::string_view compression) { return compression.empty() || compression == "none"; }

@@ -13,11 +13,11 @@ class YamlReader;
 Result<StereoRig> parse_openvins_cameras(YamlReader yaml);
 
 /// calibration.json (github.com/VladyslavUsenko/basalt, doc/Calibration.md): cameras of the models pinhole, pinhole-radtan8
-/// without its higher coefficients, and kb4.
+/// without its higher coefficients, kb4, ds and eucm.
 Result<StereoRig> parse_basalt(YamlReader yaml);
 
-/// The estimator's configuration and its cameras' files (camodocal): PINHOLE and KANNALA_BRANDT. Its noise is that of single
-/// readings at 200 Hz.
+/// The estimator's configuration and its cameras' files (camodocal): PINHOLE, KANNALA_BRANDT and MEI. Its noise figures are
+/// those of single readings at 200 Hz.
 Result<StereoRig> parse_vins_fusion(YamlReader configuration, YamlReader left, YamlReader right);
 
 /// camera_info as camera_calibration writes it: C1 against C0 comes from rectification and projection.

@@ -126,7 +126,7 @@ TEST(ForeignCalibration, ALensOfMoreThan180DegreesIsRefused) {
   EXPECT_EQ(
       parse_basalt({"c.json", text}).error().message,
       "c.json: the left camera sees more than 180 degrees from edge to edge; only what is in front of a camera can be used: "
-      "crop the images, and take what is cut off at the left and the top off cx and cy");
+      "crop the images, and subtract what is cut off at the left and the top from cx and cy");
 }
 
 TEST(ForeignCalibration, VinsFusionHasAFileACamera) {

@@ -69,7 +69,7 @@ class McapBag final : public BagReader {
   std::shared_ptr<const ByteSource> bytes_;
   McapReader reader_;
   std::map<const McapChannel*, std::size_t> numbers_;
-  std::string kept_, message_;  ///< records of the chunk that read() last looked into, and a message that lies in no packed one
+  std::string kept_, message_;  ///< records of the compressed chunk that read() used last; a message outside of such
   std::uint64_t kept_at_ = 0;
 };
 

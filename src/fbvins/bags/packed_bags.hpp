@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: bags whose chunks are plain, with these chunks compressed. What their indexes at the end say of places is wrong
-// then, which no reader here asks.
+// For tests: compresses the chunks of bags whose chunks are plain. The offsets in their indexes at the end are wrong then; no
+// reader here uses them.
 #pragma once
 
 #include <bzlib.h>
@@ -68,7 +68,7 @@ inline std::string packed_mcap(std::string_view file, std::string_view compressi
   for (ByteCursor in(file.substr(kMcapMagic.size())); in.left() > kMcapRecordHead_bytes;) {
     const auto kind = static_cast<McapRecord>(in.get<std::uint8_t>());
     const std::string_view content = in.take(in.get<std::uint64_t>());
-    if (kind == McapRecord::attachment) continue;  // by them a flight record is known
+    if (kind == McapRecord::attachment) continue;  // a flight record is recognised by them
     const std::size_t record = begin_mcap_record(out, kind);
     if (kind == McapRecord::chunk) {
       constexpr std::size_t kBeforeCompression_bytes = 8 + 8 + 8 + 4, kBeforeRecords_bytes = kBeforeCompression_bytes + 4 + 8;

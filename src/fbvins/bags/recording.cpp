@@ -79,7 +79,7 @@ std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
   return rows;
 }
 
-/// Of a gyroscope and an accelerometer that are read apart, both in order of stamps: a reading for each of the gyroscope's.
+/// Joins a gyroscope and an accelerometer on topics of their own, both in order of stamps: a reading for each of the gyroscope's.
 std::vector<ImuSample> merged(const std::vector<ImuSample>& gyro, const std::vector<ImuSample>& accel) {
   MotionMerge merge;
   std::vector<ImuSample> out;
@@ -232,7 +232,7 @@ void find_tum_vi(const fs::path& folder, RecordingOptions& options) {
     options.imu_calibration = (folder / "dso/imu_config.yaml").string();
 }
 
-/// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which knows
+/// Puts the calibration that is given with a recording into its options. Kalibr's is left to the recording's reader, which has
 /// noise figures to go with it.
 Result<void> take_calibration(bool bag, RecordingOptions& options) {
   if (options.calibration.empty()) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: everybody's recordings as Datasets: ROS 1 bags (also librealsense's), ROS 2 bags (SQLite and MCAP), MCAP files of ROS
+// Private: third-party recordings as Datasets: ROS 1 bags (also librealsense's), ROS 2 bags (SQLite and MCAP), MCAP files of ROS
 // messages, TUM-VI and EuRoC folders, flight records. Any thread, one a Dataset.
 //
 //   auto data = open_recording("flight.bag", {});
 //   if (!data) return report(data.error().message);        // "flight.bag: has 3 image topics (/a, /b, /c): say which ..."
 //   while (auto event = (*data)->next()) system.push(std::move(*event));
 //
-// A bag is gone through once when it is opened, its images are read when it is their turn. IMU readings and images are in the
+// A bag is scanned once when it is opened, its images are read when they are delivered. IMU readings and images are in the
 // order of their own stamps, not of when they were recorded.
 #pragma once
 

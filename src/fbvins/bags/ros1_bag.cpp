@@ -92,7 +92,7 @@ class Ros1Bag final : public BagReader {
     complain(fmt::format("{}: byte {}: {}", name_, offset, sentence));
   }
 
-  /// The record at `at`; nullopt where its header is not whole or no header.
+  /// The record at `at`; nullopt where its header is incomplete or malformed.
   std::optional<Head> head_at(std::uint64_t at) const {
     const std::string size = bytes_->read(at, sizeof(std::uint32_t));
     const auto length = ByteCursor(size).get<std::uint32_t>();
@@ -107,7 +107,7 @@ class Ros1Bag final : public BagReader {
     return head;
   }
 
-  /// Returns whether they are all there. Rooms are used again and again: new ones of this size would cost more than unpacking.
+  /// Returns whether all records are there. Buffers are reused: new ones of this size would cost more than unpacking.
   bool unpack_chunk(const Head& chunk, std::string& records) {
     const std::string compression = chunk.fields.text("compression");
     const auto size = chunk.fields.number<std::uint32_t>("size").value_or(0);
@@ -141,7 +141,7 @@ class Ros1Bag final : public BagReader {
     return true;
   }
 
-  /// By the index of each of its connections, which follows a chunk. One without, or with a connection not met yet, is read.
+  /// By the indexes of its connections, which follow a chunk. One without, or with a connection still unknown, is read.
   bool lies_outside(const Head& chunk) {
     constexpr std::size_t kEntry_bytes = 12;  // seconds, nanoseconds, place
     std::vector<std::size_t> topics;
@@ -215,7 +215,7 @@ class Ros1Bag final : public BagReader {
   std::shared_ptr<const ByteSource> bytes_;
   std::string name_;
   std::uint64_t next_;
-  std::string loaded_, kept_;  ///< records of the chunk in work, and of the one read() last looked into
+  std::string loaded_, kept_;  ///< records of the chunk in work, and of the one that read() used last
   std::string packed_;         ///< the last one's bytes in the file
   std::uint64_t loaded_at_ = 0, kept_at_ = 0;
   bool loaded_whole_ = true, indexed_ = false;

@@ -116,7 +116,7 @@ std::string imu_message(const ImuSample& sample) {
   std::array<double, 9> unknown{};
   add_header(out, sample.t, kBodyFrame);
   add_quaternion(out, Quat::Identity());
-  unknown[0] = -1;  // ROS's sign for: there is no orientation
+  unknown[0] = -1;  // how ROS marks that there is no orientation
   add_doubles(out, unknown.data(), 9);
   unknown[0] = 0;
   add_doubles(out, sample.gyro_radps.data(), 3);

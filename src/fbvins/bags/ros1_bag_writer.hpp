@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private: a recording as a ROS 1 bag, format 2.0, uncompressed, with its index. One thread.
 //
-//   Result<Ros1BagWriter> bag = Ros1BagWriter::create("flight.bag");
+//   Result<Ros1BagWriter> bag = Ros1BagWriter::create("flight.bag", rig, first_stamp);
 //   bag->add(sample); bag->add(frame);
 //   Result<void> done = bag->finish();          // the file appears here
 #pragma once

@@ -90,7 +90,7 @@ class SqliteBag final : public BagReader {
       const bool by_time = !messages_ && window();
       if (!messages_) messages_ = by_time ? messages_in_window(file) : all_messages(file);
       int state = messages_ ? sqlite3_step(messages_.get()) : SQLITE_ERROR;
-      if (by_time && state != SQLITE_ROW && state != SQLITE_DONE) {  // what it is picked by is damaged
+      if (by_time && state != SQLITE_ROW && state != SQLITE_DONE) {  // the index of stamps is damaged
         messages_ = all_messages(file);
         state = messages_ ? sqlite3_step(messages_.get()) : SQLITE_ERROR;
       }
@@ -113,7 +113,7 @@ class SqliteBag final : public BagReader {
       const Statement first = prepare(file.database.get(), "SELECT timestamp FROM messages ORDER BY id LIMIT 1");
       if (first && sqlite3_step(first.get()) == SQLITE_ROW) origin_ns_ = sqlite3_column_int64(first.get(), 0);
     }
-    // Other rows' data is not read: it lies on pages of its own.
+    // The data of other rows, which lies on pages of its own, is not read.
     Statement some =
         prepare(file.database.get(),
                 "SELECT id, topic_id, timestamp, data FROM messages WHERE timestamp BETWEEN ? AND ? OR topic_id IN "
@@ -151,7 +151,7 @@ class SqliteBag final : public BagReader {
   std::size_t at_ = 0;
   Statement messages_;
   std::optional<std::int64_t> origin_ns_;  ///< of the first message
-  std::string unpacked_, read_;            ///< the messages that next() and read() have shown last
+  std::string unpacked_, read_;            ///< the messages that next() and read() returned last
 };
 
 }  // namespace
@@ -162,7 +162,7 @@ Result<std::unique_ptr<BagReader>> open_sqlite_bag(const std::vector<std::string
     sqlite3* database = nullptr;
     const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, whole_pages_vfs());
     files.push_back({path, Database(database), {}, {}});
-    // A file that is shorter than it says is refused otherwise.
+    // Otherwise SQLite refuses a file that is shorter than its header says.
     if (opened == SQLITE_OK) sqlite3_exec(database, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
     if (opened != SQLITE_OK) return Error{ErrorCode::unreadable, fmt::format("{}: {}", path, sqlite3_errmsg(database))};
   }

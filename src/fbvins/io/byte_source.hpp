@@ -20,7 +20,7 @@ class ByteSource {
     fill(out, offset, count);
     return out;
   }
-  /// Same, into a string whose room is used again: what it held is not worth keeping.
+  /// The same, into a string whose memory is reused; its former content is lost.
   virtual void fill(std::string& out, std::uint64_t offset, std::uint64_t count) const = 0;
 };
 

@@ -17,7 +17,7 @@ int read_side(YamlReader& yaml, const YAML::Node& map, double value) {
   return 1;
 }
 
-/// Complains about lists that are too long, unless what is too much is zero; pads short ones with zeros.
+/// Four coefficients; complains about other lengths, unless all after the fourth are zero.
 std::vector<double> read_coefficients(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   std::vector<double> k = yaml.numbers(map, field);
   if (k.size() != 4 && !(k.size() > 4 && std::all_of(k.begin() + 4, k.end(), [](double x) { return x == 0; })))
@@ -108,7 +108,7 @@ Result<void> check_rig(const StereoRig& rig, const std::string& file) {
       return Error{
           ErrorCode::unsupported,
           fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
-                      "can be used: crop the images, and take what is cut off at the left and the top off cx and cy",
+                      "can be used: crop the images, and subtract what is cut off at the left and the top from cx and cy",
                       file, side)};
   return {};
 }

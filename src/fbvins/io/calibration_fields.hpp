@@ -17,7 +17,7 @@ struct RigidTransform {
 };
 RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field);
 
-/// The same, between the frames that the format gives the field.
+/// The same, between the frames that the format defines for the field.
 template <class To, class From>
 Pose<To, From> read_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   const RigidTransform T = read_rigid_transform(yaml, map, field);

@@ -50,7 +50,7 @@ TEST(Calibration, EurocMountingTakesSensorToBody) {
   EXPECT_EQ(std::get<KannalaBrandt>(camera->camera.model()).k4, 0.4);
 }
 
-TEST(Calibration, OurBodyIsTheImuEvenWhereTheFilesIsNot) {
+TEST(Calibration, OurBodyIsTheImuEvenWhereThatOfTheFileIsNot) {
   const auto left = parse_euroc_camera({"cam0", euroc_camera(kLeft)}), right = parse_euroc_camera({"cam1", euroc_camera(kRight)});
   ImuSensor imu;
   imu.T_BS = Pose<B, B>(so3_exp({0.3, 0.2, 0.1}), {1, 2, 3});

@@ -48,7 +48,7 @@ class CdrWriter {
   std::size_t origin_ = 0;
 };
 
-/// After the first value that is not wholly there everything is zero or empty, and ok() is false.
+/// After the first incomplete value everything is zero or empty, and ok() is false.
 class CdrReader {
  public:
   explicit CdrReader(std::string_view bytes) : in_(bytes) {

@@ -25,7 +25,7 @@ std::optional<SensorEvent> Dataset::next() {
   }
 }
 
-/// True until one sample at or after the next image, on the IMU's clock, has been handed out, or as many as the record says.
+/// True until one sample at or after the next image, on the IMU's clock, has been delivered, or as many as the record says.
 bool Dataset::imu_is_due() const {
   if (next_imu_ == contents_.imu.size()) return false;
   if (next_frame_ == contents_.frames.size()) return deliver_rest_;

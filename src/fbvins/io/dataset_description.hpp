@@ -9,10 +9,10 @@ namespace fbvins {
 /// Fills in what `contents.info` says of its frames and IMU samples, with a warning for each long gap. Needs a frame.
 void describe(DatasetContents& contents);
 
-/// Leaves the frames that the options ask for; an error where there is none.
+/// Keeps the frames that the options ask for; an error where there is none.
 Result<void> cut_frames(const DatasetOptions& options, std::vector<FrameEntry>& frames);
 
-/// Whether readings before the first frame that is left are those of a part left out.
+/// Whether readings before the first frame kept belong to a part that is left out.
 inline bool begins_later(const DatasetOptions& options) { return options.skip_frames > 0 || options.start_s > 0; }
 
 }  // namespace fbvins

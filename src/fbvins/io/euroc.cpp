@@ -140,7 +140,7 @@ class EurocReader {
     return find_images();
   }
 
-  /// Forgets names of files that are not there, and frames of which nothing is there.
+  /// Drops names of missing files, and frames of which both files are missing.
   Result<void> find_images() {
     std::string first_missing;
     const auto look = [&](std::string& file, const std::string& folder, ImageCounts& counts) {
@@ -187,7 +187,7 @@ class EurocReader {
     return {};
   }
 
-  /// Only for judging a result: where it cannot be used, a warning is enough.
+  /// Needed for evaluation only: where it cannot be used, a warning is enough.
   void read_ground_truth() {
     const std::string folder = "state_groundtruth_estimate0/";
     if (!exists(folder + "data.csv")) return;

@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-/// Places in topics().
+/// Indices in topics().
 enum Topic : std::size_t {
   kImu,
   kLeft,
@@ -26,7 +26,7 @@ enum Topic : std::size_t {
 };
 
 constexpr std::size_t kLargeChunk_bytes = 1'000'000;
-// Those who begin to look in the middle find the cameras' places again soon.
+// The camera extrinsics are repeated, for viewers that start in the middle.
 constexpr Duration kCalibrationInterval = {1'000'000'000};
 
 std::vector<McapTopic> topics() {
@@ -120,7 +120,7 @@ Result<void> FlightRecord::add(const ImuSample& sample) {
   return flush_if_large();
 }
 
-/// A frame without any image leaves an image without pixels: the estimator takes it as well.
+/// A frame without any image is recorded as an image without pixels: the estimator processes it as well.
 Result<void> FlightRecord::add(const StereoFrame& frame) {
   if (Result<void> good = check_stamp(frame.t); !good) return good;
   if (calibration_t_.ns < 0 || frame.t < calibration_t_ || frame.t - calibration_t_ >= kCalibrationInterval)
@@ -128,7 +128,7 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
   if (!images_) return flush_if_large();
   const bool left = frame.left || !frame.right, right = frame.right != nullptr;
   const Time t = frame.t;
-  // The two images lie side by side: a record that breaks off between them shows it.
+  // The two images follow one another, so that a record cut off between them is recognised.
   if (left) write(kLeft, t, [&](std::string& out) { append_image(out, t, kLeftFrame, frame.left.get()); });
   if (right) write(kRight, t, [&](std::string& out) { append_image(out, t, kRightFrame, frame.right.get()); });
   if (left) write(kLeftInfo, t, [&](std::string& out) { append_camera_info(out, t, kLeftFrame, rig_.left); });

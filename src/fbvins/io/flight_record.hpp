@@ -48,14 +48,14 @@ class FlightRecord {
   /// Pose where there is one, and health.
   Result<void> add(const Odometry& odometry);
   Result<void> add(const MapUpdate& update);
-  /// At an IMU reading; its rate is taken to be as good as that of the newest Odometry.
+  /// The pose at an IMU reading; the covariance of its rate is that of the newest Odometry.
   Result<void> add_live(RosOdometry odometry);
-  /// What was seen in an image and where it lies; needs no Odometry.
+  /// Landmarks observed in an image, with their positions; needs no Odometry.
   Result<void> add_landmarks(Time t, std::span<const RosLandmark> landmarks);
   Result<void> add_mark(Time t, std::string_view text);
   Result<void> add_health(Time t, const RosDiagnostic& diagnostic);
 
-  /// Lets all that was added reach the file.
+  /// Writes all that was added to the file.
   Result<void> flush() { return file_.flush(); }
   Result<void> finish() { return file_.finish(); }
   /// See McapWriter::sync().
@@ -71,7 +71,7 @@ class FlightRecord {
   McapWriter file_;
   StereoRig rig_;
   bool images_;
-  Time calibration_t_{-1};               ///< when the cameras' places were written
+  Time calibration_t_{-1};               ///< when the camera extrinsics were last written
   Mat3 rate_covariance_ = Mat3::Zero();  ///< of the body's rate: a reading's noise, and the bias
 };
 

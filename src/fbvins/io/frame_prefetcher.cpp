@@ -13,7 +13,7 @@ FramePrefetcher::FramePrefetcher(const std::vector<FrameEntry>& frames, FrameLoa
   try {
     thread_ = std::thread([this] { work(); });
   } catch (const std::system_error&) {
-    depth_ = 0;  // no thread to be had: slower, not different
+    depth_ = 0;  // no thread available: slower, but the same result
   }
 }
 
@@ -55,7 +55,7 @@ void FramePrefetcher::work() {
   }
 }
 
-/// Whatever a decoder throws costs this frame only.
+/// An exception of a decoder costs this frame only.
 LoadedFrame FramePrefetcher::load(std::size_t index) {
   try {
     return loader_.load(frames_[index]);

@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-/// No bias that a flight could begin with is larger; the estimator would call it implausible.
+/// Largest plausible biases at the start of a flight.
 constexpr double kLargestGyroBias_radps = 1;
 constexpr double kLargestAccelBias_mps2 = 5;
 
@@ -33,7 +33,7 @@ Vec3 read_bias(YamlReader& yaml, const char* field, double largest) {
   const std::vector<double> values = yaml.numbers(yaml.root(), field, 3);
   const Vec3 bias(values[0], values[1], values[2]);
   if (!(bias.cwiseAbs().maxCoeff() <= largest))
-    yaml.complain(yaml.root(), field, fmt::format("is more than {} and no bias", largest));
+    yaml.complain(yaml.root(), field, fmt::format("is more than {}, too much for a bias", largest));
   return bias;
 }
 

@@ -13,7 +13,7 @@
 namespace fbvins {
 namespace {
 
-/// T_C1B of the second camera: its own, or by way of the first one.
+/// T_C1B of the second camera: given directly, or through the first one.
 Pose<C1, B> read_second_camera(YamlReader& yaml, const YAML::Node& cam1, const Pose<C0, B>& T_C0B) {
   if (yaml.has(cam1, "T_cam_imu")) return read_transform<C1, B>(yaml, cam1, "T_cam_imu");
   return read_transform<C1, C0>(yaml, cam1, "T_cn_cnm1") * T_C0B;

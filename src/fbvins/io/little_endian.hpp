@@ -32,7 +32,7 @@ void overwrite_le(std::string& out, std::size_t at, Number value) {
   std::memcpy(out.data() + at, &value, sizeof value);
 }
 
-/// Reads from the front of somebody's bytes. After the first value that is not wholly there everything is zero or empty.
+/// Reads from the front of bytes that it does not own. After the first incomplete value everything is zero or empty.
 class ByteCursor {
  public:
   explicit ByteCursor(std::string_view bytes) : bytes_(bytes) {}

@@ -22,7 +22,7 @@ namespace {
 constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
-// An image finds its partner among this many frames before it.
+// The partner of an image is searched for among this many frames before it.
 constexpr std::ptrdiff_t kPairingReach = 8;
 
 /// Where an image's message is in the file, as a FrameEntry names it.
@@ -118,7 +118,7 @@ class RecordReader {
     const std::optional<ImuSample> sample = read_imu(message.data);
     if (!sample) {
       ++counts.malformed;
-      return reader_.complain(message.offset, "this is no reading of an IMU");
+      return reader_.complain(message.offset, "this is not an IMU reading");
     }
     const auto usable = [](const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargestImuValue; };
     if (!usable(sample->gyro_radps) || !usable(sample->accel_mps2)) {
@@ -135,7 +135,7 @@ class RecordReader {
       ++camera.rows.malformed;
       return reader_.complain(message.offset, image ? "this image is not in 8-bit grey (mono8)" : "this is no image");
     }
-    if (image->empty()) {  // the writer's sign for a frame of which no camera delivered anything
+    if (image->empty()) {  // marks a frame of which neither camera delivered an image
       out_.frames.push_back({image->t, "", "", out_.imu.size()});
       return;
     }
@@ -154,7 +154,7 @@ class RecordReader {
     return partner != last ? *partner : frames.emplace_back(FrameEntry{t, "", "", std::nullopt});
   }
 
-  /// Where the file breaks off behind one image of a frame nobody knows whether there was another.
+  /// Where the file ends after one image of a frame, it is unknown whether there was another: the frame is left out.
   void drop_half_frame() {
     if (!reader_.damage().ends_early || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: flight records as recordings. They are scanned once when opened; images are read from the file when it is their
-// turn.
+// Private: flight records as recordings. They are scanned once when opened; images are read from the file when they are
+// delivered.
 #pragma once
 
 #include "fbvins/io/byte_source.hpp"
@@ -8,7 +8,7 @@
 
 namespace fbvins {
 
-/// By content, or by name where there is no content.
+/// By the first bytes, or by the ending of the name.
 bool is_mcap(const std::string& path);
 Result<DatasetContents> open_mcap(const std::string& path, const DatasetOptions& options);
 /// The same of bytes; `name` is only for messages.

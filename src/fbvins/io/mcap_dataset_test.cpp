@@ -39,7 +39,7 @@ StereoFrame frame(std::int64_t ms, bool left = true, bool right = true) {
   return {Time{kStart_ns + ms * kMs}, left ? picture(seed) : nullptr, right ? picture(seed + 100) : nullptr};
 }
 
-/// As an estimator may have taken them: an image before its readings, readings that stay out, one camera alone, none, a stamp
+/// As an estimator may have received them: an image before its readings, missing readings, one camera alone, neither, a stamp
 /// that goes back.
 std::vector<SensorEvent> eventful_flight() {
   return {reading(0),
@@ -133,7 +133,7 @@ TEST_F(FlightRecordTest, CanBeReadFromALaterFrameOn) {
   EXPECT_TRUE(same_event(back.back(), frame(30, true, false)));
 }
 
-/// What else is in a record must not stand between its events.
+/// Other messages of a record do not disturb its events.
 TEST_F(FlightRecordTest, PosesAndHealthChangeNothing) {
   FlightRecord record = create();
   Odometry odometry;
@@ -206,7 +206,7 @@ TEST_F(FlightRecordTest, WithoutCalibrationItIsRefusedUnlessOneIsGiven) {
   expect_refused(": holds no calibration, and none is given with it");
 }
 
-TEST_F(FlightRecordTest, MessagesThatAreNoneAreNamedAndLeftOut) {
+TEST_F(FlightRecordTest, MalformedMessagesAreNamedAndLeftOut) {
   {
     auto file = McapWriter::create(path_, {"ros2", "a test"},
                                    {{"/imu", "sensor_msgs/msg/Imu", ""}, {"/camera/left", "sensor_msgs/msg/Image", ""}});
@@ -221,7 +221,7 @@ TEST_F(FlightRecordTest, MessagesThatAreNoneAreNamedAndLeftOut) {
   const auto data = open_dataset(path_);
   ASSERT_FALSE(data);
   EXPECT_TRUE(data.error().message.starts_with(path_ + ": byte ")) << data.error().message;
-  EXPECT_TRUE(data.error().message.ends_with(": this is no reading of an IMU")) << data.error().message;
+  EXPECT_TRUE(data.error().message.ends_with(": this is not an IMU reading")) << data.error().message;
 }
 
 TEST_F(FlightRecordTest, AnImageOfAnotherSizeIsLeftOut) {
@@ -243,7 +243,7 @@ TEST_F(FlightRecordTest, StampsBeyondRosAreRefused) {
   EXPECT_TRUE(record.finish());
 }
 
-TEST_F(FlightRecordTest, AFileOfThatNameThatIsNoneIsNamed) {
+TEST_F(FlightRecordTest, AFileThatIsNoMcapIsRefused) {
   std::ofstream(path_) << "hello";
   expect_refused(": does not begin as an MCAP file does");
 }

@@ -38,7 +38,7 @@ inline constexpr std::size_t kMcapRecordHead_bytes = 9;
 inline constexpr std::size_t kMcapChunkHead_bytes = kMcapRecordHead_bytes + 8 + 8 + 8 + 4 + 4 + 8;
 /// channel, sequence, log time, publish time.
 inline constexpr std::size_t kMcapMessageHead_bytes = 2 + 4 + 8 + 8;
-/// Of a message index: stamp and place.
+/// Of a message index: stamp and offset.
 inline constexpr std::size_t kMcapIndexEntry_bytes = 16;
 
 /// The checksum of zip and PNG. Continues from `so_far`.

@@ -11,7 +11,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargestChunk_bytes = std::uint64_t{256} << 20u;
-constexpr std::uint64_t kLargestAttachment_bytes = std::uint64_t{4} << 20u;  // larger ones are not ours to read
+constexpr std::uint64_t kLargestAttachment_bytes = std::uint64_t{4} << 20u;  // larger ones are not read
 
 }  // namespace
 
@@ -113,7 +113,7 @@ std::optional<McapReader::ChunkHead> McapReader::chunk_head(std::uint64_t offset
   return in.ok() ? std::optional(std::move(head)) : std::nullopt;
 }
 
-/// Nothing of a whole chunk is used unless its checksum says so; one that the file ends in is read as far as it goes.
+/// A complete chunk is used only if its checksum matches (0: it has none); one that the file ends in is read as far as it goes.
 void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool whole) {
   const std::optional<ChunkHead> head = chunk_head(offset, length);
   if (!head) return whole ? complain(offset, "this chunk's head is not what it should be") : void();

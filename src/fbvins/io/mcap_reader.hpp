@@ -6,8 +6,8 @@
 //   file->damage();   // what could not be read, and where
 //
 // A file that ends too early is read up to its last whole record, in an unfinished chunk too. A chunk whose checksum is wrong
-// is left out, as is what does not fit together; each is counted, the first one with its place. Compressed chunks need somebody
-// who can unpack them.
+// is left out, as are malformed records; each is counted, the first one with its offset. Compressed chunks need an McapUnpack,
+// which this module does not have.
 #pragma once
 
 #include <cstdint>
@@ -38,12 +38,12 @@ struct McapMessage {
   std::uint64_t chunk = 0;   ///< the compressed chunk it lies in
 };
 
-/// What comes out of a chunk of so named a compression, or what of it came out before the damage or the end; nullopt for an
-/// unknown name.
+/// Decompresses the records of a chunk (`size` bytes of them), or those before damage or the end of the bytes; nullopt for an
+/// unknown compression.
 using McapUnpack =
     std::function<std::optional<std::string>(std::string_view compression, std::string_view bytes, std::uint64_t size)>;
 
-/// Whether a chunk with messages of these channels from `first` to `last` is passed over.
+/// Whether to skip a chunk with messages of these channels, stamped from `first` to `last`.
 using McapPassOver = std::function<bool(Time first, Time last, const std::vector<const McapChannel*>& channels)>;
 
 struct McapAttachment {
@@ -54,7 +54,7 @@ struct McapDamage {
   int parts = 0;            ///< records and chunks left out
   std::string first;        ///< "file: byte N: sentence" about the first of them
   bool ends_early = false;  ///< no end of data was met: the writer was cut off
-  std::uint64_t end = 0;    ///< up to where it was read
+  std::uint64_t end = 0;    ///< offset up to which it was read
 };
 
 class McapReader {
@@ -62,11 +62,11 @@ class McapReader {
   /// `name` is only for messages. An error where this is not MCAP.
   static Result<McapReader> open(std::shared_ptr<const ByteSource> bytes, const std::string& name, McapUnpack unpack = {});
 
-  /// Asked about each chunk that an index of its messages follows and whose channels have all been met.
+  /// `decide` is asked about each chunk that is followed by an index of its messages and whose channels are all known.
   void pass_over(McapPassOver decide) { pass_over_ = std::move(decide); }
   /// Nullopt at the end.
   std::optional<McapMessage> next();
-  /// Those met so far.
+  /// Those read so far.
   const std::vector<McapAttachment>& attachments() const { return attachments_; }
   const McapDamage& damage() const { return damage_; }
   /// The records of a compressed chunk again.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The end of an MCAP file, by which programs seek: copies of what its topics are, how much there is of each, where the chunks
-// are.
+// The summary at the end of an MCAP file, by which programs seek: its topics, the number of messages of each, the offsets of
+// the chunks.
 #include <algorithm>
 
 #include "fbvins/io/mcap_format.hpp"
@@ -93,7 +93,7 @@ std::string McapWriter::places_of_message_indexes(const ChunkPlace& place) const
   const std::uint64_t first = place.offset + place.chunk_bytes;
   std::string indexes(place.index_bytes, '\0'), out;
   const ssize_t read = ::pread(file_.number(), indexes.data(), indexes.size(), static_cast<off_t>(first));
-  if (read != static_cast<ssize_t>(indexes.size())) return out;  // an empty map: that is said to be unknown
+  if (read != static_cast<ssize_t>(indexes.size())) return out;  // an empty map stands for unknown
   ByteCursor in(indexes);
   while (in.left() >= kMcapRecordHead_bytes + sizeof(std::uint16_t)) {
     const std::uint64_t offset = first + in.position();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writer and reader of MCAP against each other, and against files that break off or are damaged. Other people's readers are
-// asked in tests/mcap_by_others.py.
+// Writer and reader of MCAP against each other, and against files that are cut off or damaged. Third-party readers are
+// tried in tests/flight_record_by_others.py.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>

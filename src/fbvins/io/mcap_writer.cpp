@@ -73,7 +73,7 @@ McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<
   clear_chunk();
 }
 
-/// A part that did not fit is taken back, so that what follows is found.
+/// A part that did not fit is removed, so that the file stays readable.
 Result<void> McapWriter::write_all(const std::string& bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
     const ssize_t now = ::pwrite(file_.number(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(end_ + done));

@@ -36,7 +36,7 @@ struct McapLabel {
 
 class McapWriter {
  public:
-  /// Messages name their topic by its place in `topics`. An error where there is a file of that name: a record is never
+  /// Messages name their topic by its index in `topics`. An error where there is a file of that name: a record is never
   /// written over.
   static Result<McapWriter> create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics);
 
@@ -52,7 +52,7 @@ class McapWriter {
   /// Writes what is waiting. After an error (disk full) that part is lost, and the file is whole without it.
   Result<void> flush();
   Result<void> finish();
-  /// What is written, to the disk itself, against loss of power. Beside the writing thread too.
+  /// Flushes what is written to the disk itself, against loss of power. May run beside the writing thread.
   void sync() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: other people's text inside of a sentence of ours.
+// Private to io: text of foreign files in error messages.
 #pragma once
 
 #include <algorithm>

@@ -53,7 +53,7 @@ void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise
   put_header(cdr, sample.t, kBodyFrame);
   put(cdr, Quat::Identity());
   RowMajor3 unknown = RowMajor3::Zero();
-  unknown(0, 0) = -1;  // ROS's sign for: there is no orientation
+  unknown(0, 0) = -1;  // how ROS marks that there is no orientation
   put(cdr, unknown);
   put(cdr, sample.gyro_radps);
   put(cdr, of_readings(noise.gyro_noise_density_radps_rthz, noise.rate_hz));
@@ -181,7 +181,7 @@ void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> lan
     cdr.put(l.track);
     for (const float number : {l.pixel[0], l.pixel[1], l.age_frames, l.depth_m}) cdr.put(number);
   }
-  cdr.put(std::uint8_t{0});  // some are not numbers
+  cdr.put(std::uint8_t{0});  // not dense: some are NaN
 }
 
 void append_log(std::string& out, Time t, std::string_view name, std::string_view text) {

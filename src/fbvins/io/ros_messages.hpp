@@ -60,8 +60,8 @@ struct RosTransform {
 };
 void append_transforms(std::string& out, Time t, std::span<const RosTransform> transforms);
 
-/// A point of sensor_msgs/PointCloud2 in W, with what the left camera's newest image shows of it. What is not known is NaN: where
-/// a feature's landmark lies, where the image has a landmark.
+/// A point of sensor_msgs/PointCloud2 in W, with its observation in the left camera's newest image. What is unknown is NaN: p_W
+/// of a feature without a landmark, pixel of a landmark that the image does not show.
 struct RosLandmark {
   std::uint32_t track = 0;
   std::array<float, 3> p_W{};    ///< m
@@ -104,7 +104,7 @@ struct RosImage {
   /// A frame of which this camera delivered nothing.
   bool empty() const { return width == 0 && height == 0; }
 };
-/// With as many pixels as it says.
+/// Nullopt also where a grey image has fewer pixels than its size needs.
 std::optional<RosImage> read_image(std::string_view bytes);
 
 }  // namespace fbvins

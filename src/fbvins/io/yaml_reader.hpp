@@ -23,7 +23,7 @@ class YamlReader {
  public:
   enum class Root {
     fields,   ///< complain unless the file is a map
-    anything  ///< whoever reads says what is wrong
+    anything  ///< the caller checks
   };
   /// OpenCV's header line `%YAML:1.0`, which is not YAML, is accepted.
   YamlReader(std::string file, std::string text, Root root = Root::fields);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What calibrations, configurations and matrices make of it is tested with each of them.
+// Its use for calibrations, configurations and matrices is tested with each of them.
 #include "fbvins/io/yaml_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -46,7 +46,7 @@ TEST(YamlReader, BrokenTextIsSaidWithItsLineAndEveryGetterStillAnswers) {
   EXPECT_TRUE(yaml.texts(yaml.root(), "a").empty());
 }
 
-TEST(YamlReader, AFileOfNothingMayBeWanted) {
+TEST(YamlReader, AnEmptyFileIsAcceptedWhereAllowed) {
   EXPECT_EQ(YamlReader("f.yaml", "").error().message, "f.yaml: holds no fields");
   EXPECT_TRUE(YamlReader("f.yaml", "", YamlReader::Root::anything).ok());
   EXPECT_TRUE(YamlReader("f.yaml", "%YAML:1.0\n---\na: 1\n").ok()) << "OpenCV's header";
