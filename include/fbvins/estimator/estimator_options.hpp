@@ -10,7 +10,7 @@ namespace fbvins {
 /// Which keyframe leaves a full window.
 enum class KeyframeLeaving { oldest, entropy };
 
-/// Whether the direction of gravity in W is estimated, or W is level by definition from the start on.
+/// Whether the direction of gravity in W is a state of the window, or W is level by definition (docs/derivations/window.md).
 enum class UpDirection { state, fixed };
 
 struct KeyframeOptions {
@@ -24,8 +24,8 @@ struct KeyframeOptions {
     v("max_keyframes", max_keyframes, "", "keyframes in the sliding window", 3, 30);
     v("newest_frames", newest_frames, "", "newest frames kept beside them, keyframes or not", 2, 10);
     v("leaving", leaving, "oldest|entropy",
-      "which keyframe leaves a full window: the oldest, or the one whose measurements tell least (paper 2.1.2)");
-    v("min_parallax_px", min_parallax_px, "px", "mean rotation-free image motion since the last keyframe that makes a new one",
+      "which keyframe leaves a full window: the oldest, or the one with the least information on the newest (paper 2.1.2)");
+    v("min_parallax_px", min_parallax_px, "px", "median rotation-free image motion since the last keyframe that makes a new one",
       0.5, 100.0);
   }
 };
@@ -37,9 +37,9 @@ struct KnownLandmarkOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("enabled", enabled, "", "landmarks seen again are held to where they were; none is while up is fixed");
+    v("enabled", enabled, "", "re-observed landmarks constrain the window; not while up is fixed");
     v("position_sigma_m", position_sigma_m, "m",
-      "standard deviation of where a landmark is in the map, beside what its depth leaves open", 1e-4, 1.0);
+      "standard deviation of a remembered landmark's position, in addition to that of its triangulation", 1e-4, 1.0);
   }
 };
 
@@ -62,7 +62,7 @@ struct EstimatorOptions {
   double max_speed_mps = 30;
   double max_step_m = 0.0015;
 
-  /// The noise that readings are weighed by, from the calibrated one.
+  /// The noise that readings are weighted with, from the calibrated one.
   ImuNoise assumed(ImuNoise noise) const {
     noise.gyro_noise_density_radps_rthz *= gyro_noise_scale;
     noise.accel_noise_density_mps2_rthz *= accel_noise_scale;
@@ -76,7 +76,7 @@ struct EstimatorOptions {
     v.group("keyframes", keyframes, "the sliding window");
     v.group("known_landmarks", known_landmarks, "landmarks that have left the window");
     v("up", up, "state|fixed",
-      "the direction of gravity in W is estimated all the time, or W is held level from the start on and itself turns");
+      "state: the direction of gravity in W is estimated; fixed: W is level and turns as gravity becomes better known");
     v("max_iterations", max_iterations, "", "Levenberg-Marquardt iterations per frame", 1, 100);
     v("max_landmarks", max_landmarks, "", "landmarks in the solver", 20, 5000);
     v("gravity_mps2", gravity_mps2, "m/s^2", "magnitude of gravity", 9.7, 9.9);
@@ -91,7 +91,7 @@ struct EstimatorOptions {
     v("min_tracks", min_tracks, "", "fewer landmarks than this in view: degraded", 3, 200);
     v("max_speed_mps", max_speed_mps, "m/s", "faster is implausible and restarts the estimator", 1.0, 1000.0);
     v("max_step_m", max_step_m, "m",
-      "what corrections may move the published pose by from one image to the next, and turn in proportion; 0: at once", 0.0, 1.0);
+      "largest correction of the published position from one image to the next, attitude in proportion; 0: no limit", 0.0, 1.0);
   }
 };
 

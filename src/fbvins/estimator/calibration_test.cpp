@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Online calibration: with a rig that is wrong by a known amount, the estimate moves towards the truth, and
-// with the option off it stays where it was.
+// Online calibration: with a rig that is wrong by a known amount, the estimate moves towards the truth;
+// with the option off it does not change.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ using test::SimulatedFlight;
 constexpr int kFrames = 300;
 
 EstimatorOptions exact_noise() {
-  EstimatorOptions o;  // the simulated IMU is as good as its data sheet
+  EstimatorOptions o;  // the simulated IMU has the calibrated noise
   o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
   return o;
 }
@@ -66,8 +66,8 @@ TEST(OnlineCalibration, LeavesGoodExtrinsicsWhereTheyAre) {
   EXPECT_LT(shift_to(found, flight.rig), 0.005);
 }
 
-/// Scale hangs on the distance between the cameras; a flight that hardly moves says next to nothing about it.
-TEST(OnlineCalibration, HoldsTheCamerasToOneAnother) {
+/// The baseline determines the scale; a flight with little motion hardly observes it.
+TEST(OnlineCalibration, KeepsThePoseBetweenTheCameras) {
   for (const double amplitude : {0.02, 0.6}) {
     SimulatedFlight flight(Motion(amplitude, 0.5), 47);
     EstimatorOptions options = exact_noise();
@@ -90,8 +90,8 @@ TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
     dx.segment<kCalibrationSize>(prior.calibration_row()) = calibration_displacement({rig.T_BC0, rig.T_BC1, 0.0}, calibrated);
     return prior.quadratic.cost(dx);
   };
-  // Turned together by one standard deviation about an axis through the IMU: the left camera's rotation, and its position
-  // on the lever arm; nothing of what lies between the cameras.
+  // Both cameras turned by one standard deviation about an axis through the IMU: costs of the left camera's rotation and
+  // of its position, by the lever arm; none of the pose between the cameras.
   const StereoRig turned = loose_mount(flight.rig, sigmas.rotation_sigma_rad, 0);
   const double moved = (turned.T_BC0.p - flight.rig.T_BC0.p).norm() / sigmas.position_sigma_m;
   EXPECT_NEAR(cost(turned), 0.5 * (1 + moved * moved), 0.02);
@@ -104,7 +104,7 @@ TEST(InitialPrior, CostsOfTheCalibrationAreThoseOfItsStandardDeviations) {
   EXPECT_NEAR(cost(squinting), 0.5, 1e-6);
 }
 
-TEST(OnlineCalibration, TouchesNothingWhenOff) {
+TEST(OnlineCalibration, ChangesNothingWhenOff) {
   SimulatedFlight flight(Motion(0.6, 0.5), 46);
   const StereoRig calibrated = loose_mount(flight.rig, 0.002, 0.001);
   const Calibration found = fly(flight, calibrated, exact_noise());

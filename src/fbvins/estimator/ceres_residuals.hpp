@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: the window's residuals once more, from their definitions, for Ceres' automatic derivatives.
+// For tests: the window's residuals implemented again from their definitions, for Ceres' automatic derivatives.
 #pragma once
 
 #include <ceres/jet.h>
@@ -27,7 +27,7 @@ Q<T> exp(const T* theta) {
   return {q[0], q[1], q[2], q[3]};
 }
 
-/// Everything about a frame that moves with its perturbation d of 15 numbers.
+/// A frame's state perturbed by d, of 15 numbers.
 template <class T>
 struct Moved {
   Vec<T> p, v, bg, ba;
@@ -56,7 +56,7 @@ struct ResidualOf : Residual {
   const Derived& self() const { return static_cast<const Derived&>(*this); }
 };
 
-/// The one functor that Ceres sees.
+/// The only functor that Ceres instantiates.
 struct Functor {
   std::unique_ptr<Residual> residual;
   template <class T>
@@ -101,7 +101,7 @@ struct Reprojection : ResidualOf<Reprojection> {
   }
 };
 
-/// The landmark's distance from where it was (K1), from its definition. Of x = (landmark, calibration, host).
+/// The prior of a re-observed landmark (K1), from its definition. Of x = (landmark, calibration, host).
 struct LandmarkPriorResidual : ResidualOf<LandmarkPriorResidual> {
   Reprojection seen;
   LandmarkPrior prior;

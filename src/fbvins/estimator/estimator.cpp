@@ -13,7 +13,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kRestForStandstill_s = 0.5;
-/// Tilt, velocity and biases hardly move the cost of so short a time as the first: its solve does not stop on a small decrease.
+/// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
 WindowWeights weights_of(const EstimatorOptions& o) {
@@ -78,7 +78,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   running_ = true;
   health_.start(frame);
   solve(out.odometry, kThorough);
-  // The first solve may have moved the first frame far: Jacobians of the prior follow it.
+  // The first solve may have moved the first frame far: the prior is linearised anew at its state.
   window_.restart_first_estimates();
   const WindowSolution& solution = solve(out.odometry, kThorough);
   out.odometry.health = judge(frame);
@@ -123,7 +123,7 @@ Frame Estimator::predict(const TrackedFrame& frame) const {
   f.id = frame.id;
   f.t = frame.t;
   f.images = frame.images;
-  if (frame.imu.empty()) {  // no reading at all: carry on with the velocity
+  if (frame.imu.empty()) {  // no readings: constant velocity
     f.state = last.state;
     f.state.T_WB.p += (frame.t - last.t).seconds() * last.state.v_WB;
     return f;
@@ -159,7 +159,7 @@ const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
   window_.describe(calibration_, solution_.window);
   solver_.solve(solution_, lm);
   if (!solution_.summary.usable &&
-      window_.refuse_landmark_priors(solution_.window) > 0) {  // one of them can make every step worse
+      window_.refuse_landmark_priors(solution_.window) > 0) {  // a wrong one can make every step fail
     window_.describe(calibration_, solution_.window);
     solver_.solve(solution_, lm);
   }
@@ -251,7 +251,7 @@ void Estimator::restart() {
   rest_.reset();
 }
 
-/// The pose of the newest frame, carried on from the one published before.
+/// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).
 void Estimator::publish(Odometry& out) {
   const NavState& newest = window_.newest().state;
   const NavState level = window_.tilt().levelled(newest);

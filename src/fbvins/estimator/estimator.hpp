@@ -24,7 +24,7 @@
 
 namespace fbvins {
 
-/// What one frame brought: its pose, the keyframes that have become final with it, and the landmarks that left the window.
+/// Result of one frame: its pose, the keyframes that have become final with it, and the landmarks that left the window.
 struct Estimate {
   Odometry odometry;
   std::vector<Keyframe> keyframes;
@@ -33,17 +33,17 @@ struct Estimate {
 
 class Estimator {
  public:
-  /// `before`: what an earlier flight knew of the IMU.
+  /// `before`: the IMU's biases at the end of an earlier flight.
   Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before = {});
 
-  /// The state at the frame's stamp. Never a silent wrong pose: health says what it is worth.
+  /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& frame);
 
   /// For the frontend: the newest state in the window's W, not levelled; not valid before initialisation.
   StatePrior prior() const;
   WindowSnapshot snapshot() const;
   const Calibration& calibration() const { return calibration_; }
-  /// For tests and those who want to look inside.
+  /// For tests and inspection.
   const SlidingWindow& window() const { return window_; }
 
  private:
@@ -63,14 +63,14 @@ class Estimator {
   EstimatorOptions options_;
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
-  double scale_sigma_;                    ///< what the calibration leaves open of the scale (W21)
+  double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;
   HealthJudge health_;
   SlidingWindow window_;
   WindowSolver solver_;
-  WindowSolution solution_;  ///< of the newest solve; kept for its memory
+  WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused
   bool running_ = false;
   std::uint32_t reset_counter_ = 0;
   int failed_solves_ = 0;

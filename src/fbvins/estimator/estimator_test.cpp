@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The estimator as a whole on simulated tracks and readings: accuracy, consistency, and what it does when
-// sensors stop or lie.
+// The whole estimator on simulated tracks and readings: accuracy, consistency, and its behaviour when
+// sensors stop or give wrong data.
 #include "fbvins/estimator/estimator.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ using test::Motion;
 using test::SimulatedFlight;
 
 EstimatorOptions exact_noise() {
-  EstimatorOptions o;  // the simulated IMU is as good as its data sheet
+  EstimatorOptions o;  // the simulated IMU has the calibrated noise
   o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
   return o;
 }
@@ -25,7 +25,7 @@ EstimatorOptions exact_noise() {
 struct Flown {
   std::vector<Odometry> odometry;
   std::vector<NavState> truth;
-  int gauge_frame = -1;  ///< the frame whose position and heading W was chosen by
+  int gauge_frame = -1;  ///< the frame whose pose defines W's origin and heading
   Pose<W, B> gauge_pose;
 
   int first_pose() const {
@@ -125,14 +125,14 @@ TEST(Estimator, CovarianceIsConsistent) {
 }
 
 TEST(Estimator, CovarianceIsNotOverconfidentWithLandmarksKnown) {
-  // A landmark that leaves in view is held at once by where it was: what it was seen by is counted twice, and the covariance
-  // allows for it (K4), even where it hardly matters.
+  // A landmark that leaves while in view is re-observed at once: its earlier observations count twice, and the covariance
+  // allows for that (K4), even where it hardly matters.
   const double nees = mean_normalised_error(true);
   EXPECT_GT(nees, 1.0);
   EXPECT_LT(nees, 12.0);
 }
 
-TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
+TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
   double with = 0, without = 0, nees = 0;
   int n = 0;
   for (int seed = 0; seed < 4; ++seed) {
@@ -144,7 +144,7 @@ TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
       options.known_landmarks.enabled = known;
       Flown flown = fly(flight, 600, options);
       for (int k = 300; known && k < 600; k += 20, ++n) nees += normalised_error(flown, k);
-      flown.gauge_frame = 200;  // what comes after the start
+      flown.gauge_frame = 200;  // drift after the start only
       flown.gauge_pose = flown.odometry[200].T_WB;
       for (int k = 300; k < 600; k += 20) (known ? with : without) += flown.position_error(k);
     }
@@ -155,7 +155,7 @@ TEST(Estimator, LandmarksKnownAgainStopTheDrift) {
   EXPECT_LT(nees / n, 12.0);
 }
 
-TEST(Estimator, ALandmarkTakenForAnotherHarmsNothing) {
+TEST(Estimator, MistakenLandmarksDoNoHarm) {
   // From the sixth second on, tracks come back as those of points elsewhere: one in ten.
   SimulatedFlight flight(Motion(0.8, 0.8), 210);
   flight.knows_again = true;
@@ -168,17 +168,17 @@ TEST(Estimator, ALandmarkTakenForAnotherHarmsNothing) {
   EXPECT_EQ(flown.odometry.back().reset_counter, 0u);
 }
 
-TEST(Estimator, PriorKnowsNothingOfPositionAndHeadingBeyondTheGauge) {
+TEST(Estimator, PriorHasNoInformationOnPositionAndHeadingBeyondTheGauge) {
   for (const KeyframeLeaving policy : {KeyframeLeaving::oldest, KeyframeLeaving::entropy}) {
     SimulatedFlight flight(Motion(0.6, 0.3), 5);
     EstimatorOptions options = exact_noise();
     options.keyframes.leaving = policy;
-    options.known_landmarks.enabled = false;  // they do know position and heading
+    options.known_landmarks.enabled = false;  // they have information on position and heading
     Estimator estimator(flight.rig, options);
     for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
     const WindowPrior& prior = estimator.window().prior();
     ASSERT_FALSE(prior.empty());
-    // The four directions of W9 at the first estimates, up being where the state has it.
+    // The four directions of W9 that leave gravity as it is, at the first estimates and the estimated up.
     const Vec3 up_W = estimator.window().tilt().q() * Vec3::UnitZ();
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
     for (std::size_t i = 0; i < prior.frames.size(); ++i) {
@@ -217,7 +217,7 @@ TEST(Estimator, BridgesASecondWithoutImages) {
   SimulatedFlight flight(Motion(0.6, 0.3), 7);
   flight.images = [](int k) { return k < 80 || k >= 100; };
   const Flown flown = fly(flight, 160);
-  for (int k = 80; k <= 100; ++k)  // the first image is the first after a hole
+  for (int k = 80; k <= 100; ++k)  // frame 100 is the first after the gap
     EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::no_images})) << k;
   for (int k = 105; k < 160; ++k) {
     EXPECT_EQ(flown.odometry[k].health.state, HealthState::good) << k;
@@ -257,7 +257,7 @@ TEST(Estimator, WaitsForImages) {
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
 }
 
-TEST(Estimator, SaysOfTheFirstImageAfterAHoleThatThereWasOne) {
+TEST(Estimator, TheFirstImageAfterAGapIsDegraded) {
   // Images 80 to 89 never come; the next brings all readings since 79.
   SimulatedFlight flight(Motion(0.6, 0.3), 15);
   Estimator estimator(flight.rig, exact_noise());
@@ -298,12 +298,12 @@ TEST(Estimator, UpIsAStateOrFixedWhetherLandmarksAreRememberedOrNot) {
       }
       EXPECT_EQ(estimator.window().prior().with_tilt, up == UpDirection::state);
       EXPECT_EQ(estimator.window().tilt().angle_rad.isZero(0), up == UpDirection::fixed);
-      EXPECT_EQ(located > 0, known && up == UpDirection::state) << "in a W that turns no position may be remembered";
+      EXPECT_EQ(located > 0, known && up == UpDirection::state) << "no position is remembered where up is fixed";
     }
   }
 }
 
-TEST(Estimator, ShrugsOffOutliers) {
+TEST(Estimator, IsRobustToOutliers) {
   SimulatedFlight flight(Motion(0.6, 0.3), 10);
   flight.outlier = [](int k, std::int64_t track) {  // a tenth of the tracks jumps about, each in its own way
     return track % 10 == 0 ? Vec2(20 * std::sin(0.7 * k + static_cast<double>(track)), 15 * std::cos(1.1 * k)) : Vec2(0, 0);
@@ -338,7 +338,7 @@ TEST(Estimator, WindowIsBounded) {
   }
 }
 
-TEST(Estimator, HandsOnKeyframesInOrderWithWhatTheySee) {
+TEST(Estimator, HandsOnKeyframesInOrderWithTheirLandmarks) {
   SimulatedFlight flight(Motion(0.6, 0.3), 13);
   Estimator estimator(flight.rig, exact_noise());
   FrameId last;
@@ -374,7 +374,7 @@ TEST(Estimator, TheGaugeIsTheWindowsOwnFrameWithUpBeside) {
     const Odometry& o = estimate.odometry;
     if (!o.health.has_pose()) continue;
     ++poses;
-    const StatePrior prior = estimator.prior();  // what the frontend gets is the window's as well
+    const StatePrior prior = estimator.prior();  // the frontend's is in the window's frame as well
     EXPECT_EQ(o.gauge.T_GB.p, prior.T_WB.p);
     EXPECT_EQ(o.gauge.v_GB, prior.v_WB);
     EXPECT_LT((o.gauge.up_G() + prior.gravity_W.normalized()).norm(), 1e-12);

@@ -15,8 +15,8 @@
 
 namespace fbvins {
 
-/// A frame of the window. `imu` joins it to the frame before it in the window; it is replaced, never altered, so that
-/// the problems made of the window can share it.
+/// A frame of the window. `imu` joins it to the frame before it in the window; it is replaced, never modified, so that
+/// window problems can share it.
 struct Frame {
   FrameId id;
   Time t;

@@ -5,7 +5,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kImuGapDegraded_s = 0.05;
-/// Images further apart than this have others missing between them.
+/// Between images farther apart than this others are missing.
 constexpr double kImageHole_s = 0.25;
 constexpr int kFailedSolvesUntilLost = 3;
 /// Larger biases are implausible.
@@ -27,7 +27,7 @@ void HealthJudge::pass(const TrackedFrame& frame) {
   if (!without_images(frame)) previous_image_ = frame.t;
 }
 
-/// Neither camera's image came, or this is the first after a hole.
+/// Neither camera's image came, or these are the first ones after a gap.
 bool HealthJudge::images_missing(const TrackedFrame& frame) const {
   return without_images(frame) || (previous_image_ && (frame.t - *previous_image_).seconds() > kImageHole_s);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pose is worth, and why: sensors that are missing, tracks that are few, numbers that cannot be. Causes go before
+// Health of the estimate and its reason: missing sensor data, few tracks, implausible states. Causes take precedence over
 // their symptoms: an image that did not come is `no_images`, not `no_tracks`. One owner, one thread.
 #pragma once
 
@@ -18,11 +18,11 @@ class HealthJudge {
 
   /// The window starts with this frame.
   void start(const TrackedFrame& frame) { last_good_tracking_ = frame.t; }
-  /// Of a frame in the window, after its solve.
+  /// Health at a frame in the window, after its solve.
   Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves);
-  /// Of a frame before the start; `reason` is what the initialiser waits for.
+  /// Health at a frame before the start; `reason` is what the initialiser waits for.
   static Health before_start(const TrackedFrame& frame, HealthReason reason);
-  /// The frame is done with, whether it was judged or not.
+  /// To be called after each frame, whether it was judged or not.
   void pass(const TrackedFrame& frame);
 
  private:

@@ -24,7 +24,7 @@ TrackedFrame frame_at(double t_s) {
   return f;
 }
 
-/// Starts with a good frame at 0 s, and passes what follows.
+/// Starts with a good frame at 0 s; judges and passes each that follows.
 class Judged {
  public:
   Judged() {
@@ -61,7 +61,7 @@ TEST(HealthJudge, ImagesWithoutTracksAreNoTracks) {
   EXPECT_EQ(judged.next(frame_at(3.05), 0), lost(HealthReason::no_tracks));
 }
 
-TEST(HealthJudge, TheFirstImageAfterAHoleSaysSo) {
+TEST(HealthJudge, TheFirstImageAfterAGapIsNoImages) {
   Judged judged;
   EXPECT_EQ(judged.next(frame_at(0.24)), good());
   EXPECT_EQ(judged.next(frame_at(0.50)), degraded(HealthReason::no_images)) << "a quarter of a second without a stamp";
@@ -73,7 +73,7 @@ TEST(HealthJudge, TheFirstImageAfterAHoleSaysSo) {
   }
   EXPECT_EQ(judged.next(frame_at(0.85)), degraded(HealthReason::no_images)) << "or of stamps without an image";
   EXPECT_EQ(judged.next(frame_at(0.90)), good());
-  EXPECT_EQ(judged.next(frame_at(4.00), 0), lost(HealthReason::no_images)) << "a hole longer than can be bridged";
+  EXPECT_EQ(judged.next(frame_at(4.00), 0), lost(HealthReason::no_images)) << "a gap longer than can be bridged";
 }
 
 TEST(HealthJudge, OneImageIsOneCamera) {
@@ -90,7 +90,7 @@ TEST(HealthJudge, OneImageIsOneCamera) {
   EXPECT_EQ(judged.next(blocked), degraded(HealthReason::one_camera));
 }
 
-TEST(HealthJudge, SilentImuGoesBeforeMissingImages) {
+TEST(HealthJudge, ASilentImuTakesPrecedenceOverMissingImages) {
   Judged judged;
   TrackedFrame silent = frame_at(0.05);
   silent.imu = {};
@@ -105,7 +105,7 @@ TEST(HealthJudge, SolverThatFailsThriceIsLost) {
   EXPECT_EQ(judged.next(frame_at(0.10), kManyTracks, 3), lost(HealthReason::solver_failed));
 }
 
-TEST(HealthJudge, NumbersThatCannotBeAreLost) {
+TEST(HealthJudge, ImplausibleStatesAreLost) {
   HealthJudge judge{EstimatorOptions{}};
   judge.start(frame_at(0));
   NavState fast, biased;
@@ -115,7 +115,7 @@ TEST(HealthJudge, NumbersThatCannotBeAreLost) {
   EXPECT_EQ(judge.judge(frame_at(0), biased, kManyTracks, 0), lost(HealthReason::implausible_bias));
 }
 
-TEST(HealthJudge, BeforeTheStartMissingImagesGoBeforeOtherReasons) {
+TEST(HealthJudge, BeforeTheStartMissingImagesTakePrecedenceOverOtherReasons) {
   TrackedFrame frame = frame_at(0);
   EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::too_few_features}));

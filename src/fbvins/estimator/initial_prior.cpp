@@ -6,9 +6,9 @@
 namespace fbvins {
 namespace {
 
-/// The gauge: position and heading of the first frame are chosen; and roll and pitch, where the tilt is estimated instead.
+/// The gauge: position and heading of the first frame are chosen; also its roll and pitch, where the tilt of W is estimated.
 constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad
-/// Next to nothing is known of the rest.
+/// Weak priors of the other variables.
 constexpr double kTiltSigma_rad = 0.5;
 constexpr double kVelocitySigma_mps = 5;
 constexpr double kGyroBiasSigma_radps = 0.1;
@@ -16,7 +16,7 @@ constexpr double kAccelBiasSigma_mps2 = 0.2;
 
 double information(double sigma) { return 1 / (sigma * sigma); }
 
-/// With variables of their own, known to H and not moved from where they are, before number `at`.
+/// `prior` with new variables before number `at`, at their mean and with information H.
 QuadraticPrior inserted(const QuadraticPrior& prior, int at, const Eigen::MatrixXd& H) {
   const int n = static_cast<int>(H.rows()), after = prior.size() - at;
   QuadraticPrior out{Eigen::MatrixXd::Zero(prior.size() + n, prior.size() + n), Eigen::VectorXd::Zero(prior.size() + n)};
@@ -60,7 +60,7 @@ WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& bias
 }
 
 WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& sigmas, const Calibration& calibrated) {
-  // Of T_C0C1 = T_BC0^-1 T_BC1, over T_BC0 (dp, dtheta), T_BC1 (dp, dtheta):
+  // Derivative of T_C0C1 = T_BC0^-1 T_BC1 by T_BC0 (dp, dtheta), T_BC1 (dp, dtheta):
   // dp = R_0^T (dp_1 - dp_0) + p_01 x dtheta_0, dtheta = dtheta_1 - R_01^T dtheta_0.
   const Mat3 R_0 = calibrated.T_BC0.R(), R_01 = R_0.transpose() * calibrated.T_BC1.R();
   const Vec3 p_01 = R_0.transpose() * (calibrated.T_BC1.p - calibrated.T_BC0.p);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Priors before any measurement: of the first frame's state, and of the calibration where it is estimated.
+// Priors before any measurement: of the first frame's state, and of the calibration if it is estimated.
 // Pure functions.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace fbvins {
 
-/// How far the calibration may be off, where it is estimated: standard deviations.
+/// Prior standard deviations of the calibration, if it is estimated.
 struct CalibrationPrior {
   double rotation_sigma_rad = 0.02;         ///< of the cameras to the IMU
   double position_sigma_m = 0.01;           ///< of the cameras in the IMU's frame
@@ -17,16 +17,16 @@ struct CalibrationPrior {
   double time_offset_sigma_s = 0.005;
 };
 
-/// Biases of an IMU of which nothing is known: near zero.
+/// Biases of an unknown IMU: zero, with a wide covariance.
 ImuBiasEstimate unknown_biases();
 
-/// Of the first frame: position and heading are a choice of W, biases as given, tilt and velocity are wide open: the
-/// tilt of W where that is estimated, else that of the frame. The initial solution is where the optimiser starts, not a prior:
-/// it was made from measurements that the window still holds.
+/// Prior of the first frame: position and heading are fixed as the gauge, biases as given, velocity and tilt almost free: the
+/// tilt of W where that is estimated, else that of the frame. The initial solution is the optimiser's starting point, not
+/// the prior's mean: it was made from measurements that are in the window.
 WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& biases, bool estimate_tilt);
 
-/// Puts the prior of the calibration before that of the first frame: its mean is `calibrated`, its standard deviations are those
-/// given. The two cameras are held to one another far more firmly than to the IMU: scale hangs on their distance.
+/// Inserts the prior of the calibration before that of the first frame: its mean is `calibrated`, its standard deviations are
+/// those given. The pose between the cameras is constrained far more tightly than that to the IMU: it determines the scale.
 WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& sigmas, const Calibration& calibrated);
 
 }  // namespace fbvins

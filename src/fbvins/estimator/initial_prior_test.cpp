@@ -20,7 +20,7 @@ double cost_of_turn(const WindowPrior& prior, const Vec3& angle_W) {
   return prior.quadratic.cost(dx) - prior.quadratic.cost(Eigen::VectorXd::Zero(prior.quadratic.size()));
 }
 
-TEST(FirstFramePrior, HoldsHeadingAndLeavesTiltOpenWhereUpIsFixed) {
+TEST(FirstFramePrior, FixesHeadingAndLeavesRollAndPitchFreeWhereUpIsFixed) {
   const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), false);
   EXPECT_EQ(prior.quadratic.size(), 15);
   const double angle = 0.01;
@@ -29,7 +29,7 @@ TEST(FirstFramePrior, HoldsHeadingAndLeavesTiltOpenWhereUpIsFixed) {
   EXPECT_LT(cost_of_turn(prior, angle * Vec3::UnitY()), 1e-3);
 }
 
-TEST(FirstFramePrior, HoldsTheFrameAndLeavesTheTiltOpenWhereUpIsAState) {
+TEST(FirstFramePrior, FixesTheFrameAndLeavesTheTiltFreeWhereUpIsAState) {
   const WindowPrior prior = first_frame_prior(tilted(), unknown_biases(), true);
   EXPECT_EQ(prior.quadratic.size(), 17);
   for (int axis = 0; axis < 3; ++axis) EXPECT_GT(cost_of_turn(prior, 0.01 * Vec3::Unit(axis)), 40);
@@ -43,7 +43,7 @@ TEST(FirstFramePrior, HasBiasesNearZeroAndNotNearTheInitialSolution) {
   Eigen::VectorXd to_zero = Eigen::VectorXd::Zero(17);
   to_zero.tail<6>() << -tilted().bias.gyro_radps, -tilted().bias.accel_mps2;
   EXPECT_LT(prior.quadratic.cost(to_zero), prior.quadratic.cost(Eigen::VectorXd::Zero(17)));
-  EXPECT_LT(prior.quadratic.gradient(to_zero).norm(), 1e-9) << "the least";
+  EXPECT_LT(prior.quadratic.gradient(to_zero).norm(), 1e-9) << "the minimum";
 }
 
 TEST(FirstFramePrior, HasTheBiasesOfAnEarlierFlight) {
@@ -54,7 +54,7 @@ TEST(FirstFramePrior, HasTheBiasesOfAnEarlierFlight) {
   const WindowPrior prior = first_frame_prior(tilted(), before, true);
   Eigen::VectorXd there = Eigen::VectorXd::Zero(17);
   there.tail<6>() << before.bias.gyro_radps - tilted().bias.gyro_radps, before.bias.accel_mps2 - tilted().bias.accel_mps2;
-  EXPECT_LT(prior.quadratic.gradient(there).norm(), 1e-9) << "the least";
+  EXPECT_LT(prior.quadratic.gradient(there).norm(), 1e-9) << "the minimum";
   Eigen::VectorXd a_sigma_off = there;
   a_sigma_off(2 + nav::ba + 1) += 0.02;
   EXPECT_NEAR(prior.quadratic.cost(a_sigma_off) - prior.quadratic.cost(there), 0.5, 1e-9);

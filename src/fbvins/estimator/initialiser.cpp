@@ -18,19 +18,19 @@
 namespace fbvins {
 namespace {
 
-/// An initial solution is made from so many images, at least so far apart.
+/// An initial solution is made from so many images, at least this far apart.
 constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
-/// Stereo features needed in each of them. At rest position and speed are known without them: enough to follow will do, as the
-/// floor in front of a landed drone shows few.
+/// Stereo features needed in each of them. At rest motion is known without them, and fewer are enough: the floor in front of
+/// a landed drone shows few.
 constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
-/// At rest a track that is further than this from where it was first seen is on something that moves.
+/// At rest a track that is farther than this from its first pixel is on a moving object.
 constexpr double kStill_px = 1.5;
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
 constexpr std::size_t kFramesPerRefinement = 3;
 
-/// All fifteen numbers of the first frame: images alone fix neither origin nor velocity.
+/// Prior on all fifteen numbers of the first frame: images alone determine neither origin nor velocity.
 WindowPrior held_still() {
   WindowPrior prior;
   prior.frames = {0};
@@ -45,7 +45,7 @@ int stereo_features(const TrackedFrame& frame) {
   return n;
 }
 
-/// A vehicle at rest sees what moves: tracks that have left where they were first seen are left out.
+/// Removes tracks on moving objects, for a vehicle at rest: those that have left their first pixel.
 void leave_out_moving(std::vector<TrackedFrame>& frames) {
   std::unordered_map<TrackId, Vec2> first;
   std::unordered_set<TrackId> moving;
@@ -56,7 +56,7 @@ void leave_out_moving(std::vector<TrackedFrame>& frames) {
     std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
 }
 
-/// Turns and shifts W so that the first state has the origin's position and heading.
+/// Rotates about the vertical and translates W so that the first state has the position and heading of `origin`.
 void move_to(const Pose<W, B>& origin, InitialSolution& start) {
   const Pose<W, B> first = start.states.front().T_WB;
   const Quat turn(Eigen::AngleAxisd(heading_between(first.q, origin.q), Vec3::UnitZ()));
@@ -76,7 +76,7 @@ Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise,
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                                     const std::optional<Pose<W, B>>& origin) {
-  // A break in images or readings makes what came before useless: frames must follow one another.
+  // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
   if (stereo_features(frame) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
@@ -99,7 +99,7 @@ void Initialiser::remember(const TrackedFrame& frame) {
   if (!frame.imu.empty()) readings_.push_back(frame.imu);
   while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= RestOptions{}.min_window_s)
     readings_.pop_front();
-  // A fast camera would fill the window in no time: the newest frame takes the place of one just before it.
+  // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
   const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
   if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < kMinSpacing_s) {
@@ -165,7 +165,7 @@ bool Initialiser::refine_structure(const Calibration& calibration) {
 }
 
 bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses) {
-  // Poses in a visual world whose origin is the first frame, one after the other, then all together.
+  // Poses in a visual world whose origin is the first frame, first one by one, then all together.
   poses.assign(1, Pose<W, B>{});
   std::unordered_map<TrackId, Vec3> points;
   structure_.clear();
@@ -190,7 +190,7 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
     f.state.T_WB = poses.back();
     structure_.add_frame(std::move(f), frames_[i].features, calibration);
     if (i == 0) structure_.set_prior(held_still());
-    // Stereo alone knows far points badly: the motion so far improves them before the next pose needs them.
+    // Stereo alone is inaccurate for far points: the motion so far improves them before the next pose needs them.
     if (i % kFramesPerRefinement == 0 || i + 1 == frames_.size()) {
       if (!refine_structure(calibration)) return false;
       for (const WindowSnapshot::Landmark& l : snapshot_of(structure_, calibration).landmarks) points[l.track] = l.p_W;

@@ -18,17 +18,17 @@
 
 namespace fbvins {
 
-/// States of neighbouring frames, the last being the newest.
+/// States of consecutive frames, the last being the newest.
 struct InitialSolution {
   std::vector<TrackedFrame> frames;
   std::vector<NavState> states;
   bool from_rest = false;
-  ImuBiasEstimate biases;  ///< known before these frames
+  ImuBiasEstimate biases;  ///< their prior, before these frames
 };
 
 class Initialiser {
  public:
-  /// `before`: what an earlier flight knew of the IMU.
+  /// `before`: the IMU's biases at the end of an earlier flight.
   Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before = {});
 
   void reset() {
@@ -53,7 +53,7 @@ class Initialiser {
   ImuNoise noise_;
   std::optional<ImuState> before_;
   std::deque<TrackedFrame> frames_;
-  std::deque<ImuSegment> readings_;  ///< of the last moments, for the judgement of rest
+  std::deque<ImuSegment> readings_;  ///< of the last moments, to decide whether the body is at rest
   SlidingWindow structure_;
   WindowSolver solver_;
   HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;

@@ -57,7 +57,7 @@ TEST(Initialiser, StartsFromRest) {
   EXPECT_TRUE(s.solution->states.back().v_WB.isZero());
 }
 
-TEST(Initialiser, PutsTheFirstFrameWhereItIsTold) {
+TEST(Initialiser, PutsTheFirstFrameAtTheOriginGiven) {
   SimulatedFlight flight(Motion(0.6, 0.3), 53);
   const Pose<W, B> origin(so3_exp(Vec3(0.1, -0.2, 2)), Vec3(10, -5, 3));
   const Started s = start(flight, 40, origin);
@@ -75,14 +75,14 @@ TEST(Initialiser, WaitsForFeaturesInBothCameras) {
   EXPECT_EQ(s.reason, HealthReason::too_few_features);
 }
 
-/// As many features with a right pixel as are left when the rest is taken away.
+/// The frame with at most `most` features, all matched in stereo.
 TrackedFrame with_features(TrackedFrame frame, std::size_t most) {
   std::erase_if(frame.features, [](const TrackedFeature& f) { return !f.right; });
   frame.features.resize(std::min(most, frame.features.size()));
   return frame;
 }
 
-TEST(Initialiser, FewFeaturesWillDoAtRestAndNotInMotion) {
+TEST(Initialiser, FewFeaturesAreEnoughAtRestAndNotInMotion) {
   for (const bool rests : {true, false}) {
     SimulatedFlight flight(rests ? Motion(0, 0) : Motion(0.6, 0.3), 56);
     Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
@@ -98,7 +98,7 @@ TEST(Initialiser, FewFeaturesWillDoAtRestAndNotInMotion) {
 }
 
 /// Somebody walks by: every third feature moves by two pixels an image.
-TEST(Initialiser, AtRestLeavesOutWhatMoves) {
+TEST(Initialiser, AtRestLeavesOutMovingFeatures) {
   SimulatedFlight flight(Motion(0, 0), 57);
   flight.outlier = [](int k, std::int64_t id) { return id % 3 == 0 ? Vec2(2.0 * k, 0) : Vec2(0, 0); };
   const Started s = start(flight, 40, {}, 0.05);

@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-/// Keyframes this new have not been seen by enough later frames to show what they are worth.
+/// The newest keyframes share too few later frames yet for their information to be judged.
 constexpr int kTooNewToJudge = 2;
 /// A new keyframe when fewer of the features than this were seen by the last one.
 constexpr double kMinSharedRatio = 0.7;
@@ -44,7 +44,7 @@ double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver&
     l.first_observation = first;
     l.observation_count = static_cast<int>(without.observations.size()) - first;
   }
-  // A landmark with fewer than two rays left says nothing: it would only make the elimination singular.
+  // A landmark with fewer than two rays left has no information; it would only make the elimination singular.
   std::erase_if(without.landmarks, [](const WindowLandmark& l) { return l.observation_count < 2; });
   solver.linearise(without);
   WindowInformation information;
@@ -56,7 +56,7 @@ double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver&
 }
 
 int least_telling_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver) {
-  // The entropy with everything seen is the same for all: the smallest gain is the smallest entropy without.
+  // The entropy with all observations is the same for all: the smallest gain (E3) has the smallest entropy without them.
   int least = 0;
   double least_entropy = 0;
   for (int i = 0; i < std::max(1, keyframes - kTooNewToJudge); ++i) {

@@ -16,7 +16,7 @@ class KeyframePolicy {
   bool is_keyframe(const SlidingWindow& window, const Calibration& calibration, bool standstill) const;
 
   /// Index of the keyframe that leaves, out of the first `keyframes` frames. `oldest`: 0.
-  /// `entropy`: the one whose images tell least about the newest state (docs/derivations/entropy.md, E4).
+  /// `entropy`: the one with the least information on the newest state (docs/derivations/entropy.md, E4).
   int leaving(const SlidingWindow& window, const Calibration& calibration, int keyframes);
 
  private:
@@ -25,11 +25,11 @@ class KeyframePolicy {
   WindowSolver solver_;
 };
 
-/// Index of the keyframe whose images tell least about the newest state.
+/// Index of the keyframe whose observations have the least information on the newest state (E4).
 int least_telling_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver);
 
-/// Differential entropy of the newest frame's fifteen numbers without what frame `unseen` saw; with all
-/// observations for unseen = -1. In nats, up to the constant of E2.
+/// Differential entropy of the newest frame's fifteen numbers without the observations of frame `unseen`; with all
+/// observations for unseen = -1. In nats, up to the constant of E2; 0 where the window cannot be solved.
 double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver& solver);
 
 }  // namespace fbvins

@@ -24,13 +24,13 @@ struct MidFlight {
   }
 };
 
-TEST(KeyframePolicy, WhatAKeyframeSawNeverRaisesTheEntropy) {
+TEST(KeyframePolicy, ObservationsOfAKeyframeNeverRaiseTheEntropy) {
   MidFlight m;
   const double all = entropy_of_newest(m.problem, -1, m.solver);
   for (int i = 0; i < m.keyframes; ++i) EXPECT_GE(entropy_of_newest(m.problem, i, m.solver), all - 1e-9) << i;
 }
 
-TEST(KeyframePolicy, AKeyframeThatSharesNothingTellsNothingAndLeaves) {
+TEST(KeyframePolicy, AKeyframeThatSharesNoLandmarkHasNoInformationAndLeaves) {
   MidFlight m;
   const int outdated = 2;
   for (WindowLandmark& l : m.problem.landmarks) {

@@ -9,9 +9,9 @@
 namespace fbvins {
 namespace {
 
-/// What was seen of a landmark before it was remembered is in the prior of the window and in its own (K4).
+/// The observations of a landmark before it was remembered count in the prior of the window and in its own (K4).
 constexpr double kTimesCounted = 2;
-/// Standard deviation of the depth, as a share of it, of landmarks worth remembering.
+/// Landmarks are remembered whose depth has at most this relative standard deviation.
 constexpr double kMaxRelativeDepthSigma = 0.05;
 
 }  // namespace
@@ -32,7 +32,7 @@ void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
   const double relative_sigma = depth * std::sqrt(covariance(2, 2));
-  if (!(relative_sigma < kMaxRelativeDepthSigma)) return;  // neither NaN
+  if (!(relative_sigma < kMaxRelativeDepthSigma)) return;  // nor NaN
 
   LandmarkPrior prior;
   const Vec3 p_C = depth * Vec3(alpha_beta_rho.x(), alpha_beta_rho.y(), 1);
@@ -71,7 +71,7 @@ std::optional<LandmarkPrior> KnownLandmarks::find(TrackId track) const {
   return it == priors_.end() ? std::nullopt : std::optional<LandmarkPrior>(it->second);
 }
 
-/// A map in error by (dp, dtheta) at the anchor is in error by dp - [p - p_anchor]x dtheta at p (K5).
+/// Covariance of the map at p: an error (dp, dtheta) at the anchor is dp - [p - p_anchor]x dtheta at p (K5).
 Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
   Mat6 T = Mat6::Identity();
   T.topRightCorner<3, 3>() = -hat(p_W - anchor.p_W);
@@ -80,10 +80,10 @@ Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
 
 void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use) {
   in_use_ = !in_use.empty();
-  if (!in_use_ || anchors_.empty()) return;  // still to what it was held to last
+  if (!in_use_ || anchors_.empty()) return;  // the last one's share is kept
   Anchor mean{p_W, Mat6::Zero()};
   for (const LandmarkPrior& prior : in_use) {                                        // (K6)
-    const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // forgotten meanwhile: the next
+    const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // dropped since: the oldest kept
     mean.covariance += carried(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
   }
   held_to_ = mean;

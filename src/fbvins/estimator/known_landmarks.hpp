@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks that have left the window, where they were, and how well that is known
-// (docs/derivations/known_landmarks.md, K1-K6). One that comes into the window again under its old track holds the window to W.
+// Landmarks that have left the window: their positions and covariances (docs/derivations/known_landmarks.md, K1-K6).
+// One that comes into the window again under its old track constrains the window by its prior.
 //
-// Each is known relative to the map around it, which drifted as one: what it has in common is kept once for all
-// landmarks of a moment, as an anchor, and is part of what W is uncertain of from then on.
+// A landmark's covariance is relative to the map around it, which has drifted as a whole. The common covariance is kept once
+// for all landmarks of a moment, as an anchor, and is added to that of every pose that such landmarks constrain.
 // Synchronous; one instance, one thread. At most `capacity` landmarks: the oldest are forgotten.
 //
 //   known.hold_to(T_WB.p, priors_in_use);                         // after each solve
@@ -32,14 +32,14 @@ class KnownLandmarks {
   explicit KnownLandmarks(const KnownLandmarkOptions& options) : options_(options) {}
 
   void clear();
-  /// The window is held to the map by these, around the newest position.
+  /// Sets the priors by which the map constrains the window, and the newest position.
   void hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use);
-  /// Covariance of (dp in W, dtheta in B) of a pose: of the window alone, and with that of the remembered landmarks (K4-K6).
+  /// Covariance of (dp in W, dtheta in B) of a pose: that of the window alone, plus that of the map in use (K4-K6).
   Mat6 with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
-  /// Landmarks remembered from now on have in common what this pose, their host's, is uncertain of.
+  /// Landmarks remembered from now on have the uncertainty of this pose, their host's, in common.
   void anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance);
-  /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. The first time counts,
-  /// it has drifted least; not one whose depth is too uncertain.
+  /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. Ignored for a landmark
+  /// that is known already, since the first position has drifted least, and for one whose depth is too uncertain.
   void remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information);
   std::optional<LandmarkPrior> find(TrackId track) const;
   void forget(TrackId track);
@@ -58,12 +58,12 @@ class KnownLandmarks {
 
   KnownLandmarkOptions options_;
   std::unordered_map<TrackId, LandmarkPrior> priors_;
-  std::deque<TrackId> order_;      // as remembered
+  std::deque<TrackId> order_;      // oldest first
   std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest
   Anchor next_;                    // of those remembered next
-  Anchor held_to_;                 // what the newest pose is held to
-  bool in_use_ = false;            // any landmark in the window is known from before
+  Anchor held_to_;                 // mean of the anchors in use, at the newest position (K6)
+  bool in_use_ = false;            // whether any landmark in the window has a prior
   std::vector<LocatedLandmark> new_;
 };
 

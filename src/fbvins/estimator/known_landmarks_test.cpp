@@ -14,7 +14,7 @@ const Mat3 kInformation = Vec3(1e6, 1e6, 1e5).asDiagonal();
 
 Pose<W, B> body_at(const Vec3& p_W) { return {so3_exp(Vec3(0.1, 0.2, 0.3)), p_W}; }
 
-TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
+TEST(KnownLandmarks, KeepPositionAndCovarianceOfTheTriangulation) {
   KnownLandmarkOptions options;
   options.position_sigma_m = 0.003;
   KnownLandmarks known(options);
@@ -32,7 +32,7 @@ TEST(KnownLandmarks, AreWhereTheyWereAsSurelyAsTheyWereSeen) {
   EXPECT_LT((in_camera - expected).norm(), 1e-12);
 }
 
-TEST(KnownLandmarks, TheFirstTimeCountsUntilForgotten) {
+TEST(KnownLandmarks, KeepTheirFirstPositionUntilForgotten) {
   KnownLandmarks known{KnownLandmarkOptions{}};
   known.remember(TrackId{7}, kCamera, kPoint, kInformation);
   const Vec3 first = known.find(TrackId{7})->p_W;
@@ -46,7 +46,7 @@ TEST(KnownLandmarks, TheFirstTimeCountsUntilForgotten) {
   EXPECT_NE(known.find(TrackId{7})->p_W, first);
 }
 
-TEST(KnownLandmarks, NothingOfUncertainDepth) {
+TEST(KnownLandmarks, AreNotThoseOfUncertainDepth) {
   KnownLandmarks known{KnownLandmarkOptions{}};
   known.remember(TrackId{3}, kCamera, kPoint, Vec3(1e6, 1e6, 1e3).asDiagonal());  // sigma of a sixteenth of the depth
   EXPECT_EQ(known.size(), 0u);
@@ -75,7 +75,7 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   EXPECT_NEAR(known.with_map(body_at(Vec3(39, 0, 0)), Mat6::Zero())(0, 0), 40e-7, 1e-10);
 }
 
-TEST(KnownLandmarks, APoseOwesItsMapWhatThatWasUncertainOf) {
+TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
   // Heading known to 2 mrad, the rest exactly, where the landmark was remembered; seen again from 5 m away.
   Mat6 heading = Mat6::Zero();
   const Pose<W, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
@@ -86,7 +86,7 @@ TEST(KnownLandmarks, APoseOwesItsMapWhatThatWasUncertainOf) {
   const Mat6 window = 1e-8 * Mat6::Identity();
   known.hold_to(here.p, std::array{*known.find(TrackId{1})});
   const Mat6 held = known.with_map(here, window);
-  EXPECT_NEAR(held(5, 5), 4e-6 + 2e-8, 1e-12) << "what was seen twice is counted twice";
+  EXPECT_NEAR(held(5, 5), 4e-6 + 2e-8, 1e-12) << "the window's share is doubled (K4)";
   EXPECT_NEAR(held(0, 0), 25 * 4e-6 + 2e-8, 1e-12) << "the lever of 5 m along y moves x";
   EXPECT_NEAR(held(1, 1), 2e-8, 1e-12);
   EXPECT_NEAR(held(0, 5), -5 * 4e-6, 1e-12);

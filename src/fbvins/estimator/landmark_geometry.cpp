@@ -7,14 +7,14 @@
 namespace fbvins {
 namespace {
 
-/// A landmark whose inverse depth is known worse than this is not worth starting with.
+/// A landmark is not triangulated while its inverse depth is less certain than this.
 constexpr double kMaxInverseDepthSigma_1pm = 0.15;
-/// No sighting may be further than this from a point that starts.
+/// No observation of a triangulated landmark may have a larger residual.
 constexpr double kMaxError_sigma = 6.0;
-/// Over a longer gap the difference of two sightings says little of the velocity at either.
+/// Over a longer gap the difference of two sightings is no good estimate of the velocity at either.
 constexpr double kLongestGap_s = 0.25;
 
-/// p_C = a + rho * b of a ray hosted in one frame, in some camera of another (W2, W3).
+/// p_C = a + rho * b: a ray of the host frame, seen from a camera of another frame (W2, W3).
 struct RayInCamera {
   Vec3 a, b;
 };
@@ -86,7 +86,7 @@ void set_velocities(Sighting& before, Sighting& now, double gap_s) {
   now.left_velocity = (now.left.normalised - before.left.normalised) / gap_s;
   now.right_velocity =
       now.right && before.right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
-  // Of the sighting before, the difference on its other side is known only now: their mean is good to second order.
+  // The sighting before has differences on both sides now: their mean is its velocity to second order.
   const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
   before.left_velocity += share * (now.left_velocity - before.left_velocity);
   before.right_velocity += share * (now.right_velocity - before.right_velocity);

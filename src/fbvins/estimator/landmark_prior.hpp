@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// A landmark that was known before it was hosted here, as a factor (docs/derivations/known_landmarks.md, K1-K3).
+// The prior of a re-observed landmark, as a factor of the window (docs/derivations/known_landmarks.md, K1-K3).
 #pragma once
 
 #include "fbvins/estimator/reprojection.hpp"
 
 namespace fbvins {
 
-/// Where a landmark was when it left the window before.
+/// Position of a landmark when it left the window.
 struct LandmarkPrior {
   Vec3 p_W = Vec3::Zero();                   ///< m
   Mat3 sqrt_information = Mat3::Identity();  ///< 1/m; of the position, in W, relative to the map around it
-  std::int64_t anchor = 0;                   ///< which of KnownLandmarks' anchors holds what that map has in common
+  std::int64_t anchor = 0;                   ///< number of KnownLandmarks' anchor with the common uncertainty of that map
 };
 
 /// The landmark in the body of its host, m (W1).

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Tracks that proved wrong are remembered as such up to this many, the newest.
+/// Of so many tracks with outliers, the newest, the strikes are kept.
 constexpr std::size_t kMaxTracksWithStrikes = 20000;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tracks that frames of the sliding window see, and the points they show. Found by id and by track; no geometry
+// The tracks in the frames of the sliding window and their landmarks, found by id and by track. No geometry
 // (that is landmark_geometry.hpp). A value.
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace fbvins {
 
-/// A landmark seen from one frame.
+/// The observations of a landmark by one frame's cameras.
 struct Sighting {
   FrameId frame;
   Observation left;
@@ -25,16 +25,16 @@ struct Sighting {
   Vec2 right_velocity = Vec2::Zero();
 };
 
-/// A track and, once triangulated, the point it shows.
+/// A track and, once triangulated, its 3-D point.
 struct Landmark {
   LandmarkId id;
   TrackId track;
   FrameId host;
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
-  std::optional<LandmarkPrior> prior;  ///< of one that was known before
-  int strikes = 0;                     ///< times an observation of it was thrown out
-  std::vector<Sighting> sightings;     ///< oldest first; one without any is removed
+  std::optional<LandmarkPrior> prior;  ///< of a re-observed one
+  int strikes = 0;                     ///< solves after which observations of it were removed as outliers
+  std::vector<Sighting> sightings;     ///< oldest first; a landmark without any is removed
 
   bool seen_in(FrameId frame) const { return sighting_in(frame) != nullptr; }
   const Sighting* sighting_in(FrameId frame) const;
@@ -42,7 +42,7 @@ struct Landmark {
 
 class LandmarkTable {
  public:
-  /// Ids go on where they were.
+  /// Ids are not used again.
   void clear();
   const std::vector<Landmark>& all() const { return landmarks_; }
   std::vector<Landmark>& all() { return landmarks_; }
@@ -52,10 +52,10 @@ class LandmarkTable {
   const Landmark* find(LandmarkId id) const { return const_cast<LandmarkTable*>(this)->find(id); }
   /// The landmark of a track, and whether it is a new one.
   std::pair<Landmark&, bool> of_track(TrackId track);
-  /// Removes landmarks whose sightings have all been taken away.
+  /// Removes landmarks without sightings.
   void remove_unseen();
 
-  /// Tracks that proved wrong keep their strikes; three, and they are not followed any more.
+  /// Remembers the strikes of a track whose landmark is removed; after three the track is ignored.
   void keep_strikes(const Landmark& landmark);
   bool banned(TrackId track) const;
   static constexpr int kStrikesUntilBanned = 3;

@@ -10,15 +10,15 @@
 
 namespace fbvins {
 
-struct PointSighting {
+struct PointSighting {  // a landmark of known position and its observations
   Vec3 p_W = Vec3::Zero();
   const TrackedFeature* feature = nullptr;
 };
 
 struct PoseRefinement {
   Pose<W, B> T_WB;
-  int inliers = 0;  ///< left observations within 3 sigma
-  bool converged = false;
+  int inliers = 0;         ///< left observations within 3 sigma
+  bool converged = false;  ///< or stopped at max_iterations with inliers
 };
 
 PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<W, B> guess,

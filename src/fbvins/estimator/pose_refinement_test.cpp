@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// What a simulated frame sees, with where it is. Tracks are numbered as their points are found.
+/// The features of a simulated frame with the positions of their points.
 struct Seen {
   test::SimulatedFlight flight{test::Motion(0.5, 0.3), 31};
   TrackedFrame frame;
@@ -46,7 +46,7 @@ TEST(PoseRefinement, FindsThePoseFromAGuess) {
   EXPECT_GT(found.inliers, 0.9 * static_cast<double>(s.sightings.size()));
 }
 
-TEST(PoseRefinement, OutliersAreCountedOut) {
+TEST(PoseRefinement, OutliersAreNoInliers) {
   Seen s;
   const std::size_t wrong = s.sightings.size() / 5;
   for (std::size_t k = 0; k < wrong; ++k) s.sightings[k].p_W += Vec3(0.5, -0.5, 0.5);
@@ -55,7 +55,7 @@ TEST(PoseRefinement, OutliersAreCountedOut) {
   EXPECT_LE(found.inliers, static_cast<int>(s.sightings.size() - wrong) + 2);
 }
 
-TEST(PoseRefinement, NothingSeenIsNoPose) {
+TEST(PoseRefinement, WithoutFeaturesItDoesNotConverge) {
   Seen s;
   const PoseRefinement found = refine_pose({}, s.calibration, s.guess());
   EXPECT_FALSE(found.converged);

@@ -8,19 +8,20 @@
 namespace fbvins {
 namespace {
 
-/// From a to b in the perturbation of poses (conventions, R3 and R4).
+/// The perturbation that takes a to b (conventions, R3 and R4).
 Vec6 difference(const Pose<W, B>& b, const Pose<W, B>& a) {
   Vec6 d;
   d << b.p - a.p, so3_log((a.q.conjugate() * b.q).normalized());
   return d;
 }
 
-Vec3 at_most(const Vec3& pending, double limit) {
+/// `pending`, shortened to at most `limit` (W18).
+Vec3 limited(const Vec3& pending, double limit) {
   const double size = pending.norm();
   return size > limit ? Vec3((limit / size) * pending) : pending;
 }
 
-/// Of the attitude against the level about its less known axis, from the covariance of dtheta in B.
+/// Standard deviation of the attitude's tilt about its less certain axis, from the covariance of dtheta in B.
 double tilt_sigma_of(const Quat& q_WB, const Mat3& covariance) {
   const Mat3 R = q_WB.toRotationMatrix();
   const Mat2 level = (R * covariance * R.transpose()).topLeftCorner<2, 2>();
@@ -38,7 +39,7 @@ void PublishedPose::follow(const std::optional<Pose<B, B>>& motion, const Pose<W
   }
   const Pose<W, B> moved = T_WB_ * *motion;
   const Vec6 pending = difference(level, moved);
-  T_WB_ = moved.boxplus(at_most(pending.head<3>(), max_step_m_), at_most(pending.tail<3>(), kTurnPerStep_radpm * max_step_m_));
+  T_WB_ = moved.boxplus(limited(pending.head<3>(), max_step_m_), limited(pending.tail<3>(), kTurnPerStep_radpm * max_step_m_));
   pending_ = difference(level, T_WB_);
 }
 

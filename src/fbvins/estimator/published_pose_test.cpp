@@ -9,7 +9,7 @@ namespace {
 constexpr double kStep_m = 0.003;
 constexpr double kStep_rad = 0.1 * 3.14159265358979323846 / 180;
 
-/// A body that flies a curve, two metres a second at 20 Hz.
+/// Poses of a body that flies a curve, two metres a second, at 20 Hz.
 Pose<W, B> flown(int k) {
   const double s = 0.05 * k;
   return {so3_exp(Vec3(0.2 * std::sin(s), 0.1, 0.5 * s)), Vec3(2 * s, std::sin(s), 1)};
@@ -33,7 +33,7 @@ TEST(PublishedPose, IsTheWindowsWhereNothingIsCorrected) {
 /// All that is corrected at frame 10: W was turned by two degrees and moved by 35 mm.
 const Pose<W, W> kCorrection{so3_exp(Vec3(0.03, -0.02, 0)), Vec3(0.02, -0.025, 0.015)};
 
-TEST(PublishedPose, NoFrameShowsMoreThanTheStepBesideTheMotion) {
+TEST(PublishedPose, NoFrameAddsMoreThanTheStepToTheMotion) {
   PublishedPose published(kStep_m);
   double largest_m = 0, largest_rad = 0;
   for (int k = 0; k < 120; ++k) {
@@ -44,9 +44,9 @@ TEST(PublishedPose, NoFrameShowsMoreThanTheStepBesideTheMotion) {
     largest_m = std::max(largest_m, (published.T_WB().p - moved.p).norm());
     largest_rad = std::max(largest_rad, angle(moved.q, published.T_WB().q));
   }
-  EXPECT_NEAR(largest_m, kStep_m, 1e-12) << "it pays what it may";
+  EXPECT_NEAR(largest_m, kStep_m, 1e-12) << "the limit is used";
   EXPECT_NEAR(largest_rad, kStep_rad, 1e-12);
-  EXPECT_LT((published.T_WB().p - (kCorrection * flown(119)).p).norm(), 1e-9) << "all is paid";
+  EXPECT_LT((published.T_WB().p - (kCorrection * flown(119)).p).norm(), 1e-9) << "nothing is pending";
   EXPECT_LT(angle(published.T_WB().q, (kCorrection * flown(119)).q), 1e-9);
   EXPECT_LT(published.pending().norm(), 1e-9);
 }
@@ -73,7 +73,7 @@ TEST(PublishedPose, VelocityIsThatOfTheMotionInTheAxesOfThePose) {
   EXPECT_LT((o.T_WB.q.conjugate() * o.up_W - level.T_WB.q.conjugate() * Vec3::UnitZ()).norm(), 1e-12);
 }
 
-TEST(PublishedPose, CovarianceHoldsWhatIsOwedUntilItIsPaid) {
+TEST(PublishedPose, CovarianceIncludesThePendingCorrection) {
   PublishedPose published(kStep_m);
   published.follow({}, flown(0));
   double first_sigma = 0, last_sigma = 0;
@@ -98,7 +98,7 @@ TEST(PublishedPose, CovarianceHoldsWhatIsOwedUntilItIsPaid) {
   EXPECT_NEAR(last_sigma, 1e-3, 1e-9);
 }
 
-TEST(PublishedPose, ARestartBeginsWhereTheWindowSays) {
+TEST(PublishedPose, ARestartBeginsAtTheWindowsPose) {
   PublishedPose published(kStep_m);
   published.follow({}, flown(0));
   published.restart();
@@ -107,7 +107,7 @@ TEST(PublishedPose, ARestartBeginsWhereTheWindowSays) {
   EXPECT_TRUE(published.pending().isZero(0));
 }
 
-TEST(PublishedPose, WithoutAContractAllIsShownAtOnce) {
+TEST(PublishedPose, WithoutALimitCorrectionsAreAppliedAtOnce) {
   PublishedPose published(0);
   published.follow({}, flown(0));
   published.follow(motion(1), kCorrection * flown(1));

@@ -10,9 +10,9 @@
 
 namespace fbvins {
 
-/// How the body at the target frame sees what is given in the body at the host frame (W2):
+/// Relative pose of the bodies at host and target frame, for points scaled by their inverse depth (W2):
 /// p_Bt = R_th * x_h + rho * t_th, with x_h = R_BC0 * (alpha, beta, 1) + rho * t_BC0.
-/// The *_first values are the same at first estimates; Jacobians are taken there (W9).
+/// The *_first values are the same at the linearisation points, where Jacobians are taken (W9).
 struct PairGeometry {
   Mat3 R_th, R_th_first;
   Mat3 R_t_first;  ///< R_WBt
@@ -30,7 +30,7 @@ struct PairGeometry {
   }
 };
 
-/// Calibration unpacked once per evaluation.
+/// Calibration as matrices, computed once per evaluation.
 struct CameraGeometry {
   Mat3 R_BC0;
   Vec3 t_BC0;
@@ -47,7 +47,7 @@ struct CameraGeometry {
   }
 };
 
-/// Landmarks closer to the image plane than this (scaled by inverse depth) have no projection.
+/// Landmarks with a smaller depth than this (scaled by inverse depth) have no projection.
 inline constexpr double kMinScaledDepth = 1e-3;
 
 struct WindowObservation {
@@ -60,12 +60,12 @@ struct WindowObservation {
 
 /// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
 struct WindowLandmark {
-  LandmarkId id = {};  ///< the window's
+  LandmarkId id = {};  ///< in the sliding window
   int host = 0;
-  int first_observation = 0;  ///< its observations are neighbours, sorted by frame
+  int first_observation = 0;  ///< its observations are consecutive, sorted by frame
   int observation_count = 0;
   Vec3 alpha_beta_rho = Vec3::Zero();
-  int prior = -1;  ///< index into WindowProblem::landmark_priors of one that was known before
+  int prior = -1;  ///< index into WindowProblem::landmark_priors of a re-observed one
 };
 
 /// Columns of the stacked Jacobian of one observation.

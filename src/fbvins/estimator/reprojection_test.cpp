@@ -77,12 +77,12 @@ TEST(Reprojection, JacobiansAreDerivatives) {
   }
 }
 
-TEST(Reprojection, APointAtInfinityIsAnOrdinaryOne) {
+TEST(Reprojection, APointAtInfinityMeasuresRotationAlone) {
   Seen s;
   s.landmark.alpha_beta_rho.z() = 0;
   const Vec2 before = s.residual();
   s.host.p += Vec3(5, 5, 5);
-  EXPECT_EQ(s.residual(), before) << "it measures rotation alone";
+  EXPECT_EQ(s.residual(), before);
 }
 
 TEST(Reprojection, BehindTheCameraThereIsNone) {

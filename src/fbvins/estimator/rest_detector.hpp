@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the body standing still? Compares the newest image with the first image of the rest, so that a
-// slow drift, which frame-to-frame motion would hide, ends it; and looks at the gyroscope.
+// Whether the body stands still. Compares the newest image with the first one of the rest, so that slow
+// drift ends it, which motion from frame to frame would not show; and the IMU's readings must be quiet.
 #pragma once
 
 #include <unordered_map>
@@ -30,7 +30,7 @@ class RestDetector {
 
   RestDetectorOptions options_;
   Time since_;
-  std::unordered_map<TrackId, Vec2> anchor_;  ///< pixels when the rest began
+  std::unordered_map<TrackId, Vec2> anchor_;  ///< pixels at the beginning of the rest
 };
 
 }  // namespace fbvins

@@ -34,7 +34,7 @@ TEST(RestDetector, ASlowDriftEndsIt) {
   EXPECT_LE(longest, Duration{6 * 50'000'000}) << "0.6 px since the rest began are too much";
 }
 
-TEST(RestDetector, AShakingGyroscopeOrNoneIsNoRest) {
+TEST(RestDetector, AShakingOrSilentImuIsNoRest) {
   RestDetector rest;
   for (int k = 0; k < 10; ++k) EXPECT_EQ(rest.update(frame(k, 0, 0.2)), Duration{});
   for (int k = 10; k < 20; ++k) {

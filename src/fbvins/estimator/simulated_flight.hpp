@@ -25,15 +25,15 @@ class SimulatedFlight {
   double pixel_sigma_px = 0.5;
   double image_rate_hz = 20;
   int max_features = 120;
-  bool knows_again = false;  ///< a point that was out of view is the same track when it is seen again
+  bool knows_again = false;  ///< a point that was out of view is re-observed as the same track
   ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.1, -0.08)};
-  /// What goes wrong at frame k; the defaults let everything work.
+  /// Whether frame k has images, a right image, readings; the defaults give all.
   std::function<bool(int)> images = [](int) { return true; };
   std::function<bool(int)> right_camera = [](int) { return true; };
   std::function<bool(int)> readings = [](int) { return true; };
   /// Turns an exact pixel displacement into an outlier; nullptr: none.
   std::function<Vec2(int, std::int64_t)> outlier = nullptr;
-  /// With knows_again: whether point i, seen again in frame k, is taken for the one before.
+  /// With knows_again: whether point i, re-observed in frame k, is mistaken for point i - 1.
   std::function<bool(int, int)> mistaken = [](int, int) { return false; };
 
   SimulatedFlight(const Motion& motion, std::uint64_t seed) : motion_(motion), rng_(seed) {
@@ -85,7 +85,7 @@ class SimulatedFlight {
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
     const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_WB.inverse();
     std::unordered_set<TrackId> in_use;
-    // Those followed so far first, then new ones up to the limit.
+    // Tracks that continue first, then new ones up to the limit.
     for (const bool followed : {true, false}) {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
         const auto track = tracks_.find(i);

@@ -71,7 +71,7 @@ void SlidingWindow::describe(const Calibration& calibration, WindowProblem& out)
   out.observations.clear();
   out.landmark_priors.clear();
 
-  // Landmarks seen by most frames first, when there are too many; filed order among equals.
+  // If there are too many, those seen by most frames; the older ones among equals.
   std::vector<const Landmark*> chosen;
   for (const Landmark& l : landmarks_.all())
     if (l.triangulated && l.sightings.size() >= 2) chosen.push_back(&l);
@@ -170,7 +170,7 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
   forget_frame(index);
 }
 
-/// What keyframes saw of it is in the prior; what the newest frames see starts it anew.
+/// Its observations by keyframes are in the prior; those by the newest frames start it anew.
 void SlidingWindow::take_leave(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
                                const Calibration& calibration) {
   Landmark& landmark = *landmarks_.find(problem.landmarks[leaving.index].id);

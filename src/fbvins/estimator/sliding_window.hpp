@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who is in the sliding window: keyframes, the newest frames beside them, and the landmarks they see
-// (paper 2.1.2). Keeps the books. Numbers go out as a WindowProblem and come back as one, by the ids of frames and
-// landmarks, so that nothing depends on when; they are the solver's (window_solver.hpp).
+// The contents of the sliding window: keyframes, the newest frames beside them, and the landmarks they see
+// (paper 2.1.2). Their estimates are given to the solver (window_solver.hpp) as a WindowProblem and taken back from one, by
+// the ids of frames and landmarks, so that the window may have changed in between.
 //
 // frames: [ keyframes ... | newest_frames ... ], oldest first. One owner, one thread.
 //
@@ -34,30 +34,30 @@ class SlidingWindow {
   const LandmarkTable& landmarks() const { return landmarks_; }
   const Frame& newest() const { return frames_.newest(); }
   const Tilt& tilt() const { return tilt_; }
-  /// Level is turned about this point from now on.
+  /// The point about which poses are levelled from now on.
   void set_pivot(const Vec3& p_W) { tilt_.pivot_W = p_W; }
   const WindowPrior& prior() const { return prior_; }
   void set_prior(WindowPrior prior);
   /// Moves the linearisation point of the prior to the present states; its mean and covariance stay. Only
-  /// while it is linear by nature: the prior of the first frame, not yet one made of measurements.
+  /// for the prior of the first frame, not for one that holds linearised measurements.
   void restart_first_estimates();
 
-  /// Appends a frame and files the sightings of its features; triangulates what can be.
+  /// Appends a frame and the sightings of its features; triangulates the landmarks that can be.
   void add_frame(Frame frame, const std::vector<TrackedFeature>& features, const Calibration& calibration);
   void make_newest_keyframe(bool keyframe) { frames_.newest().keyframe = keyframe; }
-  /// Of one frame; they move out.
+  /// Moves the images of a frame out.
   StereoFrame take_images(int frame) { return std::exchange(frames_[frame].images, {}); }
 
-  /// Fills `out` with the window: the landmarks seen by most frames, if there are too many.
+  /// Fills `out` with the window; if there are too many landmarks, with those seen by most frames.
   void describe(const Calibration& calibration, WindowProblem& out) const;
-  /// Takes a solution back: the frames and landmarks it names that are still here.
+  /// Takes over the estimates of a solution for the frames and landmarks that are still in the window.
   void accept(const WindowProblem& solved);
-  /// Landmarks far from their prior are others, or have been moved: they count as new ones. Returns how many.
+  /// Drops the priors of landmarks far from theirs: mistaken or moved, they count as new ones. Returns how many.
   int refuse_landmark_priors(const WindowProblem& solved);
-  /// Removes observations far off in a solution, and landmarks that are left with too little. Returns how many observations.
+  /// Removes outliers among the observations, and landmarks that are left with too few. Returns how many observations.
   int remove_outliers(const WindowProblem& solved);
 
-  /// A frame that is not a keyframe leaves: its IMU readings join those of the next frame.
+  /// A frame that is not a keyframe leaves: its IMU readings join those of the next frame, or the prior if that names it.
   void drop_frame(int index, const Calibration& calibration);
   /// A keyframe leaves through marginalisation, with the landmarks it hosts; they are known from now on.
   void marginalise_keyframe(int index, const Calibration& calibration);
@@ -67,7 +67,7 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
-  /// Positions are remembered in a W that is not turned: where W is turned level (UpDirection::fixed), positions in it change.
+  /// Not with UpDirection::fixed: there W turns as gravity becomes better known, and remembered positions would be wrong.
   bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);

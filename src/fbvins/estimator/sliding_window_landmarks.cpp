@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sliding window's books, part two: observations and priors that are refused, landmarks that are remembered.
+// The sliding window's landmarks: outliers among observations and priors, and landmarks that are remembered.
 #include <algorithm>
 #include <utility>
 
@@ -8,14 +8,14 @@
 namespace fbvins {
 namespace {
 
-/// W may have drifted since a landmark was seen, but not by more than this many times what tells it from others.
+/// Before a solve a landmark may be this many times kPriorOutlier_sigma from its prior, since the window may have drifted.
 constexpr double kFarFromPrior = 5;
-/// A landmark further from its prior than this is another one.
+/// After a solve a landmark farther from its prior than this is taken for another one.
 constexpr double kPriorOutlier_sigma = 6;
-/// Observations further off than this in a solution are removed.
+/// Observations with a larger residual in a solution are removed.
 constexpr double kOutlier_sigma = 4;
 
-/// Takes away the observations of a landmark that are further off than that; how many.
+/// Removes the outliers among the observations of a landmark. Returns how many.
 int remove_far_observations(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
   int removed = 0;
   std::vector<FrameId> gone;
@@ -46,7 +46,7 @@ int SlidingWindow::remove_outliers(const WindowProblem& solved) {
   return removed;
 }
 
-/// Some of its observations were thrown out.
+/// Counts a strike for a landmark with outliers; removes it where too little is left of it.
 void SlidingWindow::strike(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
   landmark.strikes += 1;
   const bool too_near = numbers.alpha_beta_rho.z() > 1.0 / kNearestLandmark_m;
@@ -68,7 +68,7 @@ int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
   return refused;
 }
 
-/// One that is nowhere near is another one, and would spoil the whole solve.
+/// A landmark very far from its prior is another one; its factor would spoil the solve.
 void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
   const WindowLandmark numbers{.alpha_beta_rho = landmark.alpha_beta_rho};
   const Pose<W, B>& host = frames_.at(landmark.host).state.T_WB;
@@ -82,7 +82,7 @@ void SlidingWindow::drop_prior(Landmark& landmark) {
   known_.forget(landmark.track);
 }
 
-/// Of those still in view the position now found holds what comes: they are re-observed at once.
+/// Those still in view are constrained by the remembered position at once.
 void SlidingWindow::remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving,
                              std::span<const Mat3> information) {
   if (!remembers_landmarks()) return;

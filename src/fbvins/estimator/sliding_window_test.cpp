@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The books of the window, on a body that moves sideways before points it sees exactly.
+// Frames and landmarks of the window, for a body that moves sideways and observes points without noise.
 #include "fbvins/estimator/sliding_window.hpp"
 
 #include <gtest/gtest.h>
@@ -92,7 +92,7 @@ struct Scene {
     window.describe(calibration, problem);
     return problem;
   }
-  /// The first frame is held, as an estimator would.
+  /// A tight prior on the first frame, as the estimator has one.
   void hold_first() {
     WindowPrior prior;
     prior.frames = {0};
@@ -131,7 +131,7 @@ TEST(SlidingWindow, TriangulatesWhereTwoRaysAgreeAndFarEnoughApart) {
   EXPECT_LT((s.position_W(1) - s.points_W[1]).norm(), 1e-9);
 }
 
-TEST(SlidingWindow, DoesNotTriangulateWhatDoesNotMeet) {
+TEST(SlidingWindow, DoesNotTriangulateRaysThatDoNotMeet) {
   Scene s;
   s.points_W[20] = Vec3(0.02, 0.01, 0.05);  // nearer than any landmark may be
   s.points_W[21] = Vec3(3, 1, 4000);
@@ -238,7 +238,7 @@ TEST(SlidingWindow, OutliersAreRemovedAndThreeStrikesBanATrack) {
   EXPECT_NE(s.landmark(4), nullptr) << "in a new window it is";
 }
 
-TEST(SlidingWindow, ARightObservationThatIsOffGoesAlone) {
+TEST(SlidingWindow, ARightOutlierLeavesTheLeftObservation) {
   Scene s;
   for (int k = 0; k < 2; ++k) s.add(k, s.all(k));
   std::vector<TrackedFeature> features = s.all(2);
@@ -258,7 +258,7 @@ Scene about_to_shrink() {
   return s;
 }
 
-TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreKnownFromThenOn) {
+TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);
   EXPECT_EQ(s.window.frames().oldest().id, FrameId{1});
@@ -280,7 +280,7 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreKnownFromThenOn) {
   EXPECT_EQ(s.window.refuse_landmark_priors(s.describe()), 0);
 }
 
-TEST(SlidingWindow, NothingIsKnownOfLandmarksInAWorldThatTurns) {
+TEST(SlidingWindow, RemembersNoLandmarksWhereUpIsFixed) {
   Scene s;
   WindowWeights level;
   level.estimate_tilt = false;
@@ -298,12 +298,12 @@ TEST(SlidingWindow, NothingIsKnownOfLandmarksInAWorldThatTurns) {
 TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);
-  s.points_W[0] += Vec3(0, 0.8, 0);  // nowhere near: refused as soon as its depth is known
+  s.points_W[0] += Vec3(0, 0.8, 0);  // far away: refused as soon as it is triangulated
   s.add(5, {s.feature(0, 5), s.feature(1, 5), s.feature(2, 5)});
   EXPECT_FALSE(s.landmark(0)->prior.has_value());
   EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
 
-  WindowProblem solved = s.describe();  // near, but the solve took it away
+  WindowProblem solved = s.describe();  // near at first, but moved away by the solve
   ASSERT_FALSE(solved.landmark_priors.empty());
   const int known = solved.landmarks[0].prior >= 0 ? 0 : 1;
   solved.landmarks[known].alpha_beta_rho.y() += 0.1;
@@ -312,7 +312,7 @@ TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   EXPECT_FALSE(s.window.landmarks().find(id)->prior.has_value());
 }
 
-TEST(SlidingWindow, ShowsItself) {
+TEST(SlidingWindow, SnapshotKeyframeAndDistanceShowItsContents) {
   Scene s;
   for (int k = 0; k < 3; ++k) s.add(k, s.all(k), k == 1);
   const WindowSnapshot snapshot = snapshot_of(s.window, s.calibration);
@@ -328,7 +328,7 @@ TEST(SlidingWindow, ShowsItself) {
   EXPECT_EQ(keyframe.id, FrameId{1});
   ASSERT_EQ(keyframe.landmarks.size(), s.points_W.size());
   EXPECT_LT((keyframe.landmarks[0].p_B - (s.points_W[0] - state_at(1).T_WB.p)).norm(), 1e-9);
-  // Nothing turned: motion of the image since the keyframe is its step over the depth.
+  // No rotation: the image motion since the keyframe is the step divided by the depth.
   const KeyframeDistance d = distance_to_last_keyframe(s.window, s.calibration, 400);
   EXPECT_EQ(d.shared_ratio, 1);
   EXPECT_GT(d.parallax_px, 400 * kStep_m / 3.2);

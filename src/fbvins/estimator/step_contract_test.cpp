@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What leaves the estimator never leaps, and how soon it is level: the whole estimator on simulated tracks and readings.
+// Published poses never leap, and become level: the whole estimator on simulated tracks and readings.
 #include <gtest/gtest.h>
 
 #include "fbvins/estimator/estimator.hpp"
@@ -19,13 +19,13 @@ double tilt_error(const Quat& a, const Quat& b) {
 }
 
 struct LargestStep {
-  double m = 0, rad = 0;  ///< beside the motion that the readings tell
-  double gauge_m = 0;     ///< that the window itself makes
-  double pending_m = 0;   ///< between what is published and what is known
+  double m = 0, rad = 0;  ///< of the published pose, in addition to the motion by the readings
+  double gauge_m = 0;     ///< of the window's own estimate
+  double pending_m = 0;   ///< between the published and the estimated position
   int poses = 0, restarts = 0;
 };
 
-/// Flies and compares each published pose with the one before carried on by the readings.
+/// Flies and compares each published pose with the one before, propagated by the readings.
 LargestStep fly(SimulatedFlight& flight, int frames, const EstimatorOptions& options) {
   Estimator estimator(flight.rig, options);
   LargestStep out;
@@ -85,7 +85,7 @@ TEST(StepContract, HoldsAfterARestartAsWell) {
   EXPECT_GT(step.poses, 120);
 }
 
-TEST(StepContract, NoneIsKeptWhereNoneIsWanted) {
+TEST(StepContract, WithoutALimitNothingIsPending) {
   SimulatedFlight flight(Motion(0.6, 0.5), 31);
   flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
   EstimatorOptions options;
@@ -93,10 +93,10 @@ TEST(StepContract, NoneIsKeptWhereNoneIsWanted) {
   EXPECT_EQ(fly(flight, 100, options).pending_m, 0);
 }
 
-TEST(Level, IsSaidWhenTheTiltIsKnown) {
+TEST(Level, IsReportedWhenTheTiltIsKnown) {
   SimulatedFlight flight(Motion(0.6, 0.5), 34);
   flight.bias.accel_mps2 = Vec3(0.3, -0.3, 0.1);
-  EstimatorOptions exact;  // the simulated IMU is as good as its data sheet
+  EstimatorOptions exact;  // the simulated IMU has the calibrated noise
   exact.gyro_noise_scale = exact.accel_noise_scale = exact.gyro_walk_scale = exact.accel_walk_scale = 1;
   Estimator estimator(flight.rig, exact);
   bool was_level = false;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which way is up in the window's world (docs/derivations/window.md, W13-W16).
+// The direction of gravity in the window's frame (docs/derivations/window.md, W13-W16).
 //
-// W is level when a flight begins, as far as that is known then. The window never turns it: landmarks that have left stay
-// where they are. What is learned of gravity later turns `up` instead, a state of the window like any other; and what
-// leaves the estimator is turned level, about the place where the flight began, step by step (published_pose.hpp). A value.
+// W is level when a flight begins, as far as the tilt is known then. The window never turns it, so that remembered landmarks
+// stay valid. What is learned of gravity later changes the tilt instead, a state of the window; published poses are
+// levelled, about the place where the flight began, in small steps (published_pose.hpp). A value.
 //
 //   out.T_WB = window.tilt().levelled(state.T_WB);
 #pragma once
@@ -17,10 +17,10 @@ using Mat17 = Eigen::Matrix<double, 17, 17>;
 using Mat15x17 = Eigen::Matrix<double, 15, 17>;
 
 struct Tilt {
-  Vec2 angle_rad = Vec2::Zero();  ///< the rotation vector (x, y, 0) turns z into up
-  Vec3 pivot_W = Vec3::Zero();    ///< m; stays where it is
+  Vec2 angle_rad = Vec2::Zero();  ///< the rotation vector (x, y, 0) takes z to up
+  Vec3 pivot_W = Vec3::Zero();    ///< m; levelling does not move this point
 
-  /// Takes directions of the level world to W (W13).
+  /// Takes directions in the levelled frame to W (W13).
   Quat q() const { return so3_exp(rotation()); }
   Vec3 gravity_W(double gravity_mps2) const { return -gravity_mps2 * (q() * Vec3::UnitZ()); }
 
@@ -37,7 +37,7 @@ struct Tilt {
   Mat15x17 levelled_jacobian(const NavState& s) const {
     const Mat3 R = q().conjugate().toRotationMatrix();
     const NavState level = levelled(s);
-    const Mat32 turn = -so3_right_jacobian(rotation()).leftCols<2>();  // turns what is level
+    const Mat32 turn = -so3_right_jacobian(rotation()).leftCols<2>();  // dphi by the angle (W16)
     Mat15x17 J = Mat15x17::Zero();
     J.leftCols<15>().setIdentity();
     J.block<3, 3>(nav::p, nav::p) = J.block<3, 3>(nav::v, nav::v) = R;

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-// Each term returns its cost, and adds to the equations where there are any.
+// Each term returns its cost, and adds to the equations unless they are null.
 
 double prior_term(const WindowProblem& w, NormalEquations* out) {
   const WindowPrior& prior = w.prior;
@@ -55,7 +55,7 @@ void add_imu_blocks(int j, const Mat15 (&J)[2], const Eigen::Matrix<double, 15, 
       const Mat15 block = J[a].transpose() * J[b];
       H.block<6, 6>(pose[a], pose[b]) += block.topLeftCorner<6, 6>();
       H.block<9, 9>(speed[a], speed[b]) += block.bottomRightCorner<9, 9>();
-      // Speed and bias rows come before all poses: of the mixed blocks the lower triangle has the pose's rows.
+      // Velocity and bias rows come before all poses: mixed blocks in the lower triangle have the rows of a pose.
       H.block<6, 9>(pose[a], speed[b]) += block.topRightCorner<6, 9>();
       if (a != b) H.block<6, 9>(pose[b], speed[a]) += block.bottomLeftCorner<9, 6>().transpose();
     }
@@ -78,7 +78,7 @@ double imu_terms(const WindowProblem& w, NormalEquations* out) {
     const Vec15 r = weighted_imu_residual(w.frames[i].state, w.frames[j].state, w.linearisation_point(i),
                                           w.linearisation_point(j), *imu, gravity_W, &J[0], &J[1]);
     cost += 0.5 * r.squaredNorm();
-    const double dt = imu->dt_s();  // gravity acts as p_j and v_j do, the other way (W15)
+    const double dt = imu->dt_s();  // the derivatives by gravity are those by p_j and v_j, scaled and negated (W15)
     const Eigen::Matrix<double, 15, 2> J_tilt =
         -(0.5 * dt * dt * J[1].middleCols<3>(nav::p) + dt * J[1].middleCols<3>(nav::v)) * gravity_by_tilt;
     add_imu_blocks(j, J, J_tilt, r, *out);
@@ -101,7 +101,7 @@ double standstill_terms(const WindowProblem& w, NormalEquations* out) {
   return cost;
 }
 
-/// Rows of what is not estimated, and padding: decoupled, unit information, no gradient.
+/// Rows of calibration that is not estimated, and of padding: decoupled, unit information, no gradient.
 void fix_inactive_calibration(const WindowWeights& weights, NormalEquations& out) {
   const int begin = out.layout.calibration_row();
   for (int k = 0; k < kCalibrationSize; ++k) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cost and normal equations of a window, landmarks still apart (docs/derivations/window.md, W2-W9). Pure functions; the
-// values they fill keep their memory from call to call.
+// Cost and normal equations of a window, landmarks not yet eliminated (docs/derivations/window.md, W2-W9). Pure functions; the
+// values they fill reuse their memory from call to call.
 //
 //   double cost = linearise(window, pairs, equations);
 #pragma once
@@ -13,7 +13,7 @@
 namespace fbvins {
 
 /// Where each variable is in the dense system: 9 of each frame (v, bg, ba), 2 of the tilt and calibration if they are
-/// estimated, 6 of each frame (p, theta): poses that follow one another are neighbours, which the Schur kernel likes.
+/// estimated, 6 of each frame (p, theta). Consecutive poses are adjacent, which makes long runs for the Schur kernel.
 struct WindowLayout {
   int frames = 0;
   int tilt_size = 0;
@@ -34,7 +34,7 @@ struct WindowLayout {
   int row_of(int frame, int k) const { return k < 6 ? pose_row(frame) + k : speed_bias_row(frame) + k - 6; }
 };
 
-/// Geometry of every frame towards every other.
+/// Relative geometry of every pair of frames.
 class PairTable {
  public:
   void fill(const WindowProblem& window, bool with_first_estimates);
@@ -52,20 +52,20 @@ struct NormalEquations {
   PointBlocks points;  ///< landmarks, in the window's order
 };
 
-/// Frames, tilt and calibration with the landmarks eliminated; lower triangle.
+/// Frames, tilt and calibration with the landmarks eliminated; at least the lower triangle.
 struct ReducedEquations {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
 };
 
-/// Cost where the window is.
+/// Cost at the window's estimate.
 double cost_of(const WindowProblem& window, PairTable& pairs);
-/// The same, and the equations there.
+/// The same, with the normal equations.
 double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out);
 /// Eliminates the landmarks without damping (W10); H is filled in both triangles.
 ReducedEquations reduced(NormalEquations& equations);
 
-/// Of all landmarks: their observations, and where they were known to be. In window_landmark_terms.cpp.
+/// Terms of all landmarks: reprojections and landmark priors. In window_landmark_terms.cpp.
 double landmark_cost(const WindowProblem& window, const PairTable& pairs);
 double add_landmarks(const WindowProblem& window, const PairTable& pairs, NormalEquations& out);
 

@@ -11,7 +11,7 @@ namespace {
 
 using test::kFrames;
 
-/// The window moved by a step of the dense system; calibration is left alone.
+/// The window moved by a step of the dense system, without calibration.
 WindowProblem moved(const WindowProblem& window, const Eigen::VectorXd& d) {
   WindowProblem out = window;
   const WindowLayout at(window);
@@ -69,7 +69,7 @@ TEST(WindowEquations, LayoutCoversEveryRowOnce) {
   }
 }
 
-TEST(WindowEquations, WhatIsNotCalibratedIsLeftAlone) {
+TEST(WindowEquations, CalibrationThatIsNotEstimatedIsDecoupled) {
   test::Window w = test::make_window(true);
   w.problem.weights.estimate_time_offset = false;
   PairTable pairs;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The normal equations' part that landmarks have: where nearly all of a solve's time goes.
+// The landmarks' part of the normal equations, which takes nearly all of a solve's time.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,12 +14,12 @@ namespace {
 /// What an observation without a projection costs: a residual of this many sigmas, with no slope.
 constexpr double kUnprojectableSigma = 100.0;
 
-/// What one frame sees of a landmark: two rows by the left camera, two by the right one.
+/// One frame's observations of a landmark: two rows of the left camera, two of the right one.
 constexpr int kMostSightings = 2;
 template <int Columns>
 using SightingRows = double[kMostSightings][2][Columns];
 
-/// G = J^T J of the rows of one or two sightings. Full square: plain loops over fixed lanes.
+/// G = J^T J of the rows of one or two observations. Both triangles: plain loops over fixed lanes.
 template <int Columns>
 FBVINS_INLINE void gram(const SightingRows<Columns>& rows, int sightings, double* G) {
   const double *a = rows[0][0], *b = rows[0][1], *c = rows[1][0], *d = rows[1][1];
@@ -127,7 +127,7 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
       if (sightings == 0) continue;
       gram_of(rows, sightings, G.data());
 
-      using Gram = Eigen::Matrix<double, Columns, Columns>;  // symmetric to the last bit
+      using Gram = Eigen::Matrix<double, Columns, Columns>;  // exactly symmetric
       const Eigen::Map<const Gram> gram(G.data());
       point.V += gram.template block<3, 3>(kPoint, kPoint);
       point.w += gram.template block<3, 1>(kPoint, kResidual);

@@ -45,8 +45,8 @@ std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   return touched;
 }
 
-/// From where the new prior is measured, to the present estimate, at which it was built; with the sign turned.
-Eigen::VectorXd way_back(const WindowProblem& problem, const WindowPrior& prior) {
+/// From the present estimate, at which the new prior's gradient was taken, to the prior's origin (-e of W12).
+Eigen::VectorXd displacement_to_origin(const WindowProblem& problem, const WindowPrior& prior) {
   Eigen::VectorXd back = Eigen::VectorXd::Zero(prior.quadratic.size());
   if (prior.with_tilt) back.head<kTiltSize>() = -problem.tilt.angle_rad;
   if (problem.prior.with_calibration)
@@ -74,7 +74,7 @@ std::vector<LeavingLandmark> landmarks_leaving_with(const WindowProblem& problem
       int frames = 0;
       for (count = 0; count < l.observation_count && seen[count].frame < newest_begin; ++count)
         frames += count == 0 || seen[count].frame != seen[count - 1].frame;
-      if (frames < 2) continue;  // says nothing about motion
+      if (frames < 2) continue;  // no information on motion
     }
     out.push_back({i, count, in_view});
   }
@@ -107,9 +107,9 @@ Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::s
     for (int k = 0; k < 15; ++k) (i == leaving ? drop : keep).push_back(at.row_of(i, k));
   }
   prior.quadratic = marginalise(information.H, information.g, keep, drop);
-  // The gradient was taken at the present estimate; the prior is measured from the first estimates.
-  // Before the prior is moved from: compilers differ in which argument they evaluate first.
-  const Eigen::VectorXd back = way_back(problem, prior);
+  // The gradient was taken at the present estimate; the prior's origin is the first estimates (W12).
+  // Computed before the prior is moved from: the order in which arguments are evaluated is unspecified.
+  const Eigen::VectorXd back = displacement_to_origin(problem, prior);
   prior.quadratic = shifted(std::move(prior.quadratic), back);
   return out;
 }

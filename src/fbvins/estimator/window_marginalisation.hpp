@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame leaves the window (paper 2.1.2): what it, the landmarks that leave with it, and the old
-// prior say about the frames that stay becomes the new prior (docs/derivations/window.md, W10-W12).
+// A frame leaves the window (paper 2.1.2): the information that it, the landmarks that leave with it, and the old
+// prior have on the frames that stay becomes the new prior (docs/derivations/window.md, W10-W12).
 #pragma once
 
 #include <span>
@@ -13,17 +13,17 @@ namespace fbvins {
 /// A landmark of a problem that leaves with a frame.
 struct LeavingLandmark {
   int index = 0;         ///< into WindowProblem::landmarks
-  int observations = 0;  ///< so many of its observations go into the prior, the oldest
-  bool in_view = false;  ///< of the newest frame
+  int observations = 0;  ///< number of its observations, the oldest, that go into the prior
+  bool in_view = false;  ///< whether the newest frame sees it
 };
 
-/// The landmarks that leave with keyframe `leaving`: those it hosts. One still in view gives up only what frames before
-/// `newest_begin` saw of it, and starts anew from the rest: no observation is used twice. In the problem's order.
+/// The landmarks that leave with keyframe `leaving`: those it hosts. One still in view gives only its observations before frame
+/// `newest_begin` to the prior, and starts anew from the rest: no observation is used twice. In the problem's order.
 std::vector<LeavingLandmark> landmarks_leaving_with(const WindowProblem& problem, int leaving, int newest_begin);
 
 struct Marginalised {
-  WindowPrior prior;                       ///< its frames still count the leaving one
-  std::vector<Mat3> landmark_information;  ///< of (alpha, beta, rho) given the poses, one a leaving landmark
+  WindowPrior prior;                       ///< its frame indices still count the leaving frame
+  std::vector<Mat3> landmark_information;  ///< of (alpha, beta, rho) given the poses, one for each leaving landmark
 };
 
 /// Working memory.
@@ -33,8 +33,8 @@ struct MarginalisationMemory {
   NormalEquations equations;
 };
 
-/// The prior on the other frames once `leaving` and the landmarks are gone: takes the old prior, the standstill and IMU
-/// factors that touch the frame, and those landmarks' observations. Frames named in it are linearised at
+/// The prior on the other frames after `leaving` and the landmarks are eliminated from the old prior, the standstill and IMU
+/// factors of the frame, and those landmarks' observations. Frames named in it are linearised at
 /// linearisation_point(): first estimates where they have one, else their state.
 Marginalised marginalise_frame(const WindowProblem& problem, int leaving, std::span<const LeavingLandmark> landmarks,
                                MarginalisationMemory& memory);

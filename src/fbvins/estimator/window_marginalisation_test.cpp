@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a leaving frame leaves behind: all that it knew, and nothing of the six directions that no sensor
-// sees (where the world has its origin and how it is turned, gravity with it), also after the states moved on from their first
+// The prior of a frame that leaves: it keeps all information, and has none in the six directions that no sensor
+// observes (translation and rotation of the world, gravity with it), also after the states have moved from their first
 // estimates.
 #include "fbvins/estimator/window_marginalisation.hpp"
 
@@ -43,8 +43,8 @@ Scene make_scene(bool with_prior) {
   }
   p.observations = kept;
   if (!with_prior) p.prior = {};
-  for (WindowFrame& f : p.frames) f.standstill = false;  // it knows the world's axes: velocity zero is absolute
-  for (WindowLandmark& l : p.landmarks) l.prior = -1;    // knows where the world is
+  for (WindowFrame& f : p.frames) f.standstill = false;
+  for (WindowLandmark& l : p.landmarks) l.prior = -1;  // a known position is not invariant to moves of the world
   return s;
 }
 
@@ -82,7 +82,7 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<Leav
 NavState linearisation_point(const WindowFrame& f) { return f.in_prior ? f.first_estimate : f.state; }
 
 /// Moves of the whole world, as perturbations of the prior's tilt and frames: x, y, z, and rotations about x, y, z; and
-/// roll of the frames alone for contrast.
+/// rotation of the frames about x without gravity, which is observable.
 Eigen::MatrixXd world_moves(const WindowProblem& p, const WindowPrior& prior) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 7);
   for (std::size_t k = 0; k < prior.frames.size(); ++k) {
@@ -103,7 +103,7 @@ Eigen::MatrixXd world_moves(const WindowProblem& p, const WindowPrior& prior) {
   return N;
 }
 
-/// |H n| against what as large a move of the states one by one would cost.
+/// Information along n, relative to that of the diagonal of H alone.
 double relative_information(const Eigen::MatrixXd& H, const Eigen::VectorXd& n) {
   return n.dot(H * n) / n.cwiseAbs2().dot(H.diagonal());
 }
@@ -112,10 +112,10 @@ void expect_six_free_directions(const WindowProblem& p, const WindowPrior& prior
   const Eigen::MatrixXd N = world_moves(p, prior);
   const Eigen::MatrixXd& H = prior.quadratic.H;
   for (int k = 0; k < 6; ++k) EXPECT_LT(std::abs(relative_information(H, N.col(k))), 1e-11) << "direction " << k;
-  EXPECT_GT(relative_information(H, N.col(6)), 1e-7) << "gravity shows roll";
+  EXPECT_GT(relative_information(H, N.col(6)), 1e-7) << "gravity makes roll observable";
 }
 
-TEST(Marginalisation, PriorIsBlindToOriginAndTurn) {
+TEST(Marginalisation, PriorHasNoInformationOnMovesOfTheWorld) {
   const Scene s = make_scene(false);
   MarginalisationMemory memory;
   const WindowPrior prior = marginalise_frame(s.w.problem, 0, s.leaving, memory).prior;
@@ -124,7 +124,7 @@ TEST(Marginalisation, PriorIsBlindToOriginAndTurn) {
   EXPECT_GT(eigenvalues.minCoeff(), -1e-9 * eigenvalues.maxCoeff()) << "never negative";
 }
 
-TEST(Marginalisation, StaysBlindAfterTheStatesMovedFromTheirFirstEstimates) {
+TEST(Marginalisation, PriorHasNoneAfterTheStatesMovedFromTheirFirstEstimates) {
   const Scene s = make_scene(false);
   MarginalisationMemory memory;
   WindowProblem rest = without_first_frame(s.w.problem, s.leaving, marginalise_frame(s.w.problem, 0, s.leaving, memory).prior);
@@ -140,7 +140,7 @@ TEST(Marginalisation, StaysBlindAfterTheStatesMovedFromTheirFirstEstimates) {
   const WindowPrior prior = marginalise_frame(rest, 0, all, memory).prior;
   expect_six_free_directions(rest, prior);
 
-  // The same without first estimates: heading is no longer free. The test can fail.
+  // Without first estimates the prior gains information on the heading: the test can fail.
   for (WindowFrame& f : rest.frames) f.first_estimate = f.state;
   const WindowPrior naive = marginalise_frame(rest, 0, all, memory).prior;
   EXPECT_GT(std::abs(relative_information(naive.quadratic.H, world_moves(rest, naive).col(5))), 1e-9);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sliding window as a least-squares problem: frame states, the tilt of the world, landmarks and, if wanted,
-// calibration, with all that was measured of them. A value: it names its frames and landmarks by the window's ids, and
-// stays right whatever becomes of the window. Minimised by window_solver.hpp. Formulas: docs/derivations/window.md (W1-W16).
+// calibration, with all their measurements. A value: it names its frames and landmarks by the window's ids, and
+// stays valid when the window changes. Minimised by window_solver.hpp. Formulas: docs/derivations/window.md (W1-W16).
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ namespace fbvins {
 struct WindowFrame {
   FrameId id;
   NavState state;
-  /// State when the prior first named this frame: the prior is built and measured from here (W9).
+  /// State when the prior first named this frame: linearisation point and origin of the prior (W9).
   NavState first_estimate;
   bool in_prior = false;
   /// From the frame before this one; null where the chain is broken or the prior holds it.
@@ -35,7 +35,7 @@ struct WindowWeights {
   double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
   bool at_first_estimates = false;       ///< Jacobians of frames in the prior are taken at their first estimates
-  bool estimate_tilt = true;             ///< or W is level
+  bool estimate_tilt = true;             ///< false: W is level
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
 };
@@ -86,7 +86,7 @@ struct WindowProblem {
   Vec2 residual(const WindowLandmark& landmark, const WindowObservation& observation) const;
   /// Whitened distance of a landmark that has a prior from it, at the current estimate.
   Vec3 distance_to_prior(const WindowLandmark& landmark) const;
-  /// Of what the prior is about, from where it is measured.
+  /// Displacement of the prior's variables from its linearisation point.
   Eigen::VectorXd prior_displacement() const;
 };
 

@@ -9,11 +9,11 @@ namespace {
 /// Keeps directions without any measurement solvable; far below any real information.
 constexpr double kRegularisation = 1e-8;
 constexpr double kNegligibleLambda = 1e-8;
-/// Damps steps of the inverse depth, 1 m^2. One camera at rest knows next to nothing of it; a free step puts the
-/// landmark before the lens, and the whole step is refused for its sake. Moves no optimum and enters no prior.
+/// Damps steps of the inverse depth, 1 m^2. One camera at rest hardly observes it: an undamped step would put the landmark
+/// right before the lens, and the step of all variables would be refused. Changes no minimum and enters no prior.
 constexpr double kDepthDamping = 1.0;
 
-/// The variables of a window, apart from what was measured.
+/// The variables of a window, without its measurements.
 struct Estimate {
   std::vector<NavState> states;
   std::vector<Vec3> landmarks;
@@ -96,7 +96,7 @@ bool WindowSolver::step(double lambda, WindowInformation& information) {
   equations_.points.back_substitute(step_.dense, step_.landmarks);
   if (!step_.dense.allFinite()) return false;
 
-  // Of the damped quadratic model: (dx^T D dx - g^T dx) / 2.
+  // Predicted decrease of the damped quadratic model: (dx^T D dx - g^T dx) / 2.
   double twice = lambda * step_.dense.cwiseAbs2().dot(equations_.H.diagonal()) - equations_.g.dot(step_.dense);
   for (std::size_t i = 0; i < step_.landmarks.size(); ++i) {
     const PointBlock& point = equations_.points.points()[i];
@@ -108,7 +108,7 @@ bool WindowSolver::step(double lambda, WindowInformation& information) {
   return true;
 }
 
-/// What minimise() wants.
+/// The problem as minimise() expects it.
 struct WindowSolver::Descent {
   WindowSolver& solver;
   WindowSolution& solution;
@@ -134,7 +134,7 @@ void WindowSolver::solve(WindowSolution& solution, const LmOptions& options) {
   Descent descent{*this, solution, {}};
   solution.information.clear();
   solution.summary = minimise(descent, options);
-  if (descent.lambda > kNegligibleLambda) (void)step(0, solution.information);  // damping would feign certainty
+  if (descent.lambda > kNegligibleLambda) (void)step(0, solution.information);  // damped covariances would be too small
 }
 
 }  // namespace fbvins

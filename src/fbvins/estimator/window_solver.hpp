@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Minimises a WindowProblem by optim/levenberg_marquardt.hpp, and says how well what it found is known.
+// Minimises a WindowProblem by optim/levenberg_marquardt.hpp, and gives the covariance of the solution.
 //
 //   WindowSolver solver;                       // keeps its working memory from call to call; one thread
 //   WindowSolution solution;
@@ -17,13 +17,13 @@
 
 namespace fbvins {
 
-/// Cholesky factor of what is known of frames, tilt and calibration, the landmarks eliminated. A value.
+/// Cholesky factor of the information matrix of frames, tilt and calibration, the landmarks eliminated. A value.
 class WindowInformation {
  public:
   /// From the lower triangle; false where it is not positive definite.
   bool factorise(const WindowLayout& layout, const Eigen::MatrixXd& information);
   Eigen::VectorXd solve(const Eigen::VectorXd& rhs) const { return factor_.solve(rhs); }
-  /// Of a frame's (p, theta, v, bg, ba) and the tilt (zero where it is not estimated); none where nothing was factorised.
+  /// Of a frame's (p, theta, v, bg, ba) and the tilt (zero where it is not estimated); none without a factor.
   std::optional<Mat17> covariance(int frame) const;
   void clear() { valid_ = false; }
 
@@ -37,13 +37,13 @@ class WindowInformation {
 struct WindowSolution {
   WindowProblem window;  ///< filled by the caller, and minimised in place
   LmSummary summary;
-  WindowInformation information;  ///< at the last linearisation, undamped
+  WindowInformation information;  ///< at the last linearisation, with negligible damping at most
 
   /// Of a frame of the window, as WindowInformation::covariance().
   std::optional<Mat17> covariance(FrameId frame) const;
 };
 
-/// A step of all variables, and what the damped quadratic model says of it.
+/// A step of all variables, and the cost decrease that the damped quadratic model predicts for it.
 struct WindowStep {
   Eigen::VectorXd dense;
   std::vector<Vec3> landmarks;
@@ -55,7 +55,7 @@ class WindowSolver {
  public:
   void solve(WindowSolution& solution, const LmOptions& options);
 
-  /// Step by step: linearises where the window is; then a damped step from there, and its factor.
+  /// The parts of solve(): linearises at the window's estimate; then a damped step from there, and its factor.
   double linearise(const WindowProblem& window) { return fbvins::linearise(window, pairs_, equations_); }
   bool step(double lambda, WindowInformation& information);
   const WindowStep& step() const { return step_; }

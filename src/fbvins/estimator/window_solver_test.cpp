@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-TEST(WindowSolver, CovariancesAreTheInverseOfWhatIsKnown) {
+TEST(WindowSolver, CovariancesAreTheInverseOfTheInformation) {
   const test::Window w = test::make_window(false);
   WindowSolver solver;
   WindowInformation information;
@@ -33,7 +33,7 @@ TEST(WindowSolver, CovariancesAreTheInverseOfWhatIsKnown) {
   }
 }
 
-TEST(WindowSolver, DampingDoesNotFeignCertainty) {
+TEST(WindowSolver, DampingDoesNotShrinkCovariances) {
   WindowSolution gentle, damped;
   gentle.window = damped.window = test::make_window(false).problem;
   WindowSolver solver;
@@ -58,7 +58,7 @@ TEST(WindowSolver, ASolutionIsNoWorseThanTheStart) {
   }
 }
 
-TEST(WindowSolver, SameMemorySameBits) {
+TEST(WindowSolver, ReusedMemoryGivesTheSameBits) {
   WindowSolution one, two;
   one.window = two.window = test::make_window(false).problem;
   WindowSolver used, fresh;

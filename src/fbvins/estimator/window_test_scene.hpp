@@ -13,7 +13,7 @@ namespace fbvins::test {
 
 inline constexpr int kFrames = 6, kLandmarks = 50;
 
-/// A noisy window off its optimum, with outliers; frame 0 is held by a prior.
+/// A noisy window off its optimum, with outliers; frame 0 has a prior.
 struct Window {
   WindowProblem problem;
   Vec2 tilt_weight;
@@ -86,7 +86,7 @@ inline Window make_window(bool calibrating) {
     add_landmark(w, w.problem.frames[host].state.T_WB * (w.problem.calibration.T_BC0 * p_C), host, rng);
   }
   Rng prior_rng(18);
-  for (int k = 0; k < kLandmarks; k += 3) {  // of every third it is known where it was, a few sigmas off
+  for (int k = 0; k < kLandmarks; k += 3) {  // every third has a prior, a few sigmas off
     WindowLandmark& l = w.problem.landmarks[k];
     LandmarkPrior prior;
     const Vec3 p_B = point_in_host(CameraGeometry(w.problem.calibration), l);
@@ -102,7 +102,7 @@ inline Window make_window(bool calibrating) {
     f.first_estimate = f.state;
   }
   w.problem.tilt.angle_rad = Vec2(0.03, -0.02);
-  w.problem.frames[3].standstill = true;  // untrue, but a term like any other
+  w.problem.frames[3].standstill = true;  // not true, to test the term
   w.problem.weights.standstill_velocity_sigma_mps = 0.5;
 
   w.tilt_weight << 20, 30;

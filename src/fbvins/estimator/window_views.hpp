@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What others want to know of a window: pictures of it, taken without changing it. Pure functions.
+// Queries on a window and copies of its contents for others. Pure functions.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-/// Triangulated landmarks seen in the newest frame.
+/// Number of triangulated landmarks seen in the newest frame and in another one.
 int landmarks_in_view(const SlidingWindow& window);
 
 /// Share of the newest frame's features that the last keyframe saw, and the median rotation-free
@@ -22,18 +22,18 @@ struct KeyframeDistance {
 };
 KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px);
 
-/// A state of the window as it is, without how well up is known.
+/// A state of the window in the gauge frame, without up_sigma_rad.
 GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state);
-/// How well up is known about its less known axis, from WindowInformation::covariance().
+/// Standard deviation of up's direction about its less certain axis, from WindowInformation::covariance().
 double up_sigma_rad(const Mat17& covariance);
 
-/// The body's way from the frame before to the newest one as the readings between them tell, from the state before as it is known
-/// now; where there are no readings, as the window has it. None for the first frame.
+/// Motion of the body from the frame before to the newest one, predicted by the readings between them from the present estimate
+/// of the frame before; without readings, as the window estimates it. None for the first frame.
 std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W);
 
-/// Levelled, as is what follows.
+/// Frames and landmarks, levelled.
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);
-/// A frame as a keyframe for loop closure, with what it sees, but without its images.
+/// A frame as a keyframe for loop closure, levelled, with its landmarks, but without its images.
 Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& calibration);
 
 }  // namespace fbvins

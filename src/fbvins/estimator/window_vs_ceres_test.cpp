@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two methods, one window: our analytic Jacobians, Schur elimination and Levenberg-Marquardt against
+// One window solved by two methods: analytic Jacobians, Schur elimination and Levenberg-Marquardt against
 // Ceres with automatic derivatives of independently written residuals, and against a dense QR.
 #include <ceres/crs_matrix.h>
 #include <ceres/dynamic_autodiff_cost_function.h>
@@ -155,7 +155,7 @@ class WindowTwins : public testing::TestWithParam<bool> {
   WindowLayout layout{w.problem};
   int dense_size() const { return 15 * kFrames + kTiltSize + (GetParam() ? 13 : 0); }
 
-  /// Column of the Ceres Jacobian (after the landmarks) that is row `row` of our dense system; -1: padding.
+  /// For each column of the Ceres Jacobian after the landmarks, its row in our dense system.
   std::vector<int> rows_of_columns() const {
     std::vector<int> rows;
     for (int f = 0; f < kFrames; ++f)
@@ -263,7 +263,7 @@ Window window_at_rest(std::uint64_t seed) {
   return w;
 }
 
-TEST(WindowAtRest, IsSolvedThoughOneDepthIsNextToFree) {
+TEST(WindowAtRest, IsSolvedThoughOneDepthIsHardlyObservable) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     WindowSolution solution;
     solution.window = window_at_rest(seed).problem;
