@@ -17,7 +17,7 @@
 
 namespace fbvins {
 
-/// The body at an IMU reading: the newest estimate propagated to it. Without a pose (`health`) all but the times is void.
+/// The body at an IMU reading: the newest estimate propagated to it. Without a pose (`health`) only times and health are valid.
 struct LivePose {
   Time t;                                   ///< of the reading, on the sensors' clock
   Time host_t;                              ///< the same moment on this machine's CLOCK_MONOTONIC
@@ -27,21 +27,21 @@ struct LivePose {
   Vec3 w_WB_B = Vec3::Zero();               ///< rad/s, in B, bias removed
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
-  double tilt_sigma_rad = 0;                ///< as the estimate's
+  double tilt_sigma_rad = 0;                ///< that of the propagated estimate
   bool level = false;                       ///< likewise
-  Health health;                            ///< the estimator's, or what the watchdogs see since
+  Health health;                            ///< the estimator's, or worse where sensors have been silent since
   std::uint32_t reset_counter = 0;          ///< +1 whenever W is a new frame
 };
 
 /// What became of the input since the start.
 struct LiveCounts {
   std::int64_t imu = 0, images = 0;    ///< arrived
-  std::int64_t images_estimated = 0;   ///< of these, with an answer of the estimator
+  std::int64_t images_estimated = 0;   ///< of these, with an answer of the estimator, a pose or not
   std::int64_t images_dropped = 0;     ///< because the stages were busy with older ones
   std::int64_t images_incomplete = 0;  ///< one camera missing or frozen
-  std::int64_t imu_late = 0;           ///< too late to be put in order
+  std::int64_t imu_late = 0;           ///< dropped: a later one had gone on before
   std::int64_t imu_reordered = 0;      ///< came late, and were put in order
-  std::int64_t clock_leaps = 0;        ///< of a sensor's clock, mended
+  std::int64_t clock_leaps = 0;        ///< jumps of a sensor's clock, corrected
   std::int64_t resets = 0;             ///< restarts of the estimator
 
   /// Calls f(name, count) for each, in this order.
@@ -68,16 +68,16 @@ struct LatencySummary {
 /// Whenever health changes, and once a second.
 struct LiveStatus {
   Time t;       ///< newest stamp of any sensor
-  Time host_t;  ///< when this was said, on CLOCK_MONOTONIC
+  Time host_t;  ///< time of this status, on CLOCK_MONOTONIC
   Health health;
   std::uint32_t reset_counter = 0;
   LiveCounts counts;
   LatencySummary shutter_to_pose;  ///< from the image's stamp to the estimator's answer
-  LatencySummary pose_age;         ///< of the newest estimate, looked at with every IMU reading
+  LatencySummary pose_age;         ///< of the newest estimate, taken at every IMU reading
   std::string problem;             ///< of a sink or a source, in one sentence; empty: none
 };
 
-/// What was seen in an image, and where the window has it: to be looked at. Before the image's Odometry, for sinks that want it.
+/// For display: an image's features, and the window. Comes before the image's Odometry, where a sink wants_views().
 struct LiveView {
   struct Feature {
     TrackId track;
@@ -87,7 +87,7 @@ struct LiveView {
   };
   struct Landmark {
     TrackId track;
-    Vec3 p_W = Vec3::Zero();  ///< m, as seen from the published pose
+    Vec3 p_W = Vec3::Zero();  ///< m, moved from the gauge to the published frame
   };
   Time t;                           ///< of the image
   double shutter_to_pose_ms = 0;    ///< from the image's stamp to the estimator's answer
@@ -96,7 +96,7 @@ struct LiveView {
   std::vector<Vec3> keyframes_W;    ///< the window's, oldest first; likewise
 };
 
-/// Somebody wants to find this moment again.
+/// A moment that somebody has marked, to find it again.
 struct LiveMark {
   Time t;  ///< newest stamp of any sensor
   std::string text;

@@ -5,7 +5,7 @@
 
 namespace fbvins {
 
-/// How sensors are watched and poses are put out while they come.
+/// Monitoring of live sensors, and publishing of poses.
 struct LiveOptions {
   double smoothing_s = 0.1;
   double camera_silence_s = 0.2;
@@ -15,10 +15,10 @@ struct LiveOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("smoothing_s", smoothing_s, "s", "time in which the pose at IMU rate converges to a new estimate, 0: at once", 0.0, 2.0);
-    v("camera_silence_s", camera_silence_s, "s", "without an image for this long the health is degraded", 0.02, 10.0);
-    v("imu_silence_s", imu_silence_s, "s", "without an IMU reading for this long the health is degraded", 0.01, 10.0);
-    v("imu_reorder_wait_s", imu_reorder_wait_s, "s", "a missing IMU reading is waited for no longer than this", 0.0, 0.1);
+    v("smoothing_s", smoothing_s, "s", "time constant to take over a new estimate at IMU rate, 0: at once", 0.0, 2.0);
+    v("camera_silence_s", camera_silence_s, "s", "without an image for this long health is degraded", 0.02, 10.0);
+    v("imu_silence_s", imu_silence_s, "s", "without an IMU reading for this long health is degraded", 0.01, 10.0);
+    v("imu_reorder_wait_s", imu_reorder_wait_s, "s", "longest wait for a missing IMU reading", 0.0, 0.1);
     v.group("mavlink", mavlink, "poses to a flight controller (--mavlink)");
   }
 };

@@ -7,9 +7,9 @@
 //   Result<void> end = source->run(live->input());   // in this thread; input() may be used by others as well
 //   Result<void> done = live->finish();
 //
-// An image that comes while older ones are being worked on waits; when the next one comes it is dropped and counted. IMU
-// readings are never dropped. Silent and frozen sensors and clocks that leap are seen by watchdogs, and the work goes on when
-// they are back (docs/live.md).
+// An image that comes while older ones are being processed waits; when the next one comes it is dropped and counted. IMU
+// readings are never dropped. Silent or frozen sensors and clock jumps are detected, and estimation goes on when the sensors
+// are back (docs/live.md).
 #pragma once
 
 #include <functional>
@@ -43,11 +43,11 @@ class LiveSystem {
   void on_failure(std::function<void()> callback);
 
   SensorInput& input();
-  /// Tells the sinks that somebody wants to find this moment again. From any thread.
+  /// Sends a LiveMark to the sinks. From any thread.
   void mark(std::string text);
   /// From any thread.
   LiveStatus status() const;
-  /// Works off what is waiting, ends the sinks. The first failure of a stage, else the first of a sink.
+  /// Processes what is waiting, then ends the sinks. Returns the first failure of a stage, else the first of a sink.
   Result<void> finish();
 
  private:

@@ -13,14 +13,14 @@
 
 namespace fbvins {
 
-/// What may be said of a source beside its name.
+/// Options of a source beside its name; each source uses those that apply to it.
 struct SourceOptions {
   DatasetOptions dataset;  ///< of a replay; its Kalibr files are the calibration of any source
   int laps = 1;            ///< how often a replay is played
   bool preload = false;    ///< a replay is decoded before its clock starts
-  /// Told in one sentence what happens at the device, on the source's thread.
+  /// Gets one sentence for each event at the device, on the source's thread.
   std::function<void(const std::string&)> say = [](const std::string&) {};
-  /// Asked now and then while a source waits for a device before it can be made: true ends that with an error.
+  /// Asked repeatedly while make_source() waits for a device: true ends that with an error.
   std::function<bool()> give_up = [] { return false; };
 };
 

@@ -17,10 +17,10 @@ struct MavlinkOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("dialect", dialect, "px4|ardupilot", "which messages tell the pose");
-    v("rate_hz", rate_hz, "Hz", "poses told in a second, no more than the IMU's rate", 1.0, 1000.0);
+    v("dialect", dialect, "px4|ardupilot", "which messages carry the pose");
+    v("rate_hz", rate_hz, "Hz", "poses sent per second, no more than the IMU's rate", 1.0, 1000.0);
     v("system_id", system_id, "", "the vehicle's number (PX4 MAV_SYS_ID, ArduPilot SYSID_THISMAV)", 1, 255);
-    v("component_id", component_id, "", "ours on the vehicle; 197: visual inertial odometry", 1, 255);
+    v("component_id", component_id, "", "component of this computer; 197: visual-inertial odometry", 1, 255);
     v.group("mounting", mounting, "the IMU on the vehicle, and the local frame");
   }
 };

@@ -5,8 +5,8 @@
 //   if (!sink) return report(sink.error().message);
 //   live.add_sink(std::move(*sink));
 //
-// Threads: take() leaves what it is given to a thread of the sink's own and returns; cables that come and go, queues that are
-// full and a flight controller that is silent hold up nobody.
+// Threads: take() hands the event to the sink's own thread and returns. Unplugged cables, full queues and a silent flight
+// controller block nobody.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace fbvins {
 
-/// What has become of the connection so far.
+/// State of the connection, and counts since the start.
 struct MavlinkLinkState {
   bool connected = false;          ///< the port is open
   bool flight_controller = false;  ///< heard within the last three seconds
@@ -32,7 +32,7 @@ struct MavlinkLinkState {
 class MavlinkSink final : public Sink {
  public:
   /// `udp:HOST:PORT`, `udp:HOST:PORT:OWN_PORT` (HOST: an IPv4 address or localhost) or `serial:DEVICE:BAUD`. An error says
-  /// what is wrong with these words or options; a device that is not there is waited for.
+  /// what is wrong with the address or the options; a device that is not there is waited for.
   static Result<std::unique_ptr<MavlinkSink>> create(const std::string& address, const MavlinkOptions& options);
   ~MavlinkSink() override;
 

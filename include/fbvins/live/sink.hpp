@@ -9,8 +9,8 @@
 //     }
 //   };
 //
-// Threads: each sink is called on a thread of its own, which nothing of the estimator waits for. A sink that is slower than
-// the events loses the oldest of those that wait; how many is told in the status.
+// Threads: each sink is called on a thread of its own, for which the estimator never waits. A sink that is slower than the
+// events loses the oldest of those that wait for it (Hub).
 #pragma once
 
 #include <string>
@@ -26,11 +26,11 @@ class Sink {
   virtual ~Sink() = default;
   /// For messages: "mavlink udp:127.0.0.1:14540".
   virtual std::string_view name() const = 0;
-  /// An error is a failure: reported once, and of the whole flight at its end; later events still come.
+  /// The first error is reported in the status, and is the result of LiveSystem::finish(); later events still come.
   virtual Result<void> take(const LiveEvent& event) = 0;
-  /// Asked once: does it want a LiveView with every image? They cost the estimator's thread some ten microseconds each.
+  /// Asked once: whether it wants a LiveView with every image. Each costs the estimator's thread some ten microseconds.
   virtual bool wants_views() const { return false; }
-  /// Trouble that may pass, in one sentence, for the status: a cable that is not plugged in. Empty: none. From any thread.
+  /// A problem that may pass, such as an unplugged cable, in one sentence for the status. Empty: none. From any thread.
   virtual std::string problem() const { return {}; }
   /// The last call: close what is open.
   virtual Result<void> finish() { return {}; }

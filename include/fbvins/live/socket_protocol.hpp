@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The messages of `fbvins live --source socket:PATH`, for programs that send sensor data. C and C++; needs no other header of
 // FB-VINS.
-// docs/socket.md tells what is sent when; examples/socket_sender.cpp does it.
+// docs/socket.md says what is sent when; examples/socket_sender.cpp is an example.
 //
 //   int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);          // every message is one packet
 //   connect(connection, ...);
 //   send a FbvinsSocketHello, with the images' memory as SCM_RIGHTS; wait for FbvinsSocketWelcome
 //   send FbvinsSocketImu and FbvinsSocketFrame as the sensors deliver, take FbvinsSocketReleased and FbvinsSocketStatus
 //
-// Numbers are as this machine has them (both ends run on it). All fields lie at multiples of their size: no padding.
+// Numbers are in this machine's byte order (both ends run on it). All fields are at multiples of their size: no padding.
 // Reserved fields are 0.
 #ifndef FBVINS_LIVE_SOCKET_PROTOCOL_HPP
 #define FBVINS_LIVE_SOCKET_PROTOCOL_HPP
@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 enum {
-  FBVINS_SOCKET_MAJOR = 1,  ///< raised when an older end would misunderstand
+  FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
   FBVINS_SOCKET_MINOR = 0,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -109,7 +109,7 @@ typedef struct FbvinsSocketFrame {
   FbvinsSocketHeader header;
   int64_t t_ns;
   uint64_t sequence;  ///< +1 for each frame that the cameras made, sent or not: gaps are counted
-  uint32_t slot;      ///< the estimator's until it says FbvinsSocketReleased
+  uint32_t slot;      ///< the estimator's until FbvinsSocketReleased
   uint32_t images;    ///< which of the two the slot holds
 } FbvinsSocketFrame;
 

@@ -30,7 +30,7 @@ class Source {
   virtual Result<void> run(SensorInput& input) = 0;
   /// From any thread: run() returns soon.
   virtual void stop() = 0;
-  /// By which the source hears of the flight, to tell its device; null: it does not care. May outlive the source.
+  /// A sink by which the source reports the flight's state to its device; null: none. May outlive the source.
   virtual std::unique_ptr<Sink> status_sink() { return nullptr; }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far another machine's clock is ahead of this one's, from questions and answers (TIMESYNC).
+// The offset of another machine's clock to this one's, from requests and answers (TIMESYNC).
 //
 //   offset.add(asked, their_time, answered);   // each answer
 //   if (offset.known()) stamp = host_time + offset.value();
@@ -11,16 +11,16 @@
 
 namespace fbvins {
 
-/// An answer is taken to be given in the middle between question and answer. Queues on the way only ever add to the round
-/// trip, so of the newest answers the quicker half counts, and of it the median.
+/// The other machine's time is taken as that of the middle between request and answer. Queues only add to the round trip, so
+/// the offset is the median of the half of the newest answers with the shorter round trips.
 class ClockOffset {
  public:
-  /// `asked` and `answered` are of this machine's clock, `theirs` of the other.
+  /// `asked` and `answered` are times of this machine's clock, `theirs` of the other's.
   void add(Time asked, Time theirs, Time answered);
   bool known() const { return answers_.size() >= kEnough; }
   /// Theirs less ours; only where known().
   Duration value() const { return value_; }
-  /// How often the other clock leapt, as it does when that machine restarts.
+  /// How often the other clock jumped, as it does when that machine restarts.
   int leaps() const { return leaps_; }
 
  private:

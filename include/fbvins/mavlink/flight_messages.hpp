@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The MAVLink messages of a mission that is flown from aboard, and of a simulator that plays a vehicle to a flight controller.
+// The MAVLink messages of a mission flown by a companion computer, and of a simulator that stands in for a vehicle's sensors.
 // Fields, names and units are those of the protocol's common set, as in messages.hpp.
 #pragma once
 
@@ -14,7 +14,7 @@ inline constexpr std::uint16_t kMavCmdLand = 21, kMavCmdSetMode = 176, kMavCmdAr
 inline constexpr std::uint8_t kMavResultAccepted = 0;
 inline constexpr std::uint8_t kMavLandedOnGround = 1;
 
-/// A setpoint; what type_mask names is not used.
+/// SET_POSITION_TARGET_LOCAL_NED, a setpoint; fields whose bit is set in type_mask are ignored.
 struct PositionTargetMessage {
   static constexpr std::uint32_t kId = 84;
   static constexpr std::uint8_t kCrcExtra = 143;
@@ -78,7 +78,7 @@ struct LandedStateMessage {
   }
 };
 
-/// What a simulated vehicle feels, forward-right-down.
+/// Sensor data of a simulated vehicle, forward-right-down.
 struct HilSensorMessage {
   static constexpr std::uint32_t kId = 107;
   static constexpr std::uint8_t kCrcExtra = 108;

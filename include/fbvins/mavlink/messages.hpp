@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The MAVLink messages of an onboard computer that estimates motion, as values. Fields, names and units are those of the
-// protocol's common set; each wire() lists them as they follow one another on the wire, extensions last.
+// protocol's common set; each wire() lists them in their order on the wire, extensions last.
 //
 //   std::vector<std::uint8_t> bytes = encode_mavlink(HeartbeatMessage{}, MavlinkAddress{}, sequence++);
 #pragma once
@@ -40,7 +40,7 @@ struct HeartbeatMessage {
   }
 };
 
-/// A question has tc1 = 0; the answer repeats its ts1 and has the answerer's time as tc1.
+/// A request has tc1 = 0; the answer repeats its ts1 and has the other machine's time as tc1.
 struct TimesyncMessage {
   static constexpr std::uint32_t kId = 111;
   static constexpr std::uint8_t kCrcExtra = 34;
@@ -74,7 +74,7 @@ struct HighresImuMessage {
   }
 };
 
-/// The same, coarser.
+/// The same with a lower resolution.
 struct ScaledImuMessage {
   static constexpr std::uint32_t kId = 26;
   static constexpr std::uint8_t kCrcExtra = 170;
@@ -161,7 +161,7 @@ struct StatusTextMessage {
   }
 };
 
-/// What is longer than the message's field is cut off.
+/// A sentence that is longer than the message's field is cut off.
 StatusTextMessage status_text(MavSeverity severity, const std::string& sentence);
 
 using MavlinkMessage =

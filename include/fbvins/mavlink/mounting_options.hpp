@@ -3,7 +3,7 @@
 
 namespace fbvins {
 
-/// Which way the axes of the IMU's frame B look on the vehicle, before the mounting's angles.
+/// Directions of the axes of the IMU's frame B on the vehicle, before the mounting's angles.
 enum class ImuAxes {
   frd,         ///< x forward, y right, z down
   flu,         ///< x forward, y left, z up
@@ -11,8 +11,8 @@ enum class ImuAxes {
   camera_down  ///< x right, y backward, z down, as in cameras that look at the ground
 };
 
-/// vehicle: x ahead of the vehicle at the start, and after a restart the frame goes on where the vehicle was last seen;
-/// world: W turned about its x, whatever W is.
+/// vehicle: x ahead of the vehicle at the start; after a restart the frame continues where the vehicle was last seen.
+/// world: W turned by 180 degrees about its x.
 enum class LocalOrigin { vehicle, world };
 
 struct MountingOptions {
@@ -23,15 +23,15 @@ struct MountingOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("imu_axes", imu_axes, "frd|flu|camera_fwd|camera_down", "which way the IMU's axes look on the vehicle");
+    v("imu_axes", imu_axes, "frd|flu|camera_fwd|camera_down", "directions of the IMU's axes on the vehicle");
     v("roll_rad", roll_rad, "rad", "the IMU is turned by this about the vehicle's forward axis", -3.2, 3.2);
     v("pitch_rad", pitch_rad, "rad", "then pitched up by this", -3.2, 3.2);
     v("yaw_rad", yaw_rad, "rad", "then turned to the right by this", -3.2, 3.2);
-    v("x_m", x_m, "m", "the IMU's place on the vehicle, forward", -10.0, 10.0);
-    v("y_m", y_m, "m", "the IMU's place on the vehicle, right", -10.0, 10.0);
-    v("z_m", z_m, "m", "the IMU's place on the vehicle, down", -10.0, 10.0);
+    v("x_m", x_m, "m", "the IMU's position on the vehicle, forward", -10.0, 10.0);
+    v("y_m", y_m, "m", "the IMU's position on the vehicle, right", -10.0, 10.0);
+    v("z_m", z_m, "m", "the IMU's position on the vehicle, down", -10.0, 10.0);
     v("local_frame", local_frame, "vehicle|world",
-      "ahead of the vehicle at the start and gone on with after a restart, or the world's own");
+      "x ahead of the vehicle at the start, continued after a restart; or W with z down");
   }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From this project's frames to a flight controller's: the only place that knows of forward-right-down.
+// From this project's frames to a flight controller's: the only place that uses forward-right-down.
 //
 //   VehicleFrames frames(mounting);
 //   if (std::optional<VehicleState> state = frames.state(odometry)) link.send(odometry_message(*state, stamp_usec));
@@ -15,10 +15,10 @@
 
 namespace fbvins {
 
-struct BodyFrd {};   ///< the vehicle: x forward, y right, z down, origin where its flight controller says
+struct BodyFrd {};   ///< the vehicle: x forward, y right, z down, origin at the flight controller
 struct LocalFrd {};  ///< z down; see LocalOrigin
 
-/// The IMU on the vehicle.
+/// Pose of the IMU on the vehicle.
 Pose<BodyFrd, B> mounting(const MountingOptions& options);
 
 struct VehicleState {
@@ -34,8 +34,8 @@ struct VehicleState {
 class VehicleFrames {
  public:
   explicit VehicleFrames(const MountingOptions& options);
-  /// Without a pose, or with numbers that are not finite, there is none. A flight controller that is told of a reset takes over
-  /// position and heading; the less they jump, the less its filter is shaken.
+  /// None without a pose, or with numbers that are not finite. At a reset a flight controller takes over position and heading:
+  /// the less they jump, the less its filter is disturbed (LocalOrigin::vehicle).
   std::optional<VehicleState> state(const Odometry& odometry);
 
  private:
@@ -48,11 +48,11 @@ class VehicleFrames {
   std::optional<Pose<LocalFrd, BodyFrd>> last_;
 };
 
-/// Percent as ODOMETRY has it: types/quality.hpp where one may fly by this pose, 0 before the start, -1 when lost.
+/// Percent as in ODOMETRY: that of types/quality.hpp where there is a pose, 0 before the start, -1 when lost.
 std::int8_t odometry_quality(const Health& health, const Mat6& pose_covariance);
 
 OdometryMessage odometry_message(const VehicleState& state, std::uint64_t time_usec);
-/// All unknown: what says that there is no pose.
+/// All numbers unknown (NaN): reports that there is no pose.
 OdometryMessage no_odometry_message(const Health& health, std::uint32_t reset_counter, std::uint64_t time_usec);
 VisionPositionMessage vision_position_message(const VehicleState& state, std::uint64_t time_usec);
 VisionSpeedMessage vision_speed_message(const VehicleState& state, std::uint64_t time_usec);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MAVLink 2 frames: written whole, read from a stream that may begin anywhere and hold anything.
+// MAVLink 2 frames: encoded, and decoded from a byte stream that may begin anywhere and contain anything.
 //
 //   MavlinkDecoder decoder;
 //   for (const MavlinkFrame& frame : decoder.push(bytes_from_the_cable))
@@ -15,13 +15,13 @@
 
 namespace fbvins {
 
-/// Who speaks: the vehicle's system number, and MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY.
+/// Sender of a message; the defaults are ours: the vehicle's system id, and MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY.
 struct MavlinkAddress {
   std::uint8_t system = 1, component = 197;
   bool operator==(const MavlinkAddress&) const = default;
 };
 
-/// One frame, unsigned; zeros at the payload's end are left out as the protocol demands.
+/// One frame, unsigned; zeros at the payload's end are left out as the protocol requires.
 std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkAddress from, std::uint8_t sequence);
 
 struct MavlinkFrame {
@@ -30,18 +30,18 @@ struct MavlinkFrame {
   MavlinkMessage message;
 };
 
-/// Reads MAVLink 2 and 1, as flight controllers begin with 1 until they are spoken to. Messages that are not of
-/// MavlinkMessage are skipped without a look at their checksum, which takes their definition. Signatures are not checked.
+/// Reads MAVLink 2, and 1, which flight controllers send until they receive a message. Messages that are not of MavlinkMessage
+/// are skipped with their checksum unchecked, as that takes their definition. Signatures are not checked.
 class MavlinkDecoder {
  public:
   struct Counts {
     std::int64_t frames = 0;        ///< returned
     std::int64_t skipped = 0;       ///< of other messages
-    std::int64_t bad_checksum = 0;  ///< looked like a frame
+    std::int64_t bad_checksum = 0;  ///< frames of known messages
     std::int64_t noise_bytes = 0;   ///< not of any frame
   };
 
-  /// The frames that end within these bytes, in order. What begins a frame is kept for the next call: at most 300 bytes.
+  /// The frames that end within these bytes, in order. An incomplete frame is kept for the next call: at most 300 bytes.
   std::vector<MavlinkFrame> push(std::span<const std::uint8_t> bytes);
   const Counts& counts() const { return counts_; }
 

@@ -19,7 +19,7 @@ class Bell {
   int fd() const { return event_.number(); }
   void ring() const {
     const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // full: it rings already
+    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // fails only where it rings already
   }
   void silence() const {
     std::uint64_t rung = 0;

@@ -20,7 +20,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kLongestUnsent = 2048;  // bytes: a few poses, older ones are of no use
+constexpr std::size_t kLongestUnsent = 2048;  // a few poses: more would arrive too late to be of use
 
 struct Baud {
   int rate;
@@ -48,7 +48,7 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
-/// -1: not a whole number.
+/// -1 where the text is not a whole number.
 long number(const std::string& text) {
   long value = -1;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -169,7 +169,7 @@ void ByteLink::flush() {
 std::vector<std::uint8_t> ByteLink::receive() {
   std::vector<std::uint8_t> bytes;
   if (!is_open()) return bytes;
-  // A port that a device hung up on reads as ended for ever; one without data does not.
+  // read() returns 0 only after a hang-up; a port without data is not readable.
   pollfd state{descriptor(), POLLIN, 0};
   for (int rounds = 0; rounds < 16 && ::poll(&state, 1, 0) > 0; ++rounds) {
     std::array<std::uint8_t, 2048> piece{};

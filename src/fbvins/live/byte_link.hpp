@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes to and from a UDP peer or a serial port that may come and go. Nothing here waits.
+// Bytes to and from a UDP peer or a serial port that may come and go. No call blocks.
 #pragma once
 
 #include <cstdint>
@@ -32,17 +32,17 @@ class ByteLink {
  public:
   explicit ByteLink(LinkAddress address) : address_(std::move(address)) {}
 
-  /// Tries once; false: problem() says why. Whoever calls decides how often.
+  /// Tries once; false: problem() says why.
   bool open();
   bool is_open() const { return static_cast<bool>(descriptor_); }
   int descriptor() const { return descriptor_.number(); }
   const std::string& problem() const { return problem_; }
 
-  /// Takes the packet whole or not at all; false: it is lost, as the port is shut or full.
+  /// Takes the packet whole or not at all; false: it is dropped, as the port is closed or its queue full.
   bool send(std::span<const std::uint8_t> packet);
-  /// What has come; the port shuts where it is broken.
+  /// The bytes that have arrived. A broken port is closed.
   std::vector<std::uint8_t> receive();
-  /// Sends on what a serial port did not take at once.
+  /// Sends what a serial port did not accept before.
   void flush();
   bool has_unsent() const { return !unsent_.empty(); }
 

@@ -7,11 +7,11 @@
 namespace fbvins {
 namespace {
 
-/// Stamps further ahead of this machine's clock than any before are from the future.
+/// A stamp is taken for a jump forward if it is this much less late, against this machine's clock, than any of the last seconds.
 constexpr double kForwardLeap_s = 0.2;
-/// Readings that come out of order come so by less.
+/// Readings that merely arrive out of order go back by less.
 constexpr double kBackwardLeap_s = 0.1;
-/// Camera and IMU share a clock: two leaps as close as these are the same leap.
+/// Camera and IMU share a clock: two jumps that agree within these are the same one.
 constexpr double kSameLeap_s = 0.05, kSameLeapWithin_s = 5;
 constexpr double kWindow_s = 5;
 
@@ -40,11 +40,12 @@ Time ClockGuard::mend(Stream stream, Time raw, Time host) {
 
 bool ClockGuard::leapt(const State& s, Time t, Time host) const {
   if (s.newest && (t - *s.newest).seconds() < -kBackwardLeap_s) return true;
-  // On the host's clock, so that a recording played at another speed is judged alike.
+  // In seconds of the host's clock, so that the speed of a replay does not matter.
   return lateness_s(t, host) < shortest_lateness_s() - kForwardLeap_s && std::isfinite(shortest_lateness_s());
 }
 
-/// As many whole periods after the stream's newest stamp as fit the time that has passed, or as the other stream has leapt.
+/// Puts the stamp a whole number of periods after the stream's newest one, by the time that has passed; or the other stream's
+/// correction, where that has jumped just now by about the same.
 Duration ClockGuard::correction_after_leap(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
   Duration own = s.correction;

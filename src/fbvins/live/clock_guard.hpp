@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sensors' clock against this machine's. A sensor whose clock leaps (a device that starts anew, a driver that sets the
-// time) would tear the data apart; its stamps are moved so that they go on where they were. Data that are merely late, bunched
-// or missing are left alone: a stamp cannot be earlier than the one before, nor from the future, and these two tell a leap.
+// Detects jumps of the sensors' clock against this machine's, and corrects them. When a clock jumps (a device restarts, a driver
+// sets the time), stamps are shifted so that they continue where they were. Data that are merely late, bunched or missing are
+// left alone: a jump shows by a stamp before the newest one, or ahead of any possible arrival.
 //
-//   Time t = guard.mend(ClockGuard::camera, frame.t, host_now);   // frame.t itself as long as nothing leaps
+//   Time t = guard.mend(ClockGuard::camera, frame.t, host_now);   // frame.t itself as long as no clock jumps
 //   Time shutter = guard.host_of(t);                              // when that was on this machine's clock
 //
 // Threads: one owner.
@@ -24,10 +24,10 @@ class ClockGuard {
   /// clock_rate: seconds of the sensors' clock in one second of this machine's.
   explicit ClockGuard(double clock_rate) : rate_(clock_rate) {}
 
-  /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any leap.
+  /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump.
   Time mend(Stream stream, Time raw, Time host);
-  /// When a moment of the (mended) sensors' clock was on this machine's. Taken from the event of the last seconds that was
-  /// delivered fastest: the shortest delay of the transport is not known and counts as none.
+  /// Converts a time of the (corrected) sensors' clock to this machine's. The offset is that of the event of the last seconds
+  /// that was delivered fastest: the shortest delay of the transport is not observable and counts as zero.
   Time host_of(Time t) const;
   int leaps() const { return leaps_; }
 
@@ -48,7 +48,7 @@ class ClockGuard {
   double rate_;
   std::array<State, 2> states_;
   std::optional<Time> first_, first_host_;
-  /// Shortest lateness of the part of a window that runs and of the whole one before: crystals drift, and it must follow.
+  /// Shortest lateness in the current window so far and in the one before: a sliding minimum, as the clocks drift.
   double current_s_ = std::numeric_limits<double>::infinity(), previous_s_ = std::numeric_limits<double>::infinity();
   Time window_start_;
   int leaps_ = 0;

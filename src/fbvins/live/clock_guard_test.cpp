@@ -37,7 +37,7 @@ TEST(ClockGuard, LeavesStampsAlone) {
 TEST(ClockGuard, LateAndBunchedDataAreNoLeap) {
   ClockGuard guard(1);
   double worst_s = 0;
-  // Everything of half a second arrives at its end.
+  // All events of half a second arrive at its end.
   play(
       guard, 20, no_leap, [](double s) { return std::ceil(s * 2) / 2 - s; }, worst_s);
   EXPECT_EQ(worst_s, 0);

@@ -15,7 +15,7 @@
 namespace fbvins {
 namespace {
 
-/// Memory whose pages are there whenever they are read: of the plain kind, never to be shortened, large enough.
+/// The memory must be readable at any time: a tmpfs memfd, sealed against shrinking, large enough.
 Result<void> check_memory(const FileDescriptor& memory, const FrameLayout& layout) {
   const auto wrong = [](std::string what) { return Error{ErrorCode::malformed, "the images' memory " + std::move(what)}; };
   const int seals = ::fcntl(memory.number(), F_GET_SEALS);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sender's images where it wrote them: its shared memory, mapped for reading, as slots that frames are made of without a
-// copy. A slot goes back when the last image in it is gone, on whatever thread that is; images outlive the sender and its
-// connection. All but the images' end: one thread.
+// A sender's shared memory, mapped for reading: its slots become frames without a copy. A slot is released when the last image
+// in it is destroyed, on whatever thread that is; images may outlive the sender and its connection. But for the images'
+// destruction: one thread.
 //
 //   Result<std::shared_ptr<FrameRing>> ring = FrameRing::map(std::move(memfd), hello.layout, bell);
 //   Result<StereoFrame> frame = (*ring)->take(message);   // an error where the sender announces a slot twice
@@ -30,10 +30,10 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
   FrameRing& operator=(const FrameRing&) = delete;
   ~FrameRing();
 
-  /// Where half of the slots are out already the images are copied, and the slot is free at once: whoever keeps frames for
-  /// long cannot leave the sender without a slot.
+  /// Where half of the slots are held already the images are copied and the slot is released at once, so that whoever keeps
+  /// frames for long does not use up the sender's slots.
   Result<StereoFrame> take(const SocketFrame& frame);
-  /// The slots that became free since it was last asked; the sender may be told.
+  /// The slots released since the last call, to be sent to the sender.
   std::uint64_t released();
   /// Slots that are not the sender's.
   int held() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera that hangs often goes on delivering its last image under new stamps. Two real images never agree in every pixel.
+// A hung camera or driver often repeats its last image with new stamps. Two real images never agree in every pixel.
 #pragma once
 
 #include <cstring>
@@ -12,7 +12,7 @@ namespace fbvins {
 
 class FrozenCamera {
  public:
-  /// True when this is the image before once more, to the last bit.
+  /// True if this image equals the one before, to the last bit.
   bool is_repeated(const std::shared_ptr<const Image>& image) {
     if (image == nullptr) return false;
     const std::shared_ptr<const Image> before = std::exchange(before_, image);

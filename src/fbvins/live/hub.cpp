@@ -81,7 +81,7 @@ class Hub::Lane {
     return event;
   }
 
-  /// A sink that throws has failed, and nothing else has.
+  /// An exception of a sink becomes its error.
   template <class Call>
   Result<void> guarded_call(const Call& call) {
     Result<void> result;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From one publisher to every sink, each on a thread of its own behind a queue that drops its oldest: a sink that hangs costs
-// nobody else anything.
+// Distributes events to sinks, each on a thread of its own behind a queue that drops its oldest event: a sink that hangs does
+// not affect the others.
 //
 //   hub.add(std::make_unique<Printer>());
 //   hub.publish(pose);                        // any thread; never waits for a sink
@@ -21,8 +21,8 @@ namespace fbvins {
 class Hub {
  public:
   struct Limits {
-    std::size_t events = 8192;  ///< that may wait for one sink: some ten seconds
-    std::size_t images = 32;    ///< of them stereo frames, for their memory
+    std::size_t events = 8192;  ///< that may wait for one sink: about ten seconds of them
+    std::size_t images = 32;    ///< of them stereo frames, which need much memory
   };
   struct SinkReport {
     std::string name;
@@ -40,7 +40,7 @@ class Hub {
   bool empty() const { return lanes_.empty(); }
   void publish(LiveEvent event);
   std::vector<SinkReport> reports() const;
-  /// Lets every sink take what waits for it, and ends it. The first error of any.
+  /// Lets every sink take what waits for it, and ends it. Returns the first error of any.
   Result<void> finish();
 
  private:

@@ -4,7 +4,7 @@
 namespace fbvins {
 namespace {
 
-/// A distance of less is one period, with jitter; of more, a hole.
+/// A longer interval than this is a gap; a shorter one is a period with jitter.
 constexpr double kHole_periods = 1.6;
 
 }  // namespace

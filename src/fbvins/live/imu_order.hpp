@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts IMU readings in order of their stamps with a bounded wait. A reading that follows its predecessor by about one period
-// goes on at once; one that leaves a hole waits for what may still come, but no longer than the wait allows.
+// is released at once; one after a gap waits for readings that may still come, but no longer than `longest_wait`.
 // Threads: one owner.
 #pragma once
 
@@ -19,15 +19,15 @@ class ImuOrder {
 
   explicit ImuOrder(Duration longest_wait) : longest_wait_(longest_wait) {}
 
-  /// Calls `release` for every reading that is next in order, now that this one has come at `host`.
+  /// Takes a reading that came at `host`; calls `release` for every reading that is next in order.
   void push(const ImuSample& sample, Time host, const Release& release);
-  /// Nothing has come: lets go what has waited long enough at `host`.
+  /// Releases what has waited long enough at `host`.
   void tick(Time host, const Release& release);
-  /// Lets go everything.
+  /// Releases everything.
   void flush(const Release& release);
 
-  int late() const { return late_; }            ///< after a reading with a later stamp had gone on: dropped
-  int reordered() const { return reordered_; }  ///< came after a later one and went before it
+  int late() const { return late_; }            ///< dropped: a reading with the same or a later stamp was released before
+  int reordered() const { return reordered_; }  ///< came after a later one and was released before it
 
  private:
   struct Waiting {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sensors push into, from any thread, and one thread takes from. Mends stamps, puts IMU readings in order, blanks frozen
-// cameras, and keeps one image waiting at most: when the next comes, the older one is dropped and counted. No reading ever is.
+// Queue from the sensors' threads to one consumer. Corrects stamps after clock jumps, puts IMU readings in order, removes frozen
+// images, and keeps one image waiting at most: when the next comes, the older one is dropped and counted. No reading ever is.
 //
 //   ingest.push(sample); ingest.push(std::move(frame));                         // the sensors' threads
-//   while (std::optional<SensorEvent> event = ingest.pop()) system.push(*event);   // the taker's
+//   while (std::optional<SensorEvent> event = ingest.pop()) system.push(*event);   // the consumer's
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ class Ingest final : public SensorInput {
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
-  /// Lets readings go that have waited long enough; to be called now and then.
+  /// Releases readings that have waited long enough (ImuOrder); to be called every few milliseconds.
   void tick();
 
   /// Waits for the next event; nothing once closed and empty.
@@ -45,9 +45,9 @@ class Ingest final : public SensorInput {
     Time newest;                                  ///< stamp, on the sensors' clock
   };
   Arrival arrivals() const;
-  /// When a stamp was on this machine's clock.
+  /// A stamp on this machine's clock (ClockGuard::host_of).
   Time host_of(Time t) const;
-  /// What is known here; the rest is left at zero.
+  /// The counts that are kept here; the others are zero.
   LiveCounts counts() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Percentiles of a time over hours in a fixed amount of memory: bins of 2 %. Any thread.
+// Percentiles of a latency in fixed memory, for flights of hours: bins 2 % wide. Any thread.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ class LatencyHistogram {
     return static_cast<std::size_t>(
         std::clamp(1 + static_cast<int>(std::log(ms / kSmallest_ms) / std::log(kStep)), 0, kBins - 1));
   }
-  /// The upper end of the bin in which that share of all lies.
+  /// The upper end of the bin that holds this quantile.
   double percentile(double share) const {
     if (count_ == 0) return 0;
     std::int64_t below = 0;

@@ -6,7 +6,7 @@
 
 namespace fbvins {
 
-/// The status of a live system as ROS 2's diagnostics have it: level, sentence, counters and latencies as values.
+/// The status of a live system as a ROS 2 diagnostic: level, sentence, counters and latencies as values.
 RosDiagnostic diagnostic_of(const LiveStatus& status);
 
 }  // namespace fbvins

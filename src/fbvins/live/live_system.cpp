@@ -40,14 +40,14 @@ struct LiveSystem::Impl {
   }
   ~Impl() { (void)finish(); }
 
-  // What happens to readings and estimates.
+  // Readings and estimates.
 
   void on_reading(const ImuSample& sample, Time host_t) {
     LivePose pose;
     {
       const std::lock_guard lock(pose_mutex);
       pose = propagator.add(sample);
-      if (pose.health.has_pose()) pose.health = health;  // never a pose where the propagator has none
+      if (pose.health.has_pose()) pose.health = health;  // else the propagator has no pose, whatever `health` says
       if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
     }
     pose.host_t = host_t;
@@ -93,7 +93,7 @@ struct LiveSystem::Impl {
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
       std::visit([this](const auto& e) { hub.publish(e); }, *event);
-      if (Result<void> taken = system.push(std::move(*event)); !taken) return;  // the watcher sees it, too
+      if (Result<void> taken = system.push(std::move(*event)); !taken) return;  // the watcher reports it
     }
   }
 
@@ -116,7 +116,7 @@ struct LiveSystem::Impl {
     }
   }
 
-  /// Brings health up to date; a status goes out when it has changed or `due`.
+  /// Updates health; publishes a status if it has changed, or if `due`.
   void look(bool due) {
     const Ingest::Arrival arrivals = ingest.arrivals();
     bool changed = false;
@@ -156,7 +156,7 @@ struct LiveSystem::Impl {
       ended = true;
       end.notify_all();
     }
-    if (watcher.joinable()) watcher.join();  // first: that sensors are silent from here on is no fault
+    if (watcher.joinable()) watcher.join();  // first, so that silent sensors are not reported from here on
     ingest.close();
     if (feeder.joinable()) feeder.join();
     result = system.finish();
@@ -171,14 +171,14 @@ struct LiveSystem::Impl {
   System system;
   SensorWatch watch;
 
-  std::mutex pose_mutex;  ///< of all up to `resets`
+  std::mutex pose_mutex;  ///< guards all up to `resets`
   PosePropagator propagator;
-  Health estimated, health;  ///< as the estimator said, and as the watchdogs see it since
+  Health estimated, health;  ///< the estimator's, and SensorWatch's judgement of it
   std::optional<Time> estimate_host_t;
   std::uint32_t reset_counter = 0;
   std::int64_t images_estimated = 0, resets = 0;
 
-  ViewMaker views;  ///< of the estimator's thread
+  ViewMaker views;  ///< used on the estimator's thread alone
   bool views_wanted = false;
   std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void()> on_failure;

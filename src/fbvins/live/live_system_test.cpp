@@ -22,7 +22,7 @@ using test::SimulatedFlight;
 
 constexpr int kReadingsPerImage = 10;
 
-/// What goes by, and a way to wait for it.
+/// Keeps all events, for a test to wait for.
 class Watcher {
  public:
   void note(const LiveEvent& event) {
@@ -38,7 +38,7 @@ class Watcher {
       if (const auto* event = std::get_if<Event>(&e)) found.push_back(*event);
     return found;
   }
-  /// Waits until an event satisfies `wanted`; false after a time that no machine needs.
+  /// Waits until an event satisfies `wanted`; false after a minute.
   template <class Event, class Predicate>
   bool wait_for(const Predicate& wanted) {
     std::unique_lock lock(mutex_);
@@ -113,7 +113,7 @@ struct Fixture {
   }
 };
 
-TEST(LiveSystem, SaysAPoseWithEveryReading) {
+TEST(LiveSystem, PublishesAPoseWithEveryReading) {
   Fixture f;
   LiveSystem live = f.live();
   f.play(live, 0, 60);
@@ -128,7 +128,7 @@ TEST(LiveSystem, SaysAPoseWithEveryReading) {
   EXPECT_EQ(status.counts.imu, 600);
 }
 
-/// What the estimator consumes is what sinks are told, so that a record of it can be run again.
+/// Sinks get the sensor events as the estimator consumes them, so that a record can be run again.
 TEST(LiveSystem, SinksGetTheSensorEventsThatTheEstimatorGets) {
   Fixture f;
   LiveSystem live = f.live();
@@ -162,7 +162,7 @@ TEST(LiveSystem, ABusyFrontendCostsImagesButNoReadings) {
   EXPECT_EQ(f.watcher.all<StereoFrame>().back().t, f.flight.stamp(39));
 }
 
-TEST(LiveSystem, SilentCamerasAreToldWhileReadingsGoOn) {
+TEST(LiveSystem, SilentCamerasAreReportedWhileReadingsGoOn) {
   Fixture f;
   LiveOptions options;
   options.camera_silence_s = 0.02;
@@ -205,8 +205,7 @@ TEST(LiveSystem, EndsAtOnceWithoutAnyInput) {
   never_ended.input().push(f.reading(0));
 }
 
-/// Estimates come 15 ms after their image, as they do in flight. Against exact truth, poses at IMU rate are as good as those
-/// of the images.
+/// Against exact truth, poses at IMU rate are about as accurate as the estimates of the images.
 TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const Motion motion(0.5, 0.3);

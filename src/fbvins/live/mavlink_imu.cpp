@@ -8,25 +8,25 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kHeartbeatEvery{1'000'000'000}, kWishEvery{1'000'000'000}, kQuiet{1'000'000'000};
-/// A stamp further ahead of its arrival, or further behind, is of a clock that is not known yet. Behind is more: on a busy
-/// machine readings wait in the port, and they are still good.
+constexpr Duration kHeartbeatEvery{1'000'000'000}, kRequestEvery{1'000'000'000}, kQuiet{1'000'000'000};
+/// Stamps further ahead of their arrival, or further behind, are of a clock that is not known yet. The limit behind is larger:
+/// on a busy machine readings wait in the port, and are still good.
 constexpr Duration kFarthestAhead{500'000'000}, kLatest{2'000'000'000};
-/// As fast as the offset follows; beyond kLeap it leaps.
+/// Largest rate at which the offset follows its estimate, s/s; for differences beyond kLeap it jumps.
 constexpr double kRamp = 1e-3;
 constexpr Duration kLeap{20'000'000};
 constexpr double kStandardGravity_mps2 = 9.80665;
 constexpr MavlinkAddress kUs{1, 197};
-/// After so many wishes for HIGHRES_IMU that were not heard SCALED_IMU is wished for, too.
+/// After this many unanswered requests for HIGHRES_IMU, SCALED_IMU is requested as well.
 constexpr int kPatience = 3;
 
 Vec3 vector(const std::array<float, 3>& v) { return Vec3(v[0], v[1], v[2]); }
 Vec3 thousandths(const std::array<std::int16_t, 3>& v) { return 1e-3 * Vec3(v[0], v[1], v[2]); }
 
-/// MAV_CMD_SET_MESSAGE_INTERVAL: the message's number, and microseconds.
+/// MAV_CMD_SET_MESSAGE_INTERVAL; parameters: the message's id, and microseconds.
 constexpr std::uint16_t kSetMessageInterval = 511;
 
-CommandMessage wish(std::uint32_t message, const MavlinkAddress& to) {
+CommandMessage interval_request(std::uint32_t message, const MavlinkAddress& to) {
   CommandMessage command;
   command.command = kSetMessageInterval;
   command.params = {static_cast<float>(message), static_cast<float>(1e6 / MavlinkImu::kRate_hz)};
@@ -61,9 +61,9 @@ MavlinkImu::Frames MavlinkImu::tick(Time now) {
   if (is_due(now, kHeartbeatEvery, next_heartbeat_)) say(HeartbeatMessage{}, out);
   if (!peer_.is_heard(now)) return out;
   if (const auto question = peer_.question(now)) say(*question, out);
-  if (now - last_reading_ > kQuiet && is_due(now, kWishEvery, next_wish_)) {
-    say(wish(HighresImuMessage::kId, *peer_.address()), out);
-    if (++wishes_ > kPatience) say(wish(ScaledImuMessage::kId, *peer_.address()), out);
+  if (now - last_reading_ > kQuiet && is_due(now, kRequestEvery, next_request_)) {
+    say(interval_request(HighresImuMessage::kId, *peer_.address()), out);
+    if (++requests_ > kPatience) say(interval_request(ScaledImuMessage::kId, *peer_.address()), out);
   }
   return out;
 }
@@ -92,7 +92,7 @@ void MavlinkImu::take(const MavlinkMessage& message, Time now, std::vector<ImuSa
 
 void MavlinkImu::take(const ImuSample& theirs, Time now, std::vector<ImuSample>& out) {
   last_reading_ = now;
-  wishes_ = 0;
+  requests_ = 0;
   if (!peer_.clock().known()) return;
   ImuSample sample = theirs;
   sample.t = theirs.t - offset_.at(now, peer_.clock().value());

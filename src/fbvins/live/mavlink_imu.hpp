@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A flight controller's IMU as a sensor of ours: what is asked of it, and its readings on this machine's clock. No threads, ports
-// or clocks of its own: time comes in as an argument.
+// A flight controller's IMU as a sensor: the messages to send to it, and its readings on this machine's clock. No threads, ports
+// or clocks of its own: time is an argument.
 //
 //   MavlinkImu imu;
 //   for (const ImuSample& sample : imu.receive(bytes, now)) input.push(sample);
@@ -16,7 +16,7 @@
 
 namespace fbvins {
 
-/// The other clock's offset as a ramp: estimates of it jitter by more than the time between two readings may.
+/// Rate-limited clock offset: its estimates jitter by more than the intervals between readings may.
 class SteadyOffset {
  public:
   /// `wanted`: the newest estimate.
@@ -28,21 +28,21 @@ class SteadyOffset {
   bool begun_ = false;
 };
 
-/// Readings are HIGHRES_IMU's; SCALED_IMU's where the other does not come. B has the flight controller's axes, x forward,
-/// y right, z down. Nothing leaves before the clocks are known to each other (TIMESYNC).
+/// Readings come from HIGHRES_IMU, or from SCALED_IMU where the other does not come. B has the flight controller's axes, x
+/// forward, y right, z down. No reading is returned before the clock offset is known (TIMESYNC).
 class MavlinkImu {
  public:
   using Frames = std::vector<std::vector<std::uint8_t>>;
 
-  /// Stamps are of CLOCK_MONOTONIC, ascending.
+  /// Readings in these bytes; stamps on CLOCK_MONOTONIC, ascending.
   std::vector<ImuSample> receive(std::span<const std::uint8_t> bytes, Time now);
-  /// Frames to send: heartbeats, questions for the time, the wish for readings at kRate_hz.
+  /// Frames to send: heartbeats, TIMESYNC requests, the request for readings at kRate_hz.
   Frames tick(Time now);
-  /// The port was opened anew.
+  /// To be called when the port was reopened.
   void restart();
 
   const MavlinkPeer& peer() const { return peer_; }
-  /// Readings whose stamps could not be right: the clock of a flight controller that restarted is learnt anew.
+  /// Readings that were dropped: stamps that cannot be right, as after a restart of the flight controller, or not finite.
   std::int64_t refused() const { return refused_; }
 
   static constexpr double kRate_hz = 200;
@@ -55,9 +55,9 @@ class MavlinkImu {
   MavlinkPeer peer_{0};
   MavlinkDecoder decoder_;
   SteadyOffset offset_;
-  Time next_heartbeat_{}, next_wish_{}, last_highres_{}, last_reading_{};
+  Time next_heartbeat_{}, next_request_{}, last_highres_{}, last_reading_{};
   Time newest_{};
-  int wishes_ = 0;
+  int requests_ = 0;
   std::uint8_t sequence_ = 0;
   std::int64_t refused_ = 0;
 };

@@ -30,8 +30,7 @@ HighresImuMessage highres(Time theirs) {
   return m;
 }
 
-/// A flight controller with a reading every 5 ms, whose clock is ahead and runs fast by a share; messages take 1 to 3 ms, its
-/// answers too.
+/// A flight controller with a reading every 5 ms, whose clock is ahead and drifts; its messages take 1 to 3 ms.
 struct FlightController {
   MavlinkImu imu;
   double ahead_s = 500, drift = 50e-6;
@@ -79,7 +78,7 @@ TEST(MavlinkImu, BringsReadingsToThisMachinesClock) {
     EXPECT_NEAR((fc.samples[i].t - fc.samples[i - 1].t).seconds(), 5e-3, 3e-5) << i;
 }
 
-TEST(MavlinkImu, SaysNothingBeforeTheClocksAreKnown) {
+TEST(MavlinkImu, ReturnsNothingBeforeTheClockOffsetIsKnown) {
   FlightController fc;
   fc.answers = false;
   fc.run(3);
@@ -118,17 +117,17 @@ TEST(MavlinkImu, KeepsReadingsThatWaitedInThePort) {
   EXPECT_EQ(fc.imu.refused(), 1);
 }
 
-TEST(MavlinkImu, WishesForReadingsUntilTheyCome) {
+TEST(MavlinkImu, RequestsReadingsUntilTheyCome) {
   FlightController fc;
-  fc.reading = [](Time) { return HeartbeatMessage{}; };  // of no autopilot: says nothing
+  fc.reading = [](Time) { return HeartbeatMessage{}; };  // of no autopilot: ignored
   fc.run(6);
-  const auto wishes = only<CommandMessage>(fc.heard);
-  ASSERT_GT(wishes.size(), 5u);
-  EXPECT_EQ(wishes[0].command, 511);
-  EXPECT_EQ(wishes[0].params[0], 105);
-  EXPECT_EQ(wishes[0].params[1], 5000);
-  EXPECT_EQ(wishes[0].target_system, 7);
-  EXPECT_EQ(wishes.back().params[0], 26);
+  const auto requests = only<CommandMessage>(fc.heard);
+  ASSERT_GT(requests.size(), 5u);
+  EXPECT_EQ(requests[0].command, 511);
+  EXPECT_EQ(requests[0].params[0], 105);
+  EXPECT_EQ(requests[0].params[1], 5000);
+  EXPECT_EQ(requests[0].target_system, 7);
+  EXPECT_EQ(requests.back().params[0], 26);
   fc.reading = [](Time t) { return highres(t); };
   fc.run(1);
   fc.heard.clear();

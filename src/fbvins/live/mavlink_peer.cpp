@@ -32,7 +32,7 @@ void MavlinkPeer::hear(const MavlinkFrame& frame, Time now) {
   }
 }
 
-/// Only the flight controller's answer to a question of ours, and to each but one.
+/// Accepts one answer to each of our requests, from the flight controller only.
 void MavlinkPeer::answer(const TimesyncMessage& message, const MavlinkAddress& from, Time now) {
   const auto asked = std::find(questions_.begin(), questions_.end(), Time{message.ts1});
   if (from != address_ || asked == questions_.end()) return;

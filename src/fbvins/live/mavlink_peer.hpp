@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flight controller at the other end of a MAVLink connection: whether it is heard, and how far its clock is ahead.
+// The flight controller at the other end of a MAVLink connection: whether it is heard, and its clock offset.
 //
 //   peer.hear(frame, now);                                       // every frame that comes
 //   if (auto question = peer.question(now)) send(*question);     // ten times a second while it is heard
@@ -24,9 +24,9 @@ class MavlinkPeer {
   bool is_heard(Time now) const;
   /// None before its first heartbeat.
   const std::optional<MavlinkAddress>& address() const { return address_; }
-  /// What to ask for its time, when that is due.
+  /// A TIMESYNC request, when one is due.
   std::optional<TimesyncMessage> question(Time now);
-  /// The port was opened anew: answers to what was asked before tell nothing.
+  /// To be called when the port was reopened: answers to older requests are ignored.
   void forget_questions() { questions_.clear(); }
   const ClockOffset& clock() const { return clock_; }
 
@@ -40,7 +40,7 @@ class MavlinkPeer {
   ClockOffset clock_;
 };
 
-/// True once in a period; a period that was slept through is not caught up on.
+/// True once in each period; missed periods are not made up for.
 bool is_due(Time now, Duration period, Time& next);
 
 }  // namespace fbvins

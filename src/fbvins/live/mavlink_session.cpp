@@ -34,14 +34,14 @@ std::uint64_t MavlinkSession::stamp_usec(Time host_t) const {
 
 MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
   Frames out;
-  // Readings come evenly but for jitter: one that is early by less than half a period of theirs is the one.
+  // A reading counts as due if it is early by less than a tenth of the output's period: their stamps jitter.
   if (!is_due(pose.host_t + Duration::from_seconds(0.1 / options_.rate_hz), Duration::from_seconds(1 / options_.rate_hz),
               next_pose_))
     return out;
   const std::optional<VehicleState> state = frames_.state(odometry(pose));
   const std::uint64_t t_usec = stamp_usec(pose.host_t);
   if (options_.dialect == MavlinkDialect::ardupilot) {
-    if (!state) return out;  // silence is how it learns that there is none
+    if (!state) return out;  // this dialect has no message for a missing pose
     say(vision_position_message(*state, t_usec), out);
     say(vision_speed_message(*state, t_usec), out);
   } else {
@@ -68,7 +68,7 @@ MavlinkSession::Frames MavlinkSession::tick(Time now) {
   Frames out;
   if (is_due(now, kHeartbeatEvery, next_heartbeat_)) say(heartbeat(), out);
   if (!flight_controller_heard(now)) {
-    told_health_.reset();  // whoever comes back hears it anew
+    told_health_.reset();  // is sent again when it comes back
     return out;
   }
   if (const auto question = peer_.question(now)) say(*question, out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is said to a flight controller and when, without threads, ports or clocks of its own: time comes in as an argument.
+// What is sent to a flight controller and when, without threads, ports or clocks of its own: time is an argument.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,9 @@ namespace fbvins {
 
 /// Times are of this machine's CLOCK_MONOTONIC. Each call returns the frames to send, in order.
 ///
-/// Clocks: a flight controller learns how far our clock is from its own by asking (TIMESYNC), and moves our stamps by that.
-/// Here stamps are moved to its clock already, so its questions are answered in its own time too, and not before that is
-/// known: it never sees two clocks.
+/// Clocks: a flight controller estimates the offset of our clock by TIMESYNC requests, and shifts our stamps by it. Our stamps
+/// are on its clock already, so its requests are answered in its own time, once that is known: the offset that it estimates
+/// is zero.
 class MavlinkSession {
  public:
   using Frames = std::vector<std::vector<std::uint8_t>>;
@@ -27,9 +27,9 @@ class MavlinkSession {
   Frames take(const LivePose& pose);
   Frames take(const LiveStatus& status, Time now);
   Frames receive(std::span<const std::uint8_t> bytes, Time now);
-  /// What is due: heartbeats, questions for the time, health that changed.
+  /// What is due: heartbeats, TIMESYNC requests, a change of health.
   Frames tick(Time now);
-  /// The port was opened anew: what is half read is of no use, and the health is told again.
+  /// To be called when the port was reopened: drops a half-read frame, and sends the health again.
   void restart();
 
   bool flight_controller_heard(Time now) const { return peer_.is_heard(now); }

@@ -39,7 +39,7 @@ LiveStatus status(Health health) {
   return s;
 }
 
-/// A flight controller whose clock is ahead by 100 s; questions and answers take 1 ms.
+/// A flight controller whose clock is ahead by 100 s; requests and answers take 1 ms.
 struct FlightController {
   explicit FlightController(MavlinkSession& with) : session(with) {}
 
@@ -56,7 +56,7 @@ struct FlightController {
     beat.autopilot = 12;
     hear(beat);
   }
-  /// Ten milliseconds in which every question is answered.
+  /// Ten milliseconds in which every request is answered.
   void step(bool answers = true) {
     now_ms += 8;
     const auto frames = session.tick(Time{now_ms * kMs});

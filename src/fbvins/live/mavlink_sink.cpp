@@ -41,7 +41,7 @@ struct MavlinkSink::Impl {
   void publish(Time now);
 
   const std::string name;
-  // The worker's alone.
+  // Used by the worker alone.
   ByteLink link;
   MavlinkSession session;
   MavlinkLinkState seen;
@@ -49,11 +49,11 @@ struct MavlinkSink::Impl {
 
   const Bell bell;
   std::atomic<bool> ending{false};
-  std::mutex mutex;  // of what follows
+  std::mutex mutex;  // guards what follows, but for the thread
   std::deque<std::variant<LivePose, LiveStatus>> waiting;
   std::int64_t overrun = 0;
   MavlinkLinkState state;
-  std::thread worker;  // last: begins when all else is there
+  std::thread worker;  // last: starts when everything else exists
 };
 
 void MavlinkSink::Impl::keep_open(Time now) {
@@ -71,7 +71,7 @@ void MavlinkSink::Impl::send(const MavlinkSession::Frames& frames) {
 void MavlinkSink::Impl::wait() {
   std::array<pollfd, 2> fds = {{{bell.fd(), POLLIN, 0}, {link.descriptor(), POLLIN, 0}}};
   if (link.has_unsent()) fds[1].events |= POLLOUT;
-  ::poll(fds.data(), fds.size(), kTick_ms);  // a descriptor of -1 is passed over
+  ::poll(fds.data(), fds.size(), kTick_ms);  // ignores a descriptor of -1
   bell.silence();
 }
 
@@ -91,7 +91,7 @@ void MavlinkSink::Impl::publish(Time now) {
 
 void MavlinkSink::Impl::work() {
   for (bool last = false; !last;) {
-    last = ending;  // what came before the end is still sent
+    last = ending;  // what was taken before the end is still sent
     keep_open(host_now());
     std::deque<std::variant<LivePose, LiveStatus>> events;
     {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sink on a loopback socket and on a pseudo-terminal that is unplugged. Waits have an end, but no time is asserted.
+// The sink on a loopback socket and on a pseudo-terminal that is unplugged. Waits are bounded, but no timing is asserted.
 #include "fbvins/live/mavlink_sink.hpp"
 
 #include <arpa/inet.h>

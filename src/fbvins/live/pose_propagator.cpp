@@ -8,9 +8,9 @@
 namespace fbvins {
 namespace {
 
-/// Readings kept while no estimate comes; older ones would carry a pose that nobody should fly by.
+/// Readings kept while no estimate comes; a pose propagated for longer is of no use.
 constexpr std::size_t kMaxReadings = 20000;
-/// An offset that has decayed to less is none, m, rad and m/s.
+/// A smaller offset is set to zero; m, rad and m/s.
 constexpr double kNoOffset = 1e-7;
 
 ImuSample interpolate(const ImuSample& a, const ImuSample& b, Time t) {
@@ -45,7 +45,7 @@ Mat15 transition(const NavState& s, const ImuSample& reading, double dt) {
 }  // namespace
 
 void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSample& to) const {
-  const Vec3 gravity_W = -gravity_mps2_ * estimate_->up_W;  // not along z while a tilt is still being corrected
+  const Vec3 gravity_W = -gravity_mps2_ * estimate_->up_W;  // not along z while a correction of the tilt is still to be published
   const double dt = (to.t - from.t).seconds();
   if (dt <= 0) return;
   const auto square = [](double x) { return x * x; };
@@ -61,7 +61,7 @@ void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSamp
 PosePropagator::Propagated PosePropagator::propagate_all() const {
   Propagated p{{estimate_->T_WB, estimate_->v_WB, estimate_->bias}, initial_covariance(*estimate_)};
   const Time start = estimate_->t + time_offset_;
-  if (!readings_.empty() && readings_.front().t > start) {  // nothing is known of before: the first reading is held
+  if (!readings_.empty() && readings_.front().t > start) {  // no reading before: the first one is held
     ImuSample held = readings_.front();
     held.t = start;
     advance(p, held, readings_.front());

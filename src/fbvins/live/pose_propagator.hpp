@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pose at IMU rate: the newest estimate carried on with the readings since its image (eq. P5-P7), with its covariance.
-// A new estimate starts the propagation anew; what it moves the newest pose by is taken back with a time constant, so that the
-// output has no steps. That is the error of the propagation and what the estimator corrects with this image: its own corrections
-// never come at once (Odometry). After a restart of the estimator W is new, and the pose changes at once.
+// The pose at IMU rate: the newest estimate propagated with the readings since its image (eq. P5-P7), with its covariance.
+// A new estimate restarts the propagation; the difference that it makes decays with a time constant, so that the output has no
+// steps. It consists of the propagation's error and of the correction that the estimator publishes with this image, which is
+// itself limited (Odometry). After a restart of the estimator W is new, and the pose changes at once.
 //
 //   PosePropagator propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), 0.1);
 //   propagator.rebase(odometry);                  // whenever an image is estimated
@@ -27,7 +27,7 @@ class PosePropagator {
       : noise_(noise), time_offset_(time_offset), smoothing_s_(smoothing_s), gravity_mps2_(gravity_mps2) {}
 
   void rebase(const Odometry& estimate);
-  /// The pose at this reading, with the health of the estimate beneath. Stamps must increase.
+  /// The pose at this reading, with the health of the propagated estimate. Stamps must increase.
   LivePose add(const ImuSample& reading);
 
  private:

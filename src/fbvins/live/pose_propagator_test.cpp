@@ -61,7 +61,7 @@ TEST(PosePropagator, FollowsTheTruthBetweenImages) {
   EXPECT_LT(largest_rad, 1e-9);
 }
 
-TEST(PosePropagator, GravityIsWhereTheEstimateKnowsItWhileATiltIsPaidOff) {
+TEST(PosePropagator, GravityHasTheEstimatesDirectionWhileATiltIsBeingCorrected) {
   const Motion motion;
   const Quat tilt = so3_exp(Vec3(0.03, -0.02, 0));
   PosePropagator propagator({}, {}, 0.1);
@@ -113,7 +113,7 @@ TEST(PosePropagator, ImageClockIsTurnedIntoTheImus) {
   EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_WB.p).norm(), 1e-4);
 }
 
-/// An estimate that says something else than the one before moves the output by no more than a share of the difference.
+/// A jump of the estimate moves the output by no more than a share of it per reading.
 TEST(PosePropagator, ConvergesToANewEstimateWithoutAStep) {
   const Motion motion;
   PosePropagator propagator({}, {}, 0.1);
@@ -176,7 +176,7 @@ TEST(PosePropagator, LostMeansNoPose) {
   EXPECT_TRUE(pose.T_WB.p.isZero());
 }
 
-/// The spread of propagated states, by differences, is what the covariance says.
+/// The propagated covariance agrees with numeric derivatives of the propagated state.
 TEST(PosePropagator, CovarianceIsThatOfTheErrors) {
   const Motion motion;
   ImuNoise noise;

@@ -12,12 +12,12 @@
 namespace fbvins {
 namespace {
 
-/// Longer than this nothing is in memory only.
+/// Messages are in memory only for no longer than this.
 constexpr std::chrono::milliseconds kFlushPeriod{100};
-/// The disk itself has all that is older than this, should the power fail.
+/// Every so many flushes the file is synchronised with the disk, for a power failure.
 constexpr int kFlushesPerSync = 10;
 
-/// Features and landmarks of the same track in one.
+/// Features and landmarks, with those of the same track as one.
 std::vector<RosLandmark> landmarks_of(const LiveView& view) {
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   std::vector<RosLandmark> out;
@@ -57,7 +57,7 @@ struct Adder {
     return record.add_mark(mark.t, mark.text);
   }
   Result<void> operator()(const LiveStatus& status) const {
-    if (status.t.ns == 0) return {};  // no sensor has spoken yet: there is no time to write it at
+    if (status.t.ns == 0) return {};  // no sensor data yet: there is no time to write it at
     return record.add_health(status.t, diagnostic_of(status));
   }
 };
@@ -89,7 +89,7 @@ Result<void> RecordSink::finish() {
   return record_.finish();
 }
 
-/// Events may cease, and what waits must reach the file all the same.
+/// On a thread, so that messages reach the file even when no more events come.
 void RecordSink::keep_flushing() {
   std::unique_lock lock(mutex_);
   for (int i = 1; !ending_.wait_for(lock, kFlushPeriod, [&] { return ended_; }); ++i) {

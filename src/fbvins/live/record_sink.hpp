@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flight record: what the estimator took and said, in an MCAP file that a kill at any moment leaves readable up to a tenth
-// of a second before (docs/flight_record.md). `fbvins run` takes such a file as a recording.
+// The flight record: the estimator's inputs and results, in an MCAP file. If the program is killed, the file is readable up to a
+// tenth of a second before (docs/flight_record.md). `fbvins run` takes such a file as a recording.
 //
 //   auto record = RecordSink::create("flight.mcap", source->rig(), {.configuration = to_yaml(config)});
 //   live->add_sink(std::move(*record));
@@ -19,7 +19,7 @@ namespace fbvins {
 
 class RecordSink final : public Sink {
  public:
-  /// An error where there is a file of that name, or none can be.
+  /// An error if the file exists already, or cannot be created.
   static Result<std::unique_ptr<RecordSink>> create(const std::string& path, const StereoRig& rig,
                                                     const FlightRecordOptions& options);
   RecordSink(const RecordSink&) = delete;

@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-/// Stereo frames decoded ahead: enough for a disk that stutters.
+/// Stereo frames decoded ahead, against delays of the disk.
 constexpr int kDecodedAhead = 40;
 constexpr double kSlowest = 0.01, kFastest = 100;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording played as a live sensor: each event is pushed when its stamp is due on this machine's clock, whether or not
-// anybody keeps up. Images are decoded ahead, as a camera's are.
+// A recording played as live sensors: each event is pushed when its stamp is due on this machine's clock, whether or not the
+// receiver keeps up. Images are decoded ahead.
 //
 //   Result<std::unique_ptr<ReplaySource>> source = ReplaySource::open("MH_01_easy@2", {});   // twice as fast
 #pragma once
@@ -22,8 +22,8 @@ class ReplaySource final : public Source {
  public:
   struct Options {
     DatasetOptions dataset;
-    int laps = 1;  ///< how often it is played; stamps go on from lap to lap, and the scene leaps back
-    bool preload = false;  ///< everything is decoded before the clock starts: a camera costs no decoding, and memory is there
+    int laps = 1;          ///< how often it is played; stamps continue from lap to lap, the scene jumps back
+    bool preload = false;  ///< everything is decoded before the clock starts, as a camera costs no decoding
     /// Recordings of more formats than open_dataset() knows.
     std::function<Result<std::unique_ptr<Dataset>>(const std::string&, const DatasetOptions&)> open_file = open_dataset;
   };
@@ -48,7 +48,7 @@ class ReplaySource final : public Source {
   std::string path_;
   Options options_;
   std::unique_ptr<Dataset> data_;
-  std::vector<SensorEvent> loaded_;  ///< all of it, where asked for
+  std::vector<SensorEvent> loaded_;  ///< all events, with Options::preload
   double speed_;
   std::optional<Time> first_, newest_;  ///< stamps pushed
   std::int64_t start_ns_ = 0;           ///< when the first was due, on this machine's clock

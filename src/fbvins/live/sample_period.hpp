@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The period of a stream of stamps: the median of the last intervals, which a few missing or late ones do not move.
+// The period of a stream of stamps: the median of the last intervals, robust against a few missing or late ones.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ class SamplePeriod {
     intervals_[count_++ % intervals_.size()] = interval;
   }
 
-  /// Nothing before a few intervals are known.
+  /// None before three intervals are known.
   std::optional<Duration> median() const {
     if (count_ < 3) return std::nullopt;
     auto sorted = intervals_;

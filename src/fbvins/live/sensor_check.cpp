@@ -15,7 +15,7 @@ constexpr double kLongGap = 1.7;              // in periods; one lost image or r
 constexpr double kRateTolerance = 0.1;        // of the calibration's
 constexpr double kClockRateTolerance = 0.02;  // crystals are a thousand times better
 constexpr double kMostAlone = 0.02;           // share of images without their partner
-constexpr double kOneClock_s = 1;             // camera and IMU are no further apart, whatever their delays
+constexpr double kOneClock_s = 1;             // largest difference of camera's and IMU's delays on one clock
 constexpr double kLowestImageRate_hz = 5;
 constexpr double kShortestLook_s = 1;
 
@@ -117,7 +117,7 @@ void SensorCheck::check_readings(std::vector<SensorFinding>& findings) const {
                   and_then(as_calibrated, fmt::format("the calibration says {:.0f}, and the covariance rests on it", expected))));
   const bool steady = readings_.largest_gap_s() < kLongGap * readings_.period_s();
   say(steady, fmt::format("longest time between two readings {:.1f} ms{}", 1e3 * readings_.largest_gap_s(),
-                          and_then(steady, "readings are lost, which no estimator forgives")));
+                          and_then(steady, "readings are lost, which makes the estimate worse")));
   if (readings_.backwards > 0)
     say(false, fmt::format("{} readings have stamps that do not ascend; the driver stamps wrongly", readings_.backwards));
   const auto count = static_cast<double>(readings_.stamps.size());
@@ -127,9 +127,9 @@ void SensorCheck::check_readings(std::vector<SensorFinding>& findings) const {
   say(metric, fmt::format("mean acceleration {:.2f} m/s^2{}", accel,
                           and_then(metric, in_g ? "it looks like g: multiply by 9.80665"
                                                 : "gravity alone is 9.81: units or axes are wrong")));
-  constexpr double kSpinning_radps = 6;  // mean over the look: faster than any drone is held by hand
+  constexpr double kSpinning_radps = 6;  // mean over the check; nobody turns a drone that fast by hand
   const bool calm = gyro < kSpinning_radps;
-  say(calm, fmt::format("mean turning rate {:.3f} rad/s{}", gyro, and_then(calm, "it looks like degrees: multiply by pi / 180")));
+  say(calm, fmt::format("mean angular rate {:.3f} rad/s{}", gyro, and_then(calm, "it looks like degrees: multiply by pi / 180")));
 }
 
 void SensorCheck::check_clocks(std::vector<SensorFinding>& findings) const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A look at live sensors before they are flown on: rates, gaps, clocks, units, sizes. Nothing is estimated.
+// Checks live sensors before a flight: rates, gaps, clocks, units, image sizes. Nothing is estimated.
 //
 //   SensorCheck check(source.rig(), source.clock_rate());
 //   source.run(check);                                     // for some seconds
@@ -32,11 +32,11 @@ class SensorCheck final : public SensorInput {
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
 
-  /// In the order in which they are worth reading: images, readings, clocks.
+  /// Images first, then readings, then clocks.
   std::vector<SensorFinding> findings() const;
 
  private:
-  /// When one sensor's data came, and by which stamps.
+  /// Stamps and arrival times of one sensor's data.
   struct Arrivals {
     std::vector<Time> stamps, host;
     int backwards = 0;
@@ -55,7 +55,7 @@ class SensorCheck final : public SensorInput {
   std::function<Time()> now_;
   mutable std::mutex mutex_;
   Arrivals images_, readings_;
-  int alone_ = 0, frozen_ = 0;              // images of one camera only; with a camera that repeats itself
+  int alone_ = 0, frozen_ = 0;              // frames of one camera only; frames with a repeated image
   int other_width_ = 0, other_height_ = 0;  // of an image that is not of the calibration's size
   FrozenCamera left_, right_;
   double accel_sum_ = 0, gyro_sum_ = 0;  // of magnitudes, m/s^2 and rad/s

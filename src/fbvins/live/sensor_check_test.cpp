@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Five seconds of sensors at rest, with what may be wrong with them.
+/// Five seconds of sensors at rest, with faults.
 struct Look {
   double image_rate_hz = 20, imu_rate_hz = 200, accel = 9.81, gyro = 0.02, clock = 1, image_stamp_offset_s = 0;
   int width = 8, lose_image = -1, lose_reading = -1;
@@ -30,7 +30,7 @@ struct Look {
     }
     return check.findings();
   }
-  /// What it says is wrong, joined.
+  /// Its findings that are faults, joined.
   std::string faults() const {
     std::string all;
     for (const SensorFinding& f : findings())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cables, cameras and clocks do to a flight, done on purpose: between a source and what it pushes into. Faults are given
-// in data time since the first event, so that the same flight meets the same faults.
+// Fault injection between a source and its SensorInput: what cables, cameras and clocks do to a flight. Times are data time since
+// the first event, so that the same flight meets the same faults.
 //
 //   Result<SensorFault> fault = parse_fault("camera_off:8:2");   // from 8 s on, for 2 s
 //   FaultyInput faulty(live.input(), {*fault});
@@ -28,7 +28,7 @@ struct SensorFault {
     imu_off,       ///< no readings
     unplugged,     ///< nothing at all
     lose_images,   ///< each image is lost with probability `amount`
-    burst,         ///< everything is held back for `amount` seconds, then comes at once, again and again
+    burst,         ///< everything is held back for `amount` seconds and then comes at once, repeatedly
     leap,          ///< stamps are `amount` seconds later
   };
   Kind kind = Kind::camera_off;
@@ -36,7 +36,7 @@ struct SensorFault {
   double amount = 0;
 };
 
-/// KIND:START:LENGTH[:AMOUNT], in seconds; AMOUNT is the share of lost images, the time a burst is held back, or a leap.
+/// KIND:START:LENGTH[:AMOUNT], in seconds; AMOUNT is the share of lost images, the hold time of a burst, or the clock's jump.
 Result<SensorFault> parse_fault(const std::string& text);
 
 /// One thread.

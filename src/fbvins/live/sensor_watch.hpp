@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator cannot say because nothing reaches it: that a camera or the IMU is silent. Joined with what it said last.
+// Detects silent cameras and a silent IMU, of which the estimator hears nothing, and combines that with its last health.
 // Pure functions of the times given.
 #pragma once
 
@@ -11,17 +11,17 @@ namespace fbvins {
 
 class SensorWatch {
  public:
-  /// `longest_blind_s`: a pose carried on without images for longer is lost (estimator.max_image_gap_s).
+  /// `longest_blind_s`: a pose propagated without images for longer is lost (estimator.max_image_gap_s).
   SensorWatch(const LiveOptions& options, double longest_blind_s) : options_(options), longest_blind_s_(longest_blind_s) {}
 
-  /// What the estimator said last, and of the image of when.
+  /// The estimator's last health, and the time of its image.
   struct Estimated {
     Health health;
     std::optional<Time> image;  ///< on this machine's clock
   };
 
-  /// The health at `host`, on this machine's clock. `started` is when sensors were first listened to. Images that come again
-  /// after a silence are not enough: the pose is as old as its estimate until the next one.
+  /// The health at `host`; both times on this machine's clock. `started`: when sensor data were first expected. New images after
+  /// a silence are not enough for good health: until the next estimate the pose is as old as the last one.
   Health judge(const Estimated& estimated, const Ingest::Arrival& arrivals, Time started, Time host) const;
 
  private:

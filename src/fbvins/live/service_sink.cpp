@@ -16,7 +16,7 @@
 namespace fbvins {
 namespace {
 
-// The longest work on one image, a restart or a loop, takes a tenth of this on a small board.
+// The longest processing of one image, a restart or a loop, takes a tenth of this on a small board.
 constexpr Duration kHungAfter{3'000'000'000};
 constexpr Duration kLogPeriod{1'000'000'000};
 
@@ -53,7 +53,7 @@ Result<void> ServiceSink::take(const LiveEvent& event) {
   return send(message);
 }
 
-/// It hangs where images keep coming and none has been answered for a while.
+/// False where complete images keep coming and none has been answered for kHungAfter.
 bool ServiceSink::estimator_lives(const LiveStatus& status) {
   const std::int64_t whole_images = status.counts.images - status.counts.images_incomplete;
   if (status.counts.images_estimated != answers_ || whole_images == images_) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tells the service manager that started the program how the flight goes, by systemd's notification protocol (sd_notify(3): one
-// datagram a message to the socket that NOTIFY_SOCKET names): ready, a line for `systemctl status`, a sign of life for the
-// watchdog. A hung estimator gives no sign of life, so that the manager restarts the program; silent sensors are no reason to.
-// The journal gets a line whenever health or problem is another, at most one a second, with its level before it (sd-daemon(3)).
+// Reports the flight's state to the service manager by systemd's notification protocol (sd_notify(3): one datagram a message, to
+// the socket that NOTIFY_SOCKET names): readiness, a line for `systemctl status`, and the watchdog's keep-alive. A hung estimator
+// gives no keep-alive, so that the manager restarts the program; silent sensors are no reason to.
+// The journal gets a line when health or problem changes, at most one a second, with its level as a prefix (sd-daemon(3)).
 #pragma once
 
 #include <cstdio>
@@ -36,7 +36,7 @@ class ServiceSink final : public Sink {
   std::string logged_;
   Time logged_at_;  // CLOCK_MONOTONIC
   bool ready_ = false;
-  std::int64_t images_ = 0, answers_ = 0;  // arrived and answered when the estimator was last seen to live
+  std::int64_t images_ = 0, answers_ = 0;  // images and answers when the estimator was last known to run
   Time waits_since_;                       // CLOCK_MONOTONIC
 };
 

@@ -20,7 +20,7 @@ Error failed(const std::string& path, const char* what) {
   return {ErrorCode::unwritable, fmt::format("{}: {}: {}", path, what, std::strerror(errno))};
 }
 
-/// Removes what a dead server left.
+/// Removes the socket file of a dead server.
 Result<void> make_way(const sockaddr_un& address, const std::string& path) {
   struct stat file {};
   if (::lstat(path.c_str(), &file) != 0) return {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Unix socket that listens at a path: for its owner alone, removed at the end. What a dead server left there is replaced;
-// what a living one serves, or what is no socket, is left alone and an error.
+// A Unix socket that listens at a path: for its owner alone, removed at the end. The socket of a dead server is replaced; that of
+// a living one, or a file that is not a socket, is left alone and is an error.
 #pragma once
 
 #include <sys/types.h>
@@ -27,7 +27,7 @@ class SocketFile {
 
   std::string path_;
   FileDescriptor socket_;
-  ino_t inode_ = 0;  ///< of the file: somebody may have put another one there since
+  ino_t inode_ = 0;  ///< of the file, as another program may have replaced it meanwhile
 };
 
 }  // namespace fbvins

@@ -48,7 +48,7 @@ TEST(SocketFile, OfALivingProgramIsLeftAlone) {
   const test::SocketFolder folder;
   const auto living = SocketFile::listen(folder.path());
   ASSERT_TRUE(living);
-  for (int i = 0; i < 8; ++i) {  // also when its queue is full of those who asked
+  for (int i = 0; i < 8; ++i) {  // also when its queue of connections is full
     const auto second = SocketFile::listen(folder.path());
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().message, folder.path() + ": another program listens there");

@@ -11,7 +11,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
-/// Stamps beyond (146 years) would overflow in differences.
+/// Stamps beyond this (146 years) could overflow in differences.
 constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
 static_assert(sizeof(FbvinsSocketHello) == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
@@ -31,7 +31,7 @@ Result<Struct> read(std::span<const std::byte> bytes, const char* name, std::siz
 
 bool is_stamp(std::int64_t t_ns) { return t_ns >= 0 && t_ns < kLastStamp_ns; }
 
-/// Text of a stranger, for a terminal.
+/// Untrusted text, made safe for a terminal.
 template <std::size_t size>
 std::string printable(const char (&text)[size]) {
   std::string out(text, strnlen(text, size));
@@ -56,7 +56,7 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
 }
 
 Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
-  // The version stands where every version has it, and is judged before what depends on it.
+  // The version is at the same place in every version, and is checked before what depends on it.
   constexpr std::size_t kUpToVersion = offsetof(FbvinsSocketHello, flags);
   const auto version = read<FbvinsSocketHello>(bytes, "hello", kUpToVersion);
   if (!version) return version.error();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a sender's messages say (fbvins/live/socket_protocol.hpp), as values that are checked: whatever the bytes, the answer
-// is a message that is right in itself, or one sentence. Pure functions, any thread.
+// Parses and checks a sender's messages (fbvins/live/socket_protocol.hpp): any bytes give either a valid message or an error of
+// one sentence. Pure functions, any thread.
 //
 //   Result<SocketMessage> message = parse_socket_message(bytes);
 //   if (!message) return refuse(message.error());
@@ -35,7 +35,7 @@ struct FrameLayout {
 
 struct SocketHello {
   std::string name;  ///< printable
-  int minor = 0;     ///< of the sender's version; the major one is ours
+  int minor = 0;     ///< of the sender's version; its major one equals ours
   FrameLayout layout;
   std::optional<FbvinsSocketRig> rig;  ///< as sent, so that two can be compared
 };
@@ -63,12 +63,12 @@ struct SocketUnknown {
 
 using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketGoodbye, SocketUnknown>;
 
-/// ErrorCode::unsupported: the version is another one.
+/// ErrorCode::unsupported: another major version; ErrorCode::malformed: anything else.
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);
 
 /// The rig of a hello, checked as calibration files are.
 Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int height_px);
-/// The reverse, for senders of our own and for tests.
+/// The reverse, for our own senders and for tests.
 FbvinsSocketRig socket_rig(const StereoRig& rig);
 
 }  // namespace fbvins

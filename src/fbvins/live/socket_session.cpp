@@ -11,9 +11,9 @@
 namespace fbvins {
 namespace {
 
-/// Of one call of receive(): the owner has other things to look at.
+/// Limit of one call of receive(), so that its owner can do other work.
 constexpr int kMostMessagesAtOnce = 64;
-/// What a connection that ends may still hold; bounded, as the sender may go on.
+/// Limit for emptying a connection that ends, as the sender may go on sending.
 constexpr int kMostLeftOver = 1024;
 constexpr int kMostDescriptors = 4;
 
@@ -35,7 +35,7 @@ std::optional<SocketSession::Packet> SocketSession::next_packet() {
   header.msg_control = control.data();
   header.msg_controllen = control.size();
   ssize_t size = ::recvmsg(fd(), &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-  // A sender that is gone without having read all is told first; what it sent before comes behind.
+  // ECONNRESET comes first where the sender has gone with unread messages; what it sent before follows.
   if (size < 0 && errno == ECONNRESET) size = ::recvmsg(fd(), &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return std::nullopt;
   Packet packet;
@@ -136,13 +136,13 @@ void SocketSession::refuse(std::uint32_t reason, const std::string& sentence) {
   sentence.copy(goodbye.text, sizeof(goodbye.text) - 1);
   send(FBVINS_SOCKET_GOODBYE, goodbye);
   ended_ = sentence;
-  // Closing with messages unread would reach the sender as an error, before the goodbye does.
+  // Closing with unread messages would give the sender an error before the goodbye.
   ::shutdown(fd(), SHUT_WR);
   for (int i = 0; i < kMostLeftOver && next_packet(); ++i) {
   }
 }
 
-/// False when the sender does not read, or is gone; the latter is seen by the next receive().
+/// False when the sender does not read, or is gone, which the next receive() notices.
 template <class Struct>
 bool SocketSession::send(std::uint32_t type, Struct message) {
   message.header = {type, sizeof(message)};

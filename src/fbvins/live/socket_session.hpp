@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sender, from its hello to the end of its connection. Nothing here waits: whoever owns the session polls fd() and the
-// bell. Whatever the sender does ends its session at worst, with one sentence.
+// One sender, from its hello to the end of its connection. No call blocks: the owner polls fd() and the bell. Whatever the sender
+// does, at worst it ends its own session, with one sentence.
 //
 //   SocketSession session(accepted, bell);
 //   session.greet();             // until greeted() or ended(): the hello, its memory mapped
@@ -19,7 +19,7 @@
 
 namespace fbvins {
 
-/// What a connection has brought.
+/// Counts of one connection.
 struct SocketCounts {
   std::uint64_t frames = 0, frames_missed = 0, readings = 0, readings_refused = 0;
 };
@@ -42,10 +42,10 @@ class SocketSession {
   void welcome();
   /// Takes what has arrived, up to a number of messages.
   void receive(SensorInput& input);
-  /// True when some could not be told yet, because the sender does not read.
+  /// True when the message could not be sent yet, because the sender does not read.
   bool send_released();
   void send_status(std::uint32_t health, std::uint32_t reset_counter);
-  /// Tells the sender why it is over, and ends.
+  /// Sends the sender a goodbye with the reason, and ends the session.
   void refuse(std::uint32_t reason, const std::string& sentence);
 
  private:

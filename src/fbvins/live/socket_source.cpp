@@ -17,10 +17,10 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStatusEvery = 1s;
-/// No descriptor for a new connection: it is tried again later.
+/// Pause after a connection could not be accepted for lack of descriptors or memory.
 constexpr auto kAcceptAgain = 1s;
 
-/// A connection is closed so long after its goodbye: a sender that is about to send would meet an error before it.
+/// A connection is closed this long after its goodbye: closed at once, a sender that is about to send would get an error first.
 constexpr auto kGoodbyeIsRead = 1s;
 
 bool same(const FbvinsSocketRig& a, const FbvinsSocketRig& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }
@@ -37,7 +37,7 @@ std::uint32_t health_number(HealthState state) {
 
 }  // namespace
 
-/// From the thread of the status sink to that of the source.
+/// The estimator's state, from the status sink's thread to the source's.
 struct SocketSource::Report {
   std::mutex mutex;
   std::uint32_t health = FBVINS_SOCKET_UNKNOWN;
@@ -106,7 +106,7 @@ void SocketSource::stop() {
 
 std::unique_ptr<Sink> SocketSource::status_sink() { return std::make_unique<StatusSink>(report_, bell_); }
 
-/// Waits until something comes, `longest` at most, and sees to it. Without an input nobody is welcomed yet.
+/// Waits for an event, `longest` at most, and handles it. Without an input a sender is checked, but not welcomed yet.
 void SocketSource::step(Clock::duration longest, SensorInput* input) {
   const auto now = Clock::now();
   const auto until = session_ ? std::clamp(next_, now, now + longest) : now + longest;
@@ -120,7 +120,7 @@ void SocketSource::step(Clock::duration longest, SensorInput* input) {
     if (!session_->greeted()) greet(input != nullptr);
     else if (input != nullptr) serve(*input);
   }
-  // A sender that comes back meets its old connection otherwise, which may still hold messages.
+  // Not while the old connection still holds messages: a sender that reconnects would be refused as a second one.
   if (watched[1].revents != 0 && watched[2].revents == 0) accept();
 }
 

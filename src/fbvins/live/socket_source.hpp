@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sensors of another process, over a Unix socket (docs/socket.md). One sender at a time; one that crashes, sends garbage or
-// speaks another version is cut off with a sentence, and the next one goes on where it was.
+// has another version is disconnected with a sentence, and the next one may connect.
 //
 //   auto source = SocketSource::open("/run/fbvins.sock", {.rig = *rig, .say = warn});
-//   live.add_sink((*source)->status_sink());          // senders hear of the estimator's health
+//   live.add_sink((*source)->status_sink());          // senders get the estimator's health
 //   Result<void> end = (*source)->run(live.input());  // until stop()
 #pragma once
 
@@ -23,11 +23,11 @@ namespace fbvins {
 struct SocketOptions {
   /// Without one open() waits for the first sender, whose calibration it takes; later senders must then have the same, or none.
   std::optional<StereoRig> rig = std::nullopt;
-  /// Told in one sentence who comes and goes, and why; on the thread of open() and run().
+  /// Gets one sentence whenever a sender comes or goes; on the thread of open() and run().
   std::function<void(const std::string&)> say = [](const std::string&) {};
   /// Asked about ten times a second while open() waits: true ends it with an error.
   std::function<bool()> give_up = [] { return false; };
-  /// A sender that has connected says hello in this time.
+  /// Time in which a connected sender must send its hello.
   double hello_s = 2;
 };
 
@@ -60,15 +60,15 @@ class SocketSource final : public Source {
   SocketOptions options_;
   StereoRig rig_;
   bool rig_known_ = false;
-  std::optional<FbvinsSocketRig> senders_rig_;  ///< where rig_ is a sender's
+  std::optional<FbvinsSocketRig> senders_rig_;  ///< where rig_ was taken from a sender
   std::shared_ptr<const Bell> bell_ = std::make_shared<const Bell>();
   std::shared_ptr<Report> report_;
   std::unique_ptr<SocketSession> session_;
-  std::unique_ptr<SocketSession> leaving_;  ///< the last one that is over, until its goodbye is read
+  std::unique_ptr<SocketSession> leaving_;  ///< the last session that ended, kept open until its goodbye has been read
   Clock::time_point leaving_until_;
-  bool backlog_ = false;            ///< the session has more to tell than its sender takes
-  Clock::time_point accept_after_;  ///< no connection is taken before
-  Clock::time_point next_;          ///< of the session: its hello is overdue then, or its next status due
+  bool backlog_ = false;            ///< a message waits because the sender does not read
+  Clock::time_point accept_after_;  ///< no connection is accepted before
+  Clock::time_point next_;          ///< the session's deadline for its hello, then the time of its next status
   std::atomic<bool> stopped_ = false;
 };
 

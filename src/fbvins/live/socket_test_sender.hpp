@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a sender that does as it should, or does not, and a rig for it.
+// For tests: a sender that follows the protocol or breaks it, and a rig for it.
 #pragma once
 
 #include <fcntl.h>

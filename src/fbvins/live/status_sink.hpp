@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state of a live system as one JSON object a line, for programs and people who watch: whenever health changes, and once a
-// second. Fields in docs/live.md.
+// The state of a live system as one JSON object a line, for programs and people: whenever health changes, and once a
+// second. The fields are in docs/live.md.
 #pragma once
 
 #include <cstdio>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of two cameras, each with a stream of its own, put together by their stamps.
+// Pairs the images of two separate camera streams by their stamps.
 #pragma once
 
 #include <array>

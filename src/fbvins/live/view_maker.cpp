@@ -19,7 +19,7 @@ LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {
   if (t_ == o.t) view.features = std::exchange(features_, {});
   if (!o.health.has_pose() || window_.frames.empty()) return view;
   const Pose<W, B>& T_WB_window = window_.frames.back().T_WB;
-  // What is published lies a little beside the window: it is corrected without leaps.
+  // From the window's gauge to the published frame, in which poses are corrected in small steps.
   const Pose<W, W> to_published = o.T_WB * T_WB_window.inverse();
   const Pose<C0, W> T_C0W = (T_WB_window * T_BC0_).inverse();
   std::unordered_map<TrackId, double> depths_m;

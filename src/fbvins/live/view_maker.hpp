@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: joins what the frontend saw in an image with where the window has it. One thread, in the order of the calls.
+// Private: combines an image's features with the window's landmarks, for display. One thread, in this order of calls.
 //
 //   views.add(tracked_frame);
 //   views.add(window_snapshot);
@@ -18,7 +18,7 @@ class ViewMaker {
 
   void add(const TrackedFrame& frame);
   void add(WindowSnapshot window) { window_ = std::move(window); }
-  /// Features only where the image is the one that was added last.
+  /// Without features unless `odometry` is of the frame that was added last.
   LiveView view_of(const Odometry& odometry, double shutter_to_pose_ms);
 
  private:

@@ -50,7 +50,7 @@ TEST(ViewMaker, GivesFeaturesTheDepthOfTheirLandmarks) {
   ASSERT_EQ(view.keyframes_W.size(), 1u);
 }
 
-TEST(ViewMaker, LandmarksLieAsSeenFromThePublishedPose) {
+TEST(ViewMaker, LandmarksAreInThePublishedFrame) {
   ViewMaker views(looking_ahead());
   WindowSnapshot window;
   window.frames.push_back({FrameId{0}, Time{7}, Pose<W, B>{Quat::Identity(), Vec3(1, 0, 0)}, false});

@@ -8,7 +8,7 @@
 
 namespace fbvins {
 
-/// Further off than an answer that was held up on one way alone could be.
+/// Whether the offset differs by more than a delay on one of the two ways alone could explain.
 bool ClockOffset::leapt(const Answer& answer) const {
   const std::int64_t off = std::abs((answer.offset - value_).ns);
   return off > answer.round_trip.ns / 2 + kLeap.ns;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-/// A cable with 1 ms each way, on which one of five questions or answers is held up by up to 30 ms.
+/// A cable with 1 ms each way, on which one of five requests or answers is delayed by up to 30 ms.
 struct Cable {
   Rng rng{5};
   Time now{1'000'000 * kMs};
@@ -65,7 +65,7 @@ TEST(ClockOffset, ALeapIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) 
   EXPECT_LT(std::abs((offset.value() - restarted).ns), kMs);
 }
 
-TEST(ClockOffset, AnswersBeforeTheirQuestionOrLongAfterSayNothing) {
+TEST(ClockOffset, AnswersBeforeTheirRequestOrLongAfterAreIgnored) {
   ClockOffset offset;
   for (int i = 0; i < 20; ++i) {
     offset.add(Time{1000}, Time{5000}, Time{900});

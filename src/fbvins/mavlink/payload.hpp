@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A message's fields to little-endian bytes and back, by the message's own wire().
+// Converts a message's fields to little-endian bytes and back, by the message's wire().
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ class PayloadWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// What lies beyond the end reads as zero: there the sender left zeros out, or is older than the field.
+/// Fields beyond the end read as zero: the sender left zeros out, or its version does not have the field.
 class PayloadReader {
  public:
   explicit PayloadReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

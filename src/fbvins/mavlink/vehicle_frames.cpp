@@ -14,7 +14,7 @@ Mat3 columns(const Vec3& x, const Vec3& y, const Vec3& z) {
   return R;
 }
 
-/// Columns: where the IMU's axes look, in forward-right-down.
+/// Columns: the IMU's axes in forward-right-down.
 Mat3 axes(ImuAxes imu_axes) {
   const Vec3 forward(1, 0, 0), right(0, 1, 0), down(0, 0, 1);
   switch (imu_axes) {
@@ -42,7 +42,7 @@ Pose<BodyFrd, B> mounting(const MountingOptions& options) {
 VehicleFrames::VehicleFrames(const MountingOptions& options)
     : origin_(options.local_frame), T_BF_(mounting(options).inverse()), T_LW_(kHalfTurnAboutX, Vec3::Zero()) {}
 
-/// The local frame for a world that is new.
+/// Places the local frame in a new W.
 void VehicleFrames::begin(const Pose<W, BodyFrd>& T_WF) {
   if (origin_ == LocalOrigin::world) return;
   const double wanted_rad = last_ ? heading_rad(last_->q) : 0.0;

@@ -50,7 +50,7 @@ Odometry level_vehicle(const MountingOptions& options) {
   return o;
 }
 
-TEST(VehicleFrames, EachChoiceOfAxesLooksWhereItSays) {
+TEST(VehicleFrames, EachChoiceOfAxesPointsWhereItSays) {
   const auto in_vehicle = [](ImuAxes axes, const Vec3& v_B) {
     MountingOptions options;
     options.imu_axes = axes;
@@ -121,7 +121,7 @@ TEST(VehicleFrames, CovarianceIsThatOfErrorsCarriedAlong) {
     const Odometry o = anywhere(rng);
     VehicleFrames frames(odd_mounting());
     const VehicleState state = *frames.state(o);
-    // The map of errors, column by column; theirs is of (dp in L, dtheta in L).
+    // Jacobian of (dp in L, dtheta in L) by the odometry's errors, column by column.
     Mat6 J;
     for (int i = 0; i < 6; ++i) {
       Vec6 e = Vec6::Zero();

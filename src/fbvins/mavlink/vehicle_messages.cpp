@@ -21,7 +21,7 @@ std::array<float, 21> upper_triangle(const Mat6& covariance) {
   return values;
 }
 
-/// The rates carry no covariance.
+/// The covariance of the rates is unknown.
 Mat6 with_unknown_rates(const Mat3& velocity) {
   Mat6 both = Mat6::Constant(kMavUnknown);
   both.topLeftCorner<3, 3>() = velocity;

@@ -12,12 +12,12 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint8_t kMagic2 = 0xfd, kMagic1 = 0xfe;
-constexpr std::uint8_t kSigned = 0x01;  // of the flags that a reader must know
+constexpr std::uint8_t kSigned = 0x01;  // MAVLINK_IFLAG_SIGNED
 constexpr std::size_t kSignatureBytes = 13, kChecksumBytes = 2;
 
 constexpr bool begins_frame(std::uint8_t byte) { return byte == kMagic2 || byte == kMagic1; }
 
-/// What a frame says of itself before its payload.
+/// A frame's header.
 struct Head {
   std::size_t payload_at = 0, payload_size = 0, frame_size = 0;
   std::uint32_t id = 0;
@@ -26,7 +26,7 @@ struct Head {
   bool readable = true;
 };
 
-/// None while the bytes do not hold it whole.
+/// None while the bytes do not contain all of it.
 std::optional<Head> read_head(std::span<const std::uint8_t> bytes) {
   Head head;
   head.payload_at = bytes[0] == kMagic2 ? 10 : 6;
@@ -45,7 +45,7 @@ std::optional<Head> read_head(std::span<const std::uint8_t> bytes) {
   return head;
 }
 
-/// Calls `known` with a default message of the number and returns true, or returns false.
+/// Calls `known` with a default message of this id and returns true; false where the id is unknown.
 template <class F, std::size_t... I>
 bool with_message(std::uint32_t id, F&& known, std::index_sequence<I...>) {
   const auto try_one = [&](auto message) { return message.kId == id && (known(message), true); };
@@ -79,7 +79,7 @@ std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkA
       message);
 }
 
-/// How many bytes are done with; 0: more are needed.
+/// Number of bytes consumed; 0: more are needed.
 std::size_t MavlinkDecoder::step(std::span<const std::uint8_t> bytes, std::vector<MavlinkFrame>& frames) {
   const auto begin = std::find_if(bytes.begin(), bytes.end(), begins_frame) - bytes.begin();
   if (begin > 0) {

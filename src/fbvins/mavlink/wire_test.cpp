@@ -134,7 +134,7 @@ TEST(MavlinkWire, ASignedFrameIsReadToItsEnd) {
   for (std::size_t i = 1; i < frame.size(); ++i) add(frame[i]);
   add(HeartbeatMessage::kCrcExtra);
   frame.push_back(static_cast<std::uint8_t>(crc)), frame.push_back(static_cast<std::uint8_t>(crc >> 8));
-  frame.insert(frame.end(), 13, 0xfd);  // a signature that looks like beginnings
+  frame.insert(frame.end(), 13, 0xfd);  // a signature that looks like the beginning of frames
   frame.insert(frame.end(), kMavlink1Heartbeat.begin(), kMavlink1Heartbeat.end());
   MavlinkDecoder decoder;
   EXPECT_EQ(decoder.push(frame).size(), 2u);
@@ -162,7 +162,7 @@ TEST(MavlinkWire, AfterAnyNoiseGoodFramesAreFoundAgain) {
     Bytes noise(rng.below(400));
     for (auto& byte : noise) byte = static_cast<std::uint8_t>(rng.below(4) == 0 ? 0xfd + rng.below(2) : rng.below(256));
     decoder.push(noise);
-    // The longest thing that noise can announce is 280 bytes: after those every frame is found.
+    // The longest frame that noise can announce has 280 bytes: after those every frame is found.
     for (int i = 0; i < 2; ++i) decoder.push(stream);
     EXPECT_EQ(decoder.push(stream).size(), one_of_each().size());
   }

@@ -11,14 +11,14 @@
 namespace fbvins {
 namespace {
 
-constexpr int kWidth_px = 640, kHeight_px = 480, kImageRate_hz = 30;  // wanted, where the device has it
+constexpr int kWidth_px = 640, kHeight_px = 480, kImageRate_hz = 30;  // preferred
 
-/// Milliseconds in a double hold whole microseconds.
+/// The library's milliseconds in a double are exact to a microsecond.
 Time time_of(const rs2::frame& frame) { return Time{std::llround(frame.get_timestamp() * 1e3) * 1000}; }
 
-/// How far a stream is from what is wanted; of the same, the first that the device names is taken.
+/// Distance of a stream from the preferred one; of equal ones the first is taken.
 double distance(const rs2::stream_profile& profile) {
-  if (!profile.is<rs2::video_stream_profile>()) return -profile.fps();  // gyroscope and accelerometer: as fast as they can
+  if (!profile.is<rs2::video_stream_profile>()) return -profile.fps();  // gyroscope and accelerometer: the highest rate
   const auto video = profile.as<rs2::video_stream_profile>();
   return std::abs(video.width() - kWidth_px) + std::abs(video.height() - kHeight_px) + std::abs(video.fps() - kImageRate_hz);
 }
@@ -126,7 +126,7 @@ void RealsenseCamera::stop() {
     try {
       stream.sensor.stop();
       stream.sensor.close();
-    } catch (const rs2::error&) {  // a camera that is unplugged cannot be stopped
+    } catch (const rs2::error&) {  // an unplugged camera cannot be stopped
     }
   }
 }

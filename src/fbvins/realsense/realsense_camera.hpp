@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One RealSense camera with an IMU, plugged in or played from a file: its factory calibration, and its streams put into ours.
-// Left and right infrared, emitter off; gyroscope and accelerometer as one IMU, which is B; stamps in the global time that the
-// library gives, one for all streams. What the library throws is an Error here.
+// One RealSense camera with an IMU, plugged in or played from a file: its factory calibration, and its streams as sensor events.
+// Left and right infrared, emitter off; gyroscope and accelerometer as one IMU, which is B; stamps in the library's global time,
+// the same for all streams. The library's exceptions become Errors.
 #pragma once
 
 #include <functional>
@@ -19,8 +19,8 @@
 
 namespace fbvins {
 
-/// The two cameras and the IMU as the device has them; the IMU's noise is the data sheet's. An error where a stream is missing or
-/// its lens is of a kind that cannot be had here.
+/// The factory calibration of both cameras and the IMU; the IMU's noise is the data sheet's. An error where a stream's lens model
+/// is not supported.
 Result<StereoRig> realsense_rig(const rs2::video_stream_profile& left, const rs2::video_stream_profile& right,
                                 const rs2::motion_stream_profile& gyro);
 
@@ -32,7 +32,7 @@ class RealsenseCamera {
   static Result<std::unique_ptr<RealsenseCamera>> open(rs2::device device, Say say);
   ~RealsenseCamera() { stop(); }
 
-  /// The factory's; an error where the device tells none that can be had, and Kalibr's is needed.
+  /// The factory calibration; an error where the device has none that is supported, so that Kalibr's is needed.
   const Result<StereoRig>& rig() const { return rig_; }
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }
@@ -42,7 +42,7 @@ class RealsenseCamera {
   void stop();
 
  private:
-  /// A sensor of the device and what is wanted of it.
+  /// A sensor of the device, and the streams that are used.
   struct Stream {
     rs2::sensor sensor;
     std::vector<rs2::stream_profile> profiles = {};
@@ -61,10 +61,10 @@ class RealsenseCamera {
   Result<StereoRig> rig_ = StereoRig{};
   int width_px_ = 0, height_px_ = 0;
   std::vector<Stream> streams_;
-  std::mutex mutex_;  // of what follows: each sensor has a thread of its own
+  std::mutex mutex_;  // guards what follows: each sensor has a thread of its own
   StereoPairs pairs_;
   MotionMerge motion_;
-  int clock_ = -1;  ///< the domain that stamps are of
+  int clock_ = -1;  ///< the first stamp's domain (rs2_timestamp_domain); -1: none yet
   std::set<std::string> said_;
 };
 

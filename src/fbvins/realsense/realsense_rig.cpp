@@ -9,8 +9,8 @@
 namespace fbvins {
 namespace {
 
-// The data sheet of the D435i's inertial sensor (BMI055): 0.014 degrees/s/sqrt(Hz) and 150 micro-g/sqrt(Hz). It has no random
-// walks; these are as large as those of the sensor whose figures are the defaults, which is better: --imu-calibration has yours.
+// Data sheet of the D435i's IMU (BMI055): 0.014 degrees/s/sqrt(Hz) and 150 micro-g/sqrt(Hz). It states no random walks; those of
+// ImuNoise's defaults are kept, which are of a better sensor: give your own by --imu-calibration.
 constexpr double kGyroNoise_radps_rthz = 2.44e-4, kAccelNoise_mps2_rthz = 1.47e-3;
 
 Result<Camera> camera_of(const rs2_intrinsics& lens, const std::string& which) {
@@ -22,12 +22,12 @@ Result<Camera> camera_of(const rs2_intrinsics& lens, const std::string& which) {
   const bool brown = lens.model == RS2_DISTORTION_BROWN_CONRADY && k[4] == 0;
   if (!straight && !brown)
     return Error{ErrorCode::unsupported,
-                 fmt::format("{}: its distortion ({}, fifth coefficient {}) is none that can be had here; calibrate with Kalibr",
-                             which, rs2_distortion_to_string(lens.model), k[4])};
+                 fmt::format("{}: its distortion ({}, fifth coefficient {}) is not supported; calibrate with Kalibr", which,
+                             rs2_distortion_to_string(lens.model), k[4])};
   return Camera(PinholeRadtan{lens.fx, lens.fy, lens.ppx, lens.ppy, k[0], k[1], k[2], k[3]}, lens.width, lens.height);
 }
 
-/// As the library has it: columns of the rotation one after the other, p_to = R * p_from + t.
+/// In the library's convention: the rotation column by column, p_to = R * p_from + t.
 template <class To, class From>
 Pose<To, From> pose_of(const rs2_extrinsics& e) {
   Mat3 R;

@@ -28,7 +28,7 @@ RealsenseSource::RealsenseSource(rs2::context context, std::string which, Source
 RealsenseSource::~RealsenseSource() {
   try {
     context_.set_devices_changed_callback([](rs2::event_information&) {});
-  } catch (const rs2::error&) {  // nothing more is told then
+  } catch (const rs2::error&) {  // then no event comes any more
   }
 }
 
@@ -49,7 +49,7 @@ Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(rs2::context cont
   return source;
 }
 
-/// A recording becomes a device of the context; devices that come and go ring.
+/// Registers for devices that are plugged in or unplugged; a recording becomes a device of the context.
 Result<void> RealsenseSource::watch() {
   try {
     context_.set_devices_changed_callback([this](rs2::event_information& event) {
@@ -71,13 +71,13 @@ Result<void> RealsenseSource::watch() {
   return {};
 }
 
-/// The camera that is meant, where it is plugged in and can be used; what stands against it is said once.
+/// The wanted camera, if it is plugged in and usable. A problem is reported when it first occurs.
 std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
   const auto say = [&](const std::string& problem) {
     if (std::exchange(problem_, problem) != problem) options_.say(problem);
   };
   try {
-    // A recording is played by the device that tells its end; the context makes new ones.
+    // For a recording the device whose end is reported: the context would make new ones.
     std::vector<rs2::device> devices;
     if (is_recording(which_)) devices.push_back(recording_);
     else
@@ -92,7 +92,7 @@ std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
       problem_.clear();
       return *std::move(camera);
     }
-  } catch (const rs2::error& e) {  // unplugged while it was looked at
+  } catch (const rs2::error& e) {  // unplugged in the meantime
     say(fmt::format("RealSense: {}", e.what()));
   }
   return nullptr;

@@ -42,14 +42,14 @@ class RealsenseSource final : public Source {
   rs2::context context_;
   std::string which_;
   StereoRig rig_;
-  rs2::device recording_;  ///< the context forgets it when nobody has it
+  rs2::device recording_;  ///< kept, as the context drops a device that nobody holds
   std::unique_ptr<RealsenseCamera> camera_;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   bool removed_ = false;  ///< the camera in use is unplugged
-  bool ended_ = false;    ///< the recording is
+  bool ended_ = false;    ///< the recording has ended
   bool stopped_ = false;
-  std::string problem_;  ///< last said of a camera that cannot be used
+  std::string problem_;  ///< last reported problem of a camera that cannot be used
 };
 
 }  // namespace fbvins

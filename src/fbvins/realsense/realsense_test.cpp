@@ -34,7 +34,7 @@ StereoRig rig() {
   return rig;
 }
 
-/// Camera and IMU for so many images; images say which they are.
+/// Plays camera and IMU for this many images, whose grey values are their numbers.
 void play(SoftwareCamera& camera, int images, Time start = kStart) {
   for (int ms = 0; ms < images * 33; ++ms) {
     const Time t = start + Duration{ms * kMs};
@@ -46,7 +46,7 @@ void play(SoftwareCamera& camera, int images, Time start = kStart) {
   }
 }
 
-/// Extrinsics of a software device are not among what the recorder writes: Kalibr's files tell them.
+/// The recorder does not write a software device's extrinsics: they come from Kalibr's files.
 SourceOptions calibrated_by(const KalibrFiles& files) {
   SourceOptions options;
   options.dataset.kalibr_camchain = files.camchain();
@@ -93,12 +93,12 @@ TEST(Realsense, RotationsAreColumnByColumn) {
   EXPECT_LT((*camera)->rig()->T_BC0.q.angularDistance(turned.T_BC0.q), 1e-6);
 }
 
-TEST(Realsense, RefusesALensThatItCannotHave) {
+TEST(Realsense, TakesBrownsModelAndRefusesACameraWithoutStereo) {
   StereoRig bent = rig();
   bent.left = Camera(PinholeRadtan{380, 381, 320.5, 239.5, -0.3, 0.1, 0, 0}, 640, 480);
   SoftwareCamera device(bent);
   auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
-  ASSERT_TRUE(camera) << "Brown's model is had: " << camera.error().message;
+  ASSERT_TRUE(camera) << "Brown's model is supported: " << camera.error().message;
   EXPECT_NEAR(std::get<PinholeRadtan>((*camera)->rig()->left.model()).k1, -0.3, 1e-7);
   rs2::software_device blind;
   auto sensor = blind.add_sensor("Motion Module");
@@ -204,7 +204,7 @@ TEST(Realsense, GoesOnWhenItIsPluggedInAgain) {
   std::filesystem::remove(camera);
 }
 
-/// A real flight by way of the library: through its recorder and its player, at the pace of the flight.
+/// A real flight through the library's recorder and player, in real time.
 TEST(Realsense, FliesARecordedFlight) {
   const char* data = std::getenv("FBVINS_DATA");
   const std::string flight = std::string(data != nullptr ? data : FBVINS_SOURCE_DIR "/../shared/data") + "/MH_01_easy_17s";

@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kAlignment = 4;  // DDS asks for whole words, bytes behind the end are undefined
+constexpr std::size_t kAlignment = 4;  // DDS reads whole words; bytes beyond the end are undefined
 
 struct Message : ddsi_serdata {
   std::string bytes;     ///< padded to whole words
@@ -53,7 +53,7 @@ ddsi_serdata* from_parts(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsrt
   return make(type, kind, std::move(bytes));
 }
 
-/// There is one instance of a topic without keys, so that all keys are the same and empty.
+/// A topic without keys has one instance: all keys are equal and empty.
 ddsi_serdata* from_keyhash(const ddsi_sertype* type, const ddsi_keyhash*) { return make(type, SDK_KEY, {}); }
 ddsi_serdata* without_value(const ddsi_serdata* data) {
   Message* key = make(data->type, SDK_KEY, {});
@@ -63,7 +63,7 @@ ddsi_serdata* without_value(const ddsi_serdata* data) {
 bool same_key(const ddsi_serdata*, const ddsi_serdata*) { return true; }
 void key_hash(const ddsi_serdata*, ddsi_keyhash* hash, bool) { *hash = {}; }
 
-/// Samples of the application are bytes: dds_writecdr and dds_takecdr are used, and nothing is converted.
+/// Conversions of samples are not used: the application writes and takes bytes (dds_writecdr, dds_takecdr).
 ddsi_serdata* from_sample(const ddsi_sertype*, ddsi_serdata_kind, const void*) { return nullptr; }
 bool to_sample(const ddsi_serdata*, void*, void**, void*) { return false; }
 bool key_to_sample(const ddsi_sertype*, const ddsi_serdata*, void*, void**, void*) { return false; }
@@ -84,7 +84,7 @@ std::size_t print(const ddsi_sertype* type, const ddsi_serdata* data, char* to, 
   return length < 0 ? 0 : static_cast<std::size_t>(length);
 }
 
-// Field by field: which there are depends on how CycloneDDS was built.
+// Field by field, as the struct's fields depend on how CycloneDDS was built.
 const ddsi_serdata_ops kMessageOperations = [] {
   ddsi_serdata_ops o{};
   o.eqkey = same_key;

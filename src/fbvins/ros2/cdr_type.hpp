@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages for CycloneDDS that are bytes already: the CDR that ros_messages.hpp writes and reads, so that nothing is
+// A CycloneDDS type whose messages are serialised bytes: the CDR that ros_messages.hpp writes and reads, so that nothing is
 // generated from an IDL and an image is copied once. Types have no key, as all of ROS 2's.
 #pragma once
 
@@ -11,10 +11,10 @@
 
 namespace fbvins {
 
-/// A type by the name that ROS 2's middleware gives it on the wire: "sensor_msgs::msg::dds_::Imu_". For
-/// dds_create_topic_sertype(), which takes the reference.
+/// A type with the name that ROS 2's middleware gives it on the wire: "sensor_msgs::msg::dds_::Imu_". For
+/// dds_create_topic_sertype(), which takes over the reference.
 ddsi_sertype* make_cdr_type(const std::string& type_name);
-/// One reference; `bytes` with their encapsulation header of four bytes.
+/// A message with one reference; `bytes` include the encapsulation header of four bytes.
 ddsi_serdata* make_cdr_message(const ddsi_sertype& type, std::string bytes);
 /// Of a message that was made or received with a type of make_cdr_type(); with the header.
 std::string_view bytes_of(const ddsi_serdata& message);

@@ -14,10 +14,10 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint32_t kMaxDomain = 232;  // of ports, by the DDS standard
+constexpr std::uint32_t kMaxDomain = 232;  // DDS derives port numbers from the domain
 constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 
-// Nothing is seen or heard outside of this machine; peers are asked one by one, as the loopback has no multicast.
+// This machine alone; peers are contacted one by one, as the loopback has no multicast.
 constexpr const char* kLoopback =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
@@ -118,7 +118,7 @@ Result<Ros2Publisher> Ros2Publisher::create(std::shared_ptr<Ros2Node> node, cons
 
 Result<void> Ros2Publisher::publish(std::string message) const {
   const dds_return_t code = dds_writecdr(writer_.handle(), make_cdr_message(*type_, std::move(message)));
-  if (code == DDS_RETCODE_OK || code == DDS_RETCODE_TIMEOUT) return {};  // a reader that does not read is its own trouble
+  if (code == DDS_RETCODE_OK || code == DDS_RETCODE_TIMEOUT) return {};  // a reader that does not read is no error
   return failure(name_, code);
 }
 
@@ -139,7 +139,7 @@ Result<std::unique_ptr<Ros2Subscriber>> Ros2Subscriber::create(std::shared_ptr<R
   return subscriber;
 }
 
-Ros2Subscriber::~Ros2Subscriber() { reader_ = DdsEntity(); }  // before what its thread uses
+Ros2Subscriber::~Ros2Subscriber() { reader_ = DdsEntity(); }  // first: its thread uses the other members
 
 Result<void> Ros2Subscriber::listen(bool reliable) {
   reader_ = DdsEntity();

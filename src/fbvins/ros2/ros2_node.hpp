@@ -6,7 +6,7 @@
 //   auto odometry = Ros2Publisher::create(*node, "/fbvins/odometry", "nav_msgs/msg/Odometry");
 //   odometry->publish(bytes);
 //
-// Threads: a node from any, a publisher from one at a time, a subscriber's function on a thread of DDS.
+// Threads: a node from any, a publisher from one at a time; a subscriber's function is called on a thread of DDS.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct ddsi_sertype;
 
 namespace fbvins {
 
-/// Which graph, and by which network.
+/// Domain and network interface.
 struct Ros2Address {
   std::uint32_t domain = 0;    ///< ROS_DOMAIN_ID
   std::string interface = {};  ///< of the network; empty: this machine alone (loopback)
@@ -30,7 +30,7 @@ struct Ros2Address {
 /// DOMAIN[:INTERFACE], as in "0" or "42:eth0".
 Result<Ros2Address> parse_ros2_address(const std::string& text);
 
-/// A handle of CycloneDDS, deleted with all that it holds when its owner goes.
+/// Owns a handle of CycloneDDS, and deletes it with its children.
 class DdsEntity {
  public:
   DdsEntity() = default;
@@ -56,7 +56,7 @@ class Ros2Node {
   DdsEntity domain_, participant_;
 };
 
-/// Delivery to subscribers: again until received or once; the last values for late ones or none; how many wait for a slow one.
+/// Quality of service: resent until received or sent once; last values for late subscribers or none; length of the queue.
 struct Ros2Quality {
   bool reliable = true;
   bool latched = false;  ///< ROS's transient_local
@@ -68,7 +68,7 @@ class Ros2Publisher {
   /// `topic` as ROS names it ("/tf"), `type` as ROS names it ("tf2_msgs/msg/TFMessage").
   static Result<Ros2Publisher> create(std::shared_ptr<Ros2Node> node, const std::string& topic, const std::string& type,
                                       const Ros2Quality& quality = {});
-  /// `message` with its CDR header. A slow reliable reader holds it up for a tenth of a second at most.
+  /// `message` with its CDR header. A slow reliable reader blocks it for a tenth of a second at most.
   Result<void> publish(std::string message) const;
 
  private:
@@ -80,19 +80,19 @@ class Ros2Publisher {
 
 class Ros2Subscriber {
  public:
-  /// The bytes stay where they are as long as `keeper` lives.
+  /// The bytes stay valid as long as `keeper` lives.
   using OnMessage = std::function<void(std::string_view message, const std::shared_ptr<const void>& keeper)>;
 
-  /// As reliable as the topic's publisher offers; before one is there, best effort.
+  /// With the reliability that the topic's publisher offers; best effort until there is one.
   static Result<std::unique_ptr<Ros2Subscriber>> create(std::shared_ptr<Ros2Node> node, const std::string& topic,
                                                         const std::string& type, int depth, OnMessage on_message);
   ~Ros2Subscriber();
   Ros2Subscriber(const Ros2Subscriber&) = delete;
   Ros2Subscriber& operator=(const Ros2Subscriber&) = delete;
 
-  /// Publishers that deliver to it.
+  /// Number of matched publishers.
   int publishers() const;
-  /// Takes up with a publisher of another reliability; to be called now and then by its owner.
+  /// Adapts to a publisher with another reliability; to be called periodically. An error where a publisher has another type.
   Result<void> look_around();
 
  private:

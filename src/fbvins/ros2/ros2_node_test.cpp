@@ -40,7 +40,7 @@ TEST(Ros2Node, BytesArriveAsTheyWereSent) {
   EXPECT_EQ(heard.messages(), sent);
 }
 
-TEST(Ros2Node, ASubscriberTakesUpThePublishersReliability) {
+TEST(Ros2Node, ASubscriberAdaptsToThePublishersReliability) {
   Heard heard;
   auto subscriber = Ros2Subscriber::create(node(), "/offered", "std_msgs/msg/String", 10, heard.function());
   ASSERT_TRUE(subscriber);
@@ -57,7 +57,7 @@ TEST(Ros2Node, ATopicOfAnotherTypeIsSaid) {
   auto subscriber = Ros2Subscriber::create(node(), "/typed", "sensor_msgs/msg/Imu", 10, heard.function());
   ASSERT_TRUE(subscriber);
   const auto other = Ros2Publisher::create(node(), "/typed", "sensor_msgs/msg/Image");
-  if (!other) return;  // within one process the topic itself refuses
+  if (!other) return;  // within one process creating the topic fails already
   const Result<void> looked = (*subscriber)->look_around();
   ASSERT_FALSE(looked);
   EXPECT_NE(looked.error().message.find("/typed carries sensor_msgs::msg::dds_::Image_"), std::string::npos);

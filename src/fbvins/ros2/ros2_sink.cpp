@@ -15,10 +15,10 @@ constexpr Duration kPathPeriod{1'000'000'000};
 constexpr double kPathStep_m = 0.05;
 constexpr std::size_t kLongestPath = 10'000;  // poses, about 0.7 MB a message
 
-/// ROS's stamps have no room for others.
+/// Range of ROS's stamps.
 bool can_be_said(Time t) { return t.ns >= 0 && t < ros_time_end(); }
 
-/// Whether a period has gone by, or time has gone back, since the last; then this is the last.
+/// Whether a period has passed, or time has gone back, since `last`, which is then set to `now`.
 bool due(std::optional<Time>& last, Time now, Duration period) {
   if (last && now >= *last && now - *last < period) return false;
   last = now;
@@ -83,7 +83,7 @@ Result<void> Ros2Sink::take(const Odometry& o) {
 }
 
 Result<void> Ros2Sink::take(const LiveStatus& status) {
-  if (status.t.ns == 0 || !can_be_said(status.t)) return {};  // no sensor has spoken yet
+  if (status.t.ns == 0 || !can_be_said(status.t)) return {};  // no sensor data yet
   RosDiagnostic diagnostic = diagnostic_of(status);
   diagnostic.name = "fbvins: " + diagnostic.name;
   std::string message;

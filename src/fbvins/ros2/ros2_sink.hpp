@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flight in ROS 2's graph: /fbvins/odometry (at IMU rate), /tf (odom -> body, map -> odom), /fbvins/path, /diagnostics.
+// Publishes the flight in ROS 2: /fbvins/odometry (at IMU rate), /tf (odom -> body, map -> odom), /fbvins/path, /diagnostics.
 // Frames and conventions are those of a flight record (docs/flight_record.md), stamps the sensors' own.
 #pragma once
 
@@ -31,11 +31,11 @@ class Ros2Sink final : public Sink {
   Result<void> take(const LiveStatus& status);
 
   Ros2Publisher odometry_, transforms_, path_, diagnostics_;
-  double reading_variance_ = 0;              // of the gyroscope, (rad/s)^2
+  double reading_variance_ = 0;              // of one gyroscope reading, (rad/s)^2
   Mat3 rate_covariance_ = Mat3::Zero();      // of w_WB_B
-  std::optional<MapUpdate> map_;             // newest, where W is known in M
-  Trajectory<W> way_;                        // thinned
-  std::uint32_t reset_counter_ = 0;          // of the way
+  std::optional<MapUpdate> map_;             // the newest, if T_MW is known
+  Trajectory<W> way_;                        // the path, a pose every kPathStep_m
+  std::uint32_t reset_counter_ = 0;          // of the path
   std::optional<Time> transformed_, shown_;  // when the last of each was sent, sensors' time
 };
 

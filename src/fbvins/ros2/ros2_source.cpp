@@ -16,7 +16,7 @@ namespace {
 constexpr int kImagesWaiting = 10, kReadingsWaiting = 2000;
 constexpr auto kLookPeriod = std::chrono::milliseconds(100);
 
-/// In place where its rows lie side by side, else copied.
+/// Without a copy where rows have no padding.
 std::shared_ptr<const Image> image_of(const RosImage& image, const std::shared_ptr<const void>& keeper) {
   const auto width = static_cast<int>(image.width), height = static_cast<int>(image.height);
   const auto* pixels = reinterpret_cast<const std::uint8_t*>(image.pixels.data());
@@ -45,7 +45,7 @@ Result<std::unique_ptr<Ros2Source>> Ros2Source::open(std::shared_ptr<Ros2Node> n
   const DatasetOptions& files = options.dataset;
   if (files.kalibr_camchain.empty())
     return Error{ErrorCode::invalid_argument,
-                 "ROS 2 topics want --calibration: a Kalibr camchain of the two cameras and the IMU"};
+                 "ROS 2 topics need --calibration: a Kalibr camchain of the two cameras and the IMU"};
   const auto rig = load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
   if (!rig) return rig.error();
   return std::unique_ptr<Ros2Source>(new Ros2Source(std::move(node), topics, options, *rig));
@@ -78,8 +78,7 @@ void Ros2Source::take_image(int camera, std::string_view bytes, const std::share
   const Camera& model = camera == 0 ? rig_.left : rig_.right;
   const auto message = read_image(bytes);
   if (!message) return say_once(fmt::format("{}: a message that is no image was left out", topic));
-  if (!message->is_grey())
-    return say_once(fmt::format("{}: images are {}, and mono8 is what can be taken", topic, message->encoding));
+  if (!message->is_grey()) return say_once(fmt::format("{}: images are {}; only mono8 is supported", topic, message->encoding));
   if (message->empty()) return;
   if (static_cast<int>(message->width) != model.width() || static_cast<int>(message->height) != model.height())
     return say_once(fmt::format("{}: images are {} x {}, in the calibration they are {} x {}", topic, message->width,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors from ROS 2 topics: sensor_msgs/Image of two cameras (mono8) and sensor_msgs/Imu, as reliable as their publishers
-// offer them. Publishers come and go as they like.
+// Sensors from ROS 2 topics: sensor_msgs/Image of two cameras (mono8) and sensor_msgs/Imu, with the reliability that their
+// publishers offer. Publishers may come and go.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 
 #include "fbvins/live/make_source.hpp"
 #include "fbvins/live/source.hpp"
-#include "fbvins/ros2/ros2_node.hpp"
 #include "fbvins/live/stereo_pairs.hpp"
+#include "fbvins/ros2/ros2_node.hpp"
 
 namespace fbvins {
 
@@ -25,7 +25,7 @@ Result<Ros2Topics> parse_ros2_topics(const std::string& text);
 
 class Ros2Source final : public Source {
  public:
-  /// The calibration is a Kalibr file's (`options.dataset`): topics have none that is complete.
+  /// The calibration is a Kalibr file's (`options.dataset`): no topic carries a complete one.
   static Result<std::unique_ptr<Ros2Source>> open(std::shared_ptr<Ros2Node> node, const Ros2Topics& topics,
                                                   const SourceOptions& options);
 

@@ -49,7 +49,7 @@ class MavlinkFeed final : public ImuFeed {
     next_try_ = now + kTryAgainAfter;
     if (link_.open()) imu_.restart();
   }
-  /// What has changed since it was last told.
+  /// Reports the connection's state when it has changed.
   void tell(Time now) {
     const bool heard = imu_.peer().is_heard(now), known = imu_.peer().clock().known();
     const std::string state = !link_.is_open() ? link_.problem()

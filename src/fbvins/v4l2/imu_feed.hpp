@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The IMU beside cameras that have none: a flight controller's by MAVLink, or another process's by our socket. Readings leave
-// with stamps of CLOCK_MONOTONIC, as video devices have them.
+// The IMU for cameras that have none: a flight controller's by MAVLink, or another process's by the socket. Readings are stamped
+// on CLOCK_MONOTONIC, as images of video devices are.
 #pragma once
 
 #include <functional>
@@ -21,8 +21,8 @@ class ImuFeed {
   virtual Result<void> run(SensorInput& input) = 0;
   virtual void stop() = 0;
 
-  /// `udp:HOST:PORT[:OWN_PORT]` or `serial:DEVICE:BAUD`: MAVLink; `socket:PATH`: listens there (docs/socket.md), images that
-  /// come are left out. `rig`: what a sender is told of. `say` is called on the thread of run().
+  /// `udp:HOST:PORT[:OWN_PORT]` or `serial:DEVICE:BAUD`: MAVLink; `socket:PATH`: listens there (docs/socket.md) and ignores
+  /// images. `rig`: with which a sender's hello must agree. `say` is called on the thread of run().
   static Result<std::unique_ptr<ImuFeed>> open(const std::string& where, const StereoRig& rig, Say say);
 };
 

@@ -53,7 +53,7 @@ Result<std::unique_ptr<V4l2Source>> V4l2Source::open(const std::string& text, co
   const DatasetOptions& files = options.dataset;
   if (files.kalibr_camchain.empty())
     return Error{ErrorCode::invalid_argument,
-                 "video devices want --calibration: a Kalibr camchain of the two cameras and the IMU"};
+                 "video devices need --calibration: a Kalibr camchain of the two cameras and the IMU"};
   const auto rig = load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
   if (!rig) return rig.error();
   std::unique_ptr<V4l2Source> source(new V4l2Source(*devices, options, *rig));

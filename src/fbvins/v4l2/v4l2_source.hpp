@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two cameras of Linux (V4L2), or one that puts two images side by side, and an IMU from elsewhere (docs/v4l2.md).
+// Two Linux video devices (V4L2), or one with two images side by side, and an IMU from elsewhere (docs/v4l2.md).
 //
 //   auto source = V4l2Source::open("/dev/video0,/dev/video2,serial:/dev/ttyS4:921600", options);
 //   Result<void> end = (*source)->run(live.input());    // until stop(); a device that is unplugged is waited for
@@ -22,8 +22,8 @@
 namespace fbvins {
 
 struct V4l2Devices {
-  std::vector<std::string> cameras;  ///< one, side by side, or left and right
-  std::string imu;                   ///< as ImuFeed::open() has it
+  std::vector<std::string> cameras;  ///< one with both images side by side, or left and right
+  std::string imu;                   ///< for ImuFeed::open()
 };
 /// DEVICE[,DEVICE],IMU.
 Result<V4l2Devices> parse_v4l2_devices(const std::string& text);

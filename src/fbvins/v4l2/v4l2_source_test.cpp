@@ -35,7 +35,7 @@ void sleep_until(Time t) {
   if (const Duration left = t - host_now(); left.ns > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(left.ns));
 }
 
-/// A flight controller on a UDP port: heartbeats, answers to TIMESYNC, readings when it is told to. Its clock is ahead.
+/// A flight controller on a UDP port: heartbeats, answers to TIMESYNC, readings on request. Its clock is ahead.
 class FakeFlightController {
  public:
   explicit FakeFlightController(Duration ahead) : ahead_(ahead), socket_(::socket(AF_INET, SOCK_DGRAM, 0)) {
@@ -123,7 +123,7 @@ std::vector<std::uint8_t> filled(std::size_t size, int value) {
   return std::vector<std::uint8_t>(size, static_cast<std::uint8_t>(value));
 }
 
-/// A source that runs in a thread, and what it says.
+/// A source that runs in a thread, and its messages.
 struct Running {
   Running(const std::string& devices, const StereoRig& rig) : files(rig) {
     options.dataset.kalibr_camchain = files.camchain();
@@ -162,7 +162,7 @@ struct Running {
   std::thread thread;
 };
 
-/// As soon as the camera streams and has a buffer.
+/// Delivers as soon as the camera streams and has a buffer.
 bool deliver(FakeVideo& camera, Time t, const std::vector<std::uint8_t>& bytes) {
   for (const Time end = host_now() + Duration{10'000 * kMs}; host_now() < end;) {
     if (camera.deliver(t, bytes)) return true;
@@ -257,7 +257,7 @@ TEST(V4l2Source, RefusesWordsItDoesNotUnderstand) {
   EXPECT_FALSE(V4l2Source::open("/dev/video0,/dev/imu", options)) << "no kind of IMU";
 }
 
-/// What a driver hands over of an image: rows with 32 bytes behind each.
+/// An image as a driver delivers it: rows with 32 bytes of padding.
 std::vector<std::uint8_t> padded(const Image& image) {
   std::vector<std::uint8_t> bytes;
   for (int y = 0; y < image.height(); ++y) {
@@ -288,7 +288,7 @@ std::vector<Delivery> deliveries(Dataset& dataset, int images) {
   return all;
 }
 
-/// Passes everything on, and compares the stamps of readings with the truth; readings are told apart by what they read.
+/// Passes everything on, and compares the stamps of readings with the truth; readings are identified by their values.
 class StampCheck final : public SensorInput {
  public:
   explicit StampCheck(SensorInput& input) : all_(input) {}
@@ -406,7 +406,7 @@ TEST(V4l2Source, FliesWithTheFlightControllersImu) {
     GTEST_SKIP() << "this machine is too busy: " << counts.images_dropped << " images dropped, " << images_lost << " not taken";
   ASSERT_GT(poses.size(), 100u) << counts.images << " images, " << counts.imu << " readings";
 
-  // The same way as in the recording's truth, by its length: the start is free.
+  // The displacement's length must be the truth's; the frame of reference is free.
   const auto truth = (*dataset)->ground_truth();
   const Time first = poses.front().t - late - to_now, last = poses.back().t - late - to_now;
   const double flown = (poses.back().T_WB.p - poses.front().T_WB.p).norm(),

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::uint32_t kBuffers = 4;
 
-/// False: errno says why.
+/// ioctl(); false: errno says why.
 template <class Argument>
 bool ask(int fd, unsigned long request, Argument& argument) {
   int answer = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera of Linux (V4L2) as a stream of grey images. One thread.
+// A Linux video device (V4L2) as a stream of grey images. One thread.
 //
 //   auto device = VideoDevice::open("/dev/video0", 752, 480);
 //   poll device->fd() for POLLIN; then
@@ -27,20 +27,20 @@ struct VideoFrame {
 
 class VideoDevice {
  public:
-  /// Streams images of this size in the first of kVideoFormats that the device has. The error says what it has instead.
+  /// Starts streaming images of this size in the first of kVideoFormats that the device has. An error says what it offers.
   static Result<VideoDevice> open(const std::string& path, int width_px, int height_px);
 
   int fd() const { return descriptor_.number(); }
   const std::string& path() const { return path_; }
   const VideoFormat& format() const { return format_; }
-  /// False: the driver's stamps are of no known clock, and the moment of arrival is taken.
+  /// False: the driver's stamps are not on CLOCK_MONOTONIC, and images are stamped on arrival.
   bool stamps_are_the_drivers() const { return stamps_known_; }
-  /// The next image that waits, or none. Images that the driver or the wire damaged are left out and counted.
+  /// The next waiting image, or none. Damaged images are left out and counted.
   Result<std::optional<VideoFrame>> take();
   int damaged() const { return damaged_; }
 
  private:
-  /// A buffer of the driver's in our memory.
+  /// A driver's buffer mapped into our memory.
   class Buffer {
    public:
     Buffer(void* data, std::size_t size) : data_(data), size_(size) {}
@@ -60,7 +60,7 @@ class VideoDevice {
   Result<void> begin();
   Error error(const std::string& what) const;
 
-  // Buffers go before the device that they belong to.
+  // In this order buffers are unmapped before the device is closed.
   FileDescriptor descriptor_;
   std::string path_;
   VideoFormat format_;

@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-/// Where the grey values lie: the first of them, and from one to the next in a row, in bytes.
+/// Position of the grey values in a row: offset of the first, and step from one to the next, in bytes.
 struct Luma {
   int first = 0, step = 1;
 };

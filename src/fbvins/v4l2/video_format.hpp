@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a video device of Linux puts into its buffers, as grey images. Pure functions, any thread.
+// Converts the buffers of Linux video devices to grey images. Pure functions, any thread.
 #pragma once
 
 #include <array>
@@ -15,10 +15,10 @@ namespace fbvins {
 struct VideoFormat {
   std::uint32_t fourcc = 0;
   int width_px = 0, height_px = 0;
-  int row_bytes = 0;  ///< from one row to the next; of no meaning where images are compressed
+  int row_bytes = 0;  ///< from one row to the next; unused for compressed images
 };
 
-/// Four characters as V4L2 has them: the first is the lowest byte.
+/// A V4L2 pixel format: four characters, the first in the lowest byte.
 constexpr std::uint32_t fourcc(const char (&name)[5]) {
   std::uint32_t code = 0;
   for (int i = 3; i >= 0; --i) code = code << 8 | static_cast<std::uint8_t>(name[i]);
@@ -26,11 +26,11 @@ constexpr std::uint32_t fourcc(const char (&name)[5]) {
 }
 std::string fourcc_name(std::uint32_t code);
 
-/// Formats that grey_image() takes, the best first: those that hold the grey values as they are come before compressed ones.
+/// Formats that grey_image() takes, in order of preference: uncompressed ones before compressed ones.
 inline constexpr std::array kVideoFormats = {fourcc("GREY"), fourcc("NV12"), fourcc("YU12"),
                                              fourcc("YUYV"), fourcc("UYVY"), fourcc("MJPG")};
 
-/// Copies; colour is left out. An error says what is wrong with the bytes: too few of them, or no image.
+/// Copies the grey values; colour is dropped. An error where there are too few bytes, or no decodable image.
 Result<Image> grey_image(const VideoFormat& format, std::span<const std::uint8_t> bytes);
 
 /// The two halves of an image of two cameras side by side.
