@@ -32,7 +32,7 @@ struct Similarity {
   Quat q = Quat::Identity();
   Vec3 p = Vec3::Zero();
 
-  /// The pose as the truth's world has it. Its frame keeps the letter: that is what an alignment says.
+  /// The pose in the truth's world. The frame's type stays: after alignment the two are one frame.
   template <class Frame>
   Pose<Frame, B> operator*(const Pose<Frame, B>& T) const {
     return {(q * T.q).normalized(), Vec3(scale * (q * T.p) + p)};
@@ -43,15 +43,15 @@ struct Similarity {
 /// three pairs, or (se3, sim3) no two directions of motion.
 Result<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment);
 
-/// Shift and heading as the poses of the first second have them: where a covariance that grows from the start is measured
-/// from. An error without any pair.
+/// Translation and heading from the poses of the first second, the reference of a covariance that grows from the start. An
+/// error without any pair.
 Result<Similarity> align_start(const std::vector<PosePair>& pairs);
 
-/// align_start for a truth whose world need not be level: what motion capture and rendered flights have of tilt against their
-/// own IMU is one constant, of up to half a degree, that no estimator can know.
+/// align_start for a truth whose world need not be level: motion capture and rendered flights have a constant tilt against
+/// their own IMU, of up to half a degree, that no estimator can observe.
 struct LevelledStart {
   Similarity to_truth;
-  double truth_tilt_rad = 0;  ///< by how much the truth's z is off the up that the estimate has in the flight's second half
+  double truth_tilt_rad = 0;  ///< angle between the truth's z and the estimate's vertical in the flight's second half
 };
 Result<LevelledStart> align_start_levelled(const std::vector<PosePair>& pairs);
 

@@ -25,10 +25,10 @@ struct AssociationOptions {
   double max_interpolation_s = 0.25;  ///< longest hole of the truth that is bridged; interpolation only
 };
 
-/// Some world, whichever the trajectory is told in: errors are the same in all of them.
+/// The world of a trajectory, whichever it is: errors are the same in all of them.
 struct AnyWorld {};
 
-/// A trajectory of whichever frame, so that evaluation is compiled once and takes them all.
+/// A trajectory in any frame, so that evaluation is compiled once and takes them all.
 struct AnyTrajectory {
   AnyTrajectory() = default;
   template <class Frame>
@@ -40,7 +40,7 @@ struct AnyTrajectory {
   Trajectory<AnyWorld> poses;
 };
 
-/// Each in a world of its own, until `apply` (alignment.hpp) lays the estimate over the truth.
+/// Each in a world of its own, until `apply` (alignment.hpp) aligns the estimate with the truth.
 struct PosePair {
   StampedPose<AnyWorld> truth;
   StampedPose<AnyWorld> estimate;

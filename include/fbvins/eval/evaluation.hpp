@@ -30,7 +30,7 @@ struct Evaluation {
   double largest_excursion_m = 0;  ///< of the estimate from its first pose: drift where the truth is at rest
 };
 
-/// Trajectories of any frames. An error when no poses belong together or they do not determine the alignment.
+/// Trajectories of any frames. An error when no poses can be associated or they do not determine the alignment.
 Result<Evaluation> evaluate(const AnyTrajectory& truth, const AnyTrajectory& estimate, const EvaluationOptions& options);
 
 /// |p_estimate - p_truth| of each pair, m.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the first seconds tell: units, stamps, left and right.
+// Checks of the first seconds: units, stamps, left and right.
 #include <gtest/gtest.h>
 
 #include "fbvins/checkup/first_seconds.hpp"

@@ -11,7 +11,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kLook_s = 5;
-/// Of the stereo images, those that are looked into.
+/// Number of stereo frames that are examined.
 constexpr std::size_t kKept = 3;
 
 }  // namespace

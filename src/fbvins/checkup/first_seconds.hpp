@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor's short form: what the first seconds of a recording tell without an estimate. Costs a few milliseconds.
+// The doctor's short form: checks of the first seconds of a recording, without an estimate. Costs a few milliseconds.
 // One thread calls.
 //
 //   FirstSeconds look(rig);
@@ -19,7 +19,7 @@ class FirstSeconds {
   explicit FirstSeconds(const StereoRig& rig) : rig_(rig) {}
 
   void push(const SensorEvent& event);
-  /// Enough has been seen; what comes later is not looked at.
+  /// Enough has been seen; what comes later is ignored.
   bool is_over() const;
   /// Units, stamps, left and right exchanged. Also after a recording shorter than that.
   std::vector<Finding> findings() const;

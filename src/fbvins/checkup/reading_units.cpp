@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPart_s = 0.5;
 constexpr std::size_t kFewestParts = 4;
-/// Gravity may look this much stronger or weaker: 3 % of an accelerometer's scale, a bias of 0.5 m/s^2, a second of climbing.
+/// Gravity may differ by this share: 3 % of an accelerometer's scale, a bias of 0.5 m/s^2, a second of climbing.
 constexpr double kGravityTolerance = 0.15;
 /// Half of all readings turn faster than this: no vehicle that a camera could follow.
 constexpr double kSpinning_radps = 6;

@@ -12,11 +12,11 @@ namespace fbvins {
 namespace {
 
 constexpr std::size_t kFewestStamps = 20;
-/// Of the rate that the calibration says.
+/// Relative to the rate of the calibration.
 constexpr double kRateTolerance = 0.1;
 /// Share of readings that repeat the one before to the last bit: a sensor's noise does not.
 constexpr double kMostRepeated = 0.1;
-/// Root mean square of what stamps of images are off their regular places. Stamps of triggered cameras are a hundred times
+/// Root mean square deviation of the images' stamps from regular ones. Stamps of triggered cameras are a hundred times
 /// better.
 constexpr double kMostIrregular_s = 2e-3;
 
@@ -43,7 +43,7 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
   const double share = repeated / static_cast<double>(steps.size());
   if (share > kMostRepeated) {
     finding.size = share, finding.unit = "of the readings", finding.corrected.clear();
-    finding.measured = fmt::format("{:.0f} % of the IMU's readings are the one before once more, to the last bit", 100 * share);
+    finding.measured = fmt::format("{:.0f} % of the IMU's readings repeat the one before to the last bit", 100 * share);
     finding.expected = "noise alone makes each different";
     finding.advice = "the driver repeats readings or the IMU hangs: hand on each reading once, at the sensor's own rate";
     findings.push_back(finding);
@@ -68,7 +68,7 @@ void check_images(std::span<const Time> images, std::vector<Finding>& findings) 
   Finding finding;
   finding.kind = FindingKind::image_stamps;
   finding.size = 1e3 * irregular, finding.sigma = finding.size / std::sqrt(2.0 * std::max(regular, 1)), finding.unit = "ms";
-  finding.measured = fmt::format("the images' stamps are {:.1f} +- {:.1f} ms off their regular places (root mean square)",
+  finding.measured = fmt::format("the images' stamps are {:.1f} +- {:.1f} ms off regular intervals (root mean square)",
                                  finding.size, finding.sigma);
   finding.expected = "a camera exposes at regular times, known to a tenth of a millisecond";
   finding.advice = "stamp images by the camera's own clock or its trigger, not on arrival";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the stamps of images and readings tell. Pure functions, any thread.
+// Checks of the stamps of images and readings. Pure functions, any thread.
 //
 //   for (Finding& finding : check_stamps(samples, image_stamps, rig)) report(finding);
 #pragma once
@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// Rate and repetition of readings, regularity of images, and whether both tell the same time.
+/// Rate and repetition of readings, regularity of images, and whether both have the same clock.
 std::vector<Finding> check_stamps(std::span<const ImuSample> samples, std::span<const Time> images, const StereoRig& rig);
 
 }  // namespace fbvins

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether left and right were exchanged: features are matched along the epipolar lines of the rig, and of the rig whose cameras
-// have changed places. Pure functions, any thread.
+// Whether left and right were exchanged: features are matched along the epipolar lines of the rig, and of the rig with its
+// cameras exchanged. Pure functions, any thread.
 //
 //   StereoOrder order = stereo_order(rig, frames);
 //   if (order.swapped()) std::swap(frame.left, frame.right);
@@ -18,13 +18,13 @@ namespace fbvins {
 struct StereoOrder {
   int features = 0;      ///< of the images called left
   int as_named = 0;      ///< of these matched as the calibration has the cameras
-  int as_swapped = 0;    ///< and with the cameras in each other's place
-  bool swapped() const;  ///< the images must be
+  int as_swapped = 0;    ///< and with the cameras exchanged
+  bool swapped() const;  ///< whether the images must be exchanged
 };
 
 StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> frames);
 
-/// The rig with its cameras in each other's place.
+/// The rig with its cameras exchanged.
 StereoRig swapped_rig(const StereoRig& rig);
 
 std::optional<Finding> check_stereo_order(const StereoOrder& order);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For how much of the recording there is a pose at all: a small error over half a flight is no success.
+// Share of the recording that has a pose at all: a small error over half a flight is no success.
 //
 //   Coverage c = coverage_of(image_stamps, estimate_stamps);   // c.share, c.first_pose_after_s
 #pragma once

@@ -26,7 +26,7 @@ TEST(Evaluation, ErrorsOfAKnownNoise) {
   EXPECT_EQ(e->per_second_m.count, 1982) << "all pairs 1 s apart, and the two within 10 % of it at the end";
 }
 
-TEST(Evaluation, OdometryAndMapAreJudgedAlikeAgainstTheSameTruth) {
+TEST(Evaluation, OdometryAndMapAreEvaluatedAlikeAgainstTheSameTruth) {
   Trajectory<W> truth;
   Trajectory<M> estimate;
   for (const StampedPose<AnyWorld>& pose : flight(300)) truth.push_back({pose.t, {pose.T.q, pose.T.p}});

@@ -56,7 +56,7 @@ TEST(Nees, OverconfidenceShows) {
   EXPECT_LT(s.share_within_95.pose, 0.5);
 }
 
-TEST(Nees, CovarianceThatIsNoneIsCountedNotUsed) {
+TEST(Nees, AnInvalidCovarianceIsCountedNotUsed) {
   const Mat6 P = some_covariance();
   const auto pairs = sampled(P, {}, 3);
   Mat6 nan = P;

@@ -25,7 +25,7 @@ int nearest_ahead(const std::vector<double>& done, int from, double delta) {
   const double wanted = done[static_cast<std::size_t>(from)] + delta;
   auto best = std::lower_bound(begin, done.end(), wanted);
   if (best == done.end() || (best != begin && wanted - *std::prev(best) <= *best - wanted))
-    best = std::lower_bound(begin, done.end(), *std::prev(best));  // the first of equals: at rest progress stands
+    best = std::lower_bound(begin, done.end(), *std::prev(best));  // the first of equals: at rest there is no progress
   return static_cast<int>(best - done.begin());
 }
 

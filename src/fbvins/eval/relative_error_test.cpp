@@ -54,7 +54,7 @@ TEST(RelativeError, StandingStillIsNotAMetre) {
   EXPECT_EQ(pieces.back(), std::make_pair(4, 8)) << "the first of the equally far poses";
 }
 
-TEST(RelativeError, DoesNotSeeTheChoiceOfWorld) {
+TEST(RelativeError, DoesNotDependOnTheChoiceOfWorld) {
   const Trajectory<AnyWorld> truth = eval_test::flight(300);
   const Trajectory<AnyWorld> estimate = eval_test::noisy(truth, 0.01, 0.01, 8);
   const Pose<AnyWorld, AnyWorld> turn{so3_exp(Vec3(0.4, 0.5, -2)), Vec3(1, 2, 3)};

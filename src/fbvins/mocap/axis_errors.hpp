@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flight from hover to hover, axis by axis, as in the paper's Tables 2 and 3: where it began and ended by the truth and by the
-// estimate, how far it went, how far it should have gone. Pure functions, any thread.
+// estimate, and the displacement that was intended. Pure functions, any thread.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-/// A time in which positions are averaged.
+/// A time span over which positions are averaged.
 struct HoverSpan {
   Time from, to;
 };
@@ -20,14 +20,14 @@ struct AxisErrors {
   HoverSpan start, end;
   Vec3 truth_start = Vec3::Zero(), truth_end = Vec3::Zero();
   Vec3 estimate_start = Vec3::Zero(), estimate_end = Vec3::Zero();
-  Vec3 expected = Vec3::Zero();  ///< how far it should have gone; without a wish as far as the estimate says
+  Vec3 expected = Vec3::Zero();  ///< intended displacement; where none is given, the estimate's
   Vec3 truth_difference() const { return truth_end - truth_start; }
   Vec3 estimate_difference() const { return estimate_end - estimate_start; }
-  /// What the flight missed its aim by.
+  /// How far the flight missed its target.
   Vec3 axial_error() const { return truth_difference() - expected; }
 };
 
-/// The first and the last second or more in which the truth moves slower than 0.1 m/s; nullopt where there are not two.
+/// The first and the last span of a second or more in which the truth moves slower than 0.1 m/s; nullopt where there are not two.
 struct HoverPair {
   HoverSpan first, last;
 };

@@ -16,7 +16,7 @@ Trajectory<W> mission(const Vec3& offset, const Vec3& end_error) {
   return out;
 }
 
-TEST(AxisErrors, AreWhatTheFlightMissesItsAimBy) {
+TEST(AxisErrors, AreWhatTheFlightMissesItsTargetBy) {
   const Trajectory<W> truth = mission(Vec3(0, 0, 0.6), Vec3(0.02, -0.01, 0.03)),
                       estimate = mission(Vec3(0.001, 0, 0.6), Vec3::Zero());
   const auto hovers = find_hovers(truth);

@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kSpan_s = 0.1;  // over which turning is measured: two images
+constexpr double kSpan_s = 0.1;  // over which angular speed is measured: two images
 constexpr double kCoarseStep_s = 0.04, kFineStep_s = 0.01;
 constexpr int kMostSamples = 8000;  // of the coarse search, whose cost is their square
 constexpr double kLargestHole_s = 0.15;
@@ -19,7 +19,7 @@ constexpr double kWeakest = 0.6;     // smallest correlation that is accepted
 constexpr double kAmbiguous = 0.85;  // another offset is as good
 constexpr double kPeakWidth_s = 1.0;
 
-/// Turning rates on a grid, NaN where not known.
+/// Angular speeds on a grid, NaN where not known.
 struct Turning {
   Time start;
   double step_s = 0;

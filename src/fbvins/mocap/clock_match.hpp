@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which time of one clock is which of another, from how fast a body turns: that is the same number in every frame, so neither
-// the worlds nor where the markers sit need to be known. Pure functions, any thread.
+// Offset of two clocks from a body's angular speed, which is the same in every frame, so that neither the worlds nor the
+// markers' place on the body need to be known. Pure functions, any thread.
 #pragma once
 
 #include "fbvins/core/result.hpp"
@@ -11,7 +11,7 @@ namespace fbvins {
 
 struct ClockMatch {
   Duration offset;         ///< estimate's time = motion capture's time + offset, to some milliseconds
-  double correlation = 0;  ///< of the two turning rates there
+  double correlation = 0;  ///< of the two angular speeds there
   double overlap_s = 0;
 };
 

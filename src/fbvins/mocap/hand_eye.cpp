@@ -15,21 +15,21 @@
 namespace fbvins {
 namespace {
 
-constexpr double kShortestPairing_s = 0.045;  // estimates denser than images tell the same error again
+constexpr double kShortestPairing_s = 0.045;  // denser estimates than images repeat the same error
 constexpr std::size_t kMostPairs = 6000;
 constexpr double kFlip_rad = 0.26, kSwap_m = 0.25, kSwap_medians = 8;
 constexpr double kOutlier_sigmas = 5,
                  kMostOutliers = 0.05;  // of the pairs at a time: more are no outliers but a noise that is not like that
 constexpr int kRounds = 4, kSteps = 8;
-constexpr double kBlock_s = 6;  // stretches of flight that are asked whether they agree
-// What a use of the result bears; a motion that leaves more in some direction does not show it.
+constexpr double kBlock_s = 6;  // length of the stretches of flight that are compared with one another
+// Largest standard deviations of a usable result; a motion that leaves more in some direction is refused.
 constexpr double kWorstRotation_rad = 0.3 * std::numbers::pi / 180, kWorstLever_m = 0.01, kWorstClock_s = 2e-3;
-// Weak knowledge that keeps directions which the motion does not show in place: 10 m, a turn, 10 s.
+// Information of weak priors that hold unobservable directions: standard deviations of 10 m, 3 rad and 10 s.
 constexpr double kLoosePosition = 1e-2, kLooseRotation = 0.1, kLooseClock = 1e-2;
-// What is assumed of stereo odometry: a scale to 1 %, and of its drift in heading any share in the path.
+// Priors of a stereo odometry's own errors: a scale to 1 %, and any share of its heading's drift in the path.
 constexpr double kScaleInformation = 1e4, kBendInformation = 1;
 
-// Places of the unknowns.
+// Indices of the unknowns.
 constexpr int kLever = 0, kTurnBK = 3, kShiftVW = 6, kTurnVW = 9, kOffset = 12, kDrift = 13, kScale = 14, kBend = 15;
 // Which noise each of the six components of a residual has.
 constexpr std::array<std::size_t, 6> kGroup = {0, 0, 1, 2, 2, 3};
@@ -136,7 +136,7 @@ class Solver {
     return out;
   }
 
-  /// How a heading that drifts bends the path that is built on it: the integral of (heading's error x motion).
+  /// How a drifting heading bends the path that is built on it: the integral of (heading's error x motion).
   std::vector<Vec3> bends_of(const std::vector<HandEyePair>& pairs) const {
     std::vector<Vec3> bends(pairs.size(), Vec3::Zero());
     if (pairs.empty()) return bends;
@@ -158,7 +158,7 @@ class Solver {
     return sums;
   }
 
-  /// The estimate's own errors are known to be small; all else is only kept from running away.
+  /// Adds the priors: the estimate's own errors are small; those of all else only hold unobservable directions.
   NormalSums with_loose(NormalSums sums) const {
     const Full information = loose_information();
     for (std::size_t i = 0; i < unknowns_.size(); ++i) {
@@ -170,8 +170,8 @@ class Solver {
     return sums;
   }
 
-  /// How much more the stretches of the flight pull apart than the noise explains, at least 1: errors of the estimate that come
-  /// with the motion are neither white nor do they wander. Under the model a stretch's gradient has the covariance of its own A.
+  /// Variance between the stretches of the flight over that which the noise explains, at least 1: errors of the estimate that
+  /// depend on the motion are neither white nor do they wander. Under the model a stretch's gradient has its own A as covariance.
   double disagreement(const Rows& all) const {
     std::vector<NormalSums> blocks;
     for (std::size_t k = 0; k < 6; ++k) {
@@ -217,7 +217,7 @@ class Solver {
     }
   }
 
-  /// Poses of the estimate of which one component is unlike what the others of it let expect.
+  /// Drops poses of the estimate of which the innovation of a component exceeds kOutlier_sigmas.
   void drop_outliers() {
     const Rows all = rows();
     std::vector<bool> bad(all[0].t_s.size(), false);
@@ -245,7 +245,7 @@ class Solver {
   int pairs_ = 0, outliers_ = 0;
 };
 
-/// At most so many, so far apart that each has markers of its own.
+/// At most kMostPairs poses, so far apart that no two share markers.
 Trajectory<W> thinned(const Trajectory<W>& estimate, double spacing_s) {
   Trajectory<W> out;
   const double duration_s = estimate.empty() ? 0 : (estimate.back().t - estimate.front().t).seconds();
@@ -261,7 +261,7 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Runs of pairs that lie far off: the markers were read otherwise there.
+/// Runs of pairs with large residuals: there the system took the markers for another orientation, or for another body.
 std::vector<MarkerFault> find_misreadings(const std::vector<HandEyePair>& pairs, const MarkerCalibration& c) {
   std::vector<double> distances;
   for (const HandEyePair& pair : pairs) distances.push_back(residual_of(pair, c).head<3>().norm());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the markers sit on the IMU, where the motion capture's world is in W, and how its clock goes, from one flight's estimate
-// and markers. Pure functions, any thread. Method and limits: docs/mocap.md.
+// Extrinsics of the markers on the IMU, pose of the motion capture's world against W, and its clock's offset and drift, from one
+// flight's estimate and markers. Pure functions, any thread. Method and limits: docs/mocap.md.
 //
 //   Result<HandEye> found = align_hand_eye(track, estimate, {});
 //   Trajectory<W> truth = body_truth(found->kept, found->calibration);   // T_WB by the estimate's clock
@@ -35,7 +35,7 @@ struct MarkerCalibration {
 };
 
 /// Order of the unknowns: lever arm p_BK (m, in B), R_BK (rad, about axes of K), p_VW (m, in W), R_VW (rad, about axes of W),
-/// offset (s), drift (s/s), and of the estimate's own errors: scale less one, share of the heading's drift that bends the path.
+/// offset (s), drift (s/s), and of the estimate's own errors: scale minus one, share of the heading's drift that bends the path.
 inline constexpr int kHandEyeUnknowns = 16;
 using HandEyeMatrix = Eigen::Matrix<double, kHandEyeUnknowns, kHandEyeUnknowns>;
 
@@ -45,7 +45,7 @@ struct HandEye {
   /// Of the estimate against the markers, along W's axes: horizontal, vertical (m), tilt, heading (rad).
   std::array<SerialNoise, 4> noise;
   double disagreement =
-      1;  ///< variance between stretches of the flight over what the noise explains; the covariance is multiplied by it
+      1;             ///< variance between stretches of the flight over that which the noise explains; a factor of the covariance
   double scale = 1;  ///< metres of the estimate's path to one of the markers'
   double clock_correlation = 0;
   int pairs = 0, outliers = 0;      ///< poses of the estimate that entered; that did not fit
@@ -54,10 +54,10 @@ struct HandEye {
 };
 
 /// `track` without the faults that `inspect` finds. An error, one sentence, where the two do not describe one motion or the
-/// motion does not show an unknown.
+/// motion does not determine an unknown.
 Result<HandEye> align_hand_eye(const MarkerTrack& track, const Trajectory<W>& estimate, const HandEyeOptions& options);
 
-/// The IMU's poses that the markers tell, in W, by the estimate's clock.
+/// The IMU's poses computed from the markers, in W, by the estimate's clock.
 Trajectory<W> body_truth(const MarkerTrack& track, const MarkerCalibration& calibration);
 
 }  // namespace fbvins

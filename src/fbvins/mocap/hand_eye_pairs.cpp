@@ -20,7 +20,7 @@ constexpr double kTurnSlack_rad = 0.02, kTurnSlack_share = 0.1;
 constexpr double kFewestFit = 0.5;
 constexpr double kWidestSlope_s = 0.3;  // between the neighbours from which a velocity is taken
 
-/// The same turn, told in B and in K: a = R_BK * b.
+/// The same rotation vector in B and in K: a = R_BK * b.
 struct Turn {
   Time t;
   Vec3 a_B, b_K;
@@ -38,7 +38,7 @@ std::vector<Turn> turns_of(const std::vector<HandEyePair>& pairs) {
   return turns;
 }
 
-/// The rotation that takes the b nearest to the a (Kabsch).
+/// The rotation that aligns the b with the a (Kabsch).
 template <class Chosen>
 Quat rotation_between(const std::vector<Turn>& turns, Chosen&& chosen) {
   Mat3 sum = Mat3::Zero();
@@ -54,7 +54,7 @@ bool fits(const Turn& turn, const Quat& q_BK) {
   return (turn.a_B - q_BK * turn.b_K).norm() < kTurnSlack_rad + kTurnSlack_share * turn.a_B.norm();
 }
 
-/// Turns that are told apart from none: at rest every rotation fits.
+/// Whether a turn is large enough to test a rotation: at rest every rotation fits.
 bool tells(const Turn& turn) { return turn.a_B.norm() > 2 * kTurnSlack_rad || turn.b_K.norm() > 2 * kTurnSlack_rad; }
 
 struct RotationFit {
@@ -119,7 +119,7 @@ Quat fit_world(const std::vector<HandEyePair>& pairs, const Quat& q_BK) {
 
 /// Lever arm and translation, linear once the rotations are known; reweighted (Cauchy).
 void fit_translations(const std::vector<HandEyePair>& pairs, MarkerCalibration& c) {
-  constexpr double kSmallestScale_m = 0.01, kLever_m = 1;  // a weak prior: a motion without turns says nothing of the lever arm
+  constexpr double kSmallestScale_m = 0.01, kLever_m = 1;  // a weak prior: without turns the lever arm is unobservable
   double scale = 1e3;
   for (int i = 0; i < 20; ++i) {
     Mat6 A = Mat6::Zero();

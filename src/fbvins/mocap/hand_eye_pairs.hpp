@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to eval: poses of the estimate with what the markers say at the same instant, and a first, rough calibration that
-// bears flips and swaps. Pure functions, any thread.
+// Private to mocap: poses of the estimate with those of the markers at the same instant, and a first, rough calibration that
+// is robust to flips and swaps. Pure functions, any thread.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ namespace fbvins {
 struct HandEyePair {
   Time t;  ///< by the estimate's clock
   Pose<W, B> T_WB;
-  /// From the estimate, which is smoother than the markers: noise in what multiplies the clock's offset would pass for knowledge
-  /// of it.
+  /// From the estimate, which is smoother than the markers: noise in the Jacobian by the clock's offset would count as
+  /// information.
   Vec3 v_WB = Vec3::Zero(), w_WB_B = Vec3::Zero();
   Pose<V, K> T_VK;
 };
@@ -26,7 +26,7 @@ std::vector<HandEyePair> pair_up(const MarkerCurve& curve, const Trajectory<W>& 
 Result<MarkerCalibration> start_hand_eye(const std::vector<HandEyePair>& pairs, const MarkerCalibration& clocks,
                                          bool level_world);
 
-/// What is left of a pair: of positions in W, m; of rotations about axes of W, rad.
+/// Residual of a pair (H2): of positions in W, m; of rotations about axes of W, rad.
 Vec6 residual_of(const HandEyePair& pair, const MarkerCalibration& calibration);
 
 }  // namespace fbvins

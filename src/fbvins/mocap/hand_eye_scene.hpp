@@ -157,7 +157,7 @@ MarkerRecording record(const Flight& flight, Time start, const RecordingFaults& 
   return out;
 }
 
-/// Lever arm, rotation, clock: found less true, in the order of HandEye's unknowns.
+/// Lever arm, rotation, clock: found minus true, in the order of HandEye's unknowns.
 inline Eigen::Matrix<double, 7, 1> error_of(const MarkerCalibration& found, const MarkerCalibration& truth) {
   Eigen::Matrix<double, 7, 1> e;
   const double clock = (found.to_estimate(found.reference) - truth.to_estimate(found.reference)).seconds();

@@ -12,7 +12,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kGap_periods = 3;
-constexpr std::size_t kHeld_poses = 3;  // this many alike are no measurement any more
+constexpr std::size_t kHeld_poses = 3;  // this many identical ones are no measurements
 // Faster than any of these no indoor drone moves; the constants are the noise of a small rigid body.
 constexpr double kFastest_mps = 15, kFastest_radps = 25, kStep_m = 0.05, kStep_rad = 0.17;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with a track of markers by itself: gaps, poses that are held, and jumps to another body or another reading of the
-// same markers. Pure functions, any thread.
+// What is wrong with a track of markers by itself: gaps, poses that are held, and jumps to another body or another assignment of
+// the same markers. Pure functions, any thread.
 //
 //   MarkerInspection found = inspect(track);
 //   MarkerTrack clean = found.kept(track);
@@ -43,7 +43,7 @@ struct MarkerInspection {
   MarkerTrack kept(const MarkerTrack& track) const;
 };
 
-/// The track needs two poses; of fewer nothing is said.
+/// Finds nothing in a track of fewer than two poses.
 MarkerInspection inspect(const MarkerTrack& track);
 
 }  // namespace fbvins

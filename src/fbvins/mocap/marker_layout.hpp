@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: where the poses stand in the tables that motion-capture systems export. Pure functions, any thread.
+// Private to mocap: where the poses are in the tables that motion-capture systems export. Pure functions, any thread.
 #pragma once
 
 #include <optional>

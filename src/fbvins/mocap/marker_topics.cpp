@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kPose = "geometry_msgs/msg/PoseStamped", kOdometry = "nav_msgs/msg/Odometry";
 
 struct Topic {
-  std::vector<MarkerPose> poses;  ///< as they came
+  std::vector<MarkerPose> poses;  ///< in recorded order
   RowCounts counts;
 };
 

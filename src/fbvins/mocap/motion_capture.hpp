@@ -20,7 +20,7 @@
 namespace fbvins {
 
 struct MarkerBody {
-  std::string name;  ///< in MCAP its topic; empty in formats that know no names
+  std::string name;  ///< in MCAP its topic; empty in formats without names
   MarkerTrack track;
   int unseen = 0;  ///< rows in which the body was not seen
 };

@@ -68,7 +68,7 @@ std::vector<Format> formats() {
           {"qualisys by frames", "Qualisys TSV", qualisys_tsv(file, false), "", 1}};
 }
 
-TEST(MotionCapture, TablesOfThreeMakersSayTheSame) {
+TEST(MotionCapture, TablesOfThreeVendorsGiveTheSamePoses) {
   const WrittenFile file = two_bodies();
   for (const Format& format : formats()) {
     SCOPED_TRACE(format.name);
@@ -90,7 +90,7 @@ TEST(MotionCapture, MotivesUpBecomesZ) {
   EXPECT_LT((read->bodies[0].track[0].T_VK.p - Vec3(1, 2, 3)).norm(), 1e-12);
 }
 
-TEST(MotionCapture, ATsvOfAnotherHandIsRead) {
+TEST(MotionCapture, AThirdPartyTsvIsRead) {
   // Rows of a published recording (a model ship), a check on the order of the rotation's nine elements: roll -0.656 degrees.
   const std::string text =
       "NO_OF_FRAMES\t1\nNO_OF_CAMERAS\t4\nNO_OF_BODIES\t1\nFREQUENCY\t100\nDATA_INCLUDED\t6D\nBODY_NAMES\tPSVH\n"

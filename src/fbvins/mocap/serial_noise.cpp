@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-// Of standard deviations, m or rad: no two measurements are more alike than this.
+// Lower bounds of the standard deviations, m or rad.
 constexpr double kSmallestWhite = 2e-5, kSmallest = 1e-9;
 
 /// log white, log wander, log memory.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors that are correlated in time: white noise plus a part that wanders and slowly forgets (Ornstein-Uhlenbeck), and least
-// squares that weighs them accordingly. Pure functions, any thread.
+// Errors that are correlated in time: white noise plus an Ornstein-Uhlenbeck process, the part that "wanders", and least
+// squares weighted accordingly. Pure functions, any thread.
 //
 //   NormalSums sums = whitened_sums(noise, stamps_s, rows);    // rows: Jacobian | residual, in order of time
 //   SerialNoise fitted = fit_serial_noise(...);                // by restricted likelihood
@@ -17,7 +17,7 @@ namespace fbvins {
 struct SerialNoise {
   double white = 1;     ///< standard deviation of the part that is new at every row
   double wander = 0;    ///< standard deviation of the part that wanders
-  double memory_s = 1;  ///< after which 1/e of it is left
+  double memory_s = 1;  ///< its correlation time
 };
 
 /// One error component: columns of the Jacobian, then the residual, as rows in order of time.
