@@ -22,7 +22,7 @@ export class CameraView {
     this.draw();
   }
 
-  /// One is decoded at a time; meanwhile the newest waits, and those before it are not shown.
+  /// Decodes one image at a time; meanwhile only the newest one waits.
   async show(message) {
     this.waiting = message;
     if (this.decoding) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One place for the colours that mean something.
+// Colours with a meaning: health, age and depth of features.
 
 export const HEALTH = { good: "#54c98f", degraded: "#e8b64f", lost: "#f0716c", initialising: "#6ba8ec", none: "#7b8b96" };
 

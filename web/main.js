@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of `fbvins live --web` and `fbvins view`: what comes over the stream goes to the parts that show it.
+// The page of `fbvins live --web` and `fbvins view`: passes the stream's messages to the parts that show them.
 import { CameraView } from "./camera.js";
 import { clearFigures, showMap, showState, showStatus } from "./figures.js";
 import { Player } from "./player.js";
@@ -16,7 +16,7 @@ const camera = new CameraView();
 const plots = new Plots();
 const timeline = new Timeline(element("timeline"), element("changes"));
 const scene = makeScene();
-let newest_s = -Infinity;  // of what the path and the plots have
+let newest_s = -Infinity;  // time of the newest point of the path
 
 function makeScene() {
   try {
@@ -104,7 +104,7 @@ const on = {
   },
   status({ t_s, status }) {
     showStatus(status);
-    // Between images the watchdogs speak: sensors are silent.
+    // Between images health changes when sensors are silent.
     if (status.health !== element("health").dataset.state) {
       showHealth(status.health, healthSentence({ health: status.health, reason: status.reason, sigma_m: NaN }));
       timeline.add(t_s, status.health, status.reason);
@@ -140,7 +140,7 @@ const stream = new Stream({
     showHealth("none", "No connection to the program; trying again every two seconds.", "Not connected");
   },
   refused() {
-    showHealth("none", "The program wants a token.", "Not connected");
+    showHealth("none", "The program asks for a token.", "Not connected");
     element("token-dialog").showModal();
   },
 });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A finished flight, played: pause, wind back and forth.
+// Controls of a replay: play, pause, seek.
 import { clock } from "./words.js";
 
 const SEEK_MS = 100;

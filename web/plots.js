@@ -58,7 +58,7 @@ export class Plots {
       this.timer = undefined;
       for (const [name, plot] of Object.entries(this.plots)) {
         plot.setData(this.data(name));
-        if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: this.columns[0].length - 1 });  // the newest, unless one is pointed at
+        if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: this.columns[0].length - 1 });  // the newest values, unless the cursor is on the plot
       }
     }, REDRAW_MS);
   }

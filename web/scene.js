@@ -7,9 +7,9 @@ import { principalAxes } from "./ellipsoid.js";
 
 const MOST_PATH = 40_000, MOST_CLOUD = 40_000, MOST_WINDOW = 2000, MOST_KEYFRAMES = 2100;
 const ELLIPSOID_SIGMAS = 3;
-const SMALLEST_ON_SCREEN = 0.012;  // of the distance to the eye; a smaller ellipsoid is drawn ten or a hundred times as large
+const SMALLEST_ON_SCREEN = 0.012;  // of the viewing distance; a smaller ellipsoid is enlarged by powers of ten
 
-/// Points or line segments in memory that grows to a limit; then the newest go where the oldest were.
+/// Ring buffer of points or line segments: when it is full the newest replace the oldest.
 class Buffer {
   constructor(most, coloured) {
     this.most = most;
@@ -77,7 +77,7 @@ export class Scene {
       makePoints(this.cloud, 1.6, { color: "#6c7f8c", transparent: true, opacity: 0.75 }),
       makePoints(this.window, 3, { color: "#ffc66b" }),
       makePoints(this.mapped, 2, { color: "#8f6cb0", transparent: true, opacity: 0.6 }),
-      makePoints(this.path, 2.2, { vertexColors: true }),  // lines are a pixel wide whatever one asks for
+      makePoints(this.path, 2.2, { vertexColors: true }),  // as lines are always one pixel wide in WebGL
       makePoints(this.keyframes, 5, { color: "#c58cf0" }));
     this.body = new THREE.AxesHelper(0.4);
     this.body.visible = false;
@@ -89,7 +89,7 @@ export class Scene {
     this.setGrid(20, 1);
   }
 
-  /// `size`: of one cell, metres. Cell by cell, as a long line that passes by the eye is not drawn everywhere.
+  /// `size`: of one cell, metres. Drawn cell by cell, as some browsers do not draw a long line that passes by the eye whole.
   setGrid(cells, size) {
     if (this.grid) { this.scene.remove(this.grid); this.grid.geometry.dispose(); this.grid.material.dispose(); }
     const half = cells * size / 2, places = [];
@@ -115,7 +115,7 @@ export class Scene {
     this.wake();
   }
 
-  /// Point after point: a piece of line wherever the one before was in the same W.
+  /// Adds a point, with a line from the one before if that was in the same W.
   addPath(point, reset, health) {
     const colour = healthColours[health] ?? healthColours.none;
     if (this.last && this.last.reset === reset) {
@@ -135,7 +135,7 @@ export class Scene {
     this.keepInView();
     this.wake();
   }
-  /// Nearer or farther as the path grows, until somebody turns the view himself.
+  /// Adapts the distance as the path grows, until the viewer moves the view.
   keepInView() {
     if (this.touched || !this.follows || !this.box) return;
     const away = this.eye.position.clone().sub(this.controls.target);
@@ -177,7 +177,7 @@ export class Scene {
     this.wake();
   }
 
-  /// Three standard deviations; ten or a hundred times as large where that is too small to be seen.
+  /// Three standard deviations; enlarged by powers of ten where that is too small to see.
   placeEllipsoid() {
     if (!this.covariance || this.covariance.some(x => !Number.isFinite(x))) return;
     const { values, vectors } = principalAxes(this.covariance);
@@ -200,7 +200,7 @@ export class Scene {
     this.wake();
   }
 
-  /// Landmarks of the window; those that leave it stay where they were seen last.
+  /// Shows landmarks of the window; those that have left it stay where they were seen last.
   showPoints(message, inWindow) {
     if (inWindow) this.window.clear();
     for (let i = 0; i < message.count; ++i) {
@@ -223,7 +223,7 @@ export class Scene {
     }
   }
 
-  /// The whole path, from the side or from above.
+  /// Shows the whole path, from the side or from above.
   fit(fromAbove) {
     this.touched = true;
     const box = this.box?.clone() ?? new THREE.Box3(new THREE.Vector3(-2, -2, -1), new THREE.Vector3(2, 2, 1));

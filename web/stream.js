@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The connection: messages in, commands out, tried again when it breaks. The messages are described in docs/web.md.
+// The connection: messages in, commands out, reconnecting when it breaks. The messages are described in docs/web.md.
 
 const HEAD_BYTES = 24;
 const KINDS = { 1: "image", 2: "points", 3: "cloud" };
 const AGAIN_MS = 2000;
 
-/// A binary message: 24 bytes, then `count` times four numbers, then what is left.
+/// A binary message: 24 bytes, then `count` times four numbers, then the rest.
 export function decode(buffer) {
   const view = new DataView(buffer);
   const count = view.getUint32(4, true), end = HEAD_BYTES + 16 * count;
@@ -31,7 +31,7 @@ export class Stream {
     this.connect();
   }
 
-  /// Nobody looks at a hidden page, and a radio link has other things to carry.
+  /// A hidden page disconnects, to save the radio link.
   look() {
     if (document.hidden) this.socket?.close();
     else if (!this.socket) this.connect();
@@ -54,7 +54,7 @@ export class Stream {
     };
   }
 
-  /// A browser does not say why it got no WebSocket; a plain request does.
+  /// A browser does not tell why a WebSocket was refused; a plain request does.
   async askWhy() {
     const answer = await fetch(`/stream?token=${this.token}`).catch(() => undefined);
     if (answer?.status !== 401) return;

@@ -38,7 +38,7 @@ export class Timeline {
     this.drawSoon();
   }
 
-  /// The state at a time.
+  /// The health state at this time.
   stateAt(t_s) {
     let low = 0, high = this.changes.length;
     while (low < high) {
@@ -76,7 +76,7 @@ export class Timeline {
     this.changes.forEach((change, i) => {
       pen.fillStyle = HEALTH[change.state] ?? HEALTH.none;
       const from = x(change.t_s), to = x(this.changes[i + 1]?.t_s ?? this.end_s);
-      pen.fillRect(from, 0, Math.max(to - from, ratio), height);  // a short one is seen all the same
+      pen.fillRect(from, 0, Math.max(to - from, ratio), height);  // at least a pixel wide
     });
     pen.fillStyle = "#ffffff";
     for (const mark of this.marks) pen.fillRect(x(mark.t_s) - ratio, 0, 2 * ratio, height);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What states and reasons mean to somebody who has not read the documentation, and how figures are written.
+// States and reasons in plain words, and the format of figures.
 
 export const STATES = {
   good: "Good", degraded: "Degraded", lost: "Lost", initialising: "Starting",
@@ -34,7 +34,7 @@ export function healthSentence(state) {
 
 function sentence(words) { return words.charAt(0).toUpperCase() + words.slice(1) + "."; }
 
-/// A length in the unit that suits it.
+/// A length in cm or m.
 export function length(metres) {
   if (!Number.isFinite(metres)) return "–";
   if (metres < 0.1) return `${(100 * metres).toFixed(1)} cm`;
@@ -49,7 +49,7 @@ export function clock(seconds, digits = 1) {
   return `${minutes}:${rest.padStart(digits ? 3 + digits : 2, "0")}`;
 }
 
-/// Whole numbers with thin groups of three.
+/// Whole numbers with thin spaces between groups of three digits.
 export function count(number) { return String(number ?? "–").replace(/\B(?=(\d{3})+$)/g, "\u202f"); }
 
 /// Degrees about x, y, z of a body whose attitude is this quaternion: yaw about z, then pitch about y, then roll about x.

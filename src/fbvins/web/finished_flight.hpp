@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A flight that is over, as the events that a live one would have told: what `fbvins run --out` left in a folder, or a flight
+// A finished flight as the events that a live one would have published: from a folder of `fbvins run --out`, or from a flight
 // record.
 //
 //   Result<std::unique_ptr<FinishedFlight>> flight = open_finished_flight("out/klt", "MH_01_easy");
@@ -24,14 +24,14 @@ class FinishedFlight {
   virtual std::size_t size() const = 0;
   virtual Time time_of(std::size_t i) const = 0;
   virtual bool is_image(std::size_t i) const = 0;
-  /// Read when it is asked for: images are many.
+  /// Images are read from the disk at this call.
   virtual LiveEvent event(std::size_t i) const = 0;
 
   std::string name, frontend;
-  std::vector<PathPoint> path;  ///< all of it; times from the first event
+  std::vector<PathPoint> path;  ///< the whole path; times since the first event
 };
 
-/// `recording`: where a run's images are; empty: it is shown without.
+/// `recording`: the recording with a run's images; empty: without images.
 Result<std::unique_ptr<FinishedFlight>> open_finished_flight(const std::string& path, const std::string& recording = "");
 
 }  // namespace fbvins

@@ -80,7 +80,7 @@ class Record : public testing::Test {
   std::string path = testing::TempDir() + "finished_flight_test_" + std::to_string(getpid()) + ".mcap";
 };
 
-TEST_F(Record, TellsWhatTheFlightTold) {
+TEST_F(Record, GivesTheEventsOfTheFlight) {
   const auto flight = open_finished_flight(path);
   ASSERT_TRUE(flight) << flight.error().message;
   const auto poses = all<Odometry>(**flight);
@@ -132,7 +132,7 @@ TEST_F(Record, IsReadAsFarAsItGoes) {
   }
 }
 
-TEST_F(Record, IsPlayedWhenSomebodyLooksAndWoundBack) {
+TEST_F(Record, IsPlayedWhenSomebodyLooksAndSeeksBack) {
   const auto flight = open_finished_flight(path);
   ASSERT_TRUE(flight);
   FlightPlayer player(**flight);
@@ -151,7 +151,7 @@ TEST_F(Record, IsPlayedWhenSomebodyLooksAndWoundBack) {
   };
   EXPECT_NE(last_pose("\"playing\":false").find("\"image\":19,"), std::string::npos) << "it is played to its end";
   peer.say(R"({"do":"seek","t_s":0.501})");
-  EXPECT_NE(last_pose("\"playing\":false").find("\"image\":10,"), std::string::npos) << "and wound back";
+  EXPECT_NE(last_pose("\"playing\":false").find("\"image\":10,"), std::string::npos) << "and sought back";
   player.stop();
   playing.join();
 }

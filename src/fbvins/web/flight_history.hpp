@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a page that is opened in the middle of a flight is told first: the flight so far, in bounded memory. One thread at a time.
+// The flight so far in bounded memory, for pages that are opened in mid-flight. One thread at a time.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct FlightMark {
   std::string text;
 };
 
-/// What the plots show of one image.
+/// The plots' values at one image.
 struct SeriesPoint {
   double t_s = 0;
   double latency_ms = -1;  ///< negative: not known
@@ -39,7 +39,7 @@ struct SeriesPoint {
   std::int64_t dropped = 0;  ///< images, since the start
 };
 
-/// The last of many points by track: where each was when it was seen last.
+/// Last known positions of landmarks, by track; the oldest are dropped when it is full.
 class PointCloud {
  public:
   static constexpr std::size_t kMost = 20'000;
@@ -50,12 +50,12 @@ class PointCloud {
  private:
   std::vector<LiveView::Landmark> points_;
   std::unordered_map<std::int64_t, std::size_t> places_;  ///< by track
-  std::size_t oldest_ = 0;                                ///< where the next new one goes when full
+  std::size_t oldest_ = 0;                                ///< the next one to be replaced when it is full
 };
 
 class FlightHistory {
  public:
-  /// `view`: of the same image, where there is one; times are of the flight.
+  /// `view`: of the same image, or null. `t_s`: since the start of the flight.
   void add(double t_s, const Odometry& odometry, const LiveView* view);
   void add(double t_s, const LiveMark& mark);
   void dropped_images(std::int64_t count) { dropped_ = count; }
@@ -81,7 +81,7 @@ class FlightHistory {
   std::int64_t dropped_ = 0;
 };
 
-/// Of the position, over all axes: the square root of the covariance's trace.
+/// Standard deviation of the position over all axes: the square root of the position covariance's trace.
 double position_sigma_m(const Mat6& pose_covariance);
 
 }  // namespace fbvins

@@ -26,7 +26,7 @@ TEST(Thinned, KeepsTheWholeTimeInBoundedMemory) {
   EXPECT_GT(kept.back(), 1000 - 2 * kept[1]);
 }
 
-TEST(FlightHistory, MeasuresThePathAndNotTheRestart) {
+TEST(FlightHistory, PathLengthLeavesOutTheJumpAtARestart) {
   FlightHistory history;
   history.add(0, pose_at(0), nullptr);
   history.add(1, pose_at(2), nullptr);
@@ -47,7 +47,7 @@ TEST(FlightHistory, NotesHealthWhenItChanges) {
   EXPECT_EQ(history.health()[1].health, blind.health);
 }
 
-TEST(FlightHistory, SaysNothingOfAPoseWhereThereIsNone) {
+TEST(FlightHistory, HasNoPathWithoutAPose) {
   FlightHistory history;
   history.add(0, Odometry{}, nullptr);
   EXPECT_TRUE(history.path().empty());
@@ -55,7 +55,7 @@ TEST(FlightHistory, SaysNothingOfAPoseWhereThereIsNone) {
   EXPECT_LT(history.newest().latency_ms, 0);
 }
 
-TEST(PointCloud, HoldsTheLastPlaceOfTheNewestTracks) {
+TEST(PointCloud, HoldsTheLastPositionsOfTheNewestTracks) {
   PointCloud cloud;
   const auto most = static_cast<std::int64_t>(PointCloud::kMost);
   for (std::int64_t i = 0; i < most + 10; ++i) cloud.add({TrackId{i}, Vec3(1, 0, 0)});

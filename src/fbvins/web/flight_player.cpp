@@ -19,7 +19,7 @@ WebFlight FlightPlayer::description() const {
   WebFlight flight{.source = flight_.name, .frontend = flight_.frontend, .replay = true};
   flight.duration_s = end_s();
   flight.cannot_save_map = "this flight is over";
-  // What a screen can show of it.
+  // Thinned out to what a screen can show.
   const std::size_t stride = flight_.path.size() / 6000 + 1;
   for (std::size_t i = 0; i < flight_.path.size(); i += stride) flight.whole_path.push_back(flight_.path[i]);
   return flight;
@@ -37,7 +37,7 @@ void FlightPlayer::stop() {
   changed_.notify_all();
 }
 
-/// Nullopt when the time has come, or at the end.
+/// None when `until` has come, or at stop().
 std::optional<WebCommand> FlightPlayer::wait_for_command(Clock::time_point until) {
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, until, [&] { return stopped_ || wanted_; });
@@ -79,11 +79,11 @@ void FlightPlayer::obey(WebSink& sink, const WebCommand& command) {
   sink.show_replay(shown_s_, playing_);
 }
 
-/// From the beginning: what a page shows is the sum of what it was told.
+/// Goes through all events from the beginning, as a page shows the sum of what it has received.
 void FlightPlayer::wind_to(WebSink& sink, double t_s) {
   std::size_t end = 0;
   while (end < flight_.size() && time_s(end) <= t_s) ++end;
-  // The last image is told as if it came now, the rest at once.
+  // The events of the last image are sent as new ones, those before it as history.
   std::size_t last = end;
   while (last > 0 && flight_.time_of(last - 1) == flight_.time_of(end - 1)) --last;
   sink.begin_again();

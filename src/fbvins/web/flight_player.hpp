@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays a finished flight to a page as if it were live: begins when somebody looks, and can be wound back and forth.
+// Plays a finished flight to a page as if it were live: begins when somebody looks; a viewer may pause and seek.
 //
 //   FlightPlayer player(*flight);
-//   auto sink = WebSink::create(options, page_files(), player.description(), {.replay = player.commands()});
-//   player.play(**sink, stop_token);      // until it is stopped
+//   auto sink = WebSink::create(options, page_files(), player.description(), {.replay = [&](auto& c) { player.command(c); }});
+//   player.play(**sink);                  // until stop()
 #pragma once
 
 #include <condition_variable>
@@ -38,12 +38,12 @@ class FlightPlayer {
   const FinishedFlight& flight_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<WebCommand> wanted_;  ///< the newest
+  std::optional<WebCommand> wanted_;  ///< the newest command that waits
   bool stopped_ = false;
 
-  // Of play()'s thread.
+  // Used by play()'s thread alone.
   using Clock = std::chrono::steady_clock;
-  std::size_t next_ = 0;  ///< event
+  std::size_t next_ = 0;  ///< index of the next event
   bool playing_ = false;
   Clock::time_point began_;  ///< when the event at 0 s would have been due
   double shown_s_ = 0;

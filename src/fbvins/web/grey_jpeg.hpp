@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: an image as a JPEG small enough to be looked at over a radio link. One thread an encoder.
+// Private: encodes an image as a JPEG that is small enough for a radio link. One thread per encoder.
 #pragma once
 
 #include <memory>

@@ -6,7 +6,7 @@
 
 namespace fbvins {
 
-/// Empty where npm, which has the page's libraries, was not there or not reached.
+/// Empty where npm, from which the page's libraries come, was missing or could not reach its registry.
 PageFiles page_files();
 
 }  // namespace fbvins

@@ -37,7 +37,7 @@ Mat6 get_covariance(CdrReader& cdr) {
   return out;
 }
 
-/// Words of the file as values of the type; nullopt for a word of another version.
+/// The enumerator with this name; none for a name of another version.
 template <class Value>
 std::optional<Value> value_of(std::string_view word, Value last) {
   for (int i = 0; i <= static_cast<int>(last); ++i)
@@ -156,7 +156,7 @@ std::optional<std::vector<RosDiagnostic>> read_diagnostics(std::string_view byte
 }
 
 std::optional<LiveView> read_view(std::string_view bytes) {
-  constexpr std::string_view kFields[] = {"x", "y", "z", "track", "u", "v", "age", "depth"};  // as append_landmarks() has them
+  constexpr std::string_view kFields[] = {"x", "y", "z", "track", "u", "v", "age", "depth"};  // as append_landmarks() writes them
   CdrReader cdr(bytes);
   const std::optional<Time> t = get_header(cdr);
   cdr.get<std::uint32_t>();
@@ -174,7 +174,7 @@ std::optional<LiveView> read_view(std::string_view bytes) {
   ByteCursor points(cdr.bytes());
   LiveView view;
   view.t = *t;
-  view.shutter_to_pose_ms = -1;  // is not recorded of each image
+  view.shutter_to_pose_ms = -1;  // not recorded for each image
   for (std::uint32_t i = 0; i < count && points.ok(); ++i) {
     const float x = points.get<float>(), y = points.get<float>(), z = points.get<float>();
     const TrackId track{points.get<std::uint32_t>()};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: a flight record's messages as our values again. Nullopt for bytes that are no such message. Pure functions, any
+// Private: decodes a flight record's messages. Nullopt for bytes that are not such a message. Pure functions, any
 // thread.
 #pragma once
 
@@ -12,9 +12,9 @@
 
 namespace fbvins {
 
-/// A pose with its covariances, of the topic /odometry; the rest of it is void.
+/// Pose, velocities and pose covariance of the topic /odometry; the rest is left at its default.
 std::optional<Odometry> read_record_odometry(std::string_view bytes);
-/// What the estimator's own diagnostic says: health, statistics, level; nullopt for that of the live system.
+/// Fills in health, statistics and level from the estimator's diagnostic; false for that of the live system.
 bool take_record_health(const RosDiagnostic& diagnostic, Odometry& odometry);
 /// Counts, latencies and health of the live system.
 std::optional<LiveStatus> status_of(const RosDiagnostic& diagnostic);

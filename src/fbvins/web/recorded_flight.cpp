@@ -18,7 +18,7 @@ namespace {
 
 enum class Kind { odometry, image, view, status, mark };
 
-/// A message in the file, and the small ones as they are.
+/// An event: a message's place in the file; of odometry only its time.
 struct Moment {
   Time t;
   Kind kind;
@@ -41,9 +41,9 @@ class RecordedFlight final : public FinishedFlight {
     Result<McapReader> reader = McapReader::open(bytes_, file);
     if (!reader) return reader.error();
     while (const auto message = reader->next()) take(*message);
-    if (odometry_.empty()) return Error{ErrorCode::unsupported, fmt::format("{}: holds nothing that the odometry said", file)};
+    if (odometry_.empty()) return Error{ErrorCode::unsupported, fmt::format("{}: contains no odometry", file)};
     for (const auto& [t, o] : odometry_) moments_.push_back({t, Kind::odometry});
-    // Of one image: its pixels, what was seen in it, then the pose; the rest behind.
+    // At the same time: the image, then its features, then the pose, then the rest.
     const auto place = [](Kind kind) {
       return kind == Kind::image ? 0 : kind == Kind::view ? 1 : kind == Kind::odometry ? 2 : 3;
     };
@@ -83,7 +83,7 @@ class RecordedFlight final : public FinishedFlight {
     else if (topic == kOdometryTopic) take_pose(message);
   }
 
-  /// The estimator's health comes before its pose, and alone where there is none.
+  /// The estimator's health comes before its pose, and alone where there is no pose.
   template <class Keep>
   void take_health(const McapMessage& message, const Keep& keep) {
     const auto diagnostics = read_diagnostics(message.data);

@@ -87,7 +87,7 @@ Odometry odometry_of(const NamedRows& row, std::int64_t image) {
 
 struct RunImage {
   Odometry odometry;
-  int features = 0;  ///< followed and new
+  int features = 0;  ///< tracked and new
 };
 
 class RunFlight final : public FinishedFlight {
@@ -97,10 +97,10 @@ class RunFlight final : public FinishedFlight {
     const auto text = text_of(file);
     if (!text)
       return Error{ErrorCode::unreadable,
-                   fmt::format("{}: cannot be read: a folder of fbvins run --out or a flight record is wanted", file)};
+                   fmt::format("{}: cannot be read: give a folder of fbvins run --out or a flight record", file)};
     for (NamedRows rows(*text); rows.next();) images_.push_back({.odometry = odometry_of(rows, std::ssize(images_))});
     std::erase_if(images_, [](const RunImage& image) { return image.odometry.t.ns <= 0; });
-    if (images_.empty()) return Error{ErrorCode::malformed, file + ": holds no poses"};
+    if (images_.empty()) return Error{ErrorCode::malformed, file + ": contains no poses"};
     read_statistics(folder);
     read_gauge(folder);
     read_summary(folder);
@@ -119,7 +119,7 @@ class RunFlight final : public FinishedFlight {
     return {};
   }
 
-  // Four of an image: its pixels, what was seen, the pose, the counts so far.
+  // Four events for each image: the image, its features, the pose, the counts so far.
   std::size_t size() const override { return 4 * images_.size(); }
   Time time_of(std::size_t i) const override { return images_[i / 4].odometry.t; }
   bool is_image(std::size_t i) const override { return i % 4 == 0; }
@@ -139,7 +139,7 @@ class RunFlight final : public FinishedFlight {
   }
 
  private:
-  /// How many features there were is known, where they were is not.
+  /// Of the features only the number is known.
   static LiveView view_of(const RunImage& image) {
     LiveView view;
     view.t = image.odometry.t;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: a long series in bounded memory. When it is full every second value is left out, and from then on only every second
-// one is kept, and so on: always the whole time, ever more coarsely. One thread.
+// Private: a long series in bounded memory. When it is full every second value is dropped, and from then on only every second
+// new one is kept, and so on: it always covers the whole time, ever more coarsely. One thread.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what waits for one viewer. Bounded: the oldest image goes first, then the oldest of the rest. One thread.
+// Private: a viewer's queue. When it is full the oldest image is dropped, or else the oldest message. One thread.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may look: where the server listens, and which requests it answers. Pure functions, any thread.
+// Access control: where the server listens, and which requests it answers. Pure functions, any thread.
 //
-// A browser on this machine will send requests here for any page that it shows. Two things tell such a page from ours: a name
-// that somebody's DNS made point here is in `Host`, and the page that asks is in `Origin`.
+// A foreign page in a browser on this machine can send requests here. `Host` and `Origin` tell them from our page's: a foreign
+// name that resolves to this machine (DNS rebinding) is in `Host`, and the page that sends the request is in `Origin`.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace fbvins {
 
 struct WebAddress {
   std::string host = "127.0.0.1";  ///< an IP address
-  std::uint16_t port = 0;          ///< 0: any that is free
+  std::uint16_t port = 0;          ///< 0: any free one
 
   bool loopback() const;
 };
@@ -23,16 +23,16 @@ struct WebAddress {
 /// [ADDRESS:]PORT, an IPv6 address in brackets; without an address this machine alone.
 Result<WebAddress> parse_web_address(const std::string& text);
 
-/// Is `Host` an IP address, localhost, or `machine` with or without .local? Any other name may be made to point here by whoever
-/// owns it.
+/// Whether `Host` is an IP address, localhost, or `machine` with or without .local. Any other name may have been made to resolve
+/// to this machine by its owner.
 bool host_allowed(std::string_view host_header, std::string_view machine);
-/// Does the page that asks come from the very host that is asked? Without `Origin` no browser asks.
+/// Whether the requesting page was served by the requested host. Requests without `Origin` are not a foreign page's.
 bool origin_allowed(std::string_view origin_header, std::string_view host_header);
-/// In a time that does not tell how much of it is right.
+/// In constant time, whatever part of it is right.
 bool token_equal(std::string_view given, std::string_view token);
 /// The value of `token` in a request's target, "/stream?token=...".
 std::string_view token_of(std::string_view target);
-/// Letters, digits, - and _, eight at least: it stands in an address.
+/// At least eight letters, digits, - and _, as it is part of a URL.
 bool token_usable(std::string_view token);
 /// 128 bits of the system's randomness, as text.
 Result<std::string> make_token();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what the server's connections share. All of it belongs to the server's thread, but for the two counts.
+// Private: data shared by the server's connections. Used on the server's thread alone, but for the two counts.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@ struct WebShared {
   PageFiles files;
   WebServer::Callbacks callbacks;
   std::string machine;          ///< this machine's name
-  std::size_t connections = 0;  ///< open now
+  std::size_t connections = 0;  ///< that are open
   std::atomic<int> viewers{0}, dropped{0};
 };
 
@@ -42,15 +42,15 @@ class WebViewer {
  public:
   virtual ~WebViewer() = default;
   virtual void send(const SharedMessage& message) = 0;
-  /// Nothing waits for it.
+  /// Whether everything has been sent to it.
   virtual bool idle() const = 0;
-  /// To be called once a second: drops a viewer that takes nothing.
+  /// To be called once a second: drops a viewer that does not read.
   virtual void judge() = 0;
   virtual void close() = 0;
 };
 using WebViewers = std::set<std::shared_ptr<WebViewer>>;
 
-/// Answers a connection's requests until it ends or becomes one of `viewers`, which outlive it.
+/// Answers a connection's requests until it ends or becomes one of `viewers`, which must outlive it.
 void receive_visitor(boost::asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers);
 
 }  // namespace fbvins

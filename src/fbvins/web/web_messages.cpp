@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the page reads numbers as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "the page reads little-endian numbers");
 
 using Json = nlohmann::ordered_json;
 
@@ -23,7 +23,7 @@ SharedMessage text(const Json& json) {
   return std::make_shared<const WebMessage>(WebMessage{json.dump(-1, ' ', false, Json::error_handler_t::replace), false, false});
 }
 
-/// Few digits make short messages: 1e-4 of the unit is less than a pixel of any screen.
+/// Few digits keep messages short; 1e-4 of the unit is less than a pixel.
 double rounded(double x) { return std::round(x * 1e4) / 1e4; }
 Json rounded(const Vec3& v) { return {rounded(v.x()), rounded(v.y()), rounded(v.z())}; }
 Json known(double x) { return x < 0 ? Json() : Json(rounded(x)); }
@@ -36,7 +36,7 @@ Json path_json(const std::vector<PathPoint>& path) {
   return out;
 }
 
-/// A count, a time, two numbers for the kind's own use: the start of every binary message, 24 bytes.
+/// Header of every binary message, 24 bytes (docs/web.md).
 struct BinaryHead {
   std::uint8_t kind;
   std::uint8_t version = 1;
@@ -121,7 +121,7 @@ SharedMessage map_message(double t_s, const MapUpdate& update, int loops) {
   json["localised"] = update.localised;
   if (update.localised) json["position_of_odometry_m"] = rounded(update.T_MW.p);
   if (!update.localised || update.corrected.empty()) return text(json);
-  // The page shows the odometry's frame; where the map has its keyframes now is drawn into it.
+  // The page shows W: the map's keyframes are transformed into it.
   const Pose<W, M> T_WM = update.T_MW.inverse();
   const std::size_t stride = update.corrected.size() / kMostKeyframes + 1;
   Json& corrected = json["corrected_m"] = Json::array();

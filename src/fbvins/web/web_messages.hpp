@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what a page is told, encoded once for all viewers (docs/web.md). Pure functions, any thread.
+// Private: messages to the pages, encoded once for all viewers (docs/web.md). Pure functions, any thread.
 #pragma once
 
 #include <optional>
@@ -13,14 +13,14 @@
 
 namespace fbvins {
 
-/// What a page is told of the flight as a whole, before anything else.
+/// Description of the flight, sent to a page first.
 struct WebFlight {
   std::string program = "fbvins";  ///< with its version
   std::string source = {}, frontend = {};
-  bool replay = false;    ///< a finished flight that is played: it can be wound back and forth
+  bool replay = false;    ///< a finished flight, in which a viewer may seek
   double duration_s = 0;  ///< of a replay
   bool can_mark = false;
-  std::string cannot_save_map = {};     ///< why not, in one sentence; empty: it can
+  std::string cannot_save_map = {};     ///< why not, in one sentence; empty: it can be saved
   std::vector<PathPoint> whole_path{};  ///< of a replay
 };
 
@@ -30,15 +30,15 @@ SharedMessage state_message(double t_s, const Odometry& odometry, const LiveView
 SharedMessage status_message(double t_s, const LiveStatus& status, const LivePose& newest);
 SharedMessage map_message(double t_s, const MapUpdate& update, int loops);
 SharedMessage mark_message(const FlightMark& mark);
-/// Something a person should read, by whoever did what was asked for.
+/// A sentence for people, such as the result of a command.
 SharedMessage note_message(const std::string& text, bool bad);
-/// A replay: where it is and whether it goes on.
+/// A replay's time, and whether it is playing.
 SharedMessage replay_message(double t_s, bool playing);
-/// A replay: what was told of the flight is void, and follows again.
+/// A replay has jumped: all that was sent of the flight is void, and follows again.
 SharedMessage rewound_message();
 SharedMessage end_message();
 
-/// JPEG with the features of that very image, whose full size is given.
+/// JPEG with the features of the same image; the size is that of the image before it was scaled down.
 SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int height_px,
                             const std::vector<LiveView::Feature>& features);
 /// Replaces the window's landmarks, or (`cloud`) adds to those seen before.
@@ -48,9 +48,9 @@ struct WebCommand {
   enum class Kind { mark, save_map, seek, play, pause };
   Kind kind;
   std::string text = {};  ///< of a mark
-  double t_s = 0;         ///< to seek
+  double t_s = 0;         ///< of a seek
 };
-/// Nullopt for what is no command.
+/// Nullopt for anything that is not a command.
 std::optional<WebCommand> parse_command(std::string_view text);
 
 }  // namespace fbvins

@@ -19,7 +19,7 @@ Number number_at(const std::string& bytes, std::size_t at) {
   return number;
 }
 
-TEST(StateMessage, SaysThePoseOnlyWhereThereIsOne) {
+TEST(StateMessage, HasAPoseOnlyWhereThereIsOne) {
   FlightHistory history;
   Odometry o;
   o.id = FrameId{5};
@@ -73,7 +73,7 @@ TEST(HelloMessage, QuotesWhatPeopleWrote) {
   EXPECT_EQ(json["can_save_map"], false);
 }
 
-TEST(Command, IsTakenOrPassedOver) {
+TEST(Command, IsParsedOrIgnored) {
   EXPECT_EQ(parse_command(R"({"do":"mark","text":"here"})")->text, "here");
   EXPECT_EQ(parse_command(R"({"do":"mark","text":")" + std::string(500, 'x') + "\"}")->text.size(), 120u);
   EXPECT_EQ(parse_command(R"({"do":"save_map"})")->kind, WebCommand::Kind::save_map);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what the server answers to a request. Pure, without a socket; any thread.
+// Private: the server's answers to requests. Pure, without a socket; any thread.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace fbvins {
 
-/// What counts of a request. Views into its bytes.
+/// The parts of a request that matter. Views into its bytes.
 struct WebRequest {
   std::string_view host = {}, origin = {};  ///< the headers; empty where they are missing
   std::string_view target = {};             ///< path and query
@@ -24,7 +24,7 @@ struct WebAnswer {
   bool gzip = false;
 };
 
-/// `machine` is this machine's own name, `viewers` how many look already. The answer's bytes are those of `files`, or constants.
+/// `machine`: this machine's own name; `viewers`: how many there are. The answer's bytes are those of `files`, or constants.
 WebAnswer answer_to(const WebRequest& request, const WebOptions& options, const PageFiles& files, std::string_view machine,
                     std::size_t viewers);
 

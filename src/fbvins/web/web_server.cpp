@@ -101,7 +101,7 @@ class WebServer::Impl {
       accept();
     });
   }
-  /// Most likely there are no more descriptors.
+  /// The likely cause is a lack of file descriptors.
   void accept_later() {
     pause_.expires_after(kAcceptPause);
     pause_.async_wait([this](Failure failure) {

@@ -4,8 +4,8 @@
 //   auto server = WebServer::start({.address = {"127.0.0.1", 8080}}, files, {.greet = ..., .command = ...});
 //   (*server)->send(std::make_shared<const WebMessage>(WebMessage{"{}"}));    // any thread; never waits
 //
-// One thread of its own. Every viewer has a bounded queue that drops its oldest; one that takes nothing for some seconds is
-// dropped itself. Nothing that a peer sends, or fails to read, is felt by whoever calls send().
+// One thread of its own. Every viewer has a bounded queue that drops its oldest messages; one that does not read for some seconds
+// is dropped itself. Nothing that a peer sends, or fails to read, delays a caller of send().
 #pragma once
 
 #include <chrono>
@@ -24,7 +24,7 @@ namespace fbvins {
 
 /// A file of the page, embedded in the program.
 struct PageFile {
-  std::string_view path;  ///< as asked for: "/main.js"
+  std::string_view path;  ///< of the URL: "/main.js"
   std::string_view type;  ///< MIME
   std::string_view bytes;
   bool gzip = false;
@@ -33,32 +33,32 @@ using PageFiles = std::vector<PageFile>;
 
 struct WebOptions {
   WebAddress address = {};
-  std::string token = {};         ///< asked of every viewer; empty: of none
-  std::size_t most_viewers = 32;  ///< further ones are told to come later
+  std::string token = {};         ///< that every viewer must give; empty: none is needed
+  std::size_t most_viewers = 32;  ///< further ones are refused
   std::size_t most_connections = 128;
-  std::chrono::milliseconds patience{10'000};  ///< for a request to come whole, and for a viewer to take what it is sent
+  std::chrono::milliseconds patience{10'000};  ///< for a complete request, and for a viewer to read
 };
 
 class WebServer {
  public:
-  /// Both on the server's thread, which they must not hold up.
+  /// Both are called on the server's thread and must not block.
   struct Callbacks {
     std::function<std::vector<SharedMessage>()> greet = [] { return std::vector<SharedMessage>{}; };  ///< to a new viewer, first
     std::function<void(std::string_view)> command = [](std::string_view) {};                          ///< text of a viewer
   };
 
-  /// An error where the address cannot be listened at.
+  /// An error where it cannot listen at the address.
   static Result<std::unique_ptr<WebServer>> start(const WebOptions& options, PageFiles files, Callbacks callbacks);
   ~WebServer();
-  /// Leaves everybody; no callback comes afterwards, and what is sent is dropped.
+  /// Closes all connections; afterwards no callback comes, and messages are dropped.
   void stop();
 
   void send(SharedMessage message);
   int viewers() const;
-  /// Viewers that were dropped because they took nothing.
+  /// Viewers that were dropped because they did not read.
   int dropped_viewers() const;
   std::uint16_t port() const;
-  /// Waits until every viewer has what was sent, for no longer than this.
+  /// Waits until every viewer has received what was sent, for no longer than `patience`.
   void drain(std::chrono::milliseconds patience);
 
  private:

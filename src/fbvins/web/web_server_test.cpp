@@ -108,7 +108,7 @@ TEST_F(Server, GreetsAndStreamsToTenViewers) {
   EXPECT_TRUE(comes_true([&] { return server->viewers() == 0; }));
 }
 
-TEST_F(Server, HearsCommandsAndLeavesThoseWhoShout) {
+TEST_F(Server, TakesCommandsAndDropsThoseWhoSendTooMuch) {
   start();
   TestPeer peer(server->port());
   peer.watch();
@@ -140,7 +140,7 @@ TEST_F(Server, LimitsViewersAndHeaders) {
   expect_works();
 }
 
-TEST_F(Server, LeavesThoseWhoSayNothing) {
+TEST_F(Server, DropsThoseWhoSendNothing) {
   start({.patience = 200ms});
   TestPeer silent(server->port());
   EXPECT_TRUE(silent.closed_within(5s));

@@ -16,10 +16,10 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kPicturePeriod = 190ms, kPointsPeriod = 190ms;
 /// Faster cameras are thinned out.
 constexpr auto kStatePeriod = 30ms;
-/// For viewers to get what was sent last.
+/// Time for viewers to receive the last messages.
 constexpr auto kFarewell = 3s;
 
-/// Is it time again? Then the next time is a period later.
+/// Whether `when` has come; then it is set a period ahead.
 bool due(Clock::time_point& when, Clock::duration period) {
   const auto now = Clock::now();
   if (now < when) return false;
@@ -50,7 +50,7 @@ std::string WebSink::url() const {
     std::array<char, 256> name{};
     host = gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
   }
-  // After the # nothing leaves the browser: no log and no other server gets to see the token.
+  // A browser does not send what follows the #: the token gets into no log.
   return fmt::format("http://{}:{}/{}{}", host, port(), options_.token.empty() ? "" : "#token=", options_.token);
 }
 
@@ -104,7 +104,7 @@ Result<void> WebSink::take(const LiveEvent& event) {
   return {};
 }
 
-/// Encoded at once rather than kept: its memory may be the sensor's. One waits for its odometry, and the next one for that.
+/// Encoded at once rather than kept, as its memory may be the sensor's. It waits for its odometry; until then no other is taken.
 void WebSink::show(const StereoFrame& frame) {
   if (!frame.left || picture_ || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
   picture_ = {frame.t, encoder_.encode(*frame.left), frame.left->width(), frame.left->height()};
@@ -113,7 +113,7 @@ void WebSink::show(const StereoFrame& frame) {
 void WebSink::show(const Odometry& o) {
   const double t_s = since_start_s(o.t);
   const LiveView* view = view_ && view_->t == o.t ? &*view_ : nullptr;
-  const bool looked_at = viewers() > 0 || flight_.replay;  // a replay that stands still has to say where
+  const bool looked_at = viewers() > 0 || flight_.replay;  // a paused replay needs the last state
   const bool send_state = looked_at && !silent_ && due(state_due_, kStatePeriod);
   {
     const std::lock_guard lock(mutex_);
@@ -129,7 +129,7 @@ void WebSink::show(const Odometry& o) {
   }
 }
 
-/// The features are those of the very image, or none.
+/// With the features of the same image, or none.
 void WebSink::send_picture(double t_s) {
   const Picture picture = *std::exchange(picture_, std::nullopt);
   const bool same = view_ && view_->t == picture.t;
@@ -147,7 +147,7 @@ void WebSink::show(const MapUpdate& update) {
 }
 
 void WebSink::show(const LiveStatus& status) {
-  if (status.t.ns == 0) return;  // no sensor has spoken yet
+  if (status.t.ns == 0) return;  // no sensor data yet
   const SharedMessage message = status_message(since_start_s(status.t), status, newest_);
   const std::lock_guard lock(mutex_);
   history_.dropped_images(status.counts.images_dropped);
@@ -196,7 +196,7 @@ void WebSink::caught_up() {
 Result<void> WebSink::finish() {
   server_->send(end_message());
   server_->drain(kFarewell);
-  server_->stop();  // what its actions speak to may soon be gone
+  server_->stop();  // the targets of its actions may be destroyed next
   return {};
 }
 

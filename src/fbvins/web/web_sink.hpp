@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A live flight in a browser: one page, served by this program, and a stream of what happens to every page that looks
-// (docs/web.md). Also shows a finished flight, whose events are given to it one by one.
+// Shows a live flight in a browser: one page, served by this program, and a stream of messages to every viewer (docs/web.md).
+// Also shows a finished flight, whose events it is given one by one.
 //
 //   auto sink = WebSink::create({.address = {"127.0.0.1", 8080}}, page_files(), flight, actions);
 //   live.add_sink(*std::move(sink));
 //
-// Each event is encoded once, whoever looks; images only while somebody does, five a second.
+// Each event is encoded once for all viewers; images only while there is a viewer, five a second.
 #pragma once
 
 #include <functional>
@@ -22,7 +22,7 @@
 
 namespace fbvins {
 
-/// What a viewer may ask for, called on the server's thread; none may wait for anything.
+/// A viewer's commands, called on the server's thread; none may block.
 struct WebActions {
   std::function<void(std::string)> mark = [](std::string) {};
   std::function<void()> save_map = [] {};
@@ -39,19 +39,19 @@ class WebSink final : public Sink {
   Result<void> take(const LiveEvent& event) override;
   Result<void> finish() override;
 
-  /// From any thread: a sentence for everybody who looks.
+  /// Sends a sentence to all viewers. From any thread.
   void tell(const std::string& sentence, bool bad);
-  // Of a replay, from the thread that gives events.
+  // For replays, from the thread that calls take().
   void show_replay(double t_s, bool playing);
-  /// All is void; what comes until caught_up() is told at once then.
+  /// Discards the history. Events until caught_up() are not sent one by one, but as history then.
   void begin_again();
   void caught_up();
-  /// Times on the page begin here; without it at the first image.
+  /// Zero of the times on the page; without it the first event with a stamp.
   void set_start(Time start);
 
   int viewers() const { return server_->viewers(); }
   std::uint16_t port() const { return server_->port(); }
-  /// What to type into a browser.
+  /// Address for a browser, with the token.
   std::string url() const;
 
  private:
@@ -71,7 +71,7 @@ class WebSink final : public Sink {
 
   WebOptions options_;
   WebActions actions_;
-  std::mutex mutex_;  ///< of what a greeting is made of
+  std::mutex mutex_;  ///< guards the data of a greeting
   WebFlight flight_;
   FlightHistory history_;
   std::optional<Time> start_;
@@ -79,7 +79,7 @@ class WebSink final : public Sink {
   std::optional<Odometry> untold_;  ///< the newest since begin_again()
   SharedMessage last_state_, last_status_, last_map_, last_points_, last_image_, last_replay_;
 
-  // Of the thread that gives events.
+  // Used by the thread that calls take().
   struct Picture {
     Time t;
     std::string jpeg;
@@ -92,7 +92,7 @@ class WebSink final : public Sink {
   std::chrono::steady_clock::time_point picture_due_{}, points_due_{}, state_due_{};
   int loops_ = 0;
 
-  std::unique_ptr<WebServer> server_;  ///< last: its thread uses what is above
+  std::unique_ptr<WebServer> server_;  ///< last: its thread uses the members above
 };
 
 }  // namespace fbvins

@@ -61,7 +61,7 @@ class Page : public testing::Test {
   std::unique_ptr<WebSink> sink;
 };
 
-TEST_F(Page, TellsWhoComesLateTheFlightSoFar) {
+TEST_F(Page, SendsALateViewerTheFlightSoFar) {
   open({.source = "somewhere"});
   fly(0, 100);
   TestPeer peer(sink->port());
@@ -103,7 +103,7 @@ TEST_F(Page, ShowsImagesWithTheirOwnFeaturesWhileSomebodyLooks) {
   EXPECT_EQ(height, 48);
 }
 
-TEST_F(Page, ButtonsDoWhatTheyMay) {
+TEST_F(Page, ButtonsDoWhatIsAllowed) {
   std::atomic<int> marks{0}, saves{0};
   WebFlight flight;
   flight.can_mark = true;

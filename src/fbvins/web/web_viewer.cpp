@@ -19,9 +19,9 @@ using Request = http::request<http::empty_body>;
 
 constexpr std::size_t kMostCommand_bytes = 1024;
 constexpr int kMostCommandsPerSecond = 40;
-/// What the kernel may hold for a viewer: seconds of the stream, not minutes.
+/// The kernel's buffer for a viewer: seconds of the stream, not minutes.
 constexpr int kSendBuffer_bytes = 256 * 1024;
-/// A viewer that has answered no ping for so long is gone: a phone out of reach.
+/// A viewer that answers no ping for this long is dropped: a phone out of reach.
 constexpr std::chrono::seconds kIdle{30};
 
 /// Leaves `viewers` when it ends.

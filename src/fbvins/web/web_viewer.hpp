@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: a connection that has asked for the stream. The server's thread.
+// Private: a connection that has requested the stream. On the server's thread.
 #pragma once
 
 #include <boost/beast/core/tcp_stream.hpp>
@@ -11,7 +11,7 @@
 
 namespace fbvins {
 
-/// Shakes hands; from then on it is one of `viewers`, until it ends, whatever ends it.
+/// Completes the WebSocket handshake; then the connection is one of `viewers` until it ends.
 void accept_viewer(boost::beast::tcp_stream&& stream, const boost::beast::http::request<boost::beast::http::empty_body>& request,
                    std::shared_ptr<WebPlace> place, WebViewers& viewers);
 

@@ -32,7 +32,7 @@ WebRequest seen_as(const Request& request) {
           .upgrades = beast::websocket::is_upgrade(request)};
 }
 
-/// Requests, one after the other.
+/// Answers the requests of one connection, one after the other.
 class Visitor : public std::enable_shared_from_this<Visitor> {
  public:
   Visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers)
