@@ -5,8 +5,8 @@
     run = fbvins.run("MH_01_easy", frontend="orb", loop=True)
     print(fbvins.evaluate(run.ground_truth, run))
 
-Frames: W is the odometry's world (z up), M the map, G the estimator's own frame, B the body, which is the IMU, C0 and C1 the left and right
-camera (z forward, x right, y down). T_WB takes body coordinates to world. Quaternions are Hamilton, w first. SI units and radians; time
+Frames: W is the odometry frame (gravity-aligned, z up), M the map frame, G the gauge frame, in which the estimator computes, B the body frame,
+which is the IMU's, C0 and C1 the left and right camera (z forward, x right, y down). T_WB takes body coordinates to world. Quaternions are Hamilton, w first. SI units and radians; time
 is int64 nanoseconds of the sensors' clock. Covariances of poses are of (dp in W [m], dtheta in B [rad]).
 """
 from __future__ import annotations
@@ -42,8 +42,8 @@ def _assignments(options: Mapping, prefix: str = "") -> Iterable[str]:
 
 
 def config(file: Optional[PathLike] = None, options: Optional[Mapping] = None) -> Config:
-    """The options of odometry, map and live sensors: the defaults, changed by a YAML file (or what a flight record was flown with),
-    then by `options`, such as {"frontend.kind": "orb"} or {"frontend": {"kind": "orb"}}. ValueError for an unknown option."""
+    """The options of odometry, map and live sensors: the defaults, changed by a YAML file (or by the options of a flight record), then
+    by `options`, such as {"frontend.kind": "orb"} or {"frontend": {"kind": "orb"}}. ValueError for an unknown option."""
     return Config(os.fspath(file) if file is not None else "", list(_assignments(options or {})))
 
 
@@ -66,15 +66,15 @@ def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibrat
          skip_frames: int = 0, max_frames: int = 0, topics: Tuple[str, ...] = (), start_s: float = 0.0,
          duration_s: float = 0.0) -> Recording:
     """A recording: a EuRoC or TUM-VI folder, an EuRoC zip, a flight record, a ROS 1 or ROS 2 bag, an MCAP file of ROS messages.
-    `calibration` is a file of any format that fbvins.calibration.load() knows, instead of the recording's own. `topics` of a bag, where they are not found:
-    left, right and, if there are several, IMU. max_frames 0: all. Only what is stamped from start_s seconds after the first stereo frame on, for duration_s
-    seconds (0: to the end)."""
+    `calibration` is a file of any format that fbvins.calibration.load() knows, instead of the recording's own. `topics` of a bag, where they are
+    not found automatically: left, right and, if there are several, IMU. max_frames 0: all. start_s, duration_s: only events stamped from start_s
+    seconds after the first stereo frame on, for duration_s seconds (0: to the end)."""
     left, right, imu = (tuple(topics) + ("", "", ""))[:3]
     return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, left, right, imu)
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:
-    """A synthetic flight with exact truth, rendered image by image while it is gone through: the same events, whatever the machine.
+    """A synthetic flight with exact ground truth, rendered image by image while it is iterated: the same events on every machine.
     `seconds` 0: the preset's length. simulation_presets() lists the presets."""
     return _fbvins.simulate(preset, seed, seconds)
 
@@ -84,11 +84,11 @@ def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, l
         load_map: Optional[PathLike] = None, save_map: Optional[PathLike] = None, vocabulary: Optional[PathLike] = None,
         imu_state: Optional[PathLike] = None, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
         max_images: int = 0, progress: Optional[Callable[[int, int], object]] = None) -> Run:
-    """Estimates a whole recording, as `fbvins run` does, with the same bytes.
+    """Estimates a whole recording, as `fbvins run` does: the same results to the byte.
 
-    recording: a path, or a Recording that nobody has gone through.  frontend: "klt", "orb" or "boost"; None: as configured.
-    loop: a map beside the odometry; load_map, save_map, final_ba, boosted_map imply it.  config: a Config, a file or a dict of options;
-    `options` over that.  imu_state: file of the IMU's biases from flight to flight.  progress(done, all) is called now and then.
+    recording: a path, or a Recording that has not been iterated yet.  frontend: "klt", "orb" or "boost"; None: as configured.
+    loop: loop closure with a map; load_map, save_map, final_ba, boosted_map imply it.  config: a Config, a file or a dict of options;
+    `options` override it.  imu_state: file that carries the IMU's biases from flight to flight.  progress(done, all) is called every 16 images.
     """
     if isinstance(recording, Recording):
         if calibration or imu_calibration or max_images:
@@ -115,12 +115,12 @@ class Map(_fbvins.Map):
 
     def __init__(self, rig: Rig, file: Optional[PathLike] = None, *, vocabulary: Optional[PathLike] = None, boosted: bool = False,
                  config: AnyConfig = None):
-        """file: a map to find oneself in and go on with; None: a new one, in which M begins where W does."""
+        """file: a map to relocalise in and to extend; None: a new one, whose M starts equal to W."""
         super().__init__(rig, _path(file), _path(vocabulary), boosted, _as_config(config))
 
 
 def load_map(path: PathLike) -> MapContents:
-    """What is in a map that `fbvins run --save-map` or Map.save() wrote."""
+    """Contents of a map file that `fbvins run --save-map` or Map.save() wrote."""
     return _fbvins.load_map(os.fspath(path))
 
 
@@ -151,7 +151,7 @@ def evaluate(truth: AnyTrajectory, estimate: AnyTrajectory, align: str = "se3", 
     """Absolute and relative errors of an estimate, as `fbvins eval` has them; they agree with evo.
 
     Both: a Trajectory, a Run, a TUM or EuRoC file, or arrays (t, p, q): int64 (N,) ns, float64 (N, 3) m, float64 (N, 4) w first.
-    align: "se3", "yaw", "sim3" or "none". interpolate: the truth at the estimate's very stamps instead of the nearest one.
+    align: "se3", "yaw", "sim3" or "none". interpolate: the truth interpolated at the estimate's stamps instead of its nearest pose.
     """
     return _fbvins.evaluate(_as_trajectory(truth), _as_trajectory(estimate), align, max_difference_s, interpolate)
 
@@ -167,8 +167,8 @@ def boost(descriptors: Union[Features, numpy.ndarray], keypoints: Optional[numpy
     boosted ones only.
 
     boost(orb(image)), or its parts: descriptors, the int8 (N, 512) margins of Features (uint8 (N, 32) for weights trained on bits),
-    keypoints, float64 (N, 6) as in Features, and size, (width, height) of the image. All of an image's features go in together:
-    the network looks at them as a whole.
+    keypoints, float64 (N, 6) as in Features, and size, (width, height) of the image. Pass all features of an image together:
+    the result of each depends on all of them.
     """
     network = _booster(weights)
     if isinstance(descriptors, Features):

@@ -4,8 +4,8 @@
   python -m fbvins.bench scenarios.yaml --out /shared/scenarios --dask tcp://scheduler:8786
   python -m fbvins.bench scenarios.yaml --out /shared/scenarios --slurm | sbatch
 
-All machines see the matrix, the recordings and OUT under the same paths, and run the same build of `fbvins`. A cell whose worker dies is done by
-another one; a cell is done once, whoever tries it. The tables are those of `fbvins bench` alone.
+All machines need the matrix, the recordings and OUT under the same paths, and the same build of `fbvins`. A cell whose worker dies is done by
+another one; a cell is done once, however many workers try it. The tables are those of `fbvins bench` alone.
 """
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from typing import NamedTuple, Sequence
 
 
 class CellEnd(NamedTuple):
-    """What became of a cell."""
+    """Result of a cell."""
 
     cell: str
     exit_code: int
-    said: str  #: on stderr; empty when all is well
+    said: str  #: output on stderr; empty on success
 
 
 def bench_command(program: str, matrix: str, out: str, further: Sequence[str] = ()) -> list[str]:
-    """`fbvins bench` on that matrix; further: its own options, as --euroc."""
+    """`fbvins bench` on that matrix; further: its own options, such as --euroc."""
     return [program, "bench", matrix, "--out", out, *further]
 
 
@@ -40,14 +40,14 @@ def list_cells(command: Sequence[str]) -> list[str]:
 
 
 def run_cell(command: Sequence[str], cell: str) -> CellEnd:
-    """One cell, on this machine; where it was done before, at once."""
+    """Runs one cell on this machine; returns at once where it was done before."""
     done = subprocess.run([*command, "--cell", cell, "--quiet"], capture_output=True, text=True, check=False)
     return CellEnd(cell, done.returncode, done.stderr.strip())
 
 
 def run_on_dask(client, command: Sequence[str]) -> list[CellEnd]:
-    """All cells on the workers of a distributed.Client, a task each. The scheduler gives a cell whose worker died to another one, and gives it
-    up when several have died of it (distributed.scheduler.allowed-failures)."""
+    """All cells on the workers of a distributed.Client, a task each. The scheduler gives a cell whose worker died to another one, and gives up
+    after several deaths (distributed.scheduler.allowed-failures)."""
     from distributed import as_completed
 
     cells = list_cells(command)
@@ -55,33 +55,33 @@ def run_on_dask(client, command: Sequence[str]) -> list[CellEnd]:
     ends = {}
     for future in as_completed(list(futures)):
         cell = futures[future]
-        error = future.exception()  # of the task itself, as when its workers died too often
+        error = future.exception()  # of the task itself, such as when its workers died too often
         ends[cell] = CellEnd(cell, -1, str(error)) if error else future.result()
         print(f"{len(ends)}/{len(cells)} cells  {cell}  {ends[cell].said or 'done'}", file=sys.stderr)
     return [ends[cell] for cell in cells]
 
 
 def write_tables(command: Sequence[str]) -> int:
-    """The tables of the finished matrix; what failed is tried once more, here. The exit code is that of `fbvins bench`."""
+    """Writes the tables of the finished matrix; failed cells are tried once more, on this machine. The exit code is that of `fbvins bench`."""
     return subprocess.run(list(command), check=False).returncode
 
 
 def slurm_script(command: Sequence[str], name: str = "fbvins-bench") -> str:
-    """An array job, a cell each, for sbatch. When it is through, `fbvins bench` without --cell writes the tables."""
+    """An array job for sbatch, one task per cell. When it has finished, `fbvins bench` without --cell writes the tables."""
     words = shlex.join(command)
     return f"""#!/bin/bash
 #SBATCH --job-name={name}
 #SBATCH --array=1-{len(list_cells(command))}
 #SBATCH --cpus-per-task=2
 #SBATCH --requeue
-# The tables, when the array is through: sbatch --dependency=afterany:JOB --wrap {shlex.quote(words)}
+# For the tables, once the array has finished: sbatch --dependency=afterany:JOB --wrap {shlex.quote(words)}
 cell=$({words} --list | sed -n "${{SLURM_ARRAY_TASK_ID}}p")
 exec {words} --cell "$cell"
 """
 
 
 def dask_client(address: str):
-    """A distributed.Client, or the end of the program with a sentence."""
+    """A distributed.Client; exits with an error message where the package is missing."""
     try:
         from distributed import Client
     except ImportError:
@@ -91,12 +91,12 @@ def dask_client(address: str):
 
 def parse(arguments: Sequence[str] | None):
     parser = argparse.ArgumentParser(prog="python -m fbvins.bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
-                                     epilog="Further options are those of `fbvins bench`, as --euroc DIR.")
+                                     epilog="Further options are those of `fbvins bench`, such as --euroc DIR.")
     parser.add_argument("matrix", metavar="MATRIX", help="YAML file, as for fbvins bench")
     parser.add_argument("--out", required=True, help="folder for the results, shared by all machines")
     parser.add_argument("--program", default=os.environ.get("FBVINS") or shutil.which("fbvins"), help="fbvins (default: $FBVINS, or that of PATH)")
     where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--dask", metavar="ADDRESS", help="of a Dask scheduler, as tcp://HOST:8786")
+    where.add_argument("--dask", metavar="ADDRESS", help="of a Dask scheduler, such as tcp://HOST:8786")
     where.add_argument("--slurm", action="store_true", help="print the array job for sbatch")
     known, further = parser.parse_known_args(arguments)
     if not known.program:

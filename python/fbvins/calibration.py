@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def load(path: PathLike, imu: Optional[PathLike] = None) -> _fbvins.Rig:
-    """Told apart by content: Kalibr's camchain-imucam.yaml (cam0 is left, cam1 right), OpenVINS's estimator_config.yaml or kalibr_imucam_chain.yaml,
-    Basalt's calibration.json (pinhole, pinhole-radtan8, kb4), VINS-Fusion's configuration with its two camera files (PINHOLE,
-    KANNALA_BRANDT), an EuRoC folder. imu: noise figures as Kalibr writes them, instead of the file's own."""
+    """The format is recognised by content: Kalibr's camchain-imucam.yaml (cam0 is left, cam1 right), OpenVINS's estimator_config.yaml or
+    kalibr_imucam_chain.yaml, Basalt's calibration.json (pinhole, pinhole-radtan8, kb4, ds, eucm), VINS-Fusion's configuration with its two camera
+    files (PINHOLE, KANNALA_BRANDT, MEI), a EuRoC folder. imu: noise figures in Kalibr's format, instead of the file's own."""
     return _fbvins.load_calibration(os.fspath(path), os.fspath(imu) if imu is not None else "")
 
 
@@ -25,7 +25,7 @@ kalibr = openvins = basalt = vins_fusion = euroc = load
 
 
 def ros_camera_info(left: PathLike, right: PathLike, T_BC0: numpy.ndarray, imu_noise: Optional[_fbvins.ImuNoise] = None) -> _fbvins.Rig:
-    """Two files of ROS's camera calibration. They say how the cameras see each other; where the IMU is says T_BC0, float64 (4, 4), which takes
+    """From two files of ROS's camera calibration. They contain the stereo extrinsics but not those of the IMU: T_BC0, float64 (4, 4), takes
     coordinates in the left camera to the IMU, m."""
     rig = _fbvins.load_camera_info(os.fspath(left), os.fspath(right), T_BC0)
     if imu_noise is None:

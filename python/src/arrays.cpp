@@ -26,7 +26,7 @@ std::string text_of(std::initializer_list<std::int64_t> shape) {
   return fmt::format("({}{})", fmt::join(sides, ", "), sides.size() == 1 ? "," : "");
 }
 
-/// What the object is, in words.
+/// Type and shape of the object, for messages.
 std::string text_of(nb::handle object) {
   const nb::object type = object.type().attr("__name__");
   if (!nb::hasattr(object, "dtype") || !nb::hasattr(object, "shape")) return nb::str(type).c_str();
@@ -80,7 +80,7 @@ CheckedArray<T> checked(nb::handle object, const char* name, std::initializer_li
   for (std::size_t axis = 0; fits && axis < shape.size(); ++axis)
     fits = shape.begin()[axis] == kAny || static_cast<std::int64_t>(array.shape(axis)) == shape.begin()[axis];
   if (!fits) refuse(fmt::format("not {}", text_of(object)));
-  if (has_holes(array)) refuse("this one has holes or another order; np.ascontiguousarray() makes one");
+  if (has_holes(array)) refuse("this one is not contiguous or in another order; use np.ascontiguousarray()");
   CheckedArray<T> out{nb::borrow(object), static_cast<const T*>(array.data()), {}};
   for (std::size_t axis = 0; axis < array.ndim(); ++axis) out.shape.push_back(array.shape(axis));
   return out;
@@ -106,7 +106,7 @@ Pose<To, From> transform(nb::handle object, const char* name) {
   const CheckedArray<double> array = checked<double>(as_double(object), name, {4, 4});
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> T(array.data);
   const Mat3 R = T.topLeftCorner<3, 3>();
-  constexpr double kTolerance = 1e-3;  // matrices typed by hand carry three or four digits
+  constexpr double kTolerance = 1e-3;  // matrices typed by hand have three or four digits
   const bool rigid = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kTolerance && R.determinant() > 0 &&
                      T.row(3) == Eigen::RowVector4d(0, 0, 0, 1) && T.allFinite();
   if (!rigid) throw nb::value_error(fmt::format("{}: a rotation and a translation over 0 0 0 1 is expected", name).c_str());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NumPy arrays in and out: what comes in is checked, what goes out is not copied twice. With the GIL.
+// NumPy arrays in and out: inputs are checked, outputs are not copied a second time. All functions need the GIL.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -17,7 +17,7 @@ namespace fbvins::python {
 
 namespace nb = nanobind;
 
-/// Raises what an Error of the library is in Python: FileNotFoundError, OSError, ValueError or RuntimeError.
+/// Raises an Error of the library as a Python exception: FileNotFoundError, OSError, ValueError or RuntimeError.
 [[noreturn]] void raise(const Error& error);
 
 template <class T>
@@ -29,13 +29,13 @@ inline void check(const Result<void>& result) {
   if (!result) raise(result.error());
 }
 
-/// Numbers on their way out, which own themselves: also as a property, for which nanobind would have the object own them.
+/// An array to return that owns its memory, also as a property, where nanobind would make the object its owner.
 template <class T>
 struct Array {
   nb::ndarray<nb::numpy, T> numbers;
 };
 
-/// Hands the numbers over to NumPy.
+/// Moves the numbers into a NumPy array.
 template <class T>
 Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shape) {
   auto* kept = new std::vector<T>(std::move(values));
@@ -43,7 +43,7 @@ Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shap
   return {nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.begin(), owner)};
 }
 
-/// A matrix or vector of Eigen's, row by row; a vector has one axis.
+/// An Eigen matrix or vector, row-major; a vector has one axis.
 template <class Derived>
 Array<double> to_array(const Eigen::MatrixBase<Derived>& m) {
   std::vector<double> values;
@@ -59,10 +59,10 @@ Array<double> to_array(const Pose<To, From>& T) {
   return matrix_of(T.q, T.p);
 }
 
-/// The w first.
+/// In the package's order, w first.
 inline Eigen::Vector4d wxyz(const Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-/// One number a row: `of(row)`.
+/// One number per row: `of(row)`.
 template <class T, class Rows, class Function>
 Array<T> column(const Rows& rows, Function of) {
   std::vector<T> values;
@@ -71,7 +71,7 @@ Array<T> column(const Rows& rows, Function of) {
   return to_array(std::move(values), {rows.size()});
 }
 
-/// One vector or matrix of Eigen's of fixed size a row: (N, n) or (N, n, m).
+/// One Eigen vector or matrix of fixed size per row: (N, n) or (N, n, m).
 template <class Rows, class Function>
 Array<double> columns(const Rows& rows, Function of) {
   using Matrix = std::decay_t<decltype(of(*rows.begin()))>;
@@ -87,11 +87,11 @@ Array<double> columns(const Rows& rows, Function of) {
   return to_array(std::move(values), {rows.size(), kRows, kColumns});
 }
 
-/// Any number, in the shape of a checked array.
+/// Any size of an axis, in the shape of a checked array.
 inline constexpr std::int64_t kAny = -1;
 
-/// An array of exactly this kind, row after row without holes, read in place. Raises ValueError with what `name` should be and
-/// what it is. The object keeps the memory alive.
+/// An array of exactly this type and shape, contiguous in C order, read in place. Raises ValueError with what was expected of
+/// `name` and what it is. The object keeps the memory alive.
 template <class T>
 struct CheckedArray {
   nb::object keeper;
@@ -103,7 +103,7 @@ struct CheckedArray {
 template <class T>
 CheckedArray<T> checked(nb::handle object, const char* name, std::initializer_list<std::int64_t> shape);
 
-/// A list or tuple of numbers does for a small array of double.
+/// Converts a list or tuple of numbers to an array of double; returns any other object as it is.
 nb::object as_double(nb::handle object);
 
 Vec3 vector3(nb::handle object, const char* name);

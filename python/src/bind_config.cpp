@@ -13,7 +13,7 @@ Config make_config(const std::string& file, const std::vector<std::string>& assi
   return value_or_raise(load_config(file, assignments));
 }
 
-/// As what it is: bool, int, float or str.
+/// In its own type: bool, int, float or str.
 nb::object value_of(const OptionField& field) {
   return std::visit(
       [](const auto& value) -> nb::object {

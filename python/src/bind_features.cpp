@@ -51,7 +51,7 @@ Array<std::int8_t> margins_of(const Features& f) {
   return to_array(std::move(values), {f.orb.margins.size(), static_cast<std::size_t>(kMarginsPerFeature)});
 }
 
-/// The network with a lock: any thread may call.
+/// The network behind a lock, so that any thread may call it.
 class Booster {
  public:
   Booster(const std::string& name, bool exact)
@@ -98,14 +98,14 @@ void bind_features(nb::module_& m) {
       .def_prop_ro(
           "keypoints", &keypoints_of,
           "float64 (N, 6): x, y [px of the image], scale [px of the image a px of its level spans], angle [rad, from x to y], "
-          "score (Harris), level")
+          "score (Harris), level of the pyramid")
       .def_prop_ro(
           "descriptors", [](const Features& f) { return bytes_of(f.orb.descriptors); },
           "uint8 (N, 32): 256 bits, to be compared by Hamming distance")
       .def_prop_ro(
           "margins", &margins_of,
-          "int8 (N, 512): how clearly each of the 256 comparisons was decided, in 1/32 of their root mean square, near and "
-          "around; what the shipped booster takes")
+          "int8 (N, 512): margin of each of the 256 comparisons, in 1/32 of their root mean square, of the pattern and of its "
+          "surroundings; the input of the shipped booster")
       .def_prop_ro(
           "size", [](const Features& f) { return nb::make_tuple(f.width, f.height); }, "(width, height) of the image, px")
       .def("__len__", [](const Features& f) { return f.orb.size(); })
@@ -116,7 +116,7 @@ void bind_features(nb::module_& m) {
 
   nb::class_<Booster>(m, "Booster", "The network that improves descriptors (paper 2.2.2), loaded once. Any thread may call.")
       .def(nb::init<const std::string&, bool>(), "weights"_a = "boost-s", "exact"_a = false,
-           "weights: 'boost-s', which ships, or a .safetensors file. exact: single precision instead of whole numbers.")
+           "weights: 'boost-s', which ships, or a .safetensors file. exact: single precision instead of 8-bit integers.")
       .def("__call__", &Booster::boost, "descriptors"_a, "keypoints"_a, "width"_a, "height"_a, "uint8 (N, 32).")
       .def_prop_ro("takes_margins", &Booster::takes_margins, "descriptors are Features.margins; False: Features.descriptors");
 }

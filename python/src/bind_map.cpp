@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maps: beside a System, and what is in their files.
+// Maps of a System, and the contents of their files.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -61,17 +61,17 @@ Array<double> points_of(const MapContents& contents) {
 
 void bind_map(nb::module_& m) {
   nb::class_<PyMap>(m, "Map",
-                    "A map beside the odometry, given to System(map=...): recognises places and says where W lies in M. Call "
+                    "Loop closure, given to System(map=...): recognises places and estimates the pose of W in M. Call "
                     "finish() after the system's finish(), then save().")
       .def("__init__", &make_map, "rig"_a, "file"_a = "", "vocabulary"_a = "", "boosted"_a = false, "config"_a = Config{},
-           "file: a map to find oneself in and go on with; empty: a new one, in which M begins where W does.")
+           "file: a map to relocalise in and to extend; empty: a new one, whose M starts equal to W.")
       .def(
           "finish",
           [](PyMap& self) {
             nb::gil_scoped_release released;
             self.map->finish();
           },
-          "A last optimisation over everything, once the flight is over.")
+          "Last pose-graph optimisation, once the flight is over.")
       .def(
           "adjust",
           [](PyMap& self) {
@@ -81,15 +81,15 @@ void bind_map(nb::module_& m) {
             }();
             if (!report.refused.empty()) throw nb::value_error(report.refused.c_str());
           },
-          "After finish(): bundle adjustment over all of it. ValueError where the result is not more plausible; the map is as it was.")
-      .def("corrected", &corrected, "odometry"_a, "The Trajectory of a flight in M as the map has it now.")
+          "After finish(): bundle adjustment of the whole map. ValueError where the result fits no better; the map is unchanged then.")
+      .def("corrected", &corrected, "odometry"_a, "The Trajectory of a flight in M by the map's present state.")
       .def_prop_ro(
-          "keyframes", [](const PyMap& self) { return self.map->keyframes(); }, "how many it holds")
+          "keyframes", [](const PyMap& self) { return self.map->keyframes(); }, "number of keyframes")
       .def(
           "save", [](const PyMap& self, const std::string& path) { check(self.map->save(path)); }, "path"_a)
       .def("__repr__", [](const PyMap& self) { return fmt::format("<fbvins.Map of {} keyframes>", self.map->keyframes()); });
 
-  nb::class_<MapContents>(m, "MapContents", "What is in a map file.")
+  nb::class_<MapContents>(m, "MapContents", "Contents of a map file.")
       .def_prop_ro("keyframes", &keyframes_of, "Trajectory of B in M")
       .def_prop_ro("points", &points_of, "float64 (N, 3), m in M")
       .def_prop_ro(
@@ -97,16 +97,16 @@ void bind_map(nb::module_& m) {
           [](const MapContents& c) {
             return column<std::int64_t>(c.map.keyframes(), [](const MapKeyframe& k) { return k.session; });
           },
-          "int64, which flight each keyframe is of")
+          "int64 (N,), the flight of each keyframe")
       .def_prop_ro("loops",
                    [](const MapContents& c) {
                      return std::count_if(c.map.edges.begin(), c.map.edges.end(),
                                           [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
                    })
       .def_prop_ro(
-          "boosted", [](const MapContents& c) { return c.map.boosted; }, "descriptors are boosted ones")
+          "boosted", [](const MapContents& c) { return c.map.boosted; }, "whether the descriptors are boosted")
       .def("__repr__", [](const MapContents& c) { return fmt::format("<fbvins.MapContents of {} keyframes>", c.map.size()); });
-  m.def("load_map", &load, "path"_a, "What is in a map that `fbvins run --save-map` or Map.save() wrote.");
+  m.def("load_map", &load, "path"_a, "Contents of a map file that `fbvins run --save-map` or Map.save() wrote.");
 }
 
 }  // namespace fbvins::python

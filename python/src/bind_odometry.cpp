@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator tells the world, image by image.
+// The estimator's and loop closure's results, image by image.
 #include <fmt/format.h>
 
 #include "bindings.hpp"
@@ -10,14 +10,14 @@ namespace fbvins::python {
 
 void bind_odometry(nb::module_& m) {
   nb::class_<Odometry>(m, "Odometry",
-                       "One pose of the flight, at an image's stamp. W is z up, level as far as known, and never leaps unless "
-                       "reset_counter counts up; B is the IMU.")
+                       "One pose of the flight, at an image's stamp. W is gravity-aligned (z up) as far as gravity is known, and "
+                       "never jumps unless reset_counter increases; B is the IMU.")
       .def_prop_ro(
           "frame", [](const Odometry& o) { return o.id.value; }, "counts the images from 0")
       .def_prop_ro(
           "t", [](const Odometry& o) { return o.t.ns; }, "ns of the cameras' clock")
       .def_prop_ro(
-          "has_pose", [](const Odometry& o) { return o.health.has_pose(); }, "False: pose and covariances mean nothing")
+          "has_pose", [](const Odometry& o) { return o.health.has_pose(); }, "False: pose and covariances are meaningless")
       .def_prop_ro(
           "p", [](const Odometry& o) { return to_array(o.T_WB.p); }, "(3,), p_WB, m in W")
       .def_prop_ro(
@@ -25,7 +25,7 @@ void bind_odometry(nb::module_& m) {
       .def_prop_ro(
           "T_WB", [](const Odometry& o) { return to_array(o.T_WB); }, "(4, 4), takes body to W")
       .def_prop_ro(
-          "T_GB", [](const Odometry& o) { return to_array(o.gauge.T_GB); }, "(4, 4), in the estimator's own frame G")
+          "T_GB", [](const Odometry& o) { return to_array(o.gauge.T_GB); }, "(4, 4), in the gauge frame G")
       .def_prop_ro(
           "v", [](const Odometry& o) { return to_array(o.v_WB); }, "(3,), v_WB, m/s in W")
       .def_prop_ro(
@@ -43,25 +43,25 @@ void bind_odometry(nb::module_& m) {
           "health", [](const Odometry& o) { return std::string(to_string(o.health.state)); },
           "initialising, good, degraded or lost")
       .def_prop_ro("reason", [](const Odometry& o) { return std::string(to_string(o.health.reason)); })
-      .def_ro("level", &Odometry::level, "the tilt is known to 0.3 degrees")
+      .def_ro("level", &Odometry::level, "whether the tilt is known to 0.3 degrees")
       .def_ro("tilt_sigma_rad", &Odometry::tilt_sigma_rad)
-      .def_ro("reset_counter", &Odometry::reset_counter, "+1 whenever the estimator started again: W is a new frame then")
+      .def_ro("reset_counter", &Odometry::reset_counter, "+1 whenever the estimator restarts: W is a new frame then")
       .def("__repr__", [](const Odometry& o) {
         return fmt::format("<fbvins.Odometry frame {} t={} ns {} p=({:.3f}, {:.3f}, {:.3f})>", o.id.value, o.t.ns,
                            to_string(o.health.state), o.T_WB.p.x(), o.T_WB.p.y(), o.T_WB.p.z());
       });
 
-  nb::class_<MapUpdate>(m, "MapUpdate", "What loop closure says after a keyframe: T_MB = T_MW T_WB. M is level.")
+  nb::class_<MapUpdate>(m, "MapUpdate", "Result of loop closure after a keyframe: T_MB = T_MW T_WB. M is gravity-aligned.")
       .def_prop_ro(
           "t", [](const MapUpdate& u) { return u.t.ns; }, "ns, of the keyframe")
       .def_prop_ro("frame", [](const MapUpdate& u) { return u.frame.value; })
       .def_prop_ro(
-          "applies_from", [](const MapUpdate& u) { return u.applies_from.value; }, "first frame that comes after it")
-      .def_ro("localised", &MapUpdate::localised, "False: where W is in M is not known")
+          "applies_from", [](const MapUpdate& u) { return u.applies_from.value; }, "the first frame after it")
+      .def_ro("localised", &MapUpdate::localised, "False: the pose of W in M is unknown")
       .def_prop_ro(
           "T_MW", [](const MapUpdate& u) { return to_array(u.T_MW); }, "(4, 4); jumps when a place is recognised")
       .def_prop_ro(
-          "T_MW_smooth", [](const MapUpdate& u) { return to_array(u.T_MW_smooth); }, "(4, 4), to fly by")
+          "T_MW_smooth", [](const MapUpdate& u) { return to_array(u.T_MW_smooth); }, "(4, 4), without jumps, for control")
       .def_prop_ro(
           "T_MG", [](const MapUpdate& u) { return to_array(u.T_MG); }, "(4, 4)")
       .def_prop_ro(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings and simulations: sensor events in order of time.
+// Recordings and simulations as iterators of sensor events in order of time.
 #include <fmt/format.h>
 
 #include "bindings.hpp"
@@ -76,19 +76,19 @@ void bind_recording(nb::module_& m) {
       .def_prop_ro(
           "t", [](const StereoFrame& f) { return f.t.ns; }, "ns of the cameras' clock")
       .def_prop_ro(
-          "left", [](const StereoFrame& f) { return pixels(f.left); }, "uint8 (height, width), read-only; None: nothing came")
+          "left", [](const StereoFrame& f) { return pixels(f.left); }, "uint8 (height, width), read-only; None: missing")
       .def_prop_ro(
-          "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: nothing came")
+          "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: missing")
       .def("__repr__", [](const StereoFrame& f) { return fmt::format("<fbvins.StereoFrame t={} ns>", f.t.ns); });
 
   nb::class_<Dataset>(m, "Recording",
                       "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
-                      "It can be gone through once.")
+                      "It can be iterated once.")
       .def_prop_ro("rig", &Dataset::rig, "the calibration")
       .def_prop_ro("name", [](const Dataset& d) { return d.info().name; })
       .def_prop_ro("format", [](const Dataset& d) { return d.info().format; })
       .def_prop_ro(
-          "warnings", [](const Dataset& d) { return d.info().warnings; }, "what is broken in it, a sentence each")
+          "warnings", [](const Dataset& d) { return d.info().warnings; }, "its faults, a sentence each")
       .def_prop_ro(
           "image_stamps",
           [](const Dataset& d) { return column<std::int64_t>(d.frames(), [](const FrameEntry& f) { return f.t.ns; }); },

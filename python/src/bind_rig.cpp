@@ -59,7 +59,7 @@ StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb
 }  // namespace
 
 void bind_rig(nb::module_& m) {
-  nb::class_<Camera>(m, "Camera", "A camera: size, lens. Lengths in pixels.")
+  nb::class_<Camera>(m, "Camera", "A camera: image size and lens model. Lengths in pixels.")
       .def(
           nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
           "distortion"_a = std::vector<double>{},
@@ -69,7 +69,7 @@ void bind_rig(nb::module_& m) {
       .def_prop_ro("height", &Camera::height, "px")
       .def_prop_ro("model", &Camera::model_name)
       .def_prop_ro("intrinsics", &Camera::intrinsics, "fx, fy, cx, cy in px")
-      .def_prop_ro("distortion", &Camera::distortion, "the model's numbers, in the order above")
+      .def_prop_ro("distortion", &Camera::distortion, "the model's parameters, in the order above")
       .def("__repr__", &text_of);
 
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")

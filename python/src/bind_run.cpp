@@ -20,8 +20,8 @@ struct PyRun {
   const std::vector<app::TrackedRecord>& tracked() const { return flight.run.tracked; }
 };
 
-/// Every so many frames Python may see signals and progress.
-constexpr int kFramesBetweenLooks = 16;
+/// Frames between two checks for signals and calls of `progress`.
+constexpr int kFramesBetweenChecks = 16;
 
 PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool final_ba, bool boosted_map,
           const std::string& load_map, const std::string& save_map, const std::string& vocabulary, const std::string& imu_state,
@@ -31,8 +31,8 @@ PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool fi
   arguments.imu_state = imu_state;
   arguments.threaded = threaded;
   const int all = static_cast<int>(data.frames().size());
-  const auto look = [&](int frames) {
-    if (frames % kFramesBetweenLooks != 0 && frames != all) return;
+  const auto on_frame = [&](int frames) {
+    if (frames % kFramesBetweenChecks != 0 && frames != all) return;
     const nb::gil_scoped_acquire acquired;
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
     if (!progress.is_none()) progress(frames, all);
@@ -40,7 +40,7 @@ PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool fi
   PyRun out;
   auto flight = [&] {
     nb::gil_scoped_release released;
-    return app::run_flight(arguments, config, data, {.on_frame = look});
+    return app::run_flight(arguments, config, data, {.on_frame = on_frame});
   }();
   out.flight = value_or_raise(std::move(flight));
   if (out.flight.map && !out.flight.map->not_saved.empty()) raise(Error{ErrorCode::unwritable, out.flight.map->not_saved});
@@ -117,14 +117,14 @@ void bind_rows(nb::class_<PyRun>& c) {
   };
   c.def_prop_ro(
       "t", [](const PyRun& r) { return column<std::int64_t>(r.odometry(), [](const Odometry& o) { return o.t.ns; }); },
-      "int64 (N,), ns: one row an image, here and below");
+      "int64 (N,), ns: one row per image, here and below");
   c.def_prop_ro(
       "has_pose",
       [](const PyRun& r) {
         return nb::cast(column<std::uint8_t>(r.odometry(), [](const Odometry& o) { return o.health.has_pose(); }))
             .attr("astype")("bool");
       },
-      "bool (N,): where it is False, poses and covariances mean nothing", nb::sig("def has_pose(self) -> numpy.ndarray"));
+      "bool (N,): where it is False, poses and covariances are meaningless", nb::sig("def has_pose(self) -> numpy.ndarray"));
   rows(
       "p", [](const Odometry& o) { return o.T_WB.p; }, "float64 (N, 3), p_WB, m in W");
   rows(
@@ -155,26 +155,26 @@ void bind_rows(nb::class_<PyRun>& c) {
   c.def_prop_ro(
       "reset_counter",
       [](const PyRun& r) { return column<std::int64_t>(r.odometry(), [](const Odometry& o) { return o.reset_counter; }); },
-      "int64 (N,): W is a new frame where it counts up");
+      "int64 (N,): W is a new frame where it increases");
   c.def_prop_ro(
       "tilt_sigma_rad",
       [](const PyRun& r) { return column<double>(r.odometry(), [](const Odometry& o) { return o.tilt_sigma_rad; }); },
-      "float64 (N,): standard deviation of the tilt about its less known axis");
+      "float64 (N,): standard deviation of the tilt about its less certain axis");
 }
 
 }  // namespace
 
 void bind_run(nb::module_& m) {
-  nb::class_<PyRun> c(m, "Run", "What a run leaves: arrays with one row an image, trajectories, statistics.");
+  nb::class_<PyRun> c(m, "Run", "Result of a run: arrays with one row per image, trajectories, statistics.");
   bind_rows(c);
   c.def_prop_ro(
       "trajectory", [](const PyRun& r) { return plain(r.flight.run.poses()); }, "Trajectory in W: the images that have a pose");
-  c.def_prop_ro("ground_truth", &truth_of, "Trajectory of the recording's truth, empty where there is none");
+  c.def_prop_ro("ground_truth", &truth_of, "Trajectory of the recording's ground truth, empty where there is none");
   c.def_prop_ro("odometry", &PyRun::odometry, "The list of Odometry.");
   c.def_prop_ro("map_trajectory", &map_trajectory<&app::MapRecord::final>, "Trajectory in M after the run; None without a map");
   c.def_prop_ro("map_adjusted", &map_trajectory<&app::MapRecord::adjusted>, "the same after bundle adjustment (final_ba)");
-  c.def_prop_ro("map_causal", &map_trajectory<&app::MapRecord::causal>, "Trajectory in M as it was known at each moment");
-  c.def_prop_ro("map_bounded", &map_trajectory<&app::MapRecord::bounded>, "the same, moved without steps");
+  c.def_prop_ro("map_causal", &map_trajectory<&app::MapRecord::causal>, "Trajectory in M as known at each moment");
+  c.def_prop_ro("map_bounded", &map_trajectory<&app::MapRecord::bounded>, "the same by T_MW_smooth: without jumps");
   c.def_prop_ro("frontend_statistics", &frontend_statistics, "dict of (N,) arrays; frontend_ms is CPU time");
   c.def_prop_ro("estimator_statistics", &estimator_statistics, "dict of (N,) arrays; estimator_ms is CPU time");
   c.def_prop_ro(
@@ -184,10 +184,10 @@ void bind_run(nb::module_& m) {
   c.def(
       "save",
       [](const PyRun& r, const std::string& folder) { check(app::write_flight(r.flight, r.summary, r.config, r.truth, folder)); },
-      "folder"_a, "The files that `fbvins run --out FOLDER` writes, the same bytes.");
+      "folder"_a, "Writes the files of `fbvins run --out FOLDER`, the same to the byte.");
   c.def(
       "pandas", [](nb::handle self) { return nb::module_::import_("fbvins._pandas").attr("frame_of")(self); },
-      nb::sig("def pandas(self) -> 'pandas.DataFrame'"), "One row an image, indexed by t; needs pandas.");
+      nb::sig("def pandas(self) -> 'pandas.DataFrame'"), "One row per image, indexed by t; needs pandas.");
   c.def("__str__", [](const PyRun& r) { return app::to_text(r.summary); });
   c.def("__repr__", [](const PyRun& r) {
     return fmt::format("<fbvins.Run of {} with {}: {} poses of {} images>", r.summary.dataset, r.summary.frontend,

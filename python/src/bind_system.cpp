@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The odometry fed from Python. Locks: the GIL is never waited for while the system's own are held by the caller, and never held
-// while the system works.
+// The odometry fed from Python. Locks: no thread waits for the GIL while it holds a lock of the System, and the GIL is released
+// while the System works.
 #include <fmt/format.h>
 
 #include <deque>
@@ -20,7 +20,7 @@ std::optional<ImuState> imu_state(const std::string& path, const ImuNoise& imu) 
   return path.empty() ? std::nullopt : value_or_raise(read_imu_state(path, imu));
 }
 
-/// An image in an array's memory: read where it lies, and the array is kept until the last reader is done.
+/// An image in an array's memory, which is not copied: the array is kept alive until the last reader is done.
 std::shared_ptr<const Image> image_of(nb::handle object, const char* name, const Camera& camera) {
   if (object.is_none()) return nullptr;
   auto array = checked<std::uint8_t>(object, name, {camera.height(), camera.width()});
@@ -46,7 +46,7 @@ class PySystem {
   PySystem(const PySystem&) = delete;
   PySystem& operator=(const PySystem&) = delete;
   ~PySystem() {
-    nb::gil_scoped_release released;  // threads that end may want to call back
+    nb::gil_scoped_release released;  // ending threads may still call back
     system_.reset();
   }
 
@@ -69,7 +69,7 @@ class PySystem {
   InputCounts counts() const { return system_->input_counts(); }
   const StereoRig& rig() const { return rig_; }
 
-  /// For Python's collector of cycles.
+  /// For Python's cyclic garbage collector.
   int traverse(visitproc visit, void* arg) const {
     for (const nb::object* held : {&map_, &on_odometry_, &on_map_update_}) Py_VISIT(held->ptr());
     return 0;
@@ -97,7 +97,7 @@ class PySystem {
     });
   }
 
-  /// Works without the GIL. A failure in a callback is raised as it was there.
+  /// Works without the GIL. Raises the original exception of a callback.
   template <class Work>
   void done(Work work) {
     const Result<void> result = [&] {
@@ -109,7 +109,7 @@ class PySystem {
     raise(result.error());
   }
 
-  /// On the thread that calls back, without the GIL. What no one is called with waits for poll().
+  /// On the thread that calls back, without the GIL. Without a callback the values wait for poll().
   template <class T>
   void tell(const nb::object& callback, const T& value, std::deque<T>& waiting) {
     if (callback.is_none()) {
@@ -184,17 +184,17 @@ void bind_system(nb::module_& m) {
           "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none(),
           nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None) -> None"),
           "A stereo frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size in C order, None where a "
-          "camera delivered nothing. They are read where they lie, by other threads later: hand over new arrays, do not "
+          "camera delivered nothing. They are not copied, and other threads read them later: pass new arrays, do not "
           "write to them afterwards.")
       .def(
           "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
       .def(
           "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
       .def("finish", &PySystem::finish,
-           "Processes what is waiting and ends; nothing comes afterwards but what poll() still holds.")
-      .def("poll", &PySystem::poll, "The Odometry of every image done since the last call; empty where on_odometry is given.")
-      .def("poll_map", &PySystem::poll_map, "The MapUpdates since the last call; empty where on_map_update is given.")
-      .def_prop_ro("input_counts", &counts_of, "What became of readings and images: taken, refused, and why.")
+           "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
+      .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")
+      .def("poll_map", &PySystem::poll_map, "The MapUpdates since the last call; empty with on_map_update.")
+      .def_prop_ro("input_counts", &counts_of, "Numbers of readings and images accepted, and refused by reason.")
       .def_prop_ro("rig", &PySystem::rig)
       .def(
           "__enter__", [](nb::handle self) { return nb::borrow(self); }, nb::sig("def __enter__(self) -> System"))
@@ -205,9 +205,9 @@ void bind_system(nb::module_& m) {
           },
           "type"_a.none(), "value"_a.none(), "traceback"_a.none())
       .attr("__doc__") =
-      "Stereo visual-inertial odometry, fed by push_imu() and push_images() in order of time. One thread at a time pushes. "
-      "threaded: frontend, estimator and map work on threads of their own; the same results. A callback is called with each Odometry "
-      "(MapUpdate) on the thread that made it; what it raises is raised by a push or finish() soon after. In a `with`, "
+      "Stereo visual-inertial odometry, fed by push_imu() and push_images() in order of time. One thread at a time may push. "
+      "threaded: frontend, estimator and map run on threads of their own; same results. A callback is called with each Odometry "
+      "(MapUpdate) on the thread that computed it; its exception is raised by a later push or finish(). In a `with`, "
       "finish() is called at the end.";
 }
 

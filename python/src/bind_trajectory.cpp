@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trajectories and how far apart they are.
+// Trajectories and their evaluation.
 #include <fmt/format.h>
 
 #include "apps/evaluation_report.hpp"
@@ -64,7 +64,7 @@ void bind_trajectory(nb::module_& m) {
   nb::class_<PyTrajectory>(m, "Trajectory", "Poses of the body in one world, in order of time.")
       .def(nb::new_(&make_trajectory), "t"_a, "p"_a, "q"_a,
            "t: int64 (N,), ns. p: float64 (N, 3), m. q: float64 (N, 4), unit quaternions, w first. Both take body to world.")
-      .def_static("read", &read, "path"_a, "A TUM file, or a CSV of EuRoC's or of `fbvins run`, told apart by content.")
+      .def_static("read", &read, "path"_a, "A TUM file, or a CSV of EuRoC or of `fbvins run`, recognised by content.")
       .def("write", &write, "path"_a, "As TUM: t x y z qx qy qz qw, seconds.")
       .def_prop_ro(
           "t", [](const PyTrajectory& s) { return column<std::int64_t>(s.poses, [](const Point& x) { return x.t.ns; }); },
@@ -80,7 +80,7 @@ void bind_trajectory(nb::module_& m) {
       .def("__len__", [](const PyTrajectory& s) { return s.poses.size(); })
       .def("__repr__", [](const PyTrajectory& s) { return fmt::format("<fbvins.Trajectory of {} poses>", s.poses.size()); });
 
-  nb::class_<ErrorStatistics>(m, "ErrorStatistics", "The five figures of a list of errors, as evo computes them.")
+  nb::class_<ErrorStatistics>(m, "ErrorStatistics", "Statistics of a list of errors, as evo computes them.")
       .def_ro("count", &ErrorStatistics::count)
       .def_ro("max", &ErrorStatistics::max)
       .def_ro("mean", &ErrorStatistics::mean)
@@ -93,8 +93,8 @@ void bind_trajectory(nb::module_& m) {
       });
 
   nb::class_<PyEvaluation>(m, "Evaluation",
-                           "How far an estimate is from the truth; str() is the table that `fbvins eval` prints.")
-      .def_ro("pairs", &PyEvaluation::pairs, "poses compared")
+                           "Errors of an estimate against the truth; str() is the table that `fbvins eval` prints.")
+      .def_ro("pairs", &PyEvaluation::pairs, "number of poses compared")
       .def_ro("truth_path_m", &PyEvaluation::truth_path_m)
       .def_prop_ro(
           "scale", [](const PyEvaluation& e) { return e.alignment.scale; }, "of the alignment; 1 unless sim3")

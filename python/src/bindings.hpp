@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of the module fbvins._fbvins, one function a part.
+// The parts of the module fbvins._fbvins, one function each.
 #pragma once
 
 #include <nanobind/nanobind.h>

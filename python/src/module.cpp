@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The compiled half of the package `fbvins`; the other is in python/fbvins.
+// The compiled part of the package `fbvins`; the rest is in python/fbvins.
 #include "bindings.hpp"
 
 NB_MODULE(_fbvins, m) {
   using namespace fbvins::python;
-  m.doc() = "Stereo visual-inertial odometry: the compiled half of fbvins.";
+  m.doc() = "Stereo visual-inertial odometry: the compiled part of fbvins.";
   m.attr("__version__") = FBVINS_VERSION;
   bind_rig(m);
   bind_config(m);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values that only the Python package has.
+// Types that only the Python package has.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@ namespace fbvins::python {
 
 using Recording = std::unique_ptr<Dataset>;
 
-/// A trajectory in whichever world: Python's types do not carry frames.
+/// A trajectory in any world: Python's types have no frames.
 struct PyTrajectory : AnyTrajectory {
   using AnyTrajectory::AnyTrajectory;
 };

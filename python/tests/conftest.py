@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests fly: a rendered flight for everybody, a real one where FBVINS_DATA names the folder that holds it."""
+"""Recordings of the tests: a rendered flight always, a real one where FBVINS_DATA names the folder that holds it."""
 import os
 import pathlib
 import subprocess

@@ -16,7 +16,7 @@ datasets:
   - simulate: {preset: normal, seconds: 2, seeds: 3, set: [image_rate_hz=10]}
 frontends: [klt, orb]
 """
-#: What differs from run to run.
+#: Columns that differ from run to run.
 TIMES = {"cpu_ms", "cpu_p99_ms", "peak_mb"}
 
 
@@ -52,7 +52,7 @@ def test_a_killed_worker_costs_nothing(program, matrix, alone, tmp_path):
             killed = []
 
             def kill_one():
-                """As soon as a cell is finished, one of those that work on another."""
+                """Kills a worker that is busy, as soon as the first cell is finished."""
                 while not finished(tmp_path):
                     time.sleep(0.02)
                 busy = [worker for worker, tasks in client.processing().items() if tasks]
@@ -96,7 +96,7 @@ def test_a_slurm_array_gives_the_same_table(program, matrix, alone, tmp_path):
     assert table(tmp_path) == table(alone)
 
 
-def test_what_cannot_be_is_one_sentence(program, matrix, tmp_path, capsys):
+def test_a_missing_matrix_or_cell_is_one_message(program, matrix, tmp_path, capsys):
     assert bench.main([str(tmp_path / "none.yaml"), "--out", str(tmp_path), "--program", program, "--slurm"]) == 2
     assert "none.yaml" in capsys.readouterr().err
     done = subprocess.run([program, "bench", matrix, "--out", str(tmp_path), "--cell", "normal-9s-klt"], capture_output=True, text=True, check=False)

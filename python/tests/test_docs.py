@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the documents say can be typed, can."""
+"""The commands and code blocks of the documents work."""
 import json
 import os
 import pathlib

@@ -102,7 +102,7 @@ def test_wrong_features_are_refused(flight):
     assert len(fbvins.orb(np.zeros((480, 752), np.uint8))) == 0
 
 
-def test_docstrings_say_shapes_and_types_are_stated():
+def test_docstrings_and_type_stubs_exist():
     package = pathlib.Path(fbvins.__file__).parent
     assert (package / "py.typed").exists()
     stubs = (package / "_fbvins.pyi").read_text()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Other people's recordings and calibrations."""
+"""Third-party recordings and calibrations."""
 import subprocess
 
 import numpy as np

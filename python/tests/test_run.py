@@ -93,7 +93,7 @@ def test_progress_and_interruption(flight):
         fbvins.run(flight, "klt", max_images=40, progress=stop)
 
 
-def test_what_is_wrong_is_said(flight, tmp_path):
+def test_wrong_arguments_are_refused_with_a_message(flight, tmp_path):
     with pytest.raises(FileNotFoundError, match="nowhere"):
         fbvins.run("/nowhere")
     with pytest.raises(ValueError, match="frontend.kind"):

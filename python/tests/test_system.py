@@ -50,7 +50,7 @@ def test_readings_come_one_by_one_or_many_at_once(flight):
     assert np.array_equal(fly(batch=False), fly(batch=True))
 
 
-def test_images_are_not_copied_and_are_let_go(flight):
+def test_images_are_not_copied_and_are_released(flight):
     recording = fbvins.open(flight, max_frames=30)
     rig = recording.rig
     system = fbvins.System(None, rig, threaded=True)
@@ -67,7 +67,7 @@ def test_images_are_not_copied_and_are_let_go(flight):
     system.finish()
     del system
     gc.collect()
-    assert all(r() is None for r in kept), "an image was kept for ever"
+    assert all(r() is None for r in kept), "an image was never released"
 
 
 def test_the_map_beside_it(flight, tmp_path):
@@ -87,7 +87,7 @@ def test_the_map_beside_it(flight, tmp_path):
 
 
 @pytest.mark.parametrize("threaded", [False, True])
-def test_an_exception_in_a_callback_comes_out_as_it_is(flight, threaded):
+def test_an_exception_in_a_callback_is_raised_unchanged(flight, threaded):
     class Mine(Exception):
         pass
 
@@ -112,7 +112,7 @@ def test_other_threads_run_while_it_works(flight):
     system = fbvins.System({"frontend.kind": "orb"}, recording.rig)
     worker.start()
     switch, begin = sys.getswitchinterval(), time.perf_counter()
-    sys.setswitchinterval(100)  # whoever has the GIL keeps it: ticks come only where it is released
+    sys.setswitchinterval(100)  # no forced switches: there are ticks only where the GIL is released
     try:
         feed(system, recording)
     finally:

@@ -44,7 +44,7 @@ class LoopMap final : public Mapper {
 
   MapUpdate process(const Keyframe& keyframe) override;
 
-  /// A last optimisation over everything, once the flight is over.
+  /// Last optimisation of the pose graph, once the flight is over.
   PoseGraphReport finish();
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
   FinalAdjustmentReport adjust();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors that are correlated in time: white noise plus an Ornstein-Uhlenbeck process, the part that "wanders", and least
-// squares weighted accordingly. Pure functions, any thread.
+// Errors that are correlated in time: white noise plus a first-order Gauss-Markov process, the part that "wanders", and
+// least squares weighted accordingly. Pure functions, any thread.
 //
 //   NormalSums sums = whitened_sums(noise, stamps_s, rows);    // rows: Jacobian | residual, in order of time
 //   SerialNoise fitted = fit_serial_noise(...);                // by restricted likelihood
