@@ -17,14 +17,14 @@ class Frontend {
  public:
   virtual ~Frontend() = default;
 
-  /// Features of the newest image. `prior` is the newest state the estimator has published
-  /// (usually one or two frames old; not valid before initialisation); the packet's IMU readings
-  /// carry it on. A missing image gives a frame without features of that camera.
+  /// Features of the newest image. `prior` is the newest state fed back by the estimator
+  /// (usually two frames old; not valid before initialisation); the packet's IMU readings
+  /// propagate it. A missing image gives a frame without features of that camera.
   virtual TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) = 0;
 
-  /// Where landmarks were when they left the estimator's window. Every update comes in order and without gaps, before the image
-  /// that follows it; one that comes twice counts once. For frontends that re-observe landmarks under their old track; others
-  /// ignore it.
+  /// Positions of landmarks that have left the estimator's window. Updates come in order and without gaps, before the image
+  /// that follows them; one that comes twice counts once. For frontends that re-observe landmarks under their old track; others
+  /// ignore the positions.
   virtual void locate(const LandmarkUpdate& update) { (void)update; }
 };
 

@@ -19,13 +19,13 @@
 
 namespace fbvins {
 
-/// All there are, the cheapest first.
+/// All frontends, the cheapest first.
 std::vector<std::string> frontend_names();
-/// The one that runs where none is named.
+/// The one that is used if none is named.
 std::string default_frontend();
-/// The same as the choices of an option: "klt|orb|boost".
+/// The names as the choices of an option: "klt|orb|boost".
 const std::string& frontend_choices();
-/// One line about all of them, for the option.
+/// One line about all of them, for the help of that option.
 const std::string& frontend_meanings();
 
 /// The boost frontend is the orb frontend, with its options, and a network that improves descriptors.
@@ -49,11 +49,11 @@ struct FrontendOptions {
     v("kind", kind, frontend_choices(), frontend_meanings());
     v.group("klt", klt, "the klt frontend");
     v.group("orb", orb, "the orb frontend");
-    v.group("boost", boost, "what the boost frontend has beside the orb frontend's options");
+    v.group("boost", boost, "the boost frontend, in addition to the orb frontend's options");
   }
 };
 
-/// An error where there is no frontend of that name, or what it needs (the booster's weights) cannot be used.
+/// An error if there is no frontend of that name, or the booster's weights cannot be used.
 Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const FrontendOptions& options);
 /// The same with the options' defaults.
 Result<std::unique_ptr<Frontend>> make_frontend(const StereoRig& rig, const std::string& name);

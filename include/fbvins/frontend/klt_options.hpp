@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be said of the klt frontend.
+// Options of the klt frontend.
 #pragma once
 
 namespace fbvins {
@@ -10,16 +10,16 @@ struct KltFrontendOptions {
   double epipolar_px = 0.7;
   double sigma_px = 0.6;
   double min_depth_m = 0.35;
-  double max_gap_s = 0.6;  ///< after a longer gap without left image features start anew; set by tests
+  double max_gap_s = 0.6;  ///< after a longer gap without left images all tracks are dropped; set by tests
 
   template <class V>
   void visit(V&& v) {
     v("max_features", max_features, "", "features followed at once", 10, 2000);
-    v("min_distance_px", min_distance_px, "px", "smallest distance between features; half the side of a cell that gets its own",
+    v("min_distance_px", min_distance_px, "px", "smallest distance between features; half the side of the cells that share them",
       4.0, 200.0);
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between consecutive left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
-    v("min_depth_m", min_depth_m, "m", "nearest point that is looked for in the right image", 0.05, 10.0);
+    v("min_depth_m", min_depth_m, "m", "smallest depth that is searched for in the right image", 0.05, 10.0);
   }
 };
 

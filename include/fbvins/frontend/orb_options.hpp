@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be said of the orb and boost frontends.
+// Options of the orb and boost frontends.
 #pragma once
 
 namespace fbvins {
@@ -11,13 +11,13 @@ struct RecognitionOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("enabled", enabled, "", "know landmarks again, however long they were out of view");
+    v("enabled", enabled, "", "re-observe landmarks, however long they were out of view");
     v("capacity", capacity, "", "landmarks remembered", 0, 100000);
   }
 };
 
 struct OrbFrontendOptions {
-  /// Tracks go from image to image by patch alignment, and only some images are examined for keypoints.
+  /// Tracks are followed from image to image by patch alignment; keypoints are extracted from some images only.
   bool follows_patches() const { return subpixel && fill_in && !examine_all; }
 
   int max_features = 180;
@@ -37,17 +37,17 @@ struct OrbFrontendOptions {
   template <class V>
   void visit(V&& v) {
     v("max_features", max_features, "", "features followed at once", 10, 2000);
-    v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, for tracks to be found among", 10, 10000);
+    v("max_keypoints", max_keypoints, "", "keypoints extracted from one image, as candidates for tracks", 10, 10000);
     v("min_distance_px", min_distance_px, "px", "smallest distance of a new feature from others", 2.0, 200.0);
-    v("memory_s", memory_s, "s", "how long a feature that left the view is searched for at its predicted place", 0.0, 10.0);
+    v("memory_s", memory_s, "s", "how long a feature that is not observed is searched for at its predicted position", 0.0, 10.0);
     v("search_px", search_px, "px", "search radius around a prediction from the estimator's state", 2.0, 200.0);
     v("subpixel", subpixel, "", "refine matched positions by patch alignment");
     v("fill_in", fill_in, "", "follow features without a descriptor match by patch alignment alone");
     v("examine_all", examine_all, "",
-      "match descriptors in every image, left to right as well (paper 2.2.3), instead of one image in four and patches between");
+      "match descriptors in every image, and left to right (paper 2.2.3), instead of in one of four, with patches between");
     v("epipolar_px", epipolar_px, "px", "RANSAC threshold between left images", 0.1, 10.0);
     v("sigma_px", sigma_px, "px", "standard deviation of an observation, for the estimator", 0.05, 10.0);
-    v("min_depth_m", min_depth_m, "m", "nearest point that is looked for in the right image", 0.05, 10.0);
+    v("min_depth_m", min_depth_m, "m", "smallest depth that is searched for in the right image", 0.05, 10.0);
     v.group("recognition", recognition, "landmarks re-observed after they were out of view");
   }
 };

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outliers among tracks seen at two moments (paper 2.2.3): gather those to be judged, then one RANSAC over them.
-// Buffers are reused; one instance, one thread. Numbers are drawn from one seeded row, so the order of calls counts.
+// Outliers among tracks observed in two images (paper 2.2.3): gather those to be judged, then one RANSAC over them.
+// Buffers are reused; one instance, one thread. One seeded generator serves all calls, so their order matters.
 //
 //   EpipolarCheck check(camera.focal_px(), 1);
 //   check.gather(tracks, [](const Track& t) { return t.observed ? &t.previous_normalised : nullptr; });
-//   EpipolarResult result = check.judge(tracks, motion.R_ba, 0.7, stats);      // those that break it are lost
+//   EpipolarResult result = check.judge(tracks, motion.R_ba, 0.7, stats);      // outliers are lost
 #pragma once
 
 #include <optional>
@@ -20,7 +20,7 @@ class EpipolarCheck {
  public:
   EpipolarCheck(double focal_px, std::uint64_t seed) : focal_px_(focal_px), rng_(seed) {}
 
-  /// `then(track)`: pointer to the normalised position of the earlier moment; null leaves the track out.
+  /// `then(track)`: pointer to the normalised position in the earlier image; null leaves the track out.
   template <class Tracks, class Then>
   void gather(const Tracks& tracks, Then&& then) {
     chosen_.clear();
@@ -36,7 +36,7 @@ class EpipolarCheck {
   }
   std::size_t gathered() const { return chosen_.size(); }
 
-  /// Tracks farther than the threshold from the epipolar constraint of most are lost. The rotation, where it is known.
+  /// Tracks farther than the threshold from the consensus' epipolar lines are lost. `R_now_then`: if it is known.
   template <class Tracks>
   EpipolarResult judge(Tracks& tracks, const std::optional<Mat3>& R_now_then, double threshold_px, FrontendStats& stats) {
     EpipolarResult result = ransac(R_now_then, threshold_px);

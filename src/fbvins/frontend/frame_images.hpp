@@ -21,8 +21,8 @@ class FrameImages {
 
   /// The newest images. One that is missing, or of another size than the calibration's (its geometry is unknown), is empty.
   void take(const StereoFrame& frame, FrontendStats& stats);
-  /// Time went backwards, or on by more than `longest_s`, since the image before: it counts as none. False where there was
-  /// none, or no gap.
+  /// Drops the image before if time went backwards, or on by more than `longest_s`, since then. False where there was none,
+  /// or no gap.
   bool forget_before_gap(double longest_s);
   /// The newest left image becomes the one before.
   void advance();

@@ -39,7 +39,7 @@ TEST(FrameImages, OnlyImagesOfTheCalibrationsSizeAreUsedAndAllAreMeasured) {
   EXPECT_EQ(stats.mean_brightness_left, 0);
 }
 
-TEST(FrameImages, TheImageBeforeIsTheLastThatWasAdvancedFrom) {
+TEST(FrameImages, TheImageBeforeIsThatOfTheLastAdvance) {
   FrameImages images(rig(), 1);
   FrontendStats stats;
   images.take(frame(0, grey(10)), stats);
@@ -63,7 +63,7 @@ TEST(FrameImages, NothingCarriesOverAGapOrBackInTime) {
     images.take(frame(t_s, grey(20)), stats);
     EXPECT_EQ(images.forget_before_gap(0.6), t_s != 0.05) << t_s;
     EXPECT_EQ(images.has_before(), t_s == 0.05) << t_s;
-    EXPECT_FALSE(images.forget_before_gap(0.6)) << "said once";
+    EXPECT_FALSE(images.forget_before_gap(0.6)) << "reported once";
   }
 }
 

@@ -35,10 +35,10 @@ struct Registration {
   Made (*make)(const StereoRig&, const FrontendOptions&);
 };
 
-/// The one place that knows all frontends. The last is the default.
+/// All frontends. The last is the default.
 constexpr Registration kFrontends[] = {
     {"klt", "corners followed by Lucas-Kanade", make_klt},
-    {"orb", "descriptors matched from image to image", make_orb},
+    {"orb", "ORB keypoints followed by patch alignment and descriptors", make_orb},
     {"boost", "orb with descriptors improved by a network", make_boost},
 };
 

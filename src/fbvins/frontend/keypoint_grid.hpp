@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The keypoints of an image by place, so that those near a point are found without looking at all.
+// The keypoints of an image by grid cell, so that those near a point are found without a search through all.
 // Buffers are reused; reading it is safe from several threads.
 //
 //   KeypointGrid grid;
@@ -18,7 +18,7 @@ namespace fbvins {
 class KeypointGrid {
  public:
   void build(int width, int height, std::span<const Keypoint> keypoints);
-  /// Replaces `out` by the keypoints it was built of that are within the radius, and at most one level of the pyramid apart.
+  /// Fills `out` with the keypoints within the radius and at most one pyramid level from `level`; `keypoints` as in build().
   void near(const Vec2& px, double radius_px, int level, std::span<const Keypoint> keypoints,
             std::vector<std::int32_t>& out) const;
 

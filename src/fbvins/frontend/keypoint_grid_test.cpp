@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-TEST(KeypointGrid, FindsWhatLookingAtAllOfThemFinds) {
+TEST(KeypointGrid, FindsTheSameAsAnExhaustiveSearch) {
   Rng rng(3);
   std::vector<Keypoint> keypoints(300);
   for (Keypoint& k : keypoints) {

@@ -6,16 +6,16 @@
 namespace fbvins {
 namespace {
 
-/// An anchor seen smaller than this, or larger than its inverse, gives way to a new one.
+/// An anchor whose scale changes by more than this, or its inverse, is replaced.
 constexpr double kSmallestScale = 0.65;
-/// Correlation with the anchor below which it is taken anew.
+/// Correlation with the anchor below which it is replaced.
 constexpr double kMinAnchorCorrelation = 0.8;
-/// A feature farther from its anchor's match has slid and is dropped.
+/// A feature farther from its anchor's match has drifted and is dropped.
 constexpr double kMaxCreep_px = 0.7;
-/// Largest error of following a feature there and back.
+/// Largest forward-backward error.
 constexpr double kForwardBackward_px = 0.7;
 constexpr int kTop = kKltLevels - 1;
-/// Coarsest level where motion and depth are known, and that of the way back.
+/// Coarsest level where motion and depth are known, and that of the backward check.
 constexpr int kWellPredictedLevel = 2, kBackLevel = 1;
 
 }  // namespace
@@ -39,7 +39,7 @@ KltResult KltFollower::align_to_anchor(const KltTrack& track, const KltAnchor& a
                                        const Pyramid& left) {
   Mat2 J_pixel_normalised;
   camera_.distort(track.normalised, &J_pixel_normalised);
-  // A small fronto-parallel plane at the anchor, seen from now.
+  // A small plane, fronto-parallel in the anchor's image, as seen in the newest one.
   Eigen::Matrix<double, 2, 3> project;
   project << 1, 0, -track.normalised.x(), 0, 1, -track.normalised.y();
   const Mat2 J_now_anchor =
@@ -59,7 +59,7 @@ void KltFollower::set_anchor(KltTrack& track, KltPatches& patches, const Pyramid
   track.depth_ratio = 1;
 }
 
-/// What of the track moves with the camera, and its position by optical flow.
+/// Updates what depends on the camera's motion, and the normalised position.
 bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotion& motion) const {
   const Vec3 p_now = motion.R_ba * track.normalised.homogeneous() + track.inverse_depth.value_or(0) * motion.p_ba;
   const auto normalised = camera_.undistort(found_px);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Follows one feature of the klt frontend into the newest image: Lucas-Kanade from where the motion predicts it, held to
-// the patch where it began (its anchor), and followed back as a check.
+// Follows one feature of the klt frontend into the newest image: Lucas-Kanade from its predicted position, aligned with
+// the patch with which it began (its anchor), and a forward-backward check.
 // Holds scratch memory; one instance, one thread.
 //
 //   KltFollower follower(camera);
@@ -43,7 +43,7 @@ class KltFollower {
   /// False when it is lost.
   bool follow(KltTrack& track, KltPatches& patches, const CameraMotion& motion, double typical_inverse_depth,
               const FrameImages& images, FrontendStats& stats);
-  /// From here on the feature is what the newest image shows.
+  /// Takes the newest image's patch as the anchor.
   void set_anchor(KltTrack& track, KltPatches& patches, const Pyramid& left) const;
 
  private:

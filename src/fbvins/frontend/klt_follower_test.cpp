@@ -60,10 +60,10 @@ TEST(KltFollower, LosesWhatIsNotThere) {
   EXPECT_FALSE(elsewhere.follow({}));
 }
 
-TEST(KltFollower, KnowsHowTheDepthHasChanged) {
+TEST(KltFollower, UpdatesTheDepthByTheMotion) {
   Scene scene;
   scene.take(scene.wall.render(0, 2));
-  CameraMotion ahead;  // the image says nothing of it: the wall looks the same
+  CameraMotion ahead;  // does not show in the image: the wall looks the same
   ahead.has_rotation = ahead.has_translation = true;
   ahead.p_ba = Vec3(0, 0, -0.03);
   ASSERT_TRUE(scene.follow(ahead));

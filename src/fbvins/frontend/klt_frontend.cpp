@@ -8,7 +8,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kSeed = 1;
-/// RANSAC threshold between left images KltTrack::kHistory frames apart, and the fewest tracks so old that it is asked of.
+/// RANSAC threshold between left images KltTrack::kHistory frames apart, and the fewest tracks of that age for this check.
 constexpr double kLongEpipolar_px = 1.0;
 constexpr std::size_t kFewestForLongCheck = 12;
 
@@ -43,7 +43,7 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
   out.has_left = !images_.left().empty();
   out.has_right = !images_.right().empty();
   stats.pyramid_ms = timer.lap_ms();
-  // Without a left image features wait in the previous one for a while.
+  // Without a left image tracks stay as they are; the motion to the next image spans the gap.
   if (!out.has_left) return out;
 
   if (images_.has_before()) {
@@ -91,8 +91,8 @@ void KltFrontend::reject_outliers(const CameraMotion& motion, FrontendStats& sta
   stats.tracked = static_cast<int>(tracks_.size());
 }
 
-/// What slides along an occluding edge, or moves slowly, obeys the constraint from one frame to the
-/// next and breaks it over several.
+/// A track that slides along an occluding edge, or moves slowly, satisfies the constraint from one frame to the
+/// next, but not over several.
 void KltFrontend::reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats) {
   constexpr int kHistory = KltTrack::kHistory;
   rotations_[static_cast<std::size_t>(next_rotation_)] = R_ba;

@@ -28,7 +28,7 @@ class KltFrontend final : public Frontend {
   KltFrontend(const StereoRig& rig, const KltFrontendOptions& options);
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
-  /// Landmarks are nothing to it: only that W is another.
+  /// Landmarks are ignored; a new W voids the prior.
   void locate(const LandmarkUpdate& update) override;
 
  private:

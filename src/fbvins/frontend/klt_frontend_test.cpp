@@ -185,9 +185,9 @@ TEST(KltFrontend, AMissingLeftImageIsBridgedAndAMissingRightOneCostsOnlyStereo) 
   const Wall wall;
   KltFrontend frontend(wall.rig, small_options());
   frontend.process(wall.packet(0), StatePrior{});
-  SensorPacket one_eyed = wall.packet(1);
-  one_eyed.frame.right = nullptr;
-  const TrackedFrame left_only = frontend.process(one_eyed, wall.prior(0));
+  SensorPacket no_right = wall.packet(1);
+  no_right.frame.right = nullptr;
+  const TrackedFrame left_only = frontend.process(no_right, wall.prior(0));
   EXPECT_GE(left_only.stats.tracked, 35);
   EXPECT_EQ(left_only.stats.stereo, 0);
   SensorPacket blind = wall.packet(2);

@@ -16,13 +16,13 @@ constexpr int kKnownDepthLevel = 1;
 constexpr int kMostSteps = 200;
 /// Correlation that the search must reach.
 constexpr double kMinSearchCorrelation = 0.6;
-/// Largest error of following a feature right and back.
+/// Largest forward-backward error, right and back.
 constexpr double kForwardBackward_px = 0.7;
 /// Largest distance from the epipolar line in the right image.
 constexpr double kEpipolar_px = 1.5;
-/// A match may turn out this much nearer than the nearest point searched for: noise of the disparity.
+/// A match may be nearer than the smallest depth searched for by this factor: noise of the disparity.
 constexpr double kNearerThanSearched = 1.2;
-/// Disparities down to this are taken as infinitely far rather than as wrong.
+/// Negative disparities down to this are taken as points at infinity, not as wrong.
 constexpr double kInfinity_px = 1.0;
 
 }  // namespace

@@ -29,10 +29,10 @@ struct StereoMatch {
 
 class KltStereoMatcher {
  public:
-  /// `min_depth_m`: nearest point that is searched in the right image.
+  /// `min_depth_m`: smallest depth that is searched for in the right image.
   KltStereoMatcher(const StereoRig& rig, double min_depth_m);
 
-  /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure says what went wrong, if anything.
+  /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure is the check that failed, if any.
   StereoMatch match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
                     std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right);
 

@@ -7,11 +7,11 @@
 namespace fbvins {
 namespace {
 
-/// Longer than any window lasts.
+/// Longer than a landmark stays in the window.
 constexpr double kWaitForPosition_s = 15;
 /// Nearer to the image's edge a keypoint has no descriptor or no patch.
 constexpr double kBorder_px = 16;
-/// Along the camera's z; what is nearer or behind is not seen.
+/// Along the camera's z; nearer landmarks are not expected.
 constexpr double kNearest_m = 0.1;
 
 }  // namespace

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracks that have ended, with what it takes to know their landmarks again: descriptor, patch, where the estimator left
-// them and where they were seen from. Those that an image taken elsewhere should show are looked for in it
-// (docs/derivations/known_landmarks.md, K7). Synchronous; one instance, one thread. At most `capacity` landmarks: those unseen
+// Tracks that have ended, with all that is needed to re-observe their landmarks: descriptor, patch, position as estimated
+// and the camera's position when they were last observed (docs/derivations/known_landmarks.md, K7).
+// Synchronous; one instance, one thread. At most `capacity` landmarks: those not observed
 // for longest are forgotten.
 //
 //   LandmarkMemory memory(3000);
 //   memory.keep(landmark);                            // when a track has ended
-//   memory.locate(track, p_W);                        // when the estimator has left its landmark somewhere
-//   memory.expect(T_WC, camera, levels, expected);    // what the newest image should show, and where
-//   memory.take_out(track);                           // found: it is a track again
+//   memory.locate(track, p_W);                        // when its landmark has left the estimator's window
+//   memory.expect(T_WC, camera, levels, expected);    // landmarks that the newest image should show, and where
+//   memory.take_out(track);                           // re-observed: it is a track again
 #pragma once
 
 #include <deque>
@@ -26,12 +26,12 @@
 
 namespace fbvins {
 
-/// Largest angle between the directions that a landmark was and is seen from.
+/// Largest angle between the directions from which a landmark was observed and is searched for.
 inline constexpr double kMaxViewAngle_rad = 0.6;
-/// One that is seen smaller than this, or larger than its inverse, is not looked for.
+/// Smallest ratio of its distances then and now; the largest is the inverse.
 inline constexpr double kSmallestViewScale = 0.6;
 
-/// What stays of a track.
+/// What is kept of a track.
 struct RememberedLandmark {
   TrackId track;
   Descriptor descriptor, raw;  ///< as used, and before it was improved
@@ -40,8 +40,8 @@ struct RememberedLandmark {
   PatchReference reference;
   Mat3 R_W_reference = Mat3::Identity();  ///< of the camera that saw the reference
   double reference_depth_m = 1;           ///< along that camera's z
-  Vec3 seen_from_W = Vec3::Zero();        ///< camera when it was last seen, m
-  std::optional<Vec3> p_W;                ///< m; unknown until the estimator has let go of it
+  Vec3 seen_from_W = Vec3::Zero();        ///< position of the camera that observed it last, m
+  std::optional<Vec3> p_W;                ///< m; unknown until the landmark has left the estimator's window
   Time kept;                              ///< when it came into the memory
 };
 
@@ -60,11 +60,11 @@ class LandmarkMemory {
   void clear();
   void keep(RememberedLandmark landmark);
   void locate(TrackId track, const Vec3& p_W);
-  /// Located landmarks that a left camera at T_WC sees from about where they were seen from before. `levels`: of the
-  /// scale pyramid that keypoints come from.
+  /// Located landmarks in the view of a left camera at T_WC, from about the direction and distance of their last observation.
+  /// `levels`: of the scale pyramid that keypoints come from.
   void expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const;
   void take_out(TrackId track);
-  /// Landmarks that the estimator has not located long after it must have let go of them.
+  /// Forgets landmarks that have not been located long after they must have left the estimator's window.
   void forget_unlocated(Time now);
 
   bool contains(TrackId track) const { return landmarks_.contains(track); }
@@ -74,7 +74,7 @@ class LandmarkMemory {
   using Kept = std::pair<Time, TrackId>;
 
   int capacity_;
-  std::map<TrackId, RememberedLandmark> landmarks_;  // in order, so that the same ones are found in the same order everywhere
+  std::map<TrackId, RememberedLandmark> landmarks_;  // ordered, so that results do not depend on the platform's hash
   std::set<Kept> oldest_first_;                      // all of them
   std::deque<Kept> waiting_;                         // those without a position when kept, oldest first
 };

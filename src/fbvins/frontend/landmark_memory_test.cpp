@@ -35,12 +35,12 @@ TEST(LandmarkMemory, ExpectsALandmarkWhereItProjects) {
   const auto aside = expected_from(memory, Vec3(0.5, 0, 0));
   ASSERT_EQ(aside.size(), 1u);
   EXPECT_LT((aside[0].px - Vec2(320 - 50, 240)).norm(), 1e-9);
-  // From nearer it looks larger, as on a coarser level; from farther away the other way round.
+  // From nearer it looks larger and is on a coarser level; from farther away on a finer one.
   EXPECT_EQ(expected_from(memory, Vec3(0, 0, 0.8)).at(0).level, 2);
   EXPECT_EQ(expected_from(memory, Vec3(0, 0, -1)).at(0).level, 0);
 }
 
-TEST(LandmarkMemory, LooksForNothingThatWouldLookDifferent) {
+TEST(LandmarkMemory, ExpectsNoneFromAnotherDirectionOrDistance) {
   LandmarkMemory memory(3000);
   memory.keep(landmark(3));
   const auto seen_at_angle = [&](double angle) {  // from 4 m away, looking at it

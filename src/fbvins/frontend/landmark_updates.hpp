@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps count of the updates that come from the estimator, each once and in order. One instance, one thread.
+// Checks that the estimator's updates come in order, and recognises repeated ones. One instance, one thread.
 //
 //   switch (updates.take(update)) { ... }
 #pragma once
@@ -14,11 +14,11 @@ class LandmarkUpdates {
  public:
   enum class Kind {
     next,
-    in_another_W,  ///< the next, and all positions of before are void
+    in_another_W,  ///< the next, and all earlier positions are void
     repeated,      ///< has been taken already
   };
 
-  /// A gap is a fault of whoever delivers them: positions in it would be lost.
+  /// A gap is a bug of the caller: its positions would be lost.
   Kind take(const LandmarkUpdate& update) {
     if (update.sequence < next_) return Kind::repeated;
     assert(update.sequence == next_ && "landmark updates come without gaps and in order");

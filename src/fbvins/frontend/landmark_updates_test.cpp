@@ -18,7 +18,7 @@ TEST(LandmarkUpdates, EveryUpdateCountsOnce) {
   EXPECT_EQ(updates.take(update(0)), Kind::repeated);
 }
 
-TEST(LandmarkUpdates, AnotherWIsSaidOnce) {
+TEST(LandmarkUpdates, ANewWIsReportedOnce) {
   LandmarkUpdates updates;
   EXPECT_EQ(updates.take(update(0)), Kind::next);
   EXPECT_EQ(updates.take(update(1, 1)), Kind::in_another_W);

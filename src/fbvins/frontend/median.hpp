@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The median of a few numbers, and the depth that a feature without one is given.
+// The median of a few numbers, and the depth that is assumed for a feature without one.
 //
 //   std::vector<double> motion_px = ...;
 //   stats.median_motion_px = median(motion_px);
@@ -19,10 +19,10 @@ inline double median(std::vector<double>& numbers) {
   return *middle;
 }
 
-/// What is said of the depth of a feature that has none yet: that of the others.
+/// Depth that is assumed for a feature without one: the median of the others'.
 class TypicalDepth {
  public:
-  /// Inverse depths matched in one image, 1/m. Reorders them. Of too few nothing is learnt.
+  /// Inverse depths matched in one image, 1/m. Reorders them. Too few are ignored.
   void update(std::vector<double>& inverse_depths) {
     constexpr std::size_t kFewest = 10;
     if (inverse_depths.size() >= kFewest) inverse_depth_ = median(inverse_depths);
@@ -30,7 +30,7 @@ class TypicalDepth {
   double inverse_depth() const { return inverse_depth_; }
 
  private:
-  double inverse_depth_ = 0;  // 1/m: infinitely far until something is known
+  double inverse_depth_ = 0;  // 1/m; infinitely far before the first update
 };
 
 }  // namespace fbvins

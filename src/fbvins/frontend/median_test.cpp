@@ -15,7 +15,7 @@ TEST(Median, IsTheMiddleOrTheUpperOfTwo) {
   EXPECT_EQ(median_of({4, 1, 3, 2}), 3);
 }
 
-TEST(TypicalDepth, LearnsNothingFromAFew) {
+TEST(TypicalDepth, IgnoresTooFewDepths) {
   TypicalDepth depth;
   std::vector<double> few(9, 0.5), enough(10, 0.25);
   depth.update(few);

@@ -10,22 +10,22 @@ namespace {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-/// What the prediction may be off between two images: rotation, and velocity.
+/// Standard deviations of the prediction between two images: of its rotation, and of its velocity.
 constexpr double kRotationSigma_rad = 1e-3, kVelocitySigma_mps = 0.02;
-/// A prediction further off than this is wrong, and judges nobody.
+/// A prediction that needs a larger correction is wrong; no track is rejected by it.
 constexpr double kFurthest_sigma = 6;
 /// Noise of a track, and the residual at which its weight has fallen to a quarter.
 constexpr double kNoise_px = 0.4, kScale_px = 1.2;
 constexpr int kIterations = 3;
-/// (T4): a track that is further off moves by itself.
+/// (T4): a track with a larger residual is on a moving object.
 constexpr double kMoving_px = 0.8;
-/// Fewer tracks say nothing; a prediction that a smaller share of them follows is wrong.
+/// No track is rejected where there are fewer, or where a smaller share of them agrees with the prediction, which is wrong then.
 constexpr std::size_t kFewest = 20;
 constexpr double kLeastShare = 0.25;
 
 }  // namespace
 
-/// (T1), (T2). J: by a turn and a shift of the camera's motion, both in the camera now.
+/// (T1), (T2). J: derivative by a rotation and a translation of the motion, both in the camera now.
 Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Jacobian* J) const {
   const Vec3 p = motion.R_ba * point.before.homogeneous() + point.inverse_depth * motion.p_ba;
   const Vec2 seen = p.head<2>() / p.z();
@@ -39,13 +39,13 @@ Vec2 MotionCheck::residual_px(const CameraMotion& motion, const Point& point, Ja
   return point.J_pixel_normalised * (seen - point.now);
 }
 
-/// (T5): a depth that is a pixel of disparity off moves the track by as much for each baseline that the camera has moved.
+/// (T5): a depth error of a pixel of disparity moves the track by as much for each baseline that the camera has moved.
 double MotionCheck::noise_scale(const CameraMotion& motion) const {
   return std::sqrt(1 + motion.p_ba.squaredNorm() / (baseline_m_ * baseline_m_));
 }
 
-/// (T3): Gauss-Newton from the prediction, which is also the prior. Weights that fall with the residual (Geman and McClure) leave
-/// those out that are far from it. Nothing where the prediction cannot be that far off.
+/// (T3): Gauss-Newton from the prediction, which is also the prior. The weights of the Geman-McClure loss leave out tracks that
+/// are far from it. Nothing where the correction is implausibly large.
 std::optional<CameraMotion> MotionCheck::corrected(const CameraMotion& predicted, double dt_s) const {
   const double shift_sigma_m = kVelocitySigma_mps * dt_s;
   const double scale_px = kScale_px * noise_scale(predicted), noise_px = kNoise_px * noise_scale(predicted);

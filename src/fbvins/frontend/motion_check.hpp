@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds tracks on moving things. However many of them agree with one another, they disagree with the motion of the camera that
-// the estimator's state and the IMU predict (docs/derivations/moving.md). The prediction may be slightly off; the tracks correct
-// it first.
+// Finds tracks on moving objects. However many of them agree with one another, they disagree with the camera's motion that
+// is predicted from the estimator's state and the IMU (docs/derivations/moving.md). Small errors of the prediction are first
+// corrected by the tracks.
 // Buffers are reused; one instance, one thread.
 //
 //   MotionCheck check(camera, baseline_m);
@@ -20,7 +20,7 @@ namespace fbvins {
 
 class MotionCheck {
  public:
-  /// `baseline_m` of the stereo pair, which depths come from.
+  /// `baseline_m`: of the stereo pair by which depths are measured.
   MotionCheck(const Camera& camera, double baseline_m) : camera_(camera), baseline_m_(baseline_m) {}
 
   /// `before(track)`: pointer to the normalised position in the image before; null leaves the track out, as an unknown depth
@@ -38,7 +38,7 @@ class MotionCheck {
     }
   }
 
-  /// Nothing happens where the motion has no translation, or explains too few tracks: then it is the state that is wrong.
+  /// Tracks on moving objects are lost. None where the motion has no translation, or agrees with too few tracks to be right.
   template <class Tracks>
   void judge(Tracks& tracks, const CameraMotion& predicted, double dt_s, FrontendStats& stats) {
     for (const std::size_t k : moving(predicted, dt_s)) {
@@ -63,7 +63,7 @@ class MotionCheck {
   double baseline_m_;
   std::vector<std::size_t> chosen_;  // tracks of points_
   std::vector<Point> points_;
-  std::vector<std::size_t> moving_;  // points_ that move by themselves
+  std::vector<std::size_t> moving_;  // points_ on moving objects
 };
 
 }  // namespace fbvins

@@ -64,14 +64,14 @@ TEST(MotionCheck, FindsAMajorityThatMovesTogether) {
   EXPECT_EQ(still, 0);
 }
 
-TEST(MotionCheck, CorrectsWhatThePredictionIsOff) {
+TEST(MotionCheck, CorrectsSmallErrorsOfThePrediction) {
   Crowd crowd(100, 0, 0);
   CameraMotion predicted = crowd.motion;
   predicted.R_ba = so3_exp(Vec3(2e-3, -2e-3, 0)).toRotationMatrix() * predicted.R_ba;  // more than a pixel
   EXPECT_EQ(crowd.lost(predicted).second, 0);
 }
 
-TEST(MotionCheck, DoesNotJudgeByAStateThatFewTracksFollow) {
+TEST(MotionCheck, RejectsNoneWhereFewTracksAgreeWithTheState) {
   Crowd crowd(100, 0, 0);
   CameraMotion predicted = crowd.motion;
   predicted.p_ba += Vec3(0.05, 0, 0);  // a metre a second too fast

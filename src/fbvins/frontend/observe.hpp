@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator is told of a feature: where it is seen, and how well. Pure functions.
+// Observations of features for the estimator, with their weights. Pure functions.
 #pragma once
 
 #include "fbvins/camera/camera.hpp"

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Coarsest level on which the position of a keypoint is aligned.
+/// Coarsest level of alignment from a keypoint.
 constexpr int kNearLevel = 1;
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The observed tracks found in the right image, and their depth with that: by aligning the patch along the epipolar line, or,
-// where patches are not followed, by descriptor. Buffers are reused; one instance, one thread.
+// Finds the observed tracks in the right image, and with that their depth: by aligning the patch along the epipolar line;
+// where patches are not followed, first by descriptor. Buffers are reused; one instance, one thread.
 //
 //   OrbDepth depth(rig, options);
 //   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features());
@@ -23,12 +23,12 @@ class OrbDepth {
   /// `sigma_px`: standard deviation of an observation in the right image.
   OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
 
-  /// Whether match() goes by descriptor.
+  /// Whether match() uses descriptors.
   bool wants_features() const { return by_descriptors_; }
-  /// Then to be filled before match().
+  /// If so, to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
-  /// Median of those matched last, 1/m.
+  /// Median of the last image's matches, 1/m.
   double typical_inverse_depth() const { return typical_.inverse_depth(); }
 
  private:

@@ -47,7 +47,7 @@ TEST(OrbDepth, IsTheWalls) {
   }
 }
 
-TEST(OrbDepth, AlignmentFindsWhatDescriptorsDoNot) {
+TEST(OrbDepth, AlignmentFindsMoreThanDescriptorsAlone) {
   Scene with, without;
   (void)with.match({});
   (void)without.match({.fill_in = false});

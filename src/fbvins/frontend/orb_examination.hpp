@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which images are examined for keypoints: tracks follow from image to image by alignment, which costs a third, and descriptors
-// say no more of one image than of the next. One instance, one thread.
+// Decides which images are examined, that is, have keypoints extracted and matched. Between them tracks are followed by patch
+// alignment, which costs a third. One instance, one thread.
 //
 //   ExaminationPolicy policy(false);
 //   if (policy.due(observed)) examine();
@@ -13,20 +13,20 @@ namespace fbvins {
 
 class ExaminationPolicy {
  public:
-  /// `every`: all images, as where tracks cannot be followed by alignment.
+  /// `every`: examine all images, for tracks that are not followed by alignment.
   explicit ExaminationPolicy(bool every) : every_(every) {}
 
   /// `observed`: tracks that alignment has found in this image.
   bool due(int observed) const { return every_ || since_ >= kMostBetween || observed < kShareObserved * observed_then_; }
-  /// The image is done with: whether it was examined, and the tracks observed in it at the end.
+  /// To be called after each image: whether it was examined, and the tracks observed in it at the end.
   void pass(bool examined, int observed) {
     since_ = examined ? 0 : since_ + 1;
     if (examined)
-      observed_then_ = std::max<double>(observed, observed_then_ / 2);  // what a dark image hides is missed for a while
+      observed_then_ = std::max<double>(observed, observed_then_ / 2);  // a dark image does not lower it to zero at once
   }
 
  private:
-  /// Images passed over at most, and the share of the tracks of the last examined image that makes do.
+  /// Most images in a row that are not examined, and the share of the last examined image's tracks below which one is.
   static constexpr int kMostBetween = 3;
   static constexpr double kShareObserved = 0.8;
 

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Images examined of so many that follow one another, `observed` tracks in each.
+/// How many of `images` consecutive images are examined, with `observed` tracks in each.
 int examined_of(ExaminationPolicy& policy, int images, int observed) {
   int examined = 0;
   for (int i = 0; i < images; ++i) {
@@ -36,7 +36,7 @@ TEST(ExaminationPolicy, EveryImageWhileAllIsDarkAndTheFirstAfterIt) {
   EXPECT_EQ(examined_of(policy, 20, 0), 20);
 }
 
-TEST(ExaminationPolicy, FewerTracksForGoodAreGotUsedTo) {
+TEST(ExaminationPolicy, AdaptsToALastingDropInTracks) {
   ExaminationPolicy policy(false);
   policy.pass(true, 100);
   EXPECT_LT(examined_of(policy, 40, 30), 15);

@@ -9,8 +9,8 @@
 namespace fbvins {
 namespace {
 
-/// A gap without images as long as tracks are remembered, but at least so long, and no longer than the predictor's IMU
-/// readings span.
+/// Bounds of the gap without images after which tracks end. It is as long as tracks are remembered (memory_s), and no longer
+/// than the predictor's IMU readings span.
 constexpr double kShortestGap_s = 0.3, kLongestGap_s = 1.4;
 /// Standard deviation of a position that is not refined: descriptors alone are good to a pixel.
 constexpr double kSigmaUnrefined_px = 1.5;
@@ -57,7 +57,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   out.has_right = !images_.right().empty();
   stats.pyramid_ms = timer.lap_ms();
   recogniser_.forget_unlocated(images_.t());
-  // Without a left image tracks wait where they were; the next image's motion spans the gap.
+  // Without a left image tracks stay as they are; the motion to the next image spans the gap.
   if (!out.has_left) return out;
 
   view_.t = images_.t();
@@ -89,8 +89,8 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   return out;
 }
 
-/// The tracks there are, from the image before into this one (2.1.1, 2.2.3): predicted, aligned; in an image that is examined the
-/// others matched; checked. Says whether the image was examined.
+/// Follows the tracks from the image before into this one (2.1.1, 2.2.3): prediction, alignment; in an image that is examined
+/// matching of the others; outlier checks. Returns whether the image was examined.
 bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   const CameraMotion motion = predictor_.between(images_.t_before(), view_.t);
   predict(tracks_, camera_, motion, depth_.typical_inverse_depth());
@@ -114,7 +114,7 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
   return examined;
 }
 
-/// Keypoints of the left image, described (2.2.1, 2.2.2).
+/// Extracts and describes keypoints of the left image (2.2.1, 2.2.2).
 void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
   CpuTimer timer;
   stats.boost_ms += describer_.describe(left, view_);

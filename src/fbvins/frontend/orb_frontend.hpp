@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `orb` frontend (paper 2.1.1, 2.2.1, 2.2.3): ORB features, followed from image to image and into the right image by patch
-// alignment where the predicted pose expects them, checked by epipolar RANSAC. Some images are examined: keypoints are
-// extracted, described and matched by Hamming distance, which finds what alignment lost, knows landmarks again and
-// starts tracks where there are holes. A track that is not seen for a moment (blur, occlusion, a black image) is remembered with
-// its descriptor and patch, and continues under its old id when it is seen again; so does, however much later, one whose
+// alignment from their predicted positions, and checked by epipolar RANSAC. Some images are examined: keypoints are
+// extracted, described and matched by Hamming distance, which finds tracks that alignment lost, re-observes landmarks and
+// starts tracks where there are few. A track that is not observed for a moment (blur, occlusion, a black image) is kept with
+// its descriptor and patch, and continues under its old id when it is observed again; so does, however much later, one whose
 // landmark the estimator has located.
 // Synchronous; one instance is used by one thread at a time; allocates only while it grows.
 //
@@ -28,14 +28,14 @@ namespace fbvins {
 
 class OrbFrontend final : public Frontend {
  public:
-  /// `stage` may improve the descriptors of each image; the default leaves them.
+  /// `stage` may improve the descriptors of each image; the default does not change them.
   OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options,
               std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
 
-  /// Whether it is a track, or its landmark is remembered.
+  /// Whether it is a current track, or its landmark is remembered.
   bool can_know_again(TrackId track) const;
 
  private:

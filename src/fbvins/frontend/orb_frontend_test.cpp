@@ -27,7 +27,7 @@ StereoRig make_rig() {
   return rig;
 }
 
-/// A textured wall 3 m ahead; the body moves along x and turns about z, seen exactly.
+/// A textured wall 3 m ahead; the body moves along x and turns about z, with exact readings.
 class World {
  public:
   Vec3 position(int k) const { return {kSpeed_mps * kFramePeriod_s * k, 0.02 * k * kFramePeriod_s, 0}; }
@@ -98,7 +98,7 @@ std::vector<TrackedFrame> run(const std::vector<SensorPacket>& input, const OrbF
   return out;
 }
 
-/// Median distance, in px, between where a track is seen and where it was first seen on the wall.
+/// Median distance, in px, between a track's points on the wall in later images and in its first one.
 double median_error_px(const std::vector<TrackedFrame>& frames) {
   std::map<std::int64_t, Vec2> first;
   std::vector<double> errors;
@@ -145,7 +145,7 @@ TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
   }
 }
 
-TEST(OrbFrontend, SubpixelRefinementIsWhatGivesThat) {
+TEST(OrbFrontend, WithoutSubpixelRefinementErrorsAreLarger) {
   OrbFrontendOptions options = small_options();
   options.subpixel = false;
   options.fill_in = false;
@@ -219,7 +219,7 @@ StatePrior true_state(int k) {
   return prior;
 }
 
-/// Ten images, three seconds in the dark, and one image more. `drift_m`: how far W has moved on in the dark.
+/// Ten images, three seconds in the dark, and one image more. `drift_m`: how far the estimate has drifted in the dark.
 TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFrame>& before) {
   OrbFrontendOptions options = small_options();
   options.recognition.enabled = enabled;
@@ -227,7 +227,7 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
   constexpr int kDark = 60;
   for (int k = 0;; ++k) {
     StatePrior prior = true_state(std::max(0, k - 2));
-    if (k == 15) {  // by now the window has let go of them
+    if (k == 15) {  // they have left the window by now
       LandmarkUpdate update;
       for (const TrackedFrame& frame : before)
         for (const TrackedFeature& f : frame.features) {
@@ -245,7 +245,7 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
   }
 }
 
-TEST(OrbFrontend, LandmarksAreKnownAgainHoweverLongTheyWereOutOfView) {
+TEST(OrbFrontend, LandmarksAreReobservedHoweverLongTheyWereOutOfView) {
   for (const double drift_m : {0.0, 0.08}) {
     std::vector<TrackedFrame> frames;
     frames.push_back(after_the_dark(true, drift_m, frames));
@@ -266,8 +266,8 @@ TEST(OrbFrontend, LandmarksAreKnownAgainHoweverLongTheyWereOutOfView) {
   }
 }
 
-/// A camera that slides along a wall and back, so that half of what it sees goes out of view and returns. The one who flies it
-/// plays the estimator: exact priors, two frames old, and where landmarks are, a while after they were last seen.
+/// A camera that slides along a wall and back, so that half of the wall goes out of view and returns. fly() takes the part of
+/// the estimator: exact priors, two frames old, and positions of landmarks some time after they were last observed.
 class Sweep {
  public:
   static constexpr int kFrames = 64, kUnseenBeforeTold = 12;
@@ -280,7 +280,7 @@ class Sweep {
     bool told = false, again = false;
   };
   std::map<TrackId, Known> known;
-  int forgotten = 0;  // landmarks told of that cannot be re-observed, summed over frames
+  int forgotten = 0;  // landmarks with a position that cannot be re-observed, summed over frames
 
   int count(bool Known::*what) const {
     return static_cast<int>(std::count_if(known.begin(), known.end(), [&](const auto& k) { return k.second.*what; }));

@@ -6,19 +6,19 @@
 namespace fbvins {
 namespace {
 
-/// Of fewer tracks nothing is learnt about what the prediction missed.
+/// Fewest tracks from which the common error of the prediction is estimated.
 constexpr std::size_t kFewestForCommonMiss = 8;
-/// Asked of a track that is followed by alignment alone.
+/// Smallest correlation for a track that is followed by alignment alone.
 constexpr double kFillInCorrelation = 0.85;
-/// Farther than this from where it is expected, alignment has found something else.
+/// Farther than this from the prediction, alignment has found something else.
 constexpr double kFarthestFillIn_px = 50;
 /// Largest disagreement between the newest patch and the reference.
 constexpr double kMaxCreep_px = 0.7;
-/// Largest error of following a track there and back.
+/// Largest forward-backward error.
 constexpr double kForwardBackward_px = 0.7;
 /// A keypoint this near, times its scale, is the track's.
 constexpr double kSameFeature_px = 2;
-/// Coarsest level on which a position that is known to a pixel or two is aligned.
+/// Coarsest level of alignment from a position that is known to a pixel or two.
 constexpr int kNearLevel = 1;
 
 const Keypoint* keypoint_of(const OrbView& view, int found) {
@@ -34,7 +34,7 @@ void take_over(OrbTrack& track, OrbView& view, std::size_t keypoint) {
 
 }  // namespace
 
-/// What the prediction missed in common (gyro bias, unknown translation) helps tracks without a keypoint.
+/// Median error of the prediction (gyro bias, unknown translation), by which tracks without a keypoint are corrected.
 Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found) {
   miss_x_px_.clear();
   miss_y_px_.clear();
@@ -102,7 +102,7 @@ std::optional<Vec2> OrbLocator::place(OrbTrack& track, const OrbPatches& patches
   return px;
 }
 
-/// From a keypoint to the place that shows the track's reference patch.
+/// From a keypoint to the position at which the image matches the track's patches.
 std::optional<Vec2> OrbLocator::refine_match(OrbTrack& track, const OrbPatches& patches, const Keypoint& keypoint,
                                              const Pyramid& left) {
   if (!track.was_observed) {
@@ -122,8 +122,8 @@ std::optional<Vec2> OrbLocator::follow_by_alignment(OrbTrack& track, const OrbPa
   return hold_to_reference(track, patches, newest.px, left);
 }
 
-/// The position against the reference, where the reference still looks alike. The newest patch and the reference
-/// disagreeing means that one of them slid along an edge or onto something else.
+/// The position by the reference, while that still matches. Where the newest patch and the reference disagree, one of them
+/// has slid along an edge or onto something else.
 std::optional<Vec2> OrbLocator::hold_to_reference(OrbTrack& track, const OrbPatches& patches, const Vec2& newest_px,
                                                   const Pyramid& left) {
   const KltResult fine = refiner_.refine(patches.reference, left, newest_px, camera_, track.normalised);
@@ -133,7 +133,7 @@ std::optional<Vec2> OrbLocator::hold_to_reference(OrbTrack& track, const OrbPatc
   return fine.px;
 }
 
-/// Following the patch found now back into the image before leads to where the track was.
+/// The forward-backward check: the patch found now, followed into the image before, leads to the track's position there.
 bool OrbLocator::returns(const OrbTrack& track, const Vec2& px, const FrameImages& images) {
   if (!back_.cut(images.left(), px, 0, kNearLevel)) return false;
   const KltResult back = klt_align(back_, images.before(), track.previous_px, kNearLevel, 0, kConvergedCheck_px);

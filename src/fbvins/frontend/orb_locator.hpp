@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where each track is in the newest image, to a fraction of a pixel: from where it is expected, by aligning its patches, or
-// from the keypoint that its descriptor was matched with; and back into the image before as a check.
+// Positions of the tracks in the newest image, to a fraction of a pixel: by aligning their patches from the predicted
+// positions or from the keypoints that their descriptors were matched with; and a forward-backward check.
 // Buffers are reused; one instance, one thread.
 //
 //   OrbLocator locator(camera, {.subpixel = true, .fill_in = true, .follows = true});
 //   locator.follow(tracks, view, images, stats);             // by alignment alone
-//   locator.locate(tracks, view, images, found, stats);      // the others, and what tracks look like now
+//   locator.locate(tracks, view, images, found, stats);      // the others; descriptors of matched tracks are renewed
 #pragma once
 
 #include <optional>
@@ -25,10 +25,10 @@ class OrbLocator {
   };
   OrbLocator(const Camera& camera, const Choices& choices) : camera_(camera), choices_(choices) {}
 
-  /// Tracks that were observed before, if choices.follows. Those found are observed afterwards.
+  /// Follows tracks that were observed before, if choices.follows. Those found are observed afterwards.
   void follow(OrbTracks& tracks, const OrbView& view, const FrameImages& images, FrontendStats& stats);
   /// `found`: the keypoint of each track, or -1. Tracks that are found are observed afterwards, and their keypoints used; those
-  /// already observed take over the descriptor of a keypoint where they are.
+  /// already observed take over the descriptor of a keypoint at their position.
   void locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found, FrontendStats& stats);
 
  private:

@@ -37,7 +37,7 @@ struct Scene {
     }
     predict(tracks, wall.camera, wall.motion(kStep_m), 0);
   }
-  /// Without any keypoint, only the patches help.
+  /// No track has a keypoint: only alignment is left.
   std::vector<int> no_keypoints() const { return std::vector<int>(tracks.size(), -1); }
   std::vector<double> errors_px() const {
     std::vector<double> errors;
@@ -47,7 +47,7 @@ struct Scene {
   }
 };
 
-TEST(OrbLocator, FollowsByAlignmentWhatHasNoKeypoint) {
+TEST(OrbLocator, FollowsTracksWithoutAKeypointByAlignment) {
   Scene scene;
   const std::size_t all = scene.tracks.size();
   OrbLocator(scene.wall.camera, {.follows = true}).follow(scene.tracks, scene.view, scene.images, scene.stats);

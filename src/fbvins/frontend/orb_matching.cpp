@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Farther than any two descriptors are.
+/// Larger than the distance of any two descriptors.
 constexpr int kFar = 257;
 
 }  // namespace

@@ -16,11 +16,11 @@
 
 namespace fbvins {
 
-/// Largest Hamming distance of a match over time, bits; of descriptors as extracted and of improved ones alike.
+/// Largest Hamming distance of a match over time, bits; the same for descriptors as extracted and for improved ones.
 inline constexpr int kMatchDistance_bits = 60;
 /// Largest ratio of the best to the second-best distance.
 inline constexpr double kMatchRatio = 0.85;
-/// Keypoints closer than this, times the scale of their level, show the same corner and are no rivals.
+/// Keypoints closer than this, times the scale of their level, are of the same corner and do not count in the ratio test.
 inline constexpr double kRival_px = 4.0;
 
 struct GuidedQuery {
@@ -43,7 +43,7 @@ class GuidedMatcher {
   std::vector<int> owner_, owner_distance_;  // best query of each keypoint
 };
 
-/// Best of the candidates if it passes distance and ratio; rivals are those farther than kRival_px away. -1 if none.
+/// The best candidate, if it passes the distance and ratio tests; the second best is one farther than kRival_px away. -1 if none.
 int pick_match(std::span<const std::int32_t> candidates, std::span<const std::uint16_t> distances,
                std::span<const Keypoint> keypoints, int max_distance_bits, int* distance);
 

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// So many bits away from none.
+/// A descriptor with this many bits set.
 Descriptor bits(int count) {
   Descriptor d;
   for (int i = 0; i < count; ++i) d.bits[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
@@ -28,7 +28,7 @@ struct Scene {
   }
 };
 
-TEST(GuidedMatcher, TakesTheBestThatIsNearAndAlike) {
+TEST(GuidedMatcher, TakesTheBestWithinRadiusAndDistance) {
   Scene scene;
   scene.add(Vec2(50, 50), 30);
   scene.add(Vec2(58, 50), 10);
@@ -38,7 +38,7 @@ TEST(GuidedMatcher, TakesTheBestThatIsNearAndAlike) {
   EXPECT_EQ(scene.match({{.px = Vec2(150, 50)}}), std::vector<int>{-1});
 }
 
-TEST(GuidedMatcher, ARivalNearlyAsGoodMakesItDoubtfulUnlessItIsTheSameCorner) {
+TEST(GuidedMatcher, ASecondBestNearlyAsGoodFailsTheRatioTestUnlessItIsTheSameCorner) {
   Scene apart;
   apart.add(Vec2(50, 50), 20);
   apart.add(Vec2(57, 50), 22);
@@ -49,7 +49,7 @@ TEST(GuidedMatcher, ARivalNearlyAsGoodMakesItDoubtfulUnlessItIsTheSameCorner) {
   EXPECT_EQ(same.match({{.px = Vec2(52, 50)}}), std::vector<int>{0});
 }
 
-TEST(GuidedMatcher, AKeypointBelongsToTheTrackThatIsMostLikeIt) {
+TEST(GuidedMatcher, AKeypointBelongsToTheMostSimilarTrack) {
   Scene scene;
   scene.add(Vec2(50, 50), 20);
   const GuidedQuery far{.px = Vec2(52, 50)}, near{.px = Vec2(48, 50), .descriptor = bits(15)};

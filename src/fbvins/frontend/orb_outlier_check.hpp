@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outliers among the observed tracks (paper 2.2.3): on moving things (motion_check.hpp), then by the epipolar constraint
-// against the image before, and against one some images back, because where two edges cross at different depths, a corner slides by less than the noise from image to image, but not for long.
-// One instance, one thread.
+// Outliers among the observed tracks (paper 2.2.3): on moving objects (motion_check.hpp), then by the epipolar constraint against
+// the image before and against one five images back: a false corner, where edges at different depths cross, slides by less than
+// the noise from image to image, but by more over several. One instance, one thread.
 //
 //   OrbOutlierCheck check(camera, baseline_m, 1.0);
 //   check.begin(view);                                   // every image, also one without tracks
-//   check.judge(tracks, view, predictor, stats);  // those that break the constraint are lost
+//   check.judge(tracks, view, predictor, stats);         // outliers are lost
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ class OrbOutlierCheck {
       : threshold_px_(threshold_px), motion_(camera, baseline_m), epipolar_(camera.focal_px(), kSeed) {}
 
   void begin(const OrbView& view) { t_[static_cast<std::size_t>(view.index) % OrbTrack::kHistory] = view.t; }
-  /// Also notes where tracks are seen in this image.
+  /// Also stores the tracks' positions in this image.
   void judge(OrbTracks& tracks, const OrbView& view, const MotionPredictor& predictor, FrontendStats& stats);
 
  private:

@@ -6,8 +6,8 @@
 namespace fbvins {
 namespace {
 
-/// Sixty points of a room; the camera goes to the right by a centimetre an image. The first slides upwards by a third of
-/// the threshold an image.
+/// Sixty points of a room; the camera moves to the right by a centimetre per image. The first point slides across the epipolar
+/// lines by a third of the threshold per image.
 TEST(OrbOutlierCheck, FindsASlowSlideOverSeveralImages) {
   constexpr double kFocal_px = 400, kThreshold_px = 1.0;
   Rng rng(3);

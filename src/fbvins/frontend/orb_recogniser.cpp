@@ -8,16 +8,16 @@
 namespace fbvins {
 namespace {
 
-/// A track of fewer images was hardly a landmark.
+/// Tracks of fewer images are not remembered.
 constexpr int kFewestFrames = 4;
-/// Around where a landmark should be.
+/// Search radius around the predicted position of a landmark.
 constexpr double kSearch_px = 15;
 constexpr int kMaxDistance_bits = 50;
-/// Fewer than this in one image are chance.
+/// Fewer matches than this in one image may be chance.
 constexpr int kFewestTogether = 4;
-/// How far one may be from where the others say that it should be.
+/// Largest deviation of one from the median prediction error.
 constexpr double kAgreement_px = 4;
-/// Asked with the patch that the track began with.
+/// With the patch with which the track began.
 constexpr double kMinCorrelation = 0.7;
 
 }  // namespace
@@ -75,7 +75,7 @@ void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& l
   }
   stats.expected = static_cast<int>(expected_.size());
   if (static_cast<int>(miss_x_px_.size()) < kFewestTogether) return;
-  // What W has drifted since they were seen moves all of them alike.
+  // The drift since they were observed moves all of them alike.
   const Vec2 common_miss(median(miss_x_px_), median(miss_y_px_));
   for (std::size_t i = 0; i < expected_.size(); ++i) {
     if (found_[i] < 0 || (miss(i) - common_miss).norm() > kAgreement_px) continue;

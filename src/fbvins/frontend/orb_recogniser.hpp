@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks re-observed after they were out of view (docs/derivations/known_landmarks.md, K7): tracks that end are remembered,
-// and begin again under their old id where descriptor, patch and the others' places agree.
+// and begin again under their old id where descriptor, patch and the prediction errors of the others agree.
 // Buffers are reused; one instance, one thread.
 //
 //   OrbRecogniser recogniser(camera, options.recognition, levels);
 //   tracks.drop_ended([&](const OrbTrack& t, const OrbPatches& p) { recogniser.remember(t, p.reference, view, now); });
-//   recogniser.locate(update, tracks);                 // where the estimator has left them
+//   recogniser.locate(update, tracks);                 // their positions, from the estimator
 //   recogniser.recognise(tracks, view, left, stats);
 #pragma once
 
@@ -25,9 +25,9 @@ class OrbRecogniser {
       : camera_(camera), options_(options), levels_(levels), memory_(options.capacity) {}
 
   void locate(const LandmarkUpdate& update, OrbTracks& tracks);
-  /// W is another: all positions are void.
+  /// W is a new frame: all positions are void.
   void clear(OrbTracks& tracks);
-  /// A track that has gone out of view, if it was a landmark. `view`: the last image that it was carried to.
+  /// Remembers a track that has gone out of view, if it may be a landmark. `view`: the last image that it was predicted to.
   void remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now);
   bool remembers(TrackId track) const { return memory_.contains(track); }
   void forget_unlocated(Time now) { memory_.forget_unlocated(now); }

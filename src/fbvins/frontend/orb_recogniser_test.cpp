@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-/// Tracks of one image of the wall, remembered; then the wall again, from elsewhere.
+/// Tracks of one image of the wall, remembered; then another image of the wall, from elsewhere.
 struct Scene {
   TestWall wall;
   OrbDescriber describer{OrbOptions{}, make_identity_stage()};
@@ -42,7 +42,7 @@ struct Scene {
     tracks.end_all(Fate::out_of_view);
     tracks.drop_ended([&](const OrbTrack& t, const OrbPatches& p) { recogniser.remember(t, p.reference, view, view.t); });
   }
-  /// Where they are on the wall, and `off_m` beside it.
+  /// Their positions on the wall, shifted by `off_m`.
   LandmarkUpdate update(const Vec3& off_m = Vec3::Zero()) const {
     LandmarkUpdate update;
     for (const OrbTrack& track : before)
@@ -51,7 +51,7 @@ struct Scene {
   }
 };
 
-TEST(OrbRecogniser, KnowsTheWallAgainFromAFewCentimetresAside) {
+TEST(OrbRecogniser, ReobservesTheWallFromAFewCentimetresAside) {
   for (const bool located_before_they_end : {true, false}) {
     Scene scene;
     if (located_before_they_end) scene.recogniser.locate(scene.update(), scene.tracks);
@@ -71,7 +71,7 @@ TEST(OrbRecogniser, KnowsTheWallAgainFromAFewCentimetresAside) {
   }
 }
 
-TEST(OrbRecogniser, TakesNoneThatOnlyAFewAgreeOn) {
+TEST(OrbRecogniser, TakesNoneWhereTooFewAgree) {
   Scene scene;
   scene.end_all();
   LandmarkUpdate far_off = scene.update(Vec3(0.5, 0, 0));

@@ -9,7 +9,7 @@ namespace {
 
 /// Uncertainty of a new track's position along its weakest direction, px for image noise of one grey value.
 constexpr double kMaxUncertainty_px = 0.18;
-/// The same where the image has too few such keypoints for half of the tracks wanted.
+/// The same where the image has fewer such keypoints than half of the tracks wanted.
 constexpr double kMaxUncertaintyFew_px = 3.0;
 
 double weakest_direction_px(const KltLevelTemplate& patch) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// New tracks where there are few: first for image cells with less than their share, then anywhere; and where the image has
-// too few sharp corners (dark, blurred, plain walls), its less sharp ones at half the distance, up to half of what is
-// wanted. Buffers are reused; one instance, one thread.
+// Starts tracks: first in image cells with less than their share, then anywhere. Where the image has too few sharp corners
+// (dark, blurred, plain walls), also less sharp ones at half the distance, up to half of the tracks wanted.
+// Buffers are reused; one instance, one thread.
 //
 //   OrbStarter starter(camera, 180, 14);
 //   starter.start(tracks, view, left, stats);
@@ -19,7 +19,7 @@ class OrbStarter {
   OrbStarter(const Camera& camera, int wanted, double min_distance_px)
       : camera_(camera), wanted_(wanted), min_distance_px_(min_distance_px) {}
 
-  /// From keypoints that no track has. Counts observed tracks and those started.
+  /// Starts tracks at keypoints that no track has. Counts observed tracks and those started.
   void start(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
 
  private:
@@ -39,8 +39,8 @@ class OrbStarter {
   Camera camera_;
   int wanted_;
   double min_distance_px_;
-  std::vector<Vec2> occupied_;                 // where tracks are
-  std::array<int, kColumns * kRows> count_{};  // of them in each cell
+  std::vector<Vec2> occupied_;                 // positions of tracks
+  std::array<int, kColumns * kRows> count_{};  // tracks in each cell
   std::vector<std::size_t> strongest_first_;   // keypoints without a track
 };
 

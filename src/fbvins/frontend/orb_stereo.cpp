@@ -10,14 +10,14 @@
 namespace fbvins {
 namespace {
 
-/// Disparities down to this are taken as infinitely far rather than as wrong.
+/// Negative disparities down to this are taken as points at infinity, not as wrong.
 constexpr double kInfinity_px = 1.0;
 /// Half-width of the band that is searched, times the scale of the keypoint, up to the largest scale.
 constexpr double kBand_px = 2.0;
 constexpr float kLargestScale = 3.0f;
 constexpr int kLevelsApart = 1;
 constexpr int kMaxDistance_bits = 64;
-/// Smallest z of a ray, of any length near 1, that still meets the rectified image plane.
+/// Smallest z of a rotated (x, y, 1) that still has rectified coordinates.
 constexpr double kGrazing = 0.05;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Left-right matching of descriptors along the epipolar band. Rays of both cameras are turned so that the baseline
+// Left-right matching of descriptors along the epipolar band. Rays of both cameras are rotated so that the baseline
 // is the x axis; matches then differ in x only (rectified normalised coordinates; images are never rectified).
 // Buffers are reused; one instance, one thread.
 //
@@ -28,7 +28,7 @@ class OrbStereoMatcher {
   void index(const OrbFeatures& right);
   /// The right keypoint that matches, or -1.
   int candidate(const Vec2& left_normalised, int level, const Descriptor& descriptor);
-  /// 1/m along z of C0; nothing when the rays are too far from one epipolar plane or meet too near or behind.
+  /// 1/m along z of C0; nothing when the rays are too far from a common epipolar plane or meet too near or behind.
   std::optional<double> inverse_depth(const Vec2& left_normalised, const Vec2& right_normalised) const;
 
  private:

@@ -8,13 +8,13 @@ namespace {
 
 /// A track expected this far outside the image is forgotten.
 constexpr double kFarOutside_px = 40;
-/// Depth now / depth before; nearer, or behind the camera, a prediction means nothing.
+/// Smallest depth now / depth before; nearer, or behind the camera, a prediction is useless.
 constexpr double kNearestAhead = 0.1;
-/// Tracks whose squared distance is less than this share of the smallest distance's square (0.4 of it) are one.
+/// Tracks nearer to each other than 0.4 of the smallest distance are taken as one; here its square.
 constexpr double kTogetherShare2 = 0.16;
-/// Without depth the prediction is a guess that soon is worth nothing: this share of the usual time.
+/// A track without depth, whose prediction soon is useless, is searched for during this share of the usual time.
 constexpr double kMemoryWithoutDepth = 0.3;
-/// Younger tracks are not worth remembering.
+/// Tracks of fewer images are not searched for.
 constexpr int kFewestFrames = 2;
 
 void predict_one(OrbTrack& track, PatchReference& reference, const Camera& camera, const CameraMotion& motion,

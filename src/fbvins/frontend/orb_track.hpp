@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A track of the orb frontend, and what happens to all of them from image to image. A track that is not seen for a moment
-// (blur, occlusion, a black image) stays in the table with its descriptor and patch, and is looked for where it should be.
-// Functions without state.
+// A track of the orb frontend, and operations on all tracks from image to image. A track that is not observed for a moment
+// (blur, occlusion, a black image) stays in the table with its descriptor and patch, and is searched for at its predicted
+// position. Functions without state.
 //
-//   predict(tracks, camera, motion, depth);         // to where they should be; not observed until found
+//   predict(tracks, camera, motion, depth);         // to their expected positions; not observed until found
 //   if (settle(track, px, camera, view)) ...        // found
 //   thin_out(tracks, 180, 14);
 //   forget(tracks, view.t, 1.0);
@@ -21,9 +21,9 @@
 
 namespace fbvins {
 
-/// Levels of the pyramid that patches are aligned on.
+/// Levels of the pyramid on which patches are aligned.
 inline constexpr int kOrbAlignmentLevels = 3;
-/// Tracks kept at most without an observation in the newest image.
+/// At most so many tracks without an observation in the newest image are kept.
 inline constexpr int kMostUnobserved = 200;
 
 struct OrbTrack : TrackState {
@@ -39,13 +39,13 @@ struct OrbTrack : TrackState {
   int level = 0;          ///< of the scale pyramid, as last seen
   Time last_seen;
   bool was_observed = false;            ///< in the image before
-  bool renew_reference = false;         ///< it no longer looks like the patch it began with
+  bool renew_reference = false;         ///< it no longer matches the patch with which it began
   std::array<Sighting, kHistory> seen;  ///< of image i at i % kHistory
-  std::optional<Vec3> seen_from_W;      ///< camera when it was last observed, m
-  std::optional<Vec3> p_W;              ///< where the estimator has left its landmark, once it has, m
+  std::optional<Vec3> seen_from_W;      ///< position of the camera when it was last observed, m
+  std::optional<Vec3> p_W;              ///< position of its landmark, once that has left the estimator's window, m
 
   void see(std::int64_t image) { seen[static_cast<std::size_t>(image) % kHistory] = {normalised, observed ? image : -1}; }
-  /// Where it was seen in that image; null if it was not.
+  /// Its position in that image; null if it was not observed.
   const Vec2* sighting(std::int64_t image) const {
     const Sighting& s = seen[static_cast<std::size_t>(image) % kHistory];
     return s.image == image ? &s.normalised : nullptr;
@@ -53,22 +53,22 @@ struct OrbTrack : TrackState {
 };
 
 struct OrbPatches {
-  KltTemplate newest;        ///< of the last image it was seen in; only for observed tracks
-  PatchReference reference;  ///< where the track began or was renewed
+  KltTemplate newest;        ///< of the last image in which it was observed
+  PatchReference reference;  ///< of the image in which the track began or its reference was renewed
 };
 
 using OrbTracks = TrackTable<OrbTrack, OrbPatches>;
 
-/// Moves every track to where it should be in the newest image.
+/// Moves every track to its predicted position in the newest image.
 void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth);
-/// The track is at px in the newest image. False at the border.
+/// Records that the track is observed at px in the newest image. False at the border.
 bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view);
-/// Two tracks that have come together are one: the older stays. Then no more than wanted, the older first, which is also
-/// their order afterwards.
+/// Of two tracks that have come together the older stays; and of all at most `most`, the older ones. Tracks are sorted by age
+/// afterwards.
 void thin_out(OrbTracks& tracks, int most, double min_distance_px);
-/// Tracks that were not observed for too long, and the oldest of too many.
+/// Ends tracks that were not observed for too long, and the youngest of too many.
 void forget(OrbTracks& tracks, Time now, double memory_s);
-/// What observed tracks look like now; one at the border is lost.
+/// Cuts the newest patches of observed tracks; a track at the border is lost.
 void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera);
 
 }  // namespace fbvins

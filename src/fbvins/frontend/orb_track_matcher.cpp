@@ -8,11 +8,11 @@ namespace {
 
 /// Search radius when only the rotation or nothing is known.
 constexpr double kSearchBlind_px = 50;
-/// Of a track that was not observed in the image before, searched for without its neighbours' help: a descriptor must say more.
+/// For a track that was not observed in the image before, whose prediction is less certain: a stricter limit.
 constexpr int kReturningDistance_bits = 45;
-/// Of descriptors as extracted, for comparison with improved ones.
+/// Limit for descriptors as extracted, for comparison with improved ones.
 constexpr int kRawDistance_bits = 60;
-/// A match this near to where its track turned out to be is right.
+/// A match within this distance of the verified position of its track is an inlier.
 constexpr double kInlier_px = 3;
 
 }  // namespace
@@ -38,7 +38,7 @@ const std::vector<int>& OrbTrackMatcher::match(const OrbTracks& tracks, const Or
   return found_;
 }
 
-/// What the same search finds by descriptors as they were extracted: for the statistics only.
+/// The same search with descriptors as extracted, for the statistics only.
 void OrbTrackMatcher::match_raw(const OrbTracks& tracks, const OrbView& view) {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     queries_[i].descriptor = tracks[i].raw;
@@ -56,7 +56,7 @@ void OrbTrackMatcher::collect(const OrbTracks& tracks, const OrbView& view, cons
 
 int OrbTrackMatcher::inliers(const OrbTracks& tracks, const Matches& matches) {
   int count = 0;
-  auto next = matches.begin();  // both are in the same order; tracks without a match and matches of dropped tracks lie between
+  auto next = matches.begin();  // both are in the same order; there are tracks without a match and matches of dropped tracks
   for (const OrbTrack& track : tracks) {
     const auto match = std::find_if(next, matches.end(), [&](const auto& m) { return m.first == track.id; });
     if (match == matches.end()) continue;

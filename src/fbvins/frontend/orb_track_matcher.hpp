@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which keypoint of the newest image each track is, by its descriptor alone (paper 2.2.3): a candidate, to be checked.
-// Counts, beside it, what descriptors as extracted would have found. Buffers are reused; one instance, one thread.
+// Matches each track with a keypoint of the newest image by its descriptor (paper 2.2.3): a candidate, to be verified.
+// For the statistics also counts matches of descriptors as extracted. Buffers are reused; one instance, one thread.
 //
 //   OrbTrackMatcher matcher(12);
 //   const std::vector<int>& found = matcher.match(tracks, view, motion.has_translation, stats);   // -1: none
@@ -18,12 +18,12 @@ namespace fbvins {
 
 class OrbTrackMatcher {
  public:
-  /// `search_px`: around a position predicted from the estimator's state.
+  /// `search_px`: radius around a position predicted from the estimator's state.
   explicit OrbTrackMatcher(double search_px) : search_px_(search_px) {}
 
   /// The keypoint of tracks[i], or -1; valid until the next call.
   const std::vector<int>& match(const OrbTracks& tracks, const OrbView& view, bool well_predicted, FrontendStats& stats);
-  /// How many of the matches lie where their track, checked, turned out to be.
+  /// Counts the matches that agree with the verified positions of their tracks.
   void count_inliers(const OrbTracks& tracks, FrontendStats& stats) const;
 
  private:
@@ -36,7 +36,7 @@ class OrbTrackMatcher {
   GuidedMatcher matcher_;
   std::vector<GuidedQuery> queries_;
   std::vector<int> found_, found_raw_;
-  bool improved_ = false;  // the descriptors of the newest image
+  bool improved_ = false;  // whether the newest image's descriptors are
   Matches matches_, raw_matches_;
 };
 

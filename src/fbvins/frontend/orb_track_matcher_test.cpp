@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-/// Makes every descriptor the same: improved ones say nothing here, those extracted do.
+/// Makes all descriptors the same: improved ones are useless here, those as extracted are not.
 class Leveller final : public DescriptorStage {
  public:
   void improve(int, int, OrbFeatures& features) override {
@@ -59,12 +59,12 @@ TEST(OrbTrackMatcher, FindsTracksWhereTheyAreExpected) {
   EXPECT_EQ(scene.stats.raw_matches.inliers, scene.stats.matches.inliers);
 }
 
-TEST(OrbTrackMatcher, CountsBesideWhatDescriptorsAsExtractedWouldHaveFound) {
+TEST(OrbTrackMatcher, AlsoCountsMatchesOfDescriptorsAsExtracted) {
   Scene scene(std::make_unique<Leveller>());
   OrbTrackMatcher matcher(12);
   (void)matcher.match(scene.tracks, scene.view, true, scene.stats);
   EXPECT_GT(scene.stats.raw_matches.found, 10);
-  EXPECT_LT(scene.stats.matches.found, scene.stats.raw_matches.found) << "rivals are equals";
+  EXPECT_LT(scene.stats.matches.found, scene.stats.raw_matches.found) << "equal descriptors fail the ratio test";
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ OrbTrack track_at(const Camera& camera, const Vec2& px, int age_frames = 5) {
   return track;
 }
 
-TEST(OrbTrack, IsPredictedWhereItsDepthSaysAndLeavesWithTheImage) {
+TEST(OrbTrack, IsPredictedByItsDepthAndEndsOutsideTheImage) {
   const TestWall wall;
   OrbTracks tracks(3);
   OrbTrack with_depth = track_at(wall.camera, Vec2(100, 90));
@@ -46,7 +46,7 @@ TEST(OrbTrack, IsLostBehindTheCamera) {
   EXPECT_EQ(tracks[0].fate, Fate::lost);
 }
 
-TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasSeen) {
+TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasObserved) {
   OrbTrack track;
   for (const std::int64_t image : {10, 11, 12}) {
     track.normalised = Vec2(static_cast<double>(image), 0);
@@ -88,11 +88,11 @@ TEST(ThinOut, KeepsTheOlderOfTwoThatHaveComeTogetherAndNoMoreThanWanted) {
   tracks.drop_ended();
   ASSERT_EQ(tracks.size(), 3u);
   EXPECT_EQ(tracks[0].age_frames, 9);
-  EXPECT_EQ(tracks[1].age_frames, 8) << "unobserved, it is in nobody's way";
+  EXPECT_EQ(tracks[1].age_frames, 8) << "tracks that are not observed are not thinned out";
   EXPECT_EQ(tracks[2].age_frames, 3);
 }
 
-TEST(Forget, IsPatientWithTracksWhoseDepthIsKnown) {
+TEST(Forget, KeepsTracksWithDepthForLonger) {
   const TestWall wall;
   const Time now{2'000'000'000};
   const auto fate = [&](double seen_ago_s, bool depth, int age_frames, bool observed = false) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The newest left image as all parts of the orb frontend see it: its keypoints with the descriptors in use, and from where
-// it was taken. OrbDescriber makes it: extraction, and the stage that may improve descriptors (paper 2.2.2).
+// The newest left image for all parts of the orb frontend: its keypoints with the descriptors in use, and the camera's pose.
+// OrbDescriber fills it: extraction, and the stage that may improve descriptors (paper 2.2.2).
 // Buffers are reused; one instance, one thread.
 //
 //   OrbDescriber describer(orb_options, make_identity_stage());
@@ -22,15 +22,15 @@ namespace fbvins {
 struct OrbView {
   std::int64_t index = 0;  ///< of usable left images, counted from 0
   Time t;
-  std::optional<Pose<W, C0>> T_WC;  ///< where the state is known
+  std::optional<Pose<W, C0>> T_WC;  ///< predicted; none without a state of the estimator
   OrbFeatures features;
   OrbFeatures raw;  ///< the same before descriptors were improved; empty where they are as extracted
   bool improved = false;
   KeypointGrid grid;
-  std::vector<std::uint8_t> used;  ///< of each keypoint, whether a track has it
+  std::vector<std::uint8_t> used;  ///< for each keypoint, whether a track has it
 
   const Descriptor& descriptor(std::size_t k) const { return features.descriptors[k]; }
-  /// As extracted; one that means nothing where none was improved.
+  /// The descriptor as extracted; zero where none was improved.
   Descriptor raw_descriptor(std::size_t k) const { return improved ? raw.descriptors[k] : Descriptor{}; }
 };
 
@@ -39,9 +39,9 @@ class OrbDescriber {
   OrbDescriber(const OrbOptions& options, std::unique_ptr<DescriptorStage> stage)
       : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
 
-  /// All of the view that comes from the image alone. Returns the CPU time that improving took, ms.
+  /// Fills all of the view that depends on the image alone. Returns the CPU time that improving took, ms.
   double describe(const ImageView& image, OrbView& view);
-  /// The features alone, of another image.
+  /// Only the features, of another image.
   double describe(const ImageView& image, OrbFeatures& features);
 
  private:

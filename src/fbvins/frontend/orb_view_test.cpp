@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// Turns every bit over.
+/// Inverts every bit.
 class Inverter final : public DescriptorStage {
  public:
   void improve(int, int, OrbFeatures& features) override {
@@ -23,7 +23,7 @@ Image textured() {
       200, 160, NoiseTexture(5, 20), [](const Vec2& px) { return px; }, 120, 35);
 }
 
-TEST(OrbDescriber, KeepsWhatWasExtractedBesideWhatWasImproved) {
+TEST(OrbDescriber, KeepsDescriptorsAsExtractedBesideTheImprovedOnes) {
   const Image image = textured();
   OrbView plain, improved;
   OrbDescriber(OrbOptions{}, make_identity_stage()).describe(image.view(), plain);

@@ -7,9 +7,9 @@ namespace fbvins {
 namespace {
 
 constexpr Duration kMemory = Duration{1'500'000'000};
-/// The prior may be this much older than the image that it is carried to.
+/// The prior may be this much older than the image that it is propagated to.
 constexpr Duration kOldestPrior = Duration{500'000'000};
-/// Between the ends of an interval and the readings inside it there may be this much.
+/// Readings cover an interval if they begin and end at most this far inside it.
 constexpr Duration kTolerance = Duration{30'000'000};
 
 }  // namespace
@@ -48,7 +48,7 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to) const 
   ImuSample last = *it;
   last.t = s.t;
   while (s.t < to) {
-    // Beyond the last reading the last value holds.
+    // After the last reading its value is held.
     const bool end = it == samples_.end() || it->t >= to;
     ImuSample next = it == samples_.end() ? last : *it;
     if (end) next.t = to;

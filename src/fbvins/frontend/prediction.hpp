@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the left camera has moved between two images, from the gyro and, when the estimator has a state, from
-// that state carried on by the IMU. Guides matching only: nothing here reaches the estimate.
+// Predicted motion of the left camera between two images, from the gyro and, when the estimator has a state, from
+// that state propagated by the IMU. For guided matching and outlier checks; never a measurement of the estimator.
 //
 //   MotionPredictor predictor(rig.T_BC0);
 //   predictor.add(packet.imu, prior);
@@ -20,17 +20,17 @@ struct CameraMotion {
   Mat3 R_ba = Mat3::Identity();
   Vec3 p_ba = Vec3::Zero();      ///< metres, in the camera at b
   bool has_rotation = false;     ///< IMU readings covered the time between
-  bool has_translation = false;  ///< a valid prior could be carried to both images
+  bool has_translation = false;  ///< a valid prior could be propagated to both images
 };
 
-/// A feature of image a as the motion to b carries it.
+/// A feature of image a, transformed by the motion to b.
 struct CarriedPoint {
   Vec3 p;  ///< in the camera at b, scaled so that its depth at a was 1: p.z() is depth at b / depth at a
-  /// Its projections. A track moves by their difference, whatever its own position: exact for no motion.
+  /// Its projections. A track's pixel is moved by their difference, so that no motion leaves it exactly where it is.
   Vec2 a_px = Vec2::Zero(), b_px = Vec2::Zero();
 };
 
-/// Nothing where one of the two cannot be seen. `inverse_depth`, 1/m, counts where the motion has a translation; the motion
+/// Nothing where one of the two has no projection. `inverse_depth`, 1/m, matters if the motion has a translation; the motion
 /// must have a rotation.
 std::optional<CarriedPoint> carry_point(const Camera& camera, const CameraMotion& motion, const Vec2& normalised,
                                         double inverse_depth);
@@ -39,16 +39,16 @@ class MotionPredictor {
  public:
   explicit MotionPredictor(const Pose<B, C0>& T_BC0) : T_BC0_(T_BC0) {}
 
-  /// Keeps the readings of the last second or so, and the newest valid prior: where an image has none, the one before is
-  /// carried on, for half a second.
+  /// Keeps the readings of the last 1.5 s, and the newest valid prior: where an image has none, the one before is
+  /// propagated, for up to half a second.
   void add(const ImuSegment& imu, const StatePrior& prior);
-  /// W is another: the prior is void.
+  /// W is a new frame: the prior is void.
   void forget_state() { prior_ = {}; }
-  /// Readings older than this are of no use any more.
+  /// Drops readings older than this.
   void forget_before(Time t);
 
   CameraMotion between(Time a, Time b) const;
-  /// The left camera in W; nothing without a prior that can be carried to t.
+  /// Pose of the left camera in W; nothing without a prior that can be propagated to t.
   std::optional<Pose<W, C0>> camera_at(Time t) const;
 
  private:

@@ -8,7 +8,7 @@ namespace {
 
 const Pose<B, C0> kT_BC0(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
 
-/// A body that turns at a constant rate and accelerates along x of W, which its IMU feels.
+/// A body that turns at a constant rate and accelerates along x of W, with its IMU readings.
 struct Flight {
   Vec3 w_B = Vec3(0.1, -0.3, 0.2), a_W = Vec3(0.4, 0, 0);
 

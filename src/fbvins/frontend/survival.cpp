@@ -11,7 +11,7 @@ Survival SurvivalMeter::add(const TrackedFrame& frame) {
   for (const TrackedFeature& feature : frame.features) now.ids.push_back(feature.id.value);
   std::sort(now.ids.begin(), now.ids.end());
   Survival out;
-  // The newest of those a second old or older is compared with.
+  // Compares with the newest frame that is at least a second old.
   while (past_.size() > 1 && frame.t - past_[1].t >= kSecond) past_.pop_front();
   if (!past_.empty() && frame.t - past_.front().t >= kSecond) {
     const std::vector<std::int64_t>& then = past_.front().ids;

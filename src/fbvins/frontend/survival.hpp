@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many of the features observed a second ago are observed now: what tracking, and finding again after
-// occlusion or blur, bring together. One instance, one thread; frames in order of time.
+// How many of the features observed a second ago are observed now, by tracking or after occlusion or blur.
+// One instance, one thread; frames in order of time.
 //
 //   SurvivalMeter meter;
 //   sum += meter.add(frame);                   // sum.now / sum.then is the share that survives a second

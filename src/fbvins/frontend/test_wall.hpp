@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of the frontends' parts: a textured wall 3 m ahead of a camera that looks at it square, and moves sideways.
+// For tests of the frontends' parts: a textured wall 3 m ahead of a camera that faces it and moves sideways.
 #pragma once
 
 #include "fbvins/features/noise_texture.hpp"
@@ -27,7 +27,7 @@ struct TestWall {
     const auto warp = [&](const Vec2& px) { return Vec2(px.x() + kFocal_px / kDepth_m * x_m, px.y()); };
     return std::make_shared<const Image>(render_texture(kWidth, kHeight, texture, warp, 120, 35, 1.0, noise_seed));
   }
-  /// Pixels that everything moves by when the camera moves by x_m.
+  /// Motion of the image, px, when the camera moves by x_m.
   static Vec2 shift(double x_m) { return {-kFocal_px / kDepth_m * x_m, 0}; }
 
   /// The motion of a camera that has gone to the right by x_m.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The features that are being followed: what every frontend knows of one, and the table of them with their patches.
-// Patches are large and stay where they are; tracks are small and move. One instance, one thread.
+// The features that are being followed: the state of a track that all frontends have, and the table of tracks with their
+// patches. Patches are large and stay in place; tracks are small and are moved. One instance, one thread.
 //
 //   TrackTable<KltTrack, KltPatches> tracks(150);
 //   if (!tracks.full() && tracks.free_patches().newest.cut(left, px, 0, 3)) tracks.start(track);
@@ -19,13 +19,13 @@
 
 namespace fbvins {
 
-/// Whether a track is still one. One whose feature went out of view may be re-observed; a lost one was wrong.
+/// Whether a track goes on. One whose feature went out of view may be re-observed; a lost one may not.
 enum class Fate : std::uint8_t { goes_on, out_of_view, lost };
 
 struct TrackState {
   TrackId id;
   std::size_t slot = 0;            ///< of its patches
-  Vec2 px = Vec2::Zero();          ///< in the newest left image; where it is expected, while it is not observed
+  Vec2 px = Vec2::Zero();          ///< in the newest left image; predicted, while it is not observed
   Vec2 normalised = Vec2::Zero();  ///< the same in C0
   Vec2 previous_px = Vec2::Zero();
   Vec2 previous_normalised = Vec2::Zero();
@@ -54,17 +54,17 @@ class TrackTable {
   const Patches& patches(const Track& track) const { return patches_[track.slot]; }
 
   bool full() const { return free_.empty(); }
-  /// Those that the next track gets: cut first, and start only when that went well. Not of a full table.
+  /// The patches of the next track to start: cut them first, and start the track only if that succeeded. Not of a full table.
   Patches& free_patches() {
     assert(!full());
     return patches_[free_.back()];
   }
-  /// A new track, with an id of its own.
+  /// Adds a track with a new id.
   Track& start(Track track) {
     track.id = TrackId{next_id_++};
     return resume(std::move(track));
   }
-  /// A track that goes on under the id it has.
+  /// Adds a track with the id that it has.
   Track& resume(Track track) {
     assert(!full());
     track.slot = free_.back();
@@ -72,7 +72,7 @@ class TrackTable {
     return tracks_.emplace_back(std::move(track));
   }
 
-  /// Takes out those whose fate is not to go on, after `on_end(track, patches)`.
+  /// Removes tracks whose fate is not to go on, after calling `on_end(track, patches)` for each.
   template <class OnEnd>
   void drop_ended(OnEnd&& on_end) {
     for (const Track& track : tracks_) {
