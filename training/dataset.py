@@ -40,14 +40,14 @@ class Batch:
     def __init__(self, records):
         self.a, self.b = Views(records["a"]), Views(records["b"])
         self.condition = torch.from_numpy(records["condition"].astype(np.int64))
-        self.in_b = torch.from_numpy(np.nan_to_num(records["a_in_b"], nan=-1e6))  # not to be seen: nowhere near
+        self.in_b = torch.from_numpy(np.nan_to_num(records["a_in_b"], nan=-1e6))  # not visible: far from every keypoint
 
     @property
     def both(self):
-        """(B, N, M): a keypoint here and there."""
+        """(B, N, M): both keypoints exist."""
         return self.a.valid[:, :, None] & self.b.valid[:, None, :]
 
     def apart(self):
-        """(B, N, M) in px."""
+        """(B, N, M), px: distance from the true position of each keypoint of a in b to each keypoint of b."""
         apart = torch.cdist(self.in_b, self.b.keypoints[..., :2], compute_mode="donot_use_mm_for_euclid_dist")
         return torch.where(self.both, apart, torch.full_like(apart, 1e6))

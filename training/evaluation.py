@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Correct mutual nearest neighbours of raw and boosted bits, by condition: what bench/features measures in C++."""
+"""Correct mutual nearest neighbours of raw and boosted bits, by condition, as bench/features measures them in C++."""
 import numpy as np
 import torch
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures that anybody may use, for training: photographs and textures of Debian's packages, cut into gray views.
+"""Freely licensed pictures for training: photographs and textures of Debian's packages, cut into grey views.
 
   training/free_pictures.py --out out/pictures                downloads the packages with apt-get, unpacks, cuts
-  training/free_pictures.py --out out/pictures --debs DIR     packages that are there already
+  training/free_pictures.py --out out/pictures --debs DIR     packages downloaded before
 
 Everything in Debian's main archive may be used, changed and passed on for any purpose; each package names its pictures'
 authors and licences in usr/share/doc/PACKAGE/copyright (training/README.md has a list). The same packages give the same
@@ -21,7 +21,7 @@ from PIL import Image
 
 Image.MAX_IMAGE_PIXELS = None
 
-# Of each package: where its pictures are. Drawings, symbols and pictures of screens are left out, by folder or by MIN_CORNERS.
+# Of each package: where its pictures are. Drawings, symbols and screenshots are left out, by folder or by MIN_CORNERS.
 PACKAGES = {
     "supertuxkart-data": ["usr/share/games/supertuxkart/data/textures", "usr/share/games/supertuxkart/data/tracks",
                           "usr/share/games/supertuxkart/data/library"],
@@ -59,7 +59,7 @@ def pictures_of(root, folders):
 
 
 def gray_of(content):
-    """Gray picture, or None for what is none, is too small, or is mostly transparent."""
+    """Grey picture, or None if the content is no picture, too small or mostly transparent."""
     try:
         picture = Image.open(io.BytesIO(content))
         if min(picture.size) < MIN_SIDE:
@@ -102,7 +102,7 @@ def unpack(package, debs, folder):
 
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--out", required=True, type=pathlib.Path, help="a folder a package, with views as PNG")
+    p.add_argument("--out", required=True, type=pathlib.Path, help="folder for the views: one folder per package, PNG")
     p.add_argument("--debs", type=pathlib.Path, help="folder of packages that were downloaded before")
     a = p.parse_args()
     with tempfile.TemporaryDirectory() as scratch:

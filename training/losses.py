@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is trained for (paper eq. 9-11), on Hamming distances of bits that are hard forwards and soft backwards.
+"""The losses (paper eq. 9-11), on Hamming distances of bits with a straight-through gradient.
 
-distance (B, N, M) in bits, positive and usable (B, N, M) masks: which pairs show the same point, which count at all
-(pairs a little farther apart than a match may be do not).
+distance (B, N, M) in bits, positive and usable (B, N, M) masks: which pairs show the same point, which are used at all
+(pairs a little farther apart than the tolerance of a match are not).
 """
 import torch
 
@@ -42,7 +42,7 @@ def fast_ap_and_boost(distance, raw_distance, positive, usable, rows=96):
 
 
 class _Contrastive(torch.autograd.Function):
-    """By hand, because the (B, N, M) tensors are what a training step spends most of its time on."""
+    """With a hand-written gradient, because a training step spends most of its time on the (B, N, M) tensors."""
 
     @staticmethod
     def forward(ctx, product, positive, usable, bits, bits_per_unit):
@@ -70,7 +70,7 @@ class _Contrastive(torch.autograd.Function):
 
 
 def contrastive(product, positive, usable, bits, bits_per_unit):
-    """InfoNCE with several positives, both ways: minus log of the share of the softmax that falls on positives.
+    """InfoNCE with several positives, in both directions: minus log of the softmax's share on positives.
 
     product (B, N, M) of bits as +-1, from which the distance is (bits - product) / 2."""
     return _Contrastive.apply(product, positive, usable, bits, bits_per_unit)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The booster's network (paper 2.2.2, eq. 6-8): descriptors and keypoint geometry in, better bits out.
+"""The booster's network (paper 2.2.2, eq. 6-8): from descriptors and keypoint geometry to better bits.
 
 One architecture, two sizes. `src/fbvins/features/booster_network.hpp` is the same in C++; docs/derivations/booster.md
 explains it. Input of one image: margins (N, 512), of which the first 256 have the signs of the bits, geometry (N, 7) from
@@ -16,13 +16,13 @@ GEOMETRY = 7  # x, y, score in the image, mean score, cos, sin of the angle, log
 
 @dataclasses.dataclass
 class Size:
-    """Of a network; stored in the weights file."""
+    """Dimensions of a network; stored in the weights file."""
     width: int
     descriptor_hidden: int
     keypoint_hidden: tuple
     layers: int
-    residual: bool  # the input added to the output
-    margins: bool  # the input is how clearly each bit was decided, here and in the surroundings, rather than +-1
+    residual: bool  # a linear path from the input to the output
+    margins: bool  # the input is the margins of the bits and of the surroundings, rather than +-1
     bits: int = 256
 
     @property
@@ -48,7 +48,7 @@ def geometry_of(keypoints, width, height, valid):
 
 
 class AttentionFree(nn.Module):
-    """Every keypoint takes, gated by its own query, one and the same summary of all keypoints (eq. 7-8)."""
+    """One summary of all keypoints, gated for each keypoint by its own query (eq. 7-8)."""
 
     def __init__(self, width):
         super().__init__()
@@ -76,8 +76,8 @@ class Layer(nn.Module):
 
 
 class Booster(nn.Module):
-    """`geometry`, `cross` and `around` switch the two paths and half of the input off, to learn what they bring: weights to
-    compare, not to fly, where nothing is switched off."""
+    """`geometry`, `cross` and `around` switch off the geometry path, cross-boosting and the margins of the surroundings, for
+    ablation only: the C++ network always has all of them."""
 
     def __init__(self, size, geometry=True, cross=True, around=True):
         super().__init__()
@@ -112,6 +112,6 @@ class Booster(nn.Module):
 
 
 def hard_bits(y):
-    """+-1 forwards, the slope of tanh backwards (straight through)."""
+    """+-1 in the forward pass, the gradient of tanh in the backward pass (straight-through estimator)."""
     soft = torch.tanh(y)
     return soft + (torch.where(y > 0, 1.0, -1.0) - soft).detach()

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Stores what the network answers to one view, for the C++ tests: store_vectors.py WEIGHTS PAIRS OUT [COUNT]."""
+"""Stores the network's output for one view, for the C++ tests: store_vectors.py WEIGHTS PAIRS OUT [COUNT]."""
 import json
 import pathlib
 import struct

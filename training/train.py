@@ -4,9 +4,9 @@
 
   training/train.py --images PHOTOS --out out/boost-s                  pairs made first, by build/training/booster_pairs
   training/train.py --pairs pairs.bin --held-out held.bin --out out/boost-s --minutes 60
-  training/train.py --resume --out out/boost-s --minutes 30             goes on where it stopped
+  training/train.py --resume --out out/boost-s --minutes 30             continues an interrupted run
 
-Writes checkpoint.pt, curve.csv, curve.png (where matplotlib is there) and the weights as .safetensors. Same seed,
+Writes checkpoint.pt, curve.csv, curve.png (where matplotlib is installed) and the weights as .safetensors. Same seed,
 same data, one thread: the same weights. A GPU is used where there is one.
 """
 import argparse
@@ -27,7 +27,7 @@ from losses import contrastive, fast_ap_and_boost, hamming  # noqa: E402
 from model import SIZES, Booster, geometry_of, hard_bits  # noqa: E402
 from weights import round_weights, save_weights  # noqa: E402
 
-FEWEST_KEYPOINTS = 20  # of a view that is trained on
+FEWEST_KEYPOINTS = 20  # of a view used in training
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
 
 
@@ -35,28 +35,28 @@ def arguments_of(argv):
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--images", nargs="*", default=[], help="folders of photographs")
     p.add_argument("--pairs", nargs="*", default=[], help="files of booster_pairs instead of --images")
-    p.add_argument("--held-out", help="file of booster_pairs of pictures that are not trained on")
+    p.add_argument("--held-out", help="file of booster_pairs, of held-out pictures")
     p.add_argument("--out", required=True, help="folder for checkpoints, curves and weights")
     p.add_argument("--size", choices=list(SIZES), default="boost-s")
     p.add_argument("--steps", type=int, default=20000, help="length of the schedule")
     p.add_argument("--minutes", type=float, default=math.inf, help="the schedule ends after this time at the latest")
-    p.add_argument("--batch", type=int, default=12, help="pairs a step")
+    p.add_argument("--batch", type=int, default=12, help="pairs per step")
     p.add_argument("--share", type=float, nargs=len(CONDITIONS), default=[1, 1, 1, 1, 1],
-                   help="how often pairs of each condition are drawn, relative to one another")
-    p.add_argument("--keypoints", type=int, default=320, help="of a view at most")
+                   help="relative sampling weight of pairs of each condition")
+    p.add_argument("--keypoints", type=int, default=320, help="most keypoints of a view")
     p.add_argument("--rate", type=float, default=1e-3, help="largest learning rate")
     p.add_argument("--ap", type=float, default=0.0, help="weight of FastAP (eq. 9)")
     p.add_argument("--boost", type=float, default=0.0, help="lambda of the boost loss (eq. 11), relative to --ap")
     p.add_argument("--contrastive", type=float, default=1.0, help="weight of the contrastive term")
-    p.add_argument("--temperature", type=float, default=4.0, help="bits a unit of the contrastive logit")
+    p.add_argument("--temperature", type=float, default=4.0, help="bits per unit of the contrastive logit")
     p.add_argument("--no-geometry", action="store_true", help="without the geometry path")
     p.add_argument("--no-cross", action="store_true", help="without cross-boosting")
-    p.add_argument("--no-residual", action="store_true", help="without the path from the input straight to the output")
-    p.add_argument("--no-margins", action="store_true", help="told only the bits, not how clearly each was decided")
+    p.add_argument("--no-residual", action="store_true", help="without the linear path from input to output")
+    p.add_argument("--no-margins", action="store_true", help="bits instead of margins as input")
     p.add_argument("--no-around", action="store_true", help="without the margins of the surroundings")
-    p.add_argument("--head-scale", type=float, default=0.1, help="of the last layer's random start")
-    p.add_argument("--tolerance", type=float, default=3.0, help="px within which two keypoints are one point")
-    p.add_argument("--start", help="checkpoint whose weights to begin with")
+    p.add_argument("--head-scale", type=float, default=0.1, help="scale of the last layer's random initialisation")
+    p.add_argument("--tolerance", type=float, default=3.0, help="largest distance of a correct match, px")
+    p.add_argument("--start", help="checkpoint with the initial weights")
     p.add_argument("--seed", type=int, default=1)
     p.add_argument("--resume", action="store_true")
     p.add_argument("--evaluate-every", type=int, default=500)
@@ -75,10 +75,10 @@ def make_pairs(a, out):
 
 
 def as_if_moved(v, generator):
-    """Keypoints as if the camera had looked elsewhere, rolled, and been closer: steered bits stay what they are.
+    """Augmentation: keypoints as if the camera had been turned, rolled and moved closer. Steered bits do not change.
 
-    Without this the network learns where in the image a point is, which two views of a training pair agree on and
-    two views of a flight do not.
+    Without this the network relies on a point's position in the image, which is similar in the two views of a training
+    pair but not in two views of a flight.
     """
     def uniform(low, high):
         return low + (high - low) * torch.rand(len(v.width), 1, generator=generator)
@@ -92,19 +92,19 @@ def as_if_moved(v, generator):
 
 
 def in_a_window(v, generator):
-    """Which keypoints a view keeps: those in a window of its own. Two views of a flight share only a part of what they
-    see; with all the same keypoints in both, the network comes to rely on their summary being the same."""
+    """Mask of the keypoints in a random window of each view. Two views of a flight overlap only partly; with the same
+    keypoints in both, the network would come to rely on equal summaries."""
     keep = v.valid
     for axis, length in ((0, v.width), (1, v.height)):
         share = 0.5 + 0.5 * torch.rand(len(length), 1, generator=generator)
         start = (1 - share) * torch.rand(len(length), 1, generator=generator)
         at = v.keypoints[..., axis] / length[:, None]
         keep = keep & (at >= start) & (at <= start + share)
-    return torch.where(keep.sum(1, keepdim=True) < 20, v.valid, keep)  # a window on a bare wall
+    return torch.where(keep.sum(1, keepdim=True) < 20, v.valid, keep)  # too few in the window: the whole view
 
 
 def thin_out(v, most, generator):
-    """At most so many keypoints, at random of those in a window: what is not there is not computed with. Returns their places."""
+    """Keeps at most `most` random keypoints of a window, which also saves computation. Returns their indices."""
     v.valid = in_a_window(v, generator)
     chance = torch.rand(v.valid.shape, generator=generator) + v.valid
     index = chance.topk(min(most, chance.shape[1]), dim=1).indices
@@ -121,7 +121,7 @@ def losses_of(model, batch, a, device, generator):
         geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid).to(device)
         with torch.autocast(device.type, torch.bfloat16, enabled=a.autocast):
             y.append(model(v.margins.to(device), geometry, v.valid.to(device)))
-    # whole numbers up to 256 are exact in bfloat16
+    # integers up to 256 are exact in bfloat16
     half = torch.bfloat16 if a.autocast else torch.float32
     product = hard_bits(y[0].float()).to(half) @ hard_bits(y[1].float()).to(half).transpose(1, 2)
     apart = batch.apart().to(device)
@@ -163,7 +163,7 @@ def plot(out):
 
 
 class Schedule:
-    """Warm-up, then half a cosine down to a hundredth. Progress is in steps or in time, whichever is further."""
+    """Warm-up, then half a cosine down to a hundredth. Progress is counted in steps or in time, whichever is further."""
 
     def __init__(self, a, spent_s):
         self.a, self.start = a, time.time() - spent_s
@@ -189,7 +189,7 @@ def train(a):
     files = [open_pairs(p) for p in pairs]
     held = open_pairs(held)[:a.evaluate_pairs] if held else None
     where = np.concatenate([[(f, i) for i in range(len(m))] for f, m in enumerate(files)])
-    # a view of a bare wall teaches nothing, and one without keypoints has no summary to share
+    # views with few keypoints are not used: without any there is no summary
     seen = np.concatenate([np.minimum(m["a"]["count"], m["b"]["count"]) >= FEWEST_KEYPOINTS for m in files])
     chance = np.concatenate([np.asarray(a.share, float)[m["condition"]] for m in files]) * seen
     chance /= chance.sum()
@@ -244,18 +244,18 @@ def train(a):
               + " ".join(f"{k} {v:.3f}" for k, v in terms.items()) + "  held out: " + " ".join(f"{s}%" for s in scores), flush=True)
 
     while schedule.progress(step) < 1.0:
-        # the step's own generator: the same pairs whether resumed or not
+        # a generator per step: the same pairs whether resumed or not
         pick = np.random.default_rng((a.seed, step)).choice(len(where), a.batch, replace=False, p=chance)
         batch = Batch(np.stack([files[f][i] for f, i in where[pick]]))
         for group in optimiser.param_groups:
             group["lr"] = schedule.rate(step)
         loss, terms = losses_of(model, batch, a, device, torch.Generator().manual_seed(a.seed * 1000003 + step))
         if not torch.isfinite(loss):
-            sys.exit(f"the loss of step {step} is {float(loss)}: lower --rate or look at the pairs")
+            sys.exit(f"the loss of step {step} is {float(loss)}: lower --rate or check the pairs")
         optimiser.zero_grad()
         loss.backward()
         if not torch.isfinite(torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)):
-            sys.exit(f"the gradient of step {step} is not a number: lower --rate or look at the pairs")
+            sys.exit(f"the gradient of step {step} is not finite: lower --rate or check the pairs")
         optimiser.step()
         recent.append(float(loss))
         step += 1

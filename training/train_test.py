@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A few steps of training on a few synthetic pictures: the loss falls, the same seed gives the same weights, the weights
-file is read back as it was. Pairs of a simulated room show the same points where they say they do.
+file is read back unchanged. Pairs of a simulated room have true correspondences.
 train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
 import pathlib
 import subprocess

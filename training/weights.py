@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Weights as .safetensors, written by hand: eight bytes of length, a JSON header, the tensors in half precision (what C++ reads)."""
+"""Weights as .safetensors, without a library: eight bytes of length, a JSON header, the tensors in half precision (what C++ reads)."""
 import dataclasses
 import json
 import struct
@@ -8,8 +8,8 @@ FORMAT = "fbvins-booster-3"
 
 
 def round_weights(model):
-    """Puts the weights of every product that flies in 8-bit numbers onto those numbers (features/int8_gemm.hpp), in place:
-    what is evaluated and stored is what flies."""
+    """Rounds, in place, the weights of every product that is computed with 8-bit integers in C++ (features/int8_gemm.hpp) to
+    those integers, so that evaluation and file use the same weights as the C++ network."""
     import torch
     with torch.no_grad():
         for layer in model.modules():
@@ -50,7 +50,7 @@ def load_weights(path):
 
 
 def load_model(path):
-    """The network that weights are of."""
+    """The network with the weights of a file."""
     import torch
     from model import Booster, Size
     meta, arrays = load_weights(path)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shapes dropped on one another with radii of density 1/r^3 have the spectrum and the edges of natural images
-// (the "dead leaves" model). Each leaf here is an ellipse, a box, a triangle or a half-plane strip with a texture of its own.
+// (the "dead leaves" model). Each leaf here is an ellipse, a box, a triangle or a ring with a texture of its own.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -17,7 +17,7 @@ enum class Paint { flat, noise, stripes, checks, speckle, fibres };
 struct Leaf {
   Shape shape;
   Paint paint;
-  double x, y, rx, ry, c, s;      // place, half axes, direction
+  double x, y, rx, ry, c, s;      // position, half axes, direction
   double grey, slope_x, slope_y;  // shading
   double contrast, period, phase;
   std::uint32_t key;
@@ -74,7 +74,7 @@ double texture(const Leaf& l, double u, double v) {
     }
     case Paint::stripes: return std::sin(2 * std::numbers::pi * u / p + l.phase) > 0 ? 0.5 : -0.5;
     case Paint::checks: return (static_cast<int>(std::floor(u / p)) + static_cast<int>(std::floor(v / p))) & 1 ? 0.5 : -0.5;
-    case Paint::fibres: {  // grass, fur, wood: noise drawn out along one direction
+    case Paint::fibres: {  // grass, fur, wood: noise stretched along one direction
       double sum = 0, weight = 0.7;
       for (int octave = 0; octave < 3; ++octave, weight *= 0.7)
         sum += weight * (value_noise(u / p * 0.15 * (1 << octave) + 70, 2 * v / p * (1 << octave) + 70,
@@ -133,7 +133,7 @@ Leaf random_leaf(int width, int height, double r, const Style& style, Rng& rng) 
   return l;
 }
 
-/// Twice as fine as the picture, averaged at the end: no jagged edges.
+/// Twice the picture's resolution, averaged at the end against aliasing.
 class Canvas {
  public:
   Canvas(int width, int height, double grey)
@@ -157,7 +157,7 @@ class Canvas {
       }
   }
 
-  /// The same leaf again and again in rows: windows, bricks, tiles.
+  /// The same leaf repeated in rows: windows, bricks, tiles.
   void drop_in_rows(Leaf l, Rng& rng) {
     const double step = rng.uniform(2.1, 4), turn = rng.uniform() < 0.7 ? 0.0 : rng.uniform(0, 1.5);
     const int columns = 1 + static_cast<int>(rng.below(10)), rows = 1 + static_cast<int>(rng.below(6));
@@ -191,7 +191,7 @@ void drop_leaves(Canvas& canvas, const Style& style, Rng& rng) {
   }
 }
 
-/// Fine structure over everything, strong here and weak there: foliage, plaster, water.
+/// Fine structure over the whole picture, of varying strength: foliage, plaster, water.
 void add_grain(Canvas& canvas, Rng& rng) {
   const double strength = 110 * rng.uniform() * rng.uniform(), period = std::exp(rng.uniform(std::log(6.0), std::log(60.0)));
   const double fall = rng.uniform(0.5, 0.9), where = rng.uniform(60, 400);

@@ -5,7 +5,7 @@
 //
 //   booster_pairs --images DIR --pairs 20 --seed 1 --out pairs.bin        a folder of PNG and JPEG, warped
 //   booster_pairs --images DIR --part train ...                           the first four fifths of each folder
-//   booster_pairs --images DIR --only "low light and blur" ...            all pairs damaged in one way
+//   booster_pairs --images DIR --only "low light and blur" ...            one condition only
 //   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        synthetic pictures, warped
 //   booster_pairs --rooms 100 --pairs 60 --seed 1 --out pairs.bin         two views of simulated rooms, true geometry
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ namespace {
 
 constexpr std::size_t kMost = 500;
 
-/// As numpy sees it: little-endian, no padding (all members are multiples of four bytes).
+/// As numpy maps it: little-endian, no padding (all members are multiples of four bytes).
 struct ViewRecord {
   std::int32_t count = 0, width = 0, height = 0;
   float keypoints[kMost][6] = {};  // x, y (px), level, scale, angle (rad), score
@@ -40,7 +40,7 @@ struct ViewRecord {
 };
 struct PairRecord {
   std::int32_t picture = 0, condition = 0;
-  float a_in_b[kMost][2] = {};  // px, NaN where not to be seen
+  float a_in_b[kMost][2] = {};  // px, NaN where not visible
   ViewRecord a, b;
 };
 
@@ -71,7 +71,7 @@ class PairWriter {
  public:
   explicit PairWriter(const Arguments& arguments) : out_(arguments.out, std::ios::binary), extractor_(options(arguments), true) {}
 
-  /// `transfer`: a pixel of a to where it is in b, or nothing.
+  /// `transfer`: from a pixel of a to its position in b, nullopt where not visible.
   template <class Transfer>
   void write(int picture, Condition condition, const Image& a, const Image& b, const Transfer& transfer) {
     pair_ = PairRecord{};
@@ -115,7 +115,7 @@ Rng rng_of(const Arguments& arguments, int picture) {
   return Rng(static_cast<std::uint64_t>(arguments.seed), static_cast<std::uint64_t>(picture) + 1);
 }
 
-/// The condition of a picture's k-th pair: all in turn, or the one asked for.
+/// The condition of a picture's k-th pair: all in turn, or the one of --only.
 Condition condition_of(const Arguments& arguments, int k) {
   const auto only = std::find(kConditionNames.begin(), kConditionNames.end(), arguments.only);
   return static_cast<Condition>(only == kConditionNames.end() ? k % static_cast<int>(kConditionNames.size())
@@ -130,7 +130,7 @@ void write_warped(const Arguments& arguments, const Image& picture, int index, R
   }
 }
 
-/// Half of the second views are damaged beyond what the simulated camera does.
+/// Half of the second views are degraded in addition to the simulated camera's own errors.
 Result<void> write_room(const Arguments& arguments, int index, Rng& rng, PairWriter& out) {
   constexpr int kFrames = 40;
   Result<RoomViews> room = RoomViews::render(1000 * arguments.seed + index, kFrames);
@@ -181,20 +181,20 @@ int run(const Arguments& arguments) {
 }  // namespace fbvins
 
 int main(int argc, char** argv) {
-  CLI::App app("Training pairs for the booster: pictures to keypoints and margins of warped, damaged views.");
+  CLI::App app("Training pairs for the booster: keypoints and margins of warped, degraded views of pictures.");
   fbvins::Arguments arguments;
   using fbvins::Part;
   app.add_option("--images", arguments.folders, "folders of PNG and JPEG, searched recursively");
   app.add_option("--part", arguments.part, "of every folder: all, train (the first four fifths), held-out (the last fifth)")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Part>{{"all", Part::all}, {"train", Part::train}, {"held-out", Part::held_out}}));
-  app.add_option("--leaves", arguments.leaves, "synthetic pictures");
-  app.add_option("--rooms", arguments.rooms, "simulated rooms");
-  app.add_option("--pairs", arguments.pairs, "pairs a picture, the conditions in turn, or a room");
+  app.add_option("--leaves", arguments.leaves, "number of synthetic pictures");
+  app.add_option("--rooms", arguments.rooms, "number of simulated rooms");
+  app.add_option("--pairs", arguments.pairs, "pairs per picture (the conditions in turn) or per room");
   app.add_option("--only", arguments.only, "pairs of pictures of this condition alone")
       ->check(CLI::IsMember(std::vector<std::string>(fbvins::kConditionNames.begin(), fbvins::kConditionNames.end())));
   app.add_option("--every", arguments.every, "only every n-th file");
-  app.add_option("--features", arguments.features, "features a view, up to 500");
+  app.add_option("--features", arguments.features, "features per view, up to 500");
   app.add_option("--seed", arguments.seed);
   app.add_option("--out", arguments.out)->required();
   CLI11_PARSE(app, argc, argv);

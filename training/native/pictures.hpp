@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Folders of pictures, and which of them are never trained on.
+// Folders of pictures, and which of them are held out.
 //
 //   for (const std::string& path : pictures_in(folder, Part::held_out)) { Result<Image> picture = read_picture(path); ... }
 #pragma once
@@ -12,8 +12,8 @@
 
 namespace fbvins {
 
-/// Of every folder, by name: the first four fifths are for training, the last fifth is held out. In one piece, because
-/// neighbours are often frames of one film.
+/// Of every folder, by name: the first four fifths are for training, the last fifth is held out. Both are contiguous,
+/// because neighbours are often frames of one film.
 enum class Part { all, train, held_out };
 
 /// PNG and JPEG below `folder`, sorted.

@@ -41,7 +41,7 @@ float RoomViews::depth_at(const Frame& frame, const Vec2& px) const {
 }
 
 std::optional<Vec2> RoomViews::transfer(std::size_t from, std::size_t to, const Vec2& px) const {
-  constexpr double kSameSurface = 0.03;  // of the depth; what is farther off hides behind something
+  constexpr double kSameSurface = 0.03;  // of the depth; a point farther off is occluded
   const Frame &a = frames_[from], &b = frames_[to];
   const float z = depth_at(a, px);
   const std::optional<Vec2> ray = rig_.left.undistort(px);

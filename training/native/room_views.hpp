@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pairs of views of simulated rooms with true geometry: wide baselines, occlusion, surfaces seen askew, other light at
-// another time, which no homography of one picture shows. Same seed, same bytes.
+// Pairs of views of simulated rooms with true geometry: wide baselines, occlusion, surfaces seen at an angle, light that
+// changes with time, which no homography of one picture has. Same seed, same bytes.
 //
 //   Result<RoomViews> room = RoomViews::render(7, 40);    // a preset, a world and a flight by seed; 40 frames
 //   if (auto pair = room->choose(rng)) room->transfer(pair->from, pair->to, pixel);
@@ -22,9 +22,9 @@ class RoomViews {
     std::size_t from = 0, to = 0;
   };
   const Image& image(std::size_t frame) const { return frames_[frame].image; }
-  /// Two frames of which the second sees 15 to 95 % of what the first sees; none when many draws find no such frames.
+  /// Two frames of which the second sees 15 to 95 % of what the first sees; nullopt when 200 random pairs contain none.
   std::optional<Pair> choose(Rng& rng) const;
-  /// Where the surface at a pixel of frame `from` is in frame `to`; none where it is occluded or nothing is there.
+  /// Position in frame `to` of the surface at a pixel of frame `from`; nullopt where it is not visible or there is no surface.
   std::optional<Vec2> transfer(std::size_t from, std::size_t to, const Vec2& px) const;
 
  private:

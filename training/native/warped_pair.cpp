@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// Grey values as numbers, row by row.
+/// Grey values as floats, row-major.
 struct Plane {
   int width = 0, height = 0;
   std::vector<float> v;
@@ -36,7 +36,7 @@ Image image_of(Plane& plane) {
   return out;
 }
 
-/// One pass of a kernel laid along (dx, dy) per tap, bilinear.
+/// One pass of a kernel with taps (dx, dy) apart, bilinear.
 Plane blur_along(Plane& in, const std::vector<float>& kernel, double dx, double dy) {
   Plane out(in.width, in.height);
   const int half = static_cast<int>(kernel.size()) / 2;
@@ -73,7 +73,7 @@ Plane defocus(Plane& in, double sigma) {
   return blur_along(once, kernel, 0, 1);
 }
 
-/// A homography about the image's centre: turn, zoom, shift and tilt.
+/// Largest parameters of a random homography about the image's centre.
 struct Motion {
   double turn_rad, zoom, shift, tilt;
 };
@@ -96,7 +96,7 @@ Mat3 homography(int width, int height, const Motion& strength, Rng& rng) {
   return centre.inverse() * shift * tilt * shape * turn(angle) * centre;
 }
 
-/// The picture seen through H, smoothed first where it shrinks.
+/// The picture warped by H, smoothed first where it shrinks.
 Plane warp(Plane& in, const Mat3& H, double zoom) {
   Plane source = zoom < 0.95 ? defocus(in, 0.5 * std::sqrt(1 / (zoom * zoom) - 1)) : in;
   Plane out(in.width, in.height);
@@ -118,7 +118,7 @@ Plane warp(Plane& in, const Mat3& H, double zoom) {
   return out;
 }
 
-/// A factor for each pixel: a slope and up to two soft spots.
+/// Multiplies each pixel by a factor: a linear gradient and two soft spots.
 void light_unevenly(Plane& image, double strength, Rng& rng) {
   const double a = rng.uniform(0, 2 * std::numbers::pi), slope = rng.uniform(0, strength);
   struct Spot {
@@ -138,7 +138,7 @@ void light_unevenly(Plane& image, double strength, Rng& rng) {
     }
 }
 
-/// Nearly normal: the sum of four bytes.
+/// Nearly normal, standard deviation 1: the sum of four random bytes.
 float quick_normal(Rng& rng) {
   const std::uint32_t r = rng.next_u32();
   const auto sum = static_cast<float>((r & 255u) + (r >> 8 & 255u) + (r >> 16 & 255u) + (r >> 24));
@@ -154,7 +154,7 @@ Image expose(Plane image, const Damage& d, Rng& rng) {
     image = blur_along(image, std::vector<float>(static_cast<std::size_t>(taps), 1.0f / static_cast<float>(taps)),
                        step * std::cos(d.motion_angle_rad), step * std::sin(d.motion_angle_rad));
   }
-  // gamma by table: exact to far below a grey value
+  // gamma by table, with an error far below one grey value
   constexpr int kSteps = 1024;
   std::vector<float> lit(kSteps + 1);
   for (int i = 0; i <= kSteps; ++i)

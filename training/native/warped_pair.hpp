@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two views of one picture with known correspondence, damaged as flight damages images: for training the booster and
-// for measuring it. The second view is the first through a random homography; both pass a camera with gain, gamma,
+// Two views of one picture with known correspondence, degraded as in flight: for training and evaluating the
+// booster. The second view is the first through a random homography; both pass a camera with gain, gamma,
 // shot noise, motion blur, defocus and uneven light. Same seed, same bytes. Pure functions.
 //
 //   Rng rng(7);
@@ -31,20 +31,20 @@ WarpedPair make_warped_pair(const ImageView& picture, Condition condition, Rng& 
 
 inline Vec2 transfer(const Mat3& H, const Vec2& px) { return (H * px.homogeneous()).hnormalized(); }
 
-/// Damage of one camera image, drawn at random up to the given strengths (0 none).
+/// Degradation of one camera image.
 struct Damage {
   double gain = 1, gamma = 1;
   double uneven_light = 0;  ///< largest relative change of brightness over the image
   double photons = 1e4;     ///< of a full-scale pixel: shot noise
   double read_noise = 0.7;  ///< grey values, after the gain
   double motion_px = 0, motion_angle_rad = 0, defocus_px = 0;
-  double exposure = 1;  ///< light that reaches the sensor; the gain brings part of it back
+  double exposure = 1;  ///< light that reaches the sensor; the gain compensates part of the loss
 };
 
-/// As the second view of a pair has it under that condition.
+/// Random degradation of the second view of a pair under that condition.
 Damage random_damage(Condition condition, Rng& rng);
 
-/// `picture` (grey 0..255) through that camera.
+/// `picture` (grey 0..255) with that degradation.
 Image damage(const ImageView& picture, const Damage& damage, Rng& rng);
 
 /// A synthetic picture with the statistics of natural ones: overlapping shapes of all sizes, shaded and textured.
