@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A barometer as height: noise of its own, and weather and temperature that make it wander. One owner.
+// A barometer's height: white noise, and a random walk for weather and temperature. One owner.
 //
 //   Barometer barometer(options, seed);
 //   double height_m = barometer.read(true_height_m);   // every 1 / Barometer::kRate_hz seconds
@@ -28,7 +28,7 @@ class Barometer {
   static constexpr double kRate_hz = 50;
 
   Barometer(const BarometerOptions& options, std::uint64_t seed) : options_(options), rng_(seed, 72) {
-    zero_m_ = rng_.uniform(-50, 50);  // the pressure at the floor is unknown
+    zero_m_ = rng_.uniform(-50, 50);  // the absolute height is unknown
   }
   double read(double true_height_m) {
     zero_m_ += options_.wander_m_rts / std::sqrt(kRate_hz) * rng_.normal();

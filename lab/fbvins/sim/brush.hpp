@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What painters paint with: noise, shapes, letters, wear. Private to the painters (paint*.cpp); pure functions.
+// Building blocks of procedural textures: noise, shapes, letters, wear. Private to paint*.cpp; pure functions.
 //
 // Random numbers are drawn in an order that the language fixes: at most one draw in the arguments of a call, several
 // only inside braces (evaluated from left to right) or in statements of their own. Otherwise another compiler
-// would paint another world from the same seed.
+// would make another world from the same seed.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace fbvins::brush {
 
 inline constexpr int S = kTextureSize;
 
-/// Smoothed random values on a lattice of `cells` a side that wraps around; mean 0, within [-1, 1].
+/// Value noise: smoothly interpolated random values on a periodic lattice; mean 0, within [-1, 1].
 class LatticeNoise {
  public:
   LatticeNoise(Rng& rng, int cells_x, int cells_y) : nx_(cells_x), ny_(cells_y) {
@@ -44,7 +44,7 @@ class LatticeNoise {
   std::vector<float> values_;
 };
 
-/// Noise of several scales, each half as large and `gain` as strong as the one before.
+/// Fractal noise: octaves, each with half the scale and `gain` times the strength of the one before.
 class Fractal {
  public:
   Fractal(Rng& rng, int cells, int octaves, float gain) : gain_(gain) {
@@ -68,14 +68,14 @@ class Fractal {
 inline float between(Rng& rng, double lo, double hi) { return static_cast<float>(rng.uniform(lo, hi)); }
 inline int pick(Rng& rng, int lo, int hi) { return lo + static_cast<int>(rng.below(static_cast<std::uint32_t>(hi - lo + 1))); }
 
-/// A pixel's new value from its place and its old one.
+/// Sets every texel from its position and its old value.
 template <class F>
 void shade(Canvas& canvas, F value) {
   for (int y = 0; y < S; ++y)
     for (int x = 0; x < S; ++x) canvas.at(x, y) = std::clamp(value(x, y, canvas.at(x, y)), 0.0f, 1.0f);
 }
 
-/// Upright rectangle, in texels; x1 and y1 are outside.
+/// Axis-aligned rectangle, in texels; x1 and y1 are exclusive.
 struct Box {
   int x0, y0, x1, y1;
   float value;
@@ -99,7 +99,7 @@ struct Line {
 };
 void text_line(Canvas& canvas, Rng& rng, const Line& line);
 
-/// Grain on everything, so that no surface is perfectly flat.
+/// Fine noise, so that no surface is perfectly uniform.
 void grain(Canvas& canvas, Rng& rng, float strength);
 void scratches(Canvas& canvas, Rng& rng, int count, float contrast);
 void stains(Canvas& canvas, Rng& rng, int count, float contrast);

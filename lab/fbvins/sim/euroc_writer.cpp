@@ -33,7 +33,7 @@ std::string encode(const std::vector<const std::uint8_t*>& rows, int width, int 
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(png, 1);
   png_set_filter(png, 0, PNG_FILTER_SUB);
-  // Noise has no repetitions worth searching for: Huffman coding alone is as small and far faster.
+  // Huffman coding alone: noisy images have no repetitions to search for, and it is far faster.
   png_set_compression_strategy(png, 2);
   png_write_info(png, info);
   for (const std::uint8_t* row : rows) png_write_row(png, row);
@@ -120,7 +120,7 @@ std::string depth_png(const std::vector<float>& depth_m, int width, int height) 
   return encode_png16(mm, width, height);
 }
 
-/// Folders and calibrations; what is recorded follows.
+/// Makes the folders and writes the calibrations.
 Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool depth) {
   std::error_code error;
   for (const char* folder : {"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"})
@@ -140,7 +140,7 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool
   return {};
 }
 
-/// One frame's files, of the cameras that delivered; may run while the next frame is rendered.
+/// Writes a frame's images, of the cameras that delivered one; may run while the next frame is rendered.
 Result<void> write_images(const RenderedFrame& rendered, const fs::path& mav0) {
   const std::string left = fmt::format("{}.png", rendered.frame.t.ns), right = fmt::format("{}.png", rendered.right_stamp.ns);
   if (rendered.frame.left)

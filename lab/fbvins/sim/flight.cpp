@@ -15,7 +15,7 @@ constexpr double kLowest_m = 0.8;   ///< of the waypoint box, above the floor
 constexpr double kGround_m = 0.22;  ///< height of a vehicle that stands on its legs
 constexpr double kPi = std::numbers::pi;
 
-/// A sum of sines: smooth, bounded, never quite repeating.
+/// A sum of sines with incommensurate frequencies: smooth and bounded.
 class Wander {
  public:
   Wander(Rng& rng, double lowest_hz, double highest_hz, double amplitude, int terms = 5) {
@@ -43,7 +43,7 @@ struct Wander3 {
   Vec3 operator()(double t) const { return {x(t), y(t), z(t)}; }
 };
 
-/// 0 before the start, 1 a while after, smooth in between.
+/// 0 before `start`, 1 after `start` + `length`, smooth in between.
 double fade_in(double t, double start, double length) {
   const double x = std::clamp((t - start) / length, 0.0, 1.0);
   return x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x)));
@@ -76,7 +76,7 @@ std::vector<Vec3> corners_of(const FlightOptions& o, const std::vector<Vec3>& to
   return corners;
 }
 
-/// Heading of travel, smoothed and slowed to the limit, with the nose wandering about it.
+/// Yaw: the direction of travel, smoothed and rate-limited, plus a slow random variation.
 std::vector<double> yaws_along(const TimedPath& path, const FlightOptions& o, Rng& rng) {
   const double dt = path.knot_spacing_s;
   const Wander wander(rng, 0.03, 0.15, 0.25);
@@ -105,7 +105,7 @@ std::vector<double> yaws_along(const TimedPath& path, const FlightOptions& o, Rn
   return yaw;
 }
 
-/// Control points for position and yaw to a flight whose attitude follows from its acceleration.
+/// From control points of position and yaw to a flight whose attitude follows from its acceleration.
 SplineTrajectory fly_multirotor(TimedPath path, std::vector<double> yaw, const FlightOptions& o, const Quat& q_VB) {
   const double dt = path.knot_spacing_s;
   const auto rest = static_cast<std::size_t>(o.rest_s / dt) + 3;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From corners in space to positions over time: rounds a polyline, chooses the speed along it within
-// limits, and makes sure that the B-spline through the result keeps them. Pure functions.
+// limits, and makes sure that the B-spline with the result as control points keeps them. Pure functions.
 #pragma once
 
 #include <vector>
@@ -22,7 +22,7 @@ struct TimedPath {
 /// Starts and ends at rest at the first and last corner.
 TimedPath fly_along(const std::vector<Vec3>& corners, const MotionLimits& limits, double corner_radius_m);
 
-/// Mean over 2 * half_width + 1 neighbours, ends held, repeated.
+/// Moving average over 2 * half_width + 1 values, the ends extended, applied `passes` times.
 template <class T>
 void smooth(std::vector<T>& values, int half_width, int passes, const T& zero) {
   const int n = static_cast<int>(values.size());
@@ -39,8 +39,8 @@ void smooth(std::vector<T>& values, int half_width, int passes, const T& zero) {
   }
 }
 
-/// How much slower the control points must be passed to keep the limits; at most 1: they are kept.
-/// A B-spline's derivatives stay within the hull of the differences of its control points.
+/// Factor by which time must be stretched to keep the limits; at most 1: they are kept.
+/// A B-spline's derivatives are bounded by the differences of its control points (convex hull).
 double slowdown_needed(const TimedPath& path, const MotionLimits& limits);
 
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// Van der Corput numbers to two bases: points that fill the pixel evenly, whatever their count.
+/// Halton sequence (bases 2 and 3): sample positions that fill the pixel evenly, whatever their number.
 Vec2 place_in_pixel(int i) {
   const auto radical = [](int n, int base) {
     double value = 0, share = 1.0 / base;
@@ -47,7 +47,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   eye.renderer.begin();
   const double ambient = options_.world.ambient, line_s = options_.camera.line_delay_us * 1e-6;
   for (int i = 0; i < samples; ++i) {
-    // The middle line is the one that is read at t.
+    // The middle line is read at t.
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
     const double first_line = t - 0.5 * line_s * 480;
     const MotionState m = motion_(line_s > 0 ? first_line : t);

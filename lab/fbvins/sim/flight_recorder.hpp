@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two cameras on their flight: renders a stereo frame, left and right on a thread each.
+// Renders the stereo frames of a flight, left and right on a thread each.
 // One thread calls; frames in order.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace fbvins {
 
-/// Where the body is at a time from the start, s; asked for within an exposure's length of an image.
+/// The body's motion at a time since the start, s; called for times within an image's exposure and readout.
 using BodyMotion = std::function<MotionState(double t_s)>;
 
 class FlightRecorder {
@@ -19,16 +19,16 @@ class FlightRecorder {
   FlightRecorder(const SimulationOptions& options, const StereoRig& rig, BodyMotion motion, const Vec3& world_from_flight,
                  std::shared_ptr<const World> world);
 
-  /// t_s: of the images, from the start of the flight.
+  /// t_s: time of the images, from the start of the flight.
   RenderedFrame render(double t_s, std::int64_t frame, bool with_depth);
-  /// By how much the right image's stamp is off.
+  /// Error of the right image's stamp.
   Duration right_jitter(std::int64_t frame) const;
 
  private:
   struct Eye {
     Renderer renderer;
     ImageSensor sensor;
-    Pose<B, C0> T_BC;  ///< for both eyes: C0 stands for this eye's camera
+    Pose<B, C0> T_BC;  ///< pose of this camera, whichever it is
     std::vector<float> radiance;
     MixedLight light;
     std::vector<Facet> facets;

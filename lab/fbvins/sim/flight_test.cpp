@@ -50,7 +50,7 @@ TEST(Flight, RestsAtTheStart) {
   }
 }
 
-TEST(Flight, ThrustPointsWhereTheAccelerationNeedsIt) {
+TEST(Flight, ThrustPointsAlongTheSpecificForce) {
   FlightOptions options;
   options.kind = "aggressive";
   options.max_speed_mps = 3, options.max_accel_mps2 = 6, options.max_jerk_mps3 = 40;

@@ -13,7 +13,7 @@ std::vector<double> sorted_cuts(std::vector<double> cuts) {
   return cuts;
 }
 
-/// Appends a piece to the last stretch where it goes on in the same direction.
+/// Appends a piece, joined to the last one if it continues in the same direction.
 void extend(std::vector<WallRun>& runs, const Vec2& a, const Vec2& b) {
   if (!runs.empty() && (runs.back().b - a).norm() < 1e-9 &&
       ((runs.back().b - runs.back().a).normalized() - (b - a).normalized()).norm() < 1e-9)
@@ -27,7 +27,7 @@ bool FloorPlan::inside(double x, double y) const {
   return std::any_of(rooms.begin(), rooms.end(), [&](const FloorRect& r) { return r.contains(x, y); });
 }
 
-// The rectangles' edges cut the plane into cells; a wall stands between a free cell and one that is not.
+// The rectangles' edges divide the plane into cells; a wall is between a free cell and an occupied one.
 std::vector<WallRun> wall_runs(const FloorPlan& plan) {
   std::vector<double> xs, ys;
   for (const FloorRect& r : plan.rooms) {

@@ -16,7 +16,7 @@ Quat about_z(double angle) { return so3_exp(Vec3(0, 0, angle)); }
 }  // namespace
 
 void paint_all(World& world, std::uint64_t seed) {
-  std::vector<std::future<Canvas>> canvases;  // each from numbers of its own: the threads change nothing
+  std::vector<std::future<Canvas>> canvases;  // each with its own random numbers: the result does not depend on the threads
   for (int surface = 0; surface < static_cast<int>(Surface::count); ++surface)
     for (int variant = 0; variant < kVariants; ++variant)
       canvases.push_back(std::async(std::launch::async, [=] {
@@ -35,7 +35,7 @@ void add_box(std::vector<Facet>& facets, const BoxShape& shape, int texture, flo
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side) {
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      // Right-handed for both sides: swap the edges on the far one. Side walls keep v upright.
+      // u x v points outwards on both sides: the edges are swapped on one. Side walls keep v upright.
       Vec3 u = 2 * shape.half[a] * R.col(a), v = 2 * shape.half[b] * R.col(b);
       Facet f;
       f.corner = shape.centre + (side ? 1.0 : -1.0) * shape.half[axis] * R.col(axis) - 0.5 * (u + v);
@@ -135,7 +135,7 @@ void Furnisher::build_shell() {
   }
 }
 
-/// Windows, lockers or posts of one make at equal distances: what a matcher confuses.
+/// Equal things at equal distances, such as lockers or posts: ambiguous for matchers.
 void Furnisher::repeat_along(const Wall& wall) {
   const double pitch = rng_.uniform(0.5, 1.1), width = pitch * rng_.uniform(0.45, 0.8);
   const double low = rng_.uniform(0.2, 1.0), high = low + rng_.uniform(0.7, 1.4);
@@ -153,7 +153,7 @@ void Furnisher::add_door(const Wall& wall, double at) {
   if (rng_.uniform() < 0.6) add_panel(wall, at + 0.25, at + 0.75, 1.3, 1.65, texture(Surface::page), 0.5, 0.025, 1.0f);
 }
 
-/// Bright sky behind a grid of bars, a radiator below.
+/// A window with a grid of bars and bright sky, and a radiator below.
 void Furnisher::add_window(const Wall& wall, double at) {
   const double width = rng_.uniform(0.8, 1.4), high = std::min(world_.plan.height_m - 0.25, 2.3);
   if (at + width + 0.1 > wall.length()) return;
@@ -231,7 +231,7 @@ void Furnisher::hang_pictures() {
       const Surface kinds[] = {Surface::page,  Surface::poster, Surface::picture, Surface::picture,
                                Surface::panel, Surface::cloth,  Surface::mat,     Surface::checker};
       const int what = texture(kinds[rng_.below(8)]);
-      // Each a little further out than the last, so that overlapping ones do not flicker.
+      // Each a little in front of the last, so that overlapping ones do not flicker.
       const double out = 0.022 + 0.0008 * i;
       add_panel(wall, from - 0.02, from + width + 0.02, low - 0.02, low + height + 0.02, texture(Surface::wood), 1.0,
                 out - 0.0004, 0.5f);
@@ -292,8 +292,8 @@ bool Furnisher::add_box_stack(const Vec3& floor_point) {
   return true;
 }
 
-/// Thin rods that cross one another, as plants, tripods and stacked chairs do: what is seen between them, and next to
-/// what, changes with every step.
+/// Thin rods that cross one another, as in plants, tripods and stacked chairs: what is seen between them changes with
+/// every step.
 bool Furnisher::add_tangle(const Vec3& floor_point) {
   const double height = rng_.uniform(0.5, 1.7), foot = rng_.uniform(0.05, 0.2), crown = rng_.uniform(0.15, 0.45);
   for (double z = 0; z < height; z += 0.3)
@@ -321,7 +321,7 @@ bool Furnisher::add_pillar(const Vec3& floor_point) {
   return true;
 }
 
-/// Pipes and ducts along a wall under the ceiling, and one upright.
+/// Pipes and ducts along a wall under the ceiling, and a vertical one.
 void Furnisher::add_pipes(const Wall& wall) {
   const Vec3 x = wall.along.normalized(), foot(wall.corner.x(), wall.corner.y(), 0);
   const Quat q = about_z(std::atan2(x.y(), x.x()));
@@ -388,7 +388,7 @@ void Furnisher::hang_lamps() {
   }
 }
 
-/// Half of them people: legs, body, arms and head out of boxes; the others are boxes.
+/// Half of them are people, made of boxes for legs, body, arms and head; the others are boxes.
 void Furnisher::add_movers() {
   for (int i = 0; i < options_.movers; ++i) {
     const FloorRect& room = world_.plan.rooms[rng_.below(static_cast<std::uint32_t>(world_.plan.rooms.size()))];

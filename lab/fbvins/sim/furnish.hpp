@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands and hangs in a room: walls with their pictures, furniture, boxes, lamps, people.
-// Used by build_world only; one thread.
+// Contents of a room: walls with pictures, furniture, boxes, lamps, people. Used by build_world only;
+// one thread.
 #pragma once
 
 #include <vector>
@@ -17,10 +17,10 @@ struct BoxShape {
   Quat q = Quat::Identity();
 };
 
-/// Facets of the six sides; textures repeat every `texture_m` metres, sides smaller than that show one part.
+/// Adds the facets of the six sides. Textures repeat every `texture_m` metres; smaller sides show a part.
 void add_box(std::vector<Facet>& facets, const BoxShape& shape, int texture, float tint, double texture_m);
 
-/// Chooses surfaces and writes facets into a world.
+/// Chooses surfaces at random and adds facets to a world.
 class Furnisher {
  public:
   Furnisher(World& world, const WorldOptions& options, const std::vector<Vec3>& path, std::uint64_t seed);
@@ -28,7 +28,7 @@ class Furnisher {
   void build_shell();  ///< walls, floor, ceiling
   void hang_pictures();
   void place_furniture();
-  void cover_floors();  ///< mats, tapes, papers
+  void cover_floors();  ///< with mats, tapes, papers
   void hang_lamps();
   void add_movers();
 

@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-/// A number for each (pixel, seed), mixed as in "lowbias32".
+/// Integer hash ("lowbias32").
 inline std::uint32_t mix(std::uint32_t x) {
   x ^= x >> 16;
   x *= 0x7feb352dU;
@@ -19,7 +19,7 @@ inline std::uint32_t mix(std::uint32_t x) {
   return x ^ x >> 16;
 }
 
-/// Grey values with noise: the sum of eight bytes is normal enough.
+/// Grey values with noise; the sum of eight random bytes is nearly normal.
 FBVINS_KERNEL void digitise(const float* light, int count, float shot, float read2, float black, std::uint32_t key,
                             std::uint8_t* out) {
   for (int i = 0; i < count; ++i) {
@@ -71,7 +71,7 @@ void ImageSensor::follow(double mean_radiance, double share) {
 
 void ImageSensor::settle(const std::vector<float>& radiance) {
   double sum = 0;
-  const double white = 3.0;  // what is much brighter saturates and counts no more
+  const double white = 3.0;  // brighter pixels saturate and count as this
   for (std::size_t i = 0; i < radiance.size(); ++i) sum += std::min<double>(white, radiance[i] * falloff_[i]);
   follow(brightness_ * sum / static_cast<double>(radiance.size()), 1.0);
 }
@@ -115,7 +115,7 @@ void ImageSensor::blur(std::vector<float>& image) {
              width_, w0, w1, w2, stride);
 }
 
-/// Scatters a share of the light widely: box means of two sizes, computed on blocks of 16 pixels.
+/// Scatters a share of the light: over the neighbourhood (box means of blocks of 16 pixels) and over the whole image.
 void ImageSensor::add_glare(std::vector<float>& image) const {
   constexpr int kBlock = 16;
   const int nx = (width_ + kBlock - 1) / kBlock, ny = (height_ + kBlock - 1) / kBlock;

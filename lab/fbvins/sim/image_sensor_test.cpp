@@ -52,7 +52,7 @@ TEST(ImageSensor, ExposureSettlesAndFollowsWithLag) {
   EXPECT_NEAR(of(sensor.expose(light, 0)).mean, options.target_level, 2);
   light = dim;
   const double first = of(sensor.expose(light, 1)).mean;
-  EXPECT_NEAR(first, options.target_level / 4, 2);  // does not know yet
+  EXPECT_NEAR(first, options.target_level / 4, 2);  // exposure has not reacted yet
   double last = first;
   for (int k = 2; k < 60; ++k) {
     light = dim;

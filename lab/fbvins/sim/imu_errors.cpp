@@ -12,7 +12,7 @@ Vec3 normal3(Rng& rng, double sigma) {
   return sigma * Vec3(x, y, z);
 }
 
-/// Diagonal: scale; the rest: axes that are not quite at right angles.
+/// Diagonal: scale; off the diagonal: misalignment.
 Mat3 crooked_axes(Rng& rng, double scale, double angle) {
   Mat3 m;
   for (int r = 0; r < 3; ++r)

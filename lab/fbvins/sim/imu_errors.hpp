@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the true motion to readings, one at a time: bias that walks, crooked axes, noise, digits. One owner.
+// Readings from the true motion, one at a time: bias walk, scale, misalignment, noise, quantisation. One owner.
 //
 //   ImuErrors errors(noise, options, seed);
 //   ImuBias bias = errors.bias();                       // of the reading that comes next
@@ -11,9 +11,9 @@
 
 namespace fbvins {
 
-/// What rotors do to an IMU: how strongly, and vectors of unit variance on each axis.
+/// Vibration by the rotors: its strength, and vectors of unit variance on each axis.
 struct Shake {
-  double power = 0;  ///< 0: at rest, 1: as the options say
+  double power = 0;  ///< 0: at rest, 1: that of the options
   Vec3 accel = Vec3::Zero(), gyro = Vec3::Zero();
 };
 
@@ -28,7 +28,7 @@ class ImuErrors {
  private:
   ImuNoise noise_;
   ImuModelOptions options_;
-  // Each error has numbers of its own, so that switching one off leaves the others as they are.
+  // Each error has its own random numbers, so that switching one off does not change the others.
   Rng white_, walk_, rumble_;
   ImuBias bias_;
   Mat3 gyro_axes_, accel_axes_;

@@ -15,7 +15,7 @@ Vec3 normal3(Rng& rng, double sigma) {
   return sigma * Vec3(x, y, z);
 }
 
-/// Four rotors at slightly different, slowly wandering speeds shake every axis.
+/// Four rotors at slightly different, slowly varying speeds shake every axis.
 class Vibration {
  public:
   explicit Vibration(Rng& rng) {

@@ -96,7 +96,7 @@ TEST(ImuModel, BiasOfTheTruthIsTheBiasOfTheReadings) {
   EXPECT_LT((imu.samples[5].accel_mps2 - Vec3(0, 0, kSimGravity_mps2) - imu.truth[5].bias.accel_mps2).norm(), 1e-9);
 }
 
-TEST(ImuModel, SaturatesAndCounts) {
+TEST(ImuModel, SaturatesAndQuantises) {
   ImuModelOptions options = ideal();
   options.gyro_range_radps = 0.5;
   options.accel_range_mps2 = 9.0;

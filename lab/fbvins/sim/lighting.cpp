@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kNode_m = 0.22;
-constexpr double kReach_m = 9.0;      ///< lamps further away are left out
-constexpr double kOcclusion_m = 0.9;  ///< things nearer than this darken the light from everywhere
+constexpr double kReach_m = 9.0;      ///< lamps farther away are ignored
+constexpr double kOcclusion_m = 0.9;  ///< things nearer than this occlude ambient light
 
 /// A facet prepared for shadow rays, single precision.
 struct Blocker {
@@ -36,7 +36,7 @@ std::vector<Blocker> blockers_of(const World& world) {
   return blockers;
 }
 
-/// Does anything stand between x and x + d?
+/// Whether anything is between x and x + d.
 bool blocked(const std::vector<Blocker>& blockers, const Eigen::Vector3f& x, const Eigen::Vector3f& d) {
   for (const Blocker& k : blockers) {
     const float dn = d.dot(k.n);
@@ -53,7 +53,7 @@ double lamp_light(const Lamp& lamp, const Vec3& x, const Vec3& n) {
   const Vec3 d = lamp.p - x;
   const double r2 = d.squaredNorm();
   const double facing = n.dot(d);
-  // 0.15 m^2 keeps the ceiling next to a lamp from burning out.
+  // 0.15 m^2 limits the light on the ceiling next to a lamp.
   return facing <= 0 ? 0.0 : lamp.power * facing / (std::sqrt(r2) * (r2 + 0.15));
 }
 
@@ -64,12 +64,12 @@ Vec3 node_position(const Facet& f, int i, int j, const LightGrid& g) {
   return f.corner + a * f.u + b * f.v + 0.006 * f.normal();
 }
 
-/// Share of directions in which nothing is near.
+/// Ambient occlusion: share of directions in which nothing is near.
 double openness(const std::vector<Blocker>& near, const Vec3& x, const Vec3& n) {
   const Vec3 s = (std::abs(n.z()) < 0.9 ? n.cross(Vec3::UnitZ()) : n.cross(Vec3::UnitX())).normalized(), t = n.cross(s);
   constexpr int kRays = 14;
   int open = 0;
-  for (int k = 0; k < kRays; ++k) {  // a spiral with the density of the cosine
+  for (int k = 0; k < kRays; ++k) {  // a spiral with cosine-weighted density
     const double r = std::sqrt((k + 0.5) / kRays), angle = 2.399963 * k;
     const Vec3 d = r * std::cos(angle) * s + r * std::sin(angle) * t + std::sqrt(1 - r * r) * n;
     if (!blocked(near, x.cast<float>(), Vec3(kOcclusion_m * d).cast<float>())) ++open;
@@ -123,7 +123,7 @@ void bake_facet(const World& world, const std::vector<Blocker>& blockers, double
 
 int nodes_over(double length) { return std::clamp(static_cast<int>(std::lround(length / kNode_m)) + 1, 2, 25); }
 
-/// A value that changes without rhythm, 0..1, the same for the same step.
+/// A random value in 0..1 that depends on the step alone.
 double hashed(std::uint64_t seed, std::int64_t step) {
   return Rng(seed * 1000003u + static_cast<std::uint64_t>(step), 41).uniform();
 }
@@ -140,7 +140,7 @@ LightBake bake_light(const World& world, double ambient) {
   }
   for (auto& group : bake.nodes) group.assign(static_cast<std::size_t>(nodes), 0.0f);
   const std::vector<Blocker> blockers = blockers_of(world);
-  std::vector<std::thread> workers;  // each facet by itself: the split changes nothing
+  std::vector<std::thread> workers;  // facets are independent: the result does not depend on the threads
   const std::size_t count = std::max(1u, std::min(16u, std::thread::hardware_concurrency()));
   for (std::size_t w = 0; w < count; ++w)
     workers.emplace_back([&, w] {
@@ -154,7 +154,7 @@ LightState light_at(const LightOptions& options, const World& world, double t_s,
   LightState state;
   const double k = options.strength;
   if (options.change == "flicker") {
-    const auto burst = static_cast<std::int64_t>(std::floor(t_s * 12));  // a tube that does not start well
+    const auto burst = static_cast<std::int64_t>(std::floor(t_s * 12));  // a failing fluorescent tube
     const double drop = hashed(seed, burst) < 0.3 ? 0.6 : 0.0;
     state.group[kLampsA] = std::max(0.05, 1 - k * (drop + 0.15 * std::sin(2 * kPi * 3.1 * t_s)));
     state.group[kLampsB] = std::max(0.05, 1 + k * (0.3 * std::sin(2 * kPi * 0.7 * t_s) + 0.12 * std::sin(2 * kPi * 7.3 * t_s)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Painters of textures: each draws one kind of surface from random numbers alone. Pure functions.
+// Procedural textures: each kind of surface is generated from random numbers alone. Pure functions.
 #pragma once
 
 #include "fbvins/core/rng.hpp"
@@ -9,7 +9,7 @@ namespace fbvins {
 
 enum class Surface {
   plaster,  ///< nearly plain
-  weave,    ///< fine threads, the same everywhere: corners that cannot be told apart
+  weave,    ///< fine threads: corners that all look the same
   concrete,
   wood,
   brick,
@@ -23,7 +23,7 @@ enum class Surface {
   books,
   cloth,
   panel,    ///< switches, lamps and labels of a machine
-  marks,    ///< dark tape with light scraps on it
+  marks,    ///< dark tape with light pieces on it
   checker,  ///< a calibration board
   mat,      ///< a play mat: roads, houses, signs
   count

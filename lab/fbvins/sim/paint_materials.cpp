@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces that a material makes.
+// Textures of materials.
 #include <array>
 #include <numbers>
 

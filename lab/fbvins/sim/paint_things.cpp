@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces that somebody printed, drew or put together.
+// Textures of things: prints, pictures, shelves, panels.
 #include "fbvins/sim/brush.hpp"
 #include "fbvins/sim/painters.hpp"
 
@@ -57,8 +57,8 @@ Canvas poster(Rng& rng) {
   return canvas;
 }
 
-/// Overlapping regions of different tone whose outlines are rough, with texture inside: edges and
-/// corners at every scale, as in a photograph.
+/// Overlapping textured regions of different tone with rough outlines: edges and corners at every scale, as in a
+/// photograph.
 Canvas picture(Rng& rng) {
   Canvas canvas;
   const Fractal base(rng, 2, 7, 0.6f);

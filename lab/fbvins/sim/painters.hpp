@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One painter a surface, what each looks like is said in paint.hpp. Private to paint*.cpp; pure functions.
+// One generator for each Surface, described in paint.hpp. Private to paint*.cpp; pure functions.
 #pragma once
 
 #include "fbvins/core/rng.hpp"

@@ -13,7 +13,7 @@ const Vec3 kGravity_W(0, 0, -kSimGravity_mps2);
 // Legs: stiff enough to stand on, soft enough for the step.
 constexpr double kFootStiffness_N_per_m = 4000, kFootDamping_Ns_per_m = 60;
 constexpr double kFriction = 0.7, kCreep_Ns_per_m = 60;
-/// Beneath it the formula of the ground effect is no longer true.
+/// Below this height the formula of the ground effect no longer holds.
 constexpr double kLowestGroundEffect_radii = 0.6;
 
 QuadrotorState advanced(const QuadrotorState& s, const Vec3& p, const Vec3& v, const Eigen::Vector4d& q, const Vec3& w,
@@ -33,7 +33,7 @@ double ground_effect(double height_m, double radius_m) {
   return 1 / (1 - ratio * ratio);
 }
 
-/// PX4's defaults (SIH_*): 1 kg, 5 N and 0.1 N m a rotor at full thrust, motors of 50 ms, drag by speed.
+/// PX4's defaults (SIH_*): 1 kg, 5 N and 0.1 N m per rotor at full thrust, motors of 50 ms, linear drag.
 QuadrotorOptions sih() {
   QuadrotorOptions o;
   o.mass_kg = 1;
@@ -94,7 +94,7 @@ PerRotor Quadrotor::targets(const PerRotor& commands) const {
   return target;
 }
 
-/// Thrust, its moments, the torque of the air and of the rotors' own inertia.
+/// Thrust, its moments, aerodynamic torque, and the torque of the rotors' inertia.
 Quadrotor::Wrench Quadrotor::rotor_wrench(const QuadrotorState& s, const PerRotor& acceleration) const {
   Wrench sum;
   double spin = 0;  // of all rotors, kg m^2 rad/s
@@ -122,7 +122,7 @@ Quadrotor::Wrench Quadrotor::air_wrench(const QuadrotorState& s, const Vec3& win
   return sum;
 }
 
-/// Four feet beneath the rotors: springs with dampers, and friction that holds.
+/// Four feet beneath the rotors: springs with dampers, and friction, viscous at low speed.
 Quadrotor::Wrench Quadrotor::ground_wrench(const QuadrotorState& s) const {
   Wrench sum;
   if (s.T_WV.p.z() > 2 * options_.leg_m + options_.arm_x_m) return sum;

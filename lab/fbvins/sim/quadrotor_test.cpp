@@ -42,7 +42,7 @@ TEST(Quadrotor, FallsFreely) {
   run(vehicle, all(0), 2);
   EXPECT_NEAR(vehicle.state().T_WV.p.z(), 100 - 0.5 * g * 4, 1e-9);
   EXPECT_NEAR(vehicle.state().v_WV.z(), -2 * g, 1e-9);
-  EXPECT_LT(vehicle.motion_of({}).specific_force().norm(), 1e-9);  // an accelerometer that falls reads nothing
+  EXPECT_LT(vehicle.motion_of({}).specific_force().norm(), 1e-9);  // an accelerometer in free fall reads zero
 }
 
 TEST(Quadrotor, HoversAtTheThrustThatCarriesIt) {
@@ -76,7 +76,7 @@ TEST(Quadrotor, RotorsLagByTheirTimeConstants) {
   Quadrotor vehicle(o, in_the_air());
   run(vehicle, all(0.5), o.spin_up_s);
   EXPECT_NEAR(vehicle.state().rotor_radps[0], 0.5 * o.rotor_max_radps * (1 - std::exp(-1.0)), 0.1);
-  run(vehicle, all(2.0), 1);  // more than all is all
+  run(vehicle, all(2.0), 1);  // commands above 1 count as 1
   EXPECT_NEAR(vehicle.state().rotor_radps[0], o.rotor_max_radps, 1e-3);
   run(vehicle, all(0), o.spin_down_s);
   EXPECT_NEAR(vehicle.state().rotor_radps[0], o.rotor_max_radps * std::exp(-1.0), 0.1);
@@ -94,7 +94,7 @@ TEST(Quadrotor, YawTorqueIsTheDifferenceOfTheRotors) {
   EXPECT_LT(vehicle.motion_of({}).dw_WB_B.head<2>().norm(), 1e-9);
 }
 
-TEST(Quadrotor, EachRotorTiltsAsItsPlaceSays) {
+TEST(Quadrotor, EachRotorTiltsTheVehicleByItsPosition) {
   const QuadrotorOptions o = without_air();
   const Vec2 wanted[] = {{-1, -1}, {1, 1}, {1, -1}, {-1, 1}};  // sign of roll and pitch in V, y to the left
   for (int i = 0; i < kRotors; ++i) {
@@ -145,7 +145,7 @@ TEST(Quadrotor, DriftsWithTheWind) {
   EXPECT_NEAR(vehicle.state().v_WV.y(), wind.y() * (1 - std::exp(-rate)), 1e-3);
 }
 
-TEST(Quadrotor, TheFloorHelpsTheRotorsAndCarriesTheLegs) {
+TEST(Quadrotor, TheFloorAddsLiftAndCarriesTheLegs) {
   QuadrotorOptions o = without_air();
   o.ground_effect = true;
   const auto lift = [&](double height) {
@@ -185,12 +185,12 @@ TEST(Quadrotor, BatterySagsUnderLoadAndEmpties) {
   run(vehicle, all(0.7), 1);
   const double under_load = vehicle.battery_V();
   EXPECT_LT(under_load, o.battery_full_V - 0.1);
-  EXPECT_LT(vehicle.state().rotor_radps[0], 0.7 * o.rotor_max_radps);  // as the voltage, so the speed
+  EXPECT_LT(vehicle.state().rotor_radps[0], 0.7 * o.rotor_max_radps);  // speed falls with voltage
   run(vehicle, all(0.7), 20);
   EXPECT_LT(vehicle.battery_V(), under_load);
 }
 
-TEST(Quadrotor, ALeverFeelsTheTurn) {
+TEST(Quadrotor, MotionOffTheCentreIncludesTheLeverArm) {
   QuadrotorState s = in_the_air();
   s.w_WV_V = Vec3(0, 0, 5);
   const Pose<BodyFlu, B> mounting{Quat::Identity(), Vec3(0.1, 0, 0)};
@@ -199,7 +199,7 @@ TEST(Quadrotor, ALeverFeelsTheTurn) {
   EXPECT_NEAR(m.a_WB.x(), -0.1 * 25, 1e-9);
 }
 
-TEST(Wind, HasTheStrengthAndTheTimeThatItIsTold) {
+TEST(Wind, HasTheStrengthOfItsOptions) {
   WindOptions o{.mean_mps = 0, .gust_mps = 0.5, .gust_s = 0.5};
   Wind wind(o, 3);
   Vec3 squares = Vec3::Zero();

@@ -65,7 +65,7 @@ inline float rough_log2(float x) {
   return exponent + f * (1.3465f - 0.3465f * f);
 }
 
-/// Where a look-up at coordinates (s, t), in copies of the texture, goes.
+/// Word index and bilinear weights of a look-up at coordinates (s, t), in copies of the texture.
 struct Lookup {
   alignas(64) std::int32_t index[kBlock];
   alignas(64) float fx[kBlock];
@@ -122,7 +122,7 @@ void select(const Hits& hits, int id, Lanes& lanes) {
     const int i = lanes.ray[k];
     lanes.w[k] = hits.w[i], lanes.u[k] = hits.u[i], lanes.v[k] = hits.v[i];
   }
-  // The last block is filled up with a ray that exists: what it looks up is valid, and nobody adds it.
+  // The last block is padded with the last ray, so that look-ups are valid; their results are not used.
   for (int k = n; k % kBlock != 0; ++k) lanes.w[k] = lanes.w[n - 1], lanes.u[k] = lanes.u[n - 1], lanes.v[k] = lanes.v[n - 1];
 }
 
@@ -145,7 +145,7 @@ FBVINS_KERNEL void shade_block(const float* w, const float* u, const float* v, c
     const float fine_lod = lod + look.detail_lod;
     const float fine_level = fine_lod < 0 ? 0.0f : fine_lod > 6.0f ? 6.0f : fine_lod;
     const std::int32_t fl = static_cast<std::int32_t>(fine_level);
-    // Grain fades between levels instead of being blended; it is gone at level 6.
+    // The grain fades out with the level, up to 6, instead of being blended between levels.
     fine_share[i] = look.detail_strength * (fine_level > 5.0f ? 6.0f - fine_level : 1.0f);
     locate(s * look.detail_repeat, t * look.detail_repeat, fl, fine.index[i], fine.fx[i], fine.fy[i]);
     const float cx = u[i] * look.light_x, cy = v[i] * look.light_y;

@@ -8,7 +8,7 @@ namespace fbvins::rays {
 
 inline constexpr int kRays = 64;
 
-/// What 64 rays hit: inverse depth, numerators of the facet's coordinates, and who.
+/// Hits of 64 rays: inverse depth, numerators of the coordinates on the facet, and its id.
 struct Hits {
   alignas(64) float w[kRays];
   alignas(64) float u[kRays];
@@ -25,10 +25,10 @@ void shift(const float* ray_x, const float* ray_y, float dx, float dy, float* x,
 /// u and v become coordinates in [0, 1]; the depth of each ray, 0 where it hit nothing.
 void divide(Hits& hits, float* depth);
 
-/// Adds a spot of light in the direction `towards` (a unit vector) to the rays (x, y, 1) that hit `id`.
+/// Adds a highlight in the direction `towards` (a unit vector) to the rays (x, y, 1) that hit `id`.
 void add_spot(const float* x, const float* y, const Hits& hits, int id, const float* towards, float strength, float* sum);
 
-/// How one facet looks.
+/// Appearance of one facet.
 struct Look {
   const std::uint32_t* texture;
   const std::uint32_t* detail;
@@ -41,7 +41,7 @@ struct Look {
   float emission;
 };
 
-/// The rays that hit `id`, packed: only they cost look-ups. `ray` says which they are unless they are all.
+/// The rays that hit `id`, packed to save look-ups. `ray`: their indices; unused if all rays hit it.
 struct Lanes {
   alignas(64) float w[kRays];
   alignas(64) float u[kRays];

@@ -23,7 +23,7 @@ Pose<W, B> between(const std::vector<TrajectoryPoint>& points, Time t) {
   return {a.T_WB.q.slerp(share, b.T_WB.q), Vec3(a.T_WB.p + share * (b.T_WB.p - a.T_WB.p))};
 }
 
-/// Poses at equal distances in time, those of `points` where no better is known between them.
+/// Poses at equal intervals, interpolated between `points`.
 std::vector<Pose<W, B>> at_equal_times(const std::vector<TrajectoryPoint>& points, double dt_s) {
   std::vector<Pose<W, B>> poses;
   const double span = (points.back().t - points.front().t).seconds();
@@ -50,7 +50,7 @@ Error too_short(double seconds) {
   return Error{ErrorCode::invalid_argument, fmt::format("the recorded flight covers {:.2f} s; at least 2 s are needed", seconds)};
 }
 
-/// Constant that the gyro reads too much, from the whole way.
+/// The gyroscope's mean bias over the whole trajectory.
 Vec3 mean_gyro_bias(const std::vector<Quat>& q, const std::vector<ImuSample>& imu, double dt) {
   const std::size_t step = static_cast<std::size_t>(std::lround(0.5 / dt));
   Vec3 sum = Vec3::Zero();
@@ -106,7 +106,7 @@ Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, dou
   const std::vector<Vec3> none(poses.size(), Vec3::Zero());
   const double lambda = lambda_of(3 * crossover_hz, dt);
   std::vector<Quat> q{poses.front().q};
-  std::vector<Vec3> turned{Vec3::Zero()};  // rotation vector, summed up: smooth as it were a position
+  std::vector<Vec3> turned{Vec3::Zero()};  // sum of the rotation vectors of the steps, smoothed like a position
   for (std::size_t k = 1; k < poses.size(); ++k)
     turned.push_back(turned.back() + so3_log(poses[k - 1].q.conjugate() * poses[k].q));
   const std::vector<Vec3> smooth = blend_second_differences(turned, none, lambda);
@@ -135,7 +135,7 @@ Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, con
     truth.push_back(pose.q);
     p.push_back(pose.p);
   }
-  // The gyro's integral, and what it is off by in W: small and slow once the mean bias is out.
+  // The gyroscope's integral, and its error in W: small and slow once the mean bias is removed.
   const Vec3 bias = mean_gyro_bias(truth, imu, dt);
   std::vector<Quat> q{truth.front()};
   for (std::size_t k = 1; k < n; ++k)

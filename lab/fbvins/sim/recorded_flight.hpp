@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recorded trajectory made into one that can be flown again, alone or with its real IMU recording.
-// With the IMU, the trajectory counts below a crossover frequency and the IMU's own integral above it, so
-// that images rendered along the result and the untouched IMU agree. Pure functions.
+// Makes a smooth trajectory of a recorded one, alone or with its real IMU recording. With the IMU, the result
+// follows the trajectory below a crossover frequency and the IMU's integral above it, so that images rendered
+// along it agree with the unchanged IMU data. Pure functions.
 #pragma once
 
 #include <string>
@@ -14,14 +14,14 @@ namespace fbvins {
 
 struct RecordedFlight {
   SplineTrajectory flight;
-  Time start;        ///< where the spline's time is 0
+  Time start;        ///< stamp of the spline's time 0
   SimulatedImu imu;  ///< empty without a real IMU
 };
 
-/// From a trajectory alone: smoothed below `crossover_hz` * 3, made uniform.
+/// From a trajectory alone: low-pass filtered at 3 * `crossover_hz`, resampled at equal intervals.
 Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, double crossover_hz);
 
-/// With the IMU: one knot a sample; the biases are what turns the IMU's readings into the result.
+/// With the IMU: one knot per sample; the truth's biases are the difference between readings and result.
 Result<RecordedFlight> fly_again(const std::vector<TrajectoryPoint>& points, const std::vector<ImuSample>& imu,
                                  double crossover_hz);
 

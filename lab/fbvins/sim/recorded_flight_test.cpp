@@ -15,7 +15,7 @@ namespace {
 struct Recording {
   SplineTrajectory flight;
   SimulatedImu imu;
-  std::vector<TrajectoryPoint> points;  ///< 100 Hz, with the noise of a motion capture
+  std::vector<TrajectoryPoint> points;  ///< 100 Hz, with the noise of motion capture
 };
 
 Recording record(double position_noise_m) {
@@ -41,7 +41,7 @@ TEST(RecordedFlight, BlendKeepsTheSlowOfOneAndTheFastOfTheOther) {
     fast.emplace_back(0.01 * std::sin(2 * M_PI * 12 * k * dt), 0, 0);
   }
   for (std::size_t k = 0; k < slow.size(); ++k) {
-    y.push_back(slow[k]);  // knows nothing of the fast part
+    y.push_back(slow[k]);  // without the fast part
     const std::size_t a = k > 0 ? k - 1 : k, b = k + 1 < slow.size() ? k + 1 : k;
     const double drift = 1e-7;  // a constant error of the acceleration
     c.push_back((slow[a] + fast[a] - 2 * (slow[k] + fast[k]) + slow[b] + fast[b]) + Vec3(drift, 0, 0));

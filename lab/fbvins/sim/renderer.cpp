@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kFarthest_w = 1e-3f;  ///< nothing beyond a kilometre
 constexpr double kNear_m = 0.02;
-/// Several rays a pixel, so each stands for less than a pixel.
+/// Levels by which textures are sharper than for one ray per pixel, as a pixel has several rays.
 constexpr float kSharper = 0.7f;
 constexpr double kGrainRepeat = 7.0;  ///< copies of the grain in one copy of a texture
 
@@ -102,7 +102,7 @@ void Renderer::look(const Instant& instant, const std::vector<Facet>& facets) {
     const Facet& f = facets[i];
     const Vec3 n = f.u.cross(f.v), s = instant.p_WC - f.corner;
     const double c = n.dot(s), nn = n.squaredNorm();
-    if (!(c > 1e-4 * std::sqrt(nn))) continue;  // its back, or edge on
+    if (!(c > 1e-4 * std::sqrt(nn))) continue;  // seen from behind, or edge-on
     const Vec3 corner = -(R_CW * s), u = R_CW * f.u, v = R_CW * f.v;
     View view;
     if (!project_bounds({corner, Vec3(corner + u), Vec3(corner + u + v), Vec3(corner + v)}, view.x0, view.y0, view.x1, view.y1))
@@ -121,7 +121,7 @@ void Renderer::look(const Instant& instant, const std::vector<Facet>& facets) {
   std::stable_sort(views_.begin(), views_.end(), [](const View& p, const View& q) { return p.nearest_w > q.nearest_w; });
 }
 
-/// Gives each tile the views that may show in it. A view that covers the whole tile hides all that lie behind.
+/// Gives each tile the views that may be visible in it. A view that covers the whole tile hides all behind it.
 void Renderer::distribute(int first_row, int last_row) {
   for (int t = first_row * tiles_x_; t < last_row * tiles_x_; ++t) {
     tiles_[static_cast<std::size_t>(t)].views.clear();
@@ -160,7 +160,7 @@ void Renderer::add(const Instant& instant, const std::vector<Facet>& facets, con
     for (int t = 0; t < tiles_x_ * tiles_y_; ++t) render_tile(t, instant, facets, light, weight);
     return;
   }
-  for (int row = 0; row < tiles_y_; ++row) {  // each strip from where the camera is when its middle line is read
+  for (int row = 0; row < tiles_y_; ++row) {  // each row of tiles with the camera's pose when its middle line is read
     Instant strip = instant;
     const double dt = (row * kTile + 3.5) * instant.line_s;
     strip.p_WC += dt * instant.v_WC;
@@ -211,7 +211,7 @@ void Renderer::render_tile(int index, const Instant& instant, const std::vector<
     look.texture = world_.atlas.words(f.texture);
     look.detail = world_.atlas.words(world_.detail_texture);
     look.light = light.words.data() + lit.first;
-    // u x v points at the viewer, so u runs to the left where v runs down: mirrored, or writing would be.
+    // u x v points at the viewer, so u runs to the left if v runs down: without this, textures would be mirrored.
     look.repeat_u = -f.repeat_u, look.shift_u = f.shift_u + f.repeat_u, look.repeat_v = f.repeat_v, look.shift_v = f.shift_v;
     look.lod_constant = 0.5f * std::log2(static_cast<float>(texels) + 1e-20f) - kSharper;
     look.detail_repeat = static_cast<float>(kGrainRepeat);
@@ -242,7 +242,7 @@ void Renderer::add_mirror_images(const Instant& instant, const Facet& facet, con
   }
 }
 
-/// What the tiles hold, as an image.
+/// Rearranges the tiles' values into an image.
 void Renderer::untile(const std::vector<float>& tiled, std::vector<float>& image) const {
   image.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)

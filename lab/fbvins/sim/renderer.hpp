@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders the world through a camera with its real distortion, on the CPU. Every pixel's ray is followed
-// exactly (no remapping of a pinhole image); tiles of 8 x 8 rays meet the few facets that can be
-// seen there, sorted from near to far. One instant a call: motion blur is the sum of several.
-// One Renderer a thread; the same input gives the same bits on every machine with the same libm.
+// Renders the world through a camera with its real distortion, on the CPU. Every pixel's ray is cast
+// exactly (no remapping of a pinhole image); tiles of 8 x 8 rays are intersected with the few facets that
+// can be seen there, from near to far. One instant per call: motion blur is the sum of several.
+// One Renderer per thread; the same input gives the same bits on every machine with the same libm.
 //
 //   Renderer renderer(camera, world);
 //   renderer.begin();
@@ -22,14 +22,14 @@ namespace rays {
 struct Hits;
 }
 
-/// Where a camera is while (part of) an image is taken.
+/// A camera's motion at one instant of an exposure.
 struct Instant {
   Quat q_WC = Quat::Identity();
   Vec3 p_WC = Vec3::Zero();
   Vec3 w_WC_C = Vec3::Zero();    ///< rad/s, for lines read one after the other
   Vec3 v_WC = Vec3::Zero();      ///< m/s, in W
   double line_s = 0;             ///< time from line to line; 0: all at once
-  Vec2 shift_px = Vec2::Zero();  ///< where in the pixel the ray passes, for antialiasing
+  Vec2 shift_px = Vec2::Zero();  ///< offset of the ray within the pixel, for antialiasing
 };
 
 class Renderer {
@@ -46,8 +46,8 @@ class Renderer {
   static constexpr int kRays = kTile * kTile;
 
  private:
-  /// A facet seen from a place: with d = (x, y, 1) in C, w = m.d is 1/z of the hit, (a.d)/w and (b.d)/w
-  /// its coordinates on the facet.
+  /// A facet seen from a camera: with d = (x, y, 1) in C, w = m.d is 1/z of the hit, (a.d)/w and (b.d)/w
+  /// are its coordinates on the facet.
   struct View {
     float m[3], a[3], b[3];
     float nearest_w;

@@ -35,7 +35,8 @@ Quat looking_along_x() {
   return Quat(R);
 }
 
-std::vector<float> draw(const World& world, const Camera& camera, const Instant& instant, std::vector<float>* depth = nullptr) {
+std::vector<float> rendered(const World& world, const Camera& camera, const Instant& instant,
+                            std::vector<float>* depth = nullptr) {
   const LightBake bake = bake_light(world, 1.0);
   MixedLight light;
   mix_light(bake, world, world.facets, {}, 1.0, light);
@@ -63,7 +64,7 @@ TEST(Renderer, EdgesAreWhereTheDistortedCameraSeesThem) {
   Instant instant;
   instant.q_WC = looking_along_x();
   instant.p_WC = Vec3(0, 0.4, 0.1);
-  const std::vector<float> image = draw(world, camera, instant);
+  const std::vector<float> image = rendered(world, camera, instant);
   int checked = 0;
   for (double z = -1.2; z <= 1.2; z += 0.1) {
     const auto px = camera.project(instant.q_WC.conjugate() * (Vec3(3, 0, z) - instant.p_WC));
@@ -81,12 +82,12 @@ TEST(Renderer, EdgesAreWhereTheDistortedCameraSeesThem) {
   EXPECT_GT(checked, 10);
 }
 
-TEST(Renderer, WritingReadsFromLeftToRight) {
+TEST(Renderer, TexturesAreNotMirrored) {
   const World world = split_wall();
   const Camera camera = euroc_rig().left;
   Instant instant;
   instant.q_WC = looking_along_x();
-  const std::vector<float> image = draw(world, camera, instant);
+  const std::vector<float> image = rendered(world, camera, instant);
   const float* row = image.data() + 240 * camera.width();
   EXPECT_LT(row[100], row[650]);  // the texture's left half is dark
 }
@@ -97,7 +98,7 @@ TEST(Renderer, DepthIsExact) {
   Instant instant;
   instant.q_WC = (looking_along_x() * so3_exp(Vec3(0, 0.2, 0))).normalized();
   std::vector<float> depth;
-  draw(world, camera, instant, &depth);
+  rendered(world, camera, instant, &depth);
   for (int y = 10; y < 470; y += 57)
     for (int x = 10; x < 740; x += 61) {
       const Vec2 n = *camera.undistort(Vec2(x, y));
@@ -116,7 +117,7 @@ TEST(Renderer, NearerThingsHideFartherOnes) {
   Instant instant;
   instant.q_WC = looking_along_x();
   std::vector<float> depth;
-  draw(world, euroc_rig().left, instant, &depth);
+  rendered(world, euroc_rig().left, instant, &depth);
   EXPECT_NEAR(depth[248 * 752 + 367], 1.5, 1e-3);
   EXPECT_GT(depth[20 * 752 + 367], 2.9);
 }
@@ -128,7 +129,7 @@ TEST(Renderer, LinesReadLaterShowALaterMoment) {
   still.q_WC = turning.q_WC = looking_along_x();
   turning.w_WC_C = Vec3(0, 1.0, 0);  // to the right: the scene moves left
   turning.line_s = 50e-6;
-  const std::vector<float> a = draw(world, camera, still), b = draw(world, camera, turning);
+  const std::vector<float> a = rendered(world, camera, still), b = rendered(world, camera, turning);
   EXPECT_NEAR(edge_column(b, 752, 4) - edge_column(a, 752, 4), 0, 0.4);
   // 476 lines of 50 us at 1 rad/s turn the camera by 23.8 mrad.
   Mat2 J_pixel_normalised;

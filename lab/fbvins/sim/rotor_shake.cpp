@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// Strength of the octave over that of the tone.
+/// Amplitude of the octave over that of the tone.
 constexpr double kOctave = 0.4;
 
 Vec3 direction(Rng& rng) {
@@ -26,7 +26,7 @@ RotorShake::RotorShake(std::uint64_t seed) {
   }
 }
 
-// An unbalanced mass pushes with the square of its speed.
+// The force of an imbalance grows with the square of the speed.
 Shake RotorShake::step(const std::array<double, 4>& rotors, double dt_s) {
   Shake shake;
   for (std::size_t i = 0; i < rotors_.size(); ++i) {
@@ -39,7 +39,7 @@ Shake RotorShake::step(const std::array<double, 4>& rotors, double dt_s) {
   }
   // Four tones of variance 1/2 each along their directions, with their octaves: one on each axis, together.
   const double unit = std::sqrt(3.0 * 2.0 / 4.0 / (1 + kOctave * kOctave));
-  // The strength is in the vectors already; what has no tone takes it from `power`.
+  // The vectors contain the strength already, and are divided by `power`, with which ImuErrors multiplies.
   const double by_power = shake.power > 1e-9 ? unit / shake.power : 0;
   shake.accel *= by_power;
   shake.gyro *= by_power;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four rotors that are not quite balanced shake an IMU: each by the tone of its own speed and the octave above, the stronger the
-// faster it turns. One owner.
+// Vibration by four slightly unbalanced rotors: each gives a tone at its own speed and one an octave above, with the square of
+// that speed. One owner.
 //
 //   RotorShake shake(seed);
 //   Shake now = shake.step(rotor_radps / hover_radps, dt);
@@ -16,7 +16,7 @@ namespace fbvins {
 class RotorShake {
  public:
   explicit RotorShake(std::uint64_t seed);
-  /// `rotors`: speeds as shares of those in hover, at which the strength is that of the options.
+  /// `rotors`: speeds over those in hover, at which the strength is that of the options.
   Shake step(const std::array<double, 4>& rotors, double dt_s);
 
   static constexpr double kHover_hz = 80;  ///< of a rotor's tone in hover

@@ -14,7 +14,7 @@ struct SensorStation::Impl {
   SimulationOptions options;
   StereoRig rig;
   std::shared_ptr<const World> world;
-  BodyMotion motion;  ///< of the image that is being rendered
+  BodyMotion motion;  ///< of the image being rendered
   FlightRecorder recorder;
   ImuErrors errors;
   RotorShake shake;

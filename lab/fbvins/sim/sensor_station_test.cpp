@@ -31,9 +31,9 @@ Result<SensorStation> station(const SimulationOptions& options) {
   return SensorStation::create(options, room_around(path, 2, 3), path);
 }
 
-// The models are those of a recording: asked along the same flight, an IMU without rotors gives the same readings, and the
+// The models are those of a recording: along the same flight, an IMU without rotors gives the same readings, and the
 // cameras the same images.
-TEST(SensorStation, GivesWhatARecordingOfTheSameFlightHolds) {
+TEST(SensorStation, AgreesWithARecordingOfTheSameFlight) {
   SimulationOptions options = quick();
   options.flight.duration_s = 3;
   options.imu.vibration_accel_mps2 = options.imu.vibration_gyro_radps = 0;
@@ -60,7 +60,7 @@ TEST(SensorStation, GivesWhatARecordingOfTheSameFlightHolds) {
   }
 }
 
-TEST(SensorStation, IsStillUntilTheRotorsTurn) {
+TEST(SensorStation, VibratesWithTheRotors) {
   auto asked = station(quick());
   ASSERT_TRUE(asked) << asked.error().message;
   const auto spread = [&](double rotors) {

@@ -19,7 +19,7 @@ Result<RecordedFlight> recorded_flight(const RecordedOptions& o, double duration
   Result<TrajectoryFile> file = read_trajectory(o.trajectory);
   if (!file) return file.error();
   std::vector<TrajectoryPoint>& points = file->points;
-  if (points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: holds no pose", o.trajectory)};
+  if (points.empty()) return Error{ErrorCode::malformed, fmt::format("{}: contains no pose", o.trajectory)};
   const Time from = points.front().t + Duration::from_seconds(o.start_s), to = from + Duration::from_seconds(duration_s);
   std::erase_if(points, [&](const TrajectoryPoint& p) { return p.t < from || p.t > to; });
   if (o.imu.empty()) return fly_again(points, o.crossover_hz);
@@ -49,9 +49,9 @@ std::vector<Vec3> path_of(const SplineTrajectory& flight) {
 }
 
 /// Renders frames for a Dataset.
-class DrawingLoader : public FrameLoader {
+class RenderingLoader : public FrameLoader {
  public:
-  DrawingLoader(Simulation simulation, Duration offset) : simulation_(std::move(simulation)), offset_(offset) {}
+  RenderingLoader(Simulation simulation, Duration offset) : simulation_(std::move(simulation)), offset_(offset) {}
 
   LoadedFrame load(const FrameEntry& entry) override {
     const auto at = std::lower_bound(simulation_.frames.begin(), simulation_.frames.end(), entry.t + offset_);
@@ -127,7 +127,7 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
   if (s.imu.samples.empty()) s.imu = simulate_imu(s.flight, s.rig.imu_noise, o.imu, s.start, seed);
   s.frames = frame_times(o, s.start, s.flight.duration_s());
 
-  // The floor is at z = 0; a recorded flight has its origin anywhere.
+  // The floor is at z = 0; a recorded flight's origin may be anywhere.
   std::vector<Vec3> path = path_of(s.flight);
   if (is_recorded) {
     double lowest = path.front().z();
@@ -163,7 +163,7 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   info.imu_rate_hz = simulation.rig.imu_noise.rate_hz;
   if (!contents.frames.empty()) info.first_image = contents.frames.front().t, info.last_image = contents.frames.back().t;
   if (!contents.imu.empty()) info.first_imu = contents.imu.front().t, info.last_imu = contents.imu.back().t;
-  contents.loader = std::make_unique<DrawingLoader>(std::move(simulation), offset);
+  contents.loader = std::make_unique<RenderingLoader>(std::move(simulation), offset);
   return contents;
 }
 

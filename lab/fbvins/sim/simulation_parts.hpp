@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording that is rendered and sensors that are asked step by step have in common. Pure functions but where named.
+// Shared by rendered recordings and SensorStation. Pure functions unless said otherwise.
 #pragma once
 
 #include "fbvins/core/rng.hpp"
@@ -11,7 +11,7 @@ namespace fbvins {
 inline constexpr Time kSimulationStart{1'700'000'000'000'000'000};  ///< stamp of a synthetic flight's first IMU sample
 inline constexpr double kMargin_s = 0.05;                           ///< IMU before the first and after the last image
 
-/// When images are taken, s from the start; lost frames are left out. One owner.
+/// Times of the images since the start, s, without lost frames. One owner.
 class FrameTimes {
  public:
   explicit FrameTimes(const SimulationOptions& options);
@@ -24,7 +24,7 @@ class FrameTimes {
   std::int64_t k_ = -1;
 };
 
-/// The stereo frame of t_s after kSimulationStart or another start; frames in order.
+/// Renders the stereo frame at t_s after `start`; frames in order.
 RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t_s, std::int64_t frame, bool with_depth = false,
                         Time start = kSimulationStart);
 

@@ -82,7 +82,7 @@ TEST(Simulation, ADatasetDeliversItInOrderWithTruth) {
   ASSERT_TRUE(data.ground_truth()[3].bias && data.ground_truth()[3].v_WB);
 }
 
-TEST(Simulation, ScenariosDoWhatTheyAreCalled) {
+TEST(Simulation, ScenariosHaveTheirEffects) {
   // Dim: darker and noisier though exposed and amplified to the limits.
   auto dim = prepare_simulation(short_flight("dim"));
   ASSERT_TRUE(dim);
@@ -130,7 +130,7 @@ TEST(Simulation, TheEurocFolderReadsBackToTheSameBits) {
   ASSERT_TRUE(simulation);
   const auto written = write_euroc(*simulation, folder, {true, true, 3}, {});
   ASSERT_TRUE(written) << written.error().message;
-  EXPECT_FALSE(write_euroc(*simulation, folder, {}, {}));  // never over something else
+  EXPECT_FALSE(write_euroc(*simulation, folder, {}, {}));  // never overwrites
 
   auto data = open_dataset(folder);
   ASSERT_TRUE(data) << data.error().message;

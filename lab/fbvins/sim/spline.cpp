@@ -23,7 +23,7 @@ SplineTrajectory::Place SplineTrajectory::place(double t_s) const {
 
 // The m-th derivative of a B-spline is the B-spline of degree k - m over the m-th differences of its
 // control points; for the cumulative form (Sommer et al., CVPR 2020) angular velocity and acceleration
-// follow from the product of the five factors, one after the other.
+// follow recursively from the five factors.
 MotionState SplineTrajectory::at(double t_s) const {
   const auto [first, u] = place(t_s);
   const auto b5 = bspline_basis<5>(u);

@@ -47,7 +47,7 @@ TEST(Spline, DerivativesAgreeWithDifferences) {
   }
 }
 
-TEST(Spline, PoseAloneIsTheSameBits) {
+TEST(Spline, PoseAloneAgreesWithTheFullState) {
   const SplineTrajectory flight = random_flight(4);
   for (double t = 0; t <= flight.duration_s(); t += 0.031) {
     EXPECT_LT((flight.pose(t).p - flight.at(t).T_WB.p).norm(), 1e-14);
@@ -55,7 +55,7 @@ TEST(Spline, PoseAloneIsTheSameBits) {
   }
 }
 
-TEST(Spline, NothingJumpsAtKnots) {
+TEST(Spline, DerivativesAreContinuousAtKnots) {
   const SplineTrajectory flight = random_flight(5);
   for (int k = 1; k < 30; ++k) {
     const MotionState a = flight.at(0.1 * k - 1e-9), b = flight.at(0.1 * k + 1e-9);

@@ -7,7 +7,7 @@
 namespace fbvins {
 namespace {
 
-/// There the wind is as told; at the floor there is none.
+/// Height from which the wind has its full strength; at the floor there is none.
 constexpr double kFullWind_m = 0.5;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Air that moves: a steady draught and Dryden's gusts about it. The same seed gives the same bits. One owner.
+// Wind: a steady part and Dryden turbulence. The same seed gives the same bits. One owner.
 //
 //   Wind wind(options, seed);
 //   Vec3 wind_W = wind.step(1e-3, height_m);   // m/s, in W
@@ -22,7 +22,7 @@ struct WindOptions {
   void visit(V&& v) {
     v("mean_mps", mean_mps, "m/s", "speed of the steady part; its direction comes from the seed", 0.0, 20.0);
     v("gust_mps", gust_mps, "m/s", "standard deviation of the gusts along and across it; upwards half of that", 0.0, 10.0);
-    v("gust_s", gust_s, "s", "how long a gust lasts: Dryden's length over the speed of the air", 0.05, 60.0);
+    v("gust_s", gust_s, "s", "correlation time of the gusts: Dryden's length over the airspeed", 0.05, 60.0);
   }
 };
 
@@ -34,7 +34,7 @@ class Wind {
   Vec3 step(double dt_s, double height_m);
 
  private:
-  /// White noise through 1 / (1 + T s), and that through it again.
+  /// White noise filtered once and twice by 1 / (1 + T s).
   struct Filter {
     double once = 0, twice = 0;
   };

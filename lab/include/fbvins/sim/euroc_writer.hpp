@@ -36,7 +36,7 @@ class EurocFolder {
   EurocFolder& operator=(EurocFolder&&) noexcept;
 
   Result<void> add(RenderedFrame rendered);
-  /// Readings and truth; the recording is complete. Once.
+  /// Writes readings and truth, and completes the recording. To be called once.
   Result<void> finish(const SimulatedImu& imu);
 
  private:
@@ -45,7 +45,7 @@ class EurocFolder {
   std::unique_ptr<State> state_;
 };
 
-/// Fast PNG: one filter, lowest compression. 8-bit grey, or 16-bit where `deep` is given.
+/// Fast PNG, with one filter and the lowest compression: 8-bit or 16-bit grey.
 std::string encode_png(const Image& image);
 std::string encode_png16(const std::vector<std::uint16_t>& values, int width, int height);
 

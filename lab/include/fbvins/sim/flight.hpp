@@ -33,16 +33,16 @@ struct FlightOptions {
   void visit(V&& v) {
     v("kind", kind, "hover|waypoint|aggressive|handheld|takeoff|tour", "how the camera moves");
     v("duration_s", duration_s, "s", "length of the flight, rest included", 2.0, 3600.0);
-    v("rest_s", rest_s, "s", "stands still at the start (not handheld)", 0.0, 60.0);
+    v("rest_s", rest_s, "s", "rest at the start (not handheld)", 0.0, 60.0);
     v("max_speed_mps", max_speed_mps, "m/s", "never exceeded", 0.05, 30.0);
     v("max_accel_mps2", max_accel_mps2, "m/s^2", "never exceeded", 0.1, 100.0);
     v("max_jerk_mps3", max_jerk_mps3, "m/s^3", "never exceeded", 0.5, 2000.0);
-    v("max_yaw_rate_radps", max_yaw_rate_radps, "rad/s", "how fast the flight turns its nose", 0.05, 10.0);
-    v("extent_x_m", extent_x_m, "m", "size of the box of waypoints, centred over the world's origin", 0.2, 500.0);
-    v("extent_y_m", extent_y_m, "m", "its second side", 0.2, 500.0);
+    v("max_yaw_rate_radps", max_yaw_rate_radps, "rad/s", "largest yaw rate of the flight", 0.05, 10.0);
+    v("extent_x_m", extent_x_m, "m", "size of the waypoints' box along x, centred over the world's origin", 0.2, 500.0);
+    v("extent_y_m", extent_y_m, "m", "its size along y", 0.2, 500.0);
     v("extent_z_m", extent_z_m, "m", "its height; it begins 0.8 m above the floor", 0.1, 50.0);
     v("camera_pitch_deg", camera_pitch_deg, "deg", "the cameras look down by this much at level flight", -60.0, 90.0);
-    v("shake", shake, "", "strength of a hand's trembling (handheld)", 0.0, 5.0);
+    v("shake", shake, "", "strength of the hand's tremor (handheld)", 0.0, 5.0);
   }
 };
 
@@ -52,7 +52,7 @@ Quat body_in_vehicle(const StereoRig& rig, double camera_pitch_deg);
 /// `tour`: the corners that a flight of kind "tour" visits again and again (z included).
 SplineTrajectory make_flight(const FlightOptions& options, const Quat& q_VB, const std::vector<Vec3>& tour, std::uint64_t seed);
 
-/// Attitude of a multirotor: thrust along the acceleration it needs, nose at yaw.
+/// Attitude of a multirotor with thrust along a_WB less gravity, and heading `yaw_rad`.
 Quat vehicle_attitude(const Vec3& a_WB, double yaw_rad);
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where one can walk: axis-parallel rectangles that overlap at doors. Values.
+// Floor plan: axis-parallel rectangles that overlap at doors. Values.
 #pragma once
 
 #include <string>
@@ -19,23 +19,23 @@ struct FloorRect {
 struct FloorPlan {
   std::vector<FloorRect> rooms;
   double height_m = 3;
-  std::vector<Vec3> tour;  ///< corners of a round through all rooms
+  std::vector<Vec3> tour;  ///< waypoints of a tour through all rooms
 
   bool inside(double x, double y) const;
 };
 
-/// A stretch of wall: from a to b with the free side to the left of the way.
+/// A straight piece of wall from a to b, with the free side to its left.
 struct WallRun {
   Vec2 a, b;
 };
 
-/// The outline of the union of the rooms, in long straight stretches.
+/// The outline of the union of the rooms, in straight pieces that are as long as possible.
 std::vector<WallRun> wall_runs(const FloorPlan& plan);
 
 /// One rectangle around the path.
 FloorPlan room_around(const std::vector<Vec3>& path, double margin_m, double height_m);
 
-/// A ring of corridors with four rooms inside its corners' outer sides.
+/// A ring of four corridors with two rooms at its outer sides.
 FloorPlan corridor_ring(double length_x_m, double length_y_m, double height_m);
 
 }  // namespace fbvins

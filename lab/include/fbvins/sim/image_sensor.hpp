@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// From light to grey values: exposure control with its lag, lens blur and vignetting, veiling glare,
-// shot and read noise, gain, saturation. One ImageSensor a camera; images in order of time.
+// Converts radiance to grey values: exposure control with lag, lens blur and vignetting, veiling glare,
+// shot and read noise, gain, saturation. One ImageSensor per camera; images in order of time.
 //
 //   ImageSensor sensor(options, camera, factor, seed);
-//   double exposure_s = sensor.exposure_s();      // render the radiance of that long
+//   double exposure_s = sensor.exposure_s();      // render the radiance for that exposure
 //   Image image = sensor.expose(radiance, frame);
 #pragma once
 
@@ -42,20 +42,20 @@ struct CameraModelOptions {
     v("line_delay_us", line_delay_us, "us", "rolling shutter: time from line to line, 0 for a global shutter", 0.0, 200.0);
     v("auto_exposure", auto_exposure, "", "exposure follows the images' mean level");
     v("target_level", target_level, "", "mean grey value that the exposure aims at", 5.0, 250.0);
-    v("exposure_lag_frames", exposure_lag_frames, "", "frames until an exposure error has fallen to 1/e", 0.0, 200.0);
+    v("exposure_lag_frames", exposure_lag_frames, "", "time constant of the exposure control, in frames", 0.0, 200.0);
     v("min_exposure_ms", min_exposure_ms, "ms", "shortest exposure", 0.01, 50.0);
-    v("max_exposure_ms", max_exposure_ms, "ms", "longest exposure; beyond it gain goes up", 0.01, 50.0);
+    v("max_exposure_ms", max_exposure_ms, "ms", "longest exposure; in less light the gain rises", 0.01, 50.0);
     v("max_gain", max_gain, "", "largest gain; the smallest is 1", 1.0, 100.0);
     v("sensitivity", sensitivity, "1/ms", "grey value of radiance 1 after one millisecond at gain 1", 0.1, 10000.0);
     v("shot_noise", shot_noise, "", "variance of the grey value per grey value and gain", 0.0, 5.0);
     v("read_noise", read_noise, "", "standard deviation in grey values at gain 1", 0.0, 50.0);
-    v("black_level", black_level, "", "grey value of darkness", 0.0, 100.0);
+    v("black_level", black_level, "", "grey value without light", 0.0, 100.0);
     v("blur_px", blur_px, "px", "standard deviation of the lens' blur", 0.0, 5.0);
     v("vignetting", vignetting, "", "light lost at 45 degrees from the axis", 0.0, 0.95);
     v("glare", glare, "", "share of the light that the lens scatters over the image", 0.0, 0.9);
     v("right_gain", right_gain, "", "the right camera's brightness, relative to the left's", 0.1, 10.0);
-    v("stamp_jitter_us", stamp_jitter_us, "us", "standard deviation of the right image's stamp", 0.0, 2000.0);
-    v("drop_share", drop_share, "", "share of stereo frames that get lost", 0.0, 0.9);
+    v("stamp_jitter_us", stamp_jitter_us, "us", "jitter of the right image's stamp, standard deviation", 0.0, 2000.0);
+    v("drop_share", drop_share, "", "share of stereo frames that are lost", 0.0, 0.9);
     v("time_offset_ms", time_offset_ms, "ms", "IMU stamp less image stamp of the same instant", -100.0, 100.0);
   }
 };
@@ -64,12 +64,12 @@ class ImageSensor {
  public:
   ImageSensor(const CameraModelOptions& options, const Camera& camera, double brightness, std::uint64_t seed);
 
-  /// Of the next image.
+  /// Exposure time of the next image.
   double exposure_s() const { return exposure_ms_ * 1e-3; }
   double gain() const { return gain_; }
-  /// Sets the exposure as it would settle on a scene that looks like this.
+  /// Sets exposure and gain to the values that they settle at for this radiance.
   void settle(const std::vector<float>& radiance);
-  /// Radiance, row by row, is changed in place. `frame` chooses the noise.
+  /// Image of the radiance (row by row, changed in place). `frame` seeds the noise.
   Image expose(std::vector<float>& radiance, std::int64_t frame);
 
  private:

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an IMU on a trajectory reads: white noise, biases that walk, scale and misalignment,
+// Readings of an IMU along a trajectory: white noise, bias random walks, scale and misalignment,
 // vibration, quantisation, saturation. Pure functions, any thread.
 //
 //   SimulatedImu imu = simulate_imu(flight, rig.imu_noise, options, start, seed);
 //   imu.samples, imu.truth   // one state and bias a sample
 //
-// What has no trajectory beforehand asks reading by reading (sensor_station.hpp).
+// Where the trajectory is not known beforehand, sensor_station.hpp gives reading by reading.
 #pragma once
 
 #include <cstdint>
@@ -33,25 +33,25 @@ struct ImuModelOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("noise_factor", noise_factor, "", "times the calibration's noise densities and random walks; 0: no noise", 0.0, 100.0);
+    v("noise_factor", noise_factor, "", "factor of the calibration's noise densities and random walks; 0: no noise", 0.0, 100.0);
     v("turn_on_gyro_bias_radps", turn_on_gyro_bias_radps, "rad/s", "standard deviation of the bias at the start", 0.0, 1.0);
     v("turn_on_accel_bias_mps2", turn_on_accel_bias_mps2, "m/s^2", "standard deviation of the bias at the start", 0.0, 5.0);
     v("scale_error", scale_error, "", "standard deviation of each axis' scale, 0.001 is 0.1 %", 0.0, 0.1);
     v("misalignment_rad", misalignment_rad, "rad", "standard deviation of each axis' direction", 0.0, 0.1);
     v("vibration_accel_mps2", vibration_accel_mps2, "m/s^2", "rotors in flight: standard deviation on each axis", 0.0, 50.0);
     v("vibration_gyro_radps", vibration_gyro_radps, "rad/s", "rotors in flight: standard deviation on each axis", 0.0, 5.0);
-    v("rumble_accel_mps2_rthz", rumble_accel_mps2_rthz, "m/s^2/sqrt(Hz)", "rotors in flight: density of what has no tone", 0.0,
+    v("rumble_accel_mps2_rthz", rumble_accel_mps2_rthz, "m/s^2/sqrt(Hz)", "rotors in flight: density of broadband noise", 0.0,
       10.0);
-    v("rumble_gyro_radps_rthz", rumble_gyro_radps_rthz, "rad/s/sqrt(Hz)", "rotors in flight: density of what has no tone", 0.0,
+    v("rumble_gyro_radps_rthz", rumble_gyro_radps_rthz, "rad/s/sqrt(Hz)", "rotors in flight: density of broadband noise", 0.0,
       1.0);
     v("gyro_range_radps", gyro_range_radps, "rad/s", "readings saturate here", 0.1, 1000.0);
     v("accel_range_mps2", accel_range_mps2, "m/s^2", "readings saturate here", 1.0, 10000.0);
-    v("gyro_step_radps", gyro_step_radps, "rad/s", "step of the digital reading, 0 for none", 0.0, 0.1);
-    v("accel_step_mps2", accel_step_mps2, "m/s^2", "step of the digital reading, 0 for none", 0.0, 1.0);
+    v("gyro_step_radps", gyro_step_radps, "rad/s", "quantisation step, 0 for none", 0.0, 0.1);
+    v("accel_step_mps2", accel_step_mps2, "m/s^2", "quantisation step, 0 for none", 0.0, 1.0);
   }
 };
 
-/// The truth at an instant, as EuRoC's ground truth has it.
+/// The true state at an instant, as in EuRoC's ground truth.
 struct TrueState {
   Time t;
   Pose<W, B> T_WB;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A quadrotor as a rigid body: rotors that lag and saturate, a battery that sags, rotor drag, ground effect, wind, legs on
-// the floor. Integrated with fixed steps of Runge and Kutta's fourth order; the same commands give the same bits.
+// A quadrotor as a rigid body: rotor lag and saturation, battery sag, rotor drag, ground effect, wind, legs on the floor.
+// Integrated by the fourth-order Runge-Kutta method with fixed steps; the same commands give the same bits.
 //
 //   Quadrotor vehicle(*quadrotor_preset("indoor330"), standing_at({0, 0}, heading_rad, options));
 //   vehicle.step({0.4, 0.4, 0.4, 0.4}, wind_W);       // one millisecond
-//   MotionState imu = vehicle.motion_of(mounting);    // what a sensor aboard goes through
+//   MotionState imu = vehicle.motion_of(mounting);    // motion of a sensor aboard
 //
 // Frames: W has z up and the floor at z = 0, V is the vehicle (x forward, y left, z up, origin at the centre of mass).
 // Rotors in PX4's order: front right, rear left (both counter-clockwise from above), front left, rear right (clockwise).
@@ -24,7 +24,7 @@ namespace fbvins {
 struct BodyFlu {};
 
 inline constexpr int kRotors = 4;
-/// One number a rotor, in PX4's order.
+/// A value for each rotor, in PX4's order.
 using PerRotor = std::array<double, kRotors>;
 
 struct QuadrotorOptions {
@@ -51,30 +51,30 @@ struct QuadrotorOptions {
 
   template <class Visitor>
   void visit(Visitor&& v) {
-    v("mass_kg", mass_kg, "kg", "of everything", 0.05, 50.0);
+    v("mass_kg", mass_kg, "kg", "of the whole vehicle", 0.05, 50.0);
     v("inertia_x_kgm2", inertia_x_kgm2, "kg m^2", "about the forward axis", 1e-5, 10.0);
     v("inertia_y_kgm2", inertia_y_kgm2, "kg m^2", "about the left axis", 1e-5, 10.0);
     v("inertia_z_kgm2", inertia_z_kgm2, "kg m^2", "about the upward axis", 1e-5, 10.0);
     v("arm_x_m", arm_x_m, "m", "a rotor's distance from the centre, forward", 0.01, 2.0);
     v("arm_y_m", arm_y_m, "m", "a rotor's distance from the centre, sideways", 0.01, 2.0);
     v("rotor_radius_m", rotor_radius_m, "m", "of a propeller", 0.01, 1.0);
-    v("thrust_N_per_radps2", thrust_N_per_radps2, "N s^2", "thrust of a rotor by the square of its speed", 1e-8, 1e-2);
-    v("torque_per_thrust_m", torque_per_thrust_m, "m", "torque of a rotor by its thrust", 1e-4, 1.0);
+    v("thrust_N_per_radps2", thrust_N_per_radps2, "N s^2", "thrust of a rotor over the square of its speed", 1e-8, 1e-2);
+    v("torque_per_thrust_m", torque_per_thrust_m, "m", "torque of a rotor over its thrust", 1e-4, 1.0);
     v("rotor_inertia_kgm2", rotor_inertia_kgm2, "kg m^2", "of a propeller with its motor's bell", 0.0, 0.1);
     v("rotor_max_radps", rotor_max_radps, "rad/s", "at full command and full battery", 10.0, 10000.0);
-    v("command_is_thrust", command_is_thrust, "", "a command is a share of full thrust, not of full speed");
-    v("spin_up_s", spin_up_s, "s", "time constant of a rotor that gets faster", 0.002, 1.0);
-    v("spin_down_s", spin_down_s, "s", "time constant of a rotor that gets slower", 0.002, 1.0);
-    v("rotor_drag_Ns2_per_rad_m", rotor_drag_Ns2_per_rad_m, "N s^2/(rad m)", "drag of a turning rotor in its plane", 0.0, 0.1);
-    v("drag_Ns2_per_m2", drag_Ns2_per_m2, "N s^2/m^2", "drag of the body by the square of its speed", 0.0, 10.0);
-    v("drag_Ns_per_m", drag_Ns_per_m, "N s/m", "drag of the body by its speed", 0.0, 10.0);
-    v("angular_drag_Nms", angular_drag_Nms, "N m s", "drag of the body that turns", 0.0, 1.0);
-    v("ground_effect", ground_effect, "", "rotors near the floor push more");
+    v("command_is_thrust", command_is_thrust, "", "commands are shares of full thrust, not of full speed");
+    v("spin_up_s", spin_up_s, "s", "time constant of an accelerating rotor", 0.002, 1.0);
+    v("spin_down_s", spin_down_s, "s", "time constant of a decelerating rotor", 0.002, 1.0);
+    v("rotor_drag_Ns2_per_rad_m", rotor_drag_Ns2_per_rad_m, "N s^2/(rad m)", "drag of a spinning rotor in its plane", 0.0, 0.1);
+    v("drag_Ns2_per_m2", drag_Ns2_per_m2, "N s^2/m^2", "quadratic drag of the body", 0.0, 10.0);
+    v("drag_Ns_per_m", drag_Ns_per_m, "N s/m", "linear drag of the body", 0.0, 10.0);
+    v("angular_drag_Nms", angular_drag_Nms, "N m s", "rotational drag of the body", 0.0, 1.0);
+    v("ground_effect", ground_effect, "", "more thrust near the floor");
     v("leg_m", leg_m, "m", "height of the centre of mass over the feet", 0.02, 2.0);
-    v("battery_full_V", battery_full_V, "V", "open voltage, full", 1.0, 100.0);
-    v("battery_empty_V", battery_empty_V, "V", "open voltage, empty", 1.0, 100.0);
+    v("battery_full_V", battery_full_V, "V", "open-circuit voltage, full", 1.0, 100.0);
+    v("battery_empty_V", battery_empty_V, "V", "open-circuit voltage, empty", 1.0, 100.0);
     v("battery_capacity_As", battery_capacity_As, "A s", "from full to empty", 10.0, 1e7);
-    v("battery_resistance_ohm", battery_resistance_ohm, "ohm", "voltage lost by current", 0.0, 1.0);
+    v("battery_resistance_ohm", battery_resistance_ohm, "ohm", "internal resistance", 0.0, 1.0);
     v("power_efficiency", power_efficiency, "", "of motors and their controllers", 0.05, 1.0);
   }
 };
@@ -106,13 +106,13 @@ class Quadrotor {
   const QuadrotorOptions& options() const { return options_; }
   const QuadrotorState& state() const { return state_; }
   double battery_V() const { return battery_V_; }
-  /// Weight is on the legs.
+  /// Whether weight is on the legs.
   bool on_ground() const { return on_ground_; }
-  /// Of what is fixed to the vehicle at `mounting`.
+  /// Motion of a frame that is fixed to the vehicle at `mounting`.
   MotionState motion_of(const Pose<BodyFlu, B>& mounting) const;
 
  private:
-  /// Time derivatives of the state, of the quaternion as of four numbers.
+  /// Time derivatives of the state; q: of the quaternion's coefficients.
   struct Rates {
     Vec3 p, v, w;
     Eigen::Vector4d q;

@@ -3,7 +3,7 @@
 //
 //   Result<SimulationOptions> options = simulation_preset("normal");
 //   Result<DatasetContents> contents = simulate(*options);
-//   Dataset data(*std::move(contents), {});       // renders images as they are asked for
+//   Dataset data(*std::move(contents), {});       // renders images on demand
 //   while (auto event = data.next()) system.push(std::move(*event));
 //
 // simulate() is a pure function, but for reading a recorded flight's files; the Dataset is used as any other.
@@ -22,7 +22,7 @@
 
 namespace fbvins {
 
-/// A flight that somebody has flown, in place of a synthetic one.
+/// A recorded flight in place of a synthetic one.
 struct RecordedOptions {
   std::string trajectory = "";
   std::string imu = "";
@@ -32,9 +32,9 @@ struct RecordedOptions {
   template <class V>
   void visit(V&& v) {
     v("trajectory", trajectory, "", "TUM or EuRoC trajectory file to fly along; empty: a synthetic flight");
-    v("imu", imu, "", "its real IMU recording (EuRoC CSV), then used untouched");
-    v("start_s", start_s, "s", "left out at the start", 0.0, 1e6);
-    v("crossover_hz", crossover_hz, "Hz", "below it the trajectory counts, above it the IMU", 0.05, 20.0);
+    v("imu", imu, "", "its real IMU recording (EuRoC CSV), used unchanged");
+    v("start_s", start_s, "s", "skipped at the start", 0.0, 1e6);
+    v("crossover_hz", crossover_hz, "Hz", "the motion follows the trajectory below this, the IMU above", 0.05, 20.0);
   }
 };
 
@@ -51,8 +51,8 @@ struct SimulationOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("seed", seed, "", "of everything random", 0, 2'000'000'000);
-    v("image_rate_hz", image_rate_hz, "Hz", "stereo frames a second", 1.0, 200.0);
+    v("seed", seed, "", "of all random numbers", 0, 2'000'000'000);
+    v("image_rate_hz", image_rate_hz, "Hz", "stereo frames per second", 1.0, 200.0);
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
     v.group("flight", flight, "how the rig moves");
     v.group("recorded", recorded, "a recorded flight instead");
@@ -63,18 +63,18 @@ struct SimulationOptions {
   }
 };
 
-/// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and the
-/// flights handheld, takeoff, hover, tour in normal light.
+/// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
+/// normal light, handheld, takeoff, hover, tour, hall.
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
 /// The rig of EuRoC's calibration (figures, not files).
 StereoRig euroc_rig();
 
-/// The calibration that the options name, with their rate and time offset.
+/// The rig of the options: their calibration, image rate and time offset.
 Result<StereoRig> simulated_rig(const SimulationOptions& options);
 
-/// A stereo frame with what only a simulator knows.
+/// A stereo frame with data that only a simulator has.
 struct RenderedFrame {
   StereoFrame frame;
   Time right_stamp;
@@ -90,7 +90,7 @@ struct Simulation {
   SplineTrajectory flight;
   Time start;
   SimulatedImu imu;
-  std::vector<Time> frames;               ///< of the images, on the IMU's clock
+  std::vector<Time> frames;               ///< stamps of the images, on the IMU's clock
   Vec3 world_from_flight = Vec3::Zero();  ///< added to the flight's positions: a recorded one has its origin anywhere
   std::shared_ptr<const World> world;
   std::shared_ptr<FlightRecorder> recorder;

@@ -2,9 +2,9 @@
 // A trajectory as a function of time with exact derivatives: uniform B-splines of degree 5 (position
 // four times continuously differentiable, rotation likewise on its cumulative form). Immutable, any thread.
 //
-//   SplineTrajectory flight(Duration::from_seconds(0.1), positions, rotations);
-//   MotionState m = flight.at(2.5);        // seconds from the start
-//   Vec3 f_B = m.specific_force(kGravity); // what an ideal accelerometer reads
+//   SplineTrajectory flight(0.1, positions, rotations);   // seconds from knot to knot
+//   MotionState m = flight.at(2.5);                       // seconds from the start
+//   Vec3 f_B = m.specific_force();                        // what an ideal accelerometer reads
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-/// Length of gravity, m/s^2 (EuRoC's convention; the estimator's default).
+/// Magnitude of gravity, m/s^2 (EuRoC's convention; the estimator's default).
 inline constexpr double kSimGravity_mps2 = 9.81;
 
 /// Values of the k + 1 uniform B-splines of degree k that are not zero in an interval, u in [0, 1).
@@ -33,7 +33,7 @@ std::array<double, k + 1> bspline_basis(double u) {
   return b;
 }
 
-/// Everything that a rigid body does at an instant.
+/// The motion of a rigid body at an instant.
 struct MotionState {
   Pose<W, B> T_WB;
   Vec3 v_WB = Vec3::Zero();     ///< m/s, in W
@@ -51,7 +51,7 @@ struct MotionState {
 class SplineTrajectory {
  public:
   SplineTrajectory() = default;
-  /// Control points, one a knot; at least six. Time 0 is where the first six are in use.
+  /// Control points, one per knot, at least six. Time 0 is the start of the interval of the first six.
   SplineTrajectory(double knot_spacing_s, std::vector<Vec3> positions, std::vector<Quat> rotations);
 
   double duration_s() const { return (static_cast<double>(positions_.size()) - 5) * dt_; }

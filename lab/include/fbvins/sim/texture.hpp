@@ -19,7 +19,7 @@ constexpr int mip_offset(int level) {
 }
 inline constexpr int kTextureWords = mip_offset(kTextureLevels - 1) + 1;
 
-/// What painters draw on: reflectance 0..1, rows from top to bottom.
+/// A texture before packing: reflectance 0..1, rows from top to bottom.
 struct Canvas {
   std::vector<float> texels = std::vector<float>(static_cast<std::size_t>(kTextureSize) * kTextureSize, 0.5f);
 

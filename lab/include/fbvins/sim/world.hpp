@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The synthetic place: textured parallelograms, lamps, things that move. z up, floor at z = 0.
+// The synthetic world: textured parallelograms, lamps, moving things. z up, floor at z = 0.
 // Immutable once built, any thread.
 //
-//   World world = build_world(options, path, seed);
+//   World world = build_world(options, plan, path, seed);
 //   std::vector<Facet> now = world.facets;   append_movers(world, t, now)
 #pragma once
 
@@ -23,17 +23,17 @@ struct Facet {
   int texture = 0;
   float repeat_u = 1, repeat_v = 1;  ///< copies of the texture along u and v
   float shift_u = 0, shift_v = 0;    ///< start inside the texture, in copies
-  float tint = 1;                    ///< times the texture's reflectance
-  float detail = 0.15f;              ///< strength of the fine grain that shows near by
-  float gloss = 0;                   ///< strength of a lamp's mirror image
+  float tint = 1;                    ///< factor of the texture's reflectance
+  float detail = 0.15f;              ///< strength of the fine grain, visible at short distance
+  float gloss = 0;                   ///< strength of the lamps' mirror images
   float emission = 0;                ///< light of its own, same scale as reflected light under irradiance 1
-  int lamp_group = -1;               ///< of a lamp's own surface: it goes on and off with this group
+  int lamp_group = -1;               ///< of a lamp's surface, which is dimmed with this group; -1: none
 
   Vec3 normal() const { return u.cross(v).normalized(); }
   Vec3 centre() const { return corner + 0.5 * (u + v); }
 };
 
-/// Lamps are switched and dimmed by group; group kAmbient is the light from everywhere.
+/// Lamps are switched and dimmed by group; kAmbient is the ambient light.
 enum LightGroup : int { kLampsA, kLampsB, kAmbient, kLightGroups };
 
 struct Lamp {
@@ -42,7 +42,7 @@ struct Lamp {
   int group = kLampsA;
 };
 
-/// A rigid thing that goes to and fro between two places.
+/// A rigid thing that moves to and fro between two places.
 struct Mover {
   std::vector<Facet> facets;  ///< around its own origin
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();
@@ -80,20 +80,20 @@ struct WorldOptions {
     v("margin_m", margin_m, "m", "from the flight to the walls (room, hall)", 0.7, 50.0);
     v("height_m", height_m, "m", "of the ceiling, or more where the flight needs it", 2.2, 30.0);
     v("plain_share", plain_share, "", "share of surfaces with almost no texture", 0.0, 1.0);
-    v("weave_share", weave_share, "", "share of those that are woven: fine corners that look all the same", 0.0, 1.0);
+    v("weave_share", weave_share, "", "share of those that are woven: fine corners that all look the same", 0.0, 1.0);
     v("posters_per_m2", posters_per_m2, "1/m^2", "posters, pages and pictures on walls", 0.0, 5.0);
     v("clutter_per_m2", clutter_per_m2, "1/m^2", "boxes and furniture on the floor", 0.0, 10.0);
     v("tangles_per_m2", tangles_per_m2, "1/m^2", "plants, tripods, chairs and cables: thin rods in front of one another", 0.0,
       5.0);
-    v("repeat_share", repeat_share, "", "share of walls with the same thing again and again", 0.0, 1.0);
-    v("clearance_m", clearance_m, "m", "nothing stands nearer to the flight", 0.1, 10.0);
+    v("repeat_share", repeat_share, "", "share of walls with equal things at equal distances", 0.0, 1.0);
+    v("clearance_m", clearance_m, "m", "least distance of things from the flight", 0.1, 10.0);
     v("lamp_spacing_m", lamp_spacing_m, "m", "of the lamps under the ceiling", 0.8, 50.0);
-    v("ambient", ambient, "", "share of light without direction", 0.0, 1.0);
-    v("detail", detail, "", "strength of fine grain near by", 0.0, 2.0);
+    v("ambient", ambient, "", "share of ambient light", 0.0, 1.0);
+    v("detail", detail, "", "strength of fine grain, visible at short distance", 0.0, 2.0);
     v("gloss", gloss, "", "mirror images of lamps on floor and furniture", 0.0, 10.0);
     v("lamp_glow", lamp_glow, "", "brightness of a lamp's own surface", 0.0, 100.0);
     v("window_glow", window_glow, "", "brightness of the sky in windows", 0.0, 100.0);
-    v("window_share", window_share, "", "share of the places for windows that have one", 0.0, 1.0);
+    v("window_share", window_share, "", "share of possible windows that are there", 0.0, 1.0);
     v("floor_marks", floor_marks, "1/m^2", "mats, tapes and papers on the floor", 0.0, 10.0);
     v("movers", movers, "", "walking people and moving boxes", 0, 100);
   }
@@ -108,7 +108,7 @@ struct World {
   std::vector<Mover> movers;
 };
 
-/// `path`: places of the cameras over time; the world keeps clear of them.
+/// `path`: positions of the cameras over time, which are kept clear.
 World build_world(const WorldOptions& options, const FloorPlan& plan, const std::vector<Vec3>& path, std::uint64_t seed);
 
 /// The movers' facets at an instant, but for those that would touch a camera at `camera`.
