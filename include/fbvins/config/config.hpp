@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a configuration file holds: the odometry's options, and those of loop closure and of live sensors beside them.
+// The contents of a configuration file: the options of the odometry, of loop closure and of live sensors.
 #pragma once
 
 #include "fbvins/live/live_options.hpp"
@@ -15,7 +15,7 @@ struct Config : SystemOptions {
   template <class V>
   void visit(V&& v) {
     SystemOptions::visit(v);
-    v.group("loop", loop, "loop closure, where it is asked for");
+    v.group("loop", loop, "loop closure, if it is switched on");
     v.group("live", live, "sensors in wall time (fbvins live)");
   }
 };

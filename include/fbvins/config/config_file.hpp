@@ -13,13 +13,13 @@
 
 namespace fbvins {
 
-/// The defaults, changed by the file. A flight record (MCAP) gives what it was flown with.
+/// The defaults, changed by the file. From a flight record (MCAP), the configuration of that flight.
 Result<Config> load_config(const std::string& path);
 
 /// The defaults, changed by the file (none for an empty path), then by "name=value" assignments in order.
 Result<Config> load_config(const std::string& path, const std::vector<std::string>& assignments);
 
-/// Every option with its value, meaning, unit and range; load_config gives the same configuration back.
+/// Every option with its value, meaning, unit and range; load_config reads the same configuration back.
 std::string to_yaml(Config config);
 
 }  // namespace fbvins

@@ -3,14 +3,14 @@
 
 namespace fbvins {
 
-/// Sensor data on its way in.
+/// How images and IMU readings are joined.
 struct InputOptions {
   double max_imu_wait_s = 0.25;
 
   template <class V>
   void visit(V&& v) {
-    v("max_imu_wait_s", max_imu_wait_s, "s", "an image goes on without its IMU readings when newer images are ahead by this", 0.0,
-      10.0);
+    v("max_imu_wait_s", max_imu_wait_s, "s", "an image is processed without its IMU readings once newer images are ahead by this",
+      0.0, 10.0);
   }
 };
 

@@ -8,7 +8,7 @@
 //     if (Result<void> taken = system->push(std::move(*event)); !taken) return report(taken.error().message);
 //   Result<void> end = system->finish();
 //
-// A frontend of one's own, or a map, is handed over as a part:
+// A custom frontend, or a mapper, is passed as a part:
 //
 //   System::create(options, rig, RunMode::threaded, {.frontend = std::make_unique<MyFrontend>(rig), .mapper = &map});
 //
@@ -40,37 +40,37 @@ namespace fbvins {
 
 enum class RunMode { deterministic, threaded };
 
-/// What a user may bring: instead of the parts that the options name, or from an earlier flight.
+/// Parts that a user may provide: instead of those that the options name, or from an earlier flight.
 struct SystemParts {
   std::unique_ptr<Frontend> frontend = {};  ///< instead of `options.frontend.kind`
   Mapper* mapper = nullptr;                 ///< gets every keyframe; not owned, must live longer than the System
-  std::optional<ImuState> imu_state = {};   ///< what an earlier flight knew of this IMU
+  std::optional<ImuState> imu_state = {};   ///< this IMU's biases at the end of an earlier flight
 };
 
 class System {
  public:
-  /// An error where an option is out of its range or the frontend cannot be made (its name, the booster's weights).
+  /// An error if an option is out of its range or the frontend cannot be made (its name, the booster's weights).
   static Result<System> create(const SystemOptions& options, const StereoRig& rig, RunMode mode = RunMode::deterministic,
                                SystemParts parts = {});
   ~System();
   System(System&&) noexcept;
   System& operator=(System&&) noexcept;
 
-  /// What the frontend saw in an image.
+  /// The frontend's result for every image.
   void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
   /// Keyframes as they become final, with their images.
   void on_keyframe(std::function<void(const Keyframe&)> callback);
-  /// The window after every image, before its odometry, from the estimator's thread; W is as the window has it, level.
+  /// The window after every image, before its odometry, from the estimator's thread; levelled, but not smoothed as T_WB is.
   void on_window(std::function<void(const WindowSnapshot&)> callback);
-  /// One for every image, with or without a pose: `health` tells.
+  /// One for every image, with or without a pose (see `health`).
   void on_odometry(std::function<void(const Odometry&)> callback);
-  /// After every keyframe that the mapper has seen.
+  /// After every keyframe that the mapper has processed.
   void on_map_update(std::function<void(const MapUpdate&)> callback);
 
-  /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). The error of the stage
-  /// that failed, if one has; the event is dropped then.
+  /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). Returns the error of the
+  /// stage that failed, if one has; the event is dropped then.
   Result<void> push(SensorEvent event);
-  /// Processes what is waiting and ends; no callback comes afterwards. Says the same however often it is called.
+  /// Processes what is waiting and ends; no callback comes afterwards. Returns the same on every call.
   Result<void> finish();
   /// The first failure of a stage, or success.
   Result<void> status() const;

@@ -17,7 +17,7 @@ struct SystemOptions {
   void visit(V&& v) {
     v.group("frontend", frontend, "features and their tracks");
     v.group("estimator", estimator, "sliding window");
-    v.group("input", input, "sensor data on its way in");
+    v.group("input", input, "how images and IMU readings are joined");
   }
 };
 

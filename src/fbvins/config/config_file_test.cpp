@@ -53,7 +53,7 @@ TEST(ConfigFile, AssignmentsComeAfterTheFileAndInOrder) {
   EXPECT_FALSE(load_config("no/such/file.yaml"));
 }
 
-TEST(ConfigFile, AFlightRecordGivesWhatItWasFlownWith) {
+TEST(ConfigFile, AFlightRecordGivesTheFlightsConfiguration) {
   const std::string path = ::testing::TempDir() + "/fbvins_config_" + std::to_string(getpid()) + ".mcap";
   Config flown;
   flown.frontend.kind = "orb";

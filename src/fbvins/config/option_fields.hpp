@@ -30,7 +30,7 @@ struct OptionField {
   std::string meaning;
   std::string choices;      ///< of a text or an enum: allowed values separated by '|', empty for any text
   double min = 0, max = 0;  ///< of a number
-  /// Where the value lives; monostate for the heading of a group, whose fields follow it.
+  /// Pointer to the value; monostate for the heading of a group, whose fields follow it.
   std::variant<std::monostate, bool*, int*, double*, std::string*, EnumValue> value;
 
   bool is_group() const { return value.index() == 0; }
@@ -99,7 +99,7 @@ std::vector<OptionField> fields_of(Options& options) {
   return collector.take();
 }
 
-/// The known path most like a wrong one (edit distance), or empty where none is near.
+/// The known path most similar to a wrong one (edit distance), or empty if none is.
 std::string nearest_path(const std::vector<OptionField>& fields, std::string_view wrong);
 
 /// "klt.max_features=200". The error names the path and, if unknown, the nearest one.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which options a user is shown first. All that a configuration file can set are user or expert options; what nobody
+// Which options a user is shown first. All options of a configuration file are user or expert options; a value that nobody
 // should have to set is a constant in the code.
 //
 //   for (const OptionField& f : user_fields(fields_of(config))) print(f.path);

@@ -19,7 +19,7 @@ std::vector<std::string> values_of(const std::vector<OptionField>& fields) {
   return paths;
 }
 
-TEST(OptionTiers, EveryUserOptionIsAnOptionAndComesInTheConfigurationsOrder) {
+TEST(OptionTiers, EveryUserOptionIsAnOption) {
   Config config;
   const auto chosen = user_options();
   const std::vector<std::string> expected(chosen.begin(), chosen.end());
@@ -33,10 +33,10 @@ TEST(OptionTiers, EveryUserOptionIsAnOptionAndComesInTheConfigurationsOrder) {
 TEST(OptionTiers, ThereAreFewEnoughToRead) {
   Config config;
   EXPECT_LE(user_options().size(), 16u);
-  EXPECT_LE(values_of(fields_of(config)).size(), 72u);  // twelve of them for who has a flight controller
+  EXPECT_LE(values_of(fields_of(config)).size(), 72u);  // twelve of them for users of a flight controller
 }
 
-TEST(OptionTiers, AGroupIsShownOnlyForWhatIsInIt) {
+TEST(OptionTiers, AGroupIsShownOnlyWithAUserOption) {
   Config config;
   const auto fields = user_fields(fields_of(config));
   const auto has = [&](const std::string& path) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint64_t kLargestConfig_bytes = 1u << 20u;
 
-/// Sets the options that a text names; the reader keeps the first complaint.
+/// Sets the options that a text names; the reader keeps the first error.
 struct OptionReader {
   YamlReader& yaml;
   const std::vector<OptionField>& fields;

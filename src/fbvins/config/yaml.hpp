@@ -18,7 +18,7 @@ namespace fbvins {
 /// Fields set before the error keep their new values: read into a copy.
 Result<void> read_yaml(const std::string& text, const std::string& source, const std::vector<OptionField>& fields);
 
-/// The same of a file; of a flight record, what it was flown with.
+/// The same from a file, or from the configuration in a flight record.
 Result<void> read_yaml_file(const std::string& path, const std::vector<OptionField>& fields);
 
 /// Every field in the order of visit(), each with a comment: meaning, unit, range.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator tells the frontend: the newest state, which may be skipped, and the positions of landmarks that left
-// the window, which may not. The frontend of frame k always sees the estimator after frame k - kLag, whatever the mode and
-// however fast the threads: this is why threads give the same bits.
+// Feedback from the estimator to the frontend: the newest state, which may be skipped, and the positions of landmarks that left
+// the window, which may not. The frontend of frame k always gets the estimator's state after frame k - kLag, whatever the mode
+// and the speed of the threads: this is why threads give the same bits.
 //
 //   feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));    // the estimator's thread
 //   Feedback::Message message = feedback.for_frame(packet.id);                       // the frontend's thread
@@ -24,13 +24,13 @@ class Feedback {
 
   struct Message {
     StatePrior prior;
-    std::vector<LandmarkUpdate> landmarks;  ///< those that no message before has brought, in order
+    std::vector<LandmarkUpdate> landmarks;  ///< those that no earlier message held, in order
   };
 
   void publish(FrameId frame, const StatePrior& prior, LandmarkUpdate landmarks);
   /// Waits until the estimator has finished frame - kLag.
   Message for_frame(FrameId frame);
-  /// The same wait alone: nobody gets further ahead of the estimator than this.
+  /// The same wait, without a message: keeps the caller from getting further ahead of the estimator.
   void wait_for(FrameId frame);
   /// Ends all waiting, now and later.
   void stop();
@@ -40,7 +40,7 @@ class Feedback {
 
   std::mutex mutex_;
   std::condition_variable published_;
-  std::array<StatePrior, 2 * kLag> priors_;  // after the last frames, of frame f at f % size
+  std::array<StatePrior, 2 * kLag> priors_;  // after the last frames; that of frame f at f % size
   std::deque<std::pair<FrameId, LandmarkUpdate>> landmarks_;
   FrameId newest_;
   bool stopped_ = false;

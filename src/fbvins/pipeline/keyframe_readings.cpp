@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Readings older than this bind no keyframes any more; an estimator that does not start takes none.
+/// Older readings are dropped, as an estimator that does not start never takes any.
 constexpr double kLongest_s = 10;
 
 bool joined(const std::vector<ImuSegment>& segments) {

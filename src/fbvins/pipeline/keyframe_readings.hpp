@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// IMU readings from keyframe to keyframe, for whoever takes keyframes: gathered frame by frame, handed out when a keyframe
+// IMU readings from keyframe to keyframe, for the receivers of keyframes: gathered frame by frame, handed out when a keyframe
 // has become final, some frames later. One thread at a time.
 //
 //   readings.add(frame.imu);                                       // every frame, in order
@@ -17,7 +17,7 @@ namespace fbvins {
 class KeyframeReadings {
  public:
   void add(const ImuSegment& segment);
-  /// Since the keyframe before, one segment joining the next; empty where some are missing.
+  /// Consecutive segments since the keyframe before; none where some are missing.
   std::vector<ImuSegment> until(Time t);
 
  private:

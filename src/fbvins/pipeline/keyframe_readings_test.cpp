@@ -40,7 +40,7 @@ TEST(KeyframeReadings, WhereSomeAreMissingThereAreNone) {
   EXPECT_TRUE(readings.until(at(300)).empty());
 }
 
-TEST(KeyframeReadings, AreNotGatheredForEver) {
+TEST(KeyframeReadings, OldOnesAreDropped) {
   KeyframeReadings readings;
   for (int i = 0; i < 400; ++i) readings.add(between(50 * i, 50 * (i + 1)));
   EXPECT_TRUE(readings.until(at(20'000)).empty()) << "the first ten seconds are gone";

@@ -4,7 +4,7 @@
 namespace fbvins {
 
 void PacketMaker::push(StereoFrame frame) {
-  frame.t = frame.t + offset_;  // from here on everything is on the IMU's clock
+  frame.t = frame.t + offset_;  // on the IMU's clock while it waits
   if (newest_image_ && frame.t <= *newest_image_) {
     ++backward_;
     return;
@@ -24,7 +24,7 @@ std::optional<SensorPacket> PacketMaker::next(bool flush) {
   waiting_.pop_front();
   if (previous_image_) packet.imu = imu_.extract_now(*previous_image_, t);
   previous_image_ = t;
-  // Back to the image's own clock for everybody downstream.
+  // All later stages use the image's own clock.
   packet.frame.t = t - offset_;
   return packet;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joins each stereo image with the IMU readings since the image before it. An image waits until the
-// readings reach its stamp, but not for ever: an IMU that falls silent must not silence the cameras.
+// readings reach its stamp, but for a limited time, so that a silent IMU does not block the images.
 #pragma once
 
 #include <deque>

@@ -43,7 +43,7 @@ TEST(PacketMaker, AnImageWaitsForTheReadingsUpToItsStamp) {
   EXPECT_EQ(packets[0].imu.samples.size(), 9u);
 }
 
-TEST(PacketMaker, ASilentImuDoesNotSilenceTheCameras) {
+TEST(PacketMaker, ASilentImuDoesNotBlockTheImages) {
   PacketMaker maker = make();
   for (int ms = 0; ms <= 600; ms += 50) maker.push(image(ms));
   const auto packets = drain(maker);
@@ -52,7 +52,7 @@ TEST(PacketMaker, ASilentImuDoesNotSilenceTheCameras) {
   for (const SensorPacket& packet : packets) EXPECT_TRUE(packet.imu.empty());
 }
 
-TEST(PacketMaker, ReadingsThatComeBackServeTheImagesAfterThem) {
+TEST(PacketMaker, ReadingsThatComeBackAreUsedForTheNextImages) {
   PacketMaker maker = make();
   for (int ms = 0; ms <= 600; ms += 50) maker.push(image(ms));
   (void)drain(maker);
@@ -63,7 +63,7 @@ TEST(PacketMaker, ReadingsThatComeBackServeTheImagesAfterThem) {
   EXPECT_EQ(packets.back().imu.samples.size(), 11u);
 }
 
-TEST(PacketMaker, ImagesThatDoNotMoveOnAreSkippedAndCounted) {
+TEST(PacketMaker, ImagesThatAreNotNewerAreSkippedAndCounted) {
   PacketMaker maker = make();
   for (int ms : {0, 50, 50, 20, 100}) maker.push(image(ms));
   const auto packets = drain(maker, true);
@@ -74,7 +74,7 @@ TEST(PacketMaker, ImagesThatDoNotMoveOnAreSkippedAndCounted) {
   EXPECT_EQ(maker.counts().images_backward, 2);
 }
 
-TEST(PacketMaker, FlushHandsOutWhatNeverGotItsReadings) {
+TEST(PacketMaker, FlushGivesImagesThatStillWaitForReadings) {
   PacketMaker maker = make();
   for (int ms = 0; ms <= 70; ms += 5) maker.push(reading(ms));
   for (int ms : {0, 50, 100}) maker.push(image(ms));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only owner of threads: runs one function on a thread of its own until it returns. And what becomes of an exception
-// in a stage: it ends neither the thread nor the program, it becomes the status that the caller sees.
+// The only owner of threads: runs one function on a thread of its own until it returns. An exception in a stage ends neither
+// the thread nor the program; it becomes the status that the caller sees.
 #pragma once
 
 #include <exception>
@@ -14,7 +14,7 @@
 
 namespace fbvins {
 
-/// The first failure of any stage; the rest follow from it. Any thread.
+/// The first failure of any stage; later ones are ignored. Any thread.
 class StageStatus {
  public:
   void fail(Error error) {
@@ -43,7 +43,7 @@ Result<void> guarded(const char* stage, Body&& body) {
   } catch (const std::exception& e) {
     return failed(e.what());
   } catch (...) {
-    return failed("an exception that is none of the standard library's");
+    return failed("an exception that is not a std::exception");
   }
 }
 

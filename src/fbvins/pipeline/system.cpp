@@ -35,7 +35,7 @@ struct System::Impl {
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
   Mapper* mapper;
-  KeyframeImu imu_model;  ///< what every keyframe's readings have in common
+  KeyframeImu imu_model;  ///< noise and gravity, the same for all keyframes
   KeyframeReadings readings;
   Feedback feedback;
 
@@ -66,7 +66,7 @@ struct System::Impl {
   }
   ~Impl() { (void)finish(); }
 
-  // What happens to a frame, whatever the thread.
+  // The steps of a frame, on whatever thread.
 
   void track(SensorPacket packet) {
     const Feedback::Message told = feedback.for_frame(packet.id);
@@ -87,7 +87,7 @@ struct System::Impl {
     if (on_odometry) on_odometry(estimate.odometry);
     if (on_keyframe)
       for (const Keyframe& keyframe : estimate.keyframes) on_keyframe(keyframe);
-    // After the callbacks: whoever waits for this frame sees whether one of them threw.
+    // After the callbacks, so that whoever waits for this frame sees whether one of them threw.
     feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
     if (mapper != nullptr)
       for (Keyframe& keyframe : estimate.keyframes) hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
@@ -95,7 +95,7 @@ struct System::Impl {
 
   bool keyframes_wanted() const { return on_keyframe || mapper != nullptr; }
 
-  /// What keyframes carry that the estimator does not know of.
+  /// Fills the parts of keyframes that the estimator does not know.
   void complete(Estimate& estimate, const ImuSegment& imu) {
     readings.add(imu);
     const Pose<W, G> T_WG = estimate.odometry.T_WB * estimate.odometry.gauge.T_GB.inverse();
@@ -111,9 +111,9 @@ struct System::Impl {
     if (on_map_update) on_map_update(update);
   }
 
-  // How it gets from stage to stage.
+  // The way from stage to stage.
 
-  /// Sends on what has become ready; with `flush`, all that waits.
+  /// Sends on the packets that are ready; with `flush`, all that wait.
   void forward(bool flush) {
     while (std::optional<SensorPacket> packet = packet_maker.next(flush)) {
       feedback.wait_for(packet->id);  // the frontend could not begin earlier, and the caller sees a failure in time
@@ -155,7 +155,7 @@ struct System::Impl {
     if (!std::exchange(finished, true)) {
       forward(true);
       tracking.queue.close();
-      // All have ended before this returns, whichever failed: no callback comes later.
+      // All threads have ended before this returns, whichever stage failed: no callback comes later.
       tracking.runner.join();
       estimation.runner.join();
       mapping.runner.join();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The threads of the whole: same bits as without them, and no way of ending them leaves one behind.
+// The whole system: threads give the same bits as without them, and however it ends none is left behind.
 #include "fbvins/pipeline/system.hpp"
 
 #include <gtest/gtest.h>
@@ -85,7 +85,7 @@ void append(std::string& bytes, const Matrix& m) {
   bytes.append(reinterpret_cast<const char*>(m.data()), sizeof(*m.data()) * static_cast<std::size_t>(m.size()));
 }
 
-/// Everything of an odometry that is a result, as bytes.
+/// The results in an odometry, as bytes.
 std::string bytes_of(const Odometry& o) {
   std::string bytes = std::to_string(o.id.value) + " " + std::to_string(o.t.ns) + " " +
                       std::to_string(static_cast<int>(o.health.state)) + " " + std::to_string(o.stats.iterations) + " ";
@@ -147,7 +147,7 @@ TEST_P(Frontends, ThreadsGiveTheSameBits) {
   }
 }
 
-TEST_P(Frontends, TheSwayIsMeasured) {
+TEST_P(Frontends, TheMotionIsMeasured) {
   const Outcome outcome = fly(RunMode::threaded, GetParam());
   ASSERT_TRUE(outcome.last.health.has_pose());
   const double truth_m = sway_m(outcome.last.t.seconds());
@@ -189,7 +189,7 @@ MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEve
   return outcome;
 }
 
-TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotFeelIt) {
+TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotChange) {
   const std::vector<SensorEvent> events = sway(130);  // comes by the same places again and again
   const MapOutcome without = fly_with_map(RunMode::deterministic, false, events);
   const MapOutcome alone = fly_with_map(RunMode::deterministic, true, events);
@@ -213,7 +213,7 @@ TEST(SystemParts, AnUnknownFrontendOrAnOptionOutOfRangeIsAnErrorAtOnce) {
   EXPECT_NE(system.error().message.find("estimator.max_iterations"), std::string::npos);
 }
 
-/// Sees nothing, and throws at a frame.
+/// Finds no features, and throws at a frame.
 class ThrowingFrontend final : public Frontend {
  public:
   explicit ThrowingFrontend(std::int64_t at) : at_(at) {}
@@ -335,7 +335,7 @@ TEST_P(Modes, FinishFlushesAndMayBeCalledTwice) {
   EXPECT_EQ(frames, 4);
 }
 
-TEST(SystemParts, AFrontendOfOnesOwnGetsStampsReadingsAndLandmarksInOrder) {
+TEST(SystemParts, ACustomFrontendGetsStampsReadingsAndLandmarksInOrder) {
   class Recorder final : public Frontend {
    public:
     explicit Recorder(std::vector<std::int64_t>& updates) : updates_(updates) {}
