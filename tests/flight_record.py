@@ -64,7 +64,7 @@ def check_refusals(program, flight, root):
     record = root / "0.mcap"
     before = record.read_bytes()
     done = subprocess.run(fly(program, flight, record), capture_output=True, text=True)
-    require(done.returncode == 2 and "never written over" in done.stderr, f"written over: {done}")
+    require(done.returncode == 2 and "never overwritten" in done.stderr, f"overwritten: {done}")
     require(record.read_bytes() == before, "the record that was there has changed")
     blind = root / "blind.mcap"
     subprocess.run(fly(program, flight, blind, "--record-no-images", "--max-images", 20), capture_output=True)

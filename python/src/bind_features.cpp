@@ -64,7 +64,7 @@ class Booster {
     std::vector<Margins> margins(weights_.margins ? points.rows() : 0);
     std::vector<Descriptor> bits(points.rows());
     if (weights_.margins) {
-      const auto in = checked<std::int8_t>(descriptors, "descriptors (margins, as these weights want)", {n, kMarginsPerFeature});
+      const auto in = checked<std::int8_t>(descriptors, "descriptors (margins, as these weights need)", {n, kMarginsPerFeature});
       if (n > 0) std::memcpy(static_cast<void*>(margins.data()), in.data, static_cast<std::size_t>(n) * kMarginsPerFeature);
     } else {
       const auto in = checked<std::uint8_t>(descriptors, "descriptors", {n, kDescriptorBytes});

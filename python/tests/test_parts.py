@@ -89,7 +89,7 @@ def test_orb_and_booster(flight):
 
 def test_wrong_features_are_refused(flight):
     features = fbvins.orb(image_of(flight, 60).left)
-    with pytest.raises(ValueError, match=r"margins, as these weights want.*int8 \(\d+, 512\)"):
+    with pytest.raises(ValueError, match=r"margins, as these weights need.*int8 \(\d+, 512\)"):
         fbvins.boost(features.descriptors, features.keypoints, features.size)
     with pytest.raises(ValueError, match=r"keypoints: a NumPy array of float64 \(N, 6\)"):
         fbvins.boost(features.margins, features.keypoints.astype(np.float32), features.size)

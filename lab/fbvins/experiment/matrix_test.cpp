@@ -57,7 +57,7 @@ TEST(Matrix, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(message("datasets:\n  - {path: a, colour: red}\n"),
             "m.yaml:2: unknown key 'colour'; known here: name, euroc, path, simulate");
   EXPECT_EQ(message("frontends: [klt]\n"), "m.yaml:1: a list 'datasets' is needed");
-  EXPECT_EQ(message("datasets: [{path: a}]\nrepetitions: many\n"), "m.yaml:2: 'repetitions' wants a number from 1 to 1000");
+  EXPECT_EQ(message("datasets: [{path: a}]\nrepetitions: many\n"), "m.yaml:2: 'repetitions' must be a number from 1 to 1000");
   EXPECT_NE(message("datasets: [{path: a\n").find("m.yaml:"), std::string::npos);
   EXPECT_EQ(message("datasets: [{path: a}]\nfrontends: [klt, surf]\n"),
             "m.yaml:2: there is no frontend 'surf'; there are klt, orb, boost");

@@ -65,7 +65,7 @@ TEST(Mission, WhatIsWrongIsOneSentenceWithTheLine) {
   EXPECT_NE(complaint(up + "  - goto: [1, 2]\n").find("3 are needed"), std::string::npos);
   EXPECT_NE(complaint(up + "  - goto: [1, 2, -1]\n").find("into the floor"), std::string::npos);
   EXPECT_NE(complaint(up + "  - goto: {to: [1, 1, 1], nose: up}\n").find("'nose' is forward or kept"), std::string::npos);
-  EXPECT_NE(complaint(up + "limits: {speed: -1}\n").find("'speed' wants a number"), std::string::npos);
+  EXPECT_NE(complaint(up + "limits: {speed: -1}\n").find("'speed' must be a number"), std::string::npos);
   EXPECT_NE(complaint(up + "geofence: {x: [1, 0], y: [0, 1], z: [0, 1]}\n").find("from a smaller to a larger"),
             std::string::npos);
   EXPECT_NE(complaint(up + "place: {kind: cave}\n").find("there is no place 'cave'"), std::string::npos);

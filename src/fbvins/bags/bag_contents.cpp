@@ -215,7 +215,7 @@ Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics
   if ((!left || !right) && !contents.camera_problem.empty()) return missing(contents.camera_problem);
   if (!left || !right) return missing(fmt::format("no camera_info for {}", left ? topics.right : topics.left));
   const auto imu = contents.imu.find(topics.imu);
-  if (imu == contents.imu.end()) return missing("without IMU nothing says where the cameras are on it");
+  if (imu == contents.imu.end()) return missing("without an IMU the cameras' extrinsics to it are unknown");
   const std::string& body = imu->second.frame;
   StereoRig rig;
   rig.left = left->camera;

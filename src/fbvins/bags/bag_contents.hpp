@@ -44,10 +44,10 @@ MessagePlace place_of(const std::string& name);
 
 struct ChosenTopics {
   std::string left, right, imu;
-  std::string accel;  ///< of an accelerometer apart: `imu` is the gyroscope's then; found by its name, never given
+  std::string accel;  ///< of a separate accelerometer: `imu` is the gyroscope's then; found by its name, never given
 };
-/// Those named, else those that are alone of their kind or whose names say left and right, gyroscope and accelerometer. The
-/// error lists what there is.
+/// Those in `named`, else the only ones of their kind or those with left and right, gyroscope and accelerometer in their names.
+/// The error lists the topics there are.
 Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
 
 /// From camera_info and transforms. The error says what is missing.

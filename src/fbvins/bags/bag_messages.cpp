@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
 
 bool is_usable(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargestImuValue; }
 

@@ -242,7 +242,7 @@ TEST(GreyImage, EveryEncodingBecomesBrightness) {
   EXPECT_EQ(grey_of("yuv422", 2, 4, "uavb"), "ab");
   EXPECT_EQ(grey_of("jpeg2000", 1, 1, "a"), "images encoded as 'jpeg2000' cannot be read");
   EXPECT_EQ(grey_of("a\nb", 1, 1, "a"), "images encoded as 'a?b' cannot be read");  // one sentence on one line
-  EXPECT_EQ(grey_of("mono8", 3, 2, "abcd"), "this image holds fewer pixels than it says");
+  EXPECT_EQ(grey_of("mono8", 3, 2, "abcd"), "this image has fewer pixels than its header says");
 }
 
 /// Red 40, green 80, blue 120 everywhere: (40 + 2 80 + 120) / 4 at every pixel, at the edges as well.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: the rig from the calibration files of other programs, told apart by content. Any thread.
+// Private: the rig from the calibration files of other programs, recognised by content. Any thread.
 //
 //   Result<StereoRig> rig = load_calibration("calibration.json");              // Basalt
 //   Result<StereoRig> rig = load_calibration("camchain-imucam.yaml", "imu.yaml");
@@ -20,8 +20,8 @@ namespace fbvins {
 /// as Kalibr writes them; without it they are the file's own, where it has any. An error for a camera model that is not known.
 Result<StereoRig> load_calibration(const std::string& path, const std::string& imu_path = "");
 
-/// Two files of ROS's camera calibration (camera_info). They say how the cameras see each other, but not where the IMU is: T_BC0
-/// says that.
+/// Two files of ROS's camera calibration (camera_info). They have the stereo extrinsics, but not those of the IMU: these are
+/// T_BC0.
 Result<StereoRig> load_camera_info(const std::string& left_path, const std::string& right_path, const Pose<B, C0>& T_BC0);
 
 /// Which of them a file's text is: "Kalibr", "OpenVINS", "Basalt", "VINS-Fusion"; empty for none.

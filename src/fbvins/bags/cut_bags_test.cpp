@@ -187,7 +187,7 @@ TEST(CutBags, SqliteWithZstd) {
   expect_beginnings("sqlite zstd", bytes_of(files().path("packed.db3")), open_sqlite<true>, std::nullopt);
 }
 
-/// Counts what is read of it.
+/// Counts the bytes read from it.
 class CountedBytes final : public ByteSource {
  public:
   CountedBytes(std::string bytes, std::uint64_t& count) : bytes_(bytes_in_memory(std::move(bytes))), count_(&count) {}

@@ -18,7 +18,7 @@ struct Unpacked {
   bool whole = false;
 };
 
-/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is that of the output, which is never larger; 0: as the bytes say, at most
+/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is that of the output, which is never larger; 0: unknown, at most
 /// `kLargestUnpacked_bytes`. The memory of `room` is reused.
 Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room = {});
 

@@ -16,7 +16,7 @@ using Row = const std::uint8_t*;
 
 void take_mono8(Row in, std::uint8_t* out, int width) { std::memcpy(out, in, static_cast<std::size_t>(width)); }
 
-/// The high byte of each two; `high` is where it lies.
+/// The high byte of each pair; `high` is its index.
 template <int high>
 void take_mono16(Row in, std::uint8_t* out, int width) {
   for (int x = 0; x < width; ++x) out[x] = in[2 * x + high];
@@ -51,7 +51,7 @@ constexpr Format kFormats[] = {
     {"bayer_grbg8", 1, take_mono8},
 };
 
-/// (1 2 1)/4 both ways, mirrored at the edges so that the mosaic goes on.
+/// (1 2 1)/4 both ways, mirrored at the edges so that the mosaic's pattern continues.
 Image smooth_mosaic(const Image& mosaic) {
   const int width = mosaic.width(), height = mosaic.height();
   Image out(width, height);
@@ -78,7 +78,7 @@ Result<Image> grey_image(const RawImage& raw) {
   const std::uint64_t row_bytes = std::uint64_t{raw.width} * static_cast<std::uint64_t>(format->bytes_per_pixel);
   const std::uint64_t needed = std::uint64_t{raw.step} * (raw.height - 1) + row_bytes;
   if (raw.step < row_bytes || needed > raw.pixels.size())
-    return Error{ErrorCode::malformed, "this image holds fewer pixels than it says"};
+    return Error{ErrorCode::malformed, "this image has fewer pixels than its header says"};
   Image image(static_cast<int>(raw.width), static_cast<int>(raw.height));
   const bool swapped = raw.big_endian && format->take == take_mono16<1>;
   const auto take = swapped ? take_mono16<0> : format->take;

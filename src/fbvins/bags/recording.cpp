@@ -133,7 +133,7 @@ class BagRecording {
       const Result<StereoRig> rig = rig_of(contents_, topics_);
       if (!rig) return rig.error();
       rig_ = *rig;
-      out_.info.warnings.emplace_back("the bag says nothing of the IMU's noise: its figures are the defaults");
+      out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
     }
     out_.rig = *rig_;
     return {};

@@ -87,7 +87,7 @@ void check_clocks(std::span<const ImuSample> samples, std::span<const Time> imag
   finding.measured = fmt::format(
       "{} of {} images are at times at which there are IMU readings; the first reading is stamped {:.3f} s after the first image",
       covered, images.size(), finding.size);
-  finding.expected = "camera and IMU tell the same time";
+  finding.expected = "cameras and IMU have the same clock";
   finding.advice = "stamp both by one clock";
   findings.push_back(std::move(finding));
 }

@@ -51,7 +51,7 @@ struct OptionReader {
       return read_map(value, field.path + ".");
     }
     if (!value.IsScalar())
-      return yaml.complain(name, fmt::format("option '{}' wants a {}, not a list or group", field.path, field.type_name()));
+      return yaml.complain(name, fmt::format("option '{}' must be a {}, not a list or group", field.path, field.type_name()));
     const bool quoted_number = value.Tag() == "!" && field.type_name() != "text";
     if (quoted_number)
       return yaml.complain(

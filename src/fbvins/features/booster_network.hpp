@@ -17,7 +17,7 @@
 
 namespace fbvins {
 
-/// Geometry of keypoints as the network is told it, kBoosterGeometry numbers each: place relative to the image's centre,
+/// Geometry of keypoints as the network's input, kBoosterGeometry numbers each: position relative to the image's centre,
 /// logarithm of the score relative to the image's mean and that mean, cosine and sine of the angle, logarithm of the scale.
 void booster_geometry(int width, int height, std::span<const Keypoint> keypoints, std::vector<float>& out);
 

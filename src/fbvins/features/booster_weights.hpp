@@ -40,7 +40,7 @@ struct BoosterWeights {
   std::string name;      ///< of the size, as trained
 };
 
-/// Numbers a keypoint's geometry is told in: see booster_geometry().
+/// Length of a keypoint's geometry input: see booster_geometry().
 inline constexpr int kBoosterGeometry = 7;
 
 Result<BoosterWeights> parse_booster_weights(std::string_view bytes);

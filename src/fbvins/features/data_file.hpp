@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a file lies that ships with the project: weights, vocabularies. Reads the file system only; any thread.
+// Path of a file that ships with the project: weights, vocabularies. Only reads the file system; any thread.
 //
 //   std::string path = data_file("boost-s.safetensors");
 #pragma once

@@ -55,7 +55,7 @@ struct KltTemplate {
   /// False when the feature is too close to the border or the finest patch has no texture in some direction.
   bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest);
   /// Level 0 from an anchor: an offset d from the feature in the new image shows what the anchor has at
-  /// J_anchor_now * d. False when the warp leaves the block or nothing of use is seen.
+  /// J_anchor_now * d. False when the warp leaves the block or the patch has no texture.
   bool cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now);
 };
 

@@ -17,7 +17,7 @@
 
 namespace fbvins {
 
-/// A piece of an image and how it is seen now: a small plane that faced the camera then.
+/// A patch of an image and its warp to the present view: a small plane that faced the camera then.
 struct PatchReference {
   KltAnchor anchor;
   Mat2 J_normalised_pixel_then = Mat2::Identity();

@@ -142,7 +142,7 @@ Result<SafeTensors> parse_safetensors(std::string_view bytes) {
   if (bytes.size() < sizeof(length)) return damaged("the file is too short for a header");
   std::memcpy(&length, bytes.data(), sizeof(length));
   if (length > kLargestHeader || length > bytes.size() - sizeof(length))
-    return damaged(fmt::format("the header is said to have {} bytes, the file has {}", length, bytes.size()));
+    return damaged(fmt::format("the header is {} bytes long by its length field, the file has {}", length, bytes.size()));
   const Result<Json> header = parse_header(bytes.substr(sizeof(length), length));
   if (!header) return header.error();
   const std::string_view data = bytes.substr(sizeof(length) + length);

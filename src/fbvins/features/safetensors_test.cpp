@@ -56,7 +56,7 @@ TEST(SafeTensors, SaysWhatIsWrongWithADamagedFile) {
   EXPECT_EQ(error_of(file_of(good.substr(0, 20), "")), "the header is not valid near byte 21");
   std::string long_header = file_of(good, floats({1, 2}));
   long_header[6] = '\x7f';
-  EXPECT_NE(error_of(long_header).find("the header is said to have"), std::string::npos);
+  EXPECT_NE(error_of(long_header).find("by its length field"), std::string::npos);
 }
 
 TEST(SafeTensors, IsStricterThanJson) {

@@ -15,7 +15,7 @@ constexpr int kWindow = 7;  // side of the structure tensor's window
 constexpr int kHalf = kWindow / 2;
 constexpr int kFewestCells = 24;             // searched each time, if as many are empty
 constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is searched
-constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not deliver enough
+constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not give enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
 constexpr int kBorder_px = 10;               // no corner is nearer to the image's edge
 /// Smallest response of a corner, (grey/px)^2, and as a multiple of the noise's own response; the larger counts.
@@ -209,7 +209,7 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
   }
 
   search_cells(image, columns, true, threshold, existing, wanted);
-  // Walls without texture leave cells empty for good; what is missing may come from the others.
+  // Walls without texture leave cells empty for good; the missing corners are taken from the others.
   if (static_cast<int>(corners_.size()) < wanted) search_cells(image, columns, false, threshold, existing, wanted);
   return corners_;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shi-Tomasi corners (Good Features to Track, CVPR 1994), kept apart and spread over a grid of cells.
 // Responses are computed only in cells that still need a feature. The threshold follows the image's own noise,
-// so that dim and weakly textured cells deliver as long as their best corner stands out of the noise.
+// so that dim and weakly textured cells give corners as long as the best one exceeds the noise.
 // Buffers are reused; not thread-safe.
 //
 //   ShiTomasiDetector detector(22);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to io: CDR, in which ROS 2 sends its messages (XCDR1, little-endian): numbers aligned to their size, counted from the
-// end of four bytes that say so. One thread a value.
+// end of the four-byte header. One thread a value.
 //
 //   CdrWriter cdr(bytes);
 //   cdr.put(7.0);

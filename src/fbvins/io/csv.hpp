@@ -23,7 +23,7 @@
 
 namespace fbvins {
 
-/// What a row parser says about one row.
+/// Result of parsing one row.
 enum class RowVerdict { good, not_finite, malformed };
 
 template <class Row>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: which part of a recording is asked for; counts, rates and gaps of what a format's reader has found.
+// Private to io: which part of a recording is requested; counts, rates and gaps of what a format's reader has found.
 #pragma once
 
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {
 
-/// Fills in what `contents.info` says of its frames and IMU samples, with a warning for each long gap. Needs a frame.
+/// Fills in the fields of `contents.info` on frames and IMU samples, with a warning for each long gap. Needs a frame.
 void describe(DatasetContents& contents);
 
 /// Keeps the frames that the options ask for; an error where there is none.

@@ -12,7 +12,7 @@ namespace fbvins {
 namespace {
 
 constexpr std::uint64_t kLargestImage_bytes = std::uint64_t{64} << 20u;
-constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
 
 /// File names stay below the camera's folder.
 bool is_harmless_name(std::string_view name) {

@@ -29,7 +29,7 @@ class FileSource {
   virtual bool packed() const = 0;
 };
 
-/// A folder or a zip archive, told apart by content.
+/// A folder or a zip archive, recognised by content.
 Result<std::unique_ptr<FileSource>> open_file_source(const std::string& path);
 
 /// The whole of a plain file outside of any dataset.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG and JPEG to 8-bit grey, told apart by content. Pure functions, any thread.
+// PNG and JPEG to 8-bit grey, recognised by content. Pure functions, any thread.
 //
 //   Result<Image> image = decode_image(bytes);
 //

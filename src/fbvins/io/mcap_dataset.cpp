@@ -19,7 +19,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above what any sensor can say
+constexpr double kLargestImuValue = 1e6;  // rad/s or m/s^2: far above the range of any sensor
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
 // The partner of an image is searched for among this many frames before it.

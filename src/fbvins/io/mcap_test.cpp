@@ -174,7 +174,7 @@ TEST_F(Mcap, ARecordIsNeverWrittenOver) {
   write_thirty(true);
   const auto second = McapWriter::create(path_, {"ros2", "a test"}, kTopics);
   ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().message, path_ + ": is there already, and a record is never written over");
+  EXPECT_EQ(second.error().message, path_ + ": exists already, and a record is never overwritten");
   EXPECT_FALSE(McapWriter::create(folder_ + "/nowhere/a.mcap", {"ros2", "a test"}, kTopics));
 }
 

@@ -38,7 +38,7 @@ void append_channel(std::string& out, std::uint16_t id, std::uint16_t schema, co
   append_le(out, schema);
   append_mcap_text(out, topic.topic);
   append_mcap_text(out, "cdr");
-  // The profile "ros2" wants this key; empty stands for the defaults.
+  // The profile "ros2" requires this key; empty stands for the defaults.
   std::string metadata;
   append_mcap_text(metadata, "offered_qos_profiles");
   append_mcap_text(metadata, "");
@@ -51,7 +51,7 @@ void append_channel(std::string& out, std::uint16_t id, std::uint16_t schema, co
 Result<McapWriter> McapWriter::create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics) {
   FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644));
   if (!file && errno == EEXIST)
-    return Error{ErrorCode::unwritable, fmt::format("{}: is there already, and a record is never written over", path)};
+    return Error{ErrorCode::unwritable, fmt::format("{}: exists already, and a record is never overwritten", path)};
   if (!file) return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written ({})", path, std::strerror(errno))};
   McapWriter writer(path, std::move(file), topics);
   std::string bytes(kMcapMagic);

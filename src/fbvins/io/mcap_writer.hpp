@@ -36,8 +36,8 @@ struct McapLabel {
 
 class McapWriter {
  public:
-  /// Messages name their topic by its index in `topics`. An error where there is a file of that name: a record is never
-  /// written over.
+  /// Messages name their topic by its index in `topics`. An error where the file exists already: a record is never
+  /// overwritten.
   static Result<McapWriter> create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics);
 
   // Both are written at once.

@@ -101,7 +101,7 @@ struct RosImage {
   std::string_view encoding, pixels;  ///< in the bytes given
 
   bool is_grey() const { return encoding == "mono8" || encoding == "8UC1"; }
-  /// A frame of which this camera delivered nothing.
+  /// A frame without an image of this camera.
   bool empty() const { return width == 0 && height == 0; }
 };
 /// Nullopt also where a grey image has fewer pixels than its size needs.

@@ -12,7 +12,7 @@
 namespace fbvins {
 namespace {
 
-/// Makes the OpenCV header a comment, keeping the number of lines. YAML wants no other directives here.
+/// Makes the OpenCV header a comment, keeping the number of lines. No other YAML directive may follow it.
 void hide_opencv_header(std::string& text) {
   std::size_t start = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
   if (text.compare(start, 6, "%YAML:") == 0) text[start] = '#';
@@ -108,14 +108,14 @@ double YamlReader::number_between(const YAML::Node& map, const std::string& fiel
   if (!node.IsDefined()) return otherwise;
   const auto value = node.IsScalar() ? parse_double(node.Scalar()) : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
-  complain(node, fmt::format("'{}' wants a number from {} to {}", field, low, high));
+  complain(node, fmt::format("'{}' must be a number from {} to {}", field, low, high));
   return otherwise;
 }
 
 std::string YamlReader::text(const YAML::Node& map, const std::string& field) {
   const YAML::Node node = get(map, field);
   if (!node.IsDefined()) return "";
-  if (!node.IsScalar()) return complain(node, fmt::format("'{}' wants one value", field)), "";
+  if (!node.IsScalar()) return complain(node, fmt::format("'{}' must be a single value", field)), "";
   return node.Scalar();
 }
 
@@ -123,10 +123,10 @@ std::vector<std::string> YamlReader::texts(const YAML::Node& map, const std::str
   const YAML::Node node = get(map, field);
   if (!node.IsDefined()) return {};
   if (node.IsScalar()) return {node.Scalar()};
-  if (!node.IsSequence()) return complain(node, fmt::format("'{}' wants a list", field)), std::vector<std::string>{};
+  if (!node.IsSequence()) return complain(node, fmt::format("'{}' must be a list", field)), std::vector<std::string>{};
   std::vector<std::string> out;
   for (const YAML::Node& item : node) {
-    if (!item.IsScalar()) complain(item, fmt::format("'{}' wants a list of plain values", field));
+    if (!item.IsScalar()) complain(item, fmt::format("'{}' must be a list of plain values", field));
     else out.push_back(item.Scalar());
   }
   return out;

@@ -27,7 +27,7 @@ TEST(YamlReader, FieldsThatMayBeLeftOut) {
   EXPECT_EQ(yaml.number_between(yaml.root(), "none", 1, 5, 3), 3);
   ASSERT_TRUE(yaml.ok());
   EXPECT_EQ(yaml.number_between(yaml.root(), "n", 1, 5, 3), 3);
-  EXPECT_EQ(yaml.error().message, "f.yaml:3: 'n' wants a number from 1 to 5");
+  EXPECT_EQ(yaml.error().message, "f.yaml:3: 'n' must be a number from 1 to 5");
 }
 
 TEST(YamlReader, OnlyKnownFields) {

@@ -8,11 +8,11 @@
 namespace fbvins {
 namespace {
 
-/// Loops are many and never quite independent of one another.
+/// Factor on the covariance of loops: there are many, and they are not quite independent of one another.
 constexpr double kLoopInflation = 2.0;
 /// No loop is more certain than this.
 constexpr double kLoopFloor_m = 0.006, kLoopFloor_rad = 0.10 * kDegree;
-/// Nor is a step of the odometry, as variances: two keyframes may stand on one spot.
+/// Nor is an odometry edge, as variances: two keyframes may have the same position.
 constexpr double kOdometryFloor_m2 = 1e-6, kOdometryFloor_rad2 = 1e-8;
 
 Mat6 symmetric(const Mat6& m) { return 0.5 * (m + m.transpose()); }

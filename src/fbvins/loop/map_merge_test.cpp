@@ -23,7 +23,7 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const auto both = merge_maps(a, b, {}, vocabulary());
   ASSERT_TRUE(both.ok()) << both.error().message;
   EXPECT_EQ(both->size(), a.size() + b.size());
-  // The second flight's frame is its own: only distances between keyframes of both tell.
+  // The second flight has a frame of its own: only distances between keyframes of both are comparable.
   const auto truth_a = flight(room(1), 120, 0, 0, 2, 0), truth_b = flight(room(1), 120, 0, 0, 3, 9);
   const Vec3 measured = both->keyframes()[a.size() + 50].T_MB.p - both->keyframes()[60].T_MB.p;
   EXPECT_NEAR(measured.norm(), (truth_b[50].truth.p - truth_a[60].truth.p).norm(), 0.05);

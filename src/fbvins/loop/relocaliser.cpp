@@ -10,9 +10,9 @@ namespace {
 
 /// A guess of G in M is forgotten after this.
 constexpr double kGuessLife_s = 5;
-/// Two keyframes agree to this.
+/// Largest difference between the results of two keyframes that agree.
 constexpr double kAgree_m = 0.15, kAgree_rad = 2.5 * kDegree;
-/// So many inliers, and this share of what is visible, need no second keyframe.
+/// With this many inliers, and this share of the visible landmarks, no second keyframe is needed.
 constexpr int kSureInliers = 90;
 constexpr double kSureShare = 0.35;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the vocabularies that ship with the project lie. Only files are read; any thread.
+// Paths and reading of the vocabularies that ship with the project. Only reads files; any thread.
 //
 //   Result<Vocabulary> vocabulary = open_vocabulary(kRawDescriptors);
 #pragma once

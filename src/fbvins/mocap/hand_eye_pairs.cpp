@@ -55,22 +55,22 @@ bool fits(const Turn& turn, const Quat& q_BK) {
 }
 
 /// Whether a turn is large enough to test a rotation: at rest every rotation fits.
-bool tells(const Turn& turn) { return turn.a_B.norm() > 2 * kTurnSlack_rad || turn.b_K.norm() > 2 * kTurnSlack_rad; }
+bool is_large(const Turn& turn) { return turn.a_B.norm() > 2 * kTurnSlack_rad || turn.b_K.norm() > 2 * kTurnSlack_rad; }
 
 struct RotationFit {
   Quat q_BK = Quat::Identity();
-  double share = 0;  ///< of the turns that tell
+  double share = 0;  ///< of the large turns, those that fit
 };
 
-/// Candidates from pieces of the flight, the one that most turns agree with, refined by these.
+/// Of candidates from pieces of the flight the one with which most turns agree, refined with these.
 RotationFit fit_rotation(const std::vector<Turn>& turns) {
-  std::size_t telling = 0, most = 0;
-  for (const Turn& turn : turns) telling += tells(turn);
+  std::size_t large = 0, most = 0;
+  for (const Turn& turn : turns) large += is_large(turn);
   RotationFit best;
-  if (telling == 0) return best;
+  if (large == 0) return best;
   const auto count = [&](const Quat& q) {
     return static_cast<std::size_t>(
-        std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) { return tells(turn) && fits(turn, q); }));
+        std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) { return is_large(turn) && fits(turn, q); }));
   };
   const Duration piece = Duration::from_seconds(kCandidate_s);
   for (Time from = turns.front().t; from <= turns.back().t; from = from + piece) {
@@ -78,7 +78,7 @@ RotationFit fit_rotation(const std::vector<Turn>& turns) {
     if (const std::size_t agree = count(q); agree > most) most = agree, best.q_BK = q;
   }
   for (int i = 0; i < 5; ++i) best.q_BK = rotation_between(turns, [&](const Turn& turn) { return fits(turn, best.q_BK); });
-  best.share = static_cast<double>(count(best.q_BK)) / static_cast<double>(telling);
+  best.share = static_cast<double>(count(best.q_BK)) / static_cast<double>(large);
   return best;
 }
 

@@ -45,7 +45,7 @@ std::optional<double> metres_of(std::string_view unit) {
   return std::nullopt;
 }
 
-/// Where the header's row of column names is; its rows stand before it.
+/// Index of the row of column names; the rest of the header is before it.
 std::optional<std::size_t> row_beginning_with(const std::vector<CsvLine>& lines, std::string_view word) {
   constexpr std::size_t kLongestHeader = 40;
   for (std::size_t i = 0; i < std::min(lines.size(), kLongestHeader); ++i)
@@ -53,7 +53,7 @@ std::optional<std::size_t> row_beginning_with(const std::vector<CsvLine>& lines,
   return std::nullopt;
 }
 
-/// Rows that begin with a number; what comes after the first other one is another table.
+/// Rows that begin with a number; the first other one begins another table.
 std::vector<CsvLine> table_from(const std::vector<CsvLine>& lines, std::size_t first, char separator) {
   std::vector<CsvLine> rows;
   for (std::size_t i = first; i < lines.size(); ++i) {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t kLargestFile_bytes = std::uint64_t{1} << 31u;
 constexpr double kLargestValue = 1e9;
-constexpr double kLargestSize_m = 1e4;  // of a volume: beyond it the unit is not the one said
+constexpr double kLargestSize_m = 1e4;  // of a volume: beyond it the stated unit must be wrong
 
 /// y up to z up: z of the file points backwards.
 const Quat& upright() {

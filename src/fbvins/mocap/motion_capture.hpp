@@ -4,8 +4,8 @@
 //   Result<MotionCapture> file = read_motion_capture("take.csv");
 //   Result<MarkerBody> body = choose_body(*std::move(file), "quad", "take.csv");
 //
-// Told apart by content: Motive CSV (Y up, turned to z up here), Vicon CSV, Qualisys TSV (6D), TUM, EuRoC CSV, and topics of
-// PoseStamped or Odometry in MCAP. docs/mocap.md says what each looks like. Metres and seconds of the file's own clock come out.
+// Recognised by content: Motive CSV (Y up, turned to z up here), Vicon CSV, Qualisys TSV (6D), TUM, EuRoC CSV, and topics of
+// PoseStamped or Odometry in MCAP. docs/mocap.md describes each. Results are in metres and seconds of the file's own clock.
 #pragma once
 
 #include <string>
