@@ -27,7 +27,7 @@ struct FinalAdjustmentReport {
   int keyframes = 0, points = 0, observations = 0, iterations = 0;
   double initial_rms_px = 0, final_rms_px = 0;  ///< of position in the image, both over the observations kept in the end
   Plausibility before, after;
-  double tilt_rad = 0;       ///< by which the map was turned level
+  double tilt_rad = 0;       ///< by which the map was levelled
   std::string refused = {};  ///< why the result does not fit better than the start, and the map is as it was; empty: accepted
 };
 

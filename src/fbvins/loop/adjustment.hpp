@@ -45,7 +45,7 @@ class Adjustment {
   /// Removes observations that do not fit a solution: they are wrong matches.
   void drop_outliers(const AdjustmentState& x);
   Plausibility judged(AdjustmentState x) const;  ///< of the poses of x; all else is fitted to them (L19)
-  /// Writes the poses of a solution into the map and turns it level.
+  /// Writes the poses of a solution into the map and aligns it with gravity.
   void write(const AdjustmentState& x, PlaceMap& map) const;
 
   std::size_t points() const;

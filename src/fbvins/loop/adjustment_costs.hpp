@@ -48,7 +48,7 @@ class ImuCost final : public ceres::SizedCostFunction<15, 6, 9, 6, 9, 2> {
   double gravity_mps2_;
 };
 
-/// The quaternion that takes directions of a level world to M.
+/// The quaternion that takes directions of a gravity-aligned frame to M.
 Quat turn_of(const TiltBlock& tilt);
 
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// Adjusts the keyframes that have a place in M, and turns the map level about the first one. A map without two views of one
+/// Adjusts the keyframes that have a place in M, and aligns M with gravity about the first one. A map without two views of one
 /// point stays as it is, and so does one whose result does not fit better than the start (`refused` says why).
 FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matching);
 

@@ -14,7 +14,7 @@ namespace {
 
 /// Standard deviation of the difference between the map's and the odometry's roll and pitch.
 constexpr double kTiltSigma_rad = 0.005;
-/// A new map begins as the gauge of its first flight, turned level.
+/// A new map begins as the gauge of its first flight, aligned with gravity.
 constexpr double kNewMapSigma_m = 1e-3, kNewMapSigma_rad = 1e-4;
 /// Prior of T_MG at relocalisation, before the recognised pose is applied as a measurement.
 constexpr double kFoundSigma_m = 0.05, kFoundSigma_rad = 0.01;
@@ -93,8 +93,8 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
   if (map_.empty()) frame_.reset({session_.q_LG, Vec3::Zero()}, kNewMapSigma_m, kNewMapSigma_rad);
 }
 
-/// Gravity has become better known. Where the flight began the map, all of M is turned level at once, which changes no
-/// relative pose; where it has joined an older one, M is level already, and the flight's own keyframes turn.
+/// Gravity has become better known. Where the flight began the map, M is aligned with it as a whole, which changes no
+/// relative pose; where it has joined an older one, M is gravity-aligned already, and the flight's own keyframes are rotated.
 void LoopCloser::level(const Quat& q_LG) {
   const Quat turned = q_LG * session_.q_LG.conjugate();
   session_.q_LG = q_LG;

@@ -40,7 +40,7 @@ class LoopCloser final : public Mapper {
   /// The same from features already extracted (joining maps, replay); the images are not looked at.
   MapUpdate process(Place place, const Keyframe& keyframe);
 
-  /// A last optimisation over everything.
+  /// Last optimisation of the pose graph.
   PoseGraphReport finish();
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
   FinalAdjustmentReport adjust();
@@ -56,7 +56,7 @@ class LoopCloser final : public Mapper {
     std::uint32_t number = 0;  ///< counts the sessions of this map
     bool begun = false;
     std::uint32_t reset_counter = 0;
-    bool began_map = false;  ///< M is its gauge, turned level
+    bool began_map = false;  ///< M is its gauge, aligned with gravity
     Quat q_LG = Quat::Identity();
     double up_sigma_rad = 0;
     KeyframeId newest = {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The map: keyframes with their features and poses in M, and relative poses between them. Relative poses are as estimated, in
-// the gauge of a flight; M is level, and is turned as a whole when gravity becomes better known (loop.md, L17).
+// the gauge of a flight; M is gravity-aligned: rotated as a whole when gravity becomes better known (loop.md, L17).
 // A value; one thread at a time.
 //
 //   PlaceMap map;
@@ -32,7 +32,7 @@ struct MapKeyframe {
   KeyframeId id;
   Time t;
   std::uint32_t session = 0;  ///< which flight's gauge G it was taken in
-  Pose<G, B> T_GB;            ///< as estimated in flight; never turned level
+  Pose<G, B> T_GB;            ///< as estimated in flight; never levelled
   Pose<M, B> T_MB;
   double path_m = 0;   ///< flown in this session until here
   int seen_again = 0;  ///< loops that ended here
