@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::string_view kTruthTopic = "/ground_truth";
 
-/// librealsense names no frames, and its streams by topics: /device_0/sensor_0/Infrared_1/image/data. Empty for other topics.
+/// Prefix /device_/sensor_/stream of a topic of librealsense, which has no frame names, to be used as the frame; else empty.
 std::string realsense_stream(const std::string& topic) {
   if (!topic.starts_with("/device_")) return "";
   std::size_t end = 0;

@@ -165,7 +165,7 @@ void expect_beginnings(const char* name, const std::string& whole, const Open& o
   EXPECT_EQ(read_beginning(**all), all_readings) << name;
 }
 
-// Of a chunk that is packed in blocks only whole blocks come out; a ROS 1 bag's chunk holds half of the recording.
+// Of a chunk compressed in blocks only complete blocks are decompressed; a ROS 1 bag's chunk holds half of the recording.
 constexpr std::size_t kRos1Chunk_readings = 3 * kReadings / 4, kMcapChunk_readings = 200;
 
 TEST(CutBags, Ros1) { expect_beginnings("plain", files().ros1, open_ros1, 60); }

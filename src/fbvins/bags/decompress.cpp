@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kFirstRatio = 8;  // of the first output buffer to the packed bytes
+constexpr std::uint64_t kFirstRatio = 8;  // first output buffer / compressed bytes
 constexpr std::uint64_t kFirst_bytes = 4096;
 
 /// Buffer that grows with the output, so that a wrong size costs no memory.

@@ -22,7 +22,7 @@ struct RawImage {
   std::string_view pixels;
 };
 
-/// An error for an unknown encoding, or where there are fewer pixels than it says.
+/// An error for an unknown encoding, or for fewer pixels than the size needs.
 Result<Image> grey_image(const RawImage& raw);
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MCAP files of ROS messages, packed or not: rosbag2's, Foxglove's and converted ROS 1 bags.
+// MCAP files of ROS messages, compressed or not: rosbag2's, Foxglove's and converted ROS 1 bags.
 #include <fmt/format.h>
 
 #include <map>

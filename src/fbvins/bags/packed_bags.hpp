@@ -85,7 +85,7 @@ inline std::string packed_mcap(std::string_view file, std::string_view compressi
   return out.append(kMcapMagic);
 }
 
-/// A bag as rosbag2 keeps it in tables, its messages as they are or packed by zstd. False where something failed.
+/// A bag as rosbag2 keeps it in tables, its messages plain or compressed by zstd. False on any failure.
 inline bool write_sqlite(const std::string& path, BagReader& bag, bool packed_messages) {
   sqlite3* database = nullptr;
   bool good = sqlite3_open(path.c_str(), &database) == SQLITE_OK;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ROS 1 bags, format 2.0 (wiki.ros.org/Bags/Format/2.0): records of a header with named fields and data; messages lie in chunks.
-// The index at the end is not needed: all records are gone through in order.
+// The index at the end is not needed: all records are read in order.
 #include <fmt/format.h>
 
 #include <algorithm>

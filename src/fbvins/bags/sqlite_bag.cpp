@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ROS 2 bags in SQLite: a table of topics and one of messages in each file; messages may be packed one by one.
+// ROS 2 bags in SQLite: a table of topics and one of messages in each file; messages may be compressed one by one.
 #include <fmt/format.h>
 #include <sqlite3.h>
 

@@ -84,7 +84,7 @@ FBVINS_INLINE bool exceeds(const U8x32& v, std::uint8_t limit) {
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-/// Few pixels are left: eight at a time are looked at as one number.
+/// Few pixels remain: eight at a time are tested as one integer.
 void collect_row(const std::uint8_t* kept, int count, int x0, int y, std::vector<FastCorner>& out) {
   static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first pixel");
   for (int block = 0; block < count; block += 8) {

@@ -57,7 +57,7 @@ void FastCells::fill(int y) {
                           rows_.data() + static_cast<std::size_t>(y % 3) * pitch_);
 }
 
-/// Few pixels are left: eight at a time are looked at as one number.
+/// Few pixels remain: eight at a time are tested as one integer.
 void FastCells::collect(int y) {
   static_assert(std::endian::native == std::endian::little, "the lowest byte must be the first pixel");
   const auto row = [&](int r) { return rows_.data() + static_cast<std::size_t>(r % 3) * pitch_ + 1; };

@@ -190,7 +190,7 @@ TEST(Orb, MarginsAreComputedOnlyWhenAskedFor) {
   EXPECT_TRUE(with.descriptors == without.descriptors);
 }
 
-/// Share of the numbers of two margins that have another sign.
+/// Share of margins whose signs differ.
 double flipped(const std::array<std::int8_t, 256>& a, const std::array<std::int8_t, 256>& b) {
   int n = 0;
   for (std::size_t i = 0; i < 256; ++i) n += (a[i] > 0) != (b[i] > 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of numbers with a stamp, read so that damage is counted, never used and never fatal
-// while most rows are good. Pure functions, any thread.
+// Rows of numbers with a stamp. Unusable rows are counted and left out; they are an error only where they are
+// more than half. Pure functions, any thread.
 //
 //   Result<StampedRows<ImuSample>> imu = read_stamped_rows<ImuSample>(text, "imu0/data.csv", parse_imu_row);
 //   imu->rows;             // strictly increasing stamps

@@ -24,7 +24,7 @@ std::optional<double> parse_double(std::string_view text);
 /// Integer nanoseconds from 0 to kLatestStamp_ns.
 std::optional<Time> parse_nanoseconds(std::string_view text);
 /// Decimal seconds, also with an exponent, rounded to the nearest nanosecond without passing
-/// through a double (which would lose about 100 ns of a stamp of our days).
+/// through a double (which would lose about 100 ns of a present-day stamp).
 std::optional<Time> parse_seconds(std::string_view text);
 
 /// Seconds with nine decimals, exact.

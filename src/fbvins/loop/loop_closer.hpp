@@ -37,7 +37,7 @@ class LoopCloser final : public Mapper {
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
   MapUpdate process(const Keyframe& keyframe) override;
-  /// The same from features already extracted (joining maps, replay); the images are not looked at.
+  /// The same from features already extracted (joining maps, replay); the images are not used.
   MapUpdate process(Place place, const Keyframe& keyframe);
 
   /// Last optimisation of the pose graph.
