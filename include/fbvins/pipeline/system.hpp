@@ -16,8 +16,8 @@
 // `deterministic` runs everything on the caller's thread; `threaded` runs the frontend, the estimator and the mapper each
 // on a thread of its own, where they call back. Both give the same bits.
 //
-// Failures: an exception in a stage or a callback ends the work. push() says so from then on, at the latest two images
-// after the one that failed in the frontend or the estimator (the mapper may be behind by its queue), and finish() says it again.
+// Failures: an exception in a stage or a callback ends the work. push() returns it from then on, at the latest two images
+// after the one that failed in the frontend or the estimator (the mapper may be behind by its queue), and so does finish().
 #pragma once
 
 #include <functional>

@@ -12,7 +12,7 @@
 
 namespace fbvins {
 
-/// A view of somebody's pixels.
+/// A view of pixels that it does not own.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0;
@@ -28,8 +28,8 @@ class Image {
   Image() = default;
   Image(int width, int height, std::uint8_t fill = 0)
       : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height, fill) {}
-  /// Pixels in somebody else's memory, row after row: read in place, kept by `keeper` until the last copy of this image is
-  /// gone, never written. Whoever writes to the image gets pixels of its own first.
+  /// Pixels in foreign memory, row after row: read in place, kept alive by `keeper` until the last copy of this image is
+  /// gone, never written. A write to the image first copies them to pixels of its own.
   Image(int width, int height, std::shared_ptr<const std::uint8_t> keeper)
       : width_(width), height_(height), foreign_(std::move(keeper)) {}
 

@@ -9,7 +9,7 @@ struct ImuBufferCounts {
   int duplicate = 0;  ///< same stamp as the one before
   int backward = 0;   ///< earlier stamp than the one before, or than the last extraction
   int invalid = 0;    ///< NaN, infinite or beyond any sensor's range
-  int overflow = 0;   ///< dropped because nobody extracted them
+  int overflow = 0;   ///< dropped from a full buffer before they were extracted
 };
 
 struct InputCounts {

@@ -43,7 +43,7 @@ struct MapUpdate {
   FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
   Time t;
   bool localised = false;           ///< false: where W is in M is not known (a loaded map, or after a restart)
-  Pose<M, G> T_MG;                  ///< best knowledge now; jumps when a place is recognised. M is level
+  Pose<M, G> T_MG;                  ///< best estimate; jumps when a place is recognised. M is level
   Pose<M, W> T_MW;                  ///< the same for W as it was published when the keyframe was handed on
   Pose<M, W> T_MW_smooth;           ///< follows T_MW at a bounded speed: for a controller
   std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this refers to

@@ -14,7 +14,7 @@ class Mapper {
  public:
   virtual ~Mapper() = default;
 
-  /// Takes a keyframe into the map and says where W is in it now. Keyframes come in order of time, from one thread.
+  /// Adds a keyframe to the map and returns the pose of W in it. Keyframes come in order of time, from one thread.
   virtual MapUpdate process(const Keyframe& keyframe) = 0;
 };
 

@@ -82,7 +82,7 @@ struct LocatedLandmark {
   Vec3 p_W = Vec3::Zero();  ///< m
 };
 
-/// Positions of the landmarks that left the window with one frame. A message of its own beside StatePrior, because a state may
+/// Positions of the landmarks that left the window with one frame. A message apart from StatePrior, because a state may
 /// be skipped and a position must not: updates are numbered without gaps, and each is delivered once, in order.
 struct LandmarkUpdate {
   std::int64_t sequence = 0;        ///< counts from 0

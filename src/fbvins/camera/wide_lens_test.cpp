@@ -128,7 +128,7 @@ TEST(WideLens, WhatLooksBackwardsHasNoNormalisedCoordinates) {
   }
 }
 
-TEST(WideLens, AnImageThatSeesBackwardsAtItsEdgesIsKnown) {
+TEST(WideLens, AnImageWhoseEdgesLookBackwardsIsRecognised) {
   for (const Camera& camera : all()) EXPECT_FALSE(camera.sees_backwards()) << camera.model_name();
   EXPECT_TRUE(Camera(DoubleSphere{100, 100, 256, 256, -0.2, 0.6}, 512, 512).sees_backwards());
   EXPECT_TRUE(Camera(ExtendedUnified{100, 100, 256, 256, 0.63, 1.04}, 512, 512).sees_backwards());

@@ -34,7 +34,7 @@ struct Scene {
   }
 };
 
-TEST(OrbDepth, IsTheWalls) {
+TEST(OrbDepth, IsThatOfTheWall) {
   Scene scene;
   const OrbDepth depth = scene.match({});
   EXPECT_GT(scene.stats.stereo, 15);

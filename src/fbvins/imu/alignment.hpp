@@ -9,7 +9,7 @@
 //   if (a.accepted) start(a.states);                  // else a.reason says why not
 //
 // A window without motion is fine: gravity then comes from the accelerometers alone, the accelerometer
-// bias stays at its prior (accel_bias_sigma_mps2 tells). Threads: pure function.
+// bias stays at its prior, as accel_bias_sigma_mps2 shows. Threads: pure function.
 #pragma once
 
 #include <string_view>

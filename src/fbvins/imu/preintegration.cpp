@@ -56,7 +56,7 @@ void Preintegration::integrate(const ImuSegment& segment) {
     const ImuSample& s = segment.samples[k];
     if (k == 0 && !readings_.empty()) continue;
     const double dt = k == 0 ? 0.0 : (s.t - segment.samples[k - 1].t).seconds();
-    // A step cut by an image stamp may be short and still lie in a long gap: longest_gap tells.
+    // A step cut by an image stamp may be short and still lie in a long gap, whose length is longest_gap.
     const bool gap = dt > longest_regular_s;
     push({s.t, s.gyro_radps, s.accel_mps2, gap ? std::max(dt, segment.longest_gap.seconds()) : 0.0});
   }

@@ -16,7 +16,7 @@ Eigen::MatrixXd symmetric(int n, bool indefinite) {
   return H;
 }
 
-TEST(DenseSystem, SolvesWhatItIsGiven) {
+TEST(DenseSystem, SolvesDefiniteAndIndefiniteSystems) {
   for (const int n : {1, 2, 7, 40})
     for (const bool indefinite : {false, true}) {
       const Eigen::MatrixXd H = symmetric(n, indefinite);

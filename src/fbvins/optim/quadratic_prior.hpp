@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marginalisation: what variables that leave an optimisation say of those that stay, as a quadratic prior.
+// Marginalisation: the information of variables that leave an optimisation on those that stay, as a quadratic prior.
 #pragma once
 
 #include <Eigen/Core>

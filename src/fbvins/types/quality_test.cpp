@@ -34,7 +34,7 @@ TEST(Quality, IsNeverZeroWithAPoseAndAlwaysWithoutOne) {
   EXPECT_EQ(quality_percent({HealthState::initialising, HealthReason::none}, position_sigma(0)), 0);
 }
 
-TEST(Quality, ADegradedPoseIsWorthLittleHoweverSureItIs) {
+TEST(Quality, ADegradedPoseHasLowQualityWhateverItsCovariance) {
   const Health degraded{HealthState::degraded, HealthReason::few_tracks};
   EXPECT_EQ(quality_percent(degraded, position_sigma(0.001)), kMostDegradedQuality_percent);
   EXPECT_LT(quality_percent(degraded, position_sigma(0.5)), kMostDegradedQuality_percent);
