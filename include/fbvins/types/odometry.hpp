@@ -80,9 +80,9 @@ struct Odometry {
   Mat3 velocity_covariance = Mat3::Zero();    ///< of v_WB, m^2/s^2
   Mat3 gyro_bias_covariance = Mat3::Zero();   ///< rad^2/s^2
   Mat3 accel_bias_covariance = Mat3::Zero();  ///< m^2/s^4
-  Vec3 up_W = Vec3::UnitZ();    ///< unit vector opposite to gravity, as estimated; z once the levelling is applied
-  double tilt_sigma_rad = 0;    ///< standard deviation of the attitude's tilt about its less certain axis
-  bool level = false;           ///< tilt_sigma_rad is below kLevelSigma_rad
+  Vec3 up_W = Vec3::UnitZ();                  ///< unit vector opposite to gravity, as estimated; z once the levelling is applied
+  double tilt_sigma_rad = 0;                  ///< standard deviation of the attitude's tilt about its less certain axis
+  bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
   Health health;
   std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then
   EstimatorStats stats;

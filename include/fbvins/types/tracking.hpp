@@ -71,7 +71,7 @@ struct TrackedFrame {
   Time t;
   std::vector<TrackedFeature> features;
   bool has_left = false, has_right = false;  ///< a usable image of that camera came
-  ImuSegment imu;  ///< since the frame before
+  ImuSegment imu;                            ///< since the frame before
   FrontendStats stats;
   StereoFrame images;  ///< null unless keyframes are wanted, which carry the images
 };
