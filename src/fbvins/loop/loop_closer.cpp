@@ -23,21 +23,14 @@ constexpr double kFoundSigma_m = 0.05, kFoundSigma_rad = 0.01;
 constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDepth_m = 2, kWidestPrediction_px = 45;
 /// New loops after which the graph is optimised; in a large map one for every kOptimiseShare keyframes.
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
+/// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
+constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
 /// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
 constexpr double kSameBody = 1e-9;
 
 Pose<B, B> as_body(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0.p}; }
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
-
-/// Null where readings are missing on the way, or keyframes in between.
-std::shared_ptr<const Preintegration> readings_between(Time from, Time to, const KeyframeImu& imu) {
-  if (imu.segments.empty()) return nullptr;
-  Preintegration between(imu.noise, imu.bias);
-  for (const ImuSegment& segment : imu.segments) between.integrate(segment);
-  if (between.begin() != from || between.end() != to) return nullptr;
-  return std::make_shared<const Preintegration>(std::move(between));
-}
 
 PlaceVerifierOptions verification_for(const PlaceMap& map, const PlaceVerifierOptions& options) {
   return map.boosted ? for_boosted(options) : options;
@@ -71,7 +64,22 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
   map_.T_BC0 = T_BC0_;
 }
 
+/// Whether a keyframe would add nothing to the map, in which the flight knows where it is.
+bool LoopCloser::shows_newest_place(const Keyframe& keyframe) const {
+  if (!session_.begun || keyframe.reset_counter != session_.reset_counter || !frame_.known()) return false;
+  const MapKeyframe* newest = map_.find(session_.newest);
+  if (newest == nullptr) return false;
+  const Pose<B, B> moved = newest->T_GB.inverse() * keyframe.gauge.T_GB;
+  return moved.p.norm() < kSamePlace_m && angle_between(moved.q, Quat::Identity()) < kSamePlace_rad;
+}
+
 MapUpdate LoopCloser::process(const Keyframe& keyframe) {
+  if (shows_newest_place(keyframe)) {
+    MapUpdate update = begin_update(keyframe);
+    advance(keyframe);
+    end_update(keyframe, update);
+    return update;
+  }
   CpuTimer timer;
   Place place = extractor_.extract(keyframe.images, (keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).toRotationMatrix());
   const double extract_ms = timer.lap_ms();
@@ -109,11 +117,22 @@ void LoopCloser::level(const Quat& q_LG) {
   frame_.level(q_LG);
 }
 
-MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
+/// Path, drift and readings up to a keyframe.
+void LoopCloser::advance(const Keyframe& keyframe) {
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
   if (session_.T_GB) session_.path_m += (T_GB.p - session_.T_GB->p).norm();
   session_.T_GB = T_GB;
   frame_.advance(T_GB, keyframe.t);
+  const std::vector<ImuSegment>& read = keyframe.imu.segments;
+  const MapKeyframe* newest = map_.find(session_.newest);
+  if (newest == nullptr || read.empty() || (keyframe.t - newest->t).seconds() > kLongestImu_s) session_.readings_missing = true;
+  if (session_.readings_missing) session_.readings.clear();
+  else session_.readings.insert(session_.readings.end(), read.begin(), read.end());
+}
+
+MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
+  advance(keyframe);
+  const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
   return {{},
           keyframe.t,
           session_.number,
@@ -126,7 +145,7 @@ MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
           {keyframe.gauge.v_GB, keyframe.imu.bias}};
 }
 
-MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
+MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
   if (!session_.begun || keyframe.reset_counter != session_.reset_counter) begin_session(keyframe);
   level(keyframe.gauge.q_LG);
   session_.up_sigma_rad = keyframe.gauge.up_sigma_rad;
@@ -135,6 +154,21 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
   update.frame = keyframe.id;
   update.t = keyframe.t;
   update.reset_counter = keyframe.reset_counter;
+  return update;
+}
+
+void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
+  update.stats.keyframes = static_cast<int>(map_.size());
+  update.localised = frame_.known();
+  update.map_session = session_.number;
+  if (!update.localised) return;
+  update.T_MG = frame_.T_MG();
+  update.T_MW = update.T_MG * keyframe.T_WG.inverse();
+  update.T_MW_smooth = follower_.follow(update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
+}
+
+MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
+  MapUpdate update = begin_update(keyframe);
   MapKeyframe query = query_of(std::move(place), keyframe);
   CpuTimer timer;
   const std::vector<KeyframeId> candidates = candidates_for(query);
@@ -149,14 +183,7 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
   if (optimisation_due()) optimise(update);
   while (const auto id = thinning_.next(map_)) take_out(*id);
   update.stats.optimise_ms = timer.lap_ms();
-  update.stats.keyframes = static_cast<int>(map_.size());
-  update.localised = frame_.known();
-  update.map_session = session_.number;
-  if (update.localised) {
-    update.T_MG = frame_.T_MG();
-    update.T_MW = update.T_MG * keyframe.T_WG.inverse();
-    update.T_MW_smooth = follower_.follow(update.T_MW, keyframe.T_WG * keyframe.gauge.T_GB, keyframe.t);
-  }
+  end_update(keyframe, update);
   return update;
 }
 
@@ -231,11 +258,22 @@ void LoopCloser::join_session(const Pose<M, G>& T_MG) {
   relocaliser_.forget();
 }
 
+/// From the newest keyframe of the map to `t`; null where readings are missing on the way, or keyframes in between.
+std::shared_ptr<const Preintegration> LoopCloser::readings_since_newest(Time t, const KeyframeImu& imu) const {
+  if (session_.readings_missing) return nullptr;
+  Preintegration between(imu.noise, imu.bias);
+  for (const ImuSegment& segment : session_.readings) between.integrate(segment);
+  if (between.begin() != map_.find(session_.newest)->t || between.end() != t) return nullptr;
+  return std::make_shared<const Preintegration>(std::move(between));
+}
+
 void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update) {
   std::optional<MapEdge> odometry;
   if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr)
     odometry = odometry_edge(*previous, query.T_GB, query.t, options_.drift);
-  if (odometry) odometry->imu = readings_between(map_.find(session_.newest)->t, query.t, imu);
+  if (odometry) odometry->imu = readings_since_newest(query.t, imu);
+  session_.readings.clear();
+  session_.readings_missing = false;
   const std::size_t size_before = map_.size();
   const Time t = query.t;
   const BowVector words = query.place.words;

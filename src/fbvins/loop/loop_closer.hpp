@@ -60,8 +60,10 @@ class LoopCloser final : public Mapper {
     Quat q_LG = Quat::Identity();
     double up_sigma_rad = 0;
     KeyframeId newest = {};
-    std::optional<Pose<G, B>> T_GB = {};  ///< of the newest
+    std::optional<Pose<G, B>> T_GB = {};  ///< of the last keyframe that was handed in
     double path_m = 0;
+    std::vector<ImuSegment> readings = {};  ///< since the newest keyframe of the map
+    bool readings_missing = false;
   };
   struct Proposal {
     KeyframeId candidate;
@@ -69,14 +71,19 @@ class LoopCloser final : public Mapper {
     MapEdge edge;
   };
 
+  bool shows_newest_place(const Keyframe& keyframe) const;
+  MapUpdate begin_update(const Keyframe& keyframe);
+  void end_update(const Keyframe& keyframe, MapUpdate& update);
   void begin_session(const Keyframe& keyframe);
   void level(const Quat& q_LG);
+  void advance(const Keyframe& keyframe);
   MapKeyframe query_of(Place place, const Keyframe& keyframe);
   std::vector<KeyframeId> candidates_for(const MapKeyframe& query);
   std::vector<Proposal> look_at(const MapKeyframe& query, const std::vector<KeyframeId>& candidates);
   void close(MapKeyframe& query, const std::vector<Proposal>& proposals, MapUpdate& update, std::vector<MapEdge>& found);
   void relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found);
   void join_session(const Pose<M, G>& T_MG);
+  std::shared_ptr<const Preintegration> readings_since_newest(Time t, const KeyframeImu& imu) const;
   void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   bool optimisation_due() const;
   void optimise(MapUpdate& update);

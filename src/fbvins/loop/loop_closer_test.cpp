@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "fbvins/core/rng.hpp"
+#include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
 
@@ -106,6 +107,40 @@ TEST(LoopCloser, ALaterFlightsGaugeIsItsOwn) {
   const Vec3 first_before = first.map().keyframes()[0].T_MB.p;
   again.finish();
   EXPECT_EQ(again.map().keyframes()[0].T_MB.p, first_before) << "the old map's frame stays";
+}
+
+/// A keyframe without images, a second after the one before, with the readings since then of an IMU at rest.
+Keyframe seconds_later(int number, double x_m, double yaw_rad = 0) {
+  Keyframe k = keyframe(FrameId{number}, Time{} + Duration::from_seconds(number), {about_z(yaw_rad), Vec3(x_m, 0, 0)});
+  const Time before = k.t - Duration::from_seconds(1);
+  k.imu.segments = {{{{before, Vec3::Zero(), Vec3(0, 0, 9.81)}, {k.t, Vec3::Zero(), Vec3(0, 0, 9.81)}}, k.t - before}};
+  return k;
+}
+
+TEST(LoopCloser, AKeyframeNearTheNewestBecomesNoPlaceAndItsReadingsCount) {
+  LoopCloser closer(rig(), {}, vocabulary());
+  const auto places_after = [&](const Keyframe& k) {
+    EXPECT_TRUE(closer.process(k).localised);
+    return closer.map().size();
+  };
+  EXPECT_EQ(places_after(seconds_later(0, 0)), 1u);
+  EXPECT_EQ(places_after(seconds_later(1, 0.06)), 1u);
+  EXPECT_EQ(places_after(seconds_later(2, 0.05)), 1u);
+  EXPECT_EQ(places_after(seconds_later(3, 0.3)), 2u);
+  EXPECT_EQ(places_after(seconds_later(4, 0.3, 0.2)), 3u) << "it looks elsewhere";
+  Keyframe unread = seconds_later(5, 0.31, 0.2);
+  unread.imu.segments.clear();
+  EXPECT_EQ(places_after(unread), 3u);
+  EXPECT_EQ(places_after(seconds_later(6, 0.9)), 4u);
+  for (int i = 7; i < 14; ++i) EXPECT_EQ(places_after(seconds_later(i, 0.9)), 4u) << "it hovers";
+  EXPECT_EQ(places_after(seconds_later(14, 1.2)), 5u);
+  const std::vector<MapEdge>& edges = closer.map().edges;
+  ASSERT_EQ(edges.size(), 4u);
+  ASSERT_TRUE(edges[0].imu && edges[1].imu);
+  EXPECT_EQ(edges[0].imu->end() - edges[0].imu->begin(), Duration::from_seconds(3));
+  EXPECT_EQ(edges[1].imu->end() - edges[1].imu->begin(), Duration::from_seconds(1));
+  EXPECT_FALSE(edges[2].imu) << "readings are missing on the way";
+  EXPECT_FALSE(edges[3].imu) << "eight seconds of readings say nothing";
 }
 
 TEST(LoopCloser, SameInputSameBytes) {

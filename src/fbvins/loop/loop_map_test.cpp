@@ -45,7 +45,7 @@ TEST_F(OpenedMap, IsSavedOpenedAndFoundAgain) {
   ASSERT_TRUE(map.ok()) << map.error().message;
   std::vector<Keyframe> flown;
   for (int i = 0; i < 4; ++i) {
-    flown.push_back(before_a_wall(i, 0.1 * i));
+    flown.push_back(before_a_wall(i, 0.15 * i));
     EXPECT_TRUE((*map)->process(flown.back()).localised) << "M begins where W does";
   }
   (*map)->finish();
@@ -58,7 +58,7 @@ TEST_F(OpenedMap, IsSavedOpenedAndFoundAgain) {
   EXPECT_EQ((*again)->keyframes(), 4);
   bool localised = false;
   for (int i = 0; i < 3; ++i) {
-    Keyframe k = before_a_wall(10 + i, 0.05 + 0.1 * i);
+    Keyframe k = before_a_wall(10 + i, 0.05 + 0.15 * i);
     const Vec3 p_M = k.gauge.T_GB.p;
     k.gauge.T_GB.p += Vec3(5, -3, 1);
     const MapUpdate update = (*again)->process(k);

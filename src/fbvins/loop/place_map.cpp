@@ -16,9 +16,6 @@ auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) 
   return it != keyframes.end() && it->id == id ? &*it : nullptr;
 }
 
-/// Readings over a longer interval constrain its ends no better than the odometry's relative pose does.
-constexpr double kLongestImu_s = 5;
-
 std::shared_ptr<const Preintegration> joined(const MapEdge& first, const MapEdge& second) {
   if (!first.imu || !second.imu || first.imu->dt_s() + second.imu->dt_s() > kLongestImu_s) return nullptr;
   Preintegration both = *first.imu;

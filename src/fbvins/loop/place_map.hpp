@@ -20,6 +20,9 @@
 
 namespace fbvins {
 
+/// Readings over a longer interval constrain its ends no better than the odometry's relative pose does.
+inline constexpr double kLongestImu_s = 5;
+
 class Preintegration;
 
 /// Velocity and biases at a keyframe as estimated in flight. Not saved.
