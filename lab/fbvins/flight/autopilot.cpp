@@ -6,11 +6,11 @@
 namespace fbvins {
 namespace {
 
-constexpr double kSmoothing_s = 0.1;  ///< as `fbvins live` has it
-/// Rotors turn this long before the vehicle climbs, at this command.
+constexpr double kSmoothing_s = 0.1;  ///< the default of `fbvins live`
+/// The rotors idle for this long at this command before the vehicle climbs.
 constexpr double kSpool_s = 1.0, kIdle = 0.12;
 constexpr double kDescent_mps = 0.4;
-// It stands where it hardly moves although the rotors carry less than this share of it, for so long.
+// On the ground: vertical speed below kStill_mps and thrust below this share of hover thrust, for kStill_s.
 constexpr double kCarried = 0.6, kStill_mps = 0.15, kStill_s = 0.5;
 
 double heading(const Quat& q) {
@@ -45,7 +45,7 @@ void Autopilot::add(const MapUpdate& update) {
   level();
 }
 
-/// What is known of the floor turns L about the place where the vehicle stood.
+/// Levels L by the floor, about the place where the vehicle stood.
 void Autopilot::level() {
   if (!T_LM_) return;
   const Pose<Local, W> T_LW = *T_LM_ * T_MW_;
@@ -61,8 +61,8 @@ VehicleEstimate Autopilot::in_local(const LivePose& pose) const {
   return e;
 }
 
-/// L is where the vehicle stands, or, after a restart of the odometry, where it was last known to be: heading and place, as down
-/// is known in W; what the floor knows better comes in level().
+/// Places L at the standing vehicle, or, after a restart of the odometry, such that the vehicle keeps its last known position
+/// and heading. Position and heading only: W is gravity-aligned, and level() adds the floor's correction.
 void Autopilot::anchor(const LivePose& pose) {
   const Pose<M, BodyFlu> T_MV = T_MW_ * pose.T_WB * mounting_.inverse();
   const bool in_flight = T_LW_.has_value();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flight controller: odometry, IMU and barometer in, four motors out. It knows nothing else: where the vehicle truly is never
-// comes near it. The pose between images is the newest estimate propagated by the IMU, as `fbvins live` gives it to any
-// controller.
+// The flight controller: odometry, IMU and barometer in, four motor commands out. It has no access to the true state. Between
+// images the pose is the newest estimate propagated with the IMU, as `fbvins live` gives it to any controller.
+// L is the mission's frame: its origin is where the vehicle stands at take-off, x is its heading there, z is up.
 //
 //   Autopilot autopilot(mission, settings, rig);
 //   autopilot.add(odometry);                              // when it becomes known
@@ -28,7 +28,7 @@ class Autopilot final : public FlightController {
   Autopilot(const Mission& mission, const ControlOptions& options, const StereoRig& rig, const Pose<BodyFlu, B>& mounting);
 
   void add(const Odometry& odometry) override;
-  /// The mission is flown in the map's frame then.
+  /// From then on the mission is flown in the map's frame, M.
   void add(const MapUpdate& update) override;
   void add_barometer(double height_m) override { reference_.correct(height_m); }
   Result<void> take(const ImuSample& reading) override {
@@ -40,7 +40,7 @@ class Autopilot final : public FlightController {
 
   const PerRotor& commands() const override { return out_.control.commands; }
   const AutopilotOutput& output() const override { return out_; }
-  /// From W to L; none before take-off.
+  /// T_LW; none before take-off.
   const std::optional<Pose<Local, W>>& local_from_odometry() const { return T_LW_; }
 
  private:
@@ -60,9 +60,9 @@ class Autopilot final : public FlightController {
   Failsafe failsafe_;
   InertialReference reference_;
   FloorLevel floor_;
-  Odometry newest_;  ///< with a pose
+  Odometry newest_;  ///< the newest with a pose
   Pose<M, W> T_MW_;
-  std::optional<Pose<Local, M>> T_LM_;  ///< heading and place alone: where both are level
+  std::optional<Pose<Local, M>> T_LM_;  ///< heading and position only: both frames are level
   std::optional<Pose<Local, W>> T_LW_;
   std::uint32_t reset_counter_ = 0;
   std::optional<Time> last_t_;

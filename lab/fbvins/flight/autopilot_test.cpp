@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The autopilot with a vehicle that moves and an IMU that errs, on an odometry made of the truth: what happens when that fails.
+// The autopilot with a simulated vehicle, an IMU with errors and an odometry that is the ground truth with induced faults.
 #include "fbvins/flight/autopilot.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kDelay_s = 0.03;
 
-/// What the odometry says of an image, or nothing.
+/// The odometry's answer to an image, or nothing.
 using Told = std::function<std::optional<Odometry>(double t_s, Odometry truth)>;
 
 struct Outcome {
@@ -38,7 +38,7 @@ struct Outcome {
   }
 };
 
-/// The odometry's W: turned and moved against the world, and tilted by what a bias of the accelerometer looks like.
+/// True odometry in a W that is rotated, moved and tilted (as by an accelerometer bias) with respect to the world.
 Odometry true_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mounting, const ImuBias& bias, const Pose<W, W>& T_WoW) {
   const MotionState m = vehicle.motion_of(mounting);
   Odometry o;
@@ -52,7 +52,7 @@ Odometry true_odometry(const Quadrotor& vehicle, const Pose<BodyFlu, B>& mountin
 
 struct Circumstances {
   double seconds = 40;
-  double tilt_rad = 0;  ///< of W, and how unsure of up it is
+  double tilt_rad = 0;  ///< of W, and its stated standard deviation
   QuadrotorState start = standing_at({1, 2}, 0.6, {});
   std::string vehicle = "indoor330";
   int seed = 5;
@@ -77,7 +77,7 @@ Outcome fly_mission(const Mission& mission, const Told& told, const Circumstance
   for (int step = 0; step < in.seconds * 1000 && autopilot.output().mode != FlightMode::landed; ++step) {
     const double t = step * 1e-3;
     if (step % 50 == 25) {
-      // The tilt of W is about the axis to the left of the vehicle that stood there.
+      // W is tilted about the y axis (left) of the standing vehicle.
       const Quat tilt = start.q * so3_exp(Vec3(0, in.tilt_rad, 0)) * start.q.conjugate();
       Odometry o =
           true_odometry(vehicle, mounting, imu.bias(), {(so3_exp(Vec3(0, 0, 1.1)) * tilt).normalized(), Vec3(3, -1, 0.4)});
@@ -109,7 +109,7 @@ Outcome fly_mission(const Mission& mission, const Told& told, const Circumstance
 
 std::optional<Odometry> always(double, Odometry o) { return o; }
 
-/// A mission that ships with the project, with neither faults nor images: nothing is in its way.
+/// Flies a mission of configs/missions without its faults and without images, and expects no collision.
 Outcome fly_shipped(const std::string& name, const Circumstances& circumstances) {
   Mission mission = *read_mission(FBVINS_MISSIONS "/" + name + ".yaml");
   mission.faults.clear();
@@ -124,7 +124,7 @@ Outcome fly_shipped(const std::string& name, const Circumstances& circumstances)
   Outcome flight = fly_mission(mission, always, in);
   for (std::size_t i = 0; i < flight.rows.size(); i += 10) {
     const std::optional<Vec3> place = check.touched_at(in.start.T_WV * flight.rows[i].truth.p);
-    EXPECT_FALSE(place) << name << " touches something after " << flight.rows[i].t_s << " s";
+    EXPECT_FALSE(place) << name << " collides after " << flight.rows[i].t_s << " s";
     if (place) break;
   }
   EXPECT_EQ(flight.mode, FlightMode::landed) << name;
@@ -142,7 +142,7 @@ TEST(Autopilot, FliesAMissionWhereverTheOdometryBegan) {
   EXPECT_LT((flight.last_p - Vec3(0.6, 0.3, 0)).norm(), 0.08);
 }
 
-TEST(Autopilot, TheFloorLevelsAnOdometryThatIsNotSureOfUp) {
+TEST(Autopilot, TheFloorLevelsAnOdometryWithAnUncertainVertical) {
   const Outcome flight = fly_mission(*parse_mission(kUpAndOver, "m.yaml"), always, {.tilt_rad = 0.04});
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_LT(flight.largest(3, 14, [](const FlightRow& r) { return (r.autopilot.estimate.T_LV.p - r.truth.p).norm(); }), 0.012);
@@ -166,7 +166,7 @@ TEST(Autopilot, ComesDownWhenTheOdometryIsGone) {
   EXPECT_EQ(flight.mode, FlightMode::landed);
   EXPECT_EQ(flight.reason, FlightReason::lost);
   EXPECT_LT(flight.last_p.z(), 0.02);
-  EXPECT_LT(flight.last_p.head<2>().norm(), 1.5);  // where it was, and what the wind makes of a few seconds
+  EXPECT_LT(flight.last_p.head<2>().norm(), 1.5);  // the wind's drift of a few seconds
   for (const FlightRow& r : flight.rows) EXPECT_LT(r.true_velocity.norm(), 1.2);
 }
 
@@ -203,7 +203,7 @@ TEST(Autopilot, StaysOnTheGroundWithoutAPose) {
   EXPECT_LT(flight.last_p.norm(), 1e-3);
 }
 
-TEST(Autopilot, TheShippedMissionsLeadThroughNothing) {
+TEST(Autopilot, TheShippedMissionsAreFreeOfCollisions) {
   for (int seed : {1, 2, 3}) {
     const Outcome paper = fly_shipped("paper", {.seconds = 60, .seed = seed});
     EXPECT_LT((paper.last_p - Vec3(0.6, 0.3, 0)).norm(), 0.1);
@@ -228,7 +228,7 @@ TEST(Autopilot, FliesTheQuadrotorOfSihToo) {
   EXPECT_LT((sih.last_p - Vec3(0.6, 0.3, 0)).norm(), 0.25);
 }
 
-TEST(InertialReference, KnowsHowFastItClimbsByBarometerAndImu) {
+TEST(InertialReference, EstimatesVerticalSpeedFromBarometerAndImu) {
   const Pose<BodyFlu, B> mounting;
   InertialReference reference(mounting);
   VehicleEstimate known;

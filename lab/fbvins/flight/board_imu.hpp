@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The IMU on a flight controller's own board, at the vehicle's centre of mass, with errors of its own: a calibrated one, shaken
-// by the same rotors. One owner.
+// The IMU on the flight controller's board: at the vehicle's centre of mass, calibrated, with errors of its own and the same
+// rotor vibration. One owner.
 //
 //   BoardImu imu(250, options, seed);
 //   BoardReading reading = imu.read(t_s, vehicle, rotors);
@@ -16,7 +16,7 @@ class BoardImu {
   BoardImu(double rate_hz, ImuModelOptions options, std::uint64_t seed)
       : dt_s_(1 / rate_hz), errors_(noise(rate_hz), calibrated(options), seed + kOtherSeed), shake_(seed + kOtherSeed) {}
 
-  /// `rotors`: speeds as shares of those in hover.
+  /// `rotors`: rotor speeds divided by the hover speed.
   BoardReading read(double t_s, const Quadrotor& vehicle, const PerRotor& rotors) {
     const MotionState motion = vehicle.motion_of(Pose<BodyFlu, B>{});
     const ImuSample sample = errors_.read(Time{}, motion, shake_.step(rotors, dt_s_));

@@ -17,15 +17,15 @@
 namespace fbvins {
 namespace {
 
-/// The IMU before and above the centre of mass.
+/// The IMU is in front of and above the centre of mass.
 const Vec3 kImuOnVehicle_m(0.04, 0, 0.03);
 constexpr int kCollisionEvery_steps = 10;
-constexpr double kAfterwards_s = 1.0;  ///< flown on after the last step, or stood after landing
+constexpr double kAfterwards_s = 1.0;  ///< recorded after the last step or after touchdown
 constexpr double kHardLanding_mps = 1.5, kTippedOver = 0.8;
 constexpr double kTimeToSpare_s = 120;
 
-/// The true mounting: the autopilot's, with the error that a real assembly has.
-Pose<BodyFlu, B> askew(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
+/// The true mounting: the nominal one with a random assembly error.
+Pose<BodyFlu, B> with_mounting_error(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
   Rng rng(static_cast<std::uint64_t>(setup.simulation.seed), 73);
   const double sigma = setup.mounting_error_deg * std::numbers::pi / 180, x = rng.normal(), y = rng.normal(), z = rng.normal();
   return {(so3_exp(sigma * Vec3(x, y, z)) * mounting.q).normalized(), mounting.p};
@@ -35,15 +35,15 @@ double hover_radps(const QuadrotorOptions& o) {
   return std::sqrt(o.mass_kg * kSimGravity_mps2 / (kRotors * o.thrust_N_per_radps2));
 }
 
-/// As a recording states it, by matrices: the last bits of a quaternion are its own. So the recording, run again, gives the same
-/// bytes.
+/// Through rotation matrices, as calibration files have them: they change the last bits of a quaternion. With the same bits a
+/// replay of the recording gives the same bytes.
 StereoRig as_recorded(StereoRig rig) {
   rig.T_BC0 = Pose<B, C0>(rig.T_BC0.R(), rig.T_BC0.p);
   rig.T_BC1 = Pose<B, C1>(rig.T_BC1.R(), rig.T_BC1.p);
   return rig;
 }
 
-/// Time that the mission takes at a tenth of its speed.
+/// Bound on a mission's duration: twice the time of every leg at the slowest limit, and time to spare.
 double longest_flight_s(const Mission& mission) {
   double seconds = kTimeToSpare_s;
   const std::vector<PlannedPlace> places = planned_places(mission);
@@ -72,7 +72,7 @@ class ClosedLoop {
       : setup_(setup),
         station_(std::move(station)),
         link_(std::move(link)),
-        mounting_(askew(imu_mounting(station_.rig(), setup.simulation.flight.camera_pitch_deg), setup)),
+        mounting_(with_mounting_error(imu_mounting(station_.rig(), setup.simulation.flight.camera_pitch_deg), setup)),
         vehicle_(setup.vehicle, standing_at(site.origin_W.head<2>(), site.heading_rad, setup.vehicle)),
         start_(vehicle_.state().T_WV),
         wind_(setup.wind, static_cast<std::uint64_t>(setup.simulation.seed)),
@@ -137,7 +137,7 @@ class ClosedLoop {
     return shares;
   }
 
-  /// A flight controller with sensors of its own is on before the rest of the world.
+  /// A flight controller with its own sensors is switched on before the flight begins.
   Result<void> warm_up() {
     if (!board_) return {};
     const double rate_hz = controller_->board_rate_hz();
@@ -156,7 +156,7 @@ class ClosedLoop {
     next_barometer_s_ += 1 / Barometer::kRate_hz;
   }
 
-  /// Images whose exposure is over.
+  /// Renders the images whose exposure has ended.
   Result<void> look() {
     while (now_s() > station_.next_image_s() + 0.5 * station_.longest_exposure_s()) {
       RenderedFrame rendered = station_.render([this](double t) { return history_.at(t); });
@@ -170,7 +170,7 @@ class ClosedLoop {
     return {};
   }
 
-  /// One reading, and what follows from it.
+  /// One IMU reading: odometry, control and log.
   Result<void> feel() {
     const ImuSample reading = station_.read_imu(vehicle_.motion_of(mounting_), rotor_shares());
     log_.imu.samples.push_back(reading);
@@ -206,7 +206,7 @@ class ClosedLoop {
     log_.rows.push_back(row);
   }
 
-  /// Whether it is over: by plan, or because something is in the way.
+  /// Ends the flight when the mission is done or the vehicle crashes.
   void watch() {
     const AutopilotOutput& out = controller_->output();
     const QuadrotorState& s = vehicle_.state();
@@ -245,7 +245,7 @@ class ClosedLoop {
   std::optional<EurocFolder> recording_;
   FlightLog log_;
   std::int64_t step_ = 0;
-  std::optional<double> airborne_s_;  ///< since when the mission runs
+  std::optional<double> airborne_s_;  ///< when the mission began
   double next_barometer_s_ = 0, afterwards_s_ = 0, falling_mps_ = 0;
   bool was_on_ground_ = true, over_ = false;
 };

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A mission flown on estimates: the vehicle moves as its rotors push it, its sensors see and feel that, the odometry makes a pose
-// of it, and the autopilot flies by that pose. Simulated time waits for the odometry: the same setup gives the same bits on any
-// machine, with one thread or several.
+// A mission in closed loop: rotors move the vehicle, its sensors measure that, the odometry estimates the pose, and the
+// autopilot flies by that pose. Simulated time waits for the odometry: the same setup gives the same bits on any machine,
+// with one thread or several.
 //
 //   Result<FlightLog> flight = fly(setup, [](double t_s, FlightMode mode) { ... });
 //
-// With a real PX4 behind its simulator interface the same world waits for PX4, too; its threads make no promise about bits. With
-// a rate of wall time nothing waits: sensor data go through a socket into a live system, and estimates come when they come. Truth
-// goes to the log alone. L here is the true one: where the vehicle truly stood.
+// With a real PX4 behind its simulator interface simulated time waits for PX4, too, but its threads make results differ between
+// runs. With a wall rate nothing waits: sensor data go through a socket into a live system, and estimates arrive when they are
+// ready. Only the log contains the truth. In it, L is the true mission frame: the vehicle's true pose before take-off.
 #pragma once
 
 #include <functional>
@@ -29,21 +29,21 @@ namespace fbvins {
 
 struct FlightSetup {
   Mission mission;
-  SimulationOptions simulation;  ///< world, light, cameras, IMU, seed; not its flight
+  SimulationOptions simulation;  ///< world, light, cameras, IMU, seed; its flight is not used
   QuadrotorOptions vehicle;
   ControlOptions control;
   WindOptions wind;
   BarometerOptions barometer;
   EstimatorSetup estimator;
-  double estimate_delay_s = 0.03;   ///< from an image to its pose in the controller
-  double mounting_error_deg = 0.2;  ///< standard deviation on each axis, of what the autopilot does not know
+  double estimate_delay_s = 0.03;   ///< latency: from an image to its pose in the controller
+  double mounting_error_deg = 0.2;  ///< standard deviation on each axis; unknown to the autopilot
   std::string recording;            ///< folder for a recording; empty: none
-  Px4Setup px4;                     ///< flies instead of the autopilot, where it is named
-  double wall_rate = 0;             ///< seconds of the flight in one of this machine's; 0: simulated time waits for the odometry
-  LiveOptions live;                 ///< of wall time
+  Px4Setup px4;                     ///< if its binary is set, PX4 flies instead of the autopilot
+  double wall_rate = 0;             ///< simulated seconds per second of wall time; 0: simulated time waits for the odometry
+  LiveOptions live;                 ///< with a wall rate
 };
 
-/// One reading of the IMU.
+/// State at one IMU reading.
 struct FlightRow {
   double t_s = 0;
   Pose<Local, BodyFlu> truth;
@@ -54,26 +54,26 @@ struct FlightRow {
 };
 
 struct FlightLog {
-  Pose<W, BodyFlu> start;  ///< where it stood, in the world
+  Pose<W, BodyFlu> start;  ///< true pose before take-off, in the world
   std::vector<FlightRow> rows;
-  std::vector<Odometry> odometry;  ///< as it became known
-  SimulatedImu imu;                ///< readings, and truth in the world's frame
+  std::vector<Odometry> odometry;  ///< in order of arrival
+  SimulatedImu imu;                ///< samples, and truth in the world frame
   FlightMode mode = FlightMode::waiting;
   FlightReason reason = FlightReason::none;
   std::optional<std::string> crash;  ///< one sentence
   bool out_of_time = false;
   int images = 0;
-  std::vector<ControllerEvent> events;  ///< what another flight controller said and did
-  int controller_resets = 0;            ///< of its estimator, in flight
-  std::optional<WallTime> wall_time;    ///< of a flight in wall time
+  std::vector<ControllerEvent> events;  ///< of PX4: its messages and what it did
+  int controller_resets = 0;            ///< of PX4's estimator, in flight
+  std::optional<WallTime> wall_time;    ///< with a wall rate
 };
 
 Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double t_s, FlightMode mode)>& progress = {});
 
-/// PX4's defaults, with the hover thrust and the curve of thrust that this vehicle has.
+/// PX4's defaults with this vehicle's hover thrust and thrust curve, and stiffer position and velocity gains for indoors.
 ControlOptions control_for(const QuadrotorOptions& vehicle);
 
-/// How the IMU is fixed to the vehicle: cameras forward and a little down, as simulated flights have it.
+/// T_VB: cameras forward, pitched down by `camera_pitch_deg`, as in simulated flights; the IMU 4 cm ahead of and 3 cm above V.
 Pose<BodyFlu, B> imu_mounting(const StereoRig& rig, double camera_pitch_deg);
 
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// Mats, tapes and the floor itself lie below; legs stand on them.
+/// Facets below this height (floor, mats, tapes) are ignored: the vehicle stands on them.
 constexpr double kFloor_m = 0.08;
 
 Vec3 nearest_on_edge(const Vec3& a, const Vec3& along, const Vec3& p) {

@@ -16,7 +16,7 @@ ButterworthFilter::ButterworthFilter(double rate_hz, double cutoff_hz) {
 }
 
 Vec3 ButterworthFilter::operator()(const Vec3& x) {
-  if (!started_) {  // as if it had been there for ever
+  if (!started_) {  // steady state
     started_ = true;
     s2_ = (b2_ - a2_) * x;
     s1_ = (b1_ - a1_) * x + s2_;

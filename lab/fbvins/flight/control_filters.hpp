@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Low passes of the controller. One owner each.
+// Low-pass filters of the controller. One owner each.
 #pragma once
 
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
 
-/// Butterworth of second order, by the bilinear transform. The first sample is where it starts from.
+/// Second-order Butterworth filter by the bilinear transform. It starts in steady state at the first sample.
 class ButterworthFilter {
  public:
-  /// A cutoff at or above half the rate: what comes in goes out.
+  /// With a cutoff at or above half the rate the input passes unchanged.
   ButterworthFilter(double rate_hz, double cutoff_hz);
   Vec3 operator()(const Vec3& x);
 
@@ -19,7 +19,7 @@ class ButterworthFilter {
   bool started_ = false;
 };
 
-/// First order. The first sample is where it starts from.
+/// First-order filter. It starts at the first sample.
 class LagFilter {
  public:
   LagFilter(double rate_hz, double cutoff_hz);

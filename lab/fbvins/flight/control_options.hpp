@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gains and limits of the cascade, under the names and in the units of PX4's parameters (v1.15), with PX4's defaults, so
-// that what is tuned here can be set there.
+// The gains and limits of the cascaded controller, with the names, units and defaults of PX4's parameters (v1.15), so that
+// tuned values can be used in PX4.
 #pragma once
 
 namespace fbvins {
@@ -16,22 +16,22 @@ struct PositionControlOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("MPC_XY_P", MPC_XY_P, "1/s", "speed asked for by an error of position", 0.0, 10.0);
-    v("MPC_Z_P", MPC_Z_P, "1/s", "the same, upwards", 0.0, 10.0);
-    v("MPC_XY_VEL_P_ACC", MPC_XY_VEL_P_ACC, "1/s", "acceleration asked for by an error of velocity", 0.0, 20.0);
-    v("MPC_XY_VEL_I_ACC", MPC_XY_VEL_I_ACC, "1/s^2", "by its integral", 0.0, 60.0);
-    v("MPC_XY_VEL_D_ACC", MPC_XY_VEL_D_ACC, "", "against acceleration", 0.0, 10.0);
-    v("MPC_Z_VEL_P_ACC", MPC_Z_VEL_P_ACC, "1/s", "the same three, upwards", 0.0, 20.0);
-    v("MPC_Z_VEL_I_ACC", MPC_Z_VEL_I_ACC, "1/s^2", "by the integral", 0.0, 60.0);
-    v("MPC_Z_VEL_D_ACC", MPC_Z_VEL_D_ACC, "", "against acceleration", 0.0, 10.0);
-    v("MPC_XY_VEL_MAX", MPC_XY_VEL_MAX, "m/s", "never asked for more", 0.1, 30.0);
-    v("MPC_Z_VEL_MAX_UP", MPC_Z_VEL_MAX_UP, "m/s", "upwards", 0.1, 10.0);
-    v("MPC_Z_VEL_MAX_DN", MPC_Z_VEL_MAX_DN, "m/s", "downwards", 0.1, 10.0);
-    v("MPC_TILTMAX_AIR", MPC_TILTMAX_AIR, "deg", "largest tilt", 5.0, 89.0);
-    v("MPC_THR_HOVER", MPC_THR_HOVER, "", "share of full thrust that carries the vehicle", 0.05, 0.9);
-    v("MPC_THR_MIN", MPC_THR_MIN, "", "smallest share in flight", 0.0, 0.5);
-    v("MPC_THR_MAX", MPC_THR_MAX, "", "largest share", 0.1, 1.0);
-    v("MPC_VELD_LP", MPC_VELD_LP, "Hz", "low pass of the acceleration against which D works", 0.1, 50.0);
+    v("MPC_XY_P", MPC_XY_P, "1/s", "horizontal position error to velocity setpoint", 0.0, 10.0);
+    v("MPC_Z_P", MPC_Z_P, "1/s", "vertical position error to velocity setpoint", 0.0, 10.0);
+    v("MPC_XY_VEL_P_ACC", MPC_XY_VEL_P_ACC, "1/s", "horizontal velocity error to acceleration setpoint", 0.0, 20.0);
+    v("MPC_XY_VEL_I_ACC", MPC_XY_VEL_I_ACC, "1/s^2", "integral gain", 0.0, 60.0);
+    v("MPC_XY_VEL_D_ACC", MPC_XY_VEL_D_ACC, "", "derivative gain, on the measured acceleration", 0.0, 10.0);
+    v("MPC_Z_VEL_P_ACC", MPC_Z_VEL_P_ACC, "1/s", "vertical velocity error to acceleration setpoint", 0.0, 20.0);
+    v("MPC_Z_VEL_I_ACC", MPC_Z_VEL_I_ACC, "1/s^2", "integral gain", 0.0, 60.0);
+    v("MPC_Z_VEL_D_ACC", MPC_Z_VEL_D_ACC, "", "derivative gain, on the measured acceleration", 0.0, 10.0);
+    v("MPC_XY_VEL_MAX", MPC_XY_VEL_MAX, "m/s", "largest horizontal velocity setpoint", 0.1, 30.0);
+    v("MPC_Z_VEL_MAX_UP", MPC_Z_VEL_MAX_UP, "m/s", "largest velocity setpoint upwards", 0.1, 10.0);
+    v("MPC_Z_VEL_MAX_DN", MPC_Z_VEL_MAX_DN, "m/s", "largest velocity setpoint downwards", 0.1, 10.0);
+    v("MPC_TILTMAX_AIR", MPC_TILTMAX_AIR, "deg", "largest tilt setpoint", 5.0, 89.0);
+    v("MPC_THR_HOVER", MPC_THR_HOVER, "", "hover thrust as a share of full thrust", 0.05, 0.9);
+    v("MPC_THR_MIN", MPC_THR_MIN, "", "smallest share of full thrust in flight", 0.0, 0.5);
+    v("MPC_THR_MAX", MPC_THR_MAX, "", "largest share of full thrust", 0.1, 1.0);
+    v("MPC_VELD_LP", MPC_VELD_LP, "Hz", "low-pass cutoff of the acceleration for the derivative gains", 0.1, 50.0);
   }
 };
 
@@ -41,13 +41,13 @@ struct AttitudeControlOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("MC_ROLL_P", MC_ROLL_P, "1/s", "rate asked for by an error of roll", 0.0, 24.0);
-    v("MC_PITCH_P", MC_PITCH_P, "1/s", "of pitch", 0.0, 24.0);
-    v("MC_YAW_P", MC_YAW_P, "1/s", "of yaw", 0.0, 10.0);
-    v("MC_YAW_WEIGHT", MC_YAW_WEIGHT, "", "how much yaw counts beside roll and pitch", 0.0, 1.0);
-    v("MC_ROLLRATE_MAX", MC_ROLLRATE_MAX, "deg/s", "never asked for more", 1.0, 1800.0);
-    v("MC_PITCHRATE_MAX", MC_PITCHRATE_MAX, "deg/s", "never asked for more", 1.0, 1800.0);
-    v("MC_YAWRATE_MAX", MC_YAWRATE_MAX, "deg/s", "never asked for more", 1.0, 1800.0);
+    v("MC_ROLL_P", MC_ROLL_P, "1/s", "roll error to roll rate setpoint", 0.0, 24.0);
+    v("MC_PITCH_P", MC_PITCH_P, "1/s", "pitch error to pitch rate setpoint", 0.0, 24.0);
+    v("MC_YAW_P", MC_YAW_P, "1/s", "yaw error to yaw rate setpoint", 0.0, 10.0);
+    v("MC_YAW_WEIGHT", MC_YAW_WEIGHT, "", "weight of yaw relative to roll and pitch", 0.0, 1.0);
+    v("MC_ROLLRATE_MAX", MC_ROLLRATE_MAX, "deg/s", "largest roll rate setpoint", 1.0, 1800.0);
+    v("MC_PITCHRATE_MAX", MC_PITCHRATE_MAX, "deg/s", "largest pitch rate setpoint", 1.0, 1800.0);
+    v("MC_YAWRATE_MAX", MC_YAWRATE_MAX, "deg/s", "largest yaw rate setpoint", 1.0, 1800.0);
   }
 };
 
@@ -59,24 +59,24 @@ struct RateControlOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("MC_ROLLRATE_P", MC_ROLLRATE_P, "s", "torque asked for by an error of the roll rate, as a share of what the rotors can",
-      0.0, 2.0);
-    v("MC_ROLLRATE_I", MC_ROLLRATE_I, "", "by its integral", 0.0, 5.0);
-    v("MC_ROLLRATE_D", MC_ROLLRATE_D, "s^2", "against angular acceleration", 0.0, 0.1);
-    v("MC_ROLLRATE_FF", MC_ROLLRATE_FF, "s", "by the rate asked for", 0.0, 2.0);
-    v("MC_RR_INT_LIM", MC_RR_INT_LIM, "", "most that the integral asks for", 0.0, 1.0);
-    v("MC_PITCHRATE_P", MC_PITCHRATE_P, "s", "the same five of the pitch rate", 0.0, 2.0);
-    v("MC_PITCHRATE_I", MC_PITCHRATE_I, "", "by the integral", 0.0, 5.0);
-    v("MC_PITCHRATE_D", MC_PITCHRATE_D, "s^2", "against angular acceleration", 0.0, 0.1);
-    v("MC_PITCHRATE_FF", MC_PITCHRATE_FF, "s", "by the rate asked for", 0.0, 2.0);
-    v("MC_PR_INT_LIM", MC_PR_INT_LIM, "", "most that the integral asks for", 0.0, 1.0);
-    v("MC_YAWRATE_P", MC_YAWRATE_P, "s", "the same five of the yaw rate", 0.0, 2.0);
-    v("MC_YAWRATE_I", MC_YAWRATE_I, "", "by the integral", 0.0, 5.0);
-    v("MC_YAWRATE_D", MC_YAWRATE_D, "s^2", "against angular acceleration", 0.0, 0.1);
-    v("MC_YAWRATE_FF", MC_YAWRATE_FF, "s", "by the rate asked for", 0.0, 2.0);
-    v("MC_YR_INT_LIM", MC_YR_INT_LIM, "", "most that the integral asks for", 0.0, 1.0);
-    v("IMU_GYRO_CUTOFF", IMU_GYRO_CUTOFF, "Hz", "low pass of the rate, Butterworth of second order", 1.0, 1000.0);
-    v("IMU_DGYRO_CUTOFF", IMU_DGYRO_CUTOFF, "Hz", "low pass of the angular acceleration, the same", 1.0, 1000.0);
+    v("MC_ROLLRATE_P", MC_ROLLRATE_P, "s",
+      "roll rate error to torque setpoint; torques are shares of the largest about that axis", 0.0, 2.0);
+    v("MC_ROLLRATE_I", MC_ROLLRATE_I, "", "integral gain", 0.0, 5.0);
+    v("MC_ROLLRATE_D", MC_ROLLRATE_D, "s^2", "derivative gain, on the measured angular acceleration", 0.0, 0.1);
+    v("MC_ROLLRATE_FF", MC_ROLLRATE_FF, "s", "feed-forward of the rate setpoint", 0.0, 2.0);
+    v("MC_RR_INT_LIM", MC_RR_INT_LIM, "", "limit of the integral term", 0.0, 1.0);
+    v("MC_PITCHRATE_P", MC_PITCHRATE_P, "s", "pitch rate error to torque setpoint", 0.0, 2.0);
+    v("MC_PITCHRATE_I", MC_PITCHRATE_I, "", "integral gain", 0.0, 5.0);
+    v("MC_PITCHRATE_D", MC_PITCHRATE_D, "s^2", "derivative gain, on the measured angular acceleration", 0.0, 0.1);
+    v("MC_PITCHRATE_FF", MC_PITCHRATE_FF, "s", "feed-forward of the rate setpoint", 0.0, 2.0);
+    v("MC_PR_INT_LIM", MC_PR_INT_LIM, "", "limit of the integral term", 0.0, 1.0);
+    v("MC_YAWRATE_P", MC_YAWRATE_P, "s", "yaw rate error to torque setpoint", 0.0, 2.0);
+    v("MC_YAWRATE_I", MC_YAWRATE_I, "", "integral gain", 0.0, 5.0);
+    v("MC_YAWRATE_D", MC_YAWRATE_D, "s^2", "derivative gain, on the measured angular acceleration", 0.0, 0.1);
+    v("MC_YAWRATE_FF", MC_YAWRATE_FF, "s", "feed-forward of the rate setpoint", 0.0, 2.0);
+    v("MC_YR_INT_LIM", MC_YR_INT_LIM, "", "limit of the integral term", 0.0, 1.0);
+    v("IMU_GYRO_CUTOFF", IMU_GYRO_CUTOFF, "Hz", "low-pass cutoff of the angular rate, second-order Butterworth", 1.0, 1000.0);
+    v("IMU_DGYRO_CUTOFF", IMU_DGYRO_CUTOFF, "Hz", "low-pass cutoff of the angular acceleration, first order", 1.0, 1000.0);
   }
 };
 

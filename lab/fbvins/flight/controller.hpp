@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole cascade: where the vehicle is and where it should be, to four motors. One owner.
+// The whole cascaded controller: from estimate and setpoint to four motor commands. One owner.
 //
 //   CascadeController controller(options, 200);
 //   PerRotor commands = controller.fly(estimate, setpoint);       // every IMU reading
 //   log(controller.trace());
 //
-// The two halves are public for whoever wants one alone: position_controller.hpp, rate_controller.hpp.
+// Its two parts can be used alone: position_controller.hpp, rate_controller.hpp.
 #pragma once
 
 #include "fbvins/flight/rate_controller.hpp"
 
 namespace fbvins {
 
-/// What the loops asked one another for, last.
+/// Setpoints and outputs of the loops at the last update.
 struct ControlTrace {
   Vec3 v_setpoint = Vec3::Zero();  ///< m/s, in L
   Vec3 a_setpoint = Vec3::Zero();  ///< m/s^2, in L
   Quat q_setpoint = Quat::Identity();
   Vec3 rate_setpoint = Vec3::Zero();  ///< rad/s, in V
-  Vec3 rate = Vec3::Zero();           ///< rad/s, in V, as the controller sees it
-  Vec3 torque = Vec3::Zero();         ///< shares
-  double thrust = 0;                  ///< share
+  Vec3 rate = Vec3::Zero();           ///< rad/s, in V, filtered
+  Vec3 torque = Vec3::Zero();         ///< shares of the largest
+  double thrust = 0;                  ///< share of full thrust
   PerRotor commands{};
 };
 
@@ -28,13 +28,13 @@ class CascadeController {
  public:
   CascadeController(const ControlOptions& options, double rate_hz);
 
-  /// Along a path.
+  /// Follows a path setpoint.
   PerRotor fly(const VehicleEstimate& state, const PathSetpoint& setpoint);
-  /// Level, at a speed upwards, with the heading that it has: when nothing is known of where the vehicle is.
+  /// Keeps level at a vertical speed (positive up) and a heading: for flight without a position.
   PerRotor level(const VehicleEstimate& state, double v_z_wanted_mps, double yaw_rad);
-  /// To an attitude and a thrust: what identification flies.
+  /// Holds an attitude and a thrust, with an additional rate setpoint in V.
   PerRotor hold(const VehicleEstimate& state, const AttitudeSetpoint& wanted, const Vec3& added_rate_radps = Vec3::Zero());
-  /// Rotors off, integrals empty.
+  /// Switches the rotors off and resets the integrators.
   PerRotor rest();
 
   const ControlTrace& trace() const { return trace_; }

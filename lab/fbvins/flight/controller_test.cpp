@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cascade on true states: what it can do when it knows everything.
+// The cascaded controller on true states.
 #include "fbvins/flight/controller.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ VehicleEstimate truth(const Quadrotor& vehicle) {
   return {s.T_WV.cast_frames<Local, BodyFlu>(), s.v_WV, s.w_WV_V};
 }
 
-/// In the air at rest, rotors carrying it.
+/// Hovering at rest at p.
 QuadrotorState hovering(const QuadrotorOptions& o, const Vec3& p) {
   QuadrotorState s;
   s.T_WV.p = p;
@@ -44,7 +44,7 @@ QuadrotorState hovering(const QuadrotorOptions& o, const Vec3& p) {
   return s;
 }
 
-/// Flies along setpoint(t); `look` sees every update.
+/// Flies along setpoint(t); `look` is called at every update.
 void fly(Quadrotor& vehicle, CascadeController& controller, double seconds, const std::function<PathSetpoint(double)>& setpoint,
          const std::function<void(double, const Quadrotor&)>& look = {}, Wind* wind = nullptr) {
   for (int k = 0; k < std::lround(seconds * kRate_hz); ++k) {
@@ -70,7 +70,7 @@ TEST_P(EachCraft, HoldsAPlaceInTheWind) {
         return PathSetpoint{.p = {0, 0, 1.5}};
       },
       {}, &wind);
-  EXPECT_LT((vehicle.state().T_WV.p - Vec3(0, 0, 1.5)).norm(), 0.01);  // the integral takes the wind
+  EXPECT_LT((vehicle.state().T_WV.p - Vec3(0, 0, 1.5)).norm(), 0.01);  // the integral compensates the wind
   EXPECT_LT(vehicle.state().v_WV.norm(), 0.02);
 }
 
@@ -107,7 +107,7 @@ TEST_P(EachCraft, FollowsACircle) {
   fly(vehicle, controller, 20, circle, [&](double t, const Quadrotor& v) {
     if (t > 8) worst = std::max(worst, (v.state().T_WV.p - circle(t).p).norm());
   });
-  EXPECT_LT(worst, GetParam() == "sih" ? 0.45 : 0.2);  // the drag of SIH, 1 N at 1 m/s, turns with the way
+  EXPECT_LT(worst, GetParam() == "sih" ? 0.45 : 0.2);  // SIH's drag, 1 N at 1 m/s, turns with the velocity
 }
 
 TEST_P(EachCraft, TurnsToAHeadingTheShortWay) {
@@ -131,7 +131,7 @@ TEST_P(EachCraft, RightsItselfFromUpsideDown) {
   EXPECT_LT((vehicle.state().T_WV.p - Vec3(0, 0, 30)).norm(), 0.3);
 }
 
-TEST(Controller, LevelDescendsAtTheSpeedThatItIsTold) {
+TEST(Controller, LevelDescendsAtTheGivenSpeed) {
   const Craft c = craft("indoor330");
   QuadrotorState start = hovering(c.vehicle, {0, 0, 20});
   start.v_WV = Vec3(0.5, 0, 0);
@@ -145,7 +145,7 @@ TEST(Controller, LevelDescendsAtTheSpeedThatItIsTold) {
   EXPECT_GT((vehicle.state().T_WV.q * Vec3::UnitZ()).z(), 0.9999);
 }
 
-TEST(Controller, AWrongHoverThrustIsLearnt) {
+TEST(Controller, TheIntegralCorrectsAWrongHoverThrust) {
   Craft c = craft("indoor330");
   c.control.position.MPC_THR_HOVER = 0.5;
   Quadrotor vehicle(c.vehicle, hovering(c.vehicle, {0, 0, 1.5}));
@@ -154,7 +154,7 @@ TEST(Controller, AWrongHoverThrustIsLearnt) {
   EXPECT_NEAR(vehicle.state().T_WV.p.z(), 1.5, 0.01);
 }
 
-TEST(PositionController, NeverTiltsOrHurriesMoreThanItMay) {
+TEST(PositionController, RespectsTheLimitsOfTiltAndSpeed) {
   PositionControlOptions o;
   o.MPC_TILTMAX_AIR = 20;
   o.MPC_XY_VEL_MAX = 2;
@@ -176,7 +176,7 @@ TEST(PositionController, TheIntegralDoesNotWindUp) {
   EXPECT_LT(thrust, o.MPC_THR_HOVER);
 }
 
-TEST(Mixer, GivesWhatIsAskedWhereItCan) {
+TEST(Mixer, GivesTheRequestedThrustAndTorqueWithinLimits) {
   const MixedMotors motors = mix(0.4, {0.1, -0.2, 0.05}, 0);
   const PerRotor& u = motors.commands;
   EXPECT_NEAR((u[0] + u[1] + u[2] + u[3]) / 4, 0.4, 1e-12);
@@ -186,7 +186,7 @@ TEST(Mixer, GivesWhatIsAskedWhereItCan) {
   EXPECT_FALSE(motors.saturation.positive.any() || motors.saturation.negative.any());
 }
 
-TEST(Mixer, KeepsTiltBeforeThrustAndThrustBeforeYaw) {
+TEST(Mixer, PrefersRollAndPitchToThrustAndThrustToYaw) {
   const MixedMotors full = mix(1.0, {0.3, 0, 0}, 0);
   EXPECT_NEAR((-full.commands[0] + full.commands[1] + full.commands[2] - full.commands[3]) / 4 * std::numbers::sqrt2, 0.3, 1e-12);
   const MixedMotors yaw = mix(0.9, {0, 0, 0.5}, 0);
@@ -199,14 +199,14 @@ TEST(Mixer, KeepsTiltBeforeThrustAndThrustBeforeYaw) {
     }
 }
 
-TEST(Mixer, UndoesTheCurveOfThrust) {
+TEST(Mixer, InvertsTheThrustCurve) {
   for (double factor : {0.0, 0.3, 1.0}) {
     const double c = mix(0.37, Vec3::Zero(), factor).commands[0];
     EXPECT_NEAR(factor * c * c + (1 - factor) * c, 0.37, 1e-12);
   }
 }
 
-TEST(ControlFilters, PassLowAndStopHigh) {
+TEST(ControlFilters, PassLowFrequenciesAndStopHighOnes) {
   const auto gain = [](double hz) {
     ButterworthFilter filter(1000, 40);
     double largest = 0;
@@ -220,7 +220,7 @@ TEST(ControlFilters, PassLowAndStopHigh) {
   EXPECT_NEAR(gain(40), std::numbers::sqrt2 / 2, 0.01);
   EXPECT_LT(gain(200), 0.05);
   ButterworthFilter constant(200, 30);
-  EXPECT_NEAR(constant(Vec3(3, 0, 0)).x(), 3, 1e-12);  // starts where the signal is
+  EXPECT_NEAR(constant(Vec3(3, 0, 0)).x(), 3, 1e-12);  // starts in steady state
 }
 
 TEST(ControlOptions, AreWithinTheirRanges) { EXPECT_TRUE(validate(ControlOptions{})); }

@@ -20,13 +20,13 @@ struct EstimatorLink::Impl {
   System system;
   std::mutex mutex;
   std::condition_variable arrived;
-  std::deque<Time> asked;  ///< images pushed and not told of
+  std::deque<Time> asked;  ///< images pushed and not yet answered
   std::deque<Odometry> odometry;
-  std::deque<FrameId> keyframes;  ///< of those without an answer of the mapper: the frame that it applies from
+  std::deque<FrameId> keyframes;  ///< without an answer of the mapper yet: the frame from which it will apply
   std::deque<MapUpdate> updates;
   FrameId newest{-1};
 
-  /// Everything that was known when this frame came. With the mutex held.
+  /// Waits until `ready`; false if a stage has failed. Call with the mutex held.
   bool complete(std::unique_lock<std::mutex>& lock, const std::function<bool()>& ready) {
     while (!ready()) {
       if (!system.status()) return false;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The odometry in lockstep with simulated time: what it says of an image becomes known a fixed time after the image, however fast
-// the machine is. One thread asks; the odometry may have threads of its own, with the same result.
+// The odometry in lockstep with simulated time: the estimate of an image becomes available a fixed time after the image,
+// whatever the speed of the machine. One owner; the odometry may have threads of its own, with the same result.
 //
 //   Result<std::unique_ptr<OdometryLink>> link = EstimatorLink::create(setup, rig);
 //   (*link)->push(reading);
-//   Result<std::vector<Estimate>> known = (*link)->known_at(reading.t - delay);
+//   Result<std::vector<KnownEstimate>> known = (*link)->known_at(reading.t - delay);
 #pragma once
 
 #include <functional>
@@ -21,7 +21,7 @@ struct EstimatorSetup {
   SystemOptions options;
   RunMode mode = RunMode::deterministic;
   Mapper* mapper = nullptr;  ///< not owned
-  /// On the frontend's thread, if it has one.
+  /// Called on the frontend's thread, if it has one.
   std::function<void(const TrackedFrame&)> on_tracked_frame = {};
 };
 
@@ -31,7 +31,7 @@ class EstimatorLink final : public OdometryLink {
   ~EstimatorLink() override;
 
   Result<void> push(SensorEvent event) override;
-  /// Waits for it.
+  /// Waits for the estimates.
   Result<std::vector<KnownEstimate>> known_at(Time newest_image) override;
   Result<void> finish() override;
 

@@ -17,14 +17,14 @@ StereoFrame black_frame(std::int64_t ms) {
   return {at_ms(ms), image, image};
 }
 
-/// Stamps of the images that are known after each reading, half a second of black images at rest.
+/// Stamps [ms] of the images whose estimates became available at each reading, in half a second of black images at rest.
 std::vector<std::vector<std::int64_t>> told(RunMode mode, Mapper* mapper = nullptr) {
   auto link = EstimatorLink::create({.options = {}, .mode = mode, .mapper = mapper}, euroc_rig());
   EXPECT_TRUE(link) << link.error().message;
   std::vector<std::vector<std::int64_t>> known;
   for (std::int64_t ms = 0; ms <= 500; ms += 5) {
     if (ms % 50 == 25) {
-      EXPECT_TRUE((*link)->push(black_frame(ms - 3)));  // its exposure took a while
+      EXPECT_TRUE((*link)->push(black_frame(ms - 3)));  // arrives later than its stamp
     }
     EXPECT_TRUE((*link)->push(ImuSample{at_ms(ms), Vec3::Zero(), Vec3(0, 0, 9.81)}));
     const Result<std::vector<KnownEstimate>> now = (*link)->known_at(at_ms(ms - 30));
@@ -36,7 +36,7 @@ std::vector<std::vector<std::int64_t>> told(RunMode mode, Mapper* mapper = nullp
   return known;
 }
 
-TEST(EstimatorLink, TellsOfEachImageOnceAndNotBeforeItsTime) {
+TEST(EstimatorLink, AnswersEachImageOnceAfterTheDelay) {
   const auto known = told(RunMode::deterministic);
   std::vector<std::int64_t> all;
   for (std::size_t k = 0; k < known.size(); ++k)
@@ -51,7 +51,7 @@ TEST(EstimatorLink, TellsOfEachImageOnceAndNotBeforeItsTime) {
 
 TEST(EstimatorLink, ThreadsChangeNothing) { EXPECT_EQ(told(RunMode::threaded), told(RunMode::deterministic)); }
 
-TEST(EstimatorLink, AFailureIsSaidAndNotWaitedFor) {
+TEST(EstimatorLink, ReportsAFailureInsteadOfWaiting) {
   EstimatorSetup setup;
   setup.mode = RunMode::threaded;
   setup.on_tracked_frame = [](const TrackedFrame&) { throw std::runtime_error("no film"); };

@@ -10,15 +10,15 @@ namespace {
 
 constexpr double kChirp_s = 12, kPause_s = 1, kFade_s = 1;
 constexpr double kFrom_hz = 0.3, kTo_hz = 7;
-// No swing is wider, or asks for more, than this.
-constexpr double kWide_m = 0.25, kAcross_mps2 = 1.8, kLean_radps = 1.0, kUp_m = 0.15, kUp_mps2 = 1.5;
-constexpr double kTurn_rad = 0.3, kTurn_radps = 0.8;
+// Limits of amplitude, acceleration and rates.
+constexpr double kHorizontal_m = 0.25, kHorizontal_mps2 = 1.8, kTilt_radps = 1.0, kVertical_m = 0.15, kVertical_mps2 = 1.5;
+constexpr double kYaw_rad = 0.3, kYaw_radps = 0.8;
 
-/// Frequency and phase of a chirp that goes up by the same factor in the same time.
-struct Swing {
+/// Angular frequency and phase of an exponential chirp.
+struct ChirpState {
   double w, phase;
 };
-Swing swing(double t_s) {
+ChirpState chirp(double t_s) {
   const double growth = std::log(kTo_hz / kFrom_hz) / kChirp_s;
   const double w = 2 * std::numbers::pi * kFrom_hz * std::exp(growth * t_s);
   return {w, (w - 2 * std::numbers::pi * kFrom_hz) / growth};
@@ -36,17 +36,18 @@ PathSetpoint excited(const PathSetpoint& hover, double t_s) {
   const int axis = std::clamp(static_cast<int>(t_s / (kChirp_s + kPause_s)), 0, 3);
   const double t = t_s - axis * (kChirp_s + kPause_s);
   if (t >= kChirp_s) return now;
-  const auto [w, phase] = swing(t);
+  const auto [w, phase] = chirp(t);
   const double s = std::sin(phase), c = std::cos(phase);
   if (axis == 3) {
-    const double angle = fade(t) * std::min(kTurn_rad, kTurn_radps / w);
+    const double angle = fade(t) * std::min(kYaw_rad, kYaw_radps / w);
     now.yaw_rad += angle * s;
     now.yaw_rate_radps = angle * w * c;
     return now;
   }
-  const double wide = axis == 2 ? std::min(kUp_m, kUp_mps2 / (w * w))
-                                : std::min({kWide_m, kAcross_mps2 / (w * w), kLean_radps * kSimGravity_mps2 / (w * w * w)});
-  const double size = fade(t) * wide;
+  const double amplitude_m =
+      axis == 2 ? std::min(kVertical_m, kVertical_mps2 / (w * w))
+                : std::min({kHorizontal_m, kHorizontal_mps2 / (w * w), kTilt_radps * kSimGravity_mps2 / (w * w * w)});
+  const double size = fade(t) * amplitude_m;
   now.p[axis] += size * s;
   now.v[axis] = size * w * c;
   now.a[axis] = -size * w * w * s;

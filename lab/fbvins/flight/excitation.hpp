@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is flown to be told apart afterwards: along x, y and z and about the vertical, one after the other, a swing that gets
-// faster (a chirp), no wider than a quarter of a metre. Pure functions.
+// Excitation for system identification: chirps along x, y and z and in yaw, one after the other, with an amplitude of at most
+// a quarter of a metre. Pure functions.
 #pragma once
 
 #include "fbvins/flight/position_controller.hpp"
 
 namespace fbvins {
 
-/// Seconds.
+/// Duration of all four chirps, s.
 double excitation_length_s();
-/// The setpoint `t_s` after it began, around a place where the vehicle hovers.
+/// The setpoint `t_s` after the beginning, around a hover setpoint.
 PathSetpoint excited(const PathSetpoint& hover, double t_s);
 
 }  // namespace fbvins

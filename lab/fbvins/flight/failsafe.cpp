@@ -8,7 +8,7 @@ constexpr double kGoodBeforeTakeoff_s = 1.5, kLongestWait_s = 30;
 /// A single weak image is no reason to stop.
 constexpr double kDegraded_s = 0.2;
 constexpr double kLate_s = 0.25;
-/// As long as this the IMU carries the pose: its error grows with the square of the time.
+/// The propagated pose is used for this long: its error grows with the square of time.
 constexpr double kSilent_s = 2.0;
 constexpr double kGoodAgain_s = 1.0;
 constexpr double kLongestHold_s = 15;
@@ -50,7 +50,7 @@ void Failsafe::enter(FlightMode mode, FlightReason reason) {
   off_path_s_ = 0;
 }
 
-/// Why the mission must not go on as if nothing were; counts for how long that has been so.
+/// Why the mission must not continue; also updates the durations.
 FlightReason Failsafe::trouble(const FlightCondition& seen, double dt_s) {
   const bool late = seen.estimate_age_s > kLate_s, good = seen.health.state == HealthState::good && !late;
   good_s_ = good && !seen.restarted ? good_s_ + dt_s : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What to do when the odometry is not what it should be. Two questions are kept apart: may it go on, and is there anything to fly
-// by at all. One owner.
+// The flight mode as a function of the odometry's health. Two questions are kept apart: may the mission continue, and is there
+// a pose to fly by at all. One owner.
 //
 //   FlightMode mode = failsafe.update(seen, dt_s);
 //
@@ -16,37 +16,37 @@ namespace fbvins {
 
 enum class FlightMode {
   waiting,     ///< on the ground, until the odometry is good
-  mission,     ///< along the mission
-  holding,     ///< slowed down to a stop, by a pose that is good enough for that
+  mission,     ///< flies the mission
+  holding,     ///< slows down to a stop, by poses
   landing,     ///< straight down, by poses
-  descending,  ///< level and down, by IMU and barometer: nothing is known of where it is
+  descending,  ///< level descent by IMU and barometer: there is no pose
   landed,      ///< rotors off
 };
 
 enum class FlightReason {
   none,
-  no_pose,    ///< before take-off: the odometry has not become good in time
-  degraded,   ///< the odometry says so
+  no_pose,    ///< before take-off: the odometry did not become good in time
+  degraded,   ///< the odometry's health is not good
   late,       ///< the newest estimate is old
-  restarted,  ///< the odometry began anew
+  restarted,  ///< the odometry started again with a new W
   lost,       ///< the odometry has no pose, or has been silent for too long
-  off_path,   ///< the vehicle does not follow
+  off_path,   ///< the vehicle does not follow the setpoint
   outside_fence,
-  flight_controller,  ///< it did so by itself, or would not begin
+  flight_controller,  ///< PX4 left the mission by itself, or did not start it
 };
 
 std::string_view to_string(FlightMode mode);
 std::string_view to_string(FlightReason reason);
 
-/// What the failsafe looks at, at one reading.
+/// Input of the failsafe at one IMU reading.
 struct FlightCondition {
   Health health;
   double estimate_age_s = 0;
-  bool restarted = false;  ///< with this reading
+  bool restarted = false;  ///< at this reading
   double off_path_m = 0;   ///< from the setpoint to the estimate
   bool outside_fence = false;
-  bool landing = false;    ///< the mission itself comes down
-  bool on_ground = false;  ///< as far as the controller can tell
+  bool landing = false;    ///< the mission is at its landing step
+  bool on_ground = false;  ///< as detected by the controller
 };
 
 class Failsafe {
@@ -54,7 +54,7 @@ class Failsafe {
   FlightMode update(const FlightCondition& seen, double dt_s);
 
   FlightMode mode() const { return mode_; }
-  /// Why it is not `mission`; of `landed`, why it came down, if not by plan.
+  /// Why the mode is not `mission`; in `landed`, why the vehicle came down, none if by plan.
   FlightReason reason() const { return reason_; }
 
  private:

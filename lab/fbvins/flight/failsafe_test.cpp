@@ -32,16 +32,16 @@ TEST(Failsafe, DoesNotTakeOffWithoutAGoodPose) {
 
 TEST(Failsafe, HoldsWhileDegradedAndGoesOnAfterwards) {
   Failsafe failsafe = flying();
-  EXPECT_EQ(after(failsafe, 0.1, with(HealthState::degraded)), FlightMode::mission);  // one weak image is nothing
+  EXPECT_EQ(after(failsafe, 0.1, with(HealthState::degraded)), FlightMode::mission);  // a single weak image is tolerated
   EXPECT_EQ(after(failsafe, 0.3, with(HealthState::degraded)), FlightMode::holding);
   EXPECT_EQ(failsafe.reason(), FlightReason::degraded);
   EXPECT_EQ(after(failsafe, 0.5, good()), FlightMode::holding);
   EXPECT_EQ(after(failsafe, 1.0, good()), FlightMode::mission);
   EXPECT_EQ(after(failsafe, 1.0, with(HealthState::degraded)), FlightMode::holding);
-  EXPECT_EQ(after(failsafe, 16, with(HealthState::degraded)), FlightMode::landing);  // it does not get better
+  EXPECT_EQ(after(failsafe, 16, with(HealthState::degraded)), FlightMode::landing);  // after the longest hold
 }
 
-TEST(Failsafe, SilenceFirstHoldsThenComesDown) {
+TEST(Failsafe, SilenceHoldsAndThenDescends) {
   Failsafe failsafe = flying();
   FlightCondition seen = good();
   seen.estimate_age_s = 0.5;
@@ -56,10 +56,10 @@ TEST(Failsafe, SilenceFirstHoldsThenComesDown) {
   failsafe.update(seen, kDt_s);
   EXPECT_EQ(failsafe.mode(), FlightMode::landed);
   EXPECT_EQ(failsafe.reason(), FlightReason::lost);
-  EXPECT_EQ(after(failsafe, 5, good()), FlightMode::landed);  // it never takes off again by itself
+  EXPECT_EQ(after(failsafe, 5, good()), FlightMode::landed);  // no second take-off
 }
 
-TEST(Failsafe, LostComesDownAtOnceAndByPosesIfTheyAreBack) {
+TEST(Failsafe, LostDescendsAtOnceAndLandsByPosesWhenTheyReturn) {
   Failsafe failsafe = flying();
   failsafe.update(with(HealthState::lost), kDt_s);
   EXPECT_EQ(failsafe.mode(), FlightMode::descending);
@@ -67,7 +67,7 @@ TEST(Failsafe, LostComesDownAtOnceAndByPosesIfTheyAreBack) {
   EXPECT_EQ(failsafe.reason(), FlightReason::lost);
 }
 
-TEST(Failsafe, TheFenceAndAVehicleThatDoesNotFollowEndTheMission) {
+TEST(Failsafe, LeavingTheFenceOrThePathEndsTheMission) {
   FlightCondition seen = good();
   seen.outside_fence = true;
   Failsafe fenced = flying();

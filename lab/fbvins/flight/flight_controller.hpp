@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What flies a vehicle, as the closed loop sees it: odometry, readings and barometer in, four motors out. Where the vehicle truly
-// is never comes near it. Two of them: Autopilot, and Px4Controller behind which a real PX4 flies.
+// Interface of a flight controller to the closed loop: odometry, IMU and barometer in, four motor commands out, without access
+// to the true state. Implemented by Autopilot and by Px4Controller, which connects a real PX4.
 #pragma once
 
 #include <string>
@@ -12,26 +12,26 @@
 
 namespace fbvins {
 
-/// What was made of one reading.
+/// State of the controller after one IMU reading.
 struct AutopilotOutput {
   Time t;
   FlightMode mode = FlightMode::waiting;
   FlightReason reason = FlightReason::none;
   Health health;              ///< the odometry's
   double estimate_age_s = 0;  ///< since the image of the newest estimate
-  VehicleEstimate estimate;   ///< flown by
+  VehicleEstimate estimate;   ///< used for control
   PathSetpoint setpoint;
   ControlTrace control;
-  std::size_t step = 0;  ///< of the mission
+  std::size_t step = 0;  ///< index in the mission
 };
 
-/// Of a flight controller with sensors of its own, in V at the centre of mass.
+/// IMU reading of a flight controller's board, in V at the centre of mass, SI units.
 struct BoardReading {
-  double t_s = 0;  ///< since the flight began; negative while it stands and warms up
+  double t_s = 0;  ///< since the flight began; negative during warm-up
   Vec3 accel = Vec3::Zero(), gyro = Vec3::Zero();
 };
 
-/// Something that a flight controller said or did.
+/// A message or an action of a flight controller.
 struct ControllerEvent {
   double t_s = 0;  ///< since the flight began
   std::string text;
@@ -44,25 +44,25 @@ class FlightController {
   FlightController& operator=(const FlightController&) = delete;
   virtual ~FlightController() = default;
 
-  /// When it becomes known.
+  /// When an estimate becomes available.
   virtual void add(const Odometry& odometry) = 0;
-  /// Where W is in the map, where there is one.
+  /// T_MW, if there is a map.
   virtual void add(const MapUpdate& update) = 0;
   virtual void add_barometer(double height_m) = 0;
-  /// Of the odometry's IMU, as it comes.
+  /// A reading of the odometry's IMU.
   virtual Result<void> take(const ImuSample& reading) = 0;
 
-  /// 0: it has no IMU of its own, and flies by the odometry's.
+  /// Rate of its own IMU; 0: it has none and uses the odometry's.
   virtual double board_rate_hz() const { return 0; }
-  /// So long its own sensors are read before the flight begins.
+  /// For this long its own sensors are read before the flight begins.
   virtual double warm_up_s() const { return 0; }
   virtual Result<void> take_board(const BoardReading& /*reading*/) { return {}; }
 
-  /// Until the next reading.
+  /// Motor commands until the next reading.
   virtual const PerRotor& commands() const = 0;
   virtual const AutopilotOutput& output() const = 0;
   virtual std::vector<ControllerEvent> events() const { return {}; }
-  /// How often an estimator of its own moved its frame between arming and landing.
+  /// How often its own estimator reset between arming and landing.
   virtual int resets_in_flight() const { return 0; }
 };
 

@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-/// Names and numbers of a row side by side, so that they cannot get out of step.
+/// Writes names and values of a row together, so that header and cells always agree.
 class RowWriter {
  public:
   void number(const char* name, double x) { cell(name, fmt::format("{:.6g}", x)); }
@@ -64,7 +64,7 @@ void write(RowWriter& out, const FlightRow& row) {
   out.text("health_reason", to_string(a.health.reason));
 }
 
-/// What the vehicle does: in TUM's form its frame is the body's.
+/// T_LV in the type that TumWriter takes.
 Pose<W, B> as_body(const Quat& q, const Vec3& p) { return {q, p}; }
 
 }  // namespace

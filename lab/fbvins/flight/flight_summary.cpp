@@ -10,7 +10,7 @@
 namespace fbvins {
 namespace {
 
-/// Over which a place is measured.
+/// A position is averaged over this time.
 constexpr double kMeasured_s = 2.0;
 
 bool by_poses(FlightMode mode) {
@@ -18,7 +18,7 @@ bool by_poses(FlightMode mode) {
 }
 bool airborne(const FlightRow& row) { return by_poses(row.autopilot.mode) || row.autopilot.mode == FlightMode::descending; }
 
-/// Mean true place of the rows with t in [to - kMeasured_s, to), in the world turned to the mission's axes.
+/// Mean true position of the rows with t in [to - kMeasured_s, to): from the world's origin, along the axes of L.
 Vec3 measured(const FlightLog& log, double to_s) {
   Vec3 sum = Vec3::Zero();
   int count = 0;
@@ -38,7 +38,7 @@ const FlightRow* last_of_mission(const FlightLog& log, const Mission& mission) {
   return found;
 }
 
-/// Gathers root mean square and largest.
+/// Accumulates root mean square and maximum.
 struct Distances {
   double squares = 0, largest = 0;
   int count = 0;
@@ -54,7 +54,6 @@ void add_ends(const FlightLog& log, const Mission& mission, FlightSummary& summa
   const FlightRow* end = last_of_mission(log, mission);
   const auto takeoff = std::find_if(log.rows.begin(), log.rows.end(), airborne);
   if (end == nullptr || takeoff == log.rows.end()) return;
-  // Where the mission ends with a hold that was cut short, it did not arrive.
   summary.arrived = !log.crash && !log.out_of_time && log.reason == FlightReason::none;
   const Vec3 from = measured(log, takeoff->t_s), to = measured(log, end->t_s), wanted = end->autopilot.setpoint.p;
   for (int i = 0; i < 3; ++i) {
@@ -90,7 +89,7 @@ void add_way(const FlightLog& log, FlightSummary& summary) {
     summary.least_battery_V = std::min(summary.least_battery_V, row.battery_V);
     if (!airborne(row)) continue;
     if (by_poses(a.mode)) {
-      if (a.mode != FlightMode::landing) {  // the setpoint goes on down where the vehicle stands
+      if (a.mode != FlightMode::landing) {  // the setpoint continues below the floor
         tracking.add(row.truth.p - a.setpoint.p);
         control.add(a.estimate.T_LV.p - a.setpoint.p);
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What became of a flight, in numbers: where it ended against where it should have, as the paper's Tables 2 and 3 have it, and
-// how well it was known and followed on its way. Pure functions, any thread.
+// The result of a flight in numbers: its end position against the mission's, as in Tables 2 and 3 of the paper, and the errors
+// of estimation and tracking on the way. Pure functions, any thread.
 //
 //   FlightSummary summary = summarise(log, setup.mission);
 //   Result<void> done = write_flight(log, "out");      // flight.csv, truth_tum.txt, estimate_tum.txt, setpoint_tum.txt
@@ -17,9 +17,9 @@ namespace fbvins {
 
 /// One row of the paper's table, metres.
 struct AxisResult {
-  double start = 0, end = 0;  ///< measured: the truth's mean over a while
+  double start = 0, end = 0;  ///< mean true position over 2 s
   double difference = 0;      ///< end less start
-  double expected = 0;        ///< what the mission wanted it to be
+  double expected = 0;        ///< by the mission
   double error = 0;           ///< |difference - expected|
 };
 
@@ -29,23 +29,23 @@ struct DistanceStatistics {
 };
 
 struct FlightSummary {
-  bool arrived = false;  ///< it came to rest at the end of the mission; without, the axes are void
+  bool arrived = false;  ///< it finished the mission without crash or failsafe; `axes` may be invalid otherwise
   std::array<AxisResult, 3> axes;
-  double mean_axial_error_m = 0, distance_m = 0;  ///< from where it should have come to rest
-  DistanceStatistics tracking;                    ///< truth to setpoint, in flight by poses
+  double mean_axial_error_m = 0, distance_m = 0;  ///< of the end position's error
+  DistanceStatistics tracking;                    ///< truth to setpoint, while flying by poses, without landing
   DistanceStatistics control;                     ///< estimate to setpoint
   DistanceStatistics estimation;                  ///< estimate to truth
   double top_speed_mps = 0, largest_tilt_deg = 0;
-  double drift_blind_m = 0;   ///< sideways, while it came down without poses
+  double drift_blind_m = 0;   ///< horizontally, while descending without poses
   double mean_thrust = 0;     ///< share of full thrust, in flight
-  double command_change = 0;  ///< root mean square of a motor's command from reading to reading
+  double command_change = 0;  ///< root mean square of a motor command's change per reading
   double flown_s = 0, least_battery_V = 0;
-  std::vector<std::pair<std::string, double>> modes;  ///< "mode" or "mode/reason", seconds in each, in order of time
+  std::vector<std::pair<std::string, double>> modes;  ///< "mode" or "mode/reason" and its seconds, in order of time
 };
 
 FlightSummary summarise(const FlightLog& log, const Mission& mission);
 
-/// One row a reading of the IMU, all in L, and three trajectories of the vehicle in L.
+/// One row per IMU reading, all in L, and three trajectories of V in L.
 Result<void> write_flight(const FlightLog& log, const std::string& folder);
 
 }  // namespace fbvins

@@ -13,7 +13,7 @@
 namespace fbvins {
 namespace {
 
-/// Stands for 3 s, flies to (1, 0, 1) in no time with an error of (1, -2, 3) cm, hovers for 5 s.
+/// Stands for 3 s, jumps to (1, 0, 1) with an error of (1, -2, 3) cm and hovers for 5 s.
 FlightLog hop() {
   FlightLog log;
   log.start = {so3_exp(Vec3(0, 0, 0.5)), Vec3(0, 0, 0.2)};
@@ -38,7 +38,7 @@ FlightLog hop() {
 
 Mission up_and_hold() { return *parse_mission("steps:\n  - takeoff: 1\n  - goto: [1, 0, 1]\n", "m.yaml"); }
 
-TEST(FlightSummary, HasThePapersTable) {
+TEST(FlightSummary, HasTheValuesOfThePapersTable) {
   const FlightSummary s = summarise(hop(), up_and_hold());
   ASSERT_TRUE(s.arrived);
   EXPECT_NEAR(s.axes[2].start, 0.2, 1e-9);
@@ -59,12 +59,12 @@ TEST(FlightSummary, HasThePapersTable) {
   EXPECT_NEAR(s.least_battery_V, 15.2, 0.01);
 }
 
-TEST(FlightSummary, WhoCameDownByFailsafeOrCrashedDidNotArrive) {
+TEST(FlightSummary, AFailsafeLandingOrACrashIsNotAnArrival) {
   FlightLog log = hop();
   log.reason = FlightReason::lost;
   EXPECT_FALSE(summarise(log, up_and_hold()).arrived);
   log = hop();
-  log.crash = "touched something";
+  log.crash = "collision";
   EXPECT_FALSE(summarise(log, up_and_hold()).arrived);
   log = {};
   EXPECT_FALSE(summarise(log, up_and_hold()).arrived);  // it never flew

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// How level a vehicle stands on its legs, and how well its IMU is mounted: a standard deviation.
+/// Standard deviation of a standing vehicle's tilt, including its IMU's mounting.
 constexpr double kFloor_rad = 0.2 * std::numbers::pi / 180;
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 constexpr double kCornerRadius_m = 0.3;
 constexpr std::size_t kHeldEnds = 24;
 constexpr double kArrived_m = 0.2, kLongestWait_s = 8;
-/// Slower than this the nose keeps its heading.
+/// Below this speed `nose_first` keeps the heading.
 constexpr double kNoseSpeed_mps = 0.15;
 constexpr double kYawAccel_radps2 = 2.0, kYawGain_per_s = 2.0;
 constexpr double kDescentAccel_mps2 = 0.5;
@@ -22,7 +22,7 @@ constexpr double kDescentAccel_mps2 = 0.5;
 double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::numbers::pi); }
 
 SplineTrajectory spline_along(std::vector<Vec3> corners, const MotionLimits& limits) {
-  // Rounding moves the ends as well, unless they are there more often than it reaches.
+  // Corner smoothing would move the ends, too: repeat them over its reach.
   corners.insert(corners.begin(), kHeldEnds, Vec3(corners.front()));
   corners.insert(corners.end(), kHeldEnds, Vec3(corners.back()));
   TimedPath path = fly_along(corners, limits, kCornerRadius_m);
@@ -37,7 +37,7 @@ SplineTrajectory spline_along(std::vector<Vec3> corners, const MotionLimits& lim
 
 void YawGuide::turn(double wanted_rad, double rate_max_radps, double dt_s) {
   const double error = wrapped(wanted_rad - yaw_);
-  // Never faster than it can still be stopped in time.
+  // Braking at half the largest acceleration must suffice.
   const double stoppable = std::sqrt(2 * 0.5 * kYawAccel_radps2 * std::abs(error));
   const double rate = std::copysign(std::min({rate_max_radps, stoppable, kYawGain_per_s * std::abs(error)}), error);
   rate_ += std::clamp(rate - rate_, -kYawAccel_radps2 * dt_s, kYawAccel_radps2 * dt_s);
@@ -113,7 +113,7 @@ bool Guide::step_over(const Vec3& p_L) const {
   return at_s_ >= length_s_ && ((p_L - now_.p).norm() < kArrived_m || waited_s_ > kLongestWait_s);
 }
 
-/// Pace follows as a critically damped spring whose time grows with what has to be braked, so that braking keeps the limits.
+/// The pace follows as a critically damped second-order system, slower at higher speed, so that braking keeps the limits.
 void Guide::change_pace(double wanted) {
   const double speed = std::max(0.1, now_.v.norm());
   const double w = std::clamp(std::min(0.7 * limits_.accel_mps2 / speed, std::sqrt(limits_.jerk_mps3 / speed)), 0.5, 4.0);
@@ -133,7 +133,7 @@ PathSetpoint Guide::along_path() {
   return next;
 }
 
-/// Comes to rest where it is, then down.
+/// Brakes horizontally, then descends.
 PathSetpoint Guide::down() {
   PathSetpoint next = now_;
   const double braking = std::max(0.0, 1 - limits_.accel_mps2 * dt_s_ / std::max(1e-6, now_.v.head<2>().norm()));

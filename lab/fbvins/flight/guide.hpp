@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns the steps of a mission into a setpoint that moves within limits of speed, acceleration and jerk, and can be slowed down
-// to a stop anywhere on its way and go on from there. One owner.
+// Generates setpoints from the steps of a mission within limits of speed, acceleration and jerk. It can slow down to a stop
+// anywhere and continue from there. One owner.
 //
 //   Guide guide(mission, 200);
 //   guide.begin(state.T_LV);
-//   PathSetpoint wanted = guide.next(1.0, state.T_LV.p);   // 1: at full pace, 0: stopped
+//   PathSetpoint wanted = guide.next(1.0, state.T_LV.p);   // 1: full pace, 0: stop
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-/// A yaw that moves within limits of rate and acceleration.
+/// A yaw setpoint with limited rate and acceleration.
 class YawGuide {
  public:
   void set(double yaw_rad) { yaw_ = yaw_rad, rate_ = 0; }
@@ -31,17 +31,17 @@ class Guide {
  public:
   Guide(const Mission& mission, double rate_hz);
 
-  /// Where the vehicle stands; the first step begins.
+  /// Begins the first step at the vehicle's pose.
   void begin(const Pose<Local, BodyFlu>& standing);
-  /// The setpoint one update later. `pace`: 1 to go on, 0 to stop; what lies between is reached smoothly. `p_L`: where the
-  /// vehicle is, as a step ends only where it has arrived.
+  /// The next setpoint. `pace`: wanted speed along the path as a share, 1 to go on, 0 to stop; it is approached smoothly. `p_L`:
+  /// the estimated position; a step ends once it is near the setpoint, or after a timeout.
   PathSetpoint next(double pace, const Vec3& p_L);
-  /// Leaves the mission: brakes and comes down.
+  /// Aborts the mission: brakes and lands.
   void land_here();
-  /// The same from where the vehicle is, wherever the setpoint was.
+  /// As land_here(), with the setpoint moved to p_L.
   void land_from(const Vec3& p_L);
 
-  /// Index of the step; their number when all are done.
+  /// Index of the current step; the number of steps when all are done.
   std::size_t step() const { return step_; }
   bool landing() const { return landing_; }
   bool done() const { return step_ >= steps_.size(); }
@@ -60,10 +60,10 @@ class Guide {
   std::size_t step_ = 0;
   bool landing_ = false;
   PathSetpoint now_, hover_;
-  SplineTrajectory path_;  ///< of the step, in L; empty where it stays
+  SplineTrajectory path_;  ///< of the step, in L; empty if the step has none
   double length_s_ = 0;    ///< of the step at full pace
-  double at_s_ = 0;        ///< how far it has come
-  double waited_s_ = 0;    ///< at its end
+  double at_s_ = 0;        ///< time along the step at full pace
+  double waited_s_ = 0;    ///< at the end of the step
   double pace_ = 1, pace_rate_ = 0;
   double wanted_yaw_rad_ = 0;
   double descent_mps_ = 0;
