@@ -71,7 +71,7 @@ def main():
 
         fbvins(program, "report", root / "first", "--out", root / "report.html")
         done = fbvins(program, "fly", through, "--out", root / "wall", expect=2)
-        assert "wall.yaml:4: the way leads through a wall" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+        assert "wall.yaml:4: the path leads through a wall" in done.stderr and done.stderr.count("\n") == 1, done.stderr
         done = fbvins(program, "fly", root / "none.yaml", "--out", root / "none", expect=2)
         assert "none.yaml" in done.stderr and done.stderr.count("\n") == 1, done.stderr
     return 0

@@ -138,7 +138,7 @@ std::vector<Broken> broken_files() {
        "6: via: is further away than 1000 m"},
       {"MissionTooManyPoints", read_as_mission, mission_with("[[1, 0, 1], [1, 1, 1]]", "[" + many_points + "]"),
        "6: via: wants points of three numbers, 21 at most"},
-      {"MissionRoundTheWorld", read_as_mission, long_way, "53: the way is longer than 100 km"},
+      {"MissionRoundTheWorld", read_as_mission, long_way, "53: the path is longer than 100 km"},
       {"MissionVastRoom", read_as_mission, mission_with("[8, 6, 3]", "[900, 900, 3]"), "3: size: is larger than 200 m"},
       {"MissionTwoStepsInOne", read_as_mission, mission_with("- hold: 2.5", "- {hold: 2, land: 1}"),
        "7: a step is one of takeoff, goto, hold, yaw, identify, land"},
@@ -167,8 +167,8 @@ std::vector<Broken> broken_files() {
        "1: there is no body in it (BODY_NAMES): export 6D"},
       {"TumOfWords", read_as_markers, "there was a flight and it was good\n", ""},
 
-      {"UlogEmpty", read_as_ulog, "", " this is no log of PX4 (.ulg)"},
-      {"UlogIsACsv", read_as_ulog, "timestamp,x,y,z\n", " this is no log of PX4 (.ulg)"},
+      {"UlogEmpty", read_as_ulog, "", " this is not a PX4 log (.ulg)"},
+      {"UlogIsACsv", read_as_ulog, "timestamp,x,y,z\n", " this is not a PX4 log (.ulg)"},
       {"UlogHeadAlone", read_as_ulog, whole_ulog().substr(0, 16), " a log without topics"},
       {"UlogFormatWithoutName", read_as_ulog, whole_ulog().substr(0, 16) + ulog_message('F', "float x;"),
        " a format without a name at byte 16"},
@@ -289,8 +289,8 @@ TEST_F(BrokenLog, WhatIsWholeIsRead) {
 }
 
 TEST_F(BrokenLog, OfPx4) {
-  EXPECT_EQ(ulog("not a log"), "flight.ulg: this is no log of PX4 (.ulg)");
-  EXPECT_EQ(ulog(whole_ulog().substr(0, 20'000)), "flight.ulg: 1.0 s in flight tell too little; 10 s are the least");
+  EXPECT_EQ(ulog("not a log"), "flight.ulg: this is not a PX4 log (.ulg)");
+  EXPECT_EQ(ulog(whole_ulog().substr(0, 20'000)), "flight.ulg: only 1.0 s in flight; at least 10 s are needed");
   EXPECT_EQ(ulog(replaced(whole_ulog(), "vehicle_torque_setpoint:", "vehicle_torque_setpoinT:")),
             "flight.ulg: 'vehicle_torque_setpoint' was not logged (SDLOG_PROFILE: default and high rate)");
   EXPECT_EQ(ulog(whole_ulog([](std::uint64_t i) { return i + 1 < 2400 ? 5'000 * i : std::uint64_t{900'000'000'000'000'000}; })),
@@ -311,8 +311,7 @@ TEST_F(BrokenLog, OfOurOwn) {
             "fly/flight.csv: there is no column 'torque_y': this is no flight.csv of `fbvins fly`");
   EXPECT_EQ(csv([](std::string&, std::string& row) { row.replace(1, 4, "nan"); }, "rate: {}\n"),
             "fly/flight.csv: row 1 holds something that is not a number");
-  EXPECT_EQ(csv(mission(",mission", ",waiting"), "rate: {}\n"),
-            "fly/flight.csv: 0.0 s in flight tell too little; 10 s are the least");
+  EXPECT_EQ(csv(mission(",mission", ",waiting"), "rate: {}\n"), "fly/flight.csv: only 0.0 s in flight; at least 10 s are needed");
   EXPECT_EQ(csv([](std::string& header, std::string&) { header.erase(0, 1); }, "rate: {}\n"),
             "fly/flight.csv:1: a header line is missing");
   EXPECT_EQ(csv([](std::string&, std::string&) {}, "rate: {MC_ROLLRATE_P: much}\n").substr(0, 19), "fly/control.yaml:1:");

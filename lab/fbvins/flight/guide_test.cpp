@@ -14,7 +14,7 @@ constexpr double kRate_hz = 200;
 
 Mission mission(const std::string& text) { return *parse_mission(text, "m.yaml"); }
 
-/// The setpoints of a vehicle that is always where it should be.
+/// The setpoints for a vehicle that follows them exactly.
 std::vector<PathSetpoint> guided(const Mission& m, double pace = 1, double stop_from_s = 1e9, double stop_to_s = 1e9) {
   Guide guide(m, kRate_hz);
   guide.begin({});
@@ -26,7 +26,7 @@ std::vector<PathSetpoint> guided(const Mission& m, double pace = 1, double stop_
   return all;
 }
 
-TEST(Guide, GoesWhereItIsToldWithinItsLimits) {
+TEST(Guide, ReachesItsGoalsWithinTheLimits) {
   const Mission m = mission(
       "limits: {speed: 0.5, accel: 1, jerk: 4, climb: 0.4}\nsteps:\n  - takeoff: 0.6\n  - goto: [0.6, 0, 0.6]\n"
       "  - goto: {via: [[0.6, 2, 0.6]], to: [2, 2, 1]}\n  - hold: 1\n");
@@ -37,13 +37,13 @@ TEST(Guide, GoesWhereItIsToldWithinItsLimits) {
     EXPECT_LE(all[i].v.norm(), 0.5 * 1.01);
     EXPECT_LE(all[i].a.norm(), 1.0 * 1.01);
     EXPECT_LE((all[i].a - all[i - 1].a).norm() * kRate_hz, 4.0 * 1.05);
-    EXPECT_LE((all[i].p - all[i - 1].p - all[i].v / kRate_hz).norm(), 1e-4) << i;  // the speed is the path's
+    EXPECT_LE((all[i].p - all[i - 1].p - all[i].v / kRate_hz).norm(), 1e-4) << i;  // velocity is the derivative of position
     corner = corner || (all[i].p - Vec3(0.6, 0, 0.6)).norm() < 1e-6;
   }
-  EXPECT_TRUE(corner);  // the end of a step is reached, not rounded
+  EXPECT_TRUE(corner);  // the end of a step is not rounded off
 }
 
-TEST(Guide, StopsOnItsWayAndGoesOn) {
+TEST(Guide, StopsAnywhereAndContinues) {
   const Mission m = mission("limits: {speed: 1, accel: 1}\nsteps:\n  - takeoff: 1\n  - goto: [4, 0, 1]\n  - hold: 0.5\n");
   const std::vector<PathSetpoint> all = guided(m, 1, 6, 12);
   const PathSetpoint& stopped = all[static_cast<std::size_t>(11.5 * kRate_hz)];
@@ -63,7 +63,7 @@ TEST(Guide, WaitsUntilTheVehicleHasArrived) {
   EXPECT_EQ(guide.step(), 1u);
 }
 
-TEST(Guide, TurnsWithinItsRateTheShortWay) {
+TEST(Guide, YawsTheShortWayWithinItsRate) {
   const Mission m = mission("limits: {yaw_rate: 30}\nsteps:\n  - takeoff: 1\n  - yaw: 170\n  - yaw: -170\n");
   double fastest = 0;
   for (const PathSetpoint& s : guided(m)) fastest = std::max(fastest, std::abs(s.yaw_rate_radps));
@@ -72,10 +72,10 @@ TEST(Guide, TurnsWithinItsRateTheShortWay) {
   YawGuide yaw;
   yaw.set(170 * 0.0174533);
   yaw.turn(-170 * 0.0174533, 1, 0.01);
-  EXPECT_GT(yaw.rate_radps(), 0);  // over 180
+  EXPECT_GT(yaw.rate_radps(), 0);  // across 180 degrees
 }
 
-TEST(Guide, TheNoseLeadsWhereAsked) {
+TEST(Guide, NoseForwardFollowsThePath) {
   const Mission m = mission("steps:\n  - takeoff: 1\n  - goto: {to: [0, 3, 1], nose: forward}\n  - hold: 3\n");
   EXPECT_NEAR(guided(m).back().yaw_rad, 1.5708, 0.02);
 }
@@ -95,7 +95,7 @@ TEST(Guide, LandsFromAnywhere) {
   EXPECT_LT(s.p.x(), from + 1);
 }
 
-TEST(Excitation, SwingsEveryAxisInTurnAboutWhereItHovers) {
+TEST(Excitation, ExcitesOneAxisAfterTheOtherAroundTheHoverSetpoint) {
   PathSetpoint hover;
   hover.p = Vec3(1, 2, 3), hover.yaw_rad = 0.5;
   constexpr double kDt = 1e-4;
@@ -105,7 +105,7 @@ TEST(Excitation, SwingsEveryAxisInTurnAboutWhereItHovers) {
     const PathSetpoint now = excited(hover, t), next = excited(hover, t + kDt);
     widest = widest.cwiseMax((now.p - hover.p).cwiseAbs());
     turned = std::max(turned, std::abs(now.yaw_rad - hover.yaw_rad));
-    // Velocity is that of the place but for the swing's slow change in width.
+    // The velocity neglects the slow change of the amplitude.
     EXPECT_LT(((next.p - now.p) / kDt - now.v).norm(), 0.3) << t;
     EXPECT_LT(now.a.norm(), 2.0);
   }

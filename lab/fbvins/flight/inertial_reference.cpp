@@ -8,13 +8,13 @@
 namespace fbvins {
 namespace {
 
-/// How fast the accelerometer's idea of down is followed: slow, as flying tilts it.
+/// Gain of levelling by the accelerometer: low, because accelerations of flight disturb it.
 constexpr double kLevelling_per_s = 0.1;
-/// Only readings of about one g say where down is.
+/// Only readings within this of one g are used for levelling.
 constexpr double kNearG_mps2 = 1.5;
-// Three poles at this frequency: the barometer below, the accelerometer above.
+// Complementary filter of third order with a triple pole at this frequency.
 constexpr double kHeight_radps = 0.8;
-/// Of the barometer's zero, a reading.
+/// Gain of the barometer's zero at each reading.
 constexpr double kZeroFollows = 0.02;
 
 }  // namespace
@@ -44,7 +44,7 @@ void InertialReference::correct(double barometer_m) {
   const double height = state_.T_LV.p.z();
   if (!zero_m_) zero_m_ = barometer_m - height;
   const double error = barometer_m - *zero_m_ - height, dt = 1 / Barometer::kRate_hz, w = kHeight_radps;
-  if (following_) {  // height is known: the barometer's zero is learnt
+  if (following_) {  // the height is known: estimate the barometer's zero
     *zero_m_ += kZeroFollows * error;
     return;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which way is up, and how fast it climbs, from IMU and barometer alone: what is left when the odometry is gone. While there are
-// poses it follows them, so that it can go on from the last one. One owner.
+// Attitude and vertical speed from IMU and barometer alone, for flight without odometry. While there are poses it follows them,
+// and continues from the last one. One owner.
 //
 //   reference.predict(reading, dt_s);                 // every reading
 //   if (pose) reference.follow(estimate, bias);
@@ -20,18 +20,18 @@ class InertialReference {
 
   void predict(const ImuSample& reading, double dt_s);
   void follow(const VehicleEstimate& estimate, const ImuBias& bias);
-  /// At Barometer::kRate_hz.
+  /// A barometer reading [m]; call at Barometer::kRate_hz.
   void correct(double barometer_m);
 
-  /// Attitude and climb; where it is sideways and how fast is not known: the last position, no speed.
+  /// Attitude, height and vertical speed; horizontally the last known position and zero velocity.
   const VehicleEstimate& estimate() const { return state_; }
 
  private:
   Pose<BodyFlu, B> mounting_;
   VehicleEstimate state_;
   ImuBias bias_;                   ///< in B
-  double accel_z_error_mps2_ = 0;  ///< what the barometer says that acceleration is off by
-  std::optional<double> zero_m_;   ///< barometer at z = 0 of L
+  double accel_z_error_mps2_ = 0;  ///< correction of the vertical acceleration, by the barometer
+  std::optional<double> zero_m_;   ///< barometer reading at z = 0 of L
   bool following_ = false;
 };
 

@@ -20,7 +20,7 @@
 namespace fbvins {
 namespace {
 
-/// Estimates as they come, until they are asked for.
+/// Collects estimates until they are taken.
 class Inbox {
  public:
   void sent_image(Time t) {
@@ -37,7 +37,7 @@ class Inbox {
     const std::lock_guard lock(mutex_);
     updates_.push_back(update);
   }
-  /// Updates go with the next estimate.
+  /// Map updates go with the newest estimate.
   std::vector<KnownEstimate> take() {
     const std::lock_guard lock(mutex_);
     if (!known_.empty()) known_.back().updates = std::exchange(updates_, {});
@@ -47,7 +47,7 @@ class Inbox {
 
  private:
   std::mutex mutex_;
-  std::deque<std::pair<Time, Time>> sent_;  ///< stamps of images, and when they were sent
+  std::deque<std::pair<Time, Time>> sent_;  ///< stamps of images, and the times when they were sent
   LatencyHistogram answers_;
   std::vector<KnownEstimate> known_;
   std::vector<MapUpdate> updates_;
@@ -67,7 +67,7 @@ class InboxSink final : public Sink {
   Inbox& inbox_;
 };
 
-/// The flight's clock beside this machine's.
+/// Ties simulated time to the machine's clock.
 class Pace {
  public:
   explicit Pace(double rate) : rate_(rate) {}

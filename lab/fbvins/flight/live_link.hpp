@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The odometry in wall time, as it runs aboard: sensor data go through a socket source into a LiveSystem, and estimates come from
-// a sink of it, as late as they are. Simulated time keeps pace with this machine's clock; where the machine is too slow, it falls
-// behind and says by how much. Not the same bytes twice.
+// The odometry in wall time, as on a vehicle: sensor data go through a socket source into a LiveSystem, and estimates come from
+// one of its sinks with their real latency. Simulated time follows the machine's clock; on a machine that is too slow it falls
+// behind, by WallTime::behind_s at most. Results differ from run to run.
 //
-//   Result<std::unique_ptr<OdometryLink>> link = LiveLink::create(setup, live_options, rig, 0.5);   // half as fast as the clock
+//   Result<std::unique_ptr<OdometryLink>> link = LiveLink::create(setup, live_options, rig, 0.5);   // half of real time
 //   (*link)->push(reading);                                                                    // waits until it is due
-//   Result<std::vector<KnownEstimate>> known = (*link)->known_at(anything);                     // what has come
+//   Result<std::vector<KnownEstimate>> known = (*link)->known_at(anything);                     // all that have come
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ namespace fbvins {
 
 class LiveLink final : public OdometryLink {
  public:
-  /// `setup.mode` is not looked at: a live system has threads.
+  /// `setup.mode` is ignored: a live system has threads.
   static Result<std::unique_ptr<OdometryLink>> create(const EstimatorSetup& setup, const LiveOptions& options,
                                                       const StereoRig& rig, double rate);
   ~LiveLink() override;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In wall time: what arrives is asserted, never how fast.
+// In wall time: tests what arrives, not how fast.
 #include "fbvins/flight/live_link.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 Time at_ms(std::int64_t ms) { return Time{ms * 1'000'000}; }
 
-/// A second at rest, with images that are all alike but for one pixel (a camera that repeats itself counts as frozen).
+/// A second at rest, with images that differ in one pixel (repeated images count as a frozen camera).
 Result<std::vector<KnownEstimate>> rest(OdometryLink& link) {
   std::vector<KnownEstimate> all;
   for (std::int64_t ms = 0; ms <= 1000; ms += 5) {
@@ -38,7 +38,7 @@ TEST(LiveLink, EverythingGoesThroughTheSocketInWallTime) {
   const Time begin = host_now();
   const auto known = rest(**link);
   ASSERT_TRUE(known) << known.error().message;
-  EXPECT_GE((host_now() - begin).seconds(), 0.49) << "a second at twice the clock's pace";
+  EXPECT_GE((host_now() - begin).seconds(), 0.49) << "a second at twice real time";
   ASSERT_TRUE((*link)->finish());
   const std::optional<WallTime> wall = (*link)->wall_time();
   ASSERT_TRUE(wall);
@@ -50,7 +50,7 @@ TEST(LiveLink, EverythingGoesThroughTheSocketInWallTime) {
   for (std::size_t i = 1; i < known->size(); ++i) EXPECT_LT((*known)[i - 1].odometry.t, (*known)[i].odometry.t);
 }
 
-TEST(LiveLink, AFailureIsSaidAtTheEnd) {
+TEST(LiveLink, FinishReportsAFailure) {
   EstimatorSetup setup;
   setup.on_tracked_frame = [](const TrackedFrame&) { throw std::runtime_error("no film"); };
   auto link = LiveLink::create(setup, {}, euroc_rig(), 4);

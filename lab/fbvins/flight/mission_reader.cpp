@@ -136,7 +136,7 @@ void read_fault(YamlReader& yaml, const YAML::Node& node, Mission& mission) {
   mission.faults.push_back(fault);
 }
 
-/// It takes off once, first, and does nothing after it has landed.
+/// Takeoff is the first step only, and nothing follows land.
 void check_order(YamlReader& yaml, const YAML::Node& steps, const Mission& mission) {
   using Kind = MissionStep::Kind;
   if (mission.steps.empty()) return yaml.complain(steps, "a mission without steps");
@@ -146,14 +146,14 @@ void check_order(YamlReader& yaml, const YAML::Node& steps, const Mission& missi
     const bool first = i == 0, last = i + 1 == mission.steps.size();
     const MissionStep& step = mission.steps[i];
     if (first && step.kind != Kind::takeoff) yaml.complain(steps[i], "a mission begins with takeoff");
-    if (!first && step.kind == Kind::takeoff) yaml.complain(steps[i], "it flies already: takeoff is the first step alone");
+    if (!first && step.kind == Kind::takeoff) yaml.complain(steps[i], "takeoff must be the first step only");
     if (!last && step.kind == Kind::land) yaml.complain(steps[i], "nothing follows after land");
     for (const Vec3& p : step.points) {
-      if (p.z() < 0.1) yaml.complain(steps[i], fmt::format("the way leads to z = {} m, into the floor", p.z()));
+      if (p.z() < 0.1) yaml.complain(steps[i], fmt::format("the path leads to z = {} m, into the floor", p.z()));
       way_m += (p - from).norm();
       from = p;
     }
-    if (way_m > kLongestWay_m) yaml.complain(steps[i], fmt::format("the way is longer than {} km", kLongestWay_m / 1000));
+    if (way_m > kLongestWay_m) yaml.complain(steps[i], fmt::format("the path is longer than {} km", kLongestWay_m / 1000));
   }
 }
 

@@ -9,8 +9,8 @@
 namespace fbvins {
 namespace {
 
-constexpr double kStep_m = 0.25;  ///< of the places along the way
-/// From the centre to whatever sticks out furthest, and what an estimate and a gust may add.
+constexpr double kStep_m = 0.25;  ///< between points along the path
+/// From the vehicle's centre: its size and a margin for estimation errors and gusts.
 constexpr double kWallClearance_m = 0.45, kCeilingClearance_m = 0.3;
 
 FloorPlan plan_of(const Mission& mission, const PlaceDefaults& defaults, const std::vector<Vec3>& path_W) {
@@ -28,7 +28,7 @@ FloorPlan plan_of(const Mission& mission, const PlaceDefaults& defaults, const s
   return plan;
 }
 
-/// Nothing within the clearance is wall.
+/// There is no wall within the clearance.
 bool is_clear(const FloorPlan& plan, const Vec3& p) {
   for (int k = 0; k < 16; ++k) {
     const double angle = k * 3.14159265358979 / 8;
@@ -37,7 +37,7 @@ bool is_clear(const FloorPlan& plan, const Vec3& p) {
   return plan.inside(p.x(), p.y());
 }
 
-/// Of the default geofence, around the planned path.
+/// Margin of the default geofence around the planned path.
 constexpr double kAroundTheWay_m = 1.5;
 
 std::string place_text(const Vec3& p) { return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z()); }
@@ -86,10 +86,10 @@ Result<MissionSite> site_of(const Mission& mission, const PlaceDefaults& default
       return Error{ErrorCode::invalid_argument,
                    fmt::format("{}:{}: {} at {}", mission.source, step.line, what, place_text(places[i].p))};
     };
-    if (!is_clear(site.plan, path_W[i])) return wrong("the way leads through a wall, or too near to one,");
-    if (path_W[i].z() > site.plan.height_m - kCeilingClearance_m) return wrong("the way leads too near to the ceiling");
+    if (!is_clear(site.plan, path_W[i])) return wrong("the path leads through a wall, or too near to one,");
+    if (path_W[i].z() > site.plan.height_m - kCeilingClearance_m) return wrong("the path leads too near to the ceiling");
     if (mission.geofence && i > 0 && places[i].p.z() > 0 && !mission.geofence->contains(places[i].p))
-      return wrong("the way leads out of the geofence");
+      return wrong("the path leads out of the geofence");
   }
   return site;
 }

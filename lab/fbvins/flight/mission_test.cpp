@@ -55,7 +55,7 @@ TEST(Mission, IsReadWithAllItsParts) {
   EXPECT_EQ(site_complaint(kGood), "");
 }
 
-TEST(Mission, WhatIsWrongIsOneSentenceWithTheLine) {
+TEST(Mission, AnErrorIsOneSentenceWithItsLine) {
   const std::string up = "steps:\n  - takeoff: 1\n";
   EXPECT_EQ(complaint("steps: []\n").substr(0, 9), "m.yaml:1:");
   EXPECT_NE(complaint(up + "  - fly: 1\n").find("m.yaml:3: unknown key 'fly'"), std::string::npos);
@@ -76,22 +76,22 @@ TEST(Mission, WhatIsWrongIsOneSentenceWithTheLine) {
   EXPECT_EQ(read_mission("nowhere.yaml").error().code, ErrorCode::not_found);
 }
 
-TEST(Mission, NoWayLeadsThroughAWall) {
+TEST(Mission, APathThroughAWallIsRefused) {
   const std::string room = "place: {kind: room, size: [4, 4, 3]}\nsteps:\n  - takeoff: 1\n";
   EXPECT_EQ(site_complaint(room + "  - goto: [1.4, 0, 1]\n"), "");
-  EXPECT_NE(site_complaint(room + "  - goto: [2.5, 0, 1]\n").find("m.yaml:4: the way leads through a wall"), std::string::npos);
+  EXPECT_NE(site_complaint(room + "  - goto: [2.5, 0, 1]\n").find("m.yaml:4: the path leads through a wall"), std::string::npos);
   EXPECT_NE(site_complaint(room + "  - goto: [1.7, 0, 1]\n").find("too near"), std::string::npos);
   EXPECT_NE(site_complaint(room + "  - goto: [1, 0, 2.6]\n").find("ceiling"), std::string::npos);
   const std::string fenced = "geofence: {x: [-1, 1], y: [-1, 1], z: [-1, 2]}\n" + room;
-  EXPECT_NE(site_complaint(fenced + "  - goto: [1.2, 0, 1]\n").find("m.yaml:5: the way leads out of the geofence"),
+  EXPECT_NE(site_complaint(fenced + "  - goto: [1.2, 0, 1]\n").find("m.yaml:5: the path leads out of the geofence"),
             std::string::npos);
-  // Across the inner yard of the ring of corridors, or along it.
+  // Along a corridor of the ring, and across its inner yard.
   const std::string ring = "place: {kind: corridors, size: [12, 8, 3], start: [-6, -4]}\nsteps:\n  - takeoff: 1\n";
   EXPECT_EQ(site_complaint(ring + "  - goto: [12, 0, 1]\n"), "");
   EXPECT_NE(site_complaint(ring + "  - goto: [12, 8, 1]\n").find("wall"), std::string::npos);
 }
 
-TEST(Mission, WithoutAFenceThereIsOneAroundTheWay) {
+TEST(Mission, TheDefaultGeofenceSurroundsThePath) {
   const Geofence fence = fence_of(*parse_mission("steps:\n  - takeoff: 1\n  - goto: [2, -1, 1.5]\n", "m.yaml"));
   EXPECT_TRUE(fence.contains({3, -2, 2.5}));
   EXPECT_FALSE(fence.contains({4, 0, 1}));

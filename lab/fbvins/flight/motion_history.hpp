@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a vehicle was in the last moments, for images whose exposure is over. One owner.
+// A vehicle's recent motion, for rendering images whose exposure has ended. One owner.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace fbvins {
 
-/// Motion of the last moments, a state a millisecond.
+/// Interpolates the states of the last kHistory_s; clamps outside of them.
 class MotionHistory {
  public:
   void add(double t_s, const MotionState& m) {

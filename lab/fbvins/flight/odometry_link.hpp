@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between simulated sensors and whoever flies by what the odometry makes of them: in lockstep with simulated time
-// (estimator_link.hpp), or in wall time (live_link.hpp). One thread asks.
+// Interface from simulated sensors to a controller through the odometry: in lockstep with simulated time
+// (estimator_link.hpp) or in wall time (live_link.hpp). One owner.
 #pragma once
 
 #include <optional>
@@ -14,17 +14,17 @@
 
 namespace fbvins {
 
-/// Of one image.
+/// The estimate of one image.
 struct KnownEstimate {
   Odometry odometry;
-  std::vector<MapUpdate> updates;  ///< of the map, since the image before
+  std::vector<MapUpdate> updates;  ///< since the previous image
 };
 
-/// How a flight in wall time went.
+/// Timing of a flight in wall time.
 struct WallTime {
-  double rate = 1;        ///< seconds of the flight in one of this machine's, as wanted
-  double behind_s = 0;    ///< the flight fell behind this machine's clock by so much, at most
-  LatencySummary answer;  ///< from an image sent to its estimate in the controller's hands
+  double rate = 1;        ///< wanted simulated seconds per second of wall time
+  double behind_s = 0;    ///< largest delay of the flight behind the machine's clock
+  LatencySummary answer;  ///< from sending an image to its estimate at the controller
   LiveStatus live;        ///< at the end
 };
 
@@ -35,13 +35,13 @@ class OdometryLink {
   OdometryLink& operator=(const OdometryLink&) = delete;
   virtual ~OdometryLink() = default;
 
-  /// In order of time, but for images, which may come as late as their exposure makes them.
+  /// In order of time, except that an image comes after its exposure.
   virtual Result<void> push(SensorEvent event) = 0;
-  /// What was not told yet of images with stamps up to `newest_image`.
+  /// New estimates of images with stamps up to `newest_image`.
   virtual Result<std::vector<KnownEstimate>> known_at(Time newest_image) = 0;
-  /// Works off what is waiting.
+  /// Processes what is queued; no pushes afterwards.
   virtual Result<void> finish() = 0;
-  /// Of wall time alone.
+  /// In wall time only.
   virtual std::optional<WallTime> wall_time() const { return std::nullopt; }
 };
 

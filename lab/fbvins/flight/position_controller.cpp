@@ -28,7 +28,7 @@ Vec3 PositionController::limited_velocity(const Vec3& v) const {
   return limited;
 }
 
-/// Height before place: what the rotors cannot give is missing sideways first. Shares of full thrust, in L.
+/// Limits tilt and thrust, with priority to the vertical component. Shares of full thrust, in L.
 Vec3 PositionController::limited_thrust(Vec3 thrust) const {
   const double most = options_.MPC_THR_MAX;
   thrust.z() = std::clamp(thrust.z(), options_.MPC_THR_MIN, most);
@@ -39,7 +39,7 @@ Vec3 PositionController::limited_thrust(Vec3 thrust) const {
   return thrust;
 }
 
-/// Integrals grow no further where the vehicle cannot follow (tracking anti-windup across, a stop upwards).
+/// Anti-windup: tracking horizontally, clamping vertically.
 void PositionController::integrate(const Vec3& error, const Vec3& asked, const Vec3& given) {
   const PositionControlOptions& o = options_;
   const Vec3 missing = asked - given;
@@ -68,7 +68,7 @@ AttitudeSetpoint PositionController::update(const VehicleEstimate& state, const 
   AttitudeSetpoint out;
   out.q_LV = attitude_for(given, setpoint.yaw_rad);
   out.yaw_rate_radps = setpoint.yaw_rate_radps;
-  out.thrust = given.dot(state.T_LV.q * Vec3::UnitZ());  // what the vehicle's own axis must give for it, as it stands now
+  out.thrust = given.dot(state.T_LV.q * Vec3::UnitZ());  // projection on the current body z axis
   out.thrust = std::clamp(out.thrust, o.MPC_THR_MIN, o.MPC_THR_MAX);
   return out;
 }

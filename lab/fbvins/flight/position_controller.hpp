@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outer half of the cascade: position to velocity (P), velocity to acceleration (PID with anti-windup), acceleration to an
-// attitude and a thrust. As PX4's mc_pos_control, in L instead of north-east-down. One owner.
+// The outer loops of the cascade: position to velocity (P), velocity to acceleration (PID with anti-windup), acceleration to an
+// attitude and a thrust. Like PX4's mc_pos_control, in L instead of NED. One owner.
 //
 //   PositionController position(options, 200);
 //   AttitudeSetpoint wanted = position.update(state, setpoint);
@@ -14,17 +14,17 @@
 
 namespace fbvins {
 
-/// The mission's frame: origin where the vehicle stood, x its heading then, z up as far as gravity is known.
+/// The mission's frame L: origin and x axis are the vehicle's position and heading before take-off; z is up as estimated.
 struct Local {};
 
-/// The vehicle as its controller knows it: by estimates, never by truth.
+/// The vehicle's estimated state.
 struct VehicleEstimate {
   Pose<Local, BodyFlu> T_LV;
   Vec3 v_LV = Vec3::Zero();    ///< m/s, in L
   Vec3 w_LV_V = Vec3::Zero();  ///< rad/s, in V
 };
 
-/// A point of a smooth path.
+/// A setpoint on a smooth path.
 struct PathSetpoint {
   Vec3 p = Vec3::Zero();  ///< m, in L
   Vec3 v = Vec3::Zero();  ///< m/s
@@ -35,7 +35,7 @@ struct PathSetpoint {
 struct AttitudeSetpoint {
   Quat q_LV = Quat::Identity();
   double yaw_rate_radps = 0;
-  double thrust = 0;  ///< along the vehicle's z, share of all rotors' full thrust
+  double thrust = 0;  ///< along the vehicle's z axis, as a share of full thrust
 };
 
 class PositionController {
@@ -43,7 +43,7 @@ class PositionController {
   PositionController(const PositionControlOptions& options, double rate_hz);
 
   AttitudeSetpoint update(const VehicleEstimate& state, const PathSetpoint& setpoint);
-  /// Only downwards or upwards, at no tilt: when nothing is known of where the vehicle is.
+  /// Controls the vertical speed at level attitude: for flight without a position.
   AttitudeSetpoint climb(double v_z_mps, double v_z_wanted_mps, double yaw_rad);
   void reset() { integral_.setZero(); }
 
@@ -62,7 +62,7 @@ class PositionController {
   Vec3 integral_ = Vec3::Zero(), v_wanted_ = Vec3::Zero(), a_wanted_ = Vec3::Zero();
 };
 
-/// The body's z along the thrust, its x as near to the heading as that allows.
+/// q_LV with z along the thrust and x as near to the heading as that allows.
 Quat attitude_for(const Vec3& thrust, double yaw_rad);
 
 }  // namespace fbvins

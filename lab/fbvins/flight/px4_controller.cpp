@@ -9,13 +9,13 @@
 namespace fbvins {
 namespace {
 
-constexpr double kSmoothing_s = 0.1;  ///< as `fbvins live` has it
+constexpr double kSmoothing_s = 0.1;  ///< the default of `fbvins live`
 constexpr double kOdometry_hz = 50;
-/// Estimates that are older are not sent on: a cable that is pulled is silent.
+/// Poses of older estimates are not sent, as if the link were silent.
 constexpr double kSilent_s = 0.25;
-/// PX4's clock when the flight begins, less the warm-up.
+/// PX4's clock at the beginning of the warm-up.
 constexpr double kBoot_s = 1;
-/// The companion's clock is another one than PX4's.
+/// Offset of the companion's clock to PX4's.
 constexpr double kCompanionAhead_s = 7000;
 constexpr std::uint8_t kCompanion = 191;  // MAV_COMP_ID_ONBOARD_COMPUTER
 
@@ -57,7 +57,7 @@ Time Px4Controller::companion_time(double t_s) const {
 }
 
 void Px4Controller::send(const MavlinkSession::Frames& frames) {
-  if (!px4_->awake()) return;  // a port that nobody listens on yet
+  if (!px4_->awake()) return;  // nothing listens on the port yet
   for (const std::vector<std::uint8_t>& frame : frames) (void)link_.send(frame);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A real PX4 in the place of the autopilot. It gets what a PX4 on a vehicle gets: its board's IMU and barometer in lockstep
-// (HIL_SENSOR), and over UDP our odometry, as `fbvins live` sends it, and a mission's setpoints and commands; from it come the
-// motors (HIL_ACTUATOR_CONTROLS). One owner.
+// A real PX4 in place of the autopilot. It gets the same inputs as on a vehicle: its board's IMU and barometer in lockstep
+// (HIL_SENSOR), and over UDP the odometry, as `fbvins live` sends it, with the mission's setpoints and commands. It returns the
+// motor commands (HIL_ACTUATOR_CONTROLS). One owner.
 //
 //   Result<std::unique_ptr<Px4Controller>> px4 = Px4Controller::create(setup, mission, control, vehicle, rig, mounting);
 #pragma once
@@ -20,7 +20,7 @@ namespace fbvins {
 
 struct Px4Setup {
   std::string binary;  ///< bin/px4 of a px4_sitl build; empty: no PX4
-  std::string folder;  ///< for its parameters and logs; made anew
+  std::string folder;  ///< for its parameters and logs; deleted and created at the start
 };
 
 class Px4Controller final : public FlightController {
@@ -35,7 +35,7 @@ class Px4Controller final : public FlightController {
   void add_barometer(double height_m) override { height_m_ = height_m; }
   Result<void> take(const ImuSample& reading) override;
 
-  double board_rate_hz() const override { return 250; }  ///< as PX4's simulators have it
+  double board_rate_hz() const override { return 250; }  ///< as in PX4's simulators
   double warm_up_s() const override { return kWarmUp_s; }
   Result<void> take_board(const BoardReading& reading) override;
 
@@ -45,7 +45,7 @@ class Px4Controller final : public FlightController {
   int resets_in_flight() const override { return mission_.resets_in_flight(); }
 
  private:
-  /// PX4 uses the clock offset to a companion once it has 500 TIMESYNC answers, at ten a second.
+  /// PX4 uses its estimate of the companion's clock offset after 500 TIMESYNC answers, at 10 Hz.
   static constexpr double kWarmUp_s = 56;
 
   Px4Controller(std::unique_ptr<Px4Process> px4, MavlinkOptions options, const Mission& mission, const StereoRig& rig);
@@ -63,7 +63,7 @@ class Px4Controller final : public FlightController {
   std::optional<double> height_m_;
   PerRotor commands_{};
   double now_s_ = 0;           ///< since the flight began
-  std::optional<Time> first_;  ///< reading of the odometry's IMU, when it began
+  std::optional<Time> first_;  ///< first reading of the odometry's IMU
   std::uint8_t sequence_ = 0;
 };
 

@@ -12,7 +12,7 @@ namespace {
 
 float to_float(double x) { return static_cast<float>(x); }
 
-/// Gains and limits, under PX4's own names.
+/// Lists gains and limits by PX4's names.
 struct ParameterList {
   Px4Parameters& out;
   template <class... Rest>
@@ -25,10 +25,10 @@ struct ParameterList {
   }
 };
 
-/// What is other than PX4's defaults whatever flies.
+/// Settings that differ from PX4's defaults for every vehicle.
 const Px4Parameters& fixed_parameters() {
   static const Px4Parameters parameters{
-      // Vision alone; the barometer is a second height with a bias that is estimated, so that there is one when vision ends.
+      // Vision is the reference; EKF2 estimates the barometer's bias, so that there is a height when vision fails.
       {"EKF2_EV_CTRL", "15"},
       {"EKF2_HGT_REF", "3"},
       {"EKF2_GPS_CTRL", "0"},
@@ -43,7 +43,7 @@ const Px4Parameters& fixed_parameters() {
       {"SYS_HAS_MAG", "0"},
       {"SYS_HAS_GPS", "0"},
       {"COM_ARM_WO_GPS", "1"},
-      // Nobody has a remote control or a ground station; without a setpoint or a position it comes down at once.
+      // No remote control or ground station; without setpoints or position it lands at once.
       {"COM_RC_IN_MODE", "4"},
       {"COM_RCL_EXCEPT", "7"},
       {"NAV_DLL_ACT", "0"},
@@ -67,7 +67,7 @@ MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting) {
   const Quat half_turn(0, 1, 0, 0);
   const Quat q_FB = half_turn * mounting.q;
   MountingOptions best;
-  double least = 10;  // the axes that need the least turning are far from where angles fail
+  double least = 10;  // the axes with the smallest residual rotation are far from gimbal lock
   for (const ImuAxes axes : {ImuAxes::flu, ImuAxes::frd, ImuAxes::camera_fwd, ImuAxes::camera_down}) {
     MountingOptions options;
     options.imu_axes = axes;
@@ -134,7 +134,7 @@ Px4Parameters px4_parameters(const ControlOptions& control, const QuadrotorOptio
   ControlOptions gains = control;
   ParameterList list{parameters};
   gains.visit(list);
-  // PX4's order of rotors is ours; y is to the right there, and a rotor that turns counter-clockwise has a positive moment.
+  // Same order of rotors as PX4. There y is to the right, and a counter-clockwise rotor has a positive moment.
   const double x = vehicle.arm_x_m, y = vehicle.arm_y_m, forward[kRotors] = {x, -x, x, -x}, right[kRotors] = {y, -y, -y, y};
   for (int i = 0; i < kRotors; ++i) {
     parameters.emplace_back(fmt::format("CA_ROTOR{}_PX", i), fmt::format("{:.4f}", forward[i]));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between a simulated vehicle (forward-left-up) and a PX4 that flies it (forward-right-down), and what PX4 has to be told before.
-// Pure functions, any thread.
+// Conversions between a simulated vehicle (FLU) and the PX4 that flies it (FRD), and PX4's parameters. Pure functions, any
+// thread.
 #pragma once
 
 #include <string>
@@ -14,27 +14,27 @@
 
 namespace fbvins {
 
-/// PX4's local frame: x as its heading has it, z down.
+/// N, PX4's local frame rotated half a turn about x: z is up.
 struct Px4Local {};
 
-/// y and z the other way round, of a vector or a rotation between two frames of which both are turned.
+/// Half a turn about x (FLU to FRD or back): of a vector, or of a rotation between two frames that are both turned.
 Vec3 turned_over(const Vec3& v);
 Quat turned_over(const Quat& q);
 
-/// A mounting as `fbvins live` is told it.
+/// A mounting as options of `fbvins live`.
 MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting);
 
-/// PX4's own pose, its local frame turned over so that z is up.
+/// PX4's own estimate, in N (returned as L, with T_LN the identity).
 VehicleEstimate estimate_of(const OdometryMessage& message);
 
-/// `T_LN`: from PX4's local frame, turned over.
+/// Setpoint in PX4's local NED frame.
 PositionTargetMessage target_message(const PathSetpoint& setpoint, const Pose<Local, Px4Local>& T_LN, std::uint32_t time_boot_ms);
 
 HilSensorMessage sensor_message(const BoardReading& reading, std::uint64_t time_usec);
-/// The height as the pressure of a standard atmosphere.
+/// Adds height and its pressure in the standard atmosphere (ISA).
 void add_height(HilSensorMessage& message, double height_m);
 
-/// Names and values: no GPS, no magnetometer, vision as docs/px4.md has it, this vehicle's rotors and gains.
+/// Names and values: no GPS, no magnetometer, vision as in docs/px4.md, this vehicle's rotors and gains.
 using Px4Parameters = std::vector<std::pair<std::string, std::string>>;
 Px4Parameters px4_parameters(const ControlOptions& control, const QuadrotorOptions& vehicle);
 

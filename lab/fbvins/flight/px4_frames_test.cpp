@@ -17,10 +17,10 @@ Quat any_rotation(Rng& rng) {
   return so3_exp(3.1 * Vec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized());
 }
 
-TEST(Px4Frames, AMountingIsToldWithoutLoss) {
+TEST(Px4Frames, MountingOptionsKeepTheMounting) {
   Rng rng(3);
   std::vector<Pose<BodyFlu, B>> mountings{{Quat::Identity(), Vec3(0.04, 0.01, 0.03)}};
-  // EuRoC's, where the pitch of forward-right-down axes would be a right angle.
+  // EuRoC's: with FRD axes its pitch would be 90 degrees (gimbal lock).
   Mat3 R;
   R << 0, 0, 1, 0, -1, 0, 1, 0, 0;
   mountings.emplace_back(Quat(R), Vec3(0.1, 0, -0.02));
@@ -32,7 +32,7 @@ TEST(Px4Frames, AMountingIsToldWithoutLoss) {
   }
 }
 
-TEST(Px4Frames, WhatPx4SaysOfItselfHasZUp) {
+TEST(Px4Frames, EstimatesOfPx4HaveZUp) {
   OdometryMessage m;
   m.x = 1, m.y = 2, m.z = -3;
   m.q = {static_cast<float>(std::cos(0.25)), 0, 0, static_cast<float>(std::sin(0.25))};  // half a radian to the right
@@ -45,14 +45,14 @@ TEST(Px4Frames, WhatPx4SaysOfItselfHasZUp) {
   EXPECT_NEAR(e.w_LV_V.z(), -0.5, 1e-6);
 }
 
-TEST(Px4Frames, ASetpointComesOutWhereItWasMeant) {
+TEST(Px4Frames, ASetpointIsReachedInPx4sFrame) {
   Rng rng(4);
   const Pose<Local, Px4Local> T_LN(so3_exp(Vec3(0, 0, 0.7)), Vec3(3, -1, 0.2));
   PathSetpoint wanted;
   wanted.p = Vec3(0.6, 0.3, 0.6), wanted.v = Vec3(0.1, -0.2, 0.3), wanted.a = Vec3(1, 2, 3);
   wanted.yaw_rad = 0.4, wanted.yaw_rate_radps = 0.2;
   const PositionTargetMessage m = target_message(wanted, T_LN, 77);
-  // The vehicle that is there, as PX4 would say it of itself.
+  // PX4's odometry of a vehicle at the setpoint.
   OdometryMessage there;
   there.x = m.x, there.y = m.y, there.z = m.z;
   there.q = {std::cos(m.yaw / 2), 0, 0, std::sin(m.yaw / 2)};
@@ -68,7 +68,7 @@ TEST(Px4Frames, ASetpointComesOutWhereItWasMeant) {
   EXPECT_EQ(m.type_mask, 0);
 }
 
-TEST(Px4Frames, AStandingVehicleFeelsGravityUpwards) {
+TEST(Px4Frames, AStandingVehicleMeasuresGravityUpwards) {
   HilSensorMessage m = sensor_message({0, Vec3(0, 0.1, 9.81), Vec3(0, 0, 0.2)}, 5);
   EXPECT_FLOAT_EQ(m.zacc, -9.81F);
   EXPECT_FLOAT_EQ(m.yacc, -0.1F);
@@ -79,11 +79,11 @@ TEST(Px4Frames, AStandingVehicleFeelsGravityUpwards) {
   EXPECT_EQ(m.fields_updated & HilSensorMessage::kBarometer, HilSensorMessage::kBarometer);
 }
 
-TEST(Px4Frames, ParametersNameGainsRotorsAndNoGps) {
+TEST(Px4Frames, ParametersHaveGainsAndRotorsAndDisableGps) {
   const QuadrotorOptions vehicle;
   const Px4Parameters list = px4_parameters(control_for(vehicle), vehicle);
   const std::map<std::string, std::string> all(list.begin(), list.end());
-  EXPECT_EQ(all.size(), list.size()) << "a name is there twice";
+  EXPECT_EQ(all.size(), list.size()) << "duplicate name";
   EXPECT_EQ(all.at("EKF2_GPS_CTRL"), "0");
   EXPECT_EQ(all.at("EKF2_MAG_TYPE"), "5");
   EXPECT_EQ(all.at("MPC_XY_P"), "1.5");

@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kTargets_hz = 50, kStreamedBefore_s = 1.0, kAskAgain_s = 1.0, kRefused_s = 30.0;
 constexpr double kOdometry_us = 10'000;
-/// An estimate of PX4's is carried on by its velocity for no longer than this.
+/// PX4's estimate is extrapolated by its velocity for at most this long.
 constexpr double kCarried_s = 0.2;
 constexpr std::uint8_t kArmedFlag = 128, kCustomModeFlag = 1;  // MAV_MODE_FLAG
-// PX4's modes: main number, and below it that of the automatic ones.
+// PX4's main modes, and the sub-mode of AUTO.
 constexpr std::uint32_t kOffboard = 6, kAuto = 4, kAutoLand = 6;
 
 std::uint32_t main_mode(std::uint32_t custom_mode) { return custom_mode >> 16 & 0xff; }
@@ -86,7 +86,7 @@ void Px4Mission::hear(const CommandAckMessage& ack, double now_s) {
   if (ack.result != kMavResultAccepted) say(now_s, fmt::format("command {} refused ({})", ack.command, ack.result));
 }
 
-/// Where PX4 says it is, now.
+/// PX4's estimate, extrapolated to now.
 void Px4Mission::look(double now_s) {
   if (!odometry_ || !finite(*odometry_)) return;
   out_.estimate = estimate_of(*odometry_);
@@ -106,7 +106,7 @@ void Px4Mission::command(std::uint16_t number, std::array<float, 7> params, doub
   outgoing_.push_back(message);
 }
 
-/// Setpoints where it stands, then OFFBOARD, then armed.
+/// Streams setpoints at the current position, then asks for OFFBOARD, then arms.
 void Px4Mission::prepare(double now_s) {
   if (!heard_ || !odometry_ || !finite(*odometry_)) return;
   if (ready_s_ == 0) {
@@ -124,7 +124,7 @@ void Px4Mission::prepare(double now_s) {
   else command(kMavCmdArm, {1}, now_s);
 }
 
-/// L is where it stands, by PX4's own estimate: heading and place, as both have z up.
+/// Places L at the standing vehicle by PX4's estimate: heading and position only, as both frames have z up.
 void Px4Mission::take_off(double now_s) {
   const Pose<Local, BodyFlu> standing = estimate_of(*odometry_).T_LV;
   const Quat q_LN = so3_exp(Vec3(0, 0, -heading(standing.q)));

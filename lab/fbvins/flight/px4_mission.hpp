@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The companion's half of a mission that a PX4 flies: when the odometry is good it streams setpoints, asks for OFFBOARD and arms;
-// then the mission's setpoints, and to land the command for it. What PX4 does by itself is told as a failsafe of its own. No
-// ports and no clock: messages and time come in as arguments. One owner.
+// The companion's part in a mission that a PX4 flies: when the odometry is good it streams setpoints, asks for OFFBOARD and arms;
+// then it sends the mission's setpoints and, at its end, the command to land. What PX4 does by itself is reported as
+// FlightReason::flight_controller. No I/O and no clock: messages and time are arguments. One owner.
 //
 //   Px4Mission mission(steps, 200, px4.system_id(), ahead_s);
 //   mission.hear(frame, now_s);
@@ -22,16 +22,16 @@ namespace fbvins {
 
 class Px4Mission {
  public:
-  /// `ahead_s`: PX4's clock less the time that the other arguments are in.
+  /// `ahead_s`: PX4's clock minus `now_s`.
   Px4Mission(const Mission& mission, double rate_hz, int system_id, double ahead_s);
 
   void hear(const MavlinkFrame& frame, double now_s);
-  /// With every reading of the odometry's IMU. What is to be sent.
+  /// At every reading of the odometry's IMU. Returns the messages to send.
   std::vector<MavlinkMessage> update(const LivePose& pose, double now_s);
 
   const AutopilotOutput& output() const { return out_; }
   const std::vector<ControllerEvent>& events() const { return events_; }
-  /// How often its estimator moved its own frame between arming and landing.
+  /// How often PX4's estimator reset between arming and landing.
   int resets_in_flight() const { return resets_in_flight_; }
 
  private:
@@ -52,12 +52,12 @@ class Px4Mission {
   Guide guide_;
   Failsafe failsafe_;
   std::uint32_t reset_counter_ = 0;  ///< of the odometry
-  // What PX4 says of itself.
+  // State reported by PX4.
   bool armed_ = false, heard_ = false;
   std::uint32_t px4_mode_ = 0;
   std::optional<OdometryMessage> odometry_;
   double odometry_s_ = 0;
-  // What is said to it.
+  // State of the companion.
   Pose<Local, Px4Local> T_LN_;
   bool flying_ = false;
   double ready_s_ = 0, next_target_s_ = 0, next_command_s_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The companion's half with a simulated PX4 that obeys at once and is where its setpoint is.
+// The companion's part with a fake PX4 that obeys at once and follows setpoints exactly.
 #include "fbvins/flight/px4_mission.hpp"
 
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ struct FakePx4 {
   }
 };
 
-/// The modes that were gone through.
+/// Flies and returns the sequence of modes.
 std::vector<FlightMode> fly(Px4Mission& mission, FakePx4& px4, double seconds, double odometry_ends_s = 1e9) {
   std::vector<FlightMode> modes;
   for (int i = 0; i < 200 * seconds; ++i) {
@@ -60,7 +60,7 @@ std::vector<FlightMode> fly(Px4Mission& mission, FakePx4& px4, double seconds, d
   return modes;
 }
 
-TEST(Px4Mission, AsksArmsFliesAndLands) {
+TEST(Px4Mission, AsksForOffboardArmsFliesAndLands) {
   Px4Mission mission(hop(), 200, 2, 10);
   FakePx4 px4;
   px4.odometry.x = 4, px4.odometry.z = -0.2F;
@@ -73,7 +73,7 @@ TEST(Px4Mission, AsksArmsFliesAndLands) {
   EXPECT_NEAR(px4.odometry.z, -0.7, 0.01);
 }
 
-TEST(Px4Mission, WhatDoesNotArmStaysOnTheGround) {
+TEST(Px4Mission, GivesUpIfPx4DoesNotArm) {
   Px4Mission mission(hop(), 200, 2, 10);
   FakePx4 px4;
   px4.refuses = true;
@@ -82,7 +82,7 @@ TEST(Px4Mission, WhatDoesNotArmStaysOnTheGround) {
   EXPECT_GT(std::count(px4.commands.begin(), px4.commands.end(), kMavCmdArm), 10);
 }
 
-TEST(Px4Mission, WhatPx4DoesByItselfIsTold) {
+TEST(Px4Mission, ReportsWhatPx4DoesByItself) {
   Px4Mission mission(hop(), 200, 2, 10);
   FakePx4 px4;
   px4.leaves = true;
@@ -93,22 +93,22 @@ TEST(Px4Mission, WhatPx4DoesByItselfIsTold) {
   EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const ControllerEvent& e) { return e.text == "mode AUTO.LAND"; }));
 }
 
-TEST(Px4Mission, SilentOdometryIsHeldAndLeftToPx4) {
+TEST(Px4Mission, SilentOdometryHoldsAndThenLeavesTheDescentToPx4) {
   Px4Mission mission(hop(), 200, 2, 10);
   FakePx4 px4;
   const auto modes = fly(mission, px4, 12, 5);
   EXPECT_EQ(modes, (std::vector{FlightMode::waiting, FlightMode::mission, FlightMode::holding, FlightMode::descending}));
-  EXPECT_EQ(std::count(px4.commands.begin(), px4.commands.end(), kMavCmdLand), 0) << "landing is PX4's business then";
+  EXPECT_EQ(std::count(px4.commands.begin(), px4.commands.end(), kMavCmdLand), 0) << "PX4 lands by itself";
 }
 
-TEST(Px4Mission, ResetsCountInFlight) {
+TEST(Px4Mission, CountsResetsInFlight) {
   Px4Mission mission(hop(), 200, 2, 10);
   FakePx4 px4;
   px4.odometry.reset_counter = 3;
   fly(mission, px4, 5);
   ++px4.odometry.reset_counter;
   mission.hear({{2, 1}, 0, px4.odometry}, 5);
-  mission.hear({{2, 197}, 0, OdometryMessage{}}, 5);  // ours, sent back
+  mission.hear({{2, 197}, 0, OdometryMessage{}}, 5);  // the companion's own message
   EXPECT_EQ(mission.resets_in_flight(), 1);
 }
 

@@ -26,11 +26,11 @@ extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has 
 namespace fbvins {
 namespace {
 
-// PX4's ports, plus the number of the instance.
+// PX4's ports for instance 0; add the instance's number.
 constexpr int kSimulatorPort = 4560, kCompanionPort = 14580, kInstances = 9;
 constexpr MavlinkAddress kSimulator{1, 51};
 constexpr int kConnect_ms = 30'000;
-/// Of the machine's time: while its modules start it says nothing, later it always answers.
+/// In wall time: while its modules start PX4 does not answer, later it always does.
 constexpr int kStarting_ms = 5, kAnswer_ms = 5'000;
 constexpr std::chrono::milliseconds kStop{3'000}, kLook{10};
 
@@ -51,7 +51,7 @@ FileDescriptor bound(int type, int port) {
   return fd;
 }
 
-/// The first instance whose ports are free, and the port on which its simulator listens.
+/// The first instance with free ports, and the listening socket of its simulator.
 std::pair<int, FileDescriptor> free_instance() {
   for (int instance = 0; instance < kInstances; ++instance) {
     FileDescriptor listener = bound(SOCK_STREAM, kSimulatorPort + instance);
@@ -88,7 +88,7 @@ Result<std::unique_ptr<Px4Process>> Px4Process::start(const std::string& binary,
   std::error_code missing;
   const std::string program = std::filesystem::canonical(binary, missing).string();
   if (missing || access(program.c_str(), X_OK) != 0)
-    return Error{ErrorCode::invalid_argument, fmt::format("{}: there is no PX4 to start", binary)};
+    return Error{ErrorCode::invalid_argument, fmt::format("{}: there is no PX4 executable", binary)};
   auto [instance, listener] = free_instance();
   if (instance < 0) return Error{ErrorCode::invalid_argument, "all ports of PX4's simulator (4560 to 4568) are in use"};
   std::unique_ptr<Px4Process> px4(new Px4Process(instance, std::filesystem::absolute(folder).string()));
@@ -131,7 +131,7 @@ Result<void> Px4Process::accept_simulator(const FileDescriptor& listener) {
 }
 
 Error Px4Process::ended() const {
-  return {ErrorCode::unreadable, fmt::format("PX4 does not answer any more; what it said is in {}/px4.log", folder_)};
+  return {ErrorCode::unreadable, fmt::format("PX4 does not answer any more; its output is in {}/px4.log", folder_)};
 }
 
 std::uint16_t Px4Process::companion_port() const { return static_cast<std::uint16_t>(kCompanionPort + instance_); }

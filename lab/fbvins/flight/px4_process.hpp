@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A PX4 of its simulator's build (px4_sitl), run as a process that gets its sensors from here in lockstep: its time is that of
-// the newest reading, and it waits for the next one. Loopback only. One owner.
+// Runs a px4_sitl build of PX4 as a process in lockstep: it gets its sensor data from here, its time is that of the newest
+// reading, and it waits for the next one. Loopback only. One owner.
 //
 //   Result<std::unique_ptr<Px4Process>> px4 = Px4Process::start(".../bin/px4", folder, parameters);
-//   Result<void> done = (*px4)->step(sensor_message);    // returns with the answer
+//   Result<void> done = (*px4)->step(sensor_message);    // waits for the answer
 //   use((*px4)->controls());
 #pragma once
 
@@ -22,7 +22,7 @@ namespace fbvins {
 
 class Px4Process {
  public:
-  /// `folder` exists already; what PX4 writes, and what it says in px4.log, stays there.
+  /// `folder` must exist; PX4's files and its output, px4.log, stay there.
   static Result<std::unique_ptr<Px4Process>> start(const std::string& binary, const std::string& folder,
                                                    const Px4Parameters& parameters);
   Px4Process(const Px4Process&) = delete;
@@ -30,12 +30,12 @@ class Px4Process {
   ~Px4Process();
 
   Result<void> step(const HilSensorMessage& reading);
-  /// Of its outputs, 0 to 1, or 0 where it is not armed.
+  /// Actuator outputs, 0 to 1; 0 while disarmed.
   const std::array<float, 16>& controls() const { return controls_; }
-  /// Its modules run.
+  /// Whether its modules run: it has answered.
   bool awake() const { return awake_; }
   int system_id() const { return instance_ + 1; }
-  /// Where its link for companions listens.
+  /// UDP port of its MAVLink instance for companions.
   std::uint16_t companion_port() const;
 
  private:

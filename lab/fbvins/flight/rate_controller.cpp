@@ -9,27 +9,27 @@ namespace fbvins {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180;
-/// Rates this far from what is wanted stop the integral (PX4).
+/// The integral gain fades to zero at this rate error (as in PX4).
 constexpr double kIntegralFades_radps = 400 * kRadPerDeg;
-/// A rotor's share of a full torque about V's axes, in PX4's order of rotors.
+/// Each rotor's change of thrust for unit torques about V's axes, in PX4's order of rotors.
 constexpr double kTilt = 1 / std::numbers::sqrt2;
 constexpr double kMix[kRotors][3] = {{-kTilt, -kTilt, -1}, {kTilt, kTilt, -1}, {kTilt, -kTilt, 1}, {-kTilt, kTilt, 1}};
 
 }  // namespace
 
-// Brescianini, Hehn, D'Andrea: Nonlinear quadrocopter attitude control, 2013: first the thrust's direction by the shortest
-// rotation, then yaw by a share.
+// Brescianini, Hehn, D'Andrea: Nonlinear quadrocopter attitude control, 2013: the thrust direction by the shortest rotation,
+// and yaw with a reduced weight.
 Vec3 rates_for(const AttitudeControlOptions& o, const Quat& q, const AttitudeSetpoint& wanted) {
   const Vec3 z = q * Vec3::UnitZ(), z_wanted = wanted.q_LV * Vec3::UnitZ();
   Quat reduced = so3_between(z, z_wanted) * q;
-  if (z.dot(z_wanted) < -0.99999) reduced = wanted.q_LV;  // upside down: every way is as short
+  if (z.dot(z_wanted) < -0.99999) reduced = wanted.q_LV;  // opposite directions: the shortest rotation is not unique
   Quat yaw_part = reduced.conjugate() * wanted.q_LV;
   if (yaw_part.w() < 0) yaw_part.coeffs() *= -1;
   const double half = std::asin(std::clamp(yaw_part.z(), -1.0, 1.0));
   const Quat target = reduced * Quat(std::cos(o.MC_YAW_WEIGHT * half), 0, 0, std::sin(o.MC_YAW_WEIGHT * half));
   Quat error = q.conjugate() * target;
   if (error.w() < 0) error.coeffs() *= -1;
-  // The weight is taken out of the gain again: at small errors yaw has the gain that it is given.
+  // Divided by the weight, the gain at small yaw errors is MC_YAW_P.
   const Vec3 gain(o.MC_ROLL_P, o.MC_PITCH_P, o.MC_YAW_WEIGHT > 1e-4 ? o.MC_YAW_P / o.MC_YAW_WEIGHT : o.MC_YAW_P);
   Vec3 rates = gain.cwiseProduct(2 * error.vec()) + q.conjugate() * Vec3(0, 0, wanted.yaw_rate_radps);
   const Vec3 most = kRadPerDeg * Vec3(o.MC_ROLLRATE_MAX, o.MC_PITCHRATE_MAX, o.MC_YAWRATE_MAX);
@@ -74,7 +74,7 @@ MixedMotors mix(double thrust, const Vec3& torque, double thrust_model) {
 
   MixedMotors out;
   const bool tilt_cut = tilt_scale < 1 - 1e-9;
-  double room = 1;  // share of the yaw that fits
+  double room = 1;  // share of the yaw torque that fits
   for (int i = 0; i < kRotors; ++i) {
     share[i] = base + tilt_scale * share[i];
     const double yaw = kMix[i][2] * torque.z();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inner half of the cascade: attitude to rates (P on quaternions, tilt before yaw), rates to torques (PID with filters), and
-// torques to motors. As PX4's mc_att_control, mc_rate_control and control allocation. One owner each.
+// The inner loops of the cascade: attitude to rates (P on quaternions, tilt before yaw), rates to torques (PID with filters), and
+// torques to motors. Like PX4's mc_att_control, mc_rate_control and control allocation. One owner each.
 //
 //   Vec3 rates = rates_for(options.attitude, q_LV, wanted);                      // rad/s, in V
 //   Vec3 torque = rate_controller.update(gyro_radps, rates, saturation);         // shares, about V's axes
@@ -15,7 +15,7 @@ namespace fbvins {
 
 Vec3 rates_for(const AttitudeControlOptions& options, const Quat& q_LV, const AttitudeSetpoint& wanted);
 
-/// Whether a torque can grow no further about each axis, in either direction: integrals must not.
+/// About which axes and in which direction the torque is saturated: the integrator must not grow there.
 struct TorqueSaturation {
   Eigen::Array<bool, 3, 1> positive = Eigen::Array<bool, 3, 1>::Constant(false);
   Eigen::Array<bool, 3, 1> negative = Eigen::Array<bool, 3, 1>::Constant(false);
@@ -25,10 +25,10 @@ class RateController {
  public:
   RateController(const RateControlOptions& options, double rate_hz);
 
-  /// Rates in V, rad/s. The torques as shares: see mix().
+  /// Rates in V, rad/s. Returns torques as shares of the largest: see mix().
   Vec3 update(const Vec3& measured, const Vec3& wanted, const TorqueSaturation& saturation);
   void reset() { integral_.setZero(); }
-  /// As the controller sees it: the measured rate behind its filter.
+  /// The filtered rate, rad/s in V.
   const Vec3& filtered() const { return rate_; }
 
  private:
@@ -45,8 +45,8 @@ struct MixedMotors {
   TorqueSaturation saturation;
 };
 
-/// A full share of roll or pitch moves each rotor by 1/sqrt(2) of its thrust, one of yaw by all of it, as PX4's allocation has it
-/// for a quadrotor in X. Where rotors cannot give all, thrust yields to roll and pitch, and yaw to both.
+/// A roll or pitch torque of 1 changes each rotor's thrust by 1/sqrt(2) of full thrust, a yaw torque of 1 by all of it, as in
+/// PX4 for a quadrotor in X. At the upper limit thrust is reduced for roll and pitch, but never raised; yaw comes last.
 MixedMotors mix(double thrust, const Vec3& torque, double thrust_model);
 
 }  // namespace fbvins

@@ -89,7 +89,7 @@ Result<void> SocketSender::greet(const StereoRig& rig) {
 Result<bool> SocketSender::hear(int wait_ms) {
   pollfd waiting{connection_.number(), POLLIN, 0};
   if (::poll(&waiting, 1, wait_ms) <= 0) return false;
-  FbvinsSocketGoodbye message{};  // the longest of what it says
+  FbvinsSocketGoodbye message{};  // the longest message of a source
   if (::recv(connection_.number(), &message, sizeof(message), 0) <= 0) return failed("the source is gone");
   switch (message.header.type) {
     case FBVINS_SOCKET_WELCOME: welcome_ = true; break;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensor data to a socket source (docs/socket.md): what a driver in another process does, for a simulated vehicle. One owner.
+// Sends sensor data to a socket source (docs/socket.md) like a driver in another process, for a simulated vehicle. One owner.
 //
 //   Result<std::unique_ptr<SocketSender>> sender = SocketSender::connect("/run/fbvins.sock", rig);
 //   (*sender)->send(reading);
@@ -21,20 +21,20 @@ namespace fbvins {
 
 class SocketSender {
  public:
-  /// Says hello with the rig and waits for the welcome, ten seconds at most.
+  /// Sends HELLO with the rig and waits for WELCOME, ten seconds at most.
   static Result<std::unique_ptr<SocketSender>> connect(const std::string& path, const StereoRig& rig);
   SocketSender(const SocketSender&) = delete;
   SocketSender& operator=(const SocketSender&) = delete;
   ~SocketSender();
 
   Result<void> send(const ImuSample& reading);
-  /// Copied into shared memory. Left out, and missed by the estimator, where every slot is out.
+  /// Copies the images into shared memory. The frame is dropped if no slot is free.
   Result<void> send(const StereoFrame& frame);
 
  private:
   SocketSender(FileDescriptor connection, int width_px, int height_px);
   Result<void> greet(const StereoRig& rig);
-  /// Takes what the source has said; false: nothing is there.
+  /// Handles one message of the source; false if none came in time.
   Result<bool> hear(int wait_ms);
   Result<void> put(const void* message, std::size_t size);
 

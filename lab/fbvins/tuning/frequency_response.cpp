@@ -11,13 +11,13 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double kSegment_s = 4, kHop_s = 0.5;
 
-std::vector<double> steps(const std::vector<double>& x) {
+std::vector<double> differences(const std::vector<double>& x) {
   std::vector<double> d;
   for (std::size_t i = 1; i < x.size(); ++i) d.push_back(x[i] - x[i - 1]);
   return d;
 }
 
-/// The amplitude of a segment beneath a Hann window at one frequency.
+/// Fourier coefficient of a segment with a Hann window at one frequency.
 Complex amplitude(const std::vector<double>& x, std::size_t begin, std::size_t length, double radians_per_sample) {
   double mean = 0;
   for (std::size_t i = 0; i < length; ++i) mean += x[begin + i] / static_cast<double>(length);
@@ -41,7 +41,7 @@ std::vector<double> frequencies(double from_hz, double to_hz, int count) {
 
 std::vector<FrequencyPoint> frequency_response(const std::vector<double>& input, const std::vector<double>& output,
                                                double rate_hz, const std::vector<double>& at_hz) {
-  const std::vector<double> u = steps(input), y = steps(output);
+  const std::vector<double> u = differences(input), y = differences(output);
   const auto length = static_cast<std::size_t>(kSegment_s * rate_hz), hop = static_cast<std::size_t>(kHop_s * rate_hz);
   std::vector<FrequencyPoint> points;
   for (const double hz : at_hz) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a signal follows another, frequency by frequency, from one recording of both (Welch's cross spectra). Pure functions.
+// Frequency response from recorded input and output by Welch's cross spectra. Pure functions.
 //
 //   std::vector<FrequencyPoint> measured = frequency_response(torque, rate, 200, frequencies(0.5, 10, 24));
 #pragma once
@@ -12,13 +12,13 @@ namespace fbvins {
 struct FrequencyPoint {
   double hz = 0;
   std::complex<double> H;
-  double coherence = 0;  ///< share of the output that the input explains, 0 to 1
+  double coherence = 0;  ///< share of the output's power that is linear in the input, 0 to 1
 };
 
-/// Spaced evenly on a logarithmic axis.
+/// Logarithmically spaced.
 std::vector<double> frequencies(double from_hz, double to_hz, int count);
 
-/// Output over input. Both are evenly sampled; steps from sample to sample are compared, so that integrals do no harm.
+/// Output over input, both sampled evenly at `rate_hz`. Uses differences of consecutive samples, which removes drift.
 std::vector<FrequencyPoint> frequency_response(const std::vector<double>& input, const std::vector<double>& output,
                                                double rate_hz, const std::vector<double>& at_hz);
 

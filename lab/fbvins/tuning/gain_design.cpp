@@ -8,15 +8,15 @@ namespace fbvins {
 namespace {
 
 constexpr double kGainMargin = 2;
-constexpr double kAngle_s = 2, kYaw_s = 4, kPlace_s = 6;
-constexpr int kSizes = 48;  ///< of a gain, between the ends of its range
+constexpr double kAngle_s = 2, kYaw_s = 4, kPosition_s = 6;
+constexpr int kSizes = 48;  ///< number of gains tried between the ends of a range
 
 using GainRanges = std::array<GainRange, 4>;
 enum : std::size_t { kP, kI, kD, kOuter };
 
 double clamped(double x, const GainRange& range) { return std::clamp(x, range.least, range.most); }
 
-/// What is common to the two kinds of loops: three gains, an outer one, open loops and a step.
+/// Search over the gains of one loop pair, common to rate/angle and velocity/position.
 template <class Gains, class Inner, class Outer, class Step>
 struct Search {
   GainRanges ranges;
@@ -28,7 +28,7 @@ struct Search {
 
   bool keeps(const Margins& m) const { return m.phase_deg >= options.phase_margin_deg && m.gain >= kGainMargin; }
 
-  /// The largest P with these ratios that keeps the margins; 0 where none does.
+  /// The largest P with these ratios that keeps the margins; 0 if none does.
   double largest(double integral, double derivative, double Gains::*outer_gain) const {
     for (int i = 0; i < kSizes; ++i) {
       Gains g;
@@ -41,7 +41,7 @@ struct Search {
     return 0;
   }
 
-  /// The gains whose step settles first; `found` says whether there are any.
+  /// The gains whose step response settles first; `found`: whether there are any.
   Gains best(double Gains::*outer_gain, bool& found) const {
     Gains chosen;
     double least_s = 1e9;
@@ -51,7 +51,7 @@ struct Search {
         Gains g;
         g.P = largest(integral, derivative, outer_gain);
         if (g.P == 0) continue;
-        // Where the outer gain is at the end of its range, an inner loop that is slower settles sooner.
+        // If the outer gain is at the limit of its range, a slower inner loop can settle sooner.
         for (const double share : {1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.22, 0.16}) {
           Gains h;
           h.P = clamped(share * g.P, ranges[kP]);
@@ -95,11 +95,11 @@ RateGains tune_angle(LoopTuning& loop, const RatePlant& plant, const LoopFilters
   return g;
 }
 
-VelocityGains tune_place(LoopTuning& loop, const VelocityLoop& before, const VelocityLoop& now, const VelocityGains& flown,
-                         const TuneOptions& options) {
+VelocityGains tune_position(LoopTuning& loop, const VelocityLoop& before, const VelocityLoop& now, const VelocityGains& flown,
+                            const TuneOptions& options) {
   const auto inner = [&](const VelocityGains& g, double w) { return velocity_loop(now, g, w); };
   const auto outer = [&](const VelocityGains& g, double w) { return position_loop(now, g, w); };
-  const auto step = [&](const VelocityGains& g) { return position_step(now, g, kPlace_s); };
+  const auto step = [&](const VelocityGains& g) { return position_step(now, g, kPosition_s); };
   const std::vector<double> derivatives = now.across ? std::vector<double>{0, 0.05, 0.1, 0.15} : std::vector<double>{0};
   VelocityGains g =
       search_of<VelocityGains>(px4_ranges(loop.name), {0.1, 0.2, 0.35, 0.5}, derivatives, options, inner, outer, step)
@@ -109,7 +109,7 @@ VelocityGains tune_place(LoopTuning& loop, const VelocityLoop& before, const Vel
   loop.outer_before = margins_of([&](double w) { return position_loop(before, flown, w); });
   loop.inner = margins_of([&](double w) { return inner(g, w); });
   loop.outer = margins_of([&](double w) { return outer(g, w); });
-  loop.before = position_step(before, flown, kPlace_s);
+  loop.before = position_step(before, flown, kPosition_s);
   loop.after = step(g);
   return g;
 }
@@ -135,16 +135,16 @@ Tuning tune(const LoopLog& log, const VehicleFit& fit, const TuneOptions& option
     t.loops[i].name = kNames[i];
     lean[i] = tune_angle(t.loops[i], fit.rate[i].plant, filters, rate_gains(log.control, axis), axis == 2, options);
   }
-  // x and y share their gains: they are those of the slower of the two.
-  const std::size_t slower = fit.velocity[0].plant.delay_s >= fit.velocity[1].plant.delay_s ? 0 : 1, turning = 1 - slower;
+  // x and y share their gains: the axis with the longer delay decides.
+  const std::size_t slower = fit.velocity[0].plant.delay_s >= fit.velocity[1].plant.delay_s ? 0 : 1, rotation_axis = 1 - slower;
   const VelocityPlant &across = fit.velocity[slower].plant, &up = fit.velocity[2].plant;
-  const RateGains flown_lean = rate_gains(log.control, static_cast<int>(turning));
+  const RateGains flown_rotation = rate_gains(log.control, static_cast<int>(rotation_axis));
   t.loops[3].name = std::string(kNames[3]), t.loops[4].name = std::string(kNames[4]);
-  const VelocityGains xy =
-      tune_place(t.loops[3], {across, fit.rate[turning].plant, flown_lean, true, filters},
-                 {across, fit.rate[turning].plant, lean[turning], true, filters}, velocity_gains(log.control, 0), options);
+  const VelocityGains xy = tune_position(t.loops[3], {across, fit.rate[rotation_axis].plant, flown_rotation, true, filters},
+                                         {across, fit.rate[rotation_axis].plant, lean[rotation_axis], true, filters},
+                                         velocity_gains(log.control, 0), options);
   const VelocityLoop z_loop{up, fit.rate[0].plant, lean[0], false, filters};
-  const VelocityGains z = tune_place(t.loops[4], z_loop, z_loop, velocity_gains(log.control, 2), options);
+  const VelocityGains z = tune_position(t.loops[4], z_loop, z_loop, velocity_gains(log.control, 2), options);
 
   RateControlOptions& r = t.proposed.rate;
   AttitudeControlOptions& a = t.proposed.attitude;

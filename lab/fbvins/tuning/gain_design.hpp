@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gains for a vehicle whose response is known: each loop as fast as a stated phase margin, half a turn away from a gain of two,
-// and little overshoot allow, from the innermost outwards. Pure functions.
+// Gains for an identified vehicle, from the innermost loop outwards: each loop settles as fast as the wanted phase margin, a gain
+// margin of two and the largest overshoot allow. Pure functions.
 //
 //   Tuning tuning = tune(log, fit, {.phase_margin_deg = 55});
 //   write(tuning.proposed);
@@ -15,23 +15,23 @@
 namespace fbvins {
 
 struct TuneOptions {
-  double phase_margin_deg = 50;  ///< of every loop, at least
-  double overshoot = 0.06;       ///< of a step in angle or place, predicted, at most
+  double phase_margin_deg = 50;  ///< least, of every loop
+  double overshoot = 0.06;       ///< largest, of the predicted step response in angle or position
 };
 
-/// Between which PX4 takes a gain.
+/// Range in which PX4 accepts a gain.
 struct GainRange {
   double least, most;
 };
-/// Of P, I, D and the gain of the loop around them; loop: roll, pitch, yaw, xy or z.
+/// Ranges of P, I, D and the outer loop's P. `loop`: roll, pitch, yaw, xy or z.
 std::array<GainRange, 4> px4_ranges(const std::string& loop);
 
-/// One loop and the one around it, as flown and as proposed.
+/// An inner loop (rate or velocity) and its outer loop (angle or position), as flown and as proposed.
 struct LoopTuning {
   std::string name;
   Margins inner_before, outer_before, inner, outer;
-  StepResponse before, after;  ///< predicted, of a step in angle or place
-  bool reachable = true;       ///< the margins can be kept within PX4's ranges
+  StepResponse before, after;  ///< predicted, in angle or position
+  bool reachable = true;       ///< whether gains within PX4's ranges keep the margins
 };
 
 struct Tuning {

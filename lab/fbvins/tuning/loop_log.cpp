@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr double kShortest_s = 10, kLongest_s = 24 * 3600;
-/// PX4 begins to rate-control with each gyro sample; logs are brought to this pace.
+/// Signals of a PX4 log have different rates; they are resampled to this one.
 constexpr double kUlog_hz = 200;
 
 Error wrong(const std::string& source, const std::string& what) {
@@ -62,7 +62,7 @@ Result<LoopLog> read_csv(const std::string& folder, VelocitySource velocity) {
   return log;
 }
 
-/// A topic's three fields, turned from forward-right-down or north-east-down, at even times.
+/// Three fields of a topic, converted from FRD or NED to FLU or z up, with interpolation in time.
 class UlogSignal {
  public:
   UlogSignal(const Ulog& log, const std::string& topic, const std::array<std::string, 3>& fields) : t_(log.seconds(topic)) {
@@ -73,7 +73,7 @@ class UlogSignal {
   }
   double from_s() const { return t_.front(); }
   double to_s() const { return t_.back(); }
-  /// Between the two samples around it; of what is not a number, zero: that loop was not closed.
+  /// Linear interpolation. NaN, by which PX4 marks an open loop, counts as zero.
   Vec3 at(double t) const {
     const auto after = std::upper_bound(t_.begin(), t_.end(), t);
     const auto b = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after - t_.begin(), 1, std::ssize(t_) - 1)), a = b - 1;
@@ -88,7 +88,7 @@ class UlogSignal {
   std::array<std::vector<double>, 3> x_;
 };
 
-/// On the ground PX4 asks for an acceleration of 100 m/s^2 downwards: what counts is the longest stretch without.
+/// Keeps the longest stretch in flight: on the ground PX4's acceleration setpoint is 100 m/s^2 downwards.
 void keep_flight(LoopLog& log) {
   constexpr double kFlown_mps2 = 15;
   std::size_t begin = 0, best_begin = 0, best = 0;
@@ -144,7 +144,7 @@ Result<LoopLog> read_loop_log(const std::string& path, VelocitySource velocity) 
                                                              : read_csv(fs::path(path).parent_path().string(), velocity);
   if (!log) return log;
   if (static_cast<double>(log->rate.size()) < kShortest_s * log->rate_hz)
-    return wrong(log->source, fmt::format("{:.1f} s in flight tell too little; {:.0f} s are the least",
+    return wrong(log->source, fmt::format("only {:.1f} s in flight; at least {:.0f} s are needed",
                                           static_cast<double>(log->rate.size()) / log->rate_hz, kShortest_s));
   return log;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a flight's log tells of its control loops, evenly sampled, with the gains that were flown: of `fbvins fly` (a folder with
-// flight.csv and control.yaml) or of PX4 (.ulg). Pure functions.
+// The signals of the control loops from a flight's log, evenly sampled, with the gains as flown: from `fbvins fly` (a folder
+// with flight.csv and control.yaml) or from PX4 (.ulg). Pure functions.
 #pragma once
 
 #include <string>
@@ -16,17 +16,17 @@ struct LoopLog {
   std::string source;
   double rate_hz = 200;
   ControlOptions control;
-  // A sample each. Rates and torques about V's axes (forward, left, up), the others in a level frame with z up.
-  std::vector<Vec3> rate;                ///< rad/s, as the controller sees it
-  std::vector<Vec3> torque;              ///< shares
+  // One entry per sample. Rates and torques in V (FLU), the others in a gravity-aligned frame with z up.
+  std::vector<Vec3> rate;                ///< rad/s, filtered by the controller
+  std::vector<Vec3> torque;              ///< shares of the largest torque
   std::vector<Vec3> velocity;            ///< m/s
   std::vector<Vec3> acceleration_asked;  ///< m/s^2
 };
 
-/// Where velocity is taken from: what the controller flew by, or the truth (motion capture).
+/// Source of the velocity: the controller's estimate, or the truth (in a real flight, motion capture).
 enum class VelocitySource { estimate, truth };
 
-/// A folder of `fbvins fly`, its flight.csv, or a .ulg. Only the part in flight.
+/// `path`: a folder of `fbvins fly`, its flight.csv, or a .ulg. Keeps only the part in flight; an error if it is under 10 s.
 Result<LoopLog> read_loop_log(const std::string& path, VelocitySource velocity = VelocitySource::estimate);
 
 }  // namespace fbvins

@@ -72,10 +72,10 @@ Margins margins_of_samples(const std::vector<double>& radps, const std::vector<C
       m.phase_deg = std::min(m.phase_deg, std::arg(-open[i]) * 180 / std::numbers::pi);
       m.crossover_hz = radps[i] / (2 * std::numbers::pi);
     }
-    // Half a turn: the negative real axis is crossed from below it.
+    // -180 degrees: the locus crosses the negative real axis from below.
     const bool half_turn = open[i - 1].imag() < 0 && open[i].imag() >= 0 && open[i].real() < 0;
     if (half_turn && crossed) m.gain = std::min(m.gain, 1 / std::abs(open[i]));
-    if (half_turn && !crossed) m.gain = std::min(m.gain, 0.0);  // it turns round while it is still strong
+    if (half_turn && !crossed) m.gain = std::min(m.gain, 0.0);  // -180 degrees at a gain above 1
   }
   if (!crossed) m.phase_deg = 180;
   return m;

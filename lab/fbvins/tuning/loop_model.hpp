@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One axis of a vehicle as its control loops see it: from torque to rate, from an acceleration that is asked for to velocity; and
-// what controllers of PX4's structure make of it. Laplace's s, seconds, radians. Pure functions.
+// Linear model of one axis: from torque to rate, from acceleration setpoint to velocity, and the loops that controllers of PX4's
+// structure close around it. s is the Laplace variable; seconds, radians. Pure functions.
 #pragma once
 
 #include <complex>
@@ -10,16 +10,16 @@ namespace fbvins {
 
 /// rate / torque = gain (1 + lead s) e^(-delay s) / (s (1 + lag s)).
 struct RatePlant {
-  double gain = 1;  ///< rad/s^2 of a full torque
+  double gain = 1;  ///< rad/s^2 at full torque
   double lag_s = 0, delay_s = 0, lead_s = 0;
 };
-/// velocity / asked acceleration = gain e^(-delay s) / (s + drag), behind the attitude loop across, behind the rotors' lag
-/// upwards.
+/// velocity / acceleration setpoint = gain e^(-delay s) / (s + drag), in series with the attitude loop (horizontally) or the
+/// rotors' lag (vertically).
 struct VelocityPlant {
   double gain = 1, delay_s = 0, drag_per_s = 0;
 };
 
-/// Filters and pace of the controller.
+/// Filters and rate of the controller.
 struct LoopFilters {
   double rate_hz = 200;
   double gyro_cutoff_hz = 30, dgyro_cutoff_hz = 20;
@@ -28,7 +28,7 @@ struct LoopFilters {
 
 struct RateGains {
   double P = 0, I = 0, D = 0;
-  double angle_P = 0;  ///< of the loop around it
+  double angle_P = 0;  ///< of the outer loop
 };
 struct VelocityGains {
   double P = 0, I = 0, D = 0;
@@ -36,7 +36,7 @@ struct VelocityGains {
 };
 
 using Complex = std::complex<double>;
-/// The low pass of ButterworthFilter at this frequency.
+/// Frequency response of ButterworthFilter.
 Complex butterworth(double radps, double rate_hz, double cutoff_hz);
 
 Complex plant_of(const RatePlant& plant, double radps);
@@ -44,7 +44,7 @@ Complex rate_loop(const RatePlant& plant, const RateGains& gains, const LoopFilt
 Complex angle_loop(const RatePlant& plant, const RateGains& gains, const LoopFilters& filters, double radps);      ///< open
 Complex angle_response(const RatePlant& plant, const RateGains& gains, const LoopFilters& filters, double radps);  ///< closed
 
-/// An axis across leans by `lean`; without, it is the axis upwards with the rotors' lag.
+/// `across`: a horizontal axis, moved by tilting with the plant `rotor` and the gains `lean`; else vertical, with `rotor`'s lag.
 struct VelocityLoop {
   VelocityPlant plant;
   RatePlant rotor;
@@ -52,25 +52,25 @@ struct VelocityLoop {
   bool across = true;
   LoopFilters filters;
 };
-Complex velocity_plant(const VelocityLoop& loop, double radps);                             ///< velocity / asked acceleration
+Complex velocity_plant(const VelocityLoop& loop, double radps);                             ///< velocity / acceleration setpoint
 Complex velocity_loop(const VelocityLoop& loop, const VelocityGains& gains, double radps);  ///< open
 Complex position_loop(const VelocityLoop& loop, const VelocityGains& gains, double radps);  ///< open
 
-/// How far an open loop is from instability.
+/// Stability margins of an open loop.
 struct Margins {
-  double phase_deg = -180;  ///< least at any gain of one
-  double gain = 0;          ///< least factor to a gain of one where the phase is half a turn, above the crossover
-  double crossover_hz = 0;  ///< the last one
+  double phase_deg = -180;  ///< smallest of all crossovers
+  double gain = 0;          ///< smallest factor to a gain of 1 where the phase is -180 degrees, above the crossover
+  double crossover_hz = 0;  ///< of the last crossover (gain of 1)
 };
 template <class OpenLoop>
 Margins margins_of(OpenLoop&& open);
 
-/// A step of one.
+/// Response to a unit step.
 struct StepResponse {
   double dt_s = 0;
   std::vector<double> y;
   double overshoot = 0;   ///< share of the step
-  double settling_s = 0;  ///< until it stays within 5 %; the whole length where it does not
+  double settling_s = 0;  ///< until it stays within 5 %; the whole length if it does not
   double rise_s = 0;      ///< to 90 %
 };
 StepResponse judged(std::vector<double> y, double dt_s);

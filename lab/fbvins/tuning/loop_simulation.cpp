@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The loops of loop_model.hpp in time: the vehicle in steps of a millisecond, the controller at its own pace.
+// The loops of loop_model.hpp in the time domain: the vehicle in steps of a millisecond, the controller at its own rate.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +12,7 @@ namespace {
 constexpr double kStep_s = 1e-3, kSettled = 0.05, kRisen = 0.9;
 constexpr double kDiverged = 20;
 
-/// What went in some time ago.
+/// A pure delay.
 class DelayLine {
  public:
   explicit DelayLine(double delay_s) : kept_(static_cast<std::size_t>(std::lround(std::max(0.0, delay_s) / kStep_s)) + 1, 0.0) {}
@@ -27,13 +27,13 @@ class DelayLine {
   std::size_t at_ = 0;
 };
 
-/// From torque to angle, with the loops of rate and angle around it.
+/// From torque to angle, with the rate and angle loops closed around it.
 class LeaningAxis {
  public:
   LeaningAxis(const RatePlant& plant, const RateGains& gains, const LoopFilters& f)
       : plant_(plant),
         gains_(gains),
-        // A command that is held for a period is late by half of it already.
+        // The zero-order hold of the command is already a delay of half a period.
         delay_(plant.delay_s - 0.5 / f.rate_hz),
         period_s_(1 / f.rate_hz),
         rate_filter_(f.rate_hz, f.gyro_cutoff_hz),
@@ -64,7 +64,7 @@ class LeaningAxis {
   double last_ = 0, integral_ = 0, torque_ = 0, given_ = 0, rate_ = 0, angle_ = 0;
 };
 
-/// Calls control() once in a period and move() every step; stops where `y` runs away.
+/// Calls control() once per period and move() at every step, with y limited to +-kDiverged.
 template <class Control, class Move>
 StepResponse run(double seconds, double rate_hz, Control&& control, Move&& move) {
   std::vector<double> y;

@@ -12,9 +12,9 @@ namespace fbvins {
 namespace {
 
 constexpr double kCoherent = 0.7;
-/// Above what is flown to be told apart, noise goes round the loop and shows the controller's inverse instead of the vehicle.
+/// Above the excitation's frequencies, noise in the closed loop shows the inverse of the controller instead of the vehicle.
 constexpr double kFastest_hz = 6;
-/// Below it a window of four seconds holds too few swings of what is integrated.
+/// Below this a window of four seconds has too few periods.
 constexpr double kSlowest_hz = 0.7;
 constexpr std::size_t kFewest = 6;
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -26,8 +26,8 @@ std::vector<FrequencyPoint> coherent(std::vector<FrequencyPoint> points) {
 
 double radps(const FrequencyPoint& p) { return 2 * std::numbers::pi * p.hz; }
 
-/// A model but for its gain, against what was measured: the gain that fits best, and how well. The logarithm makes a factor of
-/// gain and an angle of the same size count the same.
+/// Fits the gain of a model `shape` to measured points. The cost is of complex logarithms: a relative error of gain and an angle
+/// of the same size count the same.
 struct Match {
   double gain = 1, cost = 0, misfit_db = 0, misfit_deg = 0;
 };
@@ -44,7 +44,7 @@ Match match(const std::vector<FrequencyPoint>& points, const std::function<Compl
           std::sqrt(turns / weight) * kDegrees};
 }
 
-/// The best plant of a grid, then of a finer one around it, and how well it fits.
+/// Grid search with refinement around the best plant.
 template <class Plant, class Fit>
 void refine(const std::function<Match(const Plant&)>& judge, const std::function<std::vector<Plant>(const Plant&, int)>& around,
             Fit& fit) {
@@ -69,7 +69,7 @@ std::vector<double> column(const std::vector<Vec3>& all, int axis) {
 
 Error unseen(const std::string& what) {
   return {ErrorCode::invalid_argument,
-          fmt::format("{}: the vehicle was not moved enough about or along it to tell its response", what)};
+          fmt::format("{}: not enough excitation about or along this axis to identify its response", what)};
 }
 
 }  // namespace
@@ -79,7 +79,7 @@ Result<RateFit> fit_rate(const std::vector<double>& torque, const std::vector<do
   RateFit fit;
   fit.points = coherent(frequency_response(torque, rate, filters.rate_hz, frequencies(0.6, kFastest_hz, 28)));
   if (fit.points.size() < kFewest) return unseen("rate");
-  // The log holds the rate behind the controller's filter.
+  // The log has the rate after the controller's filter.
   const auto judge = [&](const RatePlant& p) {
     return match(fit.points, [&](double w) { return plant_of(p, w) * butterworth(w, filters.rate_hz, filters.gyro_cutoff_hz); });
   };
@@ -153,7 +153,7 @@ Result<VehicleFit> fit_vehicle(const LoopLog& log) {
     vehicle.rate[static_cast<std::size_t>(axis)] = *std::move(fit);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    // x is reached by pitch, y by roll, z by all rotors.
+    // x is controlled by pitch, y by roll, z by thrust.
     const auto turning = static_cast<std::size_t>(axis == 0 ? 1 : 0);
     VelocityLoop loop{{}, vehicle.rate[turning].plant, rate_gains(log.control, axis == 0 ? 1 : 0), axis < 2, filters};
     Result<VelocityFit> fit = fit_velocity(column(log.acceleration_asked, axis), column(log.velocity, axis), loop);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a flight's log says of the vehicle: delay, lag and gain of each axis, from how its rate follows torque and its velocity
-// follows the acceleration that was asked for. Pure functions.
+// System identification from a flight's log: gain, lag and delay of each axis, from torque to rate and from acceleration setpoint
+// to velocity. Pure functions.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace fbvins {
 
-/// A fit and what it was made of.
+/// The measured points of a fit and its residuals.
 struct Fit {
-  std::vector<FrequencyPoint> points;    ///< those that count
-  double misfit_db = 0, misfit_deg = 0;  ///< root mean squares
+  std::vector<FrequencyPoint> points;    ///< those with enough coherence
+  double misfit_db = 0, misfit_deg = 0;  ///< root mean square residuals
 };
 struct RateFit : Fit {
   RatePlant plant;
@@ -25,17 +25,17 @@ struct VelocityFit : Fit {
   VelocityPlant plant;
 };
 
-/// `yaw`: with the torque of rotors that change their speed, which comes at once.
+/// `yaw`: with a lead, for the immediate reaction torque of rotors that change their speed.
 Result<RateFit> fit_rate(const std::vector<double>& torque, const std::vector<double>& rate, const LoopFilters& filters,
                          bool yaw);
-/// `loop` without its plant.
+/// `loop`: all but its plant, which is fitted.
 Result<VelocityFit> fit_velocity(const std::vector<double>& asked, const std::vector<double>& velocity, const VelocityLoop& loop);
 
 struct VehicleFit {
   std::array<RateFit, 3> rate;          ///< roll, pitch, yaw
   std::array<VelocityFit, 3> velocity;  ///< x, y, z
 };
-/// One sentence where the log does not show an axis: it was not moved enough.
+/// Error, in one sentence, if an axis was not excited enough.
 Result<VehicleFit> fit_vehicle(const LoopLog& log);
 
 LoopFilters filters_of(const LoopLog& log);

@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-/// Both as lists of the same fields.
+/// A gain that differs between flown and proposed options.
 struct Change {
   std::string name;
   double before, after;
@@ -29,10 +29,10 @@ std::vector<Change> changes(const Tuning& tuning) {
 }
 
 std::string step_text(const StepResponse& s) {
-  return fmt::format("{:4.0f} % over, settled after {:.2f} s", 100 * s.overshoot, s.settling_s);
+  return fmt::format("overshoot {:.0f} %, settled after {:.2f} s", 100 * s.overshoot, s.settling_s);
 }
 
-// The picture, pixels.
+// Layout of the plot, pixels.
 constexpr double kPanelWidth = 300, kPanelHeight = 200, kGap = 50, kMargin = 40, kTop = 1.6;
 
 std::string polyline(const StepResponse& s, double seconds, double x0, double y0, const char* colour) {
@@ -63,12 +63,12 @@ std::string panel(const LoopTuning& loop, double x0, double y0) {
 }  // namespace
 
 std::string tuning_text(const Tuning& t, const TuneOptions& options) {
-  std::string text = "what the log shows\n";
+  std::string text = "identified from the log\n";
   constexpr const char *kTurns[] = {"roll", "pitch", "yaw"}, *kWays[] = {"x", "y", "z"};
   for (std::size_t i = 0; i < 3; ++i) {
     const RateFit& f = t.fit.rate[i];
     text += fmt::format(
-        "  {:5}  {:6.1f} rad/s^2 of a full torque, lag {:.0f} ms, delay {:.0f} ms{}; fits to {:.1f} dB, {:.0f} deg, {:.1f} to {:.1f} Hz\n",
+        "  {:5}  {:6.1f} rad/s^2 at full torque, lag {:.0f} ms, delay {:.0f} ms{}; fits to {:.1f} dB, {:.0f} deg, {:.1f} to {:.1f} Hz\n",
         kTurns[i], f.plant.gain, 1e3 * f.plant.lag_s, 1e3 * f.plant.delay_s,
         i == 2 ? fmt::format(", lead {:.0f} ms", 1e3 * f.plant.lead_s) : "", f.misfit_db, f.misfit_deg, f.points.front().hz,
         f.points.back().hz);
@@ -76,18 +76,19 @@ std::string tuning_text(const Tuning& t, const TuneOptions& options) {
   for (std::size_t i = 0; i < 3; ++i) {
     const VelocityFit& f = t.fit.velocity[i];
     text += fmt::format(
-        "  {:5}  {:6.2f} of the acceleration asked for, delay {:.0f} ms, drag {:.2f}/s; fits to {:.1f} dB, {:.0f} deg, {:.1f} to {:.1f} Hz\n",
+        "  {:5}  {:6.2f} of the acceleration setpoint, delay {:.0f} ms, drag {:.2f}/s; fits to {:.1f} dB, {:.0f} deg, {:.1f} to {:.1f} Hz\n",
         kWays[i], f.plant.gain, 1e3 * f.plant.delay_s, f.plant.drag_per_s, f.misfit_db, f.misfit_deg, f.points.front().hz,
         f.points.back().hz);
   }
-  text += fmt::format("\nloops: margins as flown -> proposed (asked for: {:.0f} deg), and a predicted step of angle or place\n",
-                      options.phase_margin_deg);
+  text += fmt::format(
+      "\nloops: margins as flown -> proposed (wanted: {:.0f} deg), and the predicted step response in angle or position\n",
+      options.phase_margin_deg);
   for (const LoopTuning& l : t.loops) {
     text += fmt::format("  {:5}  inner {:.0f} deg at {:.2f} Hz -> {:.0f} at {:.2f}, outer {:.0f} at {:.2f} -> {:.0f} at {:.2f}\n",
                         l.name, l.inner_before.phase_deg, l.inner_before.crossover_hz, l.inner.phase_deg, l.inner.crossover_hz,
                         l.outer_before.phase_deg, l.outer_before.crossover_hz, l.outer.phase_deg, l.outer.crossover_hz);
     text += fmt::format("         {} -> {}{}\n", step_text(l.before), step_text(l.after),
-                        l.reachable ? "" : "; no gains within PX4's ranges keep the margins: left as they were");
+                        l.reachable ? "" : "; no gains within PX4's ranges keep the margins: unchanged");
   }
   text += "\ngains\n";
   for (const Change& c : changes(t)) text += fmt::format("  {:18} {:8.4g} -> {:.4g}\n", c.name, c.before, c.after);
@@ -118,7 +119,8 @@ std::string tuning_svg(const Tuning& tuning) {
   const double x = kMargin + 2 * (kPanelWidth + kGap), y = kMargin + kPanelHeight + kGap + 40;
   svg += fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" class=\"t\" style=\"fill:#c0504d\">as flown</text>\n", x, y);
   svg += fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" class=\"t\" style=\"fill:#1f77b4\">proposed</text>\n", x, y + 22);
-  svg += fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" class=\"t\">predicted from what the log shows</text>\n</svg>\n", x, y + 44);
+  svg += fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" class=\"t\">predicted with the identified vehicle</text>\n</svg>\n", x,
+                     y + 44);
   return svg;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tuning for people and programs: tables, gains as `fbvins fly --control` and as QGroundControl read them, and a picture of
-// every loop's step before and after. The same tuning gives the same bytes. Pure functions.
+// Output of a tuning: a text, gains for `fbvins fly --control` and for QGroundControl, and a plot of every loop's step response
+// before and after. The same tuning gives the same bytes. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace fbvins {
 
 std::string tuning_text(const Tuning& tuning, const TuneOptions& options);
 std::string control_yaml(const ControlOptions& control);
-/// QGroundControl's parameter file, with those that changed.
+/// QGroundControl's parameter file with the changed gains.
 std::string px4_parameter_file(const Tuning& tuning);
 std::string tuning_svg(const Tuning& tuning);
 

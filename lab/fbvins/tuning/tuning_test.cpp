@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a flight of the simulated vehicle with wrong gains to right ones, and what they are worth: judged on the vehicle itself,
-// with its saturation, its battery and its noise, against the best that a search on the vehicle finds.
+// Tunes wrong gains from a flight of the simulated vehicle and judges the result on the vehicle itself, with its saturation,
+// battery and noise, against the best gains that a search on the vehicle finds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kRate_hz = 200;
 
-/// A vehicle that hovers, flown by its cascade on its own motion, which is known but for noise.
+/// A hovering vehicle, controlled by the cascade with its true state and noise.
 class Hovering {
  public:
   explicit Hovering(const ControlOptions& control)
@@ -83,7 +83,7 @@ LoopLog identify(const ControlOptions& control) {
   return log;
 }
 
-/// A step on the vehicle itself, as a share of it.
+/// Normalised step response of the vehicle itself.
 StepResponse step_of(const ControlOptions& control, const std::string& loop) {
   Hovering flight(control);
   flight.settle(4);
@@ -128,8 +128,8 @@ ControlOptions wrong_by(double factor) {
   return control;
 }
 
-/// The shortest settling with no more overshoot than allowed that a search over the loop's gains, within PX4's ranges, finds on
-/// the vehicle.
+/// The shortest settling time within the allowed overshoot that a random search over the loop's gains, within PX4's ranges, finds
+/// on the vehicle.
 double best_settling_s(ControlOptions control, const std::string& loop, double overshoot) {
   Rng rng(5);
   double least = 1e9;
@@ -166,7 +166,7 @@ TEST(FrequencyResponse, OfAKnownLagWithADelay) {
   }
 }
 
-TEST(LoopModel, MarginsOfLoopsThatAreKnown) {
+TEST(LoopModel, MarginsOfKnownLoops) {
   const Margins integrator = margins_of([](double w) { return Complex(0, -10 / w); });
   EXPECT_NEAR(integrator.phase_deg, 90, 1e-6);
   EXPECT_NEAR(integrator.crossover_hz, 10 / (2 * std::numbers::pi), 0.05);
@@ -176,15 +176,15 @@ TEST(LoopModel, MarginsOfLoopsThatAreKnown) {
   EXPECT_LT(margins_of([](double w) { return Complex(0, -100 / w) * std::polar(1.0, -0.05 * w); }).gain, 1);
 }
 
-TEST(PlantFit, FindsWhatTheVehicleIs) {
+TEST(PlantFit, FindsTheVehiclesParameters) {
   const QuadrotorOptions vehicle;
   const Result<VehicleFit> fit = fit_vehicle(identify(control_for(vehicle)));
   ASSERT_TRUE(fit) << fit.error().message;
-  // A full torque of roll moves each rotor's share by 1/sqrt(2) of its full thrust, on arms of arm_y.
+  // A full roll torque changes each rotor's thrust by 1/sqrt(2) of full thrust, on arms of arm_y.
   const double full_N = vehicle.thrust_N_per_radps2 * std::pow(vehicle.rotor_max_radps, 2);
   const double roll = 4 / std::numbers::sqrt2 * full_N * vehicle.arm_y_m / vehicle.inertia_x_kgm2;
   EXPECT_NEAR(fit->rate[0].plant.gain / roll, 1, 0.25);
-  // Rotors lag by 30 to 45 ms, the command is held for 5.
+  // Rotors lag by 30 to 45 ms, and the command is held for 5 ms.
   const double late_s = fit->rate[0].plant.lag_s + fit->rate[0].plant.delay_s;
   EXPECT_GT(late_s, 0.03);
   EXPECT_LT(late_s, 0.06);
@@ -206,7 +206,7 @@ TEST_P(FromWrongGains, TwoRoundsLeadToGoodOnes) {
   }
   for (const std::string& loop : kLoops) {
     const StepResponse s = step_of(control, loop);
-    static std::map<std::string, double> found;  // by loop: where it began makes no difference
+    static std::map<std::string, double> found;  // by loop; independent of the initial gains
     if (!found.contains(loop)) found[loop] = best_settling_s(control, loop, 0.10);
     const double best_s = found[loop];
     std::printf("%s: %.0f %% over, settled after %.2f s, best found %.2f s\n", loop.c_str(), 100 * s.overshoot, s.settling_s,

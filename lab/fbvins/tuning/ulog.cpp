@@ -19,7 +19,7 @@ constexpr std::size_t kHead_bytes = 16, kMessageHead_bytes = 3, kLargestMessage_
 constexpr std::string_view kMagic = "ULog\x01\x12\x35";
 constexpr std::string_view kStampField = "timestamp";
 
-/// 'u' and 'i': whole numbers, 'f': the others, 'x': nothing that is read.
+/// 'u' and 'i': integers, 'f': floating point, 'x': not read.
 struct Type {
   std::string_view name;
   char kind;
@@ -74,11 +74,11 @@ Result<Ulog> Ulog::read(const std::string& path) {
 
 Result<Ulog> Ulog::parse(std::string_view bytes, const std::string& source) {
   if (bytes.size() < kHead_bytes || bytes.substr(0, kMagic.size()) != kMagic)
-    return broken(fmt::format("{}: this is no log of PX4 (.ulg)", source));
+    return broken(fmt::format("{}: this is not a PX4 log (.ulg)", source));
   Ulog log;
   for (std::size_t at = kHead_bytes; at + kMessageHead_bytes <= bytes.size();) {
     const std::size_t size = word_at(bytes, at);
-    if (at + kMessageHead_bytes + size > bytes.size()) break;  // power was cut while it was written
+    if (at + kMessageHead_bytes + size > bytes.size()) break;  // truncated, by a power cut for example
     if (Result<void> done = log.take(bytes[at + 2], bytes.substr(at + kMessageHead_bytes, size)); !done)
       return broken(fmt::format("{}: {} at byte {}", source, done.error().message, at));
     at += kMessageHead_bytes + size;
@@ -124,7 +124,7 @@ Result<void> Ulog::take_format(std::string_view text) {
     const auto* known = std::find_if(kTypes.begin(), kTypes.end(), [&](const Type& t) { return t.name == type; });
     if (known != kTypes.end() && format.size + known->size * static_cast<std::size_t>(std::max(1, count)) > kLargestMessage_bytes)
       return broken(fmt::format("'{}' is larger than a message can be", name.substr(0, 40)));
-    // Messages within messages come after what is read here; what lies behind one is not found, and not read.
+    // Nested formats are not supported: this field and those after it are not read.
     if (known == kTypes.end()) return {};
     for (int i = 0; i < std::max(1, count); ++i) {
       if (known->kind != 'x')
@@ -135,7 +135,7 @@ Result<void> Ulog::take_format(std::string_view text) {
   return {};
 }
 
-/// A byte with the length of "type name", those, and the value.
+/// One byte with the length of the key, the key "type name", and the value.
 void Ulog::take_parameter(std::string_view body) {
   if (body.empty()) return;
   const auto length = static_cast<std::size_t>(static_cast<unsigned char>(body[0]));

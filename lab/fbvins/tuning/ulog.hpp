@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of PX4's logs (.ulg) what a tuner needs: numbers of topics by name, and parameters. What else they hold is skipped, and a log
-// that was cut off is read as far as it goes. Values; one thread. Format:
+// Reads from PX4's logs (.ulg) what tuning needs: numeric fields of topics by name, and parameters. Everything else is skipped,
+// and a truncated log is read up to its end. Values; one thread. Format:
 // https://docs.px4.io/main/en/dev_log/ulog_file_format.html
 //
 //   Result<Ulog> log = Ulog::read("flight.ulg");
@@ -23,15 +23,15 @@ class Ulog {
   /// `source` names the bytes in messages.
   static Result<Ulog> parse(std::string_view bytes, const std::string& source);
 
-  /// Stamps of a topic's first instance, seconds since boot; empty where it was not logged.
+  /// Stamps of a topic's first instance, seconds since boot; empty if it was not logged.
   std::vector<double> seconds(const std::string& topic) const;
-  /// A field, of an array with its index in brackets; empty where there is no such field.
+  /// Values of a field; for arrays with the index in brackets ("xyz[0]"). Empty if there is no such field.
   std::vector<double> numbers(const std::string& topic, const std::string& field) const;
-  /// As it was when the log began.
+  /// Value at the beginning of the log.
   std::optional<double> parameter(const std::string& name) const;
 
  private:
-  /// Where a number lies in a message of a format, and how it is written there.
+  /// Offset and type of a number in a message.
   struct Field {
     std::size_t offset = 0;
     char kind = 'f';

@@ -50,7 +50,7 @@ std::string log() {
 TEST(Ulog, NumbersStampsAndParametersByName) {
   const Result<Ulog> ulog = Ulog::parse(log(), "a.ulg");
   ASSERT_TRUE(ulog) << ulog.error().message;
-  EXPECT_EQ(ulog->seconds("torque"), (std::vector{1.5, 2.5})) << "the second instance is another one";
+  EXPECT_EQ(ulog->seconds("torque"), (std::vector{1.5, 2.5})) << "only the first instance counts";
   EXPECT_EQ(ulog->numbers("torque", "xyz[1]"), (std::vector{2.0, 5.0}));
   EXPECT_EQ(ulog->numbers("torque", "z"), (std::vector{-3.0, 6.0}));
   EXPECT_TRUE(ulog->numbers("torque", "w").empty());
@@ -59,7 +59,7 @@ TEST(Ulog, NumbersStampsAndParametersByName) {
   EXPECT_FALSE(ulog->parameter("MC_YAW_P"));
 }
 
-TEST(Ulog, ALogThatWasCutOffIsReadAsFarAsItGoes) {
+TEST(Ulog, ATruncatedLogIsReadUpToItsEnd) {
   const std::string whole = log();
   for (std::size_t size = 16; size < whole.size(); ++size) {
     const Result<Ulog> cut = Ulog::parse(std::string_view(whole).substr(0, size), "cut.ulg");
@@ -70,10 +70,10 @@ TEST(Ulog, ALogThatWasCutOffIsReadAsFarAsItGoes) {
   EXPECT_EQ(cut->seconds("torque").size(), 1u);
 }
 
-TEST(Ulog, AnythingElseIsOneSentence) {
+TEST(Ulog, RefusesOtherFilesInOneSentence) {
   const Result<Ulog> other = Ulog::parse("timestamp,x,y,z, and so on", "b.csv");
   ASSERT_FALSE(other);
-  EXPECT_EQ(other.error().message, "b.csv: this is no log of PX4 (.ulg)");
+  EXPECT_EQ(other.error().message, "b.csv: this is not a PX4 log (.ulg)");
 }
 
 }  // namespace
