@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Correct matches between two images some frames apart, by OpenCV's own matcher: OpenCV's ORB, ours, and ours after the booster.
+"""Counts correct matches between two images some frames apart, with OpenCV's matcher: OpenCV's ORB, fbvins' ORB, and that boosted.
 
-A match is correct where it fits the motion that RANSAC finds between the two views.
+A match is correct if it fits the motion that RANSAC finds between the two views.
 
     pip install opencv-python-headless
     boost_beside_opencv.py RECORDING [--gap FRAMES] [--pairs N]

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A RealSense D435i as a sender for `fbvins live --source socket:PATH`, by Intel's Python package (pip install pyrealsense2 numpy).
+"""Sends a RealSense D435i to `fbvins live --source socket:PATH`, by Intel's Python package (pip install pyrealsense2 numpy).
 
-usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag]    until Ctrl-C, or the recording's end; a camera that is unplugged is waited for
+usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag]    runs until Ctrl-C, or the recording's end; waits for a camera that is unplugged
 """
 import collections
 import fcntl
@@ -18,17 +18,17 @@ import numpy
 import pyrealsense2 as rs
 
 SLOTS = 16
-IMU_NOISE = (2.44e-4, 1.9393e-5, 1.47e-3, 3.0e-3)  # BMI055's data sheet; random walks assumed. docs/d435i.md
+IMU_NOISE = (2.44e-4, 1.9393e-5, 1.47e-3, 3.0e-3)  # densities from the BMI055's data sheet, random walks assumed (docs/d435i.md)
 
 
 def rig(left, right, gyro):
-    """FbvinsSocketRig (docs/socket.md) of the factory's calibration."""
+    """FbvinsSocketRig (docs/socket.md) with the factory calibration."""
     def camera(profile):
         lens, where = profile.get_intrinsics(), profile.get_extrinsics_to(gyro)
-        rotation = numpy.array(where.rotation).reshape(3, 3).T  # it comes column by column
+        rotation = numpy.array(where.rotation).reshape(3, 3).T  # librealsense stores it by columns
         pose = numpy.hstack([rotation, numpy.array(where.translation).reshape(3, 1)])
         if lens.coeffs[4] or (any(lens.coeffs) and lens.model != rs.distortion.brown_conrady):
-            sys.exit(f"the distortion {lens.model} cannot be had; calibrate with Kalibr")
+            sys.exit(f"the distortion model {lens.model} is not supported; calibrate with Kalibr")
         return struct.pack("<II20d", 0, 0, lens.fx, lens.fy, lens.ppx, lens.ppy, *lens.coeffs[:4], *pose.flatten())
     return camera(left) + camera(right) + struct.pack("<7d", *IMU_NOISE, gyro.fps(), left.fps(), 0)
 
@@ -38,7 +38,7 @@ def message(kind, body):
 
 
 class Sender:
-    """One connection: hello, readings and frames out; slots that are free again in."""
+    """One connection: sends hello, readings and frames; receives which slots are free again."""
 
     def __init__(self, path, width, height, calibration):
         self.size, self.sequence, self.lock = width * height, 0, threading.Lock()
@@ -56,7 +56,7 @@ class Sender:
             pass
 
     def hear(self, flags=socket.MSG_DONTWAIT):
-        """The type of the next message, or none."""
+        """The type of the next message, or None."""
         try:
             said = self.connection.recv(32768, flags)
         except BlockingIOError:
@@ -79,7 +79,7 @@ class Sender:
                 pass
             self.sequence += 1
             if not self.free:
-                return  # the estimator sees from the sequence that there was a frame
+                return  # the gap in `sequence` tells the estimator of the frame
             slot = self.free.pop()
             self.slots[slot, 0], self.slots[slot, 1] = left, right
             self.connection.send(message(3, struct.pack("<qQII", t_ns, self.sequence, slot, 3)))
@@ -116,7 +116,7 @@ class Camera:
 
     @staticmethod
     def distance(profile):
-        """From 640 x 480 at 30 Hz; of an IMU the fastest."""
+        """How far a profile is from the wanted one: 640 x 480 at 30 Hz, of an IMU the fastest."""
         if profile is None:
             return float("inf")
         if not profile.is_video_stream_profile():
@@ -134,7 +134,7 @@ class Camera:
                     v = frame.as_motion_frame().get_motion_data()
                     (self.gyro if profile.stream_type() == rs.stream.gyro else self.accel).append((t_ns, numpy.array([v.x, v.y, v.z])))
                     self.send_readings()
-        except Exception as error:  # the library's threads swallow it
+        except Exception as error:  # else it would be lost in a thread of the library
             self.failure = error
 
     def take_image(self, camera, t_ns, image):
@@ -159,7 +159,7 @@ class Camera:
             try:
                 sensor.stop()
                 sensor.close()
-            except RuntimeError:  # it is unplugged
+            except RuntimeError:  # unplugged
                 pass
         self.sender.connection.close()
 
@@ -183,7 +183,7 @@ def main(path, which=""):
         while not over.wait(0.2) and camera.failure is None:
             pass
         camera.stop()
-        print(f"the camera is over: {camera.failure or 'unplugged, or the end of its recording'}", file=sys.stderr)
+        print(f"the camera's stream has ended: {camera.failure or 'unplugged, or the end of its recording'}", file=sys.stderr)
         if recorded:
             return
 

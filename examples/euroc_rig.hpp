@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The calibration of the EuRoC recordings, as a sender says it: cam0, cam1, then the IMU's noise and the rates.
+// The calibration of the EuRoC recordings, as a sender passes it: cam0, cam1, then the IMU's noise and the rates.
 #pragma once
 
 #include "fbvins/live/socket_protocol.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays an EuRoC folder as if it were sensors: a sender for `fbvins live --source socket:PATH`. Of FB-VINS it needs one header.
+// Plays a EuRoC folder as if it were sensors: a sender for `fbvins live --source socket:PATH`. It needs one header of FB-VINS.
 //   g++ -std=c++20 -O2 -I include examples/socket_sender.cpp -lpng -o socket_sender && ./socket_sender PATH MH_01_easy/mav0
 #include <fcntl.h>
 #include <png.h>
@@ -15,7 +15,7 @@
 #include <string>
 #include <thread>
 
-#include "euroc_rig.hpp"  // where your calibration goes
+#include "euroc_rig.hpp"  // put your calibration here
 
 static const uint32_t kWidth = 752, kHeight = 480, kImageBytes = kWidth * kHeight, kSlotBytes = 2 * kImageBytes, kSlots = 16;
 static const int connection = socket(AF_UNIX, SOCK_SEQPACKET, 0);
@@ -30,7 +30,7 @@ static void send_message(uint32_t type, Message& message, size_t size = sizeof(M
   with.msg_iov = &bytes, with.msg_iovlen = 1;
   need(sendmsg(connection, &with, MSG_NOSIGNAL) >= 0, "the estimator is gone");
 }
-/// Takes what the estimator says: slots that are free again, or a goodbye.
+/// Receives a message of the estimator: slots that are free again, or a goodbye.
 static bool hear(uint64_t& free_slots, int flags) {
   FbvinsSocketGoodbye message{};  // the longest of its messages
   const bool heard = recv(connection, &message, sizeof(message), flags) > 0;
@@ -83,7 +83,7 @@ int main(int argc, char** argv) {
   });
   for (; images; images.ignore(1000, '\n') >> frame.t_ns, ++frame.sequence) {
     while (hear(free_slots, MSG_DONTWAIT)) continue;
-    if (free_slots == 0) continue;  // the estimator sees from `sequence` that there was a frame
+    if (free_slots == 0) continue;  // the gap in `sequence` tells the estimator of the frame
     frame.slot = static_cast<uint32_t>(__builtin_ctzll(free_slots));
     uint8_t* slot = slots + frame.slot * kSlotBytes;
     const std::string name = "/data/" + std::to_string(frame.t_ns) + ".png";

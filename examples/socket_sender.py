@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A sender for `fbvins live --source socket:PATH`, of Python's standard library alone: a made-up rig that rests for two seconds
-and then sways sideways in front of a wall with a pattern, in wall time. Messages as in include/fbvins/live/socket_protocol.hpp.
+"""A sender for `fbvins live --source socket:PATH` that needs only Python's standard library: a synthetic rig that rests for two seconds
+and then sways sideways in front of a patterned wall, in wall time. Messages as in include/fbvins/live/socket_protocol.hpp.
 
 usage: socket_sender.py PATH [SECONDS]
 """
@@ -22,7 +22,7 @@ WIDTH, HEIGHT, SLOTS, FOCAL_PX, BASELINE_M, WALL_M = 640, 480, 16, 400.0, 0.1, 2
 IMAGE_BYTES, SLOT_BYTES, BLOCK_PX, MARGIN_PX = WIDTH * HEIGHT, 2 * WIDTH * HEIGHT, 12, 200
 AMPLITUDE_M, OMEGA_RADPS, REST_S = 0.2, 2.5, 2.0
 IMU_HZ, READINGS_A_FRAME = 200, 10
-LIGHTS = [bytes(min(255, grey + k) for grey in range(256)) for k in range(5)]  # no real image is twice the same
+LIGHTS = [bytes(min(255, grey + k) for grey in range(256)) for k in range(5)]  # images differ, as identical ones count as a frozen camera
 
 
 def message(kind, body):
@@ -30,16 +30,16 @@ def message(kind, body):
 
 
 def rig():
-    """Two cameras without distortion, side by side; B lies in the left one: x right, y down, z forward."""
+    """Two cameras without distortion, side by side; the body frame B is the left camera: x right, y down, z forward."""
     def camera(x_m):
         return struct.pack("=II20d", 0, 0, FOCAL_PX, FOCAL_PX, WIDTH / 2, HEIGHT / 2, 0, 0, 0, 0,
                            1, 0, 0, x_m, 0, 1, 0, 0, 0, 0, 1, 0)  # T_BC
-    # Noise of gyro, its walk, of accelerometer, its walk; rates of IMU and images; time offset.
+    # Noise density and random walk of gyroscope and accelerometer; rates of IMU and images; time offset.
     return camera(0) + camera(BASELINE_M) + struct.pack("=7d", 2e-4, 2e-5, 2e-3, 3e-3, IMU_HZ, IMU_HZ / READINGS_A_FRAME, 0)
 
 
 def wall():
-    """Rows of blocks of random grey and width, as long as the camera sways."""
+    """Rows of blocks of random grey and width, long enough for the camera's motion."""
     blocks = range((WIDTH + 2 * MARGIN_PX) // 6)
     return [b"".join(bytes([random.randrange(256)]) * random.randrange(6, 18) for _ in blocks) for _ in range(HEIGHT // BLOCK_PX)]
 
@@ -61,7 +61,7 @@ def reading(stamp_ns, t_s):
 
 
 def hear(connection, free, timeout_s):
-    """Takes what the estimator says: slots that are free again, or a goodbye."""
+    """Receives messages of the estimator: slots that are free again, or a goodbye."""
     while select.select([connection], [], [], timeout_s)[0]:
         answer, timeout_s = connection.recv(32768), 0
         kind = struct.unpack_from("=I", answer)[0] if answer else GOODBYE
@@ -78,7 +78,7 @@ def main():
     os.ftruncate(memory, SLOTS * SLOT_BYTES)
     fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK)
     slots = mmap.mmap(memory, SLOTS * SLOT_BYTES)
-    body = struct.pack("=8sHHI32s6I", b"fb-vins", 1, 0, HAS_RIG, b"made-up rig", WIDTH, HEIGHT, SLOTS, SLOT_BYTES, IMAGE_BYTES, 0)
+    body = struct.pack("=8sHHI32s6I", b"fb-vins", 1, 0, HAS_RIG, b"synthetic rig", WIDTH, HEIGHT, SLOTS, SLOT_BYTES, IMAGE_BYTES, 0)
     socket.send_fds(connection, [message(HELLO, body + rig())], [memory])
     free, rows = set(range(SLOTS)), wall()
     hear(connection, free, None)  # the welcome
@@ -93,7 +93,7 @@ def main():
             slot, x_m = free.pop(), motion(t_s)[0]
             slots[slot * SLOT_BYTES:(slot + 1) * SLOT_BYTES] = view(rows, x_m) + view(rows, x_m + BASELINE_M)
             connection.send(message(FRAME, struct.pack("=qQII", stamp_ns, k // READINGS_A_FRAME, slot, LEFT | RIGHT)))
-    connection.send(message(GOODBYE, struct.pack("=II240s", 0, 0, b"the show is over")))
+    connection.send(message(GOODBYE, struct.pack("=II240s", 0, 0, b"end of the synthetic flight")))
 
 
 if __name__ == "__main__":

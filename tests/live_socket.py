@@ -17,7 +17,7 @@ import unittest
 PROGRAM, CXX = sys.argv[1:3]
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
 RECORDING = pathlib.Path(os.environ.get("FBVINS_DATA") or REPOSITORY.parent / "shared" / "data") / "MH_01_easy_17s"
-# The Python sender as it is, but with the same made-up wall and noise every time.
+# The Python sender as it is, but with the same synthetic wall and noise every time.
 SEEDED = "import random, runpy, sys; random.seed(7); del sys.argv[0]; runpy.run_path(sys.argv[0], run_name='__main__')"
 
 
@@ -94,8 +94,8 @@ class LiveSocket(unittest.TestCase):
         self.assertIsNone(live.poll())
         self.assertEqual(self.python_sender(7).wait(timeout=60), 0)
         said = self.end(live)
-        self.assertIn("made-up rig: left without a goodbye", said)
-        self.assertRegex(said, r"made-up rig: said goodbye: the show is over \(1\d\d frames, \d+ missed, 1400 readings, 0 refused\)")
+        self.assertIn("synthetic rig: left without a goodbye", said)
+        self.assertRegex(said, r"synthetic rig: said goodbye: end of the synthetic flight \(1\d\d frames, \d+ missed, 1400 readings, 0 refused\)")
         # The rig sways by 0.4 m to the right, and by nothing else. The second sender has another wall: W may be a new one.
         last = self.poses()[-60:]
         span_m = [max(p[i] for p in last) - min(p[i] for p in last) for i in (1, 2, 3)]
@@ -113,7 +113,7 @@ class LiveSocket(unittest.TestCase):
         second = subprocess.run([sys.executable, REPOSITORY / "examples/socket_sender.py", self.path], capture_output=True, text=True,
                                 timeout=30, check=False)
         self.assertEqual(second.returncode, 1)
-        self.assertIn("goodbye: another sender is connected: made-up rig", second.stderr)
+        self.assertIn("goodbye: another sender is connected: synthetic rig", second.stderr)
         self.assertEqual(first.wait(timeout=30), 0)
         self.end(live)
 
