@@ -14,7 +14,7 @@ namespace fbvins {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int kNoPose = 1;  // exit code of fbvins run: an answer, not a failure
+constexpr int kNoPose = 1;  // exit code of fbvins run: a result, not a failure
 
 /// FNV-1a, 64 bits.
 std::uint64_t hash(std::string_view text, std::uint64_t h = 14695981039346656037ULL) {
@@ -83,7 +83,7 @@ BenchJob BenchFolder::render(const Recording& recording) const {
           fmt::format("{}\n", fmt::join(render_command("fbvins", recording, ""), " "))};
 }
 
-/// What a result depends on, but for the recording's contents.
+/// The fingerprint covers everything that the result depends on except the recording's contents.
 BenchJob BenchFolder::run(const Cell& cell) const {
   const Recording& recording = plan_.recordings[cell.recording];
   std::uint64_t h = program_hash_;

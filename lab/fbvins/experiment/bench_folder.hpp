@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a bench keeps on disk, and the work that makes it: recordings to render, cells to run. A folder has its name only when it
-// is complete. One thread; several processes may share a folder where each job is locked.
+// The files of a bench and the jobs that make them: recordings to render, cells to run. A job writes to a temporary folder, which
+// is renamed when it is complete. One thread; several processes may share a folder, with a lock for each job.
 //
 //   const BenchFolder folder(plan, {.program = "/usr/bin/fbvins", .out = "bench"});
 //   const BenchJob job = folder.run(plan.cells[0]);
 //   if (!folder.is_done(job)) ...                    // clear(job), run job.command, finish(job, exit code)
 //
-// OUT/cells/ID of each cell (as `fbvins run` writes it, and cell.json), OUT/logs, OUT/locks; recordings lie where the plan says.
+// Layout: OUT/cells/ID for each cell (output of `fbvins run`, and cell.json), OUT/logs, OUT/locks; recordings as in the plan.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +19,10 @@
 namespace fbvins {
 
 struct BenchOptions {
-  std::string program = "";  ///< fbvins
+  std::string program = "";  ///< path of fbvins
   std::string out = "";
   int jobs = 1;
-  bool discard_rendered = false;  ///< delete what was rendered once its cells are done
+  bool discard_rendered = false;  ///< delete a rendered recording once its cells are done
 };
 
 /// One run of the program, which writes a folder.
@@ -30,9 +30,9 @@ struct BenchJob {
   bool renders = false;  ///< a recording, not a cell
   std::string name;
   std::vector<std::string> command;  ///< writes to `part`
-  std::string folder, part;          ///< of the result; until it is complete
+  std::string folder, part;          ///< of the complete result; of the incomplete one
   std::string log, lock;             ///< files
-  std::string made_of;               ///< what the result depends on
+  std::string made_of;               ///< fingerprint of what the result depends on
 };
 
 class BenchFolder {
@@ -40,20 +40,20 @@ class BenchFolder {
   BenchFolder(const Plan& plan, const BenchOptions& options);
 
   Result<void> make() const;
-  /// Of a recording that is rendered.
+  /// The job of a recording with `rendered`.
   BenchJob render(const Recording& recording) const;
   BenchJob run(const Cell& cell) const;
-  /// Its result is there, and made of the same.
+  /// Whether its result exists with the same fingerprint.
   bool is_done(const BenchJob& job) const;
-  /// Nothing to render, or rendered.
+  /// Whether the recording exists: real, or rendered already.
   bool is_there(const Recording& recording) const { return !recording.rendered || is_done(render(recording)); }
-  /// Removes what an earlier try left.
+  /// Removes an incomplete result.
   static void clear(const BenchJob& job);
-  /// After the program's end: true when the result is there under its name.
+  /// After the program's end: renames a complete result and returns true; false if the program failed.
   static Result<bool> finish(const BenchJob& job, int exit_code);
-  /// "ID: exit code 3: ", and the last line that the program said.
+  /// "ID: exit code 3: " and the last line of the program's output.
   static std::string failure(const BenchJob& job, int exit_code);
-  /// Held by one bench alone, or by any number of processes that do single cells.
+  /// Lock file: exclusive for run_plan(), shared for run_cell().
   std::string lock() const { return options_.out + "/lock"; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a matrix found: one row a cell, as CSV and JSON, and compared with an earlier one. Pure but for reading files.
+// Results of a matrix: one row per cell, as CSV and JSON, and compared with an earlier run. Pure except for reading files.
 //
 //   std::vector<CellResult> results = read_results(plan, "bench");
 //   std::vector<Regression> worse = regressions(results, *reference, {});
@@ -34,19 +34,19 @@ struct CellResult {
 std::vector<CellResult> read_results(const Plan& plan, const std::string& out);
 
 std::string results_csv(const std::vector<CellResult>& results);
-/// With machine and version of the program, and each cell's effective configuration.
+/// With the machine, the program's version and each cell's effective configuration.
 nlohmann::ordered_json results_json(const std::string& title, const std::vector<CellResult>& results);
 
-/// The machine in a line: processor, cores, memory, system.
+/// The machine in one line: processor, cores, memory, system.
 std::string describe_machine();
 
 struct Tolerance {
-  double share = 0.2;      ///< by which an error may grow
-  double floor_m = 0.002;  ///< and this much besides
-  double coverage = 0.02;  ///< by which coverage may fall
+  double share = 0.2;      ///< relative increase of an error that is tolerated
+  double floor_m = 0.002;  ///< absolute increase that is tolerated in addition
+  double coverage = 0.02;  ///< decrease of coverage that is tolerated
 };
 
-/// What an earlier results.csv says of a cell.
+/// A cell of an earlier results.csv.
 struct Reference {
   double rmse_m = 0, coverage = 0;
   int restarts = 0;
@@ -58,7 +58,7 @@ struct Regression {
   std::string cell, what;
 };
 
-/// Cells that are worse than their reference; cells without one are not judged.
+/// Cells that are worse than their reference; cells without one are skipped.
 std::vector<Regression> regressions(const std::vector<CellResult>& results, const std::map<std::string, Reference>& reference,
                                     const Tolerance& tolerance);
 

@@ -13,16 +13,16 @@ namespace fbvins {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kRenderWeight = 8, kRunWeight = 1;  // CPU time of rendering a flight and of estimating it, roughly
+constexpr double kRenderWeight = 8, kRunWeight = 1;  // approximate CPU time of rendering and of estimating
 
-/// Two benches would throw away each other's halves.
+/// Two benches would delete each other's incomplete results.
 Result<FileLock> lock_folder(const BenchFolder& folder, const BenchOptions& options, FileLock::Kind kind) {
   Result<FileLock> lock = FileLock::take(folder.lock(), kind, FileLock::Else::refuse);
   if (lock) return lock;
   return Error{ErrorCode::unwritable, fmt::format("{}: another bench works in this folder", options.out)};
 }
 
-/// One pass through a plan.
+/// Runs a plan once.
 class Runner {
  public:
   Runner(const Plan& plan, const BenchOptions& options, const std::function<void(const BenchStep&)>& show)
@@ -75,7 +75,7 @@ class Runner {
     tell("");
   }
 
-  /// Estimating goes before rendering more: so little lies on the disk.
+  /// Estimation goes before rendering, to keep few recordings on disk.
   Result<bool> start_next() {
     for (bool renders : {false, true})
       for (std::size_t i = 0; i < tasks_.size(); ++i) {
@@ -137,7 +137,7 @@ class Runner {
   ProcessPool pool_;
 };
 
-/// A job done by one of those who want it: true where it was this one, false where it was done already.
+/// Does a job under its lock: true if done here, false if it was done already.
 Result<bool> do_job(const BenchFolder& folder, const BenchJob& job, std::string& failure) {
   const Result<FileLock> lock = FileLock::take(job.lock, FileLock::Kind::alone, FileLock::Else::wait);
   if (!lock) return lock.error();

@@ -35,7 +35,7 @@ constexpr Quantity kQuantities[] = {{"position", "position", &StateNees::positio
                                     {"gyro_bias", "gyro bias", &StateNees::gyro_bias},
                                     {"accel_bias", "accelerometer bias", &StateNees::accel_bias}};
 
-/// Cells that differ in seed and repetition only.
+/// Cells that differ only in seed and repetition.
 struct Group {
   std::string dataset, variant;
   std::vector<const CellResult*> cells;
@@ -116,7 +116,7 @@ Json single_table(const std::string& title, const std::vector<Group>& groups, co
   return table;
 }
 
-/// Many flights a scenario.
+/// Many flights per scenario.
 Json scenario_table(const std::string& title, const std::vector<Group>& groups, const std::string& note) {
   Json table{{"title", title},
              {"note", "Absolute trajectory error in metres after SE3 alignment, over the flights of a scenario; " + note},
@@ -144,14 +144,14 @@ Json scenario_table(const std::string& title, const std::vector<Group>& groups, 
   return table;
 }
 
-/// Section 3.2 of the paper: by how much each error is smaller than the first algorithm's, mean over the recordings.
+/// Section 3.2 of the paper: reduction of each error against the first algorithm, mean over the recordings.
 Json reduction_table(const std::vector<Group>& groups) {
   std::vector<std::string> variants;
   for (const Group& g : groups)
     if (std::find(variants.begin(), variants.end(), g.variant) == variants.end()) variants.push_back(g.variant);
   Json table;
   if (variants.size() < 2) return table;
-  table = {{"title", fmt::format("Smaller than with {}", variants.front())},
+  table = {{"title", fmt::format("Reduction against {}", variants.front())},
            {"note", "Reduction of each error, mean over the recordings (section 3.2 of the paper); negative: larger"},
            {"texts", 1}};
   table["head"] = {"", "Max", "Mean", "Median", "RMSE", "Std", "recordings"};
@@ -179,7 +179,7 @@ Json reduction_table(const std::vector<Group>& groups) {
   return table;
 }
 
-/// Mean over the flights at each tenth of a second; instants that fewer than half of the flights reach are left out.
+/// NEES of all flights by tenth of a second; instants reached by fewer than half of the cells are left out.
 std::map<int, std::vector<StateNees>> by_instant(const Group& group) {
   std::map<int, std::vector<StateNees>> instants;
   for (const CellResult* c : group.cells)
@@ -199,7 +199,7 @@ double mean_nees(const std::vector<StateNees>& all, double StateNees::*member) {
 Json nees_table(const std::vector<Group>& groups) {
   Json table{{"title", "Consistency"},
              {"note",
-              "Normalised error squared, mean over flights and time; 3 is consistent for each of these, 1.5 to 6 is the bar, "
+              "Normalised estimation error squared, mean over flights and time; 3 is consistent, the target is 1.5 to 6, "
               "more is overconfident. In brackets: share of the instants whose mean over the flights lies within "
               "the 95 % bounds of chi-square"},
              {"texts", 2}};
@@ -250,7 +250,7 @@ Json consistency_curves(const Group& group) {
   return curves;
 }
 
-/// Whether repetitions gave the same bytes.
+/// Whether repetitions gave identical bytes.
 Json repetition_table(const std::vector<CellResult>& results) {
   std::map<std::string, std::set<std::string>> hashes;
   std::map<std::string, int> counts;

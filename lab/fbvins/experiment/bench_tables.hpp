@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables and consistency plots of a matrix: the paper's Table 1 where each recording was run once, figures by scenario
-// where there are many seeds. Pure functions, any thread.
+// Tables and consistency plots of a matrix: as the paper's Table 1 if each recording was run once, by scenario if there
+// are several seeds. Pure functions, any thread.
 //
 //   nlohmann::ordered_json payload = bench_payload("Table 1", results, {});
 //   write(markdown(payload));  write(report_html({}, payload, options));
@@ -14,14 +14,14 @@
 
 namespace fbvins {
 
-/// {tables: [{title, note, texts, head, rows}], consistency: [{name, flights, t, position, ..., low, high}]}, which
-/// report_html shows and markdown prints.
+/// {tables: [{title, note, texts, head, rows}], consistency: [{name, flights, t, position, ..., low, high}]}, the input
+/// of report_html and markdown.
 nlohmann::ordered_json bench_payload(const std::string& title, const std::vector<CellResult>& results,
                                      const std::vector<Regression>& regressions);
 
 std::string markdown(const nlohmann::ordered_json& payload);
 
-/// Bounds that the mean of `flights` normalised errors squared with three degrees of freedom keeps with 95 %.
+/// Two-sided 95 % bounds of the mean NEES of `flights` flights, three degrees of freedom each.
 struct NeesBounds {
   double low = 0, high = 0;
 };

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A stand-in for fbvins that notes its calls, and fails to run what the file `fail` names.
+/// A fake fbvins that logs its calls, and fails at the job named in the file `fail`.
 constexpr const char* kProgram = R"SH(#!/bin/sh
 here=$(dirname "$0")
 echo "$*" >> "$here/calls"
@@ -84,7 +84,7 @@ TEST_F(BenchRunner, FinishedCellsAreNotRunAgain) {
   EXPECT_EQ(calls().size(), 12u);
 }
 
-TEST_F(BenchRunner, OnlyWhatFailedIsRunAgain) {
+TEST_F(BenchRunner, OnlyFailedCellsAreRunAgain) {
   write("fail", "run-fast-s2");
   const BenchOutcome first = run();
   ASSERT_EQ(first.failed.size(), 2u);
@@ -96,22 +96,22 @@ TEST_F(BenchRunner, OnlyWhatFailedIsRunAgain) {
   EXPECT_EQ(second.reused, 6);
 }
 
-TEST_F(BenchRunner, CellsOfAFlightThatCannotBeRenderedFail) {
+TEST_F(BenchRunner, CellsFailIfTheirRecordingCannotBeRendered) {
   write("fail", "simulate-normal");
   const BenchOutcome outcome = run();
   EXPECT_EQ(outcome.run, 4);
   EXPECT_EQ(outcome.failed.size(), 2u + 4u);
 }
 
-TEST_F(BenchRunner, HalfACellDoesNotCount) {
+TEST_F(BenchRunner, AnIncompleteCellIsRunAgain) {
   run();
   const std::string cell = cell_folder(options_.out, plan_.cells[0]);
-  fs::rename(cell, cell + ".part");  // as a kill leaves it
+  fs::rename(cell, cell + ".part");  // as after a kill
   EXPECT_EQ(run().run, 1);
   EXPECT_FALSE(fs::exists(cell + ".part"));
 }
 
-TEST_F(BenchRunner, AnotherProgramOrConfigurationRunsAgain) {
+TEST_F(BenchRunner, AChangedProgramOrConfigurationIsRunAgain) {
   run();
   plan_.cells[0].configuration.settings = {"a=1"};
   EXPECT_EQ(run().run, 1);
@@ -119,7 +119,7 @@ TEST_F(BenchRunner, AnotherProgramOrConfigurationRunsAgain) {
   EXPECT_EQ(run().run, 8);
 }
 
-TEST_F(BenchRunner, TwoInOneFolderAreRefused) {
+TEST_F(BenchRunner, ASecondBenchInAFolderIsRefused) {
   std::string refusal;
   const auto second = [&](const BenchStep&) {
     if (!refusal.empty()) return;
@@ -134,11 +134,11 @@ TEST_F(BenchRunner, RenderedRecordingsCanBeDiscarded) {
   options_.discard_rendered = true;
   run();
   for (const Recording& r : plan_.recordings) EXPECT_FALSE(fs::exists(r.path)) << r.path;
-  EXPECT_EQ(run().reused, 8);  // and nothing is rendered again
+  EXPECT_EQ(run().reused, 8);  // nothing is rendered again
   EXPECT_EQ(calls().size(), 12u);
 }
 
-TEST_F(BenchRunner, CellsAloneMakeTheWhole) {
+TEST_F(BenchRunner, SingleCellsCompleteThePlan) {
   for (const Cell& cell : plan_.cells) {
     const Result<BenchOutcome> outcome = run_cell(plan_, options_, cell.id);
     ASSERT_TRUE(outcome.ok()) << outcome.error().message;
@@ -149,7 +149,7 @@ TEST_F(BenchRunner, CellsAloneMakeTheWhole) {
   EXPECT_EQ(run().reused, 8);
 }
 
-TEST_F(BenchRunner, ManyAtTheSameCellDoItOnce) {
+TEST_F(BenchRunner, ConcurrentRunsOfACellDoItOnce) {
   std::vector<std::future<Result<BenchOutcome>>> workers;
   for (int i = 0; i < 6; ++i)
     workers.push_back(std::async(std::launch::async, [this] { return run_cell(plan_, options_, plan_.cells[0].id); }));
@@ -165,7 +165,7 @@ TEST_F(BenchRunner, ManyAtTheSameCellDoItOnce) {
   EXPECT_EQ(calls().size(), 2u);
 }
 
-TEST_F(BenchRunner, ACellThatFailsSaysWhyAndIsTriedAgain) {
+TEST_F(BenchRunner, AFailedCellReportsTheReasonAndIsTriedAgain) {
   write("fail", "run-normal-s1");
   const Result<BenchOutcome> first = run_cell(plan_, options_, plan_.cells[0].id);
   ASSERT_TRUE(first.ok());
@@ -177,13 +177,13 @@ TEST_F(BenchRunner, ACellThatFailsSaysWhyAndIsTriedAgain) {
   EXPECT_EQ(run_cell(plan_, options_, plan_.cells[0].id)->run, 1);
 }
 
-TEST_F(BenchRunner, ACellThatIsNotThereIsAnError) {
+TEST_F(BenchRunner, AnUnknownCellIsAnError) {
   const Result<BenchOutcome> outcome = run_cell(plan_, options_, "slow-s1-klt");
   ASSERT_FALSE(outcome.ok());
   EXPECT_EQ(outcome.error().message, "there is no cell 'slow-s1-klt'");
 }
 
-TEST_F(BenchRunner, CellsAloneAndTheWholeExcludeOneAnother) {
+TEST_F(BenchRunner, SingleCellsAndAWholePlanExcludeOneAnother) {
   std::string refusal;
   const auto second = [&](const BenchStep&) {
     if (!refusal.empty()) return;
@@ -207,17 +207,17 @@ CellResult result(const std::string& dataset, int seed, const std::string& front
 }
 
 TEST(BenchTables, ReductionsAreMeansOverRecordings) {
-  // As section 3.2: the mean of the recordings' own reductions, here 50 % and 10 %.
+  // As in section 3.2: the mean of the reductions of the recordings, here 50 % and 10 %.
   const auto payload = bench_payload(
       "T", {result("A", 1, "klt", 0.4), result("A", 1, "orb", 0.2), result("B", 1, "klt", 0.1), result("B", 1, "orb", 0.09)}, {});
   ASSERT_EQ(payload["tables"].size(), 2u);
   EXPECT_EQ(payload["tables"][0]["rows"][1][5], "0.2000");
-  EXPECT_EQ(payload["tables"][1]["title"], "Smaller than with klt");
+  EXPECT_EQ(payload["tables"][1]["title"], "Reduction against klt");
   EXPECT_EQ(payload["tables"][1]["rows"][0][4], "30.00 %");
   EXPECT_NE(markdown(payload).find("| A | orb | 0.6000 |"), std::string::npos);
 }
 
-TEST(BenchTables, SeedsOfAScenarioAreOneRow) {
+TEST(BenchTables, SeedsOfAScenarioShareARow) {
   const auto payload = bench_payload("T", {result("A", 1, "klt", 0.1), result("A", 2, "klt", 0.3)}, {});
   const auto& rows = payload["tables"][0]["rows"];
   ASSERT_EQ(rows.size(), 1u);
@@ -226,12 +226,12 @@ TEST(BenchTables, SeedsOfAScenarioAreOneRow) {
 }
 
 TEST(BenchTables, BoundsOfChiSquare) {
-  // Tables of chi-square: 2.5 % and 97.5 % of 60 degrees of freedom are 40.48 and 83.30.
+  // Quantiles 0.025 and 0.975 of chi-square with 60 degrees of freedom: 40.48 and 83.30.
   EXPECT_NEAR(nees_bounds(20).low, 40.48 / 20, 0.005);
   EXPECT_NEAR(nees_bounds(20).high, 83.30 / 20, 0.005);
 }
 
-TEST(BenchResults, RegressionsAreFoundAndOnlyThose) {
+TEST(BenchResults, FindsRegressionsAndNothingElse) {
   const std::string path = ::testing::TempDir() + "/reference.csv";
   std::ofstream(path) << results_csv({result("A", 1, "klt", 0.10), result("B", 1, "klt", 0.10), result("C", 1, "klt", 0.10)});
   const auto reference = read_reference(path);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A lock that processes hold on a file: taken in one step by the kernel (or the file server), and gone with the process, however
-// it ends. The file itself stays. One owner.
+// A lock between processes on a file (flock): atomic, and released by the kernel (or the file server) when the process ends in
+// any way. The file itself stays. One owner.
 //
 //   Result<FileLock> lock = FileLock::take("out/locks/flight-klt", FileLock::Kind::alone, FileLock::Else::wait);
 #pragma once
@@ -14,10 +14,10 @@ namespace fbvins {
 class FileLock {
  public:
   enum class Kind { alone, shared };
-  /// What to do while another holds it.
+  /// What to do while another process holds it.
   enum class Else { wait, refuse };
 
-  /// An error where the file cannot be opened, or, with `refuse`, another holds it (ErrorCode::unwritable).
+  /// ErrorCode::unwritable if the file cannot be opened or, with `refuse`, if another process holds the lock.
   static Result<FileLock> take(const std::string& path, Kind kind, Else otherwise);
 
   FileLock() = default;

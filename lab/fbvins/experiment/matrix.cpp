@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr int kMostSeeds = 100'000;
 
-/// `seeds: 20` are 1 to 20; a list names them.
+/// `seeds: 20` means 1 to 20; a list gives them one by one.
 std::vector<int> seeds_of(YamlReader& yaml, const YAML::Node& map) {
   std::vector<int> seeds;
   if (yaml.get(map, "seeds").IsDefined() && yaml.get(map, "seeds").IsScalar()) {
@@ -39,7 +39,7 @@ std::string default_name(const RenderSpec& rendered) {
   return rendered.seconds > 0 ? fmt::format("{}-{:g}s", rendered.preset, rendered.seconds) : rendered.preset;
 }
 
-/// One entry may stand for several presets.
+/// An entry may have several presets: each becomes a dataset.
 void read_dataset(YamlReader& yaml, const YAML::Node& node, Matrix& matrix) {
   yaml.only(node, {"name", "euroc", "path", "simulate"});
   if (!yaml.ok()) return;
@@ -83,7 +83,7 @@ ConfigurationSpec read_configuration(YamlReader& yaml, const YAML::Node& node) {
   return spec;
 }
 
-/// What may stand in the name of a folder.
+/// Replaces characters that are not allowed in names of folders.
 std::string folder_name(std::string text) {
   for (char& c : text)
     if (!(std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.')) c = '_';
@@ -94,7 +94,7 @@ std::string below(const std::string& folder, const std::string& path) {
   return path.empty() || folder.empty() || fs::path(path).is_absolute() ? path : (fs::path(folder) / path).string();
 }
 
-/// The user's own recording, if it is there.
+/// Path of the user's own recording, if it exists.
 std::string real_recording(const DatasetSpec& spec, const PlanOptions& options) {
   if (!spec.path.empty()) return spec.path;
   if (spec.euroc.empty() || options.euroc.empty()) return "";

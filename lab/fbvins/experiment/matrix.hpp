@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an experiment is made of: recordings x frontends x configurations x repetitions, from a small YAML file.
-// Pure but for looking whether recordings exist; any thread.
+// Plan of an experiment: recordings x frontends x configurations x repetitions, from a small YAML file. Pure except for
+// checking whether recordings exist; any thread.
 //
 //   Result<Matrix> matrix = read_matrix("configs/scenarios.yaml");
 //   Result<Plan> plan = make_plan(*matrix, {.rendered = "bench/rendered"});
@@ -15,25 +15,25 @@
 
 namespace fbvins {
 
-/// A flight for `fbvins simulate` to render.
+/// A recording to be rendered by `fbvins simulate`.
 struct RenderSpec {
   std::string preset = "normal";
-  std::string trajectory, imu;  ///< of a recorded flight, below --inputs; empty: a synthetic one
+  std::string trajectory, imu;  ///< files of a recorded flight, relative to --inputs; empty: synthetic
   double seconds = 0;           ///< 0: the preset's, or the whole recorded flight
   std::vector<std::string> settings;
 };
 
 struct DatasetSpec {
-  std::string name;   ///< of the group: its seeds belong together in tables
-  std::string euroc;  ///< name of a folder or zip below --euroc, taken instead of rendering where it is there
-  std::string path;   ///< of a recording; empty where it is rendered
+  std::string name;   ///< of the group: its seeds share a row in tables
+  std::string euroc;  ///< name of a folder or zip in --euroc; if it exists it is used instead of rendering
+  std::string path;   ///< of a recording; empty if it is rendered
   std::optional<RenderSpec> rendered;
   std::vector<int> seeds{1};  ///< of the rendering
 };
 
 struct ConfigurationSpec {
   std::string name = "default";
-  std::string file;                   ///< YAML for fbvins run --config, beside the matrix
+  std::string file;                   ///< YAML for fbvins run --config, relative to the matrix
   std::vector<std::string> settings;  ///< for --set
 };
 
@@ -45,14 +45,14 @@ struct Matrix {
   int repetitions = 1;
 };
 
-/// Unknown key, wrong type or nothing to do: an error with the line.
+/// Unknown keys, wrong types and an empty matrix are errors with a line number.
 Result<Matrix> parse_matrix(const std::string& text, const std::string& source);
 Result<Matrix> read_matrix(const std::string& path);
 
 struct Recording {
   std::string id;       ///< name of a folder
   std::string dataset;  ///< the group
-  std::string path;     ///< where it is, or will be once rendered
+  std::string path;     ///< existing or to be rendered
   int seed = 0;         ///< of the rendering; 0 for a real one
   std::optional<RenderSpec> rendered;
 };
@@ -67,16 +67,16 @@ struct Cell {
 
 struct Plan {
   std::vector<Recording> recordings;
-  std::vector<Cell> cells;  ///< those of a recording together
+  std::vector<Cell> cells;  ///< in order of recordings
 };
 
 struct PlanOptions {
   std::string euroc = "";     ///< folder with the user's own recordings
-  std::string inputs = "";    ///< folder that `trajectory` and `imu` are relative to
-  std::string rendered = "";  ///< folder for what is rendered
+  std::string inputs = "";    ///< `trajectory` and `imu` are relative to this folder
+  std::string rendered = "";  ///< folder for rendered recordings
 };
 
-/// Which recordings and cells there are.
+/// Lists recordings and cells. An error for a recording that neither exists nor can be rendered, or duplicate names.
 Result<Plan> make_plan(const Matrix& matrix, const PlanOptions& options);
 
 }  // namespace fbvins

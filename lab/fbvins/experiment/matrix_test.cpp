@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-TEST(Matrix, MultipliesEverything) {
+TEST(Matrix, ACellForEachCombination) {
   const Result<Matrix> matrix = parse_matrix(R"(
 datasets:
   - {path: /data/MH_01_easy.zip}
@@ -24,7 +24,7 @@ repetitions: 2
   ASSERT_TRUE(matrix.ok()) << matrix.error().message;
   const Result<Plan> plan = make_plan(*matrix, {.rendered = "/rendered"});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
-  EXPECT_EQ(plan->recordings.size(), 7u);  // one, and two presets of three seeds
+  EXPECT_EQ(plan->recordings.size(), 7u);  // one, and two presets with three seeds each
   EXPECT_EQ(plan->cells.size(), 7u * 2 * 2 * 2);
   EXPECT_EQ(plan->recordings[1].path, "/rendered/normal-8s-s1");
   EXPECT_EQ(plan->recordings[6].seed, 3);
@@ -34,7 +34,7 @@ repetitions: 2
   EXPECT_EQ(ids.size(), plan->cells.size());
 }
 
-TEST(Matrix, TakesTheRealRecordingWhereItIs) {
+TEST(Matrix, PrefersTheRealRecordingToRendering) {
   const std::string folder = ::testing::TempDir() + "/euroc_matrix_test";
   std::filesystem::create_directories(folder + "/A");
   const Result<Matrix> matrix = parse_matrix(R"(
@@ -52,7 +52,7 @@ datasets:
   EXPECT_EQ(plan->recordings[1].rendered->imu, "/in/B/imu0.csv");
 }
 
-TEST(Matrix, SaysWhatIsWrongAndWhere) {
+TEST(Matrix, ErrorsNameTheLine) {
   const auto message = [](const char* text) { return parse_matrix(text, "m.yaml").error().message; };
   EXPECT_EQ(message("datasets:\n  - {path: a, colour: red}\n"),
             "m.yaml:2: unknown key 'colour'; known here: name, euroc, path, simulate");
@@ -64,7 +64,7 @@ TEST(Matrix, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(message("datasets: [{name: a}]\n"), "m.yaml:1: a dataset needs euroc, path or simulate");
 }
 
-TEST(Matrix, TwoDatasetsOfOneNameAreRefused) {
+TEST(Matrix, DuplicateNamesOfDatasetsAreRefused) {
   const Result<Matrix> matrix = parse_matrix("datasets: [{path: a/x}, {path: b/x}]\n", "m.yaml");
   ASSERT_TRUE(matrix.ok());
   EXPECT_EQ(make_plan(*matrix, {}).error().message, "two datasets are called x");

@@ -15,7 +15,7 @@
 namespace fbvins {
 namespace {
 
-/// In the child: only calls that are safe between fork and exec.
+/// In the child: only async-signal-safe calls between fork and exec.
 [[noreturn]] void become(char* const* arguments, int log) {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -54,7 +54,7 @@ ProcessPool::Ended ProcessPool::wait() {
     const pid_t pid = waitpid(-1, &status, 0);
     if (pid < 0 && errno == EINTR) continue;
     const auto at = pid < 0 ? tags_.begin() : tags_.find(pid);
-    if (at == tags_.end()) continue;  // somebody else's child
+    if (at == tags_.end()) continue;  // not a child of this pool
     const Ended ended{at->second, pid < 0 ? 127 : WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)};
     tags_.erase(at);
     return ended;

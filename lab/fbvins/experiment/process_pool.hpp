@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Programs run side by side, a few at a time. They die with their parent. One thread.
+// Runs programs in parallel as child processes, which end with their parent. One thread.
 //
 //   ProcessPool pool;
 //   pool.start(1, {"/usr/bin/fbvins", "run", "flight"}, "log.txt");
@@ -20,18 +20,18 @@ class ProcessPool {
  public:
   struct Ended {
     int tag = 0;
-    int exit_code = 0;  ///< 128 + signal where a signal ended it
+    int exit_code = 0;  ///< 128 + signal if a signal ended it
   };
   ProcessPool() = default;
-  /// Ends what still runs.
+  /// Terminates and awaits programs that still run.
   ~ProcessPool();
   ProcessPool(const ProcessPool&) = delete;
   ProcessPool& operator=(const ProcessPool&) = delete;
 
-  /// What the program prints goes to `log`.
+  /// The program's stdout and stderr go to `log`.
   Result<void> start(int tag, const std::vector<std::string>& command, const std::string& log);
   int running() const { return static_cast<int>(tags_.size()); }
-  /// Until one of them ends; at least one must be running.
+  /// Waits until one of them ends; at least one must be running.
   Ended wait();
 
  private:

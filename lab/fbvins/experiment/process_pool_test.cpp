@@ -14,7 +14,7 @@ namespace {
 
 std::string log_file() { return ::testing::TempDir() + "/fbvins_process_pool_" + std::to_string(getpid()); }
 
-TEST(ProcessPool, TellsWhichProgramEndedAndHow) {
+TEST(ProcessPool, ReportsWhichProgramEndedAndHow) {
   ProcessPool pool;
   const std::map<int, std::string> programs{{1, "exit 0"}, {2, "exit 7"}, {3, "kill -9 $$"}};
   for (const auto& [tag, script] : programs) ASSERT_TRUE(pool.start(tag, {"/bin/sh", "-c", script}, "/dev/null"));
@@ -27,14 +27,14 @@ TEST(ProcessPool, TellsWhichProgramEndedAndHow) {
   EXPECT_EQ(codes, (std::map<int, int>{{1, 0}, {2, 7}, {3, 128 + 9}}));
 }
 
-TEST(ProcessPool, BothStreamsGoToTheLogAndArgumentsArriveAsTheyAre) {
+TEST(ProcessPool, BothStreamsGoToTheLogAndArgumentsAreUnchanged) {
   ProcessPool pool;
   ASSERT_TRUE(pool.start(1, {"/bin/sh", "-c", "echo \"$1\"; echo bad >&2", "sh", "a b *"}, log_file()));
   EXPECT_EQ(pool.wait().exit_code, 0);
   EXPECT_EQ(*read_file(log_file(), 100), "a b *\nbad\n");
 }
 
-TEST(ProcessPool, AProgramThatIsNotThereIsAnExitCode) {
+TEST(ProcessPool, AMissingProgramGivesAnExitCode) {
   ProcessPool pool;
   ASSERT_TRUE(pool.start(1, {"/nowhere/program"}, "/dev/null"));
   EXPECT_EQ(pool.wait().exit_code, 127);
@@ -42,7 +42,7 @@ TEST(ProcessPool, AProgramThatIsNotThereIsAnExitCode) {
   EXPECT_EQ(pool.running(), 0);
 }
 
-TEST(ProcessPool, EndsWhatStillRuns) {
+TEST(ProcessPool, TheDestructorTerminatesRunningPrograms) {
   const auto begin = std::chrono::steady_clock::now();
   {
     ProcessPool pool;

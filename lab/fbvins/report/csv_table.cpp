@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint64_t kLargest_bytes = std::uint64_t{1} << 30u;
 
-/// "p_WB_x [m]" is the column p_WB_x.
+/// The name without its unit: "p_WB_x [m]" is p_WB_x.
 std::string bare_name(std::string_view header) { return std::string(trim(header.substr(0, header.find('[')))); }
 
 }  // namespace
@@ -40,7 +40,7 @@ Result<CsvTable> CsvTable::parse(std::string_view text, const std::string& sourc
     const auto stamp = parse_nanoseconds(fields[0]);
     if (!stamp) return Error{ErrorCode::malformed, fmt::format("{}:{}: no stamp in nanoseconds", source, number)};
     table.stamps_.push_back(*stamp);
-    for (std::size_t i = 0; i < table.columns_.size(); ++i)  // rows may end early: what follows is empty
+    for (std::size_t i = 0; i < table.columns_.size(); ++i)  // missing fields at the end of a row are empty
       table.columns_[i].emplace_back(i + 1 < fields.size() ? fields[i + 1] : std::string_view{});
   }
   if (table.names_.empty()) return Error{ErrorCode::malformed, source + ": the file is empty"};

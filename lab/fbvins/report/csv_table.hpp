@@ -23,7 +23,7 @@ class CsvTable {
   std::size_t rows() const { return stamps_.size(); }
   const std::vector<Time>& stamps() const { return stamps_; }
   bool has(std::string_view column) const { return index(column) >= 0; }
-  /// The column, not-a-number where a field is no number; empty where there is no such column.
+  /// The column, NaN where a field is not a number; empty if there is no such column.
   std::vector<double> numbers(std::string_view column) const;
   std::vector<std::string> texts(std::string_view column) const;
 

@@ -20,14 +20,14 @@ TEST(CsvTable, FindsColumnsByNameWithoutUnits) {
   EXPECT_TRUE(table->numbers("p_y").empty());
 }
 
-TEST(CsvTable, RowsMayEndEarly) {
+TEST(CsvTable, MissingFieldsAtTheEndOfARowAreEmpty) {
   const Result<CsvTable> table = CsvTable::parse("#timestamp,a,b\r\n1,2\r\n", "t.csv");
   ASSERT_TRUE(table.ok());
   EXPECT_EQ(table->numbers("a")[0], 2);
   EXPECT_TRUE(std::isnan(table->numbers("b")[0]));
 }
 
-TEST(CsvTable, SaysWhatIsWrongAndWhere) {
+TEST(CsvTable, ErrorsNameTheLine) {
   EXPECT_EQ(CsvTable::parse("#timestamp,a\nsoon,2\n", "t.csv").error().message, "t.csv:2: no stamp in nanoseconds");
   EXPECT_EQ(CsvTable::parse("1,2\n", "t.csv").error().message, "t.csv:1: a header line is missing");
   EXPECT_EQ(CsvTable::parse("", "t.csv").error().message, "t.csv: the file is empty");

@@ -17,7 +17,7 @@
 
 namespace fbvins {
 
-/// JSON text of a curve with five digits: a tenth of what a general writer makes.
+/// A curve as JSON text with five digits: a tenth of a general writer's size.
 inline std::string curve(const std::vector<double>& values, std::size_t step) {
   std::string text = "[";
   for (std::size_t i = 0; i < values.size(); i += step) {
@@ -27,7 +27,7 @@ inline std::string curve(const std::vector<double>& values, std::size_t step) {
   return text + "]";
 }
 
-/// An object of curves that share one time axis, thinned out together.
+/// A JSON object of curves with a common time axis and a common decimation.
 class Curves {
  public:
   Curves(std::size_t length, std::size_t max_points) : step_(std::max<std::size_t>(1, (length + max_points - 1) / max_points)) {}

@@ -8,7 +8,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Stretches of equal mode: [from s, to s, mode, reason].
+/// Intervals of equal mode: [from s, to s, mode, reason].
 Json mode_stretches(const CsvTable& rows, const std::vector<double>& t) {
   const std::vector<std::string> mode = rows.texts("mode"), reason = rows.texts("mode_reason");
   Json stretches = Json::array();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `fbvins fly` leaves beside a run, for the page: where the vehicle was, its estimate and its setpoint, its
-// modes, and what its motors did. Pure functions.
+// The additional files of `fbvins fly`, for the page: the vehicle's true and estimated position, its setpoint, flight modes and
+// motor commands. Pure functions.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 double seconds_since(Time start, Time t) { return (t - start).seconds(); }
 
-/// Everything the estimator said, with or without truth.
+/// The estimated states, which need no ground truth.
 std::string odometry_curves(const RunFolder& run, std::size_t max_points) {
   std::vector<double> t;
   std::vector<Vec3> p, v, bg, ba, sp, sv, sbg, sba;
@@ -77,7 +77,7 @@ std::string error_curves(const RunFolder& run, const RunErrors& errors, std::siz
                                      {"sv", &sv},
                                      {"sbg", &sbg},
                                      {"sba", &sba}})
-    if (values->size() == t.size()) curves.add(name, *values);  // biases: where the truth knows them throughout
+    if (values->size() == t.size()) curves.add(name, *values);  // velocity and biases: only if the truth has them throughout
   return curves.text();
 }
 
@@ -91,7 +91,7 @@ std::string table_curves(const RunFolder& run, const CsvTable& table, const std:
   return curves.text();
 }
 
-/// Stretches of equal health: [from s, to s, state, reason].
+/// Intervals of equal health: [from s, to s, state, reason].
 Json health_stretches(const RunFolder& run) {
   Json stretches = Json::array();
   const std::vector<Odometry>& all = run.odometry;
@@ -111,7 +111,7 @@ Json to_json(const ErrorStatistics& s) {
   return {{"count", s.count}, {"max", s.max}, {"mean", s.mean}, {"median", s.median}, {"rmse", s.rmse}, {"std", s.std}};
 }
 
-/// Mean of the normalised errors over the run, by quantity.
+/// Mean NEES over the run, by quantity.
 Json mean_nees(const RunErrors& errors) {
   Json json = Json::object();
   const auto mean = [&](const char* name, double StateNees::*member) {

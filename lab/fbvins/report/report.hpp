@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs as one self-contained HTML page: plots drawn by the page itself from numbers inside it, nothing fetched.
+// Runs as one self-contained HTML page: its script plots the numbers that it contains; it fetches nothing.
 // Pure function, any thread.
 //
 //   std::string html = report_html(runs, {.title = "MH_01, klt and orb"});
@@ -16,10 +16,10 @@ namespace fbvins {
 
 struct ReportOptions {
   std::string title = "FB-VINS report";
-  std::size_t max_points = 1500;  ///< of a curve; longer runs are thinned out evenly
+  std::size_t max_points = 1500;  ///< of a curve; longer runs are decimated
 };
 
-/// `bench`: what a matrix found (bench_payload of bench_tables.hpp), or null.
+/// `bench`: results of a matrix (bench_payload of bench_tables.hpp), or null.
 std::string report_html(const std::vector<RunFolder>& runs, const nlohmann::ordered_json& bench, const ReportOptions& options);
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The report's page (report_page.html), with the marks <!--TITLE--> and <!--DATA--> where contents go.
+// The report's page (report_page.html), with the placeholders <!--TITLE--> and <!--DATA-->.
 #pragma once
 
 #include <string>

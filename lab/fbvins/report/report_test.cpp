@@ -17,14 +17,14 @@ RunFolder complete_run() {
   return run;
 }
 
-/// What the page's script will read.
+/// The data that the page's script reads.
 Json data_of(const std::string& html) {
   const std::string open = "<script type=\"application/json\" id=\"data\">";
   const std::size_t from = html.find(open) + open.size();
   return Json::parse(html.substr(from, html.find("</script>", from) - from));
 }
 
-TEST(Report, HoldsTheNumbersOfTheEvaluation) {
+TEST(Report, HasTheNumbersOfTheEvaluation) {
   const RunFolder run = complete_run();
   const Json data = data_of(report_html({run}, nullptr, {}));
   ASSERT_EQ(data["runs"].size(), 1u);
@@ -63,14 +63,14 @@ TEST(Report, FetchesNothing) {
   for (const char* sign : {"src=", "href=", "@import", "fetch("}) EXPECT_EQ(html.find(sign), std::string::npos) << sign;
 }
 
-TEST(Report, StretchesOfHealthCoverTheFlight) {
+TEST(Report, HealthIntervalsCoverTheRun) {
   const Json health = data_of(report_html({complete_run()}, nullptr, {}))["runs"][0]["health"];
   ASSERT_EQ(health.size(), 3u);
   EXPECT_EQ(health[1], Json({7.5, 7.55, "degraded", "few_tracks"}));
   EXPECT_EQ(health[2][1], 9.95);
 }
 
-TEST(Report, LongRunsAreThinnedOut) {
+TEST(Report, LongRunsAreDecimated) {
   const Json data = data_of(report_html({complete_run()}, nullptr, {.max_points = 50}));
   EXPECT_EQ(data["runs"][0]["errors"]["t"].size(), 50u);
   EXPECT_EQ(data["runs"][0]["table"]["absolute_m"]["count"], 200);

@@ -11,13 +11,13 @@
 namespace fbvins {
 namespace {
 
-/// Shift and rotation about z that take the estimate to the truth.
+/// Translation and yaw from the estimate to the truth.
 Pose<W, W> yaw_between(const Pose<W, B>& truth, const Pose<W, B>& estimate) {
   const Quat about_z(Eigen::AngleAxisd(heading_between(estimate.q, truth.q), Vec3::UnitZ()));
   return {about_z, Vec3(truth.p - about_z * estimate.p)};
 }
 
-/// e^T P^-1 e, not-a-number unless P is positive definite.
+/// e^T P^-1 e; NaN unless P is positive definite.
 double normalised(const Vec3& error, const Mat3& covariance) {
   const Eigen::LLT<Mat3> factor(covariance);
   if (factor.info() != Eigen::Success || !(covariance.diagonal().minCoeff() > 0)) return NAN;

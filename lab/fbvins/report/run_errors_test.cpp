@@ -18,7 +18,7 @@ StateNees mean_of(const RunErrors& errors) {
   return {mean.position / n, mean.orientation / n, mean.velocity / n, mean.gyro_bias / n, mean.accel_bias / n};
 }
 
-TEST(RunErrors, AnExactEstimateInAnotherWorldHasNone) {
+TEST(RunErrors, AnExactEstimateInAnotherFrameHasNoErrors) {
   const RunErrors errors = run_errors(circling_run(0));
   ASSERT_EQ(errors.frames.size(), 200u);
   ASSERT_TRUE(errors.evaluation.has_value());
@@ -30,8 +30,8 @@ TEST(RunErrors, AnExactEstimateInAnotherWorldHasNone) {
   }
 }
 
-TEST(RunErrors, ConsistentNoiseHasThreePerVector) {
-  // 199 flights of noise with three degrees of freedom each: the mean's standard deviation is 0.17.
+TEST(RunErrors, ConsistentNoiseHasANeesOfThree) {
+  // 199 noisy frames with three degrees of freedom each: the mean's standard deviation is 0.17.
   const StateNees mean = mean_of(run_errors(circling_run(1)));
   for (double value : {mean.position, mean.orientation, mean.velocity, mean.gyro_bias, mean.accel_bias})
     EXPECT_NEAR(value, 3, 0.6);
@@ -52,7 +52,7 @@ TEST(RunErrors, FramesWithoutAPoseDoNotCount) {
   EXPECT_LT(errors.evaluation->absolute_m.max, 0.1);
 }
 
-TEST(RunErrors, AfterARestartTheWorldIsLaidAnew) {
+TEST(RunErrors, TheFrameIsAlignedAgainAfterARestart) {
   RunFolder run = circling_run(0);
   const Pose<W, W> elsewhere(so3_exp(Vec3(0, 0, 1.1)), Vec3(5, 5, 5));
   for (std::size_t k = 100; k < 200; ++k) {
@@ -64,7 +64,7 @@ TEST(RunErrors, AfterARestartTheWorldIsLaidAnew) {
   for (const FrameError& e : errors.frames) EXPECT_LT(e.drift_m.norm() + e.velocity_error_mps.norm(), 1e-8);
 }
 
-TEST(TruthAt, IsLinearAndKnowsHoles) {
+TEST(TruthAt, IsLinearAndHasGaps) {
   const std::vector<TrajectoryPoint> truth = circling_run(0).truth;
   const auto between = truth_at(truth, truth[3].t + Duration{25'000'000});
   ASSERT_TRUE(between.has_value());

@@ -27,7 +27,7 @@ HealthReason reason_of(const std::string& name) {
   return HealthReason::none;
 }
 
-/// Columns by name, checked once.
+/// Columns by name; remembers the first missing one.
 class Columns {
  public:
   Columns(const CsvTable& table, std::string source) : table_(table), source_(std::move(source)) {}
@@ -85,7 +85,7 @@ Result<std::vector<Odometry>> read_odometry(const std::string& path) {
   return odometry;
 }
 
-/// Symmetric matrices from their upper triangles; nothing where the file is of an older version.
+/// Symmetric matrices from their upper triangles. Versions before this file did not write it: no error.
 Result<void> read_covariances(const std::string& path, std::vector<Odometry>& odometry) {
   if (!fs::exists(path)) return {};
   Result<CsvTable> table = CsvTable::read(path);
@@ -122,7 +122,7 @@ Result<std::vector<TrajectoryPoint>> read_truth(const std::string& path) {
   return std::move(file->points);
 }
 
-/// Nothing where there was no flight.
+/// Reads nothing, without an error, if the folder is not of `fbvins fly`.
 Result<void> read_flight(const fs::path& folder, RunFolder& run) {
   if (!fs::exists(folder / "flight.csv") || !fs::exists(folder / "flight.json")) return {};
   Result<CsvTable> rows = CsvTable::read(folder / "flight.csv");

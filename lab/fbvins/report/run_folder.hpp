@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `fbvins run` left in a folder, read back. Values; one thread.
+// The output folder of `fbvins run`, read back. Values; one thread.
 //
 //   Result<RunFolder> run = read_run_folder("out/MH_01_easy-klt");
 //   if (!run->truth.empty()) show(run_errors(*run));
@@ -23,16 +23,16 @@ struct RunFolder {
   std::string dataset, frontend, version;
   nlohmann::ordered_json summary;  ///< summary.json
   std::string config;              ///< config.yaml, the effective configuration
-  std::vector<Odometry> odometry;  ///< of trajectory.csv and covariance.csv: no statistics
+  std::vector<Odometry> odometry;  ///< from trajectory.csv and covariance.csv, without statistics
   std::vector<TrajectoryPoint> truth;
   CsvTable statistics, timing;
-  std::optional<FlightFiles> flight;  ///< where `fbvins fly` flew it
+  std::optional<FlightFiles> flight;  ///< if `fbvins fly` wrote the folder
 
   /// Stamp of the first image.
   Time start() const { return odometry.empty() ? Time{} : odometry.front().t; }
 };
 
-/// `truth` names a recording or trajectory file; empty: the folder's own ground_truth.csv, where there is one.
+/// `truth`: a recording or trajectory file; empty: the folder's own ground_truth.csv, if there is one.
 Result<RunFolder> read_run_folder(const std::string& path, const std::string& truth = "");
 
 }  // namespace fbvins

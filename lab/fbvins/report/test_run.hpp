@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a run whose errors are known.
+// For tests: a run with known errors.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace fbvins {
 
-/// A circle flown for ten seconds at 20 Hz. The estimate starts at the truth, seen from a world that is turned by `yaw`
-/// and shifted, and errs by white noise as large as its covariance says times `share`.
+/// A circle, ten seconds at 20 Hz. The estimate starts at the truth, in a frame rotated by `yaw` and translated; its errors
+/// are white noise of its covariance's standard deviation times `share`.
 inline RunFolder circling_run(double share, double yaw = 0.7, std::uint64_t seed = 5) {
   constexpr double kSigma_m = 0.01, kSigma_rad = 0.002, kSigma_mps = 0.03, kSigma_bg = 1e-3, kSigma_ba = 2e-2;
   Rng rng(seed);
@@ -37,7 +37,7 @@ inline RunFolder circling_run(double share, double yaw = 0.7, std::uint64_t seed
     o.T_WB = w_from_truth * truth.T_WB;
     o.v_WB = w_from_truth.q * *truth.v_WB;
     o.bias = *truth.bias;
-    if (k > 0) {  // the first pose defines where W lies
+    if (k > 0) {  // the first pose defines W
       o.T_WB = o.T_WB.boxplus(noise(kSigma_m), noise(kSigma_rad));
       o.v_WB += noise(kSigma_mps);
       o.bias.gyro_radps += noise(kSigma_bg);
