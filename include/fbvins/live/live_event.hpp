@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a live system tells its sinks. Values; images are shared, not copied.
+// The events that a live system sends to its sinks. Values; images are shared, not copied.
 #pragma once
 
 #include <cstdint>
@@ -96,7 +96,7 @@ struct LiveView {
   std::vector<Vec3> keyframes_W;    ///< the window's, oldest first; likewise
 };
 
-/// A moment that somebody has marked, to find it again.
+/// A moment marked by the user, to find it again.
 struct LiveMark {
   Time t;  ///< newest stamp of any sensor
   std::string text;

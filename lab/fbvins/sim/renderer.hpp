@@ -39,7 +39,7 @@ class Renderer {
   void begin();
   void add(const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
   void radiance(std::vector<float>& image) const;
-  /// Distance along z of the last instant added, metres, 0 where there is nothing.
+  /// Distance along z of the last instant added, metres; 0 for background.
   void depth(std::vector<float>& image) const;
 
   static constexpr int kTile = 8;

@@ -80,7 +80,7 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
 
 StereoFit Examination::pair_fit(StereoRig rig, bool focal_known) {
   rig.time_offset_s = offset_s_;
-  // Where right images are so late that there are no depths to see rotation with, the gyroscope is taken as it is.
+  // If right images are so late that there are no depths to measure rotation with, the gyroscope is used unchecked.
   const ImuSeries* imu = turns_agree_ || !turns_seen_ ? &imu_ : nullptr;
   StereoFit fit = fit_stereo(evidence_.stereo, rig, imu, pairs_, focal_known);
   // The pairs' motions need depths, which late right images make wrong; rotation alone, without the pairs, shows the delay, too.

@@ -19,7 +19,7 @@ using doctor::kUnitTolerance;
 
 /// Below this correlation the readings do not agree with the images for any axes, unit and time offset.
 constexpr double kAgreement = 0.7;
-/// Least rotation about the second principal axis for which axes can be told, rad in a tenth of a second.
+/// Least rotation about the second principal axis from which axes can be identified, rad in a tenth of a second.
 constexpr double kLeastSecondAxis_rad = 2.5e-3;
 /// A smaller factor is a wrong range or a wrong lens, not a wrong unit.
 constexpr double kMostScale = 1.7;

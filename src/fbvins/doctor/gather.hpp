@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Processes a recording's images as they come and keeps the evidence that the doctor needs. Of the calibration only the camera
 // models are assumed: features are tracked without the IMU, and matched from left to right by descriptor without an epipolar
-// line. The first seconds of images are held back until they have told which images are left ones and how the right camera is
+// line. The first seconds of images are held back until it is known which images are left ones and how the right camera is
 // oriented. One thread calls; the same events give the same evidence.
 //
 //   EvidenceGatherer gatherer(rig);

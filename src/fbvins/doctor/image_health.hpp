@@ -22,7 +22,7 @@ struct FixedFeatures {
   int pairs = 0;                    ///< of images in which others moved enough to judge by
   std::set<std::int64_t> ids = {};  ///< of those that stayed
 };
-/// `imu` tells only how far the rig rotated: if far enough, few moving features are enough to judge by.
+/// `imu` is only used for the amount of rotation: if the rig rotated enough, few moving features suffice.
 FixedFeatures measure_fixed(const Evidence& evidence, const ImuSeries& imu);
 std::optional<Finding> check_fixed(const FixedFeatures& fixed);
 

@@ -32,7 +32,7 @@ struct FramePair {
   double dt_s() const { return (b - a).seconds(); }
 };
 
-/// Pairs that follow one another, where enough features were followed; those whose motion cannot be told are left out.
+/// Pairs that follow one another, where enough features were followed; those whose motion cannot be estimated are left out.
 std::vector<FramePair> pair_frames(const Evidence& evidence);
 
 struct TurnFit {

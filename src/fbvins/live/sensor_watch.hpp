@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detects silent cameras and a silent IMU, of which the estimator hears nothing, and combines that with its last health.
+// Detects silent cameras and a silent IMU, which the estimator cannot notice, and combines that with its last health.
 // Pure functions of the times given.
 #pragma once
 

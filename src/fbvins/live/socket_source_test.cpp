@@ -37,7 +37,7 @@ class Inbox final : public SensorInput {
   void drop_frames() {
     change([&] { frames_.clear(); });
   }
-  /// True when a sentence with these words is said, within ten seconds.
+  /// True if a message with these words comes within ten seconds.
   bool hears(const std::string& words) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, 10s, [&] {
@@ -88,7 +88,7 @@ class SocketSourceTest : public testing::Test {
     source_.reset();
   }
   std::string path() const { return folder_.path(); }
-  /// What a sender that says this first is told.
+  /// The source's answer to this first message.
   std::string refusal(const FbvinsSocketHello& hello, const FileDescriptor& memory, int copies = 1) {
     TestSender sender(path());
     sender.send(bytes_of(hello), memory.number(), copies);

@@ -125,7 +125,7 @@ void V4l2Source::take(std::size_t index, SensorInput& input) {
     return;
   }
   if (stamps_were_known && !camera.device->stamps_are_the_drivers())
-    say(camera.path + ": its driver tells no time; images are stamped when they arrive");
+    say(camera.path + ": its driver gives no time stamps; images are stamped on arrival");
   if (*frame) add(index, *std::move(*frame), input);
 }
 

@@ -243,7 +243,7 @@ TEST(V4l2Source, SaysWhatIsWrong) {
   running.start(got);
   EXPECT_TRUE(running.heard("/fake/none: cannot be opened: No such file"));
   ASSERT_TRUE(deliver(silent, Time{1}, filled(96 * 48, 1)));
-  EXPECT_TRUE(running.heard("tells no time"));
+  EXPECT_TRUE(running.heard("gives no time stamps"));
   EXPECT_TRUE(running.heard("no flight controller is heard"));
 }
 
