@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What reading a bag of raw stereo costs, and whether memory grows with the file (bench/bags runs it).
+// CPU time and memory of reading a bag of raw stereo images (bench/bags runs it).
 //
 //   bag_reading make FOLDER SECONDS
 //   bag_reading read FILE
 //
-// The first writes 752 x 480 at 20 Hz and an IMU at 200 Hz in six formats; the second gives CPU time a stereo frame, from opening to
-// the last image, and the peak of memory.
+// The first writes stereo images of 752 x 480 at 20 Hz and an IMU at 200 Hz in six formats; the second prints the CPU time for each
+// stereo frame, from opening to the last image, and the peak memory.
 #include <fmt/format.h>
 #include <sys/resource.h>
 
@@ -39,7 +39,7 @@ StereoRig rig() {
   return rig;
 }
 
-/// Noise in the low bits: what compresses is what compresses in real images.
+/// A gradient with noise in the low bits, which compresses about as well as a real image.
 std::shared_ptr<const Image> image(Rng& rng) {
   auto out = std::make_shared<Image>(752, 480);
   for (int y = 0; y < 480; ++y)
@@ -94,7 +94,7 @@ double cpu_s() {
 int read(const std::string& path) {
   const double start_s = cpu_s();
   RecordingOptions options;
-  options.dataset.rig = rig();  // not only bags of ours hold one
+  options.dataset.rig = rig();  // bags of other programs hold no calibration
   const auto data = open_recording(path, options);
   if (!data) return fail(data.error().message);
   const double opened_s = cpu_s();

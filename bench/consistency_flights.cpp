@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flies the estimator alone, on synthetic tracks (synthetic_tracks.hpp) along real or simulated trajectories with real or
-// simulated IMU readings: how far off it is, and whether it knows.
+// Runs the estimator alone, on synthetic tracks (synthetic_tracks.hpp) along real or simulated trajectories with real or
+// simulated IMU readings, and prints its errors and its NEES.
 //
 //   consistency_flights --trajectory V1_02/groundtruth.csv --imu V1_02/imu0.csv --start 10 --seconds 60 --recognise
 //   consistency_flights normal --seed 4 --movers 8
@@ -33,7 +33,7 @@ const TrueState& truth_at(const Simulation& s, Time t) {
 
 double squared(const Vec3& e, const Mat3& P) { return e.dot(P.ldlt().solve(e)); }
 
-/// What is compared with the truth, pose by pose.
+/// Compares estimates with the truth, pose by pose.
 class Comparison {
  public:
   explicit Comparison(const Simulation& flight) : flight_(flight) {}
@@ -51,7 +51,7 @@ class Comparison {
     accel_bias_ += squared(o.bias.accel_mps2 - bias.accel_mps2, o.accel_bias_covariance);
   }
 
-  /// One line: errors after SE3 alignment, NEES with the truth level, means over the poses.
+  /// One line: errors after SE3 alignment, NEES with the truth levelled, means over the poses.
   Result<std::string> summary() const {
     const std::vector<PosePair> pairs = associate(truth_, estimate_, {});
     const Result<Similarity> se3 = align(pairs, Alignment::se3);
@@ -102,21 +102,21 @@ int fly(const Wanted& wanted) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("fly the estimator on synthetic tracks");
+  CLI::App app("run the estimator on synthetic tracks");
   Wanted w;
   double seconds = 30, start = 0;
   int seed = 1;
   std::string trajectory, imu;
-  app.add_option("preset", w.preset, "of fbvins simulate");
-  app.add_option("--trajectory", trajectory, "a real flight instead");
-  app.add_option("--imu", imu, "and its readings");
-  app.add_option("--start", start, "[s]");
-  app.add_option("--seconds", seconds, "length");
+  app.add_option("preset", w.preset, "preset of fbvins simulate");
+  app.add_option("--trajectory", trajectory, "trajectory of a real flight, instead of a simulated one");
+  app.add_option("--imu", imu, "with --trajectory: its IMU readings");
+  app.add_option("--start", start, "with --trajectory: where to begin, s");
+  app.add_option("--seconds", seconds, "length, s");
   app.add_option("--seed", seed, "of room, tracks and noise");
-  app.add_option("--movers", w.tracks.movers, "boxes that move");
-  app.add_option("--bad-start", w.tracks.bad_start_s, "so long [s] tracks are bad");
-  app.add_flag("--recognise", w.tracks.recognise, "corners are re-observed");
-  app.add_flag("!--forget", w.known, "landmarks that left the window are forgotten");
+  app.add_option("--movers", w.tracks.movers, "number of moving boxes");
+  app.add_option("--bad-start", w.tracks.bad_start_s, "seconds at the start with bad tracks");
+  app.add_flag("--recognise", w.tracks.recognise, "corners that come back into view are re-observed");
+  app.add_flag("!--forget", w.known, "landmarks that leave the window are not kept");
   CLI11_PARSE(app, argc, argv);
   const auto preset = simulation_preset(w.preset);
   if (!preset) {

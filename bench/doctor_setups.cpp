@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor's table (docs/doctor.md): good recordings, of which it must say nothing, and wrong setups made of them.
+// The doctor's table (docs/doctor.md): good recordings, in which it must find nothing, and faults injected into them.
 //
-// usage: doctor_setups good RECORDING...          what is said of each, and what was measured
-//        doctor_setups wrong RECORDING [WORD]     each spoiler, or those whose name holds the word
+// usage: doctor_setups good RECORDING...          findings and measurements of each
+//        doctor_setups wrong RECORDING [WORD]     each injected fault, or those whose name contains the word
 #include <fmt/format.h>
 
 #include <algorithm>

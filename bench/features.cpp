@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the booster gains in matching, and what it costs. Prints Markdown tables:
-// held-out photographs through random homographies and damages, pairs of real keyframes with known poses, times.
+// The booster's effect on matching, and its time. Prints Markdown tables.
 //
-//   fbvins_features_bench --photos DIR [--every N]        correct mutual nearest neighbours at 3 px, raw and boosted, by
-//   condition fbvins_features_bench --keyframes DATASET             matches within the epipolar band, pairs with 20 to 70 %
-//   overlap fbvins_features_bench --time                          milliseconds an image by network, precision, kernel, keypoints
+//   fbvins_features_bench --photos DIR [--every N]   held-out photographs with random homographies and image degradations:
+//                                                    correct mutual nearest neighbours within 3 px, raw and boosted, by condition
+//   fbvins_features_bench --keyframes DATASET        pairs of real keyframes with 20 to 70 % overlap: matches near the epipolar lines
+//   fbvins_features_bench --time                     milliseconds an image by network, precision, kernel, number of keypoints
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -43,7 +43,7 @@ struct Score {
   double gain(const Score& raw) const { return 100 * (correct / std::max(raw.correct, 1.0) - 1); }
 };
 
-/// Raw descriptors and those of every network, of one view.
+/// Keypoints of one view, with raw descriptors and those of every network.
 struct Described {
   std::vector<Keypoint> keypoints;
   std::vector<std::vector<Descriptor>> descriptors;  // raw first
@@ -76,11 +76,11 @@ class Describer {
   std::vector<BoosterNetwork> networks_;
 };
 
-/// Mutual nearest neighbours and nothing else: of equals the first.
+/// Mutual nearest neighbours without further tests; of equal distances the first.
 constexpr HammingOptions kNearest{256, 2.0, true};
 
-/// Adds to score[method] the mutual nearest neighbours that `correct` calls so; with `as_many`, no more than the raw
-/// descriptors have, the closest.
+/// Adds to score[method] the mutual nearest neighbours and those that are `correct`; with `as_many`, only the closest, as
+/// many as the raw descriptors have.
 template <class Correct>
 void add_matches(const Described& a, const Described& b, const Correct& correct, std::vector<Score>& score,
                  bool as_many = false) {
@@ -142,7 +142,7 @@ struct View {
   Described left;
 };
 
-/// Share of a's image that b sees as well, of a wall this far ahead.
+/// Share of a's image that b sees as well, if both look at a wall kDepth_m ahead.
 double overlap(const StereoRig& rig, const Pose<W, B>& a, const Pose<W, B>& b) {
   constexpr double kDepth_m = 4;
   const Pose<C0, C0> T_ba = (b * rig.T_BC0).inverse() * (a * rig.T_BC0);
@@ -265,7 +265,7 @@ int run(const Arguments& arguments) {
 }  // namespace fbvins
 
 int main(int argc, char** argv) {
-  CLI::App app("What the booster gains in matching, and what it costs.");
+  CLI::App app("The booster's effect on matching, and its time.");
   fbvins::Arguments arguments;
   app.add_option("--photos", arguments.photos, "folders of photographs");
   app.add_option("--every", arguments.every, "only every n-th photograph")->check(CLI::PositiveNumber);

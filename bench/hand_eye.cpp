@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well markers and clocks are found from a minute of flight: twenty recordings of motion capture with gaps, another body and
-// a flip in each, against exact truth; and what twenty recordings would show if their errors were as the covariances say.
+// How accurately lever arm, rotation and clock offset of motion capture are found from a minute of flight: twenty synthetic recordings
+// with gaps, another body and a flip in each, against exact truth; and the errors to expect if they are distributed as the covariances say.
 //
 //   hand_eye lively | gentle                     synthetic flights and odometry errors (hand_eye_scene.hpp)
-//   hand_eye TRUTH ESTIMATE [ESTIMATE...]        minutes of real estimates, with markers made from their ground truth
+//   hand_eye TRUTH ESTIMATE [ESTIMATE...]        minutes of real estimates, with markers computed from their ground truth
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
@@ -48,7 +48,7 @@ class Table {
  public:
   Table() {
     fmt::print(
-        "| recording | lever arm [mm] | sigma | rotation [deg] | sigma | clock [ms] | sigma | NEES of 7 |\n|---|---|---|---|---|---|---|---|\n");
+        "| recording | lever arm error [mm] | sigma | rotation error [deg] | sigma | clock error [ms] | sigma | NEES of 7 |\n|---|---|---|---|---|---|---|---|\n");
   }
 
   void add(const std::string& name, const test::MarkerRecording& recording, const Trajectory<W>& estimate) {
@@ -79,8 +79,7 @@ class Table {
   }
 
  private:
-  /// What these recordings would show again and again if lever arms erred as their covariances say: what their information
-  /// allows.
+  /// Errors of the lever arm sampled from the covariances: what the information in these recordings allows.
   void print_expected() const {
     constexpr int kTimes = 10000;
     Rng rng(1, 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a query of the inverted index takes as the map grows: synthetic keyframes of 500 random descriptors, whose
-// words are as common as descriptors near them in the vocabulary make them.
+// How long a query of the inverted index takes as the map grows: synthetic keyframes of 500 descriptors, each a random node of
+// the vocabulary with some bits flipped.
 //
 //   loop_index [VOCABULARY]
 #include <fmt/format.h>

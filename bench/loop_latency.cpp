@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether loop closure delays the pose: the recording is played at its own rate through the threaded system, with and
-// without a loop closer beside it, and the wall time from an image's arrival to its pose is measured. Rounds take
-// turns, so that what else the machine does meets both.
+// without loop closure, and the wall time from an image's arrival to its pose is measured. Rounds alternate,
+// so that other load on the machine affects both.
 //
 //   loop_latency DATASET [ROUNDS]
 #include <fmt/format.h>

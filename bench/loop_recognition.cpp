@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well places are recognised and verified on stereo keyframes with known poses:
+// How well places are recognised and verified, on stereo keyframes with known poses:
 //
-//   loop_recognition VOCABULARY DATASET [OTHER_DATASET...]     a boosted vocabulary: boosted descriptors
+//   loop_recognition VOCABULARY DATASET [OTHER_DATASET...]     with a boosted vocabulary: boosted descriptors
 //
-// Within the first recording every pair is asked for (no odometry helps): recall over the pairs that share more than
-// 40 % of their view, precision of what was accepted. Against the others every accepted pair is a false loop.
+// Within the first recording every pair is tested without help of the odometry: recall over the pairs that share more than
+// 40 % of their view, precision of the accepted pairs. Between it and the others every accepted pair is a false loop.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -74,7 +74,7 @@ std::optional<Recording> load(const std::string& path, const Vocabulary& vocabul
   return r;
 }
 
-/// Whether b sees a surface at that distance there: the nearest feature with depth agrees.
+/// Whether b sees a surface at the distance of p: the depth of the nearest feature agrees.
 bool surface_agrees(const View& b, const Vec3& p) {
   const Vec2 xy = p.hnormalized();
   double nearest = 1e9, inverse_depth = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waking up in a known place: a map is made of a recording (all of it, or its first half only), then the odometry is
-// started at twenty random moments (of all of it, or of the second half) and has to find itself in the map.
+// Relocalisation: a map is made of a recording (all of it, or its first half), then the odometry is
+// started at twenty random moments (of all of it, or of the second half) and has to relocalise in the map.
 //
 //   loop_relocalise DATASET...
 #include <fmt/format.h>
@@ -42,7 +42,7 @@ void fly(const std::string& path, System& system, Time from, Time to, const auto
   if (Result<void> end = system.finish(); !end) throw std::runtime_error(end.error().message);
 }
 
-/// The map of a part of the flight, moved (shift and heading) to where the ground truth has it.
+/// The map of a part of the flight, aligned with the ground truth by translation and heading.
 PlaceMap map_of(const std::string& path, const Dataset& data, const Vocabulary& vocabulary, Time to) {
   LoopCloser loop(data.rig(), LoopOptions{}, vocabulary);
   System system = *System::create({}, data.rig(), RunMode::deterministic, {.mapper = &loop});

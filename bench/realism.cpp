@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much rendered images are like real ones. Renders the preset `normal` along a real recording's trajectory,
+// How much rendered images resemble real ones. Renders the preset `normal` along a real recording's trajectory,
 // with its IMU and at its stamps, measures both, and prints a Markdown table.
 //
 //   realism RECORDING [--preset NAME] [--trajectory CSV --imu CSV] [--seeds N] [--set NAME=VALUE] [--jpeg QUALITY]
 //
-// JPEG smooths noise and weak corners away. Where the real images are JPEG, the rendered ones must pass through the same
-// quality before they are compared: --jpeg (92 is what V1_01_easy_keyframes was saved with, from its tables).
+// JPEG removes noise and weak corners. If the real images are JPEG, the rendered ones must be compressed with the same
+// quality before they are compared: --jpeg (92 for V1_01_easy_keyframes, by its quantisation tables).
 #include <fmt/format.h>
 #include <turbojpeg.h>
 
@@ -79,7 +79,7 @@ void measure_gradients(const Pyramid& pyramid, Figures& figures) {
   }
 }
 
-/// What the scene says of its motion between two images: the share of ORB features that find their like.
+/// An image's features, for the share of ORB features that find their match in another image.
 struct View {
   Time t;
   OrbFeatures features;
@@ -116,7 +116,7 @@ std::optional<Pose<W, B>> pose_at(const std::vector<TrajectoryPoint>& truth, Tim
 
 void measure_matches(const std::vector<View>& views, const StereoRig& rig, const std::vector<TrajectoryPoint>& truth,
                      Figures& figures) {
-  const std::size_t step = 1 + views.size() / 150;  // a film has more pairs than the figure needs
+  const std::size_t step = 1 + views.size() / 150;  // a sequence has more pairs than the figure needs
   for (std::size_t i = 0; i < views.size(); i += step)
     for (std::size_t j = i + step; j < views.size(); j += step) {
       const auto a = pose_at(truth, views[i].t), b = pose_at(truth, views[j].t);
@@ -130,7 +130,7 @@ void measure_matches(const std::vector<View>& views, const StereoRig& rig, const
     }
 }
 
-/// Feeds images one by one.
+/// Measures images one by one.
 class Meter {
  public:
   Meter(const StereoRig& rig, bool consecutive)
@@ -199,7 +199,7 @@ class Meter {
     const double before = frame.stats.tracked + frame.stats.lost_flow + frame.stats.lost_check + frame.stats.lost_epipolar;
     if (before > 20) survivors_.push_back(100.0 * frame.stats.tracked / before);
   }
-  /// Where the image stands still (differences are mostly small), the difference of neighbours is noise.
+  /// While the camera rests (differences are mostly small), the difference of successive images is noise.
   void count_noise(const Image& image) {
     if (!last_.empty()) {
       std::vector<int> histogram(256, 0);
@@ -259,7 +259,7 @@ Figures measure_real(const std::string& path, bool& consecutive, std::vector<Tim
   return meter.finish(truth);
 }
 
-/// What a JPEG of that quality leaves of an image.
+/// The image after JPEG compression of that quality.
 std::shared_ptr<const Image> through_jpeg(const Image& image, int quality) {
   Image copy(image.width(), image.height());
   unsigned char* bytes = nullptr;
@@ -338,10 +338,10 @@ int main(int argc, char** argv) {
   int seeds = 2, jpeg = 0;
   program.add_option("RECORDING", recording)->required();
   program.add_option("--preset", preset);
-  program.add_option("--trajectory", trajectory, "where the recording's own truth is too sparse");
+  program.add_option("--trajectory", trajectory, "if the recording's own truth is too sparse");
   program.add_option("--imu", imu);
   program.add_option("--seeds", seeds);
-  program.add_option("--jpeg", jpeg, "quality that the rendered images are compressed with first, 0 not at all");
+  program.add_option("--jpeg", jpeg, "JPEG quality with which the rendered images are compressed first; 0: they are not");
   program.add_option("--set", assignments)->take_all()->allow_extra_args(false);
   CLI11_PARSE(program, argc, argv);
   Result<SimulationOptions> options = simulation_preset(preset);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// CPU time a stereo frame costs, frontend and estimator, on one thread and with the images decoded beforehand.
-// Prints JSON; bench/speed makes the tables from it. Nothing is warmed up, left out or subtracted: every image
-// of the recording counts, those before the first pose and the initialisation as well.
+// CPU time of a stereo frame in frontend and estimator, on one thread and with the images decoded beforehand.
+// Prints JSON, of which bench/speed makes tables. There is no warm-up, and nothing is left out or subtracted: every image
+// of the recording counts, including those before the first pose and the initialisation.
 //
 //   fbvins_speed MH_01_easy_17s --set frontend.kind=orb --set estimator.keyframes.max_keyframes=12
 #include <fmt/format.h>
@@ -37,7 +37,7 @@ Measured fly(const SystemOptions& config, const StereoRig& rig, std::vector<Sens
   System system = *System::create(config, rig);
   system.on_tracked_frame([&](const TrackedFrame& f) { m.frontend.push_back(f.stats); });
   CpuTimer timer;
-  double since_pose_ms = 0;  // reading in IMU samples counts for the image that follows them
+  double since_pose_ms = 0;  // the time of IMU samples counts for the image that follows them
   bool posed = false;
   system.on_odometry([&](const Odometry& o) {
     m.estimator.push_back(o.stats);

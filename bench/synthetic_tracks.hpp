@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a frontend would tell of a flight through a synthetic room, without any image: corners on its walls, and on boxes that
-// move, seen by both cameras with the errors that tracks have: noise, a slow slide of each, and some that slide fast. One that
-// comes back into view may be re-observed where the estimator's own pose says that it should be.
-// One instance, one flight; the same seed gives the same bytes.
+// Tracks as a frontend would give them of a flight through a synthetic room, without images: corners on its walls, and on moving
+// boxes, seen by both cameras with the errors that tracks have: noise, a slow drift of each, and a fast drift of some. A corner
+// that comes back into view may be re-observed if it is close to where the estimator's pose predicts it.
+// One instance for each flight; the same seed gives the same bytes.
 #pragma once
 
 #include <algorithm>
@@ -22,12 +22,12 @@ struct TrackOptions {
   bool recognise = false;
   int movers = 0;
   double noise_px = 0.4;
-  double slide_px = 0.04;     ///< of a track, a frame
-  double bad_share = 0.02;    ///< tracks that slide ten times as fast
-  double lost_share = 0.02;   ///< of the tracks, a frame
-  double known_share = 0.15;  ///< of the corners that could be re-observed, a frame
-  double sigma_px = 0.6;      ///< what the estimator is told
-  double bad_start_s = 0;     ///< so long tracks slide five times as fast, and the cameras squint by a pixel
+  double slide_px = 0.04;     ///< drift of a track in a frame, standard deviation
+  double bad_share = 0.02;    ///< share of tracks that drift ten times as fast
+  double lost_share = 0.02;   ///< share of the tracks that end in a frame
+  double known_share = 0.15;  ///< of the corners that could be re-observed in a frame, the share that is
+  double sigma_px = 0.6;      ///< standard deviation that the estimator assumes
+  double bad_start_s = 0;     ///< time with five times as fast a drift, and a pixel of disparity error
   std::uint64_t seed = 1;
 };
 
@@ -45,7 +45,7 @@ class SyntheticTracks {
     for (int i = 0; i < std::clamp(corners, 2500, 9000); ++i) {
       Corner c;
       for (int k = 0; k < 3; ++k) c.p(k) = rng_.uniform(low(k), high(k));
-      if (rng_.uniform() < 0.75) {  // the others are things in the room, near its edge
+      if (rng_.uniform() < 0.75) {  // the others are objects in the room, near its walls
         const int axis = static_cast<int>(rng_.below(3));
         c.p(axis) = rng_.below(2) ? low(axis) : high(axis);
       } else {
@@ -85,7 +85,7 @@ class SyntheticTracks {
     if (k > 0) out.imu = readings(flight_.frames[k - 1], out.t);
     const double t_s = (out.t - flight_.start).seconds();
     const Pose<W, B> T_WB = flight_.flight.pose(t_s);
-    // What W has drifted moves what is expected; taken at the prior's own moment.
+    // The drift of W at the prior's own time shifts the predicted positions.
     Pose<W, W> drift;
     if (prior.valid) {
       const Pose<W, B> then = flight_.flight.pose((prior.t - flight_.start).seconds());
@@ -164,7 +164,7 @@ class SyntheticTracks {
     return o;
   }
 
-  /// A track of before may go on under its old id.
+  /// Whether an earlier track is re-observed, under its old id.
   bool known_again(const Track& track, const Vec3& p_W, const Vec3& body, const Pose<W, W>* drift) {
     if (!o_.recognise || drift == nullptr || track.age < 4) return false;
     const auto known = located_.find(track.id);
