@@ -37,7 +37,6 @@ struct Keyframe {
   Vec3 v_WB = Vec3::Zero();
   GaugeState gauge;                     ///< in the estimator's own frame, not levelled
   Pose<W, G> T_WG;                      ///< of the newest published pose when this was handed on; set by the pipeline
-  Mat6 pose_covariance = Mat6::Zero();  ///< of (dp in W, dtheta in B), from the start of W
   std::uint32_t reset_counter = 0;      ///< a new value: W is a new frame, with no known relation to the old
   StereoFrame images;
   std::vector<KeyframeLandmark> landmarks;

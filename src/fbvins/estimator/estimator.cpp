@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/estimator.hpp"
 
+#include <limits>
 #include <utility>
 
 #include "fbvins/core/stage_timer.hpp"
@@ -53,6 +54,7 @@ Vec3 Estimator::gravity_W() const { return window_.tilt().gravity_W(options_.gra
 Estimate Estimator::process(const TrackedFrame& frame) {
   Estimate out;
   const Duration rest = rest_.update(frame);
+  if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
   else initialise(frame, rest, out);
   Odometry& odometry = out.odometry;
@@ -87,6 +89,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
     return;
   }
   running_ = false;
+  calibration_ = calibrated_;
   initialiser_.reset();
   out.odometry.health = {HealthState::initialising, HealthReason::alignment_refused};
 }
@@ -115,6 +118,8 @@ void Estimator::open_window(const InitialSolution& start) {
   window_.set_prior(std::move(prior));
   window_.set_pivot(first.T_WB.p);
   published_.restart();
+  up_sigma_rad_ = 0;
+  covariances_.reset();
 }
 
 Frame Estimator::predict(const TrackedFrame& frame) const {
@@ -141,7 +146,6 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const bool standstill = rest.seconds() > kRestForStandstill_s;
   Frame predicted = predict(frame);
   predicted.standstill = standstill;
-  if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   window_.add_frame(std::move(predicted), frame.features, calibration_);
   stats.prepare_ms = timer.lap_ms();
   const WindowSolution& solution = solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations});
@@ -206,15 +210,15 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
   const KeyframeOptions& limits = options_.keyframes;
   const auto keyframe_zone = [&] { return window_.frames().size() - limits.newest_frames; };
   hand_on_keyframes(solution, keyframe_zone(), out.keyframes);
-  if (keyframe_zone() > limits.max_keyframes) {
-    const Frame& oldest = window_.frames().oldest();
-    const std::optional<Mat17> covariance = solution.covariance(oldest.id);
-    if (covariance) window_.known().anchor(oldest.state.T_WB, covariance->topLeftCorner<6, 6>());
-  }
   for (int i = keyframe_zone() - 1; i >= 1; --i)
     if (!window_.frames()[i].keyframe) window_.drop_frame(i, calibration_);
-  while (keyframe_zone() > limits.max_keyframes)
-    window_.marginalise_keyframe(keyframe_policy_.leaving(window_, calibration_, keyframe_zone()), calibration_);
+  while (keyframe_zone() > limits.max_keyframes) {
+    const int leaving = keyframe_policy_.leaving(window_, calibration_, keyframe_zone());
+    const Frame& host = window_.frames()[leaving];
+    const std::optional<Mat17> covariance = solution.covariance(host.id);
+    if (covariance) window_.known().anchor(host.state.T_WB, covariance->topLeftCorner<6, 6>());
+    window_.marginalise_keyframe(leaving, calibration_);
+  }
   out.odometry.stats.frames_in_window = window_.frames().size();
 }
 
@@ -227,10 +231,7 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
     keyframe.images = window_.take_images(i);
     const std::optional<Mat17> covariance = solution.covariance(frame.id);
     keyframe.gauge = gauge_state_of(window_, frame.state);
-    if (covariance) {
-      keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
-      keyframe.pose_covariance = window_.tilt().levelled_covariance(frame.state, *covariance).topLeftCorner<6, 6>();
-    }
+    if (covariance) keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
     keyframe.reset_counter = reset_counter_;
     out.push_back(std::move(keyframe));
   }
@@ -244,6 +245,7 @@ void Estimator::restart() {
   const Pose<W, B>& last = published_.T_WB();
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last;
   running_ = false;
+  calibration_ = calibrated_;
   failed_solves_ = 0;
   ++reset_counter_;
   window_.clear();
@@ -251,10 +253,29 @@ void Estimator::restart() {
   rest_.reset();
 }
 
+/// Where the solve has given no covariance, the last one goes on, with what its velocity may have been off since then;
+/// where there never was one it is unknown.
+void Estimator::carry_covariances(Odometry& out) {
+  if (!out.pose_covariance.isZero(0)) {
+    covariances_ = {out.t, out.pose_covariance, out.velocity_covariance, out.gyro_bias_covariance, out.accel_bias_covariance};
+    return;
+  }
+  const Mat3 unknown = Mat3::Constant(std::numeric_limits<double>::quiet_NaN());
+  const StateCovariances last =
+      covariances_.value_or(StateCovariances{out.t, unknown.replicate<2, 2>(), unknown, unknown, unknown});
+  const double dt = (out.t - last.t).seconds();
+  out.pose_covariance = last.pose;
+  out.pose_covariance.topLeftCorner<3, 3>() += dt * dt * last.velocity;
+  out.velocity_covariance = last.velocity;
+  out.gyro_bias_covariance = last.gyro_bias;
+  out.accel_bias_covariance = last.accel_bias;
+}
+
 /// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).
 void Estimator::publish(Odometry& out) {
   const NavState& newest = window_.newest().state;
   const NavState level = window_.tilt().levelled(newest);
+  carry_covariances(out);
   published_.follow(motion_of_newest(window_, gravity_W()), level.T_WB);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);

@@ -57,8 +57,16 @@ class Estimator {
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame);
   void restart();
+  void carry_covariances(Odometry& out);
   void publish(Odometry& out);
   Vec3 gravity_W() const;
+
+  /// Of the newest level state that had any.
+  struct StateCovariances {
+    Time t;
+    Mat6 pose;
+    Mat3 velocity, gyro_bias, accel_bias;
+  };
 
   EstimatorOptions options_;
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
@@ -76,6 +84,7 @@ class Estimator {
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
   double up_sigma_rad_ = 0;  ///< as of the last usable solve
+  std::optional<StateCovariances> covariances_;
   PublishedPose published_;
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number

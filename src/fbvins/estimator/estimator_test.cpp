@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <limits>
+#include <utility>
 
 #include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
@@ -225,6 +227,36 @@ TEST(Estimator, BridgesASecondWithoutImages) {
   }
   EXPECT_EQ(flown.odometry.back().reset_counter, 0u);
   EXPECT_GT(flown.odometry[99].pose_covariance(0, 0), flown.odometry[79].pose_covariance(0, 0)) << "blindness costs certainty";
+}
+
+TEST(Estimator, AFailedSolveKeepsTheLastCovarianceAndEnlargesIt) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 7);
+  Estimator estimator(flight.rig, exact_noise());
+  Odometry before, failed;
+  for (int k = 0; k <= 80; ++k) {
+    TrackedFrame frame = flight.frame(k);
+    if (k == 80) frame.features[0].left.normalised.x() = std::numeric_limits<double>::quiet_NaN();
+    before = std::exchange(failed, estimator.process(frame).odometry);
+  }
+  ASSERT_EQ(before.health.state, HealthState::good);
+  ASSERT_EQ(failed.health, (Health{HealthState::degraded, HealthReason::solver_failed}));
+  EXPECT_GT(before.pose_covariance(0, 0), 0);
+  for (int i = 0; i < 3; ++i) EXPECT_GT(failed.pose_covariance(i, i), before.pose_covariance(i, i));
+  EXPECT_EQ(failed.velocity_covariance, before.velocity_covariance);
+}
+
+TEST(Estimator, ARestartForgetsWhatWasEstimatedOfTheCalibration) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 8);
+  flight.images = [](int k) { return k < 100; };
+  EstimatorOptions options = exact_noise();
+  options.estimate_extrinsics = true;
+  Estimator estimator(flight.rig, options);
+  const Calibration given = estimator.calibration();
+  bool changed = false;
+  for (int k = 0; k < 400 && estimator.process(flight.frame(k)).odometry.health.state != HealthState::lost; ++k)
+    changed = changed || estimator.calibration().T_BC0.p != given.T_BC0.p;
+  EXPECT_TRUE(changed);
+  EXPECT_EQ(estimator.calibration().T_BC0.p, given.T_BC0.p);
 }
 
 TEST(Estimator, BridgesHalfASecondWithoutReadings) {

@@ -25,7 +25,7 @@ class PublishedPose {
   explicit PublishedPose(double max_step_m) : max_step_m_(max_step_m) {}
 
   /// A new W begins: the next pose is published as the window has it.
-  void restart() { started_ = false; }
+  void restart() { started_ = false, tilt_sigma_rad_ = 0; }
   /// The next frame. Without `motion` since the last one its pose is published as the window has it.
   void follow(const std::optional<Pose<B, B>>& motion, const Pose<W, B>& level);
   /// Fills pose, velocity, up and tilt; adds the pending correction to the covariances in `out`, which are of the level state.

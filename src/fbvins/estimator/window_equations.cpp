@@ -6,6 +6,9 @@
 namespace fbvins {
 namespace {
 
+/// Relative damping with which a landmark is eliminated whose depth the observations leave open.
+constexpr double kDampingOfSingular = 1e-5;
+
 // Each term returns its cost, and adds to the equations unless they are null.
 
 double prior_term(const WindowProblem& w, NormalEquations* out) {
@@ -155,7 +158,10 @@ double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations&
 
 ReducedEquations reduced(NormalEquations& equations) {
   ReducedEquations out{equations.H, equations.g};
-  equations.points.eliminate(0, out.H, out.g);
+  if (!equations.points.eliminate(0, out.H, out.g)) {
+    out = {equations.H, equations.g};
+    equations.points.eliminate(kDampingOfSingular, out.H, out.g);
+  }
   out.H = Eigen::MatrixXd(out.H.selfadjointView<Eigen::Lower>());
   return out;
 }

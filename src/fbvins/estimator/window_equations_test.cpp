@@ -82,5 +82,22 @@ TEST(WindowEquations, CalibrationThatIsNotEstimatedIsDecoupled) {
   for (PointBlock& point : equations.points.points()) EXPECT_TRUE(equations.points.coupling(point, 2).isZero(0));
 }
 
+TEST(WindowEquations, ASingularLandmarkDoesNotKeepTheOthersFromBeingEliminated) {
+  const test::Window w = test::make_window(false);
+  PairTable pairs;
+  NormalEquations singular;
+  linearise(w.problem, pairs, singular);
+  PointBlock& first = singular.points.points().front();
+  for (int k = 0; k < first.count; ++k) singular.points.coupling(first, k).setZero();
+  first.w.setZero();
+  first.V.setIdentity();
+  NormalEquations regular = singular;
+  first.V = Vec3(1, 2, 3) * Vec3(1, 2, 3).transpose();
+  const ReducedEquations expected = reduced(regular), found = reduced(singular);
+  EXPECT_LT((found.g - expected.g).norm(), 1e-3 * expected.g.norm());
+  EXPECT_LT((found.H - expected.H).norm(), 1e-3 * expected.H.norm());
+  EXPECT_GT((singular.H - expected.H).norm(), 1e-2 * expected.H.norm());
+}
+
 }  // namespace
 }  // namespace fbvins

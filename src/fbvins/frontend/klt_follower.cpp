@@ -66,6 +66,7 @@ bool KltFollower::carry(KltTrack& track, const Vec2& found_px, const CameraMotio
   if (!normalised || !(p_now.z() > 0)) return false;
   track.previous_px = track.px;
   track.previous_normalised = track.normalised;
+  track.previous_inverse_depth = track.inverse_depth;
   track.normalised = *normalised;
   track.R_now_anchor = motion.R_ba * track.R_now_anchor;
   track.depth_ratio *= p_now.z();

@@ -68,6 +68,7 @@ TEST(KltFollower, UpdatesTheDepthByTheMotion) {
   ahead.p_ba = Vec3(0, 0, -0.03);
   ASSERT_TRUE(scene.follow(ahead));
   EXPECT_NEAR(1 / *scene.track.inverse_depth, TestWall::kDepth_m - 0.03, 1e-9);
+  EXPECT_NEAR(1 / *scene.track.previous_inverse_depth, TestWall::kDepth_m, 1e-9);
   EXPECT_NEAR(scene.track.depth_ratio, (TestWall::kDepth_m - 0.03) / TestWall::kDepth_m, 1e-9);
 }
 

@@ -36,7 +36,7 @@ struct Crowd {
       Track track;
       track.previous_normalised = p.hnormalized();
       track.normalised = (motion.R_ba * walked + motion.p_ba).hnormalized() + kNoise_px / kFocal_px * Vec2(noise_x, noise_y);
-      track.inverse_depth = 1 / p.z();
+      track.previous_inverse_depth = 1 / p.z();
       tracks.start(track);
     }
   }
@@ -89,8 +89,31 @@ TEST(MotionCheck, NeedsAStateAndEnoughTracks) {
 
 TEST(MotionCheck, LeavesOutTracksWithoutDepth) {
   Crowd crowd(100, 30, 0.8);
-  crowd.tracks[0].inverse_depth.reset();
+  crowd.tracks[0].previous_inverse_depth.reset();
   EXPECT_EQ(crowd.lost(crowd.motion).first, 29);
+}
+
+/// The depth that counts is that of the image before; towards the edge of the image the newest one's would be wrong by pixels.
+TEST(MotionCheck, KeepsWhatStandsStillInFastFlightAhead) {
+  TrackTable<Track, Patches> tracks(100);
+  CameraMotion ahead;
+  ahead.has_rotation = ahead.has_translation = true;
+  ahead.p_ba = Vec3(0, 0, -2 * kDt_s);
+  Rng rng(13);
+  for (int i = 0; i < 60; ++i) {
+    const double x = rng.uniform(-0.7, 0.7), y = rng.uniform(-0.5, 0.5), depth_m = rng.uniform(1, 2);
+    Track track;
+    track.previous_normalised = Vec2(x, y);
+    track.previous_inverse_depth = 1 / depth_m;
+    track.normalised = (depth_m * Vec3(x, y, 1) + ahead.p_ba).hnormalized();
+    track.inverse_depth = 1 / (depth_m + ahead.p_ba.z());
+    tracks.start(track);
+  }
+  MotionCheck check(kPinhole, 0.11);
+  FrontendStats stats;
+  check.gather(tracks, [](const Track& track) { return &track.previous_normalised; });
+  check.judge(tracks, ahead, kDt_s, stats);
+  EXPECT_EQ(stats.lost_check, 0);
 }
 
 /// Towards the edge of a wide lens a pixel is a long way in the plane of normalised coordinates.
@@ -105,7 +128,7 @@ TEST(MotionCheck, MeasuresInPixelsOfTheLens) {
     Track track;
     track.previous_normalised = *fisheye.undistort(px);
     track.normalised = *fisheye.undistort(px + kNoise_px * Vec2(noise_x, noise_y));
-    track.inverse_depth = 0.3;
+    track.previous_inverse_depth = 0.3;
     tracks.start(track);
   }
   CameraMotion still;

@@ -40,6 +40,7 @@ void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion
     track.right.reset();
     track.previous_normalised = track.normalised;
     track.previous_px = track.px;
+    track.previous_inverse_depth = track.inverse_depth;
     if (motion.has_rotation) predict_one(track, tracks.patches(track).reference, camera, motion, typical_inverse_depth);
   }
 }

@@ -34,6 +34,19 @@ TEST(OrbTrack, IsPredictedByItsDepthAndEndsOutsideTheImage) {
   EXPECT_EQ(tracks[2].fate, Fate::out_of_view) << "120 px to the left of the image";
 }
 
+TEST(OrbTrack, CarriesItsDepthAndRemembersThatOfTheImageBefore) {
+  const TestWall wall;
+  OrbTracks tracks(1);
+  tracks.start(track_at(wall.camera, Vec2(100, 90)));
+  tracks[0].inverse_depth = 0.5;
+  CameraMotion ahead;
+  ahead.has_rotation = ahead.has_translation = true;
+  ahead.p_ba = Vec3(0, 0, -0.1);
+  predict(tracks, wall.camera, ahead, 0);
+  EXPECT_NEAR(1 / *tracks[0].inverse_depth, 1.9, 1e-9);
+  EXPECT_EQ(tracks[0].previous_inverse_depth, 0.5);
+}
+
 TEST(OrbTrack, IsLostBehindTheCamera) {
   const TestWall wall;
   OrbTracks tracks(1);

@@ -29,8 +29,9 @@ struct TrackState {
   Vec2 normalised = Vec2::Zero();  ///< the same in C0
   Vec2 previous_px = Vec2::Zero();
   Vec2 previous_normalised = Vec2::Zero();
-  std::optional<double> inverse_depth;  ///< 1/m along z of C0, from the last stereo match
-  std::optional<Observation> right;     ///< match in the newest right image
+  std::optional<double> inverse_depth;  ///< 1/m along z of C0, from the last stereo match, carried to the newest image
+  std::optional<double> previous_inverse_depth;
+  std::optional<Observation> right;  ///< match in the newest right image
   int age_frames = 0;
   bool observed = true;  ///< has an observation in the newest image
   Fate fate = Fate::goes_on;
