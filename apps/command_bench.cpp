@@ -20,9 +20,9 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(MATRIX lists recordings, frontends, configurations and repetitions; every combination is run, several at a time.
-Killed? The same command goes on where it was: finished cells are not run again, unless program or configuration
-changed. Writes results.csv, results.json (machine, version, effective configurations), tables.md and report.html.
+    R"(MATRIX lists recordings, frontends, configurations and repetitions; every combination, a cell, is run, several at a time.
+After an interruption the same command continues: finished cells are not run again, unless program or configuration
+have changed. Writes results.csv, results.json (machine, version, effective configurations), tables.md and report.html.
 
 examples:
   fbvins bench configs/table1.yaml --euroc ~/euroc            the paper's Table 1, from real EuRoC
@@ -30,8 +30,8 @@ examples:
   fbvins bench configs/scenarios.yaml --jobs 4 --out scenarios --discard-rendered
   fbvins bench configs/scenarios.yaml --out new --reference scenarios/results.csv      exit code 1 where it got worse
   fbvins bench configs/scenarios.yaml --list                  names of the cells, one a line
-  fbvins bench configs/scenarios.yaml --out new --cell fast-8s-s3-klt     one alone, on any machine that shares the folder;
-                                                              without --cell, when all are done: the tables
+  fbvins bench configs/scenarios.yaml --out new --cell fast-8s-s3-klt     one cell alone, on any machine that shares the folder;
+                                                              then without --cell, when all are done, to write the tables
 )";
 
 struct Arguments {
@@ -149,17 +149,18 @@ void add_bench_command(CLI::App& program, int& exit_code) {
   command->add_option("--out", a->out, "folder for the results (default out/bench-<matrix>)");
   command->add_option("--jobs", a->bench.jobs, "processes at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   command->add_option("--euroc", a->where.euroc, "folder with the EuRoC recordings that the matrix names");
-  command->add_option("--inputs", a->where.inputs, "folder with recorded flights to render along (default: the matrix's)");
+  command->add_option("--inputs", a->where.inputs,
+                      "folder with recorded flights to render along (default: the matrix file's folder)");
   command->add_option("--rendered", a->where.rendered,
-                      "folder for rendered recordings (default OUT/rendered); those there are used");
+                      "folder for rendered recordings (default OUT/rendered); those in it are reused");
   CLI::Option* discard = command->add_flag("--discard-rendered", a->bench.discard_rendered,
-                                           "delete what was rendered as soon as its cells are done");
+                                           "delete each rendered recording as soon as its cells are done");
   CLI::Option* reference = command->add_option("--reference", a->reference, "results.csv of an earlier run to compare with");
   command->add_option("--tolerance", a->tolerance.share, "share by which an error may grow against the reference")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  CLI::Option* list = command->add_flag("--list", a->list, "run nothing; the names of all cells, one a line");
-  command->add_option("--cell", a->cell, "do this cell alone; any number of processes may share OUT, each cell is done once")
+  CLI::Option* list = command->add_flag("--list", a->list, "run nothing, print the names of all cells, one a line");
+  command->add_option("--cell", a->cell, "run this cell alone; any number of processes may share OUT, each cell is run once")
       ->excludes(list)
       ->excludes(discard)
       ->excludes(reference);

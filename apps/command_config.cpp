@@ -16,8 +16,8 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples = R"(examples:
-  fbvins config                                  the user's options with unit, range, value and meaning
-  fbvins config --all                            the expert's as well
+  fbvins config                                  the options for users with unit, range, value and meaning
+  fbvins config --all                            those for experts as well
   fbvins config --yaml > drone.yaml              a file to start from
   fbvins config --config drone.yaml --set estimator.max_iterations=8
 )";
@@ -61,7 +61,7 @@ void add_config_command(CLI::App& program, int& exit_code) {
                   ->take_all()
                   ->allow_extra_args(false);
   command->add_flag("--defaults", arguments->defaults, "the defaults (as without any argument)")->excludes(file)->excludes(set);
-  command->add_flag("--all", arguments->all, "the expert's options as well as the user's");
+  command->add_flag("--all", arguments->all, "options for experts as well as those for users");
   command->add_flag("--yaml", arguments->yaml, "as a configuration file");
   command->callback([arguments, &exit_code] { exit_code = show(*arguments); });
 }

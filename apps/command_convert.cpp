@@ -18,8 +18,8 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(What is written follows from the name: FILE.bag, a ROS 1 bag; FILE.mcap, a flight record, which ROS 2's programs read;
-else an EuRoC folder. Images become 8-bit grey.
+    R"(The name decides the format: FILE.bag is a ROS 1 bag; FILE.mcap a flight record, which ROS 2 programs can read;
+any other name is an EuRoC folder. Images become 8-bit grey.
 
 examples:
   fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
@@ -33,7 +33,7 @@ struct Arguments {
   bool quiet = false;
 };
 
-/// Takes what comes in order; finish() makes it whole.
+/// Takes events in order; finish() completes the output.
 struct Sink {
   std::function<Result<void>(const SensorEvent&)> add;
   std::function<Result<void>()> finish;
@@ -51,7 +51,9 @@ struct EurocSink {
   SimulatedImu imu;
 
   Result<void> add(const ImuSample& sample) { return imu.samples.push_back(sample), Result<void>{}; }
-  Result<void> add(const StereoFrame& frame) { return folder.add({.frame = frame, .right_stamp = frame.t, .exposure_s = 0, .depth_left_m = {}}); }
+  Result<void> add(const StereoFrame& frame) {
+    return folder.add({.frame = frame, .right_stamp = frame.t, .exposure_s = 0, .depth_left_m = {}});
+  }
   Result<void> finish() { return folder.finish(imu); }
 };
 

@@ -16,15 +16,15 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Says what is wrong with a setup: units, signs and axes of the IMU, its clock and mounting against the cameras, the cameras'
-calibration against each other, and the images themselves. Each finding says what was measured and how well, what it
-should be, what to do, and the calibration's line as it should be. Nothing is printed where all is well.
-It looks at the first 40 s of motion; a recording in which the rig is turned and moved about all axes shows most.
+    R"(Finds what is wrong with a setup: units, signs and axes of the IMU, its time offset and rotation to the cameras, the
+calibration between the cameras, and the images themselves. Each finding says what was measured with its standard deviation,
+what it should be, what to do, and gives the corrected line of the calibration. Nothing is printed if all is well.
+The first 40 s of motion are used; a recording shows most if the rig is rotated and moved about all axes.
 
 examples:
   fbvins doctor MH_01_easy
   fbvins doctor flight --calibration camchain-imucam.yaml
-  fbvins doctor flight.mcap --all                what was measured, whether right or wrong, and what could not be judged
+  fbvins doctor flight.mcap --all                all measurements, right or wrong, and what could not be judged
   fbvins doctor flight --json
 
 exit codes: 0 all is well, 1 something is wrong, 2 wrong usage or bad input
@@ -77,7 +77,7 @@ void add_doctor_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("doctor", kDoctorDescription);
   command->footer(kExamples);
   arguments->recording.add_to(*command);
-  command->add_flag("--all", arguments->all, "what was measured, and what could not be judged, too");
+  command->add_flag("--all", arguments->all, "print all measurements, and what could not be judged, too");
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = examine_recording(*arguments); });
 }

@@ -17,9 +17,9 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV), a recording that
-holds one, which also tells the share of images with a pose, or a bag with a topic of PoseStamped,
-TransformStamped or Odometry; ESTIMATE may be one, too. The stamps of both are matched as evo does:
+    R"(GROUND_TRUTH is a trajectory file (TUM: seconds x y z qx qy qz qw; or EuRoC CSV), a recording with
+ground truth, of which the share of images with a pose is printed as well, or a bag with a topic of PoseStamped,
+TransformStamped or Odometry; ESTIMATE is a trajectory file or such a bag. The stamps of both are matched as by evo:
 the nearest, at most --max-diff apart.
 
 examples:
@@ -41,7 +41,7 @@ struct Truth {
   std::vector<Time> images;  ///< empty when the truth came from a file
 };
 
-/// A folder of somebody's bag is one as well.
+/// A ROS 2 bag can be a folder, too.
 bool is_euroc(const std::string& path) {
   if (path.ends_with(".zip")) return true;
   return std::filesystem::is_directory(path) && !std::filesystem::exists(path + "/metadata.yaml");
@@ -120,20 +120,20 @@ void add_eval_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("GROUND_TRUTH", arguments->truth, "trajectory file or recording")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file")->required();
-  command->add_option("--topic", arguments->topic, "of poses, where GROUND_TRUTH is a bag with several");
-  command->add_option("--align", arguments->alignment, "alignment of the estimate with the truth, before errors are taken")
+  command->add_option("--topic", arguments->topic, "topic of poses, if GROUND_TRUTH is a bag with several");
+  command->add_option("--align", arguments->alignment, "alignment of the estimate with the truth, before errors are computed")
       ->check(CLI::IsMember({"se3", "yaw", "sim3", "none"}))
       ->capture_default_str();
   command->add_option("--max-diff", arguments->max_difference_s, "largest difference of matched stamps, s")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--interpolate", arguments->interpolate, "take the truth at the estimate's very stamps instead");
+  command->add_flag("--interpolate", arguments->interpolate, "interpolate the truth at the estimate's stamps instead");
   command->add_flag("--hand-eye", arguments->hand_eye,
                     "GROUND_TRUTH is motion capture: align it with the estimate first (fbvins mocap)");
-  command->add_option("--pairs", arguments->pairs, "pieces of the relative error: all, or one after the other")
+  command->add_option("--pairs", arguments->pairs, "segments for the relative error: all, overlapping, or consecutive ones")
       ->check(CLI::IsMember({"all", "consecutive"}))
       ->capture_default_str();
-  command->add_option("--path", arguments->path, "whose path is measured for pieces of a metre")
+  command->add_option("--path", arguments->path, "whose path is measured for segments of a metre")
       ->check(CLI::IsMember({"truth", "estimate"}))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "print JSON");

@@ -22,21 +22,21 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(A simulated quadrotor flies the mission by the poses of the odometry, from rendered images and a simulated IMU;
-the truth is only recorded (docs/flight.md). The same arguments give the same bytes, with --threaded or without, but for
---px4 and --wall-clock.
-Writes what `fbvins run` writes, and flight.csv, flight.json, truth, estimate and setpoint as trajectories.
+    R"(A simulated quadrotor flies the mission by the odometry's poses, which come from rendered images and a simulated IMU;
+the true poses are only recorded (docs/flight.md). The same arguments give the same bytes, with --threaded or without, except
+with --px4 and --wall-clock.
+Writes the files of `fbvins run`, flight.csv, flight.json, and truth, estimate and setpoint as trajectories.
 
 examples:
   fbvins fly configs/missions/paper.yaml                         the paper's flight
   fbvins fly configs/missions/paper.yaml --frontend orb --preset dim --seed 3
-  fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, the map's frame flown in
+  fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, flown in the map frame
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
   FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
-  fbvins fly paper.yaml --wall-clock 0.5                         in wall time at half its pace, through what `fbvins live` runs
+  fbvins fly paper.yaml --wall-clock 0.5                         in wall time at half speed, through the live system of `fbvins live`
   fbvins fly --identify --out f && fbvins tune f                 gains from the vehicle's response
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
-  fbvins report f                                                path, setpoint, modes, effort in one page
+  fbvins report f                                                path, setpoint, modes, commands in one page
 )";
 
 struct Arguments {
@@ -120,7 +120,7 @@ Result<FlightRun> flown(const Arguments& a, const Config& config, FlightSetup se
   return flight;
 }
 
-/// What a report needs of a run, as `fbvins run` leaves it.
+/// The files of `fbvins run`, for `fbvins report`.
 Result<void> write_as_run(const Arguments& a, const Config& config, const FlightRun& flight, double wall_s) {
   std::vector<TrajectoryPoint> truth;
   Trajectory<W> poses;
@@ -178,26 +178,25 @@ void add_fly_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("fly", kFlyDescription);
   command->footer(kExamples);
   command->add_option("MISSION", a->mission, "YAML file: takeoff, goto, hold, yaw, identify, land");
-  command->add_flag("--identify", a->identify,
-                    "instead of a mission: moves every axis, so that `fbvins tune` can tell them apart");
+  command->add_flag("--identify", a->identify, "instead of a mission: excites every axis in turn, for `fbvins tune`");
   command->add_option("--preset", a->preset, "world and light (see fbvins simulate)")
       ->check(CLI::IsMember(simulation_presets()))
       ->capture_default_str();
-  command->add_option("--seed", a->seed, "of world, wind and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--seed", a->seed, "seed of world, wind and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_option("--out", a->out, "folder for the results (default out/<mission>-<preset>-s<seed>-<frontend>)");
   a->config.add_to(*command);
-  command->add_option("--vehicle", a->vehicle, "what flies")->check(CLI::IsMember(quadrotor_presets()))->capture_default_str();
+  command->add_option("--vehicle", a->vehicle, "the quadrotor")->check(CLI::IsMember(quadrotor_presets()))->capture_default_str();
   command->add_option("--control", a->control, "YAML file that changes gains and limits, by PX4's names");
   command->add_option("--wind", a->wind_mps, "mean wind in m/s, gusts of two thirds of it (default 0.3)")
       ->check(CLI::Range(0.0, 10.0));
   CLI::Option* wall = command
                           ->add_option("--wall-clock", a->wall_rate,
-                                       "fly in wall time through a live system, so many seconds of the flight in one")
+                                       "fly in wall time through a live system, this many seconds of the flight in one")
                           ->check(CLI::Range(0.05, 4.0));
   CLI::Option* px4 =
       command->add_flag("--px4", a->px4, "a real PX4 flies: FBVINS_PX4 names bin/px4 of its px4_sitl build (docs/px4.md)");
   command->add_flag("--loop", a->loop, "loop closure: the mission is flown in the map's frame");
-  command->add_flag("--record", a->record, "images, IMU and truth too, as a recording in OUT/recording");
+  command->add_flag("--record", a->record, "write images, IMU and truth as a recording to OUT/recording, too");
   wall->excludes(px4);
   command->add_flag("--threaded", a->threaded, "frontend and estimator on threads of their own; the same result");
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");

@@ -16,15 +16,15 @@ namespace {
 
 constexpr const char* kExamples = R"(examples:
   fbvins run MH_01_easy                         estimate a flight, write out/MH_01_easy-boost
-  fbvins run MH_01_easy.zip --frontend orb      the other frontend, straight from the zip
+  fbvins run MH_01_easy.zip --frontend orb      another frontend, directly from the zip
   fbvins live --source replay:MH_01_easy        the same flight in wall time, poses at IMU rate
   fbvins eval MH_01_easy out/MH_01_easy-boost/trajectory_tum.txt
-  fbvins report out/MH_01_easy-*                both in one page: report.html
+  fbvins report out/MH_01_easy-*                both runs in one page: report.html
   fbvins info MH_01_easy                        what is in a recording
   fbvins doctor MH_01_easy                      what is wrong with its setup
   fbvins config                                 options with unit, default, meaning
 
-exit codes: 0 fine, 1 no pose could be estimated, 2 wrong usage or bad input
+exit codes: 0 success, 1 no pose could be estimated (doctor, --check: something is wrong), 2 wrong usage or bad input
 )";
 
 }  // namespace
@@ -34,7 +34,7 @@ int hand_over(const HandedOver& command, char** argv) {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::string program = self.parent_path() / command.program;
   execv(program.c_str(), argv);
-  return fail(fmt::format("the command {} is in a program of its own, {}, and that cannot be started: {}; ./dev build makes it",
+  return fail(fmt::format("the command {} is in a program of its own, {}, which cannot be started: {}; ./dev build makes it",
                           command.command, program, std::generic_category().message(errno)));
 }
 
@@ -58,7 +58,7 @@ int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> co
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? kOk : kBadInput;  // --help and --version arrive here, too
-  } catch (const std::exception& error) {               // the last line of defence: no memory, a full disk
+  } catch (const std::exception& error) {               // such as no memory, or a full disk
     return fail(error.what());
   }
   return exit_code;

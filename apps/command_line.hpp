@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One command line, several programs: `fbvins` holds the commands that read a recording and write results, and hands the
-// others to the program beside it that holds them. The user types `fbvins live` all the same, and a build of `fbvins` alone
-// compiles no more than it runs.
+// One command line, several programs: `fbvins` has the commands that read a recording and write results, and starts the
+// program beside it for the others. The user types `fbvins live` all the same, and a build of `fbvins` alone need not
+// compile the rest.
 #pragma once
 
 #include <initializer_list>
@@ -12,17 +12,17 @@ namespace fbvins::app {
 
 using AddCommand = void (*)(CLI::App& program, int& exit_code);
 
-/// A command that another program holds: a program in the same folder.
+/// A command of another program in the same folder.
 struct HandedOver {
   const char* command;
   const char* description;  ///< as in that program
   const char* program;
 };
 
-/// Becomes the program that holds the command; returns, with an error, only where that is not there.
+/// Replaces this process by the program that has the command; returns, with an error, only if that cannot be started.
 int hand_over(const HandedOver& command, char** argv);
 
-/// What main() of each program does: parses, runs the command, returns the exit code.
+/// The main() of each program: parses, runs the command, returns the exit code.
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
                      std::initializer_list<HandedOver> elsewhere = {});
 

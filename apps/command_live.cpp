@@ -32,19 +32,19 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Takes sensor data as they come and gives the pose at IMU rate. Ends with its source, or at Ctrl-C. Without --quiet one
-JSON object a line tells the state, whenever health changes and once a second. --out writes the files of `fbvins run` while
-the flight goes on, live_tum.txt (poses at IMU rate) and summary.json (latency, what was dropped, health; accuracy where the
-source is a recording with truth).
+    R"(Estimates the pose from sensor data as they come, at IMU rate. Ends with its source, or at Ctrl-C. Without --quiet a status
+line, one JSON object, is printed whenever health changes and once a second. --out writes the files of `fbvins run` while
+the flight goes on, live_tum.txt (poses at IMU rate) and summary.json (latency, dropped images, health; accuracy if the
+source is a recording with ground truth).
 
 sources:
   replay:DATASET[@SPEED]     a recording played in wall time
-  socket:PATH                another process, over a Unix socket (docs/socket.md); without --calibration it gives its own
-  ros2:LEFT,RIGHT,IMU        topics of ROS 2, in the domain of --ros2 (docs/ros2.md); with --calibration
+  socket:PATH                another process, over a Unix socket (docs/socket.md); it sends its calibration, unless --calibration is given
+  ros2:LEFT,RIGHT,IMU        ROS 2 topics, in the domain of --ros2 (docs/ros2.md); needs --calibration
   d435i[:SERIAL or FILE.bag] a RealSense camera with an IMU, by its factory calibration (docs/d435i.md)
-  v4l2:LEFT,RIGHT,IMU        video devices, or one with two images side by side; the IMU a flight controller's (udp:..., serial:...)
-                             or a process's (socket:...); with --calibration (docs/v4l2.md)
-faults, in seconds of the flight, for tests (KIND:START:LENGTH[:AMOUNT]):
+  v4l2:LEFT,RIGHT,IMU        video devices, or one with two images side by side; the IMU is a flight controller's (udp:..., serial:...)
+                             or another process's (socket:...); needs --calibration (docs/v4l2.md)
+faults to inject for tests, in seconds of the flight (KIND:START:LENGTH[:AMOUNT]):
   camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
   burst:..:HELD_BACK, leap:..:SECONDS
 
@@ -56,7 +56,7 @@ examples:
   fbvins live --source replay:MH_01_easy --mavlink udp:127.0.0.1:14580 --set live.mavlink.rate_hz=30
   fbvins live --source replay:MH_01_easy --record flight.mcap
   fbvins live --source replay:MH_01_easy --web 8080
-  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor says
+  fbvins live --source socket:/run/fbvins.sock --check 10       before the first flight: rates, gaps, clocks, and what the doctor finds
   fbvins live --source replay:MH_01_easy --fault camera_off:8:2 --fault leap:12:1:0.5
 )";
 
@@ -69,10 +69,10 @@ struct Arguments {
   bool record_images = true, quiet = false;
   int laps = 1;
   bool preload = false;
-  double check_s = 0;  ///< look at the sensors for so long, and do not fly
+  double check_s = 0;  ///< check the sensors for so long, and estimate nothing
 };
 
-/// A map to keep is one to load, where it is there, and to save.
+/// The map of --map is loaded, if the file exists, and saved.
 MapArguments map_arguments(const Arguments& arguments) {
   if (arguments.kept_map.empty()) return arguments.map;
   MapArguments map = arguments.map;
@@ -122,7 +122,7 @@ Result<void> add_sinks(const Arguments& arguments, const Config& config, const S
   return {};
 }
 
-/// Why a page's button cannot save the map; empty: it can.
+/// Why the page's button cannot save the map; empty: it can.
 std::string cannot_save_map(const Arguments& arguments) {
   if (!arguments.map.wanted()) return "this flight has no map: start it with --map FILE";
   if (arguments.map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
@@ -234,41 +234,42 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("--source", arguments->source, "where sensor data come from")->required();
   arguments->config.add_to(*command);
-  command->add_option("--out", arguments->out, "folder for files; without, none are written");
+  command->add_option("--out", arguments->out, "folder for the results; without it no files are written");
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
                       "Kalibr camchain-imucam.yaml instead of the source's own");
   command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
   command->add_option("--imu-state", arguments->imu_state, kImuStateHelp);
-  command->add_option("--max-images", arguments->dataset.max_frames, "of a replay: end after this many stereo images, 0 for all")
+  command->add_option("--max-images", arguments->dataset.max_frames, "replay: end after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--laps", arguments->laps, "of a replay: play it this often, one after the other")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--preload", arguments->preload, "of a replay: decode all images before the clock starts");
+  command->add_option("--laps", arguments->laps, "replay: play the recording this often")->check(CLI::PositiveNumber);
+  command->add_flag("--preload", arguments->preload, "replay: decode all images before the clock starts");
   command->add_flag("--loop", arguments->map.loop, "loop closure: a map beside the odometry");
   command->add_option("--save-map", arguments->map.save, "file for the map at the end; with loop closure");
   command->add_option("--load-map", arguments->map.load, "map to relocalise in and extend; with loop closure");
   command
       ->add_option(
           "--map", arguments->kept_map,
-          "a map that stays: loaded where the file is there, written every half minute and at the end; with loop closure")
+          "a map kept from flight to flight: loaded if the file exists, written every half minute and at the end; with loop closure")
       ->excludes("--save-map")
       ->excludes("--load-map");
-  command->add_option("--vocabulary", arguments->map.vocabulary, "words for loop closure, instead of those that ship");
+  command->add_option("--vocabulary", arguments->map.vocabulary,
+                      "vocabulary file for loop closure, instead of the one that ships");
   command
       ->add_option("--mavlink", arguments->mavlink,
                    "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
   command->add_option("--ros2", arguments->ros2,
-                      "publish in ROS 2's graph: DOMAIN[:INTERFACE], this machine alone without an interface");
+                      "publish ROS 2 topics: DOMAIN[:INTERFACE]; without an interface to this machine alone");
   command->add_option("--web", arguments->web, kWebHelp);
-  command->add_option("--check", arguments->check_s, "look at the sensors for so many seconds, say what is wrong, and end")
+  command->add_option("--check", arguments->check_s, "check the sensors for this many seconds, print what is wrong, and end")
       ->check(CLI::PositiveNumber);
-  command->add_option("--fault", arguments->faults, "something that sensors do to a flight; may be repeated")
+  command->add_option("--fault", arguments->faults, "sensor fault to inject (see below); may be repeated")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--record", arguments->record, "MCAP file for the flight record; fbvins run takes it as a recording");
-  command->add_flag("!--record-no-images", arguments->record_images, "keep images out of the record; it cannot be run then");
+  command->add_option("--record", arguments->record, "MCAP file for the flight record; it is a recording for fbvins run");
+  command->add_flag("!--record-no-images", arguments->record_images,
+                    "leave images out of the record, which cannot be run again then");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] {
     arguments->map = map_arguments(*arguments);

@@ -75,7 +75,7 @@ int write_text(const std::string& path, const std::string& text) {
 }
 
 int export_files(const Arguments& arguments) {
-  if (arguments.ply.empty() && arguments.tum.empty()) return fail("say where to: --ply FILE, --tum FILE");
+  if (arguments.ply.empty() && arguments.tum.empty()) return fail("no output file: give --ply FILE or --tum FILE");
   const auto map = load_map(arguments.file);
   if (!map) return fail(map.error().message);
   int code = kOk;
@@ -97,7 +97,7 @@ void add_map_command(CLI::App& program, int& exit_code) {
   CLI::App* joining = command->add_subcommand("merge", "join maps in the frame of the first");
   joining->add_option("maps", arguments->files, "map files")->required()->expected(2, 1000);
   joining->add_option("-o,--output", arguments->output, "the file to write")->required();
-  joining->add_option("--vocabulary", arguments->vocabulary, "instead of the one that ships");
+  joining->add_option("--vocabulary", arguments->vocabulary, "vocabulary file, instead of the one that ships");
   joining->callback([arguments, &exit_code] { exit_code = merge(*arguments); });
   CLI::App* exporting = command->add_subcommand("export", "points as PLY, keyframes as TUM");
   exporting->add_option("map", arguments->file, "map file")->required();

@@ -15,13 +15,13 @@ namespace {
 
 constexpr const char* kExamples =
     R"(MOCAP_FILE is an export of OptiTrack Motive (CSV), Vicon (CSV) or Qualisys (TSV, 6D), an MCAP with poses, or a TUM or
-EuRoC file; ESTIMATE a trajectory file or the folder of a run. The markers' place on the IMU, the pose
-of one world in the other and the clocks' offset are estimated from the flight itself (docs/mocap.md), which must tilt and turn.
+EuRoC file; ESTIMATE a trajectory file or the folder of a run. The pose of the markers on the IMU, the transformation
+between both frames and the clocks' offset are estimated from the flight itself (docs/mocap.md), which must tilt and turn.
 
 examples:
   fbvins mocap take.csv out/flight-orb --body quad
   fbvins mocap take.csv out/flight-orb --expected 0.6,0.3,0 --out measured     the aligned truth as measured/truth_tum.txt
-  fbvins mocap take.csv out/flight-orb --start 2:4 --end 28:30                 hovers by hand, seconds of the estimate
+  fbvins mocap take.csv out/flight-orb --start 2:4 --end 28:30                 hovers given by hand, in seconds of the estimate
 )";
 
 struct Arguments {
@@ -76,7 +76,7 @@ int run_mocap(const Arguments& arguments) {
   fmt::print("{}", describe(*markers));
   fmt::print("{}", describe(*found, markers->start));
   if (*errors) fmt::print("{}", to_table(**errors, estimate->front().t));
-  else fmt::print("no two hovers of a second: --start and --end choose instants\n");
+  else fmt::print("no two hovers of a second were found: choose spans with --start and --end\n");
   if (arguments.out.empty()) return kOk;
   const Trajectory<W> truth = within(body_truth(found->kept, found->calibration), *estimate);
   if (Result<void> done = write_truth_file(truth, arguments.out); !done) return fail(done.error().message);
@@ -92,14 +92,13 @@ void add_mocap_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("MOCAP_FILE", arguments->mocap, "export of the motion capture")->required();
   command->add_option("ESTIMATE", arguments->estimate, "trajectory file or folder of a run")->required();
-  command->add_option("--body", arguments->body, "the rigid body, where there are several");
-  command->add_flag("--drift", arguments->options.clock_drift, "find the drift of the clocks, too");
-  command->add_flag("--level", arguments->options.level_world, "the motion capture's world is level: find its heading only");
-  command->add_option("--start", arguments->start, "where the flight is measured from, seconds of the estimate, such as 2:4");
-  command->add_option("--end", arguments->end, "where it is measured to");
-  command->add_option("--expected", arguments->expected, "how far it should have gone, m in W: x,y,z")
-      ->delimiter(',')
-      ->expected(3);
+  command->add_option("--body", arguments->body, "the rigid body, if there are several");
+  command->add_flag("--drift", arguments->options.clock_drift, "estimate the drift of the clocks, too");
+  command->add_flag("--level", arguments->options.level_world, "the motion capture's frame is level: estimate its heading only");
+  command->add_option("--start", arguments->start,
+                      "span from which the flight is measured, in seconds of the estimate, such as 2:4");
+  command->add_option("--end", arguments->end, "span to which it is measured");
+  command->add_option("--expected", arguments->expected, "expected displacement, m in W: x,y,z")->delimiter(',')->expected(3);
   command->add_option("--out", arguments->out, "folder for the aligned truth");
   command->callback([arguments, &exit_code] { exit_code = run_mocap(*arguments); });
 }

@@ -15,11 +15,11 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(RUN is a folder that `fbvins run` wrote. The page needs nothing but itself: open it from disk, send it, print it.
+    R"(RUN is a folder that `fbvins run` wrote. The page is complete in itself: open it from disk, send it, print it.
 
 examples:
-  fbvins report out/MH_01_easy-boost out/MH_01_easy-klt -o report.html      both, one over the other
-  fbvins report out/flight-boost --truth groundtruth.csv                    where the run knew no truth
+  fbvins report out/MH_01_easy-boost out/MH_01_easy-klt -o report.html      both, in the same figures
+  fbvins report out/flight-boost --truth groundtruth.csv                    if the recording has no ground truth
 )";
 
 struct Arguments {

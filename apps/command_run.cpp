@@ -18,11 +18,11 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), statistics.csv,
-config.yaml (the effective configuration), summary.json, summary.txt, timing.csv. The same input and
-configuration give the same bytes in the first four, with --threaded as well. Loop closure (--loop, --save-map,
---load-map, --final-ba) adds map_trajectory_tum.txt (M after the run), map_causal_tum.txt and map_bounded_tum.txt
-(M as it was known at each moment, as corrected and without steps) and map_updates.csv; the odometry is not touched.
+    R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), covariance.csv, gauge.csv,
+statistics.csv, config.yaml (the effective configuration), summary.json, summary.txt, timing.csv (docs/outputs.md). The same
+input and configuration give the same bytes in the first six, with --threaded as well. Loop closure (--loop, --save-map,
+--load-map, --final-ba) adds poses in the map frame M: map_trajectory_tum.txt (known after the run), map_causal_tum.txt and
+map_bounded_tum.txt (as known at each moment, with and without steps), and map_updates.csv; the odometry stays the same.
 
 examples:
   fbvins run MH_01_easy
@@ -31,8 +31,8 @@ examples:
   fbvins run flight --calibration camchain-imucam.yaml --imu-calibration imu.yaml
   fbvins run MH_01_easy --config drone.yaml --set estimator.max_iterations=8 --threaded
   fbvins run flight.mcap --config flight.mcap    a flight record of fbvins live, as it was flown
-  fbvins run monday --save-map flat.fbm          with loop closure, the map kept
-  fbvins run tuesday --load-map flat.fbm         relocalises in Monday's map and goes on in its frame
+  fbvins run monday --save-map flat.fbm          with loop closure, the map is saved
+  fbvins run tuesday --load-map flat.fbm         relocalises in Monday's map and continues in its frame
 )";
 
 struct Arguments {
@@ -99,7 +99,8 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_flag("--final-ba", arguments->flight.map.final_ba,
                     "bundle adjustment over the whole map after the run; with loop closure");
   command->add_flag("--boosted-map", arguments->flight.map.boosted, "a new map of boosted descriptors; with loop closure");
-  command->add_option("--vocabulary", arguments->flight.map.vocabulary, "words for loop closure, instead of those that ship");
+  command->add_option("--vocabulary", arguments->flight.map.vocabulary,
+                      "vocabulary file for loop closure, instead of the one that ships");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -92,18 +92,18 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->add_option("PRESET", arguments->preset, "light, texture, motion or place (default normal)")
       ->check(CLI::IsMember(simulation_presets()));
   command->add_option("--out", arguments->out, "folder for the recording");
-  command->add_option("--seed", arguments->seed, "of world, flight and noise")->check(CLI::NonNegativeNumber);
+  command->add_option("--seed", arguments->seed, "seed of world, flight and noise")->check(CLI::NonNegativeNumber);
   command->add_option("--seconds", arguments->seconds, "length of the flight")->check(CLI::PositiveNumber);
   command->add_option("--config", arguments->config, "YAML file that changes the preset");
   command->add_option("--set", arguments->assignments, "one option, name=value; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
   command->add_option("--trajectory", arguments->trajectory, "fly along a recorded trajectory (TUM or EuRoC)");
-  command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU, used untouched (EuRoC CSV)");
+  command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU readings, used unchanged (EuRoC CSV)");
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--depth", arguments->depth, "left depth images in millimetres, too");
-  command->add_flag("--landmarks", arguments->landmarks, "corners of the world, too");
+  command->add_flag("--depth", arguments->depth, "write left depth images in millimetres, too");
+  command->add_flag("--landmarks", arguments->landmarks, "write the corners of the world's surfaces, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = simulate_flight(*arguments); });

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* kExamples =
     R"(Identifies the vehicle's response from a flight's log, axis by axis, and proposes gains under PX4's names (docs/tuning.md).
-The flight should have moved every axis: `fbvins fly --identify` does. A log of `fbvins fly` is its folder; of PX4 a .ulg with
+The flight should excite every axis, as `fbvins fly --identify` does. The log is the folder of `fbvins fly`, or a .ulg of PX4 with
 SDLOG_PROFILE 17 (default and high rate).
 Writes control.yaml (for `fbvins fly --control`), gains.params (for QGroundControl), tuning.txt, tuning.svg (before and after).
 
@@ -57,11 +57,11 @@ void add_tune_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("tune", kTuneDescription);
   command->footer(kExamples);
   command->add_option("FLIGHT", a->log, "folder of `fbvins fly`, or a log of PX4 (.ulg)")->required();
-  command->add_option("--phase-margin", a->options.phase_margin_deg, "of every loop, in degrees, at least")
+  command->add_option("--phase-margin", a->options.phase_margin_deg, "smallest phase margin of every loop, degrees")
       ->check(CLI::Range(20.0, 80.0))
       ->capture_default_str();
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
-  command->add_flag("--truth", a->truth, "velocities by motion capture (the simulator's truth) instead of what was flown by");
+  command->add_flag("--truth", a->truth, "use the simulator's true velocities instead of the estimated ones");
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = tune_gains(*a); });
 }

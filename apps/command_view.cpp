@@ -11,13 +11,13 @@ namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
-    R"(Shows a finished flight in the browser, on the page of `fbvins live --web`: played as it was flown, from the moment when
-somebody looks, and wound back and forth. Ends at Ctrl-C.
+    R"(Shows a finished flight in the browser, on the page of `fbvins live --web`. It begins to play when the first viewer opens
+the page, and can be moved back and forth. Ends at Ctrl-C.
 
 examples:
-  fbvins view flight.mcap                            what fbvins live --record wrote
-  fbvins view out/klt --recording MH_01_easy         what fbvins run --out wrote; its images are in the recording
-  fbvins view out/klt --web 0.0.0.0:8080             for a phone: the address that is printed has a token
+  fbvins view flight.mcap                            a flight record of fbvins live --record
+  fbvins view out/klt --recording MH_01_easy         a folder of fbvins run --out; its images are in the recording
+  fbvins view out/klt --web 0.0.0.0:8080             for a phone: the printed address has a token
 )";
 
 struct Arguments {
@@ -37,7 +37,7 @@ void add_view_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("view", kViewDescription);
   command->footer(kExamples);
   command->add_option("flight", arguments->flight, "flight record, or folder of `fbvins run --out`")->required();
-  command->add_option("--recording", arguments->recording, "recording that has the images of a run");
+  command->add_option("--recording", arguments->recording, "recording with the images of a run");
   command->add_option("--web", arguments->web, kWebHelp)->capture_default_str();
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

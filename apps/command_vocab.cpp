@@ -40,7 +40,7 @@ bool is_image(const fs::path& path) {
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
-/// Folders stand for the images below them; sorted, so that the same images give the same vocabulary.
+/// Files, and the images inside of folders; sorted, so that the same images give the same vocabulary.
 std::vector<std::string> image_files(const std::vector<std::string>& arguments) {
   std::vector<std::string> files;
   for (const std::string& argument : arguments) {
@@ -100,12 +100,12 @@ void add_vocab_command(CLI::App& program, int& exit_code) {
   CLI::App* training = command->add_subcommand("train", "from images of any kind, folders are searched");
   training->add_option("images", arguments->images, "images or folders")->required()->check(CLI::ExistingPath);
   training->add_option("-o,--output", arguments->output, "the file to write");
-  training->add_flag("--boosted", arguments->boosted, "words of boosted descriptors");
-  training->add_option("--features", arguments->orb.max_features, "ORB features of an image");
+  training->add_flag("--boosted", arguments->boosted, "use boosted descriptors");
+  training->add_option("--features", arguments->orb.max_features, "most ORB features in an image");
   training->add_option("--branching", arguments->training.branching, "children of a node");
   training->add_option("--depth", arguments->training.depth, "levels of the tree");
   training->add_option("--min-members", arguments->training.min_members, "a node with fewer descriptors is not split");
-  training->add_option("--seed", arguments->training.seed, "of the first centres");
+  training->add_option("--seed", arguments->training.seed, "seed of the initial cluster centres");
   training->callback([arguments, &exit_code] { exit_code = train(*arguments); });
   CLI::App* looking = command->add_subcommand("info", "what is in a vocabulary file");
   looking->add_option("file", arguments->file, "vocabulary")->required();

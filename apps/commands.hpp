@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The subcommands of `fbvins`, wherever they live (fbvins.cpp, fbvins_live.cpp, fbvins_tools.cpp,
-// fbvins_lab.cpp). Each adds itself to the
+// The subcommands of `fbvins`, of whatever program (fbvins.cpp, fbvins_live.cpp, fbvins_tools.cpp,
+// fbvins_bags.cpp, fbvins_lab.cpp). Each adds itself to the
 // command line and, when chosen, sets exit_code.
 #pragma once
 
@@ -10,23 +10,23 @@ class App;
 
 namespace fbvins::app {
 
-/// What the program tells the shell.
+/// The program's exit codes.
 enum ExitCode : int {
   kOk = 0,
-  kEstimationFailed = 1,  ///< the input was fine, but no pose came out of it
-  kSensorsWrong = 1,      ///< of a look at them
+  kEstimationFailed = 1,  ///< the input was fine, but no pose could be estimated
+  kSensorsWrong = 1,      ///< doctor, live --check: something is wrong
   kBadInput = 2,          ///< wrong usage, unreadable file, nothing to compare
 };
 
-/// What the help of `fbvins` says of commands that another program holds.
-inline constexpr const char* kLiveDescription = "sensors in, the pose out while they come";
+/// Descriptions of the commands of other programs, for the help of `fbvins`.
+inline constexpr const char* kLiveDescription = "estimate the pose from live sensors";
 inline constexpr const char* kViewDescription = "show a finished flight in the browser";
-inline constexpr const char* kEvalDescription = "say how far a trajectory is from the ground truth";
-inline constexpr const char* kInfoDescription = "say what is in a recording: rates, gaps, calibration, stamps";
-inline constexpr const char* kDoctorDescription = "say what is wrong with a setup: units, axes, clocks, calibration, images";
-inline constexpr const char* kMapDescription = "look at, join and export maps that `run --save-map` wrote";
-inline constexpr const char* kVocabDescription = "train or look at a vocabulary of visual words";
-inline constexpr const char* kFlyDescription = "fly a mission on the odometry's poses, in the simulator";
+inline constexpr const char* kEvalDescription = "compute the errors of a trajectory against the ground truth";
+inline constexpr const char* kInfoDescription = "show what is in a recording: rates, gaps, calibration, stamps";
+inline constexpr const char* kDoctorDescription = "find what is wrong with a setup: units, axes, clocks, calibration, images";
+inline constexpr const char* kMapDescription = "inspect, merge and export maps that `run --save-map` wrote";
+inline constexpr const char* kVocabDescription = "train or inspect a vocabulary of visual words";
+inline constexpr const char* kFlyDescription = "fly a mission by the odometry's poses, in the simulator";
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
 inline constexpr const char* kConvertDescription = "write a recording as ROS bag, flight record or EuRoC folder";

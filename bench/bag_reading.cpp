@@ -4,8 +4,8 @@
 //   bag_reading make FOLDER SECONDS
 //   bag_reading read FILE
 //
-// The first writes stereo images of 752 x 480 at 20 Hz and an IMU at 200 Hz in six formats; the second prints the CPU time for each
-// stereo frame, from opening to the last image, and the peak memory.
+// The first writes stereo images of 752 x 480 at 20 Hz and an IMU at 200 Hz in six formats; the second prints the CPU time
+// for each stereo frame, from opening to the last image, and the peak memory.
 #include <fmt/format.h>
 #include <sys/resource.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The booster's effect on matching, and its time. Prints Markdown tables.
 //
-//   fbvins_features_bench --photos DIR [--every N]   held-out photographs with random homographies and image degradations:
-//                                                    correct mutual nearest neighbours within 3 px, raw and boosted, by condition
-//   fbvins_features_bench --keyframes DATASET        pairs of real keyframes with 20 to 70 % overlap: matches near the epipolar lines
-//   fbvins_features_bench --time                     milliseconds an image by network, precision, kernel, number of keypoints
+//   fbvins_features_bench --photos DIR [--every N]   held-out photographs with random homographies and degradations:
+//                                                    correct matches within 3 px, raw and boosted, by condition
+//   fbvins_features_bench --keyframes DATASET        real keyframes with 20 to 70 % overlap: matches near the epipolar lines
+//   fbvins_features_bench --time                     milliseconds an image by network, precision, kernel, keypoints
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How accurately lever arm, rotation and clock offset of motion capture are found from a minute of flight: twenty synthetic recordings
-// with gaps, another body and a flip in each, against exact truth; and the errors to expect if they are distributed as the covariances say.
+// How accurately lever arm, rotation and clock offset of motion capture are found from a minute of flight: twenty synthetic
+// recordings with gaps, another body and a flip in each, against exact truth; and the errors to expect by their covariances.
 //
 //   hand_eye lively | gentle                     synthetic flights and odometry errors (hand_eye_scene.hpp)
 //   hand_eye TRUTH ESTIMATE [ESTIMATE...]        minutes of real estimates, with markers computed from their ground truth
