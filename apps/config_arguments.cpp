@@ -10,7 +10,7 @@ namespace fbvins::app {
 void ConfigArguments::add_to(CLI::App& command) {
   command.add_option("--config", file, "YAML file that changes the defaults (see fbvins config)");
   command.add_option("--set", assignments, "one option, name=value; may be repeated")->take_all()->allow_extra_args(false);
-  command.add_option("--frontend", frontend, "which frontend tracks the features")->check(CLI::IsMember(frontend_names()));
+  command.add_option("--frontend", frontend, "the frontend that tracks features")->check(CLI::IsMember(frontend_names()));
 }
 
 Result<Config> ConfigArguments::load() const {

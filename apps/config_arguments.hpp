@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arguments by which a command is told the odometry's configuration: --config, --frontend, --set.
+// The arguments of commands that configure the odometry: --config, --frontend, --set.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct ConfigArguments {
   std::vector<std::string> assignments;
 
   void add_to(CLI::App& command);
-  /// The file's options, over them the frontend, over that the assignments.
+  /// The file's options, overridden by the frontend, then by the assignments.
   Result<Config> load() const;
 };
 

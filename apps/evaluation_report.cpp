@@ -68,8 +68,8 @@ std::string to_table(const Evaluation& e, Alignment alignment) {
 
 std::string to_line(const Coverage& c) {
   if (c.with_pose == 0) return fmt::format("coverage 0 % of {} images: no pose\n", c.images);
-  return fmt::format("coverage {:.1f} % of {} images, first pose after {:.3f} s, longest hole {:.3f} s\n", 100 * c.share,
-                     c.images, c.first_pose_after_s, c.longest_hole_s);
+  return fmt::format("coverage {:.1f} % of {} images, first pose after {:.3f} s, longest gap {:.3f} s\n", 100 * c.share, c.images,
+                     c.first_pose_after_s, c.longest_hole_s);
 }
 
 }  // namespace fbvins::app

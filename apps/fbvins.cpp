@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `fbvins` program: recordings in, trajectories, figures and pages out; what else there is, it hands over. One file a
-// subcommand, exit codes in commands.hpp.
+// The `fbvins` program: it runs recordings, simulates and reports, and hands other commands to the programs beside it. One file
+// for each subcommand, exit codes in commands.hpp.
 #include "apps/command_line.hpp"
 #include "apps/open_recording.hpp"
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// fbvins-tools, to which `fbvins` hands what looks at files: recordings and their setup, trajectories, maps, vocabularies, motion capture.
+// fbvins-tools, to which `fbvins` hands commands on files: recordings and their setup, trajectories, maps, vocabularies, motion
+// capture.
 #include "apps/command_line.hpp"
 
 int main(int argc, char** argv) {

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Tenths of a millimetre: what lies below is not worth a digit.
+/// Rounded to tenths of a millimetre; further digits have no meaning.
 double rounded(double x) { return std::round(1e4 * x) / 1e4; }
 
 Json to_json(const DistanceStatistics& s) { return {{"rmse", rounded(s.rmse)}, {"max", rounded(s.max)}}; }
@@ -41,7 +41,7 @@ Json wall_json(const WallTime& wall) {
 std::string wall_text(const WallTime& wall) {
   const LiveStatus& live = wall.live;
   return fmt::format(
-      "  in wall time at {:g} of its pace, behind by {:.2f} s at most; {} of {} images dropped, image to estimate {:.0f} ms (p50), {:.0f} ms (p99)\n",
+      "  in wall time at {:g} of its speed, at most {:.2f} s behind; {} of {} images dropped, image to estimate {:.0f} ms (p50), {:.0f} ms (p99)\n",
       wall.rate, wall.behind_s, live.counts.images_dropped, live.counts.images, wall.answer.p50_ms, wall.answer.p99_ms);
 }
 
@@ -51,10 +51,10 @@ std::string flight_text(const FlightFacts& facts, const FlightLog& log, const Fl
   std::string text =
       fmt::format("{}, preset {}, seed {}, frontend {}: ", facts.mission, facts.preset, facts.seed, facts.frontend);
   if (log.crash) text += fmt::format("CRASH: {}\n", *log.crash);
-  else if (log.out_of_time) text += fmt::format("not at its end in time, {}\n", to_string(log.mode));
+  else if (log.out_of_time) text += fmt::format("not completed in time, {}\n", to_string(log.mode));
   else if (log.reason != FlightReason::none)
     text += fmt::format("{} by failsafe: {}\n", to_string(log.mode), to_string(log.reason));
-  else text += "flown to its end\n";
+  else text += "completed\n";
   if (s.arrived) {
     text += "         start      end  difference  expected  axial error\n";
     for (std::size_t i = 0; i < 3; ++i) {

@@ -9,7 +9,7 @@
 
 namespace fbvins::app {
 
-/// What was flown.
+/// The arguments of the flight.
 struct FlightFacts {
   std::string mission, preset, frontend, vehicle;
   int seed = 0;

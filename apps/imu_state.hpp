@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `--imu-state FILE` of run and live: the IMU's biases are read when a flight begins and written when it has ended well.
+// `--imu-state FILE` of run and live: the IMU's biases are read when a flight begins and written at its regular end.
 #pragma once
 
 #include <optional>
@@ -12,14 +12,14 @@
 namespace fbvins::app {
 
 inline constexpr const char* kImuStateHelp =
-    "biases of the IMU from flight to flight: read where the file is there, written at a clean end";
+    "file that keeps the IMU's biases from flight to flight: read if it exists, written at a regular end";
 
-/// What a frame in good health knows of the IMU.
+/// The IMU's biases as of a frame in good health; none in other states.
 std::optional<ImuState> imu_state_of(const Odometry& odometry);
 
 /// None without a path, and before the first flight.
 Result<std::optional<ImuState>> load_imu_state(const std::string& path, const ImuNoise& imu);
-/// Nothing is written where there is no path, or nothing was known; what an earlier flight has left stays then.
+/// Nothing is written without a path or a state; the file of an earlier flight then stays.
 Result<void> save_imu_state(const std::string& path, const std::optional<ImuState>& state, const ImuNoise& imu);
 
 }  // namespace fbvins::app

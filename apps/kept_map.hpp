@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map of a live flight, written while the flight goes on, so that a killed program leaves one behind.
+// The map of a live flight, written periodically during the flight, so that a killed program leaves a map.
 #pragma once
 
 #include <atomic>
@@ -11,18 +11,18 @@
 
 namespace fbvins::app {
 
-/// On the thread of loop closure, which the odometry does not wait for; a file that cannot be written is said once.
+/// Runs on the thread of loop closure, for which the odometry does not wait. Warns once of a file that cannot be written.
 class KeptMap final : public Mapper {
  public:
   using Told = std::function<void(const Result<void>& saved)>;
 
-  /// `file` empty: nothing is written but on request. `map` outlives this.
+  /// `file` empty: the map is written only on request. `map` must outlive this.
   KeptMap(LoopMap& map, std::string file) : map_(map), file_(std::move(file)) {}
   MapUpdate process(const Keyframe& keyframe) override;
 
   /// The map is written after the next keyframe. From any thread.
   void request_save() { wanted_ = true; }
-  /// Before the first keyframe: where a request's map goes, and who is told what became of it.
+  /// To be called before the first keyframe: the file for requested maps, and who is told the result.
   void on_request(std::string file, Told told) { requested_file_ = std::move(file), told_ = std::move(told); }
 
  private:

@@ -22,7 +22,7 @@ namespace {
 /// Stereo images kept for the doctor: fifteen seconds at twenty a second, 200 MB of VGA.
 constexpr int kMostImages = 300;
 
-/// Sensor data for a look at how they arrive, kept for the doctor, who looks when all have come: nothing waits for him.
+/// Checks how sensor data arrive, and keeps them for the doctor, which runs when all have come, so that nothing waits for it.
 class CheckedInput final : public SensorInput {
  public:
   explicit CheckedInput(SensorCheck& check) : check_(check) {}
@@ -47,7 +47,7 @@ class CheckedInput final : public SensorInput {
   }
 
  private:
-  /// A driver's buffers are few, and not to be held.
+  /// A copy of images in a driver's buffers, of which there are few.
   static std::shared_ptr<const Image> own(const std::shared_ptr<const Image>& image) {
     if (!image || !image->foreign()) return image;
     auto copy = std::make_shared<Image>(*image);

@@ -35,7 +35,7 @@ Result<void> LiveFiles::take(const LiveEvent& event) {
   return {};
 }
 
-/// Before the first update a new map is where the odometry began; an old one has to be found first.
+/// Before the first update a new map's frame equals W, while in an old map the flight has to be localised first.
 void LiveFiles::take_map(const Odometry& o) {
   if (!o.health.has_pose()) return;
   const std::optional<MapUpdate>& known = map_->newest;

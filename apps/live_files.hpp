@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `fbvins live --out` writes while it runs: the files of `fbvins run`, and poses at IMU rate. Memory does not grow.
+// What `fbvins live --out` writes while it runs: the files of `fbvins run`, and poses at IMU rate. It uses constant memory.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace fbvins::app {
 
 /// trajectory_tum.txt, trajectory.csv, covariance.csv, gauge.csv, statistics.csv, timing.csv; live_tum.txt (W, IMU rate);
 /// with loop closure map_causal_tum.txt and map_bounded_tum.txt (poses in M: with the correction known at each image, and with
-/// its smooth form).
+/// the smoothed one).
 class LiveFiles final : public Sink {
  public:
   static Result<std::unique_ptr<LiveFiles>> create(const std::string& folder, bool with_map, bool new_map);

@@ -80,7 +80,7 @@ std::string to_text(const LiveSummary& s) {
   const LiveCounts& c = s.tally.last.counts;
   std::string text = fmt::format("{} with {} (fbvins " FBVINS_VERSION ")\n", s.source, s.frontend);
   text +=
-      fmt::format("images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock leaps {}, resets {}\n",
+      fmt::format("images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock jumps {}, restarts {}\n",
                   c.images, s.tally.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
   text += "images by health:";
   for (const auto& [name, images] : s.tally.health) text += fmt::format(" {} {}", name, images);

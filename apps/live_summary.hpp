@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A live flight in a page: what came, what was dropped, how old poses were, how healthy; accuracy where there is truth.
+// Summary of a live flight: data received and dropped, latency, health; accuracy where there is ground truth.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@
 
 namespace fbvins::app {
 
-/// Counts what goes by; its sink must not outlive it.
+/// Counts events; must outlive its sink.
 struct LiveTally {
   std::map<std::string, std::int64_t> health;  ///< images per "state" or "state/reason"
   std::int64_t with_pose = 0;                  ///< images

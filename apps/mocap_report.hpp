@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Motion capture for commands: files read with what is wrong in them, and what was found, as text.
+// Motion capture for commands: reads files and inspects them for faults, and prints the calibration found.
 #pragma once
 
 #include <string>
@@ -22,11 +22,11 @@ struct Markers {
 Result<Markers> read_markers(const std::string& path, const std::string& body);
 /// A trajectory file, or trajectory.csv in the folder of a run.
 Result<Trajectory<W>> read_estimate(const std::string& path);
-/// The truth while there is an estimate.
+/// The part of the truth within the estimate's time.
 Trajectory<W> within(const Trajectory<W>& truth, const Trajectory<W>& estimate);
 
 std::string describe(const Markers& markers);
-/// Fault times count from `start`, by the motion capture's clock.
+/// Times of faults are relative to `start`, by the motion capture's clock.
 std::string describe(const HandEye& found, Time start);
 std::string to_table(const AxisErrors& errors, Time start);
 

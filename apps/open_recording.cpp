@@ -19,7 +19,7 @@ std::string beginning(const std::string& path, std::size_t most) {
   return text;
 }
 
-/// A file of somebody else's program: those of ours say so in their first record.
+/// An MCAP file of another program: ours name themselves in the first record.
 bool is_foreign_mcap(const std::string& path) {
   constexpr std::size_t kHeader_bytes = 64;
   const std::string text = beginning(path, kHeader_bytes);

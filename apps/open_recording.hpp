@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where commands get recordings from. Each program links its own definition: `fbvins` reads EuRoC recordings and flight records
-// (open_recording.cpp), fbvins-bags third-party ones (open_foreign_recording.cpp); the former hands what it cannot read to the
-// latter.
+// Opens recordings for commands. Each program links its own definition: `fbvins` reads EuRoC recordings and flight records
+// (open_recording.cpp), fbvins-bags also third-party ones (open_foreign_recording.cpp), which `fbvins` hands over to
+// it.
 #pragma once
 
 #include <memory>
@@ -28,13 +28,13 @@ struct RecordingArguments {
 
 Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options);
 
-/// Of TUM or EuRoC; rows left out are warned of.
+/// A TUM or EuRoC file; warns of rows that are left out.
 Result<Trajectory<W>> read_pose_file(const std::string& path);
-/// The poses of a file: TUM, EuRoC; of a bag in fbvins-bags, from `topic` or its only one.
+/// The poses of a file: TUM or EuRoC; in fbvins-bags also of a bag, from `topic` or its only topic of poses.
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic);
 
-/// Whether a command line asks for what only fbvins-bags reads: a bag, a TUM-VI folder, a calibration that is not Kalibr's,
-/// topics.
+/// Whether a command line names something that only fbvins-bags reads: a bag, a TUM-VI folder, a calibration that is not
+/// Kalibr's, topics.
 bool is_for_bags(int argc, char** argv);
 
 }  // namespace fbvins::app

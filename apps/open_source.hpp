@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The source that --source names: devices, and whatever else there is (make_source.hpp). ROS 2's is in ros_graph.hpp.
+// The source that --source names: devices, and the others of make_source.hpp. That of ROS 2 is in ros_graph.hpp.
 #pragma once
 
 #include <memory>
@@ -9,8 +9,8 @@
 
 namespace fbvins::app {
 
-/// d435i[:SERIAL or FILE.bag], v4l2:LEFT,RIGHT,IMU, or as make_source() has it. An error where this program was built without
-/// what the source needs.
+/// d435i[:SERIAL or FILE.bag], v4l2:LEFT,RIGHT,IMU, or a source of make_source(). An error if this program was built without
+/// a library that the source needs.
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options);
 
 }  // namespace fbvins::app

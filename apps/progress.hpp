@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a long job is: a bar with the time left on a terminal, a line every 10 % elsewhere.
-// Writes to stderr only; the wall clock steers nothing but this display.
+// Progress of a long job: a bar with the time left on a terminal, a line every 10 % elsewhere.
+// Writes to stderr only; the wall clock has no influence but on this display.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@ class Progress {
  public:
   /// total: number of steps; quiet: say nothing at all.
   Progress(int total, bool quiet);
-  /// Takes the bar off the terminal.
+  /// Removes the bar from the terminal.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;

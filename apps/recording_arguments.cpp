@@ -11,12 +11,15 @@ namespace fbvins::app {
 
 void RecordingArguments::add_to(CLI::App& command) {
   command.add_option("DATASET", path, "EuRoC folder or zip, flight record, ROS bag, MCAP file, or TUM-VI folder")->required();
-  command.add_option("--calibration", calibration,
-                     "instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");
+  command.add_option(
+      "--calibration", calibration,
+      "calibration file instead of the recording's own: of Kalibr, OpenVINS, Basalt or VINS-Fusion, or an EuRoC folder");
   command.add_option("--imu-calibration", imu_calibration, "Kalibr imu.yaml, with --calibration");
-  command.add_option("--topics", topics, "of a bag, where they are not found: LEFT,RIGHT[,IMU]")->delimiter(',')->expected(2, 3);
-  command.add_option("--start", start_s, "seconds of the recording to leave out")->check(CLI::NonNegativeNumber);
-  command.add_option("--duration", duration_s, "seconds of it to take from there, 0 for all")->check(CLI::NonNegativeNumber);
+  command.add_option("--topics", topics, "topics of a bag, if they are not found: LEFT,RIGHT[,IMU]")
+      ->delimiter(',')
+      ->expected(2, 3);
+  command.add_option("--start", start_s, "seconds to leave out at the start of the recording")->check(CLI::NonNegativeNumber);
+  command.add_option("--duration", duration_s, "seconds to use from there, 0 for all")->check(CLI::NonNegativeNumber);
 }
 
 Result<Trajectory<W>> read_pose_file(const std::string& path) {

@@ -49,10 +49,10 @@ Result<void> RosGraph::add_sink(const Source& source, LiveSystem& live) const {
 
 Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source) {
   if (address.empty() && !source.starts_with(kSourceKind)) return RosGraph{};
-  return Error{ErrorCode::invalid_argument, "this program was built without CycloneDDS, which ROS 2's graph wants"};
+  return Error{ErrorCode::invalid_argument, "this program was built without CycloneDDS, which ROS 2 topics need"};
 }
 Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions&) const {
-  return Error{ErrorCode::invalid_argument, "there is no ROS 2 here"};
+  return Error{ErrorCode::invalid_argument, "this program was built without ROS 2 topics"};
 }
 Result<void> RosGraph::add_sink(const Source&, LiveSystem&) const { return {}; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording through the odometry, and what is kept of it: what `fbvins run` and fbvins.run() of Python have in common.
+// Runs the odometry on a recording and keeps the results: what `fbvins run` and fbvins.run() of Python have in common.
 //
 //   Result<Flight> flight = run_flight(arguments, config, dataset, {.on_frame = [](int frames) { ... }});
 //   RunSummary summary = summarise(*flight, dataset, config, arguments);
@@ -21,7 +21,7 @@ namespace fbvins::app {
 
 struct FlightArguments {
   MapArguments map;
-  std::string imu_state;  ///< file: read where it is there, written at a clean end
+  std::string imu_state;  ///< file: read if it exists, written at a regular end
   bool threaded = false;
 };
 
@@ -31,10 +31,10 @@ struct Flight {
   double wall_s = 0;
 };
 
-/// Who is told of a flight while it goes on; each may be empty.
+/// Callbacks during the run; each may be empty.
 struct FlightListener {
-  std::function<void(int frames)> on_frame = {};        ///< how many have gone in
-  std::function<void(const Finding&)> on_finding = {};  ///< what the first seconds show of a wrong setup
+  std::function<void(int frames)> on_frame = {};        ///< frames processed so far
+  std::function<void(const Finding&)> on_finding = {};  ///< a wrong setup, as the first seconds show
 };
 
 /// Sends the whole recording through the system, ends the map and saves it.

@@ -23,7 +23,7 @@ Result<void> check_folder_of(const std::string& path) {
 }
 
 /// T_MB of every frame that has a pose, with the update that was known when the frame came.
-/// Before the first update a new map is where the odometry began, and level; an old one has to be found first.
+/// Before the first update a new map begins where the odometry began, and is level; in an old one the flight has to be localised.
 void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   MapUpdate begin;
   begin.localised = new_map;
@@ -41,7 +41,7 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   }
 }
 
-/// Each restart begins a new gauge: they are corrected one by one.
+/// Each restart begins a new gauge frame: the parts between restarts are corrected one by one.
 Trajectory<M> corrected(const LoopMap& map, const RunRecord& run) {
   Trajectory<M> all;
   Trajectory<G> part;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loop closure in `fbvins run`: how it is asked for, and the three trajectories it leaves, which are never mixed:
-// the odometry in W (written by run_output.hpp), M as it was put out at each moment, and M after the run.
+// Loop closure in `fbvins run`: its arguments, and the three trajectories that result, which are kept apart:
+// the odometry in W (written by run_output.hpp), in M as known at each moment, and in M after the run.
 #pragma once
 
 #include <memory>
@@ -22,10 +22,10 @@ struct MapArguments {
   bool wanted() const { return loop || final_ba || !load.empty() || !save.empty(); }
 };
 
-/// Null where no loop closure is wanted. Errors of the vocabulary, the old map, the folder of the new one.
+/// Null if no loop closure is wanted. Errors: of the vocabulary, the old map, the folder of the new one.
 Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options);
 
-/// What the loop stage said, keyframe by keyframe, and what came out in the end.
+/// The updates of loop closure, keyframe by keyframe, and the final result.
 struct MapRecord {
   std::vector<MapUpdate> updates;  ///< without the corrected keyframes
   Trajectory<M> causal, bounded;   ///< T_MB at each frame, with T_MG as it was known then; with the smooth T_MW
@@ -34,16 +34,16 @@ struct MapRecord {
   int keyframes_in_map = 0, loops_left_out = 0;
   double finish_ms = 0, adjust_ms = 0;  ///< CPU
   std::optional<FinalAdjustmentReport> adjustment;
-  std::string not_saved;  ///< why, where the map could not be written
+  std::string not_saved;  ///< why the map could not be written; empty: it was, or need not be
 };
 
 /// Ends the map (last optimisation, bundle adjustment where asked for) and composes the trajectories.
 void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record);
 Result<void> save_map(const MapArguments& arguments, const LoopMap& map);
-/// map_trajectory_tum.txt (the best there is), map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
+/// map_trajectory_tum.txt (the most accurate), map_causal_tum.txt, map_bounded_tum.txt, map_updates.csv.
 Result<void> write_map_record(const MapRecord& record, const std::string& folder);
 
-/// Errors of the three trajectories, where there is ground truth.
+/// Counts, times, and errors of the trajectories where there is ground truth.
 struct MapSummary {
   int keyframes = 0, keyframes_in_map = 0, loops = 0, refused = 0, left_out = 0;
   std::optional<double> localised_after_s;  ///< from the first pose to the first known T_MW

@@ -78,7 +78,7 @@ std::string timing_row(const TrackedRecord& tracked, const EstimatorStats& e) {
                      e.marginalise_ms);
 }
 
-/// Seven columns, or all sixteen where the truth knows velocity and biases.
+/// The stamp and seven columns, or sixteen if the truth has velocity and biases.
 std::string truth_row(const TrajectoryPoint& point) {
   const Quat& q = point.T_WB.q;
   std::string row = fmt::format("{}", point.t.ns);
@@ -116,7 +116,7 @@ struct RunWriter::State {
   OdometryCsvWriter csv;
   OutputFile covariance, gauge, statistics, timing;
   std::mutex mutex;
-  std::deque<TrackedRecord> without_odometry;  ///< frames the estimator has not answered yet
+  std::deque<TrackedRecord> without_odometry;  ///< frames whose odometry has not come yet
 
   void write(const TrackedRecord& tracked, const EstimatorStats& stats) {
     statistics.write(statistics_row(tracked, stats));
@@ -161,7 +161,7 @@ void RunWriter::add(const TrackedRecord& tracked) {
   state_->without_odometry.push_back(tracked);
 }
 
-/// A frame that the estimator has passed by without an answer has a row of zeros.
+/// A frame that the estimator skipped gets a row with zeros in the estimator's columns.
 void RunWriter::add(const Odometry& o) {
   const std::lock_guard lock(state_->mutex);
   if (o.health.has_pose()) {
@@ -197,7 +197,7 @@ Result<void> write_run(const RunRecord& record, const std::string& folder) {
 Result<void> write_truth(const std::vector<Time>& images, const std::vector<TrajectoryPoint>& truth, const std::string& folder) {
   const auto earlier = [](const TrajectoryPoint& p, Time t) { return p.t < t; };
   std::string text = kTruthHeader;
-  auto next = truth.begin();  // what lies before it is written or not wanted
+  auto next = truth.begin();  // points before it are written or not needed
   for (const Time image : images) {
     const auto after = std::lower_bound(truth.begin(), truth.end(), image, earlier);
     const auto from = after == truth.begin() ? after : after - 1, to = after == truth.end() ? after : after + 1;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run leaves behind: gathered frame by frame (RunRecord) or written as it comes (RunWriter).
-// trajectory_tum.txt, trajectory.csv, statistics.csv and config.yaml are the same bytes whenever
-// input and configuration are; times go to timing.csv and to their own part of the summary.
+// The results of a run: gathered frame by frame (RunRecord) or written as they come (RunWriter).
+// trajectory_tum.txt, trajectory.csv, statistics.csv and config.yaml are the same bytes for the same
+// input and configuration; times go to timing.csv and to their own part of the summary.
 // Frames and odometry may come from two threads: either side touches only its own vector.
 #pragma once
 
@@ -33,8 +33,8 @@ struct RunRecord {
   std::vector<Time> images() const;
 };
 
-/// The trajectory, statistics and timing files, written as the frames come; the folder must exist. Beside trajectory.csv lies
-/// covariance.csv with what its columns leave out: velocity and biases. Any threads; frames come before their odometry.
+/// The trajectory, statistics and timing files, written as the frames come; the folder must exist. covariance.csv has the
+/// covariances that trajectory.csv leaves out: of velocity and biases. Any thread; frames come before their odometry.
 class RunWriter {
  public:
   static Result<RunWriter> create(const std::string& folder);

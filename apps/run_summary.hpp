@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run in a page: JSON for programs, text for people. The part `result` is the same bytes from run
+// Summary of a run: JSON for programs, text for people. The part `result` is the same bytes from run
 // to run; `timing` is not.
 #pragma once
 
@@ -17,7 +17,7 @@ struct RunSummary {
   std::string frontend;
   std::string booster_weights;  ///< the file, of the boost frontend
   std::string mode;     ///< deterministic or threaded
-  std::string dataset;  ///< its name, not where it lies
+  std::string dataset;  ///< its name, not its path
   int frames = 0;       ///< stereo frames that reached the frontend
   int images_bad = 0;   ///< image files missing, corrupt or of the wrong size
   Coverage coverage;
@@ -25,7 +25,7 @@ struct RunSummary {
   std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"
   std::optional<Evaluation> evaluation;             ///< where the recording holds ground truth
   std::string no_evaluation;                        ///< why there is none
-  std::optional<NeesSummary> nees;                  ///< after alignment of the first second's shift and heading
+  std::optional<NeesSummary> nees;                  ///< after alignment of position and heading in the first second
   std::optional<NeesSummary> nees_levelled;         ///< the same without the truth's own constant tilt
   LevelledStart truth_level;                        ///< that tilt, and the alignment without it
   std::optional<MapSummary> map;                    ///< with loop closure
@@ -43,7 +43,7 @@ double peak_memory_mb();
 /// The recording's ground truth as a trajectory; empty where there is none.
 Trajectory<W> truth_of(const Dataset& data);
 RunSummary summarise(const RunRecord& record, const Dataset& data);
-/// The same where there is no recording: stamps of all images, and the truth if it is known.
+/// The same without a recording: stamps of all images, and the truth, which may be empty.
 RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Trajectory<W>& truth);
 std::string to_json_text(const RunSummary& summary);
 std::string to_text(const RunSummary& summary);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C and a service's stop end a live run in good order.
+// Ctrl-C, or the stop of a service, ends a live run regularly.
 #pragma once
 
 #include <functional>
@@ -8,8 +8,8 @@
 
 namespace fbvins::app {
 
-/// While it lives, SIGINT and SIGTERM call `on_stop` (once, on a thread of its own) instead of ending the program. To be made
-/// before other threads that must not be interrupted; those inherit that the signals are blocked.
+/// While it exists, SIGINT and SIGTERM call `on_stop` (once, on a thread of its own) instead of ending the program. Needs the
+/// signals blocked in all threads: call block_stop_signals() before any is started.
 class StopSignal {
  public:
   explicit StopSignal(std::function<void()> on_stop);
@@ -20,7 +20,7 @@ class StopSignal {
 
 /// Blocks both signals in this thread and all that it starts.
 void block_stop_signals();
-/// Whether one has come since, which no StopSignal has seen.
+/// Whether a signal is pending that no StopSignal has taken.
 bool stop_is_wanted();
 
 }  // namespace fbvins::app

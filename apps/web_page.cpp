@@ -22,8 +22,8 @@ namespace fbvins::app {
 
 namespace {
 
-/// The page at `where`, [ADDRESS:]PORT; its address is said on stderr. The token is made by chance, unless FBVINS_WEB_TOKEN has
-/// one.
+/// Serves the page at `where`, [ADDRESS:]PORT, and prints its address on stderr. The token is random, unless FBVINS_WEB_TOKEN
+/// is set.
 Result<std::unique_ptr<WebSink>> open_page(const std::string& where, WebFlight flight, WebActions actions) {
   auto address = parse_web_address(where);
   if (!address) return address.error();
@@ -34,7 +34,7 @@ Result<std::unique_ptr<WebSink>> open_page(const std::string& where, WebFlight f
   if (const char* token = std::getenv("FBVINS_WEB_TOKEN")) {
     options.token = token;
     if (!token_usable(options.token))
-      return Error{ErrorCode::invalid_argument, "FBVINS_WEB_TOKEN: wanted are eight or more letters, digits, - and _"};
+      return Error{ErrorCode::invalid_argument, "FBVINS_WEB_TOKEN: it must have eight or more letters, digits, - and _"};
   } else if (!address->loopback()) {
     auto made = make_token();
     if (!made) return made.error();

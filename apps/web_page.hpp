@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of `fbvins live --web` and `fbvins view`. In a program built without Boost, or without npm to bring the page's
-// libraries, asking for it is an error.
+// The page of `fbvins live --web` and `fbvins view`. In a program built without Boost, or without npm to get the page's
+// libraries, it is an error.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 namespace fbvins::app {
 
 inline constexpr const char* kWebHelp =
-    "serve a page that shows the flight: [ADDRESS:]PORT; this machine alone without an address, and with a token otherwise "
+    "serve a page that shows the flight: [ADDRESS:]PORT; without an address for this machine alone, otherwise with a token "
     "(docs/web.md)";
 
 /// `fbvins view`: until SIGINT or SIGTERM.
