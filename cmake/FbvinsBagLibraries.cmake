@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What bags are packed with: lz4, bzip2, zstd, and SQLite, in which ROS 2 keeps them.
+# Libraries that bags need: lz4, bzip2 and zstd, which compress them, and SQLite, ROS 2's file format.
 find_package(PkgConfig QUIET)
 find_package(BZip2 QUIET)
 set(FBVINS_BAG_LIBRARIES_FOUND ON)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-# The same bytes on arm64 as on x86-64 (docs/board.md): Eigen runs there as on x86-64, by SIMDe. FBVINS_BEFORE_EIGEN: the options
-# that say so, for sources with SKIP_PRECOMPILE_HEADERS; all others get them from fbvins_flags or with the precompiled headers.
+# The same bytes on arm64 as on x86-64 (docs/board.md): Eigen's SSE2 code runs there by SIMDe. FBVINS_BEFORE_EIGEN: the compiler options
+# for it, for sources with SKIP_PRECOMPILE_HEADERS; all others get them from fbvins_flags or with the precompiled headers.
 set(FBVINS_BEFORE_EIGEN "")
 if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
   return()
 endif()
 find_path(FBVINS_SIMDE simde/x86/sse2.h)
 if(NOT FBVINS_SIMDE)
-  message(STATUS "SIMDe is not there (Debian: libsimde-dev): results will differ from x86-64 in the last digits")
+  message(STATUS "SIMDe not found (Debian: libsimde-dev): results will differ from x86-64 in the last digits")
   return()
 endif()
 set(FBVINS_EIGEN_HEADER ${PROJECT_SOURCE_DIR}/src/fbvins/core/eigen_as_on_x86_64.hpp)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# Install and export. A downstream project says find_package(fbvins COMPONENTS core io loop live sim) and links fbvins::<component>,
-# or fbvins::fbvins for all that it found. The same names serve in a project that takes this one by add_subdirectory.
+# Install and export. A downstream project calls find_package(fbvins COMPONENTS core io loop live sim) and links fbvins::<component>,
+# or fbvins::fbvins for all components found. The same names work in a project that uses add_subdirectory.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/fbvins)
 
-# One export set a component, so that nobody looks for the libraries of a component that was not asked for.
+# One export set for each component, so that only the libraries of requested components are looked for.
 add_library(fbvins_all INTERFACE)
 add_library(fbvins::fbvins ALIAS fbvins_all)
 foreach(component ${FBVINS_COMPONENTS})

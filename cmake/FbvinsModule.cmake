@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # fbvins_module(NAME [COLD] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
 # One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
-# where they can, other libraries else. COLD: compiled with -O1. A cold module instantiates no product or
-# decomposition of Eigen's: the linker may take its copy of a template for all. What users link are components (FbvinsInstall.cmake).
+# where they can, other libraries otherwise. COLD: compiled with -O1. A cold module must not instantiate products or
+# decompositions of Eigen: the linker could use its slow copy of a template everywhere. Users link components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
@@ -12,11 +12,11 @@ if(FBVINS_BUILD_TESTS)
 endif()
 
 add_library(fbvins_flags INTERFACE)
-# The interior's headers: for the sources of this repository, not for who links its libraries.
+# Internal headers: for the sources of this repository, not for users of its libraries.
 target_include_directories(fbvins_flags INTERFACE ${PROJECT_SOURCE_DIR}/src)
 target_compile_options(fbvins_flags INTERFACE
   -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wno-psabi
-  # The same bits whatever instruction set a kernel is dispatched to: no silent fused multiply-add.
+  # No implicit fused multiply-add, so that kernels give the same bits with every instruction set.
   -ffp-contract=off
   $<$<BOOL:${FBVINS_WERROR}>:-Werror>)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: fbvins (programs, data, service) and libfbvins-dev (what find_package(fbvins) finds). `./dev package`.
+# Debian packages by CPack: fbvins (programs, data, service) and libfbvins-dev (headers and libraries). `./dev package`.
 # Dependencies of the programs are found by dpkg-shlibdeps in the built files.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME fbvins)
@@ -14,9 +14,9 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME fbvins)
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "FB-VINS: position, velocity and attitude from a stereo camera and an IMU
- Programs: recordings and live sensors in, poses with covariance and health out; MAVLink, flight records, maps; a systemd service.")
+ Programs that estimate poses with covariance and health from recordings and live sensors; MAVLink, flight records, maps; a systemd service.")
 if(CMAKE_CROSSCOMPILING)
-  # dpkg-shlibdeps asks the packages installed here, which are of another architecture: Debian 12's names by hand.
+  # dpkg-shlibdeps only knows the packages installed here, which are of another architecture: so Debian 12's names are listed.
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
   string(JOIN ", " CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libc6 (>= 2.36)" "libstdc++6 (>= 12)" libgcc-s1 "libfmt9 (>= 9.1.0+ds1)"
     "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libceres3 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 liblapack3 libblas3
@@ -30,7 +30,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/c
 set(CPACK_DEBIAN_DEVEL_PACKAGE_NAME libfbvins-dev)
 set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVEL_DESCRIPTION "FB-VINS: headers and static libraries
- For programs that say find_package(fbvins COMPONENTS core io loop live sim).")
+ For programs that call find_package(fbvins COMPONENTS core io loop live sim).")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS "libeigen3-dev, libfmt-dev")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_RECOMMENDS "libceres-dev, libyaml-cpp-dev, libzip-dev, libpng-dev, libturbojpeg0-dev")
 include(CPack)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# fbvins_web_page: the page in web/ and the libraries it uses, as bytes in a library. npm is asked for them when this is built; without it, or
-# where it reaches no registry, the program serves no page and says so.
+# fbvins_web_page: the page in web/ and the JavaScript libraries it uses, as bytes in a library. npm fetches them during the build; without npm, or
+# if it reaches no registry, the program serves no page and says so.
 find_program(NPM_PROGRAM npm)
 if(NOT NPM_PROGRAM)
   message(STATUS "the page of --web is not built in: npm not found")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# Writes OUT, a C++ source with every file of the page (SOURCE) and of the libraries it uses, packed by gzip. FOLDER is for work.
+# Writes OUT, a C++ source with every file of the page (SOURCE) and of the libraries it uses, compressed by gzip. FOLDER holds temporary files.
 #   cmake -DNPM=npm -DSOURCE=web -DFOLDER=build/page -DOUT=page_files.cpp -P embed_page.cmake
 cmake_minimum_required(VERSION 3.22)
 
 set(TYPES html text/html css text/css js text/javascript svg image/svg+xml)
-# What the page takes of its libraries: a file of the package, and its name on the page.
+# The files of libraries that the page uses: path in the package, and name on the page.
 set(LIBRARIES
   three/build/three.core.min.js three.core.min.js
   three/build/three.module.min.js three.module.min.js
@@ -12,7 +12,7 @@ set(LIBRARIES
   uplot/dist/uPlot.esm.js uPlot.esm.js
   uplot/dist/uPlot.min.css uPlot.min.css)
 
-# The libraries as the lock file has them, unless they are there already.
+# Fetches the libraries in the versions of the lock file, unless they are there already.
 function(fetch_libraries RESULT)
   file(SHA256 ${SOURCE}/package-lock.json wanted)
   set(stamp ${FOLDER}/installed)
@@ -28,7 +28,7 @@ function(fetch_libraries RESULT)
   execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund --fetch-retries=1 --fetch-timeout=20000 --loglevel=error
     WORKING_DIRECTORY ${FOLDER} RESULT_VARIABLE failed OUTPUT_VARIABLE said ERROR_VARIABLE said)
   if(failed)
-    message(STATUS "the page is not built in: npm did not bring its libraries: ${said}")
+    message(STATUS "the page is not built in: npm could not fetch its libraries: ${said}")
     set(${RESULT} FALSE PARENT_SCOPE)
     return()
   endif()
@@ -36,7 +36,7 @@ function(fetch_libraries RESULT)
   set(${RESULT} TRUE PARENT_SCOPE)
 endfunction()
 
-# Appends to BYTES and TABLE what the program holds of FILE, which the page knows as NAME.
+# Appends FILE, which the page knows as NAME, to BYTES and TABLE.
 function(embed FILE NAME)
   string(REGEX MATCH "[a-z]+$" suffix ${NAME})
   list(FIND TYPES ${suffix} place)
@@ -66,7 +66,7 @@ if(here)
   while(LIBRARIES)
     list(POP_FRONT LIBRARIES file name)
     file(READ ${FOLDER}/node_modules/${file} text)
-    string(REPLACE "from 'three'" "from './three.module.min.js'" text "${text}")  # no import map: the page has no script of its own inline
+    string(REPLACE "from 'three'" "from './three.module.min.js'" text "${text}")  # no import map: the page has no inline script
     file(WRITE ${FOLDER}/library/${name} "${text}")
     embed(${FOLDER}/library/${name} ${name})
   endwhile()

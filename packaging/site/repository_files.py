@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""For mkdocs: what documents link to outside of docs/ becomes part of the site. README.md is its first page; other files keep their place in the
-repository, so that links lead there whether they are read in the repository or in the site."""
+"""For mkdocs: files outside of docs/ to which documents link become part of the site. README.md is its first page; other files keep their path in the
+repository, so that links work in the repository and in the site."""
 import pathlib
 import posixpath
 import re
