@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""One flight in the formats of other people, written by their own writers (PyPI rosbags and mcap), gives one trajectory.
+"""One flight, written in all bag formats by independent libraries (PyPI rosbags and mcap), gives the same trajectory from each.
 
 usage: bags_by_others.py FBVINS PYTHON      exit 77 (skipped) where PYTHON lacks rosbags or mcap
 """
@@ -37,7 +37,7 @@ def rows(path):
 
 
 class Flight:
-    """What is in the EuRoC folder, as messages of a kind."""
+    """The contents of the EuRoC folder as messages of ROS 1 or ROS 2."""
 
     def __init__(self, folder, store, ros1):
         self.folder, self.types, self.ros1 = folder / "mav0", store.types, ros1
@@ -89,7 +89,7 @@ class Flight:
 
 
 def decode(file):
-    """A PNG of our simulator's: 8-bit grey, one filter. No imaging library is needed for it."""
+    """Decodes a PNG of FBVINS's simulator (8-bit grey, one filter), so that no imaging library is needed."""
     import struct
     import zlib
 
@@ -128,8 +128,9 @@ def quaternion(R):
 
 
 def write_librealsense(path, flight):
-    """As librealsense records: gyroscope and accelerometer are topics of their own, stamps of recording begin at zero, no frames are named, a stream's
-    transform takes the left camera's coordinates to its own. What is left out are messages that nobody reads."""
+    """As librealsense records: gyroscope and accelerometer have separate topics, the stamps of recording begin at zero, no frames
+    are named, and a stream's transform converts the left camera's coordinates to its own. Messages that no reader needs are left
+    out."""
     types, prefix = flight.types, "/device_0/sensor_"
     topics = {TOPICS[0]: prefix + "0/Infrared_1/image/data", TOPICS[1]: prefix + "0/Infrared_2/image/data"}
     T_BC0, T_BC1 = matrices(flight.folder.parent)
@@ -171,7 +172,7 @@ def write_ros2(path, flight, plugin, packed=False, encoding="mono8", messages=No
 
 
 def write_split(path, flight):
-    """As rosbag2 splits what it records: files one after the other, named in the metadata in their order."""
+    """As rosbag2 splits a recording: several files, listed in their order in the metadata."""
     everything = flight.messages()
     path.mkdir()
     names = []
@@ -179,7 +180,7 @@ def write_split(path, flight):
         messages = everything[part * len(everything) // 3:(part + 1) * len(everything) // 3]
         bag = path.parent / f"{path.name}_part"
         write_ros2(bag, flight, rosbag2.StoragePlugin.MCAP, messages=messages)
-        names.append(f"{path.name}_{9 + part}.mcap")  # 9, 10, 11: not in the order of letters
+        names.append(f"{path.name}_{9 + part}.mcap")  # 9, 10, 11: not in alphabetical order
         next(bag.glob("*.mcap")).rename(path / names[-1])
         metadata = (bag / "metadata.yaml").read_text()
         shutil.rmtree(bag)
@@ -237,7 +238,7 @@ def check_tum_vi(program, folder, root):
 
 
 def check_converted(program, folder, root, expected):
-    """Into each of the formats and from there into the next, and others read what was written."""
+    """Converts to each format and from there to the next; the independent libraries read what was written."""
     steps = [root / "lz4.bag", root / "once.mcap", root / "again.bag", root / "folder"]
     for before, after in zip(steps, steps[1:]):
         arguments = [] if before.name == "once.mcap" else ["--calibration", folder]
@@ -261,7 +262,7 @@ def check_converted(program, folder, root, expected):
 
 
 def check_parts(program, recordings, folder):
-    """A second of each from half a second on: the same images as of the folder."""
+    """One second of each recording, beginning at half a second, has the same images as that second of the folder."""
     def part(recording):
         text = subprocess.run([program, "info", recording, "--calibration", folder, "--start", "0.5", "--duration", "1", "--json"], check=True,
                               capture_output=True, text=True).stdout
@@ -274,7 +275,7 @@ def check_parts(program, recordings, folder):
 
 
 def poses(flight, kind):
-    """The folder's truth as messages of a kind."""
+    """The folder's truth as messages of ROS 1 or ROS 2."""
     types = flight.types
     for row in rows(flight.folder / "state_groundtruth_estimate0" / "data.csv"):
         stamp, (x, y, z, qw, qx, qy, qz) = int(row[0]), map(float, row[1:8])
@@ -292,7 +293,7 @@ def poses(flight, kind):
 
 
 def check_eval(program, folder, root):
-    """Truth on a bag's topic of poses gives the figures of the folder's."""
+    """Truth from a topic of poses in a bag gives the same figures as truth from the folder."""
     def figures(truth, *arguments):
         done = subprocess.run([program, "eval", truth, root / "euroc" / "trajectory_tum.txt", "--json", *arguments], check=False,
                               capture_output=True, text=True)
@@ -360,7 +361,7 @@ def write_all(root, folder):
 
 
 def check_cuts(program, recording, folder, root):
-    """Cut off anywhere: what is whole is read, or one sentence says why not."""
+    """A recording cut off at any byte: the intact part is read, or one sentence says why not."""
     whole, read = recording.read_bytes(), 0
     cut = root / ("cut" + recording.suffix)
     for i in range(CUTS):

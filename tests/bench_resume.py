@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Kills `fbvins bench` in the middle and starts it again: what was finished is kept, the rest is done, nothing is lost.
+"""Kills `fbvins bench` in the middle and starts it again: finished runs are kept, the others are done, nothing is lost.
 
 usage: bench_resume.py FBVINS
 """
@@ -62,7 +62,7 @@ def main():
         for name in ("results.json", "tables.md", "report.html"):
             assert (folder / "out" / name).stat().st_size > 1000, name
 
-        # The same figures are no regression; ten times better ones were.
+        # Against the same figures there is no regression; against figures ten times better there is one.
         same = folder / "same.csv"
         same.write_bytes((folder / "out" / "results.csv").read_bytes())
         assert subprocess.run(bench(folder, "--reference", same, "--quiet"), check=False, timeout=60).returncode == 0

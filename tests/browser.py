@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Headless Chromium for tests, by its DevTools protocol over two pipes: nothing but Python's own library is needed.
+"""Headless Chromium for tests, controlled by its DevTools protocol over two pipes; needs only Python's standard library.
 
     with Browser() as browser:
         page = browser.open("http://127.0.0.1:8080/", width=390, height=844)
@@ -112,13 +112,13 @@ class Page:
             time.sleep(0.05)
 
     def picture(self, path):
-        """A JPEG of what is seen."""
+        """A JPEG of the visible part of the page."""
         data = self.call("Page.captureScreenshot", format="jpeg", quality=85)["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))
 
     def faults(self):
-        """Sentences about what went wrong in the page so far."""
+        """The page's errors so far, one sentence each."""
         out = []
         for event in self.browser.events:
             if event.get("sessionId") != self.session:
@@ -131,6 +131,6 @@ class Page:
         return out
 
     def addresses(self):
-        """All that the page asked for."""
+        """The addresses of all requests of the page."""
         return [e["params"]["request"]["url"] for e in self.browser.events
                 if e.get("sessionId") == self.session and e["method"] == "Network.requestWillBeSent"]

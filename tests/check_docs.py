@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What can be checked of documents: links between them lead somewhere, headings included; every health state and reason of the code has its
-entry in docs/troubleshooting.md; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows; the
-version is one.
+"""Checks the documents: links between them, to headings as well, have a target; docs/troubleshooting.md has an entry for every
+health state and reason of the code; docs/benchmarks.md is what bench/benchmarks writes, and README.md has its rows; all files
+name the same version.
 
-usage: check_docs.py [REPOSITORY]      exit 1 and one line a fault
+usage: check_docs.py [REPOSITORY]      exit 1, and one line for each fault
 """
 import pathlib
 import re
@@ -61,7 +61,7 @@ def benchmarks(root):
 
 
 def versions(root):
-    """The version is the same wherever it is named."""
+    """All files name the same version."""
     named = {file: re.search(pattern, (root / file).read_text(encoding="utf-8"), re.M).group(1)
              for file, pattern in {"CMakeLists.txt": r"^project\(fbvins VERSION ([0-9.]+)", "pyproject.toml": r'^version = "(.*)"',
                                    "CITATION.cff": r"^version: (.*)$"}.items()}

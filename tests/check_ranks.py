@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Arrows between modules run one way: a module includes only modules of lower rank (docs/architecture.md).
-And the border holds: a public header (include/) includes public headers, the standard library, Eigen and fmt, nothing else;
-the laboratory (lab/) sees everything and is seen by nothing.
+"""Checks which files include which: a module includes only modules of lower rank (docs/architecture.md). A public header
+(include/) includes only public headers, the standard library, Eigen and fmt. The laboratory (lab/) may include everything, and
+nothing outside includes it.
 
-usage: check_ranks.py [REPOSITORY]      exit 1 and one line a fault; check_ranks.py --self-test
+usage: check_ranks.py [REPOSITORY]      exit 1, and one line for each fault; check_ranks.py --self-test
 """
 import pathlib
 import re
@@ -23,14 +23,14 @@ RANKS = {
     "report": 8,
     "experiment": 9, "tuning": 9,
 }
-# What makes and judges data lives in lab/, and nothing outside sees it.
+# Modules that make or evaluate data lie in lab/; nothing outside lab/ includes them.
 LABORATORY = {"sim", "flight", "report", "experiment", "tuning"}
-# Within a rank only these: a camera rig is made of the values that travel.
+# The only includes within a rank (from, to): a camera rig consists of values of types.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
 
-# Where modules live: folder -> the folders whose headers its headers may include; None: any.
+# Folders of modules: folder -> the folders whose headers its headers may include; None: any.
 FOLDERS = {
     "include": ("include",),
     "src": None,
@@ -61,7 +61,7 @@ def faults(root):
 
 
 def judge_laboratory(module, included):
-    """What is wrong with one include as far as the laboratory goes, or None."""
+    """The fault of one include that concerns the laboratory, or None."""
     parts = included.split("/")
     if module not in LABORATORY and parts[0] == "fbvins" and parts[1] in LABORATORY:
         return f"{module} includes {included}: nothing outside the laboratory sees it"
@@ -69,7 +69,7 @@ def judge_laboratory(module, included):
 
 
 def judge_border(root, public, included):
-    """What is wrong with one include of a public header, or None."""
+    """The fault of one include in a public header, or None."""
     if included.startswith("fbvins/"):
         if any((root / folder / included).exists() for folder in public):
             return None
@@ -80,7 +80,7 @@ def judge_border(root, public, included):
 
 
 def judge(module, included, path):
-    """What is wrong with one include, or None."""
+    """The fault of one include, or None."""
     if "/apps/" in included or included.startswith(("apps/", "../")):
         return f"includes {included}: modules are included as fbvins/<module>/<file>, programs never"
     parts = included.split("/")
@@ -90,7 +90,7 @@ def judge(module, included, path):
     if other not in RANKS:
         return f"includes unknown module '{other}'"
     lower = RANKS[other] < RANKS[module] or (module, other) in ALLOWED_WITHIN_RANK
-    # A test may set two modules of its own rank side by side; it must not reach upwards.
+    # A test may include other modules of its own rank, but none of a higher rank.
     if lower or (path.stem.endswith("_test") and RANKS[other] == RANKS[module]):
         return None
     return f"{module} (rank {RANKS[module]}) includes {other} (rank {RANKS[other]})"
@@ -127,7 +127,7 @@ def self_test():
 
 
 def main():
-    self_test()  # a check that cannot fail would be worse than none
+    self_test()  # shows that the check can fail
     if sys.argv[1:] == ["--self-test"]:
         return 0
     found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()))

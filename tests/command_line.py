@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the `fbvins` program says and returns to the shell. Needs no recording.
+"""The messages and exit codes of the program `fbvins`. Needs no recording.
 
 usage: command_line.py FBVINS
 """
@@ -31,7 +31,7 @@ def turned(q, p):
 
 
 def tumbling(t):
-    """Attitude and position of a body that is rocked about all axes, at rest for two seconds at both ends of a minute."""
+    """Attitude and position of a body that is turned about all axes for a minute, and rests in its first and last two seconds."""
     u = min(max(min(t - 2, 58 - t) / 4, 0), 1)
     u = u ** 3 * (10 + u * (6 * u - 15))
     q = (1, 0, 0, 0)
@@ -142,7 +142,7 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("map", "merge", self.folder / "a.fbm", boosted, "-o", self.folder / "c.fbm"), "boosted")
 
     def test_doctor(self):
-        """Silent of a good recording; of one whose accelerometer is in g, and whose images are exchanged, it says so, as the run does."""
+        """`doctor` finds nothing wrong with a good recording. It reports an accelerometer in g and exchanged images, and so does `run`."""
         flight = self.folder / "flight"
         self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 3, "--quiet").returncode, 0)
         done = fbvins("doctor", flight)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`fbvins eval` against evo (github.com/MichaelGrupp/evo) on the same files, every figure to 1e-6.
+"""Compares `fbvins eval` with evo (github.com/MichaelGrupp/evo) on the same files: every figure must agree to 1e-6.
 
 usage: compare_with_evo.py FBVINS [PYTHON]      PYTHON: an interpreter that may have evo (./dev test makes one)
 exit 77 (skipped) where evo is not installed
@@ -55,7 +55,7 @@ def write_truth(path, seconds):
 
 
 def write_estimate(path, seconds, seed, jitter_ns, drop):
-    """The flight in another world (turned, shifted, scaled), with noise, drift, jitter of stamps and holes."""
+    """The flight in another world frame (rotated, shifted, scaled), with noise, drift, jitter of the stamps and missing poses."""
     rng = random.Random(seed)
     turn = quaternion_xyzw([0.1, -0.2, 1.9])
     with open(path, "w", encoding="utf-8") as out:
@@ -124,7 +124,7 @@ def compare_per_metre(program, truth, estimate, failures):
 
 
 def compare_per_second(program, truth, estimate, failures):
-    """evo knows frames, not seconds: the same where the estimate has exactly 20 poses a second."""
+    """evo counts frames, not seconds: both are the same where the estimate has exactly 20 poses per second."""
     pairs = evo_pairs(truth, estimate, "se3")
     relation = metrics.PoseRelation.translation_part
 
@@ -133,7 +133,7 @@ def compare_per_second(program, truth, estimate, failures):
 
     ours = fbvins(program, truth, estimate, "--pairs", "consecutive")
     check("rpe_per_second_m consecutive", ours["rpe_per_second_m"], frames(20, False), failures)
-    # At the end fbvins takes the two pieces of 0.95 s and 0.90 s that are within 10 %, as evo does for metres.
+    # At the end of the flight fbvins also uses the two segments of 0.95 s and 0.90 s, within 10 % of a second, as evo does for metres.
     whole = np.concatenate([frames(20, True), frames(19, True)[-1:], frames(18, True)[-1:]])
     check("rpe_per_second_m all", fbvins(program, truth, estimate)["rpe_per_second_m"], whole, failures)
 
@@ -143,7 +143,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         truth, ragged, even = (pathlib.Path(folder) / name for name in ("truth.txt", "ragged.txt", "even.txt"))
         write_truth(truth, 40)
-        write_estimate(ragged, 43, seed=1, jitter_ns=2_000_000, drop=0.1)  # some stamps lie beyond the truth
+        write_estimate(ragged, 43, seed=1, jitter_ns=2_000_000, drop=0.1)  # some stamps lie outside the truth's time span
         write_estimate(even, 39, seed=2, jitter_ns=0, drop=0)
         compare_absolute(program, truth, ragged, failures)
         compare_per_metre(program, truth, ragged, failures)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""examples/d435i_bridge.py between librealsense's software device and `fbvins live`, in wall time (15 s): poses, and a camera that is
-unplugged and plugged in again.
+"""Runs examples/d435i_bridge.py between librealsense's software device and `fbvins live`, in wall time (15 s): there are poses, also
+after the camera was unplugged and plugged in again.
 
 usage: d435i_bridge.py FBVINS    skipped (77) where Python has no pyrealsense2; FBVINS_REALSENSE names a Python that has
 """
@@ -69,7 +69,7 @@ class SoftwareCamera:
             if k % world.READINGS_A_FRAME == 0:
                 for camera, at in zip(self.video, (x_m, x_m + world.BASELINE_M)):
                     self.show(camera, start_s + t_s, k, world.view(rows, at), kept)
-            del kept[:-400]  # the library reads pixels and numbers where they lie
+            del kept[:-400]  # the library does not copy pixels and numbers, so they must stay alive
 
     def show(self, profile, t_s, number, pixels, kept):
         frame = rs.software_video_frame()
@@ -89,7 +89,7 @@ class SoftwareCamera:
 
 
 def plug_in(path, seconds):
-    """A camera that is there for so long."""
+    """A camera that is plugged in for `seconds`."""
     software = SoftwareCamera()
     bridge = d435i_bridge.Camera(software.device, str(path))
     flight = threading.Thread(target=software.fly, args=(seconds,))

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The same recording gives the same bytes: twice, and with --threaded; and another option does not.
+"""Two runs of the same recording write the same bytes, and so does a run with --threaded; a run with another option does not.
 
 usage: determinism.py FBVINS FRONTEND      exit 77 (skipped) where the recordings are absent
 """
@@ -32,7 +32,7 @@ def differing(a, b):
 
 
 def check_loop_closure(program, recording, root, kind, odometry):
-    """The map repeats as well, and the odometry is the same with it as without."""
+    """The map is reproducible as well, and the odometry is the same with loop closure as without."""
     def fly(name, *arguments):
         (root / name).mkdir()
         return run(program, recording, root / name, *kind, "--save-map", str(root / name / "map.fbm"), *arguments)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A live flight is recorded and run again: the same bytes, also where sensors failed, and after a kill up to its end.
+"""Records live flights and runs the records: the results have the same bytes, also where sensors failed. The record of a program
+that was killed can be run up to its end.
 
 usage: flight_record.py FBVINS
 """
@@ -37,7 +38,7 @@ def run_again(program, record, out):
 
 
 def check_same_bytes(program, flight, root):
-    """Whatever the estimator took, dropped images included: the record holds it."""
+    """The record has exactly what the estimator received, so images that were dropped do not change the result."""
     for number, (name, faults) in enumerate(FAULTS.items()):
         record, live, again = (root / f"{number}{end}" for end in (".mcap", "live", "again"))
         subprocess.run(fly(program, flight, record, "--out", live, *faults), check=True)
@@ -50,7 +51,7 @@ def check_same_bytes(program, flight, root):
 def check_kill(program, flight, root):
     record = root / "killed.mcap"
     with subprocess.Popen(fly(program, flight, record)) as process:
-        # Not before there are images; what is written by then is all that must be there.
+        # Kill it only once there are images; only what has been written until then must be in the record.
         while process.poll() is None and (not record.exists() or record.stat().st_size < 3_000_000):
             time.sleep(0.02)
         process.send_signal(signal.SIGKILL)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A flight record in the hands of other people's programs: `mcap` and `mcap-ros2-support` (PyPI) find every topic, by index and
-without, whole and broken off, and every number is the one that went in.
+"""Reads a flight record with independent programs: `mcap` and `mcap-ros2-support` (PyPI) find every topic, with the index and
+without it, in a whole record and in one that is cut off, and every number is the one that was recorded.
 
 usage: flight_record_by_others.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
 exit 77 (skipped) where they are not installed
@@ -78,7 +78,7 @@ def check_summary(record):
 
 
 def check_time_window(record):
-    """By the index, from the middle of the file."""
+    """With the index: reads from the middle of the file on."""
     reader = indexed(record)
     statistics = reader.get_summary().statistics
     middle = (statistics.message_start_time + statistics.message_end_time) // 2
@@ -102,7 +102,7 @@ def check_poses(record, live):
     for _, _, message, m in poses:
         p, q = m.pose.pose.position, m.pose.pose.orientation
         ours = known[stamp_ns(m.header)]
-        # The table has nine digits behind the point, the record all of them.
+        # The table has nine digits after the decimal point, the record has full precision.
         require(all(abs(a - b) < 1e-8 for a, b in zip([p.x, p.y, p.z, q.w, q.x, q.y, q.z], ours)), f"{m.pose.pose} is not {ours}")
         require(message.log_time == stamp_ns(m.header), "the message's time is not its stamp")
         require(m.header.frame_id == "odom" and m.child_frame_id == "body", "frames have other names")
@@ -134,7 +134,7 @@ def check_health(record):
 
 
 def check_landmarks(record):
-    """A cloud a frame: every landmark has a place, every feature a pixel, many have both."""
+    """One point cloud for each frame: every landmark has a position, every feature a pixel, and many points have both."""
     clouds = [m for _, _, _, m in messages(indexed(record), "/landmarks")]
     bodies = {stamp_ns(m.header): m.pose.pose.position for _, _, _, m in messages(indexed(record), "/odometry")}
     require(len(clouds) >= len(bodies), f"{len(clouds)} clouds for {len(bodies)} poses")
@@ -151,7 +151,7 @@ def check_landmarks(record):
 
 
 def check_broken_off(record):
-    """Streamed, as a recovery tool does: up to the last whole chunk."""
+    """Reads the record as a stream, as recovery tools do, up to the last whole chunk."""
     whole = len(list(NonSeekingReader(io.BytesIO(record), validate_crcs=True).iter_messages(log_time_order=False)))
     last = 0
     for part in (0.2, 0.5, 0.8, 0.99):
@@ -160,7 +160,7 @@ def check_broken_off(record):
         try:
             for _ in reader.iter_messages(log_time_order=False):
                 count += 1
-        except McapError:  # the end is not there
+        except McapError:  # the end of the file is missing
             pass
         require(count > last and count >= whole * (part - 0.2), f"{count} of {whole} messages in {part} of the file")
         last = count

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`fbvins fly`: a short mission arrives; the same bytes twice over and with --threaded; its recording, run again, gives the estimates that
-it was flown by; silent odometry brings it down; in wall time, through a live system, it arrives as well; bad missions are one sentence.
+"""`fbvins fly`: a short mission arrives, also in wall time through a live system. Two flights write the same bytes, and so does one
+with --threaded. `fbvins run` on the flight's recording gives the estimates that the flight used. Without odometry the vehicle
+lands. A mission that cannot be flown is refused in one sentence.
 
 usage: fly.py FBVINS
 """
@@ -52,8 +53,8 @@ def main():
         fbvins(program, "run", root / "first" / "recording", "--out", root / "again", "--quiet")
         again = (root / "again" / "trajectory.csv").read_text(encoding="utf-8").splitlines()
         flown = first["trajectory.csv"].decode().splitlines()
-        assert len(flown) > 150 and flown == again[:len(flown)], "the recording gives other estimates than were flown by"
-        print("the recording, run again, gives the estimates that were flown by")
+        assert len(flown) > 150 and flown == again[:len(flown)], "`run` on the recording gives other estimates than the flight used"
+        print("`run` on the recording gives the estimates that the flight used")
 
         fell = json.loads(fly(program, silence, root / "silence", expect=1)["flight.json"])
         modes = [name for name, _ in fell["modes"]]
@@ -65,7 +66,7 @@ def main():
         wall = json.loads(fly(program, hop, root / "wall_clock", "--wall-clock", "0.5", expect=(0, 1))["flight.json"])
         clock = wall["wall_clock"]
         assert wall["crash"] is None and clock["images"] > 150 and clock["rate"] == 0.5, wall
-        if clock["images_dropped"] == 0:  # else this machine is too busy for wall time
+        if clock["images_dropped"] == 0:  # otherwise this machine is too slow or too busy for wall time
             assert wall["arrived"] and wall["mean_axial_error_m"] < 0.03, wall
         print(f"wall time: {wall['ended']}, {clock['images_dropped']} of {clock['images']} images dropped, behind by {clock['behind_s']} s")
 

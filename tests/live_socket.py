@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`fbvins live --source socket:PATH` with the senders of examples/, in wall time (about a minute).
+"""Runs `fbvins live --source socket:PATH` with the senders of examples/, in wall time (about a minute).
 
 usage: live_socket.py FBVINS CXX
 """

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The Python package as it lies in the build folder, by its own tests (python/tests).
+"""Runs the Python package's own tests (python/tests) on the package in the build folder.
 
 usage: python_package.py FBVINS PYTHON FOLDER      exit 77 (skipped) where the package has not been built
 """

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a report from disk in headless Chromium: no error, every plot drawn, the right numbers, both themes.
+"""Opens a report from disk in headless Chromium: there is no error, every plot is drawn, the figures are those of the run, in the
+light and the dark theme.
 
 usage: report_in_browser.py FBVINS      exit 77 where there is no Chromium (Debian: apt-get install chromium)
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`fbvins live` in ROS 2's graph beside another implementation of DDS: CycloneDDS' Python package publishes a flight's images and
-readings and reads what comes back; `rosbags` writes the same values, which must be the same bytes.
+"""`fbvins live` in a ROS 2 graph with an independent peer: the Python package of CycloneDDS publishes a flight's images and IMU
+readings, and receives what FBVINS publishes; `rosbags` encodes the same values, and the bytes must be the same.
 
 usage: ros2_peer.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
 exit 77 (skipped) where cyclonedds and rosbags are not installed, or FBVINS was built without CycloneDDS
@@ -21,7 +21,7 @@ import time
 from types import new_class
 
 try:
-    import cyclonedds._clayer as clayer  # bytes, not values
+    import cyclonedds._clayer as clayer  # reads and writes encoded bytes instead of values
     import numpy as np
     from cyclonedds import core, domain, pub, qos, sub, topic
     from cyclonedds.idl import IdlStruct, types
@@ -56,7 +56,7 @@ def require(fact, sentence):
 
 
 def bytes_topic(participant, name):
-    """A topic by the names that ROS 2's middleware gives it. Its values are written and taken as bytes."""
+    """A topic with the name that ROS 2's middleware gives it in DDS. Its values are written and read as bytes."""
     package, message = TYPES[name].split("/msg/")
     kind = new_class(message + "_", (IdlStruct,), {"typename": f"{package}.msg.dds_.{message}_"}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
     return topic.Topic(participant, "rt" + name, dataclasses.dataclass(kind))
@@ -67,7 +67,7 @@ def reliable(depth):
 
 
 class Listener(threading.Thread):
-    """Takes all that comes on the flight's topics, as bytes."""
+    """Receives everything on the flight's topics, as bytes."""
 
     def __init__(self, participant, names):
         super().__init__(daemon=True)
@@ -83,7 +83,7 @@ class Listener(threading.Thread):
 
 
 def kalibr_files(flight, folder):
-    """The recording's calibration in Kalibr's form."""
+    """The recording's calibration in Kalibr's format."""
     yaml = YAML(typ="safe")
 
     def load(sensor):
@@ -114,13 +114,13 @@ def wait_until(fact, what, seconds=60):
 
 
 def publish(participant, record):
-    """The record's messages at the pace of their stamps."""
+    """Publishes the record's messages at the times of their stamps."""
     writers = {name: pub.DataWriter(participant, bytes_topic(participant, name), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
     with open(record, "rb") as file:
         messages = [(channel.topic, message.log_time, message.data) for _, channel, message in make_reader(file).iter_messages(topics=list(writers))]
     for name, writer in writers.items():
         wait_until(lambda w=writer: len(w.get_matched_subscriptions()) > 0, f"a subscription of {name}")
-    time.sleep(0.5)  # the other end's readers change to reliable ones when they see these
+    time.sleep(0.5)  # FBVINS's readers become reliable ones once they discover these writers
     start, first = time.monotonic(), messages[0][1]
     for name, stamp_ns, data in messages:
         time.sleep(max(0.0, (stamp_ns - first) * 1e-9 - (time.monotonic() - start)))
@@ -129,7 +129,7 @@ def publish(participant, record):
 
 
 def check_bytes(messages):
-    """What rosbags writes for the values it reads is what was sent."""
+    """Decoded and encoded again by rosbags, the messages have the bytes that were sent."""
     for name, all_of_it in messages.items():
         require(all_of_it, f"nothing came on {name}")
         for data in random.Random(1).sample(all_of_it, min(len(all_of_it), 200)):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`fbvins live` as a service manager sees it: a socket in the place of systemd's, a recording as sensors.
+"""Checks what `fbvins live` reports to a service manager, with a socket instead of systemd's and a recording as sensors.
 
 usage: service.py FBVINS
 """
@@ -31,7 +31,7 @@ class Service(unittest.TestCase):
         cls.scratch.cleanup()
 
     def start(self, *arguments, speed=""):
-        """The program with a manager's socket; and that socket."""
+        """Starts the program with a service manager's socket; returns both."""
         manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.addCleanup(manager.close)
         address = str(self.folder / f"notify-{time.monotonic_ns()}")

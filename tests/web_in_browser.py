@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The page of `fbvins live --web` and `fbvins view` in headless Chromium: it shows a flight, its figures are the run's, its buttons
-work, it asks nobody else for anything.
+"""Opens the page of `fbvins live --web` and `fbvins view` in headless Chromium: it shows a flight, its figures are those of the run,
+its buttons work, and it requests nothing from other addresses.
 
 usage: web_in_browser.py FBVINS      exit 77 where there is no Chromium, or no page in the program
 FBVINS_WEB_PICTURES=FOLDER keeps pictures of the pages; those of docs/web.md, best taken while nothing else runs:
@@ -79,7 +79,7 @@ class WebInBrowser(unittest.TestCase):
         self.fail("the program ended without a page")
 
     def check_alone(self, page, address):
-        """No error in the page, and nothing from elsewhere."""
+        """The page has no error and requested nothing from other addresses."""
         self.assertEqual(page.faults(), [])
         origin = address.split("#")[0]
         strangers = [a for a in page.addresses() if not a.startswith((origin, "blob:" + origin, "data:"))]
@@ -87,7 +87,7 @@ class WebInBrowser(unittest.TestCase):
         self.assertGreater(len(page.addresses()), 5)
 
     def check_figures(self, page, run):
-        """Of the last pose, and of all of them."""
+        """Compares the figures of the last pose and those of the whole run."""
         known, rows = poses(run)
         last = [float(x) for x in known[-1][1:14]]
         self.assertEqual(page.text("position"), ", ".join(f"{x:.2f}" for x in last[0:3]))
@@ -137,9 +137,9 @@ class WebInBrowser(unittest.TestCase):
         self.assertLessEqual(phone.value("document.documentElement.scrollWidth"), PHONE["width"], "the phone's page is too wide")
         page.click("mark")
         phone.wait_for("document.getElementById('changes').textContent.includes('mark')")
-        page.click("save-map")  # with the next keyframe, whenever that is
+        page.click("save-map")  # the map is saved with the next keyframe
         end = time.monotonic() + browser.PATIENCE_S
-        while not kept.exists() and time.monotonic() < end:  # it is written at the end as well, but that is yet to come
+        while not kept.exists() and time.monotonic() < end:  # before the run ends, which saves the map as well
             time.sleep(0.05)
         self.assertTrue(kept.exists(), f"no map is saved: {page.text('note')}; {page.text('health-words')}; {page.text('map')}")
         if PICTURES:
@@ -157,7 +157,7 @@ class WebInBrowser(unittest.TestCase):
         self.assertEqual(numbers(page.text("dropped"))[0], counts["images_dropped"])
         self.assertEqual(numbers(page.text("imu")), [counts["imu"], counts["imu_late"]])
         self.assertAlmostEqual(numbers(page.text("latency"))[0], counts["shutter_to_pose_ms"]["p50"], delta=0.06)
-        # The connection ends with the program; what the page says of its tries to find it again is no fault.
+        # The connection ends with the program; the page's messages about its attempts to reconnect are no fault.
         self.assertEqual([f for f in page.faults() if "ERR_CONNECTION" not in f], [])
         self.check_record(record, live)
 

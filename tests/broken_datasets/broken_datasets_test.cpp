@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What open_dataset answers to damaged recordings: one sentence that names the file and the line or
-// field, or everything that is whole, with a count of what was left out.
+// What open_dataset returns for damaged recordings: an error of one sentence that names the file and the line or
+// field, or everything that is intact, with a count of what was left out.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -588,7 +588,7 @@ TEST_F(ToyDataset, ImuComesJustFarEnoughToInterpolate) {
   Time imu{0};
   while (auto event = (*data)->next()) {
     if (const auto* sample = std::get_if<ImuSample>(&*event)) imu = sample->t;
-    else EXPECT_EQ(imu, std::get<StereoFrame>(*event).t);  // they coincide in the toy
+    else EXPECT_EQ(imu, std::get<StereoFrame>(*event).t);  // in the toy dataset both have the same stamps
   }
   EXPECT_EQ(imu.ns, kToyStart_ns + 1'000'000'000);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What readers of missions, motion capture and flights' logs answer to damaged files: one sentence that names the file, or what
-// is whole.
+// What the readers of missions, motion-capture files and flight logs return for damaged files: an error of one sentence that
+// names the file, or everything that is intact.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -249,7 +249,7 @@ TEST_P(DamagedFlightFile, WithALineLeftOutOrTwice) {
 INSTANTIATE_TEST_SUITE_P(Table, DamagedFlightFile, testing::ValuesIn(whole_files()),
                          [](const auto& row) { return std::string(row.param.name); });
 
-// ---------------------------------------------------------------- what a tuner is given
+// ---------------------------------------------------------------- input of the tuner
 
 class BrokenLog : public testing::Test {
  protected:

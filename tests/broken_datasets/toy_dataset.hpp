@@ -34,17 +34,17 @@ struct PngKind {
   bool colour = false;
   bool sixteen_bit = false;
 };
-/// A gradient with `seed` mixed in.
+/// A grey gradient that differs from `seed` to `seed`.
 std::string make_png(int seed, const PngKind& kind);
 std::string make_jpeg(int seed);
 
-/// Lines of a CSV, line 1 being the header, changed one by one; joined again with '\n'.
+/// Lets `edit` change the lines of a CSV text (lines[0] is the header), and joins them again with '\n'.
 void edit_lines(std::string& text, const std::function<void(std::vector<std::string>&)>& edit);
-/// Replaces the only occurrence of `from`; fails the test where it is not there.
+/// Replaces the first occurrence of `from`; throws std::logic_error where there is none.
 void replace(std::string& text, const std::string& from, const std::string& to);
 
 void write_folder(const Files& files, const std::string& folder);
-/// `top` is put before every name, for example "mav0/".
+/// `top` is the folder within the archive, for example "mav0/"; it precedes every name.
 void write_zip(const Files& files, const std::string& path, const std::string& top);
 
 class TemporaryFolder {

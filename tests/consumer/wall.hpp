@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A flight in memory: a stereo camera looks at a wall two metres ahead, rests for a second, then sways 0.3 m from side to
-// side. The wall is grey noise with round dots on it, each of a grey value of its own.
+// A synthetic flight: a stereo camera looks at a wall two metres ahead, rests for a second, then sways 0.3 m from side to
+// side. On the wall are grey noise and round dots, and each dot has its own grey value.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +46,7 @@ inline double noise(double u, double v) {
          b * ((1 - a) * corner(i, k + 1) + a * corner(i + 1, k + 1));
 }
 
-/// What a camera sees that has moved by x_m to the right.
+/// The image of a camera that has moved by x_m to the right.
 inline std::shared_ptr<const fbvins::Image> seen_from(double x_m) {
   auto image = std::make_shared<fbvins::Image>(kWidth, kHeight);
   const double shift_px = x_m * kFocal_px / kDepth_m;

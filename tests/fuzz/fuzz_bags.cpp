@@ -29,7 +29,7 @@ StereoRig small_rig() {
   return rig;
 }
 
-/// In CDR: 1 an IMU's reading, 2 and 3 an image, 4 a camera's calibration.
+/// A message in CDR. 1: an IMU reading; 2 and 3: an image; 4: a camera's calibration.
 std::string small_message(int kind, Time t) {
   static const Image image(8, 6, std::uint8_t{7});
   std::string out;
@@ -55,7 +55,7 @@ std::string small_mcap(const std::string& path) {
   }
   require(bag->finish().ok());
   std::string bytes = *read_file(path, 1u << 20u);
-  // Without checksums: else whatever is changed inside of a chunk would be left out with it.
+  // Without checksums: with them the reader would leave out every mutated chunk, and never parse what is in it.
   for (std::size_t at = kMcapMagic.size(); at + kMcapRecordHead_bytes < bytes.size();) {
     const auto kind = static_cast<McapRecord>(bytes[at]);
     const auto length = ByteCursor(std::string_view(bytes).substr(at + 1)).get<std::uint64_t>();
@@ -99,7 +99,7 @@ std::vector<std::string> bag_seeds() {
           std::string(kMcapMagic)};
 }
 
-/// All that a bag holds is read, and each message again by its place; then a part of it by time.
+/// Reads a whole bag, then each message again by its position in the file, then a part of the bag by time.
 void fuzz_bag(std::string_view bytes) {
   const bool mcap = bytes.substr(0, kMcapMagic.size()) == kMcapMagic;
   const auto open = [&] {
@@ -150,7 +150,7 @@ std::vector<std::string> sqlite_bag_seeds() {
   return out;
 }
 
-/// The library wants a file with a name.
+/// Written to a file, because the library opens bags by name.
 class NamedFile {
  public:
   ~NamedFile() { std::filesystem::remove(path_); }
@@ -183,7 +183,7 @@ std::vector<std::string> message_seeds() {
   return out;
 }
 
-/// Any message's bytes read as each of those that a recording is made of; the first byte picks ROS 1's encoding or ROS 2's.
+/// Parses the bytes as each type of message that a recording has; the first byte selects the encoding of ROS 1 or of ROS 2.
 void fuzz_message(std::string_view bytes) {
   if (bytes.empty()) return;
   const Encoding encoding = bytes[0] == '1' ? Encoding::ros1 : Encoding::cdr;

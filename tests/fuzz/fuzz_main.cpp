@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One libFuzzer program a parser: FBVINS_FUZZ_TARGET names the function.
+// One libFuzzer program for each parser: FBVINS_FUZZ_TARGET names the function.
 #include <cstddef>
 #include <cstdint>
 

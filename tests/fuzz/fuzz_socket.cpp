@@ -22,7 +22,8 @@ FbvinsSocketRig seed_rig() {
   return socket_rig(rig);
 }
 
-/// Mutations change the size, and a message that contradicts its size is refused at once: it is made to agree.
+/// Makes the size in the message agree with the bytes: mutations change it, and a message that contradicts its size
+/// would be refused at once.
 std::string with_its_size(std::string_view bytes) {
   std::string out(bytes);
   const auto size = static_cast<std::uint32_t>(out.size());

@@ -66,7 +66,7 @@ std::vector<std::string> weights_seeds() {
   return {bytes + header + std::string(536, '\1')};
 }
 
-/// Else whatever is changed inside of a chunk would be left out with it.
+/// With checksums the reader would leave out every mutated chunk, and never parse what is in it.
 std::string without_checksums(std::string record) {
   for (std::size_t at = kMcapMagic.size(); at + kMcapRecordHead_bytes < record.size();) {
     const auto kind = static_cast<McapRecord>(record[at]);
@@ -80,7 +80,7 @@ std::string without_checksums(std::string record) {
   return record;
 }
 
-/// Three small frames without the definitions of messages, which are most of a short record, and a whole record.
+/// A record of three small frames without message definitions (they make up most of a short record), and a complete record.
 std::vector<std::string> mcap_seeds() {
   const test::TemporaryFolder folder;
   const std::string path = folder.path() + "/flight.mcap", bare_path = folder.path() + "/bare.mcap";
@@ -107,7 +107,7 @@ std::vector<std::string> mcap_seeds() {
   return {*read_file(path, 1u << 20u), without_checksums(*read_file(bare_path, 1u << 20u))};
 }
 
-/// Tables of two bodies, one of which is not always seen, and a topic of poses.
+/// Tables of two bodies, one of which is seen only part of the time, and a topic of poses.
 std::vector<std::string> motion_capture_seeds() {
   test::WrittenFile file;
   file.bodies = {{"quad", {}}, {"wand", {}}};
@@ -151,7 +151,7 @@ void fuzz_calibration(std::string_view bytes) {
   if (camera) {
     require_rigid(camera->T_BS);
     require(camera->camera.focal_px() > 0 && camera->camera.width() > 0);
-    // Whatever the coefficients: answered, and consistently.
+    // For any coefficients there must be a result, and a consistent one.
     if (const auto ray = camera->camera.undistort({camera->camera.width() / 3.0, 5.0}))
       require((camera->camera.distort(*ray) - Vec2(camera->camera.width() / 3.0, 5.0)).norm() < 1.0);
   }

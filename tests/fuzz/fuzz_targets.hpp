@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every parser of bytes from outside, as functions that libFuzzer and the mutation test both call.
-// A target must return for any bytes; what it finds must fit together, or it traps.
+// Every parser of untrusted bytes, as functions that libFuzzer and the mutation test both call.
+// A target must return for any bytes; where the parsed values contradict each other it traps.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fuzz targets on seeded mutations of good files, so that every sanitizer run covers them
-// without Clang. Anything wrong traps or is reported by the sanitizer.
+// Runs the fuzz targets on mutations of valid files, with fixed seeds, so that every sanitizer run covers them
+// without Clang. A fault traps or is reported by the sanitizer.
 #include <gtest/gtest.h>
 
 #include "fbvins/core/rng.hpp"
@@ -9,7 +9,7 @@
 namespace fbvins::fuzz {
 namespace {
 
-/// Pieces that parsers stumble over.
+/// Pieces of text that often break parsers.
 std::string nasty_piece(Rng& rng) {
   static const std::string pieces[] = {"nan",
                                        "-inf",

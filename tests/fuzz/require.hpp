@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What fuzz targets ask of a parser's answer; what is not so traps.
+// What fuzz targets require of a parser's result: require(false) stops the program with a trap.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ inline void require(bool fact) {
   if (!fact) __builtin_trap();
 }
 
-/// An answer is a value or one sentence.
+/// A result is a value or an error of one sentence.
 template <class T>
 void require_sentence(const Result<T>& result) {
   if (result) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the good files that fuzzing starts from: write_seeds FOLDER makes FOLDER/csv/0, FOLDER/csv/1, ...
+// Writes the valid files that fuzzing starts from: write_seeds FOLDER makes FOLDER/csv/0, FOLDER/csv/1, ...
 #include <filesystem>
 #include <fstream>
 

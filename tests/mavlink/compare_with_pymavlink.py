@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Our MAVLink frames against pymavlink's, byte by byte, on random values; and its frames read by us.
+"""Compares FBVINS's MAVLink frames with pymavlink's, byte by byte, on random values; and decodes pymavlink's frames with FBVINS.
 
 usage: compare_with_pymavlink.py MAVLINK_TEXT [PYTHON]    PYTHON: one that has pymavlink, when this one has not
 """

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints what every int8 kernel of this processor makes of fixed numbers, and a sum over the bits that the shipped network
-// gives fixed keypoints: compiled for two processors, both must print the same. booster_bits WEIGHTS
+// Prints the result of every int8 kernel of this processor for fixed numbers, and a sum over the descriptor bits of the
+// shipped network for fixed keypoints. Compiled for two processors, both must print the same. booster_bits WEIGHTS
 #include <cstdio>
 
 #include "fbvins/core/rng.hpp"
@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   std::vector<Keypoint> keypoints(123);
   std::vector<Margins> margins(keypoints.size());
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    // One draw a statement: compilers choose the order within one.
+    // One draw in each statement: within a statement the compiler chooses the order.
     const double x = rng.uniform(0, 752), y = rng.uniform(0, 480);
     keypoints[i].pixel = Vec2(x, y);
     keypoints[i].score = static_cast<float>(rng.uniform(10, 1e5));

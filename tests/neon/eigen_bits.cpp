@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Eigen and the mathematical library compute, as one number: the same on every machine, if they round alike everywhere.
+// Prints a hash of results of Eigen and the mathematical library: machines print the same number if they round alike.
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace {
 
-/// FNV-1a over the bits of what is added.
+/// FNV-1a hash of the bits of the added numbers.
 class Sum {
  public:
   template <class Scalar>
@@ -27,7 +27,7 @@ class Sum {
   std::uint64_t value_ = 14695981039346656037ULL;
 };
 
-/// Numbers of -0.5 to 0.5, the same everywhere.
+/// Pseudo-random numbers from -0.5 to 0.5, the same on every machine.
 class Numbers {
  public:
   double next() {
@@ -43,7 +43,7 @@ class Numbers {
   std::uint64_t state_ = 20;
 };
 
-/// Sizes below and above those at which Eigen takes other ways, up to a window's.
+/// Sizes below and above those at which Eigen changes its algorithm, up to the size of a window.
 void large() {
   using Matrix = Eigen::MatrixXd;
   using Vector = Eigen::VectorXd;
@@ -115,7 +115,7 @@ void functions() {
 }  // namespace
 
 int main() {
-  // Eigen cuts products of more than a hundred columns by the size of the caches, and rounds by where it cuts.
+  // Eigen splits products of more than a hundred columns by the size of the caches, and the rounding depends on the split.
   Eigen::setCpuCacheSizes(32 * 1024, 256 * 1024, 2 * 1024 * 1024);
   large();
   fixed<double, 2>("double_2");

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Eigen and the mathematical library give the same bits on arm64 as on this machine: compiled for both as the build does, the one run
-under qemu-user. Without the header that makes Eigen do so they must not: else this would show nothing.
+"""Eigen and the mathematical library give the same bits on arm64 as on this machine. eigen_bits.cpp is compiled for both with
+the flags of the build, and the arm64 program is run by qemu-user. The test also checks that the bits differ without the header
+that makes Eigen round alike: otherwise it would prove nothing.
 
 usage: eigen_equality.py SOURCE CXX [SYSROOT]    skipped (77) without the cross-compiler, the emulator and SIMDe (libsimde-dev)
 """

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The booster gives the same bits with NEON dot products as on this machine: compiled for aarch64, run under qemu-user.
-neon_equality.py SOURCE CXX. Skipped (77) without the cross-compiler and the emulator."""
+"""The booster gives the same bits with NEON dot products as on this machine: it is compiled for aarch64 and run by qemu-user.
+
+usage: neon_equality.py SOURCE CXX      exit 77 (skipped) without the cross-compiler and the emulator
+"""
 import pathlib
 import shutil
 import subprocess

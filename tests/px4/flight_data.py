@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An EuRoC recording's IMU and truth in a flight controller's frames, and our trajectory of it."""
+"""An EuRoC recording's IMU and truth in a flight controller's coordinate frames, and the trajectory that FBVINS estimates."""
 import csv
 import pathlib
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the MAVLink sink says to a flight controller, with time, poses and the flight controller's bytes from the standard input,
-// so that a test can let it live in simulated time. Arguments: options, name=value, as `fbvins live --set`. One line each:
+// Prints what the MAVLink sink sends to a flight controller. Time, poses and the flight controller's bytes come from the standard
+// input, so a test can run it in simulated time. Arguments: options name=value, as of `fbvins live --set`. Lines of the input:
 //   pose HOST_NS STATE RESETS P(3) Q_WXYZ(4) V(3) W(3) SIGMA_P SIGMA_THETA SIGMA_V     at an IMU reading
 //   health HOST_NS STATE                                                               when it changes
 //   bytes HOST_NS HEXADECIMAL                                                          from the flight controller
 //   tick HOST_NS
-// Each is answered by the frames to send, one line each in hexadecimal, and ".". STATE: good, degraded, lost, initialising.
+// The answer to each is the frames to send, each a line in hexadecimal, then ".". STATE: good, degraded, lost or initialising.
 #include <fmt/format.h>
 
 #include <iostream>

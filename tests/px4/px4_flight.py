@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A real PX4 flies by our odometry: its EKF2 gets the IMU of a recording, and poses of `fbvins run` as the MAVLink sink sends
-them, all in simulated time. Truth is compared with what PX4 tells of itself. FBVINS_PX4 names the program (bin/px4 of a
-px4_sitl build).
+"""A real PX4 navigates by FBVINS: its EKF2 gets the IMU of a recording, and the poses of `fbvins run` in the form in which the
+MAVLink sink sends them, all in simulated time. PX4's own estimates are compared with the truth. FBVINS_PX4 names the program
+(bin/px4 of a px4_sitl build).
 
 usage: px4_flight.py FBVINS MAVLINK_SESSION_TEXT [PYTHON]    PYTHON: one that has pymavlink and numpy, when this one has not
 """
@@ -31,12 +31,12 @@ BAR_M = 0.05
 STEP_US = 5000
 START_US = 1_000_000
 STANDING_S = 58  # PX4 trusts a companion's clock after 500 answers, ten a second
-CABLE_US = 60_000  # from the shutter to the flight controller
-HOST_AHEAD_NS = 7_000_000_000_000  # the companion's clock is another one
+CABLE_US = 60_000  # delay from the exposure of an image until its pose reaches the flight controller
+HOST_AHEAD_NS = 7_000_000_000_000  # how far the companion computer's clock is ahead of PX4's
 
 
 class Companion:
-    """The MAVLink sink's session, in its own process, on a clock of its own."""
+    """The MAVLink sink's session, in its own process and on its own clock."""
 
     def __init__(self, program, options=()):
         self.process = subprocess.Popen([program, *MOUNTING, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -52,7 +52,7 @@ class Companion:
 
 
 class Flight:
-    """One flight. `deliver(pose, s)` is the pose as it is sent, None: not at all; s: seconds since the first IMU reading."""
+    """One flight. `deliver(pose, s)` returns the pose to send, or None for no pose; s: seconds since the first IMU reading."""
 
     def __init__(self, px4, companion, recording, trajectory, deliver):
         self.px4, self.companion, self.recording = px4, companion, recording
@@ -109,12 +109,12 @@ class Flight:
                     self.said.append(message.text)
 
     def hear(self, message):
-        # Its own, not ours that it passes on.
+        # Only PX4's own messages: it also forwards those of FBVINS.
         if message.get_type() == "ODOMETRY" and message.get_srcComponent() == 1 and np.isfinite(message.x):
             self.odometry.append(message)
 
     def errors(self, begin_s, end_s, align_s=None):
-        """Distances from truth of what PX4 says of itself from begin to end, aligned by position and heading at one moment."""
+        """Distances of PX4's own positions from the truth, from begin to end, aligned by position and heading at one moment."""
         chosen = [(self.seconds(m.time_usec), np.array([m.x, m.y, m.z]), m.q) for m in self.odometry
                   if begin_s <= self.seconds(m.time_usec) <= end_s]
         if not chosen:
@@ -127,7 +127,7 @@ class Flight:
                          for (_, p, _), (truth, _) in zip(chosen, truths)])
 
     def to_sent(self, begin_s, end_s):
-        """Distances of what PX4 says of itself from what it was told, in one frame."""
+        """Distances of PX4's own positions from the positions that it was sent, in one coordinate frame."""
         sent_us, sent = [m.time_usec for m in self.sent], np.array([[m.x, m.y, m.z] for m in self.sent])
         return np.array([np.linalg.norm([m.x, m.y, m.z] - np.array([np.interp(m.time_usec, sent_us, sent[:, axis]) for axis in range(3)]))
                          for m in self.odometry if begin_s <= self.seconds(m.time_usec) <= end_s])
@@ -213,7 +213,7 @@ def outage(report, *world):
 
 
 def vision_messages(report, *world):
-    """ArduPilot's dialect, which PX4 understands but for the velocity; these messages have no quality."""
+    """The messages of ArduPilot's dialect. PX4 understands them, except for the velocity; they have no field for quality."""
     flight = fly(*world, lambda pose, s: pose, {12: FLAGS}, ["live.mavlink.dialect=ardupilot"], {"EKF2_EV_QMIN": 0})
     report.fact("PX4 fuses position, height and yaw of vision messages",
                 all(flight.flags(FLAGS).get(aid) == "True" for aid in ("cs_ev_pos", "cs_ev_yaw", "cs_ev_hgt")))

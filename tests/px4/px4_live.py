@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A real PX4 flies by `fbvins live --mavlink` in wall time: a recording is played as live sensors, PX4's EKF2 gets the same IMU
-at the same moments. By hand, as what it shows depends on what else the machine does (px4_flight.py is the test).
+"""A real PX4 navigates by `fbvins live --mavlink` in wall time: a recording is played as live sensors, and PX4's EKF2 gets the
+same IMU at the same moments. To be run by hand, because the result depends on the load of the machine; the test is px4_flight.py.
 
 usage: FBVINS_PX4=.../bin/px4 px4_live.py FBVINS RECORDING [ARGUMENT of fbvins live, but --quiet...]
 """
@@ -24,7 +24,7 @@ STANDING_S = 20  # in which EKF2 learns the gyro bias
 
 
 class Listener(Flight):
-    """Only the errors of a Flight: what is sent is the sink's business."""
+    """Computes the errors of a Flight only; here `fbvins live` itself sends the poses."""
 
     def __init__(self, px4, recording, flight_us):
         self.px4, self.recording, self.flight_us = px4, recording, flight_us
@@ -38,7 +38,7 @@ class Listener(Flight):
 
 
 class Live:
-    """`fbvins live`, and since when (CLOCK_MONOTONIC less the recording's stamps) it plays."""
+    """`fbvins live`, and the difference of CLOCK_MONOTONIC and the recording's stamps while it plays."""
 
     def __init__(self, arguments, instance):
         mounting = [word for one in MOUNTING for word in ("--set", one)]
@@ -59,10 +59,10 @@ class Live:
 def main():
     recording = Recording(sys.argv[2])
     with tempfile.TemporaryDirectory() as folder:
-        # VISION_POSITION_ESTIMATE has no quality that could be asked for.
+        # VISION_POSITION_ESTIMATE has no field for quality.
         px4, live = Px4(os.environ["FBVINS_PX4"], folder, {"EKF2_EV_QMIN": 0} if "live.mavlink.dialect=ardupilot" in sys.argv else {}), None
         begin_ns, listener = time.monotonic_ns(), Listener(px4, recording, START_US)
-        # PX4's own messages go to the port that the sink listens on; here they are read on its ground station's port.
+        # PX4 sends its messages to the port that the sink listens on; this script reads them on the ground station's port.
         px4.link.bind(("127.0.0.1", 0))
         rest, t_us = recording.at_rest(), START_US
         try:
@@ -87,7 +87,7 @@ def main():
             px4.close()
             if live:
                 live.process.wait()
-    # The flight begins where standing ends, in mid-motion and up to a second late: EKF2 needs a few seconds to find its tilt.
+    # The flight begins where the standing ends, in motion and up to a second late; EKF2 needs a few seconds to find its tilt.
     errors = listener.errors(4, 16.8)
     print(f"PX4 by fbvins live, to truth: {100 * np.sqrt(np.mean(errors ** 2)):.1f} cm RMS, {100 * errors.max():.1f} cm at most, "
           f"of {len(errors)} poses")

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A real PX4 flies missions by our odometry in the simulated world (`fbvins fly --px4`): the paper's, to the end and down again; and one in
-which the odometry falls silent for a second, and later for good, where PX4's own failsafe brings it down. FBVINS_PX4 names the
-program (bin/px4 of a px4_sitl build).
+"""A real PX4 flies missions by FBVINS's odometry in the simulated world (`fbvins fly --px4`): the mission of the paper, up to its
+landing; and one in which the odometry fails for a second, and later for good, so that PX4's own failsafe lands the vehicle.
+FBVINS_PX4 names the program (bin/px4 of a px4_sitl build).
 
 usage: px4_mission.py FBVINS
 """
@@ -30,7 +30,7 @@ def fly(program, mission, out, expect):
 
 
 def said(flight, text):
-    """When one of the events was so."""
+    """The time of the first event that fulfils the condition."""
     return next((t for t, event in flight["events"] if text in event), None)
 
 

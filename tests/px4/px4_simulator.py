@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A real PX4 (SITL) whose only sensor is an IMU, which we play: it waits for each reading (lockstep), so its time is ours."""
+"""A real PX4 (SITL) whose only sensor is an IMU that the test simulates. PX4 waits for each reading (lockstep), so the test
+determines PX4's time."""
 import os
 import pathlib
 import select
@@ -11,15 +12,15 @@ from pymavlink.dialects.v20 import common
 PARAMETERS = {
     "EKF2_EV_CTRL": 15, "EKF2_HGT_REF": 3, "EKF2_GPS_CTRL": 0, "EKF2_BARO_CTRL": 0, "EKF2_MAG_TYPE": 5,
     "EKF2_EV_DELAY": 0, "EKF2_EV_NOISE_MD": 0, "EKF2_EV_QMIN": 1,
-    # One IMU and nothing else, and no logs.
+    # One IMU, no other sensor, no logs.
     "EKF2_MULTI_IMU": 0, "SENS_IMU_MODE": 1, "SYS_HAS_BARO": 0, "SYS_HAS_MAG": 0, "SYS_HAS_GPS": 0, "SDLOG_MODE": -1,
 }
 ACCELEROMETER_AND_GYRO = 0b111111
-REPLY_S = 0.5  # of the machine's time, for a PX4 that has nothing to say to a reading
+REPLY_S = 0.5  # wall time to wait for PX4's answer to a reading; it does not answer every one
 
 
 def free_instance():
-    """PX4's ports are fixed but for its number."""
+    """PX4's ports depend only on the number of its instance."""
     for instance in range(9):
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as simulator, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             try:
@@ -53,7 +54,7 @@ class Px4:
         self.writer = common.MAVLink(None, srcSystem=1, srcComponent=51)
         self.reader = common.MAVLink(None)
         self.reader.robust_parsing = True
-        self.answers = False  # not before its modules run
+        self.answers = False  # PX4 answers only once its modules run
 
     def step(self, t_us, accel, gyro):
         message = common.MAVLink_hil_sensor_message(t_us, *accel, *gyro, 0, 0, 0, 0, 0, 0, 20, ACCELEROMETER_AND_GYRO)
@@ -77,7 +78,7 @@ class Px4:
         self.link.sendto(packet, ("127.0.0.1", 14580 + self.instance))
 
     def greet_as_ground_station(self):
-        """From then on what PX4 tells its ground station is received; the onboard link is left to others."""
+        """From then on receives what PX4 sends to its ground station, and leaves the onboard link to others."""
         station = common.MAVLink(None, srcSystem=255, srcComponent=190)
         beat = common.MAVLink_heartbeat_message(common.MAV_TYPE_GCS, common.MAV_AUTOPILOT_INVALID, 0, 0, common.MAV_STATE_ACTIVE, 3)
         odometry = common.MAVLink_command_long_message(1, 1, common.MAV_CMD_SET_MESSAGE_INTERVAL, 0, common.MAVLINK_MSG_ID_ODOMETRY,
@@ -86,7 +87,7 @@ class Px4:
             self.link.sendto(message.pack(station), ("127.0.0.1", 18570 + self.instance))
 
     def ask(self, *command):
-        """A command of PX4's own shell, begun; it may need steps to end."""
+        """Starts a command of PX4's own shell; it may need further steps to end."""
         return subprocess.Popen([self.binary.parent / f"px4-{command[0]}", "--instance", str(self.instance), *command[1:]],
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests on real data: a recording whose events are changed on their way into the system, and how the
-// result compares with the truth. Tests are skipped where the recordings are absent (FBVINS_DATA).
+// For tests on real data: runs a recording whose events are changed before the system gets them, and compares
+// the result with the truth. Tests are skipped where the recordings are absent (FBVINS_DATA).
 //
-//   auto flown = fly("MH_01_easy_17s", "klt", [](double t_s, SensorEvent& e) { return t_s < 8 || t_s > 9; });
-//   flown->rmse_m(HealthState::good)
+//   Flown flown = fly("MH_01_easy_17s", config_for("klt"), [](double t_s, SensorEvent&) { return t_s < 8 || t_s > 9; });
+//   flown.rmse_m(9)  // after the second without any event
 #pragma once
 
 #include <cstdlib>
@@ -20,24 +20,24 @@
 
 namespace fbvins::test {
 
-/// Changes an event, `t_s` after the first image; false: the event never arrives.
+/// Changes an event that is `t_s` after the first image. Return false to drop the event.
 using Alter = std::function<bool(double t_s, SensorEvent& event)>;
 
 struct Flown {
-  int images = 0;  ///< of the recording
+  int images = 0;  ///< number of images in the recording
   Time start;
   std::vector<Odometry> odometry;
-  std::map<FrameId, double> error_m;  ///< of poses, after SE3 alignment of all of them
+  std::map<FrameId, double> error_m;  ///< position error of each pose, after SE3 alignment of all poses
   Calibration calibration;
 
   double time_s(const Odometry& o) const { return (o.t - start).seconds(); }
-  /// Over the poses from `from_s` to `to_s` whose health is `good` or, if asked for, any that has a pose.
+  /// RMS of the position errors from `from_s` to `to_s` after the first image, whatever the health; infinite without poses.
   double rmse_m(double from_s = 0, double to_s = 1e9) const;
   double largest_error_of_good_m() const;
   int with_pose() const;
   int count(HealthState state, double from_s, double to_s) const;
   std::uint32_t resets() const { return odometry.empty() ? 0 : odometry.back().reset_counter; }
-  /// One line for people.
+  /// A summary in one line, to be printed.
   std::string text() const;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frontend of a user's own, whole in this file: follows round dots that are told apart by their grey value.
+// A complete frontend as a user may write one: tracks round dots, each of which has its own grey value.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ class DotFrontend final : public fbvins::Frontend {
  private:
   using Dots = std::array<std::optional<fbvins::Observation>, wall::kDots>;
 
-  /// The centre of each dot that is wholly inside the image.
+  /// The centre of each dot that lies completely inside the image.
   static Dots dots_in(const fbvins::Image& image, const fbvins::Camera& camera) {
     constexpr double kWhole_px2 = 100, kSigma_px = 0.1;
     std::array<fbvins::Vec3, wall::kDots> sums;

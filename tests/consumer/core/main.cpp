@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The installed core alone: images and readings made here go in, poses come out, with a frontend that ships and with one
-// of the user's own.
+// Uses only the installed core: synthetic images and readings go in, poses come out, once with a frontend of the library
+// and once with the user's own frontend.
 #include <cmath>
 #include <cstdio>
 #include <fbvins/pipeline/system.hpp>
 
 #include "dot_frontend.hpp"
 
-/// Error of the last pose's distance from the start, m; not a number without a pose.
+/// Error of the last pose's distance from the start, m; NaN without a pose.
 double fly(fbvins::SystemParts parts, const char* name) {
   auto system = fbvins::System::create({}, wall::rig(), fbvins::RunMode::threaded, std::move(parts));
   if (!system) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tutorial's lines, compiled as they stand there (fly.inc, map.inc), on a recording: consumer DATASET MAP_FILE
+// Runs the tutorial's code blocks, unchanged (fly.inc, map.inc), on a recording: consumer DATASET MAP_FILE
 #include <cstdio>
 #include <fbvins/config/config_file.hpp>
 #include <fbvins/io/dataset.hpp>
