@@ -21,7 +21,7 @@ except ImportError:
     other = os.environ.get("FBVINS_REALSENSE")
     if other and other != sys.executable:
         os.execv(other, [other, *sys.argv])
-    print("SKIPPED: pyrealsense2 and numpy are not there; FBVINS_REALSENSE may name a Python that has them")
+    print("SKIPPED: pyrealsense2 and numpy are not installed; FBVINS_REALSENSE may name a Python that has them")
     sys.exit(77)
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[1] / "examples"
@@ -115,7 +115,7 @@ def main(program):
         finally:
             live.kill()
         poses = (out / "trajectory_tum.txt").read_text(encoding="ascii").splitlines()
-    print(f"{len(poses)} poses of 260 images, two cameras after one another")
+    print(f"{len(poses)} poses of 260 images; the camera was plugged in twice")
     assert len(poses) > 120, f"{len(poses)} poses of 260 images"
     return 0
 

@@ -44,7 +44,7 @@ def check_same_bytes(program, flight, root):
         subprocess.run(fly(program, flight, record, "--out", live, *faults), check=True)
         require(run_again(program, record, again)[0] == 0, f"{name}: the record cannot be run")
         for file in FILES:
-            require((live / file).read_bytes() == (again / file).read_bytes(), f"{name}: {file} is another")
+            require((live / file).read_bytes() == (again / file).read_bytes(), f"{name}: {file} differs")
         require(b"\n" in (again / FILES[0]).read_bytes(), f"{name}: there is no pose")
 
 
@@ -58,7 +58,7 @@ def check_kill(program, flight, root):
     require(process.returncode == -signal.SIGKILL, "the flight ended before it was killed")
     code, said = run_again(program, record, root / "after_kill")
     require(code == 0 or "no pose could be estimated" in said, f"after a kill: {said}")
-    require("was cut off while it was written" in said, f"after a kill nothing is said of it: {said}")
+    require("was cut off while it was written" in said, f"after a kill there is no warning: {said}")
 
 
 def check_refusals(program, flight, root):

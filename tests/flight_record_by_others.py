@@ -67,9 +67,9 @@ def check_summary(record):
     summary = reader.get_summary()
     require({c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values()} == TYPES, "topics or types differ")
     statistics, all_messages = summary.statistics, messages(reader)
-    require(statistics.message_count == len(all_messages), "the statistics count other messages than there are")
-    require(statistics.chunk_count == len(summary.chunk_indexes), "the index is not of all chunks")
-    require(statistics.message_start_time == min(m.log_time for _, _, m, _ in all_messages), "the first time is another")
+    require(statistics.message_count == len(all_messages), "the statistics have another number of messages than the file")
+    require(statistics.chunk_count == len(summary.chunk_indexes), "the index does not have all chunks")
+    require(statistics.message_start_time == min(m.log_time for _, _, m, _ in all_messages), "the statistics have another start time than the messages")
     attachments = {a.name: a.data.decode() for a in reader.iter_attachments()}
     require(set(attachments) == {"calibration.yaml", "config.yaml"}, f"attachments: {list(attachments)}")
     require("T_BC0:" in attachments["calibration.yaml"] and "frontend:" in attachments["config.yaml"], "attachments are empty")
@@ -92,7 +92,7 @@ def check_readings(record, flight):
     known = {int(row[0]): [float(v) for v in row[1:7]] for row in rows(flight / "imu0" / "data.csv")}
     require(len(read) > 500, f"{len(read)} readings")
     for stamp, (gyro, accel) in read.items():
-        require([gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z] == known[stamp], f"the reading at {stamp} is another")
+        require([gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z] == known[stamp], f"the reading at {stamp} differs")
 
 
 def check_poses(record, live):
@@ -108,7 +108,7 @@ def check_poses(record, live):
         require(m.header.frame_id == "odom" and m.child_frame_id == "body", "frames have other names")
         require(m.pose.covariance[0] > 0 and m.twist.covariance[35] > 0, "there is no covariance")
     live_poses = messages(indexed(record), "/odometry/live")
-    require(len(live_poses) > 5 * len(poses), "poses at IMU rate are fewer than that")
+    require(len(live_poses) > 5 * len(poses), "there are too few poses at IMU rate")
 
 
 def check_images(record, flight):
@@ -118,9 +118,9 @@ def check_images(record, flight):
         require(m.encoding == "mono8" and m.step == m.width and len(m.data) == m.height * m.width, f"{topic}: {m.encoding}")
         require(m.header.frame_id == topic.strip("/").replace("/", "_"), f"{topic} is in {m.header.frame_id}")
     stamps = {topic: [stamp_ns(m.header) for t, _, _, m in images if t == topic] for topic in ("/camera/left", "/camera/right")}
-    require(stamps["/camera/left"] == stamps["/camera/right"], "left and right have other stamps")
+    require(stamps["/camera/left"] == stamps["/camera/right"], "the stamps of left and right differ")
     known = {int(row[0]) for row in rows(flight / "cam0" / "data.csv")}
-    require(set(stamps["/camera/left"]) <= known, "a stamp is none of the flight's")
+    require(set(stamps["/camera/left"]) <= known, "a stamp is not one of the flight")
 
 
 def check_health(record):
@@ -130,7 +130,7 @@ def check_health(record):
     last = by_name["odometry"][-1]
     values = {v.key: v.value for v in last.values}
     require(values["state"] in ("good", "degraded") and "reset_counter" in values, f"{last}")
-    require(int({v.key: v.value for v in by_name["live"][-1].values}["imu"]) > 500, "the live counts are not there")
+    require(int({v.key: v.value for v in by_name["live"][-1].values}["imu"]) > 500, "the counts of the live system are missing")
 
 
 def check_landmarks(record):
@@ -188,7 +188,7 @@ def main():
         except Failure as failure:
             print(failure)
             return 1
-    print(f"mcap and mcap-ros2-support read all {len(TYPES)} topics, and every number is the one that went in")
+    print(f"mcap and mcap-ros2-support read all {len(TYPES)} topics, and every number is the recorded one")
     return 0
 
 

@@ -38,7 +38,7 @@ def check(dom, runs, theme):
     assert len(plots) == int(ready[1]) >= 15, (len(plots), ready[1])
     empty = [p for p in plots if int((re.search(r'data-points="(\d+)"', p) or [0, 0])[1]) < 2]
     assert not empty, empty
-    assert "NaN" not in re.sub(r"(?s)<script.*?</script>", "", dom), "a plot has a coordinate that is no number"
+    assert "NaN" not in re.sub(r"(?s)<script.*?</script>", "", dom), "a coordinate of a plot is not a number"
     table = re.search(r'(?s)<div class="card" id="table1".*?</table>', dom)[0]
     for run in runs:
         error = json.loads((run / "summary.json").read_text(encoding="utf-8"))["result"]["accuracy"]["ape_m"]
@@ -59,7 +59,7 @@ def main():
         fbvins("report", *runs, "--out", folder / "report.html")
         for theme in ("light", "dark"):
             check(opened(folder / "report.html", theme, folder / "profile"), runs, theme)
-    print("the report opens, draws every plot and says the right numbers, light and dark")
+    print("the report opens, draws every plot and shows the right figures, light and dark")
     return 0
 
 

@@ -131,7 +131,7 @@ def publish(participant, record):
 def check_bytes(messages):
     """Decoded and encoded again by rosbags, the messages have the bytes that were sent."""
     for name, all_of_it in messages.items():
-        require(all_of_it, f"nothing came on {name}")
+        require(all_of_it, f"nothing was received on {name}")
         for data in random.Random(1).sample(all_of_it, min(len(all_of_it), 200)):
             value = STORE.deserialize_cdr(data, TYPES[name])
             again = bytes(STORE.serialize_cdr(value, TYPES[name]))
@@ -148,7 +148,7 @@ def check_values(messages, out):
         p, q = m.pose.pose.position, m.pose.pose.orientation
         stamp = m.header.stamp.sec * 10**9 + m.header.stamp.nanosec
         nearest = min((abs(t - stamp), t) for t in poses)
-        require(nearest[0] < 1000, "an odometry message whose pose is in no file")
+        require(nearest[0] < 1000, "the pose of an odometry message is in no file")
         require(np.allclose([p.x, p.y, p.z, q.x, q.y, q.z, q.w], poses[nearest[1]], atol=1e-8), "a pose other than in live_tum.txt")
         count += 1
         if count >= 100:
@@ -177,7 +177,7 @@ def fly(program, folder):
             images = publish(participant, record)
             time.sleep(1)
             live.send_signal(signal.SIGINT)
-            require(live.wait(timeout=60) == 0, "fbvins live did not end well: " + (folder / "log.txt").read_text(encoding="utf-8"))
+            require(live.wait(timeout=60) == 0, "fbvins live failed: " + (folder / "log.txt").read_text(encoding="utf-8"))
         finally:
             live.kill()
     listener.ended.set()

@@ -53,7 +53,7 @@ class Service(unittest.TestCase):
         self.assertIn("READY=1\n", messages[0])
         self.assertTrue(all("WATCHDOG=1\n" in m for m in messages[:-1]), messages)
         self.assertTrue(any(m.startswith("STATUS=good") for m in messages), messages)
-        self.assertEqual(out, "", "the status lines are for people; a journal gets changes")
+        self.assertEqual(out, "", "status lines are for terminals; a journal gets changes only")
         self.assertRegex(err, r"(?m)^<6>good$")
 
     def test_sigterm_ends_it_in_good_order_and_keeps_the_map(self):
@@ -78,7 +78,7 @@ class Service(unittest.TestCase):
         program, manager = self.start(*arguments[:2], speed="@4")
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
-        self.assertGreaterEqual(self.keyframes_of(kept), keyframes, "the second flight went on with the first one's map; a new one is smaller")
+        self.assertGreaterEqual(self.keyframes_of(kept), keyframes, "the second flight must continue the first one's map; a new map would be smaller")
 
     def keyframes_of(self, path):
         done = subprocess.run([PROGRAM, "map", "info", path], capture_output=True, text=True, timeout=120, check=True)

@@ -52,9 +52,9 @@ def main(source, native, sysroot=None):
     different = [a for a, b in zip(here, there) if a != b]
     if not has_fma():  # without it a thousandth of the functions' results are rounded otherwise (docs/board.md)
         different = [line for line in different if not line.startswith("functions")]
-    print(f"{len(here)} sums, different on arm64: {different or 'none'}; by Eigen's own code for NEON: {sum(a != b for a, b in zip(here, neon))}")
+    print(f"{len(here)} hashes; different on arm64: {different or 'none'}; with Eigen's own NEON code: {sum(a != b for a, b in zip(here, neon))}")
     assert len(here) == len(there) and not different
-    assert here != neon, "Eigen's own code for NEON gives the same: is the header still needed?"
+    assert here != neon, "Eigen's own NEON code gives the same bits: is the header still needed?"
     return 0
 
 

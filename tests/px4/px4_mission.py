@@ -46,7 +46,7 @@ def silence(program, root):
     flight = fly(program, "odometry_stops", root / "silence", 1)
     modes = [name for name, _ in flight["modes"]]
     assert "holding/late" in modes and modes[-1].startswith("landed"), modes
-    assert modes.index("mission", modes.index("holding/late")), "it did not go on after the first silence"
+    assert modes.index("mission", modes.index("holding/late")), "the mission did not continue after the first gap in the odometry"
     assert said(flight, "mode AUTO.LAND") is not None, "PX4's failsafe was not seen"
     print(f"  {', '.join(modes)}; {flight['drift_blind_m']:.2f} m of drift without poses")
 
