@@ -86,7 +86,7 @@ def main():
         except Failure as failure:
             print(failure)
             return 1
-    print("flights recorded live run again with the same bytes, whole, with faults and killed")
+    print("records of live flights give the same bytes: whole, with faults, and of a killed program")
     return 0
 
 
