@@ -88,9 +88,10 @@ void WebSink::on_command(std::string_view text) {
   const std::optional<WebCommand> command = parse_command(text);
   if (!command) return;
   using Kind = WebCommand::Kind;
+  const bool plays = command->kind == Kind::play || command->kind == Kind::pause || command->kind == Kind::seek;
   if (command->kind == Kind::mark && flight_.can_mark) actions_.mark(command->text);
   else if (command->kind == Kind::save_map && flight_.cannot_save_map.empty()) actions_.save_map();
-  else if (flight_.replay) actions_.replay(*command);
+  else if (flight_.replay && plays) actions_.replay(*command);
 }
 
 Result<void> WebSink::take(const LiveEvent& event) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/web/web_sink.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -123,6 +125,28 @@ TEST_F(Page, ButtonsDoWhatIsAllowed) {
   const Json mark = Json::parse(next(peer, "mark"));
   EXPECT_EQ(mark["t_s"], 1.0);
   EXPECT_EQ(mark["text"], "here");
+}
+
+TEST_F(Page, AReplayObeysItsOwnButtonsAlone) {
+  std::mutex mutex;
+  std::vector<WebCommand::Kind> obeyed;
+  WebFlight flight{.replay = true};
+  flight.cannot_save_map = "this flight is over";
+  open(flight, {.replay = [&](const WebCommand& command) {
+         const std::lock_guard lock(mutex);
+         obeyed.push_back(command.kind);
+       }});
+  TestPeer peer(sink->port());
+  peer.watch();
+  next(peer, "hello");
+  for (const char* what : {"mark", "save_map", "play", "pause"}) peer.say(fmt::format(R"({{"do":"{}","text":""}})", what));
+  const auto count = [&] {
+    const std::lock_guard lock(mutex);
+    return obeyed.size();
+  };
+  for (int i = 0; i < 1000 && count() < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  ASSERT_TRUE(sink->finish());
+  EXPECT_EQ(obeyed, (std::vector{WebCommand::Kind::play, WebCommand::Kind::pause}));
 }
 
 TEST_F(Page, SaysGoodbye) {
