@@ -71,11 +71,13 @@ Result<void> RealsenseSource::watch() {
   return {};
 }
 
-/// The wanted camera, if it is plugged in and usable. A problem is reported when it first occurs.
+/// A problem is reported when it first occurs: cameras are looked for twice a second.
+void RealsenseSource::report(const std::string& problem) {
+  if (std::exchange(problem_, problem) != problem) options_.say(problem);
+}
+
+/// The wanted camera, if it is plugged in and usable.
 std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
-  const auto say = [&](const std::string& problem) {
-    if (std::exchange(problem_, problem) != problem) options_.say(problem);
-  };
   try {
     // For a recording the device whose end is reported: the context would make new ones.
     std::vector<rs2::device> devices;
@@ -86,14 +88,13 @@ std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
       if (!which_.empty() && realsense_name(device) != which_) continue;
       auto camera = RealsenseCamera::open(device, options_.say);
       if (!camera) {
-        say(camera.error().message);
+        report(camera.error().message);
         continue;
       }
-      problem_.clear();
       return *std::move(camera);
     }
   } catch (const rs2::error& e) {  // unplugged in the meantime
-    say(fmt::format("RealSense: {}", e.what()));
+    report(fmt::format("RealSense: {}", e.what()));
   }
   return nullptr;
 }
@@ -148,7 +149,7 @@ Result<void> RealsenseSource::run(SensorInput& input) {
       auto camera = find();
       if (!camera) continue;
       if (!fits(rig_, *camera)) {
-        options_.say("another camera, whose images have another size, is not taken");
+        report("another camera, whose images have another size, is not taken");
         continue;
       }
       const std::lock_guard lock(mutex_);
@@ -156,8 +157,9 @@ Result<void> RealsenseSource::run(SensorInput& input) {
     }
     const std::string name = realsense_name(camera_->device());
     if (Result<void> started = camera_->start(input); !started) {
-      options_.say(started.error().message);
+      report(started.error().message);
     } else {
+      problem_.clear();
       options_.say(fmt::format("RealSense {}: {} x {} pixels", name, camera_->width_px(), camera_->height_px()));
       while (!over() && !gone()) wait(kLookEvery_s);
       camera_->stop();

@@ -37,6 +37,7 @@ class RealsenseSource final : public Source {
   Result<void> wait_for_first();
   Result<void> set_rig();
   void wait(double longest_s);
+  void report(const std::string& problem);
 
   SourceOptions options_;
   rs2::context context_;
@@ -49,7 +50,7 @@ class RealsenseSource final : public Source {
   bool removed_ = false;  ///< the camera in use is unplugged
   bool ended_ = false;    ///< the recording has ended
   bool stopped_ = false;
-  std::string problem_;  ///< last reported problem of a camera that cannot be used
+  std::string problem_;  ///< last reported problem of a camera that cannot be used; empty since one works
 };
 
 }  // namespace fbvins

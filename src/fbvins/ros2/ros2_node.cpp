@@ -4,9 +4,9 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
-#include <optional>
 #include <utility>
 
 #include "fbvins/ros2/cdr_type.hpp"
@@ -175,7 +175,6 @@ Result<void> Ros2Subscriber::look_around() {
   constexpr int kAtOnce = 64;
   std::array<void*, kAtOnce> samples{};
   std::array<dds_sample_info_t, kAtOnce> about{};
-  std::optional<bool> offered_reliable;
   std::string other_type;
   int count = 0;
   do {
@@ -183,17 +182,20 @@ Result<void> Ros2Subscriber::look_around() {
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<std::size_t>(k);
       const auto* offer = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+      offered_reliable_.erase(about[i].instance_handle);
       if (!about[i].valid_data || about[i].instance_state != DDS_ALIVE_INSTANCE_STATE || wire_topic(name_) != offer->topic_name)
         continue;
       dds_reliability_kind_t kind{};
       dds_duration_t blocking{};
       if (wire_type(type_) != offer->type_name) other_type = offer->type_name;
       else if (dds_qget_reliability(offer->qos, &kind, &blocking))
-        offered_reliable = offered_reliable.value_or(true) && kind == DDS_RELIABILITY_RELIABLE;
+        offered_reliable_[about[i].instance_handle] = kind == DDS_RELIABILITY_RELIABLE;
     }
     if (count > 0) dds_return_loan(offers_.handle(), samples.data(), count);
   } while (count == kAtOnce);
-  if (offered_reliable && *offered_reliable != reliable_) return listen(*offered_reliable);
+  const bool all_reliable =
+      std::all_of(offered_reliable_.begin(), offered_reliable_.end(), [](const auto& offer) { return offer.second; });
+  if (!offered_reliable_.empty() && all_reliable != reliable_) return listen(all_reliable);
   if (!other_type.empty())
     return Error{ErrorCode::invalid_argument,
                  fmt::format("ROS 2 topic {} carries {}, not {}", name_, other_type, wire_type(type_))};

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -83,7 +84,7 @@ class Ros2Subscriber {
   /// The bytes stay valid as long as `keeper` lives.
   using OnMessage = std::function<void(std::string_view message, const std::shared_ptr<const void>& keeper)>;
 
-  /// With the reliability that the topic's publisher offers; best effort until there is one.
+  /// With the reliability that all publishers of the topic offer; best effort until there is one.
   static Result<std::unique_ptr<Ros2Subscriber>> create(std::shared_ptr<Ros2Node> node, const std::string& topic,
                                                         const std::string& type, int depth, OnMessage on_message);
   ~Ros2Subscriber();
@@ -104,6 +105,7 @@ class Ros2Subscriber {
   int depth_ = 0;
   bool reliable_ = false;
   OnMessage on_message_;
+  std::map<std::uint64_t, bool> offered_reliable_;  ///< by publisher, as DDS numbers them
   DdsEntity topic_, offers_, reader_;
 };
 

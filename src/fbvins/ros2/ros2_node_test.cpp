@@ -52,6 +52,22 @@ TEST(Ros2Node, ASubscriberAdaptsToThePublishersReliability) {
   EXPECT_TRUE(heard.wait_for(1));
 }
 
+/// A best-effort reader hears both kinds of publishers, a reliable one only its own.
+TEST(Ros2Node, AmongPublishersOfBothKindsASubscriberHearsAll) {
+  Heard heard;
+  auto subscriber = Ros2Subscriber::create(node(), "/both", "std_msgs/msg/String", 10, heard.function());
+  ASSERT_TRUE(subscriber);
+  const auto first = Ros2Publisher::create(node(), "/both", "std_msgs/msg/String", {.reliable = false});
+  ASSERT_TRUE(first && (*subscriber)->look_around());
+  {
+    const auto second = Ros2Publisher::create(node(), "/both", "std_msgs/msg/String", {.reliable = true});
+    ASSERT_TRUE(second && (*subscriber)->look_around());
+    EXPECT_EQ((*subscriber)->publishers(), 2);
+  }
+  ASSERT_TRUE((*subscriber)->look_around());
+  EXPECT_EQ((*subscriber)->publishers(), 1);
+}
+
 TEST(Ros2Node, ATopicOfAnotherTypeIsSaid) {
   Heard heard;
   auto subscriber = Ros2Subscriber::create(node(), "/typed", "sensor_msgs/msg/Imu", 10, heard.function());
