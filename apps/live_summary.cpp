@@ -82,6 +82,7 @@ std::string to_text(const LiveSummary& s) {
   text +=
       fmt::format("images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock jumps {}, restarts {}\n",
                   c.images, s.tally.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
+  if (c.events_lost > 0) text += fmt::format("events that a slow output did not get: {}\n", c.events_lost);
   text += "images by health:";
   for (const auto& [name, images] : s.tally.health) text += fmt::format(" {} {}", name, images);
   text += "\n" + line("from the image's stamp to its pose:", s.tally.last.shutter_to_pose);

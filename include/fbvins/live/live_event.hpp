@@ -43,6 +43,7 @@ struct LiveCounts {
   std::int64_t imu_reordered = 0;      ///< came late, and were put in order
   std::int64_t clock_leaps = 0;        ///< jumps of a sensor's clock, corrected
   std::int64_t resets = 0;             ///< restarts of the estimator
+  std::int64_t events_lost = 0;        ///< events that sinks did not get, as they were too slow
 
   /// Calls f(name, count) for each, in this order.
   template <class F>
@@ -56,6 +57,7 @@ struct LiveCounts {
     f("imu_reordered", imu_reordered);
     f("clock_leaps", clock_leaps);
     f("resets", resets);
+    f("events_lost", events_lost);
   }
 };
 

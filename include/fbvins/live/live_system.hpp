@@ -39,7 +39,8 @@ class LiveSystem {
   void add_sink(std::unique_ptr<Sink> sink);
   /// What the frontend saw in an image, on its thread; before the first reading.
   void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
-  /// Once, when a stage has failed and nothing more is taken: a source can be stopped here. Before the first reading.
+  /// Once, when a stage has failed and nothing more is taken: a source can be stopped here, but not finish() be called.
+  /// Before the first reading.
   void on_failure(std::function<void()> callback);
 
   SensorInput& input();

@@ -137,6 +137,7 @@ struct LiveSystem::Impl {
     s.shutter_to_pose = shutter_to_pose.summary();
     s.pose_age = pose_age.summary();
     for (const Hub::SinkReport& report : hub.reports()) {
+      s.counts.events_lost += report.dropped;
       const std::string& problem = report.problem.empty() ? report.passing : report.problem;
       if (!problem.empty()) s.problem = report.name + ": " + problem;
     }

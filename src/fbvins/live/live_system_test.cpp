@@ -162,6 +162,26 @@ TEST(LiveSystem, ABusyFrontendCostsImagesButNoReadings) {
   EXPECT_EQ(f.watcher.all<StereoFrame>().back().t, f.flight.stamp(39));
 }
 
+TEST(LiveSystem, WhatASlowSinkLosesIsCounted) {
+  struct Hanging final : Sink {
+    explicit Hanging(std::latch& released) : go(released) {}
+    std::string_view name() const override { return "hanging"; }
+    Result<void> take(const LiveEvent&) override {
+      go.wait();
+      return {};
+    }
+    std::latch& go;
+  };
+  Fixture f;
+  LiveSystem live = f.live();
+  std::latch go(1);
+  live.add_sink(std::make_unique<Hanging>(go));
+  f.play(live, 0, 40);
+  EXPECT_GE(live.status().counts.events_lost, 40 - 33);  // 32 images may wait, and one be held
+  go.count_down();
+  ASSERT_TRUE(live.finish());
+}
+
 TEST(LiveSystem, SilentCamerasAreReportedWhileReadingsGoOn) {
   Fixture f;
   LiveOptions options;

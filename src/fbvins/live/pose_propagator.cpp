@@ -56,11 +56,12 @@ void PosePropagator::advance(Propagated& p, const ImuSample& from, const ImuSamp
   p.P.diagonal().segment<3>(nav::bg).array() += dt * square(noise_.gyro_random_walk_radps2_rthz);
   p.P.diagonal().segment<3>(nav::ba).array() += dt * square(noise_.accel_random_walk_mps3_rthz);
   p.state = propagate(p.state, {{from, to}, {}}, gravity_W);
+  p.t = to.t;
 }
 
 PosePropagator::Propagated PosePropagator::propagate_all() const {
-  Propagated p{{estimate_->T_WB, estimate_->v_WB, estimate_->bias}, initial_covariance(*estimate_)};
   const Time start = estimate_->t + time_offset_;
+  Propagated p{start, {estimate_->T_WB, estimate_->v_WB, estimate_->bias}, initial_covariance(*estimate_)};
   if (!readings_.empty() && readings_.front().t > start) {  // no reading before: the first one is held
     ImuSample held = readings_.front();
     held.t = start;
@@ -74,8 +75,21 @@ PosePropagator::Propagated PosePropagator::propagate_all() const {
   return p;
 }
 
+/// Between the newest reading and the `next` one, at or before which `t` is; without a reading, the next one is held.
+ImuSample PosePropagator::reading_at(Time t, const ImuSample& next) const {
+  if (!readings_.empty()) return readings_.back().t < t ? interpolate(readings_.back(), next, t) : readings_.back();
+  ImuSample held = next;
+  held.t = t;
+  return held;
+}
+
 void PosePropagator::rebase(const Odometry& estimate) {
   const Time start = estimate.t + time_offset_;
+  if (newest_ && newest_->t < start && !readings_.empty()) {  // no reading as new as the estimate: the last one is held
+    ImuSample from = readings_.back(), to = readings_.back();
+    from.t = newest_->t, to.t = start;
+    advance(*newest_, from, to);  // for the comparison below
+  }
   while (readings_.size() > 1 && readings_[1].t <= start) readings_.pop_front();
   const bool same_world = estimate_ && estimate_->reset_counter == estimate.reset_counter;
   estimate_ = estimate;
@@ -92,9 +106,9 @@ void PosePropagator::rebase(const Odometry& estimate) {
 }
 
 LivePose PosePropagator::add(const ImuSample& reading) {
-  if (!readings_.empty() && newest_) {
-    advance(*newest_, readings_.back(), reading);
-    decay_offset((reading.t - readings_.back().t).seconds());
+  if (newest_ && newest_->t < reading.t) {
+    decay_offset((reading.t - newest_->t).seconds());
+    advance(*newest_, reading_at(newest_->t, reading), reading);
   }
   readings_.push_back(reading);
   if (readings_.size() > kMaxReadings) readings_.pop_front();

@@ -31,14 +31,16 @@ class PosePropagator {
   LivePose add(const ImuSample& reading);
 
  private:
-  /// A state at a reading; `P` in the order of NavState.
+  /// `P` in the order of NavState; `t` is on the IMU's clock.
   struct Propagated {
+    Time t;
     NavState state;
     Mat15 P = Mat15::Zero();
   };
 
   void advance(Propagated& p, const ImuSample& from, const ImuSample& to) const;
   Propagated propagate_all() const;
+  ImuSample reading_at(Time t, const ImuSample& next) const;
   void decay_offset(double dt_s);
 
   ImuNoise noise_;
@@ -47,7 +49,7 @@ class PosePropagator {
   double gravity_mps2_;
   std::deque<ImuSample> readings_;  ///< from the last one at or before the estimate's image on
   std::optional<Odometry> estimate_;
-  std::optional<Propagated> newest_;  ///< at readings_.back(); none while there is no pose
+  std::optional<Propagated> newest_;  ///< at readings_.back(), or at a later estimate; none while there is no pose
   Vec15 offset_ = Vec15::Zero();      ///< published = newest (+) offset; biases have none
 };
 

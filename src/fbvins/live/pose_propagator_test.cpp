@@ -135,6 +135,31 @@ TEST(PosePropagator, ConvergesToANewEstimateWithoutAStep) {
   EXPECT_LT((error_before - shift).norm(), 1e-4);
 }
 
+/// The interval up to such an estimate is in it already.
+TEST(PosePropagator, EstimatesNewerThanEveryReadingAreNotPropagatedTwice) {
+  const Motion motion;
+  PosePropagator propagator({}, {}, 0.1);
+  LivePose pose;
+  for (int k = 0; k < 200; ++k) {
+    const double s = k * kPeriod_s;
+    const bool gap = k > 100 && k < 120;
+    if (!gap) pose = propagator.add(motion.reading(s));
+    if (k == 10 || k == 110 || k == 118) propagator.rebase(motion.estimate(s));
+    if (k < 11 || gap) continue;
+    EXPECT_LT((pose.T_WB.p - motion.state(s).T_WB.p).norm(), 2e-3) << k;
+    EXPECT_LT(so3_log(pose.T_WB.q.conjugate() * motion.state(s).T_WB.q).norm(), 1e-9) << k;
+  }
+}
+
+/// The first reading comes after the first estimate.
+TEST(PosePropagator, AnEstimateBeforeAllReadings) {
+  const Motion motion;
+  PosePropagator propagator({}, {}, 0);
+  propagator.rebase(motion.estimate(0));
+  const LivePose pose = propagator.add(motion.reading(kPeriod_s));
+  EXPECT_LT((pose.T_WB.p - motion.state(kPeriod_s).T_WB.p).norm(), 1e-4);
+}
+
 TEST(PosePropagator, WithoutSmoothingANewEstimateCountsAtOnce) {
   const Motion motion;
   PosePropagator propagator({}, {}, 0);

@@ -43,6 +43,7 @@ Result<void> ReplaySource::run(SensorInput& input) {
   Duration later;
   for (int lap = 0; lap < options_.laps; ++lap) {
     if (lap > 0) {
+      if (!newest_) return {};  // nothing is recorded
       later = *newest_ - *first_ + Duration::from_seconds(1 / data_->rig().image_rate_hz);
       if (!options_.preload) {
         auto again = options_.open_file(path_, options_.dataset);

@@ -85,6 +85,24 @@ TEST_F(ReplaySourceTest, StampsGoOnFromLapToLap) {
   }
 }
 
+TEST_F(ReplaySourceTest, NothingRecordedEndsAtOnceHoweverOften) {
+  struct NoImages final : FrameLoader {
+    LoadedFrame load(const FrameEntry&) override { return {}; }
+  };
+  ReplaySource::Options options;
+  options.laps = 3;
+  options.open_file = [](const std::string&, const DatasetOptions& dataset) -> Result<std::unique_ptr<Dataset>> {
+    DatasetContents contents;
+    contents.loader = std::make_unique<NoImages>();
+    return std::make_unique<Dataset>(std::move(contents), dataset);
+  };
+  auto source = ReplaySource::open("empty", options);
+  ASSERT_TRUE(source);
+  Notes notes;
+  EXPECT_TRUE((*source)->run(notes));
+  EXPECT_TRUE(notes.events.empty());
+}
+
 TEST_F(ReplaySourceTest, StopEndsItSoon) {
   auto source = ReplaySource::open(path_ + "@0.01", {});  // 20 s
   ASSERT_TRUE(source);

@@ -56,12 +56,12 @@ Result<void> ServiceSink::take(const LiveEvent& event) {
 /// False where complete images keep coming and none has been answered for kHungAfter.
 bool ServiceSink::estimator_lives(const LiveStatus& status) {
   const std::int64_t whole_images = status.counts.images - status.counts.images_incomplete;
-  if (status.counts.images_estimated != answers_ || whole_images == images_) {
+  if (status.counts.images_estimated != answers_ || !waits_since_ || whole_images == images_) {
     answers_ = status.counts.images_estimated;
     images_ = whole_images;
     waits_since_ = status.host_t;
   }
-  return status.host_t - waits_since_ < kHungAfter;
+  return status.host_t - *waits_since_ < kHungAfter;
 }
 
 void ServiceSink::log(const LiveStatus& status, const std::string& sentence) {

@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "fbvins/core/file_descriptor.hpp"
@@ -37,7 +38,7 @@ class ServiceSink final : public Sink {
   Time logged_at_;  // CLOCK_MONOTONIC
   bool ready_ = false;
   std::int64_t images_ = 0, answers_ = 0;  // images and answers when the estimator was last known to run
-  Time waits_since_;                       // CLOCK_MONOTONIC
+  std::optional<Time> waits_since_;        // CLOCK_MONOTONIC
 };
 
 }  // namespace fbvins

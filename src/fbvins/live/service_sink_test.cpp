@@ -85,6 +85,19 @@ TEST(ServiceSink, AHungEstimatorGivesNoSignOfLifeUntilItAnswers) {
   EXPECT_TRUE(lives_at(status_at(20, 400, 23)));
 }
 
+TEST(ServiceSink, TheFirstImagesMayTakeTheirTimeToo) {
+  const Manager manager;
+  const File journal(std::tmpfile());
+  auto sink = ServiceSink::create(manager.address(), journal.get());
+  ASSERT_TRUE(sink);
+  for (const double t_s : {100.0, 102.0, 104.0}) {
+    ASSERT_TRUE((*sink)->take(status_at(t_s, 20, 0)));
+    EXPECT_TRUE(has(manager.told(), "WATCHDOG=1")) << t_s;
+  }
+  ASSERT_TRUE((*sink)->take(status_at(108, 40, 0)));
+  EXPECT_FALSE(has(manager.told(), "WATCHDOG=1"));
+}
+
 TEST(ServiceSink, SilentSensorsAreNoReasonForARestart) {
   const Manager manager;
   const File journal(std::tmpfile());

@@ -131,7 +131,8 @@ std::optional<LiveStatus> status_of(const RosDiagnostic& diagnostic) {
                             {"imu_late", &c.imu_late},
                             {"imu_reordered", &c.imu_reordered},
                             {"clock_leaps", &c.clock_leaps},
-                            {"resets", &c.resets}})
+                            {"resets", &c.resets},
+                            {"events_lost", &c.events_lost}})
     take_number(diagnostic, key, *count);
   return s;
 }
