@@ -160,18 +160,18 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
 
 const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
   CpuTimer timer;
-  window_.describe(calibration_, solution_.window);
+  window_.fill_problem(calibration_, solution_.window);
   solver_.solve(solution_, lm);
   if (!solution_.summary.usable &&
       window_.refuse_landmark_priors(solution_.window) > 0) {  // a wrong one can make every step fail
-    window_.describe(calibration_, solution_.window);
+    window_.fill_problem(calibration_, solution_.window);
     solver_.solve(solution_, lm);
   }
   const WindowProblem& solved = solution_.window;
   const LmSummary& summary = solution_.summary;
   if (summary.usable) {
     window_.refuse_landmark_priors(solved);
-    window_.accept(solved);
+    window_.take_estimates(solved);
     calibration_ = solved.calibration;
     fill_covariances(solution_, out);
     out.stats.outliers += window_.remove_outliers(solved);
@@ -193,8 +193,8 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   std::optional<Mat17> covariance = solution.covariance(newest.id);
   if (!covariance) return;
   KnownLandmarks& known = window_.known();
-  known.hold_to(newest.state.T_WB.p, solution.window.landmark_priors);
-  covariance->topLeftCorner<6, 6>() = known.with_map(newest.state.T_WB, covariance->topLeftCorner<6, 6>());
+  known.set_active_priors(newest.state.T_WB.p, solution.window.landmark_priors);
+  covariance->topLeftCorner<6, 6>() = known.with_map_covariance(newest.state.T_WB, covariance->topLeftCorner<6, 6>());
   const Mat15 level = window_.tilt().levelled_covariance(newest.state, *covariance);
   out.pose_covariance = level.topLeftCorner<6, 6>();
   out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);

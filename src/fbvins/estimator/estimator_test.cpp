@@ -140,7 +140,7 @@ TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
   for (int seed = 0; seed < 4; ++seed) {
     for (const bool known : {true, false}) {
       SimulatedFlight flight(Motion(0.8, 0.8), 200 + seed);
-      flight.knows_again = true;
+      flight.reobserves = true;
       flight.max_features = 60;
       EstimatorOptions options = exact_noise();
       options.known_landmarks.enabled = known;
@@ -160,7 +160,7 @@ TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
 TEST(Estimator, MistakenLandmarksDoNoHarm) {
   // From the sixth second on, tracks come back as those of points elsewhere: one in ten.
   SimulatedFlight flight(Motion(0.8, 0.8), 210);
-  flight.knows_again = true;
+  flight.reobserves = true;
   flight.mistaken = [](int k, int point) { return k > 120 && point % 10 == 3; };
   const Flown flown = fly(flight, 400);
   for (int k = flown.first_pose(); k < 400; ++k) {

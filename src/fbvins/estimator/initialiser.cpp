@@ -156,10 +156,10 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimat
 
 bool Initialiser::refine_structure(const Calibration& calibration) {
   WindowSolution solution;
-  structure_.describe(calibration, solution.window);
+  structure_.fill_problem(calibration, solution.window);
   solver_.solve(solution, LmOptions{.max_iterations = 6});
   if (!solution.summary.usable) return false;
-  structure_.accept(solution.window);
+  structure_.take_estimates(solution.window);
   structure_.remove_outliers(solution.window);
   return true;
 }

@@ -28,8 +28,8 @@ bool KeyframePolicy::is_keyframe(const SlidingWindow& window, const Calibration&
 int KeyframePolicy::leaving(const SlidingWindow& window, const Calibration& calibration, int keyframes) {
   if (options_.leaving == KeyframeLeaving::oldest) return 0;
   WindowProblem problem;
-  window.describe(calibration, problem);
-  return least_telling_keyframe(problem, keyframes, solver_);
+  window.fill_problem(calibration, problem);
+  return least_informative_keyframe(problem, keyframes, solver_);
 }
 
 double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver& solver) {
@@ -55,7 +55,7 @@ double entropy_of_newest(const WindowProblem& problem, int unseen, WindowSolver&
   return llt.matrixLLT().diagonal().array().log().sum();  // ln det(covariance) / 2
 }
 
-int least_telling_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver) {
+int least_informative_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver) {
   // The entropy with all observations is the same for all: the smallest gain (E3) has the smallest entropy without them.
   int least = 0;
   double least_entropy = 0;

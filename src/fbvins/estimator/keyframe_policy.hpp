@@ -26,7 +26,7 @@ class KeyframePolicy {
 };
 
 /// Index of the keyframe whose observations have the least information on the newest state (E4).
-int least_telling_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver);
+int least_informative_keyframe(const WindowProblem& problem, int keyframes, WindowSolver& solver);
 
 /// Differential entropy of the newest frame's fifteen numbers without the observations of frame `unseen`; with all
 /// observations for unseen = -1. In nats, up to the constant of E2; 0 where the window cannot be solved.

@@ -19,7 +19,7 @@ struct MidFlight {
 
   MidFlight() {
     for (int k = 0; k < 100; ++k) (void)estimator.process(flight.frame(k));
-    estimator.window().describe(estimator.calibration(), problem);
+    estimator.window().fill_problem(estimator.calibration(), problem);
     keyframes = static_cast<int>(problem.frames.size()) - KeyframeOptions{}.newest_frames;
   }
 };
@@ -40,7 +40,7 @@ TEST(KeyframePolicy, AKeyframeThatSharesNoLandmarkHasNoInformationAndLeaves) {
   }
   const double all = entropy_of_newest(m.problem, -1, m.solver);
   EXPECT_NEAR(entropy_of_newest(m.problem, outdated, m.solver), all, 1e-6);
-  EXPECT_EQ(least_telling_keyframe(m.problem, m.keyframes, m.solver), outdated);
+  EXPECT_EQ(least_informative_keyframe(m.problem, m.keyframes, m.solver), outdated);
 }
 
 TEST(KeyframePolicy, OldestIsTheFirst) {

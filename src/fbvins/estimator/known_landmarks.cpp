@@ -22,7 +22,7 @@ void KnownLandmarks::clear() {
   anchors_.clear();
   first_anchor_ = 0;
   next_ = {};
-  held_to_ = {};
+  active_anchor_ = {};
   in_use_ = false;
   new_.clear();
 }
@@ -72,33 +72,34 @@ std::optional<LandmarkPrior> KnownLandmarks::find(TrackId track) const {
 }
 
 /// Covariance of the map at p: an error (dp, dtheta) at the anchor is dp - [p - p_anchor]x dtheta at p (K5).
-Mat6 KnownLandmarks::carried(const Anchor& anchor, const Vec3& p_W) {
+Mat6 KnownLandmarks::propagated(const Anchor& anchor, const Vec3& p_W) {
   Mat6 T = Mat6::Identity();
   T.topRightCorner<3, 3>() = -hat(p_W - anchor.p_W);
   return T * anchor.covariance * T.transpose();
 }
 
-void KnownLandmarks::hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use) {
+void KnownLandmarks::set_active_priors(const Vec3& p_W, std::span<const LandmarkPrior> in_use) {
   in_use_ = !in_use.empty();
   if (!in_use_ || anchors_.empty()) return;  // the last one's share is kept
   Anchor mean{p_W, Mat6::Zero()};
   for (const LandmarkPrior& prior : in_use) {                                        // (K6)
     const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // dropped since: the oldest kept
-    mean.covariance += carried(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
+    mean.covariance += propagated(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
   }
-  held_to_ = mean;
+  active_anchor_ = mean;
 }
 
-Mat6 KnownLandmarks::with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const {
+Mat6 KnownLandmarks::with_map_covariance(const Pose<W, B>& T_WB, const Mat6& window_covariance) const {
   Mat6 from_world = Mat6::Identity();
   from_world.bottomRightCorner<3, 3>() = T_WB.R().transpose();
-  return (in_use_ ? kTimesCounted : 1.0) * window_covariance + from_world * carried(held_to_, T_WB.p) * from_world.transpose();
+  return (in_use_ ? kTimesCounted : 1.0) * window_covariance +
+         from_world * propagated(active_anchor_, T_WB.p) * from_world.transpose();
 }
 
 void KnownLandmarks::anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance) {
   Mat6 to_world = Mat6::Identity();
   to_world.bottomRightCorner<3, 3>() = T_WB.R();
-  next_ = {T_WB.p, to_world * with_map(T_WB, window_covariance) * to_world.transpose()};
+  next_ = {T_WB.p, to_world * with_map_covariance(T_WB, window_covariance) * to_world.transpose()};
 }
 
 }  // namespace fbvins

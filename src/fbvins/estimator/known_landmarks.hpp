@@ -6,8 +6,8 @@
 // for all landmarks of a moment, as an anchor, and is added to that of every pose that such landmarks constrain.
 // Synchronous; one instance, one thread. At most `capacity` landmarks: the oldest are forgotten.
 //
-//   known.hold_to(T_WB.p, priors_in_use);                         // after each solve
-//   covariance = known.with_map(T_WB, covariance);                 // of any pose of the window
+//   known.set_active_priors(T_WB.p, priors_in_use);                         // after each solve
+//   covariance = known.with_map_covariance(T_WB, covariance);                 // of any pose of the window
 //   known.anchor(T_WB_leaving, covariance);                        // before a keyframe leaves
 //   known.remember(track, T_WC, point, V);                         // when a landmark leaves
 //   landmark.prior = known.find(track);                           // when a track appears
@@ -33,9 +33,9 @@ class KnownLandmarks {
 
   void clear();
   /// Sets the priors by which the map constrains the window, and the newest position.
-  void hold_to(const Vec3& p_W, std::span<const LandmarkPrior> in_use);
+  void set_active_priors(const Vec3& p_W, std::span<const LandmarkPrior> in_use);
   /// Covariance of (dp in W, dtheta in B) of a pose: that of the window alone, plus that of the map in use (K4-K6).
-  Mat6 with_map(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
+  Mat6 with_map_covariance(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
   /// Landmarks remembered from now on have the uncertainty of this pose, their host's, in common.
   void anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance);
   /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. Ignored for a landmark
@@ -53,7 +53,7 @@ class KnownLandmarks {
     Vec3 p_W = Vec3::Zero();
     Mat6 covariance = Mat6::Zero();  // (dp, dtheta) in W
   };
-  static Mat6 carried(const Anchor& anchor, const Vec3& p_W);
+  static Mat6 propagated(const Anchor& anchor, const Vec3& p_W);
   void make_room();
 
   KnownLandmarkOptions options_;
@@ -62,7 +62,7 @@ class KnownLandmarks {
   std::deque<Anchor> anchors_;     // of the landmarks remembered, oldest first
   std::int64_t first_anchor_ = 0;  // number of the oldest
   Anchor next_;                    // of those remembered next
-  Anchor held_to_;                 // mean of the anchors in use, at the newest position (K6)
+  Anchor active_anchor_;           // mean of the anchors in use, at the newest position (K6)
   bool in_use_ = false;            // whether any landmark in the window has a prior
   std::vector<LocatedLandmark> new_;
 };

@@ -71,8 +71,8 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
   EXPECT_TRUE(known.find(TrackId{32}).has_value()) << "forgotten, and remembered again";
   ASSERT_TRUE(known.find(TrackId{39}).has_value());
   // Anchors go with their landmarks, and those that stay are still found: variance 39 + 1 of the newest.
-  known.hold_to(Vec3(39, 0, 0), std::array{*known.find(TrackId{39})});
-  EXPECT_NEAR(known.with_map(body_at(Vec3(39, 0, 0)), Mat6::Zero())(0, 0), 40e-7, 1e-10);
+  known.set_active_priors(Vec3(39, 0, 0), std::array{*known.find(TrackId{39})});
+  EXPECT_NEAR(known.with_map_covariance(body_at(Vec3(39, 0, 0)), Mat6::Zero())(0, 0), 40e-7, 1e-10);
 }
 
 TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
@@ -84,17 +84,17 @@ TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
   known.anchor(there, heading);
   known.remember(TrackId{1}, kCamera, kPoint, kInformation);
   const Mat6 window = 1e-8 * Mat6::Identity();
-  known.hold_to(here.p, std::array{*known.find(TrackId{1})});
-  const Mat6 held = known.with_map(here, window);
+  known.set_active_priors(here.p, std::array{*known.find(TrackId{1})});
+  const Mat6 held = known.with_map_covariance(here, window);
   EXPECT_NEAR(held(5, 5), 4e-6 + 2e-8, 1e-12) << "the window's share is doubled (K4)";
   EXPECT_NEAR(held(0, 0), 25 * 4e-6 + 2e-8, 1e-12) << "the lever of 5 m along y moves x";
   EXPECT_NEAR(held(1, 1), 2e-8, 1e-12);
   EXPECT_NEAR(held(0, 5), -5 * 4e-6, 1e-12);
   // With nothing of the map in view its uncertainty stays.
-  known.hold_to(here.p, {});
-  EXPECT_NEAR(known.with_map(here, window)(0, 0), 25 * 4e-6 + 1e-8, 1e-12);
+  known.set_active_priors(here.p, {});
+  EXPECT_NEAR(known.with_map_covariance(here, window)(0, 0), 25 * 4e-6 + 1e-8, 1e-12);
   known.clear();
-  EXPECT_NEAR(known.with_map(here, window)(0, 0), 1e-8, 1e-15);
+  EXPECT_NEAR(known.with_map_covariance(here, window)(0, 0), 1e-8, 1e-15);
 }
 
 }  // namespace

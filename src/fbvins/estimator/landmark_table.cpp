@@ -6,8 +6,8 @@
 namespace fbvins {
 namespace {
 
-/// Of so many tracks with outliers, the newest, the strikes are kept.
-constexpr std::size_t kMaxTracksWithStrikes = 20000;
+/// Outlier counts are kept of so many tracks, the newest.
+constexpr std::size_t kMaxOutlierCounts = 20000;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ const Sighting* Landmark::sighting_in(FrameId frame) const {
 void LandmarkTable::clear() {
   landmarks_.clear();
   index_of_track_.clear();
-  strikes_.clear();
+  outlier_counts_.clear();
 }
 
 Landmark* LandmarkTable::find(LandmarkId id) {
@@ -34,8 +34,8 @@ std::pair<Landmark&, bool> LandmarkTable::of_track(TrackId track) {
     Landmark landmark;
     landmark.id = LandmarkId{next_id_++};
     landmark.track = track;
-    const auto strikes = strikes_.find(track);
-    if (strikes != strikes_.end()) landmark.strikes = strikes->second;
+    const auto outlier_count = outlier_counts_.find(track);
+    if (outlier_count != outlier_counts_.end()) landmark.outlier_count = outlier_count->second;
     landmarks_.push_back(std::move(landmark));
   }
   return {landmarks_[static_cast<std::size_t>(it->second)], is_new};
@@ -57,14 +57,14 @@ void LandmarkTable::remove_unseen() {
   landmarks_.resize(out);
 }
 
-void LandmarkTable::keep_strikes(const Landmark& landmark) {
-  strikes_[landmark.track] = landmark.strikes;
-  if (strikes_.size() > kMaxTracksWithStrikes) strikes_.erase(strikes_.begin());
+void LandmarkTable::keep_outlier_count(const Landmark& landmark) {
+  outlier_counts_[landmark.track] = landmark.outlier_count;
+  if (outlier_counts_.size() > kMaxOutlierCounts) outlier_counts_.erase(outlier_counts_.begin());
 }
 
-bool LandmarkTable::banned(TrackId track) const {
-  const auto strikes = strikes_.find(track);
-  return strikes != strikes_.end() && strikes->second >= kStrikesUntilBanned;
+bool LandmarkTable::rejected(TrackId track) const {
+  const auto outlier_count = outlier_counts_.find(track);
+  return outlier_count != outlier_counts_.end() && outlier_count->second >= kOutliersUntilRejected;
 }
 
 }  // namespace fbvins

@@ -33,7 +33,7 @@ struct Landmark {
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
   std::optional<LandmarkPrior> prior;  ///< of a re-observed one
-  int strikes = 0;                     ///< solves after which observations of it were removed as outliers
+  int outlier_count = 0;               ///< solves after which observations of it were removed as outliers
   std::vector<Sighting> sightings;     ///< oldest first; a landmark without any is removed
 
   bool seen_in(FrameId frame) const { return sighting_in(frame) != nullptr; }
@@ -55,15 +55,15 @@ class LandmarkTable {
   /// Removes landmarks without sightings.
   void remove_unseen();
 
-  /// Remembers the strikes of a track whose landmark is removed; after three the track is ignored.
-  void keep_strikes(const Landmark& landmark);
-  bool banned(TrackId track) const;
-  static constexpr int kStrikesUntilBanned = 3;
+  /// Remembers the outlier count of a track whose landmark is removed; after three the track is ignored.
+  void keep_outlier_count(const Landmark& landmark);
+  bool rejected(TrackId track) const;
+  static constexpr int kOutliersUntilRejected = 3;
 
  private:
   std::vector<Landmark> landmarks_;  ///< ids ascend
   std::unordered_map<TrackId, int> index_of_track_;
-  std::map<TrackId, int> strikes_;
+  std::map<TrackId, int> outlier_counts_;
   std::int64_t next_id_ = 0;
 };
 

@@ -39,7 +39,8 @@ void PublishedPose::follow(const std::optional<Pose<B, B>>& motion, const Pose<W
   }
   const Pose<W, B> moved = T_WB_ * *motion;
   const Vec6 pending = difference(level, moved);
-  T_WB_ = moved.boxplus(limited(pending.head<3>(), max_step_m_), limited(pending.tail<3>(), kTurnPerStep_radpm * max_step_m_));
+  T_WB_ =
+      moved.boxplus(limited(pending.head<3>(), max_step_m_), limited(pending.tail<3>(), kRotationPerStep_radpm * max_step_m_));
   pending_ = difference(level, T_WB_);
 }
 

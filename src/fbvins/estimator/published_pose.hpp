@@ -17,7 +17,7 @@
 namespace fbvins {
 
 /// Ratio of the limits on corrections of attitude and of position: 0.1 degrees for 3 mm.
-inline constexpr double kTurnPerStep_radpm = 0.1 * (3.14159265358979323846 / 180) / 0.003;
+inline constexpr double kRotationPerStep_radpm = 0.1 * (3.14159265358979323846 / 180) / 0.003;
 
 class PublishedPose {
  public:

@@ -25,7 +25,7 @@ class SimulatedFlight {
   double pixel_sigma_px = 0.5;
   double image_rate_hz = 20;
   int max_features = 120;
-  bool knows_again = false;  ///< a point that was out of view is re-observed as the same track
+  bool reobserves = false;  ///< a point that was out of view is re-observed as the same track
   ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.1, -0.08)};
   /// Whether frame k has images, a right image, readings; the defaults give all.
   std::function<bool(int)> images = [](int) { return true; };
@@ -33,7 +33,7 @@ class SimulatedFlight {
   std::function<bool(int)> readings = [](int) { return true; };
   /// Turns an exact pixel displacement into an outlier; nullptr: none.
   std::function<Vec2(int, std::int64_t)> outlier = nullptr;
-  /// With knows_again: whether point i, re-observed in frame k, is mistaken for point i - 1.
+  /// With reobserves: whether point i, re-observed in frame k, is mistaken for point i - 1.
   std::function<bool(int, int)> mistaken = [](int, int) { return false; };
 
   SimulatedFlight(const Motion& motion, std::uint64_t seed) : motion_(motion), rng_(seed) {
@@ -96,7 +96,7 @@ class SimulatedFlight {
         TrackedFeature f;
         const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
         if (followed) f.id = track->second;
-        else if (knows_again && known != known_.end() && !in_use.contains(known->second)) f.id = known->second;
+        else if (reobserves && known != known_.end() && !in_use.contains(known->second)) f.id = known->second;
         else f.id = TrackId{next_track_++};
         in_use.insert(f.id);
         f.left = *left;

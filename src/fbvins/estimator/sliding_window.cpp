@@ -43,7 +43,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
   frames_.add(std::move(frame));
   const Frame& newest = frames_.newest();
   for (const TrackedFeature& feature : features) {
-    if (landmarks_.banned(feature.id)) continue;
+    if (landmarks_.rejected(feature.id)) continue;
     auto [landmark, is_new] = landmarks_.of_track(feature.id);
     if (is_new) landmark.prior = known_.find(feature.id);
     Sighting sighting{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
@@ -60,7 +60,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
   }
 }
 
-void SlidingWindow::describe(const Calibration& calibration, WindowProblem& out) const {
+void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
   out.frames.clear();
   for (const Frame& f : frames_) out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior, f.imu, f.standstill});
   out.tilt = tilt_;
@@ -101,7 +101,7 @@ void SlidingWindow::describe(const Calibration& calibration, WindowProblem& out)
   }
 }
 
-void SlidingWindow::accept(const WindowProblem& solved) {
+void SlidingWindow::take_estimates(const WindowProblem& solved) {
   tilt_ = solved.tilt;
   for (const WindowFrame& f : solved.frames)
     if (const int i = frames_.index_of(f.id); i >= 0) frames_[i].state = f.state;
@@ -136,7 +136,7 @@ void SlidingWindow::drop_frame(int index, const Calibration& calibration) {
   Frame& leaving = frames_[index];
   Frame& next = frames_[index + 1];
   if (leaving.in_prior) {
-    describe(calibration, leaving_.problem);
+    fill_problem(calibration, leaving_.problem);
     Marginalised marginalised = marginalise_frame(leaving_.problem, index, {}, leaving_.memory);
     next.imu.reset();
     forget_sightings(leaving.id, calibration);
@@ -158,11 +158,11 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
   const FrameId id = frames_[index].id;
   const int newest_begin = frames_.size() - options_.keyframes.newest_frames;
   WindowProblem& problem = leaving_.problem;
-  describe(calibration, problem);
+  fill_problem(calibration, problem);
   const std::vector<LeavingLandmark> leaving = landmarks_leaving_with(problem, index, newest_begin);
   Marginalised marginalised = marginalise_frame(problem, index, leaving, leaving_.memory);
   remember(problem, leaving, marginalised.landmark_information);
-  for (const LeavingLandmark& l : leaving) take_leave(problem, l, newest_begin, calibration);
+  for (const LeavingLandmark& l : leaving) remember_before_removal(problem, l, newest_begin, calibration);
   if (index + 1 < frames_.size()) frames_[index + 1].imu.reset();
   landmarks_.remove_unseen();
   forget_sightings(id, calibration);
@@ -171,8 +171,8 @@ void SlidingWindow::marginalise_keyframe(int index, const Calibration& calibrati
 }
 
 /// Its observations by keyframes are in the prior; those by the newest frames start it anew.
-void SlidingWindow::take_leave(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
-                               const Calibration& calibration) {
+void SlidingWindow::remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
+                                            const Calibration& calibration) {
   Landmark& landmark = *landmarks_.find(problem.landmarks[leaving.index].id);
   std::erase_if(landmark.sightings,
                 [&](const Sighting& s) { return !leaving.in_view || frames_.index_of(s.frame) < newest_begin; });

@@ -6,9 +6,9 @@
 // frames: [ keyframes ... | newest_frames ... ], oldest first. One owner, one thread.
 //
 //   window.add_frame(frame, features, calibration);
-//   window.describe(calibration, solution.window);
+//   window.fill_problem(calibration, solution.window);
 //   solver.solve(solution, options);
-//   window.accept(solution.window);
+//   window.take_estimates(solution.window);
 #pragma once
 
 #include <span>
@@ -49,9 +49,9 @@ class SlidingWindow {
   StereoFrame take_images(int frame) { return std::exchange(frames_[frame].images, {}); }
 
   /// Fills `out` with the window; if there are too many landmarks, with those seen by most frames.
-  void describe(const Calibration& calibration, WindowProblem& out) const;
+  void fill_problem(const Calibration& calibration, WindowProblem& out) const;
   /// Takes over the estimates of a solution for the frames and landmarks that are still in the window.
-  void accept(const WindowProblem& solved);
+  void take_estimates(const WindowProblem& solved);
   /// Drops the priors of landmarks far from theirs: mistaken or moved, they count as new ones. Returns how many.
   int refuse_landmark_priors(const WindowProblem& solved);
   /// Removes outliers among the observations, and landmarks that are left with too few. Returns how many observations.
@@ -71,11 +71,12 @@ class SlidingWindow {
   bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);
-  void strike(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
+  void count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers);
   void forget_sightings(FrameId frame, const Calibration& calibration);
   void forget_frame(int index);
   void remember(const WindowProblem& problem, std::span<const LeavingLandmark> leaving, std::span<const Mat3> information);
-  void take_leave(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin, const Calibration& calibration);
+  void remember_before_removal(const WindowProblem& problem, const LeavingLandmark& leaving, int newest_begin,
+                               const Calibration& calibration);
 
   /// Working memory of marginalise_keyframe() and drop_frame().
   struct Leaving {

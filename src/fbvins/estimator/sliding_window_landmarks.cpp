@@ -39,19 +39,19 @@ int SlidingWindow::remove_outliers(const WindowProblem& solved) {
   for (const WindowLandmark& numbers : solved.landmarks) {
     Landmark* landmark = landmarks_.find(numbers.id);
     const int of_this = landmark ? remove_far_observations(*landmark, solved, numbers) : 0;
-    if (of_this > 0) strike(*landmark, solved, numbers);
+    if (of_this > 0) count_outlier(*landmark, solved, numbers);
     removed += of_this;
   }
   landmarks_.remove_unseen();
   return removed;
 }
 
-/// Counts a strike for a landmark with outliers; removes it where too little is left of it.
-void SlidingWindow::strike(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
-  landmark.strikes += 1;
+/// Counts a solve in which a landmark had outliers; removes it where too little is left of it.
+void SlidingWindow::count_outlier(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
+  landmark.outlier_count += 1;
   const bool too_near = numbers.alpha_beta_rho.z() > 1.0 / kNearestLandmark_m;
-  if (landmark.sightings.size() < 2 || landmark.strikes >= LandmarkTable::kStrikesUntilBanned || too_near) {
-    landmarks_.keep_strikes(landmark);
+  if (landmark.sightings.size() < 2 || landmark.outlier_count >= LandmarkTable::kOutliersUntilRejected || too_near) {
+    landmarks_.keep_outlier_count(landmark);
     landmark.sightings.clear();
   } else if (landmark.sightings.front().frame != landmark.host && !landmark.seen_in(landmark.host)) {
     rehost(landmark, landmark.sightings.front().frame, frames_, solved.calibration);

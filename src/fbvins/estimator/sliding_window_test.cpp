@@ -88,8 +88,8 @@ struct Scene {
     const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * calibration.T_BC0;
     return T_WC * Vec3(Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z());
   }
-  const WindowProblem& describe() {
-    window.describe(calibration, problem);
+  const WindowProblem& fill_problem() {
+    window.fill_problem(calibration, problem);
     return problem;
   }
   /// A tight prior on the first frame, as the estimator has one.
@@ -147,7 +147,7 @@ TEST(SlidingWindow, DescribesWhichLandmarkIsWhich) {
   Scene s;
   for (int k = 0; k < 3; ++k) s.add(k, s.all(k, k != 1));
   s.add(3, {s.feature(5, 3)});
-  const WindowProblem& p = s.describe();
+  const WindowProblem& p = s.fill_problem();
   ASSERT_EQ(p.frames.size(), 4u);
   EXPECT_EQ(p.frames[2].id, FrameId{2});
   EXPECT_EQ(p.index_of(FrameId{2}), 2);
@@ -168,19 +168,19 @@ TEST(SlidingWindow, DescribesTheLandmarksSeenMostWhenThereAreTooMany) {
   for (int k = 0; k < 2; ++k) s.add(k, s.all(k));
   s.add(2, {s.feature(1, 2), s.feature(8, 2), s.feature(10, 2)});
   std::vector<TrackId> tracks;
-  for (const WindowLandmark& l : s.describe().landmarks) tracks.push_back(s.window.landmarks().find(l.id)->track);
+  for (const WindowLandmark& l : s.fill_problem().landmarks) tracks.push_back(s.window.landmarks().find(l.id)->track);
   EXPECT_EQ(tracks, (std::vector<TrackId>{{0}, {1}, {2}, {8}, {10}})) << "then those filed first";
 }
 
 TEST(SlidingWindow, AcceptsASolutionByIdsThoughFramesHaveLeftMeanwhile) {
   Scene s;
   for (int k = 0; k < 4; ++k) s.add(k, s.all(k));
-  WindowProblem solved = s.describe();
+  WindowProblem solved = s.fill_problem();
   for (WindowFrame& f : solved.frames) f.state.v_WB = Vec3(static_cast<double>(f.id.value), 0, 0);
   for (WindowLandmark& l : solved.landmarks) l.alpha_beta_rho.z() += 1e-3 * static_cast<double>(l.id.value);
   s.window.drop_frame(1, s.calibration);
   const double before = s.landmark(7)->alpha_beta_rho.z();
-  s.window.accept(solved);
+  s.window.take_estimates(solved);
   EXPECT_EQ(s.window.frames().size(), 3);
   for (const Frame& f : s.window.frames()) EXPECT_EQ(f.state.v_WB.x(), static_cast<double>(f.id.value));
   EXPECT_NEAR(s.landmark(7)->alpha_beta_rho.z() - before, 1e-3 * static_cast<double>(s.landmark(7)->id.value), 1e-12);
@@ -216,7 +216,7 @@ TEST(SlidingWindow, AFrameInThePriorIsDroppedIntoIt) {
   EXPECT_EQ(s.window.landmarks().all().size(), s.points_W.size());
 }
 
-TEST(SlidingWindow, OutliersAreRemovedAndThreeStrikesBanATrack) {
+TEST(SlidingWindow, OutliersAreRemovedAndThreeSolvesWithOutliersRejectATrack) {
   Scene s;
   for (int k = 0; k < 3; ++k) s.add(k, s.all(k));
   for (int round = 1; round <= 3; ++round) {
@@ -224,13 +224,13 @@ TEST(SlidingWindow, OutliersAreRemovedAndThreeStrikesBanATrack) {
     std::vector<TrackedFeature> features = s.all(k);
     features[4] = s.feature(4, k, true, Vec2(0, 0.05));  // forty sigmas
     s.add(k, features);
-    EXPECT_EQ(s.window.remove_outliers(s.describe()), 1) << round;
+    EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1) << round;
     if (round == 3) break;
-    EXPECT_EQ(s.landmark(4)->strikes, round);
+    EXPECT_EQ(s.landmark(4)->outlier_count, round);
     EXPECT_EQ(s.landmark(4)->sightings.size(), 3u) << "the good ones stay";
   }
   EXPECT_EQ(s.landmark(4), nullptr);
-  EXPECT_TRUE(s.window.landmarks().banned(TrackId{4}));
+  EXPECT_TRUE(s.window.landmarks().rejected(TrackId{4}));
   s.add(6, s.all(6));
   EXPECT_EQ(s.landmark(4), nullptr) << "the track is not followed any more";
   s.window.clear();
@@ -244,7 +244,7 @@ TEST(SlidingWindow, ARightOutlierLeavesTheLeftObservation) {
   std::vector<TrackedFeature> features = s.all(2);
   features[4].right->normalised.y() += 0.05;
   s.add(2, features);
-  EXPECT_EQ(s.window.remove_outliers(s.describe()), 1);
+  EXPECT_EQ(s.window.remove_outliers(s.fill_problem()), 1);
   EXPECT_EQ(s.landmark(4)->sightings.size(), 3u);
   EXPECT_FALSE(s.landmark(4)->sightings[2].right.has_value());
 }
@@ -277,7 +277,7 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   s.add(5, {s.feature(0, 5)});  // seen again under its old track
   ASSERT_TRUE(s.landmark(0)->prior.has_value());
   s.add(6, {s.feature(0, 6)});
-  EXPECT_EQ(s.window.refuse_landmark_priors(s.describe()), 0);
+  EXPECT_EQ(s.window.refuse_landmark_priors(s.fill_problem()), 0);
 }
 
 TEST(SlidingWindow, RemembersNoLandmarksWhereUpIsFixed) {
@@ -303,7 +303,7 @@ TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   EXPECT_FALSE(s.landmark(0)->prior.has_value());
   EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
 
-  WindowProblem solved = s.describe();  // near at first, but moved away by the solve
+  WindowProblem solved = s.fill_problem();  // near at first, but moved away by the solve
   ASSERT_FALSE(solved.landmark_priors.empty());
   const int known = solved.landmarks[0].prior >= 0 ? 0 : 1;
   solved.landmarks[known].alpha_beta_rho.y() += 0.1;

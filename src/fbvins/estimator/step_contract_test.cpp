@@ -54,7 +54,7 @@ LargestStep fly(SimulatedFlight& flight, int frames, const EstimatorOptions& opt
 
 void expect_within(const LargestStep& step, const EstimatorOptions& options) {
   EXPECT_LE(step.m, options.max_step_m + 1e-12);
-  EXPECT_LE(step.rad, kTurnPerStep_radpm * options.max_step_m + 1e-9);
+  EXPECT_LE(step.rad, kRotationPerStep_radpm * options.max_step_m + 1e-9);
 }
 
 TEST(StepContract, HoldsWhileWIsLevelled) {
@@ -68,7 +68,7 @@ TEST(StepContract, HoldsWhileWIsLevelled) {
 
 TEST(StepContract, HoldsWhenTheWindowLeapsAfterAGap) {
   SimulatedFlight flight(Motion(0.6, 0.5), 32);
-  flight.knows_again = true;
+  flight.reobserves = true;
   flight.images = [](int k) { return k < 80 || k >= 110; };
   const LargestStep step = fly(flight, 200, EstimatorOptions{});
   expect_within(step, EstimatorOptions{});

@@ -28,7 +28,7 @@ class EpipolarCheck {
     now_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const Vec2* position = then(tracks[i]);
-      if (position == nullptr || tracks[i].fate != Fate::goes_on) continue;
+      if (position == nullptr || tracks[i].fate != Fate::active) continue;
       chosen_.push_back(i);
       then_.push_back(*position);
       now_.push_back(tracks[i].normalised);

@@ -42,7 +42,7 @@ TEST(EpipolarCheck, JudgesOnlyThoseGatheredAndNoneThatHasEnded) {
   FrontendStats stats;
   (void)check.judge(tracks, Mat3(Mat3::Identity()), 1.0, stats);
   EXPECT_EQ(stats.lost_epipolar, 6);
-  EXPECT_EQ(tracks[0].fate, Fate::goes_on);
+  EXPECT_EQ(tracks[0].fate, Fate::active);
   EXPECT_EQ(tracks[5].fate, Fate::out_of_view);
 }
 

@@ -31,7 +31,7 @@ class MotionCheck {
     points_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const Vec2* position = before(tracks[i]);
-      if (position == nullptr || tracks[i].fate != Fate::goes_on || !tracks[i].previous_inverse_depth) continue;
+      if (position == nullptr || tracks[i].fate != Fate::active || !tracks[i].previous_inverse_depth) continue;
       chosen_.push_back(i);
       Point& point = points_.emplace_back(Point{*position, tracks[i].normalised, *tracks[i].previous_inverse_depth});
       camera_.distort(point.now, &point.J_pixel_normalised);

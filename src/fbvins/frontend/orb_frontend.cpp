@@ -131,7 +131,7 @@ void OrbFrontend::locate(const LandmarkUpdate& update) {
   recogniser_.locate(update, tracks_);
 }
 
-bool OrbFrontend::can_know_again(TrackId track) const {
+bool OrbFrontend::can_reobserve(TrackId track) const {
   return recogniser_.remembers(track) ||
          std::any_of(tracks_.begin(), tracks_.end(), [&](const OrbTrack& t) { return t.id == track; });
 }

@@ -36,7 +36,7 @@ class OrbFrontend final : public Frontend {
   void locate(const LandmarkUpdate& update) override;
 
   /// Whether it is a current track, or its landmark is remembered.
-  bool can_know_again(TrackId track) const;
+  bool can_reobserve(TrackId track) const;
 
  private:
   double longest_gap_s() const;

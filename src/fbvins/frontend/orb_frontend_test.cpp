@@ -293,7 +293,7 @@ class Sweep {
       const LandmarkUpdate update = left_behind(k);
       for (int i = 0; i < 2; ++i) frontend.locate(update);
       take_in(k, frontend.process(packets()[static_cast<std::size_t>(k)], k % prior_every == 0 ? prior(k - 2) : StatePrior{}));
-      for (const auto& [id, landmark] : known) forgotten += landmark.told && !landmark.again && !frontend.can_know_again(id);
+      for (const auto& [id, landmark] : known) forgotten += landmark.told && !landmark.again && !frontend.can_reobserve(id);
     }
   }
 

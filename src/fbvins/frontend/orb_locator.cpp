@@ -48,9 +48,9 @@ Vec2 OrbLocator::common_miss(const OrbTracks& tracks, const OrbView& view, const
   return {median(miss_x_px_), median(miss_y_px_)};
 }
 
-bool OrbLocator::settle_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
+bool OrbLocator::set_observed_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view) {
   const Vec2 before = track.px;
-  if (!px || !settle(track, *px, camera_, view)) return false;
+  if (!px || !set_observed(track, *px, camera_, view)) return false;
   if (track.was_observed) motion_px_.push_back((track.px - before).norm());
   return true;
 }
@@ -63,7 +63,7 @@ void OrbLocator::follow(OrbTracks& tracks, const OrbView& view, const FrameImage
     const OrbPatches& patches = tracks.patches(track);
     std::optional<Vec2> px = follow_by_alignment(track, patches, track.px, images.left());
     if (px && !returns(track, *px, images)) px.reset();
-    if (!settle_at(px, track, view)) ++stats.lost_flow;
+    if (!set_observed_at(px, track, view)) ++stats.lost_flow;
   }
   stats.median_motion_px = median(motion_px_);
 }
@@ -80,7 +80,7 @@ void OrbLocator::locate(OrbTracks& tracks, OrbView& view, const FrameImages& ima
       continue;
     }
     const auto px = place(track, tracks.patches(track), keypoint, track.px + missed, images, stats);
-    if (settle_at(px, track, view) && keypoint != nullptr) take_over(track, view, static_cast<std::size_t>(found[i]));
+    if (set_observed_at(px, track, view) && keypoint != nullptr) take_over(track, view, static_cast<std::size_t>(found[i]));
   }
   stats.median_motion_px = median(motion_px_);
 }

@@ -32,7 +32,7 @@ class OrbLocator {
   void locate(OrbTracks& tracks, OrbView& view, const FrameImages& images, const std::vector<int>& found, FrontendStats& stats);
 
  private:
-  bool settle_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view);
+  bool set_observed_at(const std::optional<Vec2>& px, OrbTrack& track, const OrbView& view);
   Vec2 common_miss(const OrbTracks& tracks, const OrbView& view, const std::vector<int>& found);
   std::optional<Vec2> place(OrbTrack& track, const OrbPatches& patches, const Keypoint* keypoint, const Vec2& expected_px,
                             const FrameImages& images, FrontendStats& stats);

@@ -79,12 +79,12 @@ void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& l
   const Vec2 common_miss(median(miss_x_px_), median(miss_y_px_));
   for (std::size_t i = 0; i < expected_.size(); ++i) {
     if (found_[i] < 0 || (miss(i) - common_miss).norm() > kAgreement_px) continue;
-    if (begin_again(expected_[i], static_cast<std::size_t>(found_[i]), tracks, view, left)) ++stats.recognised;
+    if (resume(expected_[i], static_cast<std::size_t>(found_[i]), tracks, view, left)) ++stats.recognised;
   }
 }
 
-bool OrbRecogniser::begin_again(const ExpectedLandmark& expected, std::size_t k, OrbTracks& tracks, OrbView& view,
-                                const Pyramid& left) {
+bool OrbRecogniser::resume(const ExpectedLandmark& expected, std::size_t k, OrbTracks& tracks, OrbView& view,
+                           const Pyramid& left) {
   if (tracks.full()) return false;
   const Keypoint& keypoint = view.features.keypoints[k];
   const RememberedLandmark& landmark = *expected.landmark;
@@ -101,7 +101,7 @@ bool OrbRecogniser::begin_again(const ExpectedLandmark& expected, std::size_t k,
   track.inverse_depth = 1.0 / expected.depth_m;
   track.age_frames = landmark.age_frames;
   track.p_W = landmark.p_W;
-  if (!settle(track, fine.px, camera_, view)) return false;
+  if (!set_observed(track, fine.px, camera_, view)) return false;
   tracks.free_patches().reference = reference;
   tracks.resume(track);
   view.used[k] = 1;

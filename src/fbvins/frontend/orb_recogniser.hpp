@@ -34,7 +34,7 @@ class OrbRecogniser {
   void recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);
 
  private:
-  bool begin_again(const ExpectedLandmark& expected, std::size_t keypoint, OrbTracks& tracks, OrbView& view, const Pyramid& left);
+  bool resume(const ExpectedLandmark& expected, std::size_t keypoint, OrbTracks& tracks, OrbView& view, const Pyramid& left);
 
   Camera camera_;
   RecognitionOptions options_;

@@ -45,7 +45,7 @@ void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion
   }
 }
 
-bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view) {
+bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view) {
   if (!camera.inside(px, kPatchBorder_px)) return false;
   const auto normalised = camera.undistort(px);
   if (!normalised) return false;

@@ -4,7 +4,7 @@
 // position. Functions without state.
 //
 //   predict(tracks, camera, motion, depth);         // to their expected positions; not observed until found
-//   if (settle(track, px, camera, view)) ...        // found
+//   if (set_observed(track, px, camera, view)) ...        // found
 //   thin_out(tracks, 180, 14);
 //   forget(tracks, view.t, 1.0);
 //   tracks.drop_ended();
@@ -62,7 +62,7 @@ using OrbTracks = TrackTable<OrbTrack, OrbPatches>;
 /// Moves every track to its predicted position in the newest image.
 void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth);
 /// Records that the track is observed at px in the newest image. False at the border.
-bool settle(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view);
+bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view);
 /// Of two tracks that have come together the older stays; and of all at most `most`, the older ones. Tracks are sorted by age
 /// afterwards.
 void thin_out(OrbTracks& tracks, int most, double min_distance_px);

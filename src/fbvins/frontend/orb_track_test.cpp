@@ -30,7 +30,7 @@ TEST(OrbTrack, IsPredictedByItsDepthAndEndsOutsideTheImage) {
   EXPECT_EQ(tracks[1].px, Vec2(100, 50));
   EXPECT_EQ(tracks[0].previous_px, Vec2(100, 90));
   EXPECT_TRUE(tracks[0].was_observed && !tracks[0].observed);
-  EXPECT_EQ(tracks[0].fate, Fate::goes_on);
+  EXPECT_EQ(tracks[0].fate, Fate::active);
   EXPECT_EQ(tracks[2].fate, Fate::out_of_view) << "120 px to the left of the image";
 }
 
@@ -79,9 +79,9 @@ TEST(OrbTrack, SettlesInsideTheImageOnly) {
   view.T_WC = Pose<W, C0>(Quat::Identity(), Vec3(1, 2, 3));
   OrbTrack track = track_at(wall.camera, Vec2(100, 90));
   track.observed = false;
-  EXPECT_FALSE(settle(track, Vec2(kPatchBorder_px - 1, 90), wall.camera, view));
+  EXPECT_FALSE(set_observed(track, Vec2(kPatchBorder_px - 1, 90), wall.camera, view));
   EXPECT_FALSE(track.observed);
-  EXPECT_TRUE(settle(track, Vec2(110, 95), wall.camera, view));
+  EXPECT_TRUE(set_observed(track, Vec2(110, 95), wall.camera, view));
   EXPECT_TRUE(track.observed);
   EXPECT_EQ(track.age_frames, 6);
   EXPECT_EQ(track.last_seen, view.t);
@@ -118,12 +118,12 @@ TEST(Forget, KeepsTracksWithDepthForLonger) {
     forget(tracks, now, 1.0);
     return tracks[0].fate;
   };
-  EXPECT_EQ(fate(0.9, true, 5), Fate::goes_on);
+  EXPECT_EQ(fate(0.9, true, 5), Fate::active);
   EXPECT_EQ(fate(1.1, true, 5), Fate::out_of_view);
-  EXPECT_EQ(fate(0.2, false, 5), Fate::goes_on);
+  EXPECT_EQ(fate(0.2, false, 5), Fate::active);
   EXPECT_EQ(fate(0.4, false, 5), Fate::out_of_view);
   EXPECT_EQ(fate(0.1, true, 1), Fate::out_of_view) << "seen once only";
-  EXPECT_EQ(fate(1.1, true, 5, true), Fate::goes_on) << "observed";
+  EXPECT_EQ(fate(1.1, true, 5, true), Fate::active) << "observed";
 }
 
 }  // namespace

@@ -20,7 +20,7 @@
 namespace fbvins {
 
 /// Whether a track goes on. One whose feature went out of view may be re-observed; a lost one may not.
-enum class Fate : std::uint8_t { goes_on, out_of_view, lost };
+enum class Fate : std::uint8_t { active, out_of_view, lost };
 
 struct TrackState {
   TrackId id;
@@ -34,7 +34,7 @@ struct TrackState {
   std::optional<Observation> right;  ///< match in the newest right image
   int age_frames = 0;
   bool observed = true;  ///< has an observation in the newest image
-  Fate fate = Fate::goes_on;
+  Fate fate = Fate::active;
 };
 
 template <class Track, class Patches>
@@ -77,11 +77,11 @@ class TrackTable {
   template <class OnEnd>
   void drop_ended(OnEnd&& on_end) {
     for (const Track& track : tracks_) {
-      if (track.fate == Fate::goes_on) continue;
+      if (track.fate == Fate::active) continue;
       on_end(track, std::as_const(patches_[track.slot]));
       free_.push_back(track.slot);
     }
-    std::erase_if(tracks_, [](const Track& track) { return track.fate != Fate::goes_on; });
+    std::erase_if(tracks_, [](const Track& track) { return track.fate != Fate::active; });
   }
   void drop_ended() {
     drop_ended([](const Track&, const Patches&) {});
