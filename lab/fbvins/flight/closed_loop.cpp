@@ -22,7 +22,6 @@ const Vec3 kImuOnVehicle_m(0.04, 0, 0.03);
 constexpr int kCollisionEvery_steps = 10;
 constexpr double kAfterwards_s = 1.0;  ///< recorded after the last step or after touchdown
 constexpr double kHardLanding_mps = 1.5, kTippedOver = 0.8;
-constexpr double kTimeToSpare_s = 120;
 
 /// The true mounting: the nominal one with a random assembly error.
 Pose<BodyFlu, B> with_mounting_error(const Pose<BodyFlu, B>& mounting, const FlightSetup& setup) {
@@ -41,16 +40,6 @@ StereoRig as_recorded(StereoRig rig) {
   rig.T_BC0 = Pose<B, C0>(rig.T_BC0.R(), rig.T_BC0.p);
   rig.T_BC1 = Pose<B, C1>(rig.T_BC1.R(), rig.T_BC1.p);
   return rig;
-}
-
-/// Bound on a mission's duration: twice the time of every leg at the slowest limit, and time to spare.
-double longest_flight_s(const Mission& mission) {
-  double seconds = kTimeToSpare_s;
-  const std::vector<PlannedPlace> places = planned_places(mission);
-  const double slowest = std::min({mission.limits.speed_mps, mission.limits.climb_mps, mission.limits.land_mps});
-  for (std::size_t i = 1; i < places.size(); ++i) seconds += 2 * (places[i].p - places[i - 1].p).norm() / slowest;
-  for (const MissionStep& step : mission.steps) seconds += 10 + 2 * step.seconds;
-  return seconds;
 }
 
 Result<std::unique_ptr<FlightController>> controller_of(const FlightSetup& setup, const StereoRig& rig) {

@@ -111,7 +111,7 @@ void add_way(const FlightLog& log, FlightSummary& summary) {
   if (rows > 0) {
     summary.mean_thrust = thrust / rows;
     summary.command_change = std::sqrt(changes / rows);
-    summary.flown_s = rows * (log.rows[1].t_s - log.rows[0].t_s);
+    if (log.rows.size() > 1) summary.flown_s = rows * (log.rows[1].t_s - log.rows[0].t_s);
   }
   summary.tracking = tracking.statistics();
   summary.control = control.statistics();

@@ -59,6 +59,13 @@ TEST(FlightSummary, HasTheValuesOfThePapersTable) {
   EXPECT_NEAR(s.least_battery_V, 15.2, 0.01);
 }
 
+TEST(FlightSummary, ASingleRowHasNoDuration) {
+  FlightLog log = hop();
+  log.rows = {log.rows.back()};
+  log.rows.shrink_to_fit();
+  EXPECT_EQ(summarise(log, up_and_hold()).flown_s, 0);
+}
+
 TEST(FlightSummary, AFailsafeLandingOrACrashIsNotAnArrival) {
   FlightLog log = hop();
   log.reason = FlightReason::lost;

@@ -83,6 +83,9 @@ struct PlannedPlace {
 };
 std::vector<PlannedPlace> planned_places(const Mission& mission);
 
+/// Bound on a mission's duration: twice the time of every leg at its slowest limit, and time to spare.
+double longest_flight_s(const Mission& mission);
+
 /// The mission's own fence, or a box with a margin of 1.5 m around its path.
 Geofence fence_of(const Mission& mission);
 

@@ -9,6 +9,7 @@
 namespace fbvins {
 namespace {
 
+constexpr double kTimeToSpare_s = 120;
 constexpr double kStep_m = 0.25;  ///< between points along the path
 /// From the vehicle's centre: its size and a margin for estimation errors and gusts.
 constexpr double kWallClearance_m = 0.45, kCeilingClearance_m = 0.3;
@@ -59,6 +60,18 @@ std::vector<PlannedPlace> planned_places(const Mission& mission) {
     if (step.kind == MissionStep::Kind::land) go(Vec3(places.back().p.x(), places.back().p.y(), 0), index);
   }
   return places;
+}
+
+double longest_flight_s(const Mission& mission) {
+  double seconds = kTimeToSpare_s;
+  const std::vector<PlannedPlace> places = planned_places(mission);
+  const double slowest = std::min({mission.limits.speed_mps, mission.limits.climb_mps, mission.limits.land_mps});
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const double own = mission.steps[static_cast<std::size_t>(places[i].step)].speed_mps;
+    seconds += 2 * (places[i].p - places[i - 1].p).norm() / (own > 0 ? std::min(own, slowest) : slowest);
+  }
+  for (const MissionStep& step : mission.steps) seconds += 10 + 2 * step.seconds;
+  return seconds;
 }
 
 Geofence fence_of(const Mission& mission) {

@@ -55,6 +55,12 @@ TEST(Mission, IsReadWithAllItsParts) {
   EXPECT_EQ(site_complaint(kGood), "");
 }
 
+TEST(Mission, ASlowLegHasTheTimeThatItTakes) {
+  const auto mission = parse_mission("steps:\n  - takeoff: 1\n  - goto: {to: [20, 0, 1], speed: 0.05}\n  - land\n", "m.yaml");
+  ASSERT_TRUE(mission) << mission.error().message;
+  EXPECT_GT(longest_flight_s(*mission), 20 / 0.05);
+}
+
 TEST(Mission, AnErrorIsOneSentenceWithItsLine) {
   const std::string up = "steps:\n  - takeoff: 1\n";
   EXPECT_EQ(complaint("steps: []\n").substr(0, 9), "m.yaml:1:");

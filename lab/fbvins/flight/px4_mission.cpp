@@ -134,6 +134,14 @@ void Px4Mission::take_off(double now_s) {
   guide_.begin(out_.estimate.T_LV);
 }
 
+/// Before take-off. PX4 may be armed, or be about to.
+void Px4Mission::give_up(FlightReason reason, double now_s) {
+  out_.mode = FlightMode::landed;
+  out_.reason = reason;
+  next_command_s_ = 0;
+  if (ready_s_ > 0) command(kMavCmdArm, {0}, now_s);
+}
+
 void Px4Mission::guide(double now_s) {
   out_.mode = failsafe_.mode();
   out_.reason = failsafe_.reason();
@@ -165,7 +173,7 @@ std::vector<MavlinkMessage> Px4Mission::update(const LivePose& pose, double now_
   seen.restarted = flying_ && pose.health.has_pose() && pose.reset_counter != reset_counter_;
   if (pose.health.has_pose()) reset_counter_ = pose.reset_counter;
   seen.landing = guide_.landing();
-  seen.on_ground = flying_ && !armed_;
+  seen.on_ground = !flying_ || !armed_;
   if (flying_) {
     seen.off_path_m = (out_.estimate.T_LV.p - out_.setpoint.p).norm();
     seen.outside_fence = !fence_.contains(out_.estimate.T_LV.p) && !guide_.landing() && guide_.step() > 0;
@@ -177,9 +185,9 @@ std::vector<MavlinkMessage> Px4Mission::update(const LivePose& pose, double now_
     prepare(now_s);
     if (flying_) out_.mode = FlightMode::mission;
     const bool refused = ready_s_ > 0 && now_s - ready_s_ > kRefused_s;
-    if (!flying_ && refused) out_.mode = FlightMode::landed, out_.reason = FlightReason::flight_controller;
+    if (!flying_ && refused) give_up(FlightReason::flight_controller, now_s);
   } else if (wanted == FlightMode::landed) {
-    out_.mode = FlightMode::landed, out_.reason = failsafe_.reason();
+    give_up(failsafe_.reason(), now_s);
   }
   const bool streams = ready_s_ > 0 && out_.mode != FlightMode::landed && !guide_.landing();
   if (streams && now_s >= next_target_s_) {

@@ -41,6 +41,7 @@ class Px4Mission {
   void look(double now_s);
   void prepare(double now_s);
   void take_off(double now_s);
+  void give_up(FlightReason reason, double now_s);
   void guide(double now_s);
   void command(std::uint16_t number, std::array<float, 7> params, double now_s);
   void say(double now_s, const std::string& text);

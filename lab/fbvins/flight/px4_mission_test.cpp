@@ -14,7 +14,7 @@ constexpr std::uint32_t kOffboardMode = 6U << 16, kLandMode = 4U << 16 | 6U << 2
 Mission hop() { return *parse_mission("steps:\n  - takeoff: 0.5\n  - hold: 1\n  - goto: [0.5, 0, 0.5]\n  - land\n", "hop.yaml"); }
 
 struct FakePx4 {
-  bool refuses = false, leaves = false;
+  bool refuses = false, leaves = false, keeps_mode = false;
   HeartbeatMessage beat{.autopilot = 12};
   OdometryMessage odometry;
   std::vector<std::uint16_t> commands;
@@ -30,8 +30,8 @@ struct FakePx4 {
     if (command == nullptr) return;
     EXPECT_EQ(command->target_system, 2);
     commands.push_back(command->command);
-    if (command->command == kMavCmdSetMode) beat.custom_mode = kOffboardMode;
-    if (command->command == kMavCmdArm && !refuses) beat.base_mode = 128;
+    if (command->command == kMavCmdSetMode && !keeps_mode) beat.custom_mode = kOffboardMode;
+    if (command->command == kMavCmdArm && !refuses) beat.base_mode = command->params[0] > 0 ? 128 : 0;
     if (command->command == kMavCmdLand) beat.custom_mode = kLandMode, landed_at_s = now_s + 2;
   }
   void go_on(double now_s) {
@@ -80,6 +80,18 @@ TEST(Px4Mission, GivesUpIfPx4DoesNotArm) {
   EXPECT_EQ(fly(mission, px4, 45), (std::vector{FlightMode::waiting, FlightMode::landed}));
   EXPECT_EQ(mission.output().reason, FlightReason::flight_controller);
   EXPECT_GT(std::count(px4.commands.begin(), px4.commands.end(), kMavCmdArm), 10);
+}
+
+TEST(Px4Mission, OdometryLostBeforeTakeOffEndsItOnTheGround) {
+  for (const bool armed : {false, true}) {
+    Px4Mission mission(hop(), 200, 2, 10);
+    FakePx4 px4;
+    px4.keeps_mode = true;
+    px4.beat.base_mode = armed ? 128 : 0;
+    EXPECT_EQ(fly(mission, px4, 10, 3), (std::vector{FlightMode::waiting, FlightMode::landed}));
+    EXPECT_EQ(mission.output().reason, FlightReason::lost);
+    EXPECT_EQ(px4.beat.base_mode, 0) << "disarmed";
+  }
 }
 
 TEST(Px4Mission, ReportsWhatPx4DoesByItself) {

@@ -41,7 +41,8 @@ Result<std::unique_ptr<SocketSender>> SocketSender::connect(const std::string& p
   FileDescriptor connection(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  if (path.size() >= sizeof(address.sun_path)) return Error{ErrorCode::unreadable, path + ": too long for a socket's name"};
+  path.copy(address.sun_path, path.size());
   if (::connect(connection.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) return failed(path);
   std::unique_ptr<SocketSender> sender(new SocketSender(std::move(connection), rig.left.width(), rig.left.height()));
   if (Result<void> greeted = sender->greet(rig); !greeted) return greeted.error();
@@ -90,7 +91,9 @@ Result<bool> SocketSender::hear(int wait_ms) {
   pollfd waiting{connection_.number(), POLLIN, 0};
   if (::poll(&waiting, 1, wait_ms) <= 0) return false;
   FbvinsSocketGoodbye message{};  // the longest message of a source
-  if (::recv(connection_.number(), &message, sizeof(message), 0) <= 0) return failed("the source is gone");
+  const ssize_t got = ::recv(connection_.number(), &message, sizeof(message), 0);
+  if (got < 0) return failed("the source is gone");
+  if (got == 0) return Error{ErrorCode::unreadable, "the sensors' socket: the source has closed it"};
   switch (message.header.type) {
     case FBVINS_SOCKET_WELCOME: welcome_ = true; break;
     case FBVINS_SOCKET_RELEASED: {
