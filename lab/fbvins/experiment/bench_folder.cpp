@@ -63,11 +63,15 @@ BenchFolder::BenchFolder(const Plan& plan, const BenchOptions& options)
     : plan_(plan), options_(options), program_hash_(hash(file_text(options.program))) {}
 
 Result<void> BenchFolder::make() const {
-  std::error_code error;
-  for (const char* folder : {"cells", "logs", "locks"}) fs::create_directories(fs::path(options_.out) / folder, error);
+  std::vector<fs::path> folders;
+  for (const char* name : {"cells", "logs", "locks"}) folders.push_back(fs::path(options_.out) / name);
   for (const Recording& r : plan_.recordings)
-    if (r.rendered) fs::create_directories(fs::path(r.path).parent_path(), error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", options_.out, error.message())};
+    if (r.rendered) folders.push_back(fs::path(r.path).parent_path());
+  for (const fs::path& folder : folders) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder.string(), error.message())};
+  }
   return {};
 }
 

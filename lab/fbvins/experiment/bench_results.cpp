@@ -193,7 +193,7 @@ Result<std::map<std::string, Reference>> read_reference(const std::string& path)
     }
     if (fields.size() < column.size()) continue;
     const auto number = [&](const char* name) { return parse_double(fields[column[name]]).value_or(NAN); };
-    reference[fields[column["cell"]]] = {number("rmse_m"), number("coverage"), static_cast<int>(number("restarts"))};
+    reference[fields[column["cell"]]] = {number("rmse_m"), number("coverage"), number("restarts")};
   }
   return reference;
 }

@@ -46,10 +46,9 @@ struct Tolerance {
   double coverage = 0.02;  ///< decrease of coverage that is tolerated
 };
 
-/// A cell of an earlier results.csv.
+/// A cell of an earlier results.csv; NaN where a field is no number.
 struct Reference {
-  double rmse_m = 0, coverage = 0;
-  int restarts = 0;
+  double rmse_m = 0, coverage = 0, restarts = 0;
 };
 
 Result<std::map<std::string, Reference>> read_reference(const std::string& path);

@@ -18,7 +18,7 @@ constexpr double kRenderWeight = 8, kRunWeight = 1;  // approximate CPU time of 
 /// Two benches would delete each other's incomplete results.
 Result<FileLock> lock_folder(const BenchFolder& folder, const BenchOptions& options, FileLock::Kind kind) {
   Result<FileLock> lock = FileLock::take(folder.lock(), kind, FileLock::Else::refuse);
-  if (lock) return lock;
+  if (!lock || lock->is_held()) return lock;
   return Error{ErrorCode::unwritable, fmt::format("{}: another bench works in this folder", options.out)};
 }
 

@@ -40,10 +40,16 @@ struct Group {
   std::string dataset, variant;
   std::vector<const CellResult*> cells;
 
-  std::vector<const CellResult*> evaluated() const {
+  /// One cell a flight: repetitions should have the same result.
+  std::vector<const CellResult*> flights() const {
     std::vector<const CellResult*> out;
     for (const CellResult* c : cells)
-      if (c->evaluation) out.push_back(c);
+      if (c->cell.repetition == 1) out.push_back(c);
+    return out;
+  }
+  std::vector<const CellResult*> evaluated() const {
+    std::vector<const CellResult*> out = flights();
+    std::erase_if(out, [](const CellResult* c) { return !c->evaluation; });
     return out;
   }
 };
@@ -125,20 +131,20 @@ Json scenario_table(const std::string& title, const std::vector<Group>& groups, 
                    "largest error", "coverage", "restarts", "lost frames", "without result", "CPU ms"};
   table["rows"] = Json::array();
   for (const Group& g : groups) {
-    const auto good = g.evaluated();
+    const auto flights = g.flights(), good = g.evaluated();
     std::vector<double> rmse = collect(good, [](const CellResult& c) { return c.evaluation->absolute_m.rmse; });
     const std::vector<double> largest = collect(good, [](const CellResult& c) { return c.evaluation->absolute_m.max; });
     int restarts = 0, lost = 0;
-    for (const CellResult* c : g.cells) restarts += c->restarts, lost += c->lost_frames;
-    Json row{g.dataset, g.variant, std::to_string(g.cells.size()), metres(mean_of(rmse))};
+    for (const CellResult* c : flights) restarts += c->restarts, lost += c->lost_frames;
+    Json row{g.dataset, g.variant, std::to_string(flights.size()), metres(mean_of(rmse))};
     row.push_back(metres(percentile(rmse, 0.5)));
     row.push_back(rmse.empty() ? "-" : metres(*std::max_element(rmse.begin(), rmse.end())));
     row.push_back(largest.empty() ? "-" : metres(*std::max_element(largest.begin(), largest.end())));
-    row.push_back(number(100 * mean_of(collect(g.cells, [](const CellResult& c) { return c.coverage; })), 1) + " %");
+    row.push_back(number(100 * mean_of(collect(flights, [](const CellResult& c) { return c.coverage; })), 1) + " %");
     row.push_back(std::to_string(restarts));
     row.push_back(std::to_string(lost));
-    row.push_back(std::to_string(g.cells.size() - good.size()));
-    row.push_back(number(mean_of(collect(good, [](const CellResult& c) { return c.cpu_ms; })), 1));
+    row.push_back(std::to_string(flights.size() - good.size()));
+    row.push_back(number(mean_of(collect(g.cells, [](const CellResult& c) { return c.evaluation ? c.cpu_ms : NAN; })), 1));
     table["rows"].push_back(row);
   }
   return table;
@@ -179,13 +185,13 @@ Json reduction_table(const std::vector<Group>& groups) {
   return table;
 }
 
-/// NEES of all flights by tenth of a second; instants reached by fewer than half of the cells are left out.
+/// NEES of all flights by tenth of a second; instants reached by fewer than half of them are left out.
 std::map<int, std::vector<StateNees>> by_instant(const Group& group) {
   std::map<int, std::vector<StateNees>> instants;
-  for (const CellResult* c : group.cells)
-    if (c->cell.repetition == 1)
-      for (const auto& [t, nees] : c->nees_over_time) instants[static_cast<int>(std::lround(10 * t))].push_back(nees);
-  std::erase_if(instants, [&](const auto& entry) { return 2 * entry.second.size() < group.cells.size(); });
+  const auto flights = group.flights();
+  for (const CellResult* c : flights)
+    for (const auto& [t, nees] : c->nees_over_time) instants[static_cast<int>(std::lround(10 * t))].push_back(nees);
+  std::erase_if(instants, [&](const auto& entry) { return 2 * entry.second.size() < flights.size(); });
   return instants;
 }
 

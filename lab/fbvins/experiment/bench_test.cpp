@@ -130,6 +130,15 @@ TEST_F(BenchRunner, ASecondBenchInAFolderIsRefused) {
   EXPECT_EQ(refusal, options_.out + ": another bench works in this folder");
 }
 
+TEST_F(BenchRunner, AFolderThatCannotBeLockedOrMadeIsNamedWithTheReason) {
+  fs::create_directories(fs::path(options_.out) / "lock");
+  EXPECT_EQ(run_plan(plan_, options_, {}).error().message, options_.out + "/lock: Is a directory");
+  fs::remove_all(options_.out);
+  fs::create_directories(options_.out);
+  write("out/cells", "a file");
+  EXPECT_EQ(run_plan(plan_, options_, {}).error().message, options_.out + "/cells: Not a directory");
+}
+
 TEST_F(BenchRunner, RenderedRecordingsCanBeDiscarded) {
   options_.discard_rendered = true;
   run();
@@ -225,6 +234,24 @@ TEST(BenchTables, SeedsOfAScenarioShareARow) {
   EXPECT_EQ(rows[0][3], "0.2000");
 }
 
+TEST(BenchTables, RepetitionsAreNoFlights) {
+  std::vector<CellResult> results;
+  for (const int seed : {1, 2})
+    for (const int repetition : {1, 2, 3}) {
+      CellResult& cell = results.emplace_back(result("A", seed, "klt", 0.1));
+      cell.cell.repetition = repetition;
+      cell.nees = {3, 3, 3, 3, 3};
+      for (int tenth = 0; tenth < 10; ++tenth) cell.nees_over_time.emplace_back(0.1 * tenth, cell.nees);
+    }
+  const auto payload = bench_payload("T", results, {});
+  EXPECT_EQ(payload["tables"][0]["rows"][0][2], "2");
+  ASSERT_EQ(payload["tables"][1]["title"], "Consistency");
+  ASSERT_EQ(payload["tables"][1]["rows"].size(), 1u);
+  EXPECT_EQ(payload["tables"][1]["rows"][0][2], "2");
+  EXPECT_EQ(payload["tables"][1]["rows"][0][3], "3.00 (100 %)");
+  EXPECT_EQ(payload["consistency"][0]["flights"], 2);
+}
+
 TEST(BenchTables, BoundsOfChiSquare) {
   // Quantiles 0.025 and 0.975 of chi-square with 60 degrees of freedom: 40.48 and 83.30.
   EXPECT_NEAR(nees_bounds(20).low, 40.48 / 20, 0.005);
@@ -242,6 +269,18 @@ TEST(BenchResults, FindsRegressionsAndNothingElse) {
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].cell, "B1-klt");
   EXPECT_EQ(found[1].what, "coverage 50.0 %, was 99.0");
+}
+
+TEST(BenchResults, AFieldThatIsNoNumberIsNotCompared) {
+  const std::string path = ::testing::TempDir() + "/damaged.csv";
+  std::ofstream(path) << "cell,rmse_m,coverage,restarts\nA1-klt,0.1,0.99,many\nB1-klt,0.1,0.99,2\n";
+  const auto reference = read_reference(path);
+  ASSERT_TRUE(reference.ok()) << reference.error().message;
+  CellResult a = result("A", 1, "klt", 0.1), b = result("B", 1, "klt", 0.1);
+  a.restarts = b.restarts = 3;
+  const std::vector<Regression> found = regressions({a, b}, *reference, {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].what, "3 restarts, were 2");
 }
 
 }  // namespace

@@ -17,7 +17,8 @@ Result<FileLock> FileLock::take(const std::string& path, Kind kind, Else otherwi
   if (lock.file_ < 0) return Error{ErrorCode::unwritable, fmt::format("{}: {}", path, std::strerror(errno))};
   const int operation = (kind == Kind::alone ? LOCK_EX : LOCK_SH) | (otherwise == Else::refuse ? LOCK_NB : 0);
   while (flock(lock.file_, operation) != 0)
-    if (errno != EINTR) return Error{ErrorCode::unwritable, fmt::format("{}: {}", path, std::strerror(errno))};
+    if (errno == EWOULDBLOCK) return FileLock();
+    else if (errno != EINTR) return Error{ErrorCode::unwritable, fmt::format("{}: {}", path, std::strerror(errno))};
   return lock;
 }
 

@@ -17,7 +17,7 @@ class FileLock {
   /// What to do while another process holds it.
   enum class Else { wait, refuse };
 
-  /// ErrorCode::unwritable if the file cannot be opened or, with `refuse`, if another process holds the lock.
+  /// Not held if, with `refuse`, another process holds it. ErrorCode::unwritable if the file cannot be opened or locked.
   static Result<FileLock> take(const std::string& path, Kind kind, Else otherwise);
 
   FileLock() = default;
@@ -26,6 +26,8 @@ class FileLock {
   FileLock& operator=(FileLock&& other) noexcept;
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
+
+  bool is_held() const { return file_ >= 0; }
 
  private:
   explicit FileLock(int file) : file_(file) {}
