@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "fbvins/io/csv.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -28,10 +29,11 @@ Result<CsvTable> CsvTable::read(const std::string& path) {
 
 Result<CsvTable> CsvTable::parse(std::string_view text, const std::string& source) {
   CsvTable table;
+  bool header = false;
   std::vector<std::string_view> fields;
   for (const auto& [number, line] : lines_of(text)) {
     split_at_commas(line, fields);
-    if (table.names_.empty()) {
+    if (!std::exchange(header, true)) {
       if (line.front() != '#') return Error{ErrorCode::malformed, fmt::format("{}:1: a header line is missing", source)};
       for (std::size_t i = 1; i < fields.size(); ++i) table.names_.push_back(bare_name(fields[i]));
       table.columns_.resize(table.names_.size());
@@ -43,7 +45,7 @@ Result<CsvTable> CsvTable::parse(std::string_view text, const std::string& sourc
     for (std::size_t i = 0; i < table.columns_.size(); ++i)  // missing fields at the end of a row are empty
       table.columns_[i].emplace_back(i + 1 < fields.size() ? fields[i + 1] : std::string_view{});
   }
-  if (table.names_.empty()) return Error{ErrorCode::malformed, source + ": the file is empty"};
+  if (!header) return Error{ErrorCode::malformed, source + ": the file is empty"};
   return table;
 }
 

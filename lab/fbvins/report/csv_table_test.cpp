@@ -27,6 +27,13 @@ TEST(CsvTable, MissingFieldsAtTheEndOfARowAreEmpty) {
   EXPECT_TRUE(std::isnan(table->numbers("b")[0]));
 }
 
+TEST(CsvTable, StampsAloneAreATableToo) {
+  const Result<CsvTable> table = CsvTable::parse("#timestamp [ns]\n10\n20\n", "t.csv");
+  ASSERT_TRUE(table.ok()) << table.error().message;
+  EXPECT_EQ(table->rows(), 2u);
+  EXPECT_FALSE(table->has("timestamp"));
+}
+
 TEST(CsvTable, ErrorsNameTheLine) {
   EXPECT_EQ(CsvTable::parse("#timestamp,a\nsoon,2\n", "t.csv").error().message, "t.csv:2: no stamp in nanoseconds");
   EXPECT_EQ(CsvTable::parse("1,2\n", "t.csv").error().message, "t.csv:1: a header line is missing");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Curves as JSON text. Private to the report; one owner.
+// JSON text, and curves as such. Private to the report; one owner.
 //
 //   Curves curves(t.size(), 1500);
 //   curves.add("t", t);
@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,11 @@ inline std::string curve(const std::vector<double>& values, std::size_t step) {
     text += std::isfinite(values[i]) ? fmt::format("{:.5g}", values[i]) : "null";
   }
   return text + "]";
+}
+
+/// Bytes that are no UTF-8, as in the name of a file, are replaced.
+inline std::string json_text(const nlohmann::ordered_json& json) {
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 /// A JSON object of curves with a common time axis and a common decimation.

@@ -34,8 +34,8 @@ std::string flight_text(const FlightFiles& flight, Time start, std::size_t max_p
     for (const char* axis : {"_x", "_y", "_z"}) curves.add(std::string(name) + axis, rows.numbers(std::string(name) + axis));
   for (const char* name : {"command_1", "command_2", "command_3", "command_4", "thrust", "battery", "estimate_age"})
     curves.add(name, rows.numbers(name));
-  return fmt::format("{{\"summary\":{},\"modes\":{},\"curves\":{}}}", flight.summary.dump(), mode_stretches(rows, t).dump(),
-                     curves.text());
+  return fmt::format("{{\"summary\":{},\"modes\":{},\"curves\":{}}}", json_text(flight.summary),
+                     json_text(mode_stretches(rows, t)), curves.text());
 }
 
 }  // namespace fbvins

@@ -145,7 +145,7 @@ std::string run_text(const RunFolder& run, const ReportOptions& options) {
     head["path_m"] = e.truth_path_m;
     head["nees"] = mean_nees(errors);
   }
-  std::string text = head.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = json_text(head);
   text.pop_back();  // more members follow
   const std::size_t n = options.max_points;
   text += ",\"odometry\":" + odometry_curves(run, n);
@@ -180,7 +180,7 @@ std::string inside_element(const std::string& text) {
 }  // namespace
 
 std::string report_html(const std::vector<RunFolder>& runs, const Json& bench, const ReportOptions& options) {
-  std::string data = fmt::format("{{\"title\":{},\"bench\":{},\"runs\":[", Json(options.title).dump(), bench.dump());
+  std::string data = fmt::format("{{\"title\":{},\"bench\":{},\"runs\":[", json_text(options.title), json_text(bench));
   for (std::size_t i = 0; i < runs.size(); ++i) data += fmt::format("{}{}", i ? "," : "", run_text(runs[i], options));
   data += "]}";
   std::string page = report_page();

@@ -58,6 +58,16 @@ TEST(Report, ValuesCannotEndTheScript) {
   EXPECT_EQ(data_of(html)["title"], "<b>&");
 }
 
+TEST(Report, BytesThatAreNoTextAreReplaced) {
+  RunFolder run = complete_run();
+  run.flight = FlightFiles{Json{{"mission", "m\xff.yaml"}},
+                           *CsvTable::parse("#timestamp [ns],mode,mode_reason\n1,fly\xff,none\n", "flight.csv")};
+  const Json data = data_of(report_html({run}, Json{{"name", "b\xff"}}, {.title = "t\xff"}));
+  EXPECT_EQ(data["title"], "t\xef\xbf\xbd");
+  EXPECT_EQ(data["bench"]["name"], "b\xef\xbf\xbd");
+  EXPECT_EQ(data["runs"][0]["flight"]["summary"]["mission"], "m\xef\xbf\xbd.yaml");
+}
+
 TEST(Report, FetchesNothing) {
   const std::string html = report_html({complete_run()}, nullptr, {});
   for (const char* sign : {"src=", "href=", "@import", "fetch("}) EXPECT_EQ(html.find(sign), std::string::npos) << sign;

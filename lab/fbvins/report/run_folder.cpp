@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 
 #include "fbvins/io/dataset.hpp"
@@ -51,6 +52,9 @@ class Columns {
   std::string source_, missing_;
 };
 
+/// 0 where a field is no count.
+std::uint32_t count(double value) { return value >= 0 && value <= UINT32_MAX ? static_cast<std::uint32_t>(value) : 0; }
+
 Vec3 at(const std::array<std::vector<double>, 3>& v, std::size_t i) { return {v[0][i], v[1][i], v[2][i]}; }
 
 Result<std::vector<Odometry>> read_odometry(const std::string& path) {
@@ -80,7 +84,7 @@ Result<std::vector<Odometry>> read_odometry(const std::string& path) {
         o.pose_covariance(static_cast<int>(i), static_cast<int>(j)) =
             o.pose_covariance(static_cast<int>(j), static_cast<int>(i)) = covariance[i][j][k];
     o.health = {state_of(health[k]), reason_of(reason[k])};
-    o.reset_counter = static_cast<std::uint32_t>(resets[k]);
+    o.reset_counter = count(resets[k]);
   }
   return odometry;
 }
