@@ -122,11 +122,13 @@ std::string depth_png(const std::vector<float>& depth_m, int width, int height) 
 
 /// Makes the folders and writes the calibrations.
 Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, bool depth) {
-  std::error_code error;
-  for (const char* folder : {"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"})
+  std::vector<const char*> folders{"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"};
+  if (depth) folders.push_back("depth0");
+  for (const char* folder : folders) {
+    std::error_code error;
     fs::create_directories(mav0 / folder, error);
-  if (depth) fs::create_directories(mav0 / "depth0", error);
-  if (error) return cannot_write(mav0);
+    if (error) return cannot_write(mav0 / folder);
+  }
   const Pose<B, C0>& left = rig.T_BC0;
   const Pose<B, C1>& right = rig.T_BC1;
   for (const auto& [path, text] :

@@ -30,6 +30,7 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
       left_{Renderer(rig.left, *world_),
             ImageSensor(options.camera, rig.left, 1.0, static_cast<std::uint64_t>(options.seed) * 2),
             rig.T_BC0,
+            rig.left.height(),
             {},
             {},
             {},
@@ -37,6 +38,7 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
       right_{Renderer(rig.right, *world_),
              ImageSensor(options.camera, rig.right, options.camera.right_gain, static_cast<std::uint64_t>(options.seed) * 2 + 1),
              rig.T_BC1.cast_frames<B, C0>(),
+             rig.right.height(),
              {},
              {},
              {},
@@ -49,7 +51,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   for (int i = 0; i < samples; ++i) {
     // The middle line is read at t.
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
-    const double first_line = t - 0.5 * line_s * 480;
+    const double first_line = t - 0.5 * line_s * eye.height_px;
     const MotionState m = motion_(line_s > 0 ? first_line : t);
     Pose<W, C0> T_WC = m.T_WB * eye.T_BC;
     T_WC.p += world_from_flight_;

@@ -29,6 +29,7 @@ class FlightRecorder {
     Renderer renderer;
     ImageSensor sensor;
     Pose<B, C0> T_BC;  ///< pose of this camera, whichever it is
+    int height_px;
     std::vector<float> radiance;
     MixedLight light;
     std::vector<Facet> facets;

@@ -142,30 +142,30 @@ void ImageSensor::add_glare(std::vector<float>& image) const {
   }
   const float share = static_cast<float>(options_.glare),
               everywhere = static_cast<float>(total / static_cast<double>(image.size()));
-  struct Between {  // two neighbouring blocks and the share of the second
-    int first;
+  struct Between {  // two neighbouring blocks and the share of the second; a single block is both
+    int first, second;
     float second_share;
   };
   const auto between = [](int pixel, int blocks_there) {
     const float f = (static_cast<float>(pixel) + 0.5f) / kBlock - 0.5f;
-    const int i = std::clamp(static_cast<int>(std::floor(f)), 0, blocks_there - 2);
-    return Between{i, std::clamp(f - static_cast<float>(i), 0.0f, 1.0f)};
+    const int i = std::clamp(static_cast<int>(std::floor(f)), 0, std::max(0, blocks_there - 2));
+    return Between{i, std::min(i + 1, blocks_there - 1), std::clamp(f - static_cast<float>(i), 0.0f, 1.0f)};
   };
   std::vector<Between> columns;
   for (int x = 0; x < width_; ++x) columns.push_back(between(x, nx));
   std::vector<float> row(static_cast<std::size_t>(nx));
   for (int y = 0; y < height_; ++y) {
     const Between at = between(y, ny);
-    const float* b = &blocks[static_cast<std::size_t>(at.first * nx)];
+    const float *first = &blocks[static_cast<std::size_t>(at.first * nx)],
+                *second = &blocks[static_cast<std::size_t>(at.second * nx)];
     for (int i = 0; i < nx; ++i) {
-      const float near = (1 - at.second_share) * b[i] + at.second_share * b[nx + i];
+      const float near = (1 - at.second_share) * first[i] + at.second_share * second[i];
       row[static_cast<std::size_t>(i)] = share * (0.6f * near + 0.4f * everywhere);
     }
     float* pixels = &image[static_cast<std::size_t>(y) * width_];
     for (int x = 0; x < width_; ++x) {
-      const auto [i, u] = columns[static_cast<std::size_t>(x)];
-      const float* r = &row[static_cast<std::size_t>(i)];
-      pixels[x] = (1 - share) * pixels[x] + ((1 - u) * r[0] + u * r[1]);
+      const auto [i, j, u] = columns[static_cast<std::size_t>(x)];
+      pixels[x] = (1 - share) * pixels[x] + ((1 - u) * row[static_cast<std::size_t>(i)] + u * row[static_cast<std::size_t>(j)]);
     }
   }
 }

@@ -86,6 +86,22 @@ TEST(ImageSensor, BlurAndGlareKeepTheLight) {
   EXPECT_NEAR(of(sensor.expose(light, 0)).mean, before, 0.6);
 }
 
+TEST(ImageSensor, AnImageOfASingleBlockHasGlareToo) {
+  CameraModelOptions options = plain();
+  options.auto_exposure = false;
+  options.read_noise = options.shot_noise = 0;
+  options.glare = 0.2;
+  for (const auto& [width, height] : {std::pair{8, 6}, {40, 6}, {8, 40}}) {
+    ImageSensor sensor(options, Camera(PinholeRadtan{10, 10, 4, 3, 0, 0, 0, 0}, width, height), 1.0, 3);
+    const float level = 100;
+    std::vector<float> light(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+                             level / static_cast<float>(options.sensitivity * options.max_exposure_ms));
+    const Statistics s = of(sensor.expose(light, 0));
+    EXPECT_NEAR(s.mean, level, 1.1) << width << " x " << height;
+    EXPECT_LT(s.sigma, 0.1) << width << " x " << height;
+  }
+}
+
 TEST(ImageSensor, TheSameFrameHasTheSameNoiseAnotherHasOther) {
   const Camera camera = euroc_rig().left;
   const auto image = [&](std::int64_t frame) {

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <mutex>
+#include <set>
 
+#include "fbvins/sim/flight_recorder.hpp"
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
@@ -135,6 +138,28 @@ TEST(Renderer, LinesReadLaterShowALaterMoment) {
   Mat2 J_pixel_normalised;
   camera.distort(*camera.undistort(Vec2(camera.width() / 2, 476)), &J_pixel_normalised);
   EXPECT_NEAR(edge_column(a, 752, 476) - edge_column(b, 752, 476), 0.0238 * J_pixel_normalised(0, 0), 0.4);
+}
+
+/// The stamp is that of the middle line, whatever the number of lines.
+TEST(FlightRecorder, ARollingShutterBeginsHalfAnImageBeforeTheStamp) {
+  for (const int height : {48, 480}) {
+    StereoRig rig;
+    rig.left = rig.right = Camera(PinholeRadtan{40, 40, 32, 0.5 * height, 0, 0, 0, 0}, 64, height);
+    SimulationOptions options;
+    options.camera.line_delay_us = 30;
+    options.camera.time_samples = 1;
+    std::mutex mutex;
+    std::set<double> asked_s;
+    const auto standing = [&](double t_s) {
+      const std::lock_guard lock(mutex);
+      asked_s.insert(t_s);
+      return MotionState{};
+    };
+    FlightRecorder recorder(options, rig, standing, Vec3::Zero(), std::make_shared<const World>(split_wall()));
+    (void)recorder.render(2, 0, false);
+    ASSERT_EQ(asked_s.size(), 1u);
+    EXPECT_NEAR(*asked_s.begin(), 2 - 15e-6 * height, 1e-12);
+  }
 }
 
 }  // namespace
