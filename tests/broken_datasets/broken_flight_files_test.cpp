@@ -259,7 +259,8 @@ class BrokenLog : public testing::Test {
     return said(path);
   }
   /// A folder of `fbvins fly` with twelve seconds in flight; `change` is given its header and a row.
-  std::string csv(const std::function<void(std::string& header, std::string& row)>& change, const std::string& control = "") {
+  std::string csv(const std::function<void(std::string& header, std::string& row)>& change, const std::string& control = "",
+                  std::int64_t period_ns = 5'000'000) {
     const std::string path = folder_.path() + "/fly";
     std::string header = "#t [ns]", row;
     for (const char* name : {"rate", "torque", "acceleration_setpoint", "estimate_v"})
@@ -267,7 +268,7 @@ class BrokenLog : public testing::Test {
     header += ",mode", row += ",mission";
     change(header, row);
     std::string text = header + "\n";
-    for (std::int64_t i = 0; i < 2400; ++i) text += fmt::format("{}{}\n", 1'000'000'000 + 5'000'000 * i, row);
+    for (std::int64_t i = 0; i < 2400; ++i) text += fmt::format("{}{}\n", 1'000'000'000 + period_ns * i, row);
     write_folder({{"flight.csv", text}, {"control.yaml", control}}, path);
     return said(path);
   }
@@ -314,6 +315,9 @@ TEST_F(BrokenLog, OfOurOwn) {
   EXPECT_EQ(csv(mission(",mission", ",waiting"), "rate: {}\n"), "fly/flight.csv: only 0.0 s in flight; at least 10 s are needed");
   EXPECT_EQ(csv([](std::string& header, std::string&) { header.erase(0, 1); }, "rate: {}\n"),
             "fly/flight.csv:1: a header line is missing");
+  for (const std::int64_t period_ns : {100'000'000, 670'000'000, 2'000'000'000})
+    EXPECT_EQ(csv([](std::string&, std::string&) {}, "rate: {}\n", period_ns),
+              fmt::format("fly/flight.csv: its rows are {:.3f} s apart; at least 20 a second are needed", 1e-9 * period_ns));
   EXPECT_EQ(csv([](std::string&, std::string&) {}, "rate: {MC_ROLLRATE_P: much}\n").substr(0, 19), "fly/control.yaml:1:");
 }
 

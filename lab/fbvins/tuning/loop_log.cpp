@@ -17,6 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr double kShortest_s = 10, kLongest_s = 24 * 3600;
+/// Below, there is nothing to see of the loops.
+constexpr double kSlowest_hz = 20;
 /// Signals of a PX4 log have different rates; they are resampled to this one.
 constexpr double kUlog_hz = 200;
 
@@ -59,6 +61,9 @@ Result<LoopLog> read_csv(const std::string& folder, VelocitySource velocity) {
       if (!all->back().allFinite()) return wrong(log.source, fmt::format("row {} holds something that is not a number", i + 1));
   }
   if (t.size() > 1) log.rate_hz = std::round(1 / (t[1] - t[0]).seconds());
+  if (log.rate_hz < kSlowest_hz)
+    return wrong(log.source, fmt::format("its rows are {:.3f} s apart; at least {:.0f} a second are needed",
+                                         (t[1] - t[0]).seconds(), kSlowest_hz));
   return log;
 }
 
