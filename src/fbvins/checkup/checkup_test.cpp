@@ -68,6 +68,23 @@ TEST(Checkup, NamesUnits) {
   EXPECT_TRUE(says(check_reading_units(in_degrees), FindingKind::gyro_units));
 }
 
+TEST(Checkup, UnitsTooCloseToBeDistinguishedAreBothNamed) {
+  const auto advice = [](double factor) {
+    auto samples = readings();
+    for (ImuSample& sample : samples) sample.accel_mps2 *= factor;
+    const auto findings = check_reading_units(samples);
+    return findings.empty() ? "" : findings.front().advice;
+  };
+  for (const double factor : {1000 / 9.80665, 100.0}) {  // thousandths of g, cm/s^2
+    EXPECT_NE(advice(factor).find("thousandths of g"), std::string::npos) << advice(factor);
+    EXPECT_NE(advice(factor).find("0.00980665"), std::string::npos) << advice(factor);
+    EXPECT_NE(advice(factor).find("cm/s^2"), std::string::npos) << advice(factor);
+    EXPECT_NE(advice(factor).find("0.01"), std::string::npos) << advice(factor);
+  }
+  EXPECT_EQ(advice(1000), "it looks like mm/s^2: multiply the accelerometer's readings by 0.001");
+  EXPECT_EQ(advice(1 / 0.3048), "it looks like feet/s^2: multiply the accelerometer's readings by 0.3048");
+}
+
 TEST(Checkup, NamesWrongStamps) {
   auto twice = readings(), elsewhere = readings();
   for (std::size_t i = 1; i < twice.size(); i += 2)

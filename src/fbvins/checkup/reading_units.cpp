@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <string>
 
 #include "fbvins/frontend/median.hpp"
 #include "fbvins/imu/nav_state.hpp"
@@ -20,20 +22,36 @@ constexpr double kGravityTolerance = 0.15;
 /// Half of all readings turn faster than this: no vehicle that a camera could follow.
 constexpr double kSpinning_radps = 6;
 
+/// Units in which gravity is this nearly the same cannot be distinguished by it: a bias alone makes up for the difference.
+constexpr double kSameUnit = 0.05;
+
 struct Unit {
   double gravity;  ///< in this unit
-  const char* looks_like;
-  const char* advice;
+  const char* name;
+  const char* factor;  ///< to m/s^2
 };
 constexpr Unit kUnits[] = {
-    {1.0, "g", "multiply the accelerometer's readings by 9.80665"},
-    {1000.0, "thousandths of g", "multiply the accelerometer's readings by 0.00980665"},
-    {9810.0, "mm/s^2", "multiply the accelerometer's readings by 0.001"},
-    {981.0, "cm/s^2", "multiply the accelerometer's readings by 0.01"},
-    {32.17, "feet/s^2", "multiply the accelerometer's readings by 0.3048"},
+    {1.0, "g", "9.80665"},         {1000.0, "thousandths of g", "0.00980665"},
+    {9807.0, "mm/s^2", "0.001"},   {980.7, "cm/s^2", "0.01"},
+    {32.17, "feet/s^2", "0.3048"},
 };
 
 bool near_to(double value, double wanted) { return std::abs(value / wanted - 1) < kGravityTolerance; }
+
+/// What to do about readings in another unit; empty where gravity is near that of none.
+std::string advice_on_unit(double norm) {
+  const auto ratio = [&](const Unit& unit) { return std::abs(std::log(norm / unit.gravity)); };
+  const Unit& nearest =
+      *std::min_element(std::begin(kUnits), std::end(kUnits), [&](const Unit& a, const Unit& b) { return ratio(a) < ratio(b); });
+  if (!near_to(norm, nearest.gravity)) return {};
+  for (const Unit& other : kUnits)
+    if (&other != &nearest && std::abs(other.gravity / nearest.gravity - 1) < kSameUnit)
+      return fmt::format(
+          "it looks like {} or {}, too close to each other to be distinguished: multiply the accelerometer's readings "
+          "by {} or {}, as the sensor's data sheet says",
+          nearest.name, other.name, nearest.factor, other.factor);
+  return fmt::format("it looks like {}: multiply the accelerometer's readings by {}", nearest.name, nearest.factor);
+}
 
 void check_accelerometer(std::span<const ImuSample> samples, std::vector<Finding>& findings) {
   const GravitySeen seen = gravity_seen(samples);
@@ -47,8 +65,7 @@ void check_accelerometer(std::span<const ImuSample> samples, std::vector<Finding
   finding.advice = seen.norm_mps2 < 0.3 * kGravity_mps2
                        ? "gravity seems to have been taken out: give the readings as the sensor has them"
                        : "find out the unit of the readings, and give m/s^2";
-  for (const Unit& unit : kUnits)
-    if (near_to(seen.norm_mps2, unit.gravity)) finding.advice = fmt::format("it looks like {}: {}", unit.looks_like, unit.advice);
+  if (std::string unit = advice_on_unit(seen.norm_mps2); !unit.empty()) finding.advice = std::move(unit);
   findings.push_back(std::move(finding));
 }
 
