@@ -104,7 +104,7 @@ const Refused kRefused[] = {
        f["../metadata.yaml"] = "rosbag2";
        f["x"] = "";
      },
-     ": no cam0/data.csv in it: not a EuRoC dataset (ROS bags cannot be read)"},
+     ": no cam0/data.csv in it: not a EuRoC dataset (ROS bags are read by fbvins-bags; `fbvins convert` makes a EuRoC folder of one)"},
     {"NoLeftList", [](Files& f) { f.erase(kCam0); }, "/mav0/cam0/data.csv: no such file"},
     {"NoLeftCalibration", [](Files& f) { f.erase("cam0/sensor.yaml"); }, "/mav0/cam0/sensor.yaml: no such file"},
     {"NoRightCamera", [](Files& f) { std::erase_if(f, [](const auto& e) { return e.first.starts_with("cam1/"); }); },
@@ -471,7 +471,9 @@ TEST_F(BrokenPath, Nothing) { expect_refused(folder_.path() + "/nowhere", ": no 
 TEST_F(BrokenPath, EmptyFolder) { expect_refused(folder_.path(), ": no cam0/data.csv in it"); }
 TEST_F(BrokenPath, TextFile) { expect_refused(written("a.txt", "hello"), ": neither a EuRoC folder nor a zip archive"); }
 TEST_F(BrokenPath, EmptyFile) { expect_refused(written("a.zip", ""), ": neither a EuRoC folder nor a zip archive"); }
-TEST_F(BrokenPath, RosBag) { expect_refused(written("a.bag", "#ROSBAG V2.0\n"), ": ROS bags cannot be read"); }
+TEST_F(BrokenPath, RosBag) {
+  expect_refused(written("a.bag", "#ROSBAG V2.0\n"), ": ROS bags are read by fbvins-bags; `fbvins convert`");
+}
 TEST_F(BrokenPath, PipeDoesNotBlock) {
   const std::string path = folder_.path() + "/pipe";
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);

@@ -27,8 +27,8 @@ Result<std::string> find_root(const FileSource& files, const std::string& path) 
   if (roots.empty()) {
     std::error_code ignored;
     const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
-    return Error{ErrorCode::not_found,
-                 fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path, bag ? " (ROS bags cannot be read)" : "")};
+    return Error{ErrorCode::not_found, fmt::format("{}: no cam0/data.csv in it: not a EuRoC dataset{}", path,
+                                                   bag ? fmt::format(" ({})", kAboutRosBags) : "")};
   }
   if (roots.size() > 1)
     return Error{ErrorCode::unsupported,

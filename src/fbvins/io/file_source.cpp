@@ -118,7 +118,7 @@ Result<std::unique_ptr<FileSource>> open_file_source(const std::string& path) {
   file.read(magic.data(), static_cast<std::streamsize>(magic.size()));
   if (magic.starts_with("PK")) return open_zip(path);
   if (magic.starts_with("#ROSBAG V") || magic.starts_with("\x89MCAP"))
-    return Error{ErrorCode::unsupported, fmt::format("{}: ROS bags cannot be read; give a EuRoC folder or zip", path)};
+    return Error{ErrorCode::unsupported, fmt::format("{}: {}", path, kAboutRosBags)};
   return Error{ErrorCode::unsupported, fmt::format("{}: neither a EuRoC folder nor a zip archive", path)};
 }
 

@@ -15,6 +15,9 @@
 
 namespace fbvins {
 
+/// What a person can do who gives a ROS bag where only EuRoC recordings and flight records are read.
+inline constexpr const char* kAboutRosBags = "ROS bags are read by fbvins-bags; `fbvins convert` makes a EuRoC folder of one";
+
 class FileSource {
  public:
   virtual ~FileSource() = default;

@@ -75,7 +75,8 @@ TEST_F(FileSourceTest, SaysWhatItCannotRead) {
   write("cut.zip", "PK\x03\x04 and no more");
   const auto message = [&](const std::string& name) { return open_file_source(path(name)).error().message; };
   EXPECT_EQ(message("nothing"), path("nothing") + ": no such file or folder");
-  EXPECT_EQ(message("flight.bag"), path("flight.bag") + ": ROS bags cannot be read; give a EuRoC folder or zip");
+  EXPECT_EQ(message("flight.bag"),
+            path("flight.bag") + ": ROS bags are read by fbvins-bags; `fbvins convert` makes a EuRoC folder of one");
   EXPECT_EQ(message("notes.txt"), path("notes.txt") + ": neither a EuRoC folder nor a zip archive");
   EXPECT_NE(message("cut.zip").find("not a whole zip archive"), std::string::npos);
   EXPECT_EQ(read_file(folder_, 10).error().message, folder_ + ": not a plain file");

@@ -172,21 +172,33 @@ class RecordReader {
 
   Result<void> read_calibration() {
     if (options_.rig) return out_.rig = *options_.rig, Result<void>{};
-    if (!options_.kalibr_camchain.empty()) {
-      const auto& imu = options_.kalibr_imu;
-      Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
-      if (!rig) return rig.error();
-      out_.rig = *rig;
-      return {};
-    }
-    for (const McapAttachment& attachment : reader_.attachments()) {
-      if (attachment.name != kCalibrationAttachment) continue;
-      Result<StereoRig> rig = parse_rig(attachment.data, fmt::format("{}: {}", name_, attachment.name));
-      if (!rig) return rig.error();
-      out_.rig = *rig;
-      return {};
-    }
-    return Error{ErrorCode::malformed, fmt::format("{}: holds no calibration, and none is given with it", name_)};
+    if (!options_.kalibr_camchain.empty()) return read_kalibr_calibration();
+    std::optional<Result<StereoRig>> rig = attached_calibration();
+    if (!rig) return Error{ErrorCode::malformed, fmt::format("{}: holds no calibration, and none is given with it", name_)};
+    if (!*rig) return rig->error();
+    out_.rig = **rig;
+    return {};
+  }
+
+  /// Without Kalibr's file of the IMU, its noise is that of the record.
+  Result<void> read_kalibr_calibration() {
+    const auto& imu = options_.kalibr_imu;
+    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
+    if (!rig) return rig.error();
+    out_.rig = *rig;
+    if (!imu.empty()) return {};
+    const std::optional<Result<StereoRig>> own = attached_calibration();
+    if (own && *own) return out_.rig.imu_noise = (*own)->imu_noise, Result<void>{};
+    const std::string why = own ? own->error().message : fmt::format("{}: holds no calibration", name_);
+    out_.info.warnings.push_back(fmt::format("{}; IMU noise figures are the defaults", why));
+    return {};
+  }
+
+  std::optional<Result<StereoRig>> attached_calibration() const {
+    for (const McapAttachment& attachment : reader_.attachments())
+      if (attachment.name == kCalibrationAttachment)
+        return parse_rig(attachment.data, fmt::format("{}: {}", name_, attachment.name));
+    return std::nullopt;
   }
 
   Result<void> cut() {

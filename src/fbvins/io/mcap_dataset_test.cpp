@@ -10,6 +10,7 @@
 
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/kalibr_test_files.hpp"
 
 namespace fbvins {
 namespace {
@@ -204,6 +205,25 @@ TEST_F(FlightRecordTest, WithoutCalibrationItIsRefusedUnlessOneIsGiven) {
   file->end_message();
   ASSERT_TRUE(file->finish());
   expect_refused(": holds no calibration, and none is given with it");
+}
+
+TEST_F(FlightRecordTest, ACamchainReplacesTheCamerasAndNotTheNoise) {
+  StereoRig own = small_rig(), kalibr = small_rig();
+  own.imu_noise.gyro_noise_density_radps_rthz = 3e-4;
+  kalibr.imu_noise.gyro_noise_density_radps_rthz = 5e-4;
+  kalibr.T_BC1.p = Vec3(0.2, 0, 0);
+  const KalibrFiles files(kalibr);
+  auto record = FlightRecord::create(path_, own, {.program = "a test", .images = true});
+  ASSERT_TRUE(record);
+  for (const SensorEvent& event : eventful_flight()) std::visit([&](const auto& e) { EXPECT_TRUE(record->add(e)); }, event);
+  ASSERT_TRUE(record->finish());
+  const auto cameras = open_dataset(path_, {.kalibr_camchain = files.camchain()});
+  ASSERT_TRUE(cameras) << cameras.error().message;
+  EXPECT_NEAR((*cameras)->rig().T_BC1.p.x(), 0.2, 1e-12);
+  EXPECT_DOUBLE_EQ((*cameras)->rig().imu_noise.gyro_noise_density_radps_rthz, 3e-4);
+  const auto both = open_dataset(path_, {.kalibr_camchain = files.camchain(), .kalibr_imu = files.imu()});
+  ASSERT_TRUE(both) << both.error().message;
+  EXPECT_DOUBLE_EQ((*both)->rig().imu_noise.gyro_noise_density_radps_rthz, 5e-4);
 }
 
 TEST_F(FlightRecordTest, MalformedMessagesAreNamedAndLeftOut) {

@@ -91,13 +91,18 @@ bool McapReader::is_passed_over(std::uint64_t chunk, std::uint64_t behind) const
   return in.ok() && !channels.empty() && pass_over_(first, last, channels);
 }
 
-void McapReader::load_records(std::uint64_t offset, std::uint64_t length) {
-  if (length > kLargestChunk_bytes) return complain(offset, fmt::format("{} bytes in one piece are too many", length));
+/// False where these are too many to be loaded.
+bool McapReader::load_records(std::uint64_t offset, std::uint64_t length) {
+  if (length > kLargestChunk_bytes) {
+    complain(offset, fmt::format("{} bytes in one piece are too many", length));
+    return false;
+  }
   loaded_ = bytes_->read(offset, length);
   loaded_offset_ = offset;
   loaded_chunk_ = 0;
   position_ = 0;
   loaded_whole_ = true;
+  return true;
 }
 
 std::optional<McapReader::ChunkHead> McapReader::chunk_head(std::uint64_t offset, std::uint64_t length) const {
@@ -119,7 +124,7 @@ void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool who
   if (!head) return whole ? complain(offset, "this chunk's head is not what it should be") : void();
   const std::uint64_t there = length - head->length;
   if (whole && head->records > there) return complain(offset, "this chunk's messages are longer than the chunk");
-  load_records(offset + head->length, std::min(head->records, there));
+  if (!load_records(offset + head->length, std::min(head->records, there))) return;
   loaded_whole_ = whole;
   if (!head->compression.empty()) {
     std::optional<std::string> records = unpack_ ? unpack_(head->compression, loaded_, head->unpacked) : std::nullopt;

@@ -88,7 +88,7 @@ class McapReader {
   bool load_next();
   bool is_passed_over(std::uint64_t chunk, std::uint64_t behind) const;
   bool cut_off(std::uint64_t at);
-  void load_records(std::uint64_t offset, std::uint64_t length);
+  bool load_records(std::uint64_t offset, std::uint64_t length);
   void load_chunk(std::uint64_t offset, std::uint64_t length, bool whole);
   void load_attachment(std::uint64_t offset, std::uint64_t length);
   std::optional<McapMessage> next_loaded();

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/mcap_reader.hpp"
@@ -139,6 +140,25 @@ TEST_F(Mcap, ADamagedChunkIsLeftOutAndNamed) {
   EXPECT_EQ(reader.damage().parts, 1);
   EXPECT_TRUE(reader.damage().first.starts_with("a.mcap: byte ")) << reader.damage().first;
   EXPECT_TRUE(reader.damage().first.ends_with(": this chunk's checksum is wrong")) << reader.damage().first;
+}
+
+TEST_F(Mcap, AChunkTooLargeToLoadIsLeftOutAndNamedOnce) {
+  const std::vector<Said> said = write_thirty(false);
+  constexpr std::uint64_t kRecords = std::uint64_t{300} << 20u;
+  std::string head;
+  append_le(head, static_cast<std::uint8_t>(McapRecord::chunk));
+  append_le(head, std::uint64_t{8 + 8 + 8 + 4 + 4 + 8 + kRecords});
+  head.append(8 + 8 + 8, '\0');           // stamps, size when unpacked
+  append_le(head, std::uint32_t{12345});  // a checksum
+  append_mcap_text(head, "");
+  append_le(head, kRecords);
+  std::ofstream(path_, std::ios::binary | std::ios::app) << head;
+  fs::resize_file(path_, fs::file_size(path_) + kRecords);  // takes no space on the disk
+  auto reader = McapReader::open(*open_bytes(path_), "a.mcap");
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(read_all(*reader), said);
+  EXPECT_EQ(reader->damage().parts, 1);
+  EXPECT_TRUE(reader->damage().first.ends_with(" bytes in one piece are too many")) << reader->damage().first;
 }
 
 TEST_F(Mcap, ZerosAtTheEndAreNoMessages) {
