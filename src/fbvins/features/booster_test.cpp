@@ -156,6 +156,9 @@ TEST(BoosterWeights, ThatDoNotFitAreNamed) {
             "metadata \"format\" is \"fbvins-booster-4\", not \"fbvins-booster-3\": these are no weights of this version");
   EXPECT_EQ(error_with("\"head.bias\"", "\"head.boas\""), "tensor \"head.bias\" is missing");
   EXPECT_EQ(error_with("\"bits\":\"256\"", "\"bits\":\"255\""), "metadata \"bits\" is \"255\", not a number from 256 to 256");
+  for (const std::string bad : {"32x64", "32,6x", "32x,6", ",3264", "3264,"})  // of the right length: the header's stays right
+    EXPECT_EQ(error_with("\"32,64\"", "\"" + bad + "\""),
+              "metadata \"keypoint_hidden\" is \"" + bad + "\", not up to 8 multiples of 16 joined by commas");
   const auto cut = parse_booster_weights(std::string_view(good).substr(0, good.size() - 1));
   ASSERT_FALSE(cut);
   EXPECT_NE(cut.error().message.find("the file is cut off"), std::string::npos);

@@ -48,8 +48,10 @@ class Taker {
     for (std::size_t from = 0; from <= at->second.size();) {
       const std::size_t to = std::min(at->second.find(',', from), at->second.size());
       int value = 0;
-      std::from_chars(at->second.data() + from, at->second.data() + to, value);
-      if (value < 16 || value > kLargestSide || value % 16 != 0 || out.size() == kMostKeypointLayers)
+      const char* end = at->second.data() + to;
+      const auto [rest, error] = std::from_chars(at->second.data() + from, end, value);
+      if (error != std::errc() || rest != end || value < 16 || value > kLargestSide || value % 16 != 0 ||
+          out.size() == kMostKeypointLayers)
         return fail(fmt::format("metadata \"{}\" is \"{}\", not up to {} multiples of 16 joined by commas", field, at->second,
                                 kMostKeypointLayers)),
                out;

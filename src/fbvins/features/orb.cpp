@@ -74,7 +74,8 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
   PyramidLevel smooth_half;
   if (with_margins_) {
     half_.build({level.origin, level.width, level.height, level.stride}, 2);
-    smooth_half = smooth_level(half_.level(1), smooth_half_, scratch_);
+    // A tiny image has no half: then the surroundings are all alike.
+    if (half_.levels() == 2) smooth_half = smooth_level(half_.level(1), smooth_half_, scratch_);
   }
   for (const Candidate& c : chosen_) {
     Keypoint keypoint;
@@ -90,7 +91,7 @@ void OrbExtractor::describe(int l, OrbFeatures& out) {
     if (!with_margins_) continue;
     Margins& margins = out.margins.emplace_back();
     margins_of(difference, margins.of_bit);
-    margins_of(compare(smooth_half, 0.5 * Vec2(c.x, c.y), direction), margins.around);
+    if (smooth_half.origin) margins_of(compare(smooth_half, 0.5 * Vec2(c.x, c.y), direction), margins.around);
   }
 }
 

@@ -249,5 +249,18 @@ TEST(DescriptorStage, IdentityChangesNothing) {
   EXPECT_TRUE(before == features.descriptors);
 }
 
+TEST(Orb, AnImageTooSmallForItsHalfHasNoSurroundings) {
+  Image image(28, 28, 40);
+  for (int y = 14; y < 28; ++y)
+    for (int x = 14; x < 28; ++x) image.at(x, y) = 200;
+  OrbFeatures features;
+  OrbExtractor(OrbOptions{}, true).extract(image.view(), features);
+  ASSERT_GT(features.size(), 0u);
+  ASSERT_EQ(features.margins.size(), features.size());
+  const Margins& margins = features.margins.front();
+  EXPECT_TRUE(std::any_of(margins.of_bit.begin(), margins.of_bit.end(), [](int m) { return m != 0; }));
+  EXPECT_TRUE(std::all_of(margins.around.begin(), margins.around.end(), [](int m) { return m == 0; }));
+}
+
 }  // namespace
 }  // namespace fbvins

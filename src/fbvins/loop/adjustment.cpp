@@ -109,6 +109,7 @@ int Adjustment::solve(AdjustmentState& x, double drift) const {
   add_edges(problem, x, drift);
   add_verticals(problem, x);
   const auto first = std::find_if(x.poses.begin(), x.poses.end(), [&](auto& p) { return problem.HasParameterBlock(p.data()); });
+  if (first == x.poses.end()) return 0;  // no pose is observed or in an edge
   problem.SetParameterBlockConstant(first->data());
   ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, kMaxIterations);
   // The points go first; they are many, and see one another only through keyframes.

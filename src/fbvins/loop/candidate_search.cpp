@@ -25,12 +25,15 @@ constexpr float kNeighbourShare = 0.25f;
 
 double seconds_between(const MapKeyframe& a, const MapKeyframe& b) { return std::abs((a.t - b.t).seconds()); }
 
+/// Of one flight: those of another may have the same stamps.
+bool neighbours(const MapKeyframe& a, const MapKeyframe& b) { return a.session == b.session && seconds_between(a, b) < kGroup_s; }
+
 /// Several similar neighbours support a place.
 std::vector<IndexHit> supported_by_neighbours(const PlaceMap& map, const std::vector<IndexHit>& hits) {
   std::vector<IndexHit> grouped = hits;
   for (IndexHit& a : grouped)
     for (const IndexHit& b : hits)
-      if (a.keyframe != b.keyframe && seconds_between(*map.find(a.keyframe), *map.find(b.keyframe)) < kGroup_s)
+      if (a.keyframe != b.keyframe && neighbours(*map.find(a.keyframe), *map.find(b.keyframe)))
         a.similarity += kNeighbourShare * b.similarity;
   std::stable_sort(grouped.begin(), grouped.end(),
                    [](const IndexHit& a, const IndexHit& b) { return a.similarity > b.similarity; });
@@ -43,10 +46,7 @@ std::vector<KeyframeId> one_of_each_place(const PlaceMap& map, const std::vector
   for (const IndexHit& hit : hits) {
     if (chosen.size() == kCandidates) break;
     const MapKeyframe& k = *map.find(hit.keyframe);
-    const bool covered = std::any_of(chosen.begin(), chosen.end(), [&](KeyframeId c) {
-      const MapKeyframe& other = *map.find(c);
-      return other.session == k.session && seconds_between(other, k) < kGroup_s;
-    });
+    const bool covered = std::any_of(chosen.begin(), chosen.end(), [&](KeyframeId c) { return neighbours(*map.find(c), k); });
     if (!covered) chosen.push_back(hit.keyframe);
   }
   return chosen;

@@ -65,6 +65,13 @@ TEST_F(Search, AnywhereNeighboursSupportAPlace) {
   EXPECT_EQ(search_.anywhere(map_, query(100)), std::vector{first});
 }
 
+TEST_F(Search, AnotherFlightsKeyframesOfTheSameTimeAreNoNeighbours) {
+  const KeyframeId alone = add(0, Vec3(50, 0, 0), 2, 0.6f);
+  const KeyframeId first = add(10, Vec3(90, 0, 0), 2, 0.5f, 1);
+  const KeyframeId second = add(10.5, Vec3(10, 0, 0), 2, 0.49f, 2);
+  EXPECT_EQ(search_.anywhere(map_, query(100)), (std::vector{alone, first, second}));
+}
+
 TEST_F(Search, WhatIsRemovedIsNotFound) {
   const KeyframeId id = add(0, Vec3(0, 0, 0), 0, 0.5f);
   search_.remove(id, {{0, 0.5f}, {1, 0.5f}});

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fbvins/loop/adjustment.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/test_room.hpp"
@@ -59,6 +60,15 @@ TEST(FinalAdjustment, WrongDepthsDoNotBendIt) {
   adjust_map(clean.map, {});
   adjust_map(m.map, {});
   EXPECT_LT(error_m(m), 1.5 * error_m(clean) + 0.001);
+}
+
+TEST(FinalAdjustment, WithNothingThatTiesPosesThereIsNothingToSolve) {
+  PlaceMap map;
+  for (int i = 0; i < 3; ++i) map.add(MapKeyframe{});
+  const Adjustment adjustment(map);
+  AdjustmentState x = adjustment.start();
+  EXPECT_EQ(adjustment.solve(x), 0);
+  EXPECT_EQ(x.poses, adjustment.start().poses);
 }
 
 /// The same with the IMU, in a gauge that is not level, which the estimator does not know: it takes M for level.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -147,7 +148,8 @@ MapEdge get_edge(Reader& r) {
   e.T_from_to = r.pose<Pose<B, B>>();
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) e.information(i, j) = e.information(j, i) = r.get<double>();
-  r.check(e.information.allFinite());
+  // The pose graph takes roots of it.
+  r.check(e.information.allFinite() && Eigen::LLT<Mat6>(e.information).info() == Eigen::Success);
   return e;
 }
 

@@ -8,6 +8,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <limits>
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/loop/binary_file.hpp"
@@ -109,6 +110,16 @@ TEST_F(MapFile, ContentThatPassesTheChecksumIsCheckedAllTheSame) {
     } else {
       EXPECT_EQ(parsed.error().code, ErrorCode::malformed);
     }
+  }
+}
+
+TEST_F(MapFile, AnInformationThatIsNoneIsRefused) {
+  for (const double bad : {-1.0, 0.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    PlaceMap map = map_of(3, 1);
+    map.edges[1].information(2, 2) = bad;
+    const auto parsed = parse_map(view(serialise_map(map)), "flat.fbm");
+    ASSERT_FALSE(parsed.ok()) << bad;
+    EXPECT_EQ(parsed.error().message, "flat.fbm: damaged map: its content makes no sense");
   }
 }
 

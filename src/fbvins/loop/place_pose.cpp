@@ -128,8 +128,9 @@ std::optional<CameraFromCamera> ransac_pose(const Place& query, const Place& can
       best_score = score;
       best = CameraFromCamera(R, t);
       const double w = static_cast<double>(score) / n;
-      const double log_miss = std::log(std::max(1e-12, 1 - w * w * w));
-      needed = std::min(kMaxSamples, static_cast<int>(std::log(kMissedGoodSample) / log_miss) + 1);
+      const double log_miss = std::log1p(-std::min(1 - 1e-12, w * w * w));
+      // As a double: for a tiny share of inliers this is more than an int can hold.
+      needed = static_cast<int>(std::min<double>(kMaxSamples, std::log(kMissedGoodSample) / log_miss + 1));
     }
   }
   return best;
