@@ -206,16 +206,16 @@ def train(a):
     if a.start:
         model.load_state_dict(torch.load(a.start, map_location=device)["averaged"])
     optimiser = torch.optim.AdamW(model.parameters(), lr=a.rate, weight_decay=1e-3, betas=(0.9, 0.98))
-    step, spent_s = 0, 0.0
+    step, spent_s, averaged = 0, 0.0, None
     if a.resume and (out / "checkpoint.pt").exists():
         saved = torch.load(out / "checkpoint.pt", map_location=device)
         model.load_state_dict(saved["model"])
         optimiser.load_state_dict(saved["optimiser"])
-        step, spent_s = saved["step"], saved["spent_s"]
+        step, spent_s, averaged = saved["step"], saved["spent_s"], saved["averaged"]
     elif (out / "curve.csv").exists():
         (out / "curve.csv").unlink()
     print(f"{a.size}: {sum(p.numel() for p in model.parameters())} parameters, {len(where)} pairs, {device}", flush=True)
-    averaged = {k: v.clone() for k, v in model.state_dict().items()}
+    averaged = averaged or {k: v.clone() for k, v in model.state_dict().items()}
     schedule, recent, terms = Schedule(a, spent_s), [], {}
     fresh = not (out / "curve.csv").exists()
     curve = open(out / "curve.csv", "a", newline="")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A few steps of training on a few synthetic pictures: the loss falls, the same seed gives the same weights, the weights
-file is read back unchanged. Pairs of a simulated room have true correspondences.
+file is read back unchanged, an interrupted run continues as if it had not been interrupted. Pairs of a simulated room have true correspondences.
 train_test.py BOOSTER_PAIRS. Skipped (77) where PyTorch is not installed."""
 import pathlib
 import subprocess
@@ -17,6 +17,7 @@ except ImportError as missing:
     sys.exit(77)
 from dataset import Batch, open_pairs  # noqa: E402
 from losses import hamming  # noqa: E402
+import train as trainer  # noqa: E402
 from train import arguments_of, train  # noqa: E402
 from weights import FORMAT, load_model, load_weights  # noqa: E402
 
@@ -31,6 +32,26 @@ def rooms_are_true(program, folder):
     assert same < 0.6 * other, "points are not where the geometry says"
 
 
+def interrupt_at_step(step, run):
+    losses_of, calls = trainer.losses_of, [0]
+
+    def interrupted(*arguments):
+        calls[0] += 1
+        if calls[0] > step:
+            raise KeyboardInterrupt
+        return losses_of(*arguments)
+
+    trainer.losses_of = interrupted
+    try:
+        run()
+    except KeyboardInterrupt:
+        pass
+    else:
+        raise AssertionError("the run was not interrupted")
+    finally:
+        trainer.losses_of = losses_of
+
+
 def main(program):
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
@@ -38,14 +59,16 @@ def main(program):
         pairs = f"{folder}/pairs.bin"
         subprocess.run([program, "--leaves", "2", "--pairs", "2", "--seed", "4", "--out", pairs], check=True)
 
-        def weights_of(out):
-            losses = train(arguments_of(["--pairs", pairs, "--out", out, "--steps", "16", "--batch", "4", "--seed", "3", "--rate", "2e-3"]))
+        def weights_of(out, *more):
+            losses = train(arguments_of(["--pairs", pairs, "--out", out, "--steps", "16", "--batch", "4", "--seed", "3", "--rate", "2e-3", *more]))
             print("loss:", " ".join(f"{x:.3f}" for x in losses))
             return losses, pathlib.Path(out, "boost-s.safetensors").read_bytes()
 
         losses, first = weights_of(f"{folder}/a")
         assert np.mean(losses[-4:]) < 0.95 * np.mean(losses[:4]), "the loss does not fall"
         assert weights_of(f"{folder}/b")[1] == first, "the same seed gives other weights"
+        interrupt_at_step(12, lambda: weights_of(f"{folder}/c", "--evaluate-every", "8"))
+        assert weights_of(f"{folder}/c", "--resume")[1] == first, "a run that was interrupted gives other weights"
         meta, arrays = load_weights(f"{folder}/a/boost-s.safetensors")
         assert meta["format"] == FORMAT and meta["steps"] == "16"
         for name, tensor in load_model(f"{folder}/a/boost-s.safetensors").state_dict().items():
