@@ -18,8 +18,7 @@ namespace {
 constexpr double kShortestPairing_s = 0.045;  // denser estimates than images repeat the same error
 constexpr std::size_t kMostPairs = 6000;
 constexpr double kFlip_rad = 0.26, kSwap_m = 0.25, kSwap_medians = 8;
-constexpr double kOutlier_sigmas = 5,
-                 kMostOutliers = 0.05;  // of the pairs at a time: more are no outliers but a noise that is not like that
+constexpr double kOutlier_sigmas = 5;
 constexpr int kRounds = 4, kSteps = 8;
 constexpr double kBlock_s = 6;  // length of the stretches of flight that are compared with one another
 // Largest standard deviations of a usable result; a motion that leaves more in some direction is refused.
@@ -217,7 +216,8 @@ class Solver {
     }
   }
 
-  /// Drops poses of the estimate of which the innovation of a component exceeds kOutlier_sigmas.
+  /// Drops poses of the estimate of which the innovation of a component exceeds kOutlier_sigmas. The noise was fitted with them
+  /// in it, so that in one round they are few, and the others after them in the next rounds.
   void drop_outliers() {
     const Rows all = rows();
     std::vector<bool> bad(all[0].t_s.size(), false);
