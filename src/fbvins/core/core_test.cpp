@@ -41,6 +41,12 @@ TEST(Rng, SameSeedGivesTheSameNumberAnotherSeedAnother) {
   EXPECT_NE(first, c.next_u32());
 }
 
+TEST(Rng, IsPcg32) {
+  Rng rng(42, 54);  // seed and stream of the demonstration that its author published with its numbers
+  for (const std::uint32_t number : {0xa15c02b7u, 0x7b47f409u, 0xba1d3330u, 0x83d2f293u, 0xbfa4784bu, 0xcbed606eu})
+    EXPECT_EQ(rng.next_u32(), number);
+}
+
 TEST(Rng, NormalHasUnitVariance) {
   Rng rng(7);
   double sum = 0, sum2 = 0;

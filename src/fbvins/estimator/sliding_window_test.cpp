@@ -207,11 +207,24 @@ TEST(SlidingWindow, AFrameInThePriorIsDroppedIntoIt) {
   Scene s;
   for (int k = 0; k < 4; ++k) s.add(k, s.all(k));
   s.hold_first();
-  WindowPrior prior = s.window.prior();
   s.window.drop_frame(0, s.calibration);
   EXPECT_EQ(s.window.frames().oldest().id, FrameId{1});
   EXPECT_EQ(s.window.frames().oldest().imu, nullptr) << "its readings are in the prior";
-  EXPECT_EQ(s.window.prior().frames, std::vector<int>{0});
+  const WindowPrior& prior = s.window.prior();
+  EXPECT_EQ(prior.frames, std::vector<int>{0});
+  ASSERT_EQ(prior.quadratic.size(), 17);
+  const Eigen::MatrixXd covariance = prior.quadratic.H.inverse();
+  const Eigen::VectorXd step = -covariance * prior.quadratic.g;
+  // By its readings at rest frame 1 would be where frame 0 is.
+  EXPECT_LT((step - -kStep_m * Eigen::VectorXd::Unit(17, 2)).norm(), 1e-9) << step.transpose();
+  const ImuNoise noise;
+  const double dt = (stamp(1) - stamp(0)).seconds(), held = 1e-6;
+  const auto squared = [](double x) { return x * x; };
+  EXPECT_NEAR(covariance(0, 0), held, 1e-12) << "the tilt stays known as well as it was";
+  EXPECT_NEAR(covariance(2, 2), held * (1 + dt * dt), 1e-9) << "the position by the velocity";
+  EXPECT_NEAR(covariance(10, 10), held * (1 + dt * dt) + squared(noise.accel_noise_density_mps2_rthz) * dt, 1e-9)
+      << "the upward velocity by the bias and the noise";
+  EXPECT_NEAR(covariance(16, 16), held + squared(noise.accel_random_walk_mps3_rthz) * dt, 1e-9) << "the bias has walked";
   EXPECT_TRUE(s.window.frames().oldest().in_prior);
   EXPECT_EQ(s.window.landmarks().all().size(), s.points_W.size());
 }
