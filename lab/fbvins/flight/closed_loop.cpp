@@ -83,11 +83,11 @@ class ClosedLoop {
     const auto last = static_cast<std::int64_t>(longest_flight_s(setup_.mission) / Quadrotor::kStep_s);
     for (step_ = 0; !over_ && step_ < last; ++step_) {
       history_.add(now_s(), vehicle_.motion_of(mounting_));
-      if (Result<void> done = look(); !done) return done.error();
+      if (Result<void> done = render_due_images(); !done) return done.error();
       if (board_ && step_ % steps_at(controller_->board_rate_hz()) == 0)
         if (Result<void> done = feel_board(now_s()); !done) return done.error();
       if (step_ % steps_per_reading_ == 0) {
-        if (Result<void> done = feel(); !done) return done.error();
+        if (Result<void> done = read_imu(); !done) return done.error();
         if (progress) progress(now_s(), controller_->output().mode);
       }
       vehicle_.step(controller_->commands(), wind_.step(Quadrotor::kStep_s, vehicle_.state().T_WV.p.z()));
@@ -136,17 +136,17 @@ class ClosedLoop {
     return {};
   }
   Result<void> feel_board(double t_s) {
-    press(t_s);
+    read_barometer(t_s);
     return controller_->take_board(board_->read(t_s, vehicle_, rotor_shares()));
   }
-  void press(double t_s) {
+  void read_barometer(double t_s) {
     if (t_s < next_barometer_s_) return;
     controller_->add_barometer(barometer_.read(vehicle_.state().T_WV.p.z()));
     next_barometer_s_ += 1 / Barometer::kRate_hz;
   }
 
   /// Renders the images whose exposure has ended.
-  Result<void> look() {
+  Result<void> render_due_images() {
     while (now_s() > station_.next_image_s() + 0.5 * station_.longest_exposure_s()) {
       RenderedFrame rendered = station_.render([this](double t) { return history_.at(t); });
       ++log_.images;
@@ -160,7 +160,7 @@ class ClosedLoop {
   }
 
   /// One IMU reading: odometry, control and log.
-  Result<void> feel() {
+  Result<void> read_imu() {
     const ImuSample reading = station_.read_imu(vehicle_.motion_of(mounting_), rotor_shares());
     log_.imu.samples.push_back(reading);
     log_.imu.truth.push_back(station_.truth());
@@ -174,7 +174,7 @@ class ClosedLoop {
       controller_->add(estimate.odometry);
       for (const MapUpdate& update : estimate.updates) controller_->add(update);
     }
-    press(now_s());
+    read_barometer(now_s());
     if (Result<void> done = controller_->take(reading); !done) return done;
     if (!airborne_s_ && controller_->output().mode == FlightMode::mission) airborne_s_ = now_s();
     write_row();
@@ -267,7 +267,7 @@ Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double,
   const Result<MissionSite> site = site_of(setup.mission, defaults, standing_m);
   if (!site) return site.error();
   std::vector<Vec3> path;
-  for (const PlannedPlace& place : planned_places(setup.mission)) path.push_back(site->to_world(place.p));
+  for (const PathPoint& place : path_points(setup.mission)) path.push_back(site->to_world(place.p));
   SimulationOptions options = o;
   options.world.kind = setup.mission.place.kind.empty() ? o.world.kind : setup.mission.place.kind;
   Result<SensorStation> station = SensorStation::create(options, site->plan, path);

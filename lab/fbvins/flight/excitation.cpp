@@ -30,7 +30,7 @@ double fade(double t_s) { return std::clamp(std::min(t_s, kChirp_s - t_s) / kFad
 
 double excitation_length_s() { return 4 * (kChirp_s + kPause_s); }
 
-PathSetpoint excited(const PathSetpoint& hover, double t_s) {
+PathSetpoint excitation_setpoint(const PathSetpoint& hover, double t_s) {
   PathSetpoint now = hover;
   now.v.setZero(), now.a.setZero(), now.yaw_rate_radps = 0;
   const int axis = std::clamp(static_cast<int>(t_s / (kChirp_s + kPause_s)), 0, 3);

@@ -10,6 +10,6 @@ namespace fbvins {
 /// Duration of all four chirps, s.
 double excitation_length_s();
 /// The setpoint `t_s` after the beginning, around a hover setpoint.
-PathSetpoint excited(const PathSetpoint& hover, double t_s);
+PathSetpoint excitation_setpoint(const PathSetpoint& hover, double t_s);
 
 }  // namespace fbvins

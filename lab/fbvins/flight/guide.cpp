@@ -158,7 +158,7 @@ PathSetpoint Guide::next(double pace, const Vec3& p_L) {
     now_ = along_path();
   } else if (!done() && steps_[step_].kind == MissionStep::Kind::identify) {
     at_s_ = std::min(at_s_ + pace_ * dt_s_, length_s_);
-    now_ = excited(hover_, at_s_);
+    now_ = excitation_setpoint(hover_, at_s_);
   } else {
     at_s_ += pace_ * dt_s_;
     now_.v.setZero();

@@ -102,7 +102,7 @@ TEST(Excitation, ExcitesOneAxisAfterTheOtherAroundTheHoverSetpoint) {
   Vec3 widest = Vec3::Zero();
   double turned = 0;
   for (double t = 0; t < excitation_length_s(); t += 0.003) {
-    const PathSetpoint now = excited(hover, t), next = excited(hover, t + kDt);
+    const PathSetpoint now = excitation_setpoint(hover, t), next = excitation_setpoint(hover, t + kDt);
     widest = widest.cwiseMax((now.p - hover.p).cwiseAbs());
     turned = std::max(turned, std::abs(now.yaw_rad - hover.yaw_rad));
     // The velocity neglects the slow change of the amplitude.
@@ -114,7 +114,7 @@ TEST(Excitation, ExcitesOneAxisAfterTheOtherAroundTheHoverSetpoint) {
     EXPECT_LE(widest[axis], 0.25);
   }
   EXPECT_GT(turned, 0.2);
-  EXPECT_EQ(excited(hover, excitation_length_s()).p, hover.p);
+  EXPECT_EQ(excitation_setpoint(hover, excitation_length_s()).p, hover.p);
 }
 
 }  // namespace

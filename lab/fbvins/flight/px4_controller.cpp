@@ -65,7 +65,7 @@ void Px4Controller::receive() {
   const std::vector<std::uint8_t> bytes = link_.receive();
   if (bytes.empty()) return;
   send(session_.receive(bytes, companion_time(now_s_)));
-  for (const MavlinkFrame& frame : decoder_.push(bytes)) mission_.hear(frame, now_s_);
+  for (const MavlinkFrame& frame : decoder_.push(bytes)) mission_.receive(frame, now_s_);
 }
 
 Result<void> Px4Controller::take_board(const BoardReading& reading) {

@@ -60,8 +60,8 @@ const Px4Parameters& fixed_parameters() {
 
 }  // namespace
 
-Vec3 turned_over(const Vec3& v) { return {v.x(), -v.y(), -v.z()}; }
-Quat turned_over(const Quat& q) { return {q.w(), q.x(), -q.y(), -q.z()}; }
+Vec3 flu_to_frd(const Vec3& v) { return {v.x(), -v.y(), -v.z()}; }
+Quat flu_to_frd(const Quat& q) { return {q.w(), q.x(), -q.y(), -q.z()}; }
 
 MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting) {
   const Quat half_turn(0, 1, 0, 0);
@@ -81,7 +81,7 @@ MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting) {
     options.yaw_rad = std::atan2(R(1, 0), R(0, 0));
     best = options;
   }
-  const Vec3 p_F = turned_over(mounting.p);
+  const Vec3 p_F = flu_to_frd(mounting.p);
   best.x_m = p_F.x(), best.y_m = p_F.y(), best.z_m = p_F.z();
   return best;
 }
@@ -89,19 +89,19 @@ MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting) {
 VehicleEstimate estimate_of(const OdometryMessage& m) {
   VehicleEstimate e;
   const Quat q = Quat(m.q[0], m.q[1], m.q[2], m.q[3]).normalized();
-  e.T_LV = {turned_over(q), turned_over(Vec3(m.x, m.y, m.z))};
+  e.T_LV = {flu_to_frd(q), flu_to_frd(Vec3(m.x, m.y, m.z))};
   const Vec3 v(m.vx, m.vy, m.vz);
-  e.v_LV = turned_over(m.child_frame_id == kMavFrameBodyFrd ? Vec3(q * v) : v);
-  e.w_LV_V = turned_over(Vec3(m.rollspeed, m.pitchspeed, m.yawspeed));
+  e.v_LV = flu_to_frd(m.child_frame_id == kMavFrameBodyFrd ? Vec3(q * v) : v);
+  e.w_LV_V = flu_to_frd(Vec3(m.rollspeed, m.pitchspeed, m.yawspeed));
   return e;
 }
 
 PositionTargetMessage target_message(const PathSetpoint& setpoint, const Pose<Local, Px4Local>& T_LN,
                                      std::uint32_t time_boot_ms) {
   const Quat q_NL = T_LN.q.conjugate();
-  const Vec3 p = turned_over(Vec3(q_NL * (setpoint.p - T_LN.p))), v = turned_over(Vec3(q_NL * setpoint.v)),
-             a = turned_over(Vec3(q_NL * setpoint.a));
-  const Vec3 nose = turned_over(Vec3(q_NL * Vec3(std::cos(setpoint.yaw_rad), std::sin(setpoint.yaw_rad), 0)));
+  const Vec3 p = flu_to_frd(Vec3(q_NL * (setpoint.p - T_LN.p))), v = flu_to_frd(Vec3(q_NL * setpoint.v)),
+             a = flu_to_frd(Vec3(q_NL * setpoint.a));
+  const Vec3 nose = flu_to_frd(Vec3(q_NL * Vec3(std::cos(setpoint.yaw_rad), std::sin(setpoint.yaw_rad), 0)));
   PositionTargetMessage m;
   m.time_boot_ms = time_boot_ms;
   m.x = to_float(p.x()), m.y = to_float(p.y()), m.z = to_float(p.z());
@@ -112,7 +112,7 @@ PositionTargetMessage target_message(const PathSetpoint& setpoint, const Pose<Lo
 }
 
 HilSensorMessage sensor_message(const BoardReading& reading, std::uint64_t time_usec) {
-  const Vec3 a = turned_over(reading.accel), w = turned_over(reading.gyro);
+  const Vec3 a = flu_to_frd(reading.accel), w = flu_to_frd(reading.gyro);
   HilSensorMessage m;
   m.time_usec = time_usec;
   m.xacc = to_float(a.x()), m.yacc = to_float(a.y()), m.zacc = to_float(a.z());

@@ -18,8 +18,8 @@ namespace fbvins {
 struct Px4Local {};
 
 /// Half a turn about x (FLU to FRD or back): of a vector, or of a rotation between two frames that are both turned.
-Vec3 turned_over(const Vec3& v);
-Quat turned_over(const Quat& q);
+Vec3 flu_to_frd(const Vec3& v);
+Quat flu_to_frd(const Quat& q);
 
 /// A mounting as options of `fbvins live`.
 MountingOptions mounting_options_of(const Pose<BodyFlu, B>& mounting);

@@ -28,7 +28,7 @@ TEST(Px4Frames, MountingOptionsKeepTheMounting) {
   for (const auto& T_VB : mountings) {
     const Pose<BodyFrd, B> told = mounting(mounting_options_of(T_VB));
     const Vec3 x(0.3, -0.2, 0.9);
-    EXPECT_LT((told * x - turned_over(Vec3(T_VB * x))).norm(), 1e-9);
+    EXPECT_LT((told * x - flu_to_frd(Vec3(T_VB * x))).norm(), 1e-9);
   }
 }
 
@@ -61,7 +61,7 @@ TEST(Px4Frames, ASetpointIsReachedInPx4sFrame) {
   const VehicleEstimate e = estimate_of(there);
   EXPECT_LT((T_LN * e.T_LV.p - wanted.p).norm(), 1e-6);
   EXPECT_LT((T_LN.q * e.v_LV - wanted.v).norm(), 1e-6);
-  EXPECT_LT((T_LN.q * turned_over(Vec3(m.afx, m.afy, m.afz)) - wanted.a).norm(), 1e-6);
+  EXPECT_LT((T_LN.q * flu_to_frd(Vec3(m.afx, m.afy, m.afz)) - wanted.a).norm(), 1e-6);
   const Vec3 nose = T_LN.q * e.T_LV.q * Vec3::UnitX();
   EXPECT_NEAR(std::atan2(nose.y(), nose.x()), wanted.yaw_rad, 1e-6);
   EXPECT_NEAR(m.yaw_rate, -0.2, 1e-6);

@@ -55,16 +55,16 @@ void Px4Mission::say(double now_s, const std::string& text) {
   event.t_s = now_s, event.text = text;
 }
 
-void Px4Mission::hear(const MavlinkFrame& frame, double now_s) {
+void Px4Mission::receive(const MavlinkFrame& frame, double now_s) {
   if (frame.from != MavlinkAddress{system_, 1}) return;
-  if (const auto* beat = std::get_if<HeartbeatMessage>(&frame.message)) hear(*beat, now_s);
+  if (const auto* beat = std::get_if<HeartbeatMessage>(&frame.message)) receive(*beat, now_s);
   else if (const auto* odometry = std::get_if<OdometryMessage>(&frame.message)) hear_odometry(*odometry, now_s);
-  else if (const auto* ack = std::get_if<CommandAckMessage>(&frame.message)) hear(*ack, now_s);
+  else if (const auto* ack = std::get_if<CommandAckMessage>(&frame.message)) receive(*ack, now_s);
   else if (const auto* text = std::get_if<StatusTextMessage>(&frame.message))
     say(now_s, fmt::format("PX4: {}", std::string(text->text.data(), strnlen(text->text.data(), text->text.size()))));
 }
 
-void Px4Mission::hear(const HeartbeatMessage& beat, double now_s) {
+void Px4Mission::receive(const HeartbeatMessage& beat, double now_s) {
   const bool armed = (beat.base_mode & kArmedFlag) != 0;
   if (!heard_ || armed != armed_) say(now_s, fmt::format("{}armed", armed ? "" : "dis"));
   if (!heard_ || beat.custom_mode != px4_mode_) say(now_s, fmt::format("mode {}", mode_name(beat.custom_mode)));
@@ -82,7 +82,7 @@ void Px4Mission::hear_odometry(const OdometryMessage& odometry, double now_s) {
   odometry_s_ = 1e-6 * static_cast<double>(odometry.time_usec) - ahead_s_;
 }
 
-void Px4Mission::hear(const CommandAckMessage& ack, double now_s) {
+void Px4Mission::receive(const CommandAckMessage& ack, double now_s) {
   if (ack.result != kMavResultAccepted) say(now_s, fmt::format("command {} refused ({})", ack.command, ack.result));
 }
 

@@ -4,7 +4,7 @@
 // FlightReason::flight_controller. No I/O and no clock: messages and time are arguments. One owner.
 //
 //   Px4Mission mission(steps, 200, px4.system_id(), ahead_s);
-//   mission.hear(frame, now_s);
+//   mission.receive(frame, now_s);
 //   for (const MavlinkMessage& message : mission.update(live_pose, now_s)) send(message);
 //   log(mission.output());
 #pragma once
@@ -25,7 +25,7 @@ class Px4Mission {
   /// `ahead_s`: PX4's clock minus `now_s`.
   Px4Mission(const Mission& mission, double rate_hz, int system_id, double ahead_s);
 
-  void hear(const MavlinkFrame& frame, double now_s);
+  void receive(const MavlinkFrame& frame, double now_s);
   /// At every reading of the odometry's IMU. Returns the messages to send.
   std::vector<MavlinkMessage> update(const LivePose& pose, double now_s);
 
@@ -35,9 +35,9 @@ class Px4Mission {
   int resets_in_flight() const { return resets_in_flight_; }
 
  private:
-  void hear(const HeartbeatMessage& beat, double now_s);
+  void receive(const HeartbeatMessage& beat, double now_s);
   void hear_odometry(const OdometryMessage& odometry, double now_s);
-  void hear(const CommandAckMessage& ack, double now_s);
+  void receive(const CommandAckMessage& ack, double now_s);
   void look(double now_s);
   void prepare(double now_s);
   void take_off(double now_s);

@@ -52,8 +52,8 @@ std::vector<FlightMode> fly(Px4Mission& mission, FakePx4& px4, double seconds, d
     pose.estimate_t = std::min(pose.t, Time{1'000'000'000} + Duration::from_seconds(odometry_ends_s));
     pose.health = {HealthState::good, HealthReason::none};
     px4.go_on(now_s);
-    mission.hear({{2, 1}, 0, px4.odometry}, now_s);
-    if (i % 20 == 0) mission.hear({{2, 1}, 0, px4.beat}, now_s);
+    mission.receive({{2, 1}, 0, px4.odometry}, now_s);
+    if (i % 20 == 0) mission.receive({{2, 1}, 0, px4.beat}, now_s);
     for (const MavlinkMessage& message : mission.update(pose, now_s)) px4.take(message, now_s);
     if (modes.empty() || modes.back() != mission.output().mode) modes.push_back(mission.output().mode);
   }
@@ -119,8 +119,8 @@ TEST(Px4Mission, CountsResetsInFlight) {
   px4.odometry.reset_counter = 3;
   fly(mission, px4, 5);
   ++px4.odometry.reset_counter;
-  mission.hear({{2, 1}, 0, px4.odometry}, 5);
-  mission.hear({{2, 197}, 0, OdometryMessage{}}, 5);  // the companion's own message
+  mission.receive({{2, 1}, 0, px4.odometry}, 5);
+  mission.receive({{2, 197}, 0, OdometryMessage{}}, 5);  // the companion's own message
   EXPECT_EQ(mission.resets_in_flight(), 1);
 }
 

@@ -49,7 +49,7 @@ void multiply_float(const float* x, int rows, int inputs, const float* weight_t,
 }
 
 FBVINS_KERNEL
-void clamp_negative(float* x, int n) {
+void relu(float* x, int n) {
   for (int i = 0; i < n; ++i) x[i] = x[i] > 0 ? x[i] : 0.0f;
 }
 

@@ -10,7 +10,7 @@ namespace fbvins {
 /// out[row][n] = sum_k x[row][k] weight[n][k] + bias[n], in order of k; weight_t is [inputs][outputs].
 void multiply_float(const float* x, int rows, int inputs, const float* weight_t, const float* bias, int outputs, float* out);
 
-void clamp_negative(float* x, int n);
+void relu(float* x, int n);
 
 /// x += y
 void add(float* x, const float* y, int n);

@@ -109,7 +109,7 @@ void BoosterNetwork::encode(std::span<const Margins> margins) {
     if (skip_.outputs > 0) apply(skip_, query_, skipped_);
     apply(descriptor1_, query_, hidden_);
   }
-  clamp_negative(hidden_.data(), rows_ * descriptor1_.outputs);
+  relu(hidden_.data(), rows_ * descriptor1_.outputs);
   apply(descriptor2_, hidden_, z_);
 }
 
@@ -117,7 +117,7 @@ void BoosterNetwork::encode(std::span<const Margins> margins) {
 void BoosterNetwork::encode_geometry() {
   hidden_.assign(geometry_.begin(), geometry_.end());
   for (std::size_t i = 0; i < keypoint_.size(); ++i) {
-    if (i > 0) clamp_negative(hidden_.data(), rows_ * keypoint_[i].inputs);
+    if (i > 0) relu(hidden_.data(), rows_ * keypoint_[i].inputs);
     apply(keypoint_[i], hidden_, hidden2_);
     std::swap(hidden_, hidden2_);
   }
@@ -141,7 +141,7 @@ void BoosterNetwork::attend(const Layer& layer) {
 /// z = norm(z + down(relu(up(z)))).
 void BoosterNetwork::feed_forward(const Layer& layer) {
   apply(layer.up, z_, hidden_);
-  clamp_negative(hidden_.data(), rows_ * layer.up.outputs);
+  relu(hidden_.data(), rows_ * layer.up.outputs);
   apply(layer.down, hidden_, query_);
   add(z_.data(), query_.data(), rows_ * width_);
   normalise_rows(z_.data(), rows_, width_, layer.norm2.weight.data(), layer.norm2.bias.data());

@@ -12,9 +12,9 @@
 namespace fbvins {
 
 /// ring() from any thread makes poll() on fd() return until silence().
-class Bell {
+class WakeEvent {
  public:
-  Bell() : event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+  WakeEvent() : event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
   int fd() const { return event_.number(); }
   void ring() const {

@@ -32,7 +32,7 @@ Result<void> check_memory(const FileDescriptor& memory, const FrameLayout& layou
 }  // namespace
 
 Result<std::shared_ptr<FrameRing>> FrameRing::map(const FileDescriptor& memory, const FrameLayout& layout,
-                                                  std::shared_ptr<const Bell> bell) {
+                                                  std::shared_ptr<const WakeEvent> bell) {
   if (Result<void> good = check_memory(memory, layout); !good) return good.error();
   void* address = ::mmap(nullptr, layout.bytes(), PROT_READ, MAP_SHARED, memory.number(), 0);
   if (address == MAP_FAILED)

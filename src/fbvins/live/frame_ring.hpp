@@ -25,7 +25,7 @@ namespace fbvins {
 class FrameRing : public std::enable_shared_from_this<FrameRing> {
  public:
   static Result<std::shared_ptr<FrameRing>> map(const FileDescriptor& memory, const FrameLayout& layout,
-                                                std::shared_ptr<const Bell> bell);
+                                                std::shared_ptr<const WakeEvent> bell);
   FrameRing(const FrameRing&) = delete;
   FrameRing& operator=(const FrameRing&) = delete;
   ~FrameRing();
@@ -39,7 +39,7 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
   int held() const;
 
  private:
-  FrameRing(const std::uint8_t* memory, const FrameLayout& layout, std::shared_ptr<const Bell> bell)
+  FrameRing(const std::uint8_t* memory, const FrameLayout& layout, std::shared_ptr<const WakeEvent> bell)
       : memory_(memory), layout_(layout), bell_(std::move(bell)) {}
   StereoFrame borrow(const SocketFrame& frame);
   StereoFrame copy(const SocketFrame& frame) const;
@@ -47,7 +47,7 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
 
   const std::uint8_t* memory_;
   FrameLayout layout_;
-  std::shared_ptr<const Bell> bell_;
+  std::shared_ptr<const WakeEvent> bell_;
   std::uint64_t held_ = 0;
   std::atomic<std::uint64_t> released_ = 0;
 };

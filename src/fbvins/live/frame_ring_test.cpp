@@ -12,7 +12,7 @@ using test::kSlotBytes;
 
 const FrameLayout kLayout{test::kWidth, test::kHeight, test::kSlots, kSlotBytes, kSlotBytes / 2};
 
-bool rings(const Bell& bell) {
+bool rings(const WakeEvent& bell) {
   pollfd watched{bell.fd(), POLLIN, 0};
   return ::poll(&watched, 1, 0) == 1;
 }
@@ -30,7 +30,7 @@ class FrameRingTest : public testing::Test {
   ~FrameRingTest() override { ::munmap(slots_, kLayout.bytes()); }
 
   FileDescriptor memory_ = test::test_memory();
-  std::shared_ptr<const Bell> bell_ = std::make_shared<const Bell>();
+  std::shared_ptr<const WakeEvent> bell_ = std::make_shared<const WakeEvent>();
   std::shared_ptr<FrameRing> ring_;
   std::uint8_t* slots_ = nullptr;
 };
@@ -110,7 +110,7 @@ TEST_F(FrameRingTest, NoSlotBeyondTheLast) {
 }
 
 TEST(FrameRing, MemoryThatCouldGoAwayIsRefused) {
-  const auto bell = std::make_shared<const Bell>();
+  const auto bell = std::make_shared<const WakeEvent>();
   const auto refusal = [&](const FileDescriptor& memory) {
     const auto ring = FrameRing::map(memory, kLayout, bell);
     return ring ? "taken" : ring.error().message;

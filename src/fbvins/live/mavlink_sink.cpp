@@ -47,7 +47,7 @@ struct MavlinkSink::Impl {
   MavlinkLinkState seen;
   Time next_try{};
 
-  const Bell bell;
+  const WakeEvent bell;
   std::atomic<bool> ending{false};
   std::mutex mutex;  // guards what follows, but for the thread
   std::deque<std::variant<LivePose, LiveStatus>> waiting;

@@ -26,7 +26,7 @@ struct SocketCounts {
 
 class SocketSession {
  public:
-  SocketSession(FileDescriptor connection, std::shared_ptr<const Bell> bell)
+  SocketSession(FileDescriptor connection, std::shared_ptr<const WakeEvent> bell)
       : connection_(std::move(connection)), bell_(std::move(bell)) {}
 
   int fd() const { return connection_.number(); }
@@ -60,7 +60,7 @@ class SocketSession {
 
   FileDescriptor connection_;
   std::array<std::byte, FBVINS_SOCKET_LARGEST_MESSAGE> buffer_;
-  std::shared_ptr<const Bell> bell_;
+  std::shared_ptr<const WakeEvent> bell_;
   std::optional<SocketHello> hello_;
   std::shared_ptr<FrameRing> ring_;
   std::optional<std::uint64_t> last_sequence_;

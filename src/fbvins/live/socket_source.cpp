@@ -47,7 +47,7 @@ struct SocketSource::Report {
 
 class SocketSource::StatusSink final : public Sink {
  public:
-  StatusSink(std::shared_ptr<Report> report, std::shared_ptr<const Bell> bell)
+  StatusSink(std::shared_ptr<Report> report, std::shared_ptr<const WakeEvent> bell)
       : report_(std::move(report)), bell_(std::move(bell)) {}
   std::string_view name() const override { return "status to the sender"; }
   Result<void> take(const LiveEvent& event) override {
@@ -64,7 +64,7 @@ class SocketSource::StatusSink final : public Sink {
 
  private:
   std::shared_ptr<Report> report_;
-  std::shared_ptr<const Bell> bell_;
+  std::shared_ptr<const WakeEvent> bell_;
 };
 
 SocketSource::SocketSource(SocketFile file, SocketOptions options)

@@ -5,9 +5,9 @@
 
 namespace fbvins {
 
-void FlightRecord::hand_over(KeyframeId gone, KeyframeId heir, const Pose<B, B>& T_heir_gone) {
+void FlightRecord::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
   for (Entry& e : entries_)
-    if (e.anchor == gone) e.anchor = heir, e.T_anchor_B = T_heir_gone * e.T_anchor_B;
+    if (e.anchor == gone) e.anchor = successor, e.T_anchor_B = T_successor_gone * e.T_anchor_B;
 }
 
 void FlightRecord::drop(KeyframeId gone) {

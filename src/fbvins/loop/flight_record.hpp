@@ -4,7 +4,7 @@
 //
 //   FlightRecord flight;
 //   flight.add(t, id);
-//   flight.hand_over(gone.id, heir.id, heir.T_MB.inverse() * gone.T_MB);
+//   flight.hand_over(gone.id, successor.id, successor.T_MB.inverse() * gone.T_MB);
 //   Trajectory<M> in_map = flight.corrected(map, trajectory_in_G);
 #pragma once
 
@@ -18,8 +18,8 @@ namespace fbvins {
 class FlightRecord {
  public:
   void add(Time t, KeyframeId id) { entries_.push_back({t, id, {}}); }
-  /// Attaches what was attached to `gone` to `heir`.
-  void hand_over(KeyframeId gone, KeyframeId heir, const Pose<B, B>& T_heir_gone);
+  /// Attaches what was attached to `gone` to `successor`.
+  void hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone);
   /// Drops what was attached to `gone`.
   void drop(KeyframeId gone);
   /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, interpolated between them. Keyframes that

@@ -50,8 +50,8 @@ TEST_F(Record, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
 }
 
 TEST_F(Record, PosesOfARemovedKeyframeFollowItsHeir) {
-  const Pose<B, B> T_heir_gone(Quat::Identity(), Vec3(1.1, 0, 0));
-  flight_.hand_over(KeyframeId{2}, KeyframeId{1}, T_heir_gone);
+  const Pose<B, B> T_successor_gone(Quat::Identity(), Vec3(1.1, 0, 0));
+  flight_.hand_over(KeyframeId{2}, KeyframeId{1}, T_successor_gone);
   map_.remove(KeyframeId{2});
   EXPECT_NEAR(x_at(4), 2.2, 1e-12);
   map_.find(KeyframeId{1})->T_MB.p.x() += 0.5;

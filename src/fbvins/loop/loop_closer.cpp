@@ -219,7 +219,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
   const double gate = options_.gate_sigma * options_.gate_sigma;
   for (const Proposal& proposal : proposals) {
     MapKeyframe& k = *map_.find(proposal.candidate);
-    SeenPose seen = seen_pose(k, proposal.edge);
+    MeasuredPose seen = measured_pose(k, proposal.edge);
     // The error that different roll and pitch cause through the lever arm is not drift.
     double tilt_variance = kTiltSigma_rad * kTiltSigma_rad;
     if (k.session != session_.number) tilt_variance += session_.up_sigma_rad * session_.up_sigma_rad;
@@ -231,14 +231,14 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     frame_.update(seen);
     found.push_back(proposal.edge);
     ++update.stats.accepted;
-    ++k.seen_again;
+    ++k.loops_ending_here;
   }
   query.T_MB = frame_.T_MG() * query.T_GB;
 }
 
 void LoopCloser::relocalise(MapKeyframe& query, const std::vector<Proposal>& proposals, std::vector<MapEdge>& found) {
   for (const Proposal& proposal : proposals) {
-    const SeenPose seen = seen_pose(*map_.find(proposal.candidate), proposal.edge);
+    const MeasuredPose seen = measured_pose(*map_.find(proposal.candidate), proposal.edge);
     const std::optional<Pose<M, G>> T_MG = relocaliser_.consider(query, session_.q_LG, seen.T_MB, proposal.verified);
     if (!T_MG) continue;
     frame_.reset(*T_MG, kFoundSigma_m, kFoundSigma_rad);
@@ -310,11 +310,11 @@ PoseGraphReport LoopCloser::finish() { return map_.optimise({options_.degrees_of
 
 FinalAdjustmentReport LoopCloser::adjust() { return adjust_map(map_, verification_for(map_, options_.verification)); }
 
-/// Poses attached to the keyframe are attached to its heir; without one they are dropped.
+/// Poses attached to the keyframe are attached to its successor; without one they are dropped.
 void LoopCloser::take_out(KeyframeId id) {
   const MapKeyframe& gone = *map_.find(id);
-  if (const MapKeyframe* heir = heir_of(map_, gone); heir != nullptr)
-    flight_.hand_over(id, heir->id, heir->T_MB.inverse() * gone.T_MB);
+  if (const MapKeyframe* successor = successor_of(map_, gone); successor != nullptr)
+    flight_.hand_over(id, successor->id, successor->T_MB.inverse() * gone.T_MB);
   else flight_.drop(id);
   search_.remove(id, gone.place.words);
   map_.remove(id);

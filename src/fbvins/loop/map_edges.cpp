@@ -48,8 +48,8 @@ MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const Relative
   return {candidate, {}, T_BC * T_cq * T_BC.inverse(), symmetric(cov.inverse()), MapEdge::Kind::loop, nullptr};
 }
 
-SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge) {
-  SeenPose seen;
+MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge) {
+  MeasuredPose seen;
   seen.T_MB = from.T_MB * edge.T_from_to;
   const Mat6 cov = edge.information.inverse();
   const Mat3 R = from.T_MB.R(), R_q = seen.T_MB.R();

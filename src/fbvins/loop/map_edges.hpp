@@ -3,7 +3,7 @@
 // in M that a recognised place implies (docs/derivations/loop.md, L13). Pure functions.
 //
 //   MapEdge edge = loop_edge(T_BC0, candidate.id, verified.pose);
-//   if (frame.mahalanobis2(seen_pose(candidate, edge)) < gate) map.edges.push_back(edge);
+//   if (frame.mahalanobis2(measured_pose(candidate, edge)) < gate) map.edges.push_back(edge);
 #pragma once
 
 #include "fbvins/loop/map_frame.hpp"
@@ -22,6 +22,6 @@ MapEdge odometry_edge(const MapKeyframe& from, const Pose<G, B>& T_GB, Time t, c
 MapEdge loop_edge(const Pose<B, C0>& T_BC0, KeyframeId candidate, const RelativePose& pose);
 
 /// Pose in M of the body at the end of `edge`, from that of `from`.
-SeenPose seen_pose(const MapKeyframe& from, const MapEdge& edge);
+MeasuredPose measured_pose(const MapKeyframe& from, const MapEdge& edge);
 
 }  // namespace fbvins

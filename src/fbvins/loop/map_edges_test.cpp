@@ -46,7 +46,7 @@ TEST(LoopEdge, IsThePoseOfTheBodyAndPutsItWhereItIs) {
   EXPECT_EQ(edge.from, candidate.id);
   EXPECT_EQ(edge.kind, MapEdge::Kind::loop);
   EXPECT_LT(((candidate.T_MB * edge.T_from_to).p - T_MB_query.p).norm(), 1e-9);
-  const SeenPose seen = seen_pose(candidate, edge);
+  const MeasuredPose seen = measured_pose(candidate, edge);
   EXPECT_LT((seen.T_MB.p - T_MB_query.p).norm(), 1e-12);
   EXPECT_LT(angle_between(seen.T_MB.q, T_MB_query.q), 1e-6);
 }

@@ -91,7 +91,7 @@ void put(Writer& w, const MapKeyframe& k) {
   w.put(k.id.value);
   w.put(k.t.ns);
   w.put(k.session);
-  w.put(static_cast<std::int32_t>(k.seen_again));
+  w.put(static_cast<std::int32_t>(k.loops_ending_here));
   w.put(k.T_GB);
   w.put(k.T_MB);
   w.put(k.path_m);
@@ -107,7 +107,7 @@ MapKeyframe get_keyframe(Reader& r) {
   k.id.value = r.get<std::int64_t>();
   k.t.ns = r.get<std::int64_t>();
   k.session = r.get<std::uint32_t>();
-  k.seen_again = r.get<std::int32_t>();
+  k.loops_ending_here = r.get<std::int32_t>();
   k.T_GB = r.pose<Pose<G, B>>();
   k.T_MB = r.pose<Pose<M, B>>();
   k.path_m = r.get<double>();

@@ -60,19 +60,19 @@ void MapFrame::advance(const Pose<G, B>& T_GB, Time t) {
   last_ = Stamped{t, T_GB};
 }
 
-Vec4 MapFrame::innovation(const SeenPose& seen) const {
+Vec4 MapFrame::innovation(const MeasuredPose& seen) const {
   const Pose<M, B> predicted = T_MG_ * last_->T_GB;
   Vec4 v;
   v << seen.T_MB.p - predicted.p, yaw_of(seen.T_MB.q * predicted.q.conjugate());
   return v;
 }
 
-double MapFrame::mahalanobis2(const SeenPose& seen) const {
+double MapFrame::mahalanobis2(const MeasuredPose& seen) const {
   const Vec4 v = innovation(seen);
   return v.dot((P_ + seen.covariance).ldlt().solve(v));
 }
 
-void MapFrame::update(const SeenPose& seen) {
+void MapFrame::update(const MeasuredPose& seen) {
   const Vec4 v = innovation(seen);
   const Mat4 S = P_ + seen.covariance;
   const Mat4 K = S.ldlt().solve(P_).transpose();

@@ -31,7 +31,7 @@ struct DriftVariance {
 DriftVariance drift_over(const DriftOptions& options, double metres, double seconds);
 
 /// A pose of the body in M from a recognised place, with the covariance of (position, yaw).
-struct SeenPose {
+struct MeasuredPose {
   Pose<M, B> T_MB;
   Mat4 covariance = Mat4::Identity();
 };
@@ -61,15 +61,15 @@ class MapFrame {
   void reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad);
   /// Predicts: the odometry's next pose.
   void advance(const Pose<G, B>& T_GB, Time t);
-  double mahalanobis2(const SeenPose& seen) const;
-  void update(const SeenPose& seen);
+  double mahalanobis2(const MeasuredPose& seen) const;
+  void update(const MeasuredPose& seen);
 
  private:
   struct Stamped {
     Time t;
     Pose<G, B> T_GB;
   };
-  Vec4 innovation(const SeenPose& seen) const;
+  Vec4 innovation(const MeasuredPose& seen) const;
   /// Where the body is in G; its origin before the odometry has begun.
   Vec3 body() const { return last_ ? last_->T_GB.p : Vec3(Vec3::Zero()); }
   void put(double yaw_rad, const Vec3& p_MB);

@@ -61,7 +61,7 @@ TEST(MapFrame, FlyingWidensTheCovarianceAndAPlaceNarrowsIt) {
   EXPECT_GT(flown(0, 0), before(0, 0) + 8 * 0.01 * 0.01);
   EXPECT_GT(flown(1, 1), flown(0, 0)) << "a yaw error turns the step sideways";
   EXPECT_NEAR(flown(1, 3), 9 * before(3, 3), 1e-6) << "and the two errors are correlated";
-  SeenPose seen{{about_z(0.01), Vec3(9, 0.05, 0)}, 1e-4 * Mat4::Identity()};
+  MeasuredPose seen{{about_z(0.01), Vec3(9, 0.05, 0)}, 1e-4 * Mat4::Identity()};
   const double far = frame.mahalanobis2(seen);
   frame.update(seen);
   EXPECT_LT(frame.mahalanobis2(seen), far);
@@ -75,7 +75,7 @@ TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
   MapFrame frame({});
   frame.advance(body_at(Vec3::Zero()), Time{0});
   frame.reset({}, 0.3, 0.02);
-  SeenPose seen{{Quat::Identity(), Vec3(0.5, 0, 0)}, Mat4::Zero()};
+  MeasuredPose seen{{Quat::Identity(), Vec3(0.5, 0, 0)}, Mat4::Zero()};
   seen.covariance.diagonal() << 0.16, 0.16, 0.16, 1e-4;  // 0.09 + 0.16 = 0.25
   EXPECT_NEAR(frame.mahalanobis2(seen), 1, 1e-9);
 }

@@ -37,9 +37,9 @@ struct MapKeyframe {
   std::uint32_t session = 0;  ///< which flight's gauge G it was taken in
   Pose<G, B> T_GB;            ///< as estimated in flight; never levelled
   Pose<M, B> T_MB;
-  double path_m = 0;   ///< flown in this session until here
-  int seen_again = 0;  ///< loops that ended here
-  bool placed = true;  ///< T_MB is known: its session has been localised in the map
+  double path_m = 0;          ///< flown in this session until here
+  int loops_ending_here = 0;  ///< loops that ended here
+  bool placed = true;         ///< T_MB is known: its session has been localised in the map
   Place place;
   MapMotion motion;
 };

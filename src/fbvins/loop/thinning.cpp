@@ -49,7 +49,7 @@ std::optional<KeyframeId> Thinning::next(const PlaceMap& map) {
   return std::nullopt;
 }
 
-const MapKeyframe* heir_of(const PlaceMap& map, const MapKeyframe& gone) {
+const MapKeyframe* successor_of(const PlaceMap& map, const MapKeyframe& gone) {
   const auto& all = map.keyframes();
   const auto at = static_cast<std::size_t>(&gone - all.data());
   if (at > 0 && all[at - 1].session == gone.session) return &all[at - 1];

@@ -32,6 +32,6 @@ class Thinning {
 
 /// The keyframe that takes over the poses attached to `gone`: a neighbour of its session, else the last one before it that
 /// has a place in M, if `gone` has one. Null for a session's only keyframe that has none.
-const MapKeyframe* heir_of(const PlaceMap& map, const MapKeyframe& gone);
+const MapKeyframe* successor_of(const PlaceMap& map, const MapKeyframe& gone);
 
 }  // namespace fbvins

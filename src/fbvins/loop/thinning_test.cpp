@@ -73,14 +73,14 @@ TEST(Thinning, EndsWithAMapOfTwo) {
 
 TEST(Thinning, HeirsAreOfTheSessionElseTheLastOneWithAPlace) {
   PlaceMap map = line({0, 0, 1, 1, 2, 3});
-  const auto heir = [&](std::size_t i) { return heir_of(map, map.keyframes()[i]); };
-  EXPECT_EQ(heir(1)->id, KeyframeId{0});
-  EXPECT_EQ(heir(2)->id, KeyframeId{3}) << "of its own session";
-  EXPECT_EQ(heir(4)->id, KeyframeId{3}) << "alone in its session";
+  const auto successor = [&](std::size_t i) { return successor_of(map, map.keyframes()[i]); };
+  EXPECT_EQ(successor(1)->id, KeyframeId{0});
+  EXPECT_EQ(successor(2)->id, KeyframeId{3}) << "of its own session";
+  EXPECT_EQ(successor(4)->id, KeyframeId{3}) << "alone in its session";
   map.keyframes()[3].placed = false;
-  EXPECT_EQ(heir(4)->id, KeyframeId{2});
+  EXPECT_EQ(successor(4)->id, KeyframeId{2});
   map.keyframes()[4].placed = false;
-  EXPECT_EQ(heir(4), nullptr) << "nothing joins it to M";
+  EXPECT_EQ(successor(4), nullptr) << "nothing joins it to M";
 }
 
 }  // namespace

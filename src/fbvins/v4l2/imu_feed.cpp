@@ -65,7 +65,7 @@ class MavlinkFeed final : public ImuFeed {
   ByteLink link_;
   MavlinkImu imu_;
   Time next_try_{};
-  const Bell bell_;
+  const WakeEvent bell_;
   std::atomic<bool> stopped_ = false;
 };
 

@@ -55,7 +55,7 @@ class V4l2Source final : public Source {
   std::vector<Opened> cameras_;
   std::unique_ptr<ImuFeed> imu_;
   StereoPairs pairs_;
-  const Bell bell_;
+  const WakeEvent bell_;
   std::mutex say_mutex_;
   std::atomic<bool> stopped_ = false;
 };

@@ -54,12 +54,12 @@ void FlightPlayer::play(WebSink& sink) {
     }
     if (!begun && sink.viewers() > 0) {
       begun = true;
-      obey(sink, {WebCommand::Kind::play, {}});
+      apply(sink, {WebCommand::Kind::play, {}});
     }
     const auto due = playing_ ? began_ + seconds(time_s(next_)) : Clock::now() + kLookForViewers;
     if (const auto command = wait_for_command(due)) {
       begun = true;
-      obey(sink, *command);
+      apply(sink, *command);
     } else if (playing_ && Clock::now() >= due) {
       (void)sink.take(flight_.event(next_));
       shown_s_ = time_s(next_);
@@ -70,26 +70,26 @@ void FlightPlayer::play(WebSink& sink) {
   }
 }
 
-void FlightPlayer::obey(WebSink& sink, const WebCommand& command) {
+void FlightPlayer::apply(WebSink& sink, const WebCommand& command) {
   using Kind = WebCommand::Kind;
-  if (command.kind == Kind::seek) wind_to(sink, std::clamp(command.t_s, 0.0, end_s()));
-  else if (command.kind == Kind::play && next_ == flight_.size()) wind_to(sink, 0);
+  if (command.kind == Kind::seek) seek_to(sink, std::clamp(command.t_s, 0.0, end_s()));
+  else if (command.kind == Kind::play && next_ == flight_.size()) seek_to(sink, 0);
   playing_ = (command.kind == Kind::play || (command.kind == Kind::seek && playing_)) && next_ < flight_.size();
   began_ = Clock::now() - seconds(shown_s_);
   sink.show_replay(shown_s_, playing_);
 }
 
 /// Goes through all events from the beginning, as a page shows the sum of what it has received.
-void FlightPlayer::wind_to(WebSink& sink, double t_s) {
+void FlightPlayer::seek_to(WebSink& sink, double t_s) {
   std::size_t end = 0;
   while (end < flight_.size() && time_s(end) <= t_s) ++end;
   // The events of the last image are sent as new ones, those before it as history.
   std::size_t last = end;
   while (last > 0 && flight_.time_of(last - 1) == flight_.time_of(end - 1)) --last;
-  sink.begin_again();
+  sink.begin_replay();
   for (std::size_t i = 0; i < last; ++i)
     if (!flight_.is_image(i)) (void)sink.take(flight_.event(i));
-  sink.caught_up();
+  sink.end_replay();
   for (std::size_t i = last; i < end; ++i) (void)sink.take(flight_.event(i));
   next_ = end;
   shown_s_ = end > 0 ? time_s(end - 1) : 0;

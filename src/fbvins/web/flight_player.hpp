@@ -31,8 +31,8 @@ class FlightPlayer {
  private:
   double time_s(std::size_t i) const { return (flight_.time_of(i) - flight_.time_of(0)).seconds(); }
   double end_s() const { return time_s(flight_.size() - 1); }
-  void wind_to(WebSink& sink, double t_s);
-  void obey(WebSink& sink, const WebCommand& command);
+  void seek_to(WebSink& sink, double t_s);
+  void apply(WebSink& sink, const WebCommand& command);
   std::optional<WebCommand> wait_for_command(std::chrono::steady_clock::time_point until);
 
   const FinishedFlight& flight_;

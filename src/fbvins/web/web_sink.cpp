@@ -170,7 +170,7 @@ void WebSink::show_replay(double t_s, bool playing) {
   send(last_replay_ = replay_message(t_s, playing));
 }
 
-void WebSink::begin_again() {
+void WebSink::begin_replay() {
   const std::lock_guard lock(mutex_);
   silent_ = true;
   history_.clear();
@@ -180,7 +180,7 @@ void WebSink::begin_again() {
   loops_ = 0;
 }
 
-void WebSink::caught_up() {
+void WebSink::end_replay() {
   const std::lock_guard lock(mutex_);
   silent_ = false;
   state_due_ = points_due_ = picture_due_ = {};  // the next image is shown, however soon it comes

@@ -43,9 +43,9 @@ class WebSink final : public Sink {
   void tell(const std::string& sentence, bool bad);
   // For replays, from the thread that calls take().
   void show_replay(double t_s, bool playing);
-  /// Discards the history. Events until caught_up() are not sent one by one, but as history then.
-  void begin_again();
-  void caught_up();
+  /// Discards the history. Events until end_replay() are not sent one by one, but as history then.
+  void begin_replay();
+  void end_replay();
   /// Zero of the times on the page; without it the first event with a stamp.
   void set_start(Time start);
 
@@ -76,7 +76,7 @@ class WebSink final : public Sink {
   FlightHistory history_;
   std::optional<Time> start_;
   bool silent_ = false;
-  std::optional<Odometry> untold_;  ///< the newest since begin_again()
+  std::optional<Odometry> untold_;  ///< the newest since begin_replay()
   SharedMessage last_state_, last_status_, last_map_, last_points_, last_image_, last_replay_;
 
   // Used by the thread that calls take().
