@@ -16,10 +16,10 @@ namespace fbvins::app {
 struct RunSummary {
   std::string frontend;
   std::string booster_weights;  ///< the file, of the boost frontend
-  std::string mode;     ///< deterministic or threaded
-  std::string dataset;  ///< its name, not its path
-  int frames = 0;       ///< stereo frames that reached the frontend
-  int images_bad = 0;   ///< image files missing, corrupt or of the wrong size
+  std::string mode;             ///< deterministic or threaded
+  std::string dataset;          ///< its name, not its path
+  int frames = 0;               ///< stereo frames that reached the frontend
+  int images_bad = 0;           ///< image files missing, corrupt or of the wrong size
   Coverage coverage;
   int restarts = 0;                                 ///< times the estimator started anew after its first pose
   std::vector<std::pair<std::string, int>> health;  ///< frames per "state" or "state/reason"

@@ -79,8 +79,7 @@ int make(const std::string& folder, int seconds) {
       << test::packed_ros1(*read_file(path("flight.bag"), kLargestFile_bytes), "lz4");
   const std::string record_bytes = *read_file(path("flight.mcap"), kLargestFile_bytes);
   std::ofstream(path("plain.mcap"), std::ios::binary) << test::packed_mcap(record_bytes, "");
-  std::ofstream(path("zstd.mcap"), std::ios::binary)
-      << test::packed_mcap(record_bytes, "zstd");
+  std::ofstream(path("zstd.mcap"), std::ios::binary) << test::packed_mcap(record_bytes, "zstd");
   return 0;
 }
 

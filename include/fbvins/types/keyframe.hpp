@@ -35,9 +35,9 @@ struct Keyframe {
   Time t;
   Pose<W, B> T_WB;
   Vec3 v_WB = Vec3::Zero();
-  GaugeState gauge;                     ///< in the estimator's own frame, not levelled
-  Pose<W, G> T_WG;                      ///< of the newest published pose when this was handed on; set by the pipeline
-  std::uint32_t reset_counter = 0;      ///< a new value: W is a new frame, with no known relation to the old
+  GaugeState gauge;                 ///< in the estimator's own frame, not levelled
+  Pose<W, G> T_WG;                  ///< of the newest published pose when this was handed on; set by the pipeline
+  std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, with no known relation to the old
   StereoFrame images;
   std::vector<KeyframeLandmark> landmarks;
   KeyframeImu imu;  ///< set by the pipeline, except for the bias
