@@ -76,7 +76,7 @@ LoopLog identify(const ControlOptions& control) {
   log.control = control;
   for (double t = 0; t < excitation_length_s(); t += 1 / kRate_hz) {
     const Vec3 v = flight.estimate().v_LV;
-    flight.fly(excited(flight.hover(), t));
+    flight.fly(excitation_setpoint(flight.hover(), t));
     log.rate.push_back(flight.trace().rate), log.torque.push_back(flight.trace().torque);
     log.velocity.push_back(v), log.acceleration_asked.push_back(flight.trace().a_setpoint);
   }
