@@ -202,7 +202,7 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   add_scale(level_state.T_WB.p - window_.tilt().pivot_W, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
   add_scale(level_state.v_WB, scale_sigma_, out.velocity_covariance);
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg);
-  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba);
+  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_variance(options_.gravity_mps2) * Mat3::Identity();
   up_sigma_rad_ = up_sigma_rad(*covariance);
 }
 

@@ -32,5 +32,18 @@ TEST(ScaleUncertainty, ErrorsOfRandomScalesAreAsLargeAsItSays) {
   EXPECT_NEAR(sum / kFlights, 1, 0.08);  // one direction
 }
 
+TEST(AxisUncertainty, GravityMakesBiasesAsLargeAsItSaysOfCrookedAxes) {
+  Rng rng(4);
+  double sum = 0;
+  constexpr int kAccelerometers = 4000;
+  for (int i = 0; i < kAccelerometers; ++i) {
+    Mat3 crooked;
+    for (double& e : crooked.reshaped()) e = kAccelAxisSigma * rng.normal();
+    const Vec3 up(rng.normal(), 2, 1);
+    sum += (crooked * (9.81 * up.normalized())).squaredNorm() / axis_variance(9.81);
+  }
+  EXPECT_NEAR(sum / kAccelerometers, 3, 0.15);
+}
+
 }  // namespace
 }  // namespace fbvins
