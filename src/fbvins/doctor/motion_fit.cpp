@@ -46,7 +46,7 @@ struct FoundChange {
   double explained_px;
 };
 
-/// Frees the group that explains most, then the one that explains most in addition, as long as it is significant.
+/// Estimates the group of unknowns that reduces the error most, then the next, as long as the reduction is significant.
 std::vector<FoundChange> search(MotionProblem& problem, bool focal_doubted) {
   std::vector<FoundChange> found;
   double capped = problem.capped_error();

@@ -253,8 +253,8 @@ void Estimator::restart() {
   rest_.reset();
 }
 
-/// Where the solve has given no covariance, the last one goes on, with what its velocity may have been off since then;
-/// where there never was one it is unknown.
+/// Without a covariance from this solve, publishes the last one; position grows by the velocity's error over the time since.
+/// NaN (unknown) if there never was one.
 void Estimator::carry_covariances(Odometry& out) {
   if (!out.pose_covariance.isZero(0)) {
     covariances_ = {out.t, out.pose_covariance, out.velocity_covariance, out.gyro_bias_covariance, out.accel_bias_covariance};

@@ -180,7 +180,7 @@ TEST(Estimator, PriorHasNoInformationOnPositionAndHeadingBeyondTheGauge) {
     for (int k = 0; k < 120; ++k) (void)estimator.process(flight.frame(k));
     const WindowPrior& prior = estimator.window().prior();
     ASSERT_FALSE(prior.empty());
-    // The four directions of W9 that leave gravity as it is, at the first estimates and the estimated up.
+    // The four unobservable directions of W9 (position and heading), at the first estimates and the estimated up.
     const Vec3 up_W = estimator.window().tilt().q() * Vec3::UnitZ();
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
     for (std::size_t i = 0; i < prior.frames.size(); ++i) {

@@ -311,7 +311,7 @@ TEST(SlidingWindow, RemembersNoLandmarksWhereUpIsFixed) {
 TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);
-  s.points_W[0] += Vec3(0, 0.8, 0);  // far away: refused as soon as it is triangulated
+  s.points_W[0] += Vec3(0, 0.8, 0);  // far from the estimate: its triangulation refuses the prior
   s.add(5, {s.feature(0, 5), s.feature(1, 5), s.feature(2, 5)});
   EXPECT_FALSE(s.landmark(0)->prior.has_value());
   EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
