@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "fbvins/core/stage_timer.hpp"
+#include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/scale_uncertainty.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
 
@@ -201,8 +201,8 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   const NavState level_state = window_.tilt().levelled(newest.state);
   add_scale(level_state.T_WB.p - window_.tilt().pivot_W, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
   add_scale(level_state.v_WB, scale_sigma_, out.velocity_covariance);
-  out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg);
-  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_variance(options_.gravity_mps2) * Mat3::Identity();
+  out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg) + axis_covariance(mean_rate_B(window_.frames()).norm());
+  out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_covariance(options_.gravity_mps2);
   up_sigma_rad_ = up_sigma_rad(*covariance);
 }
 

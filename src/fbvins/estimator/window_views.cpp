@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/geometry/so3.hpp"
 #include "fbvins/geometry/symmetric.hpp"
 
 namespace fbvins {
@@ -64,6 +65,14 @@ std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Ve
   const NavState& before = frames[frames.size() - 2].state;
   const NavState after = newest.imu ? newest.imu->predict(before, gravity_W) : newest.state;
   return before.T_WB.inverse() * after.T_WB;
+}
+
+Vec3 mean_rate_B(const FrameList& frames) {
+  if (frames.size() < 2) return Vec3::Zero();
+  Vec3 turned = Vec3::Zero();
+  for (int i = 1; i < frames.size(); ++i)
+    turned += so3_log(frames[i - 1].state.T_WB.q.conjugate() * frames[i].state.T_WB.q);
+  return turned / (frames.newest().t - frames.oldest().t).seconds();
 }
 
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration) {

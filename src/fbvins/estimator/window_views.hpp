@@ -31,6 +31,9 @@ double up_sigma_rad(const Mat17& covariance);
 /// of the frame before; without readings, as the window estimates it. None for the first frame.
 std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W);
 
+/// Mean turning rate from the oldest to the newest frame, in the body's axes, rad/s. Zero with fewer than two frames.
+Vec3 mean_rate_B(const FrameList& frames);
+
 /// Frames and landmarks, levelled.
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);
 /// A frame as a keyframe for loop closure, levelled, with its landmarks, but without its images.

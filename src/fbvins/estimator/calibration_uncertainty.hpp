@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What calibrations leave open and no measurement of a flight shows: the error of the baseline, which scales all lengths, and
-// that of the accelerometer's axes, which acts on gravity as a bias (docs/derivations/window.md, W21, W22). Pure functions.
+// those of the IMU's axes, which act on gravity and on turning rates as biases (docs/derivations/window.md, W21-W23). Pure functions.
 #pragma once
 
 #include "fbvins/geometry/pose.hpp"
@@ -10,11 +10,12 @@ namespace fbvins {
 /// Standard deviation of the baseline after a careful calibration, m.
 inline constexpr double kBaselineSigma_m = 0.0003;
 
-/// Standard deviation of the scale and of the direction of each axis of a calibrated accelerometer, 1 and rad.
-inline constexpr double kAccelAxisSigma = 0.001;
+/// Standard deviation of the scale and of the direction of each axis of a calibrated IMU, 1 and rad.
+inline constexpr double kAxisSigma = 0.001;
 
-/// Variance of each component of the accelerometer's bias, (m/s^2)^2, that its axes add (W22).
-inline double axis_variance(double gravity_mps2) { return kAccelAxisSigma * kAccelAxisSigma * gravity_mps2 * gravity_mps2; }
+/// Covariance of the bias that crooked axes make of a constant quantity, in its unit squared: of gravity for the accelerometer (W22),
+/// of the mean turning rate for the gyroscope (W23).
+inline Mat3 axis_covariance(double quantity) { return kAxisSigma * kAxisSigma * quantity * quantity * Mat3::Identity(); }
 
 /// Relative standard deviation of all lengths.
 inline double scale_sigma(const Pose<B, C0>& T_BC0, const Pose<B, C1>& T_BC1) {
