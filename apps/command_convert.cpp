@@ -11,8 +11,8 @@
 #include "apps/progress.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/io/euroc_folder.hpp"
 #include "fbvins/io/flight_record.hpp"
-#include "fbvins/sim/euroc_writer.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -48,13 +48,12 @@ Sink sink_of(std::shared_ptr<Writer> writer) {
 /// EuRoC's readings and truth are written at the end.
 struct EurocSink {
   EurocFolder folder;
-  SimulatedImu imu;
+  std::vector<TrajectoryPoint> truth;
+  std::vector<ImuSample> readings;
 
-  Result<void> add(const ImuSample& sample) { return imu.samples.push_back(sample), Result<void>{}; }
-  Result<void> add(const StereoFrame& frame) {
-    return folder.add({.frame = frame, .right_stamp = frame.t, .exposure_s = 0, .depth_left_m = {}});
-  }
-  Result<void> finish() { return folder.finish(imu); }
+  Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
+  Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t); }
+  Result<void> finish() { return folder.finish(readings, truth); }
 };
 
 Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
@@ -70,12 +69,9 @@ Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
     if (!record) return record.error();
     return sink_of(std::make_shared<FlightRecord>(*std::move(record)));
   }
-  auto folder = EurocFolder::create(arguments.out, data.rig());
+  auto folder = EurocFolder::create(arguments.out, data.rig(), "converted by fbvins");
   if (!folder) return folder.error();
-  auto euroc = std::make_shared<EurocSink>(EurocSink{*std::move(folder), {}});
-  for (const TrajectoryPoint& p : data.ground_truth())
-    euroc->imu.truth.push_back({p.t, p.T_WB, p.v_WB.value_or(Vec3::Zero()), p.bias.value_or(ImuBias{})});
-  return sink_of(std::move(euroc));
+  return sink_of(std::make_shared<EurocSink>(EurocSink{*std::move(folder), data.ground_truth(), {}}));
 }
 
 int convert(const Arguments& arguments) {

@@ -75,7 +75,7 @@ class ClosedLoop {
 
   Result<FlightLog> run(const std::function<void(double, FlightMode)>& progress) {
     if (!setup_.recording.empty()) {
-      Result<EurocFolder> folder = EurocFolder::create(setup_.recording, station_.rig());
+      Result<EurocFolder> folder = create_simulated_recording(setup_.recording, station_.rig());
       if (!folder) return folder.error();
       recording_.emplace(std::move(*folder));
     }
@@ -97,7 +97,7 @@ class ClosedLoop {
     log_.out_of_time = !over_;
     if (Result<void> done = link_->finish(); !done) return done.error();
     if (recording_)
-      if (Result<void> done = recording_->finish(log_.imu); !done) return done.error();
+      if (Result<void> done = finish_recording(*recording_, log_.imu); !done) return done.error();
     log_.mode = controller_->output().mode;
     log_.reason = controller_->output().reason;
     log_.events = controller_->events();
@@ -148,11 +148,11 @@ class ClosedLoop {
   /// Renders the images whose exposure has ended.
   Result<void> render_due_images() {
     while (now_s() > station_.next_image_s() + 0.5 * station_.longest_exposure_s()) {
-      RenderedFrame rendered = station_.render([this](double t) { return history_.at(t); });
+      const RenderedFrame rendered = station_.render([this](double t) { return history_.at(t); });
       ++log_.images;
-      const StereoFrame frame = rendered.frame;
+      const StereoFrame& frame = rendered.frame;
       if (recording_)
-        if (Result<void> done = recording_->add(std::move(rendered)); !done) return done;
+        if (Result<void> done = recording_->add(frame, rendered.right_stamp); !done) return done;
       if (failed(MissionFault::What::cameras)) continue;
       if (Result<void> done = link_->push(frame); !done) return done;
     }

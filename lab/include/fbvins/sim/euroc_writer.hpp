@@ -5,9 +5,9 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 
+#include "fbvins/io/euroc_folder.hpp"
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
@@ -22,31 +22,8 @@ struct EurocWriterOptions {
 Result<void> write_euroc(Simulation& simulation, const std::string& folder, const EurocWriterOptions& options,
                          const std::function<void(int done, int all)>& progress);
 
-/// The same, frame by frame as a flight goes on; images are written while the next one is rendered.
-///
-///   Result<EurocFolder> recording = EurocFolder::create("out/flight", rig);
-///   recording->add(rendered);
-///   Result<void> done = recording->finish(imu);
-class EurocFolder {
- public:
-  /// The folder is made, and must not hold a mav0. `depth`: frames bring depth images.
-  static Result<EurocFolder> create(const std::string& folder, const StereoRig& rig, bool depth = false);
-  ~EurocFolder();
-  EurocFolder(EurocFolder&&) noexcept;
-  EurocFolder& operator=(EurocFolder&&) noexcept;
-
-  Result<void> add(RenderedFrame rendered);
-  /// Writes readings and truth, and completes the recording. To be called once.
-  Result<void> finish(const SimulatedImu& imu);
-
- private:
-  struct State;
-  explicit EurocFolder(std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
-};
-
-/// Fast PNG, with one filter and the lowest compression: 8-bit or 16-bit grey.
-std::string encode_png(const Image& image);
-std::string encode_png16(const std::vector<std::uint16_t>& values, int width, int height);
+/// For a flight that is recorded as it goes on: the folder that write_euroc() makes, and its end with readings and truth.
+Result<EurocFolder> create_simulated_recording(const std::string& folder, const StereoRig& rig, bool depth = false);
+Result<void> finish_recording(EurocFolder& recording, const SimulatedImu& imu);
 
 }  // namespace fbvins

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/euroc_folder.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <utility>
+
+#include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/png_encode.hpp"
+
+namespace fbvins {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error cannot_write(const fs::path& path) {
+  return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path.string())};
+}
+
+Result<void> write_file(const fs::path& path, const std::string& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) return cannot_write(path);
+  return {};
+}
+
+std::string matrix_text(const Quat& q, const Vec3& p) {
+  const Mat3 R = q.toRotationMatrix();
+  std::string text = "T_BS:\n  cols: 4\n  rows: 4\n  data: [";
+  for (int r = 0; r < 3; ++r) text += fmt::format("{}, {}, {}, {},\n         ", R(r, 0), R(r, 1), R(r, 2), p[r]);
+  return text + "0.0, 0.0, 0.0, 1.0]\n";
+}
+
+std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, double rate_hz, const std::string& origin) {
+  const KalibrCamera c = kalibr_camera(camera);
+  return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(q, p) +
+         fmt::format(
+             "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
+             "distortion_coefficients: [{}]\n",
+             rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
+             c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", "));
+}
+
+std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
+  return fmt::format("sensor_type: imu\ncomment: {}\n\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero()) +
+         fmt::format(
+             "rate_hz: {}\n\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+             n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
+             n.accel_random_walk_mps3_rthz);
+}
+
+std::string imu_csv(const std::vector<ImuSample>& samples) {
+  std::string text =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  for (const ImuSample& s : samples)
+    text += fmt::format("{},{},{},{},{},{},{}\n", s.t.ns, s.gyro_radps.x(), s.gyro_radps.y(), s.gyro_radps.z(), s.accel_mps2.x(),
+                        s.accel_mps2.y(), s.accel_mps2.z());
+  return text;
+}
+
+std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
+  std::string text =
+      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
+      "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
+  for (const TrajectoryPoint& s : truth) {
+    const Vec3 v = s.v_WB.value_or(Vec3::Zero());
+    const ImuBias bias = s.bias.value_or(ImuBias{});
+    const auto &p = s.T_WB.p, &bg = bias.gyro_radps, &ba = bias.accel_mps2;
+    const Quat& q = s.T_WB.q;
+    text += fmt::format(
+        "{},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{:.9f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.6f},{:.6f},{:.6f}\n",
+        s.t.ns, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), bg.x(), bg.y(), bg.z(), ba.x(), ba.y(),
+        ba.z());
+  }
+  return text;
+}
+
+std::string depth_png(const std::vector<float>& depth_m, int width, int height) {
+  std::vector<std::uint16_t> mm;
+  for (float z : depth_m) mm.push_back(static_cast<std::uint16_t>(std::clamp(z * 1000.0f + 0.5f, 0.0f, 65535.0f)));
+  return encode_png16(mm, width, height);
+}
+
+/// Makes the folders and writes the calibrations.
+Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, const std::string& origin, bool depth) {
+  std::vector<const char*> folders{"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"};
+  if (depth) folders.push_back("depth0");
+  for (const char* folder : folders) {
+    std::error_code error;
+    fs::create_directories(mav0 / folder, error);
+    if (error) return cannot_write(mav0 / folder);
+  }
+  const Pose<B, C0>& left = rig.T_BC0;
+  const Pose<B, C1>& right = rig.T_BC1;
+  for (const auto& [path, text] :
+       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(rig.left, left.q, left.p, rig.image_rate_hz, origin)},
+        {mav0 / "cam1/sensor.yaml", camera_yaml(rig.right, right.q, right.p, rig.image_rate_hz, origin)},
+        {mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise, origin)},
+        {mav0 / "state_groundtruth_estimate0/sensor.yaml",
+         fmt::format("sensor_type: visual-inertial\ncomment: {}\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero())},
+        {mav0 / "body.yaml", fmt::format("comment: {}\n", origin)}})
+    if (Result<void> done = write_file(path, text); !done) return done;
+  return {};
+}
+
+struct Images {
+  StereoFrame frame;
+  Time right_stamp;
+  std::vector<float> depth_left_m;
+};
+
+/// Writes a frame's images, of the cameras that delivered one; may run while the next frame is made.
+Result<void> write_images(const Images& images, const fs::path& mav0) {
+  const StereoFrame& frame = images.frame;
+  const std::string left = fmt::format("{}.png", frame.t.ns), right = fmt::format("{}.png", images.right_stamp.ns);
+  if (frame.left)
+    if (Result<void> done = write_file(mav0 / "cam0/data" / left, encode_png(*frame.left)); !done) return done;
+  if (!images.depth_left_m.empty()) {
+    const std::string depth = depth_png(images.depth_left_m, frame.left->width(), frame.left->height());
+    if (Result<void> done = write_file(mav0 / "depth0" / left, depth); !done) return done;
+  }
+  return frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*frame.right)) : Result<void>{};
+}
+
+}  // namespace
+
+struct EurocFolder::State {
+  fs::path mav0;
+  std::string left_rows = "#timestamp [ns],filename\n", right_rows = left_rows;
+  std::future<Result<void>> writing;
+
+  Result<void> wait() { return writing.valid() ? writing.get() : Result<void>{}; }
+};
+
+Result<EurocFolder> EurocFolder::create(const std::string& folder, const StereoRig& rig, const std::string& origin, bool depth) {
+  const fs::path mav0 = fs::path(folder) / "mav0";
+  if (fs::exists(mav0)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", mav0.string())};
+  if (Result<void> done = write_calibrations(rig, mav0, origin, depth); !done) return done.error();
+  auto state = std::make_unique<State>();
+  state->mav0 = mav0;
+  return EurocFolder(std::move(state));
+}
+
+EurocFolder::EurocFolder(std::unique_ptr<State> state) : state_(std::move(state)) {}
+EurocFolder::~EurocFolder() = default;
+EurocFolder::EurocFolder(EurocFolder&&) noexcept = default;
+EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
+
+Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<float> depth_left_m) {
+  if (frame.left) state_->left_rows += fmt::format("{0},{0}.png\n", frame.t.ns);
+  if (frame.right) state_->right_rows += fmt::format("{0},{0}.png\n", right_stamp.ns);
+  if (Result<void> done = state_->wait(); !done) return done;
+  state_->writing = std::async(std::launch::async, [images = Images{std::move(frame), right_stamp, std::move(depth_left_m)},
+                                                    mav0 = state_->mav0] { return write_images(images, mav0); });
+  return {};
+}
+
+Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {
+  if (Result<void> done = state_->wait(); !done) return done;
+  const fs::path& mav0 = state_->mav0;
+  for (const auto& [path, text] : {std::pair{mav0 / "imu0/data.csv", imu_csv(readings)},
+                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)},
+                                   {mav0 / "cam0/data.csv", state_->left_rows},
+                                   {mav0 / "cam1/data.csv", state_->right_rows}})
+    if (Result<void> done = write_file(path, text); !done) return done;
+  return {};
+}
+
+}  // namespace fbvins

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/euroc_folder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr int kWidth = 64, kHeight = 48;
+
+StereoRig small_rig() {
+  StereoRig rig;
+  rig.left = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625, 0.001, -0.002}, kWidth, kHeight);
+  rig.right = Camera(PinholeRadtan{42, 43, 32.5, 22.5, -0.125, 0.03125, 0, 0}, kWidth, kHeight);
+  rig.T_BC0 = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, 0, 0.125)};
+  rig.T_BC1 = {Quat(0.5, -0.5, 0.5, -0.5), Vec3(0.25, -0.125, 0.125)};
+  return rig;
+}
+
+std::shared_ptr<const Image> pattern(int shift) {
+  auto image = std::make_shared<Image>(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) image->at(x, y) = static_cast<std::uint8_t>(3 * x + 5 * y + shift);
+  return image;
+}
+
+bool same_pixels(const Image& a, const Image& b) {
+  return a.width() == b.width() && a.height() == b.height() && std::equal(a.row(0), a.row(a.height()), b.row(0));
+}
+
+std::string empty_folder(const std::string& name) {
+  const std::string folder = ::testing::TempDir() + "/fbvins_" + name;
+  std::filesystem::remove_all(folder);
+  return folder;
+}
+
+TEST(EurocFolder, ReadsBackWithImagesReadingsAndTruth) {
+  const std::string folder = empty_folder("euroc_folder");
+  std::vector<ImuSample> readings;
+  std::vector<TrajectoryPoint> truth;
+  for (int i = 0; i <= 40; ++i) {
+    const Time t{1'000'000'000 + i * 5'000'000};
+    readings.push_back({t, Vec3(0.01 * i, -0.125, 1.0 / 3), Vec3(0.1, 0.2, 9.81 + 0.01 * i)});
+    truth.push_back({t, {Quat::Identity(), Vec3(0.5 * i, 0, 1)}, std::nullopt, std::nullopt});
+  }
+  {
+    auto recording = EurocFolder::create(folder, small_rig(), "made by hand");
+    ASSERT_TRUE(recording) << recording.error().message;
+    for (int i = 0; i < 3; ++i) {
+      const Time t{1'050'000'000 + i * 50'000'000};
+      ASSERT_TRUE(recording->add({t, pattern(i), i == 1 ? nullptr : pattern(100 + i)}, t));
+    }
+    const Result<void> done = recording->finish(readings, truth);
+    ASSERT_TRUE(done) << done.error().message;
+  }
+  auto data = open_dataset(folder);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ((*data)->rig().T_BC1.p, small_rig().T_BC1.p);
+  EXPECT_NEAR((*data)->rig().left.focal_px(), small_rig().left.focal_px(), 1e-12);
+  int samples = 0, frames = 0;
+  while (auto event = (*data)->next()) {
+    if (const auto* reading = std::get_if<ImuSample>(&*event)) {
+      EXPECT_EQ(reading->gyro_radps, readings[samples].gyro_radps);
+      EXPECT_EQ(reading->accel_mps2, readings[samples++].accel_mps2);
+      continue;
+    }
+    const auto& frame = std::get<StereoFrame>(*event);
+    EXPECT_TRUE(frame.left && same_pixels(*frame.left, *pattern(frames)));
+    if (frames == 1) EXPECT_EQ(frame.right, nullptr);
+    else EXPECT_TRUE(frame.right && same_pixels(*frame.right, *pattern(100 + frames)));
+    ++frames;
+  }
+  EXPECT_EQ(samples, 41);
+  EXPECT_EQ(frames, 3);
+  ASSERT_EQ((*data)->ground_truth().size(), truth.size());
+  EXPECT_EQ((*data)->ground_truth()[7].T_WB.p, truth[7].T_WB.p);
+  for (const char* sensor : {"cam0", "cam1", "imu0"}) {
+    std::stringstream text;
+    text << std::ifstream(folder + "/mav0/" + sensor + "/sensor.yaml").rdbuf();
+    EXPECT_NE(text.str().find("comment: made by hand\n"), std::string::npos) << sensor;
+  }
+  std::filesystem::remove_all(folder);
+}
+
+TEST(EurocFolder, NeverOverwritesARecording) {
+  const std::string folder = empty_folder("euroc_folder_twice");
+  ASSERT_TRUE(EurocFolder::create(folder, small_rig(), "first"));
+  const auto again = EurocFolder::create(folder, small_rig(), "second");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::unwritable);
+  EXPECT_NE(again.error().message.find("exists already"), std::string::npos);
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace fbvins
