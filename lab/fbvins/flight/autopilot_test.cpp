@@ -118,7 +118,7 @@ Outcome fly_shipped(const std::string& name, const Circumstances& circumstances)
   const Result<MissionSite> site = site_of(mission, {}, in.start.T_WV.p.z());
   EXPECT_TRUE(site) << site.error().message;
   std::vector<Vec3> path;
-  for (const PathPoint& place : path_points(mission)) path.push_back(site->to_world(place.p));
+  for (const MissionPoint& place : path_points(mission)) path.push_back(site->to_world(place.p));
   const World world = build_world({}, site->plan, path, static_cast<std::uint64_t>(in.seed));
   const CollisionCheck check(world, {});
   Outcome flight = fly_mission(mission, always, in);

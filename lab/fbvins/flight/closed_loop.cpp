@@ -267,7 +267,7 @@ Result<FlightLog> fly(const FlightSetup& setup, const std::function<void(double,
   const Result<MissionSite> site = site_of(setup.mission, defaults, standing_m);
   if (!site) return site.error();
   std::vector<Vec3> path;
-  for (const PathPoint& place : path_points(setup.mission)) path.push_back(site->to_world(place.p));
+  for (const MissionPoint& place : path_points(setup.mission)) path.push_back(site->to_world(place.p));
   SimulationOptions options = o;
   options.world.kind = setup.mission.place.kind.empty() ? o.world.kind : setup.mission.place.kind;
   Result<SensorStation> station = SensorStation::create(options, site->plan, path);

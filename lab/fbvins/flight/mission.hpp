@@ -77,11 +77,11 @@ Result<Mission> parse_mission(const std::string& text, const std::string& source
 Result<Mission> read_mission(const std::string& path);
 
 /// Points along the mission in L, 0.25 m apart at most, each with the index of its step.
-struct PathPoint {
+struct MissionPoint {
   Vec3 p;
   int step = 0;
 };
-std::vector<PathPoint> path_points(const Mission& mission);
+std::vector<MissionPoint> path_points(const Mission& mission);
 
 /// Bound on a mission's duration: twice the time of every leg at its slowest limit, and time to spare.
 double longest_flight_s(const Mission& mission);

@@ -45,8 +45,8 @@ std::string place_text(const Vec3& p) { return fmt::format("({:.2f}, {:.2f}, {:.
 
 }  // namespace
 
-std::vector<PathPoint> path_points(const Mission& mission) {
-  std::vector<PathPoint> places{{Vec3::Zero(), 0}};
+std::vector<MissionPoint> path_points(const Mission& mission) {
+  std::vector<MissionPoint> places{{Vec3::Zero(), 0}};
   const auto go = [&](const Vec3& to, int step) {
     const Vec3 from = places.back().p;
     const int n = std::max(1, static_cast<int>(std::ceil((to - from).norm() / kStep_m)));
@@ -64,7 +64,7 @@ std::vector<PathPoint> path_points(const Mission& mission) {
 
 double longest_flight_s(const Mission& mission) {
   double seconds = kTimeToSpare_s;
-  const std::vector<PathPoint> places = path_points(mission);
+  const std::vector<MissionPoint> places = path_points(mission);
   const double slowest = std::min({mission.limits.speed_mps, mission.limits.climb_mps, mission.limits.land_mps});
   for (std::size_t i = 1; i < places.size(); ++i) {
     const double own = mission.steps[static_cast<std::size_t>(places[i].step)].speed_mps;
@@ -77,7 +77,7 @@ double longest_flight_s(const Mission& mission) {
 Geofence fence_of(const Mission& mission) {
   if (mission.geofence) return *mission.geofence;
   Geofence fence{Vec3::Zero(), Vec3::Zero()};
-  for (const PathPoint& place : path_points(mission)) {
+  for (const MissionPoint& place : path_points(mission)) {
     fence.low = fence.low.cwiseMin(place.p);
     fence.high = fence.high.cwiseMax(place.p);
   }
@@ -88,9 +88,9 @@ Result<MissionSite> site_of(const Mission& mission, const PlaceDefaults& default
   MissionSite site;
   site.origin_W = Vec3(mission.place.start_m.x(), mission.place.start_m.y(), standing_height_m);
   site.heading_rad = mission.place.heading_rad;
-  const std::vector<PathPoint> places = path_points(mission);
+  const std::vector<MissionPoint> places = path_points(mission);
   std::vector<Vec3> path_W;
-  for (const PathPoint& place : places) path_W.push_back(site.to_world(place.p));
+  for (const MissionPoint& place : places) path_W.push_back(site.to_world(place.p));
   site.plan = plan_of(mission, defaults, path_W);
 
   for (std::size_t i = 0; i < places.size(); ++i) {

@@ -107,7 +107,7 @@ TEST(Mission, TheDefaultGeofenceSurroundsThePath) {
 
 TEST(Mission, PlannedPlacesFollowTheSteps) {
   const Mission mission = *parse_mission("steps:\n  - takeoff: 1\n  - goto: [2, 0, 1]\n  - land\n", "m.yaml");
-  const std::vector<PathPoint> places = path_points(mission);
+  const std::vector<MissionPoint> places = path_points(mission);
   EXPECT_EQ(places.front().p, Vec3(0, 0, 0));
   EXPECT_EQ(places.back().p, Vec3(2, 0, 0));
   for (std::size_t i = 1; i < places.size(); ++i) EXPECT_LE((places[i].p - places[i - 1].p).norm(), 0.25 + 1e-9);

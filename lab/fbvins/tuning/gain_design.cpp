@@ -26,7 +26,7 @@ struct Search {
   Outer outer;
   Step step;
 
-  bool keeps(const Margins& m) const { return m.phase_deg >= options.phase_margin_deg && m.gain >= kGainMargin; }
+  bool keeps(const StabilityMargins& m) const { return m.phase_deg >= options.phase_margin_deg && m.gain >= kGainMargin; }
 
   /// The largest P with these ratios that keeps the margins; 0 if none does.
   double largest(double integral, double derivative, double Gains::*outer_gain) const {
@@ -84,7 +84,7 @@ RateGains tune_angle(LoopTuning& loop, const RatePlant& plant, const LoopFilters
   RateGains g = search_of<RateGains>(px4_ranges(loop.name), {0.5, 1, 1.5, 2.5}, derivatives, options, inner, outer, step)
                     .best(&RateGains::angle_P, loop.reachable);
   if (!loop.reachable) g = flown;
-  const auto margins = [&](const RateGains& of, Margins& in, Margins& out) {
+  const auto margins = [&](const RateGains& of, StabilityMargins& in, StabilityMargins& out) {
     in = margins_of([&](double w) { return inner(of, w); });
     out = margins_of([&](double w) { return outer(of, w); });
   };

@@ -29,7 +29,7 @@ std::array<GainRange, 4> px4_ranges(const std::string& loop);
 /// An inner loop (rate or velocity) and its outer loop (angle or position), as flown and as proposed.
 struct LoopTuning {
   std::string name;
-  Margins inner_before, outer_before, inner, outer;
+  StabilityMargins inner_before, outer_before, inner, outer;
   StepResponse before, after;  ///< predicted, in angle or position
   bool reachable = true;       ///< whether gains within PX4's ranges keep the margins
 };

@@ -62,8 +62,8 @@ std::vector<double> margin_grid_radps() {
   return grid;
 }
 
-Margins margins_of_samples(const std::vector<double>& radps, const std::vector<Complex>& open) {
-  Margins m{180, 1e3, 0};
+StabilityMargins margins_of_samples(const std::vector<double>& radps, const std::vector<Complex>& open) {
+  StabilityMargins m{180, 1e3, 0};
   bool crossed = false;
   for (std::size_t i = 1; i < open.size(); ++i) {
     const bool above = std::abs(open[i - 1]) >= 1, is_above = std::abs(open[i]) >= 1;

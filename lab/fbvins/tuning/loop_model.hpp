@@ -57,13 +57,13 @@ Complex velocity_loop(const VelocityLoop& loop, const VelocityGains& gains, doub
 Complex position_loop(const VelocityLoop& loop, const VelocityGains& gains, double radps);  ///< open
 
 /// Stability margins of an open loop.
-struct Margins {
+struct StabilityMargins {
   double phase_deg = -180;  ///< smallest of all crossovers
   double gain = 0;          ///< smallest factor to a gain of 1 where the phase is -180 degrees, above the crossover
   double crossover_hz = 0;  ///< of the last crossover (gain of 1)
 };
 template <class OpenLoop>
-Margins margins_of(OpenLoop&& open);
+StabilityMargins margins_of(OpenLoop&& open);
 
 /// Response to a unit step.
 struct StepResponse {
@@ -79,9 +79,9 @@ StepResponse position_step(const VelocityLoop& loop, const VelocityGains& gains,
 
 /// At 600 frequencies from 0.02 Hz to 60 Hz.
 std::vector<double> margin_grid_radps();
-Margins margins_of_samples(const std::vector<double>& radps, const std::vector<Complex>& open);
+StabilityMargins margins_of_samples(const std::vector<double>& radps, const std::vector<Complex>& open);
 template <class OpenLoop>
-Margins margins_of(OpenLoop&& open) {
+StabilityMargins margins_of(OpenLoop&& open) {
   const std::vector<double> grid = margin_grid_radps();
   std::vector<Complex> samples;
   samples.reserve(grid.size());

@@ -167,10 +167,10 @@ TEST(FrequencyResponse, OfAKnownLagWithADelay) {
 }
 
 TEST(LoopModel, MarginsOfKnownLoops) {
-  const Margins integrator = margins_of([](double w) { return Complex(0, -10 / w); });
+  const StabilityMargins integrator = margins_of([](double w) { return Complex(0, -10 / w); });
   EXPECT_NEAR(integrator.phase_deg, 90, 1e-6);
   EXPECT_NEAR(integrator.crossover_hz, 10 / (2 * std::numbers::pi), 0.05);
-  const Margins late = margins_of([](double w) { return Complex(0, -10 / w) * std::polar(1.0, -0.05 * w); });
+  const StabilityMargins late = margins_of([](double w) { return Complex(0, -10 / w) * std::polar(1.0, -0.05 * w); });
   EXPECT_NEAR(late.phase_deg, 90 - 0.5 * 180 / std::numbers::pi, 0.5);
   EXPECT_NEAR(late.gain, std::numbers::pi / 2 / 0.5, 0.05);
   EXPECT_LT(margins_of([](double w) { return Complex(0, -100 / w) * std::polar(1.0, -0.05 * w); }).gain, 1);

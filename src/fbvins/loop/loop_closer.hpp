@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "fbvins/loop/candidate_search.hpp"
-#include "fbvins/loop/flight_record.hpp"
+#include "fbvins/loop/flight_anchors.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
 #include "fbvins/loop/place_extractor.hpp"
@@ -99,7 +99,7 @@ class LoopCloser final : public Mapper {
   MapFrameFollower follower_;
   Relocaliser relocaliser_;
   Thinning thinning_;
-  FlightRecord flight_;
+  FlightAnchors flight_;
   Session session_;
   int loops_since_optimised_ = 0;
 };

@@ -2,7 +2,7 @@
 // Every keyframe of the flight, each attached to one that is still in the map, so that the poses of the whole flight follow
 // the map although keyframes are removed from it. One thread at a time.
 //
-//   FlightRecord flight;
+//   FlightAnchors flight;
 //   flight.add(t, id);
 //   flight.hand_over(gone.id, successor.id, successor.T_MB.inverse() * gone.T_MB);
 //   Trajectory<M> in_map = flight.corrected(map, trajectory_in_G);
@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-class FlightRecord {
+class FlightAnchors {
  public:
   void add(Time t, KeyframeId id) { entries_.push_back({t, id, {}}); }
   /// Attaches what was attached to `gone` to `successor`.

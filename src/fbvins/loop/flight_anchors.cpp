@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/loop/flight_record.hpp"
+#include "fbvins/loop/flight_anchors.hpp"
 
 #include <algorithm>
 
 namespace fbvins {
 
-void FlightRecord::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
+void FlightAnchors::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
   for (Entry& e : entries_)
     if (e.anchor == gone) e.anchor = successor, e.T_anchor_B = T_successor_gone * e.T_anchor_B;
 }
 
-void FlightRecord::drop(KeyframeId gone) {
+void FlightAnchors::drop(KeyframeId gone) {
   std::erase_if(entries_, [&](const Entry& e) { return e.anchor == gone; });
 }
 
-Trajectory<M> FlightRecord::corrected(const PlaceMap& map, const Trajectory<G>& in_G) const {
+Trajectory<M> FlightAnchors::corrected(const PlaceMap& map, const Trajectory<G>& in_G) const {
   struct Knot {
     Time t;
     Pose<M, B> T_MB;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/loop/flight_record.hpp"
+#include "fbvins/loop/flight_anchors.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@ namespace {
 
 Pose<G, B> in_G(double x) { return {Quat::Identity(), Vec3(x, 0, 0)}; }
 
-class Record : public testing::Test {
+class Anchors : public testing::Test {
  protected:
   /// Keyframes at 0, 1, 2, 3 s, a metre apart in W; the map has them 1.1 m apart.
   void SetUp() override {
@@ -38,10 +38,10 @@ class Record : public testing::Test {
   }
 
   PlaceMap map_;
-  FlightRecord flight_;
+  FlightAnchors flight_;
 };
 
-TEST_F(Record, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
+TEST_F(Anchors, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
   ASSERT_EQ(corrected().size(), 7u);
   EXPECT_NEAR(x_at(0), 0, 1e-12);
   EXPECT_NEAR(x_at(4), 2.2, 1e-12);
@@ -49,7 +49,7 @@ TEST_F(Record, IsExactAtKeyframesInterpolatedBetweenThemAndGoesOnAfterTheLast) {
   EXPECT_NEAR(x_at(6), 3.3 + 1, 1e-12);
 }
 
-TEST_F(Record, PosesOfARemovedKeyframeFollowItsHeir) {
+TEST_F(Anchors, PosesOfARemovedKeyframeFollowItsHeir) {
   const Pose<B, B> T_successor_gone(Quat::Identity(), Vec3(1.1, 0, 0));
   flight_.hand_over(KeyframeId{2}, KeyframeId{1}, T_successor_gone);
   map_.remove(KeyframeId{2});
@@ -58,13 +58,13 @@ TEST_F(Record, PosesOfARemovedKeyframeFollowItsHeir) {
   EXPECT_NEAR(x_at(4), 2.7, 1e-12);
 }
 
-TEST_F(Record, WhatIsLostOrHasNoPlaceIsBridged) {
+TEST_F(Anchors, WhatIsLostOrHasNoPlaceIsBridged) {
   flight_.drop(KeyframeId{1});
   map_.find(KeyframeId{2})->placed = false;
   EXPECT_NEAR(x_at(2), 2.0 / 3 * 1 + 1.0 / 3 * (3.3 - 2), 1e-12);  // between the keyframes at 0 and 3 s
 }
 
-TEST_F(Record, AFlightWithoutAPlaceInMIsEmpty) {
+TEST_F(Anchors, AFlightWithoutAPlaceInMIsEmpty) {
   for (MapKeyframe& k : map_.keyframes()) k.placed = false;
   EXPECT_TRUE(corrected().empty());
   flight_ = {};
