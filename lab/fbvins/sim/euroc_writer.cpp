@@ -48,7 +48,8 @@ Result<void> write_euroc(Simulation& simulation, const std::string& folder, cons
   if (options.max_frames > 0) count = std::min(count, options.max_frames);
   for (int i = 0; i < count; ++i) {
     RenderedFrame rendered = render_frame(simulation, static_cast<std::size_t>(i), options.depth);
-    if (Result<void> done = recording->add(std::move(rendered.frame), rendered.right_stamp, std::move(rendered.depth_left_m)); !done)
+    if (Result<void> done = recording->add(std::move(rendered.frame), rendered.right_stamp, std::move(rendered.depth_left_m));
+        !done)
       return done;
     if (progress) progress(i + 1, count);
   }
