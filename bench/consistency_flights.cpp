@@ -23,6 +23,7 @@ struct Wanted {
   SimulationOptions simulation;
   TrackOptions tracks;
   bool known = true;
+  double accel_noise_scale = EstimatorOptions{}.accel_noise_scale;
 };
 
 const TrueState& truth_at(const Simulation& s, Time t) {
@@ -86,6 +87,7 @@ int fly(const Wanted& wanted) {
   SyntheticTracks tracks(*flight, wanted.tracks);
   EstimatorOptions options;
   options.known_landmarks.enabled = wanted.known;
+  options.accel_noise_scale = wanted.accel_noise_scale;
   Estimator estimator(flight->rig, options);
   Comparison comparison(*flight);
   StatePrior before, prior;
@@ -117,6 +119,7 @@ int run(int argc, char** argv) {
   app.add_option("--bad-start", w.tracks.bad_start_s, "seconds at the start with bad tracks");
   app.add_flag("--recognise", w.tracks.recognise, "corners that come back into view are re-observed");
   app.add_flag("!--forget", w.known, "landmarks that leave the window are not kept");
+  app.add_option("--accel-noise-scale", w.accel_noise_scale, "assumed noise of the accelerometer, times that of the calibration");
   CLI11_PARSE(app, argc, argv);
   const auto preset = simulation_preset(w.preset);
   if (!preset) {
