@@ -51,7 +51,7 @@ struct EstimatorOptions {
   int max_landmarks = 300;
   double gravity_mps2 = 9.81;
   double gyro_noise_scale = 2.5;
-  double accel_noise_scale = 16.0;
+  double accel_noise_scale = 24.0;
   double gyro_walk_scale = 5.0;
   double accel_walk_scale = 0.4;
   bool estimate_extrinsics = false;
