@@ -13,7 +13,7 @@ inline constexpr double kBaselineSigma_m = 0.0003;
 /// Standard deviation of the scale and of the direction of each axis of a calibrated IMU, 1 and rad.
 inline constexpr double kAxisSigma = 0.001;
 
-/// Covariance of the bias that crooked axes make of a constant quantity, in its unit squared: of gravity for the accelerometer (W22),
+/// Covariance of the bias that errors of the axes make of a constant quantity, in its unit squared: of gravity for the accelerometer (W22),
 /// of the mean turning rate for the gyroscope (W23).
 inline Mat3 axis_covariance(double quantity) { return kAxisSigma * kAxisSigma * quantity * quantity * Mat3::Identity(); }
 
