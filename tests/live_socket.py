@@ -59,6 +59,10 @@ class LiveSocket(unittest.TestCase):
                         REPOSITORY / "examples/socket_sender.cpp", "-lpng", "-o", sender], check=True)
         return sender
 
+    def skip_unless_every_image_was_estimated(self, said, sent):
+        if f"({sent} frames, 0 missed" not in said or '"images_dropped": 0' not in (self.out / "summary.json").read_text(encoding="utf-8"):
+            self.skipTest("this machine is too slow, or too busy, for wall time")
+
     def poses(self):
         rows = [line.split() for line in (self.out / "trajectory_tum.txt").read_text().splitlines() if not line.startswith("#")]
         return [[float(number) for number in row[:4]] for row in rows]
@@ -97,10 +101,12 @@ class LiveSocket(unittest.TestCase):
         self.assertIn("synthetic rig: left without a goodbye", said)
         self.assertRegex(said, r"synthetic rig: said goodbye: end of the synthetic flight \(1\d\d frames, \d+ missed, 1400 readings, 0 refused\)")
         # The rig sways by 0.4 m to the right, and by nothing else. The second sender has another wall: W may be a new one.
+        self.assertTrue(self.poses())
+        self.skip_unless_every_image_was_estimated(said, 140)
         last = self.poses()[-60:]
         span_m = [max(p[i] for p in last) - min(p[i] for p in last) for i in (1, 2, 3)]
-        self.assertAlmostEqual((span_m[0]**2 + span_m[1]**2)**0.5, 0.4, delta=0.03)
-        self.assertLess(span_m[2], 0.03)
+        self.assertAlmostEqual((span_m[0]**2 + span_m[1]**2)**0.5, 0.4, delta=0.02)
+        self.assertLess(span_m[2], 0.02)
 
     def test_a_second_listener_and_a_second_sender_are_refused(self):
         live = self.listen()
@@ -132,8 +138,7 @@ class LiveSocket(unittest.TestCase):
         subprocess.run([sender, self.path, RECORDING / "mav0"], check=True, timeout=60)
         said = self.end(live)
         self.assertIn("3531 readings, 0 refused)", said)
-        if "(340 frames" not in said or '"images_dropped": 0' not in (self.out / "summary.json").read_text():
-            self.skipTest("this machine is too slow, or too busy, for wall time")
+        self.skip_unless_every_image_was_estimated(said, 340)
         for name in ("trajectory_tum.txt", "trajectory.csv"):
             self.assertEqual((self.out / name).read_bytes(), (plain / name).read_bytes(), name)
 
