@@ -9,7 +9,7 @@ namespace {
 
 /// Uncertainty of a new track's position along its weakest direction, px for image noise of one grey value.
 constexpr double kMaxUncertainty_px = 0.18;
-/// The same where the image has fewer such keypoints than half of the tracks wanted.
+/// The same where the image has fewer such keypoints than tracks wanted.
 constexpr double kMaxUncertaintyFew_px = 3.0;
 
 double weakest_direction_px(const KltLevelTemplate& patch) {
@@ -45,9 +45,8 @@ void OrbStarter::start(OrbTracks& tracks, OrbView& view, const Pyramid& left, Fr
   stats.tracked = static_cast<int>(occupied_.size());
   list_unused(view);
   const double usual_px = min_distance_px_, few_px = min_distance_px_ / 2;
-  for (const Pass& pass :
-       {Pass{true, kMaxUncertainty_px, usual_px, wanted_}, Pass{false, kMaxUncertainty_px, usual_px, wanted_},
-        Pass{true, kMaxUncertaintyFew_px, few_px, wanted_ / 2}, Pass{false, kMaxUncertaintyFew_px, few_px, wanted_ / 2}})
+  for (const Pass& pass : {Pass{true, kMaxUncertainty_px, usual_px}, Pass{false, kMaxUncertainty_px, usual_px},
+                           Pass{true, kMaxUncertaintyFew_px, few_px}, Pass{false, kMaxUncertaintyFew_px, few_px}})
     run(pass, tracks, view, left, stats);
 }
 
@@ -55,7 +54,7 @@ void OrbStarter::run(const Pass& pass, OrbTracks& tracks, OrbView& view, const P
   const int share = wanted_ / (kColumns * kRows) + 1;
   const double min2 = pass.min_distance_px * pass.min_distance_px;
   for (const std::size_t k : strongest_first_) {
-    if (static_cast<int>(occupied_.size()) >= pass.wanted) return;
+    if (static_cast<int>(occupied_.size()) >= wanted_) return;
     const Vec2& px = view.features.keypoints[k].pixel;
     if (view.used[k] != 0 || (pass.only_poor_cells && count_[cell_of(px)] >= share)) continue;
     const bool crowded =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Starts tracks: first in image cells with less than their share, then anywhere. Where the image has too few sharp corners
-// (dark, blurred, plain walls), also less sharp ones at half the distance, up to half of the tracks wanted.
+// (dark, blurred, plain walls), also less sharp ones at half the distance.
 // Buffers are reused; one instance, one thread.
 //
 //   OrbStarter starter(camera, 180, 14);
@@ -28,7 +28,6 @@ class OrbStarter {
     bool only_poor_cells;
     double max_uncertainty_px;
     double min_distance_px;
-    int wanted;
   };
   std::size_t cell_of(const Vec2& px) const;
   void list_unused(const OrbView& view);

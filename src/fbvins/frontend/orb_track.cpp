@@ -68,7 +68,7 @@ void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
     if (!track.observed) continue;
     const bool crowded =
         std::any_of(kept.begin(), kept.end(), [&](const Vec2& other) { return (other - track.px).squaredNorm() < closest2; });
-    if (crowded || static_cast<int>(kept.size()) == most) track.fate = Fate::lost;
+    if (crowded || static_cast<int>(kept.size()) == most) track.fate = track.p_W ? Fate::out_of_view : Fate::lost;
     else kept.push_back(track.px);
   }
 }

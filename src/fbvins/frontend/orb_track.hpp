@@ -63,8 +63,8 @@ using OrbTracks = TrackTable<OrbTrack, OrbPatches>;
 void predict(OrbTracks& tracks, const Camera& camera, const CameraMotion& motion, double typical_inverse_depth);
 /// Records that the track is observed at px in the newest image. False at the border.
 bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const OrbView& view);
-/// Of two tracks that have come together the older stays; and of all at most `most`, the older ones. Tracks are sorted by age
-/// afterwards.
+/// Of two tracks that have come together the older stays; and of all at most `most`, the older ones. Of the others, those of
+/// located landmarks can be re-observed later. Tracks are sorted by age afterwards.
 void thin_out(OrbTracks& tracks, int most, double min_distance_px);
 /// Ends tracks that were not observed for too long, and the youngest of too many.
 void forget(OrbTracks& tracks, Time now, double memory_s);

@@ -105,6 +105,18 @@ TEST(ThinOut, KeepsTheOlderOfTwoThatHaveComeTogetherAndNoMoreThanWanted) {
   EXPECT_EQ(tracks[2].age_frames, 3);
 }
 
+TEST(ThinOut, LosesNoLocatedLandmark) {
+  const TestWall wall;
+  OrbTracks tracks(3);
+  for (int age_frames = 1; age_frames <= 3; ++age_frames)
+    tracks.start(track_at(wall.camera, Vec2(100 + age_frames, 90), age_frames));
+  tracks[0].p_W = Vec3(1, 2, 3);
+  thin_out(tracks, 5, 10);
+  EXPECT_EQ(tracks[0].fate, Fate::active) << "the oldest";
+  EXPECT_EQ(tracks[1].fate, Fate::lost);
+  EXPECT_EQ(tracks[2].fate, Fate::out_of_view);
+}
+
 TEST(Forget, KeepsTracksWithDepthForLonger) {
   const TestWall wall;
   const Time now{2'000'000'000};
