@@ -7,6 +7,7 @@
 
 #include "bindings.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 
 namespace fbvins::python {
@@ -44,15 +45,7 @@ StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb
                    double image_rate_hz, double time_offset_s) {
   StereoRig rig{left,          right,        transform<B, C0>(T_BC0, "T_BC0"), transform<B, C1>(T_BC1, "T_BC1"), imu_noise,
                 image_rate_hz, time_offset_s};
-  const double baseline_m = rig.T_C1C0().p.norm();
-  if (!(baseline_m > 1e-3 && baseline_m < 10))
-    throw nb::value_error(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m).c_str());
-  for (const auto& [camera, side] : {std::pair(&left, "left"), {&right, "right"}})
-    if (camera->sees_backwards())
-      throw nb::value_error(
-          fmt::format("the {} camera sees more than 180 degrees from edge to edge: crop its images", side).c_str());
-  if (!(image_rate_hz > 0) || !std::isfinite(time_offset_s))
-    throw nb::value_error("image_rate_hz is positive and time_offset_s finite");
+  if (const Result<void> good = check_rig(rig, "the rig"); !good) throw nb::value_error(good.error().message.c_str());
   return rig;
 }
 

@@ -49,7 +49,8 @@ struct SystemParts {
 
 class System {
  public:
-  /// An error if an option is out of its range or the frontend cannot be made (its name, the booster's weights).
+  /// An error if an option is out of its range, the rig cannot fly (check_rig.hpp) or the frontend cannot be made (its name, the
+  /// booster's weights).
   static Result<System> create(const SystemOptions& options, const StereoRig& rig, RunMode mode = RunMode::deterministic,
                                SystemParts parts = {});
   ~System();

@@ -98,19 +98,4 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
   return noise;
 }
 
-Result<void> check_rig(const StereoRig& rig, const std::string& file) {
-  const double baseline_m = rig.T_C1C0().p.norm();
-  if (!(baseline_m > 1e-3 && baseline_m < 10.0))
-    return Error{ErrorCode::malformed,
-                 fmt::format("{}: the two cameras are {:.3g} m apart, not between 1 mm and 10 m", file, baseline_m)};
-  for (const auto& [camera, side] : {std::pair(&rig.left, "left"), {&rig.right, "right"}})
-    if (camera->sees_backwards())
-      return Error{
-          ErrorCode::unsupported,
-          fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
-                      "can be used: crop the images, and subtract what is cut off at the left and the top from cx and cy",
-                      file, side)};
-  return {};
-}
-
 }  // namespace fbvins

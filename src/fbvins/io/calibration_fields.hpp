@@ -3,6 +3,7 @@
 #pragma once
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
@@ -29,8 +30,5 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
 
 /// The four noise figures; rate_field is "rate_hz" or "update_rate".
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);
-
-/// An error where the cameras' centres coincide or lie apart by more than 10 m, or one sees more than 180 degrees.
-Result<void> check_rig(const StereoRig& rig, const std::string& file);
 
 }  // namespace fbvins

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/pipeline/feedback.hpp"
@@ -166,6 +167,7 @@ struct System::Impl {
 
 Result<System> System::create(const SystemOptions& options, const StereoRig& rig, RunMode mode, SystemParts parts) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
+  if (Result<void> good = check_rig(rig, "the rig"); !good) return good.error();
   if (!parts.frontend) {
     Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options.frontend);
     if (!frontend) return frontend.error();

@@ -213,6 +213,15 @@ TEST(SystemParts, AnUnknownFrontendOrAnOptionOutOfRangeIsAnErrorAtOnce) {
   EXPECT_NE(system.error().message.find("estimator.max_iterations"), std::string::npos);
 }
 
+TEST(SystemParts, ARigThatCannotFlyIsRefused) {
+  StereoRig silent = small_rig();
+  silent.imu_noise.gyro_noise_density_radps_rthz = 0;
+  const Result<System> without_noise = System::create({}, silent);
+  ASSERT_FALSE(without_noise);
+  EXPECT_EQ(without_noise.error().message, "the rig: the gyroscope's noise density is 0, not positive");
+  EXPECT_FALSE(System::create({}, StereoRig{}));
+}
+
 /// Finds no features, and throws at a frame.
 class ThrowingFrontend final : public Frontend {
  public:

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a rig can be flown with: the border that every rig passes, wherever it comes from.
+//
+//   if (Result<void> good = check_rig(rig, file); !good) return good.error();
+#pragma once
+
+#include <string_view>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+
+namespace fbvins {
+
+/// An error, which begins with `origin`, where a number is not finite, a camera has no pixels or no focal length or sees more
+/// than 180 degrees, the cameras' centres coincide or lie apart by more than 10 m, or a figure of the IMU's noise is not
+/// positive.
+Result<void> check_rig(const StereoRig& rig, std::string_view origin);
+
+}  // namespace fbvins

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/camera/check_rig.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+Error malformed(std::string_view origin, const std::string& what) {
+  return {ErrorCode::malformed, fmt::format("{}: {}", origin, what)};
+}
+
+bool positive(double x) { return x > 0 && std::isfinite(x); }
+
+template <class C>
+bool is_transform(const Pose<B, C>& T) {
+  return T.p.allFinite() && std::abs(T.q.norm() - 1) < 1e-6;  // nor NaN
+}
+
+bool all_finite(const std::vector<double>& numbers) {
+  for (const double x : numbers)
+    if (!std::isfinite(x)) return false;
+  return true;
+}
+
+Result<void> check_camera(const Camera& camera, const char* side, std::string_view origin) {
+  if (camera.width() < 1 || camera.height() < 1)
+    return malformed(origin, fmt::format("the {} camera has {} x {} pixels", side, camera.width(), camera.height()));
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  if (!positive(fx) || !positive(fy) || !std::isfinite(cx) || !std::isfinite(cy) || !all_finite(camera.distortion()))
+    return malformed(origin,
+                     fmt::format("the {} camera's focal lengths are not positive, or a number of it is not finite", side));
+  if (camera.sees_backwards())
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
+                             "can be used: crop the images, and subtract what is cut off at the left and the top from cx and cy",
+                             origin, side)};
+  return {};
+}
+
+Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
+  for (const auto& [figure, name] : {std::pair(noise.gyro_noise_density_radps_rthz, "gyroscope's noise density"),
+                                     {noise.accel_noise_density_mps2_rthz, "accelerometer's noise density"},
+                                     {noise.gyro_random_walk_radps2_rthz, "gyroscope's random walk"},
+                                     {noise.accel_random_walk_mps3_rthz, "accelerometer's random walk"},
+                                     {noise.rate_hz, "IMU's rate"}})
+    if (!positive(figure)) return malformed(origin, fmt::format("the {} is {}, not positive", name, figure));
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
+  for (const auto& [camera, side] : {std::pair(&rig.left, "left"), {&rig.right, "right"}})
+    if (Result<void> good = check_camera(*camera, side, origin); !good) return good;
+  if (!is_transform(rig.T_BC0) || !is_transform(rig.T_BC1))
+    return malformed(origin, "a camera's pose in the body has a number that is not finite, or no rotation");
+  const double baseline_m = rig.T_C1C0().p.norm();
+  if (!(baseline_m > 1e-3 && baseline_m < 10.0))
+    return malformed(origin, fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
+  if (!positive(rig.image_rate_hz) || !std::isfinite(rig.time_offset_s))
+    return malformed(origin, "the images' rate is not positive, or the time offset is not finite");
+  return check_imu(rig.imu_noise, origin);
+}
+
+}  // namespace fbvins

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/camera/check_rig.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+namespace fbvins {
+namespace {
+
+StereoRig good_rig() {
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
+  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  return rig;
+}
+
+struct Broken {
+  std::function<void(StereoRig&)> breaks;
+  const char* sentence;
+};
+
+TEST(CheckRig, TakesARigThatCanFly) { EXPECT_TRUE(check_rig(good_rig(), "rig").ok()); }
+
+TEST(CheckRig, RefusesWithASentence) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Broken> all = {
+      {[](StereoRig& r) { r.left = Camera(); }, "the left camera has 0 x 0 pixels"},
+      {[](StereoRig& r) { r.right = Camera(PinholeRadtan{.fx = 0, .fy = 450, .cx = 376, .cy = 240}, 752, 480); },
+       "focal lengths"},
+      {[&](StereoRig& r) { r.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = nan, .cy = 240}, 752, 480); },
+       "not finite"},
+      {[](StereoRig& r) {
+         r.left = Camera(KannalaBrandt{150, 150, 256, 256, 0, 0, 0, 0}, 512, 512);
+       },
+       "180 degrees"},
+      {[](StereoRig& r) { r.T_BC1 = {}; }, "0 m apart"},
+      {[](StereoRig& r) { r.T_BC1.p.x() = 11; }, "11 m apart"},
+      {[&](StereoRig& r) { r.T_BC0.p.x() = nan; }, "pose in the body"},
+      {[](StereoRig& r) { r.T_BC0.q = Quat(2, 0, 0, 0); }, "no rotation"},
+      {[&](StereoRig& r) { r.time_offset_s = nan; }, "time offset"},
+      {[](StereoRig& r) { r.image_rate_hz = 0; }, "images' rate"},
+      {[](StereoRig& r) { r.imu_noise.gyro_noise_density_radps_rthz = 0; }, "gyroscope's noise density is 0, not positive"},
+      {[](StereoRig& r) { r.imu_noise.accel_noise_density_mps2_rthz = -1; }, "accelerometer's noise density is -1, not positive"},
+      {[](StereoRig& r) { r.imu_noise.gyro_random_walk_radps2_rthz = 0; }, "gyroscope's random walk"},
+      {[&](StereoRig& r) { r.imu_noise.accel_random_walk_mps3_rthz = nan; }, "accelerometer's random walk"},
+      {[](StereoRig& r) { r.imu_noise.rate_hz = 0; }, "IMU's rate"},
+  };
+  for (const Broken& broken : all) {
+    StereoRig rig = good_rig();
+    broken.breaks(rig);
+    const Result<void> checked = check_rig(rig, "drone.yaml");
+    ASSERT_FALSE(checked.ok()) << broken.sentence;
+    EXPECT_NE(checked.error().message.find(broken.sentence), std::string::npos) << checked.error().message;
+    EXPECT_EQ(checked.error().message.rfind("drone.yaml: ", 0), 0u) << checked.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace fbvins
