@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# fbvins_module(NAME [COLD] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
+# fbvins_module(NAME [COLD] [PLAIN] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
 # One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
 # where they can, other libraries otherwise. COLD: compiled with -O1. A cold module must not instantiate products or
-# decompositions of Eigen: the linker could use its slow copy of a template everywhere. Users link components (FbvinsInstall.cmake).
+# decompositions of Eigen: the linker could use its slow copy of a template everywhere. PLAIN: without precompiled headers.
+# Users link components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
@@ -28,7 +29,7 @@ include(cmake/FbvinsPrecompiled.cmake)
 include(cmake/FbvinsEigen.cmake)
 
 function(fbvins_module NAME)
-  cmake_parse_arguments(ARG "COLD" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "COLD;PLAIN" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
   set(target fbvins_${NAME})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
@@ -36,7 +37,7 @@ function(fbvins_module NAME)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:fbvins_flags> ${ARG_PRIVATE_DEPS})
     if(ARG_COLD)
       fbvins_use_precompiled(${target} cold)
-    else()
+    elseif(NOT ARG_PLAIN)
       fbvins_use_precompiled(${target} library)
     endif()
   else()

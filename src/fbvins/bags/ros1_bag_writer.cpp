@@ -4,11 +4,10 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstdio>
-#include <fstream>
 #include <map>
 #include <vector>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/little_endian.hpp"
 #include "fbvins/io/ros_messages.hpp"
 
@@ -181,27 +180,16 @@ struct ChunkInfo {
 }  // namespace
 
 struct Ros1BagWriter::State {
-  std::string path, partial;
-  std::ofstream file;
-  std::uint64_t written = 0;
+  explicit State(AtomicFile opened) : file(std::move(opened)) {}
+
+  AtomicFile file;
   std::string chunk;
   ChunkInfo info;
   std::vector<ChunkInfo> chunks;
   std::vector<Topic> all = topics();
-  bool finished = false;
 
-  ~State() {
-    if (!finished) std::remove(partial.c_str());
-  }
-
-  void write(std::string_view bytes) {
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    written += bytes.size();
-  }
-  Result<void> good() const {
-    if (file) return {};
-    return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path)};
-  }
+  void write(std::string_view bytes) { file.write(bytes); }
+  Result<void> good() const { return file.status(); }
 
   std::string connection(std::uint32_t number) const {
     const Topic& topic = all[number];
@@ -219,7 +207,7 @@ struct Ros1BagWriter::State {
   Result<void> add(std::uint32_t number, Time t, const std::string& message) {
     constexpr Time kEnd{(std::int64_t{1} << 32) * kSecond_ns};
     if (t < Time{0} || t >= kEnd)
-      return Error{ErrorCode::invalid_argument, fmt::format("{}: a stamp of {} ns is none of ROS's", path, t.ns)};
+      return Error{ErrorCode::invalid_argument, fmt::format("{}: a stamp of {} ns is none of ROS's", file.path(), t.ns)};
     std::string& entries = info.entries[number];
     if (entries.empty()) chunk += connection(number);
     if (info.entries.size() == 1 && entries.empty()) info.first = info.last = t;
@@ -241,7 +229,7 @@ struct Ros1BagWriter::State {
     add_number(header, "op", std::uint8_t{5});
     add_field(header, "compression", "none");
     add_number(header, "size", static_cast<std::uint32_t>(chunk.size()));
-    info.at = written;
+    info.at = file.size();
     write(record(header, chunk));
     for (const auto& [number, entries] : info.entries) {
       std::string index;
@@ -257,7 +245,7 @@ struct Ros1BagWriter::State {
   }
 
   void write_index() {
-    const std::uint64_t index_at = written;
+    const std::uint64_t index_at = file.size();
     for (std::uint32_t number = 0; number < all.size(); ++number) write(connection(number));
     for (const ChunkInfo& c : chunks) {
       std::string header, counts;
@@ -273,8 +261,7 @@ struct Ros1BagWriter::State {
       }
       write(record(header, counts));
     }
-    file.seekp(static_cast<std::streamoff>(kMagic.size()));
-    write(bag_header(index_at));
+    file.overwrite(kMagic.size(), bag_header(index_at));
   }
 
   std::string bag_header(std::uint64_t index_at) const {
@@ -290,10 +277,9 @@ struct Ros1BagWriter::State {
 };
 
 Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start) {
-  auto state = std::make_unique<State>();
-  state->path = path;
-  state->partial = path + ".partial";
-  state->file.open(state->partial, std::ios::binary | std::ios::trunc);
+  Result<AtomicFile> file = AtomicFile::create(path);
+  if (!file) return file.error();
+  auto state = std::make_unique<State>(*std::move(file));
   state->write(kMagic);
   state->write(state->bag_header(0));
   if (Result<void> done = state->good(); !done) return done.error();
@@ -321,12 +307,7 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
 Result<void> Ros1BagWriter::finish() {
   state_->flush();
   state_->write_index();
-  state_->file.close();
-  if (Result<void> done = state_->good(); !done) return done;
-  if (std::rename(state_->partial.c_str(), state_->path.c_str()) != 0)
-    return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", state_->path)};
-  state_->finished = true;
-  return {};
+  return state_->file.commit();
 }
 
 }  // namespace fbvins

@@ -26,8 +26,10 @@ constexpr Duration kStatusPeriod = Duration::from_seconds(1);
 //                       '-[each reading, at once]-> PosePropagator -> LivePose        '-> rebase
 //                                                                     all of it -> Hub -> sinks
 struct LiveSystem::Impl {
-  Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate, System made)
-      : ingest(options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
+  Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate,
+       std::uint32_t first_reset_counter, System made)
+      : first_reset(first_reset_counter),
+        ingest(options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
         system(std::move(made)),
         watch(options, system_options.estimator.max_image_gap_s),
         propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), options.smoothing_s,
@@ -35,8 +37,11 @@ struct LiveSystem::Impl {
         views(rig.T_BC0),
         started(host_now()) {
     system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
-    system.on_odometry([this](const Odometry& o) { on_odometry(o); });
-    system.on_map_update([this](const MapUpdate& u) { hub.publish(u); });
+    system.on_odometry([this](Odometry o) { on_odometry(std::move(o)); });
+    system.on_map_update([this](MapUpdate u) {
+      u.reset_counter += first_reset;
+      hub.publish(std::move(u));
+    });
   }
   ~Impl() { (void)finish(); }
 
@@ -47,6 +52,7 @@ struct LiveSystem::Impl {
     {
       const std::lock_guard lock(pose_mutex);
       pose = propagator.add(sample);
+      pose.reset_counter = reset_counter;                // before the first estimate, too
       if (pose.health.has_pose()) pose.health = health;  // else the propagator has no pose, whatever `health` says
       if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
     }
@@ -64,7 +70,8 @@ struct LiveSystem::Impl {
     system.on_window([this](const WindowSnapshot& window) { views.add(window); });
   }
 
-  void on_odometry(const Odometry& o) {
+  void on_odometry(Odometry o) {
+    o.reset_counter += first_reset;
     const Time image_host_t = ingest.host_of(o.t);
     const Duration latency = host_now() - image_host_t;
     shutter_to_pose.add(latency);
@@ -78,7 +85,7 @@ struct LiveSystem::Impl {
       if (o.health.has_pose()) estimate_host_t = image_host_t;
     }
     if (views_wanted) hub.publish(views.view_of(o, latency.seconds() * 1e3));
-    hub.publish(o);
+    hub.publish(std::move(o));
     look(false);
   }
 
@@ -167,6 +174,7 @@ struct LiveSystem::Impl {
     return result;
   }
 
+  std::uint32_t first_reset;  ///< what all outputs see is the System's counter plus this
   Hub hub;
   Ingest ingest;
   System system;
@@ -176,7 +184,7 @@ struct LiveSystem::Impl {
   PosePropagator propagator;
   Health estimated, health;  ///< the estimator's, and SensorWatch's judgement of it
   std::optional<Time> estimate_host_t;
-  std::uint32_t reset_counter = 0;
+  std::uint32_t reset_counter = first_reset;
   std::int64_t images_estimated = 0, resets = 0;
 
   ViewMaker views;  ///< used on the estimator's thread alone
@@ -193,11 +201,11 @@ struct LiveSystem::Impl {
 };
 
 Result<LiveSystem> LiveSystem::create(const SystemOptions& system, const LiveOptions& options, const StereoRig& rig,
-                                      double clock_rate, SystemParts parts) {
+                                      double clock_rate, SystemParts parts, std::uint32_t first_reset_counter) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
   Result<System> made = System::create(system, rig, RunMode::threaded, std::move(parts));
   if (!made) return made.error();
-  return LiveSystem(std::make_unique<Impl>(system, options, rig, clock_rate, std::move(*made)));
+  return LiveSystem(std::make_unique<Impl>(system, options, rig, clock_rate, first_reset_counter, std::move(*made)));
 }
 
 LiveSystem::LiveSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

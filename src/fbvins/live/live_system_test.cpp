@@ -90,9 +90,11 @@ struct Fixture {
   SimulatedFlight flight{motion, 1};
   Watcher watcher;
   std::uint8_t pixel = 0;
+  std::uint32_t first_reset_counter = 0;
 
   LiveSystem live(std::function<void(FrameId)> before = {}, LiveOptions options = {}) {
-    auto made = LiveSystem::create({}, options, flight.rig, 1, {.frontend = std::make_unique<SeesTheFlight>(flight, before)});
+    auto made = LiveSystem::create({}, options, flight.rig, 1, {.frontend = std::make_unique<SeesTheFlight>(flight, before)},
+                                   first_reset_counter);
     EXPECT_TRUE(made) << (made ? "" : made.error().message);
     made->add_sink(std::make_unique<WatcherSink>(watcher));
     return std::move(*made);
@@ -126,6 +128,19 @@ TEST(LiveSystem, PublishesAPoseWithEveryReading) {
   EXPECT_EQ(status.counts.images_estimated, 60);
   EXPECT_EQ(status.counts.images_dropped, 0);
   EXPECT_EQ(status.counts.imu, 600);
+}
+
+/// Another counter than the process before had tells who outlives both that W is a new frame.
+TEST(LiveSystem, AllOutputsBeginWithTheFirstResetCounter) {
+  Fixture f;
+  f.first_reset_counter = 7;
+  LiveSystem live = f.live();
+  f.play(live, 0, 30);
+  ASSERT_TRUE(live.finish());
+  for (const LivePose& pose : f.watcher.all<LivePose>()) ASSERT_EQ(pose.reset_counter, 7u);
+  for (const Odometry& o : f.watcher.all<Odometry>()) ASSERT_EQ(o.reset_counter, 7u);
+  EXPECT_EQ(live.status().reset_counter, 7u);
+  EXPECT_EQ(live.status().counts.resets, 0);
 }
 
 /// Sinks get the sensor events as the estimator consumes them, so that a record can be run again.

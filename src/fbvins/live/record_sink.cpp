@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/record_sink.hpp"
 
+#include <fmt/format.h>
+
 #include <chrono>
+#include <filesystem>
 #include <limits>
+#include <string>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -16,6 +21,18 @@ namespace {
 constexpr std::chrono::milliseconds kFlushPeriod{100};
 /// Every so many flushes the file is synchronised with the disk, for a power failure.
 constexpr int kFlushesPerSync = 10;
+
+constexpr int kMostRecords = 10'000;
+
+std::string no_space(const RecordSpace& space) {
+  return fmt::format("less than {} MB are free on its disk", space.keep_free_bytes / 1'000'000);
+}
+
+/// flight.mcap, flight-2.mcap ...
+std::string numbered(const std::filesystem::path& path, int number) {
+  if (number == 1) return path.string();
+  return (path.parent_path() / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string())).string();
+}
 
 /// Features and landmarks, with those of the same track as one.
 std::vector<RosLandmark> landmarks_of(const LiveView& view) {
@@ -64,14 +81,35 @@ struct Adder {
 
 }  // namespace
 
-Result<std::unique_ptr<RecordSink>> RecordSink::create(const std::string& path, const StereoRig& rig,
-                                                       const FlightRecordOptions& options) {
-  Result<FlightRecord> record = FlightRecord::create(path, rig, options);
-  if (!record) return record.error();
-  return std::unique_ptr<RecordSink>(new RecordSink(path, *std::move(record)));
+std::uint64_t free_bytes_beside(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const std::filesystem::space_info space = std::filesystem::space(folder.empty() ? "." : folder, error);
+  return error ? std::numeric_limits<std::uint64_t>::max() : space.available;
 }
 
-RecordSink::RecordSink(const std::string& path, FlightRecord record) : name_("record " + path), record_(std::move(record)) {
+Result<std::unique_ptr<RecordSink>> RecordSink::create(const std::string& path, const StereoRig& rig,
+                                                       const FlightRecordOptions& options, RecordSpace space) {
+  if (space.free_bytes(path) < space.keep_free_bytes) return Error{ErrorCode::unwritable, path + ": " + no_space(space)};
+  Result<FlightRecord> record = FlightRecord::create(path, rig, options);
+  if (!record) return record.error();
+  return std::unique_ptr<RecordSink>(new RecordSink(path, *std::move(record), std::move(space)));
+}
+
+Result<std::unique_ptr<RecordSink>> RecordSink::create_next(const std::string& path, const StereoRig& rig,
+                                                            const FlightRecordOptions& options, const RecordSpace& space) {
+  for (int number = 1; number < kMostRecords; ++number) {
+    const std::string name = numbered(path, number);
+    auto made = create(name, rig, options, space);
+    std::error_code ignored;
+    // Asked for only after a failure: another program may take the same number at the same time.
+    if (made || !std::filesystem::exists(std::filesystem::symlink_status(name, ignored))) return made;
+  }
+  return Error{ErrorCode::unwritable, path + ": too many records with this name"};
+}
+
+RecordSink::RecordSink(std::string path, FlightRecord record, RecordSpace space)
+    : path_(std::move(path)), name_("record " + path_), space_(std::move(space)), record_(std::move(record)) {
   flusher_ = std::thread([this] { keep_flushing(); });
 }
 
@@ -80,20 +118,34 @@ RecordSink::~RecordSink() { stop_flushing(); }
 Result<void> RecordSink::take(const LiveEvent& event) {
   const std::lock_guard lock(mutex_);
   Result<void> flushed = std::exchange(flushed_, {});
+  if (whole_) return flushed;
   Result<void> added = std::visit(Adder{record_}, event);
   return flushed ? added : flushed;
 }
 
 Result<void> RecordSink::finish() {
   stop_flushing();
-  return record_.finish();
+  const std::lock_guard lock(mutex_);
+  Result<void> flushed = std::exchange(flushed_, {});
+  const Result<void> done = std::exchange(whole_, true) ? Result<void>{} : record_.finish();
+  return flushed ? done : flushed;
+}
+
+/// With the mutex held. The error is that of the next call, so that the status says it.
+void RecordSink::end_if_disk_is_full() {
+  if (whole_ || space_.free_bytes(path_) >= space_.keep_free_bytes) return;
+  (void)record_.finish();
+  whole_ = true;
+  flushed_ = Error{ErrorCode::unwritable, "the record has ended: " + no_space(space_)};
 }
 
 /// On a thread, so that messages reach the file even when no more events come.
 void RecordSink::keep_flushing() {
   std::unique_lock lock(mutex_);
   for (int i = 1; !ending_.wait_for(lock, kFlushPeriod, [&] { return ended_; }); ++i) {
+    if (whole_) continue;
     if (Result<void> flushed = record_.flush(); !flushed) flushed_ = flushed;
+    end_if_disk_is_full();
     if (i % kFlushesPerSync != 0) continue;
     lock.unlock();  // a slow disk does not hold up the writing
     record_.sync();

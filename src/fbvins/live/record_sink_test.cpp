@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <map>
 
@@ -144,6 +145,39 @@ TEST_F(RecordSinkTest, AStampThatCannotBeWrittenIsSaidAndTheRestIsRecorded) {
   EXPECT_TRUE(sink->take(ImuSample{at(5)}));
   ASSERT_TRUE(sink->finish());
   EXPECT_EQ(topics()["/imu"], 1);
+}
+
+TEST_F(RecordSinkTest, WhereTheFileExistsTheNextNumberIsTaken) {
+  for (const char* expected : {"/flight.mcap", "/flight-2.mcap", "/flight-3.mcap"}) {
+    auto sink = RecordSink::create_next(path_, small_rig(), {});
+    ASSERT_TRUE(sink) << sink.error().message;
+    EXPECT_EQ((*sink)->path(), folder_ + expected);
+    EXPECT_EQ((*sink)->name(), "record " + folder_ + expected);
+  }
+  EXPECT_FALSE(RecordSink::create_next(folder_ + "/none/flight.mcap", small_rig(), {})) << "no number helps there";
+}
+
+TEST_F(RecordSinkTest, EndsWholeBeforeTheDiskIsFull) {
+  std::atomic<std::uint64_t> free{2'000'000};
+  auto made = RecordSink::create(path_, small_rig(), {},
+                                 {.keep_free_bytes = 1'000'000, .free_bytes = [&](const std::string&) { return free.load(); }});
+  ASSERT_TRUE(made) << made.error().message;
+  RecordSink& sink = **made;
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(sink.take(ImuSample{at(5 * i)}));
+  free = 999'999;
+  Result<void> taken;
+  for (int i = 10; taken && i < 5000; ++i, std::this_thread::sleep_for(2ms)) taken = sink.take(ImuSample{at(5 * i)});
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().message, "the record has ended: less than 1 MB are free on its disk");
+  const auto size = fs::file_size(path_);
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(sink.take(ImuSample{at(100'000 + i)})) << "said once";
+  EXPECT_TRUE(sink.finish());
+  EXPECT_EQ(fs::file_size(path_), size);
+  EXPECT_GE(topics()["/imu"], 10);
+  const auto refused =
+      RecordSink::create(folder_ + "/second.mcap", small_rig(), {},
+                         {.keep_free_bytes = 1'000'000, .free_bytes = [&](const std::string&) { return free.load(); }});
+  EXPECT_FALSE(refused);
 }
 
 }  // namespace

@@ -43,7 +43,9 @@ Result<std::unique_ptr<ServiceSink>> ServiceSink::create(const std::string& addr
 Result<void> ServiceSink::take(const LiveEvent& event) {
   const auto* status = std::get_if<LiveStatus>(&event);
   if (status == nullptr) return {};
-  std::string sentence = status->problem.empty() ? health_sentence(status->health) : status->problem;
+  // A problem of one output does not hide the health.
+  std::string sentence = health_sentence(status->health);
+  if (!status->problem.empty()) sentence += "; " + status->problem;
   std::replace(sentence.begin(), sentence.end(), '\n', ' ');
   log(*status, sentence);
   std::string message = fmt::format("STATUS={}\n", sentence);

@@ -140,7 +140,7 @@ TEST(ServiceSink, ALineBreakInAProblemIsNotAMessageOfItsOwn) {
   LiveStatus status = status_at(1, 0, 0);
   status.problem = "no cable\nWATCHDOG=trigger";
   ASSERT_TRUE((*sink)->take(status));
-  EXPECT_TRUE(has(manager.told(), "STATUS=no cable WATCHDOG=trigger"));
+  EXPECT_TRUE(has(manager.told(), "STATUS=good; no cable WATCHDOG=trigger"));
 }
 
 TEST(ServiceSink, AWrongAddressIsOneSentence) {

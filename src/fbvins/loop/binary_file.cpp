@@ -9,7 +9,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 
 namespace fbvins {
 namespace {
@@ -23,16 +22,6 @@ struct OpenFile {
 };
 
 Error system_error(ErrorCode code, const std::string& path) { return {code, fmt::format("{}: {}", path, std::strerror(errno))}; }
-
-bool write_all(int fd, std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes.remove_prefix(static_cast<std::size_t>(n));
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -54,29 +43,6 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& pa
 
 MappedFile::~MappedFile() {
   if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
-}
-
-Result<void> write_file_atomically(const std::string& path, std::string_view bytes) {
-  const std::string temporary = fmt::format("{}.{}.part", path, ::getpid());
-  {
-    const OpenFile file{::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
-    if (file.fd < 0) return system_error(ErrorCode::unwritable, path);
-    if (!write_all(file.fd, bytes) || ::fsync(file.fd) != 0) {
-      const Error error = system_error(ErrorCode::unwritable, path);
-      ::unlink(temporary.c_str());
-      return error;
-    }
-  }
-  if (::rename(temporary.c_str(), path.c_str()) != 0) {
-    const Error error = system_error(ErrorCode::unwritable, path);
-    ::unlink(temporary.c_str());
-    return error;
-  }
-  // The new name must survive a power cut, too.
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  const OpenFile parent{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (parent.fd >= 0) (void)::fsync(parent.fd);
-  return {};
 }
 
 std::uint64_t checksum64(std::span<const std::byte> bytes) {

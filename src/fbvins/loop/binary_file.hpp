@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of maps and vocabularies: mapped for reading, replaced as a whole for writing, with a checksum.
+// Files of maps and vocabularies: mapped for reading, with a checksum (written by core/atomic_file.hpp).
 // Functions without state; a MappedFile may be read by any number of threads.
 //
-//   Result<void> done = write_file_atomically("map.fbm", bytes);   // old or new file, whatever happens
 //   auto file = MappedFile::open("map.fbm");
 //   std::span<const std::byte> bytes = (*file)->bytes();
 #pragma once
@@ -12,7 +11,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 
 #include "fbvins/core/result.hpp"
 
@@ -32,10 +30,6 @@ class MappedFile {
   MappedFile() = default;
   std::span<const std::byte> bytes_;
 };
-
-/// Writes beside the file, flushes to the disk, renames over it, flushes the folder. A kill or a power cut at any
-/// moment leaves the old file or the new one, whole.
-Result<void> write_file_atomically(const std::string& path, std::string_view bytes);
 
 /// Checksum against damage, not against tampering: four multiplicative hashes side by side.
 std::uint64_t checksum64(std::span<const std::byte> bytes);

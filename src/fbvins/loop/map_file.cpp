@@ -10,6 +10,7 @@
 #include <iterator>
 #include <set>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/loop/binary_file.hpp"
 
 namespace fbvins {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/features/hamming.hpp"
 #include "fbvins/loop/binary_file.hpp"
 

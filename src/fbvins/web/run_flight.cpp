@@ -134,7 +134,7 @@ class RunFlight final : public FinishedFlight {
     status.health = o.health;
     status.reset_counter = o.reset_counter;
     status.counts.images = status.counts.images_estimated = static_cast<std::int64_t>(i / 4) + 1;
-    status.counts.resets = o.reset_counter;
+    status.counts.resets = o.reset_counter - images_.front().odometry.reset_counter;
     return status;
   }
 

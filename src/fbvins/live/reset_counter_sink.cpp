@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/reset_counter_sink.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
+#include <utility>
+
+#include "fbvins/io/byte_source.hpp"
+
+namespace fbvins {
+namespace {
+
+/// What flight controllers compare has eight bits (MAVLink's ODOMETRY).
+constexpr std::uint32_t kDifferent = 256;
+/// After a file that cannot be read: far from the small numbers of most flights.
+constexpr std::uint32_t kUnknown = 128;
+constexpr std::uint64_t kLargestFile_bytes = 100;
+
+std::uint32_t after_the_one_in(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return 0;
+  const auto bytes = open_bytes(file);
+  if (!bytes || (*bytes)->size() > kLargestFile_bytes) return kUnknown;
+  const std::string text = (*bytes)->read(0, (*bytes)->size());
+  std::uint32_t last = 0;
+  const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), last);
+  return wrong == std::errc() && end != text.data() + text.size() && *end == '\n' ? (last + 1) % kDifferent : kUnknown;
+}
+
+}  // namespace
+
+ResetCounterSink::ResetCounterSink(std::string file, WriteFile write)
+    : file_(std::move(file)),
+      write_(std::move(write)),
+      first_(after_the_one_in(file_)),
+      kept_(first_),
+      first_kept_(keep(first_)) {}
+
+Result<void> ResetCounterSink::keep(std::uint32_t counter) {
+  kept_ = counter;
+  return write_(file_, fmt::format("{}\n", counter));
+}
+
+Result<void> ResetCounterSink::take(const LiveEvent& event) {
+  if (!first_kept_) return std::exchange(first_kept_, {});
+  const auto* pose = std::get_if<LivePose>(&event);
+  return pose && pose->reset_counter != kept_ ? keep(pose->reset_counter) : Result<void>{};
+}
+
+}  // namespace fbvins
