@@ -20,7 +20,7 @@ if(CMAKE_CROSSCOMPILING)
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
   string(JOIN ", " CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libc6 (>= 2.36)" "libstdc++6 (>= 12)" libgcc-s1 "libfmt9 (>= 9.1.0+ds1)"
     "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libceres3 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 liblapack3 libblas3
-    libddsc0debian)
+    libddsc0debian libnettle8)
 else()
   set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 endif()
@@ -32,5 +32,5 @@ set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVEL_DESCRIPTION "FB-VINS: headers and static libraries
  For programs that call find_package(fbvins COMPONENTS core io loop live sim).")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS "libeigen3-dev, libfmt-dev")
-set(CPACK_DEBIAN_DEVEL_PACKAGE_RECOMMENDS "libceres-dev, libyaml-cpp-dev, libzip-dev, libpng-dev, libturbojpeg0-dev")
+set(CPACK_DEBIAN_DEVEL_PACKAGE_RECOMMENDS "libceres-dev, libyaml-cpp-dev, libzip-dev, libpng-dev, libturbojpeg0-dev, nettle-dev")
 include(CPack)

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sends a RealSense D435i to `fbvins live --source socket:PATH`, by Intel's Python package (pip install pyrealsense2 numpy).
 
-usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag]    runs until Ctrl-C, or the recording's end; waits for a camera that is unplugged
+usage: d435i_bridge.py SOCKET [SERIAL or FILE.bag]    runs until Ctrl-C, or the recording's end; waits for a camera that is unplugged, and
+for fbvins, which may start later or anew
 """
 import collections
 import fcntl
@@ -18,6 +19,9 @@ import numpy
 import pyrealsense2 as rs
 
 SLOTS = 16
+SAME_INSTANT_NS = 2_000_000  # stamps of a pair differ by at most this
+LONGEST_WAIT = 4  # images of one camera without any of the other
+PATIENCE_S = 2  # of a connection: longer silence or blocking means that it is dead
 IMU_NOISE = (2.44e-4, 1.9393e-5, 1.47e-3, 3.0e-3)  # densities from the BMI055's data sheet, random walks assumed (docs/d435i.md)
 
 
@@ -37,6 +41,44 @@ def message(kind, body):
     return struct.pack("<II", kind, 8 + len(body)) + body
 
 
+class StereoPairs:
+    """Pairs two cameras' images by their stamps, by the rule of src/fbvins/live/stereo_pairs.hpp: an image whose partner is lost leaves
+    alone as soon as that is certain."""
+
+    def __init__(self):
+        self.waiting, self.pairs, self.alone, self.nearest_ns = (collections.deque(), collections.deque()), 0, 0, None
+
+    def add(self, camera, t_ns, image):
+        """camera: 0 left, 1 right. After it, next() until that is None."""
+        own = self.waiting[camera]
+        if not own or t_ns > own[-1][0]:
+            own.append((t_ns, image))
+
+    def next(self):
+        """(stamp, left, right), one of the images None where it is lost."""
+        left, right = self.waiting
+        if left and right and abs(right[0][0] - left[0][0]) <= SAME_INSTANT_NS:
+            self.pairs += 1
+            return left[0][0], left.popleft()[1], right.popleft()[1]
+        for camera, own, other in ((0, left, right), (1, right, left)):
+            if own and (own[0][0] < other[0][0] if other else len(own) >= LONGEST_WAIT):
+                t_ns, image = own.popleft()
+                self.alone += 1
+                if other:
+                    self.nearest_ns = min(self.nearest_ns or other[0][0] - t_ns, other[0][0] - t_ns)
+                return t_ns, *((image, None), (None, image))[camera]
+        return None
+
+    def report(self):
+        """What is wrong since the last report, or None."""
+        pairs, alone, nearest_ns = self.pairs, self.alone, self.nearest_ns
+        self.pairs, self.alone, self.nearest_ns = 0, 0, None
+        if alone == 0:
+            return None
+        apart = "" if nearest_ns is None else f"; the other camera's next image was at least {nearest_ns / 1e6:.3f} ms later"
+        return f"{alone} images without their partner, {pairs} pairs{apart}"
+
+
 class Sender:
     """One connection: sends hello, readings and frames; receives which slots are free again."""
 
@@ -48,6 +90,8 @@ class Sender:
         self.slots = numpy.frombuffer(mmap.mmap(memory, SLOTS * 2 * self.size), numpy.uint8).reshape(SLOTS, 2, height, width)
         self.free = set(range(SLOTS))
         self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            self.connection.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", PATIENCE_S, 0))
         self.connection.connect(path)
         hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 0, 1, b"D435i bridge", width, height, SLOTS, 2 * self.size, self.size, 0)
         socket.send_fds(self.connection, [message(1, hello + calibration)], [memory])
@@ -60,6 +104,8 @@ class Sender:
         try:
             said = self.connection.recv(32768, flags)
         except BlockingIOError:
+            if flags == 0:
+                raise ConnectionError("the estimator does not answer") from None
             return None
         kind = struct.unpack_from("<I", said)[0] if said else 4
         if kind == 4:
@@ -81,8 +127,51 @@ class Sender:
             if not self.free:
                 return  # the gap in `sequence` tells the estimator of the frame
             slot = self.free.pop()
-            self.slots[slot, 0], self.slots[slot, 1] = left, right
-            self.connection.send(message(3, struct.pack("<qQII", t_ns, self.sequence, slot, 3)))
+            for camera, image in enumerate((left, right)):
+                if image is not None:
+                    self.slots[slot, camera] = image
+            which = (left is not None) + 2 * (right is not None)
+            self.connection.send(message(3, struct.pack("<qQII", t_ns, self.sequence, slot, which)))
+
+
+class Link:
+    """The connection to fbvins, which may start later, end, and start again. Meanwhile images and readings are dropped."""
+
+    def __init__(self, path, *rig_and_size):
+        self.path, self.arguments, self.sender, self.dropped, self.told = path, rig_and_size, None, 0, None
+
+    def keep_open(self):
+        """Tries once where there is no connection; true: there is one."""
+        if self.sender is None:
+            try:
+                self.sender = Sender(self.path, *self.arguments)
+                self.tell(f"connected to {self.path}" + (f", {self.dropped} images were dropped" if self.dropped else ""))
+                self.dropped = 0
+            except OSError as error:
+                self.tell(f"waiting for fbvins at {self.path}: {error}")
+        return self.sender is not None
+
+    def tell(self, sentence):
+        if sentence != self.told:
+            print(sentence, file=sys.stderr, flush=True)
+        self.told = sentence
+
+    def send(self, what, *values):
+        sender = self.sender
+        if sender is None:
+            self.dropped += what == "frame"
+            return
+        try:
+            getattr(sender, what)(*values)
+        except OSError as error:
+            self.sender = None
+            sender.connection.close()
+            self.tell(f"the connection to {self.path} has ended: {error}")
+
+    def close(self):
+        sender, self.sender = self.sender, None
+        if sender:
+            sender.connection.close()
 
 
 class Camera:
@@ -107,9 +196,11 @@ class Camera:
         if chosen.keys() != wanted.keys():
             raise RuntimeError(f"the camera has no {wanted.keys() - chosen.keys()}")
         left, right, gyro = (chosen[key] for key in list(wanted)[:3])
-        self.sender = Sender(path, left.width(), left.height(), rig(left, right, gyro))
-        self.images, self.accel, self.gyro = {1: {}, 2: {}}, collections.deque(maxlen=100), collections.deque(maxlen=1000)
+        self.link = Link(path, left.width(), left.height(), rig(left, right, gyro))
+        self.pairs, self.accel, self.gyro = StereoPairs(), collections.deque(maxlen=100), collections.deque(maxlen=1000)
         self.lock, self.failure = threading.Lock(), None
+
+    def start(self):
         for sensor, profiles in self.sensors:
             sensor.open(profiles)
             sensor.start(self.take)
@@ -138,12 +229,9 @@ class Camera:
             self.failure = error
 
     def take_image(self, camera, t_ns, image):
-        self.images[camera][t_ns] = image
-        if t_ns in self.images[3 - camera]:
-            self.sender.frame(t_ns, self.images[1][t_ns], self.images[2][t_ns])
-            for waiting in self.images.values():
-                for old in [t for t in waiting if t <= t_ns]:
-                    del waiting[old]
+        self.pairs.add(camera - 1, t_ns, image)
+        while frame := self.pairs.next():
+            self.link.send("frame", *frame)
 
     def send_readings(self):
         while self.gyro and len(self.accel) > 1 and self.accel[-1][0] >= self.gyro[0][0]:
@@ -152,7 +240,11 @@ class Camera:
                 self.accel.popleft()
             (t0, before), (t1, after) = self.accel[0], self.accel[1]
             if t0 <= t_ns <= t1 and t1 - t0 < 50_000_000:
-                self.sender.reading(t_ns, rate, before + (t_ns - t0) / (t1 - t0) * (after - before))
+                self.link.send("reading", t_ns, rate, before + (t_ns - t0) / (t1 - t0) * (after - before))
+
+    def report(self):
+        with self.lock:
+            return self.pairs.report()
 
     def stop(self):
         for sensor, _ in self.sensors:
@@ -161,7 +253,7 @@ class Camera:
                 sensor.close()
             except RuntimeError:  # unplugged
                 pass
-        self.sender.connection.close()
+        self.link.close()
 
 
 def find(context, which):
@@ -180,8 +272,16 @@ def main(path, which=""):
         if recorded:
             device.set_status_changed_callback(lambda status: status == rs.playback_status.stopped and over.set())
         camera = Camera(device, path)
-        while not over.wait(0.2) and camera.failure is None:
+        while not camera.link.keep_open() and not over.wait(0.5):
             pass
+        camera.start()
+        next_report_s = 0
+        while not over.wait(0.2) and camera.failure is None:
+            camera.link.keep_open()
+            if time.monotonic() >= next_report_s:
+                next_report_s, wrong = time.monotonic() + 5, camera.report()
+                if wrong:
+                    print(wrong, file=sys.stderr, flush=True)
         camera.stop()
         print(f"the camera's stream has ended: {camera.failure or 'unplugged, or the end of its recording'}", file=sys.stderr)
         if recorded:

@@ -92,6 +92,9 @@ def plug_in(path, seconds):
     """A camera that is plugged in for `seconds`."""
     software = SoftwareCamera()
     bridge = d435i_bridge.Camera(software.device, str(path))
+    while not bridge.link.keep_open():
+        time.sleep(0.2)
+    bridge.start()
     flight = threading.Thread(target=software.fly, args=(seconds,))
     flight.start()
     flight.join()

@@ -235,6 +235,7 @@ const std::vector<Target>& targets() {
 #endif
 #ifdef FBVINS_WITH_LIVE
       {"socket", fuzz_socket, socket_seeds},
+      {"mavlink", fuzz_mavlink, mavlink_seeds},
 #endif
   };
   return all;

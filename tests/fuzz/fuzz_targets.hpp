@@ -19,6 +19,8 @@ void fuzz_motion_capture(std::string_view bytes);
 #ifdef FBVINS_WITH_LIVE
 void fuzz_socket(std::string_view bytes);
 std::vector<std::string> socket_seeds();
+void fuzz_mavlink(std::string_view bytes);
+std::vector<std::string> mavlink_seeds();
 #endif
 
 #ifdef FBVINS_WITH_BAGS

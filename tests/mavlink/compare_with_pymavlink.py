@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares FBVINS's MAVLink frames with pymavlink's, byte by byte, on random values; and decodes pymavlink's frames with FBVINS.
+"""Compares FBVINS's MAVLink frames with pymavlink's, byte by byte, on random values, also signed; decodes pymavlink's frames with
+FBVINS, and FBVINS's signed ones with pymavlink, which refuses what is not signed with its key.
 
 usage: compare_with_pymavlink.py MAVLINK_TEXT [PYTHON]    PYTHON: one that has pymavlink, when this one has not
 """
@@ -61,6 +62,38 @@ def flat(message):
             yield f"{number:.9g}" if isinstance(number, float) else str(number)
 
 
+def pymavlink_takes(frame, key):
+    """Whether pymavlink takes a frame where it wants frames that are signed with the key."""
+    reader = common.MAVLink(None)
+    reader.signing.secret_key, reader.robust_parsing = key, True
+    reader.signing.sign_outgoing = True
+    return [message for message in reader.parse_buffer(frame) or [] if message.get_type() != "BAD_DATA"] != []
+
+
+def signed(program):
+    """Signed frames of both sides."""
+    rng, key, time = random.Random(20), bytes(range(7, 39)), 40_000_000_000_000
+    lines, frames = [f"key {key.hex()} {time}"], []
+    for k, kind in enumerate(MESSAGES * 20):
+        message, link = random_message(rng, kind), common.MAVLink(None, srcSystem=1, srcComponent=197)
+        link.seq, link.signing.secret_key, link.signing.sign_outgoing, link.signing.timestamp = k % 256, key, True, time + k
+        frames.append(bytes(message.pack(link)))
+        lines += [f"encode {kind.id} 1 197 {k % 256} {' '.join(flat(message))}", f"decode {frames[-1].hex()}", f"decode {frames[-1].hex()}"]
+    done = subprocess.run([program], input="\n".join(lines) + "\n", stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode == 77:
+        print(f"no signed frames: {done.stdout.strip()}")
+        return 0
+    answer, failures = iter(done.stdout.split("\n")[1:]), 0
+    for frame in frames:
+        ours = bytes.fromhex(next(answer))
+        once, again = (list(itertools.takewhile(lambda line: line != ".", answer)) for _ in range(2))
+        wrong_key = bytes(reversed(key))
+        good = ours == frame and len(once) == 1 and not again and pymavlink_takes(ours, key) and not pymavlink_takes(ours, wrong_key)
+        failures += not good
+    print(f"{len(frames)} signed frames: {failures} differ from pymavlink's or are not taken as they should")
+    return failures
+
+
 def main():
     rng, messages, lines = random.Random(19), [], []
     for kind, _ in itertools.product(MESSAGES, range(300)):
@@ -79,6 +112,7 @@ def main():
             failures += 1
             print(f"DIFFERENT {name} {text}\n  pymavlink {frame}\n  fbvins    {ours}\n  read      {read}")
     print(f"{len(messages)} frames of {len(MESSAGES)} messages: {failures} differ from pymavlink's")
+    failures += signed(sys.argv[1])
     return 1 if failures else 0
 
 

@@ -2,9 +2,11 @@
 // MAVLink frames to and from text, for a comparison with another implementation, one line each from the standard input:
 //   encode NUMBER SYSTEM COMPONENT SEQUENCE VALUE...   prints the frame in hexadecimal; values in the order of the wire
 //   decode HEXADECIMAL                                 prints NUMBER SYSTEM COMPONENT SEQUENCE VALUE... for each frame, then "."
+//   key HEXADECIMAL TIME                               from here on frames are signed, the first at TIME, and must be signed
 #include <fmt/format.h>
 
 #include <iostream>
+#include <optional>
 #include <sstream>
 #include <string>
 
@@ -60,22 +62,43 @@ MavlinkMessage read_message(std::uint32_t id, std::istream& in) {
   throw std::invalid_argument(fmt::format("message {} is not known", id));
 }
 
-void encode(std::istream& in) {
+std::vector<std::uint8_t> read_bytes(const std::string& text) {
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2)
+    bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
+  return bytes;
+}
+
+/// One for each direction, as two programs would have.
+struct Signers {
+  std::optional<MavlinkSigner> out, in;
+};
+
+int set_key(std::istream& in, Signers& signers) {
+  std::string text;
+  std::uint64_t time = 0;
+  in >> text >> time;
+  const auto key = parse_mavlink_key(text);
+  if (!key) return fmt::print("{}\n", key.error().message), 77;
+  signers.out.emplace(*key, time - 1), signers.in.emplace(*key, time - 1);
+  return fmt::print("signed\n"), 0;
+}
+
+void encode(std::istream& in, Signers& signers) {
   int id = 0, system = 0, component = 0, sequence = 0;
   in >> id >> system >> component >> sequence;
   const MavlinkAddress from{static_cast<std::uint8_t>(system), static_cast<std::uint8_t>(component)};
   const MavlinkMessage message = read_message(static_cast<std::uint32_t>(id), in);
-  for (const std::uint8_t byte : encode_mavlink(message, from, static_cast<std::uint8_t>(sequence))) fmt::print("{:02x}", byte);
+  MavlinkSigner* signer = signers.out ? &*signers.out : nullptr;
+  for (const std::uint8_t byte : encode_mavlink(message, from, static_cast<std::uint8_t>(sequence), signer))
+    fmt::print("{:02x}", byte);
   fmt::print("\n");
 }
 
-void decode(std::istream& in) {
+void decode(std::istream& in, Signers& signers) {
   std::string text;
   in >> text;
-  std::vector<std::uint8_t> bytes;
-  for (std::size_t i = 0; i + 1 < text.size(); i += 2)
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
-  for (const MavlinkFrame& frame : MavlinkDecoder().push(bytes)) {
+  for (const MavlinkFrame& frame : MavlinkDecoder(signers.in ? &*signers.in : nullptr).push(read_bytes(text))) {
     TextWriter writer;
     std::uint32_t id = 0;
     std::visit([&](auto message) { message.wire(writer), id = message.kId; }, frame.message);
@@ -88,11 +111,13 @@ void decode(std::istream& in) {
 }  // namespace fbvins
 
 int main() {
+  fbvins::Signers signers;
   for (std::string line; std::getline(std::cin, line);) {
     std::istringstream in(line);
     std::string what;
     in >> what;
-    if (what == "encode") fbvins::encode(in);
-    else fbvins::decode(in);
+    if (what == "encode") fbvins::encode(in, signers);
+    else if (what == "decode") fbvins::decode(in, signers);
+    else if (const int code = fbvins::set_key(in, signers); code != 0) return code;
   }
 }

@@ -22,17 +22,20 @@ namespace fbvins {
 struct MavlinkLinkState {
   bool connected = false;          ///< the port is open
   bool flight_controller = false;  ///< heard within the last three seconds
-  bool clock_known = false;        ///< stamps are on the flight controller's clock
+  bool clock_known = false;        ///< its clock is known, and was confirmed lately
   double clock_offset_s = 0;       ///< its clock less CLOCK_MONOTONIC
   std::int64_t poses_sent = 0, frames_sent = 0, frames_dropped = 0, frames_received = 0;
+  std::int64_t poses_withheld = 0;   ///< due while the flight controller's clock was not sure
+  std::int64_t frames_refused = 0;   ///< not signed with the key
+  std::int64_t packets_refused = 0;  ///< UDP packets of others than the flight controller
   int times_opened = 0;
-  std::string problem;  ///< one sentence while the port is not open
+  std::string problem;  ///< one sentence while the port is not open, no poses can be sent or strangers send packets
 };
 
 class MavlinkSink final : public Sink {
  public:
   /// `udp:HOST:PORT`, `udp:HOST:PORT:OWN_PORT` (HOST: an IPv4 address or localhost) or `serial:DEVICE:BAUD`. An error says
-  /// what is wrong with the address or the options; a device that is not there is waited for.
+  /// what is wrong with the address, the options or the key; a device that is not there is waited for.
   static Result<std::unique_ptr<MavlinkSink>> create(const std::string& address, const MavlinkOptions& options);
   ~MavlinkSink() override;
 

@@ -15,11 +15,13 @@ namespace fbvins {
 /// the offset is the median of the half of the newest answers with the shorter round trips.
 class ClockOffset {
  public:
-  /// `asked` and `answered` are times of this machine's clock, `theirs` of the other's.
+  /// `asked` and `answered` are times of this machine's clock, `theirs` of the other's; a time that no clock can have is ignored.
   void add(Time asked, Time theirs, Time answered);
   bool known() const { return answers_.size() >= kEnough; }
   /// Theirs less ours; only where known().
   Duration value() const { return value_; }
+  /// The newest answers contradict the value: the other clock may have begun anew.
+  bool in_doubt() const { return !strays_.empty(); }
   /// How often the other clock jumped, as it does when that machine restarts.
   int leaps() const { return leaps_; }
 

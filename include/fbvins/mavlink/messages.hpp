@@ -15,9 +15,10 @@
 
 namespace fbvins {
 
-/// MAV_FRAME, MAV_ESTIMATOR_TYPE and MAV_SEVERITY, as far as used here.
+/// MAV_FRAME, MAV_ESTIMATOR_TYPE, MAV_STATE and MAV_SEVERITY, as far as used here.
 inline constexpr std::uint8_t kMavFrameBodyFrd = 12, kMavFrameLocalFrd = 20;
 inline constexpr std::uint8_t kMavEstimatorVio = 3;
+inline constexpr std::uint8_t kMavStateCalibrating = 2, kMavStateActive = 4, kMavStateCritical = 5, kMavStateTermination = 8;
 enum class MavSeverity : std::uint8_t { error = 3, warning = 4, notice = 5, info = 6 };
 
 inline constexpr float kMavUnknown = std::numeric_limits<float>::quiet_NaN();
@@ -31,7 +32,7 @@ struct HeartbeatMessage {
   std::uint8_t type = 18;  ///< MAV_TYPE_ONBOARD_CONTROLLER
   std::uint8_t autopilot = kNoAutopilot;
   std::uint8_t base_mode = 0;
-  std::uint8_t system_status = 4;  ///< MAV_STATE_ACTIVE
+  std::uint8_t system_status = kMavStateActive;
   std::uint8_t mavlink_version = 3;
 
   template <class V>

@@ -20,6 +20,17 @@ constexpr MavlinkAddress kUs{1, 197};
 /// After this many unanswered requests for HIGHRES_IMU, SCALED_IMU is requested as well.
 constexpr int kPatience = 3;
 
+/// Numbers on the wire are any 64 bits; a larger one is no clock's, and does not fit nanoseconds.
+constexpr std::uint64_t kLatestClock_usec = 3'800'000'000'000'000;
+constexpr std::int64_t kNsPerMs = 1'000'000;
+
+/// The time nearest to `expected` of a counter of milliseconds that begins anew after 49.7 days.
+Time unwrapped(std::uint32_t counter_ms, Time expected) {
+  const std::int64_t expected_ms = expected.ns / kNsPerMs;
+  const auto off_ms = static_cast<std::int32_t>(counter_ms - static_cast<std::uint32_t>(expected_ms));
+  return Time{(expected_ms + off_ms) * kNsPerMs};
+}
+
 Vec3 vector(const std::array<float, 3>& v) { return Vec3(v[0], v[1], v[2]); }
 Vec3 thousandths(const std::array<std::int16_t, 3>& v) { return 1e-3 * Vec3(v[0], v[1], v[2]); }
 
@@ -52,7 +63,7 @@ Duration SteadyOffset::at(Time now, Duration wanted) {
 void MavlinkImu::say(const MavlinkMessage& message, Frames& out) { out.push_back(encode_mavlink(message, kUs, sequence_++)); }
 
 void MavlinkImu::restart() {
-  decoder_ = MavlinkDecoder();
+  decoder_.restart();
   peer_.forget_questions();
 }
 
@@ -80,11 +91,13 @@ std::vector<ImuSample> MavlinkImu::receive(std::span<const std::uint8_t> bytes, 
 void MavlinkImu::take(const MavlinkMessage& message, Time now, std::vector<ImuSample>& out) {
   if (const auto* m = std::get_if<HighresImuMessage>(&message)) {
     if (m->id != 0 || (m->fields_updated & m->kAccelAndGyro) != m->kAccelAndGyro) return;
+    if (m->time_usec > kLatestClock_usec) return void(++refused_);
     last_highres_ = now;
     take({Time{static_cast<std::int64_t>(m->time_usec) * 1000}, vector(m->gyro), vector(m->acc)}, now, out);
   } else if (const auto* coarse = std::get_if<ScaledImuMessage>(&message)) {
     if (now - last_highres_ < kQuiet) return;
-    take({Time{static_cast<std::int64_t>(coarse->time_boot_ms) * 1'000'000}, thousandths(coarse->gyro),
+    const Duration offset = peer_.clock().known() ? peer_.clock().value() : Duration{};
+    take({unwrapped(coarse->time_boot_ms, now + offset), thousandths(coarse->gyro),
           kStandardGravity_mps2 * thousandths(coarse->acc)},
          now, out);
   }

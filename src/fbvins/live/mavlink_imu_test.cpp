@@ -151,6 +151,49 @@ TEST(MavlinkImu, TakesTheCoarseMessageWhereTheOtherDoesNotCome) {
   EXPECT_LT((fc.samples.back().gyro_radps - Vec3(0.1, 0, 0)).norm(), 1e-12);
 }
 
+TEST(MavlinkImu, CoarseReadingsGoOnWhenTheirCounterBeginsAnew) {
+  FlightController fc;
+  fc.ahead_s = 4'294'967.296 - 5, fc.drift = 0;  // its 32 bits of milliseconds end in four seconds
+  fc.reading = [](Time theirs) {
+    ScaledImuMessage m;
+    m.time_boot_ms = static_cast<std::uint32_t>(theirs.ns / kMs);
+    return m;
+  };
+  fc.run(10);
+  EXPECT_GT(fc.samples.size(), 1700u);
+  EXPECT_LT(fc.worst_s, 2.5e-3);
+  EXPECT_EQ(fc.imu.refused(), 0);
+}
+
+TEST(MavlinkImu, AStampThatNoClockHasIsRefused) {
+  FlightController fc;
+  fc.run(3);
+  const std::size_t before = fc.samples.size();
+  for (const std::uint64_t usec : {~0ull, 1ull << 63, 10'000'000'000'000'000ull, 4'000'000'000'000'000ull}) {
+    HighresImuMessage m = highres(fc.theirs(fc.now()));
+    m.time_usec = usec;
+    fc.hear(m, fc.now());
+  }
+  EXPECT_EQ(fc.samples.size(), before);
+  EXPECT_EQ(fc.imu.refused(), 4);
+  fc.run(1);
+  EXPECT_GT(fc.samples.size(), before + 190);
+}
+
+TEST(MavlinkImu, AStrangersHeartbeatsDoNotTakeTheFlightControllersPlace) {
+  FlightController fc;
+  fc.run(2);
+  const std::size_t before = fc.samples.size();
+  for (int half_second = 0; half_second < 20; ++half_second) {
+    HeartbeatMessage beat;
+    beat.autopilot = 12;
+    for (const MavlinkAddress stranger : {MavlinkAddress{7, 200}, MavlinkAddress{9, 1}})
+      fc.imu.receive(encode_mavlink(beat, stranger, 0), fc.now());
+    fc.run(0.5);
+  }
+  EXPECT_GE(fc.samples.size(), before + 1999);
+}
+
 TEST(MavlinkImu, LeavesOutOthersAndHalfReadings) {
   FlightController fc;
   fc.reading = [](Time t) {

@@ -6,7 +6,10 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kQuestionEvery{100'000'000}, kSilence{3'000'000'000};
+constexpr Duration kQuestionEvery{100'000'000}, kFirstQuestionsEvery{20'000'000}, kSilence{3'000'000'000};
+/// Without an answer for longer the flight controller may be restarting, with a clock that begins anew: that takes a board more
+/// than two seconds.
+constexpr Duration kClockStaysSure{2'000'000'000};
 constexpr std::size_t kOpenQuestions = 16;
 
 }  // namespace
@@ -25,6 +28,8 @@ void MavlinkPeer::hear(const MavlinkFrame& frame, Time now) {
     if (beat->autopilot == HeartbeatMessage::kNoAutopilot) return;
     if (system_id_ == 0) system_id_ = frame.from.system;
     if (frame.from.system != system_id_) return;
+    if (is_heard(now) && frame.from != *address_) return;  // the first keeps its place until it is silent
+    if (address_ && frame.from != *address_) clock_ = ClockOffset(), questions_.clear();
     address_ = frame.from;
     heard_at_ = now;
   } else if (const auto* sync = std::get_if<TimesyncMessage>(&frame.message)) {
@@ -37,11 +42,18 @@ void MavlinkPeer::answer(const TimesyncMessage& message, const MavlinkAddress& f
   const auto asked = std::find(questions_.begin(), questions_.end(), Time{message.ts1});
   if (from != address_ || asked == questions_.end()) return;
   clock_.add(*asked, Time{message.tc1}, now);
+  answered_at_ = now;
   questions_.erase(asked);
 }
 
+bool MavlinkPeer::clock_is_sure(Time now) const {
+  return clock_.known() && !clock_.in_doubt() && now - answered_at_ < kClockStaysSure;
+}
+
 std::optional<TimesyncMessage> MavlinkPeer::question(Time now) {
-  if (!is_heard(now) || !is_due(now, kQuestionEvery, next_question_)) return std::nullopt;
+  if (!is_heard(now)) return std::nullopt;
+  if (!is_due(now, clock_.known() && !clock_.in_doubt() ? kQuestionEvery : kFirstQuestionsEvery, next_question_))
+    return std::nullopt;
   questions_.push_back(now);
   if (questions_.size() > kOpenQuestions) questions_.pop_front();
   return TimesyncMessage{0, now.ns};

@@ -3,7 +3,7 @@
 //
 //   peer.hear(frame, now);                                       // every frame that comes
 //   if (auto question = peer.question(now)) send(*question);     // ten times a second while it is heard
-//   if (peer.clock().known()) ours = theirs - peer.clock().value();
+//   if (peer.clock_is_sure(now)) theirs = ours + peer.clock().value();
 #pragma once
 
 #include <deque>
@@ -22,9 +22,12 @@ class MavlinkPeer {
 
   void hear(const MavlinkFrame& frame, Time now);
   bool is_heard(Time now) const;
+  Time heard_at() const { return heard_at_; }
   /// None before its first heartbeat.
   const std::optional<MavlinkAddress>& address() const { return address_; }
-  /// A TIMESYNC request, when one is due.
+  /// The offset is known and the flight controller has confirmed it lately: it has not restarted since.
+  bool clock_is_sure(Time now) const;
+  /// A TIMESYNC request, when one is due: more often until the clock is known.
   std::optional<TimesyncMessage> question(Time now);
   /// To be called when the port was reopened: answers to older requests are ignored.
   void forget_questions() { questions_.clear(); }
@@ -35,7 +38,7 @@ class MavlinkPeer {
 
   int system_id_;
   std::optional<MavlinkAddress> address_;
-  Time heard_at_{}, next_question_{};
+  Time heard_at_{}, answered_at_{}, next_question_{};
   std::deque<Time> questions_;
   ClockOffset clock_;
 };

@@ -2,11 +2,12 @@
 #include "fbvins/live/mavlink_session.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace fbvins {
 namespace {
 
-constexpr Duration kHeartbeatEvery{1'000'000'000}, kTextEvery{500'000'000};
+constexpr Duration kHeartbeatEvery{1'000'000'000}, kTextEvery{500'000'000}, kPatience{3'000'000'000};
 
 Odometry odometry(const LivePose& pose) {
   Odometry o;
@@ -19,17 +20,26 @@ Odometry odometry(const LivePose& pose) {
 
 }  // namespace
 
-MavlinkSession::MavlinkSession(const MavlinkOptions& options)
-    : options_(options), frames_(options.mounting), peer_(options.system_id) {}
+MavlinkSession::MavlinkSession(const MavlinkOptions& options, std::unique_ptr<MavlinkSigner> signer)
+    : options_(options),
+      signer_(std::move(signer)),
+      frames_(options.mounting),
+      decoder_(signer_.get()),
+      peer_(options.system_id) {}
 
 void MavlinkSession::say(const MavlinkMessage& message, Frames& out) {
   const MavlinkAddress us{static_cast<std::uint8_t>(options_.system_id), static_cast<std::uint8_t>(options_.component_id)};
-  out.push_back(encode_mavlink(message, us, sequence_++));
+  out.push_back(encode_mavlink(message, us, sequence_++, signer_.get()));
+}
+
+bool MavlinkSession::may_send_poses(Time now) const { return options_.clock == MavlinkClock::own || peer_.clock_is_sure(now); }
+
+Time MavlinkSession::their_time(Time host_t) const {
+  return options_.clock == MavlinkClock::own ? host_t : host_t + clock().value();
 }
 
 std::uint64_t MavlinkSession::stamp_usec(Time host_t) const {
-  const Time t = clock().known() ? host_t + clock().value() : host_t;
-  return static_cast<std::uint64_t>(std::max<std::int64_t>(t.ns, 0) / 1000);
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(their_time(host_t).ns, 0) / 1000);
 }
 
 MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
@@ -38,6 +48,7 @@ MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
   if (!is_due(pose.host_t + Duration::from_seconds(0.1 / options_.rate_hz), Duration::from_seconds(1 / options_.rate_hz),
               next_pose_))
     return out;
+  if (!may_send_poses(pose.host_t)) return ++withheld_, out;
   const std::optional<VehicleState> state = frames_.state(odometry(pose));
   const std::uint64_t t_usec = stamp_usec(pose.host_t);
   if (options_.dialect == MavlinkDialect::ardupilot) {
@@ -45,7 +56,10 @@ MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
     say(vision_position_message(*state, t_usec), out);
     say(vision_speed_message(*state, t_usec), out);
   } else {
-    say(state ? odometry_message(*state, t_usec) : no_odometry_message(pose.health, pose.reset_counter, t_usec), out);
+    OdometryMessage message =
+        state ? odometry_message(*state, t_usec) : no_odometry_message(pose.health, pose.reset_counter, t_usec);
+    if (options_.frame == MavlinkFrameId::local_ned) message.frame_id = kMavFrameLocalNed;
+    say(message, out);
   }
   ++poses_;
   return out;
@@ -53,25 +67,42 @@ MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
 
 MavlinkSession::Frames MavlinkSession::take(const LiveStatus& status, Time now) {
   health_ = status.health;
+  had_pose_ |= status.health.has_pose();
   return tick(now);
 }
 
+/// PX4's documents name three states for odometry: active; critical where it works with low confidence; flight termination where
+/// it has failed. A start that follows a failure is one until there is a pose again.
 HeartbeatMessage MavlinkSession::heartbeat() const {
-  constexpr std::uint8_t calibrating = 2, active = 4, critical = 5;  // MAV_STATE
   HeartbeatMessage beat;
-  const Health health = health_.value_or(Health{});
-  beat.system_status = health.has_pose() ? active : health.state == HealthState::lost ? critical : calibrating;
+  switch (health_.value_or(Health{}).state) {
+    case HealthState::good: beat.system_status = kMavStateActive; break;
+    case HealthState::degraded: beat.system_status = kMavStateCritical; break;
+    case HealthState::lost: beat.system_status = kMavStateTermination; break;
+    case HealthState::initialising: beat.system_status = had_pose_ ? kMavStateTermination : kMavStateCalibrating; break;
+  }
   return beat;
+}
+
+std::string MavlinkSession::problem(Time now) const {
+  if (!unsure_since_ || now - *unsure_since_ < kPatience) return {};
+  if (!flight_controller_heard(now)) return "no flight controller is heard; poses are sent once its clock is known";
+  if (clock().known())
+    return "the flight controller's clock has changed or is not confirmed; poses are sent once it is known again";
+  return "the flight controller does not answer TIMESYNC, and no pose is sent (live.mavlink.clock=own sends them without)";
 }
 
 MavlinkSession::Frames MavlinkSession::tick(Time now) {
   Frames out;
+  if (may_send_poses(now)) unsure_since_.reset();
+  else if (!unsure_since_) unsure_since_ = now;
   if (is_due(now, kHeartbeatEvery, next_heartbeat_)) say(heartbeat(), out);
   if (!flight_controller_heard(now)) {
     told_health_.reset();  // is sent again when it comes back
     return out;
   }
-  if (const auto question = peer_.question(now)) say(*question, out);
+  if (options_.clock == MavlinkClock::flight_controller)
+    if (const auto question = peer_.question(now)) say(*question, out);
   if (health_ && told_health_ != health_ && is_due(now, kTextEvery, next_text_)) {
     told_health_ = health_;
     say(health_message(*health_), out);
@@ -89,11 +120,11 @@ void MavlinkSession::receive(const MavlinkFrame& frame, Time now, Frames& out) {
   if (frame.from.system == options_.system_id && frame.from.component == options_.component_id) return;  // our own, sent back
   peer_.hear(frame, now);
   const auto* sync = std::get_if<TimesyncMessage>(&frame.message);
-  if (sync != nullptr && sync->tc1 == 0 && clock().known()) say(TimesyncMessage{(now + clock().value()).ns, sync->ts1}, out);
+  if (sync != nullptr && sync->tc1 == 0 && may_send_poses(now)) say(TimesyncMessage{their_time(now).ns, sync->ts1}, out);
 }
 
 void MavlinkSession::restart() {
-  decoder_ = MavlinkDecoder();
+  decoder_.restart();
   peer_.forget_questions();
   told_health_.reset();
 }

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace fbvins {
 namespace {
 
@@ -31,6 +34,13 @@ LivePose pose_at(std::int64_t host_ms, Health health = kGood) {
   pose.t = Time{5'000 * kMs + host_ms * kMs}, pose.host_t = Time{host_ms * kMs};
   pose.health = health;
   return pose;
+}
+
+/// A session whose poses go to nobody in particular.
+MavlinkOptions own_clock() {
+  MavlinkOptions options;
+  options.clock = MavlinkClock::own;
+  return options;
 }
 
 LiveStatus status(Health health) {
@@ -78,7 +88,7 @@ TEST(MavlinkSession, BeatsOnceASecondWhoeverListens) {
 
 TEST(MavlinkSession, FiftyPosesASecondOfTwoHundredOrSoReadings) {
   for (const double imu_hz : {100.0, 200.0, 400.0, 1000.0}) {
-    MavlinkSession session({});
+    MavlinkSession session(own_clock());
     int poses = 0;
     for (int i = 0; i < 10 * imu_hz; ++i) {
       LivePose pose = pose_at(0);
@@ -89,14 +99,128 @@ TEST(MavlinkSession, FiftyPosesASecondOfTwoHundredOrSoReadings) {
   }
 }
 
-TEST(MavlinkSession, StampsAreTheHostsUntilTheFlightControllersClockIsKnown) {
+TEST(MavlinkSession, NoPoseIsSentBeforeTheFlightControllersClockIsKnown) {
   MavlinkSession session({});
   FlightController px4(session);
-  EXPECT_EQ(only<OdometryMessage>(session.take(pose_at(900)))[0].time_usec, 900'000u);
+  EXPECT_TRUE(session.take(pose_at(900)).empty());
   px4.beat();
-  for (int i = 0; i < 200; ++i) px4.step();
-  ASSERT_TRUE(session.clock().known());
-  EXPECT_NEAR(static_cast<double>(only<OdometryMessage>(session.take(pose_at(5000)))[0].time_usec), 105'000'000.0, 1.0);
+  int before = 0;
+  for (; !session.clock().known() && before < 100; ++before) {
+    EXPECT_TRUE(session.take(pose_at(px4.now_ms)).empty());
+    px4.step();
+  }
+  EXPECT_LT(before, 30) << "it is asked more often until it is known";
+  EXPECT_GT(session.poses_withheld(), 1);
+  px4.now_ms += 20;
+  EXPECT_NEAR(static_cast<double>(only<OdometryMessage>(session.take(pose_at(px4.now_ms)))[0].time_usec),
+              1e3 * static_cast<double>(px4.now_ms) + 100e6, 1.0);
+  EXPECT_EQ(session.poses(), 1);
+}
+
+TEST(MavlinkSession, AFlightControllerThatRestartsGetsNoPoseOnItsOldClock) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  const auto fly = [&](int steps, bool answers) {
+    std::vector<double> ahead_s;
+    for (int i = 0; i < steps; ++i) {
+      if (answers && i % 50 == 0) px4.beat();
+      for (const auto& sent : only<OdometryMessage>(session.take(pose_at(px4.now_ms))))
+        ahead_s.push_back(1e-6 * static_cast<double>(sent.time_usec) - 1e-3 * static_cast<double>(px4.now_ms));
+      px4.step(answers);
+    }
+    return ahead_s;
+  };
+  EXPECT_GT(fly(300, true).size(), 80u);
+  // A board is silent while it starts. One that is back at once gets what is sent until its next answer, a tenth of a second
+  // later.
+  for (const auto& [silent_steps, most_old] : {std::pair{400, 0}, {0, 6}}) {
+    const double old_s = px4.ahead.seconds();
+    fly(silent_steps, false);
+    px4.ahead = px4.ahead - Duration{40'000 * kMs};
+    const auto after_s = fly(300, true);
+    EXPECT_GT(after_s.size(), 80u);
+    EXPECT_LE(std::count_if(after_s.begin(), after_s.end(), [&](double s) { return std::abs(s - old_s) < 1; }), most_old);
+    EXPECT_NEAR(after_s.back(), px4.ahead.seconds(), 1e-3);
+  }
+}
+
+TEST(MavlinkSession, PosesStopBeforeASilentFlightControllerCanHaveRestarted) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  px4.beat();
+  for (int i = 0; i < 100; ++i) px4.step();
+  const std::int64_t last_ms = px4.now_ms;
+  EXPECT_FALSE(session.take(pose_at(last_ms + 1500)).empty());
+  EXPECT_TRUE(session.take(pose_at(last_ms + 2100)).empty());
+}
+
+TEST(MavlinkSession, ItIsSaidWhyNoPosesAreSent) {
+  MavlinkSession session({});
+  FlightController px4(session);
+  const auto after_s = [&](double seconds, bool answers) {
+    for (const std::int64_t end = px4.now_ms + static_cast<std::int64_t>(1e3 * seconds); px4.now_ms < end;) px4.step(answers);
+    return session.problem(Time{px4.now_ms * kMs});
+  };
+  EXPECT_EQ(after_s(2, false), "");
+  EXPECT_NE(after_s(2, false).find("no flight controller is heard"), std::string::npos);
+  px4.beat();
+  EXPECT_NE(after_s(2, false).find("does not answer TIMESYNC"), std::string::npos);
+  px4.beat();
+  EXPECT_EQ(after_s(1, true), "");
+  px4.beat();
+  EXPECT_EQ(after_s(2.5, false), "");
+  px4.beat();
+  EXPECT_EQ(after_s(2, false), "");
+  px4.beat();
+  EXPECT_NE(after_s(2.5, false).find("not confirmed"), std::string::npos);
+}
+
+TEST(MavlinkSession, WithItsOwnClockItAsksNobody) {
+  MavlinkSession session(own_clock());
+  FlightController logger(session);
+  EXPECT_EQ(only<OdometryMessage>(session.take(pose_at(900)))[0].time_usec, 900'000u);
+  logger.beat();
+  for (int i = 0; i < 500; ++i) logger.step(false);
+  EXPECT_TRUE(only<TimesyncMessage>(logger.said).empty());
+  EXPECT_EQ(session.problem(Time{logger.now_ms * kMs}), "");
+  logger.hear(TimesyncMessage{0, 78});
+  EXPECT_EQ(only<TimesyncMessage>(logger.said).at(0).tc1, logger.now_ms * kMs);
+}
+
+TEST(MavlinkSession, ARestartOfTheProgramIsToldAsAReset) {
+  std::vector<int> counters;
+  for (const std::uint32_t first : {255u, 256u, 257u}) {  // a process's first reset_counter, one further at each start
+    MavlinkSession session(own_clock());
+    for (const std::int64_t ms : {100, 200}) {
+      LivePose pose = pose_at(ms);
+      pose.reset_counter = first;
+      counters.push_back(only<OdometryMessage>(session.take(pose)).at(0).reset_counter);
+    }
+  }
+  EXPECT_EQ(counters, (std::vector<int>{255, 255, 0, 0, 1, 1}));
+}
+
+TEST(MavlinkSession, TheFrameIsTheOneOfTheOptions) {
+  MavlinkOptions options = own_clock();
+  EXPECT_EQ(only<OdometryMessage>(MavlinkSession(options).take(pose_at(100)))[0].frame_id, 20);
+  options.frame = MavlinkFrameId::local_ned;
+  MavlinkSession ned(options);
+  EXPECT_EQ(only<OdometryMessage>(ned.take(pose_at(100)))[0].frame_id, 1);
+  EXPECT_EQ(only<OdometryMessage>(ned.take(pose_at(200, kLost)))[0].frame_id, 1);
+  EXPECT_EQ(only<OdometryMessage>(ned.take(pose_at(300)))[0].child_frame_id, 12);
+}
+
+TEST(MavlinkSession, TheHeartbeatTellsPx4WhetherTheOdometryWorks) {
+  constexpr Health kStarting{HealthState::initialising, HealthReason::waiting_for_motion_or_rest},
+      kDegraded{HealthState::degraded, HealthReason::few_tracks};
+  MavlinkSession session({});
+  std::vector<int> states;
+  std::int64_t ms = 0;
+  for (const Health health : {kStarting, kGood, kDegraded, kGood, kLost, kStarting, kGood})
+    for (const auto& beat : only<HeartbeatMessage>(session.take(status(health), Time{(ms += 1000) * kMs})))
+      states.push_back(beat.system_status);
+  // MAV_STATE: calibrating, active, critical, active, flight termination until there is a pose again
+  EXPECT_EQ(states, (std::vector<int>{2, 4, 5, 4, 8, 8, 4}));
 }
 
 TEST(MavlinkSession, AQuestionForTheTimeIsAnsweredOnThatClockAndNotBefore) {
@@ -165,12 +289,12 @@ TEST(MavlinkSession, HealthIsToldWhenItChangesAndToWhoeverComesBack) {
 }
 
 TEST(MavlinkSession, WithoutAPoseOdometrySaysSoAndVisionIsSilent) {
-  MavlinkSession px4({});
+  MavlinkSession px4(own_clock());
   const auto none = only<OdometryMessage>(px4.take(pose_at(100, kLost)));
   ASSERT_EQ(none.size(), 1u);
   EXPECT_EQ(none[0].quality, -1);
   EXPECT_NE(none[0].x, none[0].x);
-  MavlinkOptions options;
+  MavlinkOptions options = own_clock();
   options.dialect = MavlinkDialect::ardupilot;
   MavlinkSession ardupilot(options);
   EXPECT_TRUE(ardupilot.take(pose_at(100, kLost)).empty());

@@ -4,16 +4,20 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <thread>
 
 #include "fbvins/core/options.hpp"
+#include "fbvins/io/file_source.hpp"
 #include "fbvins/live/bell.hpp"
 #include "fbvins/live/byte_link.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/mavlink_session.hpp"
+#include "fbvins/live/signing_time.hpp"
 
 namespace fbvins {
 namespace {
@@ -21,12 +25,34 @@ namespace {
 constexpr int kTick_ms = 20;
 constexpr Duration kTryAgainAfter{500'000'000};
 constexpr std::size_t kWaiting = 64;  // events
+constexpr Duration kStrangersAreToldFor{5'000'000'000};
+constexpr std::uint64_t kLongestKeyFile_bytes = 4096;
+
+std::uint64_t signing_time_now() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return mavlink_signing_time(Time{std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count()});
+}
+
+/// Null where frames are not to be signed.
+Result<std::unique_ptr<MavlinkSigner>> make_signer(const std::string& key_file, std::uint64_t first) {
+  if (key_file.empty()) return std::unique_ptr<MavlinkSigner>();
+  const auto text = read_file(key_file, kLongestKeyFile_bytes);
+  if (!text) return text.error();
+  const auto key = parse_mavlink_key(*text);
+  if (!key) return Error{key.error().code, fmt::format("{}: {}", key_file, key.error().message)};
+  return std::make_unique<MavlinkSigner>(*key, first);
+}
 
 }  // namespace
 
 struct MavlinkSink::Impl {
-  Impl(const std::string& address, LinkAddress link_address, const MavlinkOptions& options)
-      : name(fmt::format("mavlink {}", address)), link(std::move(link_address)), session(options), worker([this] { work(); }) {}
+  Impl(const std::string& address, LinkAddress link_address, const MavlinkOptions& options, SigningTime time,
+       std::unique_ptr<MavlinkSigner> signer)
+      : name(fmt::format("mavlink {}", address)),
+        link(std::move(link_address)),
+        session(options, std::move(signer)),
+        signing_time(std::move(time)),
+        worker([this] { work(); }) {}
   ~Impl() { stop(); }
 
   void stop() {
@@ -38,14 +64,20 @@ struct MavlinkSink::Impl {
   void wait();
   void keep_open(Time now);
   void send(const MavlinkSession::Frames& frames);
+  void mind_peer(Time now);
+  void mind_signing_time();
+  std::string problem(Time now);
   void publish(Time now);
 
   const std::string name;
   // Used by the worker alone.
   ByteLink link;
   MavlinkSession session;
+  SigningTime signing_time;
+  bool signing_time_is_kept = true;
   MavlinkLinkState seen;
   Time next_try{};
+  std::optional<Time> stranger_at;
 
   const WakeEvent bell;
   std::atomic<bool> ending{false};
@@ -68,6 +100,31 @@ void MavlinkSink::Impl::send(const MavlinkSession::Frames& frames) {
   for (const auto& frame : frames) ++(link.send(frame) ? seen.frames_sent : seen.frames_dropped);
 }
 
+/// Whose packet has a flight controller's heartbeat is the peer that was to be learnt, until it is silent.
+void MavlinkSink::Impl::mind_peer(Time now) {
+  if (!link.has_peer() && session.heard_at() == now) link.pin_to_sender();
+  else if (link.has_peer() && !session.flight_controller_heard(now)) link.forget_peer();
+}
+
+void MavlinkSink::Impl::mind_signing_time() {
+  MavlinkSigner* signer = session.signer();
+  if (signer == nullptr) return;
+  signer->advance(signing_time_now());
+  signing_time_is_kept = signing_time.keep(signer->time());
+}
+
+std::string MavlinkSink::Impl::problem(Time now) {
+  if (!link.problem().empty()) return link.problem() + "; it is tried again twice a second";
+  if (const std::string why = session.problem(now); !why.empty()) return why;
+  if (!signing_time_is_kept)
+    return fmt::format("{} cannot be written: after a restart a flight controller may refuse signed messages",
+                       signing_time.file());
+  if (link.strangers() > seen.packets_refused) stranger_at = now;
+  if (stranger_at && now - *stranger_at < kStrangersAreToldFor)
+    return fmt::format("packets of {} are ignored: it is not the flight controller's address", link.newest_stranger());
+  return {};
+}
+
 void MavlinkSink::Impl::wait() {
   std::array<pollfd, 2> fds = {{{bell.fd(), POLLIN, 0}, {link.descriptor(), POLLIN, 0}}};
   if (link.has_unsent()) fds[1].events |= POLLOUT;
@@ -78,12 +135,14 @@ void MavlinkSink::Impl::wait() {
 void MavlinkSink::Impl::publish(Time now) {
   seen.connected = link.is_open();
   seen.flight_controller = session.flight_controller_heard(now);
-  seen.clock_known = session.clock().known();
+  seen.clock_known = session.clock_is_sure(now);
   seen.clock_offset_s = seen.clock_known ? session.clock().value().seconds() : 0;
   seen.poses_sent = session.poses();
   seen.frames_received = session.frames_received();
-  seen.problem = link.problem();
-  if (!seen.problem.empty()) seen.problem += "; it is tried again twice a second";
+  seen.poses_withheld = session.poses_withheld();
+  seen.frames_refused = session.frames_refused();
+  seen.problem = problem(now);
+  seen.packets_refused = link.strangers();
   const std::lock_guard lock(mutex);
   state = seen;
   state.frames_dropped += overrun;
@@ -106,6 +165,8 @@ void MavlinkSink::Impl::work() {
     const std::vector<std::uint8_t> bytes = link.receive();
     const Time now = host_now();
     send(session.receive(bytes, now));
+    mind_peer(now);
+    mind_signing_time();
     send(session.tick(now));
     publish(now);
     if (!last) wait();
@@ -116,7 +177,12 @@ Result<std::unique_ptr<MavlinkSink>> MavlinkSink::create(const std::string& addr
   Result<LinkAddress> link = parse_link_address(address);
   if (!link) return link.error();
   if (const Result<void> valid = validate(options); !valid) return valid.error();
-  return std::unique_ptr<MavlinkSink>(new MavlinkSink(std::make_unique<Impl>(address, *std::move(link), options)));
+  if (auto* udp = std::get_if<UdpAddress>(&*link)) udp->peer_is_learnt = options.udp_peer == MavlinkUdpPeer::first;
+  SigningTime time(options.key_file.empty() ? std::string() : options.key_time_file);
+  auto signer = make_signer(options.key_file, std::max(time.first(), signing_time_now()));
+  if (!signer) return signer.error();
+  return std::unique_ptr<MavlinkSink>(
+      new MavlinkSink(std::make_unique<Impl>(address, *std::move(link), options, std::move(time), *std::move(signer))));
 }
 
 MavlinkSink::MavlinkSink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -13,6 +13,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <thread>
 
@@ -33,6 +34,7 @@ bool comes_true(const std::function<bool()>& fact) {
 /// A flight controller at the other end of a descriptor, whose clock is 1000 s ahead.
 struct FarEnd {
   MavlinkDecoder decoder;
+  MavlinkSigner* signer = nullptr;
   int odometries = 0, heartbeats = 0, texts = 0, answers = 0;
   std::uint8_t newest_reset = 0;
   std::uint64_t newest_usec = 0;
@@ -48,16 +50,16 @@ struct FarEnd {
       } else if (std::holds_alternative<HeartbeatMessage>(frame.message)) {
         ++heartbeats;
       } else if (const auto* sync = std::get_if<TimesyncMessage>(&frame.message)) {
-        if (sync->tc1 == 0) send(encode_mavlink(TimesyncMessage{sync->ts1 + 1'000'000'000'000, sync->ts1}, {1, 1}, 0));
+        if (sync->tc1 == 0) send(encode_mavlink(TimesyncMessage{sync->ts1 + 1'000'000'000'000, sync->ts1}, {1, 1}, 0, signer));
         else ++answers;
       }
     }
   }
-  static void greet(const Send& send) {
+  void greet(const Send& send) {
     HeartbeatMessage beat;
     beat.autopilot = 12;
-    send(encode_mavlink(beat, {1, 1}, 0));
-    send(encode_mavlink(TimesyncMessage{0, 5}, {1, 1}, 0));
+    send(encode_mavlink(beat, {1, 1}, 0, signer));
+    send(encode_mavlink(TimesyncMessage{0, 5}, {1, 1}, 0, signer));
   }
 };
 
@@ -67,6 +69,13 @@ LivePose pose(std::int64_t i, std::uint32_t resets = 0) {
   p.health = {HealthState::good, HealthReason::none};
   p.reset_counter = resets;
   return p;
+}
+
+/// Poses go out without a flight controller that answers.
+MavlinkOptions own_clock() {
+  MavlinkOptions options;
+  options.clock = MavlinkClock::own;
+  return options;
 }
 
 struct UdpEnd {
@@ -82,6 +91,17 @@ struct UdpEnd {
     EXPECT_EQ(getsockname(fd.number(), reinterpret_cast<sockaddr*>(&own), &size), 0);
     return ntohs(own.sin_port);
   }
+  /// Learns where the sink's packets come from.
+  bool hear_one() {
+    std::array<std::uint8_t, 2048> bytes{};
+    socklen_t size = sizeof peer;
+    return recvfrom(fd.number(), bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size) > 0;
+  }
+  void greet() {
+    end.greet([this](const std::vector<std::uint8_t>& frame) {
+      sendto(fd.number(), frame.data(), frame.size(), 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
+    });
+  }
   void serve() {
     std::array<std::uint8_t, 2048> bytes{};
     socklen_t size = sizeof peer;
@@ -92,14 +112,14 @@ struct UdpEnd {
          (got = recvfrom(fd.number(), bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size)) > 0;) {
       const int beats = end.heartbeats;
       end.hear(std::span(bytes).first(static_cast<std::size_t>(got)), send);
-      if (end.heartbeats > beats || end.odometries % 10 == 1) FarEnd::greet(send);
+      if (end.heartbeats > beats || end.odometries % 10 == 1) end.greet(send);
     }
   }
 };
 
 TEST(MavlinkSink, OverUdpPosesComeAndTheClockIsFound) {
   UdpEnd px4;
-  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}", px4.bind_any()), {});
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", px4.bind_any()), {});
   ASSERT_TRUE(sink);
   std::int64_t i = 0;
   EXPECT_TRUE((*sink)->take(LiveEvent(LiveStatus{})));
@@ -114,9 +134,87 @@ TEST(MavlinkSink, OverUdpPosesComeAndTheClockIsFound) {
   EXPECT_TRUE((*sink)->finish());
 }
 
+/// A host that sends a flight controller's heartbeats, as anyone on the network may.
+struct Stranger {
+  FileDescriptor fd{socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0)};
+  void beat(const sockaddr_in& to) const {
+    HeartbeatMessage message;
+    message.autopilot = 12;
+    const auto frame = encode_mavlink(message, {1, 1}, 0);
+    sendto(fd.number(), frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  }
+};
+
+TEST(MavlinkSink, OverUdpStrangersAreIgnoredAndCounted) {
+  UdpEnd px4;
+  const Stranger stranger;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", px4.bind_any()), {});
+  ASSERT_TRUE(sink);
+  EXPECT_TRUE(comes_true([&] { return px4.hear_one(); }));
+  EXPECT_TRUE(comes_true([&] { return stranger.beat(px4.peer), (*sink)->state().packets_refused > 10; }));
+  EXPECT_FALSE((*sink)->state().flight_controller);
+  std::int64_t i = 0;
+  EXPECT_TRUE(comes_true([&] {
+    EXPECT_TRUE((*sink)->take(LiveEvent(pose(i++))));
+    stranger.beat(px4.peer);
+    px4.serve();
+    return px4.end.odometries > 20;
+  }));
+  EXPECT_NE((*sink)->problem().find("packets of 127.0.0.1:"), std::string::npos) << (*sink)->problem();
+}
+
+TEST(MavlinkSink, OverUdpThePeerMayBeTheFirstFlightController) {
+  UdpEnd configured, px4;
+  MavlinkOptions options;
+  options.udp_peer = MavlinkUdpPeer::first;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", configured.bind_any()), options);
+  ASSERT_TRUE(sink);
+  px4.bind_any();
+  EXPECT_TRUE(comes_true([&] { return configured.hear_one(); }));
+  px4.peer = configured.peer;  // behind an address translation its packets come from another port
+  px4.greet();
+  std::int64_t i = 0;
+  EXPECT_TRUE(comes_true([&] {
+    EXPECT_TRUE((*sink)->take(LiveEvent(pose(i++))));
+    px4.serve();
+    return px4.end.odometries > 20;
+  }));
+  configured.serve();
+  EXPECT_EQ(configured.end.odometries, 0);
+}
+
+TEST(MavlinkSink, SignedFramesAloneAreTaken) {
+  UdpEnd px4;
+  const std::string folder = testing::TempDir(), key_file = folder + "fbvins_sink_key", time_file = folder + "fbvins_sink_time";
+  std::ofstream(key_file) << std::string(64, 'a') << "\n";
+  std::filesystem::remove(time_file);
+  MavlinkOptions options;
+  options.key_file = key_file, options.key_time_file = time_file;
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", px4.bind_any()), options);
+  if (!sink && sink.error().code == ErrorCode::unsupported) GTEST_SKIP() << sink.error().message;
+  ASSERT_TRUE(sink) << sink.error().message;
+  MavlinkKey key;
+  key.fill(0xaa);
+  MavlinkSigner signer(key, 0);
+  px4.end.decoder = MavlinkDecoder(&signer);
+  EXPECT_TRUE(comes_true([&] { return px4.serve(), (*sink)->state().frames_refused > 3; }));
+  EXPECT_FALSE((*sink)->state().flight_controller);
+  px4.end.signer = &signer;
+  std::int64_t i = 0;
+  EXPECT_TRUE(comes_true([&] {
+    EXPECT_TRUE((*sink)->take(LiveEvent(pose(i++))));
+    px4.serve();
+    return px4.end.odometries > 20;
+  }));
+  EXPECT_EQ(px4.end.decoder.counts().unsigned_frames, 0);
+  EXPECT_TRUE(std::filesystem::exists(time_file));
+  options.key_file = "/no/such/key";
+  EXPECT_FALSE(MavlinkSink::create("udp:127.0.0.1:9:0", options));
+}
+
 TEST(MavlinkSink, WhatWasTakenBeforeTheEndIsSent) {
   UdpEnd px4;
-  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}", px4.bind_any()), {});
+  const auto sink = MavlinkSink::create(fmt::format("udp:127.0.0.1:{}:0", px4.bind_any()), own_clock());
   for (int i = 0; i < 5; ++i) EXPECT_TRUE((*sink)->take(LiveEvent(pose(i, 4))));
   EXPECT_TRUE((*sink)->finish());
   px4.serve();
@@ -154,7 +252,7 @@ struct Cable {
     std::array<std::uint8_t, 2048> bytes{};
     for (ssize_t got = 0; (got = ::read(master.number(), bytes.data(), bytes.size())) > 0;) {
       end.hear(std::span(bytes).first(static_cast<std::size_t>(got)), send);
-      if (end.heartbeats > 0 && end.answers == 0) FarEnd::greet(send);
+      if (end.heartbeats > 0 && (end.answers == 0 || end.odometries % 10 == 1)) end.greet(send);
     }
   }
 };
@@ -185,7 +283,7 @@ TEST(MavlinkSink, ASerialCableMayComeLateGoAndComeAgain) {
 TEST(MavlinkSink, ACableThatTakesNothingLosesWholeFrames) {
   Cable cable;
   cable.plug();
-  const auto sink = MavlinkSink::create("serial:" + cable.device() + ":57600", {});
+  const auto sink = MavlinkSink::create("serial:" + cable.device() + ":57600", own_clock());
   std::int64_t i = 0;
   EXPECT_TRUE(comes_true([&] { return (void)(*sink)->take(LiveEvent(pose(i++))).ok(), (*sink)->state().frames_dropped > 10; }));
   EXPECT_TRUE(

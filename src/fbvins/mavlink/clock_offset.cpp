@@ -7,6 +7,13 @@
 #include <vector>
 
 namespace fbvins {
+namespace {
+
+/// Times on the wire are any 64 bits. No clock counts from before zero or to beyond the year 2090, and so differences of
+/// offsets stay within 64 bits.
+constexpr Time kLatestClock{3'800'000'000'000'000'000};
+
+}  // namespace
 
 /// Whether the offset differs by more than a delay on one of the two ways alone could explain.
 bool ClockOffset::leapt(const Answer& answer) const {
@@ -15,6 +22,7 @@ bool ClockOffset::leapt(const Answer& answer) const {
 }
 
 void ClockOffset::add(Time asked, Time theirs, Time answered) {
+  if (theirs.ns < 0 || theirs > kLatestClock) return;
   Answer answer;
   answer.round_trip = answered - asked;
   if (answer.round_trip.ns < 0 || answer.round_trip > kLongestRoundTrip) return;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <limits>
 
 #include "fbvins/core/rng.hpp"
 
@@ -63,6 +64,33 @@ TEST(ClockOffset, ALeapIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) 
   for (int i = 0; i < 10; ++i) cable.ask(offset, restarted);
   EXPECT_TRUE(offset.known());
   EXPECT_LT(std::abs((offset.value() - restarted).ns), kMs);
+}
+
+TEST(ClockOffset, ATimeThatNoClockHasIsIgnored) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max(), kLeast = std::numeric_limits<std::int64_t>::min();
+  Cable cable;
+  ClockOffset offset;
+  const Duration ahead{5'000 * kMs};
+  for (int i = 0; i < 40; ++i) {
+    for (const std::int64_t theirs : {kMost, kLeast, kMost - 1, kLeast + 1, std::int64_t{-1}, std::int64_t{1} << 62})
+      offset.add(cable.now, Time{theirs}, cable.now + Duration{kMs});
+    cable.ask(offset, ahead);
+  }
+  EXPECT_TRUE(offset.known());
+  EXPECT_FALSE(offset.in_doubt());
+  EXPECT_EQ(offset.leaps(), 0);
+  EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 10);
+}
+
+TEST(ClockOffset, OneAnswerThatContradictsPutsItInDoubtAndOneThatDoesNotEndsThat) {
+  Cable cable;
+  ClockOffset offset;
+  for (int i = 0; i < 20; ++i) cable.ask(offset, Duration{5'000 * kMs});
+  EXPECT_FALSE(offset.in_doubt());
+  cable.ask(offset, Duration{-7'000 * kMs});
+  EXPECT_TRUE(offset.in_doubt());
+  cable.ask(offset, Duration{5'000 * kMs});
+  EXPECT_FALSE(offset.in_doubt());
 }
 
 TEST(ClockOffset, AnswersBeforeTheirRequestOrLongAfterAreIgnored) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint8_t kMagic2 = 0xfd, kMagic1 = 0xfe;
 constexpr std::uint8_t kSigned = 0x01;  // MAVLINK_IFLAG_SIGNED
-constexpr std::size_t kSignatureBytes = 13, kChecksumBytes = 2;
+constexpr std::size_t kSignatureBytes = MavlinkSigner::kBytes, kChecksumBytes = 2;
 
 constexpr bool begins_frame(std::uint8_t byte) { return byte == kMagic2 || byte == kMagic1; }
 
@@ -59,7 +59,8 @@ bool with_message(std::uint32_t id, F&& known) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkAddress from, std::uint8_t sequence) {
+std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkAddress from, std::uint8_t sequence,
+                                         MavlinkSigner* signer) {
   return std::visit(
       [&](auto fields) {
         PayloadWriter payload;
@@ -68,15 +69,22 @@ std::vector<std::uint8_t> encode_mavlink(const MavlinkMessage& message, MavlinkA
         while (bytes.size() > 1 && bytes.back() == 0) bytes.pop_back();
         const auto id = fields.kId;
         PayloadWriter frame;
-        frame(std::array<std::uint8_t, 7>{kMagic2, static_cast<std::uint8_t>(bytes.size()), 0, 0, sequence, from.system,
+        const std::uint8_t flags = signer != nullptr ? kSigned : std::uint8_t{0};
+        frame(std::array<std::uint8_t, 7>{kMagic2, static_cast<std::uint8_t>(bytes.size()), flags, 0, sequence, from.system,
                                           from.component});
         frame(std::array<std::uint8_t, 3>{static_cast<std::uint8_t>(id), static_cast<std::uint8_t>(id >> 8),
                                           static_cast<std::uint8_t>(id >> 16)});
         for (const std::uint8_t byte : bytes) frame(byte);
         frame(mavlink_checksum(std::span(frame.bytes()).subspan(1), fields.kCrcExtra));
+        if (signer != nullptr) frame(signer->sign(frame.bytes()));
         return std::move(frame.bytes());
       },
       message);
+}
+
+bool MavlinkDecoder::is_signed(std::span<const std::uint8_t> frame) const {
+  if (frame[0] != kMagic2 || (frame[2] & kSigned) == 0) return false;
+  return signer_->accept(frame.first(frame.size() - kSignatureBytes), frame.last<kSignatureBytes>());
 }
 
 /// Number of bytes consumed; 0: more are needed.
@@ -97,11 +105,13 @@ std::size_t MavlinkDecoder::step(std::span<const std::uint8_t> bytes, std::vecto
     const auto wanted = mavlink_checksum(bytes.subspan(1, crc_at - 1), message.kCrcExtra);
     good = wanted == (bytes[crc_at] | bytes[crc_at + 1] << 8);
     if (!good) return;
+    if (signer_ != nullptr && !is_signed(bytes.first(head->frame_size))) return void(++counts_.unsigned_frames);
+    ++counts_.frames;
     PayloadReader reader(payload);
     message.wire(reader);
     frames.push_back({head->from, head->sequence, message});
   });
-  if (good) return ++counts_.frames, head->frame_size;
+  if (good) return head->frame_size;
   // A frame whose checksum cannot be judged is accepted where another follows it, or nothing yet.
   if (!known && (bytes.size() == head->frame_size || begins_frame(bytes[head->frame_size])))
     return ++counts_.skipped, head->frame_size;

@@ -98,7 +98,7 @@ Result<std::unique_ptr<ImuFeed>> ImuFeed::open(const std::string& where, const S
     if (!source) return source.error();
     return std::unique_ptr<ImuFeed>(std::make_unique<SocketFeed>(*std::move(source)));
   }
-  Result<LinkAddress> address = parse_link_address(where);
+  Result<LinkAddress> address = parse_link_address(where, kOwnUdpPortForImu);
   if (!address) return address.error();
   return std::unique_ptr<ImuFeed>(std::make_unique<MavlinkFeed>(where, *std::move(address), std::move(say)));
 }

@@ -52,7 +52,7 @@ class FakeFlightController {
     ending_ = true;
     listener_.join();
   }
-  std::string address() const { return fmt::format("udp:127.0.0.1:{}", port_); }
+  std::string address() const { return fmt::format("udp:127.0.0.1:{}:0", port_); }
   bool was_synchronised() const { return answers_ > 10; }
   void read(Time t, const Vec3& gyro, const Vec3& accel) {
     HighresImuMessage m;
@@ -173,7 +173,7 @@ bool deliver(FakeVideo& camera, Time t, const std::vector<std::uint8_t>& bytes) 
 
 TEST(V4l2Source, PutsTwoCamerasTogether) {
   FakeVideo left("/fake/left", {fourcc("MJPG"), fourcc("YUYV")}), right("/fake/right", {fourcc("GREY")});
-  Running running("/fake/left,/fake/right,udp:127.0.0.1:9", small_rig());
+  Running running("/fake/left,/fake/right,udp:127.0.0.1:9:0", small_rig());
   CollectedInput got;
   running.start(got);
   // Stamps at a camera's pace, however fast they come: within 2 ms another frame's image would be a partner as good.
@@ -197,7 +197,7 @@ TEST(V4l2Source, PutsTwoCamerasTogether) {
 
 TEST(V4l2Source, CutsOneCameraInTwo) {
   FakeVideo both("/fake/both", {fourcc("GREY")});
-  Running running("/fake/both,udp:127.0.0.1:9", small_rig());
+  Running running("/fake/both,udp:127.0.0.1:9:0", small_rig());
   CollectedInput got;
   running.start(got);
   std::vector<std::uint8_t> bytes = filled((128 + 32) * 48, 1);
@@ -211,7 +211,7 @@ TEST(V4l2Source, CutsOneCameraInTwo) {
 
 TEST(V4l2Source, WaitsForACameraThatIsUnplugged) {
   auto camera = std::make_unique<FakeVideo>("/fake/both", std::vector{fourcc("GREY")});
-  Running running("/fake/both,udp:127.0.0.1:9", small_rig());
+  Running running("/fake/both,udp:127.0.0.1:9:0", small_rig());
   CollectedInput got;
   running.start(got);
   ASSERT_TRUE(deliver(*camera, host_now(), filled(160 * 48, 1)));
@@ -228,7 +228,7 @@ TEST(V4l2Source, SaysWhatIsWrong) {
       silent("/fake/silent", {fourcc("GREY")});
   silent.say_no_time();
   {
-    Running running("/fake/narrow,/fake/colours,udp:127.0.0.1:9", [] {
+    Running running("/fake/narrow,/fake/colours,udp:127.0.0.1:9:0", [] {
       StereoRig rig = small_rig();
       rig.left = rig.right = Camera(PinholeRadtan{100, 100, 60, 23.5, 0, 0, 0, 0}, 128, 48);
       return rig;
@@ -238,7 +238,7 @@ TEST(V4l2Source, SaysWhatIsWrong) {
     EXPECT_TRUE(running.heard("delivers 100 x 48 pixels of GREY, wanted are 128 x 48"));
     EXPECT_TRUE(running.heard("has formats RGB3"));
   }
-  Running running("/fake/silent,/fake/none,udp:127.0.0.1:9", small_rig());
+  Running running("/fake/silent,/fake/none,udp:127.0.0.1:9:0", small_rig());
   CollectedInput got;
   running.start(got);
   EXPECT_TRUE(running.heard("/fake/none: cannot be opened: No such file"));
@@ -248,11 +248,11 @@ TEST(V4l2Source, SaysWhatIsWrong) {
 }
 
 TEST(V4l2Source, RefusesWordsItDoesNotUnderstand) {
-  for (const char* text : {"", "/dev/video0", "/dev/video0,,udp:127.0.0.1:9", "a,b,c,udp:127.0.0.1:9"})
+  for (const char* text : {"", "/dev/video0", "/dev/video0,,udp:127.0.0.1:9:0", "a,b,c,udp:127.0.0.1:9:0"})
     EXPECT_FALSE(parse_v4l2_devices(text)) << text;
   const KalibrFiles files(small_rig());
   SourceOptions options;
-  EXPECT_FALSE(V4l2Source::open("/dev/video0,udp:127.0.0.1:9", options)) << "no calibration";
+  EXPECT_FALSE(V4l2Source::open("/dev/video0,udp:127.0.0.1:9:0", options)) << "no calibration";
   options.dataset.kalibr_camchain = files.camchain();
   EXPECT_FALSE(V4l2Source::open("/dev/video0,/dev/imu", options)) << "no kind of IMU";
 }
