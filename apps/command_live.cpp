@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -12,7 +11,7 @@
 #include "apps/imu_state.hpp"
 #include "apps/kept_map.hpp"
 #include "apps/live_check.hpp"
-#include "apps/live_files.hpp"
+#include "apps/live_outputs.hpp"
 #include "apps/live_summary.hpp"
 #include "apps/open_source.hpp"
 #include "apps/ros_graph.hpp"
@@ -21,12 +20,10 @@
 #include "apps/terminal.hpp"
 #include "apps/web_page.hpp"
 #include "fbvins/live/live_system.hpp"
-#include "fbvins/live/mavlink_sink.hpp"
-#include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/replay_source.hpp"
+#include "fbvins/live/reset_counter_sink.hpp"
 #include "fbvins/live/sensor_faults.hpp"
-#include "fbvins/live/service_sink.hpp"
-#include "fbvins/live/status_sink.hpp"
+#include "fbvins/pipeline/stage_runner.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -61,12 +58,12 @@ examples:
 )";
 
 struct Arguments {
-  std::string source, out, record, kept_map, ros2, imu_state, web;
-  std::vector<std::string> faults, mavlink;
+  std::string source, kept_map, ros2, imu_state, socket_group;
+  std::vector<std::string> faults;
+  OutputArguments outputs;
   ConfigArguments config;
   DatasetOptions dataset;
   MapArguments map;
-  bool record_images = true, quiet = false;
   int laps = 1;
   bool preload = false;
   double check_s = 0;  ///< check the sensors for so long, and estimate nothing
@@ -91,64 +88,6 @@ Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
   return faults;
 }
 
-/// The sinks that the command line asks for; the one that writes files, if any, also wants to see the frontend's frames.
-Result<void> add_sinks(const Arguments& arguments, const Config& config, const Source& source, LiveSystem& live,
-                       LiveTally& tally) {
-  live.add_sink(tally.make_sink());
-  if (!arguments.record.empty()) {
-    auto record = RecordSink::create(
-        arguments.record, source.rig(),
-        {.program = "fbvins " FBVINS_VERSION, .configuration = to_yaml(config), .images = arguments.record_images});
-    if (!record) return record.error();
-    live.add_sink(std::move(*record));
-  }
-  if (const char* address = std::getenv("NOTIFY_SOCKET")) {
-    auto sink = ServiceSink::create(address, stderr);
-    if (!sink) return sink.error();
-    live.add_sink(*std::move(sink));
-  } else if (!arguments.quiet) {
-    live.add_sink(std::make_unique<StatusSink>(stdout));
-  }
-  for (const std::string& address : arguments.mavlink) {
-    auto sink = MavlinkSink::create(address, config.live.mavlink);
-    if (!sink) return sink.error();
-    live.add_sink(*std::move(sink));
-  }
-  if (arguments.out.empty()) return {};
-  auto files = LiveFiles::create(arguments.out, arguments.map.wanted(), arguments.map.load.empty());
-  if (!files) return files.error();
-  live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
-  live.add_sink(std::move(*files));
-  return {};
-}
-
-/// Why the page's button cannot save the map; empty: it can.
-std::string cannot_save_map(const Arguments& arguments) {
-  if (!arguments.map.wanted()) return "this flight has no map: start it with --map FILE";
-  if (arguments.map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
-  return {};
-}
-
-/// The page and its buttons, where one is wanted.
-Result<void> add_page(const Arguments& arguments, const Config& config, LiveSystem& live, KeptMap* map) {
-  if (arguments.web.empty()) return {};
-  auto page = open_live_page({.where = arguments.web,
-                              .source = arguments.source,
-                              .frontend = config.frontend.kind,
-                              .cannot_save_map = cannot_save_map(arguments),
-                              .mark = [&live](std::string text) { live.mark(std::move(text)); },
-                              .save_map = [map] { map->request_save(); }});
-  if (!page) return page.error();
-  if (map) {
-    const std::string& file = arguments.map.save;
-    map->on_request(file, [file, tell = page->tell](const Result<void>& saved) {
-      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
-    });
-  }
-  live.add_sink(std::move(page->sink));
-  return {};
-}
-
 Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault>& faults) {
   const StopSignal stop([&] { source.stop(); });
   live.on_failure([&] { source.stop(); });
@@ -163,66 +102,90 @@ Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault
   return ended ? done : ended;
 }
 
-Result<void> write_results(const Arguments& arguments, const Config& config, const Source& source, const LiveSummary& summary) {
-  if (Result<void> done = write_text(arguments.out + "/config.yaml", to_yaml(config)); !done) return done;
+Result<void> write_results(const std::string& folder, const Config& config, const Source& source, const LiveSummary& summary) {
+  if (Result<void> done = write_text(folder + "/config.yaml", to_yaml(config)); !done) return done;
   if (const auto* replay = dynamic_cast<const ReplaySource*>(&source); replay && replay->dataset().has_ground_truth()) {
     std::vector<Time> images;
     for (const FrameEntry& frame : replay->dataset().frames()) images.push_back(frame.t);
-    if (Result<void> done = write_truth(images, replay->dataset().ground_truth(), arguments.out); !done) return done;
+    if (Result<void> done = write_truth(images, replay->dataset().ground_truth(), folder); !done) return done;
   }
-  if (Result<void> done = write_text(arguments.out + "/summary.json", to_json_text(summary)); !done) return done;
-  return write_text(arguments.out + "/summary.txt", to_text(summary));
+  if (Result<void> done = write_text(folder + "/summary.json", to_json_text(summary)); !done) return done;
+  return write_text(folder + "/summary.txt", to_text(summary));
 }
 
-int run(const Arguments& arguments) {
-  block_stop_signals();  // before any thread is made
+Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosGraph& graph) {
+  const SourceOptions options{.dataset = arguments.dataset,
+                              .laps = arguments.laps,
+                              .preload = arguments.preload,
+                              .say = note,
+                              .give_up = stop_is_wanted,
+                              .socket_group = arguments.socket_group};
+  return graph.has_source() ? graph.open_source(options) : open_source(arguments.source, options);
+}
+
+/// From the first reading to the end of the outputs.
+Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, Source& source, const RosGraph& graph,
+                              KeptMap* kept, LiveTally& tally, Troubles& troubles) {
+  std::unique_ptr<ResetCounterSink> counter;
+  if (!arguments.outputs.reset_counter.empty()) counter = std::make_unique<ResetCounterSink>(arguments.outputs.reset_counter);
+  SystemParts parts{.mapper = kept, .imu_state = imu_state_for_flight(arguments.imu_state, source.rig().imu_noise)};
+  auto live = LiveSystem::create(config, config.live, source.rig(), source.clock_rate(), std::move(parts),
+                                 counter ? counter->first() : 0);
+  if (!live) return live.error();
+  const LiveFlight flight{config, source, arguments.source, arguments.map, kept};
+  if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
+  if (counter) live->add_sink(std::move(counter));
+  if (Result<void> added = add_outputs(arguments.outputs, flight, *live, tally, troubles); !added) return added;
+  if (Result<void> added = graph.add_sink(source, *live); !added) return added;
+  const auto faults = faults_of(arguments);
+  if (!faults) return faults.error();
+  if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)
+    return added;  // last: its viewers reach the others
+  const Result<void> flown = fly(source, *live, *faults);
+  if (kept) kept->finish();
+  tally.last = live->status();
+  return flown;
+}
+
+/// Every file is tried, whatever became of the others.
+void save(const Arguments& arguments, const Config& config, const Source& source, LoopMap* map, const LiveTally& tally,
+          Troubles& troubles) {
+  troubles.add(save_imu_state(arguments.imu_state, tally.imu_state, source.rig().imu_noise));
+  if (map) {
+    troubles.add(guarded("loop closure", [&] { map->finish(); }));
+    troubles.add(save_map(arguments.map, *map));
+  }
+  const std::string& folder = arguments.outputs.out;
+  const LiveSummary summary = summarise(tally, arguments.source, config.frontend.kind, source, folder);
+  if (!folder.empty()) troubles.add(write_results(folder, config, source, summary));
+  if (!arguments.outputs.quiet) std::fputs(to_text(summary).c_str(), stderr);
+}
+
+int run(Arguments arguments) {
+  const StopSignals signals;  // before any thread is made
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
-  const auto faults = faults_of(arguments);
-  if (!faults) return fail(faults.error().message);
+  if (const auto faults = faults_of(arguments); !faults) return fail(faults.error().message);
   const auto graph = RosGraph::join(arguments.ros2, arguments.source);
   if (!graph) return fail(graph.error().message);
-  const SourceOptions options{
-      .dataset = arguments.dataset, .laps = arguments.laps, .preload = arguments.preload, .say = note, .give_up = stop_is_wanted};
-  const auto source = graph->has_source() ? graph->open_source(options) : open_source(arguments.source, options);
+  const auto source = source_of(arguments, *graph);
   if (!source) return fail(source.error().message);
-  if (!arguments.out.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(arguments.out, error);
-    if (error) return fail(fmt::format("{}: {}", arguments.out, error.message()));
-  }
   if (arguments.check_s > 0) return check_sensors(**source, arguments.check_s);
-  const auto map = make_map(arguments.map, (*source)->rig(), config->loop);
+  const StereoRig& rig = (*source)->rig();
+  const auto map =
+      arguments.kept_map.empty() ? make_map(arguments.map, rig, config->loop) : make_kept_map(arguments.map, rig, config->loop);
   if (!map) return fail(map.error().message);
   std::optional<KeptMap> kept;
-  if (*map) kept.emplace(**map, arguments.kept_map);
-  const ImuNoise& imu = (*source)->rig().imu_noise;
-  const auto imu_state = load_imu_state(arguments.imu_state, imu);
-  if (!imu_state) return fail(imu_state.error().message);
+  const std::string kept_file = arguments.kept_map.empty() ? "" : arguments.map.save;
+  if (*map)
+    kept.emplace(
+        **map, [from = map->get()] { return from->bytes(); }, kept_file);
   LiveTally tally;
-  const Result<void> flown = [&]() -> Result<void> {
-    auto live = LiveSystem::create(*config, config->live, (*source)->rig(), (*source)->clock_rate(),
-                                   {.mapper = kept ? &*kept : nullptr, .imu_state = *imu_state});
-    if (!live) return live.error();
-    if (auto sink = (*source)->status_sink()) live->add_sink(std::move(sink));
-    if (Result<void> added = add_sinks(arguments, *config, **source, *live, tally); !added) return added;
-    if (Result<void> added = graph->add_sink(**source, *live); !added) return added;
-    if (Result<void> added = add_page(arguments, *config, *live, kept ? &*kept : nullptr); !added) return added;
-    const Result<void> done = fly(**source, *live, *faults);
-    tally.last = live->status();
-    return done;
-  }();
-  if (!flown) return fail(flown.error().message);
-  if (Result<void> saved = save_imu_state(arguments.imu_state, tally.imu_state, imu); !saved) return fail(saved.error().message);
-  if (*map) {
-    (*map)->finish();
-    if (Result<void> saved = save_map(arguments.map, **map); !saved) return fail(saved.error().message);
-  }
-  const LiveSummary summary = summarise(tally, arguments.source, config->frontend.kind, **source, arguments.out);
-  if (!arguments.out.empty())
-    if (Result<void> written = write_results(arguments, *config, **source, summary); !written)
-      return fail(written.error().message);
-  if (!arguments.quiet) std::fputs(to_text(summary).c_str(), stderr);
+  Troubles troubles;
+  troubles.add(fly_with_outputs(arguments, *config, **source, *graph, kept ? &*kept : nullptr, tally, troubles));
+  if (tally.last.host_t == Time{}) return kBadInput;  // it did not fly
+  save(arguments, *config, **source, map->get(), tally, troubles);
+  if (troubles.any()) return kBadInput;
   return tally.with_pose > 0 ? kOk : kEstimationFailed;
 }
 
@@ -234,7 +197,8 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("--source", arguments->source, "where sensor data come from")->required();
   arguments->config.add_to(*command);
-  command->add_option("--out", arguments->out, "folder for the results; without it no files are written");
+  OutputArguments& outputs = arguments->outputs;
+  command->add_option("--out", outputs.out, "folder for the results; without it no files are written");
   command->add_option("--calibration", arguments->dataset.kalibr_camchain,
                       "Kalibr camchain-imucam.yaml instead of the source's own");
   command->add_option("--imu-calibration", arguments->dataset.kalibr_imu, "Kalibr imu.yaml, with --calibration");
@@ -255,22 +219,36 @@ void add_live_command(CLI::App& program, int& exit_code) {
   command->add_option("--vocabulary", arguments->map.vocabulary,
                       "vocabulary file for loop closure, instead of the one that ships");
   command
-      ->add_option("--mavlink", arguments->mavlink,
+      ->add_option("--mavlink", outputs.mavlink,
                    "a flight controller to send poses to, udp:HOST:PORT[:OWN_PORT] or serial:DEVICE:BAUD; may be repeated")
       ->take_all()
       ->allow_extra_args(false);
   command->add_option("--ros2", arguments->ros2,
                       "publish ROS 2 topics: DOMAIN[:INTERFACE]; without an interface to this machine alone");
-  command->add_option("--web", arguments->web, kWebHelp);
+  command
+      ->add_option("--reset-counter", outputs.reset_counter,
+                   "file that keeps the reset counter from process to process, so that a flight controller notices the new frame")
+      ->take_last();
+  command
+      ->add_option("--socket-group", arguments->socket_group,
+                   "a Unix group that may connect to the sensors' socket; without it its owner alone")
+      ->take_last();
+  command->add_option("--web", outputs.web, kWebHelp);
   command->add_option("--check", arguments->check_s, "check the sensors for this many seconds, print what is wrong, and end")
       ->check(CLI::PositiveNumber);
   command->add_option("--fault", arguments->faults, "sensor fault to inject (see below); may be repeated")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--record", arguments->record, "MCAP file for the flight record; it is a recording for fbvins run");
-  command->add_flag("!--record-no-images", arguments->record_images,
+  command->add_option("--record", outputs.record,
+                      "MCAP file for the flight record, or the next number where it exists; it is a recording for fbvins run");
+  command
+      ->add_option("--record-keep-free", outputs.record_keep_free_mb,
+                   "MB of its disk that the record leaves free for maps; it ends before")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("!--record-no-images", outputs.record_images,
                     "leave images out of the record, which cannot be run again then");
-  command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
+  command->add_flag("--quiet", outputs.quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] {
     arguments->map = map_arguments(*arguments);
     exit_code = run(*arguments);

@@ -25,7 +25,7 @@ struct Arguments {
 };
 
 int run(const Arguments& arguments) {
-  block_stop_signals();
+  const StopSignals signals;
   const Result<void> shown = show_finished_flight(arguments.flight, arguments.recording, arguments.web);
   return shown ? kOk : fail(shown.error().message);
 }

@@ -1,23 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/kept_map.hpp"
 
+#include <fmt/format.h>
+
+#include <utility>
+
 #include "apps/terminal.hpp"
 
 namespace fbvins::app {
+namespace {
 
 constexpr Duration kWritePeriod{30'000'000'000};
 
+/// Whether the file is out of the way.
+bool make_room(const std::string& file, const std::string& problem) {
+  const Result<std::string> aside = set_aside(file);
+  if (aside) warn(fmt::format("{}; it is kept as {}, and the flight begins a new map", problem, *aside));
+  else warn(fmt::format("{}; {}: the flight's map will not be written", problem, aside.error().message));
+  return aside.ok();
+}
+
+}  // namespace
+
+KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string file, WriteFile write)
+    : map_(map), bytes_(std::move(bytes)), file_(std::move(file)), writer_(std::move(write)) {}
+
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
   MapUpdate update = map_.process(keyframe);
-  if (wanted_.exchange(false) && told_) told_(map_.save(requested_file_));
-  if (file_.empty()) return update;
-  if (written_ == Time{}) written_ = keyframe.t;
-  if (keyframe.t - written_ < kWritePeriod) return update;
-  written_ = keyframe.t;
-  const Result<void> saved = map_.save(file_);
-  if (!saved && !warned_) warn(saved.error().message);
-  warned_ = !saved;
+  if (!writer_.idle()) return update;
+  if (told_ && wanted_.exchange(false)) {
+    writer_.write(requested_file_, bytes_(), told_);
+  } else if (due(keyframe.t)) {
+    writer_.write(file_, bytes_(), [this](const Result<void>& saved) {
+      if (!saved && !warned_) warn(saved.error().message);
+      warned_ = !saved;
+    });
+  }
   return update;
+}
+
+bool KeptMap::due(Time t) {
+  if (file_.empty()) return false;
+  if (written_ == Time{}) written_ = t;
+  if (t - written_ < kWritePeriod) return false;
+  written_ = t;
+  return true;
+}
+
+Result<std::unique_ptr<LoopMap>> make_kept_map(MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {
+  auto map = make_map(arguments, rig, options);
+  if (map) return map;
+  const Error problem = map.error();
+  MapArguments other = arguments;
+  if (problem.code == ErrorCode::unwritable) {  // no folder for it
+    warn(problem.message + ": the flight's map will not be written");
+    other.save.clear();
+    other.load.clear();
+    other.loop = true;
+  } else {
+    if (arguments.load.empty()) return problem;
+    other.load.clear();
+  }
+  map = make_map(other, rig, options);
+  if (!map) return problem;  // not the old file's fault
+  if (problem.code != ErrorCode::unwritable && !make_room(arguments.load, problem.message)) {
+    other.loop = true;
+    other.save.clear();
+  }
+  arguments = other;
+  return map;
 }
 
 }  // namespace fbvins::app

@@ -16,7 +16,7 @@ Result<std::unique_ptr<LiveFiles>> LiveFiles::create(const std::string& folder, 
   if (!causal) return causal.error();
   auto bounded = TumWriter::create(folder + "/map_bounded_tum.txt");
   if (!bounded) return bounded.error();
-  files->map_.emplace(MapFiles{std::move(*causal), std::move(*bounded), std::nullopt});
+  files->map_.emplace(MapFiles{std::move(*causal), std::move(*bounded), std::nullopt, std::nullopt});
   files->new_map_ = new_map;
   return files;
 }
@@ -39,7 +39,9 @@ Result<void> LiveFiles::take(const LiveEvent& event) {
 void LiveFiles::take_map(const Odometry& o) {
   if (!o.health.has_pose()) return;
   const std::optional<MapUpdate>& known = map_->newest;
-  const bool localised = known ? known->localised && known->reset_counter == o.reset_counter : new_map_ && o.reset_counter == 0;
+  if (!map_->first_reset) map_->first_reset = o.reset_counter;
+  const bool localised =
+      known ? known->localised && known->reset_counter == o.reset_counter : new_map_ && o.reset_counter == *map_->first_reset;
   if (!localised) return;
   map_->causal.write(o.t, known ? known->T_MG * o.gauge.T_GB : Pose<M, W>{} * o.T_WB);
   map_->bounded.write(o.t, (known ? known->T_MW_smooth : Pose<M, W>{}) * o.T_WB);

@@ -2,6 +2,7 @@
 // What `fbvins live --out` writes while it runs: the files of `fbvins run`, and poses at IMU rate. It uses constant memory.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,6 +32,7 @@ class LiveFiles final : public Sink {
   struct MapFiles {
     TumWriter causal, bounded;
     std::optional<MapUpdate> newest;
+    std::optional<std::uint32_t> first_reset;  ///< reset counter of the first image
   };
   LiveFiles(RunWriter run, TumWriter live) : run_(std::move(run)), live_(std::move(live)) {}
   void take_map(const Odometry& o);

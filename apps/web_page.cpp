@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <utility>
 
@@ -22,13 +23,13 @@ namespace fbvins::app {
 
 namespace {
 
-/// Serves the page at `where`, [ADDRESS:]PORT, and prints its address on stderr. The token is random, unless FBVINS_WEB_TOKEN
-/// is set.
-Result<std::unique_ptr<WebSink>> open_page(const std::string& where, WebFlight flight, WebActions actions) {
+constexpr std::chrono::seconds kTryAgain{2};
+
+/// For the page at `where`, [ADDRESS:]PORT. The token is random, unless FBVINS_WEB_TOKEN is set.
+Result<WebOptions> options_for(const std::string& where) {
   auto address = parse_web_address(where);
   if (!address) return address.error();
-  PageFiles files = page_files();
-  if (files.empty())
+  if (page_files().empty())
     return Error{ErrorCode::invalid_argument, "this program was built without its page: build it again where npm is installed"};
   WebOptions options{.address = *address};
   if (const char* token = std::getenv("FBVINS_WEB_TOKEN")) {
@@ -40,10 +41,20 @@ Result<std::unique_ptr<WebSink>> open_page(const std::string& where, WebFlight f
     if (!made) return made.error();
     options.token = *std::move(made);
   }
+  return options;
+}
+
+WebFlight described(WebFlight flight) {
   flight.program = "fbvins " FBVINS_VERSION;
-  auto sink = WebSink::create(options, std::move(files), std::move(flight), std::move(actions));
-  if (sink) note(fmt::format("the page is {}", (*sink)->url()));
-  return sink;
+  return flight;
+}
+
+/// Serves the page, and prints its address on stderr.
+Result<void> begin(WebSink& sink) {
+  if (Result<void> begun = sink.begin(page_files()); !begun) return begun;
+  if (const std::string problem = sink.problem(); !problem.empty()) warn(problem + "; it is tried again");
+  note(fmt::format("the page is {}", sink.url()));
+  return {};
 }
 
 }  // namespace
@@ -52,23 +63,29 @@ Result<void> show_finished_flight(const std::string& path, const std::string& re
   const auto flight = open_finished_flight(path, recording);
   if (!flight) return flight.error();
   FlightPlayer player(**flight);
-  auto sink = open_page(where, player.description(), {.replay = [&](const WebCommand& command) { player.command(command); }});
-  if (!sink) return sink.error();
+  const auto options = options_for(where);
+  if (!options) return options.error();
+  const auto sink = WebSink::prepare(*options, described(player.description()),
+                                     {.replay = [&](const WebCommand& command) { player.command(command); }});
+  if (Result<void> begun = begin(*sink); !begun) return begun;
   const StopSignal stop([&] { player.stop(); });
-  player.play(**sink);
-  return (*sink)->finish();
+  player.play(*sink);
+  return sink->finish();
 }
 
 Result<LivePage> open_live_page(LivePageOptions options) {
   WebFlight flight{.source = std::move(options.source), .frontend = std::move(options.frontend)};
   flight.can_mark = true;
   flight.cannot_save_map = std::move(options.cannot_save_map);
-  auto sink =
-      open_page(options.where, std::move(flight), {.mark = std::move(options.mark), .save_map = std::move(options.save_map)});
-  if (!sink) return sink.error();
+  auto web = options_for(options.where);
+  if (!web) return web.error();
+  web->try_again = kTryAgain;
+  auto sink = WebSink::prepare(*web, described(std::move(flight)),
+                               {.mark = std::move(options.mark), .save_map = std::move(options.save_map)});
   LivePage page;
-  page.tell = [to = sink->get()](const std::string& sentence, bool bad) { to->tell(sentence, bad); };
-  page.sink = *std::move(sink);
+  page.begin = [to = sink.get()] { return begin(*to); };
+  page.tell = [to = sink.get()](const std::string& sentence, bool bad) { to->tell(sentence, bad); };
+  page.sink = std::move(sink);
   return page;
 }
 

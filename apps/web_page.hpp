@@ -19,9 +19,12 @@ inline constexpr const char* kWebHelp =
 /// `fbvins view`: until SIGINT or SIGTERM.
 Result<void> show_finished_flight(const std::string& flight, const std::string& recording, const std::string& where);
 
-/// A live flight's page as a sink; `tell` may be used, from any thread, as long as the sink lives.
+/// A live flight's page as a sink. It serves from `begin` on, which is called when all sinks are there. While its address is in
+/// use it tries again every other second, and says so in the status. `tell` may be used, from any thread, as long as the sink
+/// lives.
 struct LivePage {
   std::unique_ptr<Sink> sink;
+  std::function<Result<void>()> begin;
   std::function<void(const std::string& sentence, bool bad)> tell;
 };
 struct LivePageOptions {

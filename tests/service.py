@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks what `fbvins live` reports to a service manager, with a socket instead of systemd's and a recording as sensors.
 
-usage: service.py FBVINS
+usage: service.py FBVINS C++COMPILER
 """
 import os
 import pathlib
@@ -15,7 +15,14 @@ import tempfile
 import time
 import unittest
 
-PROGRAM = sys.argv[1]
+PROGRAM, COMPILER = sys.argv[1:3]
+
+# A thread that is there before main() and blocks no signal, as OpenBLAS makes one when it is loaded.
+THREAD_BEFORE_MAIN = """
+#include <thread>
+#include <unistd.h>
+namespace { const bool made = (std::thread([] { while (true) pause(); }).detach(), true); }
+"""
 
 
 class Service(unittest.TestCase):
@@ -30,7 +37,7 @@ class Service(unittest.TestCase):
     def tearDownClass(cls):
         cls.scratch.cleanup()
 
-    def start(self, *arguments, speed=""):
+    def start(self, *arguments, speed="", environment=None):
         """Starts the program with a service manager's socket; returns both."""
         manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.addCleanup(manager.close)
@@ -38,7 +45,7 @@ class Service(unittest.TestCase):
         manager.bind(address)
         manager.settimeout(120)
         program = subprocess.Popen([PROGRAM, "live", "--source", f"replay:{self.flight}{speed}", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   text=True, env=dict(os.environ, NOTIFY_SOCKET=address))
+                                   text=True, env=dict(os.environ, NOTIFY_SOCKET=address, **(environment or {})))
         self.addCleanup(program.kill)
         return program, manager
 
@@ -64,6 +71,52 @@ class Service(unittest.TestCase):
         _, err = program.communicate(timeout=120)
         self.assertEqual(program.returncode, 0, err)
         self.assertTrue((self.folder / "flat.fbm").exists())
+
+    def test_stop_signals_where_a_library_made_a_thread_before_main(self):
+        source, library = self.folder / "thread.cpp", self.folder / "thread.so"
+        source.write_text(THREAD_BEFORE_MAIN, encoding="utf-8")
+        subprocess.run([COMPILER, "-shared", "-fPIC", "-pthread", source, "-o", library], check=True, timeout=120)
+        for stop in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            with self.subTest(stop.name):
+                out = self.folder / stop.name
+                out.mkdir()
+                program, manager = self.start("--laps", "100", "--map", str(out / "flat.fbm"), "--imu-state", str(out / "imu.yaml"), "--out", str(out / "run"),
+                                              environment={"LD_PRELOAD": str(library)})
+                while "STATUS=good" not in manager.recv(4096).decode():
+                    pass
+                program.send_signal(stop)
+                _, err = program.communicate(timeout=120)
+                self.assertEqual(program.returncode, 0, err)
+                self.assertTrue((out / "flat.fbm").exists() and (out / "imu.yaml").exists() and (out / "run" / "trajectory.csv").exists())
+                self.assertEqual(list(out.rglob("*.part")), [])
+
+    def test_what_stands_in_the_way_of_an_output_does_not_stop_the_poses(self):
+        folder = self.folder / "in_the_way"
+        folder.mkdir()
+        (folder / "flight.mcap").write_text("the flight before", encoding="utf-8")
+        (folder / "flat.fbm").write_text("rubbish", encoding="utf-8")
+        (folder / "imu.yaml").write_text("", encoding="utf-8")
+        program, _ = self.start("--record", str(folder / "flight.mcap"), "--record-keep-free", "0", "--map", str(folder / "flat.fbm"),
+                                "--imu-state", str(folder / "imu.yaml"), "--reset-counter", str(folder / "counter"))
+        _, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 0, err)
+        self.assertEqual((folder / "flight.mcap").read_text(encoding="utf-8"), "the flight before")
+        self.assertGreater((folder / "flight-2.mcap").stat().st_size, 1_000_000)
+        self.assertEqual((folder / "flat.fbm.bad").read_text(encoding="utf-8"), "rubbish")
+        self.assertGreater(self.keyframes_of(folder / "flat.fbm"), 5)
+        self.assertTrue((folder / "imu.yaml.bad").exists() and (folder / "imu.yaml").stat().st_size > 100)
+        self.assertEqual((folder / "counter").read_text(encoding="utf-8"), "0\n")
+
+    def test_every_file_is_tried_when_another_cannot_be_written(self):
+        folder = self.folder / "every_file"
+        folder.mkdir()
+        program, manager = self.start("--record", str(folder / "unplugged" / "flight.mcap"), "--map", str(folder / "flat.fbm"),
+                                      "--imu-state", str(folder / "none" / "imu.yaml"), "--out", str(folder / "run"))
+        messages = manager.recv(4096).decode()
+        _, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 2, "what went wrong is the result")
+        self.assertIn("unplugged", messages, "and in the status during the flight")
+        self.assertTrue((folder / "flat.fbm").exists() and (folder / "run" / "summary.json").exists(), err)
 
     def test_a_kept_map_outlives_a_killed_program(self):
         kept = self.folder / "kept.fbm"

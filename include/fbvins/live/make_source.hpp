@@ -22,6 +22,7 @@ struct SourceOptions {
   std::function<void(const std::string&)> say = [](const std::string&) {};
   /// Asked repeatedly while make_source() waits for a device: true ends that with an error.
   std::function<bool()> give_up = [] { return false; };
+  std::string socket_group = "";  ///< that may connect to a socket; empty: this program's user alone
 };
 
 /// KIND:WHERE. replay:DATASET[@SPEED] plays a recording in wall time; socket:PATH listens there for another process

@@ -54,6 +54,8 @@ class LoopMap final : public Mapper {
   Trajectory<M> corrected(const Trajectory<G>& in_G) const;
   /// Keyframes in the map now.
   int keyframes() const;
+  /// Bytes of the file that save() writes; may be called on the thread of process(), too.
+  std::string bytes() const;
   /// Replaces the file atomically: there is never half of one.
   Result<void> save(const std::string& path) const;
 

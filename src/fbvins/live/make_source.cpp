@@ -13,7 +13,7 @@ namespace fbvins {
 namespace {
 
 Result<std::unique_ptr<Source>> make_socket_source(const std::string& path, const SourceOptions& options) {
-  SocketOptions socket{.say = options.say, .give_up = options.give_up};
+  SocketOptions socket{.say = options.say, .give_up = options.give_up, .group = options.socket_group};
   if (!options.dataset.kalibr_camchain.empty()) {
     const std::string& imu = options.dataset.kalibr_imu;
     const auto rig = load_kalibr(options.dataset.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));

@@ -2,10 +2,12 @@
 #include "fbvins/live/socket_file.hpp"
 
 #include <fmt/format.h>
+#include <grp.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -32,9 +34,21 @@ Result<void> make_way(const sockaddr_un& address, const std::string& path) {
   return {};
 }
 
+/// Connecting needs the permission to write.
+Result<void> open_to(const std::string& group, const std::string& path) {
+  std::array<char, 16384> buffer{};
+  struct group entry {};
+  struct group* found = nullptr;
+  if (getgrnam_r(group.c_str(), &entry, buffer.data(), buffer.size(), &found) != 0 || found == nullptr)
+    return Error{ErrorCode::invalid_argument, fmt::format("{}: there is no group '{}'", path, group)};
+  if (::lchown(path.c_str(), static_cast<uid_t>(-1), found->gr_gid) != 0) return failed(path, "cannot be given to the group");
+  if (::chmod(path.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0) return failed(path, "cannot be opened to the group");
+  return {};
+}
+
 }  // namespace
 
-Result<SocketFile> SocketFile::listen(const std::string& path) {
+Result<SocketFile> SocketFile::listen(const std::string& path, const std::string& group) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof(address.sun_path))
@@ -49,6 +63,8 @@ Result<SocketFile> SocketFile::listen(const std::string& path) {
     return failed(path, "no socket can be made there");
   struct stat state {};
   if (::lstat(path.c_str(), &state) == 0) file.inode_ = state.st_ino;
+  if (!group.empty())
+    if (Result<void> open = open_to(group, path); !open) return open.error();
   if (::listen(file.fd(), kWaiting) != 0) return failed(path, "cannot be listened at");
   return file;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Unix socket that listens at a path: for its owner alone, removed at the end. The socket of a dead server is replaced; that of
+// A Unix socket that listens at a path: for its owner alone, or for a group as well; removed at the end. The socket of a dead server is replaced; that of
 // a living one, or a file that is not a socket, is left alone and is an error.
 #pragma once
 
@@ -14,7 +14,8 @@ namespace fbvins {
 
 class SocketFile {
  public:
-  static Result<SocketFile> listen(const std::string& path);
+  /// `group`: a name; this program must be the group's member. Empty: for the owner alone.
+  static Result<SocketFile> listen(const std::string& path, const std::string& group = "");
   SocketFile(SocketFile&&) = default;
   SocketFile& operator=(SocketFile&&) = delete;
   ~SocketFile();

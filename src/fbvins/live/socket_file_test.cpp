@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/socket_file.hpp"
 
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -25,6 +27,27 @@ TEST(SocketFile, IsItsOwnersAloneAndGoneAtTheEnd) {
     EXPECT_EQ(state.st_mode & 0777u, 0600u);
     EXPECT_TRUE(test::TestSender(folder.path()).connected());
   }
+  EXPECT_FALSE(is_there(folder.path()));
+}
+
+TEST(SocketFile, CanBeOpenToAGroup) {
+  const struct group* mine = ::getgrgid(::getgid());
+  if (mine == nullptr) GTEST_SKIP() << "this group has no name";
+  const test::SocketFolder folder;
+  const auto file = SocketFile::listen(folder.path(), mine->gr_name);
+  ASSERT_TRUE(file) << file.error().message;
+  struct stat state {};
+  ASSERT_EQ(::stat(folder.path().c_str(), &state), 0);
+  EXPECT_EQ(state.st_mode & 0777u, 0660u);
+  EXPECT_EQ(state.st_gid, ::getgid());
+  EXPECT_TRUE(test::TestSender(folder.path()).connected());
+}
+
+TEST(SocketFile, OfAGroupThatIsNotThereIsAnError) {
+  const test::SocketFolder folder;
+  const auto file = SocketFile::listen(folder.path(), "no-such-group");
+  ASSERT_FALSE(file);
+  EXPECT_NE(file.error().message.find("there is no group 'no-such-group'"), std::string::npos) << file.error().message;
   EXPECT_FALSE(is_there(folder.path()));
 }
 

@@ -75,7 +75,7 @@ SocketSource::SocketSource(SocketFile file, SocketOptions options)
 }
 
 Result<std::unique_ptr<SocketSource>> SocketSource::open(const std::string& path, SocketOptions options) {
-  Result<SocketFile> file = SocketFile::listen(path);
+  Result<SocketFile> file = SocketFile::listen(path, options.group);
   if (!file) return file.error();
   std::unique_ptr<SocketSource> source(new SocketSource(*std::move(file), std::move(options)));
   if (Result<void> known = source->wait_for_rig(); !known) return known.error();

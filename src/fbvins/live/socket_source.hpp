@@ -29,6 +29,7 @@ struct SocketOptions {
   std::function<bool()> give_up = [] { return false; };
   /// Time in which a connected sender must send its hello.
   double hello_s = 2;
+  std::string group = "";  ///< whose members may connect; empty: this program's user alone
 };
 
 class SocketSource final : public Source {

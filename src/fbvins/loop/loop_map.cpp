@@ -32,6 +32,7 @@ PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
 Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }
 int LoopMap::keyframes() const { return static_cast<int>(closer_->map().size()); }
+std::string LoopMap::bytes() const { return serialise_map(closer_->map()); }
 Result<void> LoopMap::save(const std::string& path) const { return save_map(closer_->map(), path); }
 
 }  // namespace fbvins

@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <boost/asio/ip/tcp.hpp>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -13,6 +15,13 @@
 
 namespace fbvins {
 
+/// A connection that is no viewer: it waits for a request, or for its peer to read the answer.
+class WebVisitor {
+ public:
+  virtual ~WebVisitor() = default;
+  virtual void drop() = 0;
+};
+
 /// Lives as long as any connection.
 struct WebShared {
   WebOptions options;
@@ -21,6 +30,33 @@ struct WebShared {
   std::string machine;          ///< this machine's name
   std::size_t connections = 0;  ///< that are open
   std::atomic<int> viewers{0}, dropped{0};
+  std::map<std::uint64_t, WebVisitor*> waiting;  ///< by when they began to: the first has waited longest
+  std::uint64_t waits = 0;
+
+  void drop_longest_waiting() {
+    if (!waiting.empty()) waiting.begin()->second->drop();
+  }
+};
+
+/// A visitor's entry in the list of those that wait, for as long as this lives.
+class WebWait {
+ public:
+  WebWait(std::shared_ptr<WebShared> shared, WebVisitor& visitor) : shared_(std::move(shared)), visitor_(visitor) { begin(); }
+  ~WebWait() { shared_->waiting.erase(number_); }
+  WebWait(const WebWait&) = delete;
+  WebWait& operator=(const WebWait&) = delete;
+  /// After a request it waits anew.
+  void restart() {
+    shared_->waiting.erase(number_);
+    begin();
+  }
+
+ private:
+  void begin() { shared_->waiting.emplace(number_ = shared_->waits++, &visitor_); }
+
+  std::shared_ptr<WebShared> shared_;
+  WebVisitor& visitor_;
+  std::uint64_t number_ = 0;
 };
 
 /// Counts a connection while it lives.
@@ -32,6 +68,7 @@ class WebPlace {
   WebPlace& operator=(const WebPlace&) = delete;
   WebShared& operator*() const { return *shared_; }
   WebShared* operator->() const { return shared_.get(); }
+  const std::shared_ptr<WebShared>& shared() const { return shared_; }
 
  private:
   std::shared_ptr<WebShared> shared_;

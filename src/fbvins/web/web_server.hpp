@@ -5,7 +5,9 @@
 //   (*server)->send(std::make_shared<const WebMessage>(WebMessage{"{}"}));    // any thread; never waits
 //
 // One thread of its own. Every viewer has a bounded queue that drops its oldest messages; one that does not read for some seconds
-// is dropped itself. Nothing that a peer sends, or fails to read, delays a caller of send().
+// is dropped itself. When there are as many connections as may be, the one that has waited longest for a request or for
+// its peer to read makes room for the next, so that slow ones keep nobody out. Nothing that a peer sends, or fails to read,
+// delays a caller of send().
 #pragma once
 
 #include <chrono>
@@ -36,7 +38,10 @@ struct WebOptions {
   std::string token = {};         ///< that every viewer must give; empty: none is needed
   std::size_t most_viewers = 32;  ///< further ones are refused
   std::size_t most_connections = 128;
-  std::chrono::milliseconds patience{10'000};  ///< for a complete request, and for a viewer to read
+  std::chrono::milliseconds header_patience{3'000};  ///< for a complete request, from the connection or the last answer
+  std::chrono::milliseconds patience{10'000};        ///< for a peer to read what it gets
+  /// Where the address is in use it is tried again after so long, for as long as the server lives; zero: an error.
+  std::chrono::milliseconds try_again{0};
 };
 
 class WebServer {
@@ -47,7 +52,7 @@ class WebServer {
     std::function<void(std::string_view)> command = [](std::string_view) {};                          ///< text of a viewer
   };
 
-  /// An error where it cannot listen at the address.
+  /// An error where it cannot listen at the address, unless it is to try again.
   static Result<std::unique_ptr<WebServer>> start(const WebOptions& options, PageFiles files, Callbacks callbacks);
   ~WebServer();
   /// Closes all connections; afterwards no callback comes, and messages are dropped.
@@ -57,6 +62,9 @@ class WebServer {
   int viewers() const;
   /// Viewers that were dropped because they did not read.
   int dropped_viewers() const;
+  /// Why it does not listen at its address; empty: it does. From any thread.
+  std::string problem() const;
+  /// Zero while it does not listen.
   std::uint16_t port() const;
   /// Waits until every viewer has received what was sent, for no longer than `patience`.
   void drain(std::chrono::milliseconds patience);

@@ -141,12 +141,29 @@ TEST_F(Server, LimitsViewersAndHeaders) {
 }
 
 TEST_F(Server, DropsThoseWhoSendNothing) {
-  start({.patience = 200ms});
+  start({.header_patience = 200ms});
   TestPeer silent(server->port());
   EXPECT_TRUE(silent.closed_within(5s));
   TestPeer slow(server->port());
   slow.send("GET / HT");
   EXPECT_TRUE(slow.closed_within(5s));
+}
+
+/// Ten times as many as it takes, each with half a request, and nobody's time runs out.
+TEST_F(Server, SlowConnectionsKeepNobodyOut) {
+  start({.most_connections = 16, .header_patience = 1h, .patience = 1h});
+  TestPeer viewer(server->port());
+  viewer.watch();
+  EXPECT_EQ(viewer.message(), "greeting");
+  std::vector<std::unique_ptr<TestPeer>> slow;
+  for (int i = 0; i < 160; ++i) {
+    slow.push_back(std::make_unique<TestPeer>(server->port()));
+    if (i % 2 == 0) slow.back()->send("GET / HT");
+    if (i % 40 == 39) expect_works();
+  }
+  EXPECT_TRUE(slow.front()->closed_within(5s)) << "the oldest made room";
+  server->send(text("still here"));
+  EXPECT_EQ(viewer.message(), "still here") << "viewers are never dropped for newcomers";
 }
 
 TEST_F(Server, OneThatDoesNotReadIsDroppedAndTheOthersGoOn) {
@@ -217,6 +234,21 @@ TEST_F(Server, SaysWhyItCannotListen) {
   const auto second = WebServer::start({.address = {"127.0.0.1", server->port()}}, a_page(), {});
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("the page cannot be served at 127.0.0.1 port"), std::string::npos);
+}
+
+TEST_F(Server, AnAddressInUseIsTriedAgain) {
+  start();
+  const std::uint16_t port = server->port();
+  auto second = WebServer::start({.address = {"127.0.0.1", port}, .try_again = 10ms}, a_page(), {});
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_EQ((*second)->port(), 0);
+  EXPECT_NE((*second)->problem().find("cannot be served"), std::string::npos) << (*second)->problem();
+  (*second)->send(text("to nobody"));
+  server.reset();
+  ASSERT_TRUE(comes_true([&] { return (*second)->problem().empty(); }, 30s));
+  server = *std::move(second);
+  EXPECT_EQ(server->port(), port);
+  expect_works();
 }
 
 TEST_F(Server, EndsWithViewersAndSendingThreads) {

@@ -31,13 +31,22 @@ bool due(Clock::time_point& when, Clock::duration period) {
 
 Result<std::unique_ptr<WebSink>> WebSink::create(const WebOptions& options, PageFiles files, WebFlight flight,
                                                  WebActions actions) {
-  std::unique_ptr<WebSink> sink(new WebSink(options, std::move(flight), std::move(actions)));
-  auto server = WebServer::start(options, std::move(files),
-                                 {.greet = [to = sink.get()] { return to->greeting(); },
-                                  .command = [to = sink.get()](std::string_view text) { to->on_command(text); }});
-  if (!server) return server.error();
-  sink->server_ = *std::move(server);
+  auto sink = prepare(options, std::move(flight), std::move(actions));
+  if (Result<void> begun = sink->begin(std::move(files)); !begun) return begun.error();
   return sink;
+}
+
+std::unique_ptr<WebSink> WebSink::prepare(const WebOptions& options, WebFlight flight, WebActions actions) {
+  return std::unique_ptr<WebSink>(new WebSink(options, std::move(flight), std::move(actions)));
+}
+
+Result<void> WebSink::begin(PageFiles files) {
+  auto server =
+      WebServer::start(options_, std::move(files),
+                       {.greet = [this] { return greeting(); }, .command = [this](std::string_view text) { on_command(text); }});
+  if (!server) return server.error();
+  server_ = *std::move(server);
+  return {};
 }
 
 WebSink::WebSink(const WebOptions& options, WebFlight flight, WebActions actions)
@@ -51,7 +60,8 @@ std::string WebSink::url() const {
     host = gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
   }
   // A browser does not send what follows the #: the token gets into no log.
-  return fmt::format("http://{}:{}/{}{}", host, port(), options_.token.empty() ? "" : "#token=", options_.token);
+  return fmt::format("http://{}:{}/{}{}", host, port() == 0 ? address.port : port(),
+                     options_.token.empty() ? "" : "#token=", options_.token);
 }
 
 double WebSink::since_start_s(Time t) {
@@ -81,7 +91,7 @@ std::vector<SharedMessage> WebSink::flight_so_far() const {
 
 /// With the mutex held.
 void WebSink::send(SharedMessage message) {
-  if (!silent_) server_->send(std::move(message));
+  if (!silent_ && server_) server_->send(std::move(message));
 }
 
 void WebSink::on_command(std::string_view text) {
@@ -163,7 +173,9 @@ void WebSink::show(const LiveMark& mark) {
   send(mark_message(history_.marks().back()));
 }
 
-void WebSink::tell(const std::string& sentence, bool bad) { server_->send(note_message(sentence, bad)); }
+void WebSink::tell(const std::string& sentence, bool bad) {
+  if (server_) server_->send(note_message(sentence, bad));
+}
 
 void WebSink::show_replay(double t_s, bool playing) {
   const std::lock_guard lock(mutex_);
@@ -195,6 +207,7 @@ void WebSink::end_replay() {
 }
 
 Result<void> WebSink::finish() {
+  if (!server_) return {};
   server_->send(end_message());
   server_->drain(kFarewell);
   server_->stop();  // the targets of its actions may be destroyed next

@@ -31,13 +31,20 @@ struct WebActions {
 
 class WebSink final : public Sink {
  public:
+  /// Serves at once.
   static Result<std::unique_ptr<WebSink>> create(const WebOptions& options, PageFiles files, WebFlight flight,
                                                  WebActions actions);
+  /// Serves from begin() on, which is called before the first event: until then no action is called, as what they act on may not
+  /// be complete.
+  static std::unique_ptr<WebSink> prepare(const WebOptions& options, WebFlight flight, WebActions actions);
+  Result<void> begin(PageFiles files);
 
   std::string_view name() const override { return "web"; }
   bool wants_views() const override { return true; }
   Result<void> take(const LiveEvent& event) override;
   Result<void> finish() override;
+  /// That the page's address is in use.
+  std::string problem() const override { return server_ ? server_->problem() : ""; }
 
   /// Sends a sentence to all viewers. From any thread.
   void tell(const std::string& sentence, bool bad);
@@ -49,7 +56,7 @@ class WebSink final : public Sink {
   /// Zero of the times on the page; without it the first event with a stamp.
   void set_start(Time start);
 
-  int viewers() const { return server_->viewers(); }
+  int viewers() const { return server_ ? server_->viewers() : 0; }
   std::uint16_t port() const { return server_->port(); }
   /// Address for a browser, with the token.
   std::string url() const;

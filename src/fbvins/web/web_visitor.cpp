@@ -33,17 +33,26 @@ WebRequest seen_as(const Request& request) {
 }
 
 /// Answers the requests of one connection, one after the other.
-class Visitor : public std::enable_shared_from_this<Visitor> {
+class Visitor final : public WebVisitor, public std::enable_shared_from_this<Visitor> {
  public:
   Visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers)
-      : stream_(std::move(socket)), place_(std::move(place)), viewers_(viewers) {}
+      : stream_(std::move(socket)), place_(std::move(place)), viewers_(viewers) {
+    wait_.emplace(place_->shared(), *this);
+  }
+
+  void drop() override {
+    Failure ignored;
+    stream_.socket().close(ignored);
+    wait_.reset();
+    place_.reset();
+  }
 
   void read() {
     parser_.emplace();
     parser_->header_limit(kMostHeader_bytes);
-    stream_.expires_after((*place_)->options.patience);
+    stream_.expires_after((*place_)->options.header_patience);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](Failure failure, std::size_t) {
-      if (!failure) self->answer();
+      if (!failure && self->place_) self->answer();
     });
   }
 
@@ -52,7 +61,11 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
     const Request& request = parser_->get();
     const WebShared& shared = **place_;
     const WebAnswer answer = answer_to(seen_as(request), shared.options, shared.files, shared.machine, viewers_.size());
-    if (answer.status == 101) return accept_viewer(std::move(stream_), request, place_, viewers_);
+    if (answer.status == 101) {
+      wait_.reset();
+      return accept_viewer(std::move(stream_), request, place_, viewers_);
+    }
+    wait_->restart();
     respond(request, answer);
   }
 
@@ -70,14 +83,19 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
     response_.content_length(answer.bytes.size());
     stream_.expires_after((*place_)->options.patience);
     http::async_write(stream_, response_, [self = shared_from_this()](Failure failure, std::size_t) {
-      if (!failure && self->response_.keep_alive()) return self->read();
+      if (!self->place_) return;
+      if (!failure && self->response_.keep_alive()) {
+        self->wait_->restart();
+        return self->read();
+      }
       Failure ignored;
       self->stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
     });
   }
 
   beast::tcp_stream stream_;
-  std::shared_ptr<WebPlace> place_;
+  std::shared_ptr<WebPlace> place_;  ///< null: dropped
+  std::optional<WebWait> wait_;
   WebViewers& viewers_;
   beast::flat_buffer buffer_{2 * kMostHeader_bytes};
   std::optional<http::request_parser<http::empty_body>> parser_;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/imu_state.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+namespace fbvins::app {
+namespace {
+
+Odometry with_bias() {
+  Odometry o;
+  o.t = Time{5};
+  o.health = {HealthState::good, HealthReason::none};
+  o.bias.gyro_radps = Vec3(0.01, 0.02, 0.03);
+  o.gyro_bias_covariance = o.accel_bias_covariance = 1e-4 * Mat3::Identity();
+  return o;
+}
+
+TEST(ImuStateOfAFlight, IsThatOfFramesInGoodHealth) {
+  Odometry o = with_bias();
+  ASSERT_TRUE(imu_state_of(o));
+  EXPECT_EQ(imu_state_of(o)->biases.bias.gyro_radps, o.bias.gyro_radps);
+  o.health.state = HealthState::degraded;
+  EXPECT_FALSE(imu_state_of(o));
+  o = with_bias();
+  o.accel_bias_covariance.setZero();  // before the window knows it
+  EXPECT_FALSE(imu_state_of(o));
+}
+
+TEST(ImuStateOfAFlight, WithoutAPathOrAStateNothingIsReadOrWritten) {
+  const auto none = load_imu_state("", ImuNoise{});
+  ASSERT_TRUE(none);
+  EXPECT_FALSE(*none);
+  EXPECT_TRUE(save_imu_state("", imu_state_of(with_bias()), ImuNoise{}));
+  const std::string path = ::testing::TempDir() + "/fbvins_no_imu_state_" + std::to_string(getpid());
+  EXPECT_TRUE(save_imu_state(path, std::nullopt, ImuNoise{}));
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+TEST(ImuStateOfAFlight, ComesBack) {
+  const std::string path = ::testing::TempDir() + "/fbvins_imu_state_" + std::to_string(getpid());
+  ASSERT_TRUE(save_imu_state(path, imu_state_of(with_bias()), ImuNoise{}));
+  const auto loaded = load_imu_state(path, ImuNoise{});
+  std::filesystem::remove(path);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  ASSERT_TRUE(*loaded);
+  EXPECT_EQ((*loaded)->biases.bias.gyro_radps, with_bias().bias.gyro_radps);
+}
+
+}  // namespace
+}  // namespace fbvins::app

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/kept_map.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <vector>
+
+namespace fbvins::app {
+namespace {
+
+class CountingMapper final : public Mapper {
+ public:
+  MapUpdate process(const Keyframe& keyframe) override {
+    ++keyframes;
+    MapUpdate update;
+    update.t = keyframe.t;
+    return update;
+  }
+  int keyframes = 0;
+};
+
+/// A disk that finishes a file only when it is told to.
+class SlowDisk {
+ public:
+  Result<void> write(const std::string& path, std::string_view bytes) {
+    std::unique_lock lock(mutex_);
+    begun_.emplace_back(path, bytes);
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return open_ || allowed_ >= begun_.size(); });
+    return result_;
+  }
+  void wait_for_begin(std::size_t files) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return begun_.size() >= files; });
+  }
+  void finish(std::size_t files) {
+    const std::lock_guard lock(mutex_);
+    allowed_ = files;
+    changed_.notify_all();
+  }
+  void open(Result<void> result = {}) {
+    const std::lock_guard lock(mutex_);
+    result_ = std::move(result);
+    open_ = true;
+    changed_.notify_all();
+  }
+  std::vector<std::pair<std::string, std::string>> begun() {
+    const std::lock_guard lock(mutex_);
+    return begun_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::pair<std::string, std::string>> begun_;
+  std::size_t allowed_ = 0;
+  bool open_ = false;
+  Result<void> result_;
+};
+
+Keyframe at_s(double t_s) {
+  Keyframe keyframe;
+  keyframe.t = Time{1'000'000'000} + Duration::from_seconds(t_s);
+  return keyframe;
+}
+
+class KeptMapTest : public ::testing::Test {
+ protected:
+  ~KeptMapTest() override { disk.open(); }
+
+  CountingMapper mapper;
+  SlowDisk disk;
+  KeptMap kept{mapper, [this] { return "map of " + std::to_string(mapper.keyframes); }, "flat.fbm",
+               [this](const std::string& path, std::string_view bytes) { return disk.write(path, bytes); }};
+};
+
+TEST_F(KeptMapTest, ASlowDiskHoldsUpNoKeyframeAndTheNewestMapIsNext) {
+  kept.process(at_s(0));
+  kept.process(at_s(29));
+  kept.process(at_s(31));
+  disk.wait_for_begin(1);
+  for (int second = 32; second < 300; ++second) EXPECT_EQ(kept.process(at_s(second)).t, at_s(second).t);
+  ASSERT_EQ(disk.begun().size(), 1u) << "one file at a time, and no map waits in memory";
+  EXPECT_EQ(disk.begun()[0].second, "map of 3");
+  disk.finish(1);
+  kept.finish();
+  kept.process(at_s(300));
+  disk.wait_for_begin(2);
+  EXPECT_EQ(disk.begun()[1].first, "flat.fbm");
+  EXPECT_EQ(disk.begun()[1].second, "map of 272");
+}
+
+TEST_F(KeptMapTest, ARequestedMapIsToldWhenItIsWritten) {
+  std::vector<bool> told;
+  std::mutex mutex;
+  kept.on_request("wish.fbm", [&](const Result<void>& saved) {
+    const std::lock_guard lock(mutex);
+    told.push_back(saved.ok());
+  });
+  kept.request_save();
+  kept.process(at_s(0));
+  kept.request_save();
+  disk.wait_for_begin(1);
+  kept.process(at_s(1));
+  EXPECT_TRUE((std::lock_guard(mutex), told.empty()));
+  disk.open(Error{ErrorCode::unwritable, "full"});
+  kept.finish();
+  kept.process(at_s(2));
+  kept.finish();
+  EXPECT_EQ(told, (std::vector<bool>{false, false})) << "the second wish was not lost";
+  EXPECT_EQ(disk.begun()[1].first, "wish.fbm");
+  EXPECT_EQ(disk.begun()[1].second, "map of 3");
+}
+
+class MakeKeptMap : public ::testing::Test {
+ protected:
+  MakeKeptMap() { std::filesystem::create_directories(folder); }
+  ~MakeKeptMap() override { std::filesystem::remove_all(folder); }
+
+  static StereoRig rig() {
+    StereoRig r;
+    r.left = r.right = Camera(PinholeRadtan{400, 400, 376, 240}, 752, 480);
+    r.T_BC1.p = Vec3(0.1, 0, 0);
+    return r;
+  }
+  const std::string folder = ::testing::TempDir() + "/fbvins_kept_map_" + std::to_string(getpid());
+  const std::string file = folder + "/flat.fbm";
+};
+
+TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
+  std::ofstream(file) << "rubbish";
+  MapArguments arguments{.load = file, .save = file};
+  const auto map = make_kept_map(arguments, rig(), {});
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_EQ((*map)->keyframes(), 0);
+  EXPECT_EQ(arguments.save, file);
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_EQ(std::filesystem::file_size(file + ".bad"), 7u);
+}
+
+TEST_F(MakeKeptMap, WithoutAFolderTheFlightHasAMapAndKeepsNone) {
+  MapArguments arguments{.save = folder + "/unplugged/flat.fbm"};
+  const auto map = make_kept_map(arguments, rig(), {});
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_TRUE(*map);
+  EXPECT_EQ(arguments.save, "");
+}
+
+TEST_F(MakeKeptMap, WhatIsNotTheOldFilesFaultStaysAnError) {
+  std::ofstream(file) << "rubbish";
+  MapArguments arguments{.load = file, .save = file, .vocabulary = folder + "/none.fbv"};
+  EXPECT_FALSE(make_kept_map(arguments, rig(), {}));
+  EXPECT_TRUE(std::filesystem::exists(file)) << "not set aside";
+}
+
+}  // namespace
+}  // namespace fbvins::app

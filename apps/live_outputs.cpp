@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/live_outputs.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <utility>
+
+#include "apps/imu_state.hpp"
+#include "apps/live_files.hpp"
+#include "apps/terminal.hpp"
+#include "apps/web_page.hpp"
+#include "fbvins/config/config_file.hpp"
+#include "fbvins/live/mavlink_sink.hpp"
+#include "fbvins/live/record_sink.hpp"
+#include "fbvins/live/service_sink.hpp"
+#include "fbvins/live/status_sink.hpp"
+
+namespace fbvins::app {
+namespace {
+
+void go_on_without(const char* name, const Error& error, LiveSystem& live, Troubles& troubles) {
+  troubles.add(error);
+  live.add_sink(std::make_unique<MissingOutput>(name, error.message));
+}
+
+void add_record(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, Troubles& troubles) {
+  auto record = RecordSink::create_next(
+      arguments.record, flight.source.rig(),
+      {.program = "fbvins " FBVINS_VERSION, .configuration = to_yaml(flight.config), .images = arguments.record_images},
+      {.keep_free_bytes = static_cast<std::uint64_t>(arguments.record_keep_free_mb * 1e6)});
+  if (!record) return go_on_without("record", record.error(), live, troubles);
+  if ((*record)->path() != arguments.record)
+    note(fmt::format("{} exists already; this flight's record is {}", arguments.record, (*record)->path()));
+  live.add_sink(*std::move(record));
+}
+
+/// It also wants to see the frontend's frames.
+void add_files(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, Troubles& troubles) {
+  std::error_code error;
+  std::filesystem::create_directories(arguments.out, error);
+  if (error)
+    return go_on_without("files", {ErrorCode::unwritable, fmt::format("{}: {}", arguments.out, error.message())}, live, troubles);
+  auto files = LiveFiles::create(arguments.out, flight.map.wanted(), flight.map.load.empty());
+  if (!files) return go_on_without("files", files.error(), live, troubles);
+  live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
+  live.add_sink(std::move(*files));
+}
+
+/// Why the page's button cannot save the map; empty: it can.
+std::string cannot_save_map(const MapArguments& map) {
+  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
+  if (map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
+  return {};
+}
+
+}  // namespace
+
+void Troubles::add(const Error& error) {
+  (void)fail(error.message);
+  any_ = true;
+}
+
+Result<void> add_outputs(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, LiveTally& tally,
+                         Troubles& troubles) {
+  live.add_sink(tally.make_sink());
+  if (!arguments.record.empty()) add_record(arguments, flight, live, troubles);
+  if (const char* address = std::getenv("NOTIFY_SOCKET")) {
+    auto sink = ServiceSink::create(address, stderr);
+    if (!sink) return sink.error();
+    live.add_sink(*std::move(sink));
+  } else if (!arguments.quiet) {
+    live.add_sink(std::make_unique<StatusSink>(stdout));
+  }
+  for (const std::string& address : arguments.mavlink) {
+    auto sink = MavlinkSink::create(address, flight.config.live.mavlink);
+    if (!sink) return sink.error();
+    live.add_sink(*std::move(sink));
+  }
+  if (!arguments.out.empty()) add_files(arguments, flight, live, troubles);
+  return {};
+}
+
+Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSystem& live) {
+  if (where.empty()) return {};
+  KeptMap* map = flight.kept;
+  auto page = open_live_page({.where = where,
+                              .source = flight.source_name,
+                              .frontend = flight.config.frontend.kind,
+                              .cannot_save_map = cannot_save_map(flight.map),
+                              .mark = [&live](std::string text) { live.mark(std::move(text)); },
+                              .save_map = [map] { map->request_save(); }});
+  if (!page) return page.error();
+  if (map) {
+    const std::string& file = flight.map.save;
+    map->on_request(file, [file, tell = page->tell](const Result<void>& saved) {
+      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
+    });
+  }
+  live.add_sink(std::move(page->sink));
+  return page->begin();
+}
+
+std::optional<ImuState> imu_state_for_flight(const std::string& file, const ImuNoise& imu) {
+  const auto state = load_imu_state(file, imu);
+  if (state) return *state;
+  const Result<std::string> aside = set_aside(file);
+  warn(fmt::format("{}; {}", state.error().message,
+                   aside ? fmt::format("it is kept as {}, and the flight begins without", *aside) : aside.error().message));
+  return std::nullopt;
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/live_outputs.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "fbvins/io/imu_state_file.hpp"
+
+namespace fbvins::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+class NoSensors final : public Source {
+ public:
+  NoSensors() {
+    rig_.left = rig_.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
+    rig_.T_BC1.p = Vec3(0.1, 0, 0);
+  }
+  const StereoRig& rig() const override { return rig_; }
+  Result<void> run(SensorInput&) override { return {}; }
+  void stop() override {}
+
+ private:
+  StereoRig rig_;
+};
+
+class LiveOutputs : public ::testing::Test {
+ protected:
+  LiveOutputs() {
+    fs::create_directories(folder);
+    ::unsetenv("NOTIFY_SOCKET");
+    arguments.quiet = true;
+  }
+  ~LiveOutputs() override { fs::remove_all(folder); }
+
+  LiveSystem live() {
+    auto made = LiveSystem::create(config, config.live, source.rig());
+    EXPECT_TRUE(made) << (made ? "" : made.error().message);
+    return std::move(*made);
+  }
+  Result<void> add_to(LiveSystem& to) { return add_outputs(arguments, {config, source, "none", map}, to, tally, troubles); }
+
+  const std::string folder = ::testing::TempDir() + "/fbvins_live_outputs_" + std::to_string(getpid());
+  Config config;
+  NoSensors source;
+  MapArguments map;
+  OutputArguments arguments;
+  LiveTally tally;
+  Troubles troubles;
+};
+
+TEST_F(LiveOutputs, ARecordThatExistsGetsTheNextNumber) {
+  arguments.record = folder + "/flight.mcap";
+  arguments.record_keep_free_mb = 0;
+  std::ofstream(arguments.record) << "the flight before";
+  LiveSystem flight = live();
+  ASSERT_TRUE(add_to(flight));
+  EXPECT_FALSE(troubles.any());
+  ASSERT_TRUE(flight.finish());
+  EXPECT_EQ(fs::file_size(arguments.record), 17u);
+  EXPECT_GT(fs::file_size(folder + "/flight-2.mcap"), 100u);
+}
+
+TEST_F(LiveOutputs, WhatCannotBeOpenedIsInTheStatusAndTheFlightGoesOn) {
+  arguments.record = folder + "/unplugged/flight.mcap";
+  LiveSystem flight = live();
+  ASSERT_TRUE(add_to(flight));
+  EXPECT_TRUE(troubles.any());
+  EXPECT_NE(flight.status().problem.find("record: " + arguments.record), std::string::npos) << flight.status().problem;
+  EXPECT_TRUE(flight.finish());
+}
+
+TEST_F(LiveOutputs, AFolderThatCannotBeMadeIsSaid) {
+  std::ofstream(folder + "/file") << "no folder";
+  arguments.out = folder + "/file/out";
+  LiveSystem flight = live();
+  ASSERT_TRUE(add_to(flight));
+  EXPECT_TRUE(troubles.any());
+  EXPECT_NE(flight.status().problem.find("files: "), std::string::npos) << flight.status().problem;
+}
+
+TEST_F(LiveOutputs, AWrongCommandLineIsAnError) {
+  arguments.mavlink = {"nonsense"};
+  LiveSystem flight = live();
+  EXPECT_FALSE(add_to(flight));
+}
+
+TEST_F(LiveOutputs, FilesAreThoseOfARun) {
+  arguments.out = folder + "/out";
+  map.loop = true;
+  LiveSystem flight = live();
+  ASSERT_TRUE(add_to(flight));
+  ASSERT_TRUE(flight.finish());
+  for (const char* name : {"trajectory.csv", "trajectory_tum.txt", "live_tum.txt", "statistics.csv", "map_causal_tum.txt"})
+    EXPECT_TRUE(fs::exists(arguments.out + "/" + name)) << name;
+}
+
+TEST_F(LiveOutputs, AnImuStateThatCannotBeUsedIsSetAside) {
+  const std::string file = folder + "/imu.yaml";
+  EXPECT_FALSE(imu_state_for_flight(file, ImuNoise{})) << "the first flight";
+  for (const char* damaged : {"", "imu_state: 1\nt_ns", "\x01\x02"}) {
+    std::ofstream(file) << damaged;
+    EXPECT_FALSE(imu_state_for_flight(file, ImuNoise{}));
+    EXPECT_FALSE(fs::exists(file)) << "the way is free for this flight's";
+  }
+  EXPECT_TRUE(fs::exists(file + ".bad") && fs::exists(file + ".bad2") && fs::exists(file + ".bad3"));
+  ImuNoise other;
+  other.rate_hz += 1;
+  ASSERT_TRUE(write_imu_state(file, ImuState{}, other));
+  EXPECT_FALSE(imu_state_for_flight(file, ImuNoise{})) << "another IMU's";
+  ASSERT_TRUE(write_imu_state(file, ImuState{}, ImuNoise{}));
+  EXPECT_TRUE(imu_state_for_flight(file, ImuNoise{}));
+  EXPECT_FALSE(imu_state_for_flight("", ImuNoise{}));
+}
+
+}  // namespace
+}  // namespace fbvins::app
