@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -28,6 +29,7 @@ struct TrackOptions {
   double known_share = 0.15;  ///< of the corners that could be re-observed in a frame, the share that is
   double sigma_px = 0.6;      ///< standard deviation that the estimator assumes
   double bad_start_s = 0;     ///< time with five times as fast a drift, and a pixel of disparity error
+  double lap_s = 0;           ///< the flight is flown again and again, once in this time; 0: once
   std::uint64_t seed = 1;
 };
 
@@ -74,21 +76,28 @@ class SyntheticTracks {
 
   void locate(const LandmarkUpdate& update) {
     for (const LocatedLandmark& l : update.landmarks) located_[l.track] = l.p_W;
+    if (located_.size() > 4 * corners_.size()) forget_ended_tracks();
   }
 
   /// The k-th image; in order. `prior` is the estimator's, of some image before.
   TrackedFrame frame(std::size_t k, const StatePrior& prior) {
-    TrackedFrame out;
-    out.id = FrameId{static_cast<std::int64_t>(k)};
-    out.t = flight_.frames[k];
-    out.has_left = out.has_right = true;
+    TrackedFrame out = frame_at(FrameId{static_cast<std::int64_t>(k)}, flight_.frames[k], prior);
     if (k > 0) out.imu = readings(flight_.frames[k - 1], out.t);
+    return out;
+  }
+
+  /// The same at any stamp, in order, without IMU readings.
+  TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) {
+    TrackedFrame out;
+    out.id = id;
+    out.t = t;
+    out.has_left = out.has_right = true;
     const double t_s = (out.t - flight_.start).seconds();
-    const Pose<W, B> T_WB = flight_.flight.pose(t_s);
+    const Pose<W, B> T_WB = pose(t_s);
     // The drift of W at the prior's own time shifts the predicted positions.
     Pose<W, W> drift;
     if (prior.valid) {
-      const Pose<W, B> then = flight_.flight.pose((prior.t - flight_.start).seconds());
+      const Pose<W, B> then = pose((prior.t - flight_.start).seconds());
       drift = prior.T_WB * then.inverse().cast_frames<B, W>();
     }
     motion_px_.clear();
@@ -116,6 +125,16 @@ class SyntheticTracks {
     int age = 0;
     bool followed = false;
   };
+
+  Pose<W, B> pose(double t_s) const { return flight_.flight.pose(o_.lap_s > 0 ? std::fmod(t_s, o_.lap_s) : t_s); }
+
+  /// A corner has one track at a time; the ended ones never come back under their old id.
+  void forget_ended_tracks() {
+    std::map<TrackId, Vec3> kept;
+    for (const auto& [corner, track] : tracks_)
+      if (const auto known = located_.find(track.id); known != located_.end()) kept.insert(*known);
+    located_ = std::move(kept);
+  }
 
   ImuSegment readings(Time from, Time to) {
     ImuSegment out;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/foreign_calibration.hpp"
@@ -17,6 +15,7 @@
 #include "fbvins/io/yaml_reader.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
+#include "tests/fuzz/named_file.hpp"
 #include "tests/fuzz/require.hpp"
 
 namespace fbvins::fuzz {
@@ -150,21 +149,8 @@ std::vector<std::string> sqlite_bag_seeds() {
   return out;
 }
 
-/// Written to a file, because the library opens bags by name.
-class NamedFile {
- public:
-  ~NamedFile() { std::filesystem::remove(path_); }
-  const std::string& with(std::string_view bytes) const {
-    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
-    return path_;
-  }
-
- private:
-  std::string path_ = (std::filesystem::temp_directory_path() / fmt::format("fbvins_fuzz_{}.db3", ::getpid())).string();
-};
-
 void fuzz_sqlite_bag(std::string_view bytes) {
-  static const NamedFile file;
+  static const NamedFile file("db3");
   const std::string& path = file.with(bytes);
   for (const bool part : {false, true}) {
     auto bag = open_sqlite_bag({path}, part);

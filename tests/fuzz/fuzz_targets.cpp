@@ -227,6 +227,11 @@ const std::vector<Target>& targets() {
       {"weights", fuzz_weights, weights_seeds},
       {"mcap", fuzz_mcap, mcap_seeds},
       {"motion_capture", fuzz_motion_capture, motion_capture_seeds},
+      {"cdr", fuzz_cdr, cdr_seeds},
+#ifdef FBVINS_WITH_LOOP
+      {"map", fuzz_map, map_seeds},
+      {"vocabulary", fuzz_vocabulary, vocabulary_seeds},
+#endif
 #ifdef FBVINS_WITH_BAGS
       {"bag", fuzz_bag, bag_seeds},
       {"sqlite_bag", fuzz_sqlite_bag, sqlite_bag_seeds},

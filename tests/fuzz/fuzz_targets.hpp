@@ -16,6 +16,14 @@ void fuzz_image(std::string_view bytes);
 void fuzz_weights(std::string_view bytes);
 void fuzz_mcap(std::string_view bytes);
 void fuzz_motion_capture(std::string_view bytes);
+void fuzz_cdr(std::string_view bytes);
+std::vector<std::string> cdr_seeds();
+#ifdef FBVINS_WITH_LOOP
+void fuzz_map(std::string_view bytes);
+std::vector<std::string> map_seeds();
+void fuzz_vocabulary(std::string_view bytes);
+std::vector<std::string> vocabulary_seeds();
+#endif
 #ifdef FBVINS_WITH_LIVE
 void fuzz_socket(std::string_view bytes);
 std::vector<std::string> socket_seeds();

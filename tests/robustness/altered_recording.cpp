@@ -73,9 +73,9 @@ SystemOptions config_for(const std::string& frontend) {
   return config;
 }
 
-Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter,
+Flown fly(const std::filesystem::path& recording, const SystemOptions& config, const Alter& alter,
           const std::function<void(StereoRig&)>& miscalibrate) {
-  auto data = open_dataset(recording(name).string());
+  auto data = open_dataset(recording.string());
   if (!data) throw std::runtime_error(data.error().message);
   Flown flown;
   flown.images = static_cast<int>((*data)->frames().size());

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests on real data: runs a recording whose events are changed before the system gets them, and compares
-// the result with the truth. Tests are skipped where the recordings are absent (FBVINS_DATA).
+// Runs a recording whose events are changed before the system gets them, and compares the result with the truth. Real
+// recordings lie in FBVINS_DATA, and their tests are skipped where they are absent; the simulated one is always there.
 //
-//   Flown flown = fly("MH_01_easy_17s", config_for("klt"), [](double t_s, SensorEvent&) { return t_s < 8 || t_s > 9; });
-//   flown.rmse_m(9)  // after the second without any event
+//   Flown flown = fly(real_recording("MH_01_easy_17s"), config_for("klt"), [](double t_s, SensorEvent&) { return t_s < 8; });
+//   flown.rmse_m(7)  // in the last second
 #pragma once
 
 #include <cstdlib>
@@ -41,12 +41,15 @@ struct Flown {
   std::string text() const;
 };
 
-inline std::filesystem::path recording(const std::string& name) {
+inline std::filesystem::path real_recording(const std::string& name) {
   const char* data = std::getenv("FBVINS_DATA");
   return (data ? std::filesystem::path(data) : std::filesystem::path(FBVINS_SOURCE_DIR) / "../shared/data") / name;
 }
 
-Flown fly(const std::string& name, const SystemOptions& config, const Alter& alter = nullptr,
+/// Rendered by the CTest fixture simulated_flight (tests/simulated_flight.py): three seconds at rest, then motion.
+inline std::filesystem::path simulated_recording() { return FBVINS_SIMULATED_FLIGHT; }
+
+Flown fly(const std::filesystem::path& recording, const SystemOptions& config, const Alter& alter = nullptr,
           const std::function<void(StereoRig&)>& miscalibrate = nullptr);
 
 SystemOptions config_for(const std::string& frontend);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "fbvins/live/latency_histogram.hpp"
@@ -32,6 +34,35 @@ TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
             quality_percent(pose.health, pose.pose_covariance));
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["position_m"][2], 3);
   EXPECT_EQ(to_json_line(status, pose).find('\n'), std::string::npos);
+}
+
+TEST(StatusSink, WritesALineForEachStatusWithTheNewestPose) {
+  std::FILE* file = std::tmpfile();
+  ASSERT_NE(file, nullptr);
+  StatusSink sink(file);
+  LivePose pose;
+  pose.health.state = HealthState::good;
+  for (const double x : {1.0, 2.0}) {
+    pose.T_WB.p.x() = x;
+    EXPECT_TRUE(sink.take(pose));
+  }
+  EXPECT_TRUE(sink.take(ImuSample{}));
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(sink.take(LiveStatus{}));
+  std::rewind(file);
+  std::string text(10000, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), file));
+  std::fclose(file);
+  ASSERT_EQ(std::count(text.begin(), text.end(), '\n'), 2);
+  EXPECT_EQ(nlohmann::json::parse(text.substr(0, text.find('\n')))["position_m"][0], 2.0);
+}
+
+TEST(StatusSink, AFullDiskIsAnErrorOfEveryStatus) {
+  std::FILE* full = std::fopen("/dev/full", "w");
+  if (full == nullptr) GTEST_SKIP() << "this system has no /dev/full";
+  StatusSink sink(full);
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(sink.take(LiveStatus{}));
+  EXPECT_TRUE(sink.take(ImuSample{}));
+  std::fclose(full);
 }
 
 TEST(LatencyHistogram, PercentilesAreWithinABin) {

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files of maps and vocabularies, as fuzz targets. Lengths and checksums in the header are made to agree with the bytes, which
+// mutations change: otherwise every mutation would be refused before it is parsed.
+#include <algorithm>
+#include <cstring>
+#include <span>
+
+#include "fbvins/core/rng.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/loop/binary_file.hpp"
+#include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/vocabulary_training.hpp"
+#include "tests/broken_datasets/toy_dataset.hpp"
+#include "tests/fuzz/fuzz_targets.hpp"
+#include "tests/fuzz/named_file.hpp"
+#include "tests/fuzz/require.hpp"
+
+namespace fbvins::fuzz {
+namespace {
+
+constexpr std::size_t kMapHeader_bytes = 32, kMapFlagsAt = 12, kMapSizeAt = 16, kMapChecksumAt = 24;
+constexpr std::size_t kVocabularyHeader_bytes = 64, kNodesAt = 12, kVocabularyChecksumAt = 48, kNode_bytes = 48;
+
+Descriptor some_descriptor(Rng& rng) { return {{rng.next_u32(), rng.next_u32(), rng.next_u32(), rng.next_u32()}}; }
+
+std::string small_map(bool boosted) {
+  Rng rng(5);
+  PlaceMap map;
+  map.boosted = boosted;
+  for (int i = 0; i < 3; ++i) {
+    MapKeyframe k;
+    k.t = Time{1000 * i};
+    k.T_GB.p.x() = k.T_MB.p.x() = i;
+    k.place.focal_px = 400;
+    for (int f = 0; f < 2; ++f) {
+      k.place.features.push_back({0.1f, 0.2f, 0.3f, 0.001f, 0.01f});
+      k.place.descriptors.push_back(some_descriptor(rng));
+    }
+    map.add(std::move(k));
+    if (i == 0) continue;
+    const auto kind = i == 1 ? MapEdge::Kind::odometry : MapEdge::Kind::loop;
+    map.edges.push_back({KeyframeId{i - 1}, KeyframeId{i}, {Quat::Identity(), Vec3(1, 0, 0)}, Mat6::Identity(), kind});
+  }
+  return serialise_map(map);
+}
+
+template <class T>
+void overwrite(std::string& bytes, std::size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+std::uint64_t checksum_from(const std::string& bytes, std::size_t at) {
+  return checksum64(std::as_bytes(std::span(bytes)).subspan(at));
+}
+
+std::string with_its_checksum(std::string bytes) {
+  if (bytes.size() < kMapHeader_bytes) return bytes;
+  std::uint32_t flags = 0;
+  std::memcpy(&flags, bytes.data() + kMapFlagsAt, sizeof flags);
+  overwrite(bytes, kMapSizeAt, std::uint64_t{bytes.size() - kMapHeader_bytes});
+  overwrite(bytes, kMapChecksumAt, checksum_from(bytes, kMapHeader_bytes) ^ flags);
+  return bytes;
+}
+
+std::string with_whole_nodes(std::string bytes) {
+  if (bytes.size() < kVocabularyHeader_bytes) return bytes;
+  const std::size_t nodes = (bytes.size() - kVocabularyHeader_bytes) / kNode_bytes;
+  bytes.resize(kVocabularyHeader_bytes + nodes * kNode_bytes);
+  overwrite(bytes, kNodesAt, static_cast<std::uint32_t>(nodes));
+  overwrite(bytes, kVocabularyChecksumAt, checksum_from(bytes, kVocabularyHeader_bytes));
+  return bytes;
+}
+
+}  // namespace
+
+std::vector<std::string> map_seeds() { return {small_map(false), small_map(true), serialise_map(PlaceMap{})}; }
+
+/// What is read is written as the same bytes again.
+void fuzz_map(std::string_view bytes) {
+  require_sentence(parse_map(std::as_bytes(std::span(bytes)), "map"));
+  const std::string whole = with_its_checksum(std::string(bytes));
+  const auto map = parse_map(std::as_bytes(std::span(whole)), "map");
+  require_sentence(map);
+  if (!map) return;
+  require(serialise_map(*map) == whole);
+  require(!map_as_ply(*map).empty());
+  require(static_cast<std::size_t>(std::ranges::count(map_as_tum(*map), '\n')) == map->size());
+}
+
+std::vector<std::string> vocabulary_seeds() {
+  Rng rng(6);
+  std::vector<std::vector<Descriptor>> images(3);
+  for (auto& image : images)
+    for (int i = 0; i < 20; ++i) image.push_back(some_descriptor(rng));
+  const test::TemporaryFolder folder;
+  const std::string path = folder.path() + "/words.fbv";
+  require(train_vocabulary("orb", images, {.branching = 3, .depth = 2, .min_members = 4}).save(path).ok());
+  return {*read_file(path, 1u << 20u)};
+}
+
+/// Every descriptor has a word.
+void fuzz_vocabulary(std::string_view bytes) {
+  static const NamedFile file("fbv");
+  require_sentence(Vocabulary::open(file.with(bytes)));
+  const auto vocabulary = Vocabulary::open(file.with(with_whole_nodes(std::string(bytes))));
+  require_sentence(vocabulary);
+  if (!vocabulary) return;
+  Rng rng(7);
+  for (int i = 0; i < 10; ++i) {
+    const std::int32_t word = vocabulary->word_of(some_descriptor(rng));
+    require(word >= 0 && word < vocabulary->words());
+  }
+}
+
+}  // namespace fbvins::fuzz
