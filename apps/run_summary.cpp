@@ -13,15 +13,16 @@
 namespace fbvins::app {
 namespace {
 
-/// Counts frames by health, and restarts by jumps of the reset counter once a pose has been given.
+/// Counts frames by health, and restarts once a pose has been given, also those after which none was found again.
 void count_health(const RunRecord& record, RunSummary& summary) {
   std::map<std::string, int> counts;
-  const Odometry* last_pose = nullptr;
+  bool had_pose = false;
+  std::uint32_t reset_counter = 0;
   for (const Odometry& o : record.odometry) {
     ++counts[label_of(o.health)];
-    if (!o.health.has_pose()) continue;
-    if (last_pose && o.reset_counter != last_pose->reset_counter) ++summary.restarts;
-    last_pose = &o;
+    if (had_pose && o.reset_counter != reset_counter) ++summary.restarts;
+    reset_counter = o.reset_counter;
+    had_pose = had_pose || o.health.has_pose();
   }
   summary.health.assign(counts.begin(), counts.end());
 }

@@ -19,7 +19,7 @@ namespace fbvins {
 
 /// The body at an IMU reading: the newest estimate propagated to it. Without a pose (`health`) only times and health are valid.
 struct LivePose {
-  Time t;                                   ///< of the reading, on the sensors' clock
+  Time t;                                   ///< of the reading, on the images' clock
   Time host_t;                              ///< the same moment on this machine's CLOCK_MONOTONIC
   Time estimate_t;                          ///< of the image whose estimate was propagated
   Pose<W, B> T_WB;                          ///< converges to each new estimate without a step (LiveOptions::smoothing_s)
@@ -35,15 +35,18 @@ struct LivePose {
 
 /// What became of the input since the start.
 struct LiveCounts {
-  std::int64_t imu = 0, images = 0;    ///< arrived
-  std::int64_t images_estimated = 0;   ///< of these, with an answer of the estimator, a pose or not
-  std::int64_t images_dropped = 0;     ///< because the stages were busy with older ones
-  std::int64_t images_incomplete = 0;  ///< one camera missing or frozen
-  std::int64_t imu_late = 0;           ///< dropped: a later one had gone on before
-  std::int64_t imu_reordered = 0;      ///< came late, and were put in order
-  std::int64_t clock_leaps = 0;        ///< jumps of a sensor's clock, corrected
-  std::int64_t resets = 0;             ///< restarts of the estimator
-  std::int64_t events_lost = 0;        ///< events that sinks did not get, as they were too slow
+  std::int64_t imu = 0, images = 0;     ///< arrived
+  std::int64_t images_estimated = 0;    ///< of these, with an answer of the estimator, a pose or not
+  std::int64_t images_dropped = 0;      ///< because the stages were busy with older ones
+  std::int64_t images_incomplete = 0;   ///< one camera missing or frozen
+  std::int64_t images_late = 0;         ///< dropped: with a stamp before a newer image's, or one that no clock gives
+  std::int64_t keyframes_left_out = 0;  ///< not in the map, because it was busy with older ones
+  std::int64_t imu_refused = 0;         ///< not finite, beyond the sensor's range, or the same again and again
+  std::int64_t imu_late = 0;            ///< dropped: a later one had gone on before, or the stamp is one that no clock gives
+  std::int64_t imu_reordered = 0;       ///< came late, and were put in order
+  std::int64_t clock_leaps = 0;         ///< jumps of a sensor's clock, corrected
+  std::int64_t resets = 0;              ///< restarts of the estimator
+  std::int64_t events_lost = 0;         ///< events that sinks did not get, as they were too slow
 
   /// Calls f(name, count) for each, in this order.
   template <class F>
@@ -53,6 +56,9 @@ struct LiveCounts {
     f("images_estimated", images_estimated);
     f("images_dropped", images_dropped);
     f("images_incomplete", images_incomplete);
+    f("images_late", images_late);
+    f("keyframes_left_out", keyframes_left_out);
+    f("imu_refused", imu_refused);
     f("imu_late", imu_late);
     f("imu_reordered", imu_reordered);
     f("clock_leaps", clock_leaps);

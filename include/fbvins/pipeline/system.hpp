@@ -14,7 +14,8 @@
 //
 // Threads: callbacks are set before the first push(); push() and finish() are called by one thread, status() by any.
 // `deterministic` runs everything on the caller's thread; `threaded` runs the frontend, the estimator and the mapper each
-// on a thread of its own, where they call back. Both give the same bits.
+// on a thread of its own, where they call back. Both give the same bits. `live` is `threaded`, but a mapper that is behind
+// leaves out keyframes instead of holding up the odometry, which is the same.
 //
 // Failures: an exception in a stage or a callback ends the work. push() returns it from then on, at the latest two images
 // after the one that failed in the frontend or the estimator (the mapper may be behind by its queue), and so does finish().
@@ -38,7 +39,7 @@
 
 namespace fbvins {
 
-enum class RunMode { deterministic, threaded };
+enum class RunMode { deterministic, threaded, live };
 
 /// Parts that a user may provide: instead of those that the options name, or from an earlier flight.
 struct SystemParts {
@@ -77,6 +78,8 @@ class System {
   Result<void> status() const;
 
   InputCounts input_counts() const;
+  /// Keyframes that the mapper was not given because it was busy with older ones (`live`). Any thread.
+  int keyframes_left_out() const;
   /// The camera-IMU calibration as estimated; only after finish().
   Calibration calibration() const;
 

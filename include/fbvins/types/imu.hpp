@@ -15,22 +15,24 @@ struct ImuSample {
   Vec3 accel_mps2 = Vec3::Zero();  ///< specific force (at rest: g, upwards), m/s^2
 };
 
-/// The readings between two images: first.t and last.t are the two image stamps (interpolated),
+/// The readings between two images, on the images' clock: first.t and last.t are the two image stamps (interpolated),
 /// those between are the sensor's own. Empty for the first image and where the IMU is missing.
 struct ImuSegment {
   std::vector<ImuSample> samples;
-  Duration longest_gap;  ///< longest time between neighbouring readings that overlaps the segment
+  Duration longest_gap;  ///< longest time between neighbouring readings that overlaps the segment, its whole length
 
   bool empty() const { return samples.size() < 2; }
 };
 
-/// Continuous-time noise of an IMU, as in calibration files.
+/// An IMU as in calibration files: continuous-time noise, rate, and range.
 struct ImuNoise {
   double gyro_noise_density_radps_rthz = 1.6968e-4;
   double accel_noise_density_mps2_rthz = 2.0e-3;
   double gyro_random_walk_radps2_rthz = 1.9393e-5;
   double accel_random_walk_mps3_rthz = 3.0e-3;
   double rate_hz = 200;
+  double max_gyro_radps = 36.7;  ///< a larger number cannot be a reading of this sensor; 2000 deg/s and 5 %
+  double max_accel_mps2 = 185;   ///< likewise; 18 g and 5 %
 };
 
 struct ImuBias {

@@ -4,16 +4,17 @@
 
 namespace fbvins {
 
-struct ImuBufferCounts {
+struct ImuCounts {
   int accepted = 0;
   int duplicate = 0;  ///< same stamp as the one before
-  int backward = 0;   ///< earlier stamp than the one before, or than the last extraction
-  int invalid = 0;    ///< NaN, infinite or beyond any sensor's range
-  int overflow = 0;   ///< dropped from a full buffer before they were extracted
+  int backward = 0;   ///< earlier stamp than the one before
+  int invalid = 0;    ///< NaN, infinite or beyond the sensor's range
+  int repeated = 0;   ///< the same numbers again and again: a sensor that hangs
+  int overflow = 0;   ///< dropped before they were used, because no image came for long
 };
 
 struct InputCounts {
-  ImuBufferCounts imu;
+  ImuCounts imu;
   int images = 0;
   int images_backward = 0;  ///< stamp not after the image before: skipped
 };

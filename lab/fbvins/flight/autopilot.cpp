@@ -26,7 +26,7 @@ Autopilot::Autopilot(const Mission& mission, const ControlOptions& options, cons
       rate_hz_(rig.imu_noise.rate_hz),
       fence_(fence_of(mission)),
       options_(options),
-      propagator_(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
+      propagator_(EstimatorOptions{}.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
       controller_(options, rate_hz_),
       guide_(mission, rate_hz_),
       reference_(mounting),
@@ -76,7 +76,9 @@ void Autopilot::anchor(const LivePose& pose) {
 }
 
 PerRotor Autopilot::update(const ImuSample& reading) {
-  const LivePose pose = propagator_.add(reading);
+  const std::optional<LivePose> at_reading = propagator_.add(reading);
+  if (!at_reading) return out_.control.commands;
+  const LivePose& pose = *at_reading;
   const double dt_s = last_t_ ? (reading.t - *last_t_).seconds() : 1 / rate_hz_;
   last_t_ = reading.t;
   reference_.predict(reading, dt_s);

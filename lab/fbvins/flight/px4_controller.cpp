@@ -49,7 +49,7 @@ Px4Controller::Px4Controller(std::unique_ptr<Px4Process> px4, MavlinkOptions opt
     : px4_(std::move(px4)),
       link_(UdpAddress{"127.0.0.1", px4_->companion_port(), 0}),
       session_(options),
-      propagator_(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
+      propagator_(EstimatorOptions{}.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s), kSmoothing_s),
       mission_(mission, rig.imu_noise.rate_hz, px4_->system_id(), kWarmUp_s + kBoot_s) {}
 
 Time Px4Controller::companion_time(double t_s) const {
@@ -82,7 +82,9 @@ Result<void> Px4Controller::take_board(const BoardReading& reading) {
 }
 
 Result<void> Px4Controller::take(const ImuSample& reading) {
-  LivePose pose = propagator_.add(reading);
+  std::optional<LivePose> at_reading = propagator_.add(reading);
+  if (!at_reading) return {};
+  LivePose& pose = *at_reading;
   if (!first_) first_ = reading.t;
   const double t_s = (reading.t - *first_).seconds();
   pose.host_t = companion_time(t_s);

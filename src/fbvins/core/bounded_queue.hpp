@@ -24,6 +24,15 @@ class BoundedQueue {
     return true;
   }
 
+  /// Takes the value only if there is room, or the queue is closed, and says so; else the value is left as it was.
+  bool push_if_room(T& value) {
+    const std::lock_guard lock(mutex_);
+    if (!closed_ && values_.size() >= capacity_) return false;
+    if (!closed_) values_.push_back(std::move(value));
+    filled_.notify_one();
+    return true;
+  }
+
   /// Waits for a value; nothing once closed and drained.
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);

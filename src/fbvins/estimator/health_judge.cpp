@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/health_judge.hpp"
 
+#include <algorithm>
+
 namespace fbvins {
 namespace {
 
 constexpr double kImuGapDegraded_s = 0.05;
-/// Between images farther apart than this others are missing.
-constexpr double kImageHole_s = 0.25;
+/// Between images farther apart than this, and than this many periods of the camera, others are missing.
+constexpr double kImageHole_s = 0.25, kImageHole_periods = 2.5;
 constexpr int kFailedSolvesUntilLost = 3;
 /// Larger biases are implausible.
 constexpr double kMaxGyroBias_radps = 0.5;
@@ -24,12 +26,16 @@ Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason)
 }
 
 void HealthJudge::pass(const TrackedFrame& frame) {
-  if (!without_images(frame)) previous_image_ = frame.t;
+  if (without_images(frame)) return;
+  if (previous_image_) image_period_.add(frame.t - *previous_image_);
+  previous_image_ = frame.t;
 }
 
 /// Neither camera's image came, or these are the first ones after a gap.
 bool HealthJudge::images_missing(const TrackedFrame& frame) const {
-  return without_images(frame) || (previous_image_ && (frame.t - *previous_image_).seconds() > kImageHole_s);
+  if (without_images(frame)) return true;
+  const double hole_s = std::max(kImageHole_s, kImageHole_periods * image_period_.median().value_or(Duration{}).seconds());
+  return previous_image_ && (frame.t - *previous_image_).seconds() > hole_s;
 }
 
 Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves) {

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "fbvins/core/sample_period.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/imu/nav_state.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -30,6 +31,7 @@ class HealthJudge {
 
   EstimatorOptions options_;
   std::optional<Time> previous_image_, last_good_tracking_;
+  SamplePeriod image_period_;
 };
 
 }  // namespace fbvins

@@ -48,6 +48,25 @@ TEST(KeyframePolicy, OldestIsTheFirst) {
   EXPECT_EQ(KeyframePolicy(KeyframeOptions{}, 450).leaving(m.estimator.window(), m.estimator.calibration(), m.keyframes), 0);
 }
 
+/// The readings since the last keyframe are kept, so at rest there is one from time to time.
+TEST(KeyframePolicy, AtRestOneInTenSeconds) {
+  test::SimulatedFlight flight(test::Motion(0, 0), 5);
+  Estimator estimator(flight.rig, EstimatorOptions{});
+  int keyframes = 0, at_rest = 0;
+  double longest_s = 0;
+  for (int k = 0; k < 900; ++k) {
+    const Odometry o = estimator.process(flight.frame(k)).odometry;
+    keyframes += o.stats.keyframe, at_rest += o.stats.standstill;
+    for (const Frame& frame : estimator.window().frames())
+      if (frame.imu) longest_s = std::max(longest_s, frame.imu->dt_s());
+  }
+  ASSERT_GT(at_rest, 800);
+  EXPECT_GE(keyframes, 3);
+  EXPECT_LE(keyframes, 4);
+  EXPECT_GT(longest_s, 9);
+  EXPECT_LT(longest_s, 10.5);
+}
+
 TEST(KeyframePolicy, StandingStillMakesNoKeyframes) {
   MidFlight m;
   EXPECT_FALSE(KeyframePolicy(KeyframeOptions{}, 450).is_keyframe(m.estimator.window(), m.estimator.calibration(), true));

@@ -175,6 +175,25 @@ NavState Preintegration::predict(const NavState& i, const Vec3& gravity_W) const
   return j;
 }
 
+Mat15 Preintegration::predict_covariance(const NavState& i, const Mat15& P_i) const {
+  const ImuDeltas d = corrected(i.bias);
+  const double dt = dt_s();
+  const Mat3 R_i = i.T_WB.q.toRotationMatrix();
+  Mat15 F = Mat15::Identity();  // d(state at j)/d(state at i), the derivative of predict()
+  F.block<3, 3>(nav::p, nav::theta) = -R_i * hat(d.p);
+  F.block<3, 3>(nav::p, nav::v) = dt * Mat3::Identity();
+  F.block<3, 3>(nav::p, nav::bg) = R_i * J_p_bg_;
+  F.block<3, 3>(nav::p, nav::ba) = R_i * J_p_ba_;
+  F.block<3, 3>(nav::theta, nav::theta) = d.q.toRotationMatrix().transpose();
+  F.block<3, 3>(nav::theta, nav::bg) = J_theta_bg_;
+  F.block<3, 3>(nav::v, nav::theta) = -R_i * hat(d.v);
+  F.block<3, 3>(nav::v, nav::bg) = R_i * J_v_bg_;
+  F.block<3, 3>(nav::v, nav::ba) = R_i * J_v_ba_;
+  Mat15 G = Mat15::Identity();  // the deltas' p and v are in B_i
+  G.block<3, 3>(nav::p, nav::p) = G.block<3, 3>(nav::v, nav::v) = R_i;
+  return F * P_i * F.transpose() + G * covariance_ * G.transpose();
+}
+
 Vec3 Preintegration::last_rate_radps(const ImuBias& bias) const {
   return readings_.empty() ? Vec3::Zero() : Vec3(readings_.back().gyro_radps - bias.gyro_radps);
 }

@@ -86,6 +86,9 @@ class Preintegration {
   /// State at j from the state at i (eq. P1).
   NavState predict(const NavState& i, const Vec3& gravity_W) const;
 
+  /// Covariance of predict(i), in the order of NavState, from that of the state at i.
+  Mat15 predict_covariance(const NavState& i, const Mat15& P_i) const;
+
   /// Angular rate at the end of the interval, bias removed, rad/s in B_j.
   Vec3 last_rate_radps(const ImuBias& bias) const;
 

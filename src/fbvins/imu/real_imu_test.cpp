@@ -12,7 +12,7 @@
 
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/alignment.hpp"
-#include "fbvins/imu/imu_buffer.hpp"
+#include "fbvins/imu/imu_history.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
 
@@ -88,8 +88,8 @@ TEST(RealImu, AlignsInMotionOnMH01) {
   double worst_tilt = 0, worst_velocity = 0, worst_gyro = 0, sum_tilt = 0;
   for (std::size_t start = 100; start + kFrames * kEvery < truth.size(); start += 100) {
     ++tried;
-    ImuBuffer buffer;
-    for (const ImuSample& s : imu) buffer.push(s);
+    ImuHistory history;
+    for (const ImuSample& s : imu) history.add(s);
     Rng rng(start);
     std::vector<Pose<VisualWorld, B>> poses;
     std::vector<Preintegration> between;
@@ -99,7 +99,7 @@ TEST(RealImu, AlignsInMotionOnMH01) {
       poses.push_back({(now.state.T_WB.q * noise).normalized(), Vec3(now.state.T_WB.p + 1e-3 * test::normal3(rng))});
       if (k == 0) continue;
       between.emplace_back(ImuNoise{}, ImuBias{});
-      between.back().integrate(*buffer.extract(truth[start + static_cast<std::size_t>((k - 1) * kEvery)].t, now.t));
+      between.back().integrate(history.between(truth[start + static_cast<std::size_t>((k - 1) * kEvery)].t, now.t));
     }
     const AlignmentResult a = align_visual_inertial(poses, between);
     if (!a.accepted) continue;

@@ -95,6 +95,8 @@ ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::stri
   noise.accel_noise_density_mps2_rthz = yaml.positive(map, "accelerometer_noise_density");
   noise.accel_random_walk_mps3_rthz = yaml.positive(map, "accelerometer_random_walk");
   noise.rate_hz = yaml.positive(map, rate_field);
+  if (yaml.has(map, "gyroscope_range")) noise.max_gyro_radps = yaml.positive(map, "gyroscope_range");
+  if (yaml.has(map, "accelerometer_range")) noise.max_accel_mps2 = yaml.positive(map, "accelerometer_range");
   return noise;
 }
 

@@ -52,9 +52,10 @@ std::string rig_to_yaml(const StereoRig& rig) {
          fmt::format(
              "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
              "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
+             "  gyroscope_range: {:.17g}\n  accelerometer_range: {:.17g}\n"
              "image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
              n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
-             n.accel_random_walk_mps3_rthz, rig.image_rate_hz, rig.time_offset_s);
+             n.accel_random_walk_mps3_rthz, n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s);
 }
 
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {

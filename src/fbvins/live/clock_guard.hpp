@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detects jumps of the sensors' clock against this machine's, and corrects them. When a clock jumps (a device restarts, a driver
-// sets the time), stamps are shifted so that they continue where they were. Data that are merely late, bunched or missing are
-// left alone: a jump shows by a stamp before the newest one, or ahead of any possible arrival.
+// sets the time), stamps are shifted so that they continue where they were. A stamp far before the newest one, or ahead of any
+// possible arrival, does not fit. Events that do not fit are a jump only if they go on for a while at the clock's own pace, with
+// none between them that fits; otherwise they are late, or their stamps wrong, and the clock is left alone. Data that are
+// merely late by some constant, bunched or missing fit.
 //
-//   Time t = guard.mend(ClockGuard::camera, frame.t, host_now);   // frame.t itself as long as no clock jumps
-//   Time shutter = guard.host_of(t);                              // when that was on this machine's clock
+//   if (std::optional<Time> t = guard.mend(ClockGuard::camera, frame.t, host_now))   // frame.t itself as long as no clock jumps
+//     Time shutter = guard.host_of(*t);                                             // when that was on this machine's clock
 //
 // Threads: one owner.
 #pragma once
@@ -13,7 +15,7 @@
 #include <limits>
 #include <optional>
 
-#include "fbvins/live/sample_period.hpp"
+#include "fbvins/core/sample_period.hpp"
 
 namespace fbvins {
 
@@ -24,22 +26,33 @@ class ClockGuard {
   /// clock_rate: seconds of the sensors' clock in one second of this machine's.
   explicit ClockGuard(double clock_rate) : rate_(clock_rate) {}
 
-  /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump.
-  Time mend(Stream stream, Time raw, Time host);
+  /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump. Nothing where it does not
+  /// fit and no jump is established: the event is of no use, unless a jump is established by the next ones (`mended`).
+  std::optional<Time> mend(Stream stream, Time raw, Time host);
+  /// An earlier stamp of this stream, with the correction of today.
+  Time mended(Stream stream, Time raw) const { return raw + states_[stream].correction; }
   /// Converts a time of the (corrected) sensors' clock to this machine's. The offset is that of the event of the last seconds
   /// that was delivered fastest: the shortest delay of the transport is not observable and counts as zero.
   Time host_of(Time t) const;
   int leaps() const { return leaps_; }
 
  private:
+  /// Events in a row that do not fit.
+  struct Misfits {
+    int count = 0;
+    Time first, first_host, newest;
+  };
   struct State {
-    Duration correction;  ///< mended = raw + correction
+    Duration correction, correction_before;  ///< mended = raw + correction; before the last jump
     std::optional<Time> newest, newest_host;
     Time leapt_host{std::numeric_limits<std::int64_t>::min() / 2};
     SamplePeriod period;
+    Misfits misfits;
   };
 
-  bool leapt(const State& s, Time t, Time host) const;
+  bool fits(const State& s, Time t, Time host) const;
+  bool continues(const Misfits& misfits, Time raw, Time host) const;
+  bool go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const;
   Duration correction_after_leap(Stream stream, Time raw, Time host) const;
   void learn(State& s, Time t, Time host);
   double lateness_s(Time t, Time host) const;

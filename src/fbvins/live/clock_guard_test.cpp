@@ -11,16 +11,23 @@ namespace {
 Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 
 /// IMU at 200 Hz and images at 20 Hz over `seconds`, in order; `leap` and `delay` are functions of the time of the event.
+/// How many were not given a stamp.
 template <class Leap, class Delay>
-void play(ClockGuard& guard, double seconds, const Leap& leap, const Delay& delay, double& worst_s, double rate = 1) {
+int play(ClockGuard& guard, double seconds, const Leap& leap, const Delay& delay, double& worst_s, double rate = 1) {
+  int refused = 0;
   for (int k = 0; k < seconds * 200; ++k) {
     const double s = k * 0.005;
     const double stamp = 1000 + s * rate;
     const Time host = at(50 + s + delay(s));
-    const auto error = [&](Time mended) { return std::abs((mended - at(stamp)).seconds()); };
-    worst_s = std::max(worst_s, error(guard.mend(ClockGuard::imu, at(stamp + leap(s)), host)));
-    if (k % 10 == 0) worst_s = std::max(worst_s, error(guard.mend(ClockGuard::camera, at(stamp + leap(s)), host)));
+    const auto give = [&](ClockGuard::Stream stream) {
+      const std::optional<Time> mended = guard.mend(stream, at(stamp + leap(s)), host);
+      if (mended) worst_s = std::max(worst_s, std::abs((*mended - at(stamp)).seconds()));
+      else ++refused;
+    };
+    give(ClockGuard::imu);
+    if (k % 10 == 0) give(ClockGuard::camera);
   }
+  return refused;
 }
 
 const auto no_leap = [](double) { return 0.0; };
@@ -53,13 +60,14 @@ TEST(ClockGuard, AClockThatDriftsIsNoLeap) {
 }
 
 TEST(ClockGuard, LeapsForwardAndBackAreMended) {
-  for (const double size_s : {1.0, -1.0, 0.3, -0.3, 86400.0, -999.0}) {
+  for (const double size_s : {1.0, -1.0, 0.3, -0.3, 0.22, 86400.0, -999.0}) {
     ClockGuard guard(1);
     double worst_s = 0;
-    play(
+    const int refused = play(
         guard, 30, [&](double s) { return s > 10 && s < 20 ? size_s : 0.0; }, no_delay, worst_s);
     EXPECT_LT(worst_s, 1e-6) << size_s;     // regular sensors: to the period
     EXPECT_EQ(guard.leaps(), 4) << size_s;  // two streams, there and back
+    EXPECT_LT(refused, 2 * 60) << size_s;   // a quarter of a second each
   }
 }
 
@@ -69,11 +77,11 @@ TEST(ClockGuard, CameraAndImuLeapByTheSame) {
   double between_s = 0;
   for (int k = 0; k < 4000; ++k) {
     const double s = k * 0.005, leap = s > 10 ? 5.0 : 0.0;
-    const Time imu = guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
+    const std::optional<Time> imu = guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
     if (k % 10 != 0) continue;
     const double jitter_s = 0.003 * std::sin(k);
-    const Time image = guard.mend(ClockGuard::camera, at(1000 + s + leap + jitter_s), at(50 + s));
-    between_s = std::max(between_s, std::abs((image - imu).seconds() - jitter_s));
+    const std::optional<Time> image = guard.mend(ClockGuard::camera, at(1000 + s + leap + jitter_s), at(50 + s));
+    if (image && imu) between_s = std::max(between_s, std::abs((*image - *imu).seconds() - jitter_s));
   }
   EXPECT_LT(between_s, 1e-6);
 }
@@ -83,9 +91,73 @@ TEST(ClockGuard, ADeviceThatStartsAnewAfterASilenceGoesOnWhereTimeIs) {
   double worst_s = 0;
   play(guard, 10, no_leap, no_delay, worst_s);
   // Four seconds later, with stamps from zero.
-  const Time mended = guard.mend(ClockGuard::imu, at(0.5), at(50 + 14 + 0.001));
-  EXPECT_NEAR((mended - at(1014)).seconds(), 0, 0.006);
+  std::optional<Time> mended;
+  int k = 0;
+  for (; !mended; ++k) {
+    ASSERT_LT(k, 60);
+    mended = guard.mend(ClockGuard::imu, at(0.5 + 0.005 * k), at(50 + 14 + 0.001 + 0.005 * k));
+  }
+  EXPECT_NEAR((*mended - at(1014 + 0.005 * (k - 1))).seconds(), 0, 0.006);
+  EXPECT_EQ(guard.mended(ClockGuard::imu, at(0.5)), *mended - Duration::from_seconds(0.005 * (k - 1)));
   EXPECT_EQ(guard.leaps(), 1);
+}
+
+/// Stamps that are wrong alone, or data that come late, change no other stamp.
+struct Late {
+  const char* what;
+  ClockGuard::Stream stream;
+  bool (*late)(int k);  ///< of the k-th event of the stream
+  double late_s;        ///< its stamp is earlier by this
+};
+
+TEST(ClockGuard, LateOrWrongStampsAreNoLeap) {
+  for (const Late& c : {Late{"one reading", ClockGuard::imu, [](int k) { return k == 2000; }, 0.15},
+                        Late{"one image", ClockGuard::camera, [](int k) { return k == 200; }, 0.18},
+                        Late{"two images", ClockGuard::camera, [](int k) { return k == 200 || k == 201; }, 0.3},
+                        Late{"one reading of the future", ClockGuard::imu, [](int k) { return k == 2000; }, -3600},
+                        Late{"one image of the future", ClockGuard::camera, [](int k) { return k == 200; }, -0.3},
+                        Late{"every other reading", ClockGuard::imu, [](int k) { return k > 2000 && k % 2; }, 0.2},
+                        Late{"two readings of three", ClockGuard::imu, [](int k) { return k > 2000 && k % 3; }, 0.2},
+                        Late{"readings without stamps", ClockGuard::imu, [](int k) { return k % 10 == 9; }, 1000}}) {
+    ClockGuard guard(1);
+    int refused = 0, late = 0;
+    for (int k = 0; k < 6000; ++k) {
+      const double s = k * 0.005;
+      const auto give = [&](ClockGuard::Stream stream, int index) {
+        const bool wrong = stream == c.stream && c.late(index);
+        const std::optional<Time> t = guard.mend(stream, at(1000 + s - (wrong ? c.late_s : 0)), at(50.001 + s));
+        late += wrong, refused += !t;
+        if (t && !wrong) EXPECT_EQ(*t, at(1000 + s)) << c.what;
+      };
+      give(ClockGuard::imu, k);
+      if (k % 10 == 0) give(ClockGuard::camera, k / 10);
+    }
+    EXPECT_EQ(guard.leaps(), 0) << c.what;
+    EXPECT_EQ(refused, late) << c.what;
+  }
+}
+
+/// Readings of 200 ms that arrive in one block, after newer ones.
+TEST(ClockGuard, ABlockOfLateReadingsIsNoLeap) {
+  ClockGuard guard(1);
+  const auto give = [&](int k, int now) { return guard.mend(ClockGuard::imu, at(1000 + 0.005 * k), at(50 + 0.005 * now)); };
+  for (int k = 0; k < 400; ++k) (void)give(k, k);
+  for (int k = 440; k < 460; ++k) EXPECT_TRUE(give(k, k));
+  for (int k = 400; k < 440; ++k) (void)give(k, 460);
+  for (int k = 460; k < 800; ++k) EXPECT_EQ(give(k, k), at(1000 + 0.005 * k));
+  EXPECT_EQ(guard.leaps(), 0);
+}
+
+/// A clock that jumps there and back by about the same has its old correction again, not one that is a few milliseconds off.
+TEST(ClockGuard, AJumpBackIsUndoneExactly) {
+  ClockGuard guard(1);
+  std::optional<Time> last;
+  for (int k = 0; k < 6000; ++k) {
+    const double s = k * 0.005, leap = s > 10 && s < 20 ? 3 : 0, jitter_s = 0.002 * std::sin(7.0 * k);
+    last = guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50.003 + s + jitter_s));
+  }
+  EXPECT_EQ(guard.leaps(), 2);
+  EXPECT_EQ(last, at(1000 + 5999 * 0.005));
 }
 
 TEST(ClockGuard, SaysWhenAStampWasOnThisMachine) {

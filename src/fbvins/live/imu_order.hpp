@@ -8,7 +8,7 @@
 #include <map>
 #include <optional>
 
-#include "fbvins/live/sample_period.hpp"
+#include "fbvins/core/sample_period.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {

@@ -6,31 +6,68 @@
 
 namespace fbvins {
 
-Ingest::Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading)
+namespace {
+
+/// Readings kept until it is known whether the clock has jumped.
+constexpr std::size_t kMostMisfits = 2000;
+
+}  // namespace
+
+Ingest::Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu,
+               Duration time_offset)
     : now_(std::move(now)),
       on_reading_(std::move(on_reading)),
+      time_offset_(time_offset),
       clock_(clock_rate),
-      order_(Duration::from_seconds(options.imu_reorder_wait_s)) {}
+      order_(Duration::from_seconds(options.imu_reorder_wait_s)),
+      judge_(imu) {}
 
 void Ingest::push(const ImuSample& sample) {
   const std::lock_guard order(order_mutex_);
   const Time host = now_();
-  ImuSample mended = sample;
-  mended.t = clock_.mend(ClockGuard::imu, sample.t, host);
   ++counts_.imu;
-  arrivals_.imu = host;
-  arrivals_.newest = std::max(arrivals_.newest, mended.t);
-  order_.push(mended, host, [&](const ImuSample& s) { release(s); });
+  if (!judge_.plausible(sample)) {
+    ++counts_.imu_refused;
+    return;
+  }
+  const int leaps = clock_.leaps();
+  const std::optional<Time> t = clock_.mend(ClockGuard::imu, sample.t - time_offset_, host);
+  if (!t) {
+    misfits_.push_back(sample);
+    if (misfits_.size() <= kMostMisfits) return;
+    misfits_.pop_front();
+    ++counts_.imu_late;
+    return;
+  }
+  if (clock_.leaps() > leaps)
+    for (const ImuSample& s : misfits_) put_in_order(s, clock_.mended(ClockGuard::imu, s.t - time_offset_), host);
+  else counts_.imu_late += static_cast<std::int64_t>(misfits_.size());
+  misfits_.clear();
+  put_in_order(sample, *t, host);
+}
+
+/// `t`: the reading's stamp on the images' clock, corrected.
+void Ingest::put_in_order(ImuSample sample, Time t, Time host) {
+  sample.t = t + time_offset_;
+  order_.push(sample, host, [&](const ImuSample& s) { release(s); });
 }
 
 void Ingest::push(StereoFrame frame) {
   {
     const std::lock_guard order(order_mutex_);
     const Time host = now_();
-    frame.t = clock_.mend(ClockGuard::camera, frame.t, host);
+    ++counts_.images;
+    const std::optional<Time> t = clock_.mend(ClockGuard::camera, frame.t, host);
+    if (!t || (newest_image_ && *t <= *newest_image_)) {
+      ++counts_.images_late;
+      return;
+    }
+    frame.t = *t;
+    if (newest_image_) image_period_.add(frame.t - *newest_image_);
+    newest_image_ = frame.t;
+    arrivals_.image_period = image_period_.median();
     if (frozen_[0].is_repeated(frame.left)) frame.left.reset();
     if (frozen_[1].is_repeated(frame.right)) frame.right.reset();
-    ++counts_.images;
     if (frame.left == nullptr || frame.right == nullptr) ++counts_.images_incomplete;
     if (frame.left != nullptr) arrivals_.left = host;
     if (frame.right != nullptr) arrivals_.right = host;
@@ -51,13 +88,20 @@ void Ingest::tick() {
 }
 
 void Ingest::release(const ImuSample& sample) {
+  if (!judge_.accepts(sample)) {
+    ++counts_.imu_refused;
+    return;
+  }
+  const Time t = sample.t - time_offset_;
+  arrivals_.imu = now_();
+  arrivals_.newest = std::max(arrivals_.newest, t);
   {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
     queue_.push_back(sample);
     filled_.notify_one();
   }
-  if (on_reading_) on_reading_(sample, clock_.host_of(sample.t));
+  if (on_reading_) on_reading_(sample, clock_.host_of(t));
 }
 
 void Ingest::drop_waiting_image() {
@@ -100,7 +144,7 @@ Time Ingest::host_of(Time t) const {
 LiveCounts Ingest::counts() const {
   const std::lock_guard order(order_mutex_);
   LiveCounts counts = counts_;
-  counts.imu_late = order_.late();
+  counts.imu_late += order_.late();
   counts.imu_reordered = order_.reordered();
   counts.clock_leaps = clock_.leaps();
   const std::lock_guard lock(mutex_);

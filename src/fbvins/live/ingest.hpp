@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Queue from the sensors' threads to one consumer. Corrects stamps after clock jumps, puts IMU readings in order, removes frozen
-// images, and keeps one image waiting at most: when the next comes, the older one is dropped and counted. No reading ever is.
+// Queue from the sensors' threads to one consumer. Corrects stamps after clock jumps, puts IMU readings in order, refuses those
+// that the sensor cannot have made, removes frozen images, and keeps one image waiting at most: when the next comes, the older
+// one is dropped and counted. No good reading ever is.
 //
 //   ingest.push(sample); ingest.push(std::move(frame));                         // the sensors' threads
 //   while (std::optional<SensorEvent> event = ingest.pop()) system.push(*event);   // the consumer's
@@ -13,6 +14,8 @@
 #include <mutex>
 #include <optional>
 
+#include "fbvins/core/sample_period.hpp"
+#include "fbvins/imu/reading_judge.hpp"
 #include "fbvins/live/clock_guard.hpp"
 #include "fbvins/live/frozen_camera.hpp"
 #include "fbvins/live/imu_order.hpp"
@@ -28,8 +31,9 @@ class Ingest final : public SensorInput {
   using OnReading = std::function<void(const ImuSample& sample, Time host_t)>;
 
   /// `now` is this machine's clock. `on_reading` gets each reading in order, at once, on the thread that brought it,
-  /// with its time on this machine's clock; it must not call back.
-  Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading);
+  /// with its time on this machine's clock; it must not call back. time_offset: t_imu = t_image + offset.
+  Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu = {},
+         Duration time_offset = {});
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
@@ -42,23 +46,30 @@ class Ingest final : public SensorInput {
 
   struct Arrival {
     std::optional<Time> imu, image, left, right;  ///< newest of each, on this machine's clock
-    Time newest;                                  ///< stamp, on the sensors' clock
+    Time newest;                                  ///< stamp, on the images' clock
+    std::optional<Duration> image_period;         ///< of the images' stamps
   };
   Arrival arrivals() const;
-  /// A stamp on this machine's clock (ClockGuard::host_of).
+  /// A stamp of the images' clock on this machine's clock (ClockGuard::host_of).
   Time host_of(Time t) const;
   /// The counts that are kept here; the others are zero.
   LiveCounts counts() const;
 
  private:
+  void put_in_order(ImuSample sample, Time t, Time host);
   void release(const ImuSample& sample);
   void drop_waiting_image();
 
   Clock now_;
   OnReading on_reading_;
   mutable std::mutex order_mutex_;  ///< keeps readings in order up to the end of on_reading; taken before mutex_
-  ClockGuard clock_;
+  Duration time_offset_;
+  ClockGuard clock_;               ///< on the images' clock
+  std::deque<ImuSample> misfits_;  ///< readings whose stamps do not fit, until it is known whether the clock has jumped
   ImuOrder order_;
+  ReadingJudge judge_;
+  SamplePeriod image_period_;
+  std::optional<Time> newest_image_;
   std::array<FrozenCamera, 2> frozen_;
   Arrival arrivals_;
   LiveCounts counts_;

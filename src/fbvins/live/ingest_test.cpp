@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <thread>
 
 namespace fbvins {
@@ -12,14 +13,18 @@ Time ms(std::int64_t value) { return Time{value * 1'000'000}; }
 
 std::shared_ptr<const Image> image(std::uint8_t value) { return std::make_shared<Image>(8, 4, value); }
 
+/// All different, as a sensor's are.
+ImuSample reading(std::int64_t t_ms) { return {ms(t_ms), Vec3::Constant(1e-4 * static_cast<double>(t_ms % 5000)), Vec3::Zero()}; }
+
 struct Fixture {
   Time now = ms(1000);
   std::vector<Time> told;
   Ingest ingest{LiveOptions{}, 1, [this] { return now; }, [this](const ImuSample& s, Time) { told.push_back(s.t); }};
 
-  void read(std::int64_t t_ms) {
+  /// `stamp_ms`: instead of the time of arrival.
+  void read(std::int64_t t_ms, std::optional<std::int64_t> stamp_ms = {}) {
     now = ms(1000 + t_ms);
-    ingest.push(ImuSample{ms(t_ms), Vec3::Zero(), Vec3::Zero()});
+    ingest.push(reading(stamp_ms.value_or(t_ms)));
   }
   void see(std::int64_t t_ms, std::uint8_t left, std::uint8_t right) {
     now = ms(1000 + t_ms);
@@ -78,14 +83,77 @@ TEST(Ingest, AFrozenCameraGivesNoImage) {
   EXPECT_EQ(*f.ingest.arrivals().right, ms(1000));
 }
 
+TEST(Ingest, AReadingOrAnImageThatIsLateChangesNoOtherStamp) {
+  Fixture f;
+  std::int64_t images = 0;
+  for (std::int64_t t = 0; t < 3000; t += 5) {
+    f.read(t, t == 1000 ? t - 150 : t);
+    if (t % 50 != 0) continue;
+    f.now = ms(1000 + t);
+    f.ingest.push(StereoFrame{ms(t == 2000 ? t - 150 : t), image(static_cast<std::uint8_t>(t / 50)), image(255)});
+    if (const auto newest = f.ingest.arrivals().newest; t != 2000) EXPECT_EQ(newest, ms(t));
+    ++images;
+  }
+  const LiveCounts counts = f.ingest.counts();
+  EXPECT_EQ(counts.clock_leaps, 0);
+  EXPECT_EQ(counts.imu_late, 1);
+  EXPECT_EQ(counts.images, images);
+  EXPECT_EQ(counts.images_late, 1);
+  EXPECT_EQ(f.told.size(), 599u);
+  EXPECT_EQ(f.told.back(), ms(2995));
+}
+
+/// A jump is established a quarter of a second after it; the readings of that time are not lost.
+TEST(Ingest, NoReadingIsLostWhenTheClockJumps) {
+  Fixture f;
+  for (std::int64_t t = 0; t < 2000; t += 5) f.read(t, t < 1000 ? t : t - 700'000);
+  EXPECT_EQ(f.ingest.counts().clock_leaps, 1);
+  ASSERT_EQ(f.told.size(), 400u);
+  for (std::size_t k = 0; k < f.told.size(); ++k) EXPECT_EQ(f.told[k], ms(5 * static_cast<std::int64_t>(k)));
+}
+
+TEST(Ingest, ReadingsThatTheSensorCannotHaveMadeAreSilence) {
+  Fixture f;
+  for (std::int64_t t = 0; t < 1000; t += 5) {
+    f.now = ms(1000 + t);
+    ImuSample s = reading(t < 500 ? t : 500);
+    s.t = ms(t);
+    if (t == 200) s.accel_mps2.x() = 1e6;
+    if (t == 300) s.gyro_radps.z() = std::numeric_limits<double>::quiet_NaN();
+    f.ingest.push(s);
+  }
+  EXPECT_EQ(f.ingest.counts().imu, 200);
+  EXPECT_EQ(f.ingest.counts().imu_refused, 2 + 89) << "it repeats itself from 500 ms on";
+  EXPECT_EQ(f.told.size(), 109u);
+  EXPECT_EQ(f.ingest.arrivals().imu, ms(1550));
+}
+
+TEST(Ingest, ReadingsAreOnTheImagesClock) {
+  Time now = ms(1000);
+  std::vector<Time> stamps, host;
+  Ingest ingest(
+      LiveOptions{}, 1, [&] { return now; }, [&](const ImuSample& s, Time t) { stamps.push_back(s.t), host.push_back(t); }, {},
+      Duration{-50'000'000});
+  for (std::int64_t t = 0; t < 1000; t += 5) {
+    now = ms(1000 + t);
+    ingest.push(reading(t - 50));
+  }
+  EXPECT_EQ(stamps.back(), ms(945)) << "the recording keeps the sensor's own stamps";
+  EXPECT_EQ(host.back(), ms(1995));
+  EXPECT_EQ(ingest.arrivals().newest, ms(995));
+}
+
 TEST(Ingest, TwoThreadsMayPush) {
-  Ingest ingest(LiveOptions{}, 1, [] { return ms(1); }, {});
+  // Everything arrives at once and a second late: no stamp is ahead of its arrival.
+  Ingest ingest(LiveOptions{}, 1, [] { return ms(5000); }, {});
+  ingest.push(StereoFrame{ms(4000), image(201), image(202)});
+  ingest.pop();
   std::jthread imu([&] {
-    for (std::int64_t t = 1; t <= 2000; ++t) ingest.push(ImuSample{ms(t), Vec3::Zero(), Vec3::Zero()});
+    for (std::int64_t t = 4001; t <= 6000; ++t) ingest.push(reading(t));
   });
   std::jthread camera([&] {
     for (std::int64_t t = 1; t <= 200; ++t)
-      ingest.push(StereoFrame{ms(10 * t), image(static_cast<std::uint8_t>(t)), image(static_cast<std::uint8_t>(t + 7))});
+      ingest.push(StereoFrame{ms(4000 + 10 * t), image(static_cast<std::uint8_t>(t)), image(static_cast<std::uint8_t>(t + 7))});
   });
   std::jthread closer([&] {
     imu.join(), camera.join();

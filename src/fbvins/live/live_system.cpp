@@ -29,11 +29,13 @@ struct LiveSystem::Impl {
   Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate,
        std::uint32_t first_reset_counter, System made)
       : first_reset(first_reset_counter),
-        ingest(options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }),
+        ingest(
+            options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
+            Duration::from_seconds(rig.time_offset_s)),
         system(std::move(made)),
         watch(options, system_options.estimator.max_image_gap_s),
-        propagator(rig.imu_noise, Duration::from_seconds(rig.time_offset_s), options.smoothing_s,
-                   system_options.estimator.gravity_mps2),
+        propagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
+                   options.smoothing_s, system_options.estimator.gravity_mps2),
         views(rig.T_BC0),
         started(host_now()) {
     system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
@@ -48,16 +50,17 @@ struct LiveSystem::Impl {
   // Readings and estimates.
 
   void on_reading(const ImuSample& sample, Time host_t) {
-    LivePose pose;
+    std::optional<LivePose> pose;
     {
       const std::lock_guard lock(pose_mutex);
       pose = propagator.add(sample);
-      pose.reset_counter = reset_counter;                // before the first estimate, too
-      if (pose.health.has_pose()) pose.health = health;  // else the propagator has no pose, whatever `health` says
+      if (!pose) return;
+      pose->reset_counter = reset_counter;                 // before the first estimate, too
+      if (pose->health.has_pose()) pose->health = health;  // else the propagator has no pose, whatever `health` says
       if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
     }
-    pose.host_t = host_t;
-    hub.publish(pose);
+    pose->host_t = host_t;
+    hub.publish(*std::move(pose));
   }
 
   void on_frame(const TrackedFrame& frame) {
@@ -141,6 +144,7 @@ struct LiveSystem::Impl {
     s.t = ingest.arrivals().newest;
     s.host_t = host_now();
     s.counts = ingest.counts();
+    s.counts.keyframes_left_out = system.keyframes_left_out();
     s.shutter_to_pose = shutter_to_pose.summary();
     s.pose_age = pose_age.summary();
     for (const Hub::SinkReport& report : hub.reports()) {
@@ -203,7 +207,7 @@ struct LiveSystem::Impl {
 Result<LiveSystem> LiveSystem::create(const SystemOptions& system, const LiveOptions& options, const StereoRig& rig,
                                       double clock_rate, SystemParts parts, std::uint32_t first_reset_counter) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
-  Result<System> made = System::create(system, rig, RunMode::threaded, std::move(parts));
+  Result<System> made = System::create(system, rig, RunMode::live, std::move(parts));
   if (!made) return made.error();
   return LiveSystem(std::make_unique<Impl>(system, options, rig, clock_rate, first_reset_counter, std::move(*made)));
 }

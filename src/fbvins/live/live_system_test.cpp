@@ -246,7 +246,7 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
     const Motion motion(0.5, 0.3);
     SimulatedFlight flight(motion, seed);
     Estimator estimator(flight.rig, {});
-    PosePropagator propagator(flight.rig.imu_noise, {}, LiveOptions{}.smoothing_s);
+    PosePropagator propagator(EstimatorOptions{}.assumed(flight.rig.imu_noise), {}, LiveOptions{}.smoothing_s);
     // Both compared after the same first-pose alignment of position and heading: W begins at the body.
     std::optional<Pose<W, W>> T_truth_W;
     double at_images = 0, at_readings = 0;
@@ -259,7 +259,7 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
       const TrackedFrame frame = flight.frame(k);
       std::optional<Odometry> estimate;
       for (std::size_t i = 1; i < frame.imu.samples.size(); ++i) {
-        const LivePose pose = propagator.add(frame.imu.samples[i]);
+        const LivePose pose = *propagator.add(frame.imu.samples[i]);
         if (pose.health.has_pose() && T_truth_W && k > 100) at_readings += error2(pose.T_WB, pose.t), ++readings;
       }
       const Odometry o = estimator.process(frame).odometry;

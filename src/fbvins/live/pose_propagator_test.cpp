@@ -36,7 +36,7 @@ struct Motion {
 
 TEST(PosePropagator, NoPoseBeforeTheFirstEstimate) {
   PosePropagator propagator({}, {}, 0.1);
-  const LivePose pose = propagator.add(Motion{}.reading(0));
+  const LivePose pose = *propagator.add(Motion{}.reading(0));
   EXPECT_EQ(pose.health.state, HealthState::initialising);
   EXPECT_EQ(pose.t, at(0));
 }
@@ -47,7 +47,7 @@ TEST(PosePropagator, FollowsTheTruthBetweenImages) {
   double largest_m = 0, largest_rad = 0;
   for (int k = 0; k < 400; ++k) {
     const double s = k * kPeriod_s;
-    const LivePose pose = propagator.add(motion.reading(s));
+    const LivePose pose = *propagator.add(motion.reading(s));
     // The estimate of an image 50 ms ago, between two readings.
     if (k % 10 == 9 && k > 10) propagator.rebase(motion.estimate(s - 0.0513));
     if (!pose.health.has_pose()) continue;
@@ -72,7 +72,7 @@ TEST(PosePropagator, GravityHasTheEstimatesDirectionWhileATiltIsBeingCorrected) 
   estimate.tilt_sigma_rad = 0.02;
   LivePose pose;
   for (int k = 0; k < 40; ++k) {
-    pose = propagator.add(motion.reading(k * kPeriod_s));
+    pose = *propagator.add(motion.reading(k * kPeriod_s));
     if (k == 1) propagator.rebase(estimate);
   }
   const NavState truth = motion.state(39 * kPeriod_s);
@@ -91,7 +91,7 @@ TEST(PosePropagator, BiasesAreTakenOffTheReadings) {
     ImuSample reading = motion.reading(k * kPeriod_s);
     reading.gyro_radps += bias.gyro_radps;
     reading.accel_mps2 += bias.accel_mps2;
-    pose = propagator.add(reading);
+    pose = *propagator.add(reading);
     Odometry estimate = motion.estimate(0);
     estimate.bias = bias;
     if (k == 1) propagator.rebase(estimate);
@@ -99,18 +99,38 @@ TEST(PosePropagator, BiasesAreTakenOffTheReadings) {
   EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_WB.p).norm(), 1e-4);
 }
 
-TEST(PosePropagator, ImageClockIsTurnedIntoTheImus) {
+TEST(PosePropagator, PosesAreOnTheClockOfTheImages) {
   const Motion motion;
   const Duration offset = Duration::from_seconds(0.012);
   PosePropagator propagator({}, offset, 0.1);
   LivePose pose;
   for (int k = 0; k < 40; ++k) {
-    pose = propagator.add(motion.reading(k * kPeriod_s));
+    pose = *propagator.add(motion.reading(k * kPeriod_s));
     Odometry estimate = motion.estimate(0.05);
     estimate.t = estimate.t - offset;
     if (k == 20) propagator.rebase(estimate);
   }
   EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_WB.p).norm(), 1e-4);
+  EXPECT_EQ(pose.t, at(39 * kPeriod_s) - offset);
+}
+
+/// No finite pose follows from such readings, and one of them would stay in the pose for ever.
+TEST(PosePropagator, ReadingsThatTheSensorCannotHaveMadeDoNothing) {
+  const Motion motion;
+  PosePropagator propagator({}, {}, 0.1);
+  propagator.add(motion.reading(0));
+  propagator.rebase(motion.estimate(0));
+  double largest_m = 0;
+  for (int k = 1; k < 100; ++k) {
+    ImuSample reading = motion.reading(k * kPeriod_s);
+    if (k == 20) reading.accel_mps2.x() = 1e6;
+    if (k == 30) reading.accel_mps2.x() = 3e38;
+    if (k == 40) reading.gyro_radps.x() = 1e200;
+    const std::optional<LivePose> pose = propagator.add(reading);
+    ASSERT_EQ(pose.has_value(), k != 20 && k != 30 && k != 40);
+    if (pose) largest_m = std::max(largest_m, (pose->T_WB.p - motion.state(k * kPeriod_s).T_WB.p).norm());
+  }
+  EXPECT_LT(largest_m, 2e-3);
 }
 
 /// A jump of the estimate moves the output by no more than a share of it per reading.
@@ -123,7 +143,7 @@ TEST(PosePropagator, ConvergesToANewEstimateWithoutAStep) {
   Vec3 error_before = Vec3::Zero();
   for (int k = 0; k < 300; ++k) {
     const double s = k * kPeriod_s;
-    pose = propagator.add(motion.reading(s));
+    pose = *propagator.add(motion.reading(s));
     Odometry estimate = motion.estimate(s);
     if (k >= 100) estimate.T_WB.p += shift;
     if (k % 10 == 0) propagator.rebase(estimate);
@@ -143,7 +163,7 @@ TEST(PosePropagator, EstimatesNewerThanEveryReadingAreNotPropagatedTwice) {
   for (int k = 0; k < 200; ++k) {
     const double s = k * kPeriod_s;
     const bool gap = k > 100 && k < 120;
-    if (!gap) pose = propagator.add(motion.reading(s));
+    if (!gap) pose = *propagator.add(motion.reading(s));
     if (k == 10 || k == 110 || k == 118) propagator.rebase(motion.estimate(s));
     if (k < 11 || gap) continue;
     EXPECT_LT((pose.T_WB.p - motion.state(s).T_WB.p).norm(), 2e-3) << k;
@@ -156,7 +176,7 @@ TEST(PosePropagator, AnEstimateBeforeAllReadings) {
   const Motion motion;
   PosePropagator propagator({}, {}, 0);
   propagator.rebase(motion.estimate(0));
-  const LivePose pose = propagator.add(motion.reading(kPeriod_s));
+  const LivePose pose = *propagator.add(motion.reading(kPeriod_s));
   EXPECT_LT((pose.T_WB.p - motion.state(kPeriod_s).T_WB.p).norm(), 1e-4);
 }
 
@@ -169,7 +189,7 @@ TEST(PosePropagator, WithoutSmoothingANewEstimateCountsAtOnce) {
   Odometry moved = motion.estimate(kPeriod_s);
   moved.T_WB.p.x() += 0.3;
   propagator.rebase(moved);
-  const LivePose pose = propagator.add(motion.reading(2 * kPeriod_s));
+  const LivePose pose = *propagator.add(motion.reading(2 * kPeriod_s));
   EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_WB.p.x() + 0.3, 1e-5);
 }
 
@@ -183,7 +203,7 @@ TEST(PosePropagator, ARestartCountsAtOnceAndIsCounted) {
   restarted.T_WB.p.x() += 5;
   restarted.reset_counter = 1;
   propagator.rebase(restarted);
-  const LivePose pose = propagator.add(motion.reading(2 * kPeriod_s));
+  const LivePose pose = *propagator.add(motion.reading(2 * kPeriod_s));
   EXPECT_EQ(pose.reset_counter, 1u);
   EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_WB.p.x() + 5, 1e-5);
 }
@@ -196,9 +216,27 @@ TEST(PosePropagator, LostMeansNoPose) {
   Odometry lost = motion.estimate(0);
   lost.health = {HealthState::lost, HealthReason::no_tracks};
   propagator.rebase(lost);
-  const LivePose pose = propagator.add(motion.reading(kPeriod_s));
+  const LivePose pose = *propagator.add(motion.reading(kPeriod_s));
   EXPECT_FALSE(pose.health.has_pose());
   EXPECT_TRUE(pose.T_WB.p.isZero());
+}
+
+TEST(PosePropagator, TheCovarianceHasTheNoiseAndTheGaps) {
+  const Motion motion;
+  const auto sigma_m = [&](const ImuNoise& noise, int gap_readings) {
+    PosePropagator propagator(noise, {}, 0.1);
+    LivePose pose;
+    for (int k = 0; k <= 100; ++k) {
+      if (k > 40 && k <= 40 + gap_readings) continue;
+      pose = *propagator.add(motion.reading(k * kPeriod_s));
+      if (k == 0) propagator.rebase(motion.estimate(0));
+    }
+    return std::sqrt(pose.pose_covariance(0, 0));
+  };
+  ImuNoise noise, larger = noise;
+  larger.accel_noise_density_mps2_rthz *= 100;
+  EXPECT_GT(sigma_m(larger, 0), 2 * sigma_m(noise, 0));
+  EXPECT_GT(sigma_m(noise, 30), 5 * sigma_m(noise, 0));
 }
 
 /// The propagated covariance agrees with numeric derivatives of the propagated state.
@@ -225,7 +263,7 @@ TEST(PosePropagator, CovarianceIsThatOfTheErrors) {
     propagator.add(motion.reading(0));
     propagator.rebase(o);
     LivePose pose;
-    for (int k = 1; k <= kSteps; ++k) pose = propagator.add(motion.reading(k * kPeriod_s));
+    for (int k = 1; k <= kSteps; ++k) pose = *propagator.add(motion.reading(k * kPeriod_s));
     return pose;
   };
   const LivePose middle = fly(Vec15::Zero());

@@ -4,17 +4,24 @@
 #include <algorithm>
 
 namespace fbvins {
+namespace {
+
+constexpr double kOverdue_periods = 2.5;
+
+}  // namespace
 
 Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arrivals, Time started, Time host) const {
   const auto silence_s = [&](const std::optional<Time>& last) { return (host - last.value_or(started)).seconds(); };
   const Health& said = estimated.health;
+  // A slow camera is silent only if an image is overdue.
+  const double silent_s =
+      std::max(options_.camera_silence_s, kOverdue_periods * arrivals.image_period.value_or(Duration{}).seconds());
   double blind_s = silence_s(arrivals.image);
   if (said.has_pose() && estimated.image) blind_s = std::max(blind_s, silence_s(estimated.image));
   HealthReason reason = HealthReason::none;
   if (silence_s(arrivals.imu) > options_.imu_silence_s) reason = HealthReason::imu_gap;
-  else if (blind_s > options_.camera_silence_s) reason = HealthReason::no_images;
-  else if (silence_s(arrivals.left) > options_.camera_silence_s || silence_s(arrivals.right) > options_.camera_silence_s)
-    reason = HealthReason::one_camera;
+  else if (blind_s > silent_s) reason = HealthReason::no_images;
+  else if (silence_s(arrivals.left) > silent_s || silence_s(arrivals.right) > silent_s) reason = HealthReason::one_camera;
   if (reason == HealthReason::none) return said;
   if (!said.has_pose()) return {said.state, reason == HealthReason::one_camera ? said.reason : reason};
   if (blind_s > longest_blind_s_) return {HealthState::lost, HealthReason::no_images};

@@ -11,7 +11,7 @@ Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 const Health kGood{HealthState::good, HealthReason::none};
 
 Ingest::Arrival arrivals(double imu_s, double left_s, double right_s) {
-  return {at(imu_s), at(std::max(left_s, right_s)), at(left_s), at(right_s), {}};
+  return {at(imu_s), at(std::max(left_s, right_s)), at(left_s), at(right_s), {}, {}};
 }
 
 Health judged(const Health& estimated, const Ingest::Arrival& a, double now_s) {
@@ -30,6 +30,15 @@ TEST(SensorWatch, SilenceIsSeenAndNamed) {
   EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.99), 10), (Health{HealthState::degraded, one_camera}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.99, 9.99), 10), (Health{HealthState::degraded, imu_gap}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.7, 9.7), 10), (Health{HealthState::degraded, imu_gap}));
+}
+
+TEST(SensorWatch, ASlowCameraIsNotSilent) {
+  Ingest::Arrival slow = arrivals(9.99, 9.6, 9.6);
+  slow.image_period = Duration::from_seconds(0.2);
+  EXPECT_EQ(judged(kGood, slow, 10), kGood) << "5 Hz";
+  EXPECT_EQ(judged(kGood, slow, 10.11), (Health{HealthState::degraded, HealthReason::imu_gap}));
+  slow.imu = at(10.11);
+  EXPECT_EQ(judged(kGood, slow, 10.11), (Health{HealthState::degraded, HealthReason::no_images}));
 }
 
 TEST(SensorWatch, APoseCarriedOnBlindForTooLongIsLost) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/pipeline/keyframe_readings.hpp"
 
+#include <iterator>
 #include <utility>
 
 namespace fbvins {
@@ -20,7 +21,13 @@ bool joined(const std::vector<ImuSegment>& segments) {
 void KeyframeReadings::add(const ImuSegment& segment) {
   if (segment.empty()) return;
   segments_.push_back(segment);
-  while ((segment.samples.back().t - segments_.front().samples.front().t).seconds() > kLongest_s) segments_.pop_front();
+  drop_old();
+}
+
+void KeyframeReadings::drop_old() {
+  // The newest one stays, however long it is: a camera may have been silent for that time.
+  while (segments_.size() > 1 && (segments_.back().samples.back().t - segments_.front().samples.front().t).seconds() > kLongest_s)
+    segments_.pop_front();
 }
 
 std::vector<ImuSegment> KeyframeReadings::until(Time t) {
@@ -29,9 +36,17 @@ std::vector<ImuSegment> KeyframeReadings::until(Time t) {
     out.push_back(std::move(segments_.front()));
     segments_.pop_front();
   }
+  handed_out_before_ = handed_out_until_;
   const Time from = std::exchange(handed_out_until_, t);
   const bool whole = !out.empty() && joined(out) && out.front().samples.front().t == from && out.back().samples.back().t == t;
   return whole ? out : std::vector<ImuSegment>{};
+}
+
+void KeyframeReadings::take_back(std::vector<ImuSegment> segments) {
+  if (segments.empty()) return;  // some were missing, and are from now on
+  handed_out_until_ = handed_out_before_;
+  segments_.insert(segments_.begin(), std::make_move_iterator(segments.begin()), std::make_move_iterator(segments.end()));
+  drop_old();
 }
 
 }  // namespace fbvins

@@ -4,6 +4,7 @@
 //
 //   readings.add(frame.imu);                                       // every frame, in order
 //   keyframe.imu.segments = readings.until(keyframe.t);            // every keyframe, in order
+//   readings.take_back(std::move(keyframe.imu.segments));          // a keyframe that nobody takes
 #pragma once
 
 #include <deque>
@@ -19,10 +20,14 @@ class KeyframeReadings {
   void add(const ImuSegment& segment);
   /// Consecutive segments since the keyframe before; none where some are missing.
   std::vector<ImuSegment> until(Time t);
+  /// Of the last call of until(): the keyframe was left out, and the next one gets them.
+  void take_back(std::vector<ImuSegment> segments);
 
  private:
+  void drop_old();
+
   std::deque<ImuSegment> segments_;
-  Time handed_out_until_{};
+  Time handed_out_until_{}, handed_out_before_{};
 };
 
 }  // namespace fbvins

@@ -40,6 +40,29 @@ TEST(KeyframeReadings, WhereSomeAreMissingThereAreNone) {
   EXPECT_TRUE(readings.until(at(300)).empty());
 }
 
+/// A camera that was silent for long has one segment for all that time.
+TEST(KeyframeReadings, AnIntervalMayBeLongerThanOldOnesAreKept) {
+  KeyframeReadings readings;
+  readings.add(between(0, 50));
+  (void)readings.until(at(50));
+  readings.add(between(50, 11'050));
+  EXPECT_EQ(readings.until(at(11'050)).size(), 1u);
+  readings.add(between(11'050, 31'050));
+  readings.add(between(31'050, 31'100));
+  EXPECT_TRUE(readings.until(at(31'100)).empty()) << "the long one is older than ten seconds";
+}
+
+TEST(KeyframeReadings, OfAKeyframeThatIsLeftOutGoToTheNext) {
+  KeyframeReadings readings;
+  for (int ms = 0; ms < 500; ms += 50) readings.add(between(ms, ms + 50));
+  (void)readings.until(at(100));
+  readings.take_back(readings.until(at(200)));
+  readings.take_back(readings.until(at(250)));
+  const std::vector<ImuSegment> imu = readings.until(at(300));
+  ASSERT_EQ(imu.size(), 4u);
+  EXPECT_EQ(imu.front().samples.front().t, at(100));
+}
+
 TEST(KeyframeReadings, OldOnesAreDropped) {
   KeyframeReadings readings;
   for (int i = 0; i < 400; ++i) readings.add(between(50 * i, 50 * (i + 1)));

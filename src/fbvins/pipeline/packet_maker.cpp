@@ -4,7 +4,6 @@
 namespace fbvins {
 
 void PacketMaker::push(StereoFrame frame) {
-  frame.t = frame.t + offset_;  // on the IMU's clock while it waits
   if (newest_image_ && frame.t <= *newest_image_) {
     ++backward_;
     return;
@@ -22,10 +21,9 @@ std::optional<SensorPacket> PacketMaker::next(bool flush) {
   packet.id = FrameId{next_frame_++};
   packet.frame = std::move(waiting_.front());
   waiting_.pop_front();
-  if (previous_image_) packet.imu = imu_.extract_now(*previous_image_, t);
+  if (previous_image_) packet.imu = imu_.between(*previous_image_, t);
+  imu_.forget_before(t);
   previous_image_ = t;
-  // All later stages use the image's own clock.
-  packet.frame.t = t - offset_;
   return packet;
 }
 

@@ -6,7 +6,7 @@
 #include <deque>
 #include <optional>
 
-#include "fbvins/imu/imu_buffer.hpp"
+#include "fbvins/imu/imu_history.hpp"
 #include "fbvins/pipeline/input_options.hpp"
 #include "fbvins/types/input_counts.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -15,10 +15,11 @@ namespace fbvins {
 
 class PacketMaker {
  public:
-  /// time_offset: t_imu = t_image + offset.
-  PacketMaker(const InputOptions& options, Duration time_offset) : options_(options), offset_(time_offset) {}
+  /// time_offset: t_imu = t_image + offset. What comes out is on the images' clock.
+  PacketMaker(const InputOptions& options, const ImuNoise& imu, Duration time_offset)
+      : options_(options), imu_(imu, time_offset) {}
 
-  void push(const ImuSample& sample) { imu_.push(sample); }
+  void push(const ImuSample& sample) { imu_.add(sample); }
   void push(StereoFrame frame);
   /// The next image that is ready; with `flush`, the next image even if its readings never came.
   std::optional<SensorPacket> next(bool flush = false);
@@ -26,10 +27,9 @@ class PacketMaker {
 
  private:
   InputOptions options_;
-  Duration offset_;
-  ImuBuffer imu_;
+  ImuHistory imu_;
   std::deque<StereoFrame> waiting_;
-  std::optional<Time> newest_image_, previous_image_;  ///< on the IMU's clock
+  std::optional<Time> newest_image_, previous_image_;
   std::int64_t next_frame_ = 0;
   int backward_ = 0;
 };

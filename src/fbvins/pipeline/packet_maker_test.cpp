@@ -25,7 +25,9 @@ std::vector<SensorPacket> drain(PacketMaker& maker, bool flush = false) {
   return packets;
 }
 
-PacketMaker make(double time_offset_s = 0) { return PacketMaker(InputOptions{}, Duration::from_seconds(time_offset_s)); }
+PacketMaker make(double time_offset_s = 0) {
+  return PacketMaker(InputOptions{}, ImuNoise{}, Duration::from_seconds(time_offset_s));
+}
 
 TEST(PacketMaker, AnImageWaitsForTheReadingsUpToItsStamp) {
   PacketMaker maker = make();
@@ -87,14 +89,19 @@ TEST(PacketMaker, FlushGivesImagesThatStillWaitForReadings) {
 
 TEST(PacketMaker, TheTimeOffsetMovesTheReadingsAndNotTheImage) {
   PacketMaker maker = make(0.010);
-  for (int ms = 0; ms <= 100; ms += 5) maker.push(reading(ms));
+  for (int ms = 0; ms <= 100; ms += 5) {
+    ImuSample sample = reading(ms);
+    sample.gyro_radps.x() = 1e-3 * ms;
+    maker.push(sample);
+  }
   maker.push(image(20));
   maker.push(image(70));
   const auto packets = drain(maker);
   ASSERT_EQ(packets.size(), 2u);
   EXPECT_EQ(packets[1].frame.t.ns, 70 * kMs);
-  EXPECT_EQ(packets[1].imu.samples.front().t.ns, 30 * kMs);
-  EXPECT_EQ(packets[1].imu.samples.back().t.ns, 80 * kMs);
+  EXPECT_EQ(packets[1].imu.samples.front().t.ns, 20 * kMs);
+  EXPECT_NEAR(packets[1].imu.samples.front().gyro_radps.x(), 0.030, 1e-12) << "stamped 30 ms by the IMU";
+  EXPECT_NEAR(packets[1].imu.samples.back().gyro_radps.x(), 0.080, 1e-12);
 }
 
 }  // namespace

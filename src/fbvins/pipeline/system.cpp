@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/pipeline/system.hpp"
 
+#include <atomic>
 #include <optional>
 #include <utility>
 
@@ -47,6 +48,7 @@ struct System::Impl {
   std::function<void(const MapUpdate&)> on_map_update;
 
   StageStatus status;
+  std::atomic<int> keyframes_left_out = 0;
   bool finished = false;
   Stage<SensorPacket, Impl> tracking{"the frontend", &Impl::track, BoundedQueue<SensorPacket>{4}};
   Stage<TrackedFrame, Impl> estimation{"the estimator", &Impl::estimate, BoundedQueue<TrackedFrame>{4}};
@@ -55,12 +57,12 @@ struct System::Impl {
 
   Impl(const SystemOptions& options, const StereoRig& rig, RunMode mode_wanted, SystemParts parts)
       : mode(mode_wanted),
-        packet_maker(options.input, Duration::from_seconds(rig.time_offset_s)),
+        packet_maker(options.input, rig.imu_noise, Duration::from_seconds(rig.time_offset_s)),
         frontend(std::move(parts.frontend)),
         estimator(rig, options.estimator, parts.imu_state),
         mapper(parts.mapper),
         imu_model{{}, {}, options.estimator.assumed(rig.imu_noise), options.estimator.gravity_mps2} {
-    if (mode != RunMode::threaded) return;
+    if (mode == RunMode::deterministic) return;
     start(tracking, [this] { estimation.queue.close(); });
     start(estimation, [this] { mapping.queue.close(); });
     start(mapping, [] {});
@@ -91,7 +93,7 @@ struct System::Impl {
     // After the callbacks, so that whoever waits for this frame sees whether one of them threw.
     feedback.publish(frame.id, estimator.prior(), std::move(estimate.landmarks));
     if (mapper != nullptr)
-      for (Keyframe& keyframe : estimate.keyframes) hand_on(mapping, MapTask{std::move(keyframe), FrameId{frame.id.value + 1}});
+      for (Keyframe& keyframe : estimate.keyframes) hand_to_mapper({std::move(keyframe), FrameId{frame.id.value + 1}});
   }
 
   bool keyframes_wanted() const { return on_keyframe || mapper != nullptr; }
@@ -124,8 +126,17 @@ struct System::Impl {
 
   template <class Task>
   void hand_on(Stage<Task, Impl>& stage, Task task) {
-    if (mode == RunMode::threaded) stage.queue.push(std::move(task));
-    else run(stage, std::move(task));
+    if (mode == RunMode::deterministic) run(stage, std::move(task));
+    else stage.queue.push(std::move(task));
+  }
+
+  /// In flight nothing waits for the mapper: if it is behind, a keyframe is left out, and the next one has its readings.
+  void hand_to_mapper(MapTask task) {
+    if (mode != RunMode::live) return hand_on(mapping, std::move(task));
+    if (!mapping.queue.push_if_room(task)) {
+      readings.take_back(std::move(task.keyframe.imu.segments));
+      ++keyframes_left_out;
+    }
   }
 
   /// Nothing is processed after a failure.
@@ -201,6 +212,7 @@ Result<void> System::push(SensorEvent event) {
 Result<void> System::finish() { return impl_->finish(); }
 Result<void> System::status() const { return impl_->status.get(); }
 InputCounts System::input_counts() const { return impl_->packet_maker.counts(); }
+int System::keyframes_left_out() const { return impl_->keyframes_left_out; }
 Calibration System::calibration() const { return impl_->estimator.calibration(); }
 
 }  // namespace fbvins

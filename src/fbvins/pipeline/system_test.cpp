@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "fbvins/features/noise_texture.hpp"
@@ -200,6 +203,110 @@ TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotChange) {
   EXPECT_GT(alone.loops, 0);
   EXPECT_EQ(threaded.updates, alone.updates);
   EXPECT_EQ(threaded.map, alone.map);
+}
+
+/// With the IMU's clock beside the cameras', and the offset known, everything is the same to the last bit: the odometry with
+/// its re-observed landmarks, and the map with its readings.
+TEST(TimeOffset, AKnownOffsetChangesNothing) {
+  const std::vector<SensorEvent> events = sway(130);
+  const auto fly_at = [&](Duration offset) {
+    StereoRig rig = small_rig();
+    rig.time_offset_s = offset.seconds();
+    const std::unique_ptr<LoopCloser> loop = loop_closer();
+    SystemOptions options;
+    options.frontend.kind = "orb";
+    System system = *System::create(options, rig, RunMode::deterministic, {.mapper = loop.get()});
+    std::string bytes;
+    int known = 0, with_readings = 0;
+    system.on_odometry([&](const Odometry& o) { bytes += bytes_of(o), known += o.stats.known_landmarks; });
+    system.on_keyframe([&](const Keyframe& k) { with_readings += !k.imu.segments.empty(); });
+    // In order of arrival: a reading comes with its image, whatever it is stamped.
+    for (SensorEvent event : events) {
+      if (auto* reading = std::get_if<ImuSample>(&event)) reading->t = reading->t + offset;
+      EXPECT_TRUE(system.push(std::move(event)));
+    }
+    EXPECT_TRUE(system.finish());
+    EXPECT_GT(known, 0);
+    EXPECT_GT(with_readings, 5);
+    return std::pair(bytes, serialise_map(loop->map()));
+  };
+  const auto without = fly_at({});
+  for (const double offset_s : {-0.05, 0.0123}) {
+    const auto with = fly_at(Duration::from_seconds(offset_s));
+    EXPECT_EQ(with.first == without.first, true) << offset_s;
+    EXPECT_EQ(with.second == without.second, true) << offset_s;
+  }
+}
+
+/// Takes no keyframe until it is told to go on.
+class BlockedMapper final : public Mapper {
+ public:
+  MapUpdate process(const Keyframe& keyframe) override {
+    std::unique_lock lock(mutex_);
+    go_on_.wait(lock, [&] { return free_; });
+    keyframes.push_back(keyframe);
+    return {};
+  }
+  void go_on() {
+    const std::lock_guard lock(mutex_);
+    free_ = true;
+    go_on_.notify_all();
+  }
+  std::vector<Keyframe> keyframes;
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable go_on_;
+  bool free_ = false;
+};
+
+TEST(LiveSystemMode, AMapperThatIsBusyDoesNotHoldUpTheOdometry) {
+  const std::vector<SensorEvent> events = sway(400);
+  std::vector<std::string> alone, live;
+  for (std::vector<std::string>* odometry : {&alone, &live}) {
+    BlockedMapper mapper;
+    System system =
+        system_of(odometry == &live ? RunMode::live : RunMode::deterministic, {.mapper = odometry == &live ? &mapper : nullptr});
+    system.on_odometry([&](const Odometry& o) { odometry->push_back(bytes_of(o)); });
+    push_all(system, events);
+    if (odometry == &alone) continue;
+    while (odometry->size() + 2 < alone.size()) std::this_thread::yield();  // ends only if nothing waits for the mapper
+    EXPECT_TRUE(mapper.keyframes.empty());
+    EXPECT_GT(system.keyframes_left_out(), 0);
+    const int left_out = system.keyframes_left_out();
+    mapper.go_on();
+    EXPECT_TRUE(system.finish());
+    EXPECT_GE(mapper.keyframes.size(), 12u);
+    for (std::size_t i = 1; i < mapper.keyframes.size(); ++i) {
+      const std::vector<ImuSegment>& segments = mapper.keyframes[i].imu.segments;
+      if (segments.empty()) continue;
+      EXPECT_EQ(segments.front().samples.front().t, mapper.keyframes[i - 1].t) << "those of what was left out are there";
+    }
+    EXPECT_EQ(system.keyframes_left_out(), left_out);
+  }
+  EXPECT_EQ(live.size(), alone.size());
+  EXPECT_EQ(live, alone);
+}
+
+TEST(ImuHealth, ASilentImuIsNeverGoodAgain) {
+  SystemOptions options;
+  options.frontend.kind = "klt";
+  System system = *System::create(options, small_rig());
+  int good_before = 0, good_after = 0, gaps_named = 0;
+  system.on_odometry([&](const Odometry& o) {
+    const bool silent = o.t.seconds() > 3.06;
+    ++(silent ? good_after : good_before) -= o.health.state != HealthState::good;
+    gaps_named += silent && o.health.reason == HealthReason::imu_gap;
+  });
+  for (const SensorEvent& event : sway(160)) {
+    const auto* reading = std::get_if<ImuSample>(&event);
+    if (reading != nullptr && reading->t.seconds() > 3) continue;
+    ASSERT_TRUE(system.push(event));
+  }
+  ASSERT_TRUE(system.finish());
+  EXPECT_GT(good_before, 30);
+  EXPECT_EQ(good_after, 0);
+  EXPECT_GT(gaps_named, 10);
 }
 
 TEST(SystemParts, AnUnknownFrontendOrAnOptionOutOfRangeIsAnErrorAtOnce) {
