@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "fbvins/estimator/estimator_options.hpp"
+
 namespace fbvins {
 namespace {
 

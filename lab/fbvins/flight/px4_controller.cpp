@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "fbvins/estimator/estimator_options.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -23,7 +25,8 @@ MavlinkOptions mavlink_options(int system_id, const Pose<BodyFlu, B>& mounting) 
   MavlinkOptions options;
   options.system_id = system_id;
   options.rate_hz = kOdometry_hz;
-  options.frame = MavlinkFrameId::local_ned;  // PX4 since February 2026 does not arm with local_frd; there is no GPS or magnetometer
+  // PX4 since February 2026 does not arm with local_frd. There is no GPS or magnetometer with another heading.
+  options.frame = MavlinkFrameId::local_ned;
   options.mounting = mounting_options_of(mounting);
   return options;
 }
