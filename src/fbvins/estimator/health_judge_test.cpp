@@ -63,17 +63,24 @@ TEST(HealthJudge, ImagesWithoutTracksAreNoTracks) {
 
 TEST(HealthJudge, TheFirstImageAfterAGapIsNoImages) {
   Judged judged;
-  EXPECT_EQ(judged.next(frame_at(0.24)), good());
-  EXPECT_EQ(judged.next(frame_at(0.50)), degraded(HealthReason::no_images)) << "a quarter of a second without a stamp";
-  EXPECT_EQ(judged.next(frame_at(0.55)), good());
-  for (double t_s : {0.60, 0.70, 0.80}) {
+  for (double t_s : {0.05, 0.10, 0.15, 0.39}) EXPECT_EQ(judged.next(frame_at(t_s)), good());
+  EXPECT_EQ(judged.next(frame_at(0.65)), degraded(HealthReason::no_images)) << "a quarter of a second without a stamp";
+  EXPECT_EQ(judged.next(frame_at(0.70)), good());
+  for (double t_s : {0.75, 0.85, 0.95}) {
     TrackedFrame blind = frame_at(t_s);
     blind.has_left = blind.has_right = false;
     EXPECT_EQ(judged.next(blind, 0), degraded(HealthReason::no_images));
   }
-  EXPECT_EQ(judged.next(frame_at(0.85)), degraded(HealthReason::no_images)) << "or of stamps without an image";
-  EXPECT_EQ(judged.next(frame_at(0.90)), good());
-  EXPECT_EQ(judged.next(frame_at(4.00), 0), lost(HealthReason::no_images)) << "a gap longer than can be bridged";
+  EXPECT_EQ(judged.next(frame_at(1.00)), degraded(HealthReason::no_images)) << "or of stamps without an image";
+  EXPECT_EQ(judged.next(frame_at(1.05)), good());
+  EXPECT_EQ(judged.next(frame_at(4.15), 0), lost(HealthReason::no_images)) << "a gap longer than can be bridged";
+}
+
+TEST(HealthJudge, ASlowCameraHasNoGaps) {
+  Judged judged;
+  for (int k = 1; k < 4; ++k) (void)judged.next(frame_at(0.4 * k));
+  for (int k = 4; k < 10; ++k) EXPECT_EQ(judged.next(frame_at(0.4 * k)), good()) << k;
+  EXPECT_EQ(judged.next(frame_at(5)), degraded(HealthReason::no_images)) << "1.4 s without a stamp";
 }
 
 TEST(HealthJudge, OneImageIsOneCamera) {
