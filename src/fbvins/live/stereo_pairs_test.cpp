@@ -55,6 +55,13 @@ TEST(StereoPairs, ASilentCameraDelaysTheOtherBoundedly) {
   EXPECT_EQ(p.given, "1R 2R 3R 4R 5R 6R 7R 8");
 }
 
+TEST(StereoPairs, StampsOfAPairMayDifferALittle) {
+  Pairs p;
+  for (int k = 1; k <= 5; ++k) p.left(k), p.right(k + 1.2e-4);  // 1.2 us later
+  p.left(6), p.right(5.9), p.right(7.3), p.left(7);
+  EXPECT_EQ(p.given, "1 2 3 4 5 6 7L");
+}
+
 TEST(StereoPairs, AStampThatGoesBackIsDropped) {
   Pairs p;
   p.left(3), p.left(2), p.left(3), p.right(3);

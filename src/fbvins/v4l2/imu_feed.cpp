@@ -58,9 +58,12 @@ class MavlinkFeed final : public ImuFeed {
                                                : "the flight controller's IMU";
     if (state != told_) say_(fmt::format("{}: {}", where_, state));
     told_ = state;
+    if (link_.newest_stranger() == told_stranger_) return;
+    told_stranger_ = link_.newest_stranger();
+    say_(fmt::format("{}: packets of {} are ignored: it is not the flight controller's address", where_, told_stranger_));
   }
 
-  std::string where_, told_;
+  std::string where_, told_, told_stranger_;
   Say say_;
   ByteLink link_;
   MavlinkImu imu_;
