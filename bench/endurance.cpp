@@ -27,8 +27,8 @@ namespace {
 
 constexpr double kLap_s = 120, kImagesLap_s = 20;
 constexpr Time kStart{1'700'000'000'000'000'000};
-// Growth from the second interval to the last that is not "flat".
-constexpr double kMemoryGrowth_mb = 5, kTimeGrowth = 1.25, kErrorGrowth = 1.5, kErrorFloor_m = 0.02;
+// Growth from the end of the first quarter to the last interval that is not "flat"; errors below the floors are.
+constexpr double kMemoryGrowth_mb = 5, kTimeGrowth = 1.25, kErrorGrowth = 1.5, kErrorFloor_m = 0.02, kDriftFloor_m = 0.005;
 
 class TracksFrontend final : public Frontend {
  public:
@@ -128,9 +128,9 @@ bool fly(const Wanted& wanted, Setup& setup, EndlessFlight& flight) {
     interval.begin();
   }
   if (rows.size() < 4) return true;
-  const Row &early = rows[1], &late = rows.back();
+  const Row &early = rows[rows.size() / 4], &late = rows.back();
   const bool flat = late.memory_mb - early.memory_mb <= kMemoryGrowth_mb && late.mean_ms <= kTimeGrowth * early.mean_ms &&
-                    late.drift_m <= kErrorGrowth * early.drift_m &&
+                    late.drift_m <= std::max(kDriftFloor_m, kErrorGrowth * early.drift_m) &&
                     late.map_error_m <= std::max(kErrorFloor_m, kErrorGrowth * early.map_error_m) && interval.resets == 0;
   fmt::print("\n{}\n", flat ? "flat: pass" : "not flat: FAIL");
   return flat;
