@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kLap_s = 120, kImagesLap_s = 20;
 constexpr Time kStart{1'700'000'000'000'000'000};
-// Growth from the end of the first quarter to the last interval that is not "flat"; errors below the floors are.
+// Growth from the interval after the first quarter to the last one that is not "flat"; errors below the floors are.
 constexpr double kMemoryGrowth_mb = 5, kTimeGrowth = 1.25, kErrorGrowth = 1.5, kErrorFloor_m = 0.02, kDriftFloor_m = 0.005;
 
 class TracksFrontend final : public Frontend {
