@@ -8,6 +8,7 @@
 #pragma once
 
 #include <functional>
+#include <unordered_map>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
@@ -24,7 +25,6 @@ class InvertedIndex {
  public:
   explicit InvertedIndex(int words) : postings_(static_cast<std::size_t>(words)) {}
 
-  /// Ids are small and dense: memory grows with the largest.
   void add(KeyframeId keyframe, const BowVector& bow);
   void remove(KeyframeId keyframe, const BowVector& bow);
   /// The most similar ones first, equal ones in order of id. `allowed`, if given, leaves some out.
@@ -32,12 +32,17 @@ class InvertedIndex {
 
  private:
   struct Posting {
-    std::int32_t keyframe;
+    std::int32_t slot;
     float weight;
   };
+  std::int32_t take_slot(KeyframeId keyframe);
+
   std::vector<std::vector<Posting>> postings_;
-  std::vector<float> score_;  // by keyframe, zero between queries
-  std::vector<std::int32_t> touched_;
+  std::unordered_map<KeyframeId, std::int32_t> slots_;  // dense numbers: ids come from files and may be huge
+  std::vector<KeyframeId> keyframes_;                   // by slot
+  std::vector<std::int32_t> free_;                      // slots
+  std::vector<float> score_;                            // by slot, zero between queries
+  std::vector<std::int32_t> touched_;                   // slots
 };
 
 }  // namespace fbvins

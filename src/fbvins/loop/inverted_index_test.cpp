@@ -46,6 +46,18 @@ TEST(InvertedIndex, EqualOnesComeInOrderOfId) {
   EXPECT_EQ(hits[2].keyframe, KeyframeId{7});
 }
 
+TEST(InvertedIndex, MemoryDoesNotGrowWithTheIdsOfAFile) {
+  InvertedIndex index(kWords);
+  constexpr std::int64_t kLargest = (std::int64_t{1} << 62) - 1;
+  for (const std::int64_t id : {std::int64_t{5}, kLargest}) index.add(KeyframeId{id}, {{3, 1.0f}});
+  index.remove(KeyframeId{5}, {{3, 1.0f}});
+  index.add(KeyframeId{kLargest - 1}, {{3, 0.5f}});
+  const auto hits = index.query({{3, 1.0f}}, 10);
+  ASSERT_EQ(hits.size(), 2u);
+  EXPECT_EQ(hits[0].keyframe, KeyframeId{kLargest});
+  EXPECT_EQ(hits[1].keyframe, KeyframeId{kLargest - 1});
+}
+
 TEST(InvertedIndex, LeavesOutWhatIsNotAllowedOrNotThere) {
   InvertedIndex index(kWords);
   const BowVector words{{1, 0.5f}, {4, 0.5f}};

@@ -10,7 +10,7 @@
 namespace fbvins {
 
 /// The keyframes of `second` are processed as a flight that continues `first`; then everything is optimised with six degrees of
-/// freedom. An error where they have no place in common.
+/// freedom. An error where they have no place in common, or a keyframe: a map merged with itself would hold everything twice.
 Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary);
 
 }  // namespace fbvins

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/map_merge.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "fbvins/loop/map_file.hpp"
@@ -32,6 +33,11 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   const auto from_file = merge_maps(a, *parse_map(std::as_bytes(std::span(bytes)), "b"), {}, vocabulary());
   ASSERT_TRUE(from_file.ok()) << "words are not kept in files";
   EXPECT_EQ(serialise_map(*from_file), serialise_map(*both));
+  const auto twice = merge_maps(a, a, {}, vocabulary());
+  ASSERT_FALSE(twice.ok()) << "a map merged with itself";
+  EXPECT_EQ(twice.error().message,
+            fmt::format("{0} of its {0} keyframes are in the other map already: they would be there twice", a.size()));
+  EXPECT_FALSE(merge_maps(*both, b, {}, vocabulary()).ok()) << "a part of itself";
   PlaceMap boosted = b;
   boosted.boosted = true;
   EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
