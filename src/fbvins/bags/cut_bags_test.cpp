@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "fbvins/bags/bag_contents.hpp"
+#include "fbvins/bags/decompress.hpp"
 #include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
@@ -173,6 +174,33 @@ TEST(CutBags, Ros1WithLz4) { expect_beginnings("lz4", test::packed_ros1(files().
 TEST(CutBags, Ros1WithBz2) {
   expect_beginnings("bz2", test::packed_ros1(bytes_of(files().path("tiny.bag")), "bz2"), open_ros1, kTinyReadings, kTinyReadings);
 }
+/// Kilobytes of chunks that unpack to gigabytes.
+TEST(CutBags, ABagThatUnpacksToAThousandTimesItsSizeIsLeftOut) {
+  std::string bag = "#ROSBAG V2.0\n";
+  const std::string zeros(std::size_t{15} << 20u, '\0');
+  const auto piece = [&](const std::string& bytes) {
+    append_le(bag, static_cast<std::uint32_t>(bytes.size()));
+    bag += bytes;
+  };
+  std::string size, header;
+  append_le(size, static_cast<std::uint32_t>(zeros.size()));
+  for (const auto& [name, value] : {std::pair<std::string, std::string>{"op", "\x05"}, {"compression", "bz2"}, {"size", size}}) {
+    append_le(header, static_cast<std::uint32_t>(name.size() + 1 + value.size()));
+    header += name + "=" + value;
+  }
+  const std::string chunk = test::packed("bz2", zeros);
+  for (int i = 0; i < 100; ++i) piece(header), piece(chunk);
+  ASSERT_LT(bag.size(), 50'000u);
+  auto reader = open_ros1(bag);
+  ASSERT_TRUE(reader);
+  EXPECT_FALSE((*reader)->next());
+  const BagDamage& damage = (*reader)->damage();
+  EXPECT_LT(damage.parts, 12) << "chunks that were unpacked, and the sentence";
+  const Unpacked one = unpack("bz2", test::packed("bz2", std::string(std::size_t{40} << 20u, '\0')), 40u << 20u);
+  EXPECT_TRUE(one.bytes.empty());
+  EXPECT_FALSE(one.whole);
+}
+
 TEST(CutBags, Mcap) { expect_beginnings("plain", files().mcap, open_mcap, 60); }
 TEST(CutBags, McapWithLz4) { expect_beginnings("lz4", test::packed_mcap(files().mcap, "lz4"), open_mcap, kMcapChunk_readings); }
 TEST(CutBags, McapWithZstd) {

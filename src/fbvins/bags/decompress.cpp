@@ -6,6 +6,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 
 namespace fbvins {
@@ -62,7 +63,7 @@ bool unpack_bz2(std::string_view in, Room& room) {
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return false;
   const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end(&stream, BZ2_bzDecompressEnd);
   stream.next_in = const_cast<char*>(in.data());  // NOLINT: the library does not write there
-  stream.avail_in = static_cast<unsigned>(std::min<std::size_t>(in.size(), kLargestUnpacked_bytes));
+  stream.avail_in = static_cast<unsigned>(std::min<std::size_t>(in.size(), std::numeric_limits<unsigned>::max()));
   while (true) {
     if (room.left() == 0 && !room.grow()) return room.full();
     const auto before = static_cast<unsigned>(room.left());
@@ -109,8 +110,9 @@ Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint6
                                              : nullptr;
   if (work == nullptr) return {{}, false, false};
   if (compression == "zstd" && size == 0) size = size_in_frame(bytes);
-  if (size > kLargestUnpacked_bytes) return {};
-  Room out_room(std::move(room), kFirst_bytes + kFirstRatio * bytes.size(), size == 0 ? kLargestUnpacked_bytes : size);
+  const std::uint64_t most = largest_unpacked_bytes(bytes.size());
+  if (size > most) return {};
+  Room out_room(std::move(room), kFirst_bytes + kFirstRatio * bytes.size(), size == 0 ? most : size);
   const bool ended = work(bytes, out_room);
   Unpacked out{out_room.take(), true, ended};
   if (size != 0 && out.bytes.size() != size) out.whole = false;

@@ -18,12 +18,17 @@ struct Unpacked {
   bool whole = false;
 };
 
-/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is that of the output, which is never larger; 0: unknown, at most
-/// `kLargestUnpacked_bytes`. The memory of `room` is reused.
+/// "", "none", "lz4" (frames), "bz2" or "zstd". `size` is that of the output, which is never larger; 0: unknown. Of either, at
+/// most `largest_unpacked_bytes` are unpacked. The memory of `room` is reused.
 Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room = {});
 
 inline bool is_plain(std::string_view compression) { return compression.empty() || compression == "none"; }
 
-inline constexpr std::uint64_t kLargestUnpacked_bytes = std::uint64_t{256} << 20u;
+/// What a chunk of so many bytes may unpack to: a few kilobytes of zeros, compressed again and again, would keep the reader busy
+/// for minutes. Images, also black ones, in the chunks that ROS and MCAP write, stay far below.
+inline constexpr std::uint64_t largest_unpacked_bytes(std::uint64_t packed) {
+  constexpr std::uint64_t kFree = std::uint64_t{16} << 20u, kRatio = 1000, kMost = std::uint64_t{256} << 20u;
+  return packed > (kMost - kFree) / kRatio ? kMost : kFree + kRatio * packed;
+}
 
 }  // namespace fbvins

@@ -167,8 +167,22 @@ class Ros1Bag final : public BagReader {
     return false;
   }
 
+  /// Of compressed chunks in a row so much is unpacked, then nothing more: the bag is made to keep the reader busy.
+  bool is_affordable(const Head& chunk) {
+    constexpr std::uint64_t kFree = std::uint64_t{64} << 20u, kRatio = 1000;
+    if (is_plain(chunk.fields.text("compression"))) return true;
+    return unpacked_bytes_ <= kFree + kRatio * (chunk.data + chunk.length);
+  }
+
   void load_chunk(std::uint64_t at, const Head& head) {
+    if (!is_affordable(head)) {
+      complain_at(at, "what is compressed here unpacks to a thousand times its size: it is left out");
+      next_ = bytes_->size();
+      loaded_.clear();
+      return;
+    }
     loaded_whole_ = unpack_chunk(head, loaded_);
+    unpacked_bytes_ += loaded_.size();
     loaded_at_ = at;
     position_ = 0;
     if (loaded_whole_ || !head.whole) return;
@@ -184,15 +198,15 @@ class Ros1Bag final : public BagReader {
       const auto length = in.get<std::uint32_t>();
       const std::size_t data_at = position_ + in.position();
       const std::string_view data = in.take(length);
-      if (!in.ok() || !fields.ok()) {
+      const auto op = fields.number<std::uint8_t>("op");
+      if (!in.ok() || !fields.ok() || !op) {
         if (loaded_whole_) complain_at(loaded_at_, "there is no whole record here in the chunk");
         position_ = loaded_.size();
         return std::nullopt;
       }
       position_ += in.position();
-      const std::uint8_t op = fields.number<std::uint8_t>("op").value_or(0);
-      if (op == kConnection) take_connection(fields, data);
-      if (op != kMessage) continue;
+      if (*op == kConnection) take_connection(fields, data);
+      if (*op != kMessage) continue;
       const auto known = connections_.find(fields.number<std::uint32_t>("conn").value_or(~0u));
       const auto time = fields.number<std::uint64_t>("time");
       if (known == connections_.end() || !time) {
@@ -217,7 +231,7 @@ class Ros1Bag final : public BagReader {
   std::uint64_t next_;
   std::string loaded_, kept_;  ///< records of the chunk in work, and of the one that read() used last
   std::string packed_;         ///< the last one's bytes in the file
-  std::uint64_t loaded_at_ = 0, kept_at_ = 0;
+  std::uint64_t loaded_at_ = 0, kept_at_ = 0, unpacked_bytes_ = 0;
   bool loaded_whole_ = true, indexed_ = false;
   std::size_t position_ = 0;
   std::map<std::uint32_t, std::size_t> connections_;
