@@ -108,19 +108,25 @@ RowVerdict ImuRowParser::operator()(std::string_view line, ImuSample& sample, st
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance) {
   std::vector<Time> stamps;
   for (const ImageRow& row : left) stamps.push_back(row.t);
-  if (const Duration median = measure_intervals(stamps).median; median.ns > 0)
-    tolerance.ns = std::min(tolerance.ns, median.ns / 2);
+  const Duration half_interval{measure_intervals(stamps).median.ns / 2};
+  if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
   const auto distance = [&](std::size_t l, std::size_t r) { return std::abs((left[l].t - right[r].t).ns); };
   PairedFrames out;
   std::size_t r = 0;
+  const auto skip_right = [&](std::size_t next_left) {
+    const bool before_free = next_left == 0 || right[r].t > left[next_left - 1].t + half_interval;
+    const bool after_free = next_left == left.size() || right[r].t + half_interval < left[next_left].t;
+    if (before_free && after_free) out.frames.push_back({right[r].t, "", right[r].file});
+    ++r, ++out.right_only;
+  };
   for (std::size_t l = 0; l < left.size(); ++l) {
-    while (r < right.size() && right[r].t < left[l].t && distance(l, r) > tolerance.ns) ++r, ++out.right_only;
-    while (r + 1 < right.size() && distance(l, r + 1) < distance(l, r)) ++r, ++out.right_only;
+    while (r < right.size() && right[r].t < left[l].t && distance(l, r) > tolerance.ns) skip_right(l);
+    while (r + 1 < right.size() && distance(l, r + 1) < distance(l, r)) skip_right(l);
     const bool paired = r < right.size() && distance(l, r) <= tolerance.ns;
     out.frames.push_back({left[l].t, left[l].file, paired ? right[r].file : ""});
     paired ? ++r : ++out.left_only;
   }
-  out.right_only += static_cast<int>(right.size() - r);
+  while (r < right.size()) skip_right(left.size());
   return out;
 }
 

@@ -25,12 +25,12 @@ class ImuRowParser {
 };
 
 struct PairedFrames {
-  std::vector<FrameEntry> frames;  ///< one for each left image
-  int left_only = 0;
-  int right_only = 0;  ///< right images that are in no frame
+  std::vector<FrameEntry> frames;     ///< in order of time
+  int left_only = 0, right_only = 0;  ///< images without a partner
 };
 
-/// Each left image with the nearest right one within the tolerance (at most half the median interval).
+/// Each left image with the nearest right one within the tolerance (at most half the median interval). A right image farther
+/// than half the interval from all left ones, where those are missing, is a frame of its own; one that is nearer is left out.
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance);
 
 struct Intervals {

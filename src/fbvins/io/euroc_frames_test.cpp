@@ -40,9 +40,20 @@ TEST(PairFrames, HalfTheIntervalBoundsAGenerousTolerance) {
   EXPECT_EQ(p.right_only, 1);
 }
 
+TEST(PairFrames, RightImagesAreFramesWhereLeftOnesAreMissing) {
+  const PairedFrames p =
+      pair_frames(at_ms({100, 150, 200, 300}), at_ms({50, 100, 150, 200, 250, 304, 350, 400}), Duration{3 * kMs});
+  std::vector<std::string> frames;
+  for (const FrameEntry& f : p.frames) frames.push_back(f.left_file + "/" + f.right_file);
+  EXPECT_EQ(frames, (std::vector<std::string>{"/50", "100/100", "150/150", "200/200", "/250", "300/", "/350", "/400"}));
+  EXPECT_EQ(p.left_only, 1);
+  EXPECT_EQ(p.right_only, 5) << "304 ms is too near to 300 ms to be an instant of its own";
+}
+
 TEST(PairFrames, OneSideMayBeEmpty) {
   EXPECT_EQ(pair_frames(at_ms({0, 50}), {}, Duration{kMs}).left_only, 2);
   EXPECT_EQ(pair_frames({}, at_ms({0, 50}), Duration{kMs}).right_only, 2);
+  EXPECT_EQ(pair_frames({}, at_ms({0, 50}), Duration{kMs}).frames.size(), 2u);
 }
 
 TEST(MeasureIntervals, MedianIsTheRateAndTheLongestIsFound) {
