@@ -18,6 +18,7 @@ const REASONS = {
   implausible_speed: "the speed became implausible",
   solver_failed: "the solver failed",
   one_camera: "only one camera delivers",
+  frontend_fault: "the frontend returned impossible features",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }

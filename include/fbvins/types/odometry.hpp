@@ -33,8 +33,10 @@ enum class HealthReason {
   implausible_bias,
   implausible_speed,
   solver_failed,
-  one_camera,  ///< no stereo matches
+  one_camera,      ///< no stereo matches
+  frontend_fault,  ///< the frontend returned features that cannot be: they were left out
 };
+inline constexpr HealthReason kLastHealthReason = HealthReason::frontend_fault;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);

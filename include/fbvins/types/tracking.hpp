@@ -30,11 +30,11 @@ struct Observation {
   Mat2 sqrt_information = Mat2::Identity();
 };
 
-/// A feature in the newest frame. Features keep their id as long as they are followed.
+/// A feature in the newest frame, seen by at least one camera. Features keep their id as long as they are followed.
 struct TrackedFeature {
   TrackId id;
-  Observation left;
-  std::optional<Observation> right;  ///< present when matched in the right image
+  std::optional<Observation> left;   ///< absent while the left camera delivers no images
+  std::optional<Observation> right;  ///< present when matched, or followed, in the right image
   int age_frames = 0;                ///< 0 when detected in this frame
 };
 

@@ -23,7 +23,7 @@ HealthState state_of(const std::string& name) {
 }
 
 HealthReason reason_of(const std::string& name) {
-  for (int i = 0; i <= static_cast<int>(HealthReason::one_camera); ++i)
+  for (int i = 0; i <= static_cast<int>(kLastHealthReason); ++i)
     if (to_string(static_cast<HealthReason>(i)) == name) return static_cast<HealthReason>(i);
   return HealthReason::none;
 }

@@ -66,18 +66,20 @@ struct Functor {
   }
 };
 
-/// The reprojection, from its definition: a point on a ray of the host's left camera at depth 1 / rho.
+/// The reprojection, from its definition: a point on a ray of one of the host's cameras at depth 1 / rho.
 /// Of x = (landmark, calibration), or also (host, target) where these are two frames.
 struct Reprojection : ResidualOf<Reprojection> {
   NavState host, target;
   Calibration calibration;
   WindowObservation o;
-  bool same_frame = false;
+  bool same_frame = false, right_ray = false;
 
   template <class T>
   Vec<T> in_host_body(const T* l, const T* c) const {
     const Vec<T> p_C = Vec<T>(l[0], l[1], T(1)) / l[2];
-    return (calibration.T_BC0.q.cast<T>() * exp(c + 3)) * p_C + calibration.T_BC0.p.cast<T>() + Eigen::Map<const Vec<T>>(c);
+    const Pose<B, C0> T_BC = ray_camera(calibration, right_ray);
+    const T* d = c + (right_ray ? 6 : 0);
+    return (T_BC.q.cast<T>() * exp(d + 3)) * p_C + T_BC.p.cast<T>() + Eigen::Map<const Vec<T>>(d);
   }
   template <class T>
   Vec<T> in_target_body(T const* const* x) const {

@@ -51,8 +51,9 @@ WindowSnapshot Estimator::snapshot() const { return snapshot_of(window_, calibra
 
 Vec3 Estimator::gravity_W() const { return window_.tilt().gravity_W(options_.gravity_mps2); }
 
-Estimate Estimator::process(const TrackedFrame& frame) {
+Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
+  const TrackedFrame& frame = contract_.enforced(tracked);
   const Duration rest = rest_.update(frame);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
@@ -88,10 +89,19 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
     shrink_window(solution, out);
     return;
   }
+  refuse_start(out.odometry);
+}
+
+/// Nothing of it is published.
+void Estimator::refuse_start(Odometry& out) {
   running_ = false;
   calibration_ = calibrated_;
   initialiser_.reset();
-  out.odometry.health = {HealthState::initialising, HealthReason::alignment_refused};
+  window_.clear();
+  const EstimatorStats stats = out.stats;
+  out = {};
+  out.stats = stats;
+  out.health = {HealthState::initialising, HealthReason::alignment_refused};
 }
 
 void Estimator::open_window(const InitialSolution& start) {
@@ -238,7 +248,7 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
 }
 
 Health Estimator::judge(const TrackedFrame& frame) {
-  return health_.judge(frame, window_.newest().state, landmarks_in_view(window_), failed_solves_);
+  return health_.judge(frame, window_.newest().state, landmarks_in_view(window_), failed_solves_, contract_.broken());
 }
 
 void Estimator::restart() {

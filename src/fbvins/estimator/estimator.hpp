@@ -11,6 +11,7 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/frame_contract.hpp"
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
@@ -37,7 +38,7 @@ class Estimator {
   Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before = {});
 
   /// The state at the frame's stamp; health says whether it may be trusted.
-  Estimate process(const TrackedFrame& frame);
+  Estimate process(const TrackedFrame& tracked);
 
   /// For the frontend: the newest state in the window's W, not levelled; not valid before initialisation.
   StatePrior prior() const;
@@ -56,6 +57,7 @@ class Estimator {
   void shrink_window(const WindowSolution& solution, Estimate& out);
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame);
+  void refuse_start(Odometry& out);
   void restart();
   void carry_covariances(Odometry& out);
   void publish(Odometry& out);
@@ -76,6 +78,7 @@ class Estimator {
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;
   HealthJudge health_;
+  FrameContract contract_;
   SlidingWindow window_;
   WindowSolver solver_;
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused

@@ -235,7 +235,7 @@ TEST(Estimator, AFailedSolveKeepsTheLastCovarianceAndEnlargesIt) {
   Odometry before, failed;
   for (int k = 0; k <= 80; ++k) {
     TrackedFrame frame = flight.frame(k);
-    if (k == 80) frame.features[0].left.normalised.x() = std::numeric_limits<double>::quiet_NaN();
+    if (k == 80) frame.features[0].left->normalised.x() = 1e300;  // its square is infinite
     before = std::exchange(failed, estimator.process(frame).odometry);
   }
   ASSERT_EQ(before.health.state, HealthState::good);
@@ -278,6 +278,44 @@ TEST(Estimator, FliesOnWithOneCamera) {
   const int first = flown.first_pose();
   EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera}));
   for (int k = first; k < 180; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
+}
+
+TEST(Estimator, FliesOnWithTheRightCameraAlone) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 9);
+  flight.left_camera = [](int k) { return k < 60 || k >= 160; };
+  const Flown flown = fly(flight, 220);
+  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera}));
+  EXPECT_GT(flown.odometry[155].stats.landmarks, 40) << "new ones, too";
+  for (int k = flown.first_pose(); k < 220; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
+  EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
+}
+
+TEST(Estimator, AStartNeedsBothCamerasAndSaysSo) {
+  for (const bool left : {true, false}) {
+    SimulatedFlight flight(Motion(0.6, 0.3), 14);
+    flight.left_camera = [&](int k) { return left || k >= 30; };
+    flight.right_camera = [&](int k) { return !left || k >= 30; };
+    const Flown flown = fly(flight, 60);
+    for (int k = 0; k < 30; ++k)
+      EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::initialising, HealthReason::one_camera})) << k;
+    EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
+  }
+}
+
+TEST(Estimator, ARefusedStartIsNotPublished) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 1);
+  EstimatorOptions options = exact_noise();
+  options.max_speed_mps = 0.01;  // every start in motion is implausible
+  Estimator estimator(flight.rig, options);
+  int refused = 0;
+  for (int k = 0; k < 40; ++k) {
+    const Odometry o = estimator.process(flight.frame(k)).odometry;
+    ASSERT_EQ(o.health.state, HealthState::initialising);
+    refused += o.health.reason == HealthReason::alignment_refused && o.stats.iterations > 0;
+    EXPECT_TRUE(estimator.snapshot().frames.empty()) << k;
+    EXPECT_TRUE(o.pose_covariance.isZero(0)) << k;
+  }
+  EXPECT_GT(refused, 0);
 }
 
 TEST(Estimator, WaitsForImages) {

@@ -22,7 +22,9 @@ Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
 }  // namespace
 
 Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) {
-  return {HealthState::initialising, without_images(frame) ? HealthReason::no_images : reason};
+  if (without_images(frame)) reason = HealthReason::no_images;
+  else if (!frame.has_left || !frame.has_right) reason = HealthReason::one_camera;  // a start needs the pair
+  return {HealthState::initialising, reason};
 }
 
 void HealthJudge::pass(const TrackedFrame& frame) {
@@ -38,7 +40,8 @@ bool HealthJudge::images_missing(const TrackedFrame& frame) const {
   return previous_image_ && (frame.t - *previous_image_).seconds() > hole_s;
 }
 
-Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves) {
+Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves,
+                          int broken_features) {
   const bool few_tracks = landmarks_in_view < options_.min_tracks;
   if (!few_tracks) last_good_tracking_ = frame.t;
   const Duration blind = frame.t - last_good_tracking_.value_or(frame.t);
@@ -54,6 +57,7 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int 
   if (failed_solves > 0) return degraded(HealthReason::solver_failed);
   if (no_imu || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
   if (images_missing(frame)) return degraded(HealthReason::no_images);
+  if (broken_features > 0) return degraded(HealthReason::frontend_fault);
   if (!frame.has_left || !frame.has_right) return degraded(HealthReason::one_camera);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
   if (few_tracks) return degraded(HealthReason::few_tracks);

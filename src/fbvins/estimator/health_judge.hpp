@@ -19,8 +19,9 @@ class HealthJudge {
 
   /// The window starts with this frame.
   void start(const TrackedFrame& frame) { last_good_tracking_ = frame.t; }
-  /// Health at a frame in the window, after its solve.
-  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves);
+  /// Health at a frame in the window, after its solve. `broken_features`: of the frame, that were left out.
+  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves,
+               int broken_features = 0);
   /// Health at a frame before the start; `reason` is what the initialiser waits for.
   static Health before_start(const TrackedFrame& frame, HealthReason reason);
   /// To be called after each frame, whether it was judged or not.

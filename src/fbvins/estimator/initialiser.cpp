@@ -41,7 +41,7 @@ WindowPrior held_still() {
 
 int stereo_features(const TrackedFrame& frame) {
   int n = 0;
-  for (const TrackedFeature& f : frame.features) n += f.right.has_value();
+  for (const TrackedFeature& f : frame.features) n += f.left && f.right;
   return n;
 }
 
@@ -51,7 +51,8 @@ void leave_out_moving(std::vector<TrackedFrame>& frames) {
   std::unordered_set<TrackId> moving;
   for (const TrackedFrame& frame : frames)
     for (const TrackedFeature& f : frame.features)
-      if ((f.left.pixel - first.try_emplace(f.id, f.left.pixel).first->second).norm() > kStill_px) moving.insert(f.id);
+      if (f.left && (f.left->pixel - first.try_emplace(f.id, f.left->pixel).first->second).norm() > kStill_px)
+        moving.insert(f.id);
   for (TrackedFrame& frame : frames)
     std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
 }

@@ -19,10 +19,21 @@ struct RayInCamera {
   Vec3 a, b;
 };
 
-RayInCamera ray_in_camera(const Vec2& ray, const PairGeometry& pair, const CameraGeometry& cameras, bool right) {
-  const Vec3 direction_B = cameras.R_BC0 * Vec3(ray.x(), ray.y(), 1);
+/// `from_right`: the ray is of the host's right camera.
+RayInCamera ray_in_camera(const Vec2& ray, bool from_right, const PairGeometry& pair, const CameraGeometry& cameras, bool right) {
+  const Vec3 direction_B = cameras.R_BC[from_right] * Vec3(ray.x(), ray.y(), 1);
   const Mat3& R_CB = cameras.R_CB[right];
-  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC0 + pair.t_th - cameras.t_BC[right])};
+  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC[from_right] + pair.t_th - cameras.t_BC[right])};
+}
+
+/// The landmark in a camera of a frame, times its inverse depth (W2, W3).
+Vec3 scaled_point(const Landmark& landmark, const Frame& target, bool right, const FrameList& frames,
+                  const Calibration& calibration) {
+  const CameraGeometry cameras(calibration);
+  PairGeometry pair;
+  pair.set(frames.at(landmark.host).state.T_WB, target.state.T_WB);
+  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.right_ray, pair, cameras, right);
+  return line.a + landmark.alpha_beta_rho.z() * line.b;
 }
 
 }  // namespace
@@ -31,14 +42,17 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
   const CameraGeometry cameras(calibration);
   const Pose<W, B>& host = frames.at(landmark.host).state.T_WB;
-  const Vec2 ray = landmark.sightings.front().left.normalised;
+  const Sighting& first = landmark.sightings.front();
+  const bool from_right = !first.left;
+  const Vec2 ray = from_right ? first.right->normalised : first.left->normalised;
   double numerator = 0, information = 0;
   const auto each = [&](auto&& visit) {
     for (const Sighting& s : landmark.sightings) {
       PairGeometry pair;
       pair.set(host, frames.at(s.frame).state.T_WB);
-      if (s.frame != landmark.host) visit(ray_in_camera(ray, pair, cameras, false), s.left);
-      if (s.right) visit(ray_in_camera(ray, pair, cameras, true), *s.right);
+      const bool of_host = s.frame == landmark.host;
+      if (s.left && !of_host) visit(ray_in_camera(ray, from_right, pair, cameras, false), *s.left);
+      if (s.right && !(of_host && from_right)) visit(ray_in_camera(ray, from_right, pair, cameras, true), *s.right);
     }
   };
   each([&](const RayInCamera& line, const Observation& o) {
@@ -60,32 +74,34 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   });
   if (worst > kMaxError_sigma * kMaxError_sigma) return false;
   landmark.alpha_beta_rho << ray, rho;
+  landmark.right_ray = from_right;
   return true;
 }
 
 Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const FrameList& frames,
                             const Calibration& calibration) {
-  const CameraGeometry cameras(calibration);
-  PairGeometry pair;
-  pair.set(frames.at(landmark.host).state.T_WB, target.state.T_WB);
-  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), pair, cameras, false);
-  return line.a + landmark.alpha_beta_rho.z() * line.b;
+  return scaled_point(landmark, target, false, frames, calibration);
 }
 
 void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration) {
+  const Sighting* sighting = landmark.sighting_in(new_host);
+  const bool right_ray = sighting != nullptr && !sighting->left;
   if (landmark.triangulated) {
-    const Vec3 p = scaled_point_in_camera(landmark, frames.at(new_host), frames, calibration);
+    const Vec3 p = scaled_point(landmark, frames.at(new_host), right_ray, frames, calibration);
     if (p.z() < kMinScaledDepth) landmark.triangulated = false;
     else landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
   }
   landmark.host = new_host;
+  landmark.right_ray = right_ray;
 }
 
 void set_velocities(Sighting& before, Sighting& now, double gap_s) {
   if (gap_s <= 0 || gap_s > kLongestGap_s) return;
-  now.left_velocity = (now.left.normalised - before.left.normalised) / gap_s;
-  now.right_velocity =
-      now.right && before.right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
+  const bool left = now.left && before.left, right = now.right && before.right;
+  if (!left && !right) return;
+  if (left) now.left_velocity = (now.left->normalised - before.left->normalised) / gap_s;
+  now.right_velocity = right ? Vec2((now.right->normalised - before.right->normalised) / gap_s) : now.left_velocity;
+  if (!left) now.left_velocity = now.right_velocity;
   // The sighting before has differences on both sides now: their mean is its velocity to second order.
   const double share = before.left_velocity.isZero(0) ? 1.0 : 0.5;
   before.left_velocity += share * (now.left_velocity - before.left_velocity);

@@ -29,12 +29,12 @@ struct LandmarkPriorJacobian {
   using Mat36 = Eigen::Matrix<double, 3, 6>;
   Mat36 host;       ///< by the host's (p, theta)
   Mat3 point;       ///< by (alpha, beta, rho)
-  Mat36 extrinsic;  ///< by T_BC0's (p, theta)
+  Mat36 extrinsic;  ///< by the (p, theta) of the ray's camera in the body
 
   LandmarkPriorJacobian(const CameraGeometry& cameras, const Pose<W, B>& T_WB, const WindowLandmark& l,
                         const LandmarkPrior& prior) {
     const Mat3 R_WB = T_WB.R();
-    const Mat3 SR_WB = prior.sqrt_information * R_WB, SR_WC = SR_WB * cameras.R_BC0;
+    const Mat3 SR_WB = prior.sqrt_information * R_WB, SR_WC = SR_WB * cameras.R_BC[l.right_ray];
     const double depth = 1.0 / l.alpha_beta_rho.z();
     const Vec3 p_C = depth * Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
     host << prior.sqrt_information, -SR_WB * hat(point_in_host(cameras, l));

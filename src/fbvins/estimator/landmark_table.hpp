@@ -16,11 +16,10 @@
 
 namespace fbvins {
 
-/// The observations of a landmark by one frame's cameras.
+/// The observations of a landmark by one frame's cameras, one at least.
 struct Sighting {
   FrameId frame;
-  Observation left;
-  std::optional<Observation> right;
+  std::optional<Observation> left, right;
   Vec2 left_velocity = Vec2::Zero();  ///< of the normalised position, 1/s
   Vec2 right_velocity = Vec2::Zero();
 };
@@ -30,6 +29,7 @@ struct Landmark {
   LandmarkId id;
   TrackId track;
   FrameId host;
+  bool right_ray = false;  ///< on a ray of the host's right camera: the left one did not see it
   Vec3 alpha_beta_rho = Vec3::Zero();
   bool triangulated = false;
   std::optional<LandmarkPrior> prior;  ///< of a re-observed one

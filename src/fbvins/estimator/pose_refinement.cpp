@@ -44,13 +44,12 @@ PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Ca
   for (int i = 0; i < max_iterations; ++i) {
     NormalEquations n;
     const Mat3 R_BW = out.T_WB.R().transpose();
-    int left_inliers = 0;
     for (const PointSighting& s : sightings) {
       const Vec3 p_B = R_BW * (s.p_W - out.T_WB.p);
-      n.add(s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BW);
-      left_inliers = n.inliers;
+      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BW);
+      const int of_left = n.inliers;
       if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[1], cameras.t_BC[1], R_BW);
-      n.inliers = left_inliers;
+      n.inliers = s.feature->left ? of_left : n.inliers;
     }
     out.inliers = n.inliers;
     const Eigen::LDLT<Mat6> ldlt(n.H);

@@ -17,7 +17,7 @@ struct PointSighting {  // a landmark of known position and its observations
 
 struct PoseRefinement {
   Pose<W, B> T_WB;
-  int inliers = 0;         ///< left observations within 3 sigma
+  int inliers = 0;         ///< points whose left observation, or right one where there is no left one, is within 3 sigma
   bool converged = false;  ///< or stopped at max_iterations with inliers
 };
 

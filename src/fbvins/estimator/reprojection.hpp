@@ -11,7 +11,8 @@
 namespace fbvins {
 
 /// Relative pose of the bodies at host and target frame, for points scaled by their inverse depth (W2):
-/// p_Bt = R_th * x_h + rho * t_th, with x_h = R_BC0 * (alpha, beta, 1) + rho * t_BC0.
+/// p_Bt = R_th * x_h + rho * t_th, with x_h = R_BC * (alpha, beta, 1) + rho * t_BC
+/// of the camera of the host that the ray belongs to.
 /// The *_first values are the same at the linearisation points, where Jacobians are taken (W9).
 struct PairGeometry {
   Mat3 R_th, R_th_first;
@@ -32,20 +33,23 @@ struct PairGeometry {
 
 /// Calibration as matrices, computed once per evaluation.
 struct CameraGeometry {
-  Mat3 R_BC0;
-  Vec3 t_BC0;
+  Mat3 R_BC[2];  ///< left, right
   Mat3 R_CB[2];  ///< left, right
   Vec3 t_BC[2];  ///< left, right
   double time_offset_s = 0;
 
   explicit CameraGeometry(const Calibration& calibration)
-      : R_BC0(calibration.T_BC0.R()), t_BC0(calibration.T_BC0.p), time_offset_s(calibration.time_offset_s) {
-    R_CB[0] = R_BC0.transpose();
-    t_BC[0] = t_BC0;
-    R_CB[1] = calibration.T_BC1.R().transpose();
-    t_BC[1] = calibration.T_BC1.p;
+      : R_BC{calibration.T_BC0.R(), calibration.T_BC1.R()},
+        t_BC{calibration.T_BC0.p, calibration.T_BC1.p},
+        time_offset_s(calibration.time_offset_s) {
+    for (int i = 0; i < 2; ++i) R_CB[i] = R_BC[i].transpose();
   }
 };
+
+/// The host's camera that a landmark's ray belongs to, whichever it is.
+inline Pose<B, C0> ray_camera(const Calibration& calibration, bool right) {
+  return right ? calibration.T_BC1.cast_frames<B, C0>() : calibration.T_BC0;
+}
 
 /// Landmarks with a smaller depth than this (scaled by inverse depth) have no projection.
 inline constexpr double kMinScaledDepth = 1e-3;
@@ -58,10 +62,12 @@ struct WindowObservation {
   Mat2 sqrt_information = Mat2::Identity();
 };
 
-/// A point on the ray (alpha, beta, 1) of its host frame's left camera, at inverse depth rho (W1).
+/// A point on the ray (alpha, beta, 1) of its host frame's left camera, or of the right one if that alone saw it first, at
+/// inverse depth rho (W1).
 struct WindowLandmark {
   LandmarkId id = {};  ///< in the sliding window
   int host = 0;
+  bool right_ray = false;     ///< the ray is of the right camera
   int first_observation = 0;  ///< its observations are consecutive, sorted by frame
   int observation_count = 0;
   Vec3 alpha_beta_rho = Vec3::Zero();
@@ -74,7 +80,7 @@ enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 =
 /// The landmark in its host's body, scaled by its inverse depth (W2).
 inline Vec3 scaled_point_in_host(const CameraGeometry& cameras, const WindowLandmark& l) {
   const Vec3& m = l.alpha_beta_rho;
-  return cameras.R_BC0 * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC0;
+  return cameras.R_BC[l.right_ray] * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC[l.right_ray];
 }
 
 /// Whitened residual (W5); false where there is no projection.
@@ -111,15 +117,16 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
       Eigen::Map<Vec3>(J + kTarget) = -translation;
       Eigen::Map<Vec3>(J + kTarget + 3) = a.cross(p_B);
     }
-    const Vec3 c = cameras.R_BC0.transpose() * b;
+    const Vec3 c = cameras.R_BC[l.right_ray].transpose() * b;
     J[kPoint] = c.x();
     J[kPoint + 1] = c.y();
-    J[kPoint + 2] = b.dot(cameras.t_BC0) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.right]);
+    J[kPoint + 2] = b.dot(cameras.t_BC[l.right_ray]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.right]);
     J[kResidual] = r[k];
     if constexpr (Columns == 32) {
       const Vec3 m(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
-      Eigen::Map<Vec3>(J + kExtrinsic0) = rho * b;
-      Eigen::Map<Vec3>(J + kExtrinsic0 + 3) = m.cross(c);
+      const int of_ray = l.right_ray ? kExtrinsic1 : kExtrinsic0;
+      Eigen::Map<Vec3>(J + of_ray) = rho * b;
+      Eigen::Map<Vec3>(J + of_ray + 3) = m.cross(c);
       double* camera = J + (o.right ? kExtrinsic1 : kExtrinsic0);
       Eigen::Map<Vec3>(camera) -= rho * a;
       Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);

@@ -9,7 +9,11 @@ namespace fbvins {
 void RestDetector::start(const TrackedFrame& frame) {
   anchor_.clear();
   since_ = frame.t;
-  for (const TrackedFeature& f : frame.features) anchor_.emplace(f.id, f.left.pixel);
+  for (const TrackedFeature& f : frame.features) {
+    Pixels& pixels = anchor_[f.id];
+    if (f.left) pixels.left = f.left->pixel;
+    if (f.right) pixels.right = f.right->pixel;
+  }
 }
 
 bool RestDetector::imu_is_quiet(const ImuSegment& imu) const {
@@ -32,7 +36,9 @@ Duration RestDetector::update(const TrackedFrame& frame) {
   std::vector<double> motion;
   for (const TrackedFeature& f : frame.features) {
     const auto before = anchor_.find(f.id);
-    if (before != anchor_.end()) motion.push_back((f.left.pixel - before->second).norm());
+    if (before == anchor_.end()) continue;
+    if (f.left && before->second.left) motion.push_back((f.left->pixel - *before->second.left).norm());
+    else if (f.right && before->second.right) motion.push_back((f.right->pixel - *before->second.right).norm());
   }
   bool at_rest = static_cast<int>(motion.size()) >= options_.min_features && imu_is_quiet(frame.imu);
   if (at_rest) {

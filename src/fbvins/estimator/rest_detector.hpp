@@ -3,6 +3,7 @@
 // drift ends it, which motion from frame to frame would not show; and the IMU's readings must be quiet.
 #pragma once
 
+#include <optional>
 #include <unordered_map>
 
 #include "fbvins/types/tracking.hpp"
@@ -30,7 +31,10 @@ class RestDetector {
 
   RestDetectorOptions options_;
   Time since_;
-  std::unordered_map<TrackId, Vec2> anchor_;  ///< pixels at the beginning of the rest
+  struct Pixels {
+    std::optional<Vec2> left, right;
+  };
+  std::unordered_map<TrackId, Pixels> anchor_;  ///< at the beginning of the rest
 };
 
 }  // namespace fbvins

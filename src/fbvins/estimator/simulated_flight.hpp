@@ -27,8 +27,9 @@ class SimulatedFlight {
   int max_features = 120;
   bool reobserves = false;  ///< a point that was out of view is re-observed as the same track
   ImuBias bias{Vec3(0.01, -0.02, 0.03), Vec3(0.05, 0.1, -0.08)};
-  /// Whether frame k has images, a right image, readings; the defaults give all.
+  /// Whether frame k has images, a left one, a right one, readings; the defaults give all.
   std::function<bool(int)> images = [](int) { return true; };
+  std::function<bool(int)> left_camera = [](int) { return true; };
   std::function<bool(int)> right_camera = [](int) { return true; };
   std::function<bool(int)> readings = [](int) { return true; };
   /// Turns an exact pixel displacement into an outlier; nullptr: none.
@@ -58,7 +59,7 @@ class SimulatedFlight {
     TrackedFrame out;
     out.id = FrameId{k};
     out.t = stamp(k);
-    out.has_left = images(k);
+    out.has_left = images(k) && left_camera(k);
     out.has_right = images(k) && right_camera(k);
     if (k > 0 && readings(k)) {
       out.imu = motion_.segment(stamp(k - 1), out.t, Duration::from_seconds(1 / rig.imu_noise.rate_hz), bias);
@@ -100,10 +101,12 @@ class SimulatedFlight {
         else f.id = TrackId{next_track_++};
         in_use.insert(f.id);
         f.left = *left;
-        if (outlier) f.left = shifted(f.left, outlier(k, f.id.value));
+        if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
         if (right_camera(k)) f.right = observe(rig.right, rig.T_BC1.inverse() * p_B);
+        if (!left_camera(k)) f.left.reset();
+        if (!f.left && !f.right) continue;
         out.stats.tracked += followed;
-        out.stats.stereo += f.right.has_value();
+        out.stats.stereo += f.left && f.right;
         still[i] = f.id;
         out.features.push_back(f);
       }

@@ -85,11 +85,12 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
     WindowLandmark l;
     l.id = landmark->id;
     l.host = frames_.index_of(landmark->host);
+    l.right_ray = landmark->right_ray;
     l.alpha_beta_rho = landmark->alpha_beta_rho;
     l.first_observation = static_cast<int>(out.observations.size());
     for (const Sighting& s : landmark->sightings) {
       const int frame = frames_.index_of(s.frame);
-      out.observations.push_back({frame, false, s.left.normalised, s.left_velocity, s.left.sqrt_information});
+      if (s.left) out.observations.push_back({frame, false, s.left->normalised, s.left_velocity, s.left->sqrt_information});
       if (s.right) out.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;

@@ -18,17 +18,18 @@ constexpr double kOutlier_sigma = 4;
 /// Removes the outliers among the observations of a landmark. Returns how many.
 int remove_far_observations(Landmark& landmark, const WindowProblem& solved, const WindowLandmark& numbers) {
   int removed = 0;
-  std::vector<FrameId> gone;
   for (int k = 0; k < numbers.observation_count; ++k) {
     const WindowObservation& o = solved.observations[numbers.first_observation + k];
     if (!(solved.residual(numbers, o).norm() > kOutlier_sigma)) continue;
     ++removed;
-    const FrameId frame = solved.frames[o.frame].id;
-    if (!o.right) gone.push_back(frame);
-    else if (const Sighting* s = landmark.sighting_in(frame)) landmark.sightings[s - landmark.sightings.data()].right.reset();
+    const Sighting* s = landmark.sighting_in(solved.frames[o.frame].id);
+    if (s == nullptr) continue;
+    Sighting& sighting = landmark.sightings[static_cast<std::size_t>(s - landmark.sightings.data())];
+    // The right position was found from the left one: it goes with it.
+    if (!o.right) sighting.left.reset();
+    sighting.right.reset();
   }
-  std::erase_if(landmark.sightings,
-                [&](const Sighting& s) { return std::find(gone.begin(), gone.end(), s.frame) != gone.end(); });
+  std::erase_if(landmark.sightings, [](const Sighting& s) { return !s.left && !s.right; });
   return removed;
 }
 
@@ -70,7 +71,7 @@ int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
 
 /// A landmark very far from its prior is another one; its factor would spoil the solve.
 void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
-  const WindowLandmark numbers{.alpha_beta_rho = landmark.alpha_beta_rho};
+  const WindowLandmark numbers{.right_ray = landmark.right_ray, .alpha_beta_rho = landmark.alpha_beta_rho};
   const Pose<W, B>& host = frames_.at(landmark.host).state.T_WB;
   const double distance_sigma = landmark_prior_residual(CameraGeometry(calibration), host, numbers, *landmark.prior).norm();
   if (distance_sigma < kFarFromPrior * kPriorOutlier_sigma) return;
@@ -89,7 +90,7 @@ void SlidingWindow::remember(const WindowProblem& problem, std::span<const Leavi
   for (std::size_t k = 0; k < leaving.size(); ++k) {
     const WindowLandmark& numbers = problem.landmarks[leaving[k].index];
     Landmark& landmark = *landmarks_.find(numbers.id);
-    const Pose<W, C0> T_WC = problem.frames[numbers.host].state.T_WB * problem.calibration.T_BC0;
+    const Pose<W, C0> T_WC = problem.frames[numbers.host].state.T_WB * ray_camera(problem.calibration, numbers.right_ray);
     known_.remember(landmark.track, T_WC, numbers.alpha_beta_rho, information[k]);
     landmark.prior = known_.find(landmark.track);
   }

@@ -56,7 +56,7 @@ struct Scene {
     TrackedFeature f;
     f.id = TrackId{track};
     f.left = seen_at(p_B);
-    f.left.normalised += left_shift;
+    f.left->normalised += left_shift;
     if (stereo) f.right = seen_at(calibration.T_BC1.inverse() * p_B);
     return f;
   }

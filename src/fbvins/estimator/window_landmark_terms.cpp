@@ -51,11 +51,11 @@ double add_landmark_prior(const WindowProblem& w, const CameraGeometry& cameras,
   point.w += robust.weight * J.point.transpose() * r;
   out.points.coupling(point, host_block) += robust.weight * J.point.transpose() * J.host;
   if (w.calibrating()) {
-    const int row = out.layout.calibration_row();
+    const int row = out.layout.calibration_row() + 6 * l.right_ray;
     out.H.block<6, 6>(row, row) += robust.weight * J.extrinsic.transpose() * J.extrinsic;
     out.H.block<6, 6>(host, row) += robust.weight * J.host.transpose() * J.extrinsic;
     out.g.segment<6>(row) += robust.weight * J.extrinsic.transpose() * r;
-    out.points.coupling(point, 0) += robust.weight * J.point.transpose() * J.extrinsic;
+    out.points.coupling(point, l.right_ray) += robust.weight * J.point.transpose() * J.extrinsic;
   }
   return robust.cost;
 }

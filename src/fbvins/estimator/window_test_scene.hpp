@@ -65,7 +65,8 @@ inline void add_landmark(Window& w, const Vec3& p_W, int host, Rng& rng) {
       ++l.observation_count;
     }
   }
-  const Vec3 p_C = in_camera(host, false);
+  l.right_ray = w.problem.landmarks.size() % 4 == 1;
+  const Vec3 p_C = in_camera(host, l.right_ray);
   l.alpha_beta_rho =
       Vec3(p_C.x() / p_C.z() + 1e-3 * rng.normal(), p_C.y() / p_C.z() + 1e-3 * rng.normal(), (1 + 0.05 * rng.normal()) / p_C.z());
   w.problem.landmarks.push_back(l);

@@ -8,6 +8,15 @@
 #include "fbvins/geometry/symmetric.hpp"
 
 namespace fbvins {
+namespace {
+
+/// Distance of two positions of a feature in one camera, without the part of the rotation; normalised.
+double parallax(const Mat3& R_ba, const Observation& a, const Observation& b) {
+  const Vec3 p = R_ba * Vec3(a.normalised.x(), a.normalised.y(), 1);
+  return (p.head<2>() / p.z() - b.normalised).norm();
+}
+
+}  // namespace
 
 int landmarks_in_view(const SlidingWindow& window) {
   const FrameId newest = window.newest().id;
@@ -26,8 +35,10 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   if (last < 0) return out;
   const Frame& keyframe = frames[last];
   out.age = newest.t - keyframe.t;
-  const Mat3 R_BC = calibration.T_BC0.R();
-  const Mat3 R_new_last = (newest.state.T_WB.R() * R_BC).transpose() * keyframe.state.T_WB.R() * R_BC;
+  const auto rotation = [&](const Mat3& R_BC) -> Mat3 {
+    return (newest.state.T_WB.R() * R_BC).transpose() * keyframe.state.T_WB.R() * R_BC;
+  };
+  const Mat3 R_new_last[2] = {rotation(calibration.T_BC0.R()), rotation(calibration.T_BC1.R())};
   int seen = 0;
   std::vector<double> motion;
   for (const Landmark& l : window.landmarks().all()) {
@@ -35,8 +46,9 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
     ++seen;
     const Sighting* before = l.sighting_in(keyframe.id);
     if (before == nullptr) continue;
-    const Vec3 p = R_new_last * Vec3(before->left.normalised.x(), before->left.normalised.y(), 1);
-    motion.push_back(focal_px * (p.head<2>() / p.z() - l.sightings.back().left.normalised).norm());
+    const Sighting& now = l.sightings.back();
+    if (before->left && now.left) motion.push_back(focal_px * parallax(R_new_last[0], *before->left, *now.left));
+    else if (before->right && now.right) motion.push_back(focal_px * parallax(R_new_last[1], *before->right, *now.right));
   }
   if (seen > 0) out.shared_ratio = static_cast<double>(motion.size()) / seen;
   if (!motion.empty()) {
@@ -70,8 +82,7 @@ std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Ve
 Vec3 mean_rate_B(const FrameList& frames) {
   if (frames.size() < 2) return Vec3::Zero();
   Vec3 turned = Vec3::Zero();
-  for (int i = 1; i < frames.size(); ++i)
-    turned += so3_log(frames[i - 1].state.T_WB.q.conjugate() * frames[i].state.T_WB.q);
+  for (int i = 1; i < frames.size(); ++i) turned += so3_log(frames[i - 1].state.T_WB.q.conjugate() * frames[i].state.T_WB.q);
   return turned / (frames.newest().t - frames.oldest().t).seconds();
 }
 
@@ -81,7 +92,7 @@ WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calib
   for (const Frame& f : window.frames()) out.frames.push_back({f.id, f.t, tilt.levelled(f.state.T_WB), f.keyframe});
   for (const Landmark& l : window.landmarks().all()) {
     if (!l.triangulated) continue;
-    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * calibration.T_BC0;
+    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * ray_camera(calibration, l.right_ray);
     const Vec3 p_C = Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z();
     out.landmarks.push_back({l.id, l.track, tilt.levelled(Vec3(T_WC * p_C)), static_cast<int>(l.sightings.size())});
   }
@@ -99,9 +110,9 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
     const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;
-    if (seen == nullptr) continue;
+    if (seen == nullptr || !seen->left) continue;
     const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
-    out.landmarks.push_back({l.track, seen->left.pixel, calibration.T_BC0 * p_C});
+    out.landmarks.push_back({l.track, seen->left->pixel, calibration.T_BC0 * p_C});
   }
   return out;
 }

@@ -123,6 +123,7 @@ class CeresTwin {
       seen->host = p.frames[l.host].state, seen->target = p.frames[seen->o.frame].state;
       seen->calibration = p.calibration;
       seen->same_frame = seen->o.frame == l.host;
+      seen->right_ray = l.right_ray;
       std::vector<Block> blocks{landmark, calibration_block()};
       if (!seen->same_frame) blocks.insert(blocks.end(), {frame(l.host), frame(seen->o.frame)});
       add(std::move(seen), 2, blocks, new ceres::HuberLoss(p.weights.huber_sigma));
@@ -130,6 +131,7 @@ class CeresTwin {
     if (l.prior < 0) return;
     auto residual = std::make_unique<LandmarkPriorResidual>();
     residual->seen.host = p.frames[l.host].state, residual->seen.calibration = p.calibration;
+    residual->seen.right_ray = l.right_ray;
     residual->prior = p.landmark_priors[l.prior];
     add(std::move(residual), 3, {landmark, calibration_block(), frame(l.host)}, new ceres::HuberLoss(p.weights.huber_sigma));
   }

@@ -12,6 +12,10 @@ void clear_if_of_another_size(Pyramid& pyramid, const Camera& camera) {
 
 }  // namespace
 
+bool is_usable(const Image* image, const Camera& camera) {
+  return image != nullptr && !image->empty() && image->width() == camera.width() && image->height() == camera.height();
+}
+
 void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
   t_ = frame.t;
   left_.clear();
@@ -25,7 +29,7 @@ void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
 }
 
 bool FrameImages::forget_before_gap(double longest_s) {
-  if (!has_before() || (t_ >= t_before_ && (t_ - t_before_).seconds() <= longest_s)) return false;
+  if (!has_before() || reaches(t_, longest_s)) return false;
   before_.clear();
   return true;
 }
@@ -33,6 +37,13 @@ bool FrameImages::forget_before_gap(double longest_s) {
 void FrameImages::advance() {
   std::swap(left_, before_);
   t_before_ = t_;
+}
+
+Pyramid FrameImages::take_right() { return std::exchange(right_, Pyramid{}); }
+
+void FrameImages::start_from(Pyramid image, Time t) {
+  before_ = std::move(image);
+  t_before_ = t;
 }
 
 }  // namespace fbvins

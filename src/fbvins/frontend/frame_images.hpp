@@ -15,6 +15,9 @@
 
 namespace fbvins {
 
+/// Whether there is an image, of the size that the camera was calibrated with.
+bool is_usable(const Image* image, const Camera& camera);
+
 class FrameImages {
  public:
   FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(levels) {}
@@ -26,11 +29,18 @@ class FrameImages {
   bool forget_before_gap(double longest_s);
   /// The newest left image becomes the one before.
   void advance();
+  /// Moves the newest right image out; empty if there was none.
+  Pyramid take_right();
+  /// Another's image becomes the one before.
+  void start_from(Pyramid image, Time t);
 
   Time t() const { return t_; }
   const Pyramid& left() const { return left_; }
   const Pyramid& right() const { return right_; }
   bool has_before() const { return !before_.empty(); }
+  bool reaches(Time t, double longest_s) const {
+    return has_before() && t >= t_before_ && (t - t_before_).seconds() <= longest_s;
+  }
   Time t_before() const { return t_before_; }
   const Pyramid& before() const { return before_; }
 

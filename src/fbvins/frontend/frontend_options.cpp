@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "fbvins/features/booster.hpp"
+#include "fbvins/frontend/either_camera.hpp"
 #include "fbvins/frontend/klt_frontend.hpp"
 #include "fbvins/frontend/orb_frontend.hpp"
 
@@ -17,17 +18,22 @@ namespace {
 using Made = Result<std::unique_ptr<Frontend>>;
 
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
-  return std::unique_ptr<Frontend>(std::make_unique<KltFrontend>(rig, options.klt));
+  return std::unique_ptr<Frontend>(std::make_unique<EitherCamera>(rig, std::make_unique<KltFrontend>(rig, options.klt),
+                                                                  std::make_unique<KltFrontend>(mirrored(rig), options.klt)));
 }
 
-Made make_orb(const StereoRig& rig, const FrontendOptions& options) {
-  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, options.orb));
+std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
+                                   const std::shared_ptr<DescriptorStage>& stage) {
+  return std::make_unique<EitherCamera>(rig, std::make_unique<OrbFrontend>(rig, options, stage),
+                                        std::make_unique<OrbFrontend>(mirrored(rig), options, stage));
 }
+
+Made make_orb(const StereoRig& rig, const FrontendOptions& options) { return orb_with(rig, options.orb, make_identity_stage()); }
 
 Made make_boost(const StereoRig& rig, const FrontendOptions& options) {
   Result<std::unique_ptr<DescriptorStage>> stage = make_booster_stage(options.boost.booster);
   if (!stage) return stage.error();
-  return std::unique_ptr<Frontend>(std::make_unique<OrbFrontend>(rig, options.orb, std::move(*stage)));
+  return orb_with(rig, options.orb, std::move(*stage));
 }
 
 struct Registration {

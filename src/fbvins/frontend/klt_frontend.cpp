@@ -119,15 +119,46 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
 bool KltFrontend::start_track(const Vec2& px) {
   const auto normalised = rig_.left.undistort(px);
   if (!normalised) return false;
-  KltPatches& patches = tracks_.free_patches();
-  if (!patches.newest.cut(images_.left(), px, 0, kKltLevels - 1)) return false;
   KltTrack track;
   track.px = px;
   track.normalised = *normalised;
-  follower_.set_anchor(track, patches, images_.left());
-  track.at_age(0) = track.normalised;
+  if (!cut_patches(track, tracks_.free_patches(), images_.left())) return false;
   tracks_.start(track);
   return true;
+}
+
+bool KltFrontend::cut_patches(KltTrack& track, KltPatches& patches, const Pyramid& image) const {
+  if (!patches.newest.cut(image, track.px, 0, kKltLevels - 1)) return false;
+  follower_.set_anchor(track, patches, image);
+  track.at_age(0) = track.normalised;
+  return true;
+}
+
+Handover KltFrontend::hand_over() {
+  Handover out{images_.t(), images_.take_right(), {}, tracks_.next_id()};
+  if (out.image.empty()) return out;
+  for (const KltTrack& track : tracks_)
+    if (const auto handed = seen_by_second(track, rig_.T_C1C0())) out.tracks.push_back(*handed);
+  return out;
+}
+
+void KltFrontend::take_over(Handover handover) {
+  tracks_.end_all(Fate::lost);
+  tracks_.drop_ended();
+  tracks_.begin_ids_at(handover.next_id);
+  std::vector<double> inverse_depths;
+  for (const HandedTrack& handed : handover.tracks) {
+    if (tracks_.full()) break;
+    KltTrack track;  // its age is that of its history, in this camera
+    track.id = handed.id;
+    track.px = handed.px;
+    track.normalised = handed.normalised;
+    track.inverse_depth = handed.inverse_depth;
+    inverse_depths.push_back(handed.inverse_depth);
+    if (cut_patches(track, tracks_.free_patches(), handover.image)) tracks_.resume(track);
+  }
+  typical_depth_.update(inverse_depths);
+  images_.start_from(std::move(handover.image), handover.t);
 }
 
 void KltFrontend::match_stereo(FrontendStats& stats) {

@@ -13,7 +13,7 @@
 
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/epipolar_check.hpp"
-#include "fbvins/frontend/frontend.hpp"
+#include "fbvins/frontend/handover.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_options.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
@@ -23,7 +23,7 @@
 
 namespace fbvins {
 
-class KltFrontend final : public Frontend {
+class KltFrontend final : public LeadingFrontend {
  public:
   KltFrontend(const StereoRig& rig, const KltFrontendOptions& options);
 
@@ -31,12 +31,20 @@ class KltFrontend final : public Frontend {
   /// Landmarks are ignored; a new W voids the prior.
   void locate(const LandmarkUpdate& update) override;
 
+  void stand_by(const SensorPacket& packet, const StatePrior& prior) override { predictor_.add(packet.imu, prior); }
+  bool reaches(Time t) const override { return images_.reaches(t, options_.max_gap_s); }
+  void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
+  std::int64_t next_id() const override { return tracks_.next_id(); }
+  Handover hand_over() override;
+  void take_over(Handover handover) override;
+
  private:
   void follow_tracks(const CameraMotion& motion, FrontendStats& stats);
   void reject_outliers(const CameraMotion& motion, FrontendStats& stats);
   void reject_slow_outliers(const Mat3& R_ba, FrontendStats& stats);
   void detect_corners(FrontendStats& stats);
   bool start_track(const Vec2& px);
+  bool cut_patches(KltTrack& track, KltPatches& patches, const Pyramid& image) const;
   void match_stereo(FrontendStats& stats);
 
   KltFrontendOptions options_;

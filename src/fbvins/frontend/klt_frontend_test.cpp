@@ -104,10 +104,10 @@ struct Errors {
     const Pose<W, C0> T_WC0 = wall.T_WC0(s);
     const Pose<W, C1> T_WC1 = wall.T_WB(s) * wall.rig.T_BC1;
     for (const TrackedFeature& feature : frame.features) {
-      const Vec3 here = Wall::on_wall(T_WC0, feature.left.normalised);
+      const Vec3 here = Wall::on_wall(T_WC0, feature.left->normalised);
       const Vec3& first = points.emplace(feature.id, here).first->second;
       if (feature.age_frames > 0)
-        left.push_back((wall.rig.left.project(T_WC0.inverse() * first).value() - feature.left.pixel).norm());
+        left.push_back((wall.rig.left.project(T_WC0.inverse() * first).value() - feature.left->pixel).norm());
       if (feature.right) right.push_back((wall.rig.right.project(T_WC1.inverse() * here).value() - feature.right->pixel).norm());
     }
   }
@@ -150,10 +150,10 @@ TEST(KltFrontend, ObservationsAreConsistentWithTheCamera) {
   const TrackedFrame out = frontend.process(wall.packet(0), StatePrior{});
   ASSERT_FALSE(out.features.empty());
   for (const TrackedFeature& feature : out.features) {
-    EXPECT_LT((wall.rig.left.distort(feature.left.normalised) - feature.left.pixel).norm(), 1e-6);
+    EXPECT_LT((wall.rig.left.distort(feature.left->normalised) - feature.left->pixel).norm(), 1e-6);
     const Vec2 d(1e-5, -2e-5);
-    const Vec2 moved = (wall.rig.left.distort(feature.left.normalised + d) - feature.left.pixel) / 0.5;
-    EXPECT_LT((feature.left.sqrt_information * d - moved).norm(), 1e-2 * moved.norm());
+    const Vec2 moved = (wall.rig.left.distort(feature.left->normalised + d) - feature.left->pixel) / 0.5;
+    EXPECT_LT((feature.left->sqrt_information * d - moved).norm(), 1e-2 * moved.norm());
     EXPECT_EQ(feature.age_frames, 0);
   }
 }
@@ -232,7 +232,7 @@ TEST(KltFrontend, SameInputSameBits) {
     ASSERT_EQ(x.features.size(), y.features.size());
     for (std::size_t i = 0; i < x.features.size(); ++i) {
       EXPECT_EQ(x.features[i].id, y.features[i].id);
-      EXPECT_EQ(x.features[i].left.pixel, y.features[i].left.pixel);
+      EXPECT_EQ(x.features[i].left->pixel, y.features[i].left->pixel);
       EXPECT_EQ(x.features[i].right.has_value(), y.features[i].right.has_value());
     }
   }

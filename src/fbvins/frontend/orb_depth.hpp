@@ -28,6 +28,8 @@ class OrbDepth {
   /// If so, to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
+  /// As if these had been matched, 1/m.
+  void assume(std::vector<double>& inverse_depths) { typical_.update(inverse_depths); }
   /// Median of the last image's matches, 1/m.
   double typical_inverse_depth() const { return typical_.inverse_depth(); }
 

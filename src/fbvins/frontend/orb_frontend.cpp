@@ -23,10 +23,11 @@ OrbOptions extraction(const OrbFrontendOptions& options) { return {.max_features
 
 }  // namespace
 
-OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::unique_ptr<DescriptorStage> stage)
+OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options, std::shared_ptr<DescriptorStage> stage)
     : options_(options),
       sigma_px_(options.subpixel ? options.sigma_px : kSigmaUnrefined_px),
       camera_(rig.left),
+      T_C1C0_(rig.T_C1C0()),
       images_(rig, kOrbAlignmentLevels),
       predictor_(rig.T_BC0),
       describer_(extraction(options), std::move(stage)),
@@ -134,6 +135,64 @@ void OrbFrontend::locate(const LandmarkUpdate& update) {
 bool OrbFrontend::can_reobserve(TrackId track) const {
   return recogniser_.remembers(track) ||
          std::any_of(tracks_.begin(), tracks_.end(), [&](const OrbTrack& t) { return t.id == track; });
+}
+
+void OrbFrontend::stand_by(const SensorPacket& packet, const StatePrior& prior) {
+  predictor_.add(packet.imu, prior);
+  recogniser_.forget_unlocated(packet.frame.t);
+}
+
+Handover OrbFrontend::hand_over() {
+  Handover out{images_.t(), images_.take_right(), {}, tracks_.next_id()};
+  if (out.image.empty()) return out;
+  for (const OrbTrack& track : tracks_) {
+    std::optional<HandedTrack> handed = seen_by_second(track, T_C1C0_);
+    if (!handed) continue;
+    handed->descriptor = track.descriptor;
+    handed->raw = track.raw;
+    handed->level = track.level;
+    handed->seen_from_W = track.seen_from_W;
+    handed->p_W = track.p_W;
+    out.tracks.push_back(*handed);
+  }
+  return out;
+}
+
+void OrbFrontend::take_over(Handover handover) {
+  tracks_.end_all(Fate::out_of_view);
+  drop_ended();
+  tracks_.begin_ids_at(handover.next_id);
+  view_.t = handover.t;
+  view_.T_WC = predictor_.camera_at(view_.t);
+  outliers_.begin(view_);
+  std::vector<double> inverse_depths;
+  for (const HandedTrack& handed : handover.tracks)
+    if (!tracks_.full() && resume(handed, handover.image)) inverse_depths.push_back(handed.inverse_depth);
+  depth_.assume(inverse_depths);
+  images_.start_from(std::move(handover.image), handover.t);
+  ++view_.index;
+}
+
+bool OrbFrontend::resume(const HandedTrack& handed, const Pyramid& image) {
+  recogniser_.forget(handed.id);
+  OrbPatches& patches = tracks_.free_patches();
+  if (!patches.newest.cut(image, handed.px, 0, kOrbAlignmentLevels - 1)) return false;
+  if (!patches.reference.take(image, handed.px, camera_, handed.normalised)) return false;
+  OrbTrack track;
+  track.id = handed.id;
+  track.px = handed.px;
+  track.normalised = handed.normalised;
+  track.inverse_depth = handed.inverse_depth;
+  track.age_frames = handed.age_frames;
+  track.descriptor = handed.descriptor;
+  track.raw = handed.raw;
+  track.level = handed.level;
+  track.seen_from_W = handed.seen_from_W;
+  track.p_W = handed.p_W;
+  track.last_seen = view_.t;
+  track.see(view_.index);
+  tracks_.resume(track);
+  return true;
 }
 
 double OrbFrontend::longest_gap_s() const { return std::clamp(options_.memory_s, kShortestGap_s, kLongestGap_s); }

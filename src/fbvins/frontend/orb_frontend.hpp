@@ -13,7 +13,7 @@
 
 #include <memory>
 
-#include "fbvins/frontend/frontend.hpp"
+#include "fbvins/frontend/handover.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
 #include "fbvins/frontend/orb_depth.hpp"
 #include "fbvins/frontend/orb_examination.hpp"
@@ -26,14 +26,21 @@
 
 namespace fbvins {
 
-class OrbFrontend final : public Frontend {
+class OrbFrontend final : public LeadingFrontend {
  public:
-  /// `stage` may improve the descriptors of each image; the default does not change them.
+  /// `stage` may improve the descriptors of each image; the default does not change them. Frontends of one thread can share it.
   OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options,
-              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
+              std::shared_ptr<DescriptorStage> stage = make_identity_stage());
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
   void locate(const LandmarkUpdate& update) override;
+
+  void stand_by(const SensorPacket& packet, const StatePrior& prior) override;
+  bool reaches(Time t) const override { return images_.reaches(t, longest_gap_s()); }
+  void begin_ids_at(std::int64_t id) override { tracks_.begin_ids_at(id); }
+  std::int64_t next_id() const override { return tracks_.next_id(); }
+  Handover hand_over() override;
+  void take_over(Handover handover) override;
 
   /// Whether it is a current track, or its landmark is remembered.
   bool can_reobserve(TrackId track) const;
@@ -43,10 +50,12 @@ class OrbFrontend final : public Frontend {
   bool follow(const ImageView& left, FrontendStats& stats);
   void examine(const ImageView& left, FrontendStats& stats);
   void drop_ended();
+  bool resume(const HandedTrack& handed, const Pyramid& image);
 
   OrbFrontendOptions options_;
   double sigma_px_;  // of an observation
   Camera camera_;
+  Pose<C1, C0> T_C1C0_;
   FrameImages images_;
   MotionPredictor predictor_;
   OrbDescriber describer_;

@@ -104,7 +104,7 @@ double median_error_px(const std::vector<TrackedFrame>& frames) {
   std::vector<double> errors;
   for (std::size_t k = 0; k < frames.size(); ++k)
     for (const TrackedFeature& f : frames[k].features) {
-      const Vec2 p = world().wall_point(static_cast<int>(k), f.left.normalised);
+      const Vec2 p = world().wall_point(static_cast<int>(k), f.left->normalised);
       const auto [it, is_new] = first.try_emplace(f.id.value, p);
       if (!is_new) errors.push_back((p - it->second).norm() / kDepth_m * 230);
     }
@@ -138,7 +138,7 @@ TEST(OrbFrontend, FollowsAWallThroughWideLensesAndSeesItsDepth) {
     std::vector<double> depths_m;
     for (const TrackedFrame& frame : frames)
       for (const TrackedFeature& f : frame.features)
-        if (f.right) depths_m.push_back(0.11 / (f.left.normalised - f.right->normalised).x());
+        if (f.right) depths_m.push_back(0.11 / (f.left->normalised - f.right->normalised).x());
     ASSERT_GT(depths_m.size(), 150u) << rig.left.model_name();
     std::nth_element(depths_m.begin(), depths_m.begin() + std::ssize(depths_m) / 2, depths_m.end());
     EXPECT_NEAR(depths_m[depths_m.size() / 2], kDepth_m, 0.03) << rig.left.model_name();
@@ -162,9 +162,9 @@ TEST(OrbFrontend, StereoGivesTheWallsDepth) {
       ++all;
       if (!f.right) continue;
       ++stereo;
-      const double disparity_px = (f.left.normalised - f.right->normalised).x() * 230;
+      const double disparity_px = (f.left->normalised - f.right->normalised).x() * 230;
       EXPECT_NEAR(disparity_px, 0.11 / kDepth_m * 230, 0.6);
-      EXPECT_NEAR((f.left.normalised - f.right->normalised).y() * 230, 0, 0.6);
+      EXPECT_NEAR((f.left->normalised - f.right->normalised).y() * 230, 0, 0.6);
     }
   EXPECT_GT(stereo, 0.7 * all);
 }
@@ -173,8 +173,8 @@ TEST(OrbFrontend, ObservationsAreConsistent) {
   const auto frames = run({packets().begin(), packets().begin() + 3});
   for (const TrackedFeature& f : frames.back().features) {
     Mat2 J;
-    EXPECT_LT((world().rig.left.distort(f.left.normalised, &J) - f.left.pixel).norm(), 1e-6);
-    EXPECT_LT((f.left.sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
+    EXPECT_LT((world().rig.left.distort(f.left->normalised, &J) - f.left->pixel).norm(), 1e-6);
+    EXPECT_LT((f.left->sqrt_information - J / small_options().sigma_px).norm(), 1e-9);
   }
 }
 
@@ -231,7 +231,7 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
       LandmarkUpdate update;
       for (const TrackedFrame& frame : before)
         for (const TrackedFeature& f : frame.features) {
-          const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left.normalised);
+          const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left->normalised);
           update.landmarks.push_back({f.id, Vec3(p.x(), p.y(), kDepth_m)});
         }
       frontend.locate(update);
@@ -255,7 +255,7 @@ TEST(OrbFrontend, LandmarksAreReobservedHoweverLongTheyWereOutOfView) {
     int again = 0, wrong = 0;
     for (const TrackedFrame& frame : frames)
       for (const TrackedFeature& f : frame.features) {
-        const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left.normalised);
+        const Vec2 p = world().wall_point(static_cast<int>(frame.id.value), f.left->normalised);
         const auto [it, is_new] = first.try_emplace(f.id.value, p);
         if (is_new || frame.id != frames.back().id) continue;
         ++again;
@@ -345,8 +345,8 @@ class Sweep {
     for (const TrackedFeature& f : frame.features) {
       Known& landmark = known[f.id];
       if (landmark.told) landmark.again = true;
-      else landmark.p_W = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left.normalised.homogeneous());
-      landmark.px = f.left.pixel;
+      else landmark.p_W = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left->normalised.homogeneous());
+      landmark.px = f.left->pixel;
       landmark.last = k;
       ++landmark.frames;
     }
@@ -405,7 +405,7 @@ TEST(OrbFrontend, SameInputSameBits) {
     ASSERT_EQ(a[k].features.size(), b[k].features.size());
     for (std::size_t i = 0; i < a[k].features.size(); ++i) {
       EXPECT_EQ(a[k].features[i].id, b[k].features[i].id);
-      EXPECT_TRUE(a[k].features[i].left.pixel == b[k].features[i].left.pixel);
+      EXPECT_TRUE(a[k].features[i].left->pixel == b[k].features[i].left->pixel);
       EXPECT_EQ(a[k].features[i].right.has_value(), b[k].features[i].right.has_value());
     }
   }

@@ -29,6 +29,8 @@ class OrbRecogniser {
   void clear(OrbTracks& tracks);
   /// Remembers a track that has gone out of view, if it may be a landmark. `view`: the last image that it was predicted to.
   void remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now);
+  /// It is followed again.
+  void forget(TrackId track) { memory_.take_out(track); }
   bool remembers(TrackId track) const { return memory_.contains(track); }
   void forget_unlocated(Time now) { memory_.forget_unlocated(now); }
   void recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats);

@@ -36,7 +36,7 @@ struct OrbView {
 
 class OrbDescriber {
  public:
-  OrbDescriber(const OrbOptions& options, std::unique_ptr<DescriptorStage> stage)
+  OrbDescriber(const OrbOptions& options, std::shared_ptr<DescriptorStage> stage)
       : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
 
   /// Fills all of the view that depends on the image alone. Returns the CPU time that improving took, ms.
@@ -47,7 +47,7 @@ class OrbDescriber {
  private:
   double improve(const ImageView& image, OrbFeatures& features);
 
-  std::unique_ptr<DescriptorStage> stage_;
+  std::shared_ptr<DescriptorStage> stage_;
   OrbExtractor extractor_;
 };
 

@@ -8,6 +8,7 @@
 //   tracks.drop_ended();
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -60,6 +61,8 @@ class TrackTable {
     assert(!full());
     return patches_[free_.back()];
   }
+  std::int64_t next_id() const { return next_id_; }
+  void begin_ids_at(std::int64_t id) { next_id_ = std::max(next_id_, id); }
   /// Adds a track with a new id.
   Track& start(Track track) {
     track.id = TrackId{next_id_++};

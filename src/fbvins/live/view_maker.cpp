@@ -11,7 +11,7 @@ void ViewMaker::add(const TrackedFrame& frame) {
   features_.clear();
   features_.reserve(frame.features.size());
   for (const TrackedFeature& feature : frame.features)
-    features_.push_back({feature.id, feature.left.pixel, feature.age_frames, 0});
+    if (feature.left) features_.push_back({feature.id, feature.left->pixel, feature.age_frames, 0});
 }
 
 LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {

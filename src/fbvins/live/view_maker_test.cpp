@@ -12,7 +12,7 @@ TrackedFrame frame_with(Time t, std::initializer_list<std::int64_t> tracks) {
   for (const std::int64_t track : tracks) {
     TrackedFeature feature;
     feature.id = TrackId{track};
-    feature.left.pixel = Vec2(10. * static_cast<double>(track), 5);
+    feature.left.emplace().pixel = Vec2(10. * static_cast<double>(track), 5);
     feature.age_frames = static_cast<int>(track);
     frame.features.push_back(feature);
   }

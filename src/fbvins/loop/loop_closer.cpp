@@ -64,9 +64,11 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
   map_.T_BC0 = T_BC0_;
 }
 
-/// Whether a keyframe would add nothing to the map, in which the flight knows where it is.
-bool LoopCloser::shows_newest_place(const Keyframe& keyframe) const {
+/// Whether a keyframe would add nothing to the map, in which the flight knows where it is: it shows the newest place, or none,
+/// because the left camera, by which places are recognised, delivers nothing.
+bool LoopCloser::adds_nothing(const Keyframe& keyframe) const {
   if (!session_.begun || keyframe.reset_counter != session_.reset_counter || !frame_.known()) return false;
+  if (keyframe.images.right && !keyframe.images.left) return true;
   const MapKeyframe* newest = map_.find(session_.newest);
   if (newest == nullptr) return false;
   const Pose<B, B> moved = newest->T_GB.inverse() * keyframe.gauge.T_GB;
@@ -74,7 +76,7 @@ bool LoopCloser::shows_newest_place(const Keyframe& keyframe) const {
 }
 
 MapUpdate LoopCloser::process(const Keyframe& keyframe) {
-  if (shows_newest_place(keyframe)) {
+  if (adds_nothing(keyframe)) {
     MapUpdate update = begin_update(keyframe);
     advance(keyframe);
     end_update(keyframe, update);

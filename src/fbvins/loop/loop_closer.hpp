@@ -71,7 +71,7 @@ class LoopCloser final : public Mapper {
     MapEdge edge;
   };
 
-  bool shows_newest_place(const Keyframe& keyframe) const;
+  bool adds_nothing(const Keyframe& keyframe) const;
   MapUpdate begin_update(const Keyframe& keyframe);
   void end_update(const Keyframe& keyframe, MapUpdate& update);
   void begin_session(const Keyframe& keyframe);

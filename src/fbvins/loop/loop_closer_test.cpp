@@ -117,6 +117,21 @@ Keyframe seconds_later(int number, double x_m, double yaw_rad = 0) {
   return k;
 }
 
+TEST(LoopCloser, AKeyframeOfTheRightCameraAloneBecomesNoPlace) {
+  LoopCloser closer(rig(), {}, vocabulary());
+  closer.process(seconds_later(0, 0));
+  for (int i = 1; i < 5; ++i) {
+    Keyframe k = seconds_later(i, i);
+    k.images.right = std::make_shared<Image>(8, 8);
+    EXPECT_TRUE(closer.process(k).localised);
+  }
+  EXPECT_EQ(closer.map().size(), 1u);
+  closer.process(seconds_later(5, 5));
+  EXPECT_EQ(closer.map().size(), 2u);
+  ASSERT_EQ(closer.map().edges.size(), 1u);
+  EXPECT_NEAR(closer.map().edges[0].T_from_to.p.x(), 5, 1e-9);
+}
+
 TEST(LoopCloser, AKeyframeNearTheNewestBecomesNoPlaceAndItsReadingsCount) {
   LoopCloser closer(rig(), {}, vocabulary());
   const auto places_after = [&](const Keyframe& k) {

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
@@ -318,6 +319,61 @@ TEST(SystemParts, AnUnknownFrontendOrAnOptionOutOfRangeIsAnErrorAtOnce) {
   const Result<System> system = System::create(options, small_rig());
   ASSERT_FALSE(system);
   EXPECT_NE(system.error().message.find("estimator.max_iterations"), std::string::npos);
+}
+
+/// Flies 8 s, of which one camera delivers nothing from 2.5 s to `back_s`. The largest error of the distance from the start, m.
+double error_without(bool left, double back_s, const std::string& frontend) {
+  static const std::vector<SensorEvent> all = sway(160);
+  System system = system_of(RunMode::deterministic, {}, frontend);
+  double worst_m = 0;
+  system.on_odometry([&](const Odometry& o) {
+    const double t_s = (o.t - Time{}).seconds();
+    EXPECT_EQ(o.reset_counter, 0u);
+    EXPECT_TRUE(o.health.has_pose() || t_s < 0.6) << t_s << " s: " << to_string(o.health.reason);
+    const bool alone = t_s >= 2.5 && t_s<back_s, again = t_s> back_s + 0.2;
+    const Health expected = alone ? Health{HealthState::degraded, HealthReason::one_camera} : Health{HealthState::good};
+    if (alone || again) {
+      EXPECT_EQ(o.health, expected) << t_s << " s: " << to_string(o.health.reason);
+    }
+    if (o.health.has_pose()) worst_m = std::max(worst_m, std::abs(o.T_WB.p.norm() - sway_m(t_s)));
+  });
+  for (SensorEvent event : all) {
+    if (auto* frame = std::get_if<StereoFrame>(&event);
+        frame && (frame->t - Time{}).seconds() >= 2.5 && (frame->t - Time{}).seconds() < back_s)
+      (left ? frame->left : frame->right).reset();
+    EXPECT_TRUE(system.push(std::move(event)));
+  }
+  EXPECT_TRUE(system.finish().ok());
+  return worst_m;
+}
+
+class OneCamera : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(System, OneCamera, testing::Values("klt", "orb", "boost"));
+
+TEST_P(OneCamera, FliesOnWhicheverIsDeadForSecondsOrForEver) {
+  for (const double back_s : {6.0, 1e9}) {
+    const double left_m = error_without(true, back_s, GetParam()), right_m = error_without(false, back_s, GetParam());
+    std::printf("%s, back at %g s: left dead %.4f m, right dead %.4f m\n", GetParam(), back_s, left_m, right_m);
+    EXPECT_LT(left_m, 0.03);
+    EXPECT_LT(left_m, 2 * right_m + 0.01);
+  }
+}
+
+TEST(SystemInput, AnImageOfAnotherSizeCountsAsMissing) {
+  System system = system_of(RunMode::deterministic);
+  std::vector<Health> health;
+  system.on_odometry([&](const Odometry& o) { health.push_back(o.health); });
+  const auto good = std::make_shared<Image>(kWidth, kHeight), other = std::make_shared<Image>(kWidth, kHeight - 1);
+  for (int k = 0; k <= 400; ++k) {
+    ASSERT_TRUE(system.push(ImuSample{Time{k * kMs}, Vec3::Zero(), Vec3(0, -9.81, 0)}));
+    if (k != 100 && k != 150 && k != 200) continue;
+    ASSERT_TRUE(system.push(StereoFrame{Time{k * kMs}, k == 150 ? good : other, k == 100 ? good : other}));
+  }
+  ASSERT_TRUE(system.finish().ok());
+  using enum HealthReason;
+  ASSERT_EQ(health.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_EQ(health[k], (Health{HealthState::initialising, k < 2 ? one_camera : no_images})) << k;
 }
 
 TEST(SystemParts, ARigThatCannotFlyIsRefused) {

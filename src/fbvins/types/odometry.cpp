@@ -27,6 +27,7 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::implausible_speed: return "implausible_speed";
     case HealthReason::solver_failed: return "solver_failed";
     case HealthReason::one_camera: return "one_camera";
+    case HealthReason::frontend_fault: return "frontend_fault";
   }
   return "unknown";
 }

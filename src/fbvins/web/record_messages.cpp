@@ -60,7 +60,7 @@ void take_number(const RosDiagnostic& diagnostic, std::string_view key, Number& 
 
 Health health_of(const RosDiagnostic& diagnostic) {
   return {value_of(text_at(diagnostic, "state"), HealthState::lost).value_or(HealthState::initialising),
-          value_of(text_at(diagnostic, "reason"), HealthReason::one_camera).value_or(HealthReason::none)};
+          value_of(text_at(diagnostic, "reason"), kLastHealthReason).value_or(HealthReason::none)};
 }
 
 /// "p50 1.2, p99 3.4, max 5.6 of 7".

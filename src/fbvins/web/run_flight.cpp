@@ -80,7 +80,7 @@ Odometry odometry_of(const NamedRows& row, std::int64_t image) {
     for (int j = i; j < 6; ++j)
       o.pose_covariance(i, j) = o.pose_covariance(j, i) = row(fmt::format("cov_{}_{}", kNames[i], kNames[j]));
   o.health = {value_of(row.text("health"), HealthState::lost, HealthState::initialising),
-              value_of(row.text("health_reason"), HealthReason::one_camera, HealthReason::none)};
+              value_of(row.text("health_reason"), kLastHealthReason, HealthReason::none)};
   o.reset_counter = row.number<std::uint32_t>("reset_counter");
   return o;
 }

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The border between frontend and estimator: what a frontend, perhaps a user's own, must hold to. A track comes once in a frame;
+// a feature is seen by at least one camera; all numbers of an observation are finite. Features that break this are left out, and
+// counted; stereo matches that the frontend did not count are.
+// Buffers are reused; one instance, one thread.
+//
+//   const TrackedFrame& frame = contract.enforced(tracked);
+//   if (contract.broken() > 0) ...
+#pragma once
+
+#include <vector>
+
+#include "fbvins/types/tracking.hpp"
+
+namespace fbvins {
+
+class FrameContract {
+ public:
+  /// The frame itself where it holds to the contract, else a copy that does, valid until the next call.
+  const TrackedFrame& enforced(const TrackedFrame& frame);
+  /// Features left out of the last frame.
+  int broken() const { return broken_; }
+
+ private:
+  bool any_twice(const std::vector<TrackedFeature>& features);
+
+  std::vector<TrackId> ids_;
+  TrackedFrame mended_;
+  int broken_ = 0;
+};
+
+}  // namespace fbvins
