@@ -25,6 +25,9 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   if (reason == HealthReason::none) return said;
   if (!said.has_pose()) return {said.state, reason == HealthReason::one_camera ? said.reason : reason};
   if (blind_s > longest_blind_s_) return {HealthState::lost, HealthReason::no_images};
+  // Images come, and their estimates are late: the estimator knows why, where it waits for readings.
+  const bool images_come = reason == HealthReason::no_images && silence_s(arrivals.image) <= silent_s;
+  if (images_come && said.state == HealthState::degraded) return said;
   return {HealthState::degraded, reason};
 }
 

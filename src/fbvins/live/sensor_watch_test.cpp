@@ -53,6 +53,15 @@ TEST(SensorWatch, ImagesThatComeAgainAreNoPoseYet) {
             (Health{HealthState::lost, HealthReason::no_images}));
 }
 
+/// Images wait a quarter of a second for readings that are missing.
+TEST(SensorWatch, LateEstimatesKeepTheirReason) {
+  const Health gap{HealthState::degraded, HealthReason::imu_gap};
+  const SensorWatch watch(LiveOptions{}, 3);
+  EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)), gap);
+  EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.7, 9.7), at(0), at(10)),
+            (Health{HealthState::degraded, HealthReason::no_images}));
+}
+
 TEST(SensorWatch, BeforeTheFirstPoseItOnlySaysWhatIsMissing) {
   const Health waiting{HealthState::initialising, HealthReason::waiting_for_motion_or_rest};
   EXPECT_EQ(judged(waiting, {}, 1), (Health{HealthState::initialising, HealthReason::imu_gap}));
