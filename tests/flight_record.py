@@ -65,8 +65,9 @@ def check_refusals(program, flight, root):
     record = root / "0.mcap"
     before = record.read_bytes()
     done = subprocess.run(fly(program, flight, record), capture_output=True, text=True)
-    require(done.returncode == 2 and "never overwritten" in done.stderr, f"overwritten: {done}")
+    require(done.returncode == 0 and "exists already" in done.stderr, f"the flight has no record of its own: {done}")
     require(record.read_bytes() == before, "the record that was there has changed")
+    require((root / "0-2.mcap").exists(), "the next record has not the next number")
     blind = root / "blind.mcap"
     subprocess.run(fly(program, flight, blind, "--record-no-images", "--max-images", 20), capture_output=True)
     code, said = run_again(program, blind, root / "blind")
