@@ -24,7 +24,7 @@ class KeptMap final : public Mapper {
   KeptMap(Mapper& map, std::function<std::string()> bytes, std::string file, WriteFile write = write_file_atomically);
   MapUpdate process(const Keyframe& keyframe) override;
 
-  /// Waits for the file in work; whoever is told of requested files may end then.
+  /// Waits until the file being written is complete. The receiver of on_request() may be destroyed afterwards.
   void finish() const { writer_.wait(); }
   /// The map is written after the next keyframe. From any thread.
   void request_save() { wanted_ = true; }

@@ -29,7 +29,7 @@ namespace fbvins {
 class LiveSystem {
  public:
   /// `clock_rate`: Source::clock_rate(). `first_reset_counter`: of the first W that is published, another one than the process
-  /// before ended with, so that whoever outlives this process notices the new W. Errors as System::create.
+  /// before ended with, so that a flight controller that outlives this process notices the new W. Errors as System::create.
   static Result<LiveSystem> create(const SystemOptions& system, const LiveOptions& options, const StereoRig& rig,
                                    double clock_rate = 1, SystemParts parts = {}, std::uint32_t first_reset_counter = 0);
   ~LiveSystem();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MAVLink 2 message signing: frames carry a time and a keyed hash, so that whoever lacks the key can neither make frames nor
+// MAVLink 2 message signing: frames carry a time and a keyed hash, so that a sender without the key can neither make frames nor
 // repeat old ones.
 //
 //   Result<MavlinkKey> key = parse_mavlink_key(text);

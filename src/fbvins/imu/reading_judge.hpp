@@ -6,7 +6,7 @@
 //
 // A reading is refused if a number is not finite or beyond the sensor's range, if its stamp is not later than that of the
 // last accepted one, or if it repeats the last one for longer than a sensor at rest does (a hung driver).
-// Whoever is given accepted readings only, accepts all of them. Threads: one owner.
+// Readings that one ReadingJudge has accepted are accepted by another. Threads: one owner.
 #pragma once
 
 #include <optional>

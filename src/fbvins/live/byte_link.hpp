@@ -22,7 +22,7 @@ namespace fbvins {
 struct UdpAddress {
   std::string host;
   std::uint16_t port = 0, own_port = 0;  ///< own_port 0: any
-  /// The peer is whoever sends packets for which the owner calls pin_to_sender(); until then packets go to host and port.
+  /// The peer is the sender of packets for which the owner calls pin_to_sender(); until then packets go to host and port.
   bool peer_is_learnt = false;
 };
 struct SerialAddress {
