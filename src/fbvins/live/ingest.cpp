@@ -114,6 +114,15 @@ void Ingest::drop_waiting_image() {
 std::optional<SensorEvent> Ingest::pop() {
   std::unique_lock lock(mutex_);
   filled_.wait(lock, [&] { return closed_ || !queue_.empty(); });
+  return take_first();
+}
+
+std::optional<SensorEvent> Ingest::pop_waiting() {
+  const std::lock_guard lock(mutex_);
+  return take_first();
+}
+
+std::optional<SensorEvent> Ingest::take_first() {
   if (queue_.empty()) return std::nullopt;
   SensorEvent event = std::move(queue_.front());
   queue_.pop_front();

@@ -42,6 +42,8 @@ class Ingest final : public SensorInput {
 
   /// Waits for the next event; nothing once closed and empty.
   std::optional<SensorEvent> pop();
+  /// The next event if there is one: for callers of a single thread.
+  std::optional<SensorEvent> pop_waiting();
   void close();
 
   struct Arrival {
@@ -59,6 +61,7 @@ class Ingest final : public SensorInput {
   void put_in_order(ImuSample sample, Time t, Time host);
   void release(const ImuSample& sample);
   void drop_waiting_image();
+  std::optional<SensorEvent> take_first();
 
   Clock now_;
   OnReading on_reading_;

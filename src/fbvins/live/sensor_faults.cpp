@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <charconv>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -13,23 +13,68 @@ namespace {
 
 using Kind = SensorFault::Kind;
 
-struct KindName {
-  std::string_view name;
-  Kind kind;
-  bool has_amount;
-  double largest_amount;
-};
+using Reading = ReadingFault;
+using Img = ImageFault;
 
-constexpr std::array<KindName, 10> kKinds{{{"camera_off", Kind::camera_off, false, 0},
-                                           {"left_off", Kind::left_off, false, 0},
-                                           {"right_off", Kind::right_off, false, 0},
-                                           {"left_frozen", Kind::left_frozen, false, 0},
-                                           {"right_frozen", Kind::right_frozen, false, 0},
-                                           {"imu_off", Kind::imu_off, false, 0},
-                                           {"unplugged", Kind::unplugged, false, 0},
-                                           {"lose_images", Kind::lose_images, true, 1},
-                                           {"burst", Kind::burst, true, 10},
-                                           {"leap", Kind::leap, true, 1e6}}};
+constexpr FaultName kNames[] = {
+    {"camera_off", Kind::camera_off},
+    {"left_off", Kind::left_off},
+    {"right_off", Kind::right_off},
+    {"imu_off", Kind::imu_off},
+    {"unplugged", Kind::unplugged},
+    {"lose_images", Kind::lose_images, "of 1", 0.1, 0.9, 1},
+    {"lose_readings", Kind::lose_readings, "of 1", 0.1, 0.9, 1},
+    {"burst", Kind::burst, "s", 0.05, 0.5, 10},
+    {"leap", Kind::leap, "s", 0.03, 5, 1e6, true},
+    {"imu_leap", Kind::imu_leap, "s", 0.01, 0.3, 1e6, true},
+    {"image_leap", Kind::image_leap, "s", 0.01, 0.3, 1e6, true},
+    {"imu_jitter", Kind::imu_jitter, "s", 0.0005, 0.01, 1},
+    {"imu_frozen", Kind::reading, "", 0, 0, 0, false, Reading::frozen},
+    {"imu_every_fourth", Kind::reading, "", 0, 0, 0, false, Reading::every_fourth},
+    {"imu_zero", Kind::reading, "", 0, 0, 0, false, Reading::zero},
+    {"imu_nan", Kind::reading, "", 0, 0, 0, false, Reading::nan},
+    {"imu_noise", Kind::reading, "m/s^2", 0.5, 10, 1e3, false, Reading::noise},
+    {"vibration", Kind::reading, "m/s^2", 0.5, 15, 1e3, false, Reading::vibration},
+    {"imu_spikes", Kind::reading, "m/s^2", 5, 150, 1e6, false, Reading::spikes},
+    {"gyro_clipped", Kind::reading, "rad/s", 0.1, 1, 1e3, false, Reading::gyro_clipped},
+    {"accel_clipped", Kind::reading, "m/s^2", 5, 12, 1e3, false, Reading::accel_clipped},
+    {"gyro_bias", Kind::reading, "rad/s", 0.01, 0.5, 1e3, true, Reading::gyro_bias},
+    {"accel_bias", Kind::reading, "m/s^2", 0.1, 5, 1e3, true, Reading::accel_bias},
+    {"gyro_drift", Kind::reading, "rad/s^2", 0.005, 0.2, 1e3, true, Reading::gyro_drift},
+    {"gyro_scale", Kind::reading, "%", 2, 100, 1e4, true, Reading::gyro_scale},
+    {"accel_scale", Kind::reading, "%", 1, 50, 1e4, true, Reading::accel_scale},
+    {"gyro_axis_dead", Kind::reading, "", 0, 0, 0, false, Reading::gyro_axis_dead},
+    {"accel_axis_dead", Kind::reading, "", 0, 0, 0, false, Reading::accel_axis_dead},
+    {"gyro_flipped", Kind::reading, "", 0, 0, 0, false, Reading::gyro_flipped},
+    {"imu_axes_exchanged", Kind::reading, "", 0, 0, 0, false, Reading::axes_exchanged},
+    {"imu_loose", Kind::reading, "degrees", 2, 60, 180, true, Reading::loose},
+    {"left_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::left_frozen},
+    {"right_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::right_frozen},
+    {"cycle", Kind::image, "frames", 2, 8, 32, false, {}, Img::cycle},
+    {"each_twice", Kind::image, "", 0, 0, 0, false, {}, Img::each_twice},
+    {"left_late", Kind::image, "", 0, 0, 0, false, {}, Img::left_late},
+    {"right_late", Kind::image, "", 0, 0, 0, false, {}, Img::right_late},
+    {"exchanged", Kind::image, "", 0, 0, 0, false, {}, Img::exchanged},
+    {"same_twice", Kind::image, "", 0, 0, 0, false, {}, Img::same_twice},
+    {"black", Kind::image, "", 0, 0, 0, false, {}, Img::black},
+    {"white", Kind::image, "", 0, 0, 0, false, {}, Img::white},
+    {"left_black", Kind::image, "", 0, 0, 0, false, {}, Img::left_black},
+    {"blank", Kind::image, "", 0, 0, 0, false, {}, Img::blank},
+    {"dark", Kind::image, "of 1", 0.005, 0.2, 1, false, {}, Img::dark},
+    {"image_noise", Kind::image, "grey levels", 5, 60, 1e3, false, {}, Img::noise},
+    {"blur", Kind::image, "px", 3, 41, 1e3, false, {}, Img::blur},
+    {"covered", Kind::image, "of 1", 0.3, 0.9, 1, false, {}, Img::covered},
+    {"right_covered", Kind::image, "of 1", 0.3, 1, 1, false, {}, Img::right_covered},
+    {"flicker", Kind::image, "of 1", 0.05, 0.7, 1, false, {}, Img::flicker},
+    {"right_darker", Kind::image, "of 1", 0.05, 0.7, 1, false, {}, Img::right_darker},
+    {"torn", Kind::image, "", 0, 0, 0, false, {}, Img::torn},
+    {"broken_blocks", Kind::image, "of 1", 0.02, 0.7, 1, false, {}, Img::broken_blocks},
+    {"scroll", Kind::image, "px", 0.5, 12, 1e3, true, {}, Img::scroll},
+    {"right_shifted", Kind::image, "px", 1, 20, 1e3, true, {}, Img::right_shifted},
+    {"right_turned", Kind::image, "degrees", 0.3, 5, 180, true, {}, Img::right_turned},
+    {"both_turned", Kind::image, "degrees", 0.5, 20, 180, true, {}, Img::both_turned},
+    {"mirrored", Kind::image, "", 0, 0, 0, false, {}, Img::mirrored},
+};
 
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts(1);
@@ -48,38 +93,62 @@ std::optional<double> number(const std::string& text) {
 
 }  // namespace
 
+std::span<const FaultName> fault_names() { return kNames; }
+
 Result<SensorFault> parse_fault(const std::string& text) {
   const auto refuse = [&](const std::string& why) {
     return Error{ErrorCode::invalid_argument, fmt::format("fault '{}': {}; it is KIND:START:LENGTH[:AMOUNT]", text, why)};
   };
   const std::vector<std::string> parts = split(text);
   std::string known;
-  for (const KindName& kind : kKinds) {
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", kind.name);
-    if (kind.name != parts[0]) continue;
-    if (parts.size() != (kind.has_amount ? 4u : 3u))
-      return refuse(fmt::format("{} has {}", kind.name, kind.has_amount ? "an AMOUNT" : "no AMOUNT"));
+  for (const FaultName& name : kNames) {
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", name.name);
+    if (name.name != parts[0]) continue;
+    const bool has_amount = !name.unit.empty();
+    if (parts.size() != (has_amount ? 4u : 3u))
+      return refuse(has_amount ? fmt::format("{} has an AMOUNT ({})", name.name, name.unit)
+                               : fmt::format("{} has no AMOUNT", name.name));
     const std::optional<double> start = number(parts[1]), length = number(parts[2]);
-    const std::optional<double> amount = kind.has_amount ? number(parts[3]) : 0.0;
+    const std::optional<double> amount = has_amount ? number(parts[3]) : 0.0;
     if (!start || !length || !amount || *start < 0 || *length <= 0) return refuse("times are numbers, START >= 0, LENGTH > 0");
-    if (std::abs(*amount) > kind.largest_amount) return refuse(fmt::format("AMOUNT is at most {}", kind.largest_amount));
-    if (*amount <= 0 && kind.kind != Kind::leap && kind.has_amount) return refuse("AMOUNT is more than 0");
-    return SensorFault{kind.kind, *start, *length, *amount};
+    if (std::abs(*amount) > name.most) return refuse(fmt::format("AMOUNT is at most {}", name.most));
+    if (has_amount && !name.both_signs && *amount <= 0) return refuse("AMOUNT is more than 0");
+    return SensorFault{name.kind, *start, *length, *amount, name.reading, name.image};
   }
   return refuse(fmt::format("there are {}", known));
 }
 
-const SensorFault* FaultyInput::active(Kind kind, Time t) const {
+FaultyInput::FaultyInput(SensorInput& input, std::vector<SensorFault> faults, std::uint64_t seed) : input_(input), rng_(seed) {
+  for (const SensorFault& f : faults)
+    injected_.push_back({f, ReadingSpoiler(f.reading, f.amount, seed), ImageSpoiler(f.image, f.amount, seed)});
+}
+
+bool FaultyInput::active(const SensorFault& fault, Time t) const {
   const double since_s = (t - *first_).seconds();
-  for (const SensorFault& fault : faults_)
-    if (fault.kind == kind && since_s >= fault.start_s && since_s < fault.start_s + fault.length_s) return &fault;
+  return since_s >= fault.start_s && since_s < fault.start_s + fault.length_s;
+}
+
+const SensorFault* FaultyInput::active(Kind kind, Time t) const {
+  for (const Injected& i : injected_)
+    if (i.fault.kind == kind && active(i.fault, t)) return &i.fault;
   return nullptr;
 }
 
 void FaultyInput::push(const ImuSample& sample) {
   if (!first_) first_ = sample.t;
-  if (active(Kind::imu_off, sample.t) || active(Kind::unplugged, sample.t)) return;
-  pass(sample, sample.t);
+  const Time t = sample.t;
+  if (active(Kind::imu_off, t) || active(Kind::unplugged, t)) return;
+  if (const SensorFault* lost = active(Kind::lose_readings, t))
+    if (rng_.uniform() < lost->amount) return;
+  ImuSample altered = sample;
+  for (Injected& i : injected_) {
+    if (i.fault.kind != Kind::reading) continue;
+    if (active(i.fault, t)) i.reading.alter(altered);
+  }
+  altered.t = t + leap(Kind::imu_leap, t);
+  if (const SensorFault* jitter = active(Kind::imu_jitter, t))
+    altered.t = altered.t + Duration::from_seconds(jitter->amount * rng_.normal());
+  pass(altered, t);
 }
 
 void FaultyInput::push(StereoFrame frame) {
@@ -88,21 +157,24 @@ void FaultyInput::push(StereoFrame frame) {
   if (active(Kind::camera_off, t) || active(Kind::unplugged, t)) return;
   if (const SensorFault* lost = active(Kind::lose_images, t))
     if (rng_.uniform() < lost->amount) return;
+  for (Injected& i : injected_) {
+    if (i.fault.kind != Kind::image) continue;
+    i.image.see(frame);
+    if (active(i.fault, t)) i.image.alter(frame);
+  }
   if (active(Kind::left_off, t)) frame.left.reset();
-  else if (active(Kind::left_frozen, t)) frame.left = left_;
   if (active(Kind::right_off, t)) frame.right.reset();
-  else if (active(Kind::right_frozen, t)) frame.right = right_;
-  left_ = frame.left, right_ = frame.right;
+  frame.t = t + leap(Kind::image_leap, t);
   pass(std::move(frame), t);
 }
 
-Time FaultyInput::leapt(Time t) const {
-  const SensorFault* leap = active(Kind::leap, t);
-  return leap ? t + Duration::from_seconds(leap->amount) : t;
+/// How much later a stamp is, by a leap of all clocks and of that of its own kind.
+Duration FaultyInput::leap(Kind own, Time t) const {
+  const SensorFault *all = active(Kind::leap, t), *one = active(own, t);
+  return Duration::from_seconds((all ? all->amount : 0) + (one ? one->amount : 0));
 }
 
 void FaultyInput::pass(SensorEvent event, Time t) {
-  std::visit([&](auto& e) { e.t = leapt(t); }, event);
   if (held_until_ && t >= *held_until_) deliver_held();
   if (const SensorFault* burst = active(Kind::burst, t); burst && !held_until_)
     held_until_ = t + Duration::from_seconds(burst->amount);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fault injection between a source and its SensorInput: what cables, cameras and clocks do to a flight. Times are data time since
-// the first event, so that the same flight meets the same faults.
+// Fault injection between a source and its SensorInput: what cables, cameras, IMUs and clocks do to a flight. Times are data time
+// since the first event, so that the same flight meets the same faults.
 //
 //   Result<SensorFault> fault = parse_fault("camera_off:8:2");   // from 8 s on, for 2 s
 //   FaultyInput faulty(live.input(), {*fault});
@@ -9,56 +9,85 @@
 
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/rng.hpp"
+#include "fbvins/live/image_faults.hpp"
+#include "fbvins/live/reading_faults.hpp"
 #include "fbvins/live/source.hpp"
 
 namespace fbvins {
 
 struct SensorFault {
   enum class Kind {
-    camera_off,    ///< no images
-    left_off,      ///< no image of the left camera
-    right_off,     ///< no image of the right camera
-    left_frozen,   ///< the last left image again and again
-    right_frozen,  ///< the last right image again and again
-    imu_off,       ///< no readings
-    unplugged,     ///< nothing at all
-    lose_images,   ///< each image is lost with probability `amount`
-    burst,         ///< everything is held back for `amount` seconds and then comes at once, repeatedly
-    leap,          ///< stamps are `amount` seconds later
+    // What comes, and when.
+    camera_off,   ///< no images
+    left_off,     ///< no image of the left camera
+    right_off,    ///< no image of the right camera
+    imu_off,      ///< no readings
+    unplugged,    ///< nothing at all
+    lose_images,  ///< each image is lost with probability `amount`
+    lose_readings,
+    burst,       ///< everything is held back for `amount` seconds and then comes at once, repeatedly
+    leap,        ///< all stamps are `amount` seconds later
+    imu_leap,    ///< stamps of readings are
+    image_leap,  ///< stamps of images are
+    imu_jitter,  ///< stamps of readings are wrong by `amount` seconds, standard deviation
+    reading,     ///< numbers of readings are altered (ReadingFault)
+    image,       ///< images are (ImageFault)
   };
   Kind kind = Kind::camera_off;
   double start_s = 0, length_s = 0;
   double amount = 0;
+  ReadingFault reading = ReadingFault::frozen;
+  ImageFault image = ImageFault::black;
 };
 
-/// KIND:START:LENGTH[:AMOUNT], in seconds; AMOUNT is the share of lost images, the hold time of a burst, or the clock's jump.
+/// A name for parse_fault(). The amount, where there is one, is in the unit given and at most `most`; it may be negative where
+/// `both_signs`. Between `small` and `large` it is what happens to rigs.
+struct FaultName {
+  std::string_view name;
+  SensorFault::Kind kind;
+  std::string_view unit = "";  ///< of the amount; empty: there is none
+  double small = 0, large = 0, most = 0;
+  bool both_signs = false;
+  ReadingFault reading = ReadingFault::frozen;
+  ImageFault image = ImageFault::black;
+};
+std::span<const FaultName> fault_names();
+
+/// KIND:START:LENGTH[:AMOUNT], in seconds; the amount is in the unit of fault_names().
 Result<SensorFault> parse_fault(const std::string& text);
 
 /// One thread.
 class FaultyInput final : public SensorInput {
  public:
-  FaultyInput(SensorInput& input, std::vector<SensorFault> faults) : input_(input), faults_(std::move(faults)) {}
+  FaultyInput(SensorInput& input, std::vector<SensorFault> faults, std::uint64_t seed = 1);
   ~FaultyInput() override { deliver_held(); }
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
 
  private:
+  struct Injected {
+    SensorFault fault;
+    ReadingSpoiler reading;
+    ImageSpoiler image;
+  };
+  bool active(const SensorFault& fault, Time t) const;
   const SensorFault* active(SensorFault::Kind kind, Time t) const;
-  Time leapt(Time t) const;
+  Duration leap(SensorFault::Kind own, Time t) const;
   void pass(SensorEvent event, Time t);
   void deliver_held();
 
   SensorInput& input_;
-  std::vector<SensorFault> faults_;
+  std::vector<Injected> injected_;
   std::optional<Time> first_;
-  std::shared_ptr<const Image> left_, right_;  ///< newest that came through
-  Rng rng_{1};
+  Rng rng_;
   std::deque<SensorEvent> held_;
   std::optional<Time> held_until_;
 };

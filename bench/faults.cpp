@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+// A campaign of faults: recorded flights whose sensors fail in the middle, each with one fault drawn at random (kind, size,
+// moment, length), through the judgement of live sensors and the whole odometry. What counts is what is published as `good`.
+//
+//   fbvins_faults FLIGHT... --flights 300 --out rows.csv        goes on where it was stopped; the same rows in any order
+//   fbvins_faults FLIGHT... --fault imu_frozen:8:2 --frontend klt     one fault, of every recording
+//   fbvins_faults FLIGHT... --clean                              without faults: false alarms
+//
+// A row for each flight. Errors are those since the fault's beginning: the estimate is laid over the truth by the poses before it
+// (shift and heading), and by the first pose after a reset that was told.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "fbvins/core/angle.hpp"
+#include "fbvins/core/rng.hpp"
+#include "fbvins/eval/alignment.hpp"
+#include "fbvins/io/dataset.hpp"
+#include "fbvins/live/ingest.hpp"
+#include "fbvins/live/sensor_faults.hpp"
+#include "fbvins/pipeline/system.hpp"
+
+namespace fbvins::bench {
+namespace {
+
+/// False: a pose that is called good and is off by this much, and by as many standard deviations, at once.
+constexpr double kFalse_m = 0.5, kFalseTilt_rad = 5 * kDegree, kFalse_sigma = 5;
+/// Smaller errors are not counted in standard deviations: the truth has its own.
+constexpr double kTruth_m = 0.05, kTruth_rad = 1.5 * kDegree;
+constexpr double kLateStart = 0.35, kEarlyEnd = 0.75;  ///< of the flight, in which faults begin
+
+struct Flight {
+  std::string name;
+  StereoRig rig;
+  std::vector<SensorEvent> events;
+  std::vector<StampedPose<AnyWorld>> truth;
+  Time begin, end;
+};
+
+Time time_of(const SensorEvent& event) {
+  return std::visit([](const auto& e) { return e.t; }, event);
+}
+
+Result<Flight> load(const std::string& path) {
+  auto opened = open_dataset(path);
+  if (!opened) return opened.error();
+  Dataset& data = **opened;
+  Flight flight{path.substr(path.find_last_of('/', path.size() - 2) + 1), data.rig(), {}, {}, {}, {}};
+  while (auto event = data.next()) flight.events.push_back(*std::move(event));
+  for (const TrajectoryPoint& p : data.ground_truth()) flight.truth.push_back({p.t, {p.T_WB.q, p.T_WB.p}});
+  if (flight.events.empty() || flight.truth.size() < 2)
+    return Error{ErrorCode::invalid_argument, fmt::format("{}: a flight with ground truth is needed", path)};
+  flight.begin = time_of(flight.events.front()), flight.end = time_of(flight.events.back());
+  return flight;
+}
+
+std::optional<Pose<AnyWorld, B>> truth_at(const Flight& flight, Time t) {
+  const auto next = std::lower_bound(flight.truth.begin(), flight.truth.end(), t, [](const auto& p, Time x) { return p.t < x; });
+  if (next == flight.truth.begin() || next == flight.truth.end()) return std::nullopt;
+  const auto &a = *(next - 1), &b = *next;
+  const double u = (t - a.t).seconds() / (b.t - a.t).seconds();
+  return Pose<AnyWorld, B>{a.T.q.slerp(u, b.T.q), Vec3((1 - u) * a.T.p + u * b.T.p)};
+}
+
+/// A published pose with the moment at which its image was truly taken.
+struct Published {
+  Time taken;
+  Odometry odometry;
+};
+
+/// The way of live data, in one thread and in the flight's own time.
+class LiveWay final : public SensorInput {
+ public:
+  LiveWay(const Flight& flight, const SystemOptions& options)
+      : ingest_(
+            LiveOptions{}, 1, [this] { return now; }, nullptr, flight.rig.imu_noise,
+            Duration::from_seconds(flight.rig.time_offset_s)),
+        system_(*System::create(options, flight.rig)) {
+    system_.on_odometry([this](const Odometry& o) { published.push_back({taken_.at(o.t.ns), o}); });
+  }
+  void push(const ImuSample& sample) override { ingest_.push(sample), forward(); }
+  void push(StereoFrame frame) override { ingest_.push(std::move(frame)), forward(); }
+  void finish() { ingest_.close(), forward(), (void)system_.finish(); }
+  LiveCounts counts() const { return ingest_.counts(); }
+
+  Time now;
+  bool held = false;  ///< data come later than they were taken, with their own stamps
+  std::vector<Published> published;
+
+ private:
+  void forward() {
+    ingest_.tick();
+    while (std::optional<SensorEvent> event = ingest_.pop_waiting()) {
+      if (const auto* frame = std::get_if<StereoFrame>(&*event)) taken_[frame->t.ns] = held ? frame->t : now;
+      (void)system_.push(*std::move(event));
+    }
+  }
+  Ingest ingest_;
+  System system_;
+  std::map<std::int64_t, Time> taken_;
+};
+
+struct Errors {
+  int false_good = 0, good_after = 0, poses_after = 0, not_good = 0, lost = 0, resets = 0;
+  double said_s = -1;        ///< from the fault's beginning to the first image that is not good; -1: never
+  double good_again_s = -1;  ///< from the fault's end to the first image from which on all are good; -1: never
+  double good_m = 0, good_sigma = 0, good_tilt_deg = 0, good_tilt_sigma = 0, largest_m = 0, last_m = 0, step_m = 0;
+  std::set<std::string> reasons;
+};
+
+double direction_sigma(const Vec3& error, const Mat3& covariance) {
+  const Vec3 u = error.normalized();
+  return std::sqrt(std::max(0.0, u.dot(covariance * u)));
+}
+
+Similarity laid_on(const Pose<AnyWorld, B>& truth, const Pose<W, B>& estimate) {
+  const Quat q = truth.q * estimate.q.conjugate();
+  const Quat turn = Quat(q.w(), 0, 0, q.z()).normalized();
+  return {1, turn, truth.p - turn * estimate.p};
+}
+
+Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin, Time end) {
+  Errors out;
+  std::vector<PosePair> before;
+  std::uint32_t reset = 0;
+  for (const Published& p : all)
+    if (p.taken < begin && p.odometry.health.has_pose()) {
+      if (p.odometry.reset_counter != reset) before.clear(), reset = p.odometry.reset_counter;
+      if (auto truth = truth_at(flight, p.taken))
+        before.push_back({{p.taken, *truth}, {p.taken, p.odometry.T_WB.cast_frames<AnyWorld, B>()}});
+    }
+  std::optional<Similarity> S;
+  if (auto aligned = align(before, Alignment::yaw)) S = *aligned;
+  // The first pose after the fault's beginning must not pay for what the alignment cannot fit.
+  for (const Published& p : all) {
+    const Odometry& o = p.odometry;
+    if (p.taken < begin) continue;
+    ++out.poses_after;
+    const bool good = o.health.state == HealthState::good;
+    if (!good) {
+      ++out.not_good;
+      if (out.said_s < 0) out.said_s = (p.taken - begin).seconds();
+      out.reasons.insert(std::string(to_string(o.health.reason)));
+      if (p.taken > end) out.good_again_s = -1;
+    } else if (p.taken > end && out.good_again_s < 0) {
+      out.good_again_s = (p.taken - end).seconds();
+    }
+    out.lost += o.health.state == HealthState::lost;
+    if (!o.health.has_pose()) continue;
+    const auto truth = truth_at(flight, p.taken);
+    if (!truth) continue;
+    if (!S || o.reset_counter != reset) {
+      S = laid_on(*truth, o.T_WB), out.resets += o.reset_counter != reset, reset = o.reset_counter;
+    }
+    const Pose<W, B> laid = *S * o.T_WB;
+    const Vec3 error_W = S->q.conjugate() * (laid.p - truth->p);
+    const double size = error_W.norm(), sigma = size / direction_sigma(error_W, o.pose_covariance.topLeftCorner<3, 3>());
+    const double tilt =
+        std::acos(std::clamp((laid.q.conjugate() * Vec3::UnitZ()).dot(truth->q.conjugate() * Vec3::UnitZ()), -1.0, 1.0));
+    const double tilt_sigma = tilt / o.tilt_sigma_rad;
+    out.largest_m = std::max(out.largest_m, size), out.last_m = size;
+    if (!good) continue;
+    ++out.good_after;
+    out.good_m = std::max(out.good_m, size);
+    out.good_tilt_deg = std::max(out.good_tilt_deg, tilt / kDegree);
+    if (size > kTruth_m) out.good_sigma = std::max(out.good_sigma, sigma);
+    if (tilt > kTruth_rad) out.good_tilt_sigma = std::max(out.good_tilt_sigma, tilt_sigma);
+    out.false_good += (size > kFalse_m && sigma > kFalse_sigma) || (tilt > kFalseTilt_rad && tilt_sigma > kFalse_sigma);
+  }
+  return out;
+}
+
+std::string row(const std::string& name, const Flight& flight, const std::string& frontend, const std::string& fault,
+                const Errors& e) {
+  std::string reasons;
+  for (const std::string& r : e.reasons) reasons += (reasons.empty() ? "" : " ") + r;
+  return fmt::format("{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{:.2f},{:.1f},{:.3f},{:.3f},{:.4f},{},{},{:.2f},{}", name,
+                     flight.name, frontend, fault, e.false_good, e.good_after, e.said_s, e.good_m, e.good_sigma, e.good_tilt_deg,
+                     e.good_tilt_sigma, e.largest_m, e.last_m, static_cast<double>(e.not_good) / std::max(1, e.poses_after),
+                     e.resets, e.lost, e.good_again_s, reasons);
+}
+constexpr const char* kHeader =
+    "flight,recording,frontend,fault,false_good,good,said_s,good_m,good_sigma,good_tilt_deg,good_tilt_sigma,largest_m,last_m,not_good,"
+    "resets,lost,good_again_s,reasons";
+
+Errors fly(const Flight& flight, const std::string& frontend, const std::vector<SensorFault>& faults, std::uint64_t seed) {
+  SystemOptions options;
+  options.frontend.kind = frontend;
+  LiveWay way(flight, options);
+  for (const SensorFault& f : faults) way.held = way.held || f.kind == SensorFault::Kind::burst;
+  {
+    FaultyInput faulty(way, faults, seed);
+    for (const SensorEvent& event : flight.events) {
+      way.now = time_of(event);
+      std::visit([&](const auto& e) { faulty.push(e); }, event);
+    }
+  }
+  way.finish();
+  const Time begin = flight.begin + Duration::from_seconds(faults.empty() ? kLateStart * (flight.end - flight.begin).seconds()
+                                                                          : faults[0].start_s);
+  return judge(flight, way.published, begin, faults.empty() ? begin : begin + Duration::from_seconds(faults[0].length_s));
+}
+
+/// Even in the logarithm.
+double between(Rng& rng, double small, double large) { return small * std::pow(large / small, rng.uniform()); }
+
+std::string drawn(const Flight& flight, std::uint64_t number) {
+  Rng rng(number, 5);
+  const auto names = fault_names();
+  const FaultName& name = names[number % names.size()];
+  const double whole_s = (flight.end - flight.begin).seconds();
+  const double start = rng.uniform(kLateStart, kEarlyEnd) * whole_s;
+  const double length = rng.uniform() < 0.1 ? whole_s : between(rng, 0.1, 4);
+  std::string text = fmt::format("{}:{:.2f}:{:.2f}", name.name, start, length);
+  if (name.unit.empty()) return text;
+  const double amount = between(rng, name.small, name.large);
+  return text + fmt::format(":{:.4g}", name.both_signs && rng.below(2) ? -amount : amount);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("faults drawn at random, and what is called good after them");
+  std::vector<std::string> paths, faults, frontends{"klt", "orb", "boost"};
+  std::string out;
+  std::uint64_t flights = 0, first = 0;
+  bool clean = false;
+  app.add_option("recordings", paths, "with ground truth")->required();
+  app.add_option("--frontends", frontends)->delimiter(',');
+  app.add_option("--flights", flights, "drawn at random");
+  app.add_option("--first", first, "number of the first one; other numbers are other flights");
+  app.add_option("--fault", faults, "one fault, as of fbvins live")->take_all()->allow_extra_args(false);
+  app.add_flag("--clean", clean, "without faults");
+  app.add_option("--out", out, "CSV; rows that are there are not flown again");
+  CLI11_PARSE(app, argc, argv);
+  std::vector<Flight> recordings;
+  for (const std::string& path : paths) {
+    auto flight = load(path);
+    if (!flight) return fmt::print(stderr, "{}\n", flight.error().message), 2;
+    recordings.push_back(*std::move(flight));
+  }
+  std::set<std::string> done;
+  if (!out.empty()) {
+    std::ifstream file(out);
+    for (std::string line; std::getline(file, line);) done.insert(line.substr(0, line.find(',')));
+  }
+  std::FILE* file = out.empty() ? stdout : std::fopen(out.c_str(), "a");
+  if (file == nullptr) return fmt::print(stderr, "{}: cannot be written\n", out), 2;
+  if (done.empty()) fmt::print(file, "{}\n", kHeader);
+  int failed = 0;
+  const auto one = [&](const std::string& name, const Flight& flight, const std::string& frontend, const std::string& text,
+                       std::uint64_t seed) {
+    if (done.contains(name)) return;
+    std::vector<SensorFault> parsed;
+    if (!text.empty()) {
+      auto fault = parse_fault(text);
+      if (!fault) throw CLI::ValidationError(fault.error().message);
+      parsed.push_back(*fault);
+    }
+    const Errors errors = fly(flight, frontend, parsed, seed);
+    failed += errors.false_good > 0;
+    fmt::print(file, "{}\n", row(name, flight, frontend, text, errors));
+    std::fflush(file);
+  };
+  for (const std::string& frontend : frontends)
+    for (const Flight& flight : recordings) {
+      if (clean) one(fmt::format("clean-{}-{}", flight.name, frontend), flight, frontend, "", 1);
+      for (const std::string& text : faults) one(fmt::format("{}-{}-{}", text, flight.name, frontend), flight, frontend, text, 1);
+    }
+  const std::size_t kinds = fault_names().size();
+  for (std::uint64_t n = first; n < first + flights; ++n) {
+    const Flight& flight = recordings[(n / kinds + n) % recordings.size()];
+    one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()], drawn(flight, n), n);
+  }
+  return failed > 0;
+}
+
+}  // namespace
+}  // namespace fbvins::bench
+
+int main(int argc, char** argv) {
+  try {
+    return fbvins::bench::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
+}
