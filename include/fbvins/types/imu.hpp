@@ -15,11 +15,18 @@ struct ImuSample {
   Vec3 accel_mps2 = Vec3::Zero();  ///< specific force (at rest: g, upwards), m/s^2
 };
 
+/// Factors on an IMU's noise densities, 1 or more, where readings are worse than usual: strong vibration, a clipped axis, or
+/// images that contradict them.
+struct ImuNoiseScale {
+  double gyro = 1, accel = 1;
+};
+
 /// The readings between two images, on the images' clock: first.t and last.t are the two image stamps (interpolated),
 /// those between are the sensor's own. Empty for the first image and where the IMU is missing.
 struct ImuSegment {
   std::vector<ImuSample> samples;
   Duration longest_gap;  ///< longest time between neighbouring readings that overlaps the segment, its whole length
+  ImuNoiseScale noise = {};
 
   bool empty() const { return samples.size() < 2; }
 };

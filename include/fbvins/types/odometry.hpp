@@ -33,10 +33,15 @@ enum class HealthReason {
   implausible_bias,
   implausible_speed,
   solver_failed,
-  one_camera,      ///< no stereo matches
-  frontend_fault,  ///< the frontend returned features that cannot be: they were left out
+  one_camera,          ///< no stereo matches
+  frontend_fault,      ///< the frontend returned features that cannot be: they were left out
+  contradiction,       ///< images and IMU readings contradict each other
+  cameras_disagree,    ///< one camera contradicts the other and the IMU: its images are not used
+  imu_clipped,         ///< an axis of the IMU is at the end of its range
+  imu_vibration,       ///< readings are shaken so much that they say little
+  correction_pending,  ///< the published pose is still being corrected, by more than a good pose may be wrong
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::frontend_fault;
+inline constexpr HealthReason kLastHealthReason = HealthReason::correction_pending;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What calibrations leave open and no measurement of a flight shows: the error of the baseline, which scales all lengths, and
-// those of the IMU's axes, which act on gravity and on turning rates as biases (docs/derivations/window.md, W21-W23). Pure functions.
+// those of the IMU's axes, which act on gravity and on turning rates as biases (docs/derivations/window.md, W21-W23). Pure
+// functions.
 #pragma once
 
 #include "fbvins/geometry/pose.hpp"
@@ -13,8 +14,8 @@ inline constexpr double kBaselineSigma_m = 0.0003;
 /// Standard deviation of the scale and of the direction of each axis of a calibrated IMU, 1 and rad.
 inline constexpr double kAxisSigma = 0.001;
 
-/// Covariance of the bias that errors of the axes make of a constant quantity, in its unit squared: of gravity for the accelerometer (W22),
-/// of the mean turning rate for the gyroscope (W23).
+/// Covariance of the bias that errors of the axes make of a constant quantity, in its unit squared: of gravity for the
+/// accelerometer (W22), of the mean turning rate for the gyroscope (W23).
 inline Mat3 axis_covariance(double quantity) { return kAxisSigma * kAxisSigma * quantity * quantity * Mat3::Identity(); }
 
 /// Relative standard deviation of all lengths.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/estimator.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -14,6 +15,9 @@ namespace fbvins {
 namespace {
 
 constexpr double kRestForStandstill_s = 0.5;
+/// Images with readings after a gap, until velocity and attitude are known again.
+constexpr int kFramesAfterGap = 6;
+constexpr double kGap_s = 0.05;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -37,6 +41,8 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       initialiser_(options, imu_noise_, before),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options),
+      reading_noise_(imu_noise_),
+      monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
       window_(options, weights_of(options)),
       published_(options.max_step_m) {}
 
@@ -128,23 +134,25 @@ void Estimator::open_window(const InitialSolution& start) {
   window_.set_prior(std::move(prior));
   window_.set_pivot(first.T_WB.p);
   published_.restart();
+  monitor_.restart();
+  frames_with_readings_ = kFramesAfterGap;
   up_sigma_rad_ = 0;
   covariances_.reset();
 }
 
-Frame Estimator::predict(const TrackedFrame& frame) const {
+Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) const {
   const Frame& last = window_.newest();
   Frame f;
   f.id = frame.id;
   f.t = frame.t;
   f.images = frame.images;
-  if (frame.imu.empty()) {  // no readings: constant velocity
+  if (readings.empty()) {  // constant velocity
     f.state = last.state;
     f.state.T_WB.p += (frame.t - last.t).seconds() * last.state.v_WB;
     return f;
   }
   Preintegration imu(imu_noise_, last.state.bias);
-  imu.integrate(frame.imu);
+  imu.integrate(readings);
   f.state = imu.predict(last.state, gravity_W());
   f.imu = std::make_shared<const Preintegration>(std::move(imu));
   return f;
@@ -154,18 +162,50 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   EstimatorStats& stats = out.odometry.stats;
   CpuTimer timer;
   const bool standstill = rest.seconds() > kRestForStandstill_s;
-  Frame predicted = predict(frame);
+  ImuSegment imu = frame.imu;
+  imu.noise = reading_noise_.of(imu);
+  Frame predicted = predict(frame, imu);
+  const std::vector<TrackedFeature> features = examine(frame, imu, predicted);
+  out.imu_noise = imu.noise;
   predicted.standstill = standstill;
-  window_.add_frame(std::move(predicted), frame.features, calibration_);
+  window_.add_frame(std::move(predicted), features, calibration_);
   stats.prepare_ms = timer.lap_ms();
   const WindowSolution& solution = solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations});
   timer.lap_ms();
   stats.standstill = standstill;
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
+  monitor_.take_bias(window_.newest().state.bias.accel_mps2, out.odometry.accel_bias_covariance);
   out.odometry.health = judge(frame);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
   stats.marginalise_ms = timer.lap_ms();
+}
+
+/// Compares images and readings, and returns the features of the cameras that can be believed. Readings that the images
+/// contradict count less.
+std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
+  one_camera_wrong_ = false;
+  const Duration dt = frame.t - window_.newest().t;
+  // After a gap the images have to say first how fast the vehicle is.
+  frames_with_readings_ = imu.empty() || imu.longest_gap.seconds() > kGap_s ? 0 : frames_with_readings_ + 1;
+  if (frames_with_readings_ < kFramesAfterGap) {
+    monitor_.pass(dt);
+    return frame.features;
+  }
+  const Monitor::Verdict verdict =
+      monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_, predicted.state.T_WB, dt);
+  if (verdict.imu_contradicts) {
+    imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
+    imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);
+    predicted = predict(frame, imu);
+    predicted.state.T_WB = *verdict.seen;
+  }
+  std::vector<TrackedFeature> believed = frame.features;
+  one_camera_wrong_ = verdict.left_wrong || verdict.right_wrong;
+  if (!one_camera_wrong_) return believed;
+  for (TrackedFeature& feature : believed) (verdict.left_wrong ? feature.left : feature.right).reset();
+  std::erase_if(believed, [](const TrackedFeature& f) { return !f.left && !f.right; });
+  return believed;
 }
 
 const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
@@ -248,7 +288,22 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
 }
 
 Health Estimator::judge(const TrackedFrame& frame) {
-  return health_.judge(frame, window_.newest().state, landmarks_in_view(window_), failed_solves_, contract_.broken());
+  return health_.judge(frame, window_.newest().state, landmarks_in_view(window_),
+                       {.failed_solves = failed_solves_,
+                        .broken_features = contract_.broken(),
+                        .contradiction = monitor_.contradicted(),
+                        .hopeless = monitor_.hopeless(),
+                        .one_camera_wrong = one_camera_wrong_,
+                        .after_gap = frames_with_readings_ < kFramesAfterGap,
+                        .clipped = reading_noise_.clipped(),
+                        .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
+}
+
+/// The pose goes on, but nobody knows any more how it lies in the W of before: told by the reset counter.
+void Estimator::begin_new_W() {
+  published_.restart();
+  window_.forget_known();
+  ++reset_counter_;
 }
 
 void Estimator::restart() {
@@ -286,7 +341,13 @@ void Estimator::publish(Odometry& out) {
   const NavState& newest = window_.newest().state;
   const NavState level = window_.tilt().levelled(newest);
   carry_covariances(out);
-  published_.follow(motion_of_newest(window_, gravity_W()), level.T_WB);
+  if (monitor_.take_reset()) begin_new_W();
+  published_.follow(motion_of_newest(window_, gravity_W(), monitor_.follows_images()), level.T_WB);
+  if (out.health.state == HealthState::good && published_.owes_too_much()) {
+    begin_new_W();
+    published_.follow({}, level.T_WB);
+  }
+  out.pose_covariance += monitor_.doubt(level.T_WB);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

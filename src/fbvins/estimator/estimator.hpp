@@ -15,10 +15,12 @@
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
 #include "fbvins/estimator/keyframe_policy.hpp"
+#include "fbvins/estimator/monitor.hpp"
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
+#include "fbvins/imu/reading_noise.hpp"
 #include "fbvins/types/keyframe.hpp"
 #include "fbvins/types/odometry.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -30,6 +32,7 @@ struct Estimate {
   Odometry odometry;
   std::vector<Keyframe> keyframes;
   LandmarkUpdate landmarks;  ///< for the frontend
+  ImuNoiseScale imu_noise;   ///< with which the frame's readings count
 };
 
 class Estimator {
@@ -51,7 +54,8 @@ class Estimator {
   void initialise(const TrackedFrame& frame, Duration rest, Estimate& out);
   void open_window(const InitialSolution& start);
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
-  Frame predict(const TrackedFrame& frame) const;
+  Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
+  std::vector<TrackedFeature> examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
   void fill_covariances(const WindowSolution& solution, Odometry& out);
   void shrink_window(const WindowSolution& solution, Estimate& out);
@@ -59,6 +63,7 @@ class Estimator {
   Health judge(const TrackedFrame& frame);
   void refuse_start(Odometry& out);
   void restart();
+  void begin_new_W();
   void carry_covariances(Odometry& out);
   void publish(Odometry& out);
   Vec3 gravity_W() const;
@@ -79,6 +84,10 @@ class Estimator {
   KeyframePolicy keyframe_policy_;
   HealthJudge health_;
   FrameContract contract_;
+  ReadingNoise reading_noise_;
+  Monitor monitor_;
+  bool one_camera_wrong_ = false;  ///< in the newest frame
+  int frames_with_readings_ = 0;   ///< in a row
   SlidingWindow window_;
   WindowSolver solver_;
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused

@@ -14,6 +14,9 @@ constexpr int kFailedSolvesUntilLost = 3;
 constexpr double kMaxGyroBias_radps = 0.5;
 constexpr double kMaxAccelBias_mps2 = 2.5;
 
+/// Ordinary airframes shake by a third of this at most.
+constexpr double kGyroVibrationDegraded_radps = 0.2;
+
 bool without_images(const TrackedFrame& frame) { return !frame.has_left && !frame.has_right; }
 
 Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
@@ -40,28 +43,32 @@ bool HealthJudge::images_missing(const TrackedFrame& frame) const {
   return previous_image_ && (frame.t - *previous_image_).seconds() > hole_s;
 }
 
-Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves,
-                          int broken_features) {
+Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, const Evidence& evidence) {
   const bool few_tracks = landmarks_in_view < options_.min_tracks;
   if (!few_tracks) last_good_tracking_ = frame.t;
   const Duration blind = frame.t - last_good_tracking_.value_or(frame.t);
   const bool no_imu = frame.imu.empty();
 
-  if (!state.T_WB.p.allFinite() || failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
+  if (!state.T_WB.p.allFinite() || evidence.failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
   if (state.v_WB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
   if (state.bias.gyro_radps.norm() > kMaxGyroBias_radps || state.bias.accel_mps2.norm() > kMaxAccelBias_mps2)
     return lost(HealthReason::implausible_bias);
   if (blind.seconds() > options_.max_image_gap_s)
     return lost(images_missing(frame) ? HealthReason::no_images : HealthReason::no_tracks);
   if (few_tracks && (no_imu || frame.imu.longest_gap.seconds() > options_.max_imu_gap_s)) return lost(HealthReason::imu_gap);
-  if (failed_solves > 0) return degraded(HealthReason::solver_failed);
-  if (no_imu || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
+  if (evidence.hopeless) return lost(HealthReason::contradiction);
+  if (evidence.failed_solves > 0) return degraded(HealthReason::solver_failed);
+  if (no_imu || evidence.after_gap || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
   if (images_missing(frame)) return degraded(HealthReason::no_images);
-  if (broken_features > 0) return degraded(HealthReason::frontend_fault);
+  if (evidence.broken_features > 0) return degraded(HealthReason::frontend_fault);
   if (!frame.has_left || !frame.has_right) return degraded(HealthReason::one_camera);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
   if (few_tracks) return degraded(HealthReason::few_tracks);
   if (frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
+  if (evidence.one_camera_wrong) return degraded(HealthReason::cameras_disagree);
+  if (evidence.clipped) return degraded(HealthReason::imu_clipped);
+  if (evidence.contradiction) return degraded(HealthReason::contradiction);
+  if (evidence.gyro_vibration_radps > kGyroVibrationDegraded_radps) return degraded(HealthReason::imu_vibration);
   return {HealthState::good, HealthReason::none};
 }
 

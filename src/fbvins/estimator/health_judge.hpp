@@ -19,9 +19,19 @@ class HealthJudge {
 
   /// The window starts with this frame.
   void start(const TrackedFrame& frame) { last_good_tracking_ = frame.t; }
-  /// Health at a frame in the window, after its solve. `broken_features`: of the frame, that were left out.
-  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, int failed_solves,
-               int broken_features = 0);
+  /// What speaks against a frame, beside the frame itself.
+  struct Evidence {
+    int failed_solves = 0;
+    int broken_features = 0;  ///< that were left out
+    bool contradiction = false;
+    bool hopeless = false;  ///< and the estimate cannot recover from it
+    bool one_camera_wrong = false;
+    bool after_gap = false;    ///< of the readings
+    bool clipped = false;
+    double gyro_vibration_radps = 0;
+  };
+  /// Health at a frame in the window, after its solve.
+  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, const Evidence& evidence);
   /// Health at a frame before the start; `reason` is what the initialiser waits for.
   static Health before_start(const TrackedFrame& frame, HealthReason reason);
   /// To be called after each frame, whether it was judged or not.

@@ -32,7 +32,7 @@ class Judged {
     EXPECT_EQ(next(frame_at(0)), good());
   }
   Health next(const TrackedFrame& frame, int in_view = kManyTracks, int failed_solves = 0) {
-    const Health health = judge_.judge(frame, NavState{}, in_view, failed_solves);
+    const Health health = judge_.judge(frame, NavState{}, in_view, {.failed_solves = failed_solves});
     judge_.pass(frame);
     return health;
   }
@@ -118,8 +118,8 @@ TEST(HealthJudge, ImplausibleStatesAreLost) {
   NavState fast, biased;
   fast.v_WB = Vec3(31, 0, 0);
   biased.bias.gyro_radps = Vec3(0.6, 0, 0);
-  EXPECT_EQ(judge.judge(frame_at(0), fast, kManyTracks, 0), lost(HealthReason::implausible_speed));
-  EXPECT_EQ(judge.judge(frame_at(0), biased, kManyTracks, 0), lost(HealthReason::implausible_bias));
+  EXPECT_EQ(judge.judge(frame_at(0), fast, kManyTracks, {}), lost(HealthReason::implausible_speed));
+  EXPECT_EQ(judge.judge(frame_at(0), biased, kManyTracks, {}), lost(HealthReason::implausible_bias));
 }
 
 TEST(HealthJudge, BeforeTheStartMissingImagesTakePrecedenceOverOtherReasons) {
@@ -129,6 +129,23 @@ TEST(HealthJudge, BeforeTheStartMissingImagesTakePrecedenceOverOtherReasons) {
   frame.has_left = frame.has_right = false;
   EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::no_images}));
+}
+
+TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
+  const auto judged = [](const HealthJudge::Evidence& evidence) {
+    HealthJudge judge{EstimatorOptions{}};
+    judge.start(frame_at(0));
+    return judge.judge(frame_at(0), NavState{}, kManyTracks, evidence);
+  };
+  EXPECT_EQ(judged({}), good());
+  EXPECT_EQ(judged({.contradiction = true}), degraded(HealthReason::contradiction));
+  EXPECT_EQ(judged({.contradiction = true, .hopeless = true}), lost(HealthReason::contradiction));
+  EXPECT_EQ(judged({.contradiction = true, .one_camera_wrong = true}), degraded(HealthReason::cameras_disagree));
+  EXPECT_EQ(judged({.after_gap = true}), degraded(HealthReason::imu_gap));
+  EXPECT_EQ(judged({.contradiction = true, .clipped = true}), degraded(HealthReason::imu_clipped))
+      << "the cause before its effect";
+  EXPECT_EQ(judged({.gyro_vibration_radps = 0.07}), good()) << "an ordinary airframe";
+  EXPECT_EQ(judged({.gyro_vibration_radps = 0.3}), degraded(HealthReason::imu_vibration));
 }
 
 }  // namespace

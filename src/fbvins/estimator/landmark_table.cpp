@@ -28,6 +28,11 @@ Landmark* LandmarkTable::find(LandmarkId id) {
   return it != landmarks_.end() && it->id == id ? &*it : nullptr;
 }
 
+const Landmark* LandmarkTable::find(TrackId track) const {
+  const auto it = index_of_track_.find(track);
+  return it == index_of_track_.end() ? nullptr : &landmarks_[static_cast<std::size_t>(it->second)];
+}
+
 std::pair<Landmark&, bool> LandmarkTable::of_track(TrackId track) {
   const auto [it, is_new] = index_of_track_.try_emplace(track, static_cast<int>(landmarks_.size()));
   if (is_new) {

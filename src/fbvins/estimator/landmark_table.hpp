@@ -50,6 +50,7 @@ class LandmarkTable {
   /// Null where there is none.
   Landmark* find(LandmarkId id);
   const Landmark* find(LandmarkId id) const { return const_cast<LandmarkTable*>(this)->find(id); }
+  const Landmark* find(TrackId track) const;
   /// The landmark of a track, and whether it is a new one.
   std::pair<Landmark&, bool> of_track(TrackId track);
   /// Removes landmarks without sightings.

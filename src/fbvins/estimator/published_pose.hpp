@@ -11,6 +11,7 @@
 
 #include <optional>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/imu/nav_state.hpp"
 #include "fbvins/types/odometry.hpp"
 
@@ -18,6 +19,9 @@ namespace fbvins {
 
 /// Ratio of the limits on corrections of attitude and of position: 0.1 degrees for 3 mm.
 inline constexpr double kRotationPerStep_radpm = 0.1 * (3.14159265358979323846 / 180) / 0.003;
+
+/// Larger corrections are made at once, as a new W.
+inline constexpr double kLargestPending_m = 0.1, kLargestPending_rad = 3 * kDegree;
 
 class PublishedPose {
  public:
@@ -30,6 +34,12 @@ class PublishedPose {
   void follow(const std::optional<Pose<B, B>>& motion, const Pose<W, B>& level);
   /// Fills pose, velocity, up and tilt; adds the pending correction to the covariances in `out`, which are of the level state.
   void fill(const NavState& level, Odometry& out);
+
+  /// The pending correction is larger than a pose called good may be wrong, and so large that paying it slowly would mislead
+  /// whoever follows the pose.
+  bool owes_too_much() const {
+    return max_step_m_ > 0 && (pending_.head<3>().norm() > kLargestPending_m || pending_.tail<3>().norm() > kLargestPending_rad);
+  }
 
   const Pose<W, B>& T_WB() const { return T_WB_; }
   /// Pending correction (dp in W [m], dtheta in B [rad]): from the published to the level pose.

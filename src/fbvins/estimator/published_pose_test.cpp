@@ -114,5 +114,19 @@ TEST(PublishedPose, WithoutALimitCorrectionsAreAppliedAtOnce) {
   EXPECT_EQ(published.T_WB().p, (kCorrection * flown(1)).p);
 }
 
+TEST(PublishedPose, ALargeCorrectionIsTooMuchToPaySlowly) {
+  for (const double degrees : {2.0, 4.0})
+    for (const double shift_m : {0.08, 0.12}) {
+      PublishedPose published(kStep_m);
+      published.follow({}, flown(0));
+      published.follow(motion(1), Pose<W, W>{so3_exp(Vec3(0, 0, degrees * kDegree)), Vec3(shift_m, 0, 0)} * flown(1));
+      EXPECT_EQ(published.owes_too_much(), degrees > 3.1 || shift_m > 0.103) << degrees << " " << shift_m;
+    }
+  PublishedPose at_once(0);
+  at_once.follow({}, flown(0));
+  at_once.follow(motion(1), kCorrection * flown(1));
+  EXPECT_FALSE(at_once.owes_too_much());
+}
+
 }  // namespace
 }  // namespace fbvins

@@ -52,6 +52,8 @@ class SlidingWindow {
   void fill_problem(const Calibration& calibration, WindowProblem& out) const;
   /// Takes over the estimates of a solution for the frames and landmarks that are still in the window.
   void take_estimates(const WindowProblem& solved);
+  /// Forgets where landmarks were before: the estimate has moved against them by an unknown amount.
+  void forget_known();
   /// Drops the priors of landmarks far from theirs: mistaken or moved, they count as new ones. Returns how many.
   int refuse_landmark_priors(const WindowProblem& solved);
   /// Removes outliers among the observations, and landmarks that are left with too few. Returns how many observations.

@@ -78,6 +78,11 @@ void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& 
   drop_prior(landmark);
 }
 
+void SlidingWindow::forget_known() {
+  known_.clear();
+  for (Landmark& landmark : landmarks_.all()) landmark.prior.reset();
+}
+
 void SlidingWindow::drop_prior(Landmark& landmark) {
   landmark.prior.reset();
   known_.forget(landmark.track);

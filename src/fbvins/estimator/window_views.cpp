@@ -16,6 +16,11 @@ double parallax(const Mat3& R_ba, const Observation& a, const Observation& b) {
   return (p.head<2>() / p.z() - b.normalised).norm();
 }
 
+Vec3 position_of(const Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
+  const Pose<W, C0> T_WC = frames.at(landmark.host).state.T_WB * ray_camera(calibration, landmark.right_ray);
+  return T_WC * Vec3(Vec3(landmark.alpha_beta_rho.x(), landmark.alpha_beta_rho.y(), 1) / landmark.alpha_beta_rho.z());
+}
+
 }  // namespace
 
 int landmarks_in_view(const SlidingWindow& window) {
@@ -24,6 +29,18 @@ int landmarks_in_view(const SlidingWindow& window) {
   return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
     return l.triangulated && l.sightings.back().frame == newest && l.sightings.size() >= 2;
   }));
+}
+
+std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
+                                        const Calibration& calibration) {
+  std::vector<PointSighting> out;
+  out.reserve(features.size());
+  for (const TrackedFeature& feature : features) {
+    const Landmark* landmark = window.landmarks().find(feature.id);
+    if (landmark == nullptr || !landmark->triangulated) continue;
+    out.push_back({position_of(*landmark, window.frames(), calibration), &feature});
+  }
+  return out;
 }
 
 KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px) {
@@ -70,12 +87,12 @@ double up_sigma_rad(const Mat17& covariance) {
   return std::sqrt(std::max(0.0, largest_eigenvalue(covariance.bottomRightCorner<2, 2>())));
 }
 
-std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W) {
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W, bool by_images) {
   const FrameList& frames = window.frames();
   if (frames.size() < 2) return std::nullopt;
   const Frame& newest = frames.newest();
   const NavState& before = frames[frames.size() - 2].state;
-  const NavState after = newest.imu ? newest.imu->predict(before, gravity_W) : newest.state;
+  const NavState after = newest.imu && !by_images ? newest.imu->predict(before, gravity_W) : newest.state;
   return before.T_WB.inverse() * after.T_WB;
 }
 
@@ -92,9 +109,8 @@ WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calib
   for (const Frame& f : window.frames()) out.frames.push_back({f.id, f.t, tilt.levelled(f.state.T_WB), f.keyframe});
   for (const Landmark& l : window.landmarks().all()) {
     if (!l.triangulated) continue;
-    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * ray_camera(calibration, l.right_ray);
-    const Vec3 p_C = Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z();
-    out.landmarks.push_back({l.id, l.track, tilt.levelled(Vec3(T_WC * p_C)), static_cast<int>(l.sightings.size())});
+    const Vec3 p_W = tilt.levelled(position_of(l, window.frames(), calibration));
+    out.landmarks.push_back({l.id, l.track, p_W, static_cast<int>(l.sightings.size())});
   }
   return out;
 }

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
+#include "fbvins/estimator/pose_refinement.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/types/keyframe.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -12,6 +14,11 @@ namespace fbvins {
 
 /// Number of triangulated landmarks seen in the newest frame and in another one.
 int landmarks_in_view(const SlidingWindow& window);
+
+/// The landmarks of the window whose tracks are among these features, with their estimated positions. The features must outlive
+/// them.
+std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
+                                        const Calibration& calibration);
 
 /// Share of the newest frame's features that the last keyframe saw, and the median rotation-free
 /// motion of these in px of a camera with this focal length.
@@ -29,7 +36,8 @@ double up_sigma_rad(const Mat17& covariance);
 
 /// Motion of the body from the frame before to the newest one, predicted by the readings between them from the present estimate
 /// of the frame before; without readings, as the window estimates it. None for the first frame.
-std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W);
+/// `by_images`: as the window estimates it, whatever readings there are.
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W, bool by_images = false);
 
 /// Mean turning rate from the oldest to the newest frame, in the body's axes, rad/s. Zero with fewer than two frames.
 Vec3 mean_rate_B(const FrameList& frames);

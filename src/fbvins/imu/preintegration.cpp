@@ -58,7 +58,7 @@ void Preintegration::integrate(const ImuSegment& segment) {
     const double dt = k == 0 ? 0.0 : (s.t - segment.samples[k - 1].t).seconds();
     // A step cut by an image stamp may be short and still lie in a long gap, whose length is longest_gap.
     const bool gap = dt > longest_regular_s;
-    push({s.t, s.gyro_radps, s.accel_mps2, gap ? std::max(dt, segment.longest_gap.seconds()) : 0.0});
+    push({s.t, s.gyro_radps, s.accel_mps2, gap ? std::max(dt, segment.longest_gap.seconds()) : 0.0, segment.noise});
   }
 }
 
@@ -126,8 +126,9 @@ void Preintegration::step(const Reading& from, const Reading& to) {
   // Covariance (eq. P11): white noise of the readings, random walk of the biases, missing readings.
   const auto squared = [](double x) { return x * x; };
   Mat9 noise = Mat9::Zero();
-  noise.block<3, 3>(nav::theta, nav::theta).diagonal().array() += squared(noise_.gyro_noise_density_radps_rthz) * dt;
-  add_white_acceleration(squared(noise_.accel_noise_density_mps2_rthz), dt, noise);
+  noise.block<3, 3>(nav::theta, nav::theta).diagonal().array() +=
+      squared(to.noise.gyro * noise_.gyro_noise_density_radps_rthz) * dt;
+  add_white_acceleration(squared(to.noise.accel * noise_.accel_noise_density_mps2_rthz), dt, noise);
   if (to.gap_s > 0) add_gap(gap_model_, to.gap_s, dt, noise);
   const Mat9x15 FP = F * covariance_;
   covariance_.topLeftCorner<9, 9>() = FP * F.transpose() + noise;

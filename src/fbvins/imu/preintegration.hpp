@@ -98,6 +98,7 @@ class Preintegration {
     Vec3 gyro_radps;
     Vec3 accel_mps2;
     double gap_s;  ///< the IMU gap in which the step up to this reading lies; 0 for a regular step
+    ImuNoiseScale noise;
   };
 
   void reset(const ImuBias& bias);

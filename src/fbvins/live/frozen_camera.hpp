@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hung camera or driver often repeats its last image with new stamps. Two real images never agree in every pixel.
+// A hung camera or driver repeats its last image, or the last few of its buffers in turns, with new stamps. Two real images never
+// agree in every pixel; black and white ones do, and are of as little use.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstring>
 #include <memory>
-#include <utility>
 
 #include "fbvins/types/image.hpp"
 
@@ -12,21 +15,42 @@ namespace fbvins {
 
 class FrozenCamera {
  public:
-  /// True if this image equals the one before, to the last bit.
+  /// True if this image is one of the last 32 that were not repeated, judged by every eighth row.
   bool is_repeated(const std::shared_ptr<const Image>& image) {
     if (image == nullptr) return false;
-    const std::shared_ptr<const Image> before = std::exchange(before_, image);
-    return before != nullptr && same(before->view(), image->view());
+    const std::uint64_t now = fingerprint(image->view());
+    for (std::size_t i = 0; i < count_; ++i)
+      if (seen_[i] == now) return true;
+    seen_[next_] = now;
+    next_ = (next_ + 1) % seen_.size();
+    count_ = std::min(count_ + 1, seen_.size());
+    return false;
   }
 
  private:
-  static bool same(ImageView a, ImageView b) {
-    if (a.width != b.width || a.height != b.height) return false;
-    for (int y = 0; y < a.height; ++y)
-      if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
-    return true;
+  /// Multiply and fold, eight bytes at a time.
+  static std::uint64_t fingerprint(ImageView image) {
+    std::uint64_t hash =
+        0x9e3779b97f4a7c15ULL ^ (static_cast<std::uint64_t>(image.width) << 32) ^ static_cast<std::uint64_t>(image.height);
+    const auto mix = [&](std::uint64_t word) {
+      hash = (hash ^ word) * 0xd6e8feb86659fd93ULL;
+      hash ^= hash >> 32;
+    };
+    for (int y = 0; y < image.height; y += 8) {
+      const std::uint8_t* row = image.row(y);
+      int x = 0;
+      for (; x + 8 <= image.width; x += 8) {
+        std::uint64_t word = 0;
+        std::memcpy(&word, row + x, 8);
+        mix(word);
+      }
+      for (; x < image.width; ++x) mix(row[x]);
+    }
+    return hash;
   }
-  std::shared_ptr<const Image> before_;
+
+  std::array<std::uint64_t, 32> seen_{};
+  std::size_t count_ = 0, next_ = 0;
 };
 
 }  // namespace fbvins

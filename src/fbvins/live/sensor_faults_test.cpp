@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <map>
+#include <optional>
 #include <variant>
 
 namespace fbvins {
@@ -89,6 +92,75 @@ TEST(SensorFaults, StampsLeapThereAndBack) {
   for (const auto& [when, event] : fly({"leap:1:0.5:7"}).events) {
     const std::int64_t t = std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event);
     EXPECT_EQ(t - when, when >= 1000 && when < 1500 ? 7000 : 0);
+  }
+}
+
+/// A second of flight, whose images have a texture that moves.
+Notes fly_fault(const std::optional<std::string>& text) {
+  Notes notes;
+  std::vector<SensorFault> faults;
+  if (text) faults.push_back(*parse_fault(*text));
+  FaultyInput faulty(notes, faults);
+  for (std::int64_t t = 0; t < 1000; t += 10) {
+    notes.now = t;
+    const double s = static_cast<double>(t) * 1e-3;
+    faulty.push(ImuSample{ms(t), Vec3(3 * std::sin(9 * s), 1 + s, -2 + s), Vec3(1 + s, 2 - s, 9.81 + 8 * std::sin(11 * s))});
+    if (t % 50 != 0) continue;
+    Image image(64, 48), right(64, 48);
+    for (int y = 0; y < 48; ++y)
+      for (int x = 0; x < 64; ++x) {
+        image.at(x, y) = static_cast<std::uint8_t>(40 + (7 * x + 13 * y * y + t / 10) % 160);
+        right.at(x, y) = static_cast<std::uint8_t>(50 + (7 * x + 13 * y * y + t / 10) % 160);
+      }
+    faulty.push(StereoFrame{ms(t), std::make_shared<Image>(image), std::make_shared<Image>(right)});
+  }
+  return notes;
+}
+
+bool same(const SensorEvent& a, const SensorEvent& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* x = std::get_if<ImuSample>(&a)) {
+    const auto& y = std::get<ImuSample>(b);
+    return x->t == y.t && x->gyro_radps == y.gyro_radps && x->accel_mps2 == y.accel_mps2;
+  }
+  const auto &x = std::get<StereoFrame>(a), &y = std::get<StereoFrame>(b);
+  const auto equal = [](const std::shared_ptr<const Image>& p, const std::shared_ptr<const Image>& q) {
+    return p == q || (p && q && std::equal(p->row(0), p->row(0) + 64 * 48, q->row(0)));
+  };
+  return x.t == y.t && equal(x.left, y.left) && equal(x.right, y.right);
+}
+
+TEST(SensorFaults, EachAltersItsTimeAndNothingElse) {
+  const Notes clean = fly_fault({});
+  for (const FaultName& name : fault_names()) {
+    const std::string text = std::string(name.name) + ":0.3:0.4" + (name.unit.empty() ? "" : ":" + std::to_string(name.large));
+    const Notes notes = fly_fault(text);
+    int altered = 0;
+    // Events by their own time; those lost or held back count as altered.
+    std::map<std::pair<std::int64_t, std::size_t>, SensorEvent> by_time;
+    for (const auto& [when, event] : notes.events)
+      by_time[{std::visit([](const auto& e) { return e.t.ns / 1'000'000; }, event), event.index()}] = event;
+    for (const auto& [when, event] : clean.events) {
+      const auto found = by_time.find({when, event.index()});
+      const bool as_it_was = found != by_time.end() && same(found->second, event);
+      if (when < 300 || when >= 700) {
+        EXPECT_TRUE(as_it_was) << text << " at " << when;
+      } else {
+        altered += !as_it_was;
+      }
+    }
+    if (name.name != "burst") {
+      EXPECT_GT(altered, 0) << text;
+    }
+  }
+}
+
+TEST(SensorFaults, TheSameSeedGivesTheSameFault) {
+  for (const char* text : {"imu_noise:0.2:0.5:3", "vibration:0.2:0.5:5", "broken_blocks:0.2:0.5:0.3", "lose_images:0:1:0.5"}) {
+    const Notes once = fly_fault(text), again = fly_fault(text);
+    ASSERT_EQ(once.events.size(), again.events.size());
+    for (std::size_t i = 0; i < once.events.size(); ++i)
+      EXPECT_TRUE(same(once.events[i].second, again.events[i].second)) << text << " " << i;
   }
 }
 

@@ -85,6 +85,7 @@ struct System::Impl {
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(frame);
     Estimate estimate = estimator.process(frame);
+    frame.imu.noise = estimate.imu_noise;
     if (keyframes_wanted()) complete(estimate, frame.imu);
     if (on_window) on_window(estimator.snapshot());
     if (on_odometry) on_odometry(estimate.odometry);

@@ -28,6 +28,11 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::solver_failed: return "solver_failed";
     case HealthReason::one_camera: return "one_camera";
     case HealthReason::frontend_fault: return "frontend_fault";
+    case HealthReason::contradiction: return "contradiction";
+    case HealthReason::cameras_disagree: return "cameras_disagree";
+    case HealthReason::imu_clipped: return "imu_clipped";
+    case HealthReason::imu_vibration: return "imu_vibration";
+    case HealthReason::correction_pending: return "correction_pending";
   }
   return "unknown";
 }

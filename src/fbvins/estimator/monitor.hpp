@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether cameras and IMU agree. Each image is compared with the prediction by the readings: by the left camera, by the right
+// one, and by the pose that the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
+// one counts less, or not at all (docs/derivations/integrity.md). It decides what a measurement is worth; the window estimates.
+//
+//   const Verdict verdict = monitor.examine(image_of(window, frame, calibration), predicted_pose, dt);
+//   if (verdict.contradiction) ...
+//   covariance += monitor.doubt(position);
+//
+// One owner, one thread.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/estimator/pose_refinement.hpp"
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class Monitor {
+ public:
+  struct Verdict {
+    bool imu_contradicts = false;                  ///< images agree with one another, but not with the readings
+    bool left_wrong = false, right_wrong = false;  ///< this camera alone contradicts the readings
+    std::optional<Pose<W, B>> seen;                ///< by the images alone, where the readings are contradicted
+    ImuNoiseScale noise;                           ///< that makes the contradiction one standard deviation
+  };
+
+  /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.
+  Monitor(const ImuNoise& assumed, bool calibrating) : assumed_(assumed), calibrating_(calibrating) {}
+
+  /// A window begins.
+  void restart();
+  /// `sightings`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before.
+  Verdict examine(const std::vector<PointSighting>& sightings, const Calibration& calibration, const Pose<W, B>& predicted,
+                  Duration dt);
+  /// The images go on alone, without readings to compare with.
+  void pass(Duration dt);
+
+  /// After the solve: the accelerometer's bias is where a wrong tilt shows.
+  void take_bias(const Vec3& accel_bias_mps2, const Mat3& covariance);
+
+  /// A contradiction was seen within the last half second, or gravity has not confirmed the attitude since.
+  bool contradicted() const { return contradicted_ || tilt_doubted_; }
+  /// The images are right against the readings, as far as is known.
+  bool follows_images() const { return contradicted_; }
+  /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
+  bool take_reset();
+  /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
+  bool hopeless() const { return hopeless_; }
+  /// Covariance of (dp in W [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
+  Mat6 doubt(const Pose<W, B>& T_WB) const;
+
+ private:
+  void blind(Duration dt);
+  void take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W);
+
+  ImuNoise assumed_;
+  bool calibrating_;
+  double evidence_ = 0;  ///< cumulative sum (CUSUM)
+  double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
+  bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
+  Vec3 turn_W_ = Vec3::Zero(), shift_W_ = Vec3::Zero();    ///< seen minus predicted, added up
+  Mat3 turns_W_ = Mat3::Zero(), shifts_W_ = Mat3::Zero();  ///< their squares, added up
+  Vec3 where_W_ = Vec3::Zero();                            ///< where the turn began
+  Vec3 tilt_W_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
+  Vec3 accel_bias_ = Vec3::Zero(), accel_bias_before_ = Vec3::Zero();
+  double bias_sigma_ = 0, bias_sigma_before_ = 0;
+  double since_reset_s_ = 1e9;
+};
+
+}  // namespace fbvins

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/core/angle.hpp"
+#include "fbvins/core/rng.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+const Duration kStep = Duration::from_seconds(0.05);
+const Vec3 kBias(0.02, -0.01, 0.05);
+
+ImuNoise assumed() {
+  ImuNoise noise;
+  noise.gyro_noise_density_radps_rthz = 4e-4;
+  noise.accel_noise_density_mps2_rthz = 0.048;
+  return noise;
+}
+
+/// Points before a stereo rig as it sees them from a pose, with noise of one standard deviation.
+class Scene {
+ public:
+  explicit Scene(int points = 80) {
+    for (int i = 0; i < points; ++i) points_.emplace_back(rng_.uniform(2, 6), rng_.uniform(-2, 2), rng_.uniform(-1.5, 1.5));
+  }
+
+  /// The points from `T_WB`; those from `first_other` on, from `other`, as if they moved; each camera from a pose of its own.
+  std::vector<PointSighting> seen(const Pose<W, B>& left, const Pose<W, B>& right, std::size_t first_other = 1000,
+                                  const Pose<W, B>& other = {}) {
+    features_.assign(points_.size(), {});
+    std::vector<PointSighting> out;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const bool moves = i >= first_other;
+      features_[i].left = observe(rig.T_BC0.inverse() * ((moves ? other : left).inverse() * points_[i]));
+      features_[i].right = observe(rig.T_BC1.cast_frames<B, C0>().inverse() * ((moves ? other : right).inverse() * points_[i]));
+      out.push_back({points_[i], &features_[i]});
+    }
+    return out;
+  }
+  std::vector<PointSighting> seen(const Pose<W, B>& T_WB) { return seen(T_WB, T_WB); }
+
+  StereoRig rig = test::SimulatedFlight(test::Motion(0.1, 0.1), 1).rig;
+  Calibration calibration{rig.T_BC0, rig.T_BC1, 0.0};
+
+ private:
+  Observation observe(const Vec3& p_C) {
+    constexpr double kFocal_px = 450;
+    Observation o;
+    o.sqrt_information = kFocal_px * Mat2::Identity();
+    o.normalised = p_C.head<2>() / p_C.z() + Vec2(rng_.normal(), rng_.normal()) * 0.3 / kFocal_px;
+    return o;
+  }
+  Rng rng_{3};
+  std::vector<Vec3> points_;
+  std::vector<TrackedFeature> features_;
+};
+
+Pose<W, B> turned(double rad) { return Pose<W, B>{so3_exp(Vec3(0, 0, rad)), Vec3::Zero()}; }
+Pose<W, B> tilted(double rad) { return Pose<W, B>{so3_exp(Vec3(rad, 0, 0)), Vec3::Zero()}; }
+
+TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  for (int k = 0; k < 100; ++k) {
+    const Monitor::Verdict verdict = monitor.examine(scene.seen({}), scene.calibration, turned(5e-4), kStep);
+    EXPECT_FALSE(verdict.imu_contradicts || verdict.left_wrong || verdict.right_wrong);
+  }
+  EXPECT_FALSE(monitor.contradicted());
+  EXPECT_TRUE(monitor.doubt({}).isZero(0));
+}
+
+TEST(Monitor, ReadingsThatTheImagesContradictCountAsMuchAsTheyAgree) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  const Pose<W, B> truth = turned(0.02);
+  const Monitor::Verdict verdict = monitor.examine(scene.seen(truth), scene.calibration, {}, kStep);
+  ASSERT_TRUE(verdict.imu_contradicts);
+  ASSERT_TRUE(verdict.seen);
+  EXPECT_LT(so3_log((verdict.seen->q.conjugate() * truth.q).normalized()).norm(), 1e-3);
+  EXPECT_NEAR(verdict.noise.gyro * assumed().gyro_noise_density_radps_rthz * std::sqrt(kStep.seconds()), 0.02, 1e-3);
+  EXPECT_TRUE(monitor.contradicted());
+}
+
+TEST(Monitor, SmallContradictionsAddUp) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  int images = 0;
+  while (images < 100 && !monitor.contradicted()) {
+    (void)monitor.examine(scene.seen(turned(0.005)), scene.calibration, {}, kStep);
+    ++images;
+  }
+  EXPECT_GT(images, 1);
+  EXPECT_LE(images, 6) << "0.3 s";
+}
+
+TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
+  Scene scene;
+  for (const bool left : {true, false}) {
+    Monitor monitor(assumed(), false);
+    const Pose<W, B> wrong = turned(0.02);
+    const Monitor::Verdict verdict =
+        monitor.examine(scene.seen(left ? wrong : Pose<W, B>{}, left ? Pose<W, B>{} : wrong), scene.calibration, {}, kStep);
+    EXPECT_EQ(verdict.left_wrong, left);
+    EXPECT_EQ(verdict.right_wrong, !left);
+    EXPECT_FALSE(verdict.imu_contradicts);
+    EXPECT_TRUE(monitor.doubt({}).isZero(0)) << "the other camera and the readings agree";
+  }
+}
+
+TEST(Monitor, ALargeMovingThingIsNoContradiction) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  for (int k = 0; k < 20; ++k)  // 35 of 80 points
+    EXPECT_FALSE(monitor.examine(scene.seen({}, {}, 45, turned(0.03)), scene.calibration, {}, kStep).imu_contradicts);
+}
+
+TEST(Monitor, FewLandmarksProveNothing) {
+  Scene scene(12);
+  Monitor monitor(assumed(), false);
+  EXPECT_FALSE(monitor.examine(scene.seen(turned(0.05)), scene.calibration, {}, kStep).imu_contradicts);
+  EXPECT_FALSE(monitor.contradicted());
+}
+
+/// Images that agree, for a second.
+void calm(Monitor& monitor, Scene& scene, const Vec3& bias = kBias) {
+  for (int k = 0; k < 20; ++k) {
+    (void)monitor.examine(scene.seen({}), scene.calibration, {}, kStep);
+    monitor.take_bias(bias, 1e-4 * Mat3::Identity());
+  }
+}
+
+TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  calm(monitor, scene);
+  (void)monitor.examine(scene.seen(turned(0.02)), scene.calibration, {}, kStep);
+  EXPECT_TRUE(monitor.contradicted());
+  calm(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted());
+  const Pose<W, B> far{Quat::Identity(), Vec3(10, 0, 0)};
+  EXPECT_NEAR(std::sqrt(monitor.doubt(far)(5, 5)), 0.02 * std::sqrt(2), 2e-3) << "heading, of one contradiction";
+  EXPECT_NEAR(std::sqrt(monitor.doubt(far)(1, 1)), 0.2 * std::sqrt(2), 0.03) << "and what it means ten metres on";
+  EXPECT_FALSE(monitor.take_reset()) << "small enough for the covariance";
+}
+
+TEST(Monitor, ALargeDoubtIsToldOnceWhenTheContradictionIsOver) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  calm(monitor, scene);
+  for (int k = 0; k < 4; ++k) (void)monitor.examine(scene.seen(turned(0.03)), scene.calibration, {}, kStep);
+  EXPECT_FALSE(monitor.take_reset()) << "not yet";
+  calm(monitor, scene);
+  EXPECT_TRUE(monitor.take_reset());
+  EXPECT_FALSE(monitor.take_reset());
+  EXPECT_TRUE(monitor.doubt({}).isZero(0));
+  EXPECT_FALSE(monitor.hopeless());
+  for (int k = 0; k < 4; ++k) (void)monitor.examine(scene.seen(turned(0.03)), scene.calibration, {}, kStep);
+  calm(monitor, scene);
+  EXPECT_TRUE(monitor.take_reset());
+  EXPECT_TRUE(monitor.hopeless()) << "two within five seconds";
+}
+
+TEST(Monitor, GravityConfirmsOrRefutesATilt) {
+  Scene scene;
+  for (const bool right : {true, false}) {
+    Monitor monitor(assumed(), false);
+    calm(monitor, scene);
+    for (int k = 0; k < 4; ++k) (void)monitor.examine(scene.seen(tilted(0.03)), scene.calibration, {}, kStep);
+    calm(monitor, scene);
+    EXPECT_TRUE(monitor.contradicted()) << "gravity has not been asked for long enough";
+    calm(monitor, scene, right ? kBias : Vec3(kBias + Vec3(0, 0.15, 0)));
+    calm(monitor, scene, right ? kBias : Vec3(kBias + Vec3(0, 0.15, 0)));
+    EXPECT_EQ(monitor.hopeless(), !right);
+    EXPECT_EQ(monitor.contradicted(), !right);
+  }
+}
+
+TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
+  Scene scene, dark(3);
+  Monitor monitor(assumed(), false);
+  calm(monitor, scene);
+  (void)monitor.examine(scene.seen(turned(0.05)), scene.calibration, {}, kStep);
+  for (int k = 0; k < 10; ++k) (void)monitor.examine(dark.seen({}), dark.calibration, {}, kStep);
+  EXPECT_TRUE(monitor.hopeless());
+  Monitor believed(assumed(), false);
+  for (int k = 0; k < 10; ++k) (void)believed.examine(dark.seen({}), dark.calibration, {}, kStep);
+  EXPECT_FALSE(believed.hopeless());
+}
+
+}  // namespace
+}  // namespace fbvins

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/imu/reading_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fbvins {
+namespace {
+
+constexpr double kMeasured_s = 0.25;
+/// Vibration of ordinary airframes, which the assumed noise covers: the highest in six flights of a hexacopter.
+constexpr double kUsualGyro_radps = 0.07, kUsualAccel_mps2 = 3.0;
+/// Likewise for sensors of more noise: so many times their own.
+constexpr double kUsualNoise = 3;
+/// A single reading that is off by so many times the usual vibration is wrong, or a blow.
+constexpr double kOutlier = 6;
+/// An axis that gives the same number so often, at a number this large, is at the end of its range; it may be wrong by as much
+/// again.
+constexpr int kSameUntilClipped = 4;
+constexpr double kClippedGyro_radps = 0.05, kClippedAccel_mps2 = 15;
+constexpr double kLeastGyroError_radps = 0.5;
+
+/// Readings in a row with the same large number, 0 before the axis has changed for the first time.
+int count_same(int before, double previous, double now, double least) {
+  if (now != previous) return 1;
+  return before == 0 || std::abs(now) < least ? std::min(before, 1) : before + 1;
+}
+
+}  // namespace
+
+void ReadingNoise::add(const ImuSample& reading) {
+  if (!last_.empty() && reading.t <= last_.back().t) return;
+  if (last_.size() == 2) {
+    const ImuSample &a = last_[0], &b = last_[1];
+    const Vec3 gyro = a.gyro_radps - 2 * b.gyro_radps + reading.gyro_radps;
+    const Vec3 accel = a.accel_mps2 - 2 * b.accel_mps2 + reading.accel_mps2;
+    differences_.push_back({reading.t, gyro.squaredNorm() / 18, accel.squaredNorm() / 18});  // 3 axes, 1 + 4 + 1
+    worst_gyro_radps_ = std::max(worst_gyro_radps_, gyro.norm() / 2);
+    worst_accel_mps2_ = std::max(worst_accel_mps2_, accel.norm() / 2);
+    for (int k = 0; k < 3; ++k) {
+      gyro_same_[k] = count_same(gyro_same_[k], b.gyro_radps(k), reading.gyro_radps(k), kClippedGyro_radps);
+      accel_same_[k] = count_same(accel_same_[k], b.accel_mps2(k), reading.accel_mps2(k), kClippedAccel_mps2);
+      clipped_ = clipped_ || gyro_same_[k] >= kSameUntilClipped || accel_same_[k] >= kSameUntilClipped;
+    }
+    last_.pop_front();
+  }
+  last_.push_back(reading);
+}
+
+ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
+  ImuNoiseScale out;
+  clipped_before_ = clipped_ ? 4 : std::max(0, clipped_before_ - 1);
+  clipped_ = false;
+  worst_gyro_radps_ = worst_accel_mps2_ = 0;
+  if (segment.empty()) {
+    last_.clear();
+    std::fill_n(gyro_same_, 3, 0), std::fill_n(accel_same_, 3, 0);
+    return out;
+  }
+  // The ends of a segment are interpolated at the images' stamps.
+  for (std::size_t i = 1; i + 1 < segment.samples.size(); ++i) add(segment.samples[i]);
+  const Time now = segment.samples.back().t;
+  while (!differences_.empty() && (now - differences_.front().t).seconds() > kMeasured_s) differences_.pop_front();
+  if (differences_.empty()) return out;
+  double gyro2 = 0, accel2 = 0;
+  for (const Difference& d : differences_) gyro2 += d.gyro2, accel2 += d.accel2;
+  const auto count = static_cast<double>(differences_.size());
+  gyro_radps_ = std::sqrt(gyro2 / count), accel_mps2_ = std::sqrt(accel2 / count);
+
+  const double root_rate = std::sqrt(assumed_.rate_hz);
+  const double gyro_sigma = assumed_.gyro_noise_density_radps_rthz * root_rate;  // of a reading
+  const double accel_sigma = assumed_.accel_noise_density_mps2_rthz * root_rate;
+  const double usual_gyro = std::max(kUsualGyro_radps, kUsualNoise * gyro_sigma);
+  const double usual_accel = std::max(kUsualAccel_mps2, kUsualNoise * accel_sigma);
+  out.gyro = std::max(1.0, gyro_radps_ / usual_gyro), out.accel = std::max(1.0, accel_mps2_ / usual_accel);
+  // What one reading contributes to the motion, as noise of them all.
+  const double root_readings = std::sqrt(static_cast<double>(segment.samples.size()));
+  if (worst_gyro_radps_ > kOutlier * std::max(usual_gyro, gyro_radps_))
+    out.gyro = std::max(out.gyro, worst_gyro_radps_ / root_readings / gyro_sigma);
+  if (worst_accel_mps2_ > kOutlier * std::max(usual_accel, accel_mps2_))
+    out.accel = std::max(out.accel, worst_accel_mps2_ / root_readings / accel_sigma);
+  if (clipped_) {
+    double largest = kLeastGyroError_radps;
+    for (const ImuSample& s : segment.samples) largest = std::max(largest, s.gyro_radps.cwiseAbs().maxCoeff());
+    out.gyro = std::max(out.gyro, largest * root_readings / gyro_sigma);
+    double force = 0;
+    for (const ImuSample& s : segment.samples) force = std::max(force, s.accel_mps2.cwiseAbs().maxCoeff());
+    if (*std::max_element(accel_same_, accel_same_ + 3) >= kSameUntilClipped)
+      out.accel = std::max(out.accel, force * root_readings / accel_sigma);
+  }
+  return out;
+}
+
+}  // namespace fbvins

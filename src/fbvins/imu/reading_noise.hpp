@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much worse than usual the readings of an IMU are: what airframes shake, a single wrong reading, an axis at the end of its
+// range. The estimator's noise (ImuNoise, assumed) covers the vibration of ordinary airframes; what is beyond it raises that
+// noise by a factor, so that readings count as much as they are worth.
+//
+//   ReadingNoise noise(assumed);
+//   segment.noise = noise.of(segment);       // segments in order
+//
+// Vibration is measured by second differences, which motion hardly touches (J. von Neumann et al., "The mean square successive
+// difference", Annals of Mathematical Statistics 1941; here of second order). One owner, one thread.
+#pragma once
+
+#include <deque>
+
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class ReadingNoise {
+ public:
+  explicit ReadingNoise(const ImuNoise& assumed) : assumed_(assumed) {}
+
+  ImuNoiseScale of(const ImuSegment& segment);
+  /// Whether an axis was at the end of its range in the last segment, and in one of the four before.
+  bool clipped() const { return clipped_ && clipped_before_ > 0; }
+  /// Root mean square of the last quarter of a second, rad/s and m/s^2, at frequencies far above those of motion.
+  double gyro_vibration_radps() const { return gyro_radps_; }
+  double accel_vibration_mps2() const { return accel_mps2_; }
+
+ private:
+  struct Difference {
+    Time t;
+    double gyro2, accel2;  ///< squared, one axis
+  };
+  void add(const ImuSample& reading);
+
+  ImuNoise assumed_;
+  std::deque<ImuSample> last_;  ///< two at most
+  std::deque<Difference> differences_;
+  int gyro_same_[3] = {}, accel_same_[3] = {};  ///< readings in a row with the same large number
+  bool clipped_ = false;
+  int clipped_before_ = 0;  ///< segments for which that of an earlier one counts
+  double gyro_radps_ = 0, accel_mps2_ = 0;
+  double worst_gyro_radps_ = 0, worst_accel_mps2_ = 0;  ///< single readings of the segment
+};
+
+}  // namespace fbvins
