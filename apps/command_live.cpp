@@ -41,9 +41,8 @@ sources:
   d435i[:SERIAL or FILE.bag] a RealSense camera with an IMU, by its factory calibration (docs/d435i.md)
   v4l2:LEFT,RIGHT,IMU        video devices, or one with two images side by side; the IMU is a flight controller's (udp:..., serial:...)
                              or another process's (socket:...); needs --calibration (docs/v4l2.md)
-faults to inject for tests, in seconds of the flight (KIND:START:LENGTH[:AMOUNT]):
-  camera_off, left_off, right_off, left_frozen, right_frozen, imu_off, unplugged, lose_images:..:SHARE,
-  burst:..:HELD_BACK, leap:..:SECONDS
+faults to inject for tests, in seconds of the flight: --fault KIND:START:LENGTH[:AMOUNT]
+  camera_off, imu_frozen, gyro_clipped:..:RAD/S, right_late, leap:..:SECONDS and some fifty others: docs/live.md has their table
 
 examples:
   fbvins live --source replay:MH_01_easy --out out/live

@@ -3,23 +3,30 @@
 // moment, length), through the judgement of live sensors and the whole odometry. What counts is what is published as `good`.
 //
 //   fbvins_faults FLIGHT... --flights 300 --out rows.csv        goes on where it was stopped; the same rows in any order
-//   fbvins_faults FLIGHT... --fault imu_frozen:8:2 --frontend klt     one fault, of every recording
+//   fbvins_faults FLIGHT... --fault imu_frozen:8:2 --frontends klt     one fault, of every recording
 //   fbvins_faults FLIGHT... --clean                              without faults: false alarms
+//   fbvins_faults --tracks normal hover V1_02/@20 --flights 10000    synthetic tracks (faulty_tracks.hpp), without images
 //
+// With --tracks a flight is a preset of the simulator, or a folder with groundtruth.csv and imu0.csv and where to begin in it, s.
 // A row for each flight. Errors are those since the fault's beginning: the estimate is laid over the truth by the poses before it
 // (shift and heading), and by the first pose after a reset that was told.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "bench/faulty_tracks.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/eval/alignment.hpp"
@@ -43,6 +50,7 @@ struct Flight {
   std::vector<SensorEvent> events;
   std::vector<StampedPose<AnyWorld>> truth;
   Time begin, end;
+  std::shared_ptr<const Simulation> simulation = nullptr;  ///< of tracks
 };
 
 Time time_of(const SensorEvent& event) {
@@ -59,6 +67,34 @@ Result<Flight> load(const std::string& path) {
   if (flight.events.empty() || flight.truth.size() < 2)
     return Error{ErrorCode::invalid_argument, fmt::format("{}: a flight with ground truth is needed", path)};
   flight.begin = time_of(flight.events.front()), flight.end = time_of(flight.events.back());
+  return flight;
+}
+
+/// A flight of tracks: its events in order, its images faulty_frame()s.
+Result<Flight> prepare(const std::string& text, double seconds) {
+  const std::size_t at = text.find_last_of('@');
+  auto options = simulation_preset(at == std::string::npos ? text : "normal");
+  if (!options) return options.error();
+  if (at != std::string::npos) {
+    const std::string folder = text.substr(0, at);
+    options->recorded = {folder + "/groundtruth.csv", folder + "/imu0.csv", std::stod(text.substr(at + 1)), 1.0};
+  }
+  options->flight.duration_s = seconds;
+  auto made = prepare_simulation(*options);
+  if (!made) return made.error();
+  const auto simulation = std::make_shared<const Simulation>(*std::move(made));
+  Flight flight{text.substr(text.find_last_of('/', at - 2) + 1), simulation->rig, {}, {}, {}, {}, simulation};
+  std::size_t frame = 0;
+  const auto add_frames = [&](Time until) {
+    for (; frame < simulation->frames.size() && simulation->frames[frame] <= until; ++frame)
+      flight.events.emplace_back(faulty_frame(simulation->frames[frame]));
+  };
+  for (const ImuSample& sample : simulation->imu.samples) add_frames(sample.t), flight.events.emplace_back(sample);
+  flight.begin = time_of(flight.events.front()), flight.end = time_of(flight.events.back());
+  for (const TrueState& state : simulation->imu.truth) {
+    const Pose<W, B> T = simulation->flight.pose((state.t - simulation->start).seconds());
+    flight.truth.push_back({state.t, {T.q, T.p}});
+  }
   return flight;
 }
 
@@ -79,11 +115,11 @@ struct Published {
 /// The way of live data, in one thread and in the flight's own time.
 class LiveWay final : public SensorInput {
  public:
-  LiveWay(const Flight& flight, const SystemOptions& options)
+  LiveWay(const Flight& flight, const SystemOptions& options, SystemParts parts)
       : ingest_(
             LiveOptions{}, 1, [this] { return now; }, nullptr, flight.rig.imu_noise,
             Duration::from_seconds(flight.rig.time_offset_s)),
-        system_(*System::create(options, flight.rig)) {
+        system_(*System::create(options, flight.rig, RunMode::deterministic, std::move(parts))) {
     system_.on_odometry([this](const Odometry& o) { published.push_back({taken_.at(o.t.ns), o}); });
   }
   void push(const ImuSample& sample) override { ingest_.push(sample), forward(); }
@@ -108,7 +144,12 @@ class LiveWay final : public SensorInput {
   std::map<std::int64_t, Time> taken_;
 };
 
+/// Errors of position in standard deviations of the pose's worst direction, since the beginning of W: how many are above each.
+constexpr double kRatios[] = {0, 2, 3, 4, 5, 6, 8, 10, 14, 20};
+using Ratios = std::array<int, std::size(kRatios)>;
+
 struct Errors {
+  Ratios good_ratios{}, degraded_ratios{};
   int false_good = 0, good_after = 0, poses_after = 0, not_good = 0, lost = 0, resets = 0;
   double said_s = -1;        ///< from the fault's beginning to the first image that is not good; -1: never
   double good_again_s = -1;  ///< from the fault's end to the first image from which on all are good; -1: never
@@ -127,8 +168,26 @@ Similarity laid_on(const Pose<AnyWorld, B>& truth, const Pose<W, B>& estimate) {
   return {1, turn, truth.p - turn * estimate.p};
 }
 
+/// Of the whole flight, laid on the truth by the first pose of each W.
+void add_ratios(const Flight& flight, const std::vector<Published>& all, Errors& out) {
+  std::optional<Similarity> S;
+  std::uint32_t reset = 0;
+  for (const Published& p : all) {
+    const Odometry& o = p.odometry;
+    const auto truth = truth_at(flight, p.taken);
+    if (!o.health.has_pose() || !truth) continue;
+    if (!S || o.reset_counter != reset) S = laid_on(*truth, o.T_WB), reset = o.reset_counter;
+    const Mat3 covariance = o.pose_covariance.topLeftCorner<3, 3>();
+    const double worst_m = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat3>(covariance, Eigen::EigenvaluesOnly).eigenvalues()(2));
+    const double ratio = ((*S * o.T_WB).p - truth->p).norm() / worst_m;
+    Ratios& ratios = o.health.state == HealthState::good ? out.good_ratios : out.degraded_ratios;
+    for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] += ratio >= kRatios[i];
+  }
+}
+
 Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin, Time end) {
   Errors out;
+  add_ratios(flight, all, out);
   std::vector<PosePair> before;
   std::uint32_t reset = 0;
   for (const Published& p : all)
@@ -182,19 +241,31 @@ std::string row(const std::string& name, const Flight& flight, const std::string
                 const Errors& e) {
   std::string reasons;
   for (const std::string& r : e.reasons) reasons += (reasons.empty() ? "" : " ") + r;
-  return fmt::format("{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{:.2f},{:.1f},{:.3f},{:.3f},{:.4f},{},{},{:.2f},{}", name,
+  return fmt::format("{},{},{},{},{},{},{:.3f},{:.3f},{:.1f},{:.2f},{:.1f},{:.3f},{:.3f},{:.4f},{},{},{:.2f},{},{},{}", name,
                      flight.name, frontend, fault, e.false_good, e.good_after, e.said_s, e.good_m, e.good_sigma, e.good_tilt_deg,
                      e.good_tilt_sigma, e.largest_m, e.last_m, static_cast<double>(e.not_good) / std::max(1, e.poses_after),
-                     e.resets, e.lost, e.good_again_s, reasons);
+                     e.resets, e.lost, e.good_again_s, reasons, fmt::join(e.good_ratios, " "), fmt::join(e.degraded_ratios, " "));
 }
 constexpr const char* kHeader =
     "flight,recording,frontend,fault,false_good,good,said_s,good_m,good_sigma,good_tilt_deg,good_tilt_sigma,largest_m,last_m,not_good,"
-    "resets,lost,good_again_s,reasons";
+    "resets,lost,good_again_s,reasons,good_ratios,degraded_ratios";
 
-Errors fly(const Flight& flight, const std::string& frontend, const std::vector<SensorFault>& faults, std::uint64_t seed) {
+Errors fly(const Flight& flight, const std::string& frontend, std::vector<SensorFault> faults, std::uint64_t seed) {
+  const Time begin = flight.begin + Duration::from_seconds(faults.empty() ? kLateStart * (flight.end - flight.begin).seconds()
+                                                                          : faults[0].start_s);
+  const Time end = faults.empty() ? begin : begin + Duration::from_seconds(faults[0].length_s);
   SystemOptions options;
-  options.frontend.kind = frontend;
-  LiveWay way(flight, options);
+  SystemParts parts;
+  if (flight.simulation) {
+    std::optional<SensorFault> of_tracks;
+    if (!faults.empty() && on_tracks(faults[0]) == OnTracks::by_track) of_tracks = std::exchange(faults, {})[0];
+    Rng rng(seed, 6);
+    const TrackOptions tracks{.features = 80 + static_cast<int>(rng.below(80)), .recognise = rng.below(2) == 0, .seed = seed};
+    parts.frontend = std::make_unique<FaultyTracks>(*flight.simulation, tracks, of_tracks, flight.begin);
+  } else {
+    options.frontend.kind = frontend;
+  }
+  LiveWay way(flight, options, std::move(parts));
   for (const SensorFault& f : faults) way.held = way.held || f.kind == SensorFault::Kind::burst;
   {
     FaultyInput faulty(way, faults, seed);
@@ -204,17 +275,21 @@ Errors fly(const Flight& flight, const std::string& frontend, const std::vector<
     }
   }
   way.finish();
-  const Time begin = flight.begin + Duration::from_seconds(faults.empty() ? kLateStart * (flight.end - flight.begin).seconds()
-                                                                          : faults[0].start_s);
-  return judge(flight, way.published, begin, faults.empty() ? begin : begin + Duration::from_seconds(faults[0].length_s));
+  return judge(flight, way.published, begin, end);
 }
 
 /// Even in the logarithm.
 double between(Rng& rng, double small, double large) { return small * std::pow(large / small, rng.uniform()); }
 
-std::string drawn(const Flight& flight, std::uint64_t number) {
+std::vector<FaultName> kinds_of(bool tracks) {
+  std::vector<FaultName> out;
+  for (const FaultName& name : fault_names())
+    if (!tracks || on_tracks({.kind = name.kind, .image = name.image}) != OnTracks::not_on_tracks) out.push_back(name);
+  return out;
+}
+
+std::string drawn(const Flight& flight, const std::vector<FaultName>& names, std::uint64_t number) {
   Rng rng(number, 5);
-  const auto names = fault_names();
   const FaultName& name = names[number % names.size()];
   const double whole_s = (flight.end - flight.begin).seconds();
   const double start = rng.uniform(kLateStart, kEarlyEnd) * whole_s;
@@ -230,18 +305,21 @@ int run(int argc, char** argv) {
   std::vector<std::string> paths, faults, frontends{"klt", "orb", "boost"};
   std::string out;
   std::uint64_t flights = 0, first = 0;
-  bool clean = false;
-  app.add_option("recordings", paths, "with ground truth")->required();
+  bool clean = false, tracks = false;
+  double seconds = 12;
+  app.add_option("recordings", paths, "with ground truth; with --tracks presets, or FOLDER@START")->required();
+  app.add_flag("--tracks", tracks, "synthetic tracks in place of images");
+  app.add_option("--seconds", seconds, "of a flight of tracks");
   app.add_option("--frontends", frontends)->delimiter(',');
   app.add_option("--flights", flights, "drawn at random");
   app.add_option("--first", first, "number of the first one; other numbers are other flights");
   app.add_option("--fault", faults, "one fault, as of fbvins live")->take_all()->allow_extra_args(false);
-  app.add_flag("--clean", clean, "without faults");
+  app.add_flag("--clean", clean, "without faults: each recording once, or --flights of them");
   app.add_option("--out", out, "CSV; rows that are there are not flown again");
   CLI11_PARSE(app, argc, argv);
   std::vector<Flight> recordings;
   for (const std::string& path : paths) {
-    auto flight = load(path);
+    auto flight = tracks ? prepare(path, seconds) : load(path);
     if (!flight) return fmt::print(stderr, "{}\n", flight.error().message), 2;
     recordings.push_back(*std::move(flight));
   }
@@ -268,15 +346,17 @@ int run(int argc, char** argv) {
     fmt::print(file, "{}\n", row(name, flight, frontend, text, errors));
     std::fflush(file);
   };
+  if (tracks) frontends = {"tracks"};
   for (const std::string& frontend : frontends)
     for (const Flight& flight : recordings) {
-      if (clean) one(fmt::format("clean-{}-{}", flight.name, frontend), flight, frontend, "", 1);
+      if (clean && flights == 0) one(fmt::format("clean-{}-{}", flight.name, frontend), flight, frontend, "", 1);
       for (const std::string& text : faults) one(fmt::format("{}-{}-{}", text, flight.name, frontend), flight, frontend, text, 1);
     }
-  const std::size_t kinds = fault_names().size();
+  const std::vector<FaultName> names = kinds_of(tracks);
+  const std::size_t kinds = names.size();
   for (std::uint64_t n = first; n < first + flights; ++n) {
     const Flight& flight = recordings[(n / kinds + n) % recordings.size()];
-    one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()], drawn(flight, n), n);
+    one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()], clean ? "" : drawn(flight, names, n), n);
   }
   return failed > 0;
 }

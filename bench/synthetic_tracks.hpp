@@ -86,8 +86,14 @@ class SyntheticTracks {
     return out;
   }
 
-  /// The same at any stamp, in order, without IMU readings.
-  TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) {
+  /// No track goes on.
+  void lose_all() {
+    for (auto& [corner, track] : tracks_) track.followed = false;
+  }
+
+  /// The same at any stamp, in order, without IMU readings; the right image taken at `right_t`.
+  TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior) { return frame_at(id, t, prior, t); }
+  TrackedFrame frame_at(FrameId id, Time t, const StatePrior& prior, Time right_t) {
     TrackedFrame out;
     out.id = id;
     out.t = t;
@@ -101,7 +107,7 @@ class SyntheticTracks {
       drift = prior.T_WB * then.inverse().cast_frames<B, W>();
     }
     motion_px_.clear();
-    see(T_WB, t_s, prior.valid ? &drift : nullptr, out);
+    see(T_WB, right_t == t ? T_WB : pose((right_t - flight_.start).seconds()), t_s, prior.valid ? &drift : nullptr, out);
     std::sort(motion_px_.begin(), motion_px_.end());
     if (!motion_px_.empty()) out.stats.median_motion_px = motion_px_[motion_px_.size() / 2];
     return out;
@@ -194,9 +200,9 @@ class SyntheticTracks {
     return ((*drift) * p_W - known->second).norm() * 458 / now.norm() < 15;  // within the search
   }
 
-  void see(const Pose<W, B>& T_WB, double t_s, const Pose<W, W>* drift, TrackedFrame& out) {
+  void see(const Pose<W, B>& T_WB, const Pose<W, B>& right_T_WB, double t_s, const Pose<W, W>* drift, TrackedFrame& out) {
     const Pose<C0, W> T_C0W = (T_WB * flight_.rig.T_BC0).inverse();
-    const Pose<C1, W> T_C1W = (T_WB * flight_.rig.T_BC1).inverse();
+    const Pose<C1, W> T_C1W = (right_T_WB * flight_.rig.T_BC1).inverse();
     std::vector<std::size_t> fresh;
     const auto add = [&](Track& track, const Observation& left, const Vec3& p_W) {
       TrackedFeature f;

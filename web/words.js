@@ -19,6 +19,10 @@ const REASONS = {
   solver_failed: "the solver failed",
   one_camera: "only one camera delivers",
   frontend_fault: "the frontend returned impossible features",
+  contradiction: "camera and IMU contradict each other",
+  cameras_disagree: "the two cameras contradict each other",
+  imu_clipped: "the IMU is at the end of its range",
+  imu_vibration: "strong vibration spoils the IMU's readings",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }

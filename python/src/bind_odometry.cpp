@@ -5,6 +5,7 @@
 #include "bindings.hpp"
 #include "fbvins/types/loop.hpp"
 #include "fbvins/types/odometry.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins::python {
 
@@ -45,6 +46,9 @@ void bind_odometry(nb::module_& m) {
       .def_prop_ro("reason", [](const Odometry& o) { return std::string(to_string(o.health.reason)); })
       .def_ro("level", &Odometry::level, "whether the tilt is known to 0.3 degrees")
       .def_ro("tilt_sigma_rad", &Odometry::tilt_sigma_rad)
+      .def_prop_ro(
+          "protection_m", [](const Odometry& o) { return protection_level_m(o.health, o.pose_covariance); },
+          "radius that the position's error exceeds once in 10^4 poses at most, m; inf without a pose")
       .def_ro("reset_counter", &Odometry::reset_counter, "+1 whenever the estimator restarts: W is a new frame then")
       .def("__repr__", [](const Odometry& o) {
         return fmt::format("<fbvins.Odometry frame {} t={} ns {} p=({:.3f}, {:.3f}, {:.3f})>", o.id.value, o.t.ns,

@@ -56,11 +56,12 @@ struct EstimatorOptions {
   double accel_walk_scale = 0.4;
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
-  double max_image_gap_s = 3.0;
+  double max_blind_m = 0.5;
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
   double max_speed_mps = 30;
   double max_step_m = 0.0015;
+  double max_pending_m = 0.1;
 
   /// The noise that readings are weighted with, from the calibrated one.
   ImuNoise assumed(ImuNoise noise) const {
@@ -86,12 +87,15 @@ struct EstimatorOptions {
     v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
-    v("max_image_gap_s", max_image_gap_s, "s", "longest time without usable images bridged by the IMU", 0.1, 60.0);
+    v("max_blind_m", max_blind_m, "m",
+      "largest standard deviation that flight by the IMU alone, without usable images, may add to the position", 0.01, 100.0);
     v("max_imu_gap_s", max_imu_gap_s, "s", "longest time without IMU readings bridged by the images", 0.01, 10.0);
     v("min_tracks", min_tracks, "", "fewer landmarks than this in view: degraded", 3, 200);
     v("max_speed_mps", max_speed_mps, "m/s", "faster is implausible and restarts the estimator", 1.0, 1000.0);
     v("max_step_m", max_step_m, "m",
       "largest correction of the published position from one image to the next, attitude in proportion; 0: no limit", 0.0, 1.0);
+    v("max_pending_m", max_pending_m, "m",
+      "larger corrections (attitude: 3 degrees for 0.1 m) are made at once and counted as a reset; 0: none", 0.0, 100.0);
   }
 };
 

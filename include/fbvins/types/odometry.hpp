@@ -33,15 +33,14 @@ enum class HealthReason {
   implausible_bias,
   implausible_speed,
   solver_failed,
-  one_camera,          ///< no stereo matches
-  frontend_fault,      ///< the frontend returned features that cannot be: they were left out
-  contradiction,       ///< images and IMU readings contradict each other
-  cameras_disagree,    ///< one camera contradicts the other and the IMU: its images are not used
-  imu_clipped,         ///< an axis of the IMU is at the end of its range
-  imu_vibration,       ///< readings are shaken so much that they say little
-  correction_pending,  ///< the published pose is still being corrected, by more than a good pose may be wrong
+  one_camera,        ///< no stereo matches
+  frontend_fault,    ///< the frontend returned features that cannot be: they were left out
+  contradiction,     ///< images and IMU readings contradict each other
+  cameras_disagree,  ///< one camera contradicts the other and the IMU: its images are not used
+  imu_clipped,       ///< an axis of the IMU is at the end of its range
+  imu_vibration,     ///< readings are shaken so much that they say little
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::correction_pending;
+inline constexpr HealthReason kLastHealthReason = HealthReason::imu_vibration;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);
@@ -91,7 +90,8 @@ struct Odometry {
   double tilt_sigma_rad = 0;                  ///< standard deviation of the attitude's tilt about its less certain axis
   bool level = false;                         ///< tilt_sigma_rad is below kLevelSigma_rad
   Health health;
-  std::uint32_t reset_counter = 0;  ///< +1 whenever the estimator restarted: W is a new frame then
+  std::uint32_t reset_counter =
+      0;  ///< +1 whenever W is a new frame: after a restart, or a correction too large to be made slowly
   EstimatorStats stats;
 };
 

@@ -7,24 +7,24 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/types/odometry.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 
-/// Position uncertainty at which the quality is 50: square root of the trace of the position's covariance, m.
-inline constexpr double kHalfQualitySigma_m = 0.1;
+/// Protection level (once in 10^4) at which the quality is 50.
+inline constexpr double kHalfQuality_m = 0.5;
 /// Upper limit while the health is degraded.
 inline constexpr int kMostDegradedQuality_percent = 30;
 
-/// 1 to 100 where there is a pose, 0 where there is none. While the health is good it depends on the standard deviation of the
-/// published position alone and ranks poses as the covariance does (docs/experiments/consistency.md: how it ranks their errors).
+/// 1 to 100 where there is a pose, 0 where there is none. While the health is good it depends on the protection level alone and
+/// ranks poses as the position's covariance does (docs/experiments/consistency.md: how it ranks their errors).
 /// `pose_covariance` is of (position [m], attitude [rad]), in any axes.
 inline int quality_percent(const Health& health, const Mat6& pose_covariance) {
   if (!health.has_pose()) return 0;
-  const double sigma_m = std::sqrt(pose_covariance.topLeftCorner<3, 3>().trace());
-  if (!std::isfinite(sigma_m)) return 1;
+  const double level_m = protection_level_m(health, pose_covariance);
+  if (!std::isfinite(level_m)) return 1;
   const int most = health.state == HealthState::degraded ? kMostDegradedQuality_percent : 100;
-  return std::clamp(static_cast<int>(std::lround(100 / (1 + sigma_m / kHalfQualitySigma_m))), 1, most);
+  return std::clamp(static_cast<int>(std::lround(100 / (1 + level_m / kHalfQuality_m))), 1, most);
 }
 
 }  // namespace fbvins

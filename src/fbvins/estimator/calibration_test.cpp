@@ -122,7 +122,9 @@ Calibration fly_with_late_stamps(SimulatedFlight& flight, double late_s, const E
     TrackedFrame frame = flight.frame_with_late_stamp(k, late);
     last = estimator.process(frame).odometry.health;
   }
-  if (options.estimate_time_offset) EXPECT_EQ(last.state, HealthState::good);
+  if (options.estimate_time_offset) {
+    EXPECT_EQ(last.state, HealthState::good);
+  }
   return estimator.calibration();
 }
 

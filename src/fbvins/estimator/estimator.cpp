@@ -10,6 +10,7 @@
 #include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 namespace {
@@ -44,7 +45,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       reading_noise_(imu_noise_),
       monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
       window_(options, weights_of(options)),
-      published_(options.max_step_m) {}
+      published_(options.max_step_m, options.max_pending_m) {}
 
 StatePrior Estimator::prior() const {
   StatePrior out;
@@ -85,12 +86,12 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   }
   open_window(*start);
   running_ = true;
-  health_.start(frame);
+  health_.start();
   solve(out.odometry, kThorough);
   // The first solve may have moved the first frame far: the prior is linearised anew at its state.
   window_.restart_first_estimates();
   const WindowSolution& solution = solve(out.odometry, kThorough);
-  out.odometry.health = judge(frame);
+  out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.state == HealthState::good) {
     shrink_window(solution, out);
     return;
@@ -175,8 +176,8 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.standstill = standstill;
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
-  monitor_.take_bias(window_.newest().state.bias.accel_mps2, out.odometry.accel_bias_covariance);
-  out.odometry.health = judge(frame);
+  monitor_.take({frame.t, window_.newest().state.bias, out.odometry.gyro_bias_covariance, out.odometry.accel_bias_covariance});
+  out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
   stats.marginalise_ms = timer.lap_ms();
 }
@@ -287,9 +288,10 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
   }
 }
 
-Health Estimator::judge(const TrackedFrame& frame) {
+Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
   return health_.judge(frame, window_.newest().state, landmarks_in_view(window_),
-                       {.failed_solves = failed_solves_,
+                       {.worst_sigma_m = worst_sigma_m(solved.pose_covariance),
+                        .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
                         .contradiction = monitor_.contradicted(),
                         .hopeless = monitor_.hopeless(),
@@ -346,8 +348,11 @@ void Estimator::publish(Odometry& out) {
   if (out.health.state == HealthState::good && published_.owes_too_much()) {
     begin_new_W();
     published_.follow({}, level.T_WB);
+    monitor_.take_correction();
+    out.health = {HealthState::degraded, HealthReason::contradiction};
   }
-  out.pose_covariance += monitor_.doubt(level.T_WB);
+  out.pose_covariance += monitor_.doubt(newest.T_WB);
+  out.velocity_covariance += monitor_.velocity_doubt(newest.v_WB);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

@@ -60,7 +60,7 @@ class Estimator {
   void fill_covariances(const WindowSolution& solution, Odometry& out);
   void shrink_window(const WindowSolution& solution, Estimate& out);
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
-  Health judge(const TrackedFrame& frame);
+  Health judge(const TrackedFrame& frame, const Odometry& solved);
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();

@@ -11,6 +11,7 @@
 
 #include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 namespace {
@@ -250,6 +251,7 @@ TEST(Estimator, ARestartForgetsWhatWasEstimatedOfTheCalibration) {
   flight.images = [](int k) { return k < 100; };
   EstimatorOptions options = exact_noise();
   options.estimate_extrinsics = true;
+  options.max_blind_m = 0.1;
   Estimator estimator(flight.rig, options);
   const Calibration given = estimator.calibration();
   bool changed = false;
@@ -387,7 +389,9 @@ TEST(Estimator, IsRobustToOutliers) {
 TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
   SimulatedFlight flight(Motion(0.6, 0.3), 11);
   flight.images = [](int k) { return k < 60 || k >= 130; };
-  const Flown flown = fly(flight, 200);
+  EstimatorOptions options = exact_noise();
+  options.max_blind_m = 0.03;
+  const Flown flown = fly(flight, 200, options);
   const auto is_lost = [](const Odometry& o) { return o.health.state == HealthState::lost; };
   const auto lost = std::find_if(flown.odometry.begin(), flown.odometry.end(), is_lost);
   ASSERT_NE(lost, flown.odometry.end());
@@ -395,6 +399,24 @@ TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
   EXPECT_EQ(lost[1].health, (Health{HealthState::initialising, HealthReason::no_images}));
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
   EXPECT_EQ(flown.odometry.back().reset_counter, 1u);
+}
+
+/// How long the IMU may carry the pose depends on the IMU, and what it says of its error is true.
+TEST(Estimator, AGoodImuCarriesThePoseForLongerThanABadOne) {
+  int carried[2] = {};
+  for (const bool good : {true, false}) {
+    SimulatedFlight flight(Motion(0.6, 0.3), 11);
+    flight.images = [](int k) { return k < 100; };
+    EstimatorOptions options = exact_noise();
+    if (!good) options.accel_noise_scale = 100;
+    const Flown flown = fly(flight, 400, options);
+    for (int k = 100; k < 400 && flown.odometry[k].health.has_pose(); ++k, ++carried[good]) {
+      EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::no_images})) << k;
+      EXPECT_LT(flown.position_error(k), 0.02 + 3 * worst_sigma_m(flown.odometry[k].pose_covariance)) << k;
+    }
+  }
+  EXPECT_GT(carried[true], 120) << "six seconds";
+  EXPECT_LT(carried[false], 60) << "three";
 }
 
 TEST(Estimator, WindowIsBounded) {

@@ -17,16 +17,17 @@ class HealthJudge {
  public:
   explicit HealthJudge(const EstimatorOptions& options) : options_(options) {}
 
-  /// The window starts with this frame.
-  void start(const TrackedFrame& frame) { last_good_tracking_ = frame.t; }
+  /// A window starts.
+  void start() { seen_sigma_m_ = 0; }
   /// What speaks against a frame, beside the frame itself.
   struct Evidence {
+    double worst_sigma_m = 0;  ///< of the position
     int failed_solves = 0;
     int broken_features = 0;  ///< that were left out
     bool contradiction = false;
     bool hopeless = false;  ///< and the estimate cannot recover from it
     bool one_camera_wrong = false;
-    bool after_gap = false;    ///< of the readings
+    bool after_gap = false;  ///< of the readings
     bool clipped = false;
     double gyro_vibration_radps = 0;
   };
@@ -41,7 +42,8 @@ class HealthJudge {
   bool images_missing(const TrackedFrame& frame) const;
 
   EstimatorOptions options_;
-  std::optional<Time> previous_image_, last_good_tracking_;
+  std::optional<Time> previous_image_;
+  double seen_sigma_m_ = 0;  ///< of the last frame with enough landmarks
   SamplePeriod image_period_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/monitor.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -24,15 +25,38 @@ constexpr double kAgreeing = 0.6;
 /// CUSUM of (median / usual - 1): a contradiction from here on; no more is kept.
 constexpr double kContradiction = 1, kMost = 2;
 constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
+/// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
+constexpr double kDark_s = 0.15;
+constexpr int kSettling = 5;
 /// A doubt that is told as a reset; two of them within a few seconds are no way to fly.
 constexpr double kReset_m = 0.1, kReset_rad = 3 * kDegree, kNextReset_s = 5;
-/// A doubt about the tilt that gravity has to confirm, within this time, by an accelerometer's bias that stays.
-constexpr double kTilt_rad = 1 * kDegree, kConfirmed_s = 1.5, kBiasMoved_mps2 = 0.1, kBiasMoved_sigma = 4;
+/// A doubt about the tilt has to be confirmed by gravity: by biases that are where they were, for this time.
+constexpr double kTilt_rad = 1 * kDegree, kConfirmed_s = 1.5, kAccelBack_mps2 = 0.1, kGyroBack_radps = 0.005;
+/// No bias moves so far in so short a time. On flights without a fault no estimated one does.
+constexpr double kJump_s = 2, kAccelJump_mps2 = 0.25, kGyroJump_radps = 0.005, kMoved_sigma = 5;
+/// At the beginning, when the first errors of the start are found, they do.
+constexpr double kBegun_s = 2;
+/// Nor is it another one after a restart that this has caused.
+constexpr double kRemembered_s = 30;
 
 double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
+/// is what it gained or lost meanwhile.
+double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> gained(before - after);
+  const Vec3 along = gained.eigenvectors().transpose() * change;
+  return std::sqrt((along.array().square() / (gained.eigenvalues().array().abs() + floor * floor)).sum());
+}
+
+bool moved(const Monitor::Biases& from, const Monitor::Biases& to, double accel_mps2, double gyro_radps) {
+  return change_sigma(to.bias.accel_mps2 - from.bias.accel_mps2, from.accel, to.accel, accel_mps2 / kMoved_sigma) >
+             kMoved_sigma ||
+         change_sigma(to.bias.gyro_radps - from.bias.gyro_radps, from.gyro, to.gyro, gyro_radps / kMoved_sigma) > kMoved_sigma;
 }
 
 struct Medians {
@@ -59,7 +83,11 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
 
 }  // namespace
 
-void Monitor::restart() { *this = Monitor(assumed_, calibrating_); }
+void Monitor::restart() {
+  const std::optional<Biases> refuted = refuted_;
+  *this = Monitor(assumed_, calibrating_);
+  refuted_ = refuted;
+}
 
 void Monitor::pass(Duration dt) {
   calm_s_ += dt.seconds();
@@ -71,18 +99,45 @@ void Monitor::pass(Duration dt) {
 void Monitor::blind(Duration dt) {
   since_reset_s_ += dt.seconds();
   blind_s_ += dt.seconds();
-  if (!contradicted_) return;
-  tilt_doubted_ = true;  // readings that are doubted have to carry alone
+  if (!contradicted_) {
+    if (blind_s_ > kDark_s) settling_ = kSettling;
+    return;
+  }
+  doubt_tilt();  // readings that are doubted have to carry alone
   hopeless_ = hopeless_ || blind_s_ > kBlind_s;
 }
 
-void Monitor::take_bias(const Vec3& accel_bias_mps2, const Mat3& covariance) {
-  accel_bias_ = accel_bias_mps2;
-  bias_sigma_ = std::sqrt(covariance.trace());
+void Monitor::doubt_tilt() {
+  if (biases_.empty()) tilt_doubted_ = true;
+  else doubt_tilt(biases_.front());
+}
+
+void Monitor::doubt_tilt(const Biases& before) {
+  if (tilt_doubted_) return;
+  tilt_doubted_ = true;
+  before_ = before;
+  confirmed_s_ = refuted_s_ = 0;
+}
+
+void Monitor::take(const Biases& now) {
+  if (!begun_) begun_ = now.t;
+  if ((now.t - *begun_).seconds() < kBegun_s && !refuted_) return;
+  const double dt_s = biases_.empty() ? 0 : (now.t - biases_.back().t).seconds();
+  biases_.push_back(now);
+  while ((now.t - biases_.front().t).seconds() > kJump_s) biases_.pop_front();
+  if (refuted_ && (now.t - refuted_->t).seconds() > kRemembered_s) refuted_.reset();
+  const Biases& from = refuted_ ? *refuted_ : biases_.front();
+  if (moved(from, now, kAccelJump_mps2, kGyroJump_radps)) doubt_tilt(from);
   if (!tilt_doubted_ || contradicted_) return;
-  const double moved_mps2 = std::max(kBiasMoved_mps2, kBiasMoved_sigma * bias_sigma_before_);
-  if ((accel_bias_ - accel_bias_before_).norm() > moved_mps2) hopeless_ = true;
-  else if (calm_s_ > kConfirmed_s) tilt_doubted_ = false, tilt_W_.setZero();
+  const bool away = before_ && moved(*before_, now, kAccelBack_mps2, kGyroBack_radps);
+  (away ? refuted_s_ : confirmed_s_) += dt_s;
+  (away ? confirmed_s_ : refuted_s_) = 0;
+  if (refuted_s_ > kConfirmed_s) hopeless_ = true, refuted_ = before_;
+  if (confirmed_s_ <= kConfirmed_s) return;
+  tilt_doubted_ = false;
+  tilt_W_.setZero();
+  before_.reset(), refuted_.reset();
+  biases_ = {now};
 }
 
 Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, const Calibration& calibration,
@@ -90,6 +145,11 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   Verdict out;
   if (sightings.size() < kFewest) {
     blind(dt);
+    return out;
+  }
+  if (settling_ > 0 && !contradicted_) {
+    --settling_;
+    pass(dt);
     return out;
   }
   const double usual = (calibrating_ ? kCalibrating : 1) * kUsual_sigma * std::max(1.0, dt.seconds() / kUsualFor_s);
@@ -119,47 +179,58 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   if (one_camera_fits) {
     out.left_wrong = *at_prediction.of[0] > *at_prediction.of[1];
     out.right_wrong = !out.left_wrong;
-  } else {
-    const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_WB.q).normalized());
-    const Vec3 shift = seen.T_WB.p - predicted.p;
-    out.imu_contradicts = true;
-    out.seen = seen.T_WB;
-    out.noise.gyro = std::max(1.0, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
-    out.noise.accel =
-        std::max(1.0, shift.norm() / (assumed_.accel_noise_density_mps2_rthz * std::sqrt(std::pow(dt.seconds(), 3) / 3)));
-    take_doubt(predicted, turn, shift);
+    pass(dt);  // the readings agree with the other one
+    return out;
   }
+  const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_WB.q).normalized());
+  const Vec3 shift = seen.T_WB.p - predicted.p;
+  out.imu_contradicts = true;
+  out.seen = seen.T_WB;
+  out.noise.gyro = std::max(1.0, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
+  out.noise.accel =
+      std::max(1.0, shift.norm() / (assumed_.accel_noise_density_mps2_rthz * std::sqrt(std::pow(dt.seconds(), 3) / 3)));
+  take_doubt(predicted, turn, shift);
   contradicted_ = true;
   calm_s_ = blind_s_ = 0;
   return out;
 }
 
 void Monitor::take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W) {
-  if (!contradicted()) accel_bias_before_ = accel_bias_, bias_sigma_before_ = bias_sigma_;
   if (turn_W_.isZero(0)) where_W_ = predicted.p;
   const Vec3 turn_W = predicted.q * turn_B;
   turn_W_ += turn_W, shift_W_ += shift_W;
   turns_W_ += turn_W * turn_W.transpose(), shifts_W_ += shift_W * shift_W.transpose();
   tilt_W_ += Vec3(turn_W.x(), turn_W.y(), 0);
-  tilt_doubted_ = tilt_doubted_ || tilt_W_.norm() > kTilt_rad;
+  if (tilt_W_.norm() > kTilt_rad) doubt_tilt();
 }
 
 bool Monitor::take_reset() {
   if (contradicted() || (shift_W_.norm() < kReset_m && turn_W_.norm() < kReset_rad)) return false;
   turn_W_.setZero(), shift_W_.setZero(), turns_W_.setZero(), shifts_W_.setZero();
-  hopeless_ = since_reset_s_ < kNextReset_s;
-  since_reset_s_ = 0;
+  count_reset();
   return true;
+}
+
+void Monitor::take_correction() {
+  doubt_tilt();
+  count_reset();
+}
+
+void Monitor::count_reset() {
+  hopeless_ = hopeless_ || since_reset_s_ < kNextReset_s;
+  since_reset_s_ = 0;
 }
 
 Mat6 Monitor::doubt(const Pose<W, B>& T_WB) const {
   const Mat3 R_BW = T_WB.R().transpose();
-  const Mat3 turns_W = turns_W_ + turn_W_ * turn_W_.transpose();
+  const Mat3 turns_W = turns();
   const Mat3 lever = hat(T_WB.p - where_W_);
   Mat6 out = Mat6::Zero();
   out.topLeftCorner<3, 3>() = shifts_W_ + shift_W_ * shift_W_.transpose() + lever * turns_W * lever.transpose();
   out.bottomRightCorner<3, 3>() = R_BW * turns_W * R_BW.transpose();
   return out;
 }
+
+Mat3 Monitor::velocity_doubt(const Vec3& v_WB) const { return hat(v_WB) * turns() * hat(v_WB).transpose(); }
 
 }  // namespace fbvins

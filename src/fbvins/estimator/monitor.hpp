@@ -10,6 +10,7 @@
 // One owner, one thread.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -38,8 +39,13 @@ class Monitor {
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 
-  /// After the solve: the accelerometer's bias is where a wrong tilt shows.
-  void take_bias(const Vec3& accel_bias_mps2, const Mat3& covariance);
+  struct Biases {
+    Time t;
+    ImuBias bias;
+    Mat3 gyro = Mat3::Zero(), accel = Mat3::Zero();  ///< covariances
+  };
+  /// After each solve: the biases are where a wrong tilt shows, and faults of the IMU that begin without a contradiction.
+  void take(const Biases& biases);
 
   /// A contradiction was seen within the last half second, or gravity has not confirmed the attitude since.
   bool contradicted() const { return contradicted_ || tilt_doubted_; }
@@ -47,26 +53,38 @@ class Monitor {
   bool follows_images() const { return contradicted_; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
   bool take_reset();
+  /// The estimate has moved too far for its pose to follow slowly: gravity has to confirm the new one.
+  void take_correction();
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
   bool hopeless() const { return hopeless_; }
   /// Covariance of (dp in W [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
   Mat6 doubt(const Pose<W, B>& T_WB) const;
+  /// And of this velocity, in W.
+  Mat3 velocity_doubt(const Vec3& v_WB) const;
 
  private:
   void blind(Duration dt);
+  void count_reset();
+  void doubt_tilt();
+  void doubt_tilt(const Biases& before);
+  Mat3 turns() const { return turns_W_ + turn_W_ * turn_W_.transpose(); }
   void take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W);
 
   ImuNoise assumed_;
   bool calibrating_;
-  double evidence_ = 0;  ///< cumulative sum (CUSUM)
+  double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
   bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
   Vec3 turn_W_ = Vec3::Zero(), shift_W_ = Vec3::Zero();    ///< seen minus predicted, added up
   Mat3 turns_W_ = Mat3::Zero(), shifts_W_ = Mat3::Zero();  ///< their squares, added up
   Vec3 where_W_ = Vec3::Zero();                            ///< where the turn began
   Vec3 tilt_W_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
-  Vec3 accel_bias_ = Vec3::Zero(), accel_bias_before_ = Vec3::Zero();
-  double bias_sigma_ = 0, bias_sigma_before_ = 0;
+  int settling_ = 0;                                       ///< images after darkness that are not judged
+  std::optional<Time> begun_;
+  std::deque<Biases> biases_;               ///< of the last two seconds
+  std::optional<Biases> before_;            ///< the doubt about the tilt
+  std::optional<Biases> refuted_;           ///< those before a restart, which the ones after it refuted
+  double confirmed_s_ = 0, refuted_s_ = 0;  ///< for how long the biases have said so
   double since_reset_s_ = 1e9;
 };
 

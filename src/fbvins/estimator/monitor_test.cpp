@@ -44,6 +44,7 @@ class Scene {
 
   StereoRig rig = test::SimulatedFlight(test::Motion(0.1, 0.1), 1).rig;
   Calibration calibration{rig.T_BC0, rig.T_BC1, 0.0};
+  Time now;
 
  private:
   Observation observe(const Vec3& p_C) {
@@ -124,18 +125,24 @@ TEST(Monitor, FewLandmarksProveNothing) {
   EXPECT_FALSE(monitor.contradicted());
 }
 
-/// Images that agree, for a second.
-void calm(Monitor& monitor, Scene& scene, const Vec3& bias = kBias) {
+/// Images that agree, for a second, in `monitor`'s own time.
+void calm(Monitor& monitor, Scene& scene, const Vec3& accel_bias = kBias, const Vec3& gyro_bias = Vec3::Zero()) {
   for (int k = 0; k < 20; ++k) {
     (void)monitor.examine(scene.seen({}), scene.calibration, {}, kStep);
-    monitor.take_bias(bias, 1e-4 * Mat3::Identity());
+    scene.now = scene.now + kStep;
+    monitor.take({scene.now, {gyro_bias, accel_bias}, 1e-6 * Mat3::Identity(), 1e-4 * Mat3::Identity()});
   }
+}
+
+/// Until biases are compared.
+void begin(Monitor& monitor, Scene& scene) {
+  for (int k = 0; k < 4; ++k) calm(monitor, scene);
 }
 
 TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
   Scene scene;
   Monitor monitor(assumed(), false);
-  calm(monitor, scene);
+  begin(monitor, scene);
   (void)monitor.examine(scene.seen(turned(0.02)), scene.calibration, {}, kStep);
   EXPECT_TRUE(monitor.contradicted());
   calm(monitor, scene);
@@ -149,7 +156,7 @@ TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
 TEST(Monitor, ALargeDoubtIsToldOnceWhenTheContradictionIsOver) {
   Scene scene;
   Monitor monitor(assumed(), false);
-  calm(monitor, scene);
+  begin(monitor, scene);
   for (int k = 0; k < 4; ++k) (void)monitor.examine(scene.seen(turned(0.03)), scene.calibration, {}, kStep);
   EXPECT_FALSE(monitor.take_reset()) << "not yet";
   calm(monitor, scene);
@@ -167,7 +174,7 @@ TEST(Monitor, GravityConfirmsOrRefutesATilt) {
   Scene scene;
   for (const bool right : {true, false}) {
     Monitor monitor(assumed(), false);
-    calm(monitor, scene);
+    begin(monitor, scene);
     for (int k = 0; k < 4; ++k) (void)monitor.examine(scene.seen(tilted(0.03)), scene.calibration, {}, kStep);
     calm(monitor, scene);
     EXPECT_TRUE(monitor.contradicted()) << "gravity has not been asked for long enough";
@@ -178,10 +185,75 @@ TEST(Monitor, GravityConfirmsOrRefutesATilt) {
   }
 }
 
+TEST(Monitor, ABiasThatJumpsIsAFault) {
+  for (const bool gyro : {false, true}) {
+    Scene scene;
+    Monitor monitor(assumed(), false);
+    begin(monitor, scene);
+    EXPECT_FALSE(monitor.contradicted());
+    const Vec3 accel = kBias + Vec3(gyro ? 0 : 0.5, 0, 0), turning(0, 0, gyro ? 0.02 : 0);
+    calm(monitor, scene, accel, turning);
+    EXPECT_TRUE(monitor.contradicted()) << "no image contradicts it, but no bias moves so far";
+    EXPECT_FALSE(monitor.hopeless());
+    calm(monitor, scene, accel, turning);
+    EXPECT_TRUE(monitor.hopeless()) << "it stays away";
+  }
+}
+
+TEST(Monitor, ABiasThatComesBackWasNone) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  begin(monitor, scene);
+  calm(monitor, scene, kBias + Vec3(0.5, 0, 0));
+  calm(monitor, scene);
+  EXPECT_TRUE(monitor.contradicted()) << "gravity has not been asked for long enough";
+  calm(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted());
+  calm(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted() || monitor.hopeless());
+}
+
+TEST(Monitor, ABiasThatWasRefutedIsNotBelievedAfterTheRestart) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  begin(monitor, scene);
+  const Vec3 turning(0, 0, 0.02);
+  for (int k = 0; k < 4; ++k) calm(monitor, scene, kBias, turning);
+  ASSERT_TRUE(monitor.hopeless());
+  monitor.restart();
+  calm(monitor, scene, kBias, turning);
+  EXPECT_TRUE(monitor.contradicted());
+  monitor.restart();
+  for (int k = 0; k < 31; ++k) scene.now = scene.now + Duration::from_seconds(1);
+  begin(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted()) << "half a minute later it may be another one";
+}
+
+TEST(Monitor, ALargeCorrectionHasToBeConfirmedAndASecondOneIsTooMuch) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  begin(monitor, scene);
+  monitor.take_correction();
+  EXPECT_TRUE(monitor.contradicted());
+  calm(monitor, scene), calm(monitor, scene);
+  EXPECT_FALSE(monitor.contradicted() || monitor.hopeless());
+  monitor.take_correction();
+  EXPECT_TRUE(monitor.hopeless());
+}
+
+TEST(Monitor, ABiasThatIsStillBeingFoundMoves) {
+  Monitor monitor(assumed(), false);
+  for (int k = 0; k < 80; ++k) {
+    const Mat3 found = std::pow(0.3 - 0.003 * k, 2) * Mat3::Identity();
+    monitor.take({Time{} + k * kStep, {Vec3::Zero(), Vec3(0.01 * k, 0, 0)}, 1e-6 * Mat3::Identity(), found});
+  }
+  EXPECT_FALSE(monitor.contradicted());
+}
+
 TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
   Scene scene, dark(3);
   Monitor monitor(assumed(), false);
-  calm(monitor, scene);
+  begin(monitor, scene);
   (void)monitor.examine(scene.seen(turned(0.05)), scene.calibration, {}, kStep);
   for (int k = 0; k < 10; ++k) (void)monitor.examine(dark.seen({}), dark.calibration, {}, kStep);
   EXPECT_TRUE(monitor.hopeless());

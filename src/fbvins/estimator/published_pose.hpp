@@ -20,13 +20,13 @@ namespace fbvins {
 /// Ratio of the limits on corrections of attitude and of position: 0.1 degrees for 3 mm.
 inline constexpr double kRotationPerStep_radpm = 0.1 * (3.14159265358979323846 / 180) / 0.003;
 
-/// Larger corrections are made at once, as a new W.
-inline constexpr double kLargestPending_m = 0.1, kLargestPending_rad = 3 * kDegree;
+/// Likewise for corrections that are made at once: 3 degrees for 10 cm.
+inline constexpr double kRotationPending_radpm = 3 * kDegree / 0.1;
 
 class PublishedPose {
  public:
-  /// Largest correction of the position per frame; 0: no limit.
-  explicit PublishedPose(double max_step_m) : max_step_m_(max_step_m) {}
+  /// Largest correction of the position per frame, and the largest that is paid so; 0: no limit.
+  PublishedPose(double max_step_m, double max_pending_m) : max_step_m_(max_step_m), max_pending_m_(max_pending_m) {}
 
   /// A new W begins: the next pose is published as the window has it.
   void restart() { started_ = false, tilt_sigma_rad_ = 0; }
@@ -38,7 +38,8 @@ class PublishedPose {
   /// The pending correction is larger than a pose called good may be wrong, and so large that paying it slowly would mislead
   /// whoever follows the pose.
   bool owes_too_much() const {
-    return max_step_m_ > 0 && (pending_.head<3>().norm() > kLargestPending_m || pending_.tail<3>().norm() > kLargestPending_rad);
+    return max_step_m_ > 0 && max_pending_m_ > 0 &&
+           (pending_.head<3>().norm() > max_pending_m_ || pending_.tail<3>().norm() > kRotationPending_radpm * max_pending_m_);
   }
 
   const Pose<W, B>& T_WB() const { return T_WB_; }
@@ -46,7 +47,7 @@ class PublishedPose {
   const Vec6& pending() const { return pending_; }
 
  private:
-  double max_step_m_;
+  double max_step_m_, max_pending_m_;
   bool started_ = false;
   Pose<W, B> T_WB_;
   Vec6 pending_ = Vec6::Zero();

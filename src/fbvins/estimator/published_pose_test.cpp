@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kStep_m = 0.003;
 constexpr double kStep_rad = 0.1 * 3.14159265358979323846 / 180;
+constexpr double kPending_m = 0.1;
 
 /// Poses of a body that flies a curve, two metres a second, at 20 Hz.
 Pose<W, B> flown(int k) {
@@ -22,7 +23,7 @@ NavState at(const Pose<W, B>& T) { return {T, Vec3(2, 0.5, 0), {}}; }
 double angle(const Quat& a, const Quat& b) { return so3_log((a.conjugate() * b).normalized()).norm(); }
 
 TEST(PublishedPose, IsTheWindowsWhereNothingIsCorrected) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   for (int k = 0; k < 50; ++k) {
     published.follow(motion(k), flown(k));
     EXPECT_LT((published.T_WB().p - flown(k).p).norm(), 1e-12);
@@ -34,7 +35,7 @@ TEST(PublishedPose, IsTheWindowsWhereNothingIsCorrected) {
 const Pose<W, W> kCorrection{so3_exp(Vec3(0.03, -0.02, 0)), Vec3(0.02, -0.025, 0.015)};
 
 TEST(PublishedPose, NoFrameAddsMoreThanTheStepToTheMotion) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   double largest_m = 0, largest_rad = 0;
   for (int k = 0; k < 120; ++k) {
     const Pose<W, B> before = published.T_WB();
@@ -52,7 +53,7 @@ TEST(PublishedPose, NoFrameAddsMoreThanTheStepToTheMotion) {
 }
 
 TEST(PublishedPose, TurningLevelDoesNotMoveIt) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   published.follow({}, flown(0));
   const Pose<W, B> level{so3_exp(Vec3(0.03, 0, 0)) * flown(1).q, flown(1).p};  // turned about where the body is
   published.follow(motion(1), level);
@@ -61,7 +62,7 @@ TEST(PublishedPose, TurningLevelDoesNotMoveIt) {
 }
 
 TEST(PublishedPose, VelocityIsThatOfTheMotionInTheAxesOfThePose) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   published.follow({}, flown(0));
   Odometry o;
   o.pose_covariance = 1e-6 * Mat6::Identity();
@@ -74,7 +75,7 @@ TEST(PublishedPose, VelocityIsThatOfTheMotionInTheAxesOfThePose) {
 }
 
 TEST(PublishedPose, CovarianceIncludesThePendingCorrection) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   published.follow({}, flown(0));
   double first_sigma = 0, last_sigma = 0;
   for (int k = 1; k < 60; ++k) {
@@ -99,7 +100,7 @@ TEST(PublishedPose, CovarianceIncludesThePendingCorrection) {
 }
 
 TEST(PublishedPose, ARestartBeginsAtTheWindowsPose) {
-  PublishedPose published(kStep_m);
+  PublishedPose published(kStep_m, kPending_m);
   published.follow({}, flown(0));
   published.restart();
   published.follow(motion(1), kCorrection * flown(1));
@@ -108,7 +109,7 @@ TEST(PublishedPose, ARestartBeginsAtTheWindowsPose) {
 }
 
 TEST(PublishedPose, WithoutALimitCorrectionsAreAppliedAtOnce) {
-  PublishedPose published(0);
+  PublishedPose published(0, kPending_m);
   published.follow({}, flown(0));
   published.follow(motion(1), kCorrection * flown(1));
   EXPECT_EQ(published.T_WB().p, (kCorrection * flown(1)).p);
@@ -117,12 +118,12 @@ TEST(PublishedPose, WithoutALimitCorrectionsAreAppliedAtOnce) {
 TEST(PublishedPose, ALargeCorrectionIsTooMuchToPaySlowly) {
   for (const double degrees : {2.0, 4.0})
     for (const double shift_m : {0.08, 0.12}) {
-      PublishedPose published(kStep_m);
+      PublishedPose published(kStep_m, kPending_m);
       published.follow({}, flown(0));
       published.follow(motion(1), Pose<W, W>{so3_exp(Vec3(0, 0, degrees * kDegree)), Vec3(shift_m, 0, 0)} * flown(1));
       EXPECT_EQ(published.owes_too_much(), degrees > 3.1 || shift_m > 0.103) << degrees << " " << shift_m;
     }
-  PublishedPose at_once(0);
+  PublishedPose at_once(0, kPending_m);
   at_once.follow({}, flown(0));
   at_once.follow(motion(1), kCorrection * flown(1));
   EXPECT_FALSE(at_once.owes_too_much());

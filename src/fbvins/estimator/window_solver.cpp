@@ -8,7 +8,7 @@ namespace {
 
 /// Keeps directions without any measurement solvable; far below any real information.
 constexpr double kRegularisation = 1e-8;
-constexpr double kNegligibleLambda = 1e-8;
+constexpr double kNegligibleLambda = 1e-12;
 /// Damps steps of the inverse depth, 1 m^2. One camera at rest hardly observes it: an undamped step would put the landmark
 /// right before the lens, and the step of all variables would be refused. Changes no minimum and enters no prior.
 constexpr double kDepthDamping = 1.0;

@@ -8,7 +8,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kMeasured_s = 0.25;
-/// Vibration of ordinary airframes, which the assumed noise covers: the highest in six flights of a hexacopter.
+/// Vibration that the assumed noise covers: the highest in six flights of a hexacopter, and about the median of other vehicles.
 constexpr double kUsualGyro_radps = 0.07, kUsualAccel_mps2 = 3.0;
 /// Likewise for sensors of more noise: so many times their own.
 constexpr double kUsualNoise = 3;
@@ -40,7 +40,8 @@ void ReadingNoise::add(const ImuSample& reading) {
     for (int k = 0; k < 3; ++k) {
       gyro_same_[k] = count_same(gyro_same_[k], b.gyro_radps(k), reading.gyro_radps(k), kClippedGyro_radps);
       accel_same_[k] = count_same(accel_same_[k], b.accel_mps2(k), reading.accel_mps2(k), kClippedAccel_mps2);
-      clipped_ = clipped_ || gyro_same_[k] >= kSameUntilClipped || accel_same_[k] >= kSameUntilClipped;
+      gyro_clipped_ = gyro_clipped_ || gyro_same_[k] >= kSameUntilClipped;
+      accel_clipped_ = accel_clipped_ || accel_same_[k] >= kSameUntilClipped;
     }
     last_.pop_front();
   }
@@ -49,8 +50,8 @@ void ReadingNoise::add(const ImuSample& reading) {
 
 ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
   ImuNoiseScale out;
-  clipped_before_ = clipped_ ? 4 : std::max(0, clipped_before_ - 1);
-  clipped_ = false;
+  clipped_before_ = gyro_clipped_ || accel_clipped_ ? 4 : std::max(0, clipped_before_ - 1);
+  gyro_clipped_ = accel_clipped_ = false;
   worst_gyro_radps_ = worst_accel_mps2_ = 0;
   if (segment.empty()) {
     last_.clear();
@@ -79,14 +80,15 @@ ImuNoiseScale ReadingNoise::of(const ImuSegment& segment) {
     out.gyro = std::max(out.gyro, worst_gyro_radps_ / root_readings / gyro_sigma);
   if (worst_accel_mps2_ > kOutlier * std::max(usual_accel, accel_mps2_))
     out.accel = std::max(out.accel, worst_accel_mps2_ / root_readings / accel_sigma);
-  if (clipped_) {
+  if (gyro_clipped_) {
     double largest = kLeastGyroError_radps;
     for (const ImuSample& s : segment.samples) largest = std::max(largest, s.gyro_radps.cwiseAbs().maxCoeff());
     out.gyro = std::max(out.gyro, largest * root_readings / gyro_sigma);
-    double force = 0;
-    for (const ImuSample& s : segment.samples) force = std::max(force, s.accel_mps2.cwiseAbs().maxCoeff());
-    if (*std::max_element(accel_same_, accel_same_ + 3) >= kSameUntilClipped)
-      out.accel = std::max(out.accel, force * root_readings / accel_sigma);
+  }
+  if (accel_clipped_) {
+    double largest = 0;
+    for (const ImuSample& s : segment.samples) largest = std::max(largest, s.accel_mps2.cwiseAbs().maxCoeff());
+    out.accel = std::max(out.accel, largest * root_readings / accel_sigma);
   }
   return out;
 }

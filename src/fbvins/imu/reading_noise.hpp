@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much worse than usual the readings of an IMU are: what airframes shake, a single wrong reading, an axis at the end of its
-// range. The estimator's noise (ImuNoise, assumed) covers the vibration of ordinary airframes; what is beyond it raises that
+// range. The estimator's noise (ImuNoise, assumed) covers the vibration of smooth airframes; what is beyond it raises that
 // noise by a factor, so that readings count as much as they are worth.
 //
 //   ReadingNoise noise(assumed);
@@ -22,7 +22,7 @@ class ReadingNoise {
 
   ImuNoiseScale of(const ImuSegment& segment);
   /// Whether an axis was at the end of its range in the last segment, and in one of the four before.
-  bool clipped() const { return clipped_ && clipped_before_ > 0; }
+  bool clipped() const { return (gyro_clipped_ || accel_clipped_) && clipped_before_ > 0; }
   /// Root mean square of the last quarter of a second, rad/s and m/s^2, at frequencies far above those of motion.
   double gyro_vibration_radps() const { return gyro_radps_; }
   double accel_vibration_mps2() const { return accel_mps2_; }
@@ -38,7 +38,7 @@ class ReadingNoise {
   std::deque<ImuSample> last_;  ///< two at most
   std::deque<Difference> differences_;
   int gyro_same_[3] = {}, accel_same_[3] = {};  ///< readings in a row with the same large number
-  bool clipped_ = false;
+  bool gyro_clipped_ = false, accel_clipped_ = false;
   int clipped_before_ = 0;  ///< segments for which that of an earlier one counts
   double gyro_radps_ = 0, accel_mps2_ = 0;
   double worst_gyro_radps_ = 0, worst_accel_mps2_ = 0;  ///< single readings of the segment

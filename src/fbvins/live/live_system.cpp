@@ -13,6 +13,7 @@
 #include "fbvins/live/pose_propagator.hpp"
 #include "fbvins/live/sensor_watch.hpp"
 #include "fbvins/live/view_maker.hpp"
+#include "fbvins/types/protection.hpp"
 
 namespace fbvins {
 namespace {
@@ -33,7 +34,7 @@ struct LiveSystem::Impl {
             options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
             Duration::from_seconds(rig.time_offset_s)),
         system(std::move(made)),
-        watch(options, system_options.estimator.max_image_gap_s),
+        watch(options, system_options.estimator),
         propagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
                    options.smoothing_s, system_options.estimator.gravity_mps2),
         views(rig.T_BC0),
@@ -55,7 +56,8 @@ struct LiveSystem::Impl {
       const std::lock_guard lock(pose_mutex);
       pose = propagator.add(sample);
       if (!pose) return;
-      pose->reset_counter = reset_counter;                 // before the first estimate, too
+      pose->reset_counter = reset_counter;  // before the first estimate, too
+      if (pose->health.has_pose()) newest_sigma_m = worst_sigma_m(pose->pose_covariance);
       if (pose->health.has_pose()) pose->health = health;  // else the propagator has no pose, whatever `health` says
       if (estimate_host_t) pose_age.add(host_t - *estimate_host_t);
     }
@@ -85,7 +87,8 @@ struct LiveSystem::Impl {
       resets += o.reset_counter - reset_counter;
       reset_counter = o.reset_counter;
       ++images_estimated;
-      if (o.health.has_pose()) estimate_host_t = image_host_t;
+      if (o.health.has_pose())
+        estimate_host_t = image_host_t, estimate_sigma_m = newest_sigma_m = worst_sigma_m(o.pose_covariance);
     }
     if (views_wanted) hub.publish(views.view_of(o, latency.seconds() * 1e3));
     hub.publish(std::move(o));
@@ -132,7 +135,8 @@ struct LiveSystem::Impl {
     bool changed = false;
     {
       const std::lock_guard lock(pose_mutex);
-      const Health now = watch.judge({estimated, estimate_host_t}, arrivals, started, host_now());
+      const Health now =
+          watch.judge({estimated, estimate_host_t, estimate_sigma_m, newest_sigma_m}, arrivals, started, host_now());
       changed = !(now == health);
       health = now;
     }
@@ -188,6 +192,7 @@ struct LiveSystem::Impl {
   PosePropagator propagator;
   Health estimated, health;  ///< the estimator's, and SensorWatch's judgement of it
   std::optional<Time> estimate_host_t;
+  double estimate_sigma_m = 0, newest_sigma_m = 0;
   std::uint32_t reset_counter = first_reset;
   std::int64_t images_estimated = 0, resets = 0;
 

@@ -24,7 +24,11 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   else if (silence_s(arrivals.left) > silent_s || silence_s(arrivals.right) > silent_s) reason = HealthReason::one_camera;
   if (reason == HealthReason::none) return said;
   if (!said.has_pose()) return {said.state, reason == HealthReason::one_camera ? said.reason : reason};
-  if (blind_s > longest_blind_s_) return {HealthState::lost, HealthReason::no_images};
+  if (blind_s > silent_s) {
+    const double blind2 = estimated.newest_sigma_m * estimated.newest_sigma_m - estimated.sigma_m * estimated.sigma_m;
+    if (blind2 > max_blind_m_ * max_blind_m_) return {HealthState::lost, HealthReason::no_images};
+    if (silence_s(arrivals.imu) > max_imu_gap_s_) return {HealthState::lost, HealthReason::imu_gap};
+  }
   // Images come, and their estimates are late: the estimator knows why, where it waits for readings.
   const bool images_come = reason == HealthReason::no_images && silence_s(arrivals.image) <= silent_s;
   if (images_come && said.state == HealthState::degraded) return said;

@@ -3,6 +3,7 @@
 // Pure functions of the times given.
 #pragma once
 
+#include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/live/ingest.hpp"
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/types/odometry.hpp"
@@ -11,13 +12,16 @@ namespace fbvins {
 
 class SensorWatch {
  public:
-  /// `longest_blind_s`: a pose propagated without images for longer is lost (estimator.max_image_gap_s).
-  SensorWatch(const LiveOptions& options, double longest_blind_s) : options_(options), longest_blind_s_(longest_blind_s) {}
+  /// `estimator`: what is lost, max_blind_m by the IMU alone, and max_imu_gap_s without images and readings.
+  SensorWatch(const LiveOptions& options, const EstimatorOptions& estimator)
+      : options_(options), max_blind_m_(estimator.max_blind_m), max_imu_gap_s_(estimator.max_imu_gap_s) {}
 
   /// The estimator's last health, and the time of its image.
   struct Estimated {
     Health health;
     std::optional<Time> image;  ///< on this machine's clock
+    double sigma_m = 0;         ///< worst_sigma_m of its pose
+    double newest_sigma_m = 0;  ///< and of that pose, propagated to the newest reading
   };
 
   /// The health at `host`; both times on this machine's clock. `started`: when sensor data were first expected. New images after
@@ -26,7 +30,7 @@ class SensorWatch {
 
  private:
   LiveOptions options_;
-  double longest_blind_s_;
+  double max_blind_m_, max_imu_gap_s_;
 };
 
 }  // namespace fbvins

@@ -15,7 +15,7 @@ Ingest::Arrival arrivals(double imu_s, double left_s, double right_s) {
 }
 
 Health judged(const Health& estimated, const Ingest::Arrival& a, double now_s) {
-  return SensorWatch(LiveOptions{}, 3).judge({estimated, a.image}, a, at(0), at(now_s));
+  return SensorWatch(LiveOptions{}, {}).judge({estimated, a.image}, a, at(0), at(now_s));
 }
 
 TEST(SensorWatch, SaysWhatTheEstimatorSaysWhileAllIsWell) {
@@ -41,22 +41,30 @@ TEST(SensorWatch, ASlowCameraIsNotSilent) {
   EXPECT_EQ(judged(kGood, slow, 10.11), (Health{HealthState::degraded, HealthReason::no_images}));
 }
 
-TEST(SensorWatch, APoseCarriedOnBlindForTooLongIsLost) {
-  EXPECT_EQ(judged(kGood, arrivals(9.99, 6.5, 6.5), 10), (Health{HealthState::lost, HealthReason::no_images}));
+TEST(SensorWatch, APoseThatTheImuCarriesIsLostByItsUncertaintyAndNotByTime) {
+  const SensorWatch watch(LiveOptions{}, {});
+  const Ingest::Arrival a = arrivals(9.99, 2, 2);
+  EXPECT_EQ(watch.judge({kGood, at(2), 0.3, 0.57}, a, at(0), at(10)), (Health{HealthState::degraded, HealthReason::no_images}));
+  EXPECT_EQ(watch.judge({kGood, at(2), 0.3, 0.59}, a, at(0), at(10)), (Health{HealthState::lost, HealthReason::no_images}));
+}
+
+TEST(SensorWatch, APoseThatNothingCarriesIsLost) {
+  EXPECT_EQ(judged(kGood, arrivals(8.9, 8.9, 8.9), 10), (Health{HealthState::lost, HealthReason::imu_gap}));
+  EXPECT_EQ(judged(kGood, arrivals(8.9, 9.99, 9.99), 10), (Health{HealthState::degraded, HealthReason::imu_gap}));
 }
 
 TEST(SensorWatch, ImagesThatComeAgainAreNoPoseYet) {
-  const SensorWatch watch(LiveOptions{}, 3);
+  const SensorWatch watch(LiveOptions{}, {});
   EXPECT_EQ(watch.judge({kGood, at(8)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)),
             (Health{HealthState::degraded, HealthReason::no_images}));
-  EXPECT_EQ(watch.judge({kGood, at(6)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)),
+  EXPECT_EQ(watch.judge({kGood, at(6), 0.1, 0.6}, arrivals(9.99, 9.99, 9.99), at(0), at(10)),
             (Health{HealthState::lost, HealthReason::no_images}));
 }
 
 /// Images wait a quarter of a second for readings that are missing.
 TEST(SensorWatch, LateEstimatesKeepTheirReason) {
   const Health gap{HealthState::degraded, HealthReason::imu_gap};
-  const SensorWatch watch(LiveOptions{}, 3);
+  const SensorWatch watch(LiveOptions{}, {});
   EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)), gap);
   EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.7, 9.7), at(0), at(10)),
             (Health{HealthState::degraded, HealthReason::no_images}));

@@ -27,6 +27,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
     json["velocity_mps"] = {newest.v_WB.x(), newest.v_WB.y(), newest.v_WB.z()};
     json["tilt_sigma_rad"] = newest.tilt_sigma_rad;
     json["level"] = newest.level;
+    json["protection_m"] = protection_level_m(newest.health, newest.pose_covariance);
     json["quality_percent"] = quality_percent(newest.health, newest.pose_covariance);
   }
   status.counts.visit([&](const char* name, std::int64_t count) { json["counts"][name] = count; });

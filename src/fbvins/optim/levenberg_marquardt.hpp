@@ -19,9 +19,12 @@ namespace fbvins {
 
 struct LmOptions {
   int max_iterations = 5;
-  double initial_lambda = 1e-9;
-  int max_retries = 6;     ///< steps tried at one linearisation, lambda growing tenfold
-  double min_step = 1e-6;  ///< converged when the step is smaller
+  /// Relative to the information's diagonal. IMU factors put up to 1e11 there, so that 1e-9 would be information of its own
+  /// about the position, which without images is known to a metre (1).
+  double initial_lambda = 1e-13;
+  double retry_lambda = 1e-8;  ///< after a first step that failed
+  int max_retries = 6;         ///< steps tried at one linearisation, lambda growing tenfold
+  double min_step = 1e-6;      ///< converged when the step is smaller
   /// Converged when the cost, half a chi-square, falls by less than this. Absolute, because a prior's
   /// cost has no meaningful zero; 0.05 is a third of a sigma along one direction. Also converged when the decrease
   /// differs from the predicted one by less than this: the quadratic model is accurate there, and so is its minimum.
@@ -66,7 +69,7 @@ LmSummary minimise(Problem& problem, const LmOptions& options) {
         problem.undo_step();
         ++summary.rejected;
       }
-      lambda *= 10;
+      lambda = std::max(10 * lambda, options.retry_lambda);
     }
     if (!accepted) {
       summary.usable = i > 0 || converged;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace fbvins {
@@ -16,9 +17,9 @@ Mat6 position_sigma(double sigma_m) {
   return covariance;
 }
 
-TEST(Quality, HalvesAtATenthOfAMetreAndFallsWithEveryCentimetre) {
+TEST(Quality, HalvesAtAProtectionLevelOfHalfAMetreAndFallsWithEveryCentimetre) {
   EXPECT_EQ(quality_percent(kGood, position_sigma(0)), 100);
-  EXPECT_EQ(quality_percent(kGood, position_sigma(kHalfQualitySigma_m)), 50);
+  EXPECT_EQ(quality_percent(kGood, position_sigma(std::sqrt(3) * kHalfQuality_m / kProtectionOnceIn1e4)), 50);
   int last = 101;
   for (const double sigma_m : {0.01, 0.02, 0.03, 0.05, 0.08, 0.15, 0.3, 0.8}) {
     const int now = quality_percent(kGood, position_sigma(sigma_m));

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a published position may be off, at worst: what a mission compares with the room that it has.
+//
+//   if (protection_level_m(odometry.health, odometry.pose_covariance) > clearance_m) hold();
+#pragma once
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "fbvins/types/odometry.hpp"
+
+namespace fbvins {
+
+/// Standard deviation of a position along its worst direction, m; `pose_covariance` is of (position [m], attitude [rad]).
+inline double worst_sigma_m(const Mat6& pose_covariance) {
+  const Mat3 position = pose_covariance.topLeftCorner<3, 3>();
+  if (!position.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Mat3>(position, Eigen::EigenvaluesOnly).eigenvalues()(2)));
+}
+
+/// The probability that a pose's error is larger than its protection level.
+enum class IntegrityRisk { once_in_1e4, once_in_1e6 };
+
+/// Multiples of worst_sigma_m (docs/derivations/integrity.md, "Protection level").
+inline constexpr double kProtectionOnceIn1e4 = 8, kProtectionOnceIn1e6 = 16;
+
+/// Radius, m, that the error of a published position, relative to the start of W, exceeds with no more than this probability, if
+/// at most one sensor has failed. Infinite where there is no pose, or no covariance.
+inline double protection_level_m(const Health& health, const Mat6& pose_covariance,
+                                 IntegrityRisk risk = IntegrityRisk::once_in_1e4) {
+  const double sigma_m = worst_sigma_m(pose_covariance);
+  if (!health.has_pose() || !std::isfinite(sigma_m)) return std::numeric_limits<double>::infinity();
+  return (risk == IntegrityRisk::once_in_1e4 ? kProtectionOnceIn1e4 : kProtectionOnceIn1e6) * sigma_m;
+}
+
+}  // namespace fbvins
