@@ -245,7 +245,7 @@ TEST(Monitor, ABiasThatIsStillBeingFoundMoves) {
   Monitor monitor(assumed(), false);
   for (int k = 0; k < 80; ++k) {
     const Mat3 found = std::pow(0.3 - 0.003 * k, 2) * Mat3::Identity();
-    monitor.take({Time{} + k * kStep, {Vec3::Zero(), Vec3(0.01 * k, 0, 0)}, 1e-6 * Mat3::Identity(), found});
+    monitor.take({Time{k * kStep.ns}, {Vec3::Zero(), Vec3(0.01 * k, 0, 0)}, 1e-6 * Mat3::Identity(), found});
   }
   EXPECT_FALSE(monitor.contradicted());
 }
