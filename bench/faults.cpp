@@ -169,7 +169,7 @@ Similarity laid_on(const Pose<AnyWorld, B>& truth, const Pose<W, B>& estimate) {
 }
 
 /// Of the whole flight, laid on the truth by the first pose of each W.
-void add_ratios(const Flight& flight, const std::vector<Published>& all, Errors& out) {
+void add_ratios(const Flight& flight, const std::vector<Published>& all, std::FILE* poses, Errors& out) {
   std::optional<Similarity> S;
   std::uint32_t reset = 0;
   for (const Published& p : all) {
@@ -179,15 +179,18 @@ void add_ratios(const Flight& flight, const std::vector<Published>& all, Errors&
     if (!S || o.reset_counter != reset) S = laid_on(*truth, o.T_WB), reset = o.reset_counter;
     const Mat3 covariance = o.pose_covariance.topLeftCorner<3, 3>();
     const double worst_m = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat3>(covariance, Eigen::EigenvaluesOnly).eigenvalues()(2));
-    const double ratio = ((*S * o.T_WB).p - truth->p).norm() / worst_m;
+    const double error_m = ((*S * o.T_WB).p - truth->p).norm(), ratio = error_m / worst_m;
+    if (poses != nullptr)
+      fmt::print(poses, "{:.3f},{},{},{},{:.4f},{:.4f},{:.3f}\n", (p.taken - flight.begin).seconds(), to_string(o.health.state),
+                 to_string(o.health.reason), o.reset_counter, error_m, worst_m, o.tilt_sigma_rad / kDegree);
     Ratios& ratios = o.health.state == HealthState::good ? out.good_ratios : out.degraded_ratios;
     for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] += ratio >= kRatios[i];
   }
 }
 
-Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin, Time end) {
+Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin, Time end, std::FILE* poses) {
   Errors out;
-  add_ratios(flight, all, out);
+  add_ratios(flight, all, poses, out);
   std::vector<PosePair> before;
   std::uint32_t reset = 0;
   for (const Published& p : all)
@@ -250,7 +253,8 @@ constexpr const char* kHeader =
     "flight,recording,frontend,fault,false_good,good,said_s,good_m,good_sigma,good_tilt_deg,good_tilt_sigma,largest_m,last_m,not_good,"
     "resets,lost,good_again_s,reasons,good_ratios,degraded_ratios";
 
-Errors fly(const Flight& flight, const std::string& frontend, std::vector<SensorFault> faults, std::uint64_t seed) {
+Errors fly(const Flight& flight, const std::string& frontend, std::vector<SensorFault> faults, std::uint64_t seed,
+           std::FILE* poses) {
   const Time begin = flight.begin + Duration::from_seconds(faults.empty() ? kLateStart * (flight.end - flight.begin).seconds()
                                                                           : faults[0].start_s);
   const Time end = faults.empty() ? begin : begin + Duration::from_seconds(faults[0].length_s);
@@ -275,7 +279,7 @@ Errors fly(const Flight& flight, const std::string& frontend, std::vector<Sensor
     }
   }
   way.finish();
-  return judge(flight, way.published, begin, end);
+  return judge(flight, way.published, begin, end, poses);
 }
 
 /// Even in the logarithm.
@@ -303,7 +307,7 @@ std::string drawn(const Flight& flight, const std::vector<FaultName>& names, std
 int run(int argc, char** argv) {
   CLI::App app("faults drawn at random, and what is called good after them");
   std::vector<std::string> paths, faults, frontends{"klt", "orb", "boost"};
-  std::string out;
+  std::string out, poses_out;
   std::uint64_t flights = 0, first = 0;
   bool clean = false, tracks = false;
   double seconds = 12;
@@ -316,7 +320,11 @@ int run(int argc, char** argv) {
   app.add_option("--fault", faults, "one fault, as of fbvins live")->take_all()->allow_extra_args(false);
   app.add_flag("--clean", clean, "without faults: each recording once, or --flights of them");
   app.add_option("--out", out, "CSV; rows that are there are not flown again");
+  app.add_option(
+      "--poses", poses_out,
+      "every pose: seconds, health, reason, reset counter, error and worst standard deviation in m, tilt's in degrees");
   CLI11_PARSE(app, argc, argv);
+  std::FILE* poses = poses_out.empty() ? nullptr : std::fopen(poses_out.c_str(), "w");
   std::vector<Flight> recordings;
   for (const std::string& path : paths) {
     auto flight = tracks ? prepare(path, seconds) : load(path);
@@ -341,7 +349,7 @@ int run(int argc, char** argv) {
       if (!fault) throw CLI::ValidationError(fault.error().message);
       parsed.push_back(*fault);
     }
-    const Errors errors = fly(flight, frontend, parsed, seed);
+    const Errors errors = fly(flight, frontend, parsed, seed, poses);
     failed += errors.false_good > 0;
     fmt::print(file, "{}\n", row(name, flight, frontend, text, errors));
     std::fflush(file);
@@ -358,6 +366,7 @@ int run(int argc, char** argv) {
     const Flight& flight = recordings[(n / kinds + n) % recordings.size()];
     one(std::to_string(n), flight, frontends[(n / kinds + n / 7) % frontends.size()], clean ? "" : drawn(flight, names, n), n);
   }
+  if (poses != nullptr) std::fclose(poses);
   return failed > 0;
 }
 

@@ -348,8 +348,7 @@ void Estimator::publish(Odometry& out) {
   if (out.health.state == HealthState::good && published_.owes_too_much()) {
     begin_new_W();
     published_.follow({}, level.T_WB);
-    monitor_.take_correction();
-    out.health = {HealthState::degraded, HealthReason::contradiction};
+    monitor_.count_reset();
   }
   out.pose_covariance += monitor_.doubt(newest.T_WB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_WB);

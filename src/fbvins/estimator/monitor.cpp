@@ -24,6 +24,11 @@ constexpr double kBetter = 0.6;
 constexpr double kAgreeing = 0.6;
 /// CUSUM of (median / usual - 1): a contradiction from here on; no more is kept.
 constexpr double kContradiction = 1, kMost = 2;
+/// What all that a camera sees is off by, in one direction, added up with this memory: up to 2.3 where all is well. A gyroscope's
+/// axes may be off by this share of the turn.
+constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
+/// The other camera, where only one drifts.
+constexpr double kOther = 0.5;
 constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
 /// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
 constexpr double kDark_s = 0.15;
@@ -60,23 +65,30 @@ bool moved(const Monitor::Biases& from, const Monitor::Biases& to, double accel_
 }
 
 struct Medians {
-  std::optional<double> of[2];  ///< left, right; none with few landmarks
+  std::optional<double> of[2];                   ///< of the residuals' norms, left, right; none with few landmarks
+  Vec2 shift[2] = {Vec2::Zero(), Vec2::Zero()};  ///< of the residuals themselves
+  double focal = 0;                              ///< standard deviations for a radian
   double worst() const { return std::max(of[0].value_or(0), of[1].value_or(0)); }
+  double best() const { return std::min(of[0].value_or(0), of[1].value_or(0)); }
 };
 
 Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, const Pose<W, B>& T_WB) {
   const Mat3 R_BW = T_WB.R().transpose();
   Medians out;
   for (int c = 0; c < 2; ++c) {
-    std::vector<double> residuals;
+    std::vector<double> residuals, x, y;
     for (const PointSighting& s : sightings) {
       const std::optional<Observation>& o = c == 0 ? s.feature->left : s.feature->right;
       if (!o) continue;
       const Vec3 p_C = cameras.R_CB[c] * (R_BW * (s.p_W - T_WB.p) - cameras.t_BC[c]);
-      residuals.push_back(p_C.z() > kMinScaledDepth ? (o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)).norm()
-                                                    : 1e3);
+      const Vec2 r =
+          p_C.z() > kMinScaledDepth ? Vec2(o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)) : Vec2(1e3, 1e3);
+      residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
+      out.focal = o->sqrt_information(0, 0);
     }
-    if (residuals.size() >= kFewest) out.of[c] = median_of(residuals);
+    if (residuals.size() < kFewest) continue;
+    out.of[c] = median_of(residuals);
+    out.shift[c] = Vec2(median_of(x), median_of(y));
   }
   return out;
 }
@@ -97,6 +109,7 @@ void Monitor::pass(Duration dt) {
 }
 
 void Monitor::blind(Duration dt) {
+  drift_[0].setZero(), drift_[1].setZero();
   since_reset_s_ += dt.seconds();
   blind_s_ += dt.seconds();
   if (!contradicted_) {
@@ -105,6 +118,17 @@ void Monitor::blind(Duration dt) {
   }
   doubt_tilt();  // readings that are doubted have to carry alone
   hopeless_ = hopeless_ || blind_s_ > kBlind_s;
+}
+
+/// `shift`: of the residuals, left and right.
+void Monitor::add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt) {
+  const double kept = std::exp(-dt.seconds() / kDrift_s);
+  for (int c = 0; c < 2; ++c) {
+    drift_[c] = kept * drift_[c] + shift[c];
+    drift_[c] *= std::min(1.0, kMost * kDrift_sigma / std::max(1e-9, drift_[c].norm()));
+  }
+  turned_sigma_ = kept * turned_sigma_ + kScale * focal * predicted.angularDistance(predicted_);
+  predicted_ = predicted;
 }
 
 void Monitor::doubt_tilt() {
@@ -152,32 +176,37 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     pass(dt);
     return out;
   }
-  const double usual = (calibrating_ ? kCalibrating : 1) * kUsual_sigma * std::max(1.0, dt.seconds() / kUsualFor_s);
+  const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const CameraGeometry cameras(calibration);
   const Medians at_prediction = medians(sightings, cameras, predicted);
-  const double excess = at_prediction.worst() / usual - 1;
-  if (excess < 0) {
+  const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
+  add_drift(at_prediction.shift, at_prediction.focal, predicted.q, dt);
+  const double drift = patience * (kDrift_sigma + turned_sigma_), left = drift_[0].norm() / drift,
+               right = drift_[1].norm() / drift;
+  const bool drifting = std::max(left, right) > 1;
+  if (excess < 0 && !drifting) {
     evidence_ = std::max(0.0, evidence_ + excess);
     pass(dt);
     return out;
   }
   const PoseRefinement seen = refine_pose(sightings, calibration, predicted);
   const Medians at_seen = medians(sightings, cameras, seen.T_WB);
-  const bool one_camera_fits =
-      at_prediction.of[0] && at_prediction.of[1] && std::min(*at_prediction.of[0], *at_prediction.of[1]) < usual;
-  const bool explained =
-      at_seen.worst() < kBetter * at_prediction.worst() && seen.inliers >= kAgreeing * static_cast<double>(sightings.size());
+  const bool two = at_prediction.of[0] && at_prediction.of[1];
+  const bool one_camera_fits = two && (excess < 0 ? std::min(left, right) < kOther * std::max(left, right)
+                                                  : at_prediction.best() < patience * kUsual_sigma);
+  const bool explained = seen.inliers >= kAgreeing * static_cast<double>(sightings.size()) &&
+                         (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
   if (!explained && !one_camera_fits) {
     blind(dt);
     return out;
   }
-  evidence_ = std::min(kMost, evidence_ + excess);
+  evidence_ = std::min(kMost, std::max(evidence_ + excess, drifting ? kContradiction : 0.0));
   if (evidence_ < kContradiction) {
     pass(dt);
     return out;
   }
   if (one_camera_fits) {
-    out.left_wrong = *at_prediction.of[0] > *at_prediction.of[1];
+    out.left_wrong = excess < 0 ? left > right : *at_prediction.of[0] > *at_prediction.of[1];
     out.right_wrong = !out.left_wrong;
     pass(dt);  // the readings agree with the other one
     return out;
@@ -209,11 +238,6 @@ bool Monitor::take_reset() {
   turn_W_.setZero(), shift_W_.setZero(), turns_W_.setZero(), shifts_W_.setZero();
   count_reset();
   return true;
-}
-
-void Monitor::take_correction() {
-  doubt_tilt();
-  count_reset();
 }
 
 void Monitor::count_reset() {

@@ -53,8 +53,8 @@ class Monitor {
   bool follows_images() const { return contradicted_; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
   bool take_reset();
-  /// The estimate has moved too far for its pose to follow slowly: gravity has to confirm the new one.
-  void take_correction();
+  /// W is a new one. A second time within a few seconds is hopeless.
+  void count_reset();
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
   bool hopeless() const { return hopeless_; }
   /// Covariance of (dp in W [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
@@ -64,7 +64,7 @@ class Monitor {
 
  private:
   void blind(Duration dt);
-  void count_reset();
+  void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt);
   void doubt_tilt();
   void doubt_tilt(const Biases& before);
   Mat3 turns() const { return turns_W_ + turn_W_ * turn_W_.transpose(); }
@@ -72,6 +72,9 @@ class Monitor {
 
   ImuNoise assumed_;
   bool calibrating_;
+  Vec2 drift_[2] = {Vec2::Zero(), Vec2::Zero()};  ///< left, right: of all that is seen, added up
+  double turned_sigma_ = 0;                       ///< by which it may be
+  Quat predicted_ = Quat::Identity();
   double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
   bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
