@@ -19,6 +19,8 @@ constexpr double kRestForStandstill_s = 0.5;
 /// Images with readings after a gap, until velocity and attitude are known again.
 constexpr int kFramesAfterGap = 6;
 constexpr double kGap_s = 0.05;
+/// A large correction so soon after a pose that was not good has to be confirmed by gravity.
+constexpr double kTrouble_s = 2;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -297,6 +299,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .hopeless = monitor_.hopeless(),
                         .one_camera_wrong = one_camera_wrong_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
+                        .after_dark = monitor_.settling(),
                         .clipped = reading_noise_.clipped(),
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
 }
@@ -349,7 +352,12 @@ void Estimator::publish(Odometry& out) {
     begin_new_W();
     published_.follow({}, level.T_WB);
     monitor_.count_reset();
+    if (last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s) {
+      monitor_.doubt_tilt();
+      out.health = {HealthState::degraded, HealthReason::contradiction};
+    }
   }
+  if (out.health.state != HealthState::good) last_trouble_ = out.t;
   out.pose_covariance += monitor_.doubt(newest.T_WB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_WB);
   published_.fill(level, out);

@@ -86,8 +86,9 @@ class Estimator {
   FrameContract contract_;
   ReadingNoise reading_noise_;
   Monitor monitor_;
-  bool one_camera_wrong_ = false;  ///< in the newest frame
-  int frames_with_readings_ = 0;   ///< in a row
+  bool one_camera_wrong_ = false;     ///< in the newest frame
+  int frames_with_readings_ = 0;      ///< in a row
+  std::optional<Time> last_trouble_;  ///< of a pose that was not good
   SlidingWindow window_;
   WindowSolver solver_;
   WindowSolution solution_;  ///< of the newest solve; a member so that its memory is reused

@@ -63,7 +63,7 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int 
   if (evidence.broken_features > 0) return degraded(HealthReason::frontend_fault);
   if (!frame.has_left || !frame.has_right) return degraded(HealthReason::one_camera);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
-  if (few_tracks) return degraded(HealthReason::few_tracks);
+  if (few_tracks || evidence.after_dark) return degraded(HealthReason::few_tracks);
   if (frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
   if (evidence.one_camera_wrong) return degraded(HealthReason::cameras_disagree);
   if (evidence.clipped) return degraded(HealthReason::imu_clipped);

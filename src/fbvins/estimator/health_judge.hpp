@@ -27,7 +27,8 @@ class HealthJudge {
     bool contradiction = false;
     bool hopeless = false;  ///< and the estimate cannot recover from it
     bool one_camera_wrong = false;
-    bool after_gap = false;  ///< of the readings
+    bool after_gap = false;   ///< of the readings
+    bool after_dark = false;  ///< and the velocity is being found again
     bool clipped = false;
     double gyro_vibration_radps = 0;
   };

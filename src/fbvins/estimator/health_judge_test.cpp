@@ -145,6 +145,7 @@ TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
   EXPECT_EQ(judged({.after_gap = true}), degraded(HealthReason::imu_gap));
   EXPECT_EQ(judged({.contradiction = true, .clipped = true}), degraded(HealthReason::imu_clipped))
       << "the cause before its effect";
+  EXPECT_EQ(judged({.after_dark = true}), degraded(HealthReason::few_tracks));
   EXPECT_EQ(judged({.gyro_vibration_radps = 0.07}), good()) << "an ordinary airframe";
   EXPECT_EQ(judged({.gyro_vibration_radps = 0.35}), degraded(HealthReason::imu_vibration));
 }

@@ -55,6 +55,10 @@ class Monitor {
   bool take_reset();
   /// W is a new one. A second time within a few seconds is hopeless.
   void count_reset();
+  /// Gravity has to confirm the tilt.
+  void doubt_tilt();
+  /// After darkness: the velocity is being found again.
+  bool settling() const { return settling_ > 0; }
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
   bool hopeless() const { return hopeless_; }
   /// Covariance of (dp in W [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
@@ -65,7 +69,6 @@ class Monitor {
  private:
   void blind(Duration dt);
   void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt);
-  void doubt_tilt();
   void doubt_tilt(const Biases& before);
   Mat3 turns() const { return turns_W_ + turn_W_ * turn_W_.transpose(); }
   void take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W);
