@@ -27,8 +27,9 @@ constexpr double kContradiction = 1, kMost = 2;
 /// What all that a camera sees is off by, in one direction, added up with this memory: up to 2.3 where all is well. A gyroscope's
 /// axes may be off by this share of the turn.
 constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
-/// The other camera, where only one drifts.
-constexpr double kOther = 0.5;
+/// The other camera, where only one drifts. After this time of nothing but drift, the landmarks found meanwhile may be what is
+/// wrong, and the camera is heard again.
+constexpr double kOther = 0.5, kHeardAgain_s = 1;
 constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
 /// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
 constexpr double kDark_s = 0.15;
@@ -206,6 +207,13 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   if (one_camera_fits) {
+    left_out_s_ = excess < 0 ? left_out_s_ + dt.seconds() : 0;
+    if (left_out_s_ > kHeardAgain_s) {
+      left_out_s_ = evidence_ = 0;
+      drift_[0].setZero(), drift_[1].setZero();
+      pass(dt);
+      return out;
+    }
     out.left_wrong = excess < 0 ? left > right : *at_prediction.of[0] > *at_prediction.of[1];
     out.right_wrong = !out.left_wrong;
     pass(dt);  // the readings agree with the other one

@@ -122,6 +122,20 @@ TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
   }
 }
 
+TEST(Monitor, ACameraThatOnlyDriftsIsHeardAgainAfterASecond) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  int left_out = 0, heard_again = 0;
+  for (int k = 0; k < 100; ++k) {
+    // As landmarks whose depth was found while the camera was left out let it look.
+    const bool wrong = monitor.examine(scene.seen({}, turned(0.0015)), scene.calibration, {}, kStep).right_wrong;
+    left_out += wrong;
+    heard_again += !wrong && left_out >= 20;
+  }
+  EXPECT_GE(left_out, 40);
+  EXPECT_GE(heard_again, 5) << "long enough for the window to take its images";
+}
+
 TEST(Monitor, ALargeMovingThingIsNoContradiction) {
   Scene scene;
   Monitor monitor(assumed(), false);
