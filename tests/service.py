@@ -4,6 +4,7 @@
 
 usage: service.py FBVINS C++COMPILER
 """
+import json
 import os
 import pathlib
 import re
@@ -22,6 +23,21 @@ THREAD_BEFORE_MAIN = """
 #include <thread>
 #include <unistd.h>
 namespace { const bool made = (std::thread([] { while (true) pause(); }).detach(), true); }
+"""
+
+
+# A disk that takes six seconds for each file of a map.
+SLOW_DISK = """
+#include <cstring>
+#include <sys/syscall.h>
+#include <unistd.h>
+#include <cstdio>
+extern "C" int fsync(int file) {
+  char link[64], path[4096] = {};
+  std::snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+  if (readlink(link, path, sizeof path - 1) > 0 && std::strstr(path, ".fbm")) sleep(6);
+  return static_cast<int>(syscall(SYS_fsync, file));
+}
 """
 
 
@@ -73,9 +89,7 @@ class Service(unittest.TestCase):
         self.assertTrue((self.folder / "flat.fbm").exists())
 
     def test_stop_signals_where_a_library_made_a_thread_before_main(self):
-        source, library = self.folder / "thread.cpp", self.folder / "thread.so"
-        source.write_text(THREAD_BEFORE_MAIN, encoding="utf-8")
-        subprocess.run([COMPILER, "-shared", "-fPIC", "-pthread", source, "-o", library], check=True, timeout=120)
+        library = self.library("thread", THREAD_BEFORE_MAIN)
         for stop in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             with self.subTest(stop.name):
                 out = self.folder / stop.name
@@ -89,6 +103,28 @@ class Service(unittest.TestCase):
                 self.assertEqual(program.returncode, 0, err)
                 self.assertTrue((out / "flat.fbm").exists() and (out / "imu.yaml").exists() and (out / "run" / "trajectory.csv").exists())
                 self.assertEqual(list(out.rglob("*.part")), [])
+
+    def library(self, name, text):
+        """Compiled, to be loaded before the program."""
+        source, library = self.folder / f"{name}.cpp", self.folder / f"{name}.so"
+        source.write_text(text, encoding="utf-8")
+        subprocess.run([COMPILER, "-shared", "-fPIC", "-pthread", source, "-o", library], check=True, timeout=120)
+        return library
+
+    def test_a_slow_disk_holds_up_no_pose(self):
+        folder = self.folder / "slow_disk"
+        folder.mkdir()
+        program, manager = self.start("--map", str(folder / "flat.fbm"), "--out", str(folder / "run"), "--laps", "11", speed="@2",
+                                      environment={"LD_PRELOAD": str(self.library("slow_disk", SLOW_DISK))})
+        while program.poll() is None and "STOPPING=1" not in manager.recv(4096).decode():
+            pass
+        _, err = program.communicate(timeout=120)
+        self.assertEqual(program.returncode, 0, err)
+        live = json.loads((folder / "run" / "summary.json").read_text(encoding="utf-8"))["live"]
+        # One file in flight: waiting for it would cost twelve seconds of the recording, 240 images.
+        self.assertLess(live["images_dropped"], 120)
+        self.assertLess(live["shutter_to_pose_ms"]["max"], 3000)
+        self.assertGreater(self.keyframes_of(folder / "flat.fbm"), 5)
 
     def test_what_stands_in_the_way_of_an_output_does_not_stop_the_poses(self):
         folder = self.folder / "in_the_way"
