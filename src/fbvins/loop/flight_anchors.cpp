@@ -4,6 +4,21 @@
 #include <algorithm>
 
 namespace fbvins {
+namespace {
+
+/// Some hours of keyframes; 80 bytes each.
+constexpr std::size_t kMost = 32768;
+
+}  // namespace
+
+void FlightAnchors::add(Time t, KeyframeId id) {
+  entries_.push_back({t, id, {}});
+  if (entries_.size() <= kMost) return;
+  const auto begin = entries_.begin(), middle = begin + kMost / 2;
+  auto kept = begin;
+  for (auto e = begin; e < middle; e += 2) *kept++ = *e;
+  entries_.erase(kept, middle);
+}
 
 void FlightAnchors::hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone) {
   for (Entry& e : entries_)

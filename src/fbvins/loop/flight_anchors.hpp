@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every keyframe of the flight, each attached to one that is still in the map, so that the poses of the whole flight follow
-// the map although keyframes are removed from it. One thread at a time.
+// the map although keyframes are removed from it. Of a flight of many hours, older keyframes are left out: memory and time stay
+// bounded, and poses between those that are kept are interpolated. One thread at a time.
 //
 //   FlightAnchors flight;
 //   flight.add(t, id);
@@ -17,7 +18,8 @@ namespace fbvins {
 
 class FlightAnchors {
  public:
-  void add(Time t, KeyframeId id) { entries_.push_back({t, id, {}}); }
+  void add(Time t, KeyframeId id);
+  std::size_t size() const { return entries_.size(); }
   /// Attaches what was attached to `gone` to `successor`.
   void hand_over(KeyframeId gone, KeyframeId successor, const Pose<B, B>& T_successor_gone);
   /// Drops what was attached to `gone`.

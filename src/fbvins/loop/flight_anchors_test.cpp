@@ -71,5 +71,23 @@ TEST_F(Anchors, AFlightWithoutAPlaceInMIsEmpty) {
   EXPECT_TRUE(corrected().empty());
 }
 
+TEST(FlightAnchors, OfADayOlderKeyframesAreLeftOutAndTheFlightIsStillWhole) {
+  constexpr int kKeyframes = 200'000;
+  PlaceMap map;
+  MapKeyframe only;
+  only.t = Time{};
+  const KeyframeId id = map.add(only);
+  FlightAnchors flight;
+  Trajectory<G> in_G;
+  for (int i = 0; i < kKeyframes; ++i) {
+    const Time t = Time{} + Duration::from_seconds(0.5 * i);
+    flight.add(t, id);
+    if (i % 1000 == 0) in_G.push_back({t, {}});
+  }
+  EXPECT_LE(flight.size(), 40'000u);
+  EXPECT_GE(flight.size(), 10'000u);
+  EXPECT_EQ(flight.corrected(map, in_G).size(), in_G.size());
+}
+
 }  // namespace
 }  // namespace fbvins
