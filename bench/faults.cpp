@@ -42,6 +42,8 @@ namespace {
 constexpr double kFalse_m = 0.5, kFalseTilt_rad = 5 * kDegree, kFalse_sigma = 5;
 /// Smaller errors are not counted in standard deviations: the truth has its own.
 constexpr double kTruth_m = 0.05, kTruth_rad = 1.5 * kDegree;
+/// Poses of a smaller extent do not tell the heading of W.
+constexpr double kHeadingNeeds_m = 0.5;
 constexpr double kLateStart = 0.35, kEarlyEnd = 0.75;  ///< of the flight, in which faults begin
 
 struct Flight {
@@ -188,6 +190,12 @@ void add_ratios(const Flight& flight, const std::vector<Published>& all, std::FI
   }
 }
 
+double extent_m(const std::vector<PosePair>& pairs) {
+  double out = 0;
+  for (const PosePair& p : pairs) out = std::max(out, (p.truth.T.p - pairs.front().truth.T.p).norm());
+  return out;
+}
+
 Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin, Time end, std::FILE* poses) {
   Errors out;
   add_ratios(flight, all, poses, out);
@@ -201,6 +209,8 @@ Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin
     }
   std::optional<Similarity> S;
   if (auto aligned = align(before, Alignment::yaw)) S = *aligned;
+  if (S && extent_m(before) < kHeadingNeeds_m)
+    S = laid_on(before.back().truth.T, before.back().estimate.T.cast_frames<W, B>());
   // The first pose after the fault's beginning must not pay for what the alignment cannot fit.
   for (const Published& p : all) {
     const Odometry& o = p.odometry;
