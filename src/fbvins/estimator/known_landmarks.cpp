@@ -90,16 +90,16 @@ void KnownLandmarks::set_active_priors(const Vec3& p_G, std::span<const Landmark
 }
 
 Mat6 KnownLandmarks::with_map_covariance(const Pose<G, B>& T_GB, const Mat6& window_covariance) const {
-  Mat6 from_world = Mat6::Identity();
-  from_world.bottomRightCorner<3, 3>() = T_GB.R().transpose();
+  Mat6 from_gauge = Mat6::Identity();
+  from_gauge.bottomRightCorner<3, 3>() = T_GB.R().transpose();
   return (in_use_ ? kTimesCounted : 1.0) * window_covariance +
-         from_world * propagated(active_anchor_, T_GB.p) * from_world.transpose();
+         from_gauge * propagated(active_anchor_, T_GB.p) * from_gauge.transpose();
 }
 
 void KnownLandmarks::anchor(const Pose<G, B>& T_GB, const Mat6& window_covariance) {
-  Mat6 to_world = Mat6::Identity();
-  to_world.bottomRightCorner<3, 3>() = T_GB.R();
-  next_ = {T_GB.p, to_world * with_map_covariance(T_GB, window_covariance) * to_world.transpose()};
+  Mat6 to_gauge = Mat6::Identity();
+  to_gauge.bottomRightCorner<3, 3>() = T_GB.R();
+  next_ = {T_GB.p, to_gauge * with_map_covariance(T_GB, window_covariance) * to_gauge.transpose()};
 }
 
 }  // namespace fbvins

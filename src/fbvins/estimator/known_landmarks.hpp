@@ -8,7 +8,7 @@
 //
 //   known.set_active_priors(T_GB.p, priors_in_use);                         // after each solve
 //   covariance = known.with_map_covariance(T_GB, covariance);                 // of any pose of the window
-//   known.anchor(T_WB_leaving, covariance);                        // before a keyframe leaves
+//   known.anchor(T_GB_leaving, covariance);                        // before a keyframe leaves
 //   known.remember(track, T_GC, point, V);                         // when a landmark leaves
 //   landmark.prior = known.find(track);                           // when a track appears
 #pragma once
