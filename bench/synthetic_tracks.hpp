@@ -75,7 +75,7 @@ class SyntheticTracks {
   }
 
   void locate(const LandmarkUpdate& update) {
-    for (const LocatedLandmark& l : update.landmarks) located_[l.track] = l.p_W;
+    for (const LocatedLandmark& l : update.landmarks) located_[l.track] = l.p_G;
     if (located_.size() > 4 * corners_.size()) forget_ended_tracks();
   }
 
@@ -100,11 +100,11 @@ class SyntheticTracks {
     out.has_left = out.has_right = true;
     const double t_s = (out.t - flight_.start).seconds();
     const Pose<W, B> T_WB = pose(t_s);
-    // The drift of W at the prior's own time shifts the predicted positions.
-    Pose<W, W> drift;
+    // The drift of G at the prior's own time shifts the predicted positions.
+    Pose<G, W> drift;
     if (prior.valid) {
       const Pose<W, B> then = pose((prior.t - flight_.start).seconds());
-      drift = prior.T_WB * then.inverse().cast_frames<B, W>();
+      drift = prior.T_GB * then.inverse();
     }
     motion_px_.clear();
     see(T_WB, right_t == t ? T_WB : pose((right_t - flight_.start).seconds()), t_s, prior.valid ? &drift : nullptr, out);
@@ -190,7 +190,7 @@ class SyntheticTracks {
   }
 
   /// Whether an earlier track is re-observed, under its old id.
-  bool known_again(const Track& track, const Vec3& p_W, const Vec3& body, const Pose<W, W>* drift) {
+  bool known_again(const Track& track, const Vec3& p_W, const Vec3& body, const Pose<G, W>* drift) {
     if (!o_.recognise || drift == nullptr || track.age < 4) return false;
     const auto known = located_.find(track.id);
     if (known == located_.end() || rng_.uniform() > o_.known_share) return false;
@@ -200,7 +200,7 @@ class SyntheticTracks {
     return ((*drift) * p_W - known->second).norm() * 458 / now.norm() < 15;  // within the search
   }
 
-  void see(const Pose<W, B>& T_WB, const Pose<W, B>& right_T_WB, double t_s, const Pose<W, W>* drift, TrackedFrame& out) {
+  void see(const Pose<W, B>& T_WB, const Pose<W, B>& right_T_WB, double t_s, const Pose<G, W>* drift, TrackedFrame& out) {
     const Pose<C0, W> T_C0W = (T_WB * flight_.rig.T_BC0).inverse();
     const Pose<C1, W> T_C1W = (right_T_WB * flight_.rig.T_BC1).inverse();
     std::vector<std::size_t> fresh;

@@ -95,7 +95,7 @@ struct Odometry {
   EstimatorStats stats;
 };
 
-/// A read-only picture of the sliding window.
+/// A read-only picture of the sliding window, levelled.
 struct WindowSnapshot {
   struct Frame {
     FrameId id;

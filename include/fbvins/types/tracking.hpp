@@ -9,6 +9,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -76,28 +77,28 @@ struct TrackedFrame {
   StereoFrame images;  ///< null unless keyframes are wanted, which carry the images
 };
 
-/// A landmark that has left the window, with its last estimated position.
+/// A landmark with its last estimated position.
 struct LocatedLandmark {
   TrackId track;
-  Vec3 p_W = Vec3::Zero();  ///< m
+  Vec3 p_G = Vec3::Zero();  ///< m
 };
 
 /// Positions of the landmarks that left the window with one frame. A message apart from StatePrior, because a state may
 /// be skipped and a position must not: updates are numbered without gaps, and each is delivered once, in order.
 struct LandmarkUpdate {
   std::int64_t sequence = 0;        ///< counts from 0
-  std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, and earlier positions are void
+  std::uint32_t reset_counter = 0;  ///< a new value: earlier positions are void (G is a new frame, or they no longer fit in it)
   std::vector<LocatedLandmark> landmarks;
 };
 
-/// The newest estimate, fed back to the frontend for guided matching; one may be skipped. Its W is the window's own frame (G),
-/// which is never levelled: `gravity_W` is the vertical in it.
+/// The newest estimate, fed back to the frontend for guided matching; one may be skipped. It is in the window's own frame G,
+/// which is never levelled: `gravity_G` gives the vertical.
 struct StatePrior {
   Time t;
-  Pose<W, B> T_WB;
-  Vec3 v_WB = Vec3::Zero();  ///< m/s, in W
+  Pose<G, B> T_GB;
+  Vec3 v_GB = Vec3::Zero();  ///< m/s, in G
   ImuBias bias;
-  Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< m/s^2
+  Vec3 gravity_G = Vec3(0, 0, -9.81);  ///< m/s^2
   bool valid = false;
 };
 

@@ -65,7 +65,7 @@ class SyntheticEvidence {
     double at = t;
     std::optional<Vec2> px;
     for (int i = 0; i < 3; ++i) {  // each line at its own time
-      const Vec3 p_C = T_BC.inverse() * (motion_.state(at).T_WB.inverse() * p_W);
+      const Vec3 p_C = T_BC.inverse() * (motion_.state(at).T_FB.inverse() * p_W);
       if (p_C.z() < 0.3) return std::nullopt;
       px = camera.project(p_C);
       if (!px || !camera.inside(*px, 4)) return std::nullopt;
@@ -78,7 +78,7 @@ class SyntheticEvidence {
     StereoView view{t, {}};
     frame.t = t;
     frame.has_depths = true;
-    const auto T_C0W = rig_.T_BC0.inverse() * motion_.state(t.seconds()).T_WB.inverse();
+    const auto T_C0W = rig_.T_BC0.inverse() * motion_.state(t.seconds()).T_FB.inverse();
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const auto left = seen(points_[i], rig_.left, rig_.T_BC0, t.seconds());
       const auto right = seen(points_[i], rig_.right, rig_.T_BC1, t.seconds() + setup_.right_late_s);

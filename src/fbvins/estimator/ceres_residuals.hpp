@@ -32,12 +32,12 @@ template <class T>
 struct Moved {
   Vec<T> p, v, bg, ba;
   Q<T> q;
-  Moved(const NavState& s, const T* d)
-      : p(s.T_WB.p.cast<T>() + Eigen::Map<const Vec<T>>(d)),
-        v(s.v_WB.cast<T>() + Eigen::Map<const Vec<T>>(d + 6)),
+  Moved(const NavState<G>& s, const T* d)
+      : p(s.T_FB.p.cast<T>() + Eigen::Map<const Vec<T>>(d)),
+        v(s.v_FB.cast<T>() + Eigen::Map<const Vec<T>>(d + 6)),
         bg(s.bias.gyro_radps.cast<T>() + Eigen::Map<const Vec<T>>(d + 9)),
         ba(s.bias.accel_mps2.cast<T>() + Eigen::Map<const Vec<T>>(d + 12)),
-        q(s.T_WB.q.cast<T>() * exp(d + 3)) {}
+        q(s.T_FB.q.cast<T>() * exp(d + 3)) {}
 };
 
 /// A residual of some parameter blocks x, for numbers and for jets.
@@ -69,7 +69,7 @@ struct Functor {
 /// The reprojection, from its definition: a point on a ray of one of the host's cameras at depth 1 / rho.
 /// Of x = (landmark, calibration), or also (host, target) where these are two frames.
 struct Reprojection : ResidualOf<Reprojection> {
-  NavState host, target;
+  NavState<G> host, target;
   Calibration calibration;
   WindowObservation o;
   bool same_frame = false, right_ray = false;
@@ -110,7 +110,7 @@ struct LandmarkPriorResidual : ResidualOf<LandmarkPriorResidual> {
   template <class T>
   void fill(T const* const* x, T* r) const {
     const Moved<T> h(seen.host, x[2]);
-    const Vec<T> away = h.q * seen.in_host_body(x[0], x[1]) + h.p - prior.p_W.cast<T>();
+    const Vec<T> away = h.q * seen.in_host_body(x[0], x[1]) + h.p - prior.p_G.cast<T>();
     for (int k = 0; k < 3; ++k) {
       r[k] = T(0);
       for (int i = 0; i < 3; ++i) r[k] += prior.sqrt_information(k, i) * away(i);
@@ -120,7 +120,7 @@ struct LandmarkPriorResidual : ResidualOf<LandmarkPriorResidual> {
 
 /// The preintegrated readings. Of x = (frame, next frame, tilt).
 struct Imu : ResidualOf<Imu> {
-  NavState from, to;
+  NavState<G> from, to;
   std::shared_ptr<const Preintegration> between;
   double gravity = 0;
 
@@ -170,11 +170,11 @@ struct Diagonal : ResidualOf<Diagonal> {
 };
 
 struct Standstill : ResidualOf<Standstill> {
-  NavState state;
+  NavState<G> state;
   double weight = 0;
   template <class T>
   void fill(T const* const* x, T* r) const {
-    for (int k = 0; k < 3; ++k) r[k] = weight * (state.v_WB(k) + x[0][6 + k]);
+    for (int k = 0; k < 3; ++k) r[k] = weight * (state.v_FB(k) + x[0][6 + k]);
   }
 };
 

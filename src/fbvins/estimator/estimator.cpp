@@ -53,12 +53,12 @@ StatePrior Estimator::prior() const {
   StatePrior out;
   if (!running_) return out;
   const Frame& newest = window_.newest();
-  return {newest.t, newest.state.T_WB, newest.state.v_WB, newest.state.bias, gravity_W(), true};
+  return {newest.t, newest.state.T_FB, newest.state.v_FB, newest.state.bias, gravity_G(), true};
 }
 
 WindowSnapshot Estimator::snapshot() const { return snapshot_of(window_, calibration_); }
 
-Vec3 Estimator::gravity_W() const { return window_.tilt().gravity_W(options_.gravity_mps2); }
+Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gravity_mps2); }
 
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
@@ -130,12 +130,12 @@ void Estimator::open_window(const InitialSolution& start) {
     }
     window_.add_frame(std::move(f), start.frames[i].features, calibration_);
   }
-  const NavState& first = window_.frames().oldest().state;
+  const NavState<G>& first = window_.frames().oldest().state;
   WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
   if (options_.estimate_extrinsics || options_.estimate_time_offset)
     prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
   window_.set_prior(std::move(prior));
-  window_.set_pivot(first.T_WB.p);
+  window_.set_pivot(first.T_FB.p);
   published_.restart();
   monitor_.restart();
   frames_with_readings_ = kFramesAfterGap;
@@ -151,12 +151,12 @@ Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) 
   f.images = frame.images;
   if (readings.empty()) {  // constant velocity
     f.state = last.state;
-    f.state.T_WB.p += (frame.t - last.t).seconds() * last.state.v_WB;
+    f.state.T_FB.p += (frame.t - last.t).seconds() * last.state.v_FB;
     return f;
   }
   Preintegration imu(imu_noise_, last.state.bias);
   imu.integrate(readings);
-  f.state = imu.predict(last.state, gravity_W());
+  f.state = imu.predict(last.state, gravity_G());
   f.imu = std::make_shared<const Preintegration>(std::move(imu));
   return f;
 }
@@ -196,12 +196,12 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     return frame.features;
   }
   const Monitor::Verdict verdict =
-      monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_, predicted.state.T_WB, dt);
+      monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_, predicted.state.T_FB, dt);
   if (verdict.imu_contradicts) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);
     predicted = predict(frame, imu);
-    predicted.state.T_WB = *verdict.seen;
+    predicted.state.T_FB = *verdict.seen;
   }
   std::vector<TrackedFeature> believed = frame.features;
   one_camera_wrong_ = verdict.left_wrong || verdict.right_wrong;
@@ -246,14 +246,14 @@ void Estimator::fill_covariances(const WindowSolution& solution, Odometry& out) 
   std::optional<Mat17> covariance = solution.covariance(newest.id);
   if (!covariance) return;
   KnownLandmarks& known = window_.known();
-  known.set_active_priors(newest.state.T_WB.p, solution.window.landmark_priors);
-  covariance->topLeftCorner<6, 6>() = known.with_map_covariance(newest.state.T_WB, covariance->topLeftCorner<6, 6>());
+  known.set_active_priors(newest.state.T_FB.p, solution.window.landmark_priors);
+  covariance->topLeftCorner<6, 6>() = known.with_map_covariance(newest.state.T_FB, covariance->topLeftCorner<6, 6>());
   const Mat15 level = window_.tilt().levelled_covariance(newest.state, *covariance);
   out.pose_covariance = level.topLeftCorner<6, 6>();
   out.velocity_covariance = level.block<3, 3>(nav::v, nav::v);
-  const NavState level_state = window_.tilt().levelled(newest.state);
-  add_scale(level_state.T_WB.p - window_.tilt().pivot_W, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
-  add_scale(level_state.v_WB, scale_sigma_, out.velocity_covariance);
+  const NavState<W> level_state = window_.tilt().levelled(newest.state);
+  add_scale(level_state.T_FB.p - window_.tilt().pivot, scale_sigma_, out.pose_covariance.topLeftCorner<3, 3>());
+  add_scale(level_state.v_FB, scale_sigma_, out.velocity_covariance);
   out.gyro_bias_covariance = level.block<3, 3>(nav::bg, nav::bg) + axis_covariance(mean_rate_B(window_.frames()).norm());
   out.accel_bias_covariance = level.block<3, 3>(nav::ba, nav::ba) + axis_covariance(options_.gravity_mps2);
   up_sigma_rad_ = up_sigma_rad(*covariance);
@@ -269,7 +269,7 @@ void Estimator::shrink_window(const WindowSolution& solution, Estimate& out) {
     const int leaving = keyframe_policy_.leaving(window_, calibration_, keyframe_zone());
     const Frame& host = window_.frames()[leaving];
     const std::optional<Mat17> covariance = solution.covariance(host.id);
-    if (covariance) window_.known().anchor(host.state.T_WB, covariance->topLeftCorner<6, 6>());
+    if (covariance) window_.known().anchor(host.state.T_FB, covariance->topLeftCorner<6, 6>());
     window_.marginalise_keyframe(leaving, calibration_);
   }
   out.odometry.stats.frames_in_window = window_.frames().size();
@@ -313,7 +313,8 @@ void Estimator::begin_new_W() {
 
 void Estimator::restart() {
   const Pose<W, B>& last = published_.T_WB();
-  if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last;
+  // The next gauge begins where this W ends, so that the pose goes on from where it was published last.
+  if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
   running_ = false;
   calibration_ = calibrated_;
   failed_solves_ = 0;
@@ -343,14 +344,14 @@ void Estimator::carry_covariances(Odometry& out) {
 
 /// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).
 void Estimator::publish(Odometry& out) {
-  const NavState& newest = window_.newest().state;
-  const NavState level = window_.tilt().levelled(newest);
+  const NavState<G>& newest = window_.newest().state;
+  const NavState<W> level = window_.tilt().levelled(newest);
   carry_covariances(out);
   if (monitor_.take_reset()) begin_new_W();
-  published_.follow(motion_of_newest(window_, gravity_W(), monitor_.follows_images()), level.T_WB);
+  published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   if (out.health.state == HealthState::good && published_.owes_too_much()) {
     begin_new_W();
-    published_.follow({}, level.T_WB);
+    published_.follow({}, level.T_FB);
     monitor_.count_reset();
     if (last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s) {
       monitor_.doubt_tilt();
@@ -358,8 +359,9 @@ void Estimator::publish(Odometry& out) {
     }
   }
   if (out.health.state != HealthState::good) last_trouble_ = out.t;
-  out.pose_covariance += monitor_.doubt(newest.T_WB);
-  out.velocity_covariance += monitor_.velocity_doubt(newest.v_WB);
+  // These are in the axes of G; the tilt between G and W is small against a doubt.
+  out.pose_covariance += monitor_.doubt(newest.T_FB);
+  out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

@@ -43,7 +43,7 @@ class Estimator {
   /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& tracked);
 
-  /// For the frontend: the newest state in the window's W, not levelled; not valid before initialisation.
+  /// For the frontend: the newest state, in G; not valid before initialisation.
   StatePrior prior() const;
   WindowSnapshot snapshot() const;
   const Calibration& calibration() const { return calibration_; }
@@ -66,7 +66,7 @@ class Estimator {
   void begin_new_W();
   void carry_covariances(Odometry& out);
   void publish(Odometry& out);
-  Vec3 gravity_W() const;
+  Vec3 gravity_G() const;
 
   /// Of the newest level state that had any.
   struct StateCovariances {
@@ -101,7 +101,7 @@ class Estimator {
   PublishedPose published_;
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number
-  std::optional<Pose<W, B>> restart_pose_;  ///< where the next initial solution puts its first frame (position and yaw)
+  std::optional<Pose<G, B>> restart_pose_;  ///< where the next G begins: at its first frame (position and heading)
 };
 
 }  // namespace fbvins

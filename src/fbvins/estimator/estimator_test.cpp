@@ -27,7 +27,7 @@ EstimatorOptions exact_noise() {
 
 struct Flown {
   std::vector<Odometry> odometry;
-  std::vector<NavState> truth;
+  std::vector<NavState<W>> truth;
   int gauge_frame = -1;  ///< the frame whose pose defines W's origin and heading
   Pose<W, B> gauge_pose;
 
@@ -37,15 +37,15 @@ struct Flown {
     return -1;
   }
   /// The truth at k in W.
-  NavState truth_in_W(int k) const {
-    const Pose<W, B>& b = truth[gauge_frame].T_WB;
+  NavState<W> truth_in_W(int k) const {
+    const Pose<W, B>& b = truth[gauge_frame].T_FB;
     const Quat turn(Eigen::AngleAxisd(heading_between(b.q, gauge_pose.q), Vec3::UnitZ()));
-    NavState s = truth[k];
-    s.T_WB = {(turn * s.T_WB.q).normalized(), Vec3(gauge_pose.p + turn * (s.T_WB.p - b.p))};
-    s.v_WB = turn * s.v_WB;
+    NavState<W> s = truth[k];
+    s.T_FB = {(turn * s.T_FB.q).normalized(), Vec3(gauge_pose.p + turn * (s.T_FB.p - b.p))};
+    s.v_FB = turn * s.v_FB;
     return s;
   }
-  double position_error(int k) const { return (odometry[k].T_WB.p - truth_in_W(k).T_WB.p).norm(); }
+  double position_error(int k) const { return (odometry[k].T_WB.p - truth_in_W(k).T_FB.p).norm(); }
 };
 
 Flown fly(SimulatedFlight& flight, int frames, const EstimatorOptions& options = exact_noise()) {
@@ -57,7 +57,7 @@ Flown fly(SimulatedFlight& flight, int frames, const EstimatorOptions& options =
     if (out.gauge_frame < 0 && out.odometry.back().health.has_pose()) {
       const Frame& oldest = estimator.window().frames().oldest();
       out.gauge_frame = static_cast<int>(oldest.id.value);
-      out.gauge_pose = oldest.state.T_WB;
+      out.gauge_pose = oldest.state.T_FB.cast_frames<W, B>();  // W and G begin together
     }
   }
   return out;
@@ -76,14 +76,14 @@ TEST(Estimator, FollowsAMotionThatNeverRests) {
   const Odometry& last = flown.odometry.back();
   EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 2e-3);
   EXPECT_LT((last.bias.accel_mps2 - flight.bias.accel_mps2).norm(), 0.05);
-  EXPECT_LT((last.v_WB - flown.truth_in_W(199).v_WB).norm(), 0.05);
+  EXPECT_LT((last.v_WB - flown.truth_in_W(199).v_FB).norm(), 0.05);
 }
 
 TEST(Estimator, TiltIsAbsolute) {
   SimulatedFlight flight(Motion(0.6, 0.3), 2);
   const Flown flown = fly(flight, 120);
   const Vec3 up_estimated = flown.odometry.back().T_WB.q.conjugate() * Vec3::UnitZ();
-  const Vec3 up_true = flown.truth.back().T_WB.q.conjugate() * Vec3::UnitZ();
+  const Vec3 up_true = flown.truth.back().T_FB.q.conjugate() * Vec3::UnitZ();
   EXPECT_LT((up_estimated - up_true).norm(), 0.006);
 }
 
@@ -99,9 +99,9 @@ TEST(Estimator, SameInputSameBits) {
 /// Normalised error squared of the pose.
 double normalised_error(const Flown& flown, int k) {
   const Odometry& o = flown.odometry[k];
-  const NavState truth = flown.truth_in_W(k);
+  const NavState<W> truth = flown.truth_in_W(k);
   Vec6 e;
-  e << o.T_WB.p - truth.T_WB.p, so3_log(truth.T_WB.q.conjugate() * o.T_WB.q);
+  e << o.T_WB.p - truth.T_FB.p, so3_log(truth.T_FB.q.conjugate() * o.T_WB.q);
   return e.dot(o.pose_covariance.ldlt().solve(e));
 }
 
@@ -182,15 +182,15 @@ TEST(Estimator, PriorHasNoInformationOnPositionAndHeadingBeyondTheGauge) {
     const WindowPrior& prior = estimator.window().prior();
     ASSERT_FALSE(prior.empty());
     // The four unobservable directions of W9 (position and heading), at the first estimates and the estimated up.
-    const Vec3 up_W = estimator.window().tilt().q() * Vec3::UnitZ();
+    const Vec3 up_G = estimator.window().tilt().q() * Vec3::UnitZ();
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 4);
     for (std::size_t i = 0; i < prior.frames.size(); ++i) {
-      const NavState& s = estimator.window().frames()[prior.frames[i]].first_estimate;
+      const NavState<G>& s = estimator.window().frames()[prior.frames[i]].first_estimate;
       const int row = prior.frames_row() + 15 * static_cast<int>(i);
       N.block<3, 3>(row, 0).setIdentity();
-      N.block<3, 1>(row, 3) = up_W.cross(s.T_WB.p);
-      N.block<3, 1>(row + 3, 3) = s.T_WB.q.conjugate() * up_W;
-      N.block<3, 1>(row + 6, 3) = up_W.cross(s.v_WB);
+      N.block<3, 1>(row, 3) = up_G.cross(s.T_FB.p);
+      N.block<3, 1>(row + 3, 3) = s.T_FB.q.conjugate() * up_G;
+      N.block<3, 1>(row + 6, 3) = up_G.cross(s.v_FB);
     }
     const Eigen::MatrixXd information = N.transpose() * prior.quadratic.H * N;
     // The start chose position and heading with 1 mm and 1 mrad: 1e6 each. Nothing may be added, and only what
@@ -441,10 +441,10 @@ TEST(Estimator, HandsOnKeyframesInOrderWithTheirLandmarks) {
       last = keyframe.id;
       ++keyframes;
       ASSERT_GT(keyframe.landmarks.size(), 20u);
-      const NavState truth = flight.truth(static_cast<int>(keyframe.id.value));
+      const NavState<W> truth = flight.truth(static_cast<int>(keyframe.id.value));
       int near = 0;
       for (const KeyframeLandmark& l : keyframe.landmarks) {
-        const Vec3 p_true = truth.T_WB * l.p_B;
+        const Vec3 p_true = truth.T_FB * l.p_B;
         near +=
             std::any_of(flight.points().begin(), flight.points().end(), [&](const Vec3& p) { return (p - p_true).norm() < 0.1; });
       }
@@ -467,10 +467,10 @@ TEST(Estimator, TheGaugeIsTheWindowsOwnFrameWithUpBeside) {
     const Odometry& o = estimate.odometry;
     if (!o.health.has_pose()) continue;
     ++poses;
-    const StatePrior prior = estimator.prior();  // the frontend's is in the window's frame as well
-    EXPECT_EQ(o.gauge.T_GB.p, prior.T_WB.p);
-    EXPECT_EQ(o.gauge.v_GB, prior.v_WB);
-    EXPECT_LT((o.gauge.up_G() + prior.gravity_W.normalized()).norm(), 1e-12);
+    const StatePrior prior = estimator.prior();  // the frontend's is in G as well
+    EXPECT_EQ(o.gauge.T_GB.p, prior.T_GB.p);
+    EXPECT_EQ(o.gauge.v_GB, prior.v_GB);
+    EXPECT_LT((o.gauge.up_G() + prior.gravity_G.normalized()).norm(), 1e-12);
     EXPECT_GT(o.gauge.up_sigma_rad, 1e-4);
     EXPECT_LT(o.gauge.up_sigma_rad, 0.1);
   }

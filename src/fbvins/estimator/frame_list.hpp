@@ -20,8 +20,8 @@ namespace fbvins {
 struct Frame {
   FrameId id;
   Time t;
-  NavState state;
-  NavState first_estimate;
+  NavState<G> state;
+  NavState<G> first_estimate;
   bool in_prior = false;
   bool keyframe = false;
   bool standstill = false;

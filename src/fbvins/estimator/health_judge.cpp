@@ -43,14 +43,14 @@ bool HealthJudge::images_missing(const TrackedFrame& frame) const {
   return previous_image_ && (frame.t - *previous_image_).seconds() > hole_s;
 }
 
-Health HealthJudge::judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, const Evidence& evidence) {
+Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, int landmarks_in_view, const Evidence& evidence) {
   const bool few_tracks = landmarks_in_view < options_.min_tracks;
   if (!few_tracks) seen_sigma_m_ = evidence.worst_sigma_m;
   const double blind2 = evidence.worst_sigma_m * evidence.worst_sigma_m - seen_sigma_m_ * seen_sigma_m_;
   const bool no_imu = frame.imu.empty();
 
-  if (!state.T_WB.p.allFinite() || evidence.failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
-  if (state.v_WB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
+  if (!state.T_FB.p.allFinite() || evidence.failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
+  if (state.v_FB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
   if (state.bias.gyro_radps.norm() > kMaxGyroBias_radps || state.bias.accel_mps2.norm() > kMaxAccelBias_mps2)
     return lost(HealthReason::implausible_bias);
   if (few_tracks && blind2 > options_.max_blind_m * options_.max_blind_m)

@@ -33,7 +33,7 @@ class HealthJudge {
     double gyro_vibration_radps = 0;
   };
   /// Health at a frame in the window, after its solve.
-  Health judge(const TrackedFrame& frame, const NavState& state, int landmarks_in_view, const Evidence& evidence);
+  Health judge(const TrackedFrame& frame, const NavState<G>& state, int landmarks_in_view, const Evidence& evidence);
   /// Health at a frame before the start; `reason` is what the initialiser waits for.
   static Health before_start(const TrackedFrame& frame, HealthReason reason);
   /// To be called after each frame, whether it was judged or not.

@@ -32,7 +32,7 @@ class Judged {
     EXPECT_EQ(next(frame_at(0)), good());
   }
   Health next(const TrackedFrame& frame, int in_view = kManyTracks, int failed_solves = 0, double sigma_m = 0.1) {
-    const Health health = judge_.judge(frame, NavState{}, in_view, {.worst_sigma_m = sigma_m, .failed_solves = failed_solves});
+    const Health health = judge_.judge(frame, NavState<G>{}, in_view, {.worst_sigma_m = sigma_m, .failed_solves = failed_solves});
     judge_.pass(frame);
     return health;
   }
@@ -116,8 +116,8 @@ TEST(HealthJudge, SolverThatFailsThriceIsLost) {
 TEST(HealthJudge, ImplausibleStatesAreLost) {
   HealthJudge judge{EstimatorOptions{}};
   judge.start();
-  NavState fast, biased;
-  fast.v_WB = Vec3(31, 0, 0);
+  NavState<G> fast, biased;
+  fast.v_FB = Vec3(31, 0, 0);
   biased.bias.gyro_radps = Vec3(0.6, 0, 0);
   EXPECT_EQ(judge.judge(frame_at(0), fast, kManyTracks, {}), lost(HealthReason::implausible_speed));
   EXPECT_EQ(judge.judge(frame_at(0), biased, kManyTracks, {}), lost(HealthReason::implausible_bias));
@@ -136,7 +136,7 @@ TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
   const auto judged = [](const HealthJudge::Evidence& evidence) {
     HealthJudge judge{EstimatorOptions{}};
     judge.start();
-    return judge.judge(frame_at(0), NavState{}, kManyTracks, evidence);
+    return judge.judge(frame_at(0), NavState<G>{}, kManyTracks, evidence);
   };
   EXPECT_EQ(judged({}), good());
   EXPECT_EQ(judged({.contradiction = true}), degraded(HealthReason::contradiction));

@@ -6,7 +6,7 @@
 namespace fbvins {
 namespace {
 
-/// The gauge: position and heading of the first frame are chosen; also its roll and pitch, where the tilt of W is estimated.
+/// The gauge: position and heading of the first frame are chosen; also its roll and pitch, where the tilt of G is estimated.
 constexpr double kChosenSigma = 1e-3, kLevelSigma = 1e-4;  // m and rad
 /// Weak priors of the other variables.
 constexpr double kTiltSigma_rad = 0.5;
@@ -38,7 +38,7 @@ ImuBiasEstimate unknown_biases() {
           kAccelBiasSigma_mps2 * kAccelBiasSigma_mps2 * Mat3::Identity()};
 }
 
-WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& biases, bool estimate_tilt) {
+WindowPrior first_frame_prior(const NavState<G>& state, const ImuBiasEstimate& biases, bool estimate_tilt) {
   WindowPrior prior;
   prior.frames = {0};
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
@@ -47,8 +47,8 @@ WindowPrior first_frame_prior(const NavState& state, const ImuBiasEstimate& bias
       Vec6::Zero();
   prior.quadratic.H.block<3, 3>(nav::bg, nav::bg) = biases.gyro_covariance.inverse();
   prior.quadratic.H.block<3, 3>(nav::ba, nav::ba) = biases.accel_covariance.inverse();
-  // Heading is about the world's vertical, which in B is R^T z.
-  const Vec3 up_B = state.T_WB.R().transpose() * Vec3::UnitZ();
+  // Heading is about the vertical of the start, which in B is R^T z.
+  const Vec3 up_B = state.T_FB.R().transpose() * Vec3::UnitZ();
   const double level = information(estimate_tilt ? kLevelSigma : kTiltSigma_rad), heading = information(kChosenSigma);
   prior.quadratic.H.block<3, 3>(nav::theta, nav::theta) = level * Mat3::Identity() + (heading - level) * up_B * up_B.transpose();
   Vec15 from_mean = Vec15::Zero();

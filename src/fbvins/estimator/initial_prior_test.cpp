@@ -6,17 +6,17 @@
 namespace fbvins {
 namespace {
 
-NavState tilted() {
-  NavState s;
-  s.T_WB = {so3_exp(Vec3(0.4, -0.3, 1.0)), Vec3(1, 2, 3)};
+NavState<G> tilted() {
+  NavState<G> s;
+  s.T_FB = {so3_exp(Vec3(0.4, -0.3, 1.0)), Vec3(1, 2, 3)};
   s.bias = {Vec3(0.01, 0.02, -0.01), Vec3(0.1, -0.05, 0.02)};
   return s;
 }
 
-/// Cost of turning the frame by a small angle about an axis of W; W's tilt, if it is in the prior, stays.
-double cost_of_turn(const WindowPrior& prior, const Vec3& angle_W) {
+/// Cost of turning the frame by a small angle about an axis of G; G's tilt, if it is in the prior, stays.
+double cost_of_turn(const WindowPrior& prior, const Vec3& angle_G) {
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(prior.quadratic.size());
-  dx.segment<3>(prior.frames_row() + nav::theta) = tilted().T_WB.q.conjugate() * angle_W;
+  dx.segment<3>(prior.frames_row() + nav::theta) = tilted().T_FB.q.conjugate() * angle_G;
   return prior.quadratic.cost(dx) - prior.quadratic.cost(Eigen::VectorXd::Zero(prior.quadratic.size()));
 }
 

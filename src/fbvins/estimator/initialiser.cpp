@@ -57,13 +57,13 @@ void leave_out_moving(std::vector<TrackedFrame>& frames) {
     std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
 }
 
-/// Rotates about the vertical and translates W so that the first state has the position and heading of `origin`.
-void move_to(const Pose<W, B>& origin, InitialSolution& start) {
-  const Pose<W, B> first = start.states.front().T_WB;
+/// Rotates about the vertical and translates G so that the first state has the position and heading of `origin`.
+void move_to(const Pose<G, B>& origin, InitialSolution& start) {
+  const Pose<G, B> first = start.states.front().T_FB;
   const Quat turn(Eigen::AngleAxisd(heading_between(first.q, origin.q), Vec3::UnitZ()));
-  for (NavState& s : start.states) {
-    s.T_WB = {(turn * s.T_WB.q).normalized(), Vec3(origin.p + turn * (s.T_WB.p - first.p))};
-    s.v_WB = turn * s.v_WB;
+  for (NavState<G>& s : start.states) {
+    s.T_FB = {(turn * s.T_FB.q).normalized(), Vec3(origin.p + turn * (s.T_FB.p - first.p))};
+    s.v_FB = turn * s.v_FB;
   }
 }
 
@@ -76,7 +76,7 @@ Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise,
       structure_(options, WindowWeights{.estimate_tilt = false}) {}
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
-                                                    const std::optional<Pose<W, B>>& origin) {
+                                                    const std::optional<Pose<G, B>>& origin) {
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
@@ -126,13 +126,13 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
     return std::nullopt;
   }
   rest.state.bias.accel_mps2 = biases.bias.accel_mps2;
-  InitialSolution start{{frames_.begin(), frames_.end()}, std::vector<NavState>(frames_.size(), rest.state), true, {}};
+  InitialSolution start{{frames_.begin(), frames_.end()}, std::vector<NavState<G>>(frames_.size(), rest.state), true, {}};
   leave_out_moving(start.frames);
   return start;
 }
 
 std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {
-  std::vector<Pose<W, B>> poses;
+  std::vector<Pose<G, B>> poses;
   if (!stereo_structure(calibration, poses)) {
     reason_ = HealthReason::too_few_features;
     return std::nullopt;
@@ -140,7 +140,7 @@ std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimat
   std::vector<Pose<VisualWorld, B>> visual_poses;
   std::vector<Preintegration> between;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
-    visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());
+    visual_poses.push_back(poses[i].cast_frames<VisualWorld, B>());  // the structure's gauge is arbitrary
     if (i > 0) between.emplace_back(noise_, ImuBias{}).integrate(frames_[i].imu);
   }
   AlignmentOptions options;
@@ -165,9 +165,9 @@ bool Initialiser::refine_structure(const Calibration& calibration) {
   return true;
 }
 
-bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses) {
+bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<Pose<G, B>>& poses) {
   // Poses in a visual world whose origin is the first frame, first one by one, then all together.
-  poses.assign(1, Pose<W, B>{});
+  poses.assign(1, Pose<G, B>{});
   std::unordered_map<TrackId, Vec3> points;
   structure_.clear();
   for (std::size_t i = 0; i < frames_.size(); ++i) {
@@ -178,30 +178,30 @@ bool Initialiser::stereo_structure(const Calibration& calibration, std::vector<P
         if (p != points.end()) sightings.push_back({p->second, &f});
       }
       if (static_cast<int>(sightings.size()) < kMinStructureInliers) return false;
-      Pose<W, B> guess = poses.back();
+      Pose<G, B> guess = poses.back();
       guess.q = guess.q * integrate_gyro(frames_[i].imu, Vec3::Zero());
       const PoseRefinement refined = refine_pose(sightings, calibration, guess);
       if (refined.inliers < std::max<double>(kMinStructureInliers, kMinInlierShare * static_cast<double>(sightings.size())))
         return false;
-      poses.push_back(refined.T_WB);
+      poses.push_back(refined.T_GB);
     }
     Frame f;
     f.id = frames_[i].id;
     f.t = frames_[i].t;
-    f.state.T_WB = poses.back();
+    f.state.T_FB = poses.back();
     structure_.add_frame(std::move(f), frames_[i].features, calibration);
     if (i == 0) structure_.set_prior(held_still());
     // Stereo alone is inaccurate for far points: the motion so far improves them before the next pose needs them.
     if (i % kFramesPerRefinement == 0 || i + 1 == frames_.size()) {
       if (!refine_structure(calibration)) return false;
-      for (const WindowSnapshot::Landmark& l : snapshot_of(structure_, calibration).landmarks) points[l.track] = l.p_W;
+      for (const LocatedLandmark& l : located_landmarks(structure_, calibration)) points[l.track] = l.p_G;
     } else {
-      for (const WindowSnapshot::Landmark& l : snapshot_of(structure_, calibration).landmarks) points.try_emplace(l.track, l.p_W);
+      for (const LocatedLandmark& l : located_landmarks(structure_, calibration)) points.try_emplace(l.track, l.p_G);
     }
-    poses.back() = structure_.newest().state.T_WB;
+    poses.back() = structure_.newest().state.T_FB;
   }
   if (!refine_structure(calibration)) return false;
-  for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = structure_.frames()[i].state.T_WB;
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = structure_.frames()[i].state.T_FB;
   return true;
 }
 

@@ -21,7 +21,7 @@ namespace fbvins {
 /// States of consecutive frames, the last being the newest.
 struct InitialSolution {
   std::vector<TrackedFrame> frames;
-  std::vector<NavState> states;
+  std::vector<NavState<G>> states;
   bool from_rest = false;
   ImuBiasEstimate biases;  ///< their prior, before these frames
 };
@@ -36,10 +36,10 @@ class Initialiser {
     readings_.clear();
   }
   /// Takes the next frame; a solution when there is one, else reason() says what is missing.
-  /// `rest`: how long the body has stood still. W is placed so that the first frame has the
+  /// `rest`: how long the body has stood still. G is placed so that the first frame has the
   /// position and heading of `origin`, if there is one.
   std::optional<InitialSolution> process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
-                                         const std::optional<Pose<W, B>>& origin);
+                                         const std::optional<Pose<G, B>>& origin);
   HealthReason reason() const { return reason_; }
 
  private:
@@ -47,7 +47,7 @@ class Initialiser {
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
   std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
-  bool stereo_structure(const Calibration& calibration, std::vector<Pose<W, B>>& poses);
+  bool stereo_structure(const Calibration& calibration, std::vector<Pose<G, B>>& poses);
 
   double gravity_mps2_;
   ImuNoise noise_;

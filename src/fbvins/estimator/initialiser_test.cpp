@@ -19,7 +19,7 @@ struct Started {
   HealthReason reason = HealthReason::none;
 };
 
-Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<W, B>>& origin = {}, double rest_s_a_frame = 0) {
+Started start(SimulatedFlight& flight, int frames, const std::optional<Pose<G, B>>& origin = {}, double rest_s_a_frame = 0) {
   Initialiser initialiser(EstimatorOptions{}, flight.rig.imu_noise);
   const Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
   Started out;
@@ -38,12 +38,12 @@ TEST(Initialiser, StartsInMotion) {
   EXPECT_FALSE(s.solution->from_rest);
   EXPECT_EQ(s.solution->states.size(), s.solution->frames.size());
   EXPECT_EQ(s.solution->frames.back().id, FrameId{s.frame});
-  const NavState& first = s.solution->states.front();
-  const NavState& last = s.solution->states.back();
-  const NavState from = flight.truth(static_cast<int>(s.solution->frames.front().id.value)), to = flight.truth(s.frame);
-  EXPECT_NEAR((last.T_WB.p - first.T_WB.p).norm(), (to.T_WB.p - from.T_WB.p).norm(), 0.05);
-  EXPECT_NEAR(last.v_WB.norm(), to.v_WB.norm(), 0.2);
-  const Vec3 up_error = last.T_WB.q.conjugate() * Vec3::UnitZ() - to.T_WB.q.conjugate() * Vec3::UnitZ();
+  const NavState<G>& first = s.solution->states.front();
+  const NavState<G>& last = s.solution->states.back();
+  const NavState<W> from = flight.truth(static_cast<int>(s.solution->frames.front().id.value)), to = flight.truth(s.frame);
+  EXPECT_NEAR((last.T_FB.p - first.T_FB.p).norm(), (to.T_FB.p - from.T_FB.p).norm(), 0.05);
+  EXPECT_NEAR(last.v_FB.norm(), to.v_FB.norm(), 0.2);
+  const Vec3 up_error = last.T_FB.q.conjugate() * Vec3::UnitZ() - to.T_FB.q.conjugate() * Vec3::UnitZ();
   EXPECT_LT(up_error.norm(), 0.05);
   EXPECT_LT((last.bias.gyro_radps - flight.bias.gyro_radps).norm(), 0.02);
 }
@@ -54,15 +54,15 @@ TEST(Initialiser, StartsFromRest) {
   ASSERT_TRUE(s.solution.has_value());
   EXPECT_TRUE(s.solution->from_rest);
   EXPECT_LT((s.solution->states.back().bias.gyro_radps - flight.bias.gyro_radps).norm(), 5e-3);
-  EXPECT_TRUE(s.solution->states.back().v_WB.isZero());
+  EXPECT_TRUE(s.solution->states.back().v_FB.isZero());
 }
 
 TEST(Initialiser, PutsTheFirstFrameAtTheOriginGiven) {
   SimulatedFlight flight(Motion(0.6, 0.3), 53);
-  const Pose<W, B> origin(so3_exp(Vec3(0.1, -0.2, 2)), Vec3(10, -5, 3));
+  const Pose<G, B> origin(so3_exp(Vec3(0.1, -0.2, 2)), Vec3(10, -5, 3));
   const Started s = start(flight, 40, origin);
   ASSERT_TRUE(s.solution.has_value());
-  const Pose<W, B>& first = s.solution->states.front().T_WB;
+  const Pose<G, B>& first = s.solution->states.front().T_FB;
   EXPECT_LT((first.p - origin.p).norm(), 1e-9);
   EXPECT_LT(std::abs(heading_between(first.q, origin.q)), 1e-9);
 }

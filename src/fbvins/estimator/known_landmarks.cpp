@@ -27,7 +27,7 @@ void KnownLandmarks::clear() {
   new_.clear();
 }
 
-void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information) {
+void KnownLandmarks::remember(TrackId track, const Pose<G, C0>& T_GC, const Vec3& alpha_beta_rho, const Mat3& information) {
   if (priors_.contains(track)) return;
   const double depth = 1.0 / alpha_beta_rho.z();
   const Mat3 covariance = information.inverse();
@@ -36,19 +36,19 @@ void KnownLandmarks::remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3
 
   LandmarkPrior prior;
   const Vec3 p_C = depth * Vec3(alpha_beta_rho.x(), alpha_beta_rho.y(), 1);
-  prior.p_W = T_WC * p_C;
-  Mat3 J;  // of p_W by (alpha, beta, rho)
-  J << depth * T_WC.R().leftCols<2>(), -depth * (T_WC.R() * p_C);
-  Mat3 covariance_W = J * covariance * J.transpose();  // (K3)
-  covariance_W.diagonal().array() += options_.position_sigma_m * options_.position_sigma_m;
-  prior.sqrt_information = Mat3(covariance_W.inverse()).llt().matrixU();
-  if (!prior.p_W.allFinite() || !prior.sqrt_information.allFinite()) return;
+  prior.p_G = T_GC * p_C;
+  Mat3 J;  // of p_G by (alpha, beta, rho)
+  J << depth * T_GC.R().leftCols<2>(), -depth * (T_GC.R() * p_C);
+  Mat3 covariance_G = J * covariance * J.transpose();  // (K3)
+  covariance_G.diagonal().array() += options_.position_sigma_m * options_.position_sigma_m;
+  prior.sqrt_information = Mat3(covariance_G.inverse()).llt().matrixU();
+  if (!prior.p_G.allFinite() || !prior.sqrt_information.allFinite()) return;
 
-  if (anchors_.empty() || anchors_.back().p_W != next_.p_W) anchors_.push_back(next_);
+  if (anchors_.empty() || anchors_.back().p_G != next_.p_G) anchors_.push_back(next_);
   prior.anchor = first_anchor_ + static_cast<std::int64_t>(anchors_.size()) - 1;
   priors_.emplace(track, prior);
   order_.push_back(track);
-  new_.push_back({track, prior.p_W});
+  new_.push_back({track, prior.p_G});
   make_room();
 }
 
@@ -72,34 +72,34 @@ std::optional<LandmarkPrior> KnownLandmarks::find(TrackId track) const {
 }
 
 /// Covariance of the map at p: an error (dp, dtheta) at the anchor is dp - [p - p_anchor]x dtheta at p (K5).
-Mat6 KnownLandmarks::propagated(const Anchor& anchor, const Vec3& p_W) {
+Mat6 KnownLandmarks::propagated(const Anchor& anchor, const Vec3& p_G) {
   Mat6 T = Mat6::Identity();
-  T.topRightCorner<3, 3>() = -hat(p_W - anchor.p_W);
+  T.topRightCorner<3, 3>() = -hat(p_G - anchor.p_G);
   return T * anchor.covariance * T.transpose();
 }
 
-void KnownLandmarks::set_active_priors(const Vec3& p_W, std::span<const LandmarkPrior> in_use) {
+void KnownLandmarks::set_active_priors(const Vec3& p_G, std::span<const LandmarkPrior> in_use) {
   in_use_ = !in_use.empty();
   if (!in_use_ || anchors_.empty()) return;  // the last one's share is kept
-  Anchor mean{p_W, Mat6::Zero()};
+  Anchor mean{p_G, Mat6::Zero()};
   for (const LandmarkPrior& prior : in_use) {                                        // (K6)
     const std::int64_t i = std::max<std::int64_t>(prior.anchor - first_anchor_, 0);  // dropped since: the oldest kept
-    mean.covariance += propagated(anchors_[static_cast<std::size_t>(i)], p_W) / static_cast<double>(in_use.size());
+    mean.covariance += propagated(anchors_[static_cast<std::size_t>(i)], p_G) / static_cast<double>(in_use.size());
   }
   active_anchor_ = mean;
 }
 
-Mat6 KnownLandmarks::with_map_covariance(const Pose<W, B>& T_WB, const Mat6& window_covariance) const {
-  Mat6 from_world = Mat6::Identity();
-  from_world.bottomRightCorner<3, 3>() = T_WB.R().transpose();
+Mat6 KnownLandmarks::with_map_covariance(const Pose<G, B>& T_GB, const Mat6& window_covariance) const {
+  Mat6 from_gauge = Mat6::Identity();
+  from_gauge.bottomRightCorner<3, 3>() = T_GB.R().transpose();
   return (in_use_ ? kTimesCounted : 1.0) * window_covariance +
-         from_world * propagated(active_anchor_, T_WB.p) * from_world.transpose();
+         from_gauge * propagated(active_anchor_, T_GB.p) * from_gauge.transpose();
 }
 
-void KnownLandmarks::anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance) {
-  Mat6 to_world = Mat6::Identity();
-  to_world.bottomRightCorner<3, 3>() = T_WB.R();
-  next_ = {T_WB.p, to_world * with_map_covariance(T_WB, window_covariance) * to_world.transpose()};
+void KnownLandmarks::anchor(const Pose<G, B>& T_GB, const Mat6& window_covariance) {
+  Mat6 to_gauge = Mat6::Identity();
+  to_gauge.bottomRightCorner<3, 3>() = T_GB.R();
+  next_ = {T_GB.p, to_gauge * with_map_covariance(T_GB, window_covariance) * to_gauge.transpose()};
 }
 
 }  // namespace fbvins

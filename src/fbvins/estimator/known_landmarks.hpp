@@ -6,10 +6,10 @@
 // for all landmarks of a moment, as an anchor, and is added to that of every pose that such landmarks constrain.
 // Synchronous; one instance, one thread. At most `capacity` landmarks: the oldest are forgotten.
 //
-//   known.set_active_priors(T_WB.p, priors_in_use);                         // after each solve
-//   covariance = known.with_map_covariance(T_WB, covariance);                 // of any pose of the window
-//   known.anchor(T_WB_leaving, covariance);                        // before a keyframe leaves
-//   known.remember(track, T_WC, point, V);                         // when a landmark leaves
+//   known.set_active_priors(T_GB.p, priors_in_use);                         // after each solve
+//   covariance = known.with_map_covariance(T_GB, covariance);                 // of any pose of the window
+//   known.anchor(T_GB_leaving, covariance);                        // before a keyframe leaves
+//   known.remember(track, T_GC, point, V);                         // when a landmark leaves
 //   landmark.prior = known.find(track);                           // when a track appears
 #pragma once
 
@@ -33,14 +33,14 @@ class KnownLandmarks {
 
   void clear();
   /// Sets the priors by which the map constrains the window, and the newest position.
-  void set_active_priors(const Vec3& p_W, std::span<const LandmarkPrior> in_use);
-  /// Covariance of (dp in W, dtheta in B) of a pose: that of the window alone, plus that of the map in use (K4-K6).
-  Mat6 with_map_covariance(const Pose<W, B>& T_WB, const Mat6& window_covariance) const;
+  void set_active_priors(const Vec3& p_G, std::span<const LandmarkPrior> in_use);
+  /// Covariance of (dp in G, dtheta in B) of a pose: that of the window alone, plus that of the map in use (K4-K6).
+  Mat6 with_map_covariance(const Pose<G, B>& T_GB, const Mat6& window_covariance) const;
   /// Landmarks remembered from now on have the uncertainty of this pose, their host's, in common.
-  void anchor(const Pose<W, B>& T_WB, const Mat6& window_covariance);
+  void anchor(const Pose<G, B>& T_GB, const Mat6& window_covariance);
   /// A landmark leaves: its host's camera, (alpha, beta, rho) and their information given the poses. Ignored for a landmark
   /// that is known already, since the first position has drifted least, and for one whose depth is too uncertain.
-  void remember(TrackId track, const Pose<W, C0>& T_WC, const Vec3& alpha_beta_rho, const Mat3& information);
+  void remember(TrackId track, const Pose<G, C0>& T_GC, const Vec3& alpha_beta_rho, const Mat3& information);
   std::optional<LandmarkPrior> find(TrackId track) const;
   void forget(TrackId track);
   /// Those remembered since the last call.
@@ -50,10 +50,10 @@ class KnownLandmarks {
 
  private:
   struct Anchor {
-    Vec3 p_W = Vec3::Zero();
-    Mat6 covariance = Mat6::Zero();  // (dp, dtheta) in W
+    Vec3 p_G = Vec3::Zero();
+    Mat6 covariance = Mat6::Zero();  // (dp, dtheta) in G
   };
-  static Mat6 propagated(const Anchor& anchor, const Vec3& p_W);
+  static Mat6 propagated(const Anchor& anchor, const Vec3& p_G);
   void make_room();
 
   KnownLandmarkOptions options_;

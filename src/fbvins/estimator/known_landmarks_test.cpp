@@ -8,11 +8,11 @@
 namespace fbvins {
 namespace {
 
-const Pose<W, C0> kCamera{so3_exp(Vec3(0.3, -1.0, 0.4)), Vec3(1, 2, 3)};
+const Pose<G, C0> kCamera{so3_exp(Vec3(0.3, -1.0, 0.4)), Vec3(1, 2, 3)};
 const Vec3 kPoint{0.2, -0.1, 0.5};  // alpha, beta, rho: 2 m deep
 const Mat3 kInformation = Vec3(1e6, 1e6, 1e5).asDiagonal();
 
-Pose<W, B> body_at(const Vec3& p_W) { return {so3_exp(Vec3(0.1, 0.2, 0.3)), p_W}; }
+Pose<G, B> body_at(const Vec3& p_G) { return {so3_exp(Vec3(0.1, 0.2, 0.3)), p_G}; }
 
 TEST(KnownLandmarks, KeepPositionAndCovarianceOfTheTriangulation) {
   KnownLandmarkOptions options;
@@ -22,7 +22,7 @@ TEST(KnownLandmarks, KeepPositionAndCovarianceOfTheTriangulation) {
   const auto prior = known.find(TrackId{7});
   ASSERT_TRUE(prior.has_value());
   const Vec3 p_C(0.4, -0.2, 2.0);
-  EXPECT_LT((prior->p_W - kCamera * p_C).norm(), 1e-12);
+  EXPECT_LT((prior->p_G - kCamera * p_C).norm(), 1e-12);
   const Mat3 covariance = (prior->sqrt_information.transpose() * prior->sqrt_information).inverse();
   const Mat3 in_camera = kCamera.R().transpose() * covariance * kCamera.R();
   // Along the ray: sigma of 1/depth times depth squared; beside it the ray's own, at this depth; and 3 mm everywhere.
@@ -35,15 +35,15 @@ TEST(KnownLandmarks, KeepPositionAndCovarianceOfTheTriangulation) {
 TEST(KnownLandmarks, KeepTheirFirstPositionUntilForgotten) {
   KnownLandmarks known{KnownLandmarkOptions{}};
   known.remember(TrackId{7}, kCamera, kPoint, kInformation);
-  const Vec3 first = known.find(TrackId{7})->p_W;
+  const Vec3 first = known.find(TrackId{7})->p_G;
   known.remember(TrackId{7}, kCamera, 1.1 * kPoint, kInformation);
-  EXPECT_EQ(known.find(TrackId{7})->p_W, first);
+  EXPECT_EQ(known.find(TrackId{7})->p_G, first);
   EXPECT_EQ(known.take_new().size(), 1u);
   EXPECT_TRUE(known.take_new().empty());
   known.forget(TrackId{7});
   EXPECT_FALSE(known.find(TrackId{7}).has_value());
   known.remember(TrackId{7}, kCamera, 1.1 * kPoint, kInformation);
-  EXPECT_NE(known.find(TrackId{7})->p_W, first);
+  EXPECT_NE(known.find(TrackId{7})->p_G, first);
 }
 
 TEST(KnownLandmarks, AreNotThoseOfUncertainDepth) {
@@ -78,7 +78,7 @@ TEST(KnownLandmarks, AreBoundedAndTheOldestGo) {
 TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
   // Heading known to 2 mrad, the rest exactly, where the landmark was remembered; seen again from 5 m away.
   Mat6 heading = Mat6::Zero();
-  const Pose<W, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
+  const Pose<G, B> there{Quat::Identity(), Vec3(1, 0, 0)}, here{Quat::Identity(), Vec3(1, 5, 0)};
   heading(5, 5) = 4e-6;
   KnownLandmarks known{KnownLandmarkOptions{}};
   known.anchor(there, heading);

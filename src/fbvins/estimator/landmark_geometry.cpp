@@ -31,7 +31,7 @@ Vec3 scaled_point(const Landmark& landmark, const Frame& target, bool right, con
                   const Calibration& calibration) {
   const CameraGeometry cameras(calibration);
   PairGeometry pair;
-  pair.set(frames.at(landmark.host).state.T_WB, target.state.T_WB);
+  pair.set(frames.at(landmark.host).state.T_FB, target.state.T_FB);
   const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.right_ray, pair, cameras, right);
   return line.a + landmark.alpha_beta_rho.z() * line.b;
 }
@@ -41,7 +41,7 @@ Vec3 scaled_point(const Landmark& landmark, const Frame& target, bool right, con
 bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
   // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
   const CameraGeometry cameras(calibration);
-  const Pose<W, B>& host = frames.at(landmark.host).state.T_WB;
+  const Pose<G, B>& host = frames.at(landmark.host).state.T_FB;
   const Sighting& first = landmark.sightings.front();
   const bool from_right = !first.left;
   const Vec2 ray = from_right ? first.right->normalised : first.left->normalised;
@@ -49,7 +49,7 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   const auto each = [&](auto&& visit) {
     for (const Sighting& s : landmark.sightings) {
       PairGeometry pair;
-      pair.set(host, frames.at(s.frame).state.T_WB);
+      pair.set(host, frames.at(s.frame).state.T_FB);
       const bool of_host = s.frame == landmark.host;
       if (s.left && !of_host) visit(ray_in_camera(ray, from_right, pair, cameras, false), *s.left);
       if (s.right && !(of_host && from_right)) visit(ray_in_camera(ray, from_right, pair, cameras, true), *s.right);

@@ -8,8 +8,8 @@ namespace fbvins {
 
 /// Position of a landmark when it left the window.
 struct LandmarkPrior {
-  Vec3 p_W = Vec3::Zero();                   ///< m
-  Mat3 sqrt_information = Mat3::Identity();  ///< 1/m; of the position, in W, relative to the map around it
+  Vec3 p_G = Vec3::Zero();                   ///< m
+  Mat3 sqrt_information = Mat3::Identity();  ///< 1/m; of the position, in G, relative to the map around it
   std::int64_t anchor = 0;                   ///< number of KnownLandmarks' anchor with the common uncertainty of that map
 };
 
@@ -19,9 +19,9 @@ inline Vec3 point_in_host(const CameraGeometry& cameras, const WindowLandmark& l
 }
 
 /// Whitened distance from the prior (K1).
-inline Vec3 landmark_prior_residual(const CameraGeometry& cameras, const Pose<W, B>& host, const WindowLandmark& l,
+inline Vec3 landmark_prior_residual(const CameraGeometry& cameras, const Pose<G, B>& host, const WindowLandmark& l,
                                     const LandmarkPrior& prior) {
-  return prior.sqrt_information * (host * point_in_host(cameras, l) - prior.p_W);
+  return prior.sqrt_information * (host * point_in_host(cameras, l) - prior.p_G);
 }
 
 /// Derivatives of landmark_prior_residual (K2).
@@ -31,15 +31,15 @@ struct LandmarkPriorJacobian {
   Mat3 point;       ///< by (alpha, beta, rho)
   Mat36 extrinsic;  ///< by the (p, theta) of the ray's camera in the body
 
-  LandmarkPriorJacobian(const CameraGeometry& cameras, const Pose<W, B>& T_WB, const WindowLandmark& l,
+  LandmarkPriorJacobian(const CameraGeometry& cameras, const Pose<G, B>& T_GB, const WindowLandmark& l,
                         const LandmarkPrior& prior) {
-    const Mat3 R_WB = T_WB.R();
-    const Mat3 SR_WB = prior.sqrt_information * R_WB, SR_WC = SR_WB * cameras.R_BC[l.right_ray];
+    const Mat3 R_GB = T_GB.R();
+    const Mat3 SR_GB = prior.sqrt_information * R_GB, SR_GC = SR_GB * cameras.R_BC[l.right_ray];
     const double depth = 1.0 / l.alpha_beta_rho.z();
     const Vec3 p_C = depth * Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
-    host << prior.sqrt_information, -SR_WB * hat(point_in_host(cameras, l));
-    point << depth * SR_WC.leftCols<2>(), -depth * (SR_WC * p_C);
-    extrinsic << SR_WB, -SR_WC * hat(p_C);
+    host << prior.sqrt_information, -SR_GB * hat(point_in_host(cameras, l));
+    point << depth * SR_GC.leftCols<2>(), -depth * (SR_GC * p_C);
+    extrinsic << SR_GB, -SR_GC * hat(p_C);
   }
 };
 

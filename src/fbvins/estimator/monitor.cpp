@@ -73,15 +73,15 @@ struct Medians {
   double best() const { return std::min(of[0].value_or(0), of[1].value_or(0)); }
 };
 
-Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, const Pose<W, B>& T_WB) {
-  const Mat3 R_BW = T_WB.R().transpose();
+Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, const Pose<G, B>& T_GB) {
+  const Mat3 R_BG = T_GB.R().transpose();
   Medians out;
   for (int c = 0; c < 2; ++c) {
     std::vector<double> residuals, x, y;
     for (const PointSighting& s : sightings) {
       const std::optional<Observation>& o = c == 0 ? s.feature->left : s.feature->right;
       if (!o) continue;
-      const Vec3 p_C = cameras.R_CB[c] * (R_BW * (s.p_W - T_WB.p) - cameras.t_BC[c]);
+      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (s.p_G - T_GB.p) - cameras.t_BC[c]);
       const Vec2 r =
           p_C.z() > kMinScaledDepth ? Vec2(o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)) : Vec2(1e3, 1e3);
       residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
@@ -160,13 +160,13 @@ void Monitor::take(const Biases& now) {
   if (refuted_s_ > kConfirmed_s) hopeless_ = true, refuted_ = before_;
   if (confirmed_s_ <= kConfirmed_s) return;
   tilt_doubted_ = false;
-  tilt_W_.setZero();
+  tilt_G_.setZero();
   before_.reset(), refuted_.reset();
   biases_ = {now};
 }
 
 Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, const Calibration& calibration,
-                                  const Pose<W, B>& predicted, Duration dt) {
+                                  const Pose<G, B>& predicted, Duration dt) {
   Verdict out;
   if (sightings.size() < kFewest) {
     blind(dt);
@@ -191,7 +191,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   const PoseRefinement seen = refine_pose(sightings, calibration, predicted);
-  const Medians at_seen = medians(sightings, cameras, seen.T_WB);
+  const Medians at_seen = medians(sightings, cameras, seen.T_GB);
   const bool two = at_prediction.of[0] && at_prediction.of[1];
   const bool one_camera_fits = two && (excess < 0 ? std::min(left, right) < kOther * std::max(left, right)
                                                   : at_prediction.best() < patience * kUsual_sigma);
@@ -219,10 +219,10 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     pass(dt);  // the readings agree with the other one
     return out;
   }
-  const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_WB.q).normalized());
-  const Vec3 shift = seen.T_WB.p - predicted.p;
+  const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_GB.q).normalized());
+  const Vec3 shift = seen.T_GB.p - predicted.p;
   out.imu_contradicts = true;
-  out.seen = seen.T_WB;
+  out.seen = seen.T_GB;
   out.noise.gyro = std::max(1.0, turn.norm() / (assumed_.gyro_noise_density_radps_rthz * std::sqrt(dt.seconds())));
   out.noise.accel =
       std::max(1.0, shift.norm() / (assumed_.accel_noise_density_mps2_rthz * std::sqrt(std::pow(dt.seconds(), 3) / 3)));
@@ -232,18 +232,18 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   return out;
 }
 
-void Monitor::take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W) {
-  if (turn_W_.isZero(0)) where_W_ = predicted.p;
-  const Vec3 turn_W = predicted.q * turn_B;
-  turn_W_ += turn_W, shift_W_ += shift_W;
-  turns_W_ += turn_W * turn_W.transpose(), shifts_W_ += shift_W * shift_W.transpose();
-  tilt_W_ += Vec3(turn_W.x(), turn_W.y(), 0);
-  if (tilt_W_.norm() > kTilt_rad) doubt_tilt();
+void Monitor::take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G) {
+  if (turn_G_.isZero(0)) where_G_ = predicted.p;
+  const Vec3 turn_G = predicted.q * turn_B;
+  turn_G_ += turn_G, shift_G_ += shift_G;
+  turns_G_ += turn_G * turn_G.transpose(), shifts_G_ += shift_G * shift_G.transpose();
+  tilt_G_ += Vec3(turn_G.x(), turn_G.y(), 0);
+  if (tilt_G_.norm() > kTilt_rad) doubt_tilt();
 }
 
 bool Monitor::take_reset() {
-  if (contradicted() || (shift_W_.norm() < kReset_m && turn_W_.norm() < kReset_rad)) return false;
-  turn_W_.setZero(), shift_W_.setZero(), turns_W_.setZero(), shifts_W_.setZero();
+  if (contradicted() || (shift_G_.norm() < kReset_m && turn_G_.norm() < kReset_rad)) return false;
+  turn_G_.setZero(), shift_G_.setZero(), turns_G_.setZero(), shifts_G_.setZero();
   count_reset();
   return true;
 }
@@ -253,16 +253,16 @@ void Monitor::count_reset() {
   since_reset_s_ = 0;
 }
 
-Mat6 Monitor::doubt(const Pose<W, B>& T_WB) const {
-  const Mat3 R_BW = T_WB.R().transpose();
-  const Mat3 turns_W = turns();
-  const Mat3 lever = hat(T_WB.p - where_W_);
+Mat6 Monitor::doubt(const Pose<G, B>& T_GB) const {
+  const Mat3 R_BG = T_GB.R().transpose();
+  const Mat3 turns_G = turns();
+  const Mat3 lever = hat(T_GB.p - where_G_);
   Mat6 out = Mat6::Zero();
-  out.topLeftCorner<3, 3>() = shifts_W_ + shift_W_ * shift_W_.transpose() + lever * turns_W * lever.transpose();
-  out.bottomRightCorner<3, 3>() = R_BW * turns_W * R_BW.transpose();
+  out.topLeftCorner<3, 3>() = shifts_G_ + shift_G_ * shift_G_.transpose() + lever * turns_G * lever.transpose();
+  out.bottomRightCorner<3, 3>() = R_BG * turns_G * R_BG.transpose();
   return out;
 }
 
-Mat3 Monitor::velocity_doubt(const Vec3& v_WB) const { return hat(v_WB) * turns() * hat(v_WB).transpose(); }
+Mat3 Monitor::velocity_doubt(const Vec3& v_GB) const { return hat(v_GB) * turns() * hat(v_GB).transpose(); }
 
 }  // namespace fbvins

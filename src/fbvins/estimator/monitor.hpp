@@ -24,7 +24,7 @@ class Monitor {
   struct Verdict {
     bool imu_contradicts = false;                  ///< images agree with one another, but not with the readings
     bool left_wrong = false, right_wrong = false;  ///< this camera alone contradicts the readings
-    std::optional<Pose<W, B>> seen;                ///< by the images alone, where the readings are contradicted
+    std::optional<Pose<G, B>> seen;                ///< by the images alone, where the readings are contradicted
     ImuNoiseScale noise;                           ///< that makes the contradiction one standard deviation
   };
 
@@ -34,7 +34,7 @@ class Monitor {
   /// A window begins.
   void restart();
   /// `sightings`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before.
-  Verdict examine(const std::vector<PointSighting>& sightings, const Calibration& calibration, const Pose<W, B>& predicted,
+  Verdict examine(const std::vector<PointSighting>& sightings, const Calibration& calibration, const Pose<G, B>& predicted,
                   Duration dt);
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
@@ -61,17 +61,17 @@ class Monitor {
   bool settling() const { return settling_ > 0; }
   /// The estimate is wrong, and will not recover by itself: gravity does not fit the attitude, or contradictions go on.
   bool hopeless() const { return hopeless_; }
-  /// Covariance of (dp in W [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
-  Mat6 doubt(const Pose<W, B>& T_WB) const;
-  /// And of this velocity, in W.
-  Mat3 velocity_doubt(const Vec3& v_WB) const;
+  /// Covariance of (dp in G [m], dtheta in B [rad]) that contradictions since the last reset leave at this pose.
+  Mat6 doubt(const Pose<G, B>& T_GB) const;
+  /// And of this velocity, in G.
+  Mat3 velocity_doubt(const Vec3& v_GB) const;
 
  private:
   void blind(Duration dt);
   void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt);
   void doubt_tilt(const Biases& before);
-  Mat3 turns() const { return turns_W_ + turn_W_ * turn_W_.transpose(); }
-  void take_doubt(const Pose<W, B>& predicted, const Vec3& turn_B, const Vec3& shift_W);
+  Mat3 turns() const { return turns_G_ + turn_G_ * turn_G_.transpose(); }
+  void take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G);
 
   ImuNoise assumed_;
   bool calibrating_;
@@ -82,10 +82,10 @@ class Monitor {
   double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
   bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
-  Vec3 turn_W_ = Vec3::Zero(), shift_W_ = Vec3::Zero();    ///< seen minus predicted, added up
-  Mat3 turns_W_ = Mat3::Zero(), shifts_W_ = Mat3::Zero();  ///< their squares, added up
-  Vec3 where_W_ = Vec3::Zero();                            ///< where the turn began
-  Vec3 tilt_W_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
+  Vec3 turn_G_ = Vec3::Zero(), shift_G_ = Vec3::Zero();    ///< seen minus predicted, added up
+  Mat3 turns_G_ = Mat3::Zero(), shifts_G_ = Mat3::Zero();  ///< their squares, added up
+  Vec3 where_G_ = Vec3::Zero();                            ///< where the turn began
+  Vec3 tilt_G_ = Vec3::Zero();                             ///< of the turn, not confirmed by gravity
   int settling_ = 0;                                       ///< images after darkness that are not judged
   std::optional<Time> begun_;
   std::deque<Biases> biases_;               ///< of the last two seconds

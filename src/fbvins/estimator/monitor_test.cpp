@@ -27,9 +27,9 @@ class Scene {
     for (int i = 0; i < points; ++i) points_.emplace_back(rng_.uniform(2, 6), rng_.uniform(-2, 2), rng_.uniform(-1.5, 1.5));
   }
 
-  /// The points from `T_WB`; those from `first_other` on, from `other`, as if they moved; each camera from a pose of its own.
-  std::vector<PointSighting> seen(const Pose<W, B>& left, const Pose<W, B>& right, std::size_t first_other = 1000,
-                                  const Pose<W, B>& other = {}) {
+  /// The points from `T_GB`; those from `first_other` on, from `other`, as if they moved; each camera from a pose of its own.
+  std::vector<PointSighting> seen(const Pose<G, B>& left, const Pose<G, B>& right, std::size_t first_other = 1000,
+                                  const Pose<G, B>& other = {}) {
     features_.assign(points_.size(), {});
     std::vector<PointSighting> out;
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -40,7 +40,7 @@ class Scene {
     }
     return out;
   }
-  std::vector<PointSighting> seen(const Pose<W, B>& T_WB) { return seen(T_WB, T_WB); }
+  std::vector<PointSighting> seen(const Pose<G, B>& T_GB) { return seen(T_GB, T_GB); }
 
   StereoRig rig = test::SimulatedFlight(test::Motion(0.1, 0.1), 1).rig;
   Calibration calibration{rig.T_BC0, rig.T_BC1, 0.0};
@@ -59,8 +59,8 @@ class Scene {
   std::vector<TrackedFeature> features_;
 };
 
-Pose<W, B> turned(double rad) { return Pose<W, B>{so3_exp(Vec3(0, 0, rad)), Vec3::Zero()}; }
-Pose<W, B> tilted(double rad) { return Pose<W, B>{so3_exp(Vec3(rad, 0, 0)), Vec3::Zero()}; }
+Pose<G, B> turned(double rad) { return Pose<G, B>{so3_exp(Vec3(0, 0, rad)), Vec3::Zero()}; }
+Pose<G, B> tilted(double rad) { return Pose<G, B>{so3_exp(Vec3(rad, 0, 0)), Vec3::Zero()}; }
 
 TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
   Scene scene;
@@ -76,7 +76,7 @@ TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
 TEST(Monitor, ReadingsThatTheImagesContradictCountAsMuchAsTheyAgree) {
   Scene scene;
   Monitor monitor(assumed(), false);
-  const Pose<W, B> truth = turned(0.02);
+  const Pose<G, B> truth = turned(0.02);
   const Monitor::Verdict verdict = monitor.examine(scene.seen(truth), scene.calibration, {}, kStep);
   ASSERT_TRUE(verdict.imu_contradicts);
   ASSERT_TRUE(verdict.seen);
@@ -112,9 +112,9 @@ TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
   Scene scene;
   for (const bool left : {true, false}) {
     Monitor monitor(assumed(), false);
-    const Pose<W, B> wrong = turned(0.02);
+    const Pose<G, B> wrong = turned(0.02);
     const Monitor::Verdict verdict =
-        monitor.examine(scene.seen(left ? wrong : Pose<W, B>{}, left ? Pose<W, B>{} : wrong), scene.calibration, {}, kStep);
+        monitor.examine(scene.seen(left ? wrong : Pose<G, B>{}, left ? Pose<G, B>{} : wrong), scene.calibration, {}, kStep);
     EXPECT_EQ(verdict.left_wrong, left);
     EXPECT_EQ(verdict.right_wrong, !left);
     EXPECT_FALSE(verdict.imu_contradicts);
@@ -172,7 +172,7 @@ TEST(Monitor, AContradictionLastsHalfASecondAndLeavesADoubt) {
   EXPECT_TRUE(monitor.contradicted());
   calm(monitor, scene);
   EXPECT_FALSE(monitor.contradicted());
-  const Pose<W, B> far{Quat::Identity(), Vec3(10, 0, 0)};
+  const Pose<G, B> far{Quat::Identity(), Vec3(10, 0, 0)};
   EXPECT_NEAR(std::sqrt(monitor.doubt(far)(5, 5)), 0.02 * std::sqrt(2), 2e-3) << "heading, of one contradiction";
   EXPECT_NEAR(std::sqrt(monitor.doubt(far)(1, 1)), 0.2 * std::sqrt(2), 0.03) << "and what it means ten metres on";
   EXPECT_FALSE(monitor.take_reset()) << "small enough for the covariance";

@@ -16,7 +16,7 @@ struct NormalEquations {
   Vec6 g = Vec6::Zero();
   int inliers = 0;
 
-  void add(const Observation& o, const Vec3& p_B, const Mat3& R_CB, const Vec3& t_BC, const Mat3& R_BW) {
+  void add(const Observation& o, const Vec3& p_B, const Mat3& R_CB, const Vec3& t_BC, const Mat3& R_BG) {
     const Vec3 p_C = R_CB * (p_B - t_BC);
     if (p_C.z() < kMinDepth_m) return;
     const double iz = 1.0 / p_C.z();
@@ -26,7 +26,7 @@ struct NormalEquations {
     A.col(2) = -iz * iz * (o.sqrt_information * p_C.head<2>());
     A = (A * R_CB).eval();
     Eigen::Matrix<double, 2, 6> J;
-    J.leftCols<3>() = -A * R_BW;
+    J.leftCols<3>() = -A * R_BG;
     J.rightCols<3>() = A * hat(p_B);
     const double w = huber(r.squaredNorm(), kHuberSigma).weight;
     H += w * J.transpose() * J;
@@ -37,25 +37,25 @@ struct NormalEquations {
 
 }  // namespace
 
-PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<W, B> guess,
+PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
                            int max_iterations) {
   const CameraGeometry cameras(calibration);
   PoseRefinement out{guess, 0, false};
   for (int i = 0; i < max_iterations; ++i) {
     NormalEquations n;
-    const Mat3 R_BW = out.T_WB.R().transpose();
+    const Mat3 R_BG = out.T_GB.R().transpose();
     for (const PointSighting& s : sightings) {
-      const Vec3 p_B = R_BW * (s.p_W - out.T_WB.p);
-      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BW);
+      const Vec3 p_B = R_BG * (s.p_G - out.T_GB.p);
+      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BG);
       const int of_left = n.inliers;
-      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[1], cameras.t_BC[1], R_BW);
+      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[1], cameras.t_BC[1], R_BG);
       n.inliers = s.feature->left ? of_left : n.inliers;
     }
     out.inliers = n.inliers;
     const Eigen::LDLT<Mat6> ldlt(n.H);
     if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-9)) return out;
     const Vec6 step = -ldlt.solve(n.g);
-    out.T_WB = out.T_WB.boxplus(step.head<3>(), step.tail<3>());
+    out.T_GB = out.T_GB.boxplus(step.head<3>(), step.tail<3>());
     if (step.lpNorm<Eigen::Infinity>() < 1e-6) {
       out.converged = true;
       break;

@@ -11,17 +11,17 @@
 namespace fbvins {
 
 struct PointSighting {  // a landmark of known position and its observations
-  Vec3 p_W = Vec3::Zero();
+  Vec3 p_G = Vec3::Zero();
   const TrackedFeature* feature = nullptr;
 };
 
 struct PoseRefinement {
-  Pose<W, B> T_WB;
+  Pose<G, B> T_GB;
   int inliers = 0;         ///< points whose left observation, or right one where there is no left one, is within 3 sigma
   bool converged = false;  ///< or stopped at max_iterations with inliers
 };
 
-PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<W, B> guess,
+PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
                            int max_iterations = 15);
 
 }  // namespace fbvins

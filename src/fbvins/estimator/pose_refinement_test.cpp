@@ -13,45 +13,45 @@ struct Seen {
   test::SimulatedFlight flight{test::Motion(0.5, 0.3), 31};
   TrackedFrame frame;
   Calibration calibration{flight.rig.T_BC0, flight.rig.T_BC1, 0.0};
-  Pose<W, B> truth;
+  Pose<G, B> truth;
   std::vector<PointSighting> sightings;
 
   Seen() {
     flight.pixel_sigma_px = 0.3;
     frame = flight.frame(0);
-    truth = flight.truth(0).T_WB;
+    truth = flight.truth<G>(0).T_FB;
     for (const TrackedFeature& f : frame.features) sightings.push_back({nearest(f), &f});
   }
   /// The point whose projection is nearest to the feature.
   Vec3 nearest(const TrackedFeature& f) const {
     Vec3 best = Vec3::Zero();
     double least = 1e9;
-    for (const Vec3& p_W : flight.points()) {
-      const Vec3 p_C = calibration.T_BC0.inverse() * (truth.inverse() * p_W);
+    for (const Vec3& p_G : flight.points()) {
+      const Vec3 p_C = calibration.T_BC0.inverse() * (truth.inverse() * p_G);
       if (p_C.z() < 0.2) continue;
       const double distance = (p_C.head<2>() / p_C.z() - f.left->normalised).norm();
-      if (distance < least) least = distance, best = p_W;
+      if (distance < least) least = distance, best = p_G;
     }
     return best;
   }
-  Pose<W, B> guess() const { return truth.boxplus(Vec3(0.1, -0.2, 0.1), Vec3(0.03, 0.02, -0.05)); }
+  Pose<G, B> guess() const { return truth.boxplus(Vec3(0.1, -0.2, 0.1), Vec3(0.03, 0.02, -0.05)); }
 };
 
 TEST(PoseRefinement, FindsThePoseFromAGuess) {
   Seen s;
   const PoseRefinement found = refine_pose(s.sightings, s.calibration, s.guess());
   EXPECT_TRUE(found.converged);
-  EXPECT_LT((found.T_WB.p - s.truth.p).norm(), 0.01);
-  EXPECT_LT(so3_log(s.truth.q.conjugate() * found.T_WB.q).norm(), 0.003);
+  EXPECT_LT((found.T_GB.p - s.truth.p).norm(), 0.01);
+  EXPECT_LT(so3_log(s.truth.q.conjugate() * found.T_GB.q).norm(), 0.003);
   EXPECT_GT(found.inliers, 0.9 * static_cast<double>(s.sightings.size()));
 }
 
 TEST(PoseRefinement, OutliersAreNoInliers) {
   Seen s;
   const std::size_t wrong = s.sightings.size() / 5;
-  for (std::size_t k = 0; k < wrong; ++k) s.sightings[k].p_W += Vec3(0.5, -0.5, 0.5);
+  for (std::size_t k = 0; k < wrong; ++k) s.sightings[k].p_G += Vec3(0.5, -0.5, 0.5);
   const PoseRefinement found = refine_pose(s.sightings, s.calibration, s.guess());
-  EXPECT_LT((found.T_WB.p - s.truth.p).norm(), 0.05);
+  EXPECT_LT((found.T_GB.p - s.truth.p).norm(), 0.05);
   EXPECT_LE(found.inliers, static_cast<int>(s.sightings.size() - wrong) + 2);
 }
 
@@ -60,7 +60,7 @@ TEST(PoseRefinement, WithoutFeaturesItDoesNotConverge) {
   const PoseRefinement found = refine_pose({}, s.calibration, s.guess());
   EXPECT_FALSE(found.converged);
   EXPECT_EQ(found.inliers, 0);
-  EXPECT_EQ(found.T_WB.p, s.guess().p);
+  EXPECT_EQ(found.T_GB.p, s.guess().p);
 }
 
 }  // namespace

@@ -44,13 +44,13 @@ void PublishedPose::follow(const std::optional<Pose<B, B>>& motion, const Pose<W
   pending_ = difference(level, T_WB_);
 }
 
-void PublishedPose::fill(const NavState& level, Odometry& out) {
-  const Quat turn = (T_WB_.q * level.T_WB.q.conjugate()).normalized();  // from level to the published attitude
+void PublishedPose::fill(const NavState<W>& level, Odometry& out) {
+  const Quat turn = (T_WB_.q * level.T_FB.q.conjugate()).normalized();  // from level to the published attitude
   out.T_WB = T_WB_;
-  out.v_WB = turn * level.v_WB;
+  out.v_WB = turn * level.v_FB;
   out.up_W = turn * Vec3::UnitZ();
   if (!out.pose_covariance.isZero(0)) {
-    const Vec3 pending_v = level.v_WB - out.v_WB;
+    const Vec3 pending_v = level.v_FB - out.v_WB;
     out.pose_covariance += pending_ * pending_.transpose();
     out.velocity_covariance += pending_v * pending_v.transpose();
     tilt_sigma_rad_ = tilt_sigma_of(T_WB_.q, out.pose_covariance.bottomRightCorner<3, 3>());

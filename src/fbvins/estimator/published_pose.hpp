@@ -3,7 +3,7 @@
 // published at once but stay pending, and are applied by at most a fixed step with every frame
 // (docs/derivations/window.md, W17-W20).
 //
-//   published.follow(motion, level.T_WB);    // motion of the body since the frame before, by the IMU; its pose, levelled
+//   published.follow(motion, level.T_FB);    // motion of the body since the frame before, by the IMU; its pose, levelled
 //   published.fill(level, odometry);
 //
 // A value; the same calls give the same bits.
@@ -33,7 +33,7 @@ class PublishedPose {
   /// The next frame. Without `motion` since the last one its pose is published as the window has it.
   void follow(const std::optional<Pose<B, B>>& motion, const Pose<W, B>& level);
   /// Fills pose, velocity, up and tilt; adds the pending correction to the covariances in `out`, which are of the level state.
-  void fill(const NavState& level, Odometry& out);
+  void fill(const NavState<W>& level, Odometry& out);
 
   /// The pending correction is larger than a pose called good may be wrong, and so large that paying it slowly would mislead
   /// whoever follows the pose.

@@ -18,7 +18,7 @@ Pose<W, B> flown(int k) {
 
 Pose<B, B> motion(int k) { return flown(k - 1).inverse() * flown(k); }
 
-NavState at(const Pose<W, B>& T) { return {T, Vec3(2, 0.5, 0), {}}; }
+NavState<W> at(const Pose<W, B>& T) { return {T, Vec3(2, 0.5, 0), {}}; }
 
 double angle(const Quat& a, const Quat& b) { return so3_log((a.conjugate() * b).normalized()).norm(); }
 
@@ -67,11 +67,11 @@ TEST(PublishedPose, VelocityIsThatOfTheMotionInTheAxesOfThePose) {
   Odometry o;
   o.pose_covariance = 1e-6 * Mat6::Identity();
   o.velocity_covariance = 1e-4 * Mat3::Identity();
-  const NavState level = at(kCorrection * flown(1));
-  published.follow(motion(1), level.T_WB);
+  const NavState<W> level = at(kCorrection * flown(1));
+  published.follow(motion(1), level.T_FB);
   published.fill(level, o);
-  EXPECT_LT((o.T_WB.q.conjugate() * o.v_WB - level.T_WB.q.conjugate() * level.v_WB).norm(), 1e-12);
-  EXPECT_LT((o.T_WB.q.conjugate() * o.up_W - level.T_WB.q.conjugate() * Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((o.T_WB.q.conjugate() * o.v_WB - level.T_FB.q.conjugate() * level.v_FB).norm(), 1e-12);
+  EXPECT_LT((o.T_WB.q.conjugate() * o.up_W - level.T_FB.q.conjugate() * Vec3::UnitZ()).norm(), 1e-12);
 }
 
 TEST(PublishedPose, CovarianceIncludesThePendingCorrection) {
@@ -82,13 +82,13 @@ TEST(PublishedPose, CovarianceIncludesThePendingCorrection) {
     Odometry o;
     o.pose_covariance = 1e-6 * Mat6::Identity();
     o.velocity_covariance = 1e-4 * Mat3::Identity();
-    const NavState level = at(kCorrection * flown(k));
-    published.follow(motion(k), level.T_WB);
+    const NavState<W> level = at(kCorrection * flown(k));
+    published.follow(motion(k), level.T_FB);
     published.fill(level, o);
     Vec6 error;  // if the window is right
-    error << level.T_WB.p - o.T_WB.p, so3_log((o.T_WB.q.conjugate() * level.T_WB.q).normalized());
+    error << level.T_FB.p - o.T_WB.p, so3_log((o.T_WB.q.conjugate() * level.T_FB.q).normalized());
     EXPECT_LE(error.dot(o.pose_covariance.inverse() * error), 1) << k;
-    const Vec3 v_error = level.v_WB - o.v_WB;
+    const Vec3 v_error = level.v_FB - o.v_WB;
     EXPECT_LE(v_error.dot(o.velocity_covariance.inverse() * v_error), 1) << k;
     EXPECT_GE(o.tilt_sigma_rad, 1e-3 - 1e-12);
     EXPECT_EQ(o.level, o.tilt_sigma_rad < kLevelSigma_rad);

@@ -7,6 +7,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/calibration.hpp"
+#include "fbvins/types/gauge.hpp"
 
 namespace fbvins {
 
@@ -16,15 +17,15 @@ namespace fbvins {
 /// The *_first values are the same at the linearisation points, where Jacobians are taken (W9).
 struct PairGeometry {
   Mat3 R_th, R_th_first;
-  Mat3 R_t_first;  ///< R_WBt
+  Mat3 R_t_first;  ///< R_GBt
   Vec3 t_th, t_th_first;
 
-  void set(const Pose<W, B>& host, const Pose<W, B>& target) {
+  void set(const Pose<G, B>& host, const Pose<G, B>& target) {
     const Mat3 R_tT = target.R().transpose();
     R_th.noalias() = R_tT * host.R();
     t_th.noalias() = R_tT * (host.p - target.p);
   }
-  void set_first(const Pose<W, B>& host, const Pose<W, B>& target) {
+  void set_first(const Pose<G, B>& host, const Pose<G, B>& target) {
     R_t_first = target.R();
     R_th_first.noalias() = R_t_first.transpose() * host.R();
     t_th_first.noalias() = R_t_first.transpose() * (host.p - target.p);

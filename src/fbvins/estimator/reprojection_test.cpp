@@ -14,8 +14,8 @@ struct Seen {
   Calibration calibration{{so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)},
                           {so3_exp(Vec3(0.12, -1.21, 0.28)), Vec3(0.1, 0.02, -0.04)},
                           0.004};
-  Pose<W, B> host{so3_exp(Vec3(0.3, 0.2, -0.5)), Vec3(1, 2, 3)};
-  Pose<W, B> target{so3_exp(Vec3(0.35, 0.1, -0.45)), Vec3(1.2, 1.9, 3.1)};
+  Pose<G, B> host{so3_exp(Vec3(0.3, 0.2, -0.5)), Vec3(1, 2, 3)};
+  Pose<G, B> target{so3_exp(Vec3(0.35, 0.1, -0.45)), Vec3(1.2, 1.9, 3.1)};
   WindowLandmark landmark{.alpha_beta_rho = Vec3(0.2, -0.1, 0.4)};
   WindowObservation o;
 
@@ -99,7 +99,7 @@ TEST(Reprojection, BehindTheCameraThereIsNone) {
 TEST(LandmarkPrior, JacobiansAreDerivatives) {
   Seen s;
   LandmarkPrior prior;
-  prior.p_W = Vec3(2, 2, 4);
+  prior.p_G = Vec3(2, 2, 4);
   prior.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
   const auto residual = [&](const Seen& at) {
     return landmark_prior_residual(CameraGeometry(at.calibration), at.host, at.landmark, prior);

@@ -4,7 +4,7 @@
 //
 //   SimulatedFlight flight(test::Motion(0.5, 0.3), 1);
 //   TrackedFrame frame = flight.frame(k);      // k = 0, 1, 2, ... in order
-//   NavState truth = flight.truth(k);
+//   NavState<W> truth = flight.truth(k);
 #pragma once
 
 #include <algorithm>
@@ -52,7 +52,10 @@ class SimulatedFlight {
   }
 
   Time stamp(int k) const { return Time{1'000'000'000} + Duration::from_seconds(k / image_rate_hz); }
-  NavState truth(int k) const { return motion_.state(stamp(k).seconds(), bias); }
+  template <class F = W>
+  NavState<F> truth(int k) const {
+    return motion_.state<F>(stamp(k).seconds(), bias);
+  }
   const std::vector<Vec3>& points() const { return points_; }
 
   TrackedFrame frame(int k) {
@@ -84,7 +87,7 @@ class SimulatedFlight {
 
  private:
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
-    const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_WB.inverse();
+    const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_FB.inverse();
     std::unordered_set<TrackId> in_use;
     // Tracks that continue first, then new ones up to the limit.
     for (const bool followed : {true, false}) {

@@ -35,7 +35,7 @@ class SlidingWindow {
   const Frame& newest() const { return frames_.newest(); }
   const Tilt& tilt() const { return tilt_; }
   /// The point about which poses are levelled from now on.
-  void set_pivot(const Vec3& p_W) { tilt_.pivot_W = p_W; }
+  void set_pivot(const Vec3& p_G) { tilt_.pivot = p_G; }
   const WindowPrior& prior() const { return prior_; }
   void set_prior(WindowPrior prior);
   /// Moves the linearisation point of the prior to the present states; its mean and covariance stay. Only
@@ -69,7 +69,7 @@ class SlidingWindow {
   const KnownLandmarks& known() const { return known_; }
 
  private:
-  /// Not with UpDirection::fixed: there W turns as gravity becomes better known, and remembered positions would be wrong.
+  /// Not with UpDirection::fixed: there G turns as gravity becomes better known, and remembered positions would be wrong.
   bool remembers_landmarks() const { return options_.known_landmarks.enabled && weights_.estimate_tilt; }
   void refuse_distant_prior(Landmark& landmark, const Calibration& calibration);
   void drop_prior(Landmark& landmark);

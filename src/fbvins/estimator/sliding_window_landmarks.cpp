@@ -72,7 +72,7 @@ int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
 /// A landmark very far from its prior is another one; its factor would spoil the solve.
 void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
   const WindowLandmark numbers{.right_ray = landmark.right_ray, .alpha_beta_rho = landmark.alpha_beta_rho};
-  const Pose<W, B>& host = frames_.at(landmark.host).state.T_WB;
+  const Pose<G, B>& host = frames_.at(landmark.host).state.T_FB;
   const double distance_sigma = landmark_prior_residual(CameraGeometry(calibration), host, numbers, *landmark.prior).norm();
   if (distance_sigma < kFarFromPrior * kPriorOutlier_sigma) return;
   drop_prior(landmark);
@@ -95,8 +95,8 @@ void SlidingWindow::remember(const WindowProblem& problem, std::span<const Leavi
   for (std::size_t k = 0; k < leaving.size(); ++k) {
     const WindowLandmark& numbers = problem.landmarks[leaving[k].index];
     Landmark& landmark = *landmarks_.find(numbers.id);
-    const Pose<W, C0> T_WC = problem.frames[numbers.host].state.T_WB * ray_camera(problem.calibration, numbers.right_ray);
-    known_.remember(landmark.track, T_WC, numbers.alpha_beta_rho, information[k]);
+    const Pose<G, C0> T_GC = problem.frames[numbers.host].state.T_FB * ray_camera(problem.calibration, numbers.right_ray);
+    known_.remember(landmark.track, T_GC, numbers.alpha_beta_rho, information[k]);
     landmark.prior = known_.find(landmark.track);
   }
 }

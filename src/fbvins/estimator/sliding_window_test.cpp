@@ -19,9 +19,9 @@ Calibration rig() {
   c.T_BC1.p = Vec3(kBaseline_m, 0, 0);
   return c;
 }
-NavState state_at(int k) {
-  NavState s;
-  s.T_WB.p = Vec3(kStep_m * k, 0, 0);
+NavState<G> state_at(int k) {
+  NavState<G> s;
+  s.T_FB.p = Vec3(kStep_m * k, 0, 0);
   return s;
 }
 Time stamp(int k) { return Time{k * 50'000'000}; }
@@ -42,17 +42,17 @@ ImuSegment readings_up_to(int k) {
 }
 
 struct Scene {
-  std::map<int, Vec3> points_W;  ///< by track
+  std::map<int, Vec3> points_G;  ///< by track
   Calibration calibration = rig();
   SlidingWindow window;
   WindowProblem problem;
 
   explicit Scene(const EstimatorOptions& options = {}) : window(options, WindowWeights{}) {
-    for (int track = 0; track < 12; ++track) points_W[track] = Vec3(0.2 * track - 1, 0.1 * (track % 4), 2 + 0.1 * track);
+    for (int track = 0; track < 12; ++track) points_G[track] = Vec3(0.2 * track - 1, 0.1 * (track % 4), 2 + 0.1 * track);
   }
 
   TrackedFeature feature(int track, int k, bool stereo = true, const Vec2& left_shift = Vec2::Zero()) const {
-    const Vec3 p_B = state_at(k).T_WB.inverse() * points_W.at(track);
+    const Vec3 p_B = state_at(k).T_FB.inverse() * points_G.at(track);
     TrackedFeature f;
     f.id = TrackId{track};
     f.left = seen_at(p_B);
@@ -62,7 +62,7 @@ struct Scene {
   }
   std::vector<TrackedFeature> all(int k, bool stereo = true) const {
     std::vector<TrackedFeature> out;
-    for (const auto& [track, p] : points_W) out.push_back(feature(track, k, stereo));
+    for (const auto& [track, p] : points_G) out.push_back(feature(track, k, stereo));
     return out;
   }
   void add(int k, const std::vector<TrackedFeature>& features, bool keyframe = false) {
@@ -83,10 +83,10 @@ struct Scene {
       if (l.track == TrackId{track}) return &l;
     return nullptr;
   }
-  Vec3 position_W(int track) const {
+  Vec3 position_G(int track) const {
     const Landmark& l = *landmark(track);
-    const Pose<W, C0> T_WC = window.frames().at(l.host).state.T_WB * calibration.T_BC0;
-    return T_WC * Vec3(Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z());
+    const Pose<G, C0> T_GC = window.frames().at(l.host).state.T_FB * calibration.T_BC0;
+    return T_GC * Vec3(Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1) / l.alpha_beta_rho.z());
   }
   const WindowProblem& fill_problem() {
     window.fill_problem(calibration, problem);
@@ -108,7 +108,7 @@ TEST(SlidingWindow, FilesSightingsUnderTheirTracks) {
   s.add(0, s.all(0));
   s.add(1, {s.feature(3, 1), s.feature(4, 1, false)});
   EXPECT_EQ(s.window.frames().size(), 2);
-  ASSERT_EQ(s.window.landmarks().all().size(), s.points_W.size());
+  ASSERT_EQ(s.window.landmarks().all().size(), s.points_G.size());
   EXPECT_EQ(s.landmark(3)->sightings.size(), 2u);
   EXPECT_TRUE(s.landmark(3)->sightings[1].right.has_value());
   EXPECT_FALSE(s.landmark(4)->sightings[1].right.has_value());
@@ -124,17 +124,17 @@ TEST(SlidingWindow, TriangulatesWhereTwoRaysAgreeAndFarEnoughApart) {
   Scene s;
   s.add(0, {s.feature(0, 0), s.feature(1, 0, false), s.feature(2, 0)});
   EXPECT_TRUE(s.landmark(0)->triangulated) << "two cameras";
-  EXPECT_LT((s.position_W(0) - s.points_W[0]).norm(), 1e-9);
+  EXPECT_LT((s.position_G(0) - s.points_G[0]).norm(), 1e-9);
   EXPECT_FALSE(s.landmark(1)->triangulated) << "one ray";
   s.add(1, {s.feature(1, 1, false)});
   EXPECT_TRUE(s.landmark(1)->triangulated) << "two frames";
-  EXPECT_LT((s.position_W(1) - s.points_W[1]).norm(), 1e-9);
+  EXPECT_LT((s.position_G(1) - s.points_G[1]).norm(), 1e-9);
 }
 
 TEST(SlidingWindow, DoesNotTriangulateRaysThatDoNotMeet) {
   Scene s;
-  s.points_W[20] = Vec3(0.02, 0.01, 0.05);  // nearer than any landmark may be
-  s.points_W[21] = Vec3(3, 1, 4000);
+  s.points_G[20] = Vec3(0.02, 0.01, 0.05);  // nearer than any landmark may be
+  s.points_G[21] = Vec3(3, 1, 4000);
   s.add(0, {s.feature(6, 0, true, Vec2(0, 0.02)), s.feature(7, 0, true, Vec2(-0.2, 0)), s.feature(20, 0), s.feature(21, 0)});
   EXPECT_FALSE(s.landmark(6)->triangulated) << "rays pass one another by sixteen sigmas";
   EXPECT_FALSE(s.landmark(7)->triangulated) << "they meet behind the cameras";
@@ -151,7 +151,7 @@ TEST(SlidingWindow, DescribesWhichLandmarkIsWhich) {
   ASSERT_EQ(p.frames.size(), 4u);
   EXPECT_EQ(p.frames[2].id, FrameId{2});
   EXPECT_EQ(p.index_of(FrameId{2}), 2);
-  ASSERT_EQ(p.landmarks.size(), s.points_W.size());
+  ASSERT_EQ(p.landmarks.size(), s.points_G.size());
   for (const WindowLandmark& l : p.landmarks) {
     const Landmark* filed = s.window.landmarks().find(l.id);
     ASSERT_NE(filed, nullptr);
@@ -176,13 +176,13 @@ TEST(SlidingWindow, AcceptsASolutionByIdsThoughFramesHaveLeftMeanwhile) {
   Scene s;
   for (int k = 0; k < 4; ++k) s.add(k, s.all(k));
   WindowProblem solved = s.fill_problem();
-  for (WindowFrame& f : solved.frames) f.state.v_WB = Vec3(static_cast<double>(f.id.value), 0, 0);
+  for (WindowFrame& f : solved.frames) f.state.v_FB = Vec3(static_cast<double>(f.id.value), 0, 0);
   for (WindowLandmark& l : solved.landmarks) l.alpha_beta_rho.z() += 1e-3 * static_cast<double>(l.id.value);
   s.window.drop_frame(1, s.calibration);
   const double before = s.landmark(7)->alpha_beta_rho.z();
   s.window.take_estimates(solved);
   EXPECT_EQ(s.window.frames().size(), 3);
-  for (const Frame& f : s.window.frames()) EXPECT_EQ(f.state.v_WB.x(), static_cast<double>(f.id.value));
+  for (const Frame& f : s.window.frames()) EXPECT_EQ(f.state.v_FB.x(), static_cast<double>(f.id.value));
   EXPECT_NEAR(s.landmark(7)->alpha_beta_rho.z() - before, 1e-3 * static_cast<double>(s.landmark(7)->id.value), 1e-12);
 }
 
@@ -200,7 +200,7 @@ TEST(SlidingWindow, AFrameThatIsDroppedLeavesItsReadingsToTheNext) {
   // Landmarks it hosted are hosted by the next frame that sees them, and stay where they are.
   EXPECT_EQ(s.landmark(2)->host, FrameId{2});
   EXPECT_EQ(s.landmark(2)->sightings.size(), 2u);
-  EXPECT_LT((s.position_W(2) - s.points_W[2]).norm(), 1e-9);
+  EXPECT_LT((s.position_G(2) - s.points_G[2]).norm(), 1e-9);
 }
 
 TEST(SlidingWindow, AFrameInThePriorIsDroppedIntoIt) {
@@ -226,7 +226,7 @@ TEST(SlidingWindow, AFrameInThePriorIsDroppedIntoIt) {
       << "the upward velocity by the bias and the noise";
   EXPECT_NEAR(covariance(16, 16), held + squared(noise.accel_random_walk_mps3_rthz) * dt, 1e-9) << "the bias has walked";
   EXPECT_TRUE(s.window.frames().oldest().in_prior);
-  EXPECT_EQ(s.window.landmarks().all().size(), s.points_W.size());
+  EXPECT_EQ(s.window.landmarks().all().size(), s.points_G.size());
 }
 
 TEST(SlidingWindow, OutliersAreRemovedAndThreeSolvesWithOutliersRejectATrack) {
@@ -281,11 +281,11 @@ TEST(SlidingWindow, LandmarksLeaveWithTheirKeyframeAndAreRemembered) {
   EXPECT_EQ(s.landmark(1)->host, FrameId{2});
   EXPECT_EQ(s.landmark(1)->sightings.size(), 3u);
   ASSERT_TRUE(s.landmark(1)->prior.has_value());
-  EXPECT_LT((s.landmark(1)->prior->p_W - s.points_W[1]).norm(), 1e-6);
+  EXPECT_LT((s.landmark(1)->prior->p_G - s.points_G[1]).norm(), 1e-6);
   const auto known = s.window.known().find(TrackId{0});
   ASSERT_TRUE(known.has_value());
-  EXPECT_LT((known->p_W - s.points_W[0]).norm(), 1e-6);
-  EXPECT_EQ(s.window.known().take_new().size(), s.points_W.size());
+  EXPECT_LT((known->p_G - s.points_G[0]).norm(), 1e-6);
+  EXPECT_EQ(s.window.known().take_new().size(), s.points_G.size());
 
   s.add(5, {s.feature(0, 5)});  // seen again under its old track
   ASSERT_TRUE(s.landmark(0)->prior.has_value());
@@ -311,7 +311,7 @@ TEST(SlidingWindow, RemembersNoLandmarksWhereUpIsFixed) {
 TEST(SlidingWindow, ALandmarkFarFromItsPriorIsAnother) {
   Scene s = about_to_shrink();
   s.window.marginalise_keyframe(0, s.calibration);
-  s.points_W[0] += Vec3(0, 0.8, 0);  // far from the estimate: its triangulation refuses the prior
+  s.points_G[0] += Vec3(0, 0.8, 0);  // far from the estimate: its triangulation refuses the prior
   s.add(5, {s.feature(0, 5), s.feature(1, 5), s.feature(2, 5)});
   EXPECT_FALSE(s.landmark(0)->prior.has_value());
   EXPECT_FALSE(s.window.known().find(TrackId{0}).has_value());
@@ -331,16 +331,16 @@ TEST(SlidingWindow, SnapshotKeyframeAndDistanceShowItsContents) {
   const WindowSnapshot snapshot = snapshot_of(s.window, s.calibration);
   ASSERT_EQ(snapshot.frames.size(), 3u);
   EXPECT_TRUE(snapshot.frames[1].keyframe);
-  EXPECT_EQ(snapshot.frames[2].T_WB.p, state_at(2).T_WB.p);
-  ASSERT_EQ(snapshot.landmarks.size(), s.points_W.size());
+  EXPECT_EQ(snapshot.frames[2].T_WB.p, state_at(2).T_FB.p);
+  ASSERT_EQ(snapshot.landmarks.size(), s.points_G.size());
   for (const WindowSnapshot::Landmark& l : snapshot.landmarks) {
     EXPECT_EQ(l.observations, 3);
-    EXPECT_LT((l.p_W - s.points_W[static_cast<int>(l.track.value)]).norm(), 1e-9);
+    EXPECT_LT((l.p_W - s.points_G[static_cast<int>(l.track.value)]).norm(), 1e-9);
   }
   const Keyframe keyframe = keyframe_of(s.window, 1, s.calibration);
   EXPECT_EQ(keyframe.id, FrameId{1});
-  ASSERT_EQ(keyframe.landmarks.size(), s.points_W.size());
-  EXPECT_LT((keyframe.landmarks[0].p_B - (s.points_W[0] - state_at(1).T_WB.p)).norm(), 1e-9);
+  ASSERT_EQ(keyframe.landmarks.size(), s.points_G.size());
+  EXPECT_LT((keyframe.landmarks[0].p_B - (s.points_G[0] - state_at(1).T_FB.p)).norm(), 1e-9);
   // No rotation: the image motion since the keyframe is the step divided by the depth.
   const KeyframeDistance d = distance_to_last_keyframe(s.window, s.calibration, 400);
   EXPECT_EQ(d.shared_ratio, 1);

@@ -34,15 +34,15 @@ LargestStep fly(SimulatedFlight& flight, int frames, const EstimatorOptions& opt
     const Odometry o = estimator.process(flight.frame(k)).odometry;
     const FrameList& window = estimator.window().frames();
     if (before && before->reset_counter == o.reset_counter && o.health.has_pose()) {
-      const NavState& from = window[window.size() - 2].state;
-      const Vec3 gravity_W = estimator.window().tilt().gravity_W(options.gravity_mps2);
+      const NavState<G>& from = window[window.size() - 2].state;
+      const Vec3 gravity_G = estimator.window().tilt().gravity_G(options.gravity_mps2);
       const Frame& newest = window.newest();
-      const NavState to = newest.imu ? newest.imu->predict(from, gravity_W) : newest.state;
-      const Pose<W, B> moved = before->T_WB * (from.T_WB.inverse() * to.T_WB);
+      const NavState<G> to = newest.imu ? newest.imu->predict(from, gravity_G) : newest.state;
+      const Pose<W, B> moved = before->T_WB * (from.T_FB.inverse() * to.T_FB);
       out.m = std::max(out.m, (o.T_WB.p - moved.p).norm());
       out.rad = std::max(out.rad, angle(moved.q, o.T_WB.q));
-      out.gauge_m = std::max(out.gauge_m, (from.T_WB.p - before->gauge.T_GB.p).norm());
-      out.pending_m = std::max(out.pending_m, (estimator.window().tilt().levelled(newest.state.T_WB).p - o.T_WB.p).norm());
+      out.gauge_m = std::max(out.gauge_m, (from.T_FB.p - before->gauge.T_GB.p).norm());
+      out.pending_m = std::max(out.pending_m, (estimator.window().tilt().levelled(newest.state.T_FB).p - o.T_WB.p).norm());
       ++out.poses;
     }
     out.restarts = static_cast<int>(o.reset_counter);
@@ -104,7 +104,7 @@ TEST(Level, IsReportedWhenTheTiltIsKnown) {
   for (int k = 0; k < 400; ++k) {
     const Odometry o = estimator.process(flight.frame(k)).odometry;
     if (!o.health.has_pose()) continue;
-    const double error = tilt_error(o.T_WB.q, flight.truth(k).T_WB.q);
+    const double error = tilt_error(o.T_WB.q, flight.truth(k).T_FB.q);
     EXPECT_LT(error, 4 * o.tilt_sigma_rad) << k;
     EXPECT_EQ(o.level, o.tilt_sigma_rad < kLevelSigma_rad) << k;
     EXPECT_TRUE(!o.level || error < 0.015) << k << ": " << error;
@@ -126,7 +126,7 @@ TEST(ImuState, BiasesOfTheFlightBeforeMakeTheStartLevel) {
     const Odometry unknown = without.process(flight.frame(k)).odometry, known = with.process(again.frame(k)).odometry;
     if (!unknown.health.has_pose() || !known.health.has_pose()) continue;
     EXPECT_LT(known.tilt_sigma_rad, unknown.tilt_sigma_rad) << k;
-    EXPECT_LT(tilt_error(known.T_WB.q, flight.truth(k).T_WB.q), 0.008) << k;
+    EXPECT_LT(tilt_error(known.T_WB.q, flight.truth(k).T_FB.q), 0.008) << k;
   }
 }
 

@@ -66,7 +66,7 @@ void add_imu_blocks(int j, const Mat15 (&J)[2], const Eigen::Matrix<double, 15, 
 }
 
 double imu_terms(const WindowProblem& w, NormalEquations* out) {
-  const Vec3 gravity_W = w.tilt.gravity_W(w.weights.gravity_mps2);
+  const Vec3 gravity_G = w.tilt.gravity_G(w.weights.gravity_mps2);
   const Mat32 gravity_by_tilt = w.tilt.gravity_jacobian(w.weights.gravity_mps2);
   double cost = 0;
   for (int j = 1; j < w.frame_count(); ++j) {
@@ -74,12 +74,12 @@ double imu_terms(const WindowProblem& w, NormalEquations* out) {
     if (imu == nullptr || imu->empty()) continue;
     const int i = j - 1;
     if (out == nullptr) {
-      cost += 0.5 * weighted_imu_residual(w.frames[i].state, w.frames[j].state, *imu, gravity_W).squaredNorm();
+      cost += 0.5 * weighted_imu_residual(w.frames[i].state, w.frames[j].state, *imu, gravity_G).squaredNorm();
       continue;
     }
     Mat15 J[2];
     const Vec15 r = weighted_imu_residual(w.frames[i].state, w.frames[j].state, w.linearisation_point(i),
-                                          w.linearisation_point(j), *imu, gravity_W, &J[0], &J[1]);
+                                          w.linearisation_point(j), *imu, gravity_G, &J[0], &J[1]);
     cost += 0.5 * r.squaredNorm();
     const double dt = imu->dt_s();  // the derivatives by gravity are those by p_j and v_j, scaled and negated (W15)
     const Eigen::Matrix<double, 15, 2> J_tilt =
@@ -94,7 +94,7 @@ double standstill_terms(const WindowProblem& w, NormalEquations* out) {
   double cost = 0;
   for (int i = 0; i < w.frame_count(); ++i) {
     if (!w.frames[i].standstill) continue;
-    const Vec3& v = w.frames[i].state.v_WB;
+    const Vec3& v = w.frames[i].state.v_FB;
     cost += 0.5 * information * v.squaredNorm();
     if (out == nullptr) continue;
     const int row = out->layout.speed_bias_row(i);
@@ -127,10 +127,10 @@ void PairTable::fill(const WindowProblem& window, bool with_first_estimates) {
   for (std::size_t h = 0; h < n_; ++h) {
     for (std::size_t t = 0; t < n_; ++t) {
       PairGeometry& geometry = pairs_[h * n_ + t];
-      geometry.set(window.frames[h].state.T_WB, window.frames[t].state.T_WB);
+      geometry.set(window.frames[h].state.T_FB, window.frames[t].state.T_FB);
       if (with_first_estimates)
-        geometry.set_first(window.linearisation_point(static_cast<int>(h)).T_WB,
-                           window.linearisation_point(static_cast<int>(t)).T_WB);
+        geometry.set_first(window.linearisation_point(static_cast<int>(h)).T_FB,
+                           window.linearisation_point(static_cast<int>(t)).T_FB);
     }
   }
 }

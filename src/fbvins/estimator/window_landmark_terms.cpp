@@ -34,16 +34,16 @@ FBVINS_KERNEL void gram_of(const SightingRows<16>& rows, int sightings, double* 
 FBVINS_KERNEL void gram_of(const SightingRows<32>& rows, int sightings, double* G) { gram<32>(rows, sightings, G); }
 
 double landmark_prior_cost(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l) {
-  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_WB, l, w.landmark_priors[l.prior]);
+  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_FB, l, w.landmark_priors[l.prior]);
   return huber(r.squaredNorm(), w.weights.huber_sigma).cost;
 }
 
 double add_landmark_prior(const WindowProblem& w, const CameraGeometry& cameras, const WindowLandmark& l, int host_block,
                           PointBlock& point, NormalEquations& out) {
   const LandmarkPrior& prior = w.landmark_priors[l.prior];
-  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_WB, l, prior);
+  const Vec3 r = landmark_prior_residual(cameras, w.frames[l.host].state.T_FB, l, prior);
   const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
-  const LandmarkPriorJacobian J(cameras, w.linearisation_point(l.host).T_WB, l, prior);
+  const LandmarkPriorJacobian J(cameras, w.linearisation_point(l.host).T_FB, l, prior);
   const int host = out.layout.pose_row(l.host);
   out.H.block<6, 6>(host, host) += robust.weight * J.host.transpose() * J.host;
   out.g.segment<6>(host) += robust.weight * J.host.transpose() * r;

@@ -79,25 +79,25 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<Leav
   return out;
 }
 
-NavState linearisation_point(const WindowFrame& f) { return f.in_prior ? f.first_estimate : f.state; }
+NavState<G> linearisation_point(const WindowFrame& f) { return f.in_prior ? f.first_estimate : f.state; }
 
 /// Moves of the whole world, as perturbations of the prior's tilt and frames: x, y, z, and rotations about x, y, z; and
 /// rotation of the frames about x without gravity, which is observable.
 Eigen::MatrixXd world_moves(const WindowProblem& p, const WindowPrior& prior) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(prior.quadratic.size(), 7);
   for (std::size_t k = 0; k < prior.frames.size(); ++k) {
-    const NavState s = linearisation_point(p.frames[prior.frames[k]]);
+    const NavState<G> s = linearisation_point(p.frames[prior.frames[k]]);
     const int at = prior.frames_row() + 15 * static_cast<int>(k);
     N.block<3, 3>(at + nav::p, 0).setIdentity();
     for (int column : {3, 4, 5, 6}) {
       const Vec3 e = Vec3::Unit(column % 3);
-      N.block<3, 1>(at + nav::p, column) = e.cross(s.T_WB.p);
-      N.block<3, 1>(at + nav::theta, column) = s.T_WB.q.conjugate() * e;
-      N.block<3, 1>(at + nav::v, column) = e.cross(s.v_WB);
+      N.block<3, 1>(at + nav::p, column) = e.cross(s.T_FB.p);
+      N.block<3, 1>(at + nav::theta, column) = s.T_FB.q.conjugate() * e;
+      N.block<3, 1>(at + nav::v, column) = e.cross(s.v_FB);
     }
   }
   // Gravity turns with the world: J dtilt = e x g.
-  const Vec3 g = p.tilt.gravity_W(1);
+  const Vec3 g = p.tilt.gravity_G(1);
   const Mat32 J = p.tilt.gravity_jacobian(1);
   for (int axis : {0, 1, 2}) N.block<2, 1>(0, 3 + axis) = J.colPivHouseholderQr().solve(Vec3::Unit(axis).cross(g));
   return N;

@@ -24,7 +24,7 @@ int WindowProblem::index_of(FrameId id) const {
 Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObservation& observation) const {
   const CameraGeometry cameras(calibration);
   PairGeometry geometry;
-  geometry.set(frames[landmark.host].state.T_WB, frames[observation.frame].state.T_WB);
+  geometry.set(frames[landmark.host].state.T_FB, frames[observation.frame].state.T_FB);
   Vec3 p_C;
   Vec2 r;
   if (reproject(cameras, geometry, scaled_point_in_host(cameras, landmark), landmark.alpha_beta_rho.z(), observation, p_C, r))
@@ -33,7 +33,7 @@ Vec2 WindowProblem::residual(const WindowLandmark& landmark, const WindowObserva
 }
 
 Vec3 WindowProblem::distance_to_prior(const WindowLandmark& l) const {
-  return landmark_prior_residual(CameraGeometry(calibration), frames[l.host].state.T_WB, l, landmark_priors[l.prior]);
+  return landmark_prior_residual(CameraGeometry(calibration), frames[l.host].state.T_FB, l, landmark_priors[l.prior]);
 }
 
 Eigen::VectorXd WindowProblem::prior_displacement() const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sliding window as a least-squares problem: frame states, the tilt of the world, landmarks and, if wanted,
+// The sliding window as a least-squares problem: frame states, the tilt of G, landmarks and, if wanted,
 // calibration, with all their measurements. A value: it names its frames and landmarks by the window's ids, and
 // stays valid when the window changes. Minimised by window_solver.hpp. Formulas: docs/derivations/window.md (W1-W16).
 #pragma once
@@ -19,9 +19,9 @@ namespace fbvins {
 
 struct WindowFrame {
   FrameId id;
-  NavState state;
+  NavState<G> state;
   /// State when the prior first named this frame: linearisation point and origin of the prior (W9).
-  NavState first_estimate;
+  NavState<G> first_estimate;
   bool in_prior = false;
   /// From the frame before this one; null where the chain is broken or the prior holds it.
   std::shared_ptr<const Preintegration> imu;
@@ -35,7 +35,7 @@ struct WindowWeights {
   double standstill_velocity_sigma_mps = 0.01;
   double min_inverse_depth_1pm = 0.005;  ///< landmarks are kept nearer than 1 / this
   bool at_first_estimates = false;       ///< Jacobians of frames in the prior are taken at their first estimates
-  bool estimate_tilt = true;             ///< false: W is level
+  bool estimate_tilt = true;             ///< false: G is level
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
 };
@@ -77,7 +77,7 @@ struct WindowProblem {
   /// -1 where there is none.
   int index_of(FrameId id) const;
   /// Where Jacobians of a frame are taken.
-  NavState linearisation_point(int frame) const {
+  NavState<G> linearisation_point(int frame) const {
     const WindowFrame& f = frames[static_cast<std::size_t>(frame)];
     return weights.at_first_estimates && f.in_prior ? f.first_estimate : f.state;
   }

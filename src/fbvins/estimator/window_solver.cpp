@@ -15,7 +15,7 @@ constexpr double kDepthDamping = 1.0;
 
 /// The variables of a window, without its measurements.
 struct Estimate {
-  std::vector<NavState> states;
+  std::vector<NavState<G>> states;
   std::vector<Vec3> landmarks;
   Calibration calibration;
   Tilt tilt;

@@ -67,7 +67,7 @@ TEST(WindowSolver, ReusedMemoryGivesTheSameBits) {
   used.solve(other, {});
   used.solve(one, {});
   fresh.solve(two, {});
-  for (int f = 0; f < test::kFrames; ++f) EXPECT_EQ(one.window.frames[f].state.T_WB.p, two.window.frames[f].state.T_WB.p);
+  for (int f = 0; f < test::kFrames; ++f) EXPECT_EQ(one.window.frames[f].state.T_FB.p, two.window.frames[f].state.T_FB.p);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
   for (int k = 0; k < kFrames; ++k) {
     WindowFrame frame;
     frame.id = FrameId{k};
-    frame.state = motion.state(stamp(k).seconds(), bias);
+    frame.state = motion.state<G>(stamp(k).seconds(), bias);
     if (k > 0) {
       ImuSegment segment = motion.segment(stamp(k - 1), stamp(k), Duration{5'000'000}, bias);
       add_noise(segment, {}, rng);
@@ -41,10 +41,10 @@ inline void add_frames(Window& w, const Motion& motion, Rng& rng) {
   }
 }
 
-inline void add_landmark(Window& w, const Vec3& p_W, int host, Rng& rng) {
+inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
   const Calibration& c = w.problem.calibration;
   const auto in_camera = [&](int frame, bool right) {
-    const Vec3 p_B = w.problem.frames[frame].state.T_WB.inverse() * p_W;
+    const Vec3 p_B = w.problem.frames[frame].state.T_FB.inverse() * p_G;
     return right ? Vec3(c.T_BC1.inverse() * p_B) : Vec3(c.T_BC0.inverse() * p_B);
   };
   WindowLandmark l;
@@ -84,14 +84,14 @@ inline Window make_window(bool calibrating) {
     const int host = static_cast<int>(rng.below(kFrames));
     const double depth = rng.uniform(1.5, 8);
     const Vec3 p_C(rng.uniform(-0.6, 0.6) * depth, rng.uniform(-0.4, 0.4) * depth, depth);
-    add_landmark(w, w.problem.frames[host].state.T_WB * (w.problem.calibration.T_BC0 * p_C), host, rng);
+    add_landmark(w, w.problem.frames[host].state.T_FB * (w.problem.calibration.T_BC0 * p_C), host, rng);
   }
   Rng prior_rng(18);
   for (int k = 0; k < kLandmarks; k += 3) {  // every third has a prior, a few sigmas off
     WindowLandmark& l = w.problem.landmarks[k];
     LandmarkPrior prior;
     const Vec3 p_B = point_in_host(CameraGeometry(w.problem.calibration), l);
-    prior.p_W = w.problem.frames[l.host].state.T_WB * p_B + noise3(prior_rng, 0.05);
+    prior.p_G = w.problem.frames[l.host].state.T_FB * p_B + noise3(prior_rng, 0.05);
     prior.sqrt_information << 40, 5, -3, 0, 25, 2, 0, 0, 60;
     l.prior = static_cast<int>(w.problem.landmark_priors.size());
     w.problem.landmark_priors.push_back(prior);

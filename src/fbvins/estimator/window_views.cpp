@@ -16,9 +16,10 @@ double parallax(const Mat3& R_ba, const Observation& a, const Observation& b) {
   return (p.head<2>() / p.z() - b.normalised).norm();
 }
 
+/// In G.
 Vec3 position_of(const Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
-  const Pose<W, C0> T_WC = frames.at(landmark.host).state.T_WB * ray_camera(calibration, landmark.right_ray);
-  return T_WC * Vec3(Vec3(landmark.alpha_beta_rho.x(), landmark.alpha_beta_rho.y(), 1) / landmark.alpha_beta_rho.z());
+  const Pose<G, C0> T_GC = frames.at(landmark.host).state.T_FB * ray_camera(calibration, landmark.right_ray);
+  return T_GC * Vec3(Vec3(landmark.alpha_beta_rho.x(), landmark.alpha_beta_rho.y(), 1) / landmark.alpha_beta_rho.z());
 }
 
 }  // namespace
@@ -53,7 +54,7 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   const Frame& keyframe = frames[last];
   out.age = newest.t - keyframe.t;
   const auto rotation = [&](const Mat3& R_BC) -> Mat3 {
-    return (newest.state.T_WB.R() * R_BC).transpose() * keyframe.state.T_WB.R() * R_BC;
+    return (newest.state.T_FB.R() * R_BC).transpose() * keyframe.state.T_FB.R() * R_BC;
   };
   const Mat3 R_new_last[2] = {rotation(calibration.T_BC0.R()), rotation(calibration.T_BC1.R())};
   int seen = 0;
@@ -75,10 +76,10 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   return out;
 }
 
-GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state) {
+GaugeState gauge_state_of(const SlidingWindow& window, const NavState<G>& state) {
   GaugeState out;
-  out.T_GB = state.T_WB.cast_frames<G, B>();
-  out.v_GB = state.v_WB;
+  out.T_GB = state.T_FB;
+  out.v_GB = state.v_FB;
   out.q_LG = window.tilt().q().conjugate();
   return out;
 }
@@ -87,26 +88,33 @@ double up_sigma_rad(const Mat17& covariance) {
   return std::sqrt(std::max(0.0, largest_eigenvalue(covariance.bottomRightCorner<2, 2>())));
 }
 
-std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W, bool by_images) {
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_G, bool by_images) {
   const FrameList& frames = window.frames();
   if (frames.size() < 2) return std::nullopt;
   const Frame& newest = frames.newest();
-  const NavState& before = frames[frames.size() - 2].state;
-  const NavState after = newest.imu && !by_images ? newest.imu->predict(before, gravity_W) : newest.state;
-  return before.T_WB.inverse() * after.T_WB;
+  const NavState<G>& before = frames[frames.size() - 2].state;
+  const NavState<G> after = newest.imu && !by_images ? newest.imu->predict(before, gravity_G) : newest.state;
+  return before.T_FB.inverse() * after.T_FB;
 }
 
 Vec3 mean_rate_B(const FrameList& frames) {
   if (frames.size() < 2) return Vec3::Zero();
   Vec3 turned = Vec3::Zero();
-  for (int i = 1; i < frames.size(); ++i) turned += so3_log(frames[i - 1].state.T_WB.q.conjugate() * frames[i].state.T_WB.q);
+  for (int i = 1; i < frames.size(); ++i) turned += so3_log(frames[i - 1].state.T_FB.q.conjugate() * frames[i].state.T_FB.q);
   return turned / (frames.newest().t - frames.oldest().t).seconds();
+}
+
+std::vector<LocatedLandmark> located_landmarks(const SlidingWindow& window, const Calibration& calibration) {
+  std::vector<LocatedLandmark> out;
+  for (const Landmark& l : window.landmarks().all())
+    if (l.triangulated) out.push_back({l.track, position_of(l, window.frames(), calibration)});
+  return out;
 }
 
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration) {
   WindowSnapshot out;
   const Tilt& tilt = window.tilt();
-  for (const Frame& f : window.frames()) out.frames.push_back({f.id, f.t, tilt.levelled(f.state.T_WB), f.keyframe});
+  for (const Frame& f : window.frames()) out.frames.push_back({f.id, f.t, tilt.levelled(f.state.T_FB), f.keyframe});
   for (const Landmark& l : window.landmarks().all()) {
     if (!l.triangulated) continue;
     const Vec3 p_W = tilt.levelled(position_of(l, window.frames(), calibration));
@@ -117,12 +125,12 @@ WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calib
 
 Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& calibration) {
   const Frame& f = window.frames()[frame];
-  const NavState level = window.tilt().levelled(f.state);
+  const NavState<W> level = window.tilt().levelled(f.state);
   Keyframe out;
   out.id = f.id;
   out.t = f.t;
-  out.T_WB = level.T_WB;
-  out.v_WB = level.v_WB;
+  out.T_WB = level.T_FB;
+  out.v_WB = level.v_FB;
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
     const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;

@@ -29,18 +29,21 @@ struct KeyframeDistance {
 };
 KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Calibration& calibration, double focal_px);
 
-/// A state of the window in the gauge frame, without up_sigma_rad.
-GaugeState gauge_state_of(const SlidingWindow& window, const NavState& state);
+/// A state of the window with the vertical, without up_sigma_rad.
+GaugeState gauge_state_of(const SlidingWindow& window, const NavState<G>& state);
 /// Standard deviation of up's direction about its less certain axis, from WindowInformation::covariance().
 double up_sigma_rad(const Mat17& covariance);
 
 /// Motion of the body from the frame before to the newest one, predicted by the readings between them from the present estimate
 /// of the frame before; without readings, as the window estimates it. None for the first frame.
 /// `by_images`: as the window estimates it, whatever readings there are.
-std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_W, bool by_images = false);
+std::optional<Pose<B, B>> motion_of_newest(const SlidingWindow& window, const Vec3& gravity_G, bool by_images = false);
 
 /// Mean turning rate from the oldest to the newest frame, in the body's axes, rad/s. Zero with fewer than two frames.
 Vec3 mean_rate_B(const FrameList& frames);
+
+/// The landmarks of the window that have a position.
+std::vector<LocatedLandmark> located_landmarks(const SlidingWindow& window, const Calibration& calibration);
 
 /// Frames and landmarks, levelled.
 WindowSnapshot snapshot_of(const SlidingWindow& window, const Calibration& calibration);

@@ -15,7 +15,7 @@ FrameList turning(const Vec3& rate_B, int frames, Duration apart) {
     Frame frame{};
     frame.id = FrameId{i};
     frame.t = Time{apart.ns * i};
-    frame.state.T_WB.q = q;
+    frame.state.T_FB.q = q;
     out.add(frame);
     q = q * so3_exp(apart.seconds() * rate_B);
   }

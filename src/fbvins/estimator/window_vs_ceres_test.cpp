@@ -90,7 +90,7 @@ class CeresTwin {
     return summary.final_cost;
   }
 
-  NavState state(int k) const { return frames_of_window_[k].state.boxplus(Eigen::Map<const Vec15>(frames_[k].data())); }
+  NavState<G> state(int k) const { return frames_of_window_[k].state.boxplus(Eigen::Map<const Vec15>(frames_[k].data())); }
   const Vec2& tilt() const { return tilt_; }
   const Vec3& landmark(int k) const { return landmarks_[k]; }
 

@@ -26,7 +26,7 @@ struct HandedTrack {
   int age_frames = 0;
   Descriptor descriptor = {}, raw = {};
   int level = 0;
-  std::optional<Vec3> seen_from_W, p_W;
+  std::optional<Vec3> seen_from_G, p_G;
 };
 
 struct Handover {

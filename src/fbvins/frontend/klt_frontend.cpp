@@ -64,7 +64,7 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
 }
 
 void KltFrontend::locate(const LandmarkUpdate& update) {
-  if (updates_.take(update) == LandmarkUpdates::Kind::in_another_W) predictor_.forget_state();
+  if (updates_.take(update) == LandmarkUpdates::Kind::earlier_void) predictor_.forget_state();
 }
 
 void KltFrontend::follow_tracks(const CameraMotion& motion, FrontendStats& stats) {

@@ -28,7 +28,7 @@ class KltFrontend final : public LeadingFrontend {
   KltFrontend(const StereoRig& rig, const KltFrontendOptions& options);
 
   TrackedFrame process(const SensorPacket& packet, const StatePrior& prior) override;
-  /// Landmarks are ignored; a new W voids the prior.
+  /// Landmarks are ignored; what voids earlier positions voids the prior.
   void locate(const LandmarkUpdate& update) override;
 
   void stand_by(const SensorPacket& packet, const StatePrior& prior) override { predictor_.add(packet.imu, prior); }

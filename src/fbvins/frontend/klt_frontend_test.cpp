@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-/// A stereo camera that flies past a textured wall at z = 3 m of W, looking at it and turning a little.
+/// A stereo camera that flies past a textured wall at z = 3 m of G, looking at it and turning a little.
 class Wall {
  public:
   Wall() {
@@ -23,24 +23,24 @@ class Wall {
   }
 
   static double time_s(int k) { return 0.05 * k; }
-  Pose<W, C0> T_WC0(double s) const {
+  Pose<G, C0> T_GC0(double s) const {
     return {so3_exp(Vec3(0.1 * std::sin(2 * s), -0.3 * s, 0.2 * s)), Vec3(0.5 * s, 0.1 * s * s, 0.3 * s)};
   }
-  Pose<W, B> T_WB(double s) const { return T_WC0(s) * rig.T_BC0.inverse(); }
+  Pose<G, B> T_GB(double s) const { return T_GC0(s) * rig.T_BC0.inverse(); }
 
   /// Where the ray of a left pixel's normalised coordinates meets the wall.
   template <class C>
-  static Vec3 on_wall(const Pose<W, C>& T_WC, const Vec2& normalised) {
-    const Vec3 ray = T_WC.q * normalised.homogeneous();
-    return T_WC.p + (3.0 - T_WC.p.z()) / ray.z() * ray;
+  static Vec3 on_wall(const Pose<G, C>& T_GC, const Vec2& normalised) {
+    const Vec3 ray = T_GC.q * normalised.homogeneous();
+    return T_GC.p + (3.0 - T_GC.p.z()) / ray.z() * ray;
   }
 
-  static Vec2 on_texture(const Vec3& p_W) { return 70.0 * p_W.head<2>(); }  // 70 texels a metre
+  static Vec2 on_texture(const Vec3& p_G) { return 70.0 * p_G.head<2>(); }  // 70 texels a metre
 
   template <class C>
-  std::shared_ptr<const Image> render(const Camera& camera, const Pose<W, C>& T_WC, double gain) const {
+  std::shared_ptr<const Image> render(const Camera& camera, const Pose<G, C>& T_GC, double gain) const {
     auto image = std::make_shared<Image>(camera.width(), camera.height());
-    const auto warp = [&](const Vec2& px) { return on_texture(on_wall(T_WC, camera.undistort(px).value())); };
+    const auto warp = [&](const Vec2& px) { return on_texture(on_wall(T_GC, camera.undistort(px).value())); };
     *image = render_texture(camera.width(), camera.height(), texture_, warp, gain * 100, gain * 30, 0.7,
                             static_cast<std::uint64_t>(1e6 * gain));
     return image;
@@ -50,8 +50,8 @@ class Wall {
     SensorPacket packet;
     packet.id = FrameId{k};
     packet.frame.t = Time{} + Duration::from_seconds(time_s(k));
-    packet.frame.left = render(rig.left, T_WC0(time_s(k)), gain);
-    packet.frame.right = render(rig.right, T_WC0(time_s(k)) * rig.T_BC0.inverse() * rig.T_BC1, 1.2 * gain);
+    packet.frame.left = render(rig.left, T_GC0(time_s(k)), gain);
+    packet.frame.right = render(rig.right, T_GC0(time_s(k)) * rig.T_BC0.inverse() * rig.T_BC1, 1.2 * gain);
     if (k > 0) packet.imu = imu(time_s(k - 1), time_s(k));
     return packet;
   }
@@ -62,9 +62,9 @@ class Wall {
       ImuSample sample;
       sample.t = Time{} + Duration::from_seconds(s);
       const double h = 1e-4;
-      sample.gyro_radps = so3_log(T_WB(s - h).q.conjugate() * T_WB(s + h).q) / (2 * h);
-      const Vec3 a_W = (T_WB(s + h).p - 2 * T_WB(s).p + T_WB(s - h).p) / (h * h);
-      sample.accel_mps2 = T_WB(s).q.conjugate() * (a_W + Vec3(0, 0, 9.81));
+      sample.gyro_radps = so3_log(T_GB(s - h).q.conjugate() * T_GB(s + h).q) / (2 * h);
+      const Vec3 a_G = (T_GB(s + h).p - 2 * T_GB(s).p + T_GB(s - h).p) / (h * h);
+      sample.accel_mps2 = T_GB(s).q.conjugate() * (a_G + Vec3(0, 0, 9.81));
       segment.samples.push_back(sample);
     }
     return segment;
@@ -73,9 +73,9 @@ class Wall {
   StatePrior prior(int k) const {
     StatePrior prior;
     prior.t = Time{} + Duration::from_seconds(time_s(k));
-    prior.T_WB = T_WB(time_s(k));
+    prior.T_GB = T_GB(time_s(k));
     const double h = 1e-4;
-    prior.v_WB = (T_WB(time_s(k) + h).p - T_WB(time_s(k) - h).p) / (2 * h);
+    prior.v_GB = (T_GB(time_s(k) + h).p - T_GB(time_s(k) - h).p) / (2 * h);
     prior.valid = true;
     return prior;
   }
@@ -101,14 +101,14 @@ struct Errors {
 
   void add(const Wall& wall, const TrackedFrame& frame) {
     const double s = frame.t.seconds();
-    const Pose<W, C0> T_WC0 = wall.T_WC0(s);
-    const Pose<W, C1> T_WC1 = wall.T_WB(s) * wall.rig.T_BC1;
+    const Pose<G, C0> T_GC0 = wall.T_GC0(s);
+    const Pose<G, C1> T_GC1 = wall.T_GB(s) * wall.rig.T_BC1;
     for (const TrackedFeature& feature : frame.features) {
-      const Vec3 here = Wall::on_wall(T_WC0, feature.left->normalised);
+      const Vec3 here = Wall::on_wall(T_GC0, feature.left->normalised);
       const Vec3& first = points.emplace(feature.id, here).first->second;
       if (feature.age_frames > 0)
-        left.push_back((wall.rig.left.project(T_WC0.inverse() * first).value() - feature.left->pixel).norm());
-      if (feature.right) right.push_back((wall.rig.right.project(T_WC1.inverse() * here).value() - feature.right->pixel).norm());
+        left.push_back((wall.rig.left.project(T_GC0.inverse() * first).value() - feature.left->pixel).norm());
+      if (feature.right) right.push_back((wall.rig.right.project(T_GC1.inverse() * here).value() - feature.right->pixel).norm());
     }
   }
   static double quantile(std::vector<double> v, double q) {

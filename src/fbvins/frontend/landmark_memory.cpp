@@ -27,7 +27,7 @@ void LandmarkMemory::keep(RememberedLandmark landmark) {
   const Kept kept{landmark.kept, landmark.track};
   take_out(landmark.track);
   oldest_first_.insert(kept);
-  if (!landmark.p_W) waiting_.push_back(kept);
+  if (!landmark.p_G) waiting_.push_back(kept);
   landmarks_.emplace(kept.second, std::move(landmark));
   if (static_cast<int>(landmarks_.size()) > capacity_) take_out(oldest_first_.begin()->second);
 }
@@ -39,9 +39,9 @@ void LandmarkMemory::take_out(TrackId track) {
   landmarks_.erase(it);
 }
 
-void LandmarkMemory::locate(TrackId track, const Vec3& p_W) {
+void LandmarkMemory::locate(TrackId track, const Vec3& p_G) {
   const auto it = landmarks_.find(track);
-  if (it != landmarks_.end()) it->second.p_W = p_W;
+  if (it != landmarks_.end()) it->second.p_G = p_G;
 }
 
 void LandmarkMemory::forget_unlocated(Time now) {
@@ -49,19 +49,19 @@ void LandmarkMemory::forget_unlocated(Time now) {
     const auto [kept, track] = waiting_.front();
     waiting_.pop_front();
     const auto it = landmarks_.find(track);
-    if (it != landmarks_.end() && it->second.kept == kept && !it->second.p_W) take_out(track);
+    if (it != landmarks_.end() && it->second.kept == kept && !it->second.p_G) take_out(track);
   }
 }
 
-void LandmarkMemory::expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const {
+void LandmarkMemory::expect(const Pose<G, C0>& T_GC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const {
   out.clear();
-  const Pose<C0, W> T_CW = T_WC.inverse();
+  const Pose<C0, G> T_CG = T_GC.inverse();
   const double cos_limit = std::cos(kMaxViewAngle_rad);
   for (const auto& [track, landmark] : landmarks_) {
-    if (!landmark.p_W) continue;
-    const Vec3 p_C = T_CW * *landmark.p_W;
+    if (!landmark.p_G) continue;
+    const Vec3 p_C = T_CG * *landmark.p_G;
     if (p_C.z() < kNearest_m) continue;
-    const Vec3 ray_now = *landmark.p_W - T_WC.p, ray_then = *landmark.p_W - landmark.seen_from_W;
+    const Vec3 ray_now = *landmark.p_G - T_GC.p, ray_then = *landmark.p_G - landmark.seen_from_G;
     const double now = ray_now.norm(), then = ray_then.norm(), scale = then / now;
     if (scale < kSmallestViewScale || scale * kSmallestViewScale > 1) continue;
     if (ray_now.dot(ray_then) < cos_limit * now * then) continue;

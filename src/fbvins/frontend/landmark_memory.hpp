@@ -6,8 +6,8 @@
 //
 //   LandmarkMemory memory(3000);
 //   memory.keep(landmark);                            // when a track has ended
-//   memory.locate(track, p_W);                        // when its landmark has left the estimator's window
-//   memory.expect(T_WC, camera, levels, expected);    // landmarks that the newest image should show, and where
+//   memory.locate(track, p_G);                        // when its landmark has left the estimator's window
+//   memory.expect(T_GC, camera, levels, expected);    // landmarks that the newest image should show, and where
 //   memory.take_out(track);                           // re-observed: it is a track again
 #pragma once
 
@@ -38,10 +38,10 @@ struct RememberedLandmark {
   int level = 0;               ///< of the scale pyramid, when last seen
   int age_frames = 0;
   PatchReference reference;
-  Mat3 R_W_reference = Mat3::Identity();  ///< of the camera that saw the reference
+  Mat3 R_G_reference = Mat3::Identity();  ///< of the camera that saw the reference
   double reference_depth_m = 1;           ///< along that camera's z
-  Vec3 seen_from_W = Vec3::Zero();        ///< position of the camera that observed it last, m
-  std::optional<Vec3> p_W;                ///< m; unknown until the landmark has left the estimator's window
+  Vec3 seen_from_G = Vec3::Zero();        ///< position of the camera that observed it last, m
+  std::optional<Vec3> p_G;                ///< m; unknown until the landmark has left the estimator's window
   Time kept;                              ///< when it came into the memory
 };
 
@@ -59,10 +59,10 @@ class LandmarkMemory {
 
   void clear();
   void keep(RememberedLandmark landmark);
-  void locate(TrackId track, const Vec3& p_W);
-  /// Located landmarks in the view of a left camera at T_WC, from about the direction and distance of their last observation.
+  void locate(TrackId track, const Vec3& p_G);
+  /// Located landmarks in the view of a left camera at T_GC, from about the direction and distance of their last observation.
   /// `levels`: of the scale pyramid that keypoints come from.
-  void expect(const Pose<W, C0>& T_WC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const;
+  void expect(const Pose<G, C0>& T_GC, const Camera& camera, int levels, std::vector<ExpectedLandmark>& out) const;
   void take_out(TrackId track);
   /// Forgets landmarks that have not been located long after they must have left the estimator's window.
   void forget_unlocated(Time now);

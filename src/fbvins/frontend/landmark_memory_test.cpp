@@ -10,17 +10,17 @@ constexpr int kLevels = 3;
 const Camera kCamera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
 
 /// Seen from the origin, 4 m along z.
-RememberedLandmark landmark(std::int64_t track, const Vec3& p_W = Vec3(0, 0, 4)) {
+RememberedLandmark landmark(std::int64_t track, const Vec3& p_G = Vec3(0, 0, 4)) {
   RememberedLandmark l;
   l.track = TrackId{track};
   l.level = 1;
-  l.p_W = p_W;
+  l.p_G = p_G;
   return l;
 }
 
-std::vector<ExpectedLandmark> expected_from(const LandmarkMemory& memory, const Vec3& p_W, const Vec3& turn = Vec3::Zero()) {
+std::vector<ExpectedLandmark> expected_from(const LandmarkMemory& memory, const Vec3& p_G, const Vec3& turn = Vec3::Zero()) {
   std::vector<ExpectedLandmark> out;
-  memory.expect({so3_exp(turn), p_W}, kCamera, kLevels, out);
+  memory.expect({so3_exp(turn), p_G}, kCamera, kLevels, out);
   return out;
 }
 
@@ -59,7 +59,7 @@ TEST(LandmarkMemory, WaitsForThePosition) {
   LandmarkMemory memory(3000);
   for (const std::int64_t track : {1, 2}) {
     RememberedLandmark l = landmark(track);
-    l.p_W.reset();
+    l.p_G.reset();
     memory.keep(l);
   }
   EXPECT_TRUE(expected_from(memory, Vec3::Zero()).empty());

@@ -14,7 +14,7 @@ class LandmarkUpdates {
  public:
   enum class Kind {
     next,
-    in_another_W,  ///< the next, and all earlier positions are void
+    earlier_void,  ///< the next, and all earlier positions are void
     repeated,      ///< has been taken already
   };
 
@@ -23,9 +23,9 @@ class LandmarkUpdates {
     if (update.sequence < next_) return Kind::repeated;
     assert(update.sequence == next_ && "landmark updates come without gaps and in order");
     next_ = update.sequence + 1;
-    const bool another_W = update.reset_counter != reset_counter_;
+    const bool reset = update.reset_counter != reset_counter_;
     reset_counter_ = update.reset_counter;
-    return another_W ? Kind::in_another_W : Kind::next;
+    return reset ? Kind::earlier_void : Kind::next;
   }
 
  private:

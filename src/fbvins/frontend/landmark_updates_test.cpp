@@ -21,7 +21,7 @@ TEST(LandmarkUpdates, EveryUpdateCountsOnce) {
 TEST(LandmarkUpdates, ANewWIsReportedOnce) {
   LandmarkUpdates updates;
   EXPECT_EQ(updates.take(update(0)), Kind::next);
-  EXPECT_EQ(updates.take(update(1, 1)), Kind::in_another_W);
+  EXPECT_EQ(updates.take(update(1, 1)), Kind::earlier_void);
   EXPECT_EQ(updates.take(update(2, 1)), Kind::next);
 }
 

@@ -62,7 +62,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   if (!out.has_left) return out;
 
   view_.t = images_.t();
-  view_.T_WC = predictor_.camera_at(view_.t);
+  view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
   const ImageView left = packet.frame.left->view();
   bool examined = true;
@@ -125,7 +125,7 @@ void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
 void OrbFrontend::locate(const LandmarkUpdate& update) {
   const LandmarkUpdates::Kind kind = updates_.take(update);
   if (kind == LandmarkUpdates::Kind::repeated) return;
-  if (kind == LandmarkUpdates::Kind::in_another_W) {
+  if (kind == LandmarkUpdates::Kind::earlier_void) {
     recogniser_.clear(tracks_);
     predictor_.forget_state();
   }
@@ -151,8 +151,8 @@ Handover OrbFrontend::hand_over() {
     handed->descriptor = track.descriptor;
     handed->raw = track.raw;
     handed->level = track.level;
-    handed->seen_from_W = track.seen_from_W;
-    handed->p_W = track.p_W;
+    handed->seen_from_G = track.seen_from_G;
+    handed->p_G = track.p_G;
     out.tracks.push_back(*handed);
   }
   return out;
@@ -163,7 +163,7 @@ void OrbFrontend::take_over(Handover handover) {
   drop_ended();
   tracks_.begin_ids_at(handover.next_id);
   view_.t = handover.t;
-  view_.T_WC = predictor_.camera_at(view_.t);
+  view_.T_GC = predictor_.camera_at(view_.t);
   outliers_.begin(view_);
   std::vector<double> inverse_depths;
   for (const HandedTrack& handed : handover.tracks)
@@ -187,8 +187,8 @@ bool OrbFrontend::resume(const HandedTrack& handed, const Pyramid& image) {
   track.descriptor = handed.descriptor;
   track.raw = handed.raw;
   track.level = handed.level;
-  track.seen_from_W = handed.seen_from_W;
-  track.p_W = handed.p_W;
+  track.seen_from_G = handed.seen_from_G;
+  track.p_G = handed.p_G;
   track.last_seen = view_.t;
   track.see(view_.index);
   tracks_.resume(track);

@@ -213,8 +213,8 @@ TEST(OrbFrontend, TracksSurviveBlackAndMissingImagesUnderTheirOldId) {
 StatePrior true_state(int k) {
   StatePrior prior;
   prior.t = Time{static_cast<std::int64_t>(k * kFramePeriod_s * 1e9)};
-  prior.T_WB = {Quat(Eigen::AngleAxisd(world().angle(k), Vec3::UnitZ())), world().position(k)};
-  prior.v_WB = Vec3(kSpeed_mps, 0.02, 0);
+  prior.T_GB = {Quat(Eigen::AngleAxisd(world().angle(k), Vec3::UnitZ())), world().position(k)};
+  prior.v_GB = Vec3(kSpeed_mps, 0.02, 0);
   prior.valid = true;
   return prior;
 }
@@ -238,7 +238,7 @@ TrackedFrame after_the_dark(bool enabled, double drift_m, std::vector<TrackedFra
     }
     const bool dark = k >= 10 && k < 10 + kDark;
     SensorPacket packet = dark ? world().packet_without_images(k) : world().packet(k);
-    if (!dark && k >= 10) prior.T_WB.p.x() += drift_m;
+    if (!dark && k >= 10) prior.T_GB.p.x() += drift_m;
     TrackedFrame tracked = frontend.process(packet, prior);
     if (k == 10 + kDark) return tracked;
     if (!dark) before.push_back(std::move(tracked));
@@ -276,7 +276,7 @@ class Sweep {
   struct Known {
     int frames = 0, last = 0;
     Vec2 px = Vec2::Zero();
-    Vec3 p_W = Vec3::Zero();
+    Vec3 p_G = Vec3::Zero();
     bool told = false, again = false;
   };
   std::map<TrackId, Known> known;
@@ -324,8 +324,8 @@ class Sweep {
     const double s = k * kFramePeriod_s;
     StatePrior prior;
     prior.t = Time{} + Duration::from_seconds(s);
-    prior.T_WB.p.x() = x_m(s);
-    prior.v_WB.x() = 0.5 * kReach_m * kOmega_radps * std::sin(kOmega_radps * s);
+    prior.T_GB.p.x() = x_m(s);
+    prior.v_GB.x() = 0.5 * kReach_m * kOmega_radps * std::sin(kOmega_radps * s);
     prior.valid = k >= 0;
     return prior;
   }
@@ -337,7 +337,7 @@ class Sweep {
       const double from_edge_px = std::min(landmark.px.x(), TestWall::kWidth - landmark.px.x());
       if (landmark.told || landmark.last != k - kUnseenBeforeTold || landmark.frames < 6 || from_edge_px > 25) continue;
       landmark.told = true;
-      update.landmarks.push_back({id, landmark.p_W});
+      update.landmarks.push_back({id, landmark.p_G});
     }
     return update;
   }
@@ -345,7 +345,7 @@ class Sweep {
     for (const TrackedFeature& f : frame.features) {
       Known& landmark = known[f.id];
       if (landmark.told) landmark.again = true;
-      else landmark.p_W = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left->normalised.homogeneous());
+      else landmark.p_G = Vec3(x_m(k * kFramePeriod_s), 0, 0) + TestWall::kDepth_m * Vec3(f.left->normalised.homogeneous());
       landmark.px = f.left->pixel;
       landmark.last = k;
       ++landmark.frames;

@@ -25,21 +25,21 @@ constexpr double kMinCorrelation = 0.7;
 void OrbRecogniser::locate(const LandmarkUpdate& update, OrbTracks& tracks) {
   for (const LocatedLandmark& located : update.landmarks) {
     const auto track = std::find_if(tracks.begin(), tracks.end(), [&](const OrbTrack& t) { return t.id == located.track; });
-    if (track != tracks.end()) track->p_W = located.p_W;
-    else memory_.locate(located.track, located.p_W);
+    if (track != tracks.end()) track->p_G = located.p_G;
+    else memory_.locate(located.track, located.p_G);
   }
 }
 
 void OrbRecogniser::clear(OrbTracks& tracks) {
   memory_.clear();
   for (OrbTrack& track : tracks) {
-    track.seen_from_W.reset();
-    track.p_W.reset();
+    track.seen_from_G.reset();
+    track.p_G.reset();
   }
 }
 
 void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now) {
-  if (!options_.enabled || !view.T_WC || !track.seen_from_W || !track.inverse_depth || track.age_frames < kFewestFrames) return;
+  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth || track.age_frames < kFewestFrames) return;
   RememberedLandmark landmark;
   landmark.track = track.id;
   landmark.descriptor = track.descriptor;
@@ -47,17 +47,17 @@ void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& refere
   landmark.level = track.level;
   landmark.age_frames = track.age_frames;
   landmark.reference = reference;
-  landmark.R_W_reference = view.T_WC->R() * reference.R_now_then;
+  landmark.R_G_reference = view.T_GC->R() * reference.R_now_then;
   landmark.reference_depth_m = 1.0 / (*track.inverse_depth * reference.depth_ratio);
-  landmark.seen_from_W = *track.seen_from_W;
-  landmark.p_W = track.p_W;
+  landmark.seen_from_G = *track.seen_from_G;
+  landmark.p_G = track.p_G;
   landmark.kept = now;
   memory_.keep(std::move(landmark));
 }
 
 void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& left, FrontendStats& stats) {
-  if (!view.T_WC || !options_.enabled) return;
-  memory_.expect(*view.T_WC, camera_, levels_, expected_);
+  if (!view.T_GC || !options_.enabled) return;
+  memory_.expect(*view.T_GC, camera_, levels_, expected_);
   queries_.clear();
   for (const ExpectedLandmark& e : expected_)
     queries_.push_back({e.px, kSearch_px, e.level, kMaxDistance_bits, e.landmark->descriptor});
@@ -89,7 +89,7 @@ bool OrbRecogniser::resume(const ExpectedLandmark& expected, std::size_t k, OrbT
   const Keypoint& keypoint = view.features.keypoints[k];
   const RememberedLandmark& landmark = *expected.landmark;
   PatchReference reference = landmark.reference;
-  reference.R_now_then = view.T_WC->R().transpose() * landmark.R_W_reference;
+  reference.R_now_then = view.T_GC->R().transpose() * landmark.R_G_reference;
   reference.depth_ratio = expected.depth_m / landmark.reference_depth_m;
   const KltResult fine = refiner_.refine(reference, left, keypoint.pixel, camera_, expected.normalised);
   if (!refiner_.accept(fine, keypoint.pixel, keypoint.scale, kMinCorrelation)) return false;
@@ -100,7 +100,7 @@ bool OrbRecogniser::resume(const ExpectedLandmark& expected, std::size_t k, OrbT
   track.level = keypoint.level;
   track.inverse_depth = 1.0 / expected.depth_m;
   track.age_frames = landmark.age_frames;
-  track.p_W = landmark.p_W;
+  track.p_G = landmark.p_G;
   if (!set_observed(track, fine.px, camera_, view)) return false;
   tracks.free_patches().reference = reference;
   tracks.resume(track);

@@ -25,7 +25,7 @@ class OrbRecogniser {
       : camera_(camera), options_(options), levels_(levels), memory_(options.capacity) {}
 
   void locate(const LandmarkUpdate& update, OrbTracks& tracks);
-  /// W is a new frame: all positions are void.
+  /// G is a new frame, or what was known in it no longer fits: all positions are void.
   void clear(OrbTracks& tracks);
   /// Remembers a track that has gone out of view, if it may be a landmark. `view`: the last image that it was predicted to.
   void remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now);

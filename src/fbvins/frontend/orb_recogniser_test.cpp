@@ -28,7 +28,7 @@ struct Scene {
     for (OrbTrack& track : tracks) {
       track.inverse_depth = 1 / TestWall::kDepth_m;
       track.age_frames = 5;
-      track.seen_from_W = Vec3::Zero();
+      track.seen_from_G = Vec3::Zero();
     }
     before.assign(tracks.begin(), tracks.end());
   }
@@ -36,7 +36,7 @@ struct Scene {
     const auto image = wall.render(x_m, noise_seed);
     left.build(image->view(), kOrbAlignmentLevels);
     describer.describe(image->view(), view);
-    view.T_WC = Pose<W, C0>(Quat::Identity(), Vec3(x_m, 0, 0));
+    view.T_GC = Pose<G, C0>(Quat::Identity(), Vec3(x_m, 0, 0));
   }
   void end_all() {
     tracks.end_all(Fate::out_of_view);
@@ -75,7 +75,7 @@ TEST(OrbRecogniser, TakesNoneWhereTooFewAgree) {
   Scene scene;
   scene.end_all();
   LandmarkUpdate far_off = scene.update(Vec3(0.5, 0, 0));
-  for (std::size_t i = 0; i < 3; ++i) far_off.landmarks[i].p_W.x() -= 0.5;
+  for (std::size_t i = 0; i < 3; ++i) far_off.landmarks[i].p_G.x() -= 0.5;
   scene.recogniser.locate(far_off, scene.tracks);
   scene.look(0.1, 2);
   scene.recogniser.recognise(scene.tracks, scene.view, scene.left, scene.stats);
@@ -86,7 +86,7 @@ TEST(OrbRecogniser, RemembersLandmarksOnly) {
   Scene scene;
   scene.tracks[0].age_frames = 3;
   scene.tracks[1].inverse_depth.reset();
-  scene.tracks[2].seen_from_W.reset();
+  scene.tracks[2].seen_from_G.reset();
   const std::set<TrackId> hardly{scene.tracks[0].id, scene.tracks[1].id, scene.tracks[2].id};
   scene.end_all();
   for (const OrbTrack& track : scene.before) EXPECT_NE(scene.recogniser.remembers(track.id), hardly.contains(track.id));

@@ -53,7 +53,7 @@ bool set_observed(OrbTrack& track, const Vec2& px, const Camera& camera, const O
   track.normalised = *normalised;
   track.observed = true;
   track.last_seen = view.t;
-  if (view.T_WC) track.seen_from_W = view.T_WC->p;
+  if (view.T_GC) track.seen_from_G = view.T_GC->p;
   ++track.age_frames;
   return true;
 }
@@ -68,7 +68,7 @@ void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
     if (!track.observed) continue;
     const bool crowded =
         std::any_of(kept.begin(), kept.end(), [&](const Vec2& other) { return (other - track.px).squaredNorm() < closest2; });
-    if (crowded || static_cast<int>(kept.size()) == most) track.fate = track.p_W ? Fate::out_of_view : Fate::lost;
+    if (crowded || static_cast<int>(kept.size()) == most) track.fate = track.p_G ? Fate::out_of_view : Fate::lost;
     else kept.push_back(track.px);
   }
 }

@@ -41,8 +41,8 @@ struct OrbTrack : TrackState {
   bool was_observed = false;            ///< in the image before
   bool renew_reference = false;         ///< it no longer matches the patch with which it began
   std::array<Sighting, kHistory> seen;  ///< of image i at i % kHistory
-  std::optional<Vec3> seen_from_W;      ///< position of the camera when it was last observed, m
-  std::optional<Vec3> p_W;              ///< position of its landmark, once that has left the estimator's window, m
+  std::optional<Vec3> seen_from_G;      ///< position of the camera when it was last observed, m
+  std::optional<Vec3> p_G;              ///< position of its landmark, once that has left the estimator's window, m
 
   void see(std::int64_t image) { seen[static_cast<std::size_t>(image) % kHistory] = {normalised, observed ? image : -1}; }
   /// Its position in that image; null if it was not observed.

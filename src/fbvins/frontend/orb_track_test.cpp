@@ -76,7 +76,7 @@ TEST(OrbTrack, SettlesInsideTheImageOnly) {
   const TestWall wall;
   OrbView view;
   view.t = Time{7};
-  view.T_WC = Pose<W, C0>(Quat::Identity(), Vec3(1, 2, 3));
+  view.T_GC = Pose<G, C0>(Quat::Identity(), Vec3(1, 2, 3));
   OrbTrack track = track_at(wall.camera, Vec2(100, 90));
   track.observed = false;
   EXPECT_FALSE(set_observed(track, Vec2(kPatchBorder_px - 1, 90), wall.camera, view));
@@ -85,7 +85,7 @@ TEST(OrbTrack, SettlesInsideTheImageOnly) {
   EXPECT_TRUE(track.observed);
   EXPECT_EQ(track.age_frames, 6);
   EXPECT_EQ(track.last_seen, view.t);
-  EXPECT_EQ(*track.seen_from_W, Vec3(1, 2, 3));
+  EXPECT_EQ(*track.seen_from_G, Vec3(1, 2, 3));
 }
 
 TEST(ThinOut, KeepsTheOlderOfTwoThatHaveComeTogetherAndNoMoreThanWanted) {
@@ -110,7 +110,7 @@ TEST(ThinOut, LosesNoLocatedLandmark) {
   OrbTracks tracks(3);
   for (int age_frames = 1; age_frames <= 3; ++age_frames)
     tracks.start(track_at(wall.camera, Vec2(100 + age_frames, 90), age_frames));
-  tracks[0].p_W = Vec3(1, 2, 3);
+  tracks[0].p_G = Vec3(1, 2, 3);
   thin_out(tracks, 5, 10);
   EXPECT_EQ(tracks[0].fate, Fate::active) << "the oldest";
   EXPECT_EQ(tracks[1].fate, Fate::lost);

@@ -22,7 +22,7 @@ namespace fbvins {
 struct OrbView {
   std::int64_t index = 0;  ///< of usable left images, counted from 0
   Time t;
-  std::optional<Pose<W, C0>> T_WC;  ///< predicted; none without a state of the estimator
+  std::optional<Pose<G, C0>> T_GC;  ///< predicted; none without a state of the estimator
   OrbFeatures features;
   OrbFeatures raw;  ///< the same before descriptors were improved; empty where they are as extracted
   bool improved = false;

@@ -56,10 +56,10 @@ MotionPredictor::State MotionPredictor::carry(const State& from, Time to) const 
     if (dt > 0) {
       const Vec3 w = 0.5 * (last.gyro_radps + next.gyro_radps) - prior_.bias.gyro_radps;
       const Vec3 f = 0.5 * (last.accel_mps2 + next.accel_mps2) - prior_.bias.accel_mps2;
-      const Vec3 a_W = s.T_WB.q * (so3_exp(0.5 * dt * w) * f) + prior_.gravity_W;
-      s.T_WB.p += dt * s.v_WB + 0.5 * dt * dt * a_W;
-      s.v_WB += dt * a_W;
-      s.T_WB.q = (s.T_WB.q * so3_exp(dt * w)).normalized();
+      const Vec3 a_G = s.T_GB.q * (so3_exp(0.5 * dt * w) * f) + prior_.gravity_G;
+      s.T_GB.p += dt * s.v_GB + 0.5 * dt * dt * a_G;
+      s.v_GB += dt * a_G;
+      s.T_GB.q = (s.T_GB.q * so3_exp(dt * w)).normalized();
     }
     s.t = next.t;
     last = next;
@@ -72,11 +72,11 @@ bool MotionPredictor::state_reaches(Time t) const {
   return prior_.valid && prior_.t <= t && t - prior_.t < kOldestPrior && covers(prior_.t, t);
 }
 
-MotionPredictor::State MotionPredictor::state_at(Time t) const { return carry({prior_.t, prior_.T_WB, prior_.v_WB}, t); }
+MotionPredictor::State MotionPredictor::state_at(Time t) const { return carry({prior_.t, prior_.T_GB, prior_.v_GB}, t); }
 
-std::optional<Pose<W, C0>> MotionPredictor::camera_at(Time t) const {
+std::optional<Pose<G, C0>> MotionPredictor::camera_at(Time t) const {
   if (!state_reaches(t)) return std::nullopt;
-  return state_at(t).T_WB * T_BC0_;
+  return state_at(t).T_GB * T_BC0_;
 }
 
 CameraMotion MotionPredictor::between(Time a, Time b) const {
@@ -87,7 +87,7 @@ CameraMotion MotionPredictor::between(Time a, Time b) const {
   const bool with_state = state_reaches(a);
   if (with_state) at_a = state_at(a);
   const State at_b = carry(at_a, b);
-  const Pose<C0, C0> T_ba = (at_b.T_WB * T_BC0_).inverse() * (at_a.T_WB * T_BC0_);
+  const Pose<C0, C0> T_ba = (at_b.T_GB * T_BC0_).inverse() * (at_a.T_GB * T_BC0_);
   motion.R_ba = T_ba.R();
   motion.has_rotation = true;
   if (with_state) {

@@ -42,20 +42,20 @@ class MotionPredictor {
   /// Keeps the readings of the last 1.5 s, and the newest valid prior: where an image has none, the one before is
   /// propagated, for up to half a second.
   void add(const ImuSegment& imu, const StatePrior& prior);
-  /// W is a new frame: the prior is void.
+  /// G is a new frame, or what was known in it no longer fits: the prior is void.
   void forget_state() { prior_ = {}; }
   /// Drops readings older than this.
   void forget_before(Time t);
 
   CameraMotion between(Time a, Time b) const;
-  /// Pose of the left camera in W; nothing without a prior that can be propagated to t.
-  std::optional<Pose<W, C0>> camera_at(Time t) const;
+  /// Pose of the left camera in G; nothing without a prior that can be propagated to t.
+  std::optional<Pose<G, C0>> camera_at(Time t) const;
 
  private:
   struct State {
     Time t;
-    Pose<W, B> T_WB;
-    Vec3 v_WB = Vec3::Zero();
+    Pose<G, B> T_GB;
+    Vec3 v_GB = Vec3::Zero();
   };
   bool covers(Time a, Time b) const;
   bool state_reaches(Time t) const;

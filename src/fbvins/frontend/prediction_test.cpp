@@ -8,22 +8,22 @@ namespace {
 
 const Pose<B, C0> kT_BC0(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
 
-/// A body that turns at a constant rate and accelerates along x of W, with its IMU readings.
+/// A body that turns at a constant rate and accelerates along x of G, with its IMU readings.
 struct Flight {
-  Vec3 w_B = Vec3(0.1, -0.3, 0.2), a_W = Vec3(0.4, 0, 0);
+  Vec3 w_B = Vec3(0.1, -0.3, 0.2), a_G = Vec3(0.4, 0, 0);
 
-  Pose<W, B> T_WB(double s) const { return {so3_exp(s * w_B), Vec3(0.5 * s, 0, 0) + 0.5 * s * s * a_W}; }
+  Pose<G, B> T_GB(double s) const { return {so3_exp(s * w_B), Vec3(0.5 * s, 0, 0) + 0.5 * s * s * a_G}; }
   ImuSegment imu(double from_s, double to_s) const {
     ImuSegment segment;
     for (double s = from_s; s < to_s + 1e-6; s += 0.005)
-      segment.samples.push_back({Time{} + Duration::from_seconds(s), w_B, T_WB(s).q.conjugate() * (a_W + Vec3(0, 0, 9.81))});
+      segment.samples.push_back({Time{} + Duration::from_seconds(s), w_B, T_GB(s).q.conjugate() * (a_G + Vec3(0, 0, 9.81))});
     return segment;
   }
   StatePrior prior(double s) const {
     StatePrior prior;
     prior.t = Time{} + Duration::from_seconds(s);
-    prior.T_WB = T_WB(s);
-    prior.v_WB = Vec3(0.5, 0, 0) + s * a_W;
+    prior.T_GB = T_GB(s);
+    prior.v_GB = Vec3(0.5, 0, 0) + s * a_G;
     prior.valid = true;
     return prior;
   }
@@ -41,7 +41,7 @@ TEST(MotionPredictor, CarriesThePriorToBothImages) {
 
   predictor.add(ImuSegment{}, flight.prior(0.05));
   const CameraMotion motion = predictor.between(at_ms(100), at_ms(150));
-  const Pose<C0, C0> truth = (flight.T_WB(0.15) * kT_BC0).inverse() * (flight.T_WB(0.10) * kT_BC0);
+  const Pose<C0, C0> truth = (flight.T_GB(0.15) * kT_BC0).inverse() * (flight.T_GB(0.10) * kT_BC0);
   ASSERT_TRUE(motion.has_rotation && motion.has_translation);
   EXPECT_LT(so3_log(Quat(Mat3(motion.R_ba.transpose() * truth.R()))).norm(), 1e-4);
   EXPECT_LT((motion.p_ba - truth.p).norm(), 1e-3);
@@ -58,7 +58,7 @@ TEST(MotionPredictor, CarriesTheLastPriorOnForHalfASecondWhenOneIsSkipped) {
   predictor.add(ImuSegment{}, StatePrior{});  // none for this image
   const auto camera = predictor.camera_at(at_ms(550));
   ASSERT_TRUE(camera);
-  EXPECT_LT((camera->p - (flight.T_WB(0.55) * kT_BC0).p).norm(), 1e-3);
+  EXPECT_LT((camera->p - (flight.T_GB(0.55) * kT_BC0).p).norm(), 1e-3);
   EXPECT_TRUE(predictor.between(at_ms(550), at_ms(600)).has_translation);
   EXPECT_FALSE(predictor.camera_at(at_ms(650))) << "too old";
   EXPECT_FALSE(predictor.camera_at(at_ms(50))) << "of the future";

@@ -196,16 +196,16 @@ void describe_fit(const LinearSolution& s, int n, AlignmentResult& result) {
   result.velocity_sigma_mps = scale * std::sqrt(s.covariance.diagonal().segment<3>(s.gravity - 3).maxCoeff());
 }
 
-/// Transforms poses and velocities to W (eq. A19, A20).
-void to_world(const Poses& poses, const LinearSolution& s, const Vec3& gravity_V, AlignmentResult& result) {
+/// Transforms poses and velocities to G (eq. A19, A20).
+void to_gauge(const Poses& poses, const LinearSolution& s, const Vec3& gravity_V, AlignmentResult& result) {
   const int n = static_cast<int>(poses.size());
   const Vec3 up_B0 = poses[0].q.conjugate() * Vec3(-gravity_V);
-  result.R_WV = (level_rotation(up_B0) * poses[0].q.conjugate()).normalized();
+  result.R_GV = (level_rotation(up_B0) * poses[0].q.conjugate()).normalized();
   for (int k = 0; k < n; ++k) {
-    NavState state;
-    state.T_WB.q = (result.R_WV * poses[k].q).normalized();
-    state.T_WB.p = result.R_WV * Vec3(poses[k].p - poses[0].p);
-    state.v_WB = result.R_WV * Vec3(s.x.segment<3>(3 * (n + k)));
+    NavState<G> state;
+    state.T_FB.q = (result.R_GV * poses[k].q).normalized();
+    state.T_FB.p = result.R_GV * Vec3(poses[k].p - poses[0].p);
+    state.v_FB = result.R_GV * Vec3(s.x.segment<3>(3 * (n + k)));
     state.bias = result.bias;
     result.states.push_back(state);
   }
@@ -245,7 +245,7 @@ AlignmentResult align_visual_inertial(const Poses& poses, Intervals& between, co
   if (const auto reason = judge_motion(result, options, gravity_mps2); reason != AlignmentRefusal::none) return refuse(reason);
 
   for (Preintegration& p : between) p.repropagate(result.bias);
-  to_world(poses, solution, gravity_V, result);
+  to_gauge(poses, solution, gravity_V, result);
   result.accepted = true;
   return result;
 }

@@ -62,11 +62,11 @@ struct AlignmentResult {
   bool accepted = false;
   AlignmentRefusal reason = AlignmentRefusal::none;
 
-  /// W: z up, origin at the first body pose, heading such that R_WB of the first pose has no rotation
-  /// about gravity (level_rotation of static_initialiser.hpp).
-  Quat R_WV = Quat::Identity();
+  /// G, which begins here: z up as far as gravity is known, origin at the first body pose, heading such that R_GB of the
+  /// first pose has no rotation about gravity (level_rotation of static_initialiser.hpp).
+  Quat R_GV = Quat::Identity();
   ImuBias bias;
-  std::vector<NavState> states;  ///< one a pose: the visual pose in W, velocity, bias
+  std::vector<NavState<G>> states;  ///< one a pose: the visual pose in G, velocity, bias
 
   // Diagnostics, filled as far as the computation went.
   double gravity_norm_mps2 = 0;        ///< without constraint on its magnitude

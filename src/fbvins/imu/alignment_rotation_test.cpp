@@ -21,7 +21,7 @@ struct Window {
     for (int k = 0; k < frames; ++k) {
       const Time t = Time{1'000'000'000 + k * 50'000'000};
       poses.push_back(
-          {(kR_VW * motion.state(t.seconds()).T_WB.q * so3_exp(noise_rad * test::normal3(rng))).normalized(), Vec3::Zero()});
+          {(kR_VW * motion.state(t.seconds()).T_FB.q * so3_exp(noise_rad * test::normal3(rng))).normalized(), Vec3::Zero()});
       if (k == 0) continue;
       between.emplace_back(ImuNoise{}, ImuBias{});
       between.back().integrate(motion.segment(Time{t.ns - 50'000'000}, t, Duration{5'000'000}, kBias));
@@ -47,7 +47,7 @@ TEST(AlignRotations, SmoothsVisualOrientationsWithTheGyro) {
   double before = 0, after = 0;
   const auto error = [](const Quat& a, const Quat& b) { return so3_log(a.conjugate() * b).squaredNorm(); };
   for (std::size_t k = 0; k < w.poses.size(); ++k) {
-    const Quat truth = kR_VW * motion.state(1.0 + 0.05 * static_cast<double>(k)).T_WB.q;
+    const Quat truth = kR_VW * motion.state(1.0 + 0.05 * static_cast<double>(k)).T_FB.q;
     before += error(truth, w.poses[k].q);
     after += error(truth, r.R_VB[k]);
   }

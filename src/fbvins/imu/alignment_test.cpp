@@ -18,7 +18,7 @@ const Vec3 kOrigin(3, -2, 1);
 struct Window {
   std::vector<Pose<VisualWorld, B>> poses;
   std::vector<Preintegration> between;
-  std::vector<NavState> truth;
+  std::vector<NavState<W>> truth;
 };
 
 struct Noises {
@@ -32,10 +32,10 @@ Window make_window(const Motion& motion, double begin_s, int frames, const Noise
   Rng rng(seed);
   for (int k = 0; k < frames; ++k) {
     const double t = begin_s + frame_s * k;
-    const NavState truth = motion.state(t, kBias);
+    const NavState<W> truth = motion.state(t, kBias);
     w.truth.push_back(truth);
-    w.poses.push_back({(kR_VW * truth.T_WB.q * so3_exp(noises.pose_rad * test::normal3(rng))).normalized(),
-                       Vec3(kR_VW * truth.T_WB.p + kOrigin + noises.pose_m * test::normal3(rng))});
+    w.poses.push_back({(kR_VW * truth.T_FB.q * so3_exp(noises.pose_rad * test::normal3(rng))).normalized(),
+                       Vec3(kR_VW * truth.T_FB.p + kOrigin + noises.pose_m * test::normal3(rng))});
     if (k == 0) continue;
     ImuSegment segment = motion.segment(Time{} + Duration::from_seconds(t - frame_s), Time{} + Duration::from_seconds(t),
                                         Duration{5'000'000}, kBias);
@@ -46,14 +46,14 @@ Window make_window(const Motion& motion, double begin_s, int frames, const Noise
   return w;
 }
 
-double gravity_error(const NavState& estimate, const NavState& truth) {
-  const Vec3 a = estimate.T_WB.q.conjugate() * Vec3::UnitZ(), b = truth.T_WB.q.conjugate() * Vec3::UnitZ();
+double gravity_error(const NavState<G>& estimate, const NavState<W>& truth) {
+  const Vec3 a = estimate.T_FB.q.conjugate() * Vec3::UnitZ(), b = truth.T_FB.q.conjugate() * Vec3::UnitZ();
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 /// Velocity in B: free of heading.
-double velocity_error(const NavState& estimate, const NavState& truth) {
-  return (estimate.T_WB.q.conjugate() * estimate.v_WB - truth.T_WB.q.conjugate() * truth.v_WB).norm();
+double velocity_error(const NavState<G>& estimate, const NavState<W>& truth) {
+  return (estimate.T_FB.q.conjugate() * estimate.v_FB - truth.T_FB.q.conjugate() * truth.v_FB).norm();
 }
 
 TEST(Alignment, IsNearlyExactWithoutNoise) {
@@ -110,9 +110,9 @@ TEST(Alignment, WorldIsLevelWithItsOriginAtTheFirstBody) {
   const AlignmentResult a = align_visual_inertial(w.poses, w.between);
   ASSERT_TRUE(a.accepted);
   ASSERT_EQ(a.states.size(), w.poses.size());
-  EXPECT_EQ(a.states[0].T_WB.p.norm(), 0);
-  EXPECT_NEAR(so3_log(a.states[0].T_WB.q).z(), 0, 1e-12);  // no rotation about gravity
-  const Quat relative = a.states[0].T_WB.q.conjugate() * a.states[5].T_WB.q;
+  EXPECT_EQ(a.states[0].T_FB.p.norm(), 0);
+  EXPECT_NEAR(so3_log(a.states[0].T_FB.q).z(), 0, 1e-12);  // no rotation about gravity
+  const Quat relative = a.states[0].T_FB.q.conjugate() * a.states[5].T_FB.q;
   EXPECT_LT(so3_log(relative.conjugate() * (w.poses[0].q.conjugate() * w.poses[5].q)).norm(), 1e-12);
 }
 
@@ -132,7 +132,7 @@ TEST(Alignment, DoesNotDependOnTheBiasTheIntervalsCameWith) {
   const AlignmentResult a = align_visual_inertial(w.poses, w.between), b = align_visual_inertial(other.poses, other.between);
   ASSERT_TRUE(a.accepted && b.accepted);
   EXPECT_LT((a.bias.accel_mps2 - b.bias.accel_mps2).norm(), 1e-6);
-  EXPECT_LT(so3_log(a.R_WV.conjugate() * b.R_WV).norm(), 1e-6);
+  EXPECT_LT(so3_log(a.R_GV.conjugate() * b.R_GV).norm(), 1e-6);
 }
 
 TEST(Alignment, AcceptsRestAndReportsTheAccelerometerBiasAsUnobserved) {
@@ -141,7 +141,7 @@ TEST(Alignment, AcceptsRestAndReportsTheAccelerometerBiasAsUnobserved) {
   const AlignmentResult a = align_visual_inertial(w.poses, w.between, options);
   ASSERT_TRUE(a.accepted) << to_string(a.reason);
   EXPECT_LT(gravity_error(a.states.back(), w.truth.back()), 0.02);
-  EXPECT_LT(a.states.back().v_WB.norm(), 0.01);
+  EXPECT_LT(a.states.back().v_FB.norm(), 0.01);
   EXPECT_GT(a.accel_bias_sigma_mps2, 0.5 * options.accel_bias_prior_mps2);
 }
 

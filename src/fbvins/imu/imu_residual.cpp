@@ -17,22 +17,24 @@ struct Motion {
   Vec3 p, v;  ///< displacement and change of velocity less gravity, in B_i
 };
 
-Motion motion(const NavState& i, const NavState& j, double dt, const Vec3& gravity_W) {
-  const Quat q_i_t = i.T_WB.q.conjugate();
-  return {q_i_t * Vec3(j.T_WB.p - i.T_WB.p - dt * i.v_WB - 0.5 * dt * dt * gravity_W),
-          q_i_t * Vec3(j.v_WB - i.v_WB - dt * gravity_W)};
+template <class F>
+Motion motion(const NavState<F>& i, const NavState<F>& j, double dt, const Vec3& gravity_F) {
+  const Quat q_i_t = i.T_FB.q.conjugate();
+  return {q_i_t * Vec3(j.T_FB.p - i.T_FB.p - dt * i.v_FB - 0.5 * dt * dt * gravity_F),
+          q_i_t * Vec3(j.v_FB - i.v_FB - dt * gravity_F)};
 }
 
-Blocks blocks(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W) {
+template <class F>
+Blocks blocks(const NavState<F>& i, const NavState<F>& j, const Preintegration& between, const Vec3& gravity_F) {
   const double dt = between.dt_s();
-  const Motion m = motion(i, j, dt, gravity_W);
+  const Motion m = motion(i, j, dt, gravity_F);
   const Vec3 dbg = i.bias.gyro_radps - between.linearisation_bias().gyro_radps;
   const Vec3 correction = between.J_theta_bg() * dbg;
-  const Quat q_ij = i.T_WB.q.conjugate() * j.T_WB.q;
+  const Quat q_ij = i.T_FB.q.conjugate() * j.T_FB.q;
   const Quat q_r = (between.delta_q() * so3_exp(correction)).conjugate() * q_ij;
   Blocks b;
   b.dt_s = dt;
-  b.R_i_t = i.T_WB.R().transpose();
+  b.R_i_t = i.T_FB.R().transpose();
   b.p_theta = hat(m.p);
   b.v_theta = hat(m.v);
   b.theta_theta_j = so3_right_jacobian_inverse(so3_log(q_r));
@@ -65,21 +67,23 @@ void weighted(const Blocks& b, const Preintegration& between, const Mat15& U, Ma
 
 }  // namespace
 
-Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W) {
+template <class F>
+Vec15 imu_residual(const NavState<F>& i, const NavState<F>& j, const Preintegration& between, const Vec3& gravity_F) {
   const ImuDeltas d = between.corrected(i.bias);
-  const Motion m = motion(i, j, between.dt_s(), gravity_W);
+  const Motion m = motion(i, j, between.dt_s(), gravity_F);
   Vec15 r;  // eq. P17-P20
   r.segment<3>(nav::p) = m.p - d.p;
-  r.segment<3>(nav::theta) = so3_log(d.q.conjugate() * (i.T_WB.q.conjugate() * j.T_WB.q));
+  r.segment<3>(nav::theta) = so3_log(d.q.conjugate() * (i.T_FB.q.conjugate() * j.T_FB.q));
   r.segment<3>(nav::v) = m.v - d.v;
   r.segment<3>(nav::bg) = j.bias.gyro_radps - i.bias.gyro_radps;
   r.segment<3>(nav::ba) = j.bias.accel_mps2 - i.bias.accel_mps2;
   return r;
 }
 
-void imu_jacobians(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W, Mat15& J_i,
+template <class F>
+void imu_jacobians(const NavState<F>& i, const NavState<F>& j, const Preintegration& between, const Vec3& gravity_F, Mat15& J_i,
                    Mat15& J_j) {
-  const Blocks b = blocks(i, j, between, gravity_W);
+  const Blocks b = blocks(i, j, between, gravity_F);
   J_i.setZero();
   J_i.block<3, 3>(nav::p, nav::p) = -b.R_i_t;
   J_i.block<3, 3>(nav::p, nav::theta) = b.p_theta;
@@ -100,30 +104,34 @@ void imu_jacobians(const NavState& i, const NavState& j, const Preintegration& b
   J_j.diagonal().tail<6>().setConstant(1);
 }
 
-Vec15 imu_residual(const NavState& i, const NavState& j, const NavState& i_lin, const NavState& j_lin,
-                   const Preintegration& between, const Vec3& gravity_W, Mat15* J_i, Mat15* J_j) {
+template <class F>
+Vec15 imu_residual(const NavState<F>& i, const NavState<F>& j, const NavState<F>& i_lin, const NavState<F>& j_lin,
+                   const Preintegration& between, const Vec3& gravity_F, Mat15* J_i, Mat15* J_j) {
   if (J_i != nullptr || J_j != nullptr) {
     Mat15 unused_i, unused_j;
-    imu_jacobians(i_lin, j_lin, between, gravity_W, J_i != nullptr ? *J_i : unused_i, J_j != nullptr ? *J_j : unused_j);
+    imu_jacobians(i_lin, j_lin, between, gravity_F, J_i != nullptr ? *J_i : unused_i, J_j != nullptr ? *J_j : unused_j);
   }
-  return imu_residual(i, j, between, gravity_W);
+  return imu_residual(i, j, between, gravity_F);
 }
 
-Vec15 imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W, Mat15* J_i,
-                   Mat15* J_j) {
-  return imu_residual(i, j, i, j, between, gravity_W, J_i, J_j);
-}
-
-Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const NavState& i_lin, const NavState& j_lin,
-                            const Preintegration& between, const Vec3& gravity_W, Mat15* J_i, Mat15* J_j) {
+template <class F>
+Vec15 weighted_imu_residual(const NavState<F>& i, const NavState<F>& j, const NavState<F>& i_lin, const NavState<F>& j_lin,
+                            const Preintegration& between, const Vec3& gravity_F, Mat15* J_i, Mat15* J_j) {
   const Mat15& U = between.sqrt_information();
-  if (J_i != nullptr || J_j != nullptr) weighted(blocks(i_lin, j_lin, between, gravity_W), between, U, J_i, J_j);
-  return U.triangularView<Eigen::Upper>() * imu_residual(i, j, between, gravity_W);
+  if (J_i != nullptr || J_j != nullptr) weighted(blocks(i_lin, j_lin, between, gravity_F), between, U, J_i, J_j);
+  return U.triangularView<Eigen::Upper>() * imu_residual(i, j, between, gravity_F);
 }
 
-Vec15 weighted_imu_residual(const NavState& i, const NavState& j, const Preintegration& between, const Vec3& gravity_W,
-                            Mat15* J_i, Mat15* J_j) {
-  return weighted_imu_residual(i, j, i, j, between, gravity_W, J_i, J_j);
-}
+#define FBVINS_IN_FRAME(F)                                                                                                 \
+  template Vec15 imu_residual(const NavState<F>&, const NavState<F>&, const Preintegration&, const Vec3&);                 \
+  template void imu_jacobians(const NavState<F>&, const NavState<F>&, const Preintegration&, const Vec3&, Mat15&, Mat15&); \
+  template Vec15 imu_residual(const NavState<F>&, const NavState<F>&, const NavState<F>&, const NavState<F>&,              \
+                              const Preintegration&, const Vec3&, Mat15*, Mat15*);                                         \
+  template Vec15 weighted_imu_residual(const NavState<F>&, const NavState<F>&, const NavState<F>&, const NavState<F>&,     \
+                                       const Preintegration&, const Vec3&, Mat15*, Mat15*);
+FBVINS_IN_FRAME(G)
+FBVINS_IN_FRAME(W)
+FBVINS_IN_FRAME(M)
+#undef FBVINS_IN_FRAME
 
 }  // namespace fbvins

@@ -22,7 +22,7 @@ Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const 
 const std::vector<JacobianBlock> kBlocks = {{"p", 3}, {"theta", 3}, {"v", 3}, {"bg", 3}, {"ba", 3}};
 
 struct TwoStates {
-  NavState i, j;
+  NavState<W> i, j;
   Preintegration between;
 };
 
@@ -72,7 +72,7 @@ TEST(ImuResidual, WeightedIsTheRootOfTheInformationTimesTheResidual) {
 TEST(ImuResidual, FirstEstimatesMoveTheJacobiansAndNotTheResidual) {
   const TwoStates s = two_states();
   Vec15 d = Vec15::Constant(0.02);
-  const NavState i_lin = s.i.boxplus(d), j_lin = s.j.boxplus(-d);
+  const NavState<W> i_lin = s.i.boxplus(d), j_lin = s.j.boxplus(-d);
   Mat15 J_i, J_j, at_lin_i, at_lin_j;
   const Vec15 r = weighted_imu_residual(s.i, s.j, i_lin, j_lin, s.between, level_gravity(), &J_i, &J_j);
   weighted_imu_residual(i_lin, j_lin, s.between, level_gravity(), &at_lin_i, &at_lin_j);
@@ -85,9 +85,9 @@ TEST(ImuResidual, FirstEstimatesMoveTheJacobiansAndNotTheResidual) {
 TEST(ImuResidual, DoesNotSeeOriginAndHeading) {
   const TwoStates s = two_states();
   const Quat yaw = so3_exp(Vec3(0, 0, 0.7));
-  const auto moved = [&](NavState x) {
-    x.T_WB = {yaw * x.T_WB.q, yaw * x.T_WB.p + Vec3(3, -4, 5)};
-    x.v_WB = yaw * x.v_WB;
+  const auto moved = [&](NavState<W> x) {
+    x.T_FB = {yaw * x.T_FB.q, yaw * x.T_FB.p + Vec3(3, -4, 5)};
+    x.v_FB = yaw * x.v_FB;
     return x;
   };
   const Vec15 r = imu_residual(s.i, s.j, s.between, level_gravity());

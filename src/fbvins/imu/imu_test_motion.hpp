@@ -19,16 +19,18 @@ class Motion {
   explicit Motion(double position_m = 0.4, double rotation_rad = 0.3, const Vec3& tilt_rad = Vec3(0.3, -0.5, 1.0))
       : position_m_(position_m), rotation_rad_(rotation_rad), tilt_(so3_exp(tilt_rad)) {}
 
-  NavState state(double t, const ImuBias& bias = {}) const {
-    NavState s;
-    s.T_WB = {(tilt_ * so3_exp(phi(t, 0))).normalized(), p(t, 0)};
-    s.v_WB = p(t, 1);
+  /// In a level frame F, that of the motion.
+  template <class F = W>
+  NavState<F> state(double t, const ImuBias& bias = {}) const {
+    NavState<F> s;
+    s.T_FB = {(tilt_ * so3_exp(phi(t, 0))).normalized(), p(t, 0)};
+    s.v_FB = p(t, 1);
     s.bias = bias;
     return s;
   }
   Vec3 rate_B(double t) const { return so3_right_jacobian(phi(t, 0)) * phi(t, 1); }
   Vec3 specific_force_B(double t, double gravity = kGravity_mps2) const {
-    return state(t).T_WB.q.conjugate() * Vec3(p(t, 2) + Vec3(0, 0, gravity));
+    return state(t).T_FB.q.conjugate() * Vec3(p(t, 2) + Vec3(0, 0, gravity));
   }
   ImuSample sample(Time t, const ImuBias& bias = {}) const {
     return {t, rate_B(t.seconds()) + bias.gyro_radps, specific_force_B(t.seconds()) + bias.accel_mps2};

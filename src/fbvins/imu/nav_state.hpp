@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The state of the body at one instant, and the 15-vector of its perturbation.
 //
+//   NavState<G> state = window.newest().state;                    // in the gauge frame
+//   NavState<W> level = window.tilt().levelled(state);            // the same, levelled
+//
 // Order everywhere: (p, theta, v, bg, ba), three numbers each. Position, velocity and biases are
-// additive, rotation is right (local): R <- R * Exp(dtheta). p and v are in W. docs/conventions.md.
+// additive, rotation is right (local): R <- R * Exp(dtheta). p and v are in the state's frame. docs/conventions.md.
 #pragma once
 
 #include <Eigen/Core>
 
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/gauge.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -26,15 +30,17 @@ namespace nav {
 inline constexpr int p = 0, theta = 3, v = 6, bg = 9, ba = 12;
 }
 
+/// F: the frame that the state is in. G in the estimator's window, W where it is published, M in a map.
+template <class F>
 struct NavState {
-  Pose<W, B> T_WB;
-  Vec3 v_WB = Vec3::Zero();  ///< m/s, in W
+  Pose<F, B> T_FB;
+  Vec3 v_FB = Vec3::Zero();  ///< m/s, in F
   ImuBias bias;
 
   NavState boxplus(const Vec15& d) const {
     NavState s = *this;
-    s.T_WB = T_WB.boxplus(d.segment<3>(nav::p), d.segment<3>(nav::theta));
-    s.v_WB += d.segment<3>(nav::v);
+    s.T_FB = T_FB.boxplus(d.segment<3>(nav::p), d.segment<3>(nav::theta));
+    s.v_FB += d.segment<3>(nav::v);
     s.bias.gyro_radps += d.segment<3>(nav::bg);
     s.bias.accel_mps2 += d.segment<3>(nav::ba);
     return s;
@@ -43,7 +49,7 @@ struct NavState {
   /// The d with other.boxplus(d) == *this.
   Vec15 boxminus(const NavState& other) const {
     Vec15 d;
-    d << T_WB.p - other.T_WB.p, so3_log(other.T_WB.q.conjugate() * T_WB.q), v_WB - other.v_WB,
+    d << T_FB.p - other.T_FB.p, so3_log(other.T_FB.q.conjugate() * T_FB.q), v_FB - other.v_FB,
         bias.gyro_radps - other.bias.gyro_radps, bias.accel_mps2 - other.bias.accel_mps2;
     return d;
   }

@@ -166,20 +166,10 @@ const Mat15& Preintegration::sqrt_information() const {
   return sqrt_information_;
 }
 
-NavState Preintegration::predict(const NavState& i, const Vec3& gravity_W) const {
-  const ImuDeltas d = corrected(i.bias);
+Mat15 Preintegration::predict_covariance(const Quat& q_FB, const ImuBias& bias, const Mat15& P_i) const {
+  const ImuDeltas d = corrected(bias);
   const double dt = dt_s();
-  NavState j = i;
-  j.T_WB.p += dt * i.v_WB + 0.5 * dt * dt * gravity_W + i.T_WB.q * d.p;
-  j.v_WB += dt * gravity_W + i.T_WB.q * d.v;
-  j.T_WB.q = (i.T_WB.q * d.q).normalized();
-  return j;
-}
-
-Mat15 Preintegration::predict_covariance(const NavState& i, const Mat15& P_i) const {
-  const ImuDeltas d = corrected(i.bias);
-  const double dt = dt_s();
-  const Mat3 R_i = i.T_WB.q.toRotationMatrix();
+  const Mat3 R_i = q_FB.toRotationMatrix();
   Mat15 F = Mat15::Identity();  // d(state at j)/d(state at i), the derivative of predict()
   F.block<3, 3>(nav::p, nav::theta) = -R_i * hat(d.p);
   F.block<3, 3>(nav::p, nav::v) = dt * Mat3::Identity();

@@ -4,7 +4,7 @@
 //
 //   Preintegration between(noise, bias);
 //   between.integrate(frame.imu);               // again for each consecutive segment
-//   NavState j = between.predict(state_i, gravity_W);
+//   NavState<G> j = between.predict(state_i, gravity_G);
 //
 // Perturbation order (p, theta, v, bg, ba); delta_p and delta_v are in B_i, theta is right (local).
 // Threads: a value; const members may fill a cache, so share one object between threads only by copy.
@@ -84,10 +84,19 @@ class Preintegration {
   const Mat15& sqrt_information() const;
 
   /// State at j from the state at i (eq. P1).
-  NavState predict(const NavState& i, const Vec3& gravity_W) const;
+  template <class F>
+  NavState<F> predict(const NavState<F>& i, const Vec3& gravity_F) const {
+    const ImuDeltas d = corrected(i.bias);
+    const double dt = dt_s();
+    NavState<F> j = i;
+    j.T_FB.p += dt * i.v_FB + 0.5 * dt * dt * gravity_F + i.T_FB.q * d.p;
+    j.v_FB += dt * gravity_F + i.T_FB.q * d.v;
+    j.T_FB.q = (i.T_FB.q * d.q).normalized();
+    return j;
+  }
 
-  /// Covariance of predict(i), in the order of NavState, from that of the state at i.
-  Mat15 predict_covariance(const NavState& i, const Mat15& P_i) const;
+  /// Covariance of predict(i), in the order of NavState, from that of the state at i, of which attitude and bias are given.
+  Mat15 predict_covariance(const Quat& q_FB, const ImuBias& bias, const Mat15& P_i) const;
 
   /// Angular rate at the end of the interval, bias removed, rad/s in B_j.
   Vec3 last_rate_radps(const ImuBias& bias) const;

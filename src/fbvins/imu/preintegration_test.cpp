@@ -163,7 +163,7 @@ TEST(Preintegration, MissingReadingsInflateTheCovariance) {
   EXPECT_EQ(a.longest_gap_s(), 0);
   EXPECT_NEAR(c.longest_gap_s(), 0.305, 1e-9);
   EXPECT_LT(b.covariance().trace(), 1.5 * a.covariance().trace());
-  const NavState i = motion.state(kFrom.seconds()), j = motion.state(kTo.seconds());
+  const NavState<W> i = motion.state(kFrom.seconds()), j = motion.state(kTo.seconds());
   const Vec15 error = c.predict(i, level_gravity()).boxminus(j);
   for (int k = 0; k < 9; ++k)
     EXPECT_LT(std::abs(error(k)), 3.5 * std::sqrt(c.covariance()(k, k))) << "the gap's error is covered, component " << k;

@@ -12,20 +12,23 @@ Quat step_rotation(const ImuSample& from, const ImuSample& to, double dt, const 
 
 }  // namespace
 
-NavState propagate(const NavState& state, const ImuSegment& segment, const Vec3& gravity_W) {
-  NavState s = state;
+template <class F>
+NavState<F> propagate(const NavState<F>& state, const ImuSegment& segment, const Vec3& gravity_F) {
+  NavState<F> s = state;
   for (std::size_t k = 1; k < segment.samples.size(); ++k) {
     const ImuSample &from = segment.samples[k - 1], &to = segment.samples[k];
     const double dt = (to.t - from.t).seconds();
     if (dt <= 0) continue;
-    const Vec3 a0 = s.T_WB.q * Vec3(from.accel_mps2 - s.bias.accel_mps2) + gravity_W;
-    s.T_WB.q = (s.T_WB.q * step_rotation(from, to, dt, s.bias.gyro_radps)).normalized();
-    const Vec3 a1 = s.T_WB.q * Vec3(to.accel_mps2 - s.bias.accel_mps2) + gravity_W;
-    s.T_WB.p += dt * s.v_WB + dt * dt / 6 * (2 * a0 + a1);
-    s.v_WB += dt / 2 * (a0 + a1);
+    const Vec3 a0 = s.T_FB.q * Vec3(from.accel_mps2 - s.bias.accel_mps2) + gravity_F;
+    s.T_FB.q = (s.T_FB.q * step_rotation(from, to, dt, s.bias.gyro_radps)).normalized();
+    const Vec3 a1 = s.T_FB.q * Vec3(to.accel_mps2 - s.bias.accel_mps2) + gravity_F;
+    s.T_FB.p += dt * s.v_FB + dt * dt / 6 * (2 * a0 + a1);
+    s.v_FB += dt / 2 * (a0 + a1);
   }
   return s;
 }
+template NavState<G> propagate(const NavState<G>&, const ImuSegment&, const Vec3&);
+template NavState<W> propagate(const NavState<W>&, const ImuSegment&, const Vec3&);
 
 Quat integrate_gyro(const ImuSegment& segment, const Vec3& gyro_bias_radps) {
   Quat q = Quat::Identity();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Propagation of the state over a segment of readings, without covariance: for prediction between images.
 //
-//   NavState now = propagate(state, frame.imu, gravity_W);
+//   NavState<G> now = propagate(state, frame.imu, gravity_G);
 //
 // Threads: pure functions. Same integration rule as Preintegration (eq. P5-P7).
 #pragma once
@@ -11,8 +11,9 @@
 
 namespace fbvins {
 
-/// State at the segment's last stamp; an empty segment returns the state unchanged.
-NavState propagate(const NavState& state, const ImuSegment& segment, const Vec3& gravity_W);
+/// State at the segment's last stamp; an empty segment returns the state unchanged. For F = G, W.
+template <class F>
+NavState<F> propagate(const NavState<F>& state, const ImuSegment& segment, const Vec3& gravity_F);
 
 /// Rotation R_BiBj over the segment, gyro bias (rad/s) removed.
 Quat integrate_gyro(const ImuSegment& segment, const Vec3& gyro_bias_radps);

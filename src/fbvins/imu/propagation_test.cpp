@@ -22,15 +22,15 @@ Preintegration integrated(const ImuSegment& segment, const ImuBias& bias, const 
 TEST(Propagation, AgreesWithPreintegration) {
   const Motion motion;
   const ImuSegment segment = motion.segment(kFrom, kTo, Duration{5'000'000}, kBias);
-  const NavState i = motion.state(kFrom.seconds(), kBias);
-  const NavState a = integrated(segment, kBias).predict(i, level_gravity()), b = propagate(i, segment, level_gravity());
+  const NavState<W> i = motion.state(kFrom.seconds(), kBias);
+  const NavState<W> a = integrated(segment, kBias).predict(i, level_gravity()), b = propagate(i, segment, level_gravity());
   EXPECT_LT(a.boxminus(b).norm(), 1e-12);
   EXPECT_LT(so3_log(integrate_gyro(segment, kBias.gyro_radps).conjugate() * integrated(segment, kBias).delta_q()).norm(), 1e-13);
 }
 
 TEST(Propagation, FollowsAnExactMotion) {
   const Motion motion;
-  const NavState to =
+  const NavState<W> to =
       propagate(motion.state(kFrom.seconds(), kBias), motion.segment(kFrom, kTo, Duration{5'000'000}, kBias), level_gravity());
   const Vec15 error = to.boxminus(motion.state(kTo.seconds(), kBias));
   EXPECT_LT(error.segment<3>(nav::p).norm(), 5e-5);
@@ -40,7 +40,7 @@ TEST(Propagation, FollowsAnExactMotion) {
 }
 
 TEST(Propagation, WithoutReadingsNothingMoves) {
-  const NavState s = Motion().state(1.0, kBias);
+  const NavState<W> s = Motion().state(1.0, kBias);
   EXPECT_EQ(propagate(s, {}, level_gravity()).boxminus(s), Vec15::Zero());
   EXPECT_EQ(integrate_gyro({}, kBias.gyro_radps).angularDistance(Quat::Identity()), 0);
 }

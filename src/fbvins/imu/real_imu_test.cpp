@@ -54,24 +54,24 @@ std::vector<ImuSample> read_imu(const std::string& path) {
 
 struct Truth {
   Time t;
-  NavState state;
+  NavState<W> state;
 };
 
 std::vector<Truth> read_truth(const std::string& path) {
   std::vector<Truth> truth;
   for (const Row& r : read_csv(path)) {
     const auto& x = r.numbers;
-    NavState s;
-    s.T_WB = {Quat(x[3], x[4], x[5], x[6]).normalized(), Vec3(x[0], x[1], x[2])};
-    s.v_WB = Vec3(x[7], x[8], x[9]);
+    NavState<W> s;
+    s.T_FB = {Quat(x[3], x[4], x[5], x[6]).normalized(), Vec3(x[0], x[1], x[2])};
+    s.v_FB = Vec3(x[7], x[8], x[9]);
     s.bias = {Vec3(x[10], x[11], x[12]), Vec3(x[13], x[14], x[15])};
     truth.push_back({r.t, s});
   }
   return truth;
 }
 
-double tilt_between(const NavState& a, const Quat& R_WB_true) {
-  const Vec3 x = a.T_WB.q.conjugate() * Vec3::UnitZ(), y = R_WB_true.conjugate() * Vec3::UnitZ();
+double tilt_between(const NavState<G>& a, const Quat& R_WB_true) {
+  const Vec3 x = a.T_FB.q.conjugate() * Vec3::UnitZ(), y = R_WB_true.conjugate() * Vec3::UnitZ();
   return std::atan2(x.cross(y).norm(), x.dot(y));
 }
 
@@ -96,7 +96,7 @@ TEST(RealImu, AlignsInMotionOnMH01) {
     for (int k = 0; k < kFrames; ++k) {
       const Truth& now = truth[start + static_cast<std::size_t>(k * kEvery)];
       const Quat noise = so3_exp(0.1 * kDegree * test::normal3(rng));
-      poses.push_back({(now.state.T_WB.q * noise).normalized(), Vec3(now.state.T_WB.p + 1e-3 * test::normal3(rng))});
+      poses.push_back({(now.state.T_FB.q * noise).normalized(), Vec3(now.state.T_FB.p + 1e-3 * test::normal3(rng))});
       if (k == 0) continue;
       between.emplace_back(ImuNoise{}, ImuBias{});
       between.back().integrate(history.between(truth[start + static_cast<std::size_t>((k - 1) * kEvery)].t, now.t));
@@ -104,10 +104,10 @@ TEST(RealImu, AlignsInMotionOnMH01) {
     const AlignmentResult a = align_visual_inertial(poses, between);
     if (!a.accepted) continue;
     ++accepted;
-    const NavState& last = truth[start + (kFrames - 1) * kEvery].state;
-    const double tilt = tilt_between(a.states.back(), last.T_WB.q);
+    const NavState<W>& last = truth[start + (kFrames - 1) * kEvery].state;
+    const double tilt = tilt_between(a.states.back(), last.T_FB.q);
     const double velocity =
-        (a.states.back().T_WB.q.conjugate() * a.states.back().v_WB - last.T_WB.q.conjugate() * last.v_WB).norm();
+        (a.states.back().T_FB.q.conjugate() * a.states.back().v_FB - last.T_FB.q.conjugate() * last.v_FB).norm();
     worst_tilt = std::max(worst_tilt, tilt);
     sum_tilt += tilt;
     worst_velocity = std::max(worst_velocity, velocity);

@@ -110,7 +110,7 @@ RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, double ima
   r.reason = judge(s, image_motion_px, noise, options, gravity_mps2);
   r.at_rest = r.reason == RestRefusal::none;
   if (!r.at_rest) return r;
-  r.state.T_WB.q = level_rotation(s.accel_mean);  // eq. A2
+  r.state.T_FB.q = level_rotation(s.accel_mean);  // eq. A2
   r.state.bias.gyro_radps = s.gyro_mean;
   r.covariance = covariance_at_rest(s.accel_mean.normalized(), window_s, noise, options, gravity_mps2);
   return r;

@@ -41,16 +41,16 @@ std::string_view to_string(RestRefusal reason);
 struct RestEstimate {
   bool at_rest = false;
   RestRefusal reason = RestRefusal::none;
-  /// Origin at the body, up along the mean specific force, no rotation about gravity (level_rotation),
+  /// In a new gauge: origin at the body, up along the mean specific force, no rotation about gravity (level_rotation),
   /// velocity and accelerometer bias zero.
-  NavState state;
+  NavState<G> state;
   /// Of the state in (p, theta, v, bg, ba); tilt and accelerometer bias are correlated (eq. A4).
   Mat15 covariance = Mat15::Zero();
   double gyro_spread_radps = 0;
   double accel_spread_mps2 = 0;
 };
 
-/// The shortest rotation R_WB that takes up_B (any length) to +z of W: heading zero by definition.
+/// The shortest rotation R_GB that takes up_B (any length) to +z of G: heading zero by definition.
 Quat level_rotation(const Vec3& up_B);
 
 RestEstimate initialise_at_rest(const std::vector<ImuSample>& window, double image_motion_px, const ImuNoise& noise,

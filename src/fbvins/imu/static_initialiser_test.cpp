@@ -22,8 +22,8 @@ std::vector<ImuSample> window(const Motion& motion, std::uint64_t seed) {
 }
 
 /// Angle between the directions of gravity of estimate and truth in B.
-double tilt_error(const NavState& estimate, const NavState& truth) {
-  const Vec3 a = estimate.T_WB.q.conjugate() * Vec3::UnitZ(), b = truth.T_WB.q.conjugate() * Vec3::UnitZ();
+double tilt_error(const NavState<G>& estimate, const NavState<W>& truth) {
+  const Vec3 a = estimate.T_FB.q.conjugate() * Vec3::UnitZ(), b = truth.T_FB.q.conjugate() * Vec3::UnitZ();
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
@@ -34,12 +34,12 @@ TEST(StaticInitialiser, FindsTiltAndGyroBiasAtRest) {
   EXPECT_LT((r.state.bias.gyro_radps - kBias.gyro_radps).norm(), 1e-3);
   const double explained = kBias.accel_mps2.norm() / kGravity_mps2;  // tilt error that the unknown bias may cause
   EXPECT_LT(tilt_error(r.state, rest.state(3.0)), explained + 1e-3);
-  EXPECT_EQ(r.state.v_WB.norm(), 0);
+  EXPECT_EQ(r.state.v_FB.norm(), 0);
 }
 
 TEST(StaticInitialiser, HeadingIsZero) {
   const RestEstimate r = initialise_at_rest(window(Motion(0, 0), 1), 0.1, {});
-  EXPECT_NEAR(so3_log(r.state.T_WB.q).z(), 0, 1e-12);
+  EXPECT_NEAR(so3_log(r.state.T_FB.q).z(), 0, 1e-12);
 }
 
 // Random accelerometer biases drawn from the prior: the normalised error is chi-square with 8
@@ -56,11 +56,11 @@ TEST(StaticInitialiser, CovarianceIsConsistent) {
     test::add_noise(segment, {}, rng);
     const RestEstimate r = initialise_at_rest(segment.samples, 0, {}, options);
     ASSERT_TRUE(r.at_rest) << to_string(r.reason);
-    NavState truth = rest.state(3.0, bias);
+    NavState<G> truth = rest.state<G>(3.0, bias);
     // truth in the estimate's frame: same origin, and the heading that leaves no rotation about gravity
-    const Vec3 up_true_B = truth.T_WB.q.conjugate() * Vec3::UnitZ(), up_B = r.state.T_WB.q.conjugate() * Vec3::UnitZ();
-    truth.T_WB = {(r.state.T_WB.q * so3_between(up_true_B, up_B)).normalized(), Vec3::Zero()};
-    truth.v_WB.setZero();
+    const Vec3 up_true_B = truth.T_FB.q.conjugate() * Vec3::UnitZ(), up_B = r.state.T_FB.q.conjugate() * Vec3::UnitZ();
+    truth.T_FB = {(r.state.T_FB.q * so3_between(up_true_B, up_B)).normalized(), Vec3::Zero()};
+    truth.v_FB.setZero();
     const Vec15 e = truth.boxminus(r.state);
     nees += e.dot(r.covariance.ldlt().solve(e)) / kRuns;
   }

@@ -252,8 +252,8 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
     double at_images = 0, at_readings = 0;
     int images = 0, readings = 0;
     const auto error2 = [&](const Pose<W, B>& estimate, Time t) {
-      const NavState truth = motion.state(t.seconds());
-      return (*T_truth_W * estimate.p - truth.T_WB.p).squaredNorm();
+      const NavState<W> truth = motion.state(t.seconds());
+      return (*T_truth_W * estimate.p - truth.T_FB.p).squaredNorm();
     };
     for (int k = 0; k < 400; ++k) {
       const TrackedFrame frame = flight.frame(k);
@@ -264,11 +264,11 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
       }
       const Odometry o = estimator.process(frame).odometry;
       if (o.health.has_pose()) {
-        const NavState truth = motion.state(o.t.seconds());
+        const NavState<W> truth = motion.state(o.t.seconds());
         if (!T_truth_W) {
-          const Quat turn = truth.T_WB.q * o.T_WB.q.conjugate();
+          const Quat turn = truth.T_FB.q * o.T_WB.q.conjugate();
           const Quat heading = Quat(turn.w(), 0, 0, turn.z()).normalized();
-          T_truth_W = Pose<W, W>{heading, truth.T_WB.p - heading * o.T_WB.p};
+          T_truth_W = Pose<W, W>{heading, truth.T_FB.p - heading * o.T_WB.p};
         }
         if (k > 100) at_images += error2(o.T_WB, o.t), ++images;
       }

@@ -29,14 +29,14 @@ void PosePropagator::propagate_to(Time t) {
   newest_t_ = t;
 }
 
-NavState PosePropagator::newest_state() const {
+NavState<W> PosePropagator::newest_state() const {
   // Gravity is not along z while a correction of the tilt is still to be published.
   return since_->predict(estimated_state(), -gravity_mps2_ * estimate_->up_W);
 }
 
 void PosePropagator::rebase(const Odometry& estimate) {
   const bool same_world = estimate_ && estimate_->reset_counter == estimate.reset_counter;
-  std::optional<NavState> before;  // what was published so far for the same moment
+  std::optional<NavState<W>> before;  // what was published so far for the same moment
   if (since_ && same_world && smoothing_s_ > 0 && estimate.health.has_pose()) {
     if (newest_t_ < estimate.t) propagate_to(estimate.t);
     before = newest_state().boxplus(offset_);
@@ -73,10 +73,10 @@ std::optional<LivePose> PosePropagator::add(const ImuSample& reading) {
     if (pose.health.has_pose()) pose.health = {HealthState::lost, HealthReason::no_images};
     return pose;
   }
-  const NavState out = newest_state().boxplus(offset_);
-  const Mat15 P = since_->predict_covariance(estimated_state(), covariance_of(*estimate_));
-  pose.T_WB = out.T_WB;
-  pose.v_WB = out.v_WB;
+  const NavState<W> out = newest_state().boxplus(offset_);
+  const Mat15 P = since_->predict_covariance(estimate_->T_WB.q, estimate_->bias, covariance_of(*estimate_));
+  pose.T_WB = out.T_FB;
+  pose.v_WB = out.v_FB;
   pose.w_WB_B = reading.gyro_radps - out.bias.gyro_radps;
   pose.pose_covariance = P.topLeftCorner<6, 6>();
   pose.velocity_covariance = P.block<3, 3>(nav::v, nav::v);

@@ -36,8 +36,8 @@ class PosePropagator {
 
  private:
   void propagate_to(Time t);
-  NavState estimated_state() const { return {estimate_->T_WB, estimate_->v_WB, estimate_->bias}; }
-  NavState newest_state() const;
+  NavState<W> estimated_state() const { return {estimate_->T_WB, estimate_->v_WB, estimate_->bias}; }
+  NavState<W> newest_state() const;
   void decay_offset(double dt_s);
 
   ImuNoise noise_;

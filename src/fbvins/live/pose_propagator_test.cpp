@@ -13,21 +13,21 @@ Time at(double s) { return Time{Duration::from_seconds(100 + s).ns}; }
 /// A body that turns about its z axis and swings along x of W: every quantity in closed form.
 struct Motion {
   double rate_radps = 0.8, amplitude_m = 0.5, frequency_radps = 2.5;
-  NavState state(double s) const {
-    NavState n;
-    n.T_WB.q = so3_exp(Vec3(0, 0, rate_radps * s));
-    n.T_WB.p = Vec3(amplitude_m * std::sin(frequency_radps * s), 0, 1);
-    n.v_WB = Vec3(amplitude_m * frequency_radps * std::cos(frequency_radps * s), 0, 0);
+  NavState<W> state(double s) const {
+    NavState<W> n;
+    n.T_FB.q = so3_exp(Vec3(0, 0, rate_radps * s));
+    n.T_FB.p = Vec3(amplitude_m * std::sin(frequency_radps * s), 0, 1);
+    n.v_FB = Vec3(amplitude_m * frequency_radps * std::cos(frequency_radps * s), 0, 0);
     return n;
   }
   ImuSample reading(double s) const {
     const Vec3 a_W(-amplitude_m * frequency_radps * frequency_radps * std::sin(frequency_radps * s), 0, 0);
-    return {at(s), Vec3(0, 0, rate_radps), state(s).T_WB.q.conjugate() * (a_W - level_gravity())};
+    return {at(s), Vec3(0, 0, rate_radps), state(s).T_FB.q.conjugate() * (a_W - level_gravity())};
   }
   Odometry estimate(double s) const {
     Odometry o;
-    const NavState n = state(s);
-    o.t = at(s), o.T_WB = n.T_WB, o.v_WB = n.v_WB, o.health = {HealthState::good, HealthReason::none};
+    const NavState<W> n = state(s);
+    o.t = at(s), o.T_WB = n.T_FB, o.v_WB = n.v_FB, o.health = {HealthState::good, HealthReason::none};
     o.pose_covariance = 1e-6 * Mat6::Identity();
     o.velocity_covariance = 1e-4 * Mat3::Identity();
     return o;
@@ -51,10 +51,10 @@ TEST(PosePropagator, FollowsTheTruthBetweenImages) {
     // The estimate of an image 50 ms ago, between two readings.
     if (k % 10 == 9 && k > 10) propagator.rebase(motion.estimate(s - 0.0513));
     if (!pose.health.has_pose()) continue;
-    const NavState truth = motion.state(s);
-    largest_m = std::max(largest_m, (pose.T_WB.p - truth.T_WB.p).norm());
-    largest_rad = std::max(largest_rad, so3_log(pose.T_WB.q.conjugate() * truth.T_WB.q).norm());
-    EXPECT_LT((pose.v_WB - truth.v_WB).norm(), 1e-3);
+    const NavState<W> truth = motion.state(s);
+    largest_m = std::max(largest_m, (pose.T_WB.p - truth.T_FB.p).norm());
+    largest_rad = std::max(largest_rad, so3_log(pose.T_WB.q.conjugate() * truth.T_FB.q).norm());
+    EXPECT_LT((pose.v_WB - truth.v_FB).norm(), 1e-3);
     EXPECT_NEAR(pose.w_WB_B.z(), motion.rate_radps, 1e-12);
   }
   EXPECT_LT(largest_m, 2e-5);
@@ -75,9 +75,9 @@ TEST(PosePropagator, GravityHasTheEstimatesDirectionWhileATiltIsBeingCorrected) 
     pose = *propagator.add(motion.reading(k * kPeriod_s));
     if (k == 1) propagator.rebase(estimate);
   }
-  const NavState truth = motion.state(39 * kPeriod_s);
-  EXPECT_LT((pose.T_WB.p - tilt * truth.T_WB.p).norm(), 1e-4);
-  EXPECT_LT((pose.v_WB - tilt * truth.v_WB).norm(), 1e-3);
+  const NavState<W> truth = motion.state(39 * kPeriod_s);
+  EXPECT_LT((pose.T_WB.p - tilt * truth.T_FB.p).norm(), 1e-4);
+  EXPECT_LT((pose.v_WB - tilt * truth.v_FB).norm(), 1e-3);
   EXPECT_EQ(pose.tilt_sigma_rad, 0.02);
   EXPECT_FALSE(pose.level);
 }
@@ -96,7 +96,7 @@ TEST(PosePropagator, BiasesAreTakenOffTheReadings) {
     estimate.bias = bias;
     if (k == 1) propagator.rebase(estimate);
   }
-  EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_WB.p).norm(), 1e-4);
+  EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_FB.p).norm(), 1e-4);
 }
 
 TEST(PosePropagator, PosesAreOnTheClockOfTheImages) {
@@ -110,7 +110,7 @@ TEST(PosePropagator, PosesAreOnTheClockOfTheImages) {
     estimate.t = estimate.t - offset;
     if (k == 20) propagator.rebase(estimate);
   }
-  EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_WB.p).norm(), 1e-4);
+  EXPECT_LT((pose.T_WB.p - motion.state(39 * kPeriod_s).T_FB.p).norm(), 1e-4);
   EXPECT_EQ(pose.t, at(39 * kPeriod_s) - offset);
 }
 
@@ -128,7 +128,7 @@ TEST(PosePropagator, ReadingsThatTheSensorCannotHaveMadeDoNothing) {
     if (k == 40) reading.gyro_radps.x() = 1e200;
     const std::optional<LivePose> pose = propagator.add(reading);
     ASSERT_EQ(pose.has_value(), k != 20 && k != 30 && k != 40);
-    if (pose) largest_m = std::max(largest_m, (pose->T_WB.p - motion.state(k * kPeriod_s).T_WB.p).norm());
+    if (pose) largest_m = std::max(largest_m, (pose->T_WB.p - motion.state(k * kPeriod_s).T_FB.p).norm());
   }
   EXPECT_LT(largest_m, 2e-3);
 }
@@ -147,7 +147,7 @@ TEST(PosePropagator, ConvergesToANewEstimateWithoutAStep) {
     Odometry estimate = motion.estimate(s);
     if (k >= 100) estimate.T_WB.p += shift;
     if (k % 10 == 0) propagator.rebase(estimate);
-    const Vec3 error = pose.T_WB.p - motion.state(s).T_WB.p;
+    const Vec3 error = pose.T_WB.p - motion.state(s).T_FB.p;
     if (k > 1) largest_step_m = std::max(largest_step_m, (error - error_before).norm());
     error_before = error;
   }
@@ -166,8 +166,8 @@ TEST(PosePropagator, EstimatesNewerThanEveryReadingAreNotPropagatedTwice) {
     if (!gap) pose = *propagator.add(motion.reading(s));
     if (k == 10 || k == 110 || k == 118) propagator.rebase(motion.estimate(s));
     if (k < 11 || gap) continue;
-    EXPECT_LT((pose.T_WB.p - motion.state(s).T_WB.p).norm(), 2e-3) << k;
-    EXPECT_LT(so3_log(pose.T_WB.q.conjugate() * motion.state(s).T_WB.q).norm(), 1e-9) << k;
+    EXPECT_LT((pose.T_WB.p - motion.state(s).T_FB.p).norm(), 2e-3) << k;
+    EXPECT_LT(so3_log(pose.T_WB.q.conjugate() * motion.state(s).T_FB.q).norm(), 1e-9) << k;
   }
 }
 
@@ -177,7 +177,7 @@ TEST(PosePropagator, AnEstimateBeforeAllReadings) {
   PosePropagator propagator({}, {}, 0);
   propagator.rebase(motion.estimate(0));
   const LivePose pose = *propagator.add(motion.reading(kPeriod_s));
-  EXPECT_LT((pose.T_WB.p - motion.state(kPeriod_s).T_WB.p).norm(), 1e-4);
+  EXPECT_LT((pose.T_WB.p - motion.state(kPeriod_s).T_FB.p).norm(), 1e-4);
 }
 
 TEST(PosePropagator, WithoutSmoothingANewEstimateCountsAtOnce) {
@@ -190,7 +190,7 @@ TEST(PosePropagator, WithoutSmoothingANewEstimateCountsAtOnce) {
   moved.T_WB.p.x() += 0.3;
   propagator.rebase(moved);
   const LivePose pose = *propagator.add(motion.reading(2 * kPeriod_s));
-  EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_WB.p.x() + 0.3, 1e-5);
+  EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_FB.p.x() + 0.3, 1e-5);
 }
 
 TEST(PosePropagator, ARestartCountsAtOnceAndIsCounted) {
@@ -205,7 +205,7 @@ TEST(PosePropagator, ARestartCountsAtOnceAndIsCounted) {
   propagator.rebase(restarted);
   const LivePose pose = *propagator.add(motion.reading(2 * kPeriod_s));
   EXPECT_EQ(pose.reset_counter, 1u);
-  EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_WB.p.x() + 5, 1e-5);
+  EXPECT_NEAR(pose.T_WB.p.x(), motion.state(2 * kPeriod_s).T_FB.p.x() + 5, 1e-5);
 }
 
 TEST(PosePropagator, LostMeansNoPose) {
@@ -253,8 +253,8 @@ TEST(PosePropagator, CovarianceIsThatOfTheErrors) {
   const auto fly = [&](const Vec15& error) {
     PosePropagator propagator(noise, {}, 0);
     Odometry o = motion.estimate(0);
-    const NavState start = motion.state(0).boxplus(error);
-    o.T_WB = start.T_WB, o.v_WB = start.v_WB, o.bias = start.bias;
+    const NavState<W> start = motion.state(0).boxplus(error);
+    o.T_WB = start.T_FB, o.v_WB = start.v_FB, o.bias = start.bias;
     const Vec15 variance = sigma.cwiseProduct(sigma);
     o.pose_covariance = variance.head<6>().asDiagonal();
     o.velocity_covariance = variance.segment<3>(nav::v).asDiagonal();

@@ -10,11 +10,10 @@ using RowMajor = Eigen::Matrix<double, Rows, Columns, Eigen::RowMajor>;
 /// No step leads nearer to a camera's plane than this, or behind it.
 constexpr double kNearest_m = 0.05;
 
-/// The IMU's residual is written for W; the same formulas hold in M, which takes its place here.
-NavState state_of(const Quat& start, const double* pose, const double* motion) {
-  NavState s;
-  s.T_WB = {orientation<6>(start, pose), Vec3(pose[0], pose[1], pose[2])};
-  s.v_WB = {motion[0], motion[1], motion[2]};
+NavState<M> state_of(const Quat& start, const double* pose, const double* motion) {
+  NavState<M> s;
+  s.T_FB = {orientation<6>(start, pose), Vec3(pose[0], pose[1], pose[2])};
+  s.v_FB = {motion[0], motion[1], motion[2]};
   s.bias = {{motion[3], motion[4], motion[5]}, {motion[6], motion[7], motion[8]}};
   return s;
 }
@@ -62,7 +61,7 @@ std::optional<Vec3> ObservationCost::residual(const PoseBlock& pose, const Point
 }
 
 bool ImuCost::Evaluate(double const* const* x, double* residual, double** jacobians) const {
-  const NavState i = state_of(q_Mi_, x[0], x[1]), j = state_of(q_Mj_, x[2], x[3]);
+  const NavState<M> i = state_of(q_Mi_, x[0], x[1]), j = state_of(q_Mj_, x[2], x[3]);
   const Vec3 turn(x[4][0], x[4][1], 0), gravity = -gravity_mps2_ * (so3_exp(turn) * Vec3::UnitZ());
   Mat15 J_i, J_j;
   const bool wanted = jacobians != nullptr;
@@ -75,8 +74,8 @@ bool ImuCost::Evaluate(double const* const* x, double* residual, double** jacobi
     const Mat3 J_gravity = -hat(gravity) * so3_right_jacobian(-turn);
     const double dt = between_->dt_s();
     Eigen::Matrix<double, 15, 2> J = Eigen::Matrix<double, 15, 2>::Zero();
-    J.middleRows<3>(nav::p) = -0.5 * dt * dt * i.T_WB.R().transpose() * J_gravity.leftCols<2>();
-    J.middleRows<3>(nav::v) = -dt * i.T_WB.R().transpose() * J_gravity.leftCols<2>();
+    J.middleRows<3>(nav::p) = -0.5 * dt * dt * i.T_FB.R().transpose() * J_gravity.leftCols<2>();
+    J.middleRows<3>(nav::v) = -dt * i.T_FB.R().transpose() * J_gravity.leftCols<2>();
     Eigen::Map<RowMajor<15, 2>>(jacobians[4], 15, 2) = between_->sqrt_information() * J;
   }
   return true;

@@ -75,18 +75,18 @@ class Readings : public testing::Test {
     return std::make_shared<const Preintegration>(imu);
   }
   std::vector<double> pose(Time t, const Quat& start) const {
-    const NavState s = motion_.state(t.seconds());
-    const Quat d = start.conjugate() * s.T_WB.q;  // (1, x/2) normalised
-    return {s.T_WB.p.x(), s.T_WB.p.y(), s.T_WB.p.z(), 2 * d.x() / d.w(), 2 * d.y() / d.w(), 2 * d.z() / d.w()};
+    const NavState<M> s = motion_.state<M>(t.seconds());
+    const Quat d = start.conjugate() * s.T_FB.q;  // (1, x/2) normalised
+    return {s.T_FB.p.x(), s.T_FB.p.y(), s.T_FB.p.z(), 2 * d.x() / d.w(), 2 * d.y() / d.w(), 2 * d.z() / d.w()};
   }
   std::vector<double> motion(Time t) const {
-    const Vec3 v = motion_.state(t.seconds()).v_WB, &g = bias_.gyro_radps, &a = bias_.accel_mps2;
+    const Vec3 v = motion_.state<M>(t.seconds()).v_FB, &g = bias_.gyro_radps, &a = bias_.accel_mps2;
     return {v.x(), v.y(), v.z(), g.x(), g.y(), g.z(), a.x(), a.y(), a.z()};
   }
 };
 
 TEST_F(Readings, HaveNoResidualAtTheTruth) {
-  const Quat q_i = motion_.state(1).T_WB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state(1.25).T_WB.q;
+  const Quat q_i = motion_.state<M>(1).T_FB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state<M>(1.25).T_FB.q;
   const ImuCost cost(q_i, q_j, between(bias_), kGravity);
   const std::vector<double> x[] = {pose(from_, q_i), motion(from_), pose(to_, q_j), motion(to_), {0, 0}};
   const double* blocks[] = {x[0].data(), x[1].data(), x[2].data(), x[3].data(), x[4].data()};
@@ -100,7 +100,7 @@ TEST_F(Readings, HaveNoResidualAtTheTruth) {
 }
 
 TEST_F(Readings, TheirJacobianIsItsDerivative) {
-  const Quat q_i = motion_.state(1).T_WB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state(1.25).T_WB.q;
+  const Quat q_i = motion_.state<M>(1).T_FB.q * so3_exp(Vec3(0.02, 0, 0.03)), q_j = motion_.state<M>(1.25).T_FB.q;
   std::vector<std::vector<double>> x = {pose(from_, q_i), motion(from_), pose(to_, q_j), motion(to_), {0.03, -0.02}};
   x[2][0] += 0.01, x[2][4] += 0.02, x[3][1] -= 0.05, x[1][7] += 0.1;
   // Noise of unit weight, so that its scale does not hide errors of the Jacobian.
