@@ -47,7 +47,7 @@ std::optional<Mat3> homography(const std::vector<Sighting>& sightings, const Pla
   return Mat3(Eigen::Map<const Mat3>(Eigen::Matrix<double, 9, 1>(eigen.eigenvectors().col(0)).data()));
 }
 
-std::optional<Pose<Ck, T>> pose_of(Mat3 H, const PlaneScale& scale, const std::vector<Sighting>& sightings) {
+std::optional<Pose<Cn, T>> pose_of(Mat3 H, const PlaneScale& scale, const std::vector<Sighting>& sightings) {
   double ahead = 0;
   for (const Sighting& s : sightings) {
     const Vec2 xy = scale.per_m * (s.p_T.head<2>() - scale.centre);
@@ -63,18 +63,18 @@ std::optional<Pose<Ck, T>> pose_of(Mat3 H, const PlaneScale& scale, const std::v
   R = svd.matrixU() * svd.matrixV().transpose();
   if (!(R.determinant() > 0)) return std::nullopt;
   const Vec3 p = H.col(2) / scale.per_m - R * Vec3(scale.centre.x(), scale.centre.y(), 0);
-  return Pose<Ck, T>(R, p);
+  return Pose<Cn, T>(R, p);
 }
 
 /// Half the sum of Huber's loss with a bound of one pixel times `spread_px`; equations, if given, are filled.
-double cost_of(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, const Pose<Ck, T>& T_CkT,
+double cost_of(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, const Pose<Cn, T>& T_CnT,
                double spread_px, Mat6* H, Vec6* b) {
   double cost = 0;
-  const Mat3 R = T_CkT.R();
+  const Mat3 R = T_CnT.R();
   for (const BoardCorner& corner : corners) {
     const Vec3 p_T = board.corner(corner.index);
     LensDerivatives d;
-    const auto pixel = project_point(lens, T_CkT * p_T, H ? &d : nullptr);
+    const auto pixel = project_point(lens, T_CnT * p_T, H ? &d : nullptr);
     if (!pixel) {
       cost += 100 * spread_px * spread_px;
       continue;
@@ -92,7 +92,7 @@ double cost_of(const LensModel& lens, const Board& board, const std::vector<Boar
 }
 
 /// Levenberg-Marquardt; returns the cost.
-double refine(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, double spread_px, Pose<Ck, T>& pose) {
+double refine(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, double spread_px, Pose<Cn, T>& pose) {
   double lambda = 1e-4;
   double cost = cost_of(lens, board, corners, pose, spread_px, nullptr, nullptr);
   for (int i = 0; i < 20; ++i) {
@@ -107,7 +107,7 @@ double refine(const LensModel& lens, const Board& board, const std::vector<Board
       damped.diagonal().array() += 1e-12;
       const Vec6 step = damped.ldlt().solve(b);
       if (!step.allFinite()) return cost;
-      const Pose<Ck, T> trial = pose.boxplus(step.head<3>(), step.tail<3>());
+      const Pose<Cn, T> trial = pose.boxplus(step.head<3>(), step.tail<3>());
       const double next = cost_of(lens, board, corners, trial, spread_px, nullptr, nullptr);
       if ((better = next < cost)) {
         decrease = cost - next;
@@ -123,7 +123,7 @@ double refine(const LensModel& lens, const Board& board, const std::vector<Board
   return cost;
 }
 
-double robust_rms(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, const Pose<Ck, T>& pose) {
+double robust_rms(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, const Pose<Cn, T>& pose) {
   std::vector<double> sizes;
   for (const BoardCorner& corner : corners) {
     const auto pixel = project_point(lens, pose * board.corner(corner.index));
@@ -134,12 +134,12 @@ double robust_rms(const LensModel& lens, const Board& board, const std::vector<B
 }
 
 /// The board tilted to the other side of the line of sight: nearly the same image when it is small.
-Pose<Ck, T> tilted_back(const Pose<Ck, T>& pose, const Board& board, const std::vector<BoardCorner>& corners) {
+Pose<Cn, T> tilted_back(const Pose<Cn, T>& pose, const Board& board, const std::vector<BoardCorner>& corners) {
   Vec3 centre_T = Vec3::Zero();
   for (const BoardCorner& corner : corners) centre_T += board.corner(corner.index) / static_cast<double>(corners.size());
   const Vec3 centre_C = pose * centre_T, sight = centre_C.normalized();
   const Vec3 normal = pose.q * Vec3::UnitZ(), other = 2 * normal.dot(sight) * sight - normal;
-  Pose<Ck, T> out;
+  Pose<Cn, T> out;
   out.q = (so3_between(normal, other) * pose.q).normalized();
   out.p = centre_C - out.q * centre_T;
   return out;
@@ -160,7 +160,7 @@ std::optional<PosedBoard> find_board_pose(const Camera& camera, const Board& boa
   if (!pose) return std::nullopt;
   constexpr double kSpread_px = 2;
   double cost = refine(camera.model(), board, corners, kSpread_px, *pose);
-  Pose<Ck, T> other = tilted_back(*pose, board, corners);
+  Pose<Cn, T> other = tilted_back(*pose, board, corners);
   if (refine(camera.model(), board, corners, kSpread_px, other) < cost) *pose = other;
   return PosedBoard{*pose, robust_rms(camera.model(), board, corners, *pose)};
 }

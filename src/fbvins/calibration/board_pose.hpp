@@ -12,7 +12,7 @@
 namespace fbvins {
 
 struct PosedBoard {
-  Pose<Ck, T> T_CkT;
+  Pose<Cn, T> T_CnT;
   double rms_px = 0;   ///< robust: 1.48 times the median distance of corners, over sqrt(2)
 };
 

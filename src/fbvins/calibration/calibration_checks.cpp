@@ -40,7 +40,7 @@ double axial_focal_sigma_px(const CameraCalibration& found, int camera) {
 }
 
 /// Another layout with which the views do make sense.
-std::string better_board(const Board& board, const ImageSize& size, const std::vector<BoardView>& views) {
+std::string better_board(const Board& board, const ImageSize& size, const std::vector<BoardView>& views, double best_px) {
   std::vector<std::pair<Board, std::string>> others;
   if (board.columns != board.rows) {
     Board turned = board;
@@ -54,7 +54,6 @@ std::string better_board(const Board& board, const ImageSize& size, const std::v
       if (std::abs(spacing - board.spacing) > 1e-6) others.push_back({other, fmt::format("a tagSpacing of {:g}", spacing)});
     }
   std::string best;
-  double best_px = 0.3 * largest_plausible_rms_px(size);
   for (const auto& [other, words] : others) {
     const bool fits = std::ranges::all_of(views, [&](const BoardView& v) { return v.corners.back().index < other.corner_count(); });
     const auto start = fits ? start_camera("pinhole-equidistant", size, other, views) : std::nullopt;
@@ -63,6 +62,11 @@ std::string better_board(const Board& board, const ImageSize& size, const std::v
     best_px = start->rms_px;
   }
   return best;
+}
+
+Error other_layout(int camera, const Board& board, const std::string& better) {
+  return refused(fmt::format("the corners that cam{} sees do not lie as the target file says ({}): with {} they would", camera,
+                             board.describe(), better));
 }
 
 Result<void> check_models(const CameraCalibrationOptions& options, int cameras) {
@@ -126,10 +130,8 @@ Result<void> check_input(const Detections& detections, const Board& board, const
 }
 
 Error no_start(int camera, const Board& board, const ImageSize& size, const std::vector<BoardView>& views) {
-  const std::string better = better_board(board, size, views);
-  if (!better.empty())
-    return refused(fmt::format("the corners that cam{} sees do not lie as the target file says ({}): with {} they would",
-                               camera, board.describe(), better));
+  const std::string better = better_board(board, size, views, 0.3 * largest_plausible_rms_px(size));
+  if (!better.empty()) return other_layout(camera, board, better);
   return refused(fmt::format("no lens of this model explains what cam{} sees: the target file describes another board than was "
                              "recorded ({}), or the lens needs another model (--model auto tries all)",
                              camera, board.describe()));
@@ -139,7 +141,7 @@ Result<bool> check_poses(const std::vector<PosedView>& posed, int cameras) {
   std::vector<int> usable(cameras, 0), mirrored(cameras, 0);
   for (const PosedView& view : posed) {
     ++usable[view.view.camera];
-    mirrored[view.view.camera] += view.T_CkT.p.dot(view.T_CkT.q * Vec3::UnitZ()) > 0;
+    mirrored[view.view.camera] += view.T_CnT.p.dot(view.T_CnT.q * Vec3::UnitZ()) > 0;
   }
   for (int k = 0; k < cameras; ++k) {
     if (usable[k] < kFewestViews)
@@ -155,8 +157,12 @@ Result<bool> check_poses(const std::vector<PosedView>& posed, int cameras) {
   return 2 * mirrored[0] > usable[0];
 }
 
-Result<void> check_fit(double noise_px, double single_px, const ImageSize& size, int cameras) {
-  if (cameras > 1 && noise_px > std::max(0.5, 3 * single_px))
+Result<void> check_fit(double noise_px, double single_px, const ImageSize& size, int cameras, const Board& board,
+                       const std::vector<BoardView>& views) {
+  constexpr double kPoor_px = 0.5;
+  if (single_px > kPoor_px)
+    if (const std::string better = better_board(board, size, views, 0.4 * single_px); !better.empty()) return other_layout(0, board, better);
+  if (cameras > 1 && noise_px > std::max(kPoor_px, 3 * single_px))
     return refused(fmt::format("each camera alone fits the board to {:.2f} px, but together they do not ({:.2f} px): images with the same "
                                "stamp were not taken at the same time, or the cameras moved against each other", single_px, noise_px));
   if (!(noise_px < largest_plausible_rms_px(size)) || noise_px <= 0)

@@ -22,7 +22,9 @@ Result<void> check_input(const Detections& detections, const Board& board, const
 Error no_start(int camera, const Board& board, const ImageSize& size, const std::vector<BoardView>& views);
 /// Whether the board is seen mirrored, by all cameras alike.
 Result<bool> check_poses(const std::vector<PosedView>& posed, int cameras);
-Result<void> check_fit(double noise_px, double single_px, const ImageSize& size, int cameras);
+/// `views`: of cam0, in which another layout of the board is looked for where the fit is poor.
+Result<void> check_fit(double noise_px, double single_px, const ImageSize& size, int cameras, const Board& board,
+                       const std::vector<BoardView>& views);
 Error undetermined(const std::string& what);
 Result<void> check_determined(const CameraCalibration& found);
 std::vector<std::string> remarks_on(const CameraCalibration& found);

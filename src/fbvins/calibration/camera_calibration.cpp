@@ -62,7 +62,7 @@ std::vector<PosedView> posed_views(const std::vector<OneCamera>& cameras, const 
   for (const OneCamera& camera : cameras)
     for (const BoardView& view : camera.views) {
       const auto posed = find_board_pose(camera.start.camera, board, view.corners);
-      if (posed && posed->rms_px < std::max(1.0, 5 * camera.start.rms_px)) out.push_back({view, posed->T_CkT});
+      if (posed && posed->rms_px < std::max(1.0, 5 * camera.start.rms_px)) out.push_back({view, posed->T_CnT});
     }
   return out;
 }
@@ -152,7 +152,7 @@ CameraCalibration result_of(const RigAdjustment& adjustment, const std::vector<O
     const RigCamera& found = adjustment.cameras()[k];
     CalibratedCamera camera;
     camera.camera = Camera(found.lens, cameras[k].size.width, cameras[k].size.height);
-    camera.T_CkC0 = found.T_CkC0;
+    camera.T_CnC0 = found.T_CnC0;
     camera.held_out_px = cameras[k].held_out_px;
     camera.size_guessed = cameras[k].size_guessed;
     out.cameras.push_back(std::move(camera));
@@ -188,20 +188,21 @@ Result<CameraCalibration> calibrate_cameras(const Detections& detections, const 
   const Result<bool> mirrored = check_poses(posed, static_cast<int>(cameras.size()));
   if (!mirrored) return mirrored.error();
   const auto stamps = joined_by_stamp(posed, options.pair_tolerance_s);
-  const auto T_CkC0 = chain_cameras(stamps, static_cast<int>(cameras.size()));
-  if (!T_CkC0) return T_CkC0.error();
+  const auto T_CnC0 = chain_cameras(stamps, static_cast<int>(cameras.size()));
+  if (!T_CnC0) return T_CnC0.error();
 
   std::vector<RigCamera> rig;
   double single_px = 0;
   for (std::size_t k = 0; k < cameras.size(); ++k) {
-    rig.push_back({cameras[k].start.camera.model(), (*T_CkC0)[k]});
+    rig.push_back({cameras[k].start.camera.model(), (*T_CnC0)[k]});
     single_px = std::max(single_px, cameras[k].start.rms_px);
   }
-  std::vector<RigFrame> frames = chosen_frames(rig, rig_frames(stamps, *T_CkC0, board), options.max_views);
+  std::vector<RigFrame> frames = chosen_frames(rig, rig_frames(stamps, *T_CnC0, board), options.max_views);
   tell(fmt::format("adjusting {} of {} stamps", frames.size(), stamps.size()));
   RigAdjustment adjustment(std::move(rig), std::move(frames));
   const double noise_px = adjust_without_outliers(adjustment);
-  if (Result<void> good = check_fit(noise_px, single_px, cameras[0].size, static_cast<int>(cameras.size())); !good)
+  if (Result<void> good = check_fit(noise_px, single_px, cameras[0].size, static_cast<int>(cameras.size()), board, cameras[0].views);
+      !good)
     return good.error();
   const auto unit = unit_covariance(adjustment);
   if (!unit) return undetermined("the views do not determine all parameters");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lenses and extrinsics of one to eight cameras from their views of a board, without a guess from the user. Frames: C0 is
-// cam0, Ck the camera at hand, T the board. Pure functions, any thread; the same input gives the same bytes.
+// cam0, Cn the camera at hand, T the board. Pure functions, any thread; the same input gives the same bytes.
 //
 //   Result<CameraCalibration> found = calibrate_cameras(detections, board, {.models = {"pinhole-radtan"}});
-//   found->cameras[1].T_CkC0;                 // of cam1
+//   found->cameras[1].T_CnC0;                 // of cam1
 //   found->sigma("cam0.fx");                  // px
 //
 // Method: each camera alone from homographies, over a table of focal lengths and shapes; extrinsics from common views; then
@@ -21,16 +21,13 @@
 
 namespace fbvins {
 
-/// The camera at hand.
-struct Ck {};
-
 inline constexpr const char* kAutoModel = "auto";
 
 struct CameraCalibrationOptions {
   /// One for all cameras, or one a camera: as Camera::model_name() names them, or "auto": the model that predicts views best
   /// which it was not fitted to.
   std::vector<std::string> models = {"pinhole-radtan"};
-  int max_views = 250;           ///< stamps that enter the adjustment
+  int max_views = 600;           ///< stamps that enter the adjustment
   double pair_tolerance_s = 1e-3;  ///< images of two cameras with stamps that close are one view
   std::function<void(const std::string&)> tell = {};  ///< progress, a few words
 };
@@ -46,7 +43,7 @@ struct ReprojectionStatistics {
 
 struct CalibratedCamera {
   Camera camera;
-  Pose<Ck, C0> T_CkC0;
+  Pose<Cn, C0> T_CnC0;
   ReprojectionStatistics statistics;
   /// Held-out reprojection error of each model that was tried, px; empty unless asked for ("auto").
   std::vector<std::pair<std::string, double>> held_out_px;
@@ -68,8 +65,8 @@ struct CornerResidual {
 
 struct CameraCalibration {
   std::vector<CalibratedCamera> cameras;
-  /// Rows of the covariance: "cam0.fx" ..., then for cam1 and on "cam1.px" "cam1.py" "cam1.pz" (T_CkC0's translation, m, in
-  /// Ck) and "cam1.rx" ... (rad, R_CkC0 <- R Exp(r)).
+  /// Rows of the covariance: "cam0.fx" ..., then for cam1 and on "cam1.px" "cam1.py" "cam1.pz" (T_CnC0's translation, m, in
+  /// Cn) and "cam1.rx" ... (rad, R_CnC0 <- R Exp(r)).
   std::vector<std::string> names;
   Eigen::MatrixXd covariance;
   double noise_px = 0;            ///< standard deviation of a corner's coordinate, as the residuals show it

@@ -11,7 +11,7 @@ namespace fbvins {
 namespace {
 
 /// The camera at hand and another one.
-using Link = Pose<Ck, Ck>;
+using Link = Pose<Cn, Cn>;
 
 /// How far apart two poses are, in the larger of angle (rad) and translation by the board's distance.
 double difference(const Link& a, const Link& b, double distance_m) {
@@ -54,8 +54,8 @@ std::vector<Link> links_of(const std::vector<std::vector<PosedView>>& stamps, in
   for (const auto& stamp : stamps) {
     const PosedView *first = view_of(stamp, a), *second = view_of(stamp, b);
     if (!first || !second) continue;
-    out.push_back(second->T_CkT * first->T_CkT.inverse());
-    distance_m += second->T_CkT.p.norm();
+    out.push_back(second->T_CnT * first->T_CnT.inverse());
+    distance_m += second->T_CnT.p.norm();
   }
   if (!out.empty()) distance_m /= static_cast<double>(out.size());
   return out;
@@ -77,13 +77,13 @@ std::vector<std::vector<PosedView>> joined_by_stamp(std::vector<PosedView> views
   return out;
 }
 
-Result<std::vector<Pose<Ck, C0>>> chain_cameras(const std::vector<std::vector<PosedView>>& stamps, int cameras) {
+Result<std::vector<Pose<Cn, C0>>> chain_cameras(const std::vector<std::vector<PosedView>>& stamps, int cameras) {
   std::vector<std::vector<int>> common(cameras, std::vector<int>(cameras, 0));
   for (const auto& stamp : stamps)
     for (const PosedView& a : stamp)
       for (const PosedView& b : stamp) ++common[a.view.camera][b.view.camera];
-  std::vector<std::optional<Pose<Ck, C0>>> known(cameras);
-  known[0] = Pose<Ck, C0>();
+  std::vector<std::optional<Pose<Cn, C0>>> known(cameras);
+  known[0] = Pose<Cn, C0>();
   for (int round = 1; round < cameras; ++round) {
     int from = -1, to = -1;
     for (int a = 0; a < cameras; ++a)
@@ -94,7 +94,7 @@ Result<std::vector<Pose<Ck, C0>>> chain_cameras(const std::vector<std::vector<Po
     const std::vector<Link> links = links_of(stamps, from, to, distance_m);
     known[to] = agreed(links, distance_m) * *known[from];
   }
-  std::vector<Pose<Ck, C0>> out;
+  std::vector<Pose<Cn, C0>> out;
   for (int k = 0; k < cameras; ++k) {
     if (!known[k])
       return Error{ErrorCode::invalid_argument,
@@ -106,12 +106,12 @@ Result<std::vector<Pose<Ck, C0>>> chain_cameras(const std::vector<std::vector<Po
   return out;
 }
 
-std::vector<RigFrame> rig_frames(const std::vector<std::vector<PosedView>>& stamps, const std::vector<Pose<Ck, C0>>& T_CkC0,
+std::vector<RigFrame> rig_frames(const std::vector<std::vector<PosedView>>& stamps, const std::vector<Pose<Cn, C0>>& T_CnC0,
                                  const Board& board) {
   std::vector<RigFrame> out;
   for (const auto& stamp : stamps) {
     const auto fullest = std::ranges::max_element(stamp, {}, [](const PosedView& v) { return v.view.corners.size(); });
-    RigFrame frame{stamp.front().view.t, {}, T_CkC0[fullest->view.camera].inverse() * fullest->T_CkT};
+    RigFrame frame{stamp.front().view.t, {}, T_CnC0[fullest->view.camera].inverse() * fullest->T_CnT};
     for (const PosedView& posed : stamp) {
       SeenBoard seen{posed.view.camera, {}};
       for (const BoardCorner& corner : posed.view.corners) seen.corners.push_back({corner.index, board.corner(corner.index), corner.pixel});

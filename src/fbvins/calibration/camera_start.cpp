@@ -13,7 +13,8 @@
 namespace fbvins {
 namespace {
 
-constexpr int kStartViews = 24, kTableViews = 12, kTableCorners = 40, kBestOfTable = 4, kJudgedViews = 120;
+constexpr int kStartViews = 24, kTableViews = 8, kTableCorners = 24, kStartCorners = 72, kBestOfTable = 3, kJudgedViews = 120,
+              kDecisiveViews = 150;
 constexpr double kUnfit = std::numeric_limits<double>::infinity();
 
 /// Shapes that a model's lenses have; the focal length near the axis is the given one.
@@ -33,9 +34,9 @@ std::vector<LensModel> shapes(const std::string& model, double f, const Vec2& c)
   return plain ? std::vector<LensModel>{*plain} : std::vector<LensModel>{};
 }
 
-std::vector<BoardCorner> thinned_corners(const std::vector<BoardCorner>& corners) {
+std::vector<BoardCorner> thinned_corners(const std::vector<BoardCorner>& corners, std::size_t most) {
   std::vector<BoardCorner> out;
-  const std::size_t step = std::max<std::size_t>(1, corners.size() / kTableCorners);
+  const std::size_t step = (corners.size() + most - 1) / most;
   for (std::size_t i = 0; i < corners.size(); i += step) out.push_back(corners[i]);
   return out;
 }
@@ -56,7 +57,7 @@ std::vector<RigFrame> posed_frames(const Camera& camera, const Board& board, con
   for (const BoardView& view : views) {
     const auto posed = find_board_pose(camera, board, view.corners);
     if (!posed) continue;
-    RigFrame frame{view.t, {{0, {}}}, {posed->T_CkT.q, posed->T_CkT.p}};
+    RigFrame frame{view.t, {{0, {}}}, {posed->T_CnT.q, posed->T_CnT.p}};
     for (const BoardCorner& corner : view.corners)
       frame.views[0].corners.push_back({corner.index, board.corner(corner.index), corner.pixel});
     out.push_back(std::move(frame));
@@ -74,18 +75,19 @@ double robust_rms(const RigAdjustment& adjustment) {
   return sizes[sizes.size() / 2] / std::sqrt(2 * std::log(2.0));
 }
 
-/// Adjusted to the views; poses are found anew once the lens is better known.
-std::optional<CameraStart> adjusted(Camera camera, const Board& board, const std::vector<BoardView>& views) {
-  double rms_px = kUnfit;
-  for (const double spread_px : {4.0, 1.0}) {
-    std::vector<RigFrame> frames = posed_frames(camera, board, views);
-    if (2 * frames.size() < views.size() || frames.size() < 3) return std::nullopt;
-    RigAdjustment adjustment({{camera.model(), {}}}, std::move(frames));
-    if (!adjustment.solve({.spread_px = spread_px, .max_iterations = 40}).usable) return std::nullopt;
-    camera = Camera(adjustment.cameras()[0].lens, camera.width(), camera.height());
-    rms_px = robust_rms(adjustment);
-  }
-  return CameraStart{camera, rms_px};
+struct Adjusted {
+  CameraStart start;
+  double cost = 0;
+};
+
+/// Adjusted to the views, with their poses as the given lens has them.
+std::optional<Adjusted> adjusted(const Camera& camera, const Board& board, const std::vector<BoardView>& views, double spread_px) {
+  std::vector<RigFrame> frames = posed_frames(camera, board, views);
+  if (2 * frames.size() < views.size() || frames.size() < 3) return std::nullopt;
+  RigAdjustment adjustment({{camera.model(), {}}}, std::move(frames));
+  const AdjustmentSummary summary = adjustment.solve({.spread_px = spread_px, .max_iterations = 40});
+  if (!summary.usable) return std::nullopt;
+  return Adjusted{{Camera(adjustment.cameras()[0].lens, camera.width(), camera.height()), robust_rms(adjustment)}, summary.cost};
 }
 
 /// Root mean square of the residuals in views whose poses are fitted with the lens as it is; the largest per cent is left out.
@@ -109,35 +111,84 @@ double held_out_px(const std::string& model, const ImageSize& size, const Board&
   double square = 0;
   for (const int fitted : {0, 1}) {
     const auto start = start_camera(model, size, board, halves[fitted]);
-    const auto lens = start ? adjusted(start->camera, board, halves[fitted]) : std::nullopt;
-    const double error_px = lens ? predicted_px(lens->camera, board, halves[1 - fitted]) : kUnfit;
+    const auto lens = start ? adjusted(start->camera, board, halves[fitted], 1) : std::nullopt;
+    const double error_px = lens ? predicted_px(lens->start.camera, board, halves[1 - fitted]) : kUnfit;
     square += 0.5 * error_px * error_px;
   }
   return std::sqrt(square);
+}
+
+/// The lenses of the table that leave least unexplained: of a model with several shapes the best of each shape.
+std::vector<Camera> best_of_table(const std::string& model, const ImageSize& size, const Board& board,
+                                  const std::vector<std::vector<BoardCorner>>& views) {
+  struct Entry {
+    double unexplained_px = 0;
+    std::size_t shape = 0;
+    Camera camera;
+  };
+  std::vector<Entry> table;
+  const Vec2 centre(0.5 * (size.width - 1), 0.5 * (size.height - 1));
+  std::size_t shape_count = 1;
+  for (double focal_px = 0.2 * size.width; focal_px < 6.5 * size.width; focal_px *= 1.3) {
+    const std::vector<LensModel> lenses = shapes(model, focal_px, centre);
+    shape_count = lenses.size();
+    for (std::size_t i = 0; i < lenses.size(); ++i) {
+      const Camera camera(lenses[i], size.width, size.height);
+      table.push_back({unexplained_px(camera, board, views), i, camera});
+    }
+  }
+  std::ranges::stable_sort(table, {}, &Entry::unexplained_px);
+  std::vector<Camera> out;
+  for (std::size_t shape = 0; shape < shape_count; ++shape) {
+    std::size_t taken = 0;
+    for (const Entry& entry : table)
+      if (entry.shape == shape && taken++ < kBestOfTable / shape_count) out.push_back(entry.camera);
+  }
+  return out;
+}
+
+/// The double sphere has twins, of another sphere distance xi, that few views cannot tell apart.
+std::vector<Adjusted> distinct_rivals(const std::vector<Adjusted>& fitted) {
+  std::vector<Adjusted> out = {fitted[0]};
+  for (const Adjusted& other : fitted) {
+    const auto* lens = std::get_if<DoubleSphere>(&other.start.camera.model());
+    if (!lens || other.start.rms_px > 1.1 * fitted[0].start.rms_px + 0.02) continue;
+    if (std::ranges::all_of(out, [&](const Adjusted& a) { return std::abs(std::get<DoubleSphere>(a.start.camera.model()).xi - lens->xi) > 0.1; }))
+      out.push_back(other);
+  }
+  return out;
+}
+
+/// The rival that explains many views best.
+CameraStart decided(const std::vector<Adjusted>& rivals, const Board& board, const std::vector<BoardView>& views) {
+  std::optional<Adjusted> best;
+  for (const Adjusted& rival : rivals) {
+    const auto candidate = adjusted(rival.start.camera, board, views, 1);
+    if (candidate && (!best || candidate->cost < best->cost)) best = candidate;
+  }
+  return best ? best->start : rivals[0].start;
 }
 
 }  // namespace
 
 std::optional<CameraStart> start_camera(const std::string& model, const ImageSize& size, const Board& board,
                                         const std::vector<BoardView>& views) {
-  const std::vector<BoardView> chosen = spread_views(views, board, size.width, kStartViews);
+  std::vector<BoardView> chosen = spread_views(views, board, size.width, kStartViews);
+  if (chosen.empty()) return std::nullopt;
   std::vector<std::vector<BoardCorner>> thinned;
-  for (std::size_t i = 0; i < chosen.size() && i < kTableViews; ++i) thinned.push_back(thinned_corners(chosen[i].corners));
-  if (thinned.empty()) return std::nullopt;
-  std::vector<std::pair<double, Camera>> table;
-  const Vec2 centre(0.5 * (size.width - 1), 0.5 * (size.height - 1));
-  for (double focal_px = 0.2 * size.width; focal_px < 6.5 * size.width; focal_px *= 1.25)
-    for (const LensModel& lens : shapes(model, focal_px, centre)) {
-      const Camera camera(lens, size.width, size.height);
-      table.push_back({unexplained_px(camera, board, thinned), camera});
-    }
-  std::ranges::stable_sort(table, {}, [](const auto& entry) { return entry.first; });
-  std::optional<CameraStart> best;
-  for (std::size_t i = 0; i < table.size() && i < kBestOfTable; ++i) {
-    const auto candidate = adjusted(table[i].second, board, chosen);
-    if (candidate && (!best || candidate->rms_px < best->rms_px)) best = candidate;
-  }
-  return best;
+  for (std::size_t i = 0; i < chosen.size() && i < kTableViews; ++i)
+    thinned.push_back(thinned_corners(chosen[i].corners, kTableCorners));
+  for (BoardView& view : chosen) view.corners = thinned_corners(view.corners, kStartCorners);
+  std::vector<Adjusted> fitted;
+  for (const Camera& camera : best_of_table(model, size, board, thinned))
+    if (const auto candidate = adjusted(camera, board, chosen, 4)) fitted.push_back(*candidate);
+  if (fitted.empty()) return std::nullopt;
+  std::ranges::stable_sort(fitted, {}, [](const Adjusted& a) { return a.start.rms_px; });
+  const std::vector<Adjusted> rivals = distinct_rivals(fitted);
+  if (rivals.size() > 1) return decided(rivals, board, spread_views(views, board, size.width, kDecisiveViews));
+  // Poses found anew with the better lens: some were the wrong one of two, or did not fit at all.
+  const auto again = adjusted(rivals[0].start.camera, board, chosen, 1);
+  return again && again->start.rms_px <= rivals[0].start.rms_px ? again->start : rivals[0].start;
 }
 
 ModelChoice choose_model(const ImageSize& size, const Board& board, const std::vector<BoardView>& views) {

@@ -128,6 +128,53 @@ void limit(ExtendedUnified& m) {
 }
 void limit(UnifiedRadtan& m) { m.xi = std::clamp(m.xi, 0.0, 9.9); }
 
+/// Focal lengths near the axis in place of fx, fy: f / (1 + xi).
+std::vector<double> straightened(const DoubleSphere& m) {
+  return {m.fx / (1 + m.xi), m.fy / (1 + m.xi), m.cx, m.cy, m.xi, m.alpha};
+}
+DoubleSphere bent(const DoubleSphere&, const std::vector<double>& v) {
+  return {v[0] * (1 + v[4]), v[1] * (1 + v[4]), v[2], v[3], v[4], v[5]};
+}
+
+/// The projection's own share of the radial function u = f/(1+xi) r (1 + first r^2 + second r^4 + ...).
+struct Series {
+  double first, second;
+};
+Series series(double xi) {
+  const double q = xi / (1 + xi);
+  return {-0.5 * q, q / 8 + q * q / 4};
+}
+
+/// Focal lengths near the axis, coefficients of the whole radial function in place of k1 and k2.
+std::vector<double> straightened(const UnifiedRadtan& m) {
+  const double e = 1 + m.xi, k1 = m.k1 / (e * e);
+  const Series own = series(m.xi);
+  return {m.fx / e, m.fy / e, m.cx, m.cy, m.xi, own.first + k1, own.second + 3 * own.first * k1 + m.k2 / std::pow(e, 4), m.p1 / e, m.p2 / e};
+}
+UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
+  const double e = 1 + v[4];
+  const Series own = series(v[4]);
+  const double k1 = v[5] - own.first, k2 = v[6] - own.second - 3 * own.first * k1;
+  return {v[0] * e, v[1] * e, v[2], v[3], v[4], k1 * e * e, k2 * std::pow(e, 4), v[7] * e, v[8] * e};
+}
+
+/// Moves along the straight line of the other parameters that has the step's direction here.
+template <class Model>
+LensModel moved_bent(const Model& lens, const double* step) {
+  const auto at = [&](double part) {
+    Model m = lens;
+    const double* d = step;
+    each(m, [&](double& value) { value += part * *d++; });
+    return straightened(m);
+  };
+  constexpr double kPart = 1e-3;
+  std::vector<double> v = straightened(lens);
+  const std::vector<double> more = at(kPart), less = at(-kPart);
+  for (std::size_t k = 0; k < v.size(); ++k) v[k] += (more[k] - less[k]) / (2 * kPart);
+  v[4] = std::clamp(v[4], std::is_same_v<Model, DoubleSphere> ? -0.999 : 0.0, std::is_same_v<Model, DoubleSphere> ? 0.999 : 9.9);
+  return bent(lens, v);
+}
+
 std::vector<std::string> own_names(const LensModel& lens) {
   constexpr const char* kNames[][5] = {
       {"k1", "k2", "p1", "p2"}, {"k1", "k2", "k3", "k4"}, {"xi", "alpha"}, {"alpha", "beta"}, {"xi", "k1", "k2", "p1", "p2"}};
@@ -165,6 +212,15 @@ LensModel with_parameters(const LensModel& lens, const double* parameters) {
         return m;
       },
       lens);
+}
+
+LensModel moved_lens(const LensModel& lens, const double* step) {
+  std::vector<double> values = lens_parameters(lens);
+  if (const auto* m = std::get_if<UnifiedRadtan>(&lens)) values = lens_parameters(moved_bent(*m, step));
+  else if (const auto* d = std::get_if<DoubleSphere>(&lens)) values = lens_parameters(moved_bent(*d, step));
+  else
+    for (std::size_t k = 0; k < values.size(); ++k) values[k] += step[k];
+  return with_parameters(lens, values.data());
 }
 
 std::vector<std::string> lens_names() { return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"}; }

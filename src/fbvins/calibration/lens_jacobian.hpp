@@ -26,6 +26,11 @@ std::vector<std::string> lens_parameter_names(const LensModel& lens);
 /// The same model with other numbers, moved to the nearest that the model allows.
 LensModel with_parameters(const LensModel& lens, const double* parameters);
 
+/// The lens after a step of its parameters, along a curve that begins in the step's direction. For omni and ds the curve keeps
+/// what images determine well (focal length near the axis, curvature of the radial function) straight; parameters that trade
+/// off against one another along a bent valley would take hundreds of iterations otherwise.
+LensModel moved_lens(const LensModel& lens, const double* step);
+
 /// Names of all models, as Camera::model_name() gives them.
 std::vector<std::string> lens_names();
 /// A lens of that model with focal length and centre, and no distortion (ds, eucm: alpha 0.5; omni: xi 1); nullopt for another

@@ -60,6 +60,18 @@ TEST(LensJacobian, ModelsOfWideLensesAlsoTakeRaysThatPointBackwards) {
   EXPECT_FALSE(project_point(PinholeRadtan{400, 400, 256, 256}, backwards));
 }
 
+TEST(LensJacobian, ASmallStepMovesTheParametersByItself) {
+  Rng rng(3);
+  for (const Camera& camera : example_cameras()) {
+    const std::vector<double> at = lens_parameters(camera.model());
+    std::vector<double> step;
+    for (const double value : at) step.push_back(1e-5 * std::max(0.1, std::abs(value)) * rng.normal());
+    const std::vector<double> after = lens_parameters(moved_lens(camera.model(), step.data()));
+    for (std::size_t k = 0; k < at.size(); ++k)
+      EXPECT_NEAR(after[k] - at[k], step[k], 1e-8 * std::max(1.0, std::abs(at[k]))) << camera.model_name() << ' ' << k;
+  }
+}
+
 TEST(LensJacobian, EveryModelHasANameAndAStart) {
   for (const std::string& name : lens_names()) {
     const auto lens = plain_lens(name, 300, {320, 240});

@@ -42,7 +42,7 @@ RigAdjustment::RigAdjustment(std::vector<RigCamera> cameras, std::vector<RigFram
 
 Vec2 RigAdjustment::residual(const RigFrame& frame, const SeenBoard& view, const SeenCorner& corner) const {
   const RigCamera& camera = cameras_[view.camera];
-  const auto pixel = project_point(camera.lens, camera.T_CkC0 * (frame.T_C0T * corner.p_T));
+  const auto pixel = project_point(camera.lens, camera.T_CnC0 * (frame.T_C0T * corner.p_T));
   return pixel ? Vec2(corner.pixel - *pixel) : Vec2::Constant(std::numeric_limits<double>::infinity());
 }
 
@@ -50,10 +50,10 @@ double RigAdjustment::cost(const RigFrame& frame, double spread_px) const {
   double sum = 0;
   for (const SeenBoard& view : frame.views) {
     const RigCamera& camera = cameras_[view.camera];
-    const Pose<Ck, T> T_CkT = camera.T_CkC0 * frame.T_C0T;
+    const Pose<Cn, T> T_CnT = camera.T_CnC0 * frame.T_C0T;
     for (const SeenCorner& corner : view.corners) {
       if (!corner.kept) continue;
-      const auto pixel = project_point(camera.lens, T_CkT * corner.p_T);
+      const auto pixel = project_point(camera.lens, T_CnT * corner.p_T);
       sum += loss(pixel ? (*pixel - corner.pixel).norm() : kUnseen_px, spread_px);
     }
   }
@@ -74,23 +74,23 @@ RigAdjustment::FrameEquations RigAdjustment::linearise(const RigFrame& frame, do
   for (const SeenBoard& view : frame.views) {
     const RigCamera& camera = cameras_[view.camera];
     const int lens = lens_parameter_count(camera.lens), extrinsic = view.camera > 0 ? 6 : 0;
-    const Mat3 R_CkC0 = camera.T_CkC0.R(), R_CkT = R_CkC0 * frame.T_C0T.R();
+    const Mat3 R_CnC0 = camera.T_CnC0.R(), R_CnT = R_CnC0 * frame.T_C0T.R();
     LocalMatrix H = LocalMatrix::Zero();
     LocalVector b = LocalVector::Zero();
     for (const SeenCorner& corner : view.corners) {
       if (!corner.kept) continue;
       const Vec3 p_C0 = frame.T_C0T * corner.p_T;
       LensDerivatives d;
-      const auto pixel = project_point(camera.lens, camera.T_CkC0 * p_C0, &d);
+      const auto pixel = project_point(camera.lens, camera.T_CnC0 * p_C0, &d);
       if (!pixel) continue;
       const Vec2 r = *pixel - corner.pixel;
       const double distance = r.norm(), weight = spread_px > 0 && distance > spread_px ? spread_px / distance : 1;
       Eigen::Matrix<double, 2, kMostLocal> J;
-      J.leftCols<3>() = d.point * R_CkC0;
-      J.middleCols<3>(3) = -d.point * (R_CkT * hat(corner.p_T));
+      J.leftCols<3>() = d.point * R_CnC0;
+      J.middleCols<3>(3) = -d.point * (R_CnT * hat(corner.p_T));
       J.middleCols<kMostLensParameters>(6) = d.parameters;
       J.middleCols<3>(6 + lens) = d.point;  // over columns of parameters that this lens does not have
-      J.middleCols<3>(9 + lens) = -d.point * (R_CkC0 * hat(p_C0));
+      J.middleCols<3>(9 + lens) = -d.point * (R_CnC0 * hat(p_C0));
       const int used = 6 + lens + extrinsic;
       H.topLeftCorner(used, used).noalias() += weight * J.leftCols(used).transpose() * J.leftCols(used);
       b.head(used).noalias() -= weight * J.leftCols(used).transpose() * r;
@@ -120,11 +120,9 @@ namespace {
 std::vector<RigCamera> moved(const std::vector<RigCamera>& cameras, const std::vector<int>& first, const Eigen::VectorXd& step) {
   std::vector<RigCamera> out = cameras;
   for (std::size_t k = 0; k < out.size(); ++k) {
-    std::vector<double> values = lens_parameters(out[k].lens);
-    const int count = static_cast<int>(values.size());
-    for (int i = 0; i < count; ++i) values[i] += step[first[k] + i];
-    out[k].lens = with_parameters(out[k].lens, values.data());
-    if (k > 0) out[k].T_CkC0 = out[k].T_CkC0.boxplus(step.segment<3>(first[k] + count), step.segment<3>(first[k] + count + 3));
+    const int count = lens_parameter_count(out[k].lens);
+    out[k].lens = moved_lens(out[k].lens, step.data() + first[k]);
+    if (k > 0) out[k].T_CnC0 = out[k].T_CnC0.boxplus(step.segment<3>(first[k] + count), step.segment<3>(first[k] + count + 3));
   }
   return out;
 }

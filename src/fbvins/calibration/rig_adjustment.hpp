@@ -32,7 +32,7 @@ struct RigFrame {
 
 struct RigCamera {
   LensModel lens;
-  Pose<Ck, C0> T_CkC0;
+  Pose<Cn, C0> T_CnC0;
 };
 
 struct AdjustmentOptions {
@@ -57,7 +57,7 @@ class RigAdjustment {
   const std::vector<RigFrame>& frames() const { return frames_; }
   std::vector<RigFrame>& frames() { return frames_; }
 
-  /// Parameters: of each camera its lens, then (but for cam0) position and rotation of T_CkC0.
+  /// Parameters: of each camera its lens, then (but for cam0) position and rotation of T_CnC0.
   int parameter_count() const { return size_; }
   int first_of(int camera) const { return first_[camera]; }
   /// Information of one frame about them, its pose unknown, for a noise of 1 px.

@@ -18,12 +18,12 @@ inline std::vector<Camera> example_cameras() {
           {KannalaBrandt{190.98, 190.97, 254.93, 256.90, 0.0034, 0.0007, -0.0020, 0.0002}, 512, 512},
           {DoubleSphere{158.3, 158.2, 254.9, 256.9, -0.172, 0.593}, 512, 512},
           {ExtendedUnified{190.9, 190.8, 254.9, 256.9, 0.63, 1.04}, 512, 512},
-          {UnifiedRadtan{833.0, 830.3, 373.8, 253.7, 0.8007, -0.3352, 0.1321, 5.6e-4, 5.8e-4}, 752, 480}};
+          {UnifiedRadtan{520.3, 519.8, 322.1, 241.7, 1.25, -0.12, 0.03, 4e-4, -3e-4}, 640, 480}};
 }
 
 struct SimulatedRig {
   std::vector<Camera> cameras;
-  std::vector<Pose<Ck, C0>> T_CkC0;
+  std::vector<Pose<Cn, C0>> T_CnC0;
 };
 
 /// Two cameras of a kind, the second of slightly other numbers, 11 cm apart.
@@ -46,17 +46,17 @@ inline Pose<C0, T> random_board_pose(const SimulatedRig& rig, int towards, const
   const Quat facing = so3_between(Vec3(0, 0, 1), ray) * Quat(0, 1, 0, 0);  // z of the board towards the camera
   const Quat q = facing * so3_exp(tilt * Vec3(std::cos(axis), std::sin(axis), 0)) * so3_exp(Vec3(0, 0, roll));
   const Vec3 centre_T = 0.5 * board.corner(board.corner_count() - 1);
-  const Pose<Ck, T> T_CkT(q, Vec3(distance_m * ray - q * centre_T));
-  return rig.T_CkC0[towards].inverse() * T_CkT;
+  const Pose<Cn, T> T_CnT(q, Vec3(distance_m * ray - q * centre_T));
+  return rig.T_CnC0[towards].inverse() * T_CnT;
 }
 
 /// What the camera sees of the board: corners inside of the image, with noise.
 inline BoardView simulated_view(const SimulatedRig& rig, int camera, const Board& board, const Pose<C0, T>& T_C0T, Time t,
                                 double noise_px, Rng& rng) {
   BoardView view{t, camera, {}};
-  const Pose<Ck, T> T_CkT = rig.T_CkC0[camera] * T_C0T;
+  const Pose<Cn, T> T_CnT = rig.T_CnC0[camera] * T_C0T;
   for (int index = 0; index < board.corner_count(); ++index) {
-    const auto pixel = rig.cameras[camera].project(T_CkT * board.corner(index));
+    const auto pixel = rig.cameras[camera].project(T_CnT * board.corner(index));
     const double du = noise_px * rng.normal(), dv = noise_px * rng.normal();
     if (pixel && rig.cameras[camera].inside(*pixel, 3)) view.corners.push_back({index, *pixel + Vec2(du, dv)});
   }
