@@ -20,23 +20,13 @@ constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
 
 Error refused(std::string sentence) { return {ErrorCode::invalid_argument, std::move(sentence)}; }
 
-/// Focal length near the axis, px: of ds and omni not the parameter, but f / (1 + xi).
-double axial_focal_px(const std::vector<double>& values, const std::string& model) {
-  return model == "ds" || model == "omni-radtan" ? values[0] / (1 + values[4]) : values[0];
-}
-
-double axial_focal_sigma_px(const CameraCalibration& found, int camera) {
-  const Camera& c = found.cameras[camera].camera;
-  const std::vector<double> values = lens_parameters(c.model());
+/// Relative deviation of the focal length near the axis: of ds and omni not the parameter, but f / (1 + xi).
+double axial_focal_sigma(const CameraCalibration& found, int camera) {
+  const LensModel& lens = found.cameras[camera].camera.model();
   const auto first = std::ranges::find(found.names, fmt::format("cam{}.fx", camera)) - found.names.begin();
-  Eigen::VectorXd J = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(values.size()));
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    std::vector<double> more = values;
-    const double h = 1e-6 * std::max(1.0, std::abs(values[k]));
-    more[k] += h;
-    J[static_cast<Eigen::Index>(k)] = (axial_focal_px(more, c.model_name()) - axial_focal_px(values, c.model_name())) / h;
-  }
-  return std::sqrt(J.dot(found.covariance.block(first, first, J.size(), J.size()) * J));
+  const Eigen::RowVectorXd J = straight_jacobian(lens).row(0);
+  const double square = J.dot(found.covariance.block(first, first, J.size(), J.size()) * J.transpose());
+  return std::sqrt(square) / straight_parameters(lens)[0];
 }
 
 /// Another layout with which the views do make sense.
@@ -179,7 +169,7 @@ Error undetermined(const std::string& what) {
 Result<void> check_determined(const CameraCalibration& found) {
   for (std::size_t k = 0; k < found.cameras.size(); ++k) {
     const Camera& camera = found.cameras[k].camera;
-    const double focal = axial_focal_sigma_px(found, static_cast<int>(k)) / axial_focal_px(lens_parameters(camera.model()), camera.model_name());
+    const double focal = axial_focal_sigma(found, static_cast<int>(k));
     if (!(focal <= kLargestFocalSigma))
       return undetermined(fmt::format("the views do not determine the focal length of cam{} (to {:.1f} % only)", k, 100 * focal));
     const double centre_px = std::max(found.sigma(fmt::format("cam{}.cx", k)), found.sigma(fmt::format("cam{}.cy", k)));

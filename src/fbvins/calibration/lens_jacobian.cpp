@@ -2,6 +2,7 @@
 #include "fbvins/calibration/lens_jacobian.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <type_traits>
 
@@ -158,22 +159,39 @@ UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
   return {v[0] * e, v[1] * e, v[2], v[3], v[4], k1 * e * e, k2 * std::pow(e, 4), v[7] * e, v[8] * e};
 }
 
-/// Moves along the straight line of the other parameters that has the step's direction here.
 template <class Model>
-LensModel moved_bent(const Model& lens, const double* step) {
+std::vector<double> straightened(const Model& m) {
+  std::vector<double> out;
+  each(m, [&](const double& value) { out.push_back(value); });
+  return out;
+}
+template <class Model>
+Model bent(Model m, const std::vector<double>& v) {
+  auto next = v.begin();
+  each(m, [&](double& value) { value = *next++; });
+  return m;
+}
+
+/// How the straight parameters change with a small step of the others, times one over the part of the step.
+template <class Model>
+std::vector<double> direction(const Model& lens, const double* step) {
+  constexpr double kPart = 1e-3;
   const auto at = [&](double part) {
     Model m = lens;
     const double* d = step;
     each(m, [&](double& value) { value += part * *d++; });
     return straightened(m);
   };
-  constexpr double kPart = 1e-3;
-  std::vector<double> v = straightened(lens);
-  const std::vector<double> more = at(kPart), less = at(-kPart);
-  for (std::size_t k = 0; k < v.size(); ++k) v[k] += (more[k] - less[k]) / (2 * kPart);
-  v[4] = std::clamp(v[4], std::is_same_v<Model, DoubleSphere> ? -0.999 : 0.0, std::is_same_v<Model, DoubleSphere> ? 0.999 : 9.9);
-  return bent(lens, v);
+  std::vector<double> out = at(kPart);
+  const std::vector<double> less = at(-kPart);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = (out[k] - less[k]) / (2 * kPart);
+  return out;
 }
+
+/// So that 1 + xi stays positive.
+void limit_straight(const DoubleSphere&, std::vector<double>& v) { v[4] = std::clamp(v[4], -0.999, 0.999); }
+void limit_straight(const UnifiedRadtan&, std::vector<double>& v) { v[4] = std::clamp(v[4], 0.0, 9.9); }
+void limit_straight(const auto&, std::vector<double>&) {}
 
 std::vector<std::string> own_names(const LensModel& lens) {
   constexpr const char* kNames[][5] = {
@@ -214,13 +232,32 @@ LensModel with_parameters(const LensModel& lens, const double* parameters) {
       lens);
 }
 
+std::vector<double> straight_parameters(const LensModel& lens) {
+  return std::visit([](const auto& m) { return straightened(m); }, lens);
+}
+
+Eigen::MatrixXd straight_jacobian(const LensModel& lens) {
+  const int count = lens_parameter_count(lens);
+  Eigen::MatrixXd J(count, count);
+  for (int k = 0; k < count; ++k) {
+    std::array<double, kMostLensParameters> unit{};
+    unit[k] = 1e-3;
+    const std::vector<double> column = std::visit([&](const auto& m) { return direction(m, unit.data()); }, lens);
+    for (int i = 0; i < count; ++i) J(i, k) = column[i] / unit[k];
+  }
+  return J;
+}
+
 LensModel moved_lens(const LensModel& lens, const double* step) {
-  std::vector<double> values = lens_parameters(lens);
-  if (const auto* m = std::get_if<UnifiedRadtan>(&lens)) values = lens_parameters(moved_bent(*m, step));
-  else if (const auto* d = std::get_if<DoubleSphere>(&lens)) values = lens_parameters(moved_bent(*d, step));
-  else
-    for (std::size_t k = 0; k < values.size(); ++k) values[k] += step[k];
-  return with_parameters(lens, values.data());
+  return std::visit(
+      [&](const auto& m) {
+        std::vector<double> values = straightened(m);
+        const std::vector<double> change = direction(m, step);
+        for (std::size_t k = 0; k < values.size(); ++k) values[k] += change[k];
+        limit_straight(m, values);
+        return with_parameters(lens, lens_parameters(bent(m, values)).data());
+      },
+      lens);
 }
 
 std::vector<std::string> lens_names() { return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"}; }
