@@ -16,7 +16,7 @@ RANKS = {
     "geometry": 1, "optim": 1,
     "types": 2, "camera": 2,
     "imu": 3, "features": 3, "io": 3, "eval": 3, "mavlink": 3,
-    "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4,
+    "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4, "calibration": 4,
     "pipeline": 5, "checkup": 5,
     "live": 6, "doctor": 6,
     "config": 7, "ros2": 7, "v4l2": 7, "web": 7, "realsense": 7, "flight": 7,
