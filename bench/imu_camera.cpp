@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cmath>
 #include <numbers>
 
@@ -54,13 +55,6 @@ void add_gravity(Block& block, const CameraImuResult& found, const Vec3& truth) 
   J << x.transpose(), y.transpose();
   J /= truth.norm();
   block.add(J * (found.gravity_T - truth), J * found.gravity_covariance * J.transpose());
-}
-
-const BiasAt* middle(const CameraImuResult& found, const ImuCameraInput& input) {
-  const Time t = input.imu[input.imu.size() / 2].t;
-  return &*std::min_element(found.biases.begin(), found.biases.end(), [&](const BiasAt& a, const BiasAt& b) {
-    return std::abs((a.t - t).ns) < std::abs((b.t - t).ns);
-  });
 }
 
 }  // namespace
@@ -127,14 +121,16 @@ int main(int argc, char** argv) {
           if (column <= row)
             accel_axes.add(one(found->axes.accel(row, column) - r.truth.axes.accel(row, column)), square(found->axes_sigma.accel(row, column)));
         }
-    const BiasAt* bias = middle(*found, r.input);
-    gyro_bias.add(bias->bias.gyro_radps - r.truth.middle_bias.gyro_radps, Mat3(bias->sigma.gyro_radps.cwiseAbs2().asDiagonal()));
-    accel_bias.add(bias->bias.accel_mps2 - r.truth.middle_bias.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
+    const BiasAt* bias = &found->biases[found->biases.size() / 2];
+    const ImuBias& truth = r.truth.bias_at(bias->t);
+    gyro_bias.add(bias->bias.gyro_radps - truth.gyro_radps, Mat3(bias->sigma.gyro_radps.cwiseAbs2().asDiagonal()));
+    accel_bias.add(bias->bias.accel_mps2 - truth.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
     gyro_rms += found->gyro_rms_sigmas, accel_rms += found->accel_rms_sigmas, corner += found->corner_sigma_px;
     scale_nees += std::pow((found->board_scale - 1) / found->board_scale_sigma, 2);
     fmt::print("{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n", first_seed + i, place.errors.back(),
                turn.errors.back(), offset.errors.back(), found->board_scale, found->board_scale_sigma, found->measured_gravity_mps2,
                found->measured_gravity_sigma_mps2, found->knot_spacing_s, found->gyro_rms_sigmas, found->accel_rms_sigmas, found->iterations, took_s);
+    std::fflush(stdout);
   }
   const int done = std::max(1, recordings - refused);
   fmt::print("\n| | RMS | worst | sigma | wanted | NEES | worst sigmas |\n|---|---|---|---|---|---|---|\n");

@@ -97,7 +97,13 @@ struct HandHeldTruth {
   double time_offset_s = 0, line_delay_s = 0;
   Vec3 gravity_T;
   ImuAxes axes;
-  ImuBias first_bias, middle_bias;
+  std::vector<ImuBias> biases;  ///< at every time of a reading, also of those dropped
+  Time first_reading;
+  double imu_rate_hz = 200;
+
+  const ImuBias& bias_at(Time t) const {
+    return biases[static_cast<std::size_t>(std::lround((t - first_reading).seconds() * imu_rate_hz))];
+  }
 };
 
 struct HandHeldRecording {
@@ -148,7 +154,7 @@ class HandHeld {
     const double sg = o_.noise.gyro_noise_density_radps_rthz / std::sqrt(dt), sa = o_.noise.accel_noise_density_mps2_rthz / std::sqrt(dt);
     const double wg = o_.noise.gyro_random_walk_radps2_rthz * std::sqrt(dt), wa = o_.noise.accel_random_walk_mps3_rthz * std::sqrt(dt);
     ImuBias bias{random_vector(rng_, 0.02), random_vector(rng_, 0.1)};
-    out_.truth.first_bias = bias;
+    out_.truth.first_reading = at(-0.5), out_.truth.imu_rate_hz = o_.imu_rate_hz;
     int dropping = 0;
     const int count = static_cast<int>((o_.duration_s + 1) * o_.imu_rate_hz);
     for (int i = 0; i < count; ++i) {
@@ -156,8 +162,8 @@ class HandHeld {
       const BodyMotion m = motion.at(t);
       ImuSample s{at(t), o_.axes.gyro * m.w_TB_B + bias.gyro_radps + random_vector(rng_, sg),
                   o_.axes.accel * (m.T_TB.q.conjugate() * (m.a_TB - out_.truth.gravity_T)) + bias.accel_mps2 + random_vector(rng_, sa)};
+      out_.truth.biases.push_back(bias);
       bias.gyro_radps += random_vector(rng_, wg), bias.accel_mps2 += random_vector(rng_, wa);
-      if (i == count / 2) out_.truth.middle_bias = bias;
       if (rng_.uniform() < o_.dropped_share / 10) dropping = 10;
       if (rng_.uniform() < o_.spike_share) s.gyro_radps += random_vector(rng_, 3), s.accel_mps2 += random_vector(rng_, 30);
       if (dropping-- <= 0) out_.input.imu.push_back(s);
