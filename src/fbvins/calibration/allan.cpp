@@ -9,7 +9,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kFewestFreedom = 2;
-constexpr double kShortest_s = 0.08;  // below, a sensor's filter and quantisation show
+constexpr double kCluster_s = 0.08;  // shorter, a sensor's filter and quantisation show
 constexpr double kDrop = 1.92;        // of the log-likelihood at a 95 % bound
 constexpr double kSigmas = 1.96;
 
@@ -41,44 +41,70 @@ double crossing(const std::function<double(double)>& f, double level, double top
   return 0.5 * (top + far);
 }
 
-/// Log-likelihood of variances, each as a chi-square with its degrees of freedom (N4); arguments: ln N, K.
+/// Likelihood of means over clusters as white noise on a random walk (N4), by a Kalman filter for ratios of the two on a grid.
+/// Arguments: ln N, ln K.
 class NoiseLikelihood {
  public:
-  explicit NoiseLikelihood(const std::vector<AllanVariance>& all) {
-    for (const AllanVariance& v : all)
-      if (v.tau_s >= kShortest_s || all.size() < 4) used_.push_back(v);
-    if (used_.size() < 3) used_ = all;
-    // Scales of the search: white noise alone at the first point, random walk alone at the last.
-    log_density_ = 0.5 * std::log(used_.front().variance * used_.front().tau_s);
-    log_walk_ = 0.5 * std::log(3 * used_.back().variance / used_.back().tau_s);
+  NoiseLikelihood(const std::vector<double>& means, double span_s) : span_s_(span_s), count_(static_cast<double>(means.size())) {
+    double square = 0;
+    for (std::size_t i = 0; i + 1 < means.size(); ++i) square += 0.5 * std::pow(means[i + 1] - means[i], 2) / (count_ - 1);
+    log_density_ = 0.5 * std::log(square * span_s);
+    first_ = std::log(0.01 / (count_ * count_));
+    for (int i = 0; first_ + (i - 1) * kGrid < std::log(kLargestRatio); ++i) filter(means, std::exp(first_ + i * kGrid));
   }
 
   double at(double log_density, double log_walk) const {
-    const double n2 = std::exp(2 * log_density), k2 = std::exp(2 * log_walk);
-    double sum = 0;
-    for (const AllanVariance& v : used_) {
-      const double expected = n2 / v.tau_s + k2 * v.tau_s / 3;  // (N2)
-      sum -= 0.5 * v.freedom * (std::log(expected / v.variance) + v.variance / expected - 1);
-    }
-    return sum;
+    const double x = std::clamp((2 * (log_walk + std::log(span_s_) - log_density) - first_) / kGrid, 0.0, static_cast<double>(squares_.size()) - 1.001);
+    const double log_variance = 2 * log_density - std::log(span_s_);
+    return -0.5 * ((count_ - 1) * log_variance + between(logs_, x) + between(squares_, x) * std::exp(-log_variance));
   }
   double best_density(double log_walk) const {
-    return maximise([&](double x) { return at(x, log_walk); }, log_density_ - 3, log_density_ + 1);
+    return maximise([&](double x) { return at(x, log_walk); }, least_density(), most_density());
   }
   double best_walk(double log_density) const {
-    return maximise([&](double x) { return at(log_density, x); }, none(), log_walk_ + 2);
+    return maximise([&](double x) { return at(log_density, x); }, none(), most());
   }
   double by_walk(double log_walk) const { return at(best_density(log_walk), log_walk); }
   double by_density(double log_density) const { return at(log_density, best_walk(log_density)); }
-  double none() const { return log_walk_ - 8; }  ///< as good as no random walk
-  double most() const { return log_walk_ + 2; }
-  double log_density() const { return log_density_; }
-  const std::vector<AllanVariance>& used() const { return used_; }
+  double none() const { return log_density_ - std::log(span_s_) + 0.5 * first_; }  ///< as good as no random walk
+  double most() const { return log_density_ - std::log(span_s_) + 0.5 * std::log(kLargestRatio); }
+  double least_density() const { return log_density_ - 3; }
+  double most_density() const { return log_density_ + 1; }
 
  private:
-  std::vector<AllanVariance> used_;
-  double log_density_, log_walk_;
+  static constexpr double kGrid = 0.25, kLargestRatio = 100;
+
+  void filter(const std::vector<double>& means, double ratio) {
+    double estimate = means.front(), variance = 1, square = 0, log = 0;
+    for (std::size_t i = 1; i < means.size(); ++i) {
+      const double before = variance + ratio, expected = before + 1, off = means[i] - estimate;
+      square += off * off / expected, log += std::log(expected);
+      estimate += before / expected * off;
+      variance = before / expected;
+    }
+    squares_.push_back(square), logs_.push_back(log);
+  }
+  /// Cubic between the grid's points, by their slopes.
+  static double between(const std::vector<double>& grid, double x) {
+    const auto i = static_cast<std::size_t>(x);
+    const double u = x - static_cast<double>(i), a = grid[i], b = grid[i + 1];
+    const double before = i > 0 ? 0.5 * (b - grid[i - 1]) : b - a, after = i + 2 < grid.size() ? 0.5 * (grid[i + 2] - a) : b - a;
+    return a + u * (before + u * (3 * (b - a) - 2 * before - after + u * (before + after - 2 * (b - a))));
+  }
+
+  double span_s_, count_, log_density_ = 0, first_ = 0;
+  std::vector<double> squares_, logs_;  ///< at ratios of the random walk's variance over a cluster to the white noise's
 };
+
+std::vector<double> means_of(const std::vector<double>& readings, std::size_t m) {
+  std::vector<double> means;
+  for (std::size_t i = 0; i + m <= readings.size(); i += m) {
+    double sum = 0;
+    for (std::size_t k = i; k < i + m; ++k) sum += readings[k];
+    means.push_back(sum / static_cast<double>(m));
+  }
+  return means;
+}
 
 }  // namespace
 
@@ -113,26 +139,30 @@ std::vector<AllanPoint> allan_deviation(const std::vector<double>& readings, dou
   return curve;
 }
 
-AxisNoise fit_noise(const std::vector<AllanVariance>& variances) {
-  AxisNoise out;
-  const NoiseLikelihood likelihood(variances);
-  const double walk = maximise([&](double x) { return likelihood.by_walk(x); }, likelihood.none(), likelihood.most());
-  const double density = likelihood.best_density(walk);
-  const double top = std::max(likelihood.at(density, walk), likelihood.by_walk(likelihood.none()));
+AxisNoise fit_noise(const std::vector<double>& readings, double period_s) {
+  const auto m = static_cast<std::size_t>(std::max(1.0, std::round(kCluster_s / period_s)));
+  const NoiseLikelihood likelihood(means_of(readings, m), period_s * static_cast<double>(m));
   const auto by_walk = [&](double x) { return likelihood.by_walk(x); };
   const auto by_density = [&](double x) { return likelihood.by_density(x); };
+  const double walk = maximise(by_walk, likelihood.none(), likelihood.most()), density = likelihood.best_density(walk);
+  const double level = likelihood.at(density, walk) - kDrop;  // (N5)
+  AxisNoise out;
   out.random_walk.value = std::exp(walk);
-  out.random_walk.high = std::exp(crossing(by_walk, top - kDrop, walk, likelihood.most()));
-  const double low = crossing(by_walk, top - kDrop, walk, likelihood.none());
+  out.random_walk.high = std::exp(crossing(by_walk, level, walk, likelihood.most()));
+  const double low = crossing(by_walk, level, walk, likelihood.none());
   out.random_walk.low = low <= likelihood.none() ? 0 : std::exp(low);
   out.density.value = std::exp(density);
-  out.density.low = std::exp(crossing(by_density, top - kDrop, density, likelihood.log_density() - 3));
-  out.density.high = std::exp(crossing(by_density, top - kDrop, density, likelihood.log_density() + 1));
-  for (const AllanVariance& v : likelihood.used()) {
-    const double expected = std::exp(2 * density) / v.tau_s + std::exp(2 * walk) * v.tau_s / 3;
-    const double off = (v.variance / expected - 1) * std::sqrt(v.freedom / 2);
-    out.misfit += off * off / static_cast<double>(likelihood.used().size());
+  out.density.low = std::exp(crossing(by_density, level, density, likelihood.least_density()));
+  out.density.high = std::exp(crossing(by_density, level, density, likelihood.most_density()));
+  out.curve = allan_deviation(readings, period_s);
+  const std::vector<AllanVariance> variances = allan_variances(readings, period_s);
+  double points = 0;
+  for (const AllanVariance& v : variances) {
+    if (v.tau_s < kCluster_s) continue;
+    const double expected = std::exp(2 * density) / v.tau_s + std::exp(2 * walk) * v.tau_s / 3;  // (N2)
+    out.misfit += (v.variance / expected - 1) * (v.variance / expected - 1) * v.freedom / 2, points += 1;
   }
+  out.misfit /= std::max(1.0, points);
   return out;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to calibration: white noise and random walk that explain an Allan deviation (docs/derivations/calibration.md, N1-N5).
+// Private to calibration: Allan variances, and the white noise and random walk of readings at rest (docs/derivations/calibration.md, N1-N5).
 #pragma once
 
 #include "fbvins/calibration/imu_noise.hpp"
@@ -13,6 +13,7 @@ struct AllanVariance {
 
 std::vector<AllanVariance> allan_variances(const std::vector<double>& readings, double period_s);
 
-AxisNoise fit_noise(const std::vector<AllanVariance>& variances);
+/// One axis at rest.
+AxisNoise fit_noise(const std::vector<double>& readings, double period_s);
 
 }  // namespace fbvins

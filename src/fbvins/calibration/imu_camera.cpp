@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "fbvins/calibration/imu_camera_gather.hpp"
@@ -14,7 +15,10 @@
 namespace fbvins {
 namespace {
 
+constexpr double kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
+constexpr double kHuber_sigmas = 3;
 constexpr double kCornerOutlier_sigmas = 4, kReadingOutlier_sigmas = 6;
+constexpr int kMostIterations = 40;
 constexpr double kBlurred = 1.6;      // residuals of an image over those of the median one
 constexpr double kLooseGravity_mps2 = 10;
 constexpr double kRough = 1.1;        // residuals of the readings in sigmas above which closer knots are tried
@@ -24,23 +28,28 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
 /// Fit, judgement of noise and outliers, fit: the parts of a calibration that repeat.
 class Fitter {
  public:
   explicit Fitter(CalibrationStart start)
       : start_(std::move(start)), problem_(start_.data, start_.state, start_.setup) {}
 
-  /// False where no step can be computed.
-  bool fit(int most_iterations) {
+  /// False where no step can be computed, or the steps do not come to an end.
+  bool fit() {
     LmOptions lm;
-    lm.max_iterations = most_iterations;
+    lm.max_iterations = kMostIterations;
     lm.initial_lambda = 1e-12;
     lm.max_retries = 10;
     lm.min_step = 1e-9;
     lm.min_decrease = 1e-3;
     const LmSummary summary = minimise(problem_, lm);
     iterations_ += summary.iterations;
-    return summary.usable;
+    return summary.usable && summary.iterations < kMostIterations;
   }
 
   /// Corners, images and readings are judged by their residuals, and the noise by those that are left.
@@ -87,25 +96,28 @@ class Fitter {
  private:
   void judge_corners() {
     const double sigma_px = problem_.setup().corner_sigma_px;
-    std::vector<double> rms;
     std::vector<std::vector<double>> errors;
+    std::map<std::pair<int, double>, std::vector<double>> images;  // camera, time: groups of rows together
     for (const CalibrationView& view : problem_.data().views) {
       std::vector<double>& own = errors.emplace_back();
+      std::vector<double>& image = images[{view.camera, view.t_s}];
       for (const WeightedCorner& corner : view.corners) {
         const auto e = problem_.corner_error(view, corner);
         own.push_back(e ? e->norm() / sigma_px : 1e9);
+        image.push_back(own.back());
       }
-      // Of the middle corner, so that outliers do not make the image a bad one: the median of a Rayleigh distribution is 1.18 sigmas.
-      std::vector<double> sorted = own;
-      std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-      rms.push_back(sorted[sorted.size() / 2] / 1.1774);
     }
-    std::vector<double> sorted = rms;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    const double typical = sorted[sorted.size() / 2];
-    for (std::size_t v = 0; v < rms.size(); ++v) {
+    // By the middle corner, so that outliers do not make an image a bad one: the median of a Rayleigh distribution is 1.1774 sigmas.
+    std::vector<double> all;
+    for (auto& [key, image] : images) {
+      image = {median(image) / 1.1774};
+      all.push_back(image[0]);
+    }
+    const double typical = median(all);
+    for (std::size_t v = 0; v < errors.size(); ++v) {
       CalibrationView& view = problem_.data().views[v];
-      view.noise_factor = rms[v] > kBlurred * typical ? rms[v] / typical : 1;
+      const double rms = images[{view.camera, view.t_s}][0];
+      view.noise_factor = rms > kBlurred * typical ? rms / typical : 1;
       for (std::size_t i = 0; i < view.corners.size(); ++i)
         view.corners[i].used = errors[v][i] <= kCornerOutlier_sigmas * view.noise_factor * typical;
     }
@@ -119,10 +131,7 @@ class Fitter {
       gyro.push_back(r.head<3>().norm()), accel.push_back(r.tail<3>().norm());
     }
     // The median of the norm of three standard normal numbers is 1.538.
-    const auto typical = [&](std::vector<double> all) {
-      std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-      return std::max(1.0, all[all.size() / 2] / 1.538);
-    };
+    const auto typical = [](const std::vector<double>& all) { return std::max(1.0, median(all) / 1.538); };
     const double gyro_limit = kReadingOutlier_sigmas * typical(gyro), accel_limit = kReadingOutlier_sigmas * typical(accel);
     for (std::size_t i = 0; i < readings.size(); ++i)
       readings[i].used = start_.data.readings[i].used && gyro[i] <= gyro_limit && accel[i] <= accel_limit;
@@ -200,25 +209,30 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   if (!start) return start.error();
   start->setup.free_board_scale = true;
   start->setup.gravity_sigma_mps2 = kLooseGravity_mps2;
-  start->setup.corner_huber = 3;
+  start->setup.corner_sigma_px = std::max(kFirstSigma_px, start->setup.corner_sigma_px);
+  start->setup.corner_huber = kFirstHuber_px / start->setup.corner_sigma_px;
   Fitter fitter(*std::move(start));
-  if (!fitter.fit(15) || !fitter.judge() || !fitter.fit(8) || !fitter.judge()) return undetermined();
+  if (!fitter.fit() || !fitter.judge()) return undetermined();
+  CalibrationSetup setup = fitter.problem().setup();
+  setup.corner_huber = kHuber_sigmas;
+  fitter.change(setup);
+  if (!fitter.fit() || !fitter.judge()) return undetermined();
   while (options.knot_spacing_s <= 0 && fitter.worst_rms() > kRough && fitter.problem().state().path.spacing_s() > 2 * kClosestKnots_s) {
     Fitter closer = fitter;
     closer.halve_spacing();
-    if (!closer.fit(8) || !closer.judge() || closer.worst_rms() > kWorthwhile * fitter.worst_rms()) break;
+    if (!closer.fit() || !closer.judge() || closer.worst_rms() > kWorthwhile * fitter.worst_rms()) break;
     fitter = std::move(closer);
   }
   const Magnitudes measured = magnitudes(fitter);
   if (const auto wrong = check_magnitudes(measured, input.board, options)) return *wrong;
 
-  CalibrationSetup setup = fitter.problem().setup();
+  setup = fitter.problem().setup();
   setup.free_board_scale = false;
   setup.gravity_sigma_mps2 = options.gravity_sigma_mps2;
   setup.corner_huber = 1e9;  // outliers are known by now
   fitter.problem().fix_board_scale();
   fitter.change(setup);
-  if (!fitter.fit(8) || !fitter.judge() || !fitter.fit(8) || !fitter.judge()) return undetermined();
+  if (!fitter.fit() || !fitter.judge() || !fitter.fit() || !fitter.judge()) return undetermined();
   fitter.problem().linearise();
   CameraImuResult result = make_result(fitter.problem(), fitter.start());
   result.measured_gravity_mps2 = measured.gravity_mps2, result.measured_gravity_sigma_mps2 = measured.gravity_sigma;

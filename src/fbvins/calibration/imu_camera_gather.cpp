@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kMostCameras = 8;
 constexpr double kShortest_s = 8;
-constexpr int kFewestViews = 40;
+constexpr std::size_t kFewestViews = 40;
+constexpr double kPoorFit = 2.5;               // of a pose, over the median
 constexpr double kWorstFit_px = 4;             // median over the images of one camera
 constexpr double kMargin_s = 0.2;              // of the path before the first and after the last image
 constexpr double kAlone_s = 2;                 // readings further than that from an image with the board are not used
@@ -53,14 +54,19 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
   return std::nullopt;
 }
 
-/// The poses of each camera, by time.
+/// The poses of each camera, by time; some may be wrong.
 Result<std::vector<std::vector<SeenPose>>> locate_all(const ImuCameraInput& input, Time reference) {
   std::vector<std::vector<SeenPose>> poses(input.cameras.size());
-  for (const BoardView& view : input.views)
-    if (const auto pose = locate(input.board, input.cameras[static_cast<std::size_t>(view.camera)], view, reference))
-      poses[static_cast<std::size_t>(view.camera)].push_back(*pose);
+  std::vector<std::size_t> seen(input.cameras.size(), 0);
+  for (const BoardView& view : input.views) {
+    const auto c = static_cast<std::size_t>(view.camera);
+    seen[c] += view.corners.size() >= kFewestCorners;
+    if (const auto pose = locate(input.board, input.cameras[c], view, reference)) poses[c].push_back(*pose);
+  }
   for (std::size_t c = 0; c < poses.size(); ++c) {
-    if (static_cast<int>(poses[c].size()) < kFewestViews)
+    if (seen[c] >= kFewestViews && 2 * poses[c].size() < seen[c])
+      return error(fmt::format("the corners that camera {} sees do not lie as on this board: is it the right board file and the right lens?", c));
+    if (poses[c].size() < kFewestViews)
       return error(fmt::format("camera {} shows the board in {} images with at least {} corners: {} are needed", c, poses[c].size(),
                                kFewestCorners, kFewestViews));
     std::sort(poses[c].begin(), poses[c].end(), [](const SeenPose& a, const SeenPose& b) { return a.t_s < b.t_s; });
@@ -69,6 +75,17 @@ Result<std::vector<std::vector<SeenPose>>> locate_all(const ImuCameraInput& inpu
     if (const double fit = median(fits); fit > kWorstFit_px)
       return error(fmt::format("the corners that camera {} sees do not lie as on this board ({:.1f} px off, in the median): is it the right "
                                "board file and the right lens?", c, fit));
+  }
+  return poses;
+}
+
+/// Those that fit as well as most: of a few corners or blurred ones a pose may be far off.
+std::vector<std::vector<SeenPose>> good_ones(std::vector<std::vector<SeenPose>> poses) {
+  for (std::vector<SeenPose>& camera : poses) {
+    std::vector<double> fits;
+    for (const SeenPose& pose : camera) fits.push_back(pose.sigma_px);
+    const double limit_px = kPoorFit * median(fits);
+    std::erase_if(camera, [&](const SeenPose& pose) { return pose.sigma_px > limit_px; });
   }
   return poses;
 }
@@ -167,16 +184,17 @@ std::vector<CalibrationView> views_of(const ImuCameraInput& input, const BoardVi
 Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
   if (const auto bad = check_input(input)) return *bad;
   const Time origin = input.imu.front().t;
-  const auto poses = locate_all(input, origin);
-  if (!poses) return poses.error();
+  const auto located = locate_all(input, origin);
+  if (!located) return located.error();
+  const auto poses = good_ones(*located);
   const GyroIntegral gyro(input.imu, origin);
-  const Result<TurnMatch> found = match_turns((*poses)[0], gyro, options.max_time_offset_s);
+  const Result<TurnMatch> found = match_turns(poses[0], gyro, options.max_time_offset_s);
   if (!found) return found.error();
   const Result<TurnMatch> match = check_turns(*found);
   if (!match) return match.error();
-  auto T_BC = first_extrinsics(input, *poses, gyro, *match);
+  auto T_BC = first_extrinsics(input, poses, gyro, *match);
   if (!T_BC) return T_BC.error();
-  std::vector<BodyPose> body = body_poses(*poses, *T_BC, match->time_offset_s);
+  std::vector<BodyPose> body = body_poses(poses, *T_BC, match->time_offset_s);
 
   // The path covers what readings and images have in common; its time 0 is `begin_s` after the first reading.
   const double begin_s = std::max(gyro.first_s(), body.front().t_s - kMargin_s);
@@ -190,7 +208,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   CalibrationData data;
   data.cameras = input.cameras;
   std::map<std::pair<int, std::int64_t>, double> fits;
-  for (const auto& camera : *poses)
+  for (const auto& camera : *located)
     for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = pose.sigma_px;
   std::vector<double> sigmas;
   for (const BoardView& view : input.views) {

@@ -10,11 +10,12 @@
 namespace fbvins {
 namespace {
 
-constexpr double kLongestPair_s = 0.3, kLargestTurn_rad = 1;  // between two images
+constexpr double kShortestPair_s = 0.08, kLongestPair_s = 0.3, kLargestTurn_rad = 1;  // between two images
 constexpr double kHole_s = 0.05;
 constexpr int kFewestPairs = 10;
 constexpr double kCoarse_s = 0.01, kFine_s = 0.001;
-constexpr double kWeakest = 0.75, kAmbiguous = 0.97, kPeak_s = 0.5;
+constexpr double kStrong = 0.75, kWeakest = 0.4, kStandsOut = 1.5;  // correlation; a weak one must stand out
+constexpr double kAmbiguous = 0.97, kPeak_s = 0.5;
 
 struct TurnPair {
   double from_s, to_s;
@@ -23,8 +24,9 @@ struct TurnPair {
 
 std::vector<TurnPair> pairs_of(const std::vector<SeenPose>& poses) {
   std::vector<TurnPair> pairs;
-  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
-    const SeenPose &a = poses[i], &b = poses[i + 1];
+  for (std::size_t i = 0, k = 0; i + 1 < poses.size(); ++i) {
+    while (k + 1 < poses.size() && poses[k].t_s < poses[i].t_s + kShortestPair_s) ++k;
+    const SeenPose &a = poses[i], &b = poses[k];
     const double span_s = b.t_s - a.t_s;
     const Vec3 turn = so3_log(a.T_TC.q.conjugate() * b.T_TC.q);
     if (span_s > 0 && span_s <= kLongestPair_s && turn.norm() < kLargestTurn_rad) pairs.push_back({a.t_s, b.t_s, turn / span_s});
@@ -140,13 +142,15 @@ Result<TurnMatch> match_turns(const std::vector<SeenPose>& poses, const GyroInte
   }
   for (const TurnMatch& match : coarse)
     if (std::abs(match.time_offset_s - coarse[best].time_offset_s) > kPeak_s) runner_up = std::max(runner_up, match.agreement);
-  if (coarse[best].agreement < kWeakest && mirrored > kWeakest)
+  const double agreement = coarse[best].agreement;
+  const bool found = agreement >= kStrong || (agreement >= kWeakest && agreement > kStandsOut * runner_up);
+  if (!found && mirrored > kStrong)
     return error("the IMU turns as the camera does only if its axes are left-handed: one of its axes has the wrong sign, or two are "
                  "swapped");
-  if (coarse[best].agreement < kWeakest)
+  if (!found)
     return error(fmt::format("at no offset of the clocks up to {:g} s does the IMU turn as the camera does (best correlation {:.2f}): "
-                             "is it the same recording, and was it turned irregularly?", max_offset_s, coarse[best].agreement));
-  if (runner_up > kAmbiguous * coarse[best].agreement)
+                             "is it the same recording, and was it turned irregularly?", max_offset_s, agreement));
+  if (runner_up > kAmbiguous * agreement)
     return error(fmt::format("the offset of the clocks is not shown, because the motion repeats itself (another offset more than {:g} s "
                              "away fits as well): turn irregularly", kPeak_s));
   const double centre_s = coarse[best].time_offset_s;

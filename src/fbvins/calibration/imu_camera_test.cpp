@@ -124,13 +124,15 @@ TEST(ImuCamera, ScaleAndAxesOfTheImu) {
     for (int column = 0; column < 3; ++column) {
       EXPECT_NEAR(found->axes.gyro(row, column), o.axes.gyro(row, column), 4 * found->axes_sigma.gyro(row, column)) << row << column;
       EXPECT_LT(found->axes_sigma.gyro(row, column), 2e-3);
-      if (column <= row)
-        EXPECT_NEAR(found->axes.accel(row, column), o.axes.accel(row, column), 4 * found->axes_sigma.accel(row, column)) << row << column;
+      const double largest = column <= row ? 4 * found->axes_sigma.accel(row, column) : 0;
+      EXPECT_LE(std::abs(found->axes.accel(row, column) - o.axes.accel(row, column)), largest) << row << column;
     }
 }
 
 TEST(ImuCamera, NamesWrongUnitsAndSizes) {
-  const HandHeldRecording r = hand_held(short_recording(), 7);
+  HandHeldOptions o = short_recording();
+  o.cameras = 1;
+  const HandHeldRecording r = hand_held(o, 7);
   ImuCameraInput wrong = r.input;
   for (ImuSample& s : wrong.imu) s.gyro_radps /= kDegree;
   expect_refusal(wrong, "degrees/s");
@@ -144,7 +146,6 @@ TEST(ImuCamera, NamesWrongUnitsAndSizes) {
   for (ImuSample& s : wrong.imu) s.gyro_radps.x() *= -1, s.accel_mps2.x() *= -1;
   expect_refusal(wrong, "left-handed");
   wrong = r.input;
-  wrong.T_CnC0.clear();
   wrong.board.size_m *= 1.1;  // the true tags are 88 mm
   expect_refusal(wrong, "88.");
   wrong = r.input;

@@ -93,9 +93,7 @@ Rest longest_rest(const std::vector<Window>& windows) {
 AxisNoise noise_of(const std::vector<ImuSample>& readings, const Rest& rest, double period_s, const Vec3 ImuSample::*sensor, int axis) {
   std::vector<double> values;
   for (std::size_t i = rest.begin; i < rest.end; ++i) values.push_back((readings[i].*sensor)(axis));
-  AxisNoise out = fit_noise(allan_variances(values, period_s));
-  out.curve = allan_deviation(values, period_s);
-  return out;
+  return fit_noise(values, period_s);
 }
 
 double worst(const std::array<AxisNoise, 3>& axes, BoundedNoise AxisNoise::*which) {
