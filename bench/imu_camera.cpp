@@ -73,6 +73,7 @@ int main(int argc, char** argv) {
   app.add_option("--cameras", scene.cameras);
   app.add_option("--tremor", scene.tremor);
   app.add_option("--line-delay", scene.line_delay_s);
+  app.add_option("--jitter", scene.stamp_jitter_s, "of the images' stamps, s");
   app.add_option("--spacing", options.knot_spacing_s);
   app.add_flag("--axes", options.imu_axes);
   app.add_flag("--free-stereo", free_stereo);

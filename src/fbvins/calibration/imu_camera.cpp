@@ -18,7 +18,10 @@ namespace {
 constexpr double kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
 constexpr double kHuber_sigmas = 3;
 constexpr double kCornerOutlier_sigmas = 4, kReadingOutlier_sigmas = 6;
-constexpr int kMostIterations = 40;
+constexpr int kMostIterations = 40, kRounds = 3;
+constexpr double kTogether = 1.08;    // what all corners of an image are off by together, over their noise, that is more than chance
+constexpr double kNoticed = 1.3, kDoubtful = 3, kContradiction = 10;  // and that is doubtful, or no calibration any more
+constexpr double kFreedCamera_m = 0.02, kFreedCamera_rad = 0.05;
 constexpr double kBlurred = 1.6;      // residuals of an image over those of the median one
 constexpr double kLooseGravity_mps2 = 10;
 constexpr double kRough = 1.1;        // residuals of the readings in sigmas above which closer knots are tried
@@ -60,7 +63,10 @@ class Fitter {
     if (covariance_ = problem_.calibration_covariance(); !covariance_) return false;
     sums_ = problem_.residual_sums();
     CalibrationSetup setup = problem_.setup();
-    setup.corner_sigma_px *= sums_.corners.rms();
+    setup.corner_sigma_px *= sums_.corners.rms() * setup.image_factor;
+    image_factor_ = sums_.images.rms() / sums_.corners.rms();
+    setup.stamp_jitter_s = sums_.stamp_jitter_s;
+    setup.image_factor = image_factor_ > kTogether ? image_factor_ : 1;
     gyro_rms_ = sums_.gyro.rms() * setup.gyro_sigma_radps / start_.nominal_gyro_sigma_radps;
     accel_rms_ = sums_.accel.rms() * setup.accel_sigma_mps2 / start_.nominal_accel_sigma_mps2;
     setup.gyro_sigma_radps = start_.nominal_gyro_sigma_radps * std::max(1.0, gyro_rms_);
@@ -86,10 +92,12 @@ class Fitter {
   }
 
   double worst_rms() const { return std::max(gyro_rms_, accel_rms_); }
+  double image_factor() const { return image_factor_; }
   double gyro_rms() const { return gyro_rms_; }
   double accel_rms() const { return accel_rms_; }
   int iterations() const { return iterations_; }
   ImuCameraProblem& problem() { return problem_; }
+  const ImuCameraProblem& problem() const { return problem_; }
   const CalibrationStart& start() const { return start_; }
   const Eigen::MatrixXd& covariance() const { return *covariance_; }
 
@@ -101,8 +109,9 @@ class Fitter {
     for (const CalibrationView& view : problem_.data().views) {
       std::vector<double>& own = errors.emplace_back();
       std::vector<double>& image = images[{view.camera, view.t_s}];
+      const double late_s = problem_.lateness_s(view);  // a stamp that is not exact makes no corner an outlier
       for (const WeightedCorner& corner : view.corners) {
-        const auto e = problem_.corner_error(view, corner);
+        const auto e = problem_.corner_error(view, corner, late_s);
         own.push_back(e ? e->norm() / sigma_px : 1e9);
         image.push_back(own.back());
       }
@@ -141,9 +150,25 @@ class Fitter {
   ImuCameraProblem problem_;
   std::optional<Eigen::MatrixXd> covariance_;
   ResidualSums sums_;
-  double gyro_rms_ = 0, accel_rms_ = 0;
+  double gyro_rms_ = 0, accel_rms_ = 0, image_factor_ = 1;
   int iterations_ = 0;
 };
+
+/// Where images and readings contradict one another: because of the cameras' poses on one another, or for another reason.
+std::optional<Error> check_agreement(const Fitter& fitter, std::size_t cameras) {
+  if (fitter.image_factor() < kDoubtful) return std::nullopt;
+  if (cameras > 1 && !fitter.problem().setup().T_CnC0.empty()) {
+    Fitter freed = fitter;
+    CalibrationSetup setup = freed.problem().setup();
+    setup.camera_sigma_m = kFreedCamera_m, setup.camera_sigma_rad = kFreedCamera_rad;
+    freed.change(setup);
+    if (freed.fit() && freed.judge() && freed.image_factor() < 0.5 * fitter.image_factor())
+      return error("the cameras' poses relative to one another, as given, contradict the images: calibrate the cameras with this board first");
+  }
+  if (fitter.image_factor() < kContradiction) return std::nullopt;
+  return error(fmt::format("the images contradict the readings: the board is off by {:.0f} times the corners' noise; a lens, the stamps of the "
+                           "images (or a rolling shutter) or the noise of the IMU is not as given", fitter.image_factor()));
+}
 
 struct Magnitudes {
   double gravity_mps2 = 0, gravity_sigma = 0, scale = 1, scale_sigma = 0;
@@ -200,6 +225,20 @@ std::optional<Error> check_determined(const CameraImuResult& result, const Vec3&
   return std::nullopt;
 }
 
+void remark(CameraImuResult& r) {
+  const auto say = [&](std::string text) { r.remarks.push_back(std::move(text)); };
+  if (r.corner_sigma_px > 0.7)
+    say(fmt::format("corners are seen to {:.2f} px only: blurred images, a wrong lens, or a rolling shutter", r.corner_sigma_px));
+  if (r.image_factor > kNoticed)
+    say(fmt::format("all corners of an image are off together by {:.1f} times what their noise explains (stamps, lens, vibration); the "
+                    "uncertainties regard it", r.image_factor));
+  if (r.stamp_jitter_s > 0) say(fmt::format("the stamps of the images jitter by {:.2f} ms; the uncertainties regard it", 1e3 * r.stamp_jitter_s));
+  for (const auto& [rms, name] : {std::pair{r.gyro_rms_sigmas, "gyroscope"}, std::pair{r.accel_rms_sigmas, "accelerometer"}}) {
+    if (rms > 1.5) say(fmt::format("the {} is {:.1f} times as noisy as given; the uncertainties regard it", name, rms));
+    if (rms < 0.5) say(fmt::format("the noise given for the {} is {:.1f} times that of the readings", name, 1 / rms));
+  }
+}
+
 Error undetermined() { return error("the recording does not determine the calibration: turn about all three axes and move in all directions"); }
 
 }  // namespace
@@ -223,6 +262,10 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
     if (!closer.fit() || !closer.judge() || closer.worst_rms() > kWorthwhile * fitter.worst_rms()) break;
     fitter = std::move(closer);
   }
+  // What stamps are off by is known better with each round.
+  for (int round = 0; round < kRounds && fitter.image_factor() > kDoubtful; ++round)
+    if (!fitter.fit() || !fitter.judge()) return undetermined();
+  if (const auto wrong = check_agreement(fitter, input.cameras.size())) return *wrong;
   const Magnitudes measured = magnitudes(fitter);
   if (const auto wrong = check_magnitudes(measured, input.board, options)) return *wrong;
 
@@ -237,8 +280,10 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   CameraImuResult result = make_result(fitter.problem(), fitter.start());
   result.measured_gravity_mps2 = measured.gravity_mps2, result.measured_gravity_sigma_mps2 = measured.gravity_sigma;
   result.board_scale = measured.scale, result.board_scale_sigma = measured.scale_sigma;
+  result.image_factor = fitter.image_factor();
   result.gyro_rms_sigmas = fitter.gyro_rms(), result.accel_rms_sigmas = fitter.accel_rms();
   result.iterations = fitter.iterations();
+  remark(result);
   if (const auto wrong = check_determined(result, fitter.start().turning_radps)) return *wrong;
   return result;
 }

@@ -94,6 +94,9 @@ struct CameraImuResult {
   double measured_gravity_mps2 = 0, measured_gravity_sigma_mps2 = 0;
   double board_scale = 1, board_scale_sigma = 0;
 
+  std::vector<std::string> remarks;  ///< sentences for the user
+  double stamp_jitter_s = 0;   ///< standard deviation of the images' stamps; 0: not seen
+  double image_factor = 1;     ///< what moves all corners of an image together, over what each corner's noise explains
   double corner_sigma_px = 0;  ///< of one coordinate, from the residuals and the degrees of freedom
   /// Root mean square of residuals over the noise given, degrees of freedom regarded: 1 where the noise is right. Above 1, the
   /// covariances are those of the larger noise.

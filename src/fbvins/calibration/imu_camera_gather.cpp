@@ -166,7 +166,7 @@ double rate_of(const std::vector<ImuSample>& imu) {
 std::vector<CalibrationView> views_of(const ImuCameraInput& input, const BoardView& view, double t_s, bool by_rows) {
   const int groups = by_rows ? kRowGroups : 1;
   const double height = std::max(1, input.cameras[static_cast<std::size_t>(view.camera)].height());
-  std::vector<CalibrationView> out(static_cast<std::size_t>(groups), {view.camera, t_s, 0, 1, {}});
+  std::vector<CalibrationView> out(static_cast<std::size_t>(groups), {view.camera, t_s, 0, 1, 1, {}});
   for (const BoardCorner& corner : view.corners) {
     const int group = std::clamp(static_cast<int>(corner.pixel.y() / height * groups), 0, groups - 1);
     out[static_cast<std::size_t>(group)].corners.push_back({corner.index, input.board.corner(corner.index), corner.pixel});
@@ -218,6 +218,9 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     sigmas.push_back(fit->second);
     for (CalibrationView& v : views_of(input, view, t_s - begin_s, options.line_delay)) data.views.push_back(std::move(v));
   }
+  std::map<double, int> sharing;
+  for (const CalibrationView& view : data.views) ++sharing[view.t_s];
+  for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
   for (const ImuSample& s : input.imu) {
     const double t_s = (s.t - origin).seconds() - begin_s;
     if (t_s < 0 || t_s > end_s - begin_s) continue;

@@ -31,6 +31,7 @@ struct CalibrationView {
   double t_s = 0;           ///< image's stamp since the path's start, without the offset
   double row = 0;           ///< of the image, exposed line_delay * row later
   double noise_factor = 1;
+  int sharing = 1;          ///< views with this stamp
   std::vector<WeightedCorner> corners;
 };
 
@@ -61,6 +62,9 @@ struct CalibrationState {
 
 struct CalibrationSetup {
   double corner_sigma_px = 0.2;
+  /// What moves all corners of an image together (its stamp, the lens, the rig) over what each corner's noise explains (C11).
+  double image_factor = 1;
+  double stamp_jitter_s = 0;  ///< standard deviation of a stamp (C12)
   double gyro_sigma_radps = 1e-3, accel_sigma_mps2 = 1e-2;         ///< of a single reading
   double gyro_walk_radps2_rthz = 2e-5, accel_walk_mps3_rthz = 3e-3;
   double corner_huber = 2, reading_huber = 1e9;                    ///< in sigmas
@@ -86,6 +90,8 @@ struct ResidualSum {
 
 struct ResidualSums {
   ResidualSum corners, gyro, accel;
+  double stamp_jitter_s = 0;  ///< as the images' residuals along their motion show it
+  ResidualSum images;  ///< of the corners' residuals the part that another pose of the image's camera would explain
 };
 
 class ImuCameraProblem {
@@ -117,8 +123,10 @@ class ImuCameraProblem {
   /// Degrees of freedom by random signs (C14), after calibration_covariance().
   ResidualSums residual_sums();
 
-  /// Predicted minus seen, px; nullopt where the corner is not in front of the lens.
-  std::optional<Vec2> corner_error(const CalibrationView& view, const WeightedCorner& corner) const;
+  /// Predicted minus seen, px, with the image taken `late_s` later; nullopt where the corner is not in front of the lens.
+  std::optional<Vec2> corner_error(const CalibrationView& view, const WeightedCorner& corner, double late_s = 0) const;
+  /// How much later the image fits best, s.
+  double lateness_s(const CalibrationView& view) const;
   /// In sigmas: gyro, accelerometer.
   Vec6 reading_error(const CalibrationReading& reading) const;
 
@@ -146,9 +154,12 @@ class ImuCameraProblem {
   double add_camera_prior(std::size_t camera, bool build);
 
   ViewMotion view_motion(const CalibrationView& view, SplineJacobian* J) const;
-  std::optional<Vec3> corner_in_camera(const CalibrationView& view, const WeightedCorner& corner, const ViewMotion& motion) const;
+  std::optional<Vec3> corner_in_camera(const CalibrationView& view, const WeightedCorner& corner, const ViewMotion& motion,
+                                       double late_s = 0) const;
   /// With `signs`, b is that of residuals that are random signs.
   ViewTerm view_term(const CalibrationView& view, const ViewMotion& motion, Rng* signs) const;
+  /// The same for a stamp that is not exact.
+  ViewTerm with_jitter(ViewTerm term, const CalibrationView& view, const ViewMotion& motion) const;
   void view_columns(const CalibrationView& view, const ViewMotion& motion, const SplineJacobian& J);
   void reading_columns(const CalibrationReading& reading);
   void begin_local(int rows, int first_knot);
@@ -164,6 +175,8 @@ class ImuCameraProblem {
   std::optional<SkylineSystem> system_;
   Eigen::VectorXd step_;
   double predicted_ = 0;
+
+  void add_image_sum(const ViewTerm& image, ResidualSum& sum) const;
 
   // The item being added: its unknowns, Jacobian by them, and residual.
   std::vector<int> index_;

@@ -111,6 +111,7 @@ CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& s
         if (column <= row) out.axes_sigma.accel(row, column) = sigma(accel++);
       }
   out.corner_sigma_px = problem.setup().corner_sigma_px;
+  out.stamp_jitter_s = problem.setup().stamp_jitter_s;
   out.knot_spacing_s = state.path.spacing_s();
   out.duration_s = state.path.duration_s();
   tell_cameras(problem, start, out);

@@ -32,6 +32,7 @@ struct HandHeldOptions {
   double dropped_share = 0;                   ///< readings missing, in bursts of ten
   double spike_share = 0;                     ///< readings that are nonsense
   double hidden_from_s = 0, hidden_to_s = 0;  ///< board out of view
+  double stamp_jitter_s = 0;                  ///< of the images
   double tremor = 1;                          ///< factor on the trembling of the hand, 5 to 10 Hz
 };
 
@@ -173,8 +174,9 @@ class HandHeld {
   void images(const HandHeldMotion& motion, double t) {
     const bool hidden = t >= o_.hidden_from_s && t < o_.hidden_to_s;
     const double blur = rng_.uniform() < o_.blur_share ? 10 : 1;
+    const double late_s = o_.stamp_jitter_s > 0 ? o_.stamp_jitter_s * rng_.normal() : 0;
     for (int c = 0; c < o_.cameras && !hidden; ++c) {
-      BoardView view{at(t - o_.time_offset_s), c, {}};
+      BoardView view{at(t - o_.time_offset_s + late_s), c, {}};
       for (int i = 0; i < out_.input.board.corner_count(); ++i)
         if (const auto pixel = seen(motion, t, c, i)) {
           Vec2 px = *pixel;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What images and readings contribute to the problem (docs/derivations/calibration.md, C1-C8).
+#include <Eigen/Cholesky>
+
 #include "fbvins/calibration/imu_camera_problem.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
@@ -7,6 +9,8 @@ namespace fbvins {
 namespace {
 
 constexpr double kNearest_m = 0.01;
+constexpr double kLatest_s = 0.01;  // of an image whose stamp is not exact
+constexpr double kJitters = 1.5;  // squared sigmas along the motion above which stamps are not exact
 constexpr double kUnseenCost = 50;  // of a corner that the estimate puts behind the lens: any constant
 
 }  // namespace
@@ -32,24 +36,31 @@ ImuCameraProblem::ViewMotion ImuCameraProblem::view_motion(const CalibrationView
 }
 
 std::optional<Vec3> ImuCameraProblem::corner_in_camera(const CalibrationView& view, const WeightedCorner& corner,
-                                                       const ViewMotion& motion) const {
+                                                       const ViewMotion& motion, double late_s) const {
   Vec3 p_C = motion.T_CT * corner.p_T;
-  if (const double late_s = state_.line_delay_s * (corner.pixel.y() - view.row); late_s != 0)
-    p_C += late_s * (p_C.cross(motion.rate.tail<3>()) - motion.rate.head<3>());
+  late_s += state_.line_delay_s * (corner.pixel.y() - view.row);
+  if (late_s != 0) p_C += late_s * (p_C.cross(motion.rate.tail<3>()) - motion.rate.head<3>());
   const Camera& camera = data_.cameras[static_cast<std::size_t>(view.camera)];
   if (p_C.z() < kNearest_m || (p_C.head<2>() / p_C.z()).norm() > camera.max_normalised_radius()) return std::nullopt;
   return p_C;
 }
 
-std::optional<Vec2> ImuCameraProblem::corner_error(const CalibrationView& view, const WeightedCorner& corner) const {
-  const std::optional<Vec3> p_C = corner_in_camera(view, corner, view_motion(view, nullptr));
+double ImuCameraProblem::lateness_s(const CalibrationView& view) const {
+  const ViewMotion motion = view_motion(view, nullptr);
+  const ViewTerm term = view_term(view, motion, nullptr);
+  const Vec6 Hx = term.H.topLeftCorner<6, 6>() * motion.rate;
+  return -motion.rate.dot(term.b.head<6>()) / (motion.rate.dot(Hx) + 1 / (kLatest_s * kLatest_s));
+}
+
+std::optional<Vec2> ImuCameraProblem::corner_error(const CalibrationView& view, const WeightedCorner& corner, double late_s) const {
+  const std::optional<Vec3> p_C = corner_in_camera(view, corner, view_motion(view, nullptr), late_s);
   if (!p_C) return std::nullopt;
   return Vec2(data_.cameras[static_cast<std::size_t>(view.camera)].distort(p_C->head<2>() / p_C->z()) - corner.pixel);
 }
 
 ImuCameraProblem::ViewTerm ImuCameraProblem::view_term(const CalibrationView& view, const ViewMotion& motion, Rng* signs) const {
   const Camera& camera = data_.cameras[static_cast<std::size_t>(view.camera)];
-  const double weight = 1 / (setup_.corner_sigma_px * view.noise_factor);
+  const double weight = 1 / (setup_.corner_sigma_px * setup_.image_factor * view.noise_factor);
   ViewTerm term;
   for (const WeightedCorner& corner : view.corners) {
     if (!corner.used) continue;
@@ -79,6 +90,19 @@ ImuCameraProblem::ViewTerm ImuCameraProblem::view_term(const CalibrationView& vi
   return term;
 }
 
+ImuCameraProblem::ViewTerm ImuCameraProblem::with_jitter(ViewTerm term, const CalibrationView& view, const ViewMotion& motion) const {
+  if (setup_.stamp_jitter_s <= 0) return term;
+  // Images with one stamp are late together: each is worth its part.
+  const double information = 1 / (setup_.stamp_jitter_s * setup_.stamp_jitter_s * view.sharing);
+  const Eigen::Matrix<double, 7, 1> Hx = term.H.leftCols<6>() * motion.rate;
+  const double along = motion.rate.dot(term.b.head<6>()), sum = motion.rate.dot(Hx.head<6>()) + information;
+  term.H -= Hx * Hx.transpose() / sum;
+  term.b -= along / sum * Hx;
+  term.cost -= 0.5 * along * along / sum;
+  term.chi2 -= along * along / sum;
+  return term;
+}
+
 void ImuCameraProblem::view_columns(const CalibrationView& view, const ViewMotion& motion, const SplineJacobian& J) {
   const Pose<B, Cn>& T_BC = state_.T_BC[static_cast<std::size_t>(view.camera)];
   const Mat3 R_CB = T_BC.R().transpose(), R_CT = motion.T_CT.R();
@@ -100,7 +124,7 @@ void ImuCameraProblem::view_columns(const CalibrationView& view, const ViewMotio
 double ImuCameraProblem::add_view(const CalibrationView& view, bool build) {
   SplineJacobian J;
   const ViewMotion motion = view_motion(view, build ? &J : nullptr);
-  const ViewTerm term = view_term(view, motion, nullptr);
+  const ViewTerm term = with_jitter(view_term(view, motion, nullptr), view, motion);
   if (build) {
     view_columns(view, motion, J);
     const auto A = J_.leftCols(static_cast<Eigen::Index>(index_.size()));
@@ -164,16 +188,37 @@ double ImuCameraProblem::add_reading(const CalibrationReading& reading, bool bui
   return gyro.cost + accel.cost;
 }
 
+void ImuCameraProblem::add_image_sum(const ViewTerm& image, ResidualSum& sum) const {
+  const Mat6 H = image.H.topLeftCorner<6, 6>();
+  const Eigen::LDLT<Mat6> factor(H);
+  if (image.rows < 16 || factor.vectorD().minCoeff() <= 1e-9 * factor.vectorD().maxCoeff()) return;
+  const Vec6 b = image.b.head<6>();
+  sum.chi2 += b.dot(factor.solve(b)), sum.rows += 6;
+}
+
 ResidualSums ImuCameraProblem::residual_sums() {
   ResidualSums sums;
+  double jitter_chi2 = 0, jitter_rows = 0, jitter_sure = 0;
+  ViewTerm image;  // rows of one image lie side by side
   Rng signs(20261124);
   const auto random_sign = [&] { return signs.below(2) ? 1.0 : -1.0; };
   std::vector<Eigen::VectorXd> probes(3, Eigen::VectorXd::Zero(system_->size()));
-  for (const CalibrationView& view : data_.views) {
+  for (std::size_t v = 0; v < data_.views.size(); ++v) {
+    const CalibrationView& view = data_.views[v];
     SplineJacobian J;
     const ViewMotion motion = view_motion(view, &J);
-    const ViewTerm term = view_term(view, motion, &signs);
-    sums.corners.chi2 += term.chi2, sums.corners.rows += term.rows;
+    const ViewTerm exact = view_term(view, motion, nullptr), late = with_jitter(exact, view, motion);
+    const ViewTerm term = with_jitter(view_term(view, motion, &signs), view, motion);
+    sums.corners.chi2 += late.chi2, sums.corners.rows += late.rows;
+    image.H += late.H, image.b += late.b, image.rows += late.rows;
+    const Vec6 Hx = exact.H.topLeftCorner<6, 6>() * motion.rate;
+    if (const double sure = motion.rate.dot(Hx); sure > 0) {
+      jitter_chi2 += std::pow(motion.rate.dot(exact.b.head<6>()), 2) / sure, jitter_rows += 1, jitter_sure += sure;
+    }
+    if (v + 1 == data_.views.size() || data_.views[v + 1].camera != view.camera || data_.views[v + 1].t_s != view.t_s) {
+      add_image_sum(image, sums.images);
+      image = {};
+    }
     view_columns(view, motion, J);
     probes[0](index_) += J_.leftCols(static_cast<Eigen::Index>(index_.size())).transpose() * term.b;
   }
@@ -191,6 +236,9 @@ ResidualSums ImuCameraProblem::residual_sums() {
   }
   ResidualSum* all[3] = {&sums.corners, &sums.gyro, &sums.accel};
   for (int i = 0; i < 3; ++i) all[i]->taken_up = probes[static_cast<std::size_t>(i)].dot(system_->solve(probes[static_cast<std::size_t>(i)]));
+  // (C12)
+  if (jitter_chi2 > kJitters * jitter_rows) sums.stamp_jitter_s = std::sqrt((jitter_chi2 - jitter_rows) / jitter_sure);
+  sums.images.taken_up = sums.corners.taken_up;
   return sums;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/imu_camera.hpp"
 
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -129,6 +130,18 @@ TEST(ImuCamera, ScaleAndAxesOfTheImu) {
     }
 }
 
+TEST(ImuCamera, SaysWhatIsNoisierThanGiven) {
+  HandHeldOptions o = short_recording();
+  o.cameras = 1, o.stamp_jitter_s = 1e-3;
+  HandHeldRecording r = hand_held(o, 10);
+  r.input.noise.gyro_noise_density_radps_rthz /= 3;
+  const auto found = calibrate_imu_camera(r.input, {});
+  expect_truth(r, found, 3e-3, 0.1 * kDegree, 0.4e-3);
+  EXPECT_NEAR(found->stamp_jitter_s, 1e-3, 0.15e-3);
+  EXPECT_NEAR(found->gyro_rms_sigmas, 3, 0.3);
+  EXPECT_EQ(found->remarks.size(), 2u) << fmt::format("{}", fmt::join(found->remarks, "; "));
+}
+
 TEST(ImuCamera, NamesWrongUnitsAndSizes) {
   HandHeldOptions o = short_recording();
   o.cameras = 1;
@@ -159,6 +172,9 @@ TEST(ImuCamera, NamesWhatTheRecordingLacks) {
   ImuCameraInput wrong = good.input;
   wrong.imu = hand_held(o, 9).input.imu;
   expect_refusal(wrong, "at no offset");
+  wrong = good.input;
+  wrong.T_CnC0[1].p.x() += 0.006;
+  expect_refusal(wrong, "relative to one another");
   wrong = good.input;
   wrong.imu.clear();
   expect_refusal(wrong, "no IMU readings");
