@@ -9,6 +9,9 @@
 
 namespace fbvins {
 
+/// Any camera of a rig: z forward, x right, y down.
+struct Cn {};
+
 struct BoardCorner {
   int index = 0;               ///< Board::corner
   Vec2 pixel = Vec2::Zero();   ///< raw image, centre of the top-left pixel at (0, 0)

@@ -19,9 +19,6 @@
 
 namespace fbvins {
 
-/// Any camera of a rig: z forward, x right, y down.
-struct Cn {};
-
 struct ImuCameraInput {
   Board board;
   std::vector<Camera> cameras;           ///< one to eight, by BoardView::camera; lenses are taken as they are

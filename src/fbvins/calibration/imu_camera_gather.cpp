@@ -7,12 +7,14 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
+
+#include "fbvins/calibration/board_pose.hpp"
+#include "fbvins/calibration/detections_file.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kMostCameras = 8;
+constexpr std::size_t kFewestCorners = 8;
 constexpr double kShortest_s = 8;
 constexpr std::size_t kFewestViews = 40;
 constexpr double kPoorFit = 2.5;               // of a pose, over the median
@@ -34,7 +36,7 @@ double median(Values values) {
 }
 
 std::optional<Error> check_input(const ImuCameraInput& input) {
-  if (input.cameras.empty() || input.cameras.size() > kMostCameras)
+  if (input.cameras.empty() || static_cast<int>(input.cameras.size()) > kMostCameras)
     return error(fmt::format("{} cameras are given: one to {} can be calibrated", input.cameras.size(), kMostCameras));
   if (!input.T_CnC0.empty() && input.T_CnC0.size() != input.cameras.size())
     return error(fmt::format("{} cameras, but {} poses relative to the first one", input.cameras.size(), input.T_CnC0.size()));
@@ -60,8 +62,10 @@ Result<std::vector<std::vector<SeenPose>>> locate_all(const ImuCameraInput& inpu
   std::vector<std::size_t> seen(input.cameras.size(), 0);
   for (const BoardView& view : input.views) {
     const auto c = static_cast<std::size_t>(view.camera);
-    seen[c] += view.corners.size() >= kFewestCorners;
-    if (const auto pose = locate(input.board, input.cameras[c], view, reference)) poses[c].push_back(*pose);
+    if (view.corners.size() < kFewestCorners) continue;
+    ++seen[c];
+    if (const auto pose = find_board_pose(input.cameras[c], input.board, view.corners))
+      poses[c].push_back({view.camera, (view.t - reference).seconds(), pose->T_CnT.inverse(), pose->rms_px});
   }
   for (std::size_t c = 0; c < poses.size(); ++c) {
     if (seen[c] >= kFewestViews && 2 * poses[c].size() < seen[c])

@@ -15,13 +15,8 @@ struct SeenPose {
   int camera = 0;
   double t_s = 0;  ///< image's stamp since the reference
   Pose<T, Cn> T_TC;
-  double sigma_px = 0;  ///< of one coordinate, degrees of freedom regarded
+  double sigma_px = 0;  ///< of one coordinate of most corners
 };
-
-inline constexpr std::size_t kFewestCorners = 8;
-
-/// Nullopt with fewer than kFewestCorners, corners on a line, or no pose that fits.
-std::optional<SeenPose> locate(const Board& board, const Camera& camera, const BoardView& view, Time reference);
 
 /// The gyroscope's readings as a function of time: their integral.
 class GyroIntegral {
