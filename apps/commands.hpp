@@ -43,6 +43,8 @@ void add_doctor_command(CLI::App& program, int& exit_code);
 void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);
+/// Below `simulate`.
+void add_simulate_board_command(CLI::App& simulate, int& exit_code);
 void add_report_command(CLI::App& program, int& exit_code);
 void add_bench_command(CLI::App& program, int& exit_code);
 void add_fly_command(CLI::App& program, int& exit_code);

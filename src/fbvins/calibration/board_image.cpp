@@ -51,6 +51,17 @@ double BoardCamera::grey(const Vec3& origin_T, const Vec3& direction_T, const Bo
   return background_ ? background_(origin_T, direction_T) : 110 + 30 * std::sin(3 * direction_T.x()) * std::cos(2 * direction_T.y());
 }
 
+/// Whether the pixel, or the one around each of its corners, sees the sheet of paper.
+bool BoardCamera::near_board(const Vec3& origin_T, const Mat3& R_TC, const Vec3* above, const Vec3* below) const {
+  const Vec3 across = above[1] - above[0], down = below[0] - above[0];
+  for (const Vec3& ray : {Vec3(above[0] - across - down), Vec3(above[1] + across - down), Vec3(below[0] - across + down), Vec3(below[1] + across + down)}) {
+    const Vec3 direction = R_TC * ray;
+    const double along = -origin_T.z() / direction.z();
+    if (along > 0 && pattern_.black(origin_T.x() + along * direction.x(), origin_T.y() + along * direction.y())) return true;
+  }
+  return false;
+}
+
 Image BoardCamera::render(const std::vector<Pose<Cn, T>>& T_CnT, const BoardImageOptions& options, Rng& rng) const {
   std::vector<Vec3> origins;
   std::vector<Mat3> rotations;
@@ -63,6 +74,11 @@ Image BoardCamera::render(const std::vector<Pose<Cn, T>>& T_CnT, const BoardImag
     for (int x = 0; x < width_; ++x) {
       const Vec3 *above = &rays_[y * (width_ + 1) + x], *below = above + width_ + 1;
       if (above[0].isZero() || above[1].isZero() || below[0].isZero() || below[1].isZero()) continue;
+      if (!near_board(origins[0], rotations[0], above, below)) {
+        const Vec3 middle = 0.25 * (above[0] + above[1] + below[0] + below[1]);
+        light[y * width_ + x] = grey(origins[0], rotations[0] * middle, options);
+        continue;
+      }
       double sum = 0;
       const double shift = ((x * 7 + y * 11) % 16) / 16.0;
       for (int s = 0; s < kSamples; ++s) {

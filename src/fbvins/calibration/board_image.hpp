@@ -35,6 +35,8 @@ class BoardCamera {
  private:
   double grey(const Vec3& origin_T, const Vec3& direction_T, const BoardImageOptions& options) const;
 
+  bool near_board(const Vec3& origin_T, const Mat3& R_TC, const Vec3* above, const Vec3* below) const;
+
   int width_, height_;
   BoardPattern pattern_;
   Background background_;
