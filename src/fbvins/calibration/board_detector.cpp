@@ -10,7 +10,7 @@ namespace {
 
 // A tag's border is an eighth of it wide: below this it is less than two pixels.
 constexpr double kSmallestTag_px = 16;
-constexpr double kLargestRadius_px = 7;
+constexpr double kLargestRadius_px = 6;
 
 double shortest_side_px(const TagSighting& tag) {
   double shortest = 1e9;
@@ -31,7 +31,7 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
 
 BoardSighting BoardDetector::find(const ImageView& image) {
   BoardSighting out;
-  const std::vector<TagSighting> tags = detector_.find(image);
+  const std::vector<TagSighting> tags = detector_.find(image, board_.columns * board_.rows / 2);
   for (std::size_t i = 0; i < tags.size(); ++i) {
     const TagSighting& tag = tags[i];
     if (tag.id >= board_.columns * board_.rows) {
@@ -58,7 +58,7 @@ BoardSighting BoardDetector::find(const ImageView& image) {
 bool BoardDetector::finds_mirrored(const ImageView& image) {
   Image mirrored(image.width, image.height);
   for (int y = 0; y < image.height; ++y) std::reverse_copy(image.row(y), image.row(y) + image.width, mirrored.row(y));
-  return detector_.find(mirrored.view()).size() >= 3;
+  return detector_.find(mirrored.view(), 3).size() >= 3;
 }
 
 }  // namespace fbvins

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kIterations = 25;
 constexpr double kConverged_px = 1e-3;
+constexpr double kLargestMove_px = 0.7;     ///< by which the window may be off the corner
 constexpr double kLeastContrast = 6;        ///< half the difference of the fields, grey values
 constexpr double kLargestMisfit = 0.3;      ///< root mean square of the residuals, as a part of the contrast
 constexpr double kLeastAngle = 0.35;        ///< sine of the angle between the edges
@@ -133,20 +134,21 @@ std::vector<Sample> samples_around(const ImageView& image, const Vec2& at, doubl
 
 std::optional<Vec2> refine_corner(const ImageView& image, const Vec2& start, const Vec2& first, const Vec2& second, double radius_px) {
   Crossing m{start, {std::atan2(first.x(), -first.y()), std::atan2(second.x(), -second.y())}, 0, 0, 1};
-  // Twice: the window follows the corner.
-  for (int round = 0; round < 2; ++round) {
-    const std::vector<Sample> samples = samples_around(image, m.corner, radius_px);
+  // The window follows the corner.
+  for (int round = 0; round < 3; ++round) {
+    const Vec2 middle = m.corner;
+    const std::vector<Sample> samples = samples_around(image, middle, radius_px);
     if (samples.size() < 9) return std::nullopt;
     if (round == 0) fit_greys(m, samples);
     if (!fit(m, samples) || !((m.corner - start).norm() <= radius_px)) return std::nullopt;
+    if ((m.corner - middle).norm() > kLargestMove_px) continue;
     double weights = 0;
     for (const Sample& s : samples) weights += s.weight;
-    const double misfit = std::sqrt(cost_of(m, samples) / weights);
-    if (round == 1 && !(std::abs(m.contrast) > kLeastContrast && misfit < kLargestMisfit * std::abs(m.contrast) &&
-                        std::abs(std::sin(m.angle[0] - m.angle[1])) > kLeastAngle))
-      return std::nullopt;
+    const bool fits = std::sqrt(cost_of(m, samples) / weights) < kLargestMisfit * std::abs(m.contrast);
+    const bool crosses = std::abs(m.contrast) > kLeastContrast && std::abs(std::sin(m.angle[0] - m.angle[1])) > kLeastAngle;
+    return fits && crosses ? std::optional(m.corner) : std::nullopt;
   }
-  return m.corner;
+  return std::nullopt;
 }
 
 }  // namespace fbvins

@@ -90,13 +90,13 @@ void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<T
 
 }  // namespace
 
-std::vector<TagSighting> TagDetector::find(const ImageView& image) {
+std::vector<TagSighting> TagDetector::find(const ImageView& image, int enough) {
   std::vector<TagSighting> out;
   if (image.empty()) return out;
   // In a blurred image the tags of a grid hang together at their corners, by the squares between them, and few are found. With
   // black a pixel smaller they come apart; small tags, whose cells would vanish, are found in the image itself.
   detect(state_->detector, with_smaller_black(image).view(), out);
-  detect(state_->detector, image, out);
+  if (static_cast<int>(out.size()) < enough) detect(state_->detector, image, out);
   std::ranges::stable_sort(out, {}, &TagSighting::id);
   return out;
 }
@@ -114,7 +114,7 @@ Error not_built() {
 struct TagDetector::State {};
 Result<TagCells> tag_cells(int) { return not_built(); }
 Result<TagDetector> TagDetector::create() { return not_built(); }
-std::vector<TagSighting> TagDetector::find(const ImageView&) { return {}; }
+std::vector<TagSighting> TagDetector::find(const ImageView&, int) { return {}; }
 
 #endif
 

@@ -33,8 +33,8 @@ class TagDetector {
   TagDetector& operator=(TagDetector&&) noexcept;
   ~TagDetector();
 
-  /// By id; corners to about half a pixel.
-  std::vector<TagSighting> find(const ImageView& image);
+  /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried.
+  std::vector<TagSighting> find(const ImageView& image, int enough);
 
  private:
   struct State;
