@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// How accurately cameras are found on an IMU: simulated hand-held recordings of a board, corners with noise, against the truth.
+//
+//   imu_camera [--recordings 20] [--duration 72] [--corner-sigma 0.2] [--cameras 2] [--first-seed 100] [--spacing 0]
+//              [--line-delay 0] [--axes] [--free-stereo] [--trouble]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cmath>
+#include <numbers>
+
+#include "fbvins/calibration/imu_camera_scene.hpp"
+
+using namespace fbvins;
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// Errors and normalised squared errors of one block of parameters over all recordings.
+struct Block {
+  const char* name;
+  const char* unit;
+  double per_unit;
+  double bar;  ///< largest error that the project wants, in the unit; 0: none
+  std::vector<double> errors = {}, sigmas = {}, nees = {};
+
+  void add(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
+    errors.push_back(error.norm() * per_unit);
+    sigmas.push_back(std::sqrt(covariance.trace()) * per_unit);
+    nees.push_back(test::squared_sigmas(error, covariance) / static_cast<double>(error.size()));
+  }
+  void print() const {
+    if (errors.empty()) return;
+    double mean = 0, square = 0, sigma = 0;
+    for (std::size_t i = 0; i < errors.size(); ++i)
+      mean += nees[i] / static_cast<double>(errors.size()), square += errors[i] * errors[i] / static_cast<double>(errors.size()),
+          sigma += sigmas[i] / static_cast<double>(errors.size());
+    fmt::print("| {} [{}] | {:.4f} | {:.4f} | {:.4f} | {} | {:.2f} | {:.2f} |\n", name, unit, std::sqrt(square),
+               *std::max_element(errors.begin(), errors.end()), sigma, bar > 0 ? fmt::format("{:g}", bar) : "", mean,
+               std::sqrt(*std::max_element(nees.begin(), nees.end())));
+  }
+};
+
+Vec3 turn_error(const Quat& truth, const Quat& estimate) { return so3_log(truth.conjugate() * estimate); }
+
+/// Across the direction of gravity: its two components.
+void add_gravity(Block& block, const CameraImuResult& found, const Vec3& truth) {
+  const Vec3 up = truth.normalized(), x = up.unitOrthogonal(), y = up.cross(x);
+  Eigen::Matrix<double, 2, 3> J;
+  J << x.transpose(), y.transpose();
+  J /= truth.norm();
+  block.add(J * (found.gravity_T - truth), J * found.gravity_covariance * J.transpose());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"accuracy of the camera-IMU calibration on simulated recordings"};
+  int recordings = 20, first_seed = 100;
+  test::HandHeldOptions scene;
+  scene.duration_s = 72;
+  ImuCameraOptions options;
+  bool free_stereo = false, trouble = false;
+  app.add_option("--recordings", recordings);
+  app.add_option("--first-seed", first_seed);
+  app.add_option("--duration", scene.duration_s);
+  app.add_option("--corner-sigma", scene.corner_sigma_px);
+  app.add_option("--cameras", scene.cameras);
+  app.add_option("--tremor", scene.tremor);
+  app.add_option("--line-delay", scene.line_delay_s);
+  app.add_option("--jitter", scene.stamp_jitter_s, "of the images' stamps, s");
+  app.add_option("--spacing", options.knot_spacing_s);
+  app.add_flag("--axes", options.imu_axes);
+  app.add_flag("--free-stereo", free_stereo);
+  app.add_flag("--trouble", trouble, "outliers, blur, dropped readings and spikes, the board out of view");
+  CLI11_PARSE(app, argc, argv);
+  options.line_delay = scene.line_delay_s != 0;
+  if (options.imu_axes) {
+    scene.axes.gyro << 1.01, 0.004, -0.006, 0.003, 0.995, 0.002, -0.001, 0.005, 1.003;
+    scene.axes.accel << 1.006, 0, 0, 0.004, 0.992, 0, -0.003, 0.002, 1.01;
+  }
+  if (trouble) scene.outlier_share = 0.01, scene.blur_share = 0.1, scene.dropped_share = 0.02, scene.spike_share = 0.001,
+               scene.hidden_from_s = 10, scene.hidden_to_s = 13;
+
+  Block turn{"rotation", "deg", 1 / kDegree, 0.01}, place{"translation", "mm", 1e3, 0.5}, offset{"time offset", "ms", 1e3, 0.05},
+      gravity{"direction of gravity", "deg", 1 / kDegree, 0}, delay{"line delay", "us", 1e6, 0}, gyro_axes{"gyroscope's axes", "1e-3", 1e3, 0},
+      accel_axes{"accelerometer's axes", "1e-3", 1e3, 0};
+  Block gyro_bias{"gyroscope bias", "mrad/s", 1e3, 0}, accel_bias{"accelerometer bias", "mm/s2", 1e3, 0};
+  double worst_s = 0, mean_s = 0, gyro_rms = 0, accel_rms = 0, corner = 0, scale_nees = 0;
+  int refused = 0;
+  for (int i = 0; i < recordings; ++i) {
+    test::HandHeldRecording r = test::hand_held(scene, static_cast<std::uint64_t>(first_seed + i));
+    if (free_stereo) r.input.T_CnC0.clear();
+    const auto began = std::chrono::steady_clock::now();
+    const Result<CameraImuResult> found = calibrate_imu_camera(r.input, options);
+    const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    worst_s = std::max(worst_s, took_s), mean_s += took_s / recordings;
+    if (!found) {
+      ++refused;
+      fmt::print("{}: {}\n", first_seed + i, found.error().message);
+      continue;
+    }
+    for (std::size_t c = 0; c < (free_stereo ? found->cameras.size() : 1); ++c) {
+      const CameraOnImu& camera = found->cameras[c];
+      turn.add(turn_error(r.truth.T_BC[c].q, camera.T_BC.q), camera.covariance.bottomRightCorner<3, 3>());
+      place.add(camera.T_BC.p - r.truth.T_BC[c].p, camera.covariance.topLeftCorner<3, 3>());
+    }
+    const auto one = [](double x) { return Eigen::VectorXd::Constant(1, x); };
+    const auto square = [](double x) { return Eigen::MatrixXd::Constant(1, 1, x * x); };
+    offset.add(one(found->time_offset_s - r.truth.time_offset_s), square(found->time_offset_sigma_s));
+    add_gravity(gravity, *found, r.truth.gravity_T);
+    if (options.line_delay) delay.add(one(found->line_delay_s - r.truth.line_delay_s), square(found->line_delay_sigma_s));
+    if (options.imu_axes)
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) {
+          gyro_axes.add(one(found->axes.gyro(row, column) - r.truth.axes.gyro(row, column)), square(found->axes_sigma.gyro(row, column)));
+          if (column <= row)
+            accel_axes.add(one(found->axes.accel(row, column) - r.truth.axes.accel(row, column)), square(found->axes_sigma.accel(row, column)));
+        }
+    const BiasAt* bias = &found->biases[found->biases.size() / 2];
+    const ImuBias& truth = r.truth.bias_at(bias->t);
+    gyro_bias.add(bias->bias.gyro_radps - truth.gyro_radps, Mat3(bias->sigma.gyro_radps.cwiseAbs2().asDiagonal()));
+    accel_bias.add(bias->bias.accel_mps2 - truth.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
+    gyro_rms += found->gyro_rms_sigmas, accel_rms += found->accel_rms_sigmas, corner += found->corner_sigma_px;
+    scale_nees += std::pow((found->board_scale - 1) / found->board_scale_sigma, 2);
+    fmt::print("{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n", first_seed + i, place.errors.back(),
+               turn.errors.back(), offset.errors.back(), found->board_scale, found->board_scale_sigma, found->measured_gravity_mps2,
+               found->measured_gravity_sigma_mps2, found->knot_spacing_s, found->gyro_rms_sigmas, found->accel_rms_sigmas, found->iterations, took_s);
+    std::fflush(stdout);
+  }
+  const int done = std::max(1, recordings - refused);
+  fmt::print("\n| | RMS | worst | sigma | wanted | NEES | worst sigmas |\n|---|---|---|---|---|---|---|\n");
+  for (const Block* b : {&turn, &place, &offset, &gravity, &delay, &gyro_axes, &accel_axes, &gyro_bias, &accel_bias}) b->print();
+  fmt::print("\n{} recordings of {:g} s, {} refused; {:.1f} s each, {:.1f} at most; corners {:.4f} px, gyroscope {:.3f}, accelerometer {:.3f} "
+             "sigmas; NEES of the board's scale {:.2f}\n", recordings, scene.duration_s, refused, mean_s, worst_s, corner / done, gyro_rms / done,
+             accel_rms / done, scale_nees / done);
+  return 0;
+}

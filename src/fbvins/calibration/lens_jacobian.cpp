@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/lens_jacobian.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+#include "fbvins/camera/lenses.hpp"
+
+namespace fbvins {
+namespace {
+
+using Row23 = Eigen::Matrix<double, 2, 3>;
+
+/// A point on the model's plane, before focal lengths and centre.
+struct Unit {
+  Vec2 uv;
+  Row23 J_point;
+  Eigen::Matrix<double, 2, 5> J_own = Eigen::Matrix<double, 2, 5>::Zero();  ///< of the parameters after cy
+};
+
+/// (u, v) = (x, y) / D with the derivatives of D; `first` to `own` of D's own parameters.
+Unit quotient(const Vec3& p, double D, const Vec3& dD_point, std::initializer_list<double> dD_own) {
+  Unit out;
+  out.uv = p.head<2>() / D;
+  out.J_point = -out.uv * dD_point.transpose() / D;
+  out.J_point(0, 0) += 1 / D;
+  out.J_point(1, 1) += 1 / D;
+  int k = 0;
+  for (const double d : dD_own) out.J_own.col(k++) = -out.uv * d / D;
+  return out;
+}
+
+/// Brown's distortion of (u, v) with the derivatives of k1, k2, p1, p2.
+Vec2 brown(const PinholeRadtan& m, const Vec2& n, Mat2& J, Eigen::Matrix<double, 2, 4>& J_own) {
+  const double x = n.x(), y = n.y(), s = n.squaredNorm();
+  J_own << x * s, x * s * s, 2 * x * y, s + 2 * x * x, y * s, y * s * s, s + 2 * y * y, 2 * x * y;
+  return distort_unit(m, n, &J);
+}
+
+std::optional<Unit> unit(const PinholeRadtan& m, const Vec3& p) {
+  if (!(p.z() > 1e-3 * p.norm())) return std::nullopt;
+  Unit out = quotient(p, p.z(), Vec3::UnitZ(), {});
+  if (!(radial(m, out.uv.norm()).derivative > 0)) return std::nullopt;
+  Mat2 J;
+  Eigen::Matrix<double, 2, 4> J_own;
+  out.uv = brown(m, out.uv, J, J_own);
+  out.J_point = (J * out.J_point).eval();
+  out.J_own.leftCols<4>() = J_own;
+  return out;
+}
+
+std::optional<Unit> unit(const KannalaBrandt& m, const Vec3& p) {
+  const double r = p.head<2>().norm(), square = p.squaredNorm();
+  if (r < 1e-9 * p.z()) return quotient(p, p.z(), Vec3::UnitZ(), {});
+  const double theta = std::atan2(r, p.z()), s = theta * theta;
+  const double g = theta * (1 + s * (m.k1 + s * (m.k2 + s * (m.k3 + s * m.k4))));
+  const double slope = 1 + s * (3 * m.k1 + s * (5 * m.k2 + s * (7 * m.k3 + s * 9 * m.k4)));
+  if (!(slope > 0) || !(g > 0) || !(r > 0)) return std::nullopt;
+  Unit out;
+  const Vec2 direction = p.head<2>() / r;
+  out.uv = g * direction;
+  const Vec3 d_theta(p.z() * direction.x() / square, p.z() * direction.y() / square, -r / square);
+  out.J_point = slope * direction * d_theta.transpose();
+  out.J_point.leftCols<2>() += g / r * (Mat2::Identity() - direction * direction.transpose());
+  double power = theta;
+  for (int k = 0; k < 4; ++k) out.J_own.col(k) = (power *= s) * direction;
+  return out;
+}
+
+std::optional<Unit> unit(const DoubleSphere& m, const Vec3& p) {
+  const double d1 = p.norm(), w = m.xi * d1 + p.z(), d2 = std::hypot(p.x(), p.y(), w);
+  const double D = m.alpha * d2 + (1 - m.alpha) * w;
+  // Usenko et al., equations 43 to 45.
+  const double w1 = m.alpha <= 0.5 ? m.alpha / (1 - m.alpha) : (1 - m.alpha) / m.alpha;
+  const double w2 = (w1 + m.xi) / std::sqrt(2 * w1 * m.xi + m.xi * m.xi + 1);
+  if (!(p.z() > -w2 * d1) || !(D > 1e-9 * d1)) return std::nullopt;
+  const Vec3 dw = m.xi * p / d1 + Vec3::UnitZ();
+  const Vec3 dd2 = (Vec3(p.x(), p.y(), 0) + w * dw) / d2;
+  return quotient(p, D, m.alpha * dd2 + (1 - m.alpha) * dw, {d1 * (m.alpha * w / d2 + 1 - m.alpha), d2 - w});
+}
+
+std::optional<Unit> unit(const ExtendedUnified& m, const Vec3& p) {
+  const double rr = p.head<2>().squaredNorm(), d = std::sqrt(m.beta * rr + p.z() * p.z());
+  const double D = m.alpha * d + (1 - m.alpha) * p.z();
+  const double bound = m.alpha <= 0.5 ? m.alpha / (1 - m.alpha) : (1 - m.alpha) / m.alpha;
+  if (!(p.z() > -bound * d) || !(D > 1e-9 * d)) return std::nullopt;
+  const Vec3 dd = Vec3(m.beta * p.x(), m.beta * p.y(), p.z()) / d;
+  return quotient(p, D, m.alpha * dd + (1 - m.alpha) * Vec3::UnitZ(), {d - p.z(), m.alpha * rr / (2 * d)});
+}
+
+std::optional<Unit> unit(const UnifiedRadtan& m, const Vec3& p) {
+  const double d = p.norm(), D = m.xi * d + p.z();
+  if (!(p.z() > -(m.xi <= 1 ? m.xi : 1 / m.xi) * d) || !(D > 1e-9 * d)) return std::nullopt;
+  Unit out = quotient(p, D, m.xi * p / d + Vec3::UnitZ(), {d});
+  const PinholeRadtan second = behind(m);
+  if (!(radial(second, out.uv.norm()).derivative > 0)) return std::nullopt;
+  Mat2 J;
+  Eigen::Matrix<double, 2, 4> J_own;
+  out.uv = brown(second, out.uv, J, J_own);
+  out.J_point = (J * out.J_point).eval();
+  out.J_own.col(0) = (J * out.J_own.col(0)).eval();
+  out.J_own.rightCols<4>() = J_own;
+  return out;
+}
+
+/// Every parameter of a model, in order.
+template <class Model, class Visit>
+void each(Model& m, Visit&& visit) {
+  for (auto* value : {&m.fx, &m.fy, &m.cx, &m.cy}) visit(*value);
+  using Plain = std::remove_const_t<Model>;
+  if constexpr (std::is_same_v<Plain, PinholeRadtan>) for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
+  if constexpr (std::is_same_v<Plain, KannalaBrandt>) for (auto* value : {&m.k1, &m.k2, &m.k3, &m.k4}) visit(*value);
+  if constexpr (std::is_same_v<Plain, DoubleSphere>) for (auto* value : {&m.xi, &m.alpha}) visit(*value);
+  if constexpr (std::is_same_v<Plain, ExtendedUnified>) for (auto* value : {&m.alpha, &m.beta}) visit(*value);
+  if constexpr (std::is_same_v<Plain, UnifiedRadtan>) for (auto* value : {&m.xi, &m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
+}
+
+void limit(PinholeRadtan&) {}
+void limit(KannalaBrandt&) {}
+void limit(DoubleSphere& m) {
+  m.xi = std::clamp(m.xi, -0.999, 0.999);
+  m.alpha = std::clamp(m.alpha, 0.0, 1.0);
+}
+void limit(ExtendedUnified& m) {
+  m.alpha = std::clamp(m.alpha, 0.0, 1.0);
+  m.beta = std::clamp(m.beta, 1e-3, 99.0);
+}
+void limit(UnifiedRadtan& m) { m.xi = std::clamp(m.xi, 0.0, 9.9); }
+
+/// Focal lengths near the axis in place of fx, fy: f / (1 + xi).
+std::vector<double> straightened(const DoubleSphere& m) {
+  return {m.fx / (1 + m.xi), m.fy / (1 + m.xi), m.cx, m.cy, m.xi, m.alpha};
+}
+DoubleSphere bent(const DoubleSphere&, const std::vector<double>& v) {
+  return {v[0] * (1 + v[4]), v[1] * (1 + v[4]), v[2], v[3], v[4], v[5]};
+}
+
+/// The projection's own share of the radial function u = f/(1+xi) r (1 + first r^2 + second r^4 + ...).
+struct Series {
+  double first, second;
+};
+Series series(double xi) {
+  const double q = xi / (1 + xi);
+  return {-0.5 * q, q / 8 + q * q / 4};
+}
+
+/// Focal lengths near the axis, coefficients of the whole radial function in place of k1 and k2.
+std::vector<double> straightened(const UnifiedRadtan& m) {
+  const double e = 1 + m.xi, k1 = m.k1 / (e * e);
+  const Series own = series(m.xi);
+  return {m.fx / e, m.fy / e, m.cx, m.cy, m.xi, own.first + k1, own.second + 3 * own.first * k1 + m.k2 / std::pow(e, 4), m.p1 / e, m.p2 / e};
+}
+UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
+  const double e = 1 + v[4];
+  const Series own = series(v[4]);
+  const double k1 = v[5] - own.first, k2 = v[6] - own.second - 3 * own.first * k1;
+  return {v[0] * e, v[1] * e, v[2], v[3], v[4], k1 * e * e, k2 * std::pow(e, 4), v[7] * e, v[8] * e};
+}
+
+template <class Model>
+std::vector<double> straightened(const Model& m) {
+  std::vector<double> out;
+  each(m, [&](const double& value) { out.push_back(value); });
+  return out;
+}
+template <class Model>
+Model bent(Model m, const std::vector<double>& v) {
+  auto next = v.begin();
+  each(m, [&](double& value) { value = *next++; });
+  return m;
+}
+
+/// How the straight parameters change with a small step of the others, times one over the part of the step.
+template <class Model>
+std::vector<double> direction(const Model& lens, const double* step) {
+  constexpr double kPart = 1e-3;
+  const auto at = [&](double part) {
+    Model m = lens;
+    const double* d = step;
+    each(m, [&](double& value) { value += part * *d++; });
+    return straightened(m);
+  };
+  std::vector<double> out = at(kPart);
+  const std::vector<double> less = at(-kPart);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = (out[k] - less[k]) / (2 * kPart);
+  return out;
+}
+
+/// So that 1 + xi stays positive.
+void limit_straight(const DoubleSphere&, std::vector<double>& v) { v[4] = std::clamp(v[4], -0.999, 0.999); }
+void limit_straight(const UnifiedRadtan&, std::vector<double>& v) { v[4] = std::clamp(v[4], 0.0, 9.9); }
+void limit_straight(const auto&, std::vector<double>&) {}
+
+std::vector<std::string> own_names(const LensModel& lens) {
+  constexpr const char* kNames[][5] = {
+      {"k1", "k2", "p1", "p2"}, {"k1", "k2", "k3", "k4"}, {"xi", "alpha"}, {"alpha", "beta"}, {"xi", "k1", "k2", "p1", "p2"}};
+  const int count = lens_parameter_count(lens) - 4;
+  return {kNames[lens.index()], kNames[lens.index()] + count};
+}
+
+}  // namespace
+
+std::vector<double> lens_parameters(const LensModel& lens) {
+  std::vector<double> out;
+  std::visit([&](const auto& m) { each(m, [&](const double& value) { out.push_back(value); }); }, lens);
+  return out;
+}
+
+int lens_parameter_count(const LensModel& lens) {
+  constexpr int kCounts[] = {8, 8, 6, 6, 9};
+  static_assert(std::size(kCounts) == std::variant_size_v<LensModel>);
+  return kCounts[lens.index()];
+}
+
+std::vector<std::string> lens_parameter_names(const LensModel& lens) {
+  std::vector<std::string> out = {"fx", "fy", "cx", "cy"};
+  for (std::string& name : own_names(lens)) out.push_back(std::move(name));
+  return out;
+}
+
+LensModel with_parameters(const LensModel& lens, const double* parameters) {
+  return std::visit(
+      [&](auto m) -> LensModel {
+        each(m, [&](double& value) { value = *parameters++; });
+        m.fx = std::max(m.fx, 1.0);
+        m.fy = std::max(m.fy, 1.0);
+        limit(m);
+        return m;
+      },
+      lens);
+}
+
+std::vector<double> straight_parameters(const LensModel& lens) {
+  return std::visit([](const auto& m) { return straightened(m); }, lens);
+}
+
+Eigen::MatrixXd straight_jacobian(const LensModel& lens) {
+  const int count = lens_parameter_count(lens);
+  Eigen::MatrixXd J(count, count);
+  for (int k = 0; k < count; ++k) {
+    std::array<double, kMostLensParameters> unit{};
+    unit[k] = 1e-3;
+    const std::vector<double> column = std::visit([&](const auto& m) { return direction(m, unit.data()); }, lens);
+    for (int i = 0; i < count; ++i) J(i, k) = column[i] / unit[k];
+  }
+  return J;
+}
+
+LensModel moved_lens(const LensModel& lens, const double* step) {
+  return std::visit(
+      [&](const auto& m) {
+        std::vector<double> values = straightened(m);
+        const std::vector<double> change = direction(m, step);
+        for (std::size_t k = 0; k < values.size(); ++k) values[k] += change[k];
+        limit_straight(m, values);
+        return with_parameters(lens, lens_parameters(bent(m, values)).data());
+      },
+      lens);
+}
+
+std::vector<std::string> lens_names() { return {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"}; }
+
+std::optional<LensModel> plain_lens(std::string_view name, double focal_px, const Vec2& centre_px) {
+  const double f = focal_px, cx = centre_px.x(), cy = centre_px.y();
+  if (name == "pinhole-radtan") return PinholeRadtan{f, f, cx, cy};
+  if (name == "pinhole-equidistant") return KannalaBrandt{f, f, cx, cy};
+  if (name == "ds") return DoubleSphere{f, f, cx, cy, 0, 0.5};
+  if (name == "eucm") return ExtendedUnified{f, f, cx, cy, 0.5, 1};
+  if (name == "omni-radtan") return UnifiedRadtan{2 * f, 2 * f, cx, cy, 1};
+  return std::nullopt;
+}
+
+std::optional<Vec2> project_point(const LensModel& lens, const Vec3& p_C, LensDerivatives* derivatives) {
+  return std::visit(
+      [&](const auto& m) -> std::optional<Vec2> {
+        const std::optional<Unit> point = unit(m, p_C);
+        if (!point || !point->uv.allFinite()) return std::nullopt;
+        const Vec2 focal(m.fx, m.fy);
+        if (derivatives) {
+          derivatives->point = focal.asDiagonal() * point->J_point;
+          derivatives->parameters.setZero();
+          derivatives->parameters(0, 0) = point->uv.x();
+          derivatives->parameters(1, 1) = point->uv.y();
+          derivatives->parameters(0, 2) = derivatives->parameters(1, 3) = 1;
+          derivatives->parameters.rightCols<5>() = focal.asDiagonal() * point->J_own;
+        }
+        return Vec2(m.fx * point->uv.x() + m.cx, m.fy * point->uv.y() + m.cy);
+      },
+      lens);
+}
+
+}  // namespace fbvins
