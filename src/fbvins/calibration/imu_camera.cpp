@@ -15,7 +15,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
+constexpr double kNoBound = 1e9, kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
 constexpr double kHuber_sigmas = 3;
 constexpr double kCornerOutlier_sigmas = 4, kReadingOutlier_sigmas = 6;
 constexpr int kMostIterations = 40, kRounds = 3;
@@ -272,7 +272,7 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   setup = fitter.problem().setup();
   setup.free_board_scale = false;
   setup.gravity_sigma_mps2 = options.gravity_sigma_mps2;
-  setup.corner_huber = 1e9;  // outliers are known by now
+  setup.corner_huber = kNoBound;  // outliers are known by now
   fitter.problem().fix_board_scale();
   fitter.change(setup);
   if (!fitter.fit() || !fitter.judge() || !fitter.fit() || !fitter.judge()) return undetermined();
