@@ -101,6 +101,9 @@ Result<TurnMatch> check_turns(const TurnMatch& match) {
     return error(fmt::format("the gyroscope turns {:.1f} times as fast as the camera: it gives degrees/s, rad/s are needed", match.gain));
   if (match.gain > 1.25 || match.gain < 0.8)
     return error(fmt::format("the gyroscope turns {:.3g} times as fast as the camera: its unit or scale is wrong", match.gain));
+  if (match.spread_radps(0) < 2 * kWeakestTurning_radps)
+    return error(fmt::format("the rig was hardly turned ({:.1f}, {:.1f} and {:.1f} degrees/s about its axes): turn it quickly about all three",
+                             match.spread_radps(0) * degrees, match.spread_radps(1) * degrees, match.spread_radps(2) * degrees));
   if (match.spread_radps(1) < kWeakestTurning_radps)
     return error(fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
                              match.spread_radps(1) * degrees));
@@ -259,6 +262,8 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   Vec3 force_T = Vec3::Zero();
   for (const CalibrationReading& r : data.readings) force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
   state.gravity_T = -force_T;
+  if (force_T.norm() > 0.8 && force_T.norm() < 1.2)
+    return error(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
 
   CalibrationSetup setup;
   setup.corner_sigma_px = std::max(0.02, median(sigmas));
