@@ -77,7 +77,8 @@ Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
 int convert(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {.require_imu = false});
   if (!data) return fail(data.error().message);
-  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  RecordingWarnings warnings;
+  warnings.print((*data)->info());
   Result<Sink> sink = make_sink(arguments, **data);
   if (!sink) return fail(sink.error().message);
   Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
@@ -87,6 +88,7 @@ int convert(const Arguments& arguments) {
     if (std::holds_alternative<StereoFrame>(*event)) progress.update(++frames);
   }
   if (Result<void> done = sink->finish(); !done) return fail(done.error().message);
+  warnings.print_at_end((*data)->info());
   if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", frames, bold(arguments.out));
   return kOk;
 }

@@ -9,6 +9,7 @@
 #include "apps/evaluation_report.hpp"
 #include "apps/open_recording.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/bags/bag_survey.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -16,6 +17,7 @@ namespace {
 constexpr const char* kExamples = R"(examples:
   fbvins info MH_01_easy
   fbvins info MH_01_easy.zip --json
+  fbvins info flight.bag                         topics and rates of a bag, also without a calibration
 )";
 
 struct Arguments {
@@ -99,13 +101,49 @@ void print_text(const Dataset& data) {
   fmt::print("{:<14}{} poses\n", "ground truth", info.ground_truth_poses);
 }
 
+Json describe(const BagSurvey& bag) {
+  Json topics = Json::array();
+  for (const TopicSurvey& t : bag.topics)
+    topics.push_back({{"name", t.name}, {"type", t.type}, {"messages", t.messages}, {"rate_hz", t.rate_hz}, {"first", t.first}});
+  return Json{{"format", bag.format},
+              {"duration_s", bag.duration_s},
+              {"topics", topics},
+              {"left", bag.left},
+              {"right", bag.right},
+              {"imu", bag.imu},
+              {"question", bag.question},
+              {"no_calibration", bag.no_calibration},
+              {"warnings", bag.warnings}};
+}
+
+void print_text(const std::string& path, const BagSurvey& bag) {
+  fmt::print("{} ({}), {:.2f} s\n", bold(path), bag.format, bag.duration_s);
+  for (const TopicSurvey& t : bag.topics)
+    fmt::print("{:<34}{:>8} messages{:>9.2f} Hz  {}{}{}\n", t.name, t.messages, t.rate_hz, t.type, t.first.empty() ? "" : "  ", t.first);
+  if (!bag.left.empty()) fmt::print("topics to use: left {}, right {}, IMU {}\n", bag.left, bag.right, bag.imu);
+}
+
+/// A bag is shown also where it cannot be run before a calibration or its topics are named; that is said, and is no failure here.
+int show_bag(const Arguments& arguments, const BagSurvey& bag, const Error& why) {
+  for (const std::string& warning : bag.warnings) warn(warning);
+  if (arguments.json) fmt::print("{}\n", describe(bag).dump(2));
+  else print_text(arguments.recording.path, bag);
+  if (!arguments.recording.topics.empty() && !bag.question.empty()) return fail(why.message);
+  if (bag.question.empty() && bag.no_calibration.empty()) return fail(why.message);
+  warn(why.message);
+  return kOk;
+}
+
 int show(const Arguments& arguments) {
   DatasetOptions options;
   options.prefetch_frames = 0;
   options.require_imu = false;
   const auto data = open_recording(arguments.recording, options);
-  if (!data) return fail(data.error().message);
-  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  if (!data) {
+    if (const auto bag = survey_recording(arguments.recording); bag && !bag->topics.empty()) return show_bag(arguments, *bag, data.error());
+    return fail(data.error().message);
+  }
+  RecordingWarnings().print((*data)->info());
   if (arguments.json) fmt::print("{}\n", describe(**data).dump(2));
   else print_text(**data);
   return kOk;

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "fbvins/bags/bag_survey.hpp"
+
 namespace fbvins::app {
 namespace {
 
@@ -63,6 +65,8 @@ bool is_for_bags(int argc, char** argv) {
   }
   return false;
 }
+
+std::optional<BagSurvey> survey_recording(const RecordingArguments&) { return std::nullopt; }
 
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {
   if (topic.empty()) return read_pose_file(path);

@@ -73,11 +73,16 @@ class Flight:
                     continue
                 pixels = decode(file)
                 height, width = pixels.shape
+                grey = np.full_like(pixels, 128)
                 data, channels = {"mono8": (pixels, 1), "rgb8": (np.repeat(pixels[..., None], 3, 2), 3),
-                                  "mono16": (pixels.astype("<u2") * 256 + 17, 2)}[encoding]
-                padding = np.zeros((height, 8 if encoding == "mono8" else 0), np.uint8)
-                data = np.hstack([np.ascontiguousarray(data).view(np.uint8).reshape(height, -1), padding])
-                message = self.types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                                  "mono16": (pixels.astype("<u2") * 256 + 17, 2), "mono12": (pixels.astype("<u2") * 16 + 7, 2),
+                                  "rgb16": (np.repeat(pixels.astype("<u2")[..., None] * 256 + 9, 3, 2), 6),
+                                  "uyvy": (np.stack([grey, pixels], 2), 2), "nv12": (np.vstack([pixels, grey[:height // 2]]), 1),
+                                  "tiff": (pixels, 1)}[encoding]
+                padding = np.zeros((len(data), 8 if encoding == "mono8" else 0), np.uint8)
+                data = np.hstack([np.ascontiguousarray(data).view(np.uint8).reshape(len(data), -1), padding])
+                message = self.types["sensor_msgs/msg/Image"](header=header, height=height, width=width,
+                                                              encoding="mono16" if encoding == "mono12" else encoding, is_bigendian=0,
                                                               step=data.shape[1], data=data.reshape(-1))
                 assert data.shape[1] == width * channels + padding.shape[1]
                 yield int(stamp), topic, message.__msgtype__, self.pack(message)
@@ -224,6 +229,37 @@ def kalibr_files(folder, path):
     (path / "imu_config.yaml").write_text("".join(f"{new}: {re.search(rf'{old}: *([-+.e0-9]+)', imu)[1]}\n" for old, new in names.items()))
 
 
+def check_what_cannot_be_run(program, folder, root):
+    """Each command says why in one sentence and exits with 2. `info` shows a bag all the same where it lacks a calibration or a decision."""
+    def refused(arguments, *words):
+        done = subprocess.run([program, *map(str, arguments)], check=False, capture_output=True, text=True)
+        assert done.returncode == 2 and all(word in done.stderr for word in words), f"{arguments}: {done.returncode} {done.stderr}"
+    flight = Flight(folder, get_typestore(Stores.ROS1_NOETIC), True)
+    write_ros1(root / "tiff.bag", flight, encoding="tiff")
+    sentence = "images encoded as 'tiff' cannot be read (none of 8 left images tried can be used)"
+    for command in (["info"], ["doctor"], ["run", "--out", root / "none"], ["convert", root / "none"]):
+        refused([*command[:1], root / "tiff.bag", *command[1:], "--calibration", folder], sentence)
+    assert not (root / "none").exists(), "a folder of results of nothing"
+    refused(["run", root / "lz4.bag"], "give one with --calibration")
+
+    done = subprocess.run([program, "info", root / "lz4.bag"], check=False, capture_output=True, text=True)
+    assert done.returncode == 0 and "--calibration" in done.stderr, done
+    assert "topics to use: left /cam0/image_raw, right /cam1/image_raw, IMU /imu0" in done.stdout, done.stdout
+    assert re.search(r"/cam0/image_raw +40 messages +20.00 Hz  sensor_msgs/Image  \d+ x \d+ mono8", done.stdout), done.stdout
+    with rosbag1.Writer(root / "two_rigs.bag") as writer:
+        connections = {}
+        for stamp, topic, kind, data in flight.messages():
+            for name in [topic] if topic == "/imu0" else ["/front" + topic, "/rear" + topic]:
+                if name not in connections:
+                    connections[name] = writer.add_connection(name, kind, typestore=flight.store)
+                writer.write(connections[name], stamp, data)
+    question = "has 2 stereo pairs (/front/cam0/image_raw and /front/cam1/image_raw, /rear/cam0/image_raw and /rear/cam1/image_raw): say which with --topics LEFT,RIGHT"
+    refused(["run", root / "two_rigs.bag", "--calibration", folder], question)
+    shown = subprocess.run([program, "info", root / "two_rigs.bag", "--calibration", folder, "--json"], check=False, capture_output=True, text=True)
+    assert shown.returncode == 0 and json.loads(shown.stdout)["question"] == question and len(json.loads(shown.stdout)["topics"]) == 5, shown
+    print("what cannot be run is said, and shown")
+
+
 def check_tum_vi(program, folder, root):
     """No sensor.yaml, but Kalibr's files in dso/."""
     path = root / "tum_vi"
@@ -345,7 +381,8 @@ def write_all(root, folder):
     write_ros1(root / "bz2.bag", one, pack.BZ2)
     write_ros1(root / "lz4.bag", one, pack.LZ4)
     write_ros1(root / "rgb.bag", one, encoding="rgb8")
-    write_ros1(root / "mono16.bag", one, encoding="mono16")
+    for encoding in ("mono16", "mono12", "rgb16", "uyvy", "nv12"):
+        write_ros1(root / f"{encoding}.bag", one, encoding=encoding)
     write_ros1(root / "compressed_images.bag", one, encoding="compressed")
     write_ros1(root / "out_of_order.bag", one, pack.LZ4, late=3_000_000)
     write_librealsense(root / "librealsense.bag", one)
@@ -389,6 +426,7 @@ def main():
             same = trajectory(program, recording, root / "out", "--calibration", folder) == expected
             assert same, f"{recording.name}: another trajectory than from the EuRoC folder"
             print(f"{recording.name}: the same bytes")
+        check_what_cannot_be_run(program, folder, root)
         check_parts(program, recordings, folder)
         check_eval(program, folder, root)
         check_live(program, folder, root)

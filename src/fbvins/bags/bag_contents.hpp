@@ -3,6 +3,7 @@
 // One thread.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -36,7 +37,8 @@ struct BagContents {
   std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
 };
 
-BagContents read_contents(BagReader& bag);
+/// `on_message` is told of every message before it is taken.
+BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message = {});
 
 /// A message's place as a FrameEntry names it, and back.
 std::string place_name(const MessagePlace& place);

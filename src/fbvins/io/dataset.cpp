@@ -6,6 +6,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/euroc.hpp"
 #include "fbvins/io/frame_prefetcher.hpp"
+#include "fbvins/io/image_check.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 
 namespace fbvins {
@@ -65,6 +66,7 @@ Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const Dat
     return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
   Result<DatasetContents> contents = is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
   if (!contents) return contents.error();
+  if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   return std::make_unique<Dataset>(*std::move(contents), options);
 }
 
