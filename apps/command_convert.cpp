@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -19,7 +20,8 @@ namespace {
 
 constexpr const char* kExamples =
     R"(The name decides the format: FILE.bag is a ROS 1 bag; FILE.mcap a flight record, which ROS 2 programs can read;
-any other name is an EuRoC folder. Images become 8-bit grey.
+any other name is an EuRoC folder. Images become 8-bit grey. Calibration with noise, range and time offset, and
+ground truth are kept (of truth in a bag or record: the poses).
 
 examples:
   fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
@@ -33,19 +35,21 @@ struct Arguments {
   bool quiet = false;
 };
 
-/// Takes events in order; finish() completes the output.
+/// Takes events and truth in order of time; finish() completes the output.
 struct Sink {
   std::function<Result<void>(const SensorEvent&)> add;
+  std::function<Result<void>(const TrajectoryPoint&)> add_truth;
   std::function<Result<void>()> finish;
 };
 
 template <class Writer>
 Sink sink_of(std::shared_ptr<Writer> writer) {
   return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return writer->add(value); }, event); },
+          [writer](const TrajectoryPoint& point) { return writer->add_truth(point.t, point.T_WB); },
           [writer] { return writer->finish(); }};
 }
 
-/// EuRoC's readings and truth are written at the end.
+/// EuRoC's readings and truth are written at the end, the truth with its velocity and biases.
 struct EurocSink {
   EurocFolder folder;
   std::vector<TrajectoryPoint> truth;
@@ -53,7 +57,24 @@ struct EurocSink {
 
   Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
   Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t); }
+  Result<void> add_truth(Time, const Pose<W, B>&) { return {}; }
   Result<void> finish() { return folder.finish(readings, truth); }
+};
+
+/// The truth up to the event, then the event.
+class TruthBetween {
+ public:
+  TruthBetween(const std::vector<TrajectoryPoint>& truth, const Sink& sink) : truth_(truth), sink_(sink) {}
+  Result<void> add_until(Time t) {
+    for (; next_ < truth_.size() && truth_[next_].t <= t; ++next_)
+      if (Result<void> taken = sink_.add_truth(truth_[next_]); !taken) return taken;
+    return {};
+  }
+
+ private:
+  const std::vector<TrajectoryPoint>& truth_;
+  const Sink& sink_;
+  std::size_t next_ = 0;
 };
 
 Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
@@ -83,10 +104,15 @@ int convert(const Arguments& arguments) {
   if (!sink) return fail(sink.error().message);
   Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
   int frames = 0;
+  TruthBetween truth((*data)->ground_truth(), *sink);
   while (auto event = (*data)->next()) {
+    const Time t = std::visit([](const auto& value) { return value.t; }, *event);
+    if (Result<void> taken = truth.add_until(t); !taken) return fail(taken.error().message);
     if (Result<void> taken = sink->add(*event); !taken) return fail(taken.error().message);
     if (std::holds_alternative<StereoFrame>(*event)) progress.update(++frames);
   }
+  constexpr Time kEnd{std::numeric_limits<std::int64_t>::max()};
+  if (Result<void> taken = truth.add_until(kEnd); !taken) return fail(taken.error().message);
   if (Result<void> done = sink->finish(); !done) return fail(done.error().message);
   warnings.print_at_end((*data)->info());
   if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", frames, bold(arguments.out));

@@ -105,21 +105,18 @@ Json describe(const BagSurvey& bag) {
   Json topics = Json::array();
   for (const TopicSurvey& t : bag.topics)
     topics.push_back({{"name", t.name}, {"type", t.type}, {"messages", t.messages}, {"rate_hz", t.rate_hz}, {"first", t.first}});
-  return Json{{"format", bag.format},
-              {"duration_s", bag.duration_s},
-              {"topics", topics},
-              {"left", bag.left},
-              {"right", bag.right},
-              {"imu", bag.imu},
-              {"question", bag.question},
-              {"no_calibration", bag.no_calibration},
+  return Json{{"format", bag.format},     {"duration_s", bag.duration_s},
+              {"topics", topics},         {"left", bag.left},
+              {"right", bag.right},       {"imu", bag.imu},
+              {"question", bag.question}, {"no_calibration", bag.no_calibration},
               {"warnings", bag.warnings}};
 }
 
 void print_text(const std::string& path, const BagSurvey& bag) {
   fmt::print("{} ({}), {:.2f} s\n", bold(path), bag.format, bag.duration_s);
   for (const TopicSurvey& t : bag.topics)
-    fmt::print("{:<34}{:>8} messages{:>9.2f} Hz  {}{}{}\n", t.name, t.messages, t.rate_hz, t.type, t.first.empty() ? "" : "  ", t.first);
+    fmt::print("{:<34}{:>8} messages{:>9.2f} Hz  {}{}{}\n", t.name, t.messages, t.rate_hz, t.type, t.first.empty() ? "" : "  ",
+               t.first);
   if (!bag.left.empty()) fmt::print("topics to use: left {}, right {}, IMU {}\n", bag.left, bag.right, bag.imu);
 }
 
@@ -140,7 +137,8 @@ int show(const Arguments& arguments) {
   options.require_imu = false;
   const auto data = open_recording(arguments.recording, options);
   if (!data) {
-    if (const auto bag = survey_recording(arguments.recording); bag && !bag->topics.empty()) return show_bag(arguments, *bag, data.error());
+    if (const auto bag = survey_recording(arguments.recording); bag && !bag->topics.empty())
+      return show_bag(arguments, *bag, data.error());
     return fail(data.error().message);
   }
   RecordingWarnings().print((*data)->info());

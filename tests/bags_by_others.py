@@ -291,10 +291,31 @@ def check_converted(program, folder, root, expected):
             if connection.msgtype not in store.types:
                 store.register(get_types_from_msg(connection.msgdef.data, connection.msgtype))
             message = store.deserialize_ros1(data, connection.msgtype)
+            if connection.msgtype == "std_msgs/msg/String":
+                assert "gyroscope_noise_density" in message.data
+                continue
             header = message.transforms[0].header if connection.topic == "/tf_static" else message.header
             assert header.stamp.sec * 10**9 + header.stamp.nanosec == stamp
             assert connection.msgtype != "sensor_msgs/msg/Image" or len(message.data) == message.height * message.step
+            assert store.generate_msgdef(connection.msgtype, ros_version=1)[1] == connection.digest, connection.msgtype
     print("converted from bag to MCAP to bag to folder: the same bytes, and rosbags reads the bag")
+
+    def kept(recording):
+        about = json.loads(subprocess.run([program, "info", recording, "--json"], check=True, capture_output=True, text=True).stdout)
+        return {**{name: round(value, 12) for name, value in about["imu"].items() if "noise" in name or "walk" in name},
+                **{name: round(about[name], 9) for name in ("time_offset_s", "baseline_m", "ground_truth_poses")}}
+    shifted = root / "shifted"  # with noise and a time offset of its own, and truth
+    shutil.copytree(folder, shifted)
+    camera, imu = shifted / "mav0" / "cam0" / "sensor.yaml", shifted / "mav0" / "imu0" / "sensor.yaml"
+    camera.write_text(camera.read_text() + "timeshift_cam_imu: 0.004\n")
+    imu.write_text(re.sub(r"(_(density|random_walk): ).*", r"\g<1>0.0123", imu.read_text()))
+    expected, before = kept(shifted), shifted
+    assert expected["time_offset_s"] == 0.004 and expected["ground_truth_poses"] > IMAGES and 0.0123 in expected.values(), expected
+    for name in ("kept.bag", "kept.mcap", "kept"):
+        subprocess.run([program, "convert", before, root / name, "--quiet"], check=True)
+        assert kept(root / name) == expected, f"{name}: {kept(root / name)} is not {expected}"
+        before = root / name
+    print("converted: noise, time offset and truth are kept by bag, record and folder")
 
 
 def check_parts(program, recordings, folder):
@@ -389,6 +410,11 @@ def write_all(root, folder):
     write_ros2(root / "sqlite", two, plugin.SQLITE3)
     write_ros2(root / "sqlite_packed", two, plugin.SQLITE3, packed=True)
     write_ros2(root / "ros2_mcap", two, plugin.MCAP)
+    write_ros2(root / "ros2_mcap_packed", two, plugin.MCAP, packed=True)
+    for name in ("sqlite_packed", "ros2_mcap", "ros2_mcap_packed"):  # as a recorder that was killed leaves them
+        shutil.copytree(root / name, root / f"{name}_killed")
+        (root / f"{name}_killed" / "metadata.yaml").unlink()
+    shutil.copy(root / "plain.bag", root / "plain.bag.active")
     write_split(root / "ros2_split", two)
     write_mcap(root / "zstd.mcap", two, compression=CompressionType.ZSTD)
     write_mcap(root / "lz4.mcap", two, compression=CompressionType.LZ4)

@@ -9,13 +9,13 @@
 #include <deque>
 #include <span>
 
+#include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/quoted.hpp"
+#include "fbvins/io/rig_text.hpp"
 
 namespace fbvins {
 namespace {
-
-constexpr std::string_view kTruthTopic = "/ground_truth";
 
 /// Prefix /device_/sensor_/stream of a topic of librealsense, which has no frame names, to be used as the frame; else empty.
 std::string realsense_stream(const std::string& topic) {
@@ -131,11 +131,13 @@ Result<TopicPair> find_images(const BagContents& contents) {
   if (pairs.size() == 1) return pairs.front();
   if (pairs.empty() && all.size() == 2) return std::pair(all[0], all[1]);
   if (pairs.empty())
-    return Error{ErrorCode::unsupported,
-                 fmt::format("has {} image topics ({}): say which are left and right with --topics LEFT,RIGHT", all.size(), listed(all))};
+    return Error{
+        ErrorCode::unsupported,
+        fmt::format("has {} image topics ({}): say which are left and right with --topics LEFT,RIGHT", all.size(), listed(all))};
   std::vector<std::string> each;
   for (const auto& [left, right] : pairs) each.push_back(left + " and " + right);
-  return Error{ErrorCode::unsupported, fmt::format("has {} stereo pairs ({}): say which with --topics LEFT,RIGHT", pairs.size(), listed(each))};
+  return Error{ErrorCode::unsupported,
+               fmt::format("has {} stereo pairs ({}): say which with --topics LEFT,RIGHT", pairs.size(), listed(each))};
 }
 
 Result<std::string> find_imu(const BagContents& contents) {
@@ -200,7 +202,9 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
     else if (about.type == "geometry_msgs/Transform") take_stream_transform(*message, about, out);
     else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {
       for (BagTransform& t : transforms_of(message->data, about.encoding)) out.transforms.push_back(std::move(t));
-    } else if (about.name == kTruthTopic) {
+    } else if (about.name == kRigTopic && about.type == "std_msgs/String") {
+      out.rig = MessageFields(message->data, about.encoding).text();
+    } else if (about.name == kBagTruthTopic) {
       if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
     }
   }
@@ -228,6 +232,11 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopi
     out.accel = partner_by_words(*imu, names(contents.imu), kMotion);
   } else if (imu_needed || !contents.imu.empty()) return imu.error();
   return out;
+}
+
+std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics) {
+  if (contents.rig.empty() || topics.left != kBagLeftTopic || topics.right != kBagRightTopic) return std::nullopt;
+  return parse_rig(contents.rig, std::string(kRigTopic));
 }
 
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {

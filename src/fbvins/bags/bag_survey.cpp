@@ -43,7 +43,8 @@ BagSurvey survey_bag(BagReader& bag, const RecordingOptions& options) {
   std::map<std::string, TopicSurvey> topics;
   const BagContents contents = read_contents(bag, [&](const BagMessage& message, const BagTopic& about) {
     TopicSurvey& topic = topics[about.name];
-    if (topic.messages++ == 0) topic.name = printable(about.name), topic.type = printable(about.type), topic.first = first_of(message, about);
+    if (topic.messages++ == 0)
+      topic.name = printable(about.name), topic.type = printable(about.type), topic.first = first_of(message, about);
     stamps[about.name].push_back(message.log_time);
   });
   Time first{std::int64_t{1} << 62}, last{0};
@@ -63,7 +64,7 @@ BagSurvey survey_bag(BagReader& bag, const RecordingOptions& options) {
     return out;
   }
   out.left = printable(chosen->left), out.right = printable(chosen->right), out.imu = printable(chosen->imu);
-  if (!options.calibration.empty()) return out;
+  if (!options.calibration.empty() || own_rig(contents, *chosen)) return out;
   if (const auto rig = rig_of(contents, *chosen); !rig) out.no_calibration = rig.error().message;
   return out;
 }

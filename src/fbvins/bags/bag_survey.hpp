@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: what is in a bag, also where it cannot be run yet: without a calibration, or before it is known which topics to use. Any
-// thread.
+// Private: what is in a bag, also where it cannot be run yet: without a calibration, or before it is known which topics to use.
+// Any thread.
 //
 //   Result<BagSurvey> survey = survey_bag("flight.bag", {});
 //   for (const TopicSurvey& topic : survey->topics) print(topic.name, topic.rate_hz);

@@ -85,6 +85,40 @@ TEST_F(Bags, WhatIsWrittenIsRead) {
   EXPECT_EQ(frames, 20);
 }
 
+/// A recording that is converted has its whole calibration afterwards, and the poses of its truth.
+TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
+  StereoRig given = rig();
+  given.imu_noise = {1e-3, 2e-2, 3e-5, 4e-4, 201, 12, 80};
+  given.time_offset_s = 0.0125;
+  given.image_rate_hz = 20;
+  auto bag = Ros1BagWriter::create(path("whole.bag"), given, Time{1'000'000'000});
+  ASSERT_TRUE(bag) << bag.error().message;
+  for (int i = 0; i < 50; ++i) {
+    const Time t{1'000'000'000 + 5'000'000 * static_cast<std::int64_t>(i)};
+    ASSERT_TRUE(bag->add(ImuSample{t, Vec3::Zero(), Vec3(0, 0, 9.81)}));
+    if (i % 10 != 0) continue;
+    ASSERT_TRUE(bag->add(StereoFrame{t, image(i), image(i)}));
+    ASSERT_TRUE(bag->add_truth(t, {so3_exp({0.1, 0.2, 0.01 * i}), {1, 2, 0.1 * i}}));
+  }
+  ASSERT_TRUE(bag->finish());
+  auto data = open_recording(path("whole.bag"));
+  ASSERT_TRUE(data) << data.error().message;
+  const StereoRig& read = (*data)->rig();
+  EXPECT_EQ(read.imu_noise.accel_noise_density_mps2_rthz, 2e-2);
+  EXPECT_EQ(read.imu_noise.rate_hz, 201);
+  EXPECT_EQ(read.imu_noise.max_accel_mps2, 80);
+  EXPECT_EQ(read.time_offset_s, 0.0125);
+  EXPECT_EQ(read.T_BC0.q.coeffs(), given.T_BC0.q.coeffs());
+  EXPECT_TRUE((*data)->info().warnings.empty()) << (*data)->info().warnings.front();
+  ASSERT_EQ((*data)->ground_truth().size(), 5u);
+  EXPECT_LT(((*data)->ground_truth()[3].T_WB.p - Vec3(1, 2, 3)).norm(), 1e-12);
+  // Of other topics, such as exchanged ones, it is not the calibration.
+  const auto swapped = open_recording(path("whole.bag"), {.left_topic = "/cam1/image_raw", .right_topic = "/cam0/image_raw"});
+  ASSERT_TRUE(swapped) << swapped.error().message;
+  EXPECT_EQ((*swapped)->rig().time_offset_s, 0);
+  EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
+}
+
 /// What comes before the cut is there, whatever the place, and more of it the later the cut.
 TEST_F(Bags, ABagCutOffAnywhereIsReadAsFarAsItIsWhole) {
   write(path("flight.bag"));
@@ -211,13 +245,15 @@ TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
 TEST(BagContents, NamesOfTopicsDoNotBreakASentence) {
   BagContents contents;
   contents.images["/a\n"], contents.images["/b"], contents.images["/c"];
-  EXPECT_EQ(choose_topics(contents, {}, true).error().message, "has 3 image topics (/a?, /b, /c): say which are left and right with --topics LEFT,RIGHT");
+  EXPECT_EQ(choose_topics(contents, {}, true).error().message,
+            "has 3 image topics (/a?, /b, /c): say which are left and right with --topics LEFT,RIGHT");
 }
 
 TEST(BagContents, TwoRigsAreAQuestion) {
   BagContents contents;
   contents.imu["/imu"];
-  for (const char* topic : {"/front/left", "/front/right", "/front/left/compressed", "/front/right/compressed", "/front/depth"}) contents.images[topic];
+  for (const char* topic : {"/front/left", "/front/right", "/front/left/compressed", "/front/right/compressed", "/front/depth"})
+    contents.images[topic];
   const auto one = choose_topics(contents, {}, true);
   ASSERT_TRUE(one) << one.error().message;  // raw and compressed images of one rig are one pair
   EXPECT_EQ(one->right, "/front/right");
@@ -229,7 +265,9 @@ TEST(BagContents, TwoRigsAreAQuestion) {
 TEST(BagSurvey, SaysWhatIsThereWithoutACalibration) {
   ListedMessages bag;
   for (const char* topic : {"/left", "/right"})
-    bag.add(topic, "sensor_msgs/Image", header(5) + raw<std::uint32_t>({2, 3, 7}) + "bad\nred" + std::string(1, '\0') + raw<std::uint32_t>({3, 6}) + "pixels");
+    bag.add(
+        topic, "sensor_msgs/Image",
+        header(5) + raw<std::uint32_t>({2, 3, 7}) + "bad\nred" + std::string(1, '\0') + raw<std::uint32_t>({3, 6}) + "pixels");
   bag.add("/imu", "sensor_msgs/Imu", header(5) + std::string(37 * 8, '\0'));
   const BagSurvey survey = survey_bag(bag, {});
   ASSERT_EQ(survey.topics.size(), 3u);

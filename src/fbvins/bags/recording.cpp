@@ -42,8 +42,8 @@ class BagLoader : public FrameLoader {
   BagLoader(std::unique_ptr<BagReader> bag, std::string name, Side left, Side right)
       : bag_(std::move(bag)), name_(std::move(name)), left_(std::move(left)), right_(std::move(right)) {}
 
-  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in both cameras
-  /// together, from images spread over the recording, so that all its images are scaled alike.
+  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in both
+  /// cameras together, from images spread over the recording, so that all its images are scaled alike.
   int find_used_bits(const std::vector<FrameEntry>& frames) {
     std::uint16_t largest = 0;
     for (const auto& [side, file] : {std::pair{&left_, &FrameEntry::left_file}, {&right_, &FrameEntry::right_file}})
@@ -147,6 +147,11 @@ class BagRecording {
   }
 
   Result<void> calibrate() {
+    if (const auto own = own_rig(contents_, topics_); !rig_ && own) {
+      if (!*own) return own->error();
+      rig_ = **own;
+      whole_calibration_ = true;
+    }
     if (!rig_) {
       const Result<StereoRig> rig = rig_of(contents_, topics_);
       if (!rig) return rig.error();
@@ -218,7 +223,8 @@ class BagRecording {
     constexpr double kSameRate = 0.05;  // few calibrations say the cameras' rate: then it is measured
     if (std::abs(out_.rig.image_rate_hz - info.image_rate_hz) > kSameRate * info.image_rate_hz)
       out_.rig.image_rate_hz = info.image_rate_hz;
-    if (info.imu_rate_hz > 0 && options_.calibration.empty()) out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
+    if (info.imu_rate_hz > 0 && options_.calibration.empty() && !whole_calibration_)
+      out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
   }
 
   std::string path_;
@@ -226,6 +232,7 @@ class BagRecording {
   std::optional<StereoRig> rig_;
   BagContents contents_;
   ChosenTopics topics_;
+  bool whole_calibration_ = false;  ///< the bag's own, noise and rates included
   DatasetContents out_;
 };
 
@@ -273,10 +280,11 @@ bool is_bag(const std::string& path) {
   if (fs::is_directory(p, ignored)) {
     if (fs::exists(p / "metadata.yaml", ignored)) return true;
     for (const auto& entry : fs::directory_iterator(p, ignored))
-      if (entry.path().extension() == ".db3") return true;
+      if (entry.path().extension() == ".db3" || (entry.path().extension() == ".mcap" && !is_flight_record(entry.path().string())))
+        return true;
     return false;
   }
-  if (p.extension() == ".bag" || p.extension() == ".db3") return true;
+  if (p.extension() == ".db3" || is_ros1_bag(path)) return true;
   return is_mcap(path) && !is_flight_record(path);
 }
 

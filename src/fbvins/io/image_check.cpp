@@ -32,8 +32,7 @@ std::vector<FrameEntry> frames_to_try(const std::vector<FrameEntry>& frames, std
     if (!(frame.*file).empty()) with_image.push_back(&frame);
   std::vector<FrameEntry> out;
   const std::size_t count = std::min(kTried, with_image.size());
-  for (std::size_t i = 0; i < count; ++i)
-    out.push_back(*with_image[count == 1 ? 0 : i * (with_image.size() - 1) / (count - 1)]);
+  for (std::size_t i = 0; i < count; ++i) out.push_back(*with_image[count == 1 ? 0 : i * (with_image.size() - 1) / (count - 1)]);
   return out;
 }
 

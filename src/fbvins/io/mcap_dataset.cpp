@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
@@ -97,6 +98,9 @@ class RecordReader {
     for (auto step : {&RecordReader::check, &RecordReader::read_calibration, &RecordReader::cut})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     warn();
+    const auto by_time = [](const TrajectoryPoint& a, const TrajectoryPoint& b) { return a.t < b.t; };
+    std::stable_sort(out_.ground_truth.begin(), out_.ground_truth.end(), by_time);
+    out_.info.ground_truth_poses = static_cast<int>(out_.ground_truth.size());
     describe(out_);
     if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
     out_.loader = std::make_unique<McapLoader>(std::move(bytes_), name_, out_.rig);
@@ -108,6 +112,7 @@ class RecordReader {
     const std::string& topic = message.channel->topic;
     ends_with_image_ = false;
     if (topic == kImuTopic) take_imu(message);
+    if (topic == kTruthTopic) take_truth(message);
     if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
     if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
   }
@@ -126,6 +131,17 @@ class RecordReader {
       return reader_.complain(message.offset, "a value of the IMU is not a usable number");
     }
     out_.imu.push_back(*sample);
+  }
+
+  void take_truth(const McapMessage& message) {
+    RowCounts& counts = out_.info.ground_truth_rows;
+    ++counts.rows;
+    const std::optional<RosPose> pose = read_pose(message.data);
+    if (!pose || !pose->p.allFinite() || !(std::abs(pose->q.norm() - 1) < 1e-3)) {
+      ++counts.malformed;
+      return reader_.complain(message.offset, "this is not a pose");
+    }
+    out_.ground_truth.push_back({pose->t, {pose->q.normalized(), pose->p}, std::nullopt, std::nullopt});
   }
 
   void take_image(const McapMessage& message, CameraInfo& camera, std::string FrameEntry::*file) {
