@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator's and loop closure's results, image by image.
 #include <fmt/format.h>
+#include <nanobind/stl/tuple.h>
 
 #include <limits>
 
@@ -28,6 +29,47 @@ Eigen::Matrix4d matrix4(const Pose<To, From>& T) {
   out.topLeftCorner<3, 3>() = T.R();
   out.topRightCorner<3, 1>() = T.p;
   return out;
+}
+
+/// All numbers of an Odometry, in a fixed order.
+template <class Take>
+void each_number(Odometry& o, Take take) {
+  const auto all = [&](auto& m) {
+    for (Eigen::Index i = 0; i < m.size(); ++i) take(m.data()[i]);
+  };
+  all(o.T_WB.p), all(o.T_WB.q.coeffs()), all(o.gauge.T_GB.p), all(o.gauge.T_GB.q.coeffs()), all(o.gauge.v_GB);
+  all(o.gauge.q_LG.coeffs()), take(o.gauge.up_sigma_rad), all(o.v_WB), all(o.w_WB_B), all(o.bias.gyro_radps),
+      all(o.bias.accel_mps2);
+  all(o.pose_covariance), all(o.velocity_covariance), all(o.gyro_bias_covariance), all(o.accel_bias_covariance), all(o.up_W);
+  take(o.tilt_sigma_rad);
+  EstimatorStats& s = o.stats;
+  for (double* x : {&s.initial_cost, &s.final_cost, &s.prepare_ms, &s.solve_ms, &s.marginalise_ms}) take(*x);
+}
+using OdometryState = std::tuple<std::vector<std::int64_t>, std::vector<double>>;
+
+OdometryState state_of(Odometry& o) {
+  const EstimatorStats& s = o.stats;
+  OdometryState out{
+      {o.id.value, o.t.ns, o.level, static_cast<int>(o.health.state), static_cast<int>(o.health.reason), o.reset_counter,
+       s.frames_in_window, s.landmarks, s.known_landmarks, s.observations, s.iterations, s.outliers, s.keyframe, s.standstill},
+      {}};
+  each_number(o, [&](double x) { std::get<1>(out).push_back(x); });
+  return out;
+}
+
+void set_state(Odometry& self, const OdometryState& state) {
+  new (&self) Odometry();
+  const auto& [whole, numbers] = state;
+  std::size_t i = 0, k = 0;
+  const auto next = [&] { return whole.at(i++); };
+  self.id = FrameId{next()}, self.t = Time{next()}, self.level = next() != 0;
+  self.health.state = static_cast<HealthState>(next()), self.health.reason = static_cast<HealthReason>(next());
+  self.reset_counter = static_cast<std::uint32_t>(next());
+  EstimatorStats& s = self.stats;
+  for (int* count : {&s.frames_in_window, &s.landmarks, &s.known_landmarks, &s.observations, &s.iterations, &s.outliers})
+    *count = static_cast<int>(next());
+  s.keyframe = next() != 0, s.standstill = next() != 0;
+  each_number(self, [&](double& x) { x = numbers.at(k++); });
 }
 
 }  // namespace
@@ -73,6 +115,8 @@ void bind_odometry(nb::module_& m) {
           "protection_m", [](const Odometry& o) { return protection_level_m(o.health, o.pose_covariance); },
           "radius that the position's error exceeds once in 10^4 poses at most, m; inf without a pose")
       .def_ro("reset_counter", &Odometry::reset_counter, "+1 whenever the estimator restarts: W is a new frame then")
+      .def("__getstate__", &state_of)
+      .def("__setstate__", &set_state)
       .def("__repr__", [](const Odometry& o) {
         return fmt::format("<fbvins.Odometry frame {} t={} ns {} p=({:.3f}, {:.3f}, {:.3f})>", o.id.value, o.t.ns,
                            to_string(o.health.state), o.T_WB.p.x(), o.T_WB.p.y(), o.T_WB.p.z());

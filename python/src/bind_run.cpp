@@ -28,6 +28,7 @@ constexpr int kFramesBetweenChecks = 16;
 PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool final_ba, bool boosted_map,
           const std::string& load_map, const std::string& save_map, const std::string& vocabulary, const std::string& imu_state,
           nb::handle progress) {
+  if (data.begun()) throw nb::value_error("this recording has been iterated already: open it again");
   app::FlightArguments arguments;
   arguments.map = {loop, final_ba, boosted_map, load_map, save_map, vocabulary};
   arguments.imu_state = imu_state;
@@ -196,9 +197,6 @@ void bind_run(nb::module_& m) {
       "save",
       [](const PyRun& r, const std::string& folder) { check(app::write_flight(r.flight, r.summary, r.config, r.truth, folder)); },
       "folder"_a, "Writes the files of `fbvins run --out FOLDER`, the same to the byte.");
-  c.def(
-      "pandas", [](nb::handle self) { return nb::module_::import_("fbvins._pandas").attr("frame_of")(self); },
-      nb::sig("def pandas(self) -> 'pandas.DataFrame'"), "One row per image, indexed by t; needs pandas.");
   c.def("__str__", [](const PyRun& r) { return app::to_text(r.summary); });
   c.def("__repr__", [](const PyRun& r) {
     return fmt::format("<fbvins.Run of {} with {}: {} poses of {} images>", r.summary.dataset, r.summary.frontend,

@@ -19,9 +19,13 @@ Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
 Dataset::~Dataset() = default;
 
 std::optional<SensorEvent> Dataset::next() {
+  begun_ = true;
   while (true) {
     if (imu_is_due()) return contents_.imu[next_imu_++];
-    if (next_frame_ == contents_.frames.size()) return std::nullopt;
+    if (next_frame_ == contents_.frames.size()) {
+      at_end_ = true;
+      return std::nullopt;
+    }
     if (auto frame = next_frame()) return *std::move(frame);
   }
 }
