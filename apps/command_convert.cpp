@@ -16,7 +16,8 @@ namespace {
 constexpr const char* kExamples =
     R"(The name decides the format: FILE.bag is a ROS 1 bag; FILE.mcap a flight record, which ROS 2 programs can read;
 any other name is an EuRoC folder. Images become 8-bit grey. Calibration with noise, range and time offset, and
-ground truth are kept (of truth in a bag or record: the poses).
+ground truth are kept (of truth in a bag or record: the poses), and the outputs of a flight record: all of them in a
+record, the poses in a bag (/odometry) or folder (odometry_tum.txt).
 
 examples:
   fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
@@ -30,13 +31,20 @@ struct Arguments {
   bool quiet = false;
 };
 
+/// Its outputs were made with its own calibration.
+ConvertedRecord record_of(const RecordingArguments& recording, const Dataset& data) {
+  if (data.info().format != "MCAP flight record" || !recording.calibration.empty()) return {};
+  return {recording.path, recording.start_s == 0 && recording.duration_s == 0};
+}
+
 int convert(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {.require_imu = false});
   if (!data) return fail(data.error().message);
   RecordingWarnings warnings;
   warnings.print((*data)->info());
   Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
-  const auto frames = convert_recording(**data, arguments.out, [&](int done) { progress.update(done); });
+  const auto frames =
+      convert_recording(**data, record_of(arguments.recording, **data), arguments.out, [&](int done) { progress.update(done); });
   if (!frames) return fail(frames.error().message);
   warnings.print_at_end((*data)->info());
   if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", *frames, bold(arguments.out));

@@ -11,7 +11,15 @@
 
 namespace fbvins::app {
 
-/// The number of stereo frames. An error where `out` exists already or the disk is full.
-Result<int> convert_recording(Dataset& data, const std::string& out, const std::function<void(int frames)>& on_frame);
+/// The flight record that a recording is, with its own calibration: what else is in it is kept.
+struct ConvertedRecord {
+  std::string path = "";  ///< empty: it is no record, or another calibration is used
+  bool whole = true;      ///< false: a part of it by time
+};
+
+/// The number of stereo frames. A record written as a record is copied message by message, outputs included; in a bag its poses
+/// are on /odometry, in a folder in odometry_tum.txt. An error where `out` exists already or the disk is full.
+Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, const std::string& out,
+                              const std::function<void(int frames)>& on_frame);
 
 }  // namespace fbvins::app

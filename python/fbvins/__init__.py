@@ -151,7 +151,8 @@ def convert(recording: Union[Recording, PathLike], out: PathLike, *, calibration
             imu_calibration: Optional[PathLike] = None, topics: Tuple[str, ...] = ()) -> int:
     """Writes a recording as ROS 1 bag (FILE.bag), flight record (FILE.mcap) or EuRoC folder (any other name), with calibration and truth. Returns the
     number of stereo frames. The output must not exist."""
-    return _fbvins.convert(_opened(recording, calibration, imu_calibration, topics), os.fspath(out))
+    record = "" if calibration or isinstance(recording, Recording) else os.fspath(recording)
+    return _fbvins.convert(_opened(recording, calibration, imu_calibration, topics), record, os.fspath(out))
 
 
 def report(runs: Union[Run, PathLike, Iterable[Union[Run, PathLike]]], out: PathLike = "report.html", *, truth: Optional[PathLike] = None,

@@ -69,11 +69,12 @@ nb::dict examine_recording(Dataset& data, bool kalibr) {
   return out;
 }
 
-int convert(Dataset& data, const std::string& out) {
+int convert(Dataset& data, const std::string& record, const std::string& out) {
   require_fresh(data);
+  const bool is_record = data.info().format == "MCAP flight record";
   return value_or_raise([&] {
     nb::gil_scoped_release released;
-    return app::convert_recording(data, out, check_signals);
+    return app::convert_recording(data, {is_record ? record : std::string()}, out, check_signals);
   }());
 }
 
@@ -84,7 +85,7 @@ void bind_tools(nb::module_& m) {
       "info", [](const Dataset& data) { return app::describe(data).dump(); }, "recording"_a);
   m.def("survey", &survey, "path"_a, "calibration"_a, "left"_a, "right"_a, "imu"_a);
   m.def("doctor", &examine_recording, "recording"_a, "kalibr"_a);
-  m.def("convert", &convert, "recording"_a, "out"_a);
+  m.def("convert", &convert, "recording"_a, "record"_a, "out"_a);
   m.def(
       "report",
       [](const std::vector<std::string>& folders, const std::string& out, const std::string& truth, const std::string& title) {

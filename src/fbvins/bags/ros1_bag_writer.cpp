@@ -57,7 +57,7 @@ struct Topic {
 };
 
 /// In the order of their numbers.
-enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms, kRig, kTruth };
+enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms, kRig, kTruth, kOdometry };
 
 std::vector<Topic> topics() {
   const std::string imu = definition(kImuFields, {kHeader, kQuaternion, kVector}), image = definition(kImageFields, {kHeader}),
@@ -73,6 +73,8 @@ std::vector<Topic> topics() {
           {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms},
           {std::string(kRigTopic), "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n"},
           {std::string(kBagTruthTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+           definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})},
+          {std::string(kBagOdometryTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
            definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})}};
 }
 
@@ -184,9 +186,9 @@ std::string text_message(std::string_view text) {
   return out;
 }
 
-std::string pose_message(Time t, const Pose<W, B>& T_WB) {
+std::string pose_message(Time t, std::string_view frame, const Pose<W, B>& T_WB) {
   std::string out;
-  add_header(out, t, "world");
+  add_header(out, t, frame);
   add_doubles(out, T_WB.p.data(), 3);
   add_quaternion(out, T_WB.q);
   return out;
@@ -326,7 +328,13 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
   return state_->add(kRight, frame.t, image_message(frame.t, kRightFrame, *frame.right));
 }
 
-Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) { return state_->add(kTruth, t, pose_message(t, T_WB)); }
+Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {
+  return state_->add(kTruth, t, pose_message(t, "world", T_WB));
+}
+
+Result<void> Ros1BagWriter::add_odometry(Time t, const Pose<W, B>& T_WB) {
+  return state_->add(kOdometry, t, pose_message(t, kOdometryFrame, T_WB));
+}
 
 Result<void> Ros1BagWriter::finish() {
   state_->flush();

@@ -16,7 +16,8 @@
 
 namespace fbvins {
 
-inline constexpr std::string_view kRigTopic = "/fbvins/calibration", kBagTruthTopic = "/ground_truth";
+inline constexpr std::string_view kRigTopic = "/fbvins/calibration", kBagTruthTopic = "/ground_truth",
+                                  kBagOdometryTopic = "/odometry";
 /// The image topics that the calibration on kRigTopic is of.
 inline constexpr std::string_view kBagLeftTopic = "/cam0/image_raw", kBagRightTopic = "/cam1/image_raw";
 
@@ -33,6 +34,8 @@ class Ros1BagWriter {
   Result<void> add(const StereoFrame& frame);
   /// On kBagTruthTopic.
   Result<void> add_truth(Time t, const Pose<W, B>& T_WB);
+  /// On kBagOdometryTopic.
+  Result<void> add_odometry(Time t, const Pose<W, B>& T_WB);
   Result<void> finish();
 
  private:

@@ -172,10 +172,13 @@ class RecordReader {
 
   /// Where the file ends after one image of a frame, it is unknown whether there was another: the frame is left out.
   void drop_half_frame() {
-    if (!reader_.damage().ends_early || !ends_with_image_) return;
+    if (!was_cut_off() || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();
     if (last.left_file.empty() || last.right_file.empty()) out_.frames.pop_back();
   }
+
+  /// Its writer was: what is finished has a summary.
+  bool was_cut_off() const { return reader_.damage().ends_early || reader_.damage().no_summary; }
 
   Result<void> check() {
     const char* lack = nullptr;
@@ -241,7 +244,7 @@ class RecordReader {
     }
     if (damage.parts > 0)
       info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
-    if (damage.ends_early)
+    if (was_cut_off())
       info.warnings.push_back(fmt::format("{}: was cut off while it was written; all up to byte {} is read", name_, damage.end));
     if (info.left.unpaired + info.right.unpaired > 0)
       info.warnings.push_back(
@@ -287,6 +290,21 @@ Result<std::string> recorded_configuration(const std::string& path) {
   for (const McapAttachment& attachment : reader->attachments())
     if (attachment.name == kConfigurationAttachment) return attachment.data;
   return Error{ErrorCode::malformed, fmt::format("{}: holds no configuration", path)};
+}
+
+Trajectory<W> recorded_odometry(const std::string& path) {
+  Trajectory<W> out;
+  const auto bytes = is_mcap(path) ? open_bytes(path) : Error{ErrorCode::not_found, path};
+  if (!bytes) return out;
+  Result<McapReader> reader = McapReader::open(*bytes, path);
+  if (!reader) return out;
+  while (const auto message = reader->next()) {
+    if (message->channel->topic != kOdometryTopic) continue;
+    const std::optional<RosPose> pose = read_odometry(message->data);
+    if (pose && pose->p.allFinite() && std::abs(pose->q.norm() - 1) < 1e-3)
+      out.push_back({pose->t, {pose->q.normalized(), pose->p}});
+  }
+  return out;
 }
 
 }  // namespace fbvins
