@@ -2,24 +2,22 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
-#include <functional>
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/convert_recording.hpp"
 #include "apps/open_recording.hpp"
 #include "apps/progress.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/bags/ros1_bag_writer.hpp"
-#include "fbvins/io/euroc_folder.hpp"
-#include "fbvins/io/flight_record.hpp"
 
 namespace fbvins::app {
 namespace {
 
 constexpr const char* kExamples =
     R"(The name decides the format: FILE.bag is a ROS 1 bag; FILE.mcap a flight record, which ROS 2 programs can read;
-any other name is an EuRoC folder. Images become 8-bit grey.
+any other name is an EuRoC folder. Images become 8-bit grey. Calibration with noise, range and time offset, and
+ground truth are kept (of truth in a bag or record: the poses), and the outputs of a flight record: all of them in a
+record, the poses in a bag (/odometry) or folder (odometry_tum.txt).
 
 examples:
   fbvins convert flight.bag flight                           a bag with camera_info and /tf_static, as EuRoC folder
@@ -33,61 +31,23 @@ struct Arguments {
   bool quiet = false;
 };
 
-/// Takes events in order; finish() completes the output.
-struct Sink {
-  std::function<Result<void>(const SensorEvent&)> add;
-  std::function<Result<void>()> finish;
-};
-
-template <class Writer>
-Sink sink_of(std::shared_ptr<Writer> writer) {
-  return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return writer->add(value); }, event); },
-          [writer] { return writer->finish(); }};
-}
-
-/// EuRoC's readings and truth are written at the end.
-struct EurocSink {
-  EurocFolder folder;
-  std::vector<TrajectoryPoint> truth;
-  std::vector<ImuSample> readings;
-
-  Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
-  Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t); }
-  Result<void> finish() { return folder.finish(readings, truth); }
-};
-
-Result<Sink> make_sink(const Arguments& arguments, const Dataset& data) {
-  if (std::filesystem::exists(arguments.out))
-    return Error{ErrorCode::unwritable, fmt::format("{} exists already", arguments.out)};
-  if (arguments.out.ends_with(".bag")) {
-    auto bag = Ros1BagWriter::create(arguments.out, data.rig(), data.frames().front().t);
-    if (!bag) return bag.error();
-    return sink_of(std::make_shared<Ros1BagWriter>(*std::move(bag)));
-  }
-  if (arguments.out.ends_with(".mcap")) {
-    auto record = FlightRecord::create(arguments.out, data.rig());
-    if (!record) return record.error();
-    return sink_of(std::make_shared<FlightRecord>(*std::move(record)));
-  }
-  auto folder = EurocFolder::create(arguments.out, data.rig(), "converted by fbvins");
-  if (!folder) return folder.error();
-  return sink_of(std::make_shared<EurocSink>(EurocSink{*std::move(folder), data.ground_truth(), {}}));
+/// Its outputs were made with its own calibration.
+ConvertedRecord record_of(const RecordingArguments& recording, const Dataset& data) {
+  if (data.info().format != "MCAP flight record" || !recording.calibration.empty()) return {};
+  return {recording.path, recording.start_s == 0 && recording.duration_s == 0};
 }
 
 int convert(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {.require_imu = false});
   if (!data) return fail(data.error().message);
-  for (const std::string& warning : (*data)->info().warnings) warn(warning);
-  Result<Sink> sink = make_sink(arguments, **data);
-  if (!sink) return fail(sink.error().message);
+  RecordingWarnings warnings;
+  warnings.print((*data)->info());
   Progress progress(static_cast<int>((*data)->frames().size()), arguments.quiet);
-  int frames = 0;
-  while (auto event = (*data)->next()) {
-    if (Result<void> taken = sink->add(*event); !taken) return fail(taken.error().message);
-    if (std::holds_alternative<StereoFrame>(*event)) progress.update(++frames);
-  }
-  if (Result<void> done = sink->finish(); !done) return fail(done.error().message);
-  if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", frames, bold(arguments.out));
+  const auto frames =
+      convert_recording(**data, record_of(arguments.recording, **data), arguments.out, [&](int done) { progress.update(done); });
+  if (!frames) return fail(frames.error().message);
+  warnings.print_at_end((*data)->info());
+  if (!arguments.quiet) fmt::print("{} stereo frames in {}\n", *frames, bold(arguments.out));
   return kOk;
 }
 

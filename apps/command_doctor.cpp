@@ -52,10 +52,12 @@ Json to_json(const Diagnosis& diagnosis) {
 int examine_recording(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {});
   if (!data) return fail(data.error().message);
-  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  RecordingWarnings warnings;
+  warnings.print((*data)->info());
   EvidenceGatherer gatherer((*data)->rig());
   while (auto event = (*data)->next())
     if (!gatherer.push(*event)) break;
+  warnings.print_at_end((*data)->info());
   const bool kalibr = !arguments.recording.calibration.empty();
   const Diagnosis diagnosis = examine(gatherer.finish(), kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
   if (arguments.json) {

@@ -2,13 +2,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/io/output_file.hpp"
 #include "fbvins/report/report.hpp"
 
 namespace fbvins::app {
@@ -28,30 +26,10 @@ struct Arguments {
   bool quiet = false;
 };
 
-std::string title_of(const std::vector<RunFolder>& runs) {
-  std::vector<std::string> datasets;
-  for (const RunFolder& run : runs)
-    if (std::find(datasets.begin(), datasets.end(), run.dataset) == datasets.end()) datasets.push_back(run.dataset);
-  if (datasets.size() > 3) return fmt::format("{} recordings", datasets.size());
-  std::string title;
-  for (const std::string& dataset : datasets) title += (title.empty() ? "" : ", ") + dataset;
-  return title;
-}
-
-int write_report(const Arguments& arguments) {
-  std::vector<RunFolder> runs;
-  for (const std::string& path : arguments.runs) {
-    Result<RunFolder> run = read_run_folder(path, arguments.truth);
-    if (!run) return fail(run.error().message);
-    if (run->truth.empty()) warn(path + ": no ground truth, so no errors (--truth gives one)");
-    runs.push_back(*std::move(run));
-  }
-  ReportOptions options;
-  options.title = arguments.title.empty() ? title_of(runs) : arguments.title;
-  Result<OutputFile> file = OutputFile::create(arguments.out);
-  if (!file) return fail(file.error().message);
-  file->write(report_html(runs, nullptr, options));
-  if (Result<void> done = file->close(); !done) return fail(done.error().message);
+int write(const Arguments& arguments) {
+  const auto written = write_report(arguments.runs, arguments.out, arguments.truth, arguments.title);
+  if (!written) return fail(written.error().message);
+  for (const std::string& warning : *written) warn(warning);
   if (!arguments.quiet) fmt::print("report: {}\n", bold(std::filesystem::absolute(arguments.out).lexically_normal().string()));
   return kOk;
 }
@@ -67,7 +45,7 @@ void add_report_command(CLI::App& program, int& exit_code) {
   command->add_option("--truth", arguments->truth, "recording or trajectory file with the truth of all these runs");
   command->add_option("--title", arguments->title, "heading of the page (default: the recordings' names)");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
-  command->callback([arguments, &exit_code] { exit_code = write_report(*arguments); });
+  command->callback([arguments, &exit_code] { exit_code = write(*arguments); });
 }
 
 }  // namespace fbvins::app

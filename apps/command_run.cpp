@@ -58,7 +58,8 @@ int run(const Arguments& arguments) {
   if (!config) return fail(config.error().message);
   const auto data = open_recording(arguments.recording, {.max_frames = arguments.max_images});
   if (!data) return fail(data.error().message);
-  for (const std::string& warning : (*data)->info().warnings) warn(warning);
+  RecordingWarnings warnings;
+  warnings.print((*data)->info());
   const auto folder = make_folder(arguments, *config, **data);
   if (!folder) return fail(folder.error().message);
 
@@ -69,6 +70,7 @@ int run(const Arguments& arguments) {
         {.on_frame = [&](int frames) { progress.update(frames); }, .on_finding = [](const Finding& f) { warn(to_text(f)); }});
   }();
   if (!flight) return fail(flight.error().message);
+  warnings.print_at_end((*data)->info());
 
   const RunSummary summary = summarise(*flight, **data, *config, arguments.flight);
   if (Result<void> written = write_flight(*flight, summary, *config, (*data)->ground_truth(), *folder); !written)

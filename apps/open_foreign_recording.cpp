@@ -1,17 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/open_recording.hpp"
 #include "fbvins/bags/bag_poses.hpp"
+#include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/bags/recording.hpp"
 
 namespace fbvins::app {
 
-Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options) {
+namespace {
+
+RecordingOptions options_of(const RecordingArguments& arguments, const DatasetOptions& options) {
   const auto topic = [&](std::size_t i) { return i < arguments.topics.size() ? arguments.topics[i] : std::string(); };
   DatasetOptions with = options;
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
-  return fbvins::open_recording(arguments.path,
-                                {with, arguments.calibration, arguments.imu_calibration, topic(0), topic(1), topic(2)});
+  return {with, arguments.calibration, arguments.imu_calibration, topic(0), topic(1), topic(2)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options) {
+  return fbvins::open_recording(arguments.path, options_of(arguments, options));
+}
+
+std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments) {
+  if (!is_bag(arguments.path)) return std::nullopt;
+  Result<BagSurvey> survey = survey_bag(arguments.path, options_of(arguments, {}));
+  return survey ? std::optional(*std::move(survey)) : std::nullopt;
 }
 
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {

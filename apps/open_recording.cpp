@@ -6,6 +6,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "fbvins/bags/bag_survey.hpp"
+
 namespace fbvins::app {
 namespace {
 
@@ -30,14 +32,14 @@ bool is_foreign_folder(const fs::path& folder) {
   std::error_code ignored;
   if (fs::exists(folder / "metadata.yaml", ignored) || fs::exists(folder / "dso/camchain.yaml", ignored)) return true;
   for (const auto& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".db3") return true;
+    if (entry.path().extension() == ".db3" || is_foreign_mcap(entry.path().string())) return true;
   return false;
 }
 
 bool is_foreign_recording(const std::string& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return is_foreign_folder(path);
-  return path.ends_with(".bag") || path.ends_with(".db3") || is_foreign_mcap(path);
+  return path.ends_with(".bag") || path.ends_with(".db3") || beginning(path, 7) == "#ROSBAG" || is_foreign_mcap(path);
 }
 
 bool is_foreign_calibration(const std::string& path) {
@@ -63,6 +65,8 @@ bool is_for_bags(int argc, char** argv) {
   }
   return false;
 }
+
+std::optional<BagSurvey> survey_recording(const RecordingArguments&) { return std::nullopt; }
 
 Result<Trajectory<W>> open_poses(const std::string& path, const std::string& topic) {
   if (topic.empty()) return read_pose_file(path);

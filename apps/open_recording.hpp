@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@
 
 namespace CLI {
 class App;
+}
+
+namespace fbvins {
+struct BagSurvey;
 }
 
 namespace fbvins::app {
@@ -27,6 +32,21 @@ struct RecordingArguments {
 };
 
 Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& arguments, const DatasetOptions& options);
+
+/// Prints a recording's warnings, each once: those of opening it, and at the end those that came up while it was read.
+class RecordingWarnings {
+ public:
+  void print(const DatasetInfo& info);
+  /// With the number of images that could not be used.
+  void print_at_end(const DatasetInfo& info);
+
+ private:
+  std::size_t printed_ = 0;
+};
+
+/// What is in a bag that cannot be opened as a recording yet (fbvins/bags/bag_survey.hpp); none where it is no bag, or this program
+/// reads none.
+std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments);
 
 /// A TUM or EuRoC file; warns of rows that are left out.
 Result<Trajectory<W>> read_pose_file(const std::string& path);

@@ -22,6 +22,17 @@ void RecordingArguments::add_to(CLI::App& command) {
   command.add_option("--duration", duration_s, "seconds to use from there, 0 for all")->check(CLI::NonNegativeNumber);
 }
 
+void RecordingWarnings::print(const DatasetInfo& info) {
+  for (; printed_ < info.warnings.size(); ++printed_) warn(info.warnings[printed_]);
+}
+
+void RecordingWarnings::print_at_end(const DatasetInfo& info) {
+  print(info);
+  const int left = info.left.images.corrupt + info.left.images.wrong_size,
+            right = info.right.images.corrupt + info.right.images.wrong_size;
+  if (left + right > 0) warn(fmt::format("{} left and {} right images could not be used", left, right));
+}
+
 Result<Trajectory<W>> read_pose_file(const std::string& path) {
   auto file = read_trajectory(path);
   if (!file) return file.error();

@@ -32,6 +32,10 @@ std::string covariance_header() {
 
 std::string covariance_row(const Odometry& o) {
   std::string row = fmt::format("{}", o.t.ns);
+  if (!o.health.has_pose()) {
+    for (int i = 0; i < 3 * 6; ++i) row += ",nan";
+    return row + "\n";
+  }
   for (const Mat3* m : {&o.velocity_covariance, &o.gyro_bias_covariance, &o.accel_bias_covariance})
     for (int i = 0; i < 3; ++i)
       for (int j = i; j < 3; ++j) row += fmt::format(",{:.9e}", (*m)(i, j));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/test_files.hpp"
+#include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -46,6 +47,17 @@ TEST(RunWriter, ARowForEveryImageAndAPoseWhereThereIsOne) {
   EXPECT_EQ(folder.rows("gauge.csv").size(), 3u);
   for (const char* name : {"trajectory.csv", "covariance.csv", "statistics.csv", "timing.csv"})
     EXPECT_EQ(folder.rows(name).size(), 4u) << name;
+  EXPECT_EQ(folder.rows("trajectory.csv")[0].find("1000000000,nan,nan,nan,nan,"), 0u);
+  EXPECT_EQ(folder.rows("covariance.csv")[0].find("1000000000,nan,nan,nan,nan,"), 0u);
+  for (const char* name : {"trajectory.csv", "covariance.csv"}) {
+    EXPECT_EQ(test::columns(folder.rows(name)[0]), test::columns(folder.rows(name)[1])) << name;
+    EXPECT_EQ(folder.rows(name)[1].find("nan"), std::string::npos) << name;
+  }
+  const auto read = read_trajectory(folder.path() + "/trajectory.csv");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->without_pose, 1);
+  EXPECT_EQ(read->counts.bad(), 0);
+  EXPECT_EQ(read->points.size(), 3u);
   EXPECT_EQ(folder.rows("trajectory_tum.txt")[0].substr(0, 24), "1.050000000 0.100000000 ");
 }
 

@@ -73,11 +73,16 @@ class Flight:
                     continue
                 pixels = decode(file)
                 height, width = pixels.shape
+                grey = np.full_like(pixels, 128)
                 data, channels = {"mono8": (pixels, 1), "rgb8": (np.repeat(pixels[..., None], 3, 2), 3),
-                                  "mono16": (pixels.astype("<u2") * 256 + 17, 2)}[encoding]
-                padding = np.zeros((height, 8 if encoding == "mono8" else 0), np.uint8)
-                data = np.hstack([np.ascontiguousarray(data).view(np.uint8).reshape(height, -1), padding])
-                message = self.types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                                  "mono16": (pixels.astype("<u2") * 256 + 17, 2), "mono12": (pixels.astype("<u2") * 16 + 7, 2),
+                                  "rgb16": (np.repeat(pixels.astype("<u2")[..., None] * 256 + 9, 3, 2), 6),
+                                  "uyvy": (np.stack([grey, pixels], 2), 2), "nv12": (np.vstack([pixels, grey[:height // 2]]), 1),
+                                  "tiff": (pixels, 1)}[encoding]
+                padding = np.zeros((len(data), 8 if encoding == "mono8" else 0), np.uint8)
+                data = np.hstack([np.ascontiguousarray(data).view(np.uint8).reshape(len(data), -1), padding])
+                message = self.types["sensor_msgs/msg/Image"](header=header, height=height, width=width,
+                                                              encoding="mono16" if encoding == "mono12" else encoding, is_bigendian=0,
                                                               step=data.shape[1], data=data.reshape(-1))
                 assert data.shape[1] == width * channels + padding.shape[1]
                 yield int(stamp), topic, message.__msgtype__, self.pack(message)
@@ -224,6 +229,37 @@ def kalibr_files(folder, path):
     (path / "imu_config.yaml").write_text("".join(f"{new}: {re.search(rf'{old}: *([-+.e0-9]+)', imu)[1]}\n" for old, new in names.items()))
 
 
+def check_what_cannot_be_run(program, folder, root):
+    """Each command says why in one sentence and exits with 2. `info` shows a bag all the same where it lacks a calibration or a decision."""
+    def refused(arguments, *words):
+        done = subprocess.run([program, *map(str, arguments)], check=False, capture_output=True, text=True)
+        assert done.returncode == 2 and all(word in done.stderr for word in words), f"{arguments}: {done.returncode} {done.stderr}"
+    flight = Flight(folder, get_typestore(Stores.ROS1_NOETIC), True)
+    write_ros1(root / "tiff.bag", flight, encoding="tiff")
+    sentence = "images encoded as 'tiff' cannot be read (none of 8 left images tried can be used)"
+    for command in (["info"], ["doctor"], ["run", "--out", root / "none"], ["convert", root / "none"]):
+        refused([*command[:1], root / "tiff.bag", *command[1:], "--calibration", folder], sentence)
+    assert not (root / "none").exists(), "a folder of results of nothing"
+    refused(["run", root / "lz4.bag"], "give one with --calibration")
+
+    done = subprocess.run([program, "info", root / "lz4.bag"], check=False, capture_output=True, text=True)
+    assert done.returncode == 0 and "--calibration" in done.stderr, done
+    assert "topics to use: left /cam0/image_raw, right /cam1/image_raw, IMU /imu0" in done.stdout, done.stdout
+    assert re.search(r"/cam0/image_raw +40 messages +20.00 Hz  sensor_msgs/Image  \d+ x \d+ mono8", done.stdout), done.stdout
+    with rosbag1.Writer(root / "two_rigs.bag") as writer:
+        connections = {}
+        for stamp, topic, kind, data in flight.messages():
+            for name in [topic] if topic == "/imu0" else ["/front" + topic, "/rear" + topic]:
+                if name not in connections:
+                    connections[name] = writer.add_connection(name, kind, typestore=flight.store)
+                writer.write(connections[name], stamp, data)
+    question = "has 2 stereo pairs (/front/cam0/image_raw and /front/cam1/image_raw, /rear/cam0/image_raw and /rear/cam1/image_raw): say which with --topics LEFT,RIGHT"
+    refused(["run", root / "two_rigs.bag", "--calibration", folder], question)
+    shown = subprocess.run([program, "info", root / "two_rigs.bag", "--calibration", folder, "--json"], check=False, capture_output=True, text=True)
+    assert shown.returncode == 0 and json.loads(shown.stdout)["question"] == question and len(json.loads(shown.stdout)["topics"]) == 5, shown
+    print("what cannot be run is said, and shown")
+
+
 def check_tum_vi(program, folder, root):
     """No sensor.yaml, but Kalibr's files in dso/."""
     path = root / "tum_vi"
@@ -255,10 +291,31 @@ def check_converted(program, folder, root, expected):
             if connection.msgtype not in store.types:
                 store.register(get_types_from_msg(connection.msgdef.data, connection.msgtype))
             message = store.deserialize_ros1(data, connection.msgtype)
+            if connection.msgtype == "std_msgs/msg/String":
+                assert "gyroscope_noise_density" in message.data
+                continue
             header = message.transforms[0].header if connection.topic == "/tf_static" else message.header
             assert header.stamp.sec * 10**9 + header.stamp.nanosec == stamp
             assert connection.msgtype != "sensor_msgs/msg/Image" or len(message.data) == message.height * message.step
+            assert store.generate_msgdef(connection.msgtype, ros_version=1)[1] == connection.digest, connection.msgtype
     print("converted from bag to MCAP to bag to folder: the same bytes, and rosbags reads the bag")
+
+    def kept(recording):
+        about = json.loads(subprocess.run([program, "info", recording, "--json"], check=True, capture_output=True, text=True).stdout)
+        return {**{name: round(value, 12) for name, value in about["imu"].items() if "noise" in name or "walk" in name},
+                **{name: round(about[name], 9) for name in ("time_offset_s", "baseline_m", "ground_truth_poses")}}
+    shifted = root / "shifted"  # with noise and a time offset of its own, and truth
+    shutil.copytree(folder, shifted)
+    camera, imu = shifted / "mav0" / "cam0" / "sensor.yaml", shifted / "mav0" / "imu0" / "sensor.yaml"
+    camera.write_text(camera.read_text() + "timeshift_cam_imu: 0.004\n")
+    imu.write_text(re.sub(r"(_(density|random_walk): ).*", r"\g<1>0.0123", imu.read_text()))
+    expected, before = kept(shifted), shifted
+    assert expected["time_offset_s"] == 0.004 and expected["ground_truth_poses"] > IMAGES and 0.0123 in expected.values(), expected
+    for name in ("kept.bag", "kept.mcap", "kept"):
+        subprocess.run([program, "convert", before, root / name, "--quiet"], check=True)
+        assert kept(root / name) == expected, f"{name}: {kept(root / name)} is not {expected}"
+        before = root / name
+    print("converted: noise, time offset and truth are kept by bag, record and folder")
 
 
 def check_parts(program, recordings, folder):
@@ -345,13 +402,19 @@ def write_all(root, folder):
     write_ros1(root / "bz2.bag", one, pack.BZ2)
     write_ros1(root / "lz4.bag", one, pack.LZ4)
     write_ros1(root / "rgb.bag", one, encoding="rgb8")
-    write_ros1(root / "mono16.bag", one, encoding="mono16")
+    for encoding in ("mono16", "mono12", "rgb16", "uyvy", "nv12"):
+        write_ros1(root / f"{encoding}.bag", one, encoding=encoding)
     write_ros1(root / "compressed_images.bag", one, encoding="compressed")
     write_ros1(root / "out_of_order.bag", one, pack.LZ4, late=3_000_000)
     write_librealsense(root / "librealsense.bag", one)
     write_ros2(root / "sqlite", two, plugin.SQLITE3)
     write_ros2(root / "sqlite_packed", two, plugin.SQLITE3, packed=True)
     write_ros2(root / "ros2_mcap", two, plugin.MCAP)
+    write_ros2(root / "ros2_mcap_packed", two, plugin.MCAP, packed=True)
+    for name in ("sqlite_packed", "ros2_mcap", "ros2_mcap_packed"):  # as a recorder that was killed leaves them
+        shutil.copytree(root / name, root / f"{name}_killed")
+        (root / f"{name}_killed" / "metadata.yaml").unlink()
+    shutil.copy(root / "plain.bag", root / "plain.bag.active")
     write_split(root / "ros2_split", two)
     write_mcap(root / "zstd.mcap", two, compression=CompressionType.ZSTD)
     write_mcap(root / "lz4.mcap", two, compression=CompressionType.LZ4)
@@ -389,6 +452,7 @@ def main():
             same = trajectory(program, recording, root / "out", "--calibration", folder) == expected
             assert same, f"{recording.name}: another trajectory than from the EuRoC folder"
             print(f"{recording.name}: the same bytes")
+        check_what_cannot_be_run(program, folder, root)
         check_parts(program, recordings, folder)
         check_eval(program, folder, root)
         check_live(program, folder, root)

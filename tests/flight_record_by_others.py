@@ -6,15 +6,20 @@ without it, in a whole record and in one that is cut off, and every number is th
 usage: flight_record_by_others.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
 exit 77 (skipped) where they are not installed
 """
+import contextlib
 import csv
 import io
 import math
 import os
 import pathlib
+import re
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import textwrap
+import time
 import warnings
 
 try:
@@ -31,7 +36,10 @@ TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image",
          "/camera/left/camera_info": "sensor_msgs/msg/CameraInfo", "/camera/right/camera_info": "sensor_msgs/msg/CameraInfo",
          "/odometry": "nav_msgs/msg/Odometry", "/odometry/live": "nav_msgs/msg/Odometry", "/tf": "tf2_msgs/msg/TFMessage",
          "/tf_static": "tf2_msgs/msg/TFMessage", "/health": "diagnostic_msgs/msg/DiagnosticArray",
-         "/landmarks": "sensor_msgs/msg/PointCloud2", "/marks": "rcl_interfaces/msg/Log"}
+         "/landmarks": "sensor_msgs/msg/PointCloud2", "/marks": "rcl_interfaces/msg/Log", "/ground_truth": "geometry_msgs/msg/PoseStamped"}
+
+
+DOCUMENT = pathlib.Path(__file__).resolve().parents[1] / "docs" / "flight_record.md"
 
 
 class Failure(Exception):
@@ -166,6 +174,53 @@ def check_broken_off(record):
         last = count
 
 
+def all_of(record):
+    return [(c.topic, m.log_time, bytes(m.data)) for _, c, m in NonSeekingReader(io.BytesIO(record)).iter_messages(log_time_order=False)]
+
+
+def check_killed(program, flight, root):
+    """The record of a program that was killed: read by default, by the snippet of the document, too; `record recover` makes it whole."""
+    killed, whole = root / "killed.mcap", root / "recovered.mcap"
+    with subprocess.Popen([program, "live", "--source", f"replay:{flight}", "--record", killed, "--quiet"]) as process:
+        while process.poll() is None and (not killed.exists() or killed.stat().st_size < 6_000_000):
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    require(process.returncode == -signal.SIGKILL, "the flight ended before it was killed")
+    messages_before = all_of(killed.read_bytes())
+    with open(killed, "rb") as file:
+        require(sum(1 for _ in make_reader(file).iter_messages()) == len(messages_before), "make_reader gives other messages than the stream")
+    snippet = re.search(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)[1].replace('"flight.mcap"', repr(str(killed)))
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(textwrap.dedent(snippet), {})  # noqa: S102
+    require(len(said.getvalue().splitlines()) == sum(topic == "/odometry" for topic, _, _ in messages_before) > 0, "the snippet prints other poses")
+    done = subprocess.run([program, "record", "recover", killed, "-o", whole], capture_output=True, text=True, check=False)
+    require(done.returncode == 0 and f"{len(messages_before)} messages" in done.stdout, f"{done}")
+    check_summary(whole.read_bytes())
+    require(all_of(whole.read_bytes()) == messages_before, "recovered messages differ")
+    (root / "cut.mcap").write_bytes(killed.read_bytes()[:-1_000_123])  # also a file cut in the middle of a message
+    require(subprocess.run([program, "record", "recover", root / "cut.mcap", "-o", root / "cut_whole.mcap"], capture_output=True, check=False).returncode == 0, "cut")
+    check_summary((root / "cut_whole.mcap").read_bytes())
+    again = subprocess.run([program, "record", "recover", killed, "-o", whole], capture_output=True, text=True, check=False)
+    require(again.returncode == 2 and "exists already" in again.stderr, f"{again}")
+
+
+def check_converted(program, path, root):
+    """Outputs stay with a record that is converted."""
+    for out in ("copy.mcap", "copy.bag", "copy"):
+        subprocess.run([program, "convert", path, root / out, "--quiet"], check=True)
+    require(all_of((root / "copy.mcap").read_bytes()) == all_of(path.read_bytes()), "a copy of a record has other messages")
+    poses = sum(topic == "/odometry" for topic, _, _ in all_of(path.read_bytes()))
+    lines = [line for line in (root / "copy" / "odometry_tum.txt").read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    require(len(lines) == poses, f"{len(lines)} poses in the folder where the record has {poses}")
+    done = subprocess.run([program, "eval", root / "copy.bag", root / "copy" / "odometry_tum.txt", "--topic", "/odometry", "--align", "none"],
+                          capture_output=True, text=True, check=False)
+    require(done.returncode == 0 and f"{poses}" in done.stdout, f"{done}")
+    subprocess.run([program, "convert", path, root / "part.mcap", "--quiet", "--start", "1", "--duration", "1"], check=True)
+    part = all_of((root / "part.mcap").read_bytes())
+    require(0 < sum(topic == "/odometry" for topic, _, _ in part) < poses and "/camera/left" in {topic for topic, _, _ in part}, "a part of a record")
+
+
 def main():
     program = sys.argv[1]
     warnings.filterwarnings("ignore", category=DeprecationWarning)  # start_time has this name in all versions of mcap
@@ -185,6 +240,8 @@ def main():
             check_health(record)
             check_landmarks(record)
             check_broken_off(record)
+            check_converted(program, path, root)
+            check_killed(program, flight, root)
         except Failure as failure:
             print(failure)
             return 1

@@ -13,6 +13,8 @@ import subprocess
 import sys
 import tempfile
 
+import browser
+
 PROGRAM = sys.argv[1]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -46,6 +48,24 @@ def check(dom, runs, theme):
             assert f">{error[name]:.4f}<" in table, (run.name, name, error[name], table)
 
 
+def check_layout(page, runs):
+    """At every width all columns of tables are seen and all axes are named; legends name only what is there."""
+    states = {state for run in runs for state in json.loads((run / "summary.json").read_text(encoding="utf-8"))["result"]["health"]}
+    with browser.Browser() as chromium:
+        for width in (1400, 1000, 700, 480):
+            shown = chromium.open(f"file://{page}#light", width=width, height=1000)
+            shown.wait_for("document.documentElement.dataset.ready")
+            cut = shown.value("JSON.stringify([...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth + 1).map(s => s.innerText.slice(0, 60)))")
+            assert json.loads(cut) == [], f"columns are cut off at {width} px: {cut}"
+            bare = shown.value("JSON.stringify([...document.querySelectorAll('svg')].map(s => s.dataset.axes || '').filter(a => !/^[^|]+ \\| .+$/.test(a)))")
+            assert json.loads(bare) == [], f"axes without names: {bare}"
+        unnamed = shown.value("[...document.querySelectorAll('svg.plot')].filter(s => !s.querySelector('.axis-name')?.textContent).length")
+        assert unnamed == 0, unnamed
+        legend = set(json.loads(shown.value("JSON.stringify([...document.querySelectorAll('.legend i.block')].map(i => i.parentElement.textContent))")))
+        names = {"good": "good", "degraded": "degraded", "lost": "lost", "initialising": "not started"}
+        assert legend == {names[state.split("/")[0]] for state in states}, (legend, states)
+
+
 def main():
     if not BROWSER:
         print("skipped: no Chromium here to open the report with")
@@ -59,6 +79,7 @@ def main():
         fbvins("report", *runs, "--out", folder / "report.html")
         for theme in ("light", "dark"):
             check(opened(folder / "report.html", theme, folder / "profile"), runs, theme)
+        check_layout(folder / "report.html", runs)
     print("the report opens, draws every plot and shows the right figures, light and dark")
     return 0
 

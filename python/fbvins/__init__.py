@@ -12,25 +12,29 @@ is int64 nanoseconds of the sensors' clock. Covariances of poses are of (dp in W
 from __future__ import annotations
 
 import functools
+import json
 import os
-from typing import TYPE_CHECKING, Callable, Iterable, Mapping, Optional, Tuple, Union
+import tempfile
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Mapping, Optional, Tuple, Union
+
+import numpy
 
 from . import _fbvins
 from ._fbvins import (Camera, Config, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
-                      Recording, Rig, Run, StereoFrame, Trajectory, __version__, orb, simulation_presets)
+                      Recording, Rig, StereoFrame, Trajectory, __version__, orb, simulation_presets)
 from ._fbvins import Booster
 from . import calibration
+from ._run import Run
+from ._tools import Diagnosis, Finding
 
 if TYPE_CHECKING:
-    import numpy
-
     PathLike = Union[str, "os.PathLike[str]"]
     AnyConfig = Union[Config, Mapping, PathLike, None]
     AnyTrajectory = Union[Trajectory, Run, PathLike, Tuple["numpy.ndarray", "numpy.ndarray", "numpy.ndarray"]]
 
-__all__ = ["Booster", "Camera", "Config", "ErrorStatistics", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
+__all__ = ["Booster", "Camera", "Config", "Diagnosis", "ErrorStatistics", "Finding", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
            "MapUpdate", "Odometry", "Recording", "Rig", "Run", "StereoFrame", "System", "Trajectory", "__version__", "boost",
-           "calibration", "config", "evaluate", "load_map", "open", "orb", "run", "simulate", "simulation_presets"]
+           "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "report", "run", "simulate", "simulation_presets"]
 
 
 def _assignments(options: Mapping, prefix: str = "") -> Iterable[str]:
@@ -106,8 +110,70 @@ def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, l
         effective = _configured(options={**config, **changed})
     else:
         effective = _configured(config, changed)
-    return _fbvins.run(recording, effective, threaded, loop, final_ba, boosted_map, _path(load_map), _path(save_map), _path(vocabulary),
-                       _path(imu_state), progress)
+    return Run(_fbvins.run(recording, effective, threaded, loop, final_ba, boosted_map, _path(load_map), _path(save_map), _path(vocabulary),
+                           _path(imu_state), progress))
+
+
+def _opened(recording: Union[Recording, PathLike], calibration: Optional[PathLike], imu_calibration: Optional[PathLike],
+            topics: Tuple[str, ...]) -> Recording:
+    if not isinstance(recording, Recording):
+        return open(recording, calibration=calibration, imu_calibration=imu_calibration, topics=topics)
+    if calibration or imu_calibration or topics:
+        raise ValueError("calibration and topics belong to open() where a Recording is given")
+    return recording
+
+
+def info(recording: Union[Recording, PathLike], *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
+         topics: Tuple[str, ...] = ()) -> Dict[str, Any]:
+    """What is in a recording, as `fbvins info --json` says it: rates, gaps, calibration, stamps, warnings. Of a bag that lacks a calibration, or
+    whose topics must be chosen: its topics with rates, and what is missing ("question", "no_calibration")."""
+    try:
+        return json.loads(_fbvins.info(_opened(recording, calibration, imu_calibration, topics)))
+    except (ValueError, OSError):
+        if isinstance(recording, Recording):
+            raise
+        left, right, imu = (tuple(topics) + ("", "", ""))[:3]
+        survey = _fbvins.survey(os.fspath(recording), _path(calibration), left, right, imu) if not topics else ""
+        if not survey:
+            raise
+    return json.loads(survey)
+
+
+def doctor(recording: Union[Recording, PathLike], *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
+           topics: Tuple[str, ...] = ()) -> Diagnosis:
+    """What is wrong with a setup, from its recording (a path, or a Recording that has not been iterated): units, axes, clocks, calibration, images, as
+    `fbvins doctor` finds it."""
+    found = _fbvins.doctor(_opened(recording, calibration, imu_calibration, topics), calibration is not None)
+    return Diagnosis([Finding(**finding) for finding in found["findings"]], found["measured"], found["not_judged"], found["rig"])
+
+
+def convert(recording: Union[Recording, PathLike], out: PathLike, *, calibration: Optional[PathLike] = None,
+            imu_calibration: Optional[PathLike] = None, topics: Tuple[str, ...] = ()) -> int:
+    """Writes a recording as ROS 1 bag (FILE.bag), flight record (FILE.mcap) or EuRoC folder (any other name), with calibration and truth. Returns the
+    number of stereo frames. The output must not exist."""
+    record = "" if calibration or isinstance(recording, Recording) else os.fspath(recording)
+    return _fbvins.convert(_opened(recording, calibration, imu_calibration, topics), record, os.fspath(out))
+
+
+def report(runs: Union[Run, PathLike, Iterable[Union[Run, PathLike]]], out: PathLike = "report.html", *, truth: Optional[PathLike] = None,
+           title: Optional[str] = None) -> str:
+    """Writes runs (Run, or folders that `fbvins run` or Run.save() wrote) as one HTML page. truth: a recording or trajectory file with the truth of
+    all of them, where they have none. Returns the page's path."""
+    if isinstance(runs, (Run, str, os.PathLike)):
+        runs = [runs]
+    with tempfile.TemporaryDirectory() as scratch:
+        folders = []
+        for number, run in enumerate(runs):
+            if isinstance(run, Run):
+                about = json.loads(run.summary)["result"]
+                folder = os.path.join(scratch, str(number), f"{about['dataset']}-{about['frontend']}".replace(os.sep, "_"))
+                os.makedirs(folder)
+                run.save(folder)
+                folders.append(folder)
+            else:
+                folders.append(os.fspath(run))
+        _fbvins.report(folders, os.fspath(out), _path(truth), title or "")
+    return os.fspath(out)
 
 
 class Map(_fbvins.Map):
@@ -134,26 +200,56 @@ class System(_fbvins.System):
         super().__init__(_as_config(config), rig, threaded, map, on_odometry, on_map_update, _path(imu_state))
 
 
-def _as_trajectory(value: AnyTrajectory) -> Trajectory:
+def _of_file(path: str) -> Trajectory:
+    """A trajectory file; the estimate of a folder of `fbvins run`; the truth of a recording."""
+    if os.path.isfile(os.path.join(path, "trajectory_tum.txt")):
+        return Trajectory.read(os.path.join(path, "trajectory_tum.txt"))
+    if not (os.path.isdir(path) or path.endswith((".zip", ".mcap", ".bag"))):
+        return Trajectory.read(path)
+    truth = open(path).ground_truth
+    if not len(truth):
+        raise ValueError(f"{path}: the recording holds no ground truth")
+    return truth
+
+
+def _as_trajectory(value: AnyTrajectory, stamps: Optional[numpy.ndarray] = None) -> Trajectory:
     if isinstance(value, Trajectory):
         return value
     if isinstance(value, Run):
         return value.trajectory
     if isinstance(value, (str, os.PathLike)):
-        return Trajectory.read(os.fspath(value))
+        return _of_file(os.fspath(value))
     if isinstance(value, tuple) and len(value) == 3:
         return Trajectory(*value)
-    raise ValueError(f"a Trajectory, a Run, a file or arrays (t, p, q) are expected, not {type(value).__name__}")
+    if hasattr(value, "positions_xyz") and hasattr(value, "orientations_quat_wxyz"):  # evo's PosePath3D and PoseTrajectory3D
+        return Trajectory(_stamps_of(value, stamps), numpy.asarray(value.positions_xyz, float), numpy.asarray(value.orientations_quat_wxyz, float))
+    raise ValueError(f"a Trajectory, a Run, a file, a folder, arrays (t, p, q) or evo's path are expected, not {type(value).__name__}")
+
+
+def _stamps_of(path: Any, others: Optional[numpy.ndarray]) -> numpy.ndarray:
+    """ns. A path without stamps has those of the other one, pose by pose."""
+    if hasattr(path, "timestamps"):
+        return numpy.round(numpy.asarray(path.timestamps, float) * 1e9).astype(numpy.int64)
+    if others is None or len(others) != len(path.positions_xyz):
+        raise ValueError("a path without timestamps can be compared only with a trajectory of as many poses")
+    return others
 
 
 def evaluate(truth: AnyTrajectory, estimate: AnyTrajectory, align: str = "se3", *, max_difference_s: float = 0.01,
              interpolate: bool = False) -> Evaluation:
     """Absolute and relative errors of an estimate, as `fbvins eval` has them; they agree with evo.
 
-    Both: a Trajectory, a Run, a TUM or EuRoC file, or arrays (t, p, q): int64 (N,) ns, float64 (N, 3) m, float64 (N, 4) w first.
+    Both: a Trajectory, a Run, a TUM or EuRoC file, a recording (its truth), a folder of `fbvins run`, evo's PoseTrajectory3D or PosePath3D, or arrays
+    (t, p, q): int64 (N,) ns, float64 (N, 3) m, float64 (N, 4) w first.
     align: "se3", "yaw", "sim3" or "none". interpolate: the truth interpolated at the estimate's stamps instead of its nearest pose.
     """
-    return _fbvins.evaluate(_as_trajectory(truth), _as_trajectory(estimate), align, max_difference_s, interpolate)
+    without_stamps = [hasattr(x, "positions_xyz") and not hasattr(x, "timestamps") for x in (truth, estimate)]
+    if without_stamps[0]:
+        compared = None if without_stamps[1] else _as_trajectory(estimate)
+        return evaluate(_as_trajectory(truth, None if compared is None else compared.t), compared, align, max_difference_s=max_difference_s,
+                        interpolate=interpolate)
+    true = _as_trajectory(truth)
+    return _fbvins.evaluate(true, _as_trajectory(estimate, true.t), align, max_difference_s, interpolate)
 
 
 @functools.lru_cache(maxsize=8)

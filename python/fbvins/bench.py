@@ -10,12 +10,17 @@ another one; a cell is done once, however many workers try it. The tables are th
 from __future__ import annotations
 
 import argparse
+import asyncio
 import os
 import shlex
 import shutil
 import subprocess
 import sys
 from typing import NamedTuple, Sequence
+
+
+#: Time for a scheduler to answer.
+CONNECT_S = 10
 
 
 class CellEnd(NamedTuple):
@@ -81,12 +86,15 @@ exec {words} --cell "$cell"
 
 
 def dask_client(address: str):
-    """A distributed.Client; exits with an error message where the package is missing."""
+    """A distributed.Client. ValueError with one sentence where the package is missing or no scheduler answers."""
     try:
         from distributed import Client
     except ImportError:
-        sys.exit("--dask needs the package 'distributed': pip install distributed")
-    return Client(address)
+        raise ValueError("--dask needs the package 'distributed': pip install distributed") from None
+    try:
+        return Client(address, timeout=CONNECT_S)
+    except (OSError, TimeoutError, asyncio.TimeoutError) as error:
+        raise ValueError(f"--dask {address}: no scheduler answers there within {CONNECT_S} s ({type(error).__name__})") from None
 
 
 def parse(arguments: Sequence[str] | None):

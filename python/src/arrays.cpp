@@ -5,6 +5,8 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <string_view>
+#include <type_traits>
 
 namespace fbvins::python {
 namespace {
@@ -44,7 +46,34 @@ bool has_holes(const Array& array) {
   return false;
 }
 
+/// Whether NumPy converts it without losing a digit; stamps may be unsigned, images must not be of another kind of number.
+template <class T>
+bool keeps_values(nb::handle object) {
+  if (!nb::hasattr(object, "dtype")) return false;
+  const nb::object kind = object.attr("dtype").attr("kind");
+  if (std::string_view(nb::str(kind).c_str()) == "b") return false;
+  constexpr const char* kRule = std::is_same_v<T, std::int64_t> || std::is_same_v<T, double> ? "same_kind" : "safe";
+  const nb::object numpy = nb::module_::import_("numpy");
+  return nb::cast<bool>(nb::module_::import_("builtins")
+                            .attr("bool")(numpy.attr("can_cast")(object.attr("dtype"), kName<T>, nb::arg("casting") = kRule)));
+}
+
 }  // namespace
+
+nb::object reduced(const char* function, nb::object argument) {
+  return nb::make_tuple(nb::module_::import_("fbvins._restore").attr(function), nb::make_tuple(std::move(argument)));
+}
+
+std::int64_t whole_number(nb::handle object, const char* name) {
+  const nb::object number = nb::steal(PyNumber_Index(object.ptr()));
+  if (!number.is_valid()) {
+    PyErr_Clear();
+    throw nb::type_error(fmt::format("{}: a whole number is expected, not {}", name, text_of(object)).c_str());
+  }
+  return nb::cast<std::int64_t>(number);
+}
+
+bool has_axes(nb::handle object) { return nb::hasattr(object, "ndim") && nb::cast<int>(object.attr("ndim")) > 0; }
 
 void raise(const Error& error) {
   PyObject* type = PyExc_ValueError;
@@ -76,12 +105,17 @@ CheckedArray<T> checked(nb::handle object, const char* name, std::initializer_li
   };
   nb::ndarray<nb::ro> array;
   if (!nb::ndarray_check(object) || !nb::try_cast(object, array)) refuse(fmt::format("not {}", text_of(object)));
-  bool fits = array.dtype() == nb::dtype<T>() && array.ndim() == shape.size() && array.device_type() == nb::device::cpu::value;
+  bool fits = array.ndim() == shape.size() && array.device_type() == nb::device::cpu::value;
   for (std::size_t axis = 0; fits && axis < shape.size(); ++axis)
     fits = shape.begin()[axis] == kAny || static_cast<std::int64_t>(array.shape(axis)) == shape.begin()[axis];
-  if (!fits) refuse(fmt::format("not {}", text_of(object)));
-  if (has_holes(array)) refuse("this one is not contiguous or in another order; use np.ascontiguousarray()");
-  CheckedArray<T> out{nb::borrow(object), static_cast<const T*>(array.data()), {}};
+  const bool exact = array.dtype() == nb::dtype<T>();
+  if (!fits || (!exact && !keeps_values<T>(object))) refuse(fmt::format("not {}", text_of(object)));
+  nb::object keeper = nb::borrow(object);
+  if (!exact || has_holes(array)) {
+    keeper = nb::module_::import_("numpy").attr("ascontiguousarray")(object, nb::arg("dtype") = kName<T>);
+    array = nb::cast<nb::ndarray<nb::ro>>(keeper);
+  }
+  CheckedArray<T> out{std::move(keeper), static_cast<const T*>(array.data()), {}};
   for (std::size_t axis = 0; axis < array.ndim(); ++axis) out.shape.push_back(array.shape(axis));
   return out;
 }

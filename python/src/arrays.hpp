@@ -90,8 +90,9 @@ Array<double> columns(const Rows& rows, Function of) {
 /// Any size of an axis, in the shape of a checked array.
 inline constexpr std::int64_t kAny = -1;
 
-/// An array of exactly this type and shape, contiguous in C order, read in place. Raises ValueError with what was expected of
-/// `name` and what it is. The object keeps the memory alive.
+/// An array of this type and shape in C order: read in place where it is just that, else a copy, where no value changes by it
+/// (float32 as float64, int32 as int64, a view with steps). Raises ValueError with what was expected of `name` and what it is. The
+/// object keeps the memory alive.
 template <class T>
 struct CheckedArray {
   nb::object keeper;
@@ -105,6 +106,14 @@ CheckedArray<T> checked(nb::handle object, const char* name, std::initializer_li
 
 /// Converts a list or tuple of numbers to an array of double; returns any other object as it is.
 nb::object as_double(nb::handle object);
+
+/// For __reduce__: a function of fbvins/_restore.py and its argument.
+nb::object reduced(const char* function, nb::object argument);
+
+/// A whole number: Python's or NumPy's. Raises TypeError for any other object.
+std::int64_t whole_number(nb::handle object, const char* name);
+/// Whether the object has axes: (N,), not a number.
+bool has_axes(nb::handle object);
 
 Vec3 vector3(nb::handle object, const char* name);
 /// (4, 4): a rotation and a translation.

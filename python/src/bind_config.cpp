@@ -5,6 +5,7 @@
 #include "bindings.hpp"
 #include "fbvins/config/config_file.hpp"
 #include "fbvins/config/option_fields.hpp"
+#include "fbvins/config/yaml.hpp"
 
 namespace fbvins::python {
 namespace {
@@ -51,7 +52,13 @@ void bind_config(nb::module_& m) {
       .def("keys", &names, "Names of all options.")
       .def(
           "to_yaml", [](const Config& config) { return to_yaml(config); }, "Every option with value, meaning, unit and range.")
+      .def("__reduce__", [](const Config& config) { return reduced("config", nb::cast(to_yaml(config))); })
       .def("__repr__", [](const Config& c) { return fmt::format("<fbvins.Config frontend.kind={}>", c.frontend.kind); });
+  m.def("_restore_config", [](const std::string& yaml) {
+    Config config;
+    check(read_yaml(yaml, "the configuration", fields_of(config)));
+    return config;
+  });
 }
 
 }  // namespace fbvins::python

@@ -83,7 +83,7 @@ void bind_recording(nb::module_& m) {
 
   nb::class_<Dataset>(m, "Recording",
                       "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
-                      "It can be iterated once.")
+                      "It can be iterated once: ValueError when it is begun again after its end.")
       .def_prop_ro("rig", &Dataset::rig, "the calibration")
       .def_prop_ro("name", [](const Dataset& d) { return d.info().name; })
       .def_prop_ro("format", [](const Dataset& d) { return d.info().format; })
@@ -97,7 +97,13 @@ void bind_recording(nb::module_& m) {
       .def(
           "__len__", [](const Dataset& d) { return d.frames().size(); }, "stereo frames")
       .def(
-          "__iter__", [](nb::handle self) { return nb::borrow(self); }, nb::sig("def __iter__(self) -> Recording"))
+          "__iter__",
+          [](nb::handle self) {
+            if (nb::cast<const Dataset&>(self).at_end())
+              throw nb::value_error("this recording has been read to its end: open it again");
+            return nb::borrow(self);
+          },
+          nb::sig("def __iter__(self) -> Recording"))
       .def("__next__", &next, nb::sig("def __next__(self) -> ImuSample | StereoFrame"))
       .def("__repr__", [](const Dataset& d) {
         return fmt::format("<fbvins.Recording {} ({}), {} stereo frames>", d.info().name, d.info().format, d.frames().size());

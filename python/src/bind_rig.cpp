@@ -9,6 +9,7 @@
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/rig_text.hpp"
 
 namespace fbvins::python {
 namespace {
@@ -98,10 +99,13 @@ void bind_rig(nb::module_& m) {
       .def_ro("imu_noise", &StereoRig::imu_noise)
       .def_ro("image_rate_hz", &StereoRig::image_rate_hz)
       .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s")
+      .def("__reduce__", [](const StereoRig& rig) { return reduced("rig", nb::cast(rig_to_yaml(rig))); })
       .def("__repr__", [](const StereoRig& rig) {
         return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
                            rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
       });
+
+  m.def("_restore_rig", [](const std::string& yaml) { return value_or_raise(parse_rig(yaml, "the rig")); });
 
   m.def(
       "load_calibration",

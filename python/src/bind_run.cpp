@@ -2,6 +2,8 @@
 // A whole recording in one call, as `fbvins run` does it and by the same function.
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "apps/run_flight.hpp"
 #include "bindings.hpp"
 #include "fbvins/io/dataset.hpp"
@@ -26,6 +28,7 @@ constexpr int kFramesBetweenChecks = 16;
 PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool final_ba, bool boosted_map,
           const std::string& load_map, const std::string& save_map, const std::string& vocabulary, const std::string& imu_state,
           nb::handle progress) {
+  if (data.begun()) throw nb::value_error("this recording has been iterated already: open it again");
   app::FlightArguments arguments;
   arguments.map = {loop, final_ba, boosted_map, load_map, save_map, vocabulary};
   arguments.imu_state = imu_state;
@@ -112,8 +115,13 @@ PyTrajectory truth_of(const PyRun& run) {
 
 void bind_rows(nb::class_<PyRun>& c) {
   const auto rows = [&]<class Function>(const char* name, Function of, const char* doc) {
+    const auto or_nan = [of](const Odometry& o) {
+      auto value = of(o);
+      if (!o.health.has_pose()) value.setConstant(std::numeric_limits<double>::quiet_NaN());
+      return value;
+    };
     c.def_prop_ro(
-        name, [of](const PyRun& r) { return columns(r.odometry(), of); }, doc);
+        name, [or_nan](const PyRun& r) { return columns(r.odometry(), or_nan); }, doc);
   };
   c.def_prop_ro(
       "t", [](const PyRun& r) { return column<std::int64_t>(r.odometry(), [](const Odometry& o) { return o.t.ns; }); },
@@ -124,7 +132,7 @@ void bind_rows(nb::class_<PyRun>& c) {
         return nb::cast(column<std::uint8_t>(r.odometry(), [](const Odometry& o) { return o.health.has_pose(); }))
             .attr("astype")("bool");
       },
-      "bool (N,): where it is False, poses and covariances are meaningless", nb::sig("def has_pose(self) -> numpy.ndarray"));
+      "bool (N,): where it is False, all numbers of the estimate are NaN", nb::sig("def has_pose(self) -> numpy.ndarray"));
   rows(
       "p", [](const Odometry& o) { return o.T_WB.p; }, "float64 (N, 3), p_WB, m in W");
   rows(
@@ -158,7 +166,11 @@ void bind_rows(nb::class_<PyRun>& c) {
       "int64 (N,): W is a new frame where it increases");
   c.def_prop_ro(
       "tilt_sigma_rad",
-      [](const PyRun& r) { return column<double>(r.odometry(), [](const Odometry& o) { return o.tilt_sigma_rad; }); },
+      [](const PyRun& r) {
+        return column<double>(r.odometry(), [](const Odometry& o) {
+          return o.health.has_pose() ? o.tilt_sigma_rad : std::numeric_limits<double>::quiet_NaN();
+        });
+      },
       "float64 (N,): standard deviation of the tilt about its less certain axis");
 }
 
@@ -185,9 +197,6 @@ void bind_run(nb::module_& m) {
       "save",
       [](const PyRun& r, const std::string& folder) { check(app::write_flight(r.flight, r.summary, r.config, r.truth, folder)); },
       "folder"_a, "Writes the files of `fbvins run --out FOLDER`, the same to the byte.");
-  c.def(
-      "pandas", [](nb::handle self) { return nb::module_::import_("fbvins._pandas").attr("frame_of")(self); },
-      nb::sig("def pandas(self) -> 'pandas.DataFrame'"), "One row per image, indexed by t; needs pandas.");
   c.def("__str__", [](const PyRun& r) { return app::to_text(r.summary); });
   c.def("__repr__", [](const PyRun& r) {
     return fmt::format("<fbvins.Run of {} with {}: {} poses of {} images>", r.summary.dataset, r.summary.frontend,

@@ -51,11 +51,19 @@ class PySystem {
   }
 
   void push_imu(nb::handle t, nb::handle gyro, nb::handle accel) {
-    if (!nb::isinstance<nb::int_>(t)) return push_readings(t, gyro, accel);
-    push(ImuSample{Time{nb::cast<std::int64_t>(t)}, vector3(gyro, "gyro"), vector3(accel, "accel")});
+    if (has_axes(t)) return push_readings(t, gyro, accel);
+    const ImuSample sample{Time{whole_number(t, "t")}, vector3(gyro, "gyro"), vector3(accel, "accel")};
+    require_order(sample.t, newest_reading_, "reading");
+    require_finite(sample.gyro_radps, "gyro", sample.t);
+    require_finite(sample.accel_mps2, "accel", sample.t);
+    push(sample);
+    newest_reading_ = sample.t;
   }
-  void push_images(std::int64_t t, nb::handle left, nb::handle right) {
-    push(StereoFrame{Time{t}, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right)});
+  void push_images(nb::handle t, nb::handle left, nb::handle right) {
+    const Time stamp{whole_number(t, "t")};
+    require_order(stamp, newest_image_, "image");
+    push(StereoFrame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right)});
+    newest_image_ = stamp;
   }
   void push(SensorEvent event) {
     done([&] { return system_->push(std::move(event)); });
@@ -87,14 +95,33 @@ class PySystem {
     const auto stamps = checked<std::int64_t>(t, "t", {kAny});
     const auto n = static_cast<std::int64_t>(stamps.rows());
     const auto rates = checked<double>(gyro, "gyro", {n, 3}), forces = checked<double>(accel, "accel", {n, 3});
+    std::vector<ImuSample> samples;  // all are looked at before any is taken
+    std::optional<Time> newest = newest_reading_;
+    for (std::ptrdiff_t i = 0; i < n; ++i) {
+      const double *w = rates.data + 3 * i, *f = forces.data + 3 * i;
+      samples.push_back({Time{stamps.data[i]}, Vec3(w[0], w[1], w[2]), Vec3(f[0], f[1], f[2])});
+      require_order(samples.back().t, newest, "reading");
+      require_finite(samples.back().gyro_radps, "gyro", samples.back().t);
+      require_finite(samples.back().accel_mps2, "accel", samples.back().t);
+      newest = samples.back().t;
+    }
     done([&]() -> Result<void> {
-      for (std::ptrdiff_t i = 0; i < n; ++i) {
-        const double *w = rates.data + 3 * i, *f = forces.data + 3 * i;
-        const ImuSample sample{Time{stamps.data[i]}, Vec3(w[0], w[1], w[2]), Vec3(f[0], f[1], f[2])};
+      for (const ImuSample& sample : samples)
         if (Result<void> taken = system_->push(sample); !taken) return taken;
-      }
       return {};
     });
+    newest_reading_ = newest;
+  }
+
+  /// Arrays come from a program of somebody's: what is wrong there is said. A recording's events are taken as a sensor's.
+  static void require_order(Time t, const std::optional<Time>& newest, const char* what) {
+    if (newest && t <= *newest)
+      throw nb::value_error(
+          fmt::format("t: the stamp {} ns is not after {} ns, that of the {} before", t.ns, newest->ns, what).c_str());
+  }
+  static void require_finite(const Vec3& v, const char* name, Time t) {
+    if (!v.allFinite())
+      throw nb::value_error(fmt::format("{}: [{}, {}, {}] at {} ns is not finite", name, v.x(), v.y(), v.z(), t.ns).c_str());
   }
 
   /// Works without the GIL. Raises the original exception of a callback.
@@ -138,7 +165,8 @@ class PySystem {
   std::mutex mutex_;
   std::deque<Odometry> odometry_;
   std::deque<MapUpdate> updates_;
-  std::exception_ptr failure_;  // written and read with the GIL
+  std::optional<Time> newest_reading_, newest_image_;  ///< of those that came as arrays
+  std::exception_ptr failure_;                         // written and read with the GIL
   std::optional<System> system_;
 };
 
@@ -179,13 +207,14 @@ void bind_system(nb::module_& m) {
           "push_imu", &PySystem::push_imu, "t"_a, "gyro"_a, "accel"_a,
           nb::sig("def push_imu(self, t: int | numpy.ndarray, gyro: numpy.ndarray, accel: numpy.ndarray) -> None"),
           "Readings in order of time. One: t in ns, gyro (3,) in rad/s, accel (3,) in m/s^2 (specific force, +g upwards at rest), "
-          "both in B. Or many at once: int64 (N,), float64 (N, 3), float64 (N, 3).")
+          "both in B. Or many at once: int64 (N,), float64 (N, 3), float64 (N, 3). ValueError for stamps that do not increase and for "
+          "numbers that are not finite.")
       .def(
           "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none(),
           nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None) -> None"),
-          "A stereo frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size in C order, None where a "
-          "camera delivered nothing. They are not copied, and other threads read them later: pass new arrays, do not "
-          "write to them afterwards.")
+          "A stereo frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size, None where a "
+          "camera delivered nothing. Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
+          "write to them afterwards. ValueError for stamps that do not increase.")
       .def(
           "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
       .def(

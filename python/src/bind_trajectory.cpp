@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Trajectories and their evaluation.
 #include <fmt/format.h>
+#include <nanobind/stl/tuple.h>
 
 #include "apps/evaluation_report.hpp"
 #include "bindings.hpp"
@@ -22,11 +23,44 @@ PyTrajectory make_trajectory(nb::handle t, nb::handle p, nb::handle q) {
     const double* at = positions.data + 3 * i;
     const double* w = quaternions.data + 4 * i;
     const Quat rotation(w[0], w[1], w[2], w[3]);
+    const Time stamp{stamps.data[i]};
+    if (!out.poses.empty() && stamp <= out.poses.back().t)
+      throw nb::value_error(
+          fmt::format("t: row {} has {} ns, which is not after {} ns: stamps must increase", i, stamp.ns, out.poses.back().t.ns)
+              .c_str());
+    if (!Vec3(at[0], at[1], at[2]).allFinite())
+      throw nb::value_error(fmt::format("p: row {} is not finite; leave out rows without a pose", i).c_str());
     if (!(std::abs(rotation.norm() - 1) < 1e-3))
       throw nb::value_error(
           fmt::format("q: row {} has norm {:.6g}; unit quaternions are expected, w first", i, rotation.norm()).c_str());
-    out.poses.push_back({Time{stamps.data[i]}, {rotation.normalized(), Vec3(at[0], at[1], at[2])}});
+    out.poses.push_back({stamp, {rotation.normalized(), Vec3(at[0], at[1], at[2])}});
   }
+  return out;
+}
+
+using TrajectoryState = std::vector<std::tuple<std::int64_t, std::array<double, 7>>>;
+
+/// To the last bit, for pickle.
+TrajectoryState state_of(const PyTrajectory& trajectory) {
+  TrajectoryState out;
+  for (const Point& x : trajectory.poses)
+    out.push_back({x.t.ns, {x.T.p.x(), x.T.p.y(), x.T.p.z(), x.T.q.w(), x.T.q.x(), x.T.q.y(), x.T.q.z()}});
+  return out;
+}
+PyTrajectory restored(const TrajectoryState& state) {
+  PyTrajectory out;
+  for (const auto& [t, n] : state) out.poses.push_back({Time{t}, {Quat(n[3], n[4], n[5], n[6]), Vec3(n[0], n[1], n[2])}});
+  return out;
+}
+
+/// Rows by their numbers, which numpy has made of a slice, a mask or a list.
+PyTrajectory rows_of(const PyTrajectory& trajectory, nb::handle which) {
+  const nb::object numpy = nb::module_::import_("numpy");
+  const nb::object all = numpy.attr("arange")(trajectory.poses.size());
+  const nb::object chosen = numpy.attr("atleast_1d")(all[which]);
+  const auto rows = checked<std::int64_t>(chosen, "rows", {kAny});
+  PyTrajectory out;
+  for (std::size_t i = 0; i < rows.rows(); ++i) out.poses.push_back(trajectory.poses[static_cast<std::size_t>(rows.data[i])]);
   return out;
 }
 
@@ -41,6 +75,39 @@ void write(const PyTrajectory& trajectory, const std::string& path) {
 struct PyEvaluation : Evaluation {
   Alignment kind = Alignment::se3;
 };
+
+/// All numbers of an evaluation, in a fixed order.
+template <class Take>
+void each_number(Evaluation& e, Take take) {
+  for (double* x : {&e.truth_path_m, &e.largest_excursion_m, &e.alignment.scale}) take(*x);
+  for (int i = 0; i < 4; ++i) take(e.alignment.q.coeffs()[i]);
+  for (int i = 0; i < 3; ++i) take(e.alignment.p[i]);
+  for (ErrorStatistics* s :
+       {&e.absolute_m, &e.absolute_rotation_deg, &e.per_metre_m, &e.per_metre_deg, &e.per_second_m, &e.per_second_deg})
+    for (double* x : {&s->max, &s->mean, &s->median, &s->rmse, &s->std}) take(*x);
+}
+template <class Take>
+void each_count(Evaluation& e, Take take) {
+  for (int* x : {&e.pairs, &e.absolute_m.count, &e.absolute_rotation_deg.count, &e.per_metre_m.count, &e.per_metre_deg.count,
+                 &e.per_second_m.count, &e.per_second_deg.count})
+    take(*x);
+}
+using EvaluationState = std::tuple<int, std::vector<int>, std::vector<double>>;
+
+EvaluationState state_of_evaluation(PyEvaluation& e) {
+  EvaluationState out{static_cast<int>(e.kind), {}, {}};
+  each_count(e, [&](int x) { std::get<1>(out).push_back(x); });
+  each_number(e, [&](double x) { std::get<2>(out).push_back(x); });
+  return out;
+}
+void set_evaluation(PyEvaluation& self, const EvaluationState& state) {
+  new (&self) PyEvaluation();
+  const auto& [kind, counts, numbers] = state;
+  self.kind = static_cast<Alignment>(kind);
+  std::size_t i = 0, k = 0;
+  each_count(self, [&](int& x) { x = counts.at(i++); });
+  each_number(self, [&](double& x) { x = numbers.at(k++); });
+}
 
 PyEvaluation evaluate(const PyTrajectory& truth, const PyTrajectory& estimate, const std::string& align, double max_difference_s,
                       bool interpolate) {
@@ -77,8 +144,13 @@ void bind_trajectory(nb::module_& m) {
       .def_prop_ro(
           "R", [](const PyTrajectory& s) { return columns(s.poses, [](const Point& x) { return x.T.R(); }); },
           "float64 (N, 3, 3), body to world")
+      .def("__getitem__", &rows_of, "rows"_a, nb::sig("def __getitem__(self, rows: object) -> Trajectory"),
+           "A Trajectory of these rows: a slice, a mask or numbers of rows, as NumPy takes them.")
+      .def("__reduce__", [](const PyTrajectory& s) { return reduced("trajectory", nb::cast(state_of(s))); })
       .def("__len__", [](const PyTrajectory& s) { return s.poses.size(); })
       .def("__repr__", [](const PyTrajectory& s) { return fmt::format("<fbvins.Trajectory of {} poses>", s.poses.size()); });
+
+  m.def("_restore_trajectory", &restored);
 
   nb::class_<ErrorStatistics>(m, "ErrorStatistics", "Statistics of a list of errors, as evo computes them.")
       .def_ro("count", &ErrorStatistics::count)
@@ -87,6 +159,12 @@ void bind_trajectory(nb::module_& m) {
       .def_ro("median", &ErrorStatistics::median)
       .def_ro("rmse", &ErrorStatistics::rmse)
       .def_ro("std", &ErrorStatistics::std)
+      .def("__getstate__", [](const ErrorStatistics& s) { return std::tuple(s.count, s.max, s.mean, s.median, s.rmse, s.std); })
+      .def("__setstate__",
+           [](ErrorStatistics& self, const std::tuple<int, double, double, double, double, double>& s) {
+             new (&self)
+                 ErrorStatistics{std::get<0>(s), std::get<1>(s), std::get<2>(s), std::get<3>(s), std::get<4>(s), std::get<5>(s)};
+           })
       .def("__repr__", [](const ErrorStatistics& s) {
         return fmt::format("<fbvins.ErrorStatistics rmse={:.6g} median={:.6g} max={:.6g} of {}>", s.rmse, s.median, s.max,
                            s.count);
@@ -107,6 +185,8 @@ void bind_trajectory(nb::module_& m) {
       .def_ro("per_metre_deg", &PyEvaluation::per_metre_deg)
       .def_ro("per_second_m", &PyEvaluation::per_second_m, "relative error over a second")
       .def_ro("per_second_deg", &PyEvaluation::per_second_deg)
+      .def("__getstate__", &state_of_evaluation)
+      .def("__setstate__", &set_evaluation)
       .def("__str__", [](const PyEvaluation& e) { return app::to_table(e, e.kind); })
       .def("__repr__", [](const PyEvaluation& e) {
         return fmt::format("<fbvins.Evaluation RMSE {:.4f} m over {} poses>", e.absolute_m.rmse, e.pairs);

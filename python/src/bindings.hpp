@@ -24,5 +24,6 @@ void bind_system(nb::module_& m);
 void bind_map(nb::module_& m);
 void bind_run(nb::module_& m);
 void bind_features(nb::module_& m);
+void bind_tools(nb::module_& m);
 
 }  // namespace fbvins::python

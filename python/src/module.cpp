@@ -15,4 +15,5 @@ NB_MODULE(_fbvins, m) {
   bind_system(m);
   bind_run(m);
   bind_features(m);
+  bind_tools(m);
 }

@@ -57,6 +57,17 @@ def test_arrays_have_a_row_an_image(run):
     assert len(run.odometry) == n and np.array_equal(run.odometry[-1].p, run.p[-1])
 
 
+def test_what_has_no_pose_is_nan(run):
+    without = ~run.has_pose
+    assert without.any() and run.has_pose.any()
+    for name in ("p", "q", "v", "w", "gyro_bias", "accel_bias", "covariance", "velocity_covariance", "gyro_bias_covariance", "accel_bias_covariance",
+                 "tilt_sigma_rad"):
+        values = getattr(run, name)
+        assert np.isnan(values[without]).all() and np.isfinite(values[run.has_pose]).all(), name
+    first = run.odometry[0]
+    assert not first.has_pose and np.isnan(first.p).all() and np.isnan(first.T_WB).all() and np.isnan(first.covariance).all()
+
+
 def test_poses_are_near_the_truth_in_every_frame_asked_for(run):
     for estimate in (run, run.map_trajectory, run.map_causal):
         e = fbvins.evaluate(run.ground_truth, estimate)
@@ -78,7 +89,7 @@ def test_pandas(run):
     pytest.importorskip("pandas")
     table = run.pandas()
     assert list(table.index) == list(run.t)
-    assert np.array_equal(table["p_x"], run.p[:, 0]) and "landmarks" in table and "sigma_theta_z" in table
+    assert np.array_equal(table["p_x"], run.p[:, 0], equal_nan=True) and "landmarks" in table and "sigma_theta_z" in table
 
 
 def test_progress_and_interruption(flight):

@@ -216,6 +216,13 @@ const Refused kRefused[] = {
        });
      },
      "/mav0/cam1/data.csv: no stamp lies within 3 ms of one of cam0's"},
+    {"CalibrationOfAnotherSize", [](Files& f) { replace(f["cam1/sensor.yaml"], "[64, 48]", "[32, 24]"); },
+     "/mav0/cam1/data/1600000000000000123.png: 64 x 48 pixels where the calibration says 32 x 24 (none of 8 right images tried can be used)"},
+    {"NoImageCanBeRead",
+     [](Files& f) {
+       for (int i = 0; i < kToyFrames; ++i) f[toy_image(0, i)] = "this is no image";
+     },
+     "/mav0/cam0/data/1600000000000000123.png: neither PNG nor JPEG (none of 8 left images tried can be used)"},
 };
 
 class RefusedDataset : public testing::TestWithParam<Refused> {};

@@ -63,7 +63,7 @@ class Trajectory:
         for row in rows(path):
             t_ns, state = int(row[0]), row[-3]
             w_WB_B = recording.gyro_B[np.searchsorted(recording.imu_ns, t_ns).clip(0, len(recording.imu_ns) - 1)]
-            values = np.array([float(v) for v in row[1:-3]])
+            values = np.nan_to_num(np.array([float(v) for v in row[1:-3]]))  # of frames without a pose NaN
             covariance = values[16:37]
             sigmas = [np.sqrt(max(covariance[[0, 6, 11]])), np.sqrt(max(covariance[[15, 18, 20]])), 0.05]
             self.poses.append({"t_ns": t_ns, "state": state, "resets": int(row[-1]), "p": values[:3], "q": values[3:7], "v": values[7:10],

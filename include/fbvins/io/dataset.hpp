@@ -101,6 +101,10 @@ class Dataset {
   const std::vector<TrajectoryPoint>& ground_truth() const { return contents_.ground_truth; }
   const std::vector<FrameEntry>& frames() const { return contents_.frames; }
 
+  /// Whether next() has been called, and whether it has come to the end: a recording is read once.
+  bool begun() const { return begun_; }
+  bool at_end() const { return at_end_; }
+
   /// The next event, nullopt at the end.
   std::optional<SensorEvent> next();
 
@@ -114,6 +118,7 @@ class Dataset {
   bool deliver_rest_ = true;  ///< IMU samples after the last image
   std::size_t next_imu_ = 0;
   std::size_t next_frame_ = 0;
+  bool begun_ = false, at_end_ = false;
 };
 
 Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const DatasetOptions& options = {});

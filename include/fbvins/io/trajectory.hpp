@@ -63,7 +63,7 @@ class TumWriter {
 };
 
 /// EuRoC's ground-truth columns, then the upper triangle of the 6x6 pose covariance row by row,
-/// health, reason and reset counter. One row a frame, also for frames without a pose.
+/// health, reason and reset counter. One row a frame; of frames without a pose all numbers are NaN.
 class OdometryCsvWriter {
  public:
   static Result<OdometryCsvWriter> create(const std::string& path);

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "fbvins/io/output_file.hpp"
 #include "fbvins/report/curves.hpp"
 #include "fbvins/report/flight_curves.hpp"
 #include "fbvins/report/report_page.hpp"
@@ -177,6 +179,16 @@ std::string inside_element(const std::string& text) {
   return out;
 }
 
+std::string title_of(const std::vector<RunFolder>& runs) {
+  std::vector<std::string> datasets;
+  for (const RunFolder& run : runs)
+    if (std::find(datasets.begin(), datasets.end(), run.dataset) == datasets.end()) datasets.push_back(run.dataset);
+  if (datasets.size() > 3) return fmt::format("{} recordings", datasets.size());
+  std::string title;
+  for (const std::string& dataset : datasets) title += (title.empty() ? "" : ", ") + dataset;
+  return title;
+}
+
 }  // namespace
 
 std::string report_html(const std::vector<RunFolder>& runs, const Json& bench, const ReportOptions& options) {
@@ -187,6 +199,25 @@ std::string report_html(const std::vector<RunFolder>& runs, const Json& bench, c
   replace_once(page, "<!--TITLE-->", inside_element(options.title));
   replace_once(page, "<!--DATA-->", inside_script(std::move(data)));
   return page;
+}
+
+Result<std::vector<std::string>> write_report(const std::vector<std::string>& folders, const std::string& out,
+                                              const std::string& truth, const std::string& title) {
+  std::vector<RunFolder> runs;
+  std::vector<std::string> warnings;
+  for (const std::string& path : folders) {
+    Result<RunFolder> run = read_run_folder(path, truth);
+    if (!run) return run.error();
+    if (run->truth.empty()) warnings.push_back(path + ": no ground truth, so no errors (--truth gives one)");
+    runs.push_back(*std::move(run));
+  }
+  ReportOptions options;
+  options.title = title.empty() ? title_of(runs) : title;
+  Result<OutputFile> file = OutputFile::create(out);
+  if (!file) return file.error();
+  file->write(report_html(runs, nullptr, options));
+  if (Result<void> done = file->close(); !done) return done.error();
+  return warnings;
 }
 
 }  // namespace fbvins

@@ -24,7 +24,9 @@ std::string landmarks_csv(const Simulation& s) {
 }  // namespace
 
 Result<EurocFolder> create_simulated_recording(const std::string& folder, const StereoRig& rig, bool depth) {
-  return EurocFolder::create(folder, rig, "simulated by fbvins", depth);
+  StereoRig told = rig;
+  told.time_offset_s = 0;  // as in EuRoC's recordings, whose calibration has none: it is for whoever reads this to find
+  return EurocFolder::create(folder, told, "simulated by fbvins", depth);
 }
 
 Result<void> finish_recording(EurocFolder& recording, const SimulatedImu& imu) {

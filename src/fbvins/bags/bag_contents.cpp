@@ -9,13 +9,13 @@
 #include <deque>
 #include <span>
 
+#include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/quoted.hpp"
+#include "fbvins/io/rig_text.hpp"
 
 namespace fbvins {
 namespace {
-
-constexpr std::string_view kTruthTopic = "/ground_truth";
 
 /// Prefix /device_/sensor_/stream of a topic of librealsense, which has no frame names, to be used as the frame; else empty.
 std::string realsense_stream(const std::string& topic) {
@@ -98,31 +98,55 @@ std::string partner_by_words(const std::string& topic, const std::vector<std::st
   return "";
 }
 
-std::optional<std::pair<std::string, std::string>> pair_by_words(const std::vector<std::string>& topics,
-                                                                 std::span<const Words> all) {
+using TopicPair = std::pair<std::string, std::string>;
+
+/// All that differ in left and right only, each once.
+std::vector<TopicPair> pairs_by_words(const std::vector<std::string>& topics, std::span<const Words> all) {
+  std::vector<TopicPair> out;
   for (const Words& words : all)
     for (const std::string& topic : topics)
       if (const std::string partner = partner_by_words(topic, topics, {&words, 1}); !partner.empty())
-        return std::pair(topic, partner);
-  return std::nullopt;
+        if (const TopicPair pair(topic, partner); std::find(out.begin(), out.end(), pair) == out.end()) out.push_back(pair);
+  return out;
 }
 
-Result<std::pair<std::string, std::string>> find_images(const BagContents& contents) {
-  const std::vector<std::string> all = names(contents.images);
-  if (all.size() < 2) return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics, not on two", all.size())};
-  if (auto pair = pair_by_words(all, kCameras)) return *pair;
-  if (all.size() == 2) return std::pair(all[0], all[1]);
-  return Error{ErrorCode::unsupported, fmt::format("has {} image topics ({}): say which are left and right", all.size(),
-                                                   printable(fmt::format("{}", fmt::join(all, ", "))))};
+/// Without those that are the same images compressed.
+std::vector<std::string> image_topics(const BagContents& contents) {
+  std::vector<std::string> out = names(contents.images);
+  std::erase_if(out, [&](const std::string& topic) {
+    constexpr std::string_view kCompressed = "/compressed";
+    return topic.ends_with(kCompressed) && contents.images.contains(topic.substr(0, topic.size() - kCompressed.size()));
+  });
+  return out;
+}
+
+std::string listed(const std::vector<std::string>& topics) { return printable(fmt::format("{}", fmt::join(topics, ", "))); }
+
+Result<TopicPair> find_images(const BagContents& contents) {
+  const std::vector<std::string> all = image_topics(contents);
+  if (all.size() < 2)
+    return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics{}, not on two", all.size(),
+                                                     all.empty() ? "" : fmt::format(" ({})", listed(all)))};
+  const std::vector<TopicPair> pairs = pairs_by_words(all, kCameras);
+  if (pairs.size() == 1) return pairs.front();
+  if (pairs.empty() && all.size() == 2) return std::pair(all[0], all[1]);
+  if (pairs.empty())
+    return Error{
+        ErrorCode::unsupported,
+        fmt::format("has {} image topics ({}): say which are left and right with --topics LEFT,RIGHT", all.size(), listed(all))};
+  std::vector<std::string> each;
+  for (const auto& [left, right] : pairs) each.push_back(left + " and " + right);
+  return Error{ErrorCode::unsupported,
+               fmt::format("has {} stereo pairs ({}): say which with --topics LEFT,RIGHT", pairs.size(), listed(each))};
 }
 
 Result<std::string> find_imu(const BagContents& contents) {
   const std::vector<std::string> all = names(contents.imu);
   if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
   if (all.size() == 1) return all.front();
-  if (const auto pair = pair_by_words(all, kMotion); pair && all.size() == 2) return pair->first;
-  return Error{ErrorCode::unsupported, fmt::format("has {} IMU topics ({}): say which it is", all.size(),
-                                                   printable(fmt::format("{}", fmt::join(all, ", "))))};
+  if (const auto pairs = pairs_by_words(all, kMotion); pairs.size() == 1 && all.size() == 2) return pairs.front().first;
+  return Error{ErrorCode::unsupported,
+               fmt::format("has {} IMU topics ({}): say which it is with --topics LEFT,RIGHT,IMU", all.size(), listed(all))};
 }
 
 /// The camera_info that belongs to an image topic: beside it or below it, or where librealsense has it.
@@ -166,10 +190,11 @@ MessagePlace place_of(const std::string& name) {
   return place;
 }
 
-BagContents read_contents(BagReader& bag) {
+BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message) {
   BagContents out;
   while (const std::optional<BagMessage> message = bag.next()) {
     const BagTopic about = bag.topics()[message->topic];
+    if (on_message) on_message(*message, about);
     if (about.type == "sensor_msgs/Imu") take_imu(*message, about, out.imu[about.name]);
     else if (about.type == "sensor_msgs/Image" || about.type == "sensor_msgs/CompressedImage")
       take_image(*message, about, out.images[about.name]);
@@ -177,7 +202,9 @@ BagContents read_contents(BagReader& bag) {
     else if (about.type == "geometry_msgs/Transform") take_stream_transform(*message, about, out);
     else if (about.type == "tf2_msgs/TFMessage" && about.name.ends_with("tf_static")) {
       for (BagTransform& t : transforms_of(message->data, about.encoding)) out.transforms.push_back(std::move(t));
-    } else if (about.name == kTruthTopic) {
+    } else if (about.name == kRigTopic && about.type == "std_msgs/String") {
+      out.rig = MessageFields(message->data, about.encoding).text();
+    } else if (about.name == kBagTruthTopic) {
       if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
     }
   }
@@ -207,10 +234,15 @@ Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopi
   return out;
 }
 
+std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics) {
+  if (contents.rig.empty() || topics.left != kBagLeftTopic || topics.right != kBagRightTopic) return std::nullopt;
+  return parse_rig(contents.rig, std::string(kRigTopic));
+}
+
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
   const BagCamera *left = camera_for(contents, topics.left), *right = camera_for(contents, topics.right);
   const auto missing = [&](const std::string& what) {
-    return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with it", printable(what))};
+    return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with --calibration", printable(what))};
   };
   if ((!left || !right) && !contents.camera_problem.empty()) return missing(contents.camera_problem);
   if (!left || !right) return missing(fmt::format("no camera_info for {}", left ? topics.right : topics.left));

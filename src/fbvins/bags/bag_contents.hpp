@@ -3,7 +3,9 @@
 // One thread.
 #pragma once
 
+#include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,9 +36,11 @@ struct BagContents {
   std::string camera_problem;                 ///< why the first unusable one cannot be used
   std::vector<BagTransform> transforms;       ///< the static ones
   std::vector<TrajectoryPoint> ground_truth;  ///< of the topic /ground_truth
+  std::string rig;                            ///< of a bag that `fbvins convert` wrote: all of its calibration (rig_text.hpp)
 };
 
-BagContents read_contents(BagReader& bag);
+/// `on_message` is told of every message before it is taken.
+BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message = {});
 
 /// A message's place as a FrameEntry names it, and back.
 std::string place_name(const MessagePlace& place);
@@ -50,6 +54,8 @@ struct ChosenTopics {
 /// The error lists the topics there are.
 Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
 
+/// All of the calibration, noise figures included, where the bag has it for these topics.
+std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics);
 /// From camera_info and transforms. The error says what is missing.
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);
 

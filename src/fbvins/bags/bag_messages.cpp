@@ -32,6 +32,18 @@ std::optional<BagTransform> read_transform(MessageFields& in) {
   return BagTransform{"", "", q.normalized(), p};
 }
 
+/// Behind the header.
+RawImage raw_image(MessageFields& in) {
+  RawImage raw;
+  raw.height = in.get<std::uint32_t>();
+  raw.width = in.get<std::uint32_t>();
+  raw.encoding = in.text();
+  raw.big_endian = in.get<std::uint8_t>() != 0;
+  raw.step = in.get<std::uint32_t>();
+  raw.pixels = in.bytes();
+  return raw;
+}
+
 /// librealsense's names of lens models. Rectified images, which is what its infrared ones are, have none of these distortions.
 bool is_straight(std::string_view model, const std::vector<double>& d) {
   return (model == "None" || model.ends_with("Brown Conrady")) &&
@@ -66,7 +78,7 @@ std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding) {
   return in.ok() ? std::optional(t) : std::nullopt;
 }
 
-Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed) {
+Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed, int used_bits) {
   MessageFields in(bytes, encoding);
   in.header();
   if (compressed) {
@@ -75,15 +87,23 @@ Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compresse
     if (!in.ok()) return Error{ErrorCode::malformed, "this is no compressed image"};
     return decode_image(file);
   }
-  RawImage raw;
-  raw.height = in.get<std::uint32_t>();
-  raw.width = in.get<std::uint32_t>();
-  raw.encoding = in.text();
-  raw.big_endian = in.get<std::uint8_t>() != 0;
-  raw.step = in.get<std::uint32_t>();
-  raw.pixels = in.bytes();
+  RawImage raw = raw_image(in);
   if (!in.ok()) return Error{ErrorCode::malformed, "this is no image"};
+  raw.used_bits = used_bits;
   return grey_image(raw);
+}
+
+std::string encoding_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  in.header();
+  return quoted(raw_image(in).encoding);
+}
+
+std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding) {
+  MessageFields in(bytes, encoding);
+  in.header();
+  const RawImage raw = raw_image(in);
+  return in.ok() ? largest_value(raw) : std::nullopt;
 }
 
 Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {

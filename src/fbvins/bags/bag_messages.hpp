@@ -23,8 +23,12 @@ std::optional<ImuSample> imu_of(std::string_view bytes, Encoding encoding);
 
 /// sensor_msgs/Image or, with `compressed`, sensor_msgs/CompressedImage: only its stamp; the rest is not read.
 std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding);
-/// The image in 8-bit grey, or a sentence why not: mono8, mono16, bayer_*, rgb8, bgr8, rgba8, bgra8 and yuv422; PNG and JPEG.
-Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed);
+/// The image in 8-bit grey, or a sentence why not: the encodings of grey_image.hpp; PNG and JPEG. `used_bits` is RawImage's.
+Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed, int used_bits = 16);
+/// As an uncompressed image names it, printable.
+std::string encoding_of(std::string_view bytes, Encoding encoding);
+/// The largest value of an uncompressed image of 16-bit values; none for any other.
+std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding);
 
 /// sensor_msgs/CameraInfo, and the frame it names.
 struct BagCamera {

@@ -101,6 +101,8 @@ class BagReader {
 /// "sensor_msgs/msg/Imu" and "sensor_msgs/Imu" are one.
 std::string plain_type(std::string type);
 
+/// By its name (.bag; .bag.active while it is recorded, or after the recorder was killed) or content.
+bool is_ros1_bag(const std::string& path);
 /// A ROS 1 bag, a ROS 2 bag (folder, .db3 or .mcap), or an MCAP file of ROS messages, by content.
 Result<std::unique_ptr<BagReader>> open_bag(const std::string& path);
 

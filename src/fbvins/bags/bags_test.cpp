@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "fbvins/bags/bag_contents.hpp"
+#include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
@@ -82,6 +83,40 @@ TEST_F(Bags, WhatIsWrittenIsRead) {
   }
   EXPECT_EQ(readings, 200);
   EXPECT_EQ(frames, 20);
+}
+
+/// A recording that is converted has its whole calibration afterwards, and the poses of its truth.
+TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
+  StereoRig given = rig();
+  given.imu_noise = {1e-3, 2e-2, 3e-5, 4e-4, 201, 12, 80};
+  given.time_offset_s = 0.0125;
+  given.image_rate_hz = 20;
+  auto bag = Ros1BagWriter::create(path("whole.bag"), given, Time{1'000'000'000});
+  ASSERT_TRUE(bag) << bag.error().message;
+  for (int i = 0; i < 50; ++i) {
+    const Time t{1'000'000'000 + 5'000'000 * static_cast<std::int64_t>(i)};
+    ASSERT_TRUE(bag->add(ImuSample{t, Vec3::Zero(), Vec3(0, 0, 9.81)}));
+    if (i % 10 != 0) continue;
+    ASSERT_TRUE(bag->add(StereoFrame{t, image(i), image(i)}));
+    ASSERT_TRUE(bag->add_truth(t, {so3_exp({0.1, 0.2, 0.01 * i}), {1, 2, 0.1 * i}}));
+  }
+  ASSERT_TRUE(bag->finish());
+  auto data = open_recording(path("whole.bag"));
+  ASSERT_TRUE(data) << data.error().message;
+  const StereoRig& read = (*data)->rig();
+  EXPECT_EQ(read.imu_noise.accel_noise_density_mps2_rthz, 2e-2);
+  EXPECT_EQ(read.imu_noise.rate_hz, 201);
+  EXPECT_EQ(read.imu_noise.max_accel_mps2, 80);
+  EXPECT_EQ(read.time_offset_s, 0.0125);
+  EXPECT_EQ(read.T_BC0.q.coeffs(), given.T_BC0.q.coeffs());
+  EXPECT_TRUE((*data)->info().warnings.empty()) << (*data)->info().warnings.front();
+  ASSERT_EQ((*data)->ground_truth().size(), 5u);
+  EXPECT_LT(((*data)->ground_truth()[3].T_WB.p - Vec3(1, 2, 3)).norm(), 1e-12);
+  // Of other topics, such as exchanged ones, it is not the calibration.
+  const auto swapped = open_recording(path("whole.bag"), {.left_topic = "/cam1/image_raw", .right_topic = "/cam0/image_raw"});
+  ASSERT_TRUE(swapped) << swapped.error().message;
+  EXPECT_EQ((*swapped)->rig().time_offset_s, 0);
+  EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
 }
 
 /// What comes before the cut is there, whatever the place, and more of it the later the cut.
@@ -210,7 +245,38 @@ TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
 TEST(BagContents, NamesOfTopicsDoNotBreakASentence) {
   BagContents contents;
   contents.images["/a\n"], contents.images["/b"], contents.images["/c"];
-  EXPECT_EQ(choose_topics(contents, {}, true).error().message, "has 3 image topics (/a?, /b, /c): say which are left and right");
+  EXPECT_EQ(choose_topics(contents, {}, true).error().message,
+            "has 3 image topics (/a?, /b, /c): say which are left and right with --topics LEFT,RIGHT");
+}
+
+TEST(BagContents, TwoRigsAreAQuestion) {
+  BagContents contents;
+  contents.imu["/imu"];
+  for (const char* topic : {"/front/left", "/front/right", "/front/left/compressed", "/front/right/compressed", "/front/depth"})
+    contents.images[topic];
+  const auto one = choose_topics(contents, {}, true);
+  ASSERT_TRUE(one) << one.error().message;  // raw and compressed images of one rig are one pair
+  EXPECT_EQ(one->right, "/front/right");
+  contents.images["/rear/left"], contents.images["/rear/right"];
+  EXPECT_EQ(choose_topics(contents, {}, true).error().message,
+            "has 2 stereo pairs (/front/left and /front/right, /rear/left and /rear/right): say which with --topics LEFT,RIGHT");
+}
+
+TEST(BagSurvey, SaysWhatIsThereWithoutACalibration) {
+  ListedMessages bag;
+  for (const char* topic : {"/left", "/right"})
+    bag.add(
+        topic, "sensor_msgs/Image",
+        header(5) + raw<std::uint32_t>({2, 3, 7}) + "bad\nred" + std::string(1, '\0') + raw<std::uint32_t>({3, 6}) + "pixels");
+  bag.add("/imu", "sensor_msgs/Imu", header(5) + std::string(37 * 8, '\0'));
+  const BagSurvey survey = survey_bag(bag, {});
+  ASSERT_EQ(survey.topics.size(), 3u);
+  EXPECT_EQ(survey.topics[0].first, "frame '1'");
+  EXPECT_EQ(survey.topics[1].name, "/left");
+  EXPECT_EQ(survey.topics[1].first, "images encoded as 'bad?red' cannot be read");
+  EXPECT_EQ(survey.left + survey.right + survey.imu, "/left/right/imu");
+  EXPECT_EQ(survey.question, "");
+  EXPECT_EQ(survey.no_calibration, "holds no calibration (no camera_info for /left): give one with --calibration");
 }
 
 std::string grey_of(std::string_view encoding, std::uint32_t width, std::uint32_t step, std::string_view pixels,
@@ -240,9 +306,44 @@ TEST(GreyImage, EveryEncodingBecomesBrightness) {
   EXPECT_EQ(grey_of("bgr8", 1, 3, std::string_view("\xff\0\0", 3)), "\x1d");
   EXPECT_EQ(grey_of("rgba8", 1, 4, "aaaZ"), "a");
   EXPECT_EQ(grey_of("yuv422", 2, 4, "uavb"), "ab");
+  EXPECT_EQ(grey_of("uyvy", 2, 4, "uavb"), "ab");
+  EXPECT_EQ(grey_of("yuyv", 2, 4, "aubv"), "ab");
+  EXPECT_EQ(grey_of("rgb16", 1, 6, std::string_view("\0\xff\0\0\0\0", 6)), "\x4c");
+  EXPECT_EQ(grey_of("bgr16", 1, 6, std::string_view("\xff\0\0\0\0\0", 6), true), "\x1d");
+  EXPECT_EQ(grey_of("rgba16", 1, 8, "_a_a_a_Z"), "a");
+  EXPECT_EQ(grey_of("bayer_rggb16", 2, 4, "_a_a_a_a"), "aaaa");
   EXPECT_EQ(grey_of("jpeg2000", 1, 1, "a"), "images encoded as 'jpeg2000' cannot be read");
   EXPECT_EQ(grey_of("a\nb", 1, 1, "a"), "images encoded as 'a?b' cannot be read");  // one sentence on one line
   EXPECT_EQ(grey_of("mono8", 3, 2, "abcd"), "this image has fewer pixels than its header says");
+}
+
+TEST(GreyImage, PlanesOfBrightnessComeFirst) {
+  for (const char* encoding : {"nv12", "nv21"}) {
+    const auto image = grey_image({2, 2, 2, encoding, false, "abcduv"});
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->at(0, 0), 'a');
+    EXPECT_EQ(image->at(1, 1), 'd');
+    const auto of_all_planes = grey_image({2, 2, 4, encoding, false, "abcduv"});
+    ASSERT_TRUE(of_all_planes) << of_all_planes.error().message;
+    EXPECT_EQ(of_all_planes->at(1, 1), 'd');
+  }
+  EXPECT_FALSE(grey_image({2, 2, 2, "nv12", false, "abc"}));
+}
+
+TEST(GreyImage, TwelveBitsInSixteenAreScaled) {
+  const std::string_view values("\x10\x02\xf0\x0f", 4);  // 0x210, 0xff0
+  RawImage raw{2, 1, 4, "mono16", false, values};
+  EXPECT_EQ(largest_value(raw), 0xff0);
+  EXPECT_EQ(largest_value({2, 1, 2, "mono8", false, "ab"}), std::nullopt);
+  EXPECT_EQ(bits_used_for(0xff0), 12);
+  EXPECT_EQ(bits_used_for(0x3ff), 10);
+  EXPECT_EQ(bits_used_for(0x1000), 16);
+  EXPECT_EQ(bits_used_for(0), 16);
+  raw.used_bits = 12;
+  EXPECT_EQ(grey_image(raw)->at(0, 0), 0x21);
+  raw.used_bits = 10;  // a later image that is brighter than those that were tried
+  EXPECT_EQ(grey_image(raw)->at(0, 0), 0x84);
+  EXPECT_EQ(grey_image(raw)->at(1, 0), 255);
 }
 
 /// Red 40, green 80, blue 120 everywhere: (40 + 2 80 + 120) / 4 at every pixel, at the edges as well.

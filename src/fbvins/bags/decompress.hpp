@@ -22,6 +22,9 @@ struct Unpacked {
 /// most `largest_unpacked_bytes` are unpacked. The memory of `room` is reused.
 Unpacked unpack(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string room = {});
 
+/// Whether a message of ROS 2 is one that rosbag2 has compressed: in CDR it would begin with a zero.
+inline bool is_zstd(std::string_view bytes) { return bytes.starts_with("\x28\xB5\x2F\xFD"); }
+
 inline bool is_plain(std::string_view compression) { return compression.empty() || compression == "none"; }
 
 /// What a chunk of so many bytes may unpack to: a few kilobytes of zeros, compressed again and again, would keep the reader busy

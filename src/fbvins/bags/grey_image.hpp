@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: pixels as ROS names them to 8-bit grey. Pure function, any thread.
+// Private to bags: pixels as ROS names them to 8-bit grey. Pure functions, any thread.
 //
 //   Result<Image> image = grey_image({752, 480, 752, "mono8", false, bytes});
 //
-// Colour becomes luma (ITU-R BT.601 weights), 16 bit keeps its high byte, a Bayer mosaic is smoothed by (1 2 1)/4 both ways,
-// which weighs red, green and blue the same (1, 2, 1) at every pixel.
+// Colour becomes luma (ITU-R BT.601 weights), of 16 bit the upper eight of those used are kept, of YUV the brightness; a Bayer mosaic
+// is smoothed by (1 2 1)/4 both ways, which weighs red, green and blue the same (1, 2, 1) at every pixel.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "fbvins/core/result.hpp"
@@ -20,9 +21,16 @@ struct RawImage {
   std::string_view encoding;
   bool big_endian = false;
   std::string_view pixels;
+  int used_bits = 16;  ///< of 16-bit values: cameras of 10 and 12 bits send these in 16
 };
 
 /// An error for an unknown encoding, or for fewer pixels than the size needs.
 Result<Image> grey_image(const RawImage& raw);
+
+/// The largest value of an image of 16-bit values; none for other encodings and where grey_image() gives an error.
+std::optional<std::uint16_t> largest_value(const RawImage& raw);
+
+/// The bits that a camera uses whose largest value this is: 8, 10, 12 or, for anything larger, 16 (also where all is black).
+int bits_used_for(std::uint16_t largest);
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MCAP files of ROS messages, compressed or not: rosbag2's, Foxglove's and converted ROS 1 bags.
+// MCAP files of ROS messages, chunks or messages compressed or not: rosbag2's, Foxglove's and converted ROS 1 bags.
 #include <fmt/format.h>
 
 #include <map>
@@ -32,6 +32,31 @@ class McapBag final : public BagReader {
   std::string format() const override { return "MCAP"; }
 
   std::string_view read(const MessagePlace& place) override {
+    const std::string_view bytes = stored(place);
+    if (!is_zstd(bytes)) return bytes;
+    read_ = unpack("zstd", bytes, 0, std::move(read_)).bytes;
+    return read_;
+  }
+
+ protected:
+  std::optional<BagMessage> advance() override {
+    while (const std::optional<McapMessage> message = reader_.next()) {
+      if (!is_message_of_ros(*message->channel)) continue;
+      const MessagePlace place{message->chunk, message->offset, message->data.size()};
+      if (!is_zstd(message->data)) return BagMessage{topic_of(*message->channel), message->log_time, message->data, place};
+      Unpacked out = unpack("zstd", message->data, 0, std::move(unpacked_));
+      unpacked_ = std::move(out.bytes);
+      if (out.whole) return BagMessage{topic_of(*message->channel), message->log_time, unpacked_, place};
+      reader_.complain(message->offset, "this message cannot be unpacked");
+    }
+    const McapDamage& damage = reader_.damage();
+    damage_ = {damage.parts, damage.first, damage.ends_early};
+    return std::nullopt;
+  }
+
+ private:
+  /// As it lies in the file.
+  std::string_view stored(const MessagePlace& place) {
     if (place.chunk == 0) {
       bytes_->fill(message_, place.offset, place.length);
       return message_;
@@ -41,19 +66,6 @@ class McapBag final : public BagReader {
     return std::string_view(kept_).substr(place.offset, place.length);
   }
 
- protected:
-  std::optional<BagMessage> advance() override {
-    while (const std::optional<McapMessage> message = reader_.next()) {
-      if (!is_message_of_ros(*message->channel)) continue;
-      return BagMessage{
-          topic_of(*message->channel), message->log_time, message->data, {message->chunk, message->offset, message->data.size()}};
-    }
-    const McapDamage& damage = reader_.damage();
-    damage_ = {damage.parts, damage.first, damage.ends_early};
-    return std::nullopt;
-  }
-
- private:
   static bool is_message_of_ros(const McapChannel& channel) {
     return channel.message_encoding == "cdr" || channel.message_encoding == "ros1";
   }
@@ -71,6 +83,7 @@ class McapBag final : public BagReader {
   std::map<const McapChannel*, std::size_t> numbers_;
   std::string kept_, message_;  ///< records of the compressed chunk that read() used last; a message outside of such
   std::uint64_t kept_at_ = 0;
+  std::string unpacked_, read_;  ///< compressed messages that next() and read() returned last
 };
 
 }  // namespace

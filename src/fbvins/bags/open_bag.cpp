@@ -26,7 +26,7 @@ bool is_file(const fs::path& path) {
 Result<std::unique_ptr<BagReader>> open_file(const std::string& path) {
   const auto bytes = open_bytes(path);
   if (!bytes) return bytes.error();
-  return path.ends_with(".bag") ? read_ros1_bag(*bytes, path) : read_mcap_bag(*bytes, path);
+  return is_ros1_bag(path) ? read_ros1_bag(*bytes, path) : read_mcap_bag(*bytes, path);
 }
 
 /// A folder of rosbag2, by its metadata; where that is not there or not whole (the recorder was killed), by its files.
@@ -66,6 +66,12 @@ Result<std::unique_ptr<BagReader>> open_folder(const fs::path& folder) {
 }
 
 }  // namespace
+
+bool is_ros1_bag(const std::string& path) {
+  if (path.ends_with(".bag") || path.ends_with(".bag.active")) return true;
+  const auto bytes = is_file(path) ? open_bytes(path) : Error{ErrorCode::not_found, path};
+  return bytes && (*bytes)->read(0, 7) == "#ROSBAG";
+}
 
 std::string plain_type(std::string type) {
   if (const std::size_t at = type.find("/msg/"); at != std::string::npos) type.erase(at, 4);

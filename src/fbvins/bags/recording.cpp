@@ -9,12 +9,14 @@
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/bags/grey_image.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/image_check.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_reader.hpp"
@@ -40,6 +42,17 @@ class BagLoader : public FrameLoader {
   BagLoader(std::unique_ptr<BagReader> bag, std::string name, Side left, Side right)
       : bag_(std::move(bag)), name_(std::move(name)), left_(std::move(left)), right_(std::move(right)) {}
 
+  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in both
+  /// cameras together, from images spread over the recording, so that all its images are scaled alike.
+  int find_used_bits(const std::vector<FrameEntry>& frames) {
+    std::uint16_t largest = 0;
+    for (const auto& [side, file] : {std::pair{&left_, &FrameEntry::left_file}, {&right_, &FrameEntry::right_file}})
+      if (!side->compressed)
+        for (const FrameEntry& frame : frames_to_try(frames, file))
+          largest = std::max(largest, largest_value_of(bag_->read(place_of(frame.*file)), side->encoding).value_or(0));
+    return used_bits_ = bits_used_for(largest);
+  }
+
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
@@ -56,7 +69,7 @@ class BagLoader : public FrameLoader {
       if (problem.empty()) problem = fmt::format("{}: image at {}: {}", name_, place, sentence);
       return nullptr;
     };
-    Result<Image> image = image_of(bag_->read(place_of(place)), side.encoding, side.compressed);
+    Result<Image> image = image_of(bag_->read(place_of(place)), side.encoding, side.compressed, used_bits_);
     if (!image) return blame(counts.corrupt, image.error().message);
     if (const auto sentence = wrong_size(image->width(), image->height(), side.camera))
       return blame(counts.wrong_size, *sentence);
@@ -66,6 +79,7 @@ class BagLoader : public FrameLoader {
   std::unique_ptr<BagReader> bag_;
   std::string name_;
   Side left_, right_;
+  int used_bits_ = 16;
 };
 
 /// In order of stamps, each once.
@@ -114,8 +128,12 @@ class BagRecording {
       const ImageTopic& images = contents_.images.at(topic);
       return BagLoader::Side{camera, images.encoding, images.compressed};
     };
-    out_.loader = std::make_unique<BagLoader>(std::move(bag), path_, side(topics_.left, out_.rig.left),
+    auto loader = std::make_unique<BagLoader>(std::move(bag), path_, side(topics_.left, out_.rig.left),
                                               side(topics_.right, out_.rig.right));
+    if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
+      out_.info.warnings.push_back(
+          fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", path_, bits, 1 << (16 - bits)));
+    out_.loader = std::move(loader);
     return std::move(out_);
   }
 
@@ -129,6 +147,11 @@ class BagRecording {
   }
 
   Result<void> calibrate() {
+    if (const auto own = own_rig(contents_, topics_); !rig_ && own) {
+      if (!*own) return own->error();
+      rig_ = **own;
+      whole_calibration_ = true;
+    }
     if (!rig_) {
       const Result<StereoRig> rig = rig_of(contents_, topics_);
       if (!rig) return rig.error();
@@ -200,7 +223,8 @@ class BagRecording {
     constexpr double kSameRate = 0.05;  // few calibrations say the cameras' rate: then it is measured
     if (std::abs(out_.rig.image_rate_hz - info.image_rate_hz) > kSameRate * info.image_rate_hz)
       out_.rig.image_rate_hz = info.image_rate_hz;
-    if (info.imu_rate_hz > 0 && options_.calibration.empty()) out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
+    if (info.imu_rate_hz > 0 && options_.calibration.empty() && !whole_calibration_)
+      out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
   }
 
   std::string path_;
@@ -208,6 +232,7 @@ class BagRecording {
   std::optional<StereoRig> rig_;
   BagContents contents_;
   ChosenTopics topics_;
+  bool whole_calibration_ = false;  ///< the bag's own, noise and rates included
   DatasetContents out_;
 };
 
@@ -255,10 +280,11 @@ bool is_bag(const std::string& path) {
   if (fs::is_directory(p, ignored)) {
     if (fs::exists(p / "metadata.yaml", ignored)) return true;
     for (const auto& entry : fs::directory_iterator(p, ignored))
-      if (entry.path().extension() == ".db3") return true;
+      if (entry.path().extension() == ".db3" || (entry.path().extension() == ".mcap" && !is_flight_record(entry.path().string())))
+        return true;
     return false;
   }
-  if (p.extension() == ".bag" || p.extension() == ".db3") return true;
+  if (p.extension() == ".db3" || is_ros1_bag(path)) return true;
   return is_mcap(path) && !is_flight_record(path);
 }
 
@@ -274,6 +300,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const R
   if (!reader) return reader.error();
   Result<DatasetContents> contents = BagRecording(path, options, options.dataset.rig).read(*std::move(reader));
   if (!contents) return contents.error();
+  if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   return std::make_unique<Dataset>(*std::move(contents), options.dataset);
 }
 

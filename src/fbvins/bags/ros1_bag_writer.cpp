@@ -9,6 +9,7 @@
 
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/little_endian.hpp"
+#include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_messages.hpp"
 
 namespace fbvins {
@@ -30,6 +31,9 @@ constexpr const char* kCameraFields =
     "uint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n";
 constexpr std::pair<const char*, const char*> kHeader{"std_msgs/Header", "uint32 seq\ntime stamp\nstring frame_id\n"};
 constexpr std::pair<const char*, const char*> kVector{"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"};
+constexpr std::pair<const char*, const char*> kPoint{"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"};
+constexpr std::pair<const char*, const char*> kPose{"geometry_msgs/Pose",
+                                                    "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"};
 constexpr std::pair<const char*, const char*> kQuaternion{"geometry_msgs/Quaternion",
                                                           "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"};
 constexpr std::pair<const char*, const char*> kRegion{
@@ -53,7 +57,7 @@ struct Topic {
 };
 
 /// In the order of their numbers.
-enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms };
+enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms, kRig, kTruth, kOdometry };
 
 std::vector<Topic> topics() {
   const std::string imu = definition(kImuFields, {kHeader, kQuaternion, kVector}), image = definition(kImageFields, {kHeader}),
@@ -62,11 +66,16 @@ std::vector<Topic> topics() {
                                             {kTransformStamped, kHeader, kTransform, kVector, kQuaternion});
   constexpr const char *kImage = "060021388200f6f0f447d0fcd9c64743", *kCamera = "c9a58c1b0b154e0e6da7578cb991d214";
   return {{"/imu0", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", imu},
-          {"/cam0/image_raw", "sensor_msgs/Image", kImage, image},
-          {"/cam1/image_raw", "sensor_msgs/Image", kImage, image},
+          {std::string(kBagLeftTopic), "sensor_msgs/Image", kImage, image},
+          {std::string(kBagRightTopic), "sensor_msgs/Image", kImage, image},
           {"/cam0/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
           {"/cam1/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
-          {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms}};
+          {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms},
+          {std::string(kRigTopic), "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n"},
+          {std::string(kBagTruthTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+           definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})},
+          {std::string(kBagOdometryTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+           definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})}};
 }
 
 // Records: a header of fields, and data.
@@ -168,6 +177,20 @@ std::string transforms_message(Time t, const StereoRig& rig) {
   };
   add(kLeftFrame, rig.T_BC0.q, rig.T_BC0.p);
   add(kRightFrame, rig.T_BC1.q, rig.T_BC1.p);
+  return out;
+}
+
+std::string text_message(std::string_view text) {
+  std::string out;
+  add_text(out, text);
+  return out;
+}
+
+std::string pose_message(Time t, std::string_view frame, const Pose<W, B>& T_WB) {
+  std::string out;
+  add_header(out, t, frame);
+  add_doubles(out, T_WB.p.data(), 3);
+  add_quaternion(out, T_WB.q);
   return out;
 }
 
@@ -285,7 +308,8 @@ Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const Stere
   if (Result<void> done = state->good(); !done) return done.error();
   for (const auto& [number, message] : {std::pair{kLeftInfo, camera_message(start, kLeftFrame, rig.left)},
                                         {kRightInfo, camera_message(start, kRightFrame, rig.right)},
-                                        {kTransforms, transforms_message(start, rig)}})
+                                        {kTransforms, transforms_message(start, rig)},
+                                        {kRig, text_message(rig_to_yaml(rig))}})
     if (Result<void> done = state->add(number, start, message); !done) return done.error();
   return Ros1BagWriter(std::move(state));
 }
@@ -302,6 +326,14 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
     if (Result<void> done = state_->add(kLeft, frame.t, image_message(frame.t, kLeftFrame, *frame.left)); !done) return done;
   if (!frame.right) return {};
   return state_->add(kRight, frame.t, image_message(frame.t, kRightFrame, *frame.right));
+}
+
+Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {
+  return state_->add(kTruth, t, pose_message(t, "world", T_WB));
+}
+
+Result<void> Ros1BagWriter::add_odometry(Time t, const Pose<W, B>& T_WB) {
+  return state_->add(kOdometry, t, pose_message(t, kOdometryFrame, T_WB));
 }
 
 Result<void> Ros1BagWriter::finish() {

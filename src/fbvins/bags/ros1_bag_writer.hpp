@@ -16,9 +16,14 @@
 
 namespace fbvins {
 
+inline constexpr std::string_view kRigTopic = "/fbvins/calibration", kBagTruthTopic = "/ground_truth",
+                                  kBagOdometryTopic = "/odometry";
+/// The image topics that the calibration on kRigTopic is of.
+inline constexpr std::string_view kBagLeftTopic = "/cam0/image_raw", kBagRightTopic = "/cam1/image_raw";
+
 class Ros1BagWriter {
  public:
-  /// With camera_info and /tf_static of the rig at `start`.
+  /// With camera_info and /tf_static of the rig at `start`, and all of it as text (rig_text.hpp) on kRigTopic.
   static Result<Ros1BagWriter> create(const std::string& path, const StereoRig& rig, Time start);
   ~Ros1BagWriter();
   Ros1BagWriter(Ros1BagWriter&&) noexcept;
@@ -27,6 +32,10 @@ class Ros1BagWriter {
   // An error for a stamp that ROS cannot hold (before 1970, after 2106), or where the disk is full.
   Result<void> add(const ImuSample& sample);
   Result<void> add(const StereoFrame& frame);
+  /// On kBagTruthTopic.
+  Result<void> add_truth(Time t, const Pose<W, B>& T_WB);
+  /// On kBagOdometryTopic.
+  Result<void> add_odometry(Time t, const Pose<W, B>& T_WB);
   Result<void> finish();
 
  private:

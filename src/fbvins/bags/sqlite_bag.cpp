@@ -77,7 +77,7 @@ class SqliteBag final : public BagReader {
     sqlite3_bind_int64(again, 1, static_cast<std::int64_t>(place.offset));
     if (sqlite3_step(again) != SQLITE_ROW) return {};
     const std::string_view bytes = bytes_of(again, 0);
-    if (!packed_) return bytes;
+    if (!packed_ && !is_zstd(bytes)) return bytes;
     read_ = unpack("zstd", bytes, 0, std::move(read_)).bytes;
     return read_;
   }
@@ -134,7 +134,7 @@ class SqliteBag final : public BagReader {
     if (topic == file.topics.end()) return std::nullopt;
     const Time t{sqlite3_column_int64(messages_.get(), 2)};
     std::string_view data = bytes_of(messages_.get(), 3);
-    if (packed_) {
+    if (packed_ || is_zstd(data)) {
       Unpacked out = unpack("zstd", data, 0, std::move(unpacked_));
       unpacked_ = std::move(out.bytes);
       if (!out.whole) {

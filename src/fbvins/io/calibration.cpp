@@ -10,6 +10,7 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml) {
   // EuRoC nests the 16 numbers under T_BS: data; other writers put them directly under T_BS.
   sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients");
   sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
+  if (yaml.has(yaml.root(), "timeshift_cam_imu")) sensor.time_offset_s = yaml.number(yaml.root(), "timeshift_cam_imu");
   if (!yaml.ok()) return yaml.error();
   Result<Pose<B, B>> mounting = parse_euroc_mounting(std::move(yaml));
   if (!mounting) return mounting.error();
@@ -44,6 +45,7 @@ Result<StereoRig> join_euroc(const CameraSensor& left, const CameraSensor& right
   rig.T_BC1 = (imu.T_BS.inverse() * right.T_BS).cast_frames<B, C1>();
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
+  rig.time_offset_s = left.time_offset_s;
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }

@@ -17,6 +17,7 @@ struct CameraSensor {
   Camera camera;
   Pose<B, C0> T_BS;
   double rate_hz = 20;
+  double time_offset_s = 0;  ///< timeshift_cam_imu, Kalibr's name: EuRoC has none, recordings of `fbvins convert` do
 };
 
 /// EuRoC imu0/sensor.yaml.

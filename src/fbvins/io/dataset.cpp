@@ -6,6 +6,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/euroc.hpp"
 #include "fbvins/io/frame_prefetcher.hpp"
+#include "fbvins/io/image_check.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 
 namespace fbvins {
@@ -18,9 +19,13 @@ Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
 Dataset::~Dataset() = default;
 
 std::optional<SensorEvent> Dataset::next() {
+  begun_ = true;
   while (true) {
     if (imu_is_due()) return contents_.imu[next_imu_++];
-    if (next_frame_ == contents_.frames.size()) return std::nullopt;
+    if (next_frame_ == contents_.frames.size()) {
+      at_end_ = true;
+      return std::nullopt;
+    }
     if (auto frame = next_frame()) return *std::move(frame);
   }
 }
@@ -65,6 +70,7 @@ Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const Dat
     return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
   Result<DatasetContents> contents = is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
   if (!contents) return contents.error();
+  if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   return std::make_unique<Dataset>(*std::move(contents), options);
 }
 

@@ -37,22 +37,29 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
   return text + "0.0, 0.0, 0.0, 1.0]\n";
 }
 
-std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, double rate_hz, const std::string& origin) {
+std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, const StereoRig& rig, const std::string& origin) {
   const KalibrCamera c = kalibr_camera(camera);
+  const std::string offset = rig.time_offset_s == 0 ? "" : fmt::format("timeshift_cam_imu: {}\n", rig.time_offset_s);
   return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(q, p) +
          fmt::format(
              "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
              "distortion_coefficients: [{}]\n",
-             rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
-             c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", "));
+             rig.image_rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
+             c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", ")) +
+         offset;
 }
 
 std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
+  std::string range;
+  const ImuNoise usual;
+  if (n.max_gyro_radps != usual.max_gyro_radps || n.max_accel_mps2 != usual.max_accel_mps2)
+    range = fmt::format("gyroscope_range: {}\naccelerometer_range: {}\n", n.max_gyro_radps, n.max_accel_mps2);
   return fmt::format("sensor_type: imu\ncomment: {}\n\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero()) +
          fmt::format(
              "rate_hz: {}\n\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
              n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
-             n.accel_random_walk_mps3_rthz);
+             n.accel_random_walk_mps3_rthz) +
+         range;
 }
 
 std::string imu_csv(const std::vector<ImuSample>& samples) {
@@ -69,14 +76,16 @@ std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
       "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
       "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
   for (const TrajectoryPoint& s : truth) {
-    const Vec3 v = s.v_WB.value_or(Vec3::Zero());
-    const ImuBias bias = s.bias.value_or(ImuBias{});
-    const auto &p = s.T_WB.p, &bg = bias.gyro_radps, &ba = bias.accel_mps2;
+    const Vec3& p = s.T_WB.p;
     const Quat& q = s.T_WB.q;
-    text += fmt::format(
-        "{},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{:.9f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.6f},{:.6f},{:.6f}\n",
-        s.t.ns, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), bg.x(), bg.y(), bg.z(), ba.x(), ba.y(),
-        ba.z());
+    text += fmt::format("{},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{:.9f}", s.t.ns, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(),
+                        q.z());
+    if (s.v_WB && s.bias) {  // a truth of poses alone is one of eight columns: zeros would say that it is at rest
+      const Vec3 &v = *s.v_WB, &bg = s.bias->gyro_radps, &ba = s.bias->accel_mps2;
+      text += fmt::format(",{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.6f},{:.6f},{:.6f}", v.x(), v.y(), v.z(), bg.x(), bg.y(),
+                          bg.z(), ba.x(), ba.y(), ba.z());
+    }
+    text += "\n";
   }
   return text;
 }
@@ -99,8 +108,8 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, cons
   const Pose<B, C0>& left = rig.T_BC0;
   const Pose<B, C1>& right = rig.T_BC1;
   for (const auto& [path, text] :
-       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(rig.left, left.q, left.p, rig.image_rate_hz, origin)},
-        {mav0 / "cam1/sensor.yaml", camera_yaml(rig.right, right.q, right.p, rig.image_rate_hz, origin)},
+       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(rig.left, left.q, left.p, rig, origin)},
+        {mav0 / "cam1/sensor.yaml", camera_yaml(rig.right, right.q, right.p, rig, origin)},
         {mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise, origin)},
         {mav0 / "state_groundtruth_estimate0/sensor.yaml",
          fmt::format("sensor_type: visual-inertial\ncomment: {}\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero())},

@@ -41,6 +41,26 @@ std::string empty_folder(const std::string& name) {
   return folder;
 }
 
+TEST(EurocFolder, KeepsTimeOffsetAndRange) {
+  const std::string folder = empty_folder("euroc_offset");
+  StereoRig rig = small_rig();
+  rig.time_offset_s = -0.0075;
+  rig.imu_noise.max_gyro_radps = 8.5;
+  auto recording = EurocFolder::create(folder, rig, "made by hand");
+  ASSERT_TRUE(recording) << recording.error().message;
+  std::vector<ImuSample> readings;
+  for (int i = 0; i < 30; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  for (const Time t : {Time{1'020'000'000}, Time{1'070'000'000}}) ASSERT_TRUE(recording->add({t, pattern(0), pattern(1)}, t));
+  const std::vector<TrajectoryPoint> truth = {{Time{1'020'000'000}, {}, std::nullopt, std::nullopt}};
+  ASSERT_TRUE(recording->finish(readings, truth));
+  const auto data = open_dataset(folder);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ((*data)->rig().time_offset_s, -0.0075);
+  EXPECT_EQ((*data)->rig().imu_noise.max_gyro_radps, 8.5);
+  ASSERT_EQ((*data)->ground_truth().size(), 1u);
+  EXPECT_FALSE((*data)->ground_truth()[0].v_WB) << "a truth of poses alone has no velocity, also not one of zero";
+}
+
 TEST(EurocFolder, ReadsBackWithImagesReadingsAndTruth) {
   const std::string folder = empty_folder("euroc_folder");
   std::vector<ImuSample> readings;

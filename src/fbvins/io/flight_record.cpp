@@ -22,7 +22,8 @@ enum Topic : std::size_t {
   kFixedTransforms,
   kHealth,
   kLandmarks,
-  kMarks
+  kMarks,
+  kTruth
 };
 
 constexpr std::size_t kLargeChunk_bytes = 1'000'000;
@@ -46,6 +47,7 @@ std::vector<McapTopic> topics() {
       topic(kHealthTopic, "diagnostic_msgs/msg/DiagnosticArray"),
       topic(kLandmarksTopic, "sensor_msgs/msg/PointCloud2"),
       topic(kMarksTopic, "rcl_interfaces/msg/Log"),
+      topic(kTruthTopic, "geometry_msgs/msg/PoseStamped"),
   };
 }
 
@@ -182,6 +184,12 @@ Result<void> FlightRecord::add_landmarks(Time t, std::span<const RosLandmark> la
 Result<void> FlightRecord::add_mark(Time t, std::string_view text) {
   if (Result<void> good = check_stamp(t); !good) return good;
   write(kMarks, t, [&](std::string& out) { append_log(out, t, "mark", text.empty() ? "mark" : text); });
+  return flush_if_large();
+}
+
+Result<void> FlightRecord::add_truth(Time t, const Pose<W, B>& T_WB) {
+  if (Result<void> good = check_stamp(t); !good) return good;
+  write(kTruth, t, [&](std::string& out) { append_pose(out, t, "world", T_WB); });
   return flush_if_large();
 }
 

@@ -24,7 +24,7 @@ namespace fbvins {
 
 inline constexpr std::string_view kImuTopic = "/imu", kLeftTopic = "/camera/left", kRightTopic = "/camera/right";
 inline constexpr std::string_view kOdometryTopic = "/odometry", kHealthTopic = "/health", kLandmarksTopic = "/landmarks",
-                                  kMarksTopic = "/marks";
+                                  kMarksTopic = "/marks", kTruthTopic = "/ground_truth";
 /// Attachments at the start.
 inline constexpr std::string_view kCalibrationAttachment = "calibration.yaml", kConfigurationAttachment = "config.yaml";
 
@@ -53,6 +53,8 @@ class FlightRecord {
   /// Landmarks observed in an image, with their positions; needs no Odometry.
   Result<void> add_landmarks(Time t, std::span<const RosLandmark> landmarks);
   Result<void> add_mark(Time t, std::string_view text);
+  /// Where the body was, by another system; a recording that is converted may have it.
+  Result<void> add_truth(Time t, const Pose<W, B>& T_WB);
   Result<void> add_health(Time t, const RosDiagnostic& diagnostic);
 
   /// Writes all that was added to the file.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
@@ -97,6 +98,9 @@ class RecordReader {
     for (auto step : {&RecordReader::check, &RecordReader::read_calibration, &RecordReader::cut})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     warn();
+    const auto by_time = [](const TrajectoryPoint& a, const TrajectoryPoint& b) { return a.t < b.t; };
+    std::stable_sort(out_.ground_truth.begin(), out_.ground_truth.end(), by_time);
+    out_.info.ground_truth_poses = static_cast<int>(out_.ground_truth.size());
     describe(out_);
     if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
     out_.loader = std::make_unique<McapLoader>(std::move(bytes_), name_, out_.rig);
@@ -108,6 +112,7 @@ class RecordReader {
     const std::string& topic = message.channel->topic;
     ends_with_image_ = false;
     if (topic == kImuTopic) take_imu(message);
+    if (topic == kTruthTopic) take_truth(message);
     if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
     if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
   }
@@ -126,6 +131,17 @@ class RecordReader {
       return reader_.complain(message.offset, "a value of the IMU is not a usable number");
     }
     out_.imu.push_back(*sample);
+  }
+
+  void take_truth(const McapMessage& message) {
+    RowCounts& counts = out_.info.ground_truth_rows;
+    ++counts.rows;
+    const std::optional<RosPose> pose = read_pose(message.data);
+    if (!pose || !pose->p.allFinite() || !(std::abs(pose->q.norm() - 1) < 1e-3)) {
+      ++counts.malformed;
+      return reader_.complain(message.offset, "this is not a pose");
+    }
+    out_.ground_truth.push_back({pose->t, {pose->q.normalized(), pose->p}, std::nullopt, std::nullopt});
   }
 
   void take_image(const McapMessage& message, CameraInfo& camera, std::string FrameEntry::*file) {
@@ -156,10 +172,13 @@ class RecordReader {
 
   /// Where the file ends after one image of a frame, it is unknown whether there was another: the frame is left out.
   void drop_half_frame() {
-    if (!reader_.damage().ends_early || !ends_with_image_) return;
+    if (!was_cut_off() || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();
     if (last.left_file.empty() || last.right_file.empty()) out_.frames.pop_back();
   }
+
+  /// Its writer was: what is finished has a summary.
+  bool was_cut_off() const { return reader_.damage().ends_early || reader_.damage().no_summary; }
 
   Result<void> check() {
     const char* lack = nullptr;
@@ -225,7 +244,7 @@ class RecordReader {
     }
     if (damage.parts > 0)
       info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
-    if (damage.ends_early)
+    if (was_cut_off())
       info.warnings.push_back(fmt::format("{}: was cut off while it was written; all up to byte {} is read", name_, damage.end));
     if (info.left.unpaired + info.right.unpaired > 0)
       info.warnings.push_back(
@@ -271,6 +290,21 @@ Result<std::string> recorded_configuration(const std::string& path) {
   for (const McapAttachment& attachment : reader->attachments())
     if (attachment.name == kConfigurationAttachment) return attachment.data;
   return Error{ErrorCode::malformed, fmt::format("{}: holds no configuration", path)};
+}
+
+Trajectory<W> recorded_odometry(const std::string& path) {
+  Trajectory<W> out;
+  const auto bytes = is_mcap(path) ? open_bytes(path) : Error{ErrorCode::not_found, path};
+  if (!bytes) return out;
+  Result<McapReader> reader = McapReader::open(*bytes, path);
+  if (!reader) return out;
+  while (const auto message = reader->next()) {
+    if (message->channel->topic != kOdometryTopic) continue;
+    const std::optional<RosPose> pose = read_odometry(message->data);
+    if (pose && pose->p.allFinite() && std::abs(pose->q.norm() - 1) < 1e-3)
+      out.push_back({pose->t, {pose->q.normalized(), pose->p}});
+  }
+  return out;
 }
 
 }  // namespace fbvins

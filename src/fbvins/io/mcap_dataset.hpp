@@ -18,4 +18,7 @@ Result<DatasetContents> read_mcap(std::shared_ptr<const ByteSource> bytes, const
 /// The configuration that the flight was flown with, as YAML.
 Result<std::string> recorded_configuration(const std::string& path);
 
+/// The poses that a flight record has on /odometry, in its order; none where the file is no record of ours.
+Trajectory<W> recorded_odometry(const std::string& path);
+
 }  // namespace fbvins

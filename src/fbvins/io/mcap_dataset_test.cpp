@@ -244,6 +244,19 @@ TEST_F(FlightRecordTest, MalformedMessagesAreNamedAndLeftOut) {
   EXPECT_TRUE(data.error().message.ends_with(": this is not an IMU reading")) << data.error().message;
 }
 
+TEST_F(FlightRecordTest, TruthOfAConvertedRecordingIsKept) {
+  FlightRecord record = create();
+  ASSERT_TRUE(record.add(reading(0)));
+  ASSERT_TRUE(record.add_truth(Time{kStart_ns}, {so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}}));
+  ASSERT_TRUE(record.add(frame(0)));
+  ASSERT_TRUE(record.finish());
+  const auto data = open_dataset(path_);
+  ASSERT_TRUE(data) << data.error().message;
+  ASSERT_EQ((*data)->ground_truth().size(), 1u);
+  EXPECT_EQ((*data)->ground_truth()[0].T_WB.p, Vec3(1, 2, 3));
+  EXPECT_EQ((*data)->info().ground_truth_poses, 1);
+}
+
 TEST_F(FlightRecordTest, AnImageOfAnotherSizeIsLeftOut) {
   write({reading(0), frame(0), reading(5), StereoFrame{Time{kStart_ns + 5 * kMs}, picture(1, 8, 8), picture(2)}, reading(10),
          frame(10)});

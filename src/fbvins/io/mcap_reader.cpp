@@ -51,7 +51,15 @@ bool McapReader::load_next() {
   const auto kind = static_cast<McapRecord>(in.get<std::uint8_t>());
   const auto length = in.get<std::uint64_t>();
   const std::uint64_t there = bytes_->size() - at - kMcapRecordHead_bytes;
-  if (kind == McapRecord::data_end || kind == McapRecord::footer) return damage_.end = at, next_ = at, false;
+  if (kind == McapRecord::data_end || kind == McapRecord::footer) {
+    const std::uint64_t footer = kind == McapRecord::footer ? at : at + kMcapRecordHead_bytes + length;
+    const std::string bytes = bytes_->read(footer, kMcapRecordHead_bytes + sizeof(std::uint64_t));
+    ByteCursor behind(bytes);
+    const bool is_footer = static_cast<McapRecord>(behind.get<std::uint8_t>()) == McapRecord::footer;
+    behind.skip(sizeof(std::uint64_t));
+    damage_.no_summary = is_footer && behind.get<std::uint64_t>() == 0 && behind.ok();
+    return damage_.end = at, next_ = at, false;
+  }
   if (kind == McapRecord{0}) {
     complain(at, "there is no record here, and what follows cannot be read");
     return cut_off(at);
@@ -68,6 +76,7 @@ bool McapReader::load_next() {
   if (kind == McapRecord::schema || kind == McapRecord::channel || kind == McapRecord::message)
     load_records(at, kMcapRecordHead_bytes + length);
   if (kind == McapRecord::attachment) load_attachment(at + kMcapRecordHead_bytes, length);
+  if (kind == McapRecord::metadata) load_metadata(at + kMcapRecordHead_bytes, length);
   return true;  // other kinds are passed over
 }
 
@@ -152,14 +161,28 @@ void McapReader::load_attachment(std::uint64_t offset, std::uint64_t length) {
   ByteCursor in(bytes);
   in.skip(8 + 8);  // times
   const std::string_view name = take_mcap_text(in);
-  take_mcap_text(in);  // media type
+  const std::string_view media_type = take_mcap_text(in);
   const std::string_view data = in.take(in.get<std::uint64_t>());
   const std::size_t end = in.position();
   const auto checksum = in.get<std::uint32_t>();
   if (!in.ok()) return complain(offset, "this attachment is not what it should be");
   if (checksum != 0 && crc32_of(std::string_view(bytes).substr(0, end)) != checksum)
     return complain(offset, fmt::format("the checksum of the attachment '{}' is wrong", quoted(name)));
-  attachments_.push_back({std::string(name), std::string(data)});
+  attachments_.push_back({std::string(name), std::string(media_type), std::string(data)});
+}
+
+void McapReader::load_metadata(std::uint64_t offset, std::uint64_t length) {
+  if (length > kLargestAttachment_bytes) return;
+  const std::string bytes = bytes_->read(offset, length);
+  ByteCursor in(bytes);
+  McapMetadata out{std::string(take_mcap_text(in)), {}};
+  ByteCursor pairs(take_mcap_text(in));
+  while (in.ok() && pairs.ok() && pairs.left() > 0) {
+    const std::string key(take_mcap_text(pairs));
+    out.values[key] = take_mcap_text(pairs);
+  }
+  if (!in.ok() || !pairs.ok()) return complain(offset, "this metadata is not what it should be");
+  metadata_.push_back(std::move(out));
 }
 
 /// The next message of what is loaded.
@@ -187,8 +210,8 @@ std::optional<McapMessage> McapReader::next_loaded() {
 
 void McapReader::take_schema(ByteCursor& in) {
   const auto id = in.get<std::uint16_t>();
-  const std::string_view name = take_mcap_text(in);
-  if (in.ok()) schemas_.try_emplace(id, name);
+  const std::string_view name = take_mcap_text(in), encoding = take_mcap_text(in), definition = take_mcap_text(in);
+  if (in.ok()) schemas_.try_emplace(id, Schema{std::string(name), std::string(encoding), std::string(definition)});
 }
 
 void McapReader::take_channel(ByteCursor& in, std::uint64_t offset) {
@@ -196,7 +219,9 @@ void McapReader::take_channel(ByteCursor& in, std::uint64_t offset) {
   const std::string_view topic = take_mcap_text(in), encoding = take_mcap_text(in);
   if (!in.ok()) return complain(offset, "this channel is not what it should be");
   const auto known = schemas_.find(schema);
-  channels_.try_emplace(id, McapChannel{std::string(topic), std::string(encoding), known == schemas_.end() ? "" : known->second});
+  const Schema schema_of = known == schemas_.end() ? Schema{} : known->second;
+  channels_.try_emplace(
+      id, McapChannel{std::string(topic), std::string(encoding), schema_of.name, schema_of.encoding, schema_of.definition});
 }
 
 std::optional<McapMessage> McapReader::take_message(std::string_view content, std::uint64_t offset) {

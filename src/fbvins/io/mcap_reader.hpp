@@ -27,7 +27,7 @@
 namespace fbvins {
 
 struct McapChannel {
-  std::string topic, message_encoding, schema_name;
+  std::string topic, message_encoding, schema_name, schema_encoding, definition;
 };
 
 struct McapMessage {
@@ -47,13 +47,19 @@ using McapUnpack =
 using McapPassOver = std::function<bool(Time first, Time last, const std::vector<const McapChannel*>& channels)>;
 
 struct McapAttachment {
-  std::string name, data;
+  std::string name, media_type, data;
+};
+
+struct McapMetadata {
+  std::string name;
+  std::map<std::string, std::string> values;
 };
 
 struct McapDamage {
   int parts = 0;            ///< records and chunks left out
   std::string first;        ///< "file: byte N: sentence" about the first of them
   bool ends_early = false;  ///< no end of data was met: the writer was cut off
+  bool no_summary = false;  ///< the footer names none: allowed, but our records have one unless their writer was cut off
   std::uint64_t end = 0;    ///< offset up to which it was read
 };
 
@@ -68,6 +74,8 @@ class McapReader {
   std::optional<McapMessage> next();
   /// Those read so far.
   const std::vector<McapAttachment>& attachments() const { return attachments_; }
+  const std::vector<McapMetadata>& metadata() const { return metadata_; }
+  const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
   const McapDamage& damage() const { return damage_; }
   /// The records of a compressed chunk again.
   std::string records_of(std::uint64_t chunk) const;
@@ -91,6 +99,7 @@ class McapReader {
   bool load_records(std::uint64_t offset, std::uint64_t length);
   void load_chunk(std::uint64_t offset, std::uint64_t length, bool whole);
   void load_attachment(std::uint64_t offset, std::uint64_t length);
+  void load_metadata(std::uint64_t offset, std::uint64_t length);
   std::optional<McapMessage> next_loaded();
   void take_schema(ByteCursor& in);
   void take_channel(ByteCursor& in, std::uint64_t offset);
@@ -106,9 +115,13 @@ class McapReader {
   std::uint64_t loaded_chunk_ = 0;   ///< the chunk they were unpacked from
   std::size_t position_ = 0;         ///< in loaded_
   bool loaded_whole_ = true;         ///< false: the file ends inside of them
-  std::map<std::uint16_t, std::string> schemas_;
+  struct Schema {
+    std::string name, encoding, definition;
+  };
+  std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, McapChannel> channels_;
   std::vector<McapAttachment> attachments_;
+  std::vector<McapMetadata> metadata_;
   McapDamage damage_;
 };
 

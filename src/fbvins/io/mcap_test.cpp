@@ -13,6 +13,7 @@
 
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/mcap_recover.hpp"
 #include "fbvins/io/mcap_writer.hpp"
 
 namespace fbvins {
@@ -21,6 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::vector<McapTopic> kTopics = {{"/a", "x_msgs/msg/A", "int32 a\n"}, {"/b", "x_msgs/msg/B", "int32 b\n"}};
+
+/// An end of the data, a footer and the magic behind what a writer that was killed has written.
+constexpr std::size_t kProvisionalEnd_bytes = 9 + 4 + 9 + 20 + 8;
 
 struct Said {
   std::string topic, data;
@@ -115,6 +119,43 @@ TEST_F(Mcap, AFileThatIsCutAnywhereIsReadUpToItsLastWholeMessage) {
   }
 }
 
+/// Programs that insist on an end read it: the last bytes are a footer without a summary, and the magic.
+TEST_F(Mcap, AFileWhoseWriterWasKilledHasAnEnd) {
+  const std::vector<Said> said = write_thirty(false);
+  const std::string killed = bytes();
+  EXPECT_TRUE(killed.ends_with(kMcapMagic));
+  McapReader reader = reader_of(killed);
+  EXPECT_EQ(read_all(reader), said);
+  EXPECT_TRUE(reader.damage().no_summary);
+  EXPECT_EQ(reader.damage().parts, 0) << reader.damage().first;
+  fs::remove(path_);
+  write_thirty(true);
+  McapReader whole = reader_of(bytes());
+  (void)read_all(whole);
+  EXPECT_FALSE(whole.damage().no_summary);
+}
+
+TEST_F(Mcap, RecoveredFilesAreWhole) {
+  const std::vector<Said> said = write_thirty(false);
+  const std::string again = folder_ + "/again.mcap";
+  const auto done = recover_mcap(path_, again);
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(done->messages, 30);
+  EXPECT_TRUE(done->was_cut_off);
+  McapReader reader = reader_of(*read_file(again, 1u << 20u));
+  EXPECT_EQ(read_all(reader), said);
+  EXPECT_FALSE(reader.damage().no_summary);
+  EXPECT_EQ(reader.channels().at(0).definition, "int32 a\n");
+  ASSERT_EQ(reader.attachments().size(), 1u);
+  EXPECT_EQ(reader.attachments()[0].media_type, "text/plain");
+  ASSERT_EQ(reader.metadata().size(), 1u);
+  EXPECT_EQ(reader.metadata()[0].values.at("key"), "value");
+  EXPECT_EQ(recover_mcap(path_, again).error().message, again + ": exists already, and a record is never overwritten");
+  const auto part = recover_mcap(path_, folder_ + "/part.mcap", {Time{1010}, Time{1015}});
+  ASSERT_TRUE(part) << part.error().message;
+  EXPECT_EQ(part->messages, 5);
+}
+
 TEST_F(Mcap, NothingWaitsInMemoryAfterFlush) {
   McapWriter file = create();
   std::vector<Said> said;
@@ -152,6 +193,7 @@ TEST_F(Mcap, AChunkTooLargeToLoadIsLeftOutAndNamedOnce) {
   append_le(head, std::uint32_t{12345});  // a checksum
   append_mcap_text(head, "");
   append_le(head, kRecords);
+  fs::resize_file(path_, fs::file_size(path_) - kProvisionalEnd_bytes);
   std::ofstream(path_, std::ios::binary | std::ios::app) << head;
   fs::resize_file(path_, fs::file_size(path_) + kRecords);  // takes no space on the disk
   auto reader = McapReader::open(*open_bytes(path_), "a.mcap");
@@ -163,7 +205,7 @@ TEST_F(Mcap, AChunkTooLargeToLoadIsLeftOutAndNamedOnce) {
 
 TEST_F(Mcap, ZerosAtTheEndAreNoMessages) {
   const std::vector<Said> said = write_thirty(false);
-  McapReader reader = reader_of(bytes() + std::string(5000, '\0'));
+  McapReader reader = reader_of(bytes().substr(0, bytes().size() - kProvisionalEnd_bytes) + std::string(5000, '\0'));
   EXPECT_EQ(read_all(reader), said);
   EXPECT_EQ(reader.damage().parts, 1);
   EXPECT_TRUE(reader.damage().ends_early);

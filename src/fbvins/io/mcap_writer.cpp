@@ -46,6 +46,20 @@ void append_channel(std::string& out, std::uint16_t id, std::uint16_t schema, co
   end_mcap_record(out, start);
 }
 
+/// An end of the data, and a footer that names no summary.
+std::string provisional_end_of_file() {
+  std::string out;
+  const std::size_t end = begin_mcap_record(out, McapRecord::data_end);
+  append_le(out, std::uint32_t{0});
+  end_mcap_record(out, end);
+  const std::size_t footer = begin_mcap_record(out, McapRecord::footer);
+  append_le(out, std::uint64_t{0});
+  append_le(out, std::uint64_t{0});
+  append_le(out, std::uint32_t{0});
+  end_mcap_record(out, footer);
+  return out.append(kMcapMagic);
+}
+
 }  // namespace
 
 Result<McapWriter> McapWriter::create(const std::string& path, const McapLabel& label, const std::vector<McapTopic>& topics) {
@@ -74,9 +88,10 @@ McapWriter::McapWriter(std::string path, FileDescriptor file, const std::vector<
 }
 
 /// A part that did not fit is removed, so that the file stays readable.
-Result<void> McapWriter::write_all(const std::string& bytes) {
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t now = ::pwrite(file_.number(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(end_ + done));
+Result<void> McapWriter::write_all(const std::string& bytes, bool provisional_end) {
+  const std::string all = provisional_end ? bytes + provisional_end_of_file() : bytes;
+  for (std::size_t done = 0; done < all.size();) {
+    const ssize_t now = ::pwrite(file_.number(), all.data() + done, all.size() - done, static_cast<off_t>(end_ + done));
     if (now < 0 && errno == EINTR) continue;
     if (now <= 0) {
       const int problem = now < 0 ? errno : ENOSPC;
@@ -210,7 +225,7 @@ Result<void> McapWriter::finish() {
   const std::size_t start = begin_mcap_record(end, McapRecord::data_end);
   append_le(end, std::uint32_t{0});  // no checksum of all: the chunks have their own
   end_mcap_record(end, start);
-  Result<void> written = write_all(end + summary(end_ + end.size()) + std::string(kMcapMagic));
+  Result<void> written = write_all(end + summary(end_ + end.size()) + std::string(kMcapMagic), false);
   sync();
   return written;
 }

@@ -8,7 +8,8 @@
 //   file->finish();                             // index, statistics, footer
 //
 // What begin_message() takes is in memory until flush(): how long is the choice of the caller, who has a clock.
-// A file without finish() is whole up to its last chunk; it only lacks what programs seek by.
+// A file without finish() is whole up to its last chunk, and has an end: behind each chunk lies an empty one, over which the next
+// chunk is written. It only lacks the index by which programs seek, and those that insist on an end read it, too.
 #pragma once
 
 #include <cstdint>
@@ -70,7 +71,8 @@ class McapWriter {
   };
 
   McapWriter(std::string path, FileDescriptor file, const std::vector<McapTopic>& topics);
-  Result<void> write_all(const std::string& bytes);
+  /// `provisional_end`: with an end behind it that is not counted, so that it is overwritten.
+  Result<void> write_all(const std::string& bytes, bool provisional_end = true);
   Result<void> write_record(const std::string& record);
   void close_chunk();
   void clear_chunk();

@@ -124,6 +124,13 @@ void append_odometry(std::string& out, const RosOdometry& o) {
   put(cdr, twist_covariance);
 }
 
+void append_pose(std::string& out, Time t, std::string_view frame, const Pose<W, B>& T) {
+  CdrWriter cdr(out);
+  put_header(cdr, t, frame);
+  put(cdr, T.p);
+  put(cdr, T.q);
+}
+
 void append_path(std::string& out, Time t, const Trajectory<W>& path) {
   CdrWriter cdr(out);
   put_header(cdr, t, kOdometryFrame);

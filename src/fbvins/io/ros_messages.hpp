@@ -50,6 +50,9 @@ struct RosOdometry {
 };
 void append_odometry(std::string& out, const RosOdometry& odometry);
 
+/// geometry_msgs/PoseStamped.
+void append_pose(std::string& out, Time t, std::string_view frame, const Pose<W, B>& T);
+
 /// nav_msgs/Path of poses in W.
 void append_path(std::string& out, Time t, const Trajectory<W>& path);
 

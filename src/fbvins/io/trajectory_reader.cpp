@@ -88,7 +88,7 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, const std::string
     const RowVerdict verdict = commas ? parse_euroc_row(fields, row.point, problem) : parse_tum_row(fields, row.point, problem);
     row.t = row.point.t;
     row.no_pose = says_no_pose(fields);
-    return verdict;
+    return row.no_pose && verdict == RowVerdict::not_finite ? RowVerdict::good : verdict;
   });
   if (!rows) return rows.error();
   TrajectoryFile out;

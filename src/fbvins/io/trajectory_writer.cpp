@@ -25,6 +25,10 @@ void append(std::string& row, const Vec3& v) {
   fmt::format_to(std::back_inserter(row), ",{:.9f},{:.9f},{:.9f}", v.x(), v.y(), v.z());
 }
 
+void append_health(std::string& row, const Odometry& o) {
+  fmt::format_to(std::back_inserter(row), ",{},{},{}\n", to_string(o.health.state), to_string(o.health.reason), o.reset_counter);
+}
+
 }  // namespace
 
 Result<TumWriter> TumWriter::create(const std::string& path) {
@@ -48,6 +52,13 @@ Result<OdometryCsvWriter> OdometryCsvWriter::create(const std::string& path) {
 
 void OdometryCsvWriter::write(const Odometry& o) {
   std::string row = fmt::format("{}", o.t.ns);
+  constexpr int kNumbers = 16 + 21;
+  if (!o.health.has_pose()) {
+    for (int i = 0; i < kNumbers; ++i) row += ",nan";
+    append_health(row, o);
+    file_.write(row);
+    return;
+  }
   append(row, o.T_WB.p);
   const Quat& q = o.T_WB.q;
   fmt::format_to(std::back_inserter(row), ",{:.9f},{:.9f},{:.9f},{:.9f}", q.w(), q.x(), q.y(), q.z());
@@ -56,7 +67,7 @@ void OdometryCsvWriter::write(const Odometry& o) {
   append(row, o.bias.accel_mps2);
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) fmt::format_to(std::back_inserter(row), ",{:.9e}", o.pose_covariance(i, j));
-  fmt::format_to(std::back_inserter(row), ",{},{},{}\n", to_string(o.health.state), to_string(o.health.reason), o.reset_counter);
+  append_health(row, o);
   file_.write(row);
 }
 

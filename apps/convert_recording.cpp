@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/convert_recording.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/io/euroc_folder.hpp"
+#include "fbvins/io/flight_record.hpp"
+#include "fbvins/io/mcap_dataset.hpp"
+#include "fbvins/io/mcap_recover.hpp"
+#include "fbvins/io/trajectory.hpp"
+
+namespace fbvins::app {
+namespace {
+
+/// Takes events and truth in order of time; finish() completes the output.
+struct Sink {
+  std::function<Result<void>(const SensorEvent&)> add;
+  std::function<Result<void>(const TrajectoryPoint&)> add_truth;
+  std::function<Result<void>(const StampedPose<W>&)> add_odometry;
+  std::function<Result<void>()> finish;
+};
+
+template <class Writer>
+Sink sink_of(std::shared_ptr<Writer> writer) {
+  return {[writer](const SensorEvent& event) { return std::visit([&](const auto& value) { return writer->add(value); }, event); },
+          [writer](const TrajectoryPoint& point) { return writer->add_truth(point.t, point.T_WB); },
+          [writer](const StampedPose<W>& pose) { return writer->add_odometry(pose.t, pose.T); },
+          [writer] { return writer->finish(); }};
+}
+
+/// EuRoC's readings and truth are written at the end, the truth with its velocity and biases.
+struct EurocSink {
+  std::string path;
+  EurocFolder folder;
+  std::vector<TrajectoryPoint> truth;
+  std::vector<ImuSample> readings;
+  Trajectory<W> odometry;
+
+  Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
+  Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t); }
+  Result<void> add_truth(Time, const Pose<W, B>&) { return {}; }
+  Result<void> add_odometry(Time t, const Pose<W, B>& T_WB) { return odometry.push_back({t, T_WB}), Result<void>{}; }
+  Result<void> finish() {
+    if (Result<void> done = folder.finish(readings, truth); !done || odometry.empty()) return done;
+    auto tum = TumWriter::create(path + "/odometry_tum.txt");
+    if (!tum) return tum.error();
+    for (const StampedPose<W>& pose : odometry) tum->write(pose.t, pose.T);
+    return tum->close();
+  }
+};
+
+/// A record without its outputs: the calibration that they rest on is not this one.
+struct RecordOfInputs {
+  FlightRecord record;
+  template <class Event>
+  Result<void> add(const Event& event) {
+    return record.add(event);
+  }
+  Result<void> add_truth(Time t, const Pose<W, B>& T_WB) { return record.add_truth(t, T_WB); }
+  Result<void> add_odometry(Time, const Pose<W, B>&) { return {}; }
+  Result<void> finish() { return record.finish(); }
+};
+
+/// Poses up to an event, before it.
+template <class Row>
+class InBetween {
+ public:
+  InBetween(const std::vector<Row>& rows, const std::function<Result<void>(const Row&)>& add) : rows_(rows), add_(add) {}
+  Result<void> add_until(Time t) {
+    for (; next_ < rows_.size() && rows_[next_].t <= t; ++next_)
+      if (Result<void> taken = add_(rows_[next_]); !taken) return taken;
+    return {};
+  }
+
+ private:
+  const std::vector<Row>& rows_;
+  const std::function<Result<void>(const Row&)>& add_;
+  std::size_t next_ = 0;
+};
+
+Result<Sink> make_sink(const std::string& out, const Dataset& data) {
+  if (std::filesystem::exists(out)) return Error{ErrorCode::unwritable, fmt::format("{} exists already", out)};
+  if (out.ends_with(".bag")) {
+    auto bag = Ros1BagWriter::create(out, data.rig(), data.frames().front().t);
+    if (!bag) return bag.error();
+    return sink_of(std::make_shared<Ros1BagWriter>(*std::move(bag)));
+  }
+  if (out.ends_with(".mcap")) {
+    auto record = FlightRecord::create(out, data.rig());
+    if (!record) return record.error();
+    return sink_of(std::make_shared<RecordOfInputs>(RecordOfInputs{*std::move(record)}));
+  }
+  auto folder = EurocFolder::create(out, data.rig(), "converted by fbvins");
+  if (!folder) return folder.error();
+  return sink_of(std::make_shared<EurocSink>(EurocSink{out, *std::move(folder), data.ground_truth(), {}, {}}));
+}
+
+/// All messages of a record, or those of a part of it with the second of readings before.
+Result<int> copy_record(Dataset& data, const ConvertedRecord& record, const std::string& out,
+                        const std::function<void(int frames)>& on_frame) {
+  constexpr Duration kLeadIn{1'000'000'000}, kBehind{100'000'000};
+  const DatasetInfo& info = data.info();
+  const McapPart part = record.whole ? McapPart{} : McapPart{info.first_image - kLeadIn, info.last_image + kBehind};
+  const auto copied = recover_mcap(record.path, out, part);
+  if (!copied) return copied.error();
+  on_frame(info.frames);
+  return info.frames;
+}
+
+}  // namespace
+
+Result<int> convert_recording(Dataset& data, const ConvertedRecord& record, const std::string& out,
+                              const std::function<void(int frames)>& on_frame) {
+  if (!record.path.empty() && out.ends_with(".mcap")) return copy_record(data, record, out, on_frame);
+  Result<Sink> sink = make_sink(out, data);
+  if (!sink) return sink.error();
+  int frames = 0;
+  const Trajectory<W> odometry = record.path.empty() ? Trajectory<W>{} : recorded_odometry(record.path);
+  InBetween truth(data.ground_truth(), sink->add_truth);
+  InBetween poses(odometry, sink->add_odometry);
+  const auto add_until = [&](Time t) {
+    const Result<void> taken = truth.add_until(t);
+    return taken ? poses.add_until(t) : taken;
+  };
+  while (auto event = data.next()) {
+    const Time t = std::visit([](const auto& value) { return value.t; }, *event);
+    if (Result<void> taken = add_until(t); !taken) return taken.error();
+    if (Result<void> taken = sink->add(*event); !taken) return taken.error();
+    if (std::holds_alternative<StereoFrame>(*event)) on_frame(++frames);
+  }
+  constexpr Time kEnd{std::numeric_limits<std::int64_t>::max()};
+  if (Result<void> taken = record.whole ? add_until(kEnd) : truth.add_until(kEnd); !taken) return taken.error();
+  if (Result<void> done = sink->finish(); !done) return done.error();
+  return frames;
+}
+
+}  // namespace fbvins::app

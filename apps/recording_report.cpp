@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/recording_report.hpp"
+
+#include <vector>
+
+namespace fbvins::app {
+namespace {
+
+std::vector<double> row_major(const auto& pose) {
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = pose.R();
+  return {R(0, 0), R(0, 1), R(0, 2), pose.p.x(), R(1, 0), R(1, 1), R(1, 2), pose.p.y(),
+          R(2, 0), R(2, 1), R(2, 2), pose.p.z(), 0,       0,       0,       1};
+}
+
+std::vector<double> parameters_of(const Camera& camera) {
+  const std::array<double, 4> f = camera.intrinsics();
+  std::vector<double> out(f.begin(), f.end());
+  const std::vector<double> k = camera.distortion();
+  out.insert(out.end(), k.begin(), k.end());
+  return out;
+}
+
+Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info) {
+  return Json{{"images", info.listed},
+              {"rows_left_out", info.rows.bad()},
+              {"unpaired", info.unpaired},
+              {"missing", info.images.missing},
+              {"model", camera.model_name()},
+              {"width", camera.width()},
+              {"height", camera.height()},
+              {"fx_fy_cx_cy_distortion", parameters_of(camera)},
+              {"T_BC_row_major", row_major(T_BC)}};
+}
+
+}  // namespace
+
+Json describe(const Dataset& data) {
+  const DatasetInfo& info = data.info();
+  const StereoRig& rig = data.rig();
+  Json json{{"name", info.name}, {"format", info.format}, {"frames", info.frames}};
+  json["duration_s"] = (info.last_image - info.first_image).seconds();
+  json["first_image_ns"] = info.first_image.ns;
+  json["last_image_ns"] = info.last_image.ns;
+  json["image_rate_hz"] = info.image_rate_hz;
+  json["longest_image_gap_s"] = info.longest_image_gap.seconds();
+  json["imu"] = Json{{"samples", info.imu_samples},
+                     {"rows_left_out", info.imu_rows.bad()},
+                     {"rate_hz", info.imu_rate_hz},
+                     {"longest_gap_s", info.longest_imu_gap.seconds()},
+                     {"first_ns", info.first_imu.ns},
+                     {"last_ns", info.last_imu.ns},
+                     {"gyro_noise_density_radps_rthz", rig.imu_noise.gyro_noise_density_radps_rthz},
+                     {"accel_noise_density_mps2_rthz", rig.imu_noise.accel_noise_density_mps2_rthz},
+                     {"gyro_random_walk_radps2_rthz", rig.imu_noise.gyro_random_walk_radps2_rthz},
+                     {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
+  json["left"] = camera_json(rig.left, rig.T_BC0, info.left);
+  json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
+  json["baseline_m"] = rig.T_C1C0().p.norm();
+  json["time_offset_s"] = rig.time_offset_s;
+  json["ground_truth_poses"] = info.ground_truth_poses;
+  json["warnings"] = info.warnings;
+  return json;
+}
+
+Json describe(const BagSurvey& bag) {
+  Json topics = Json::array();
+  for (const TopicSurvey& t : bag.topics)
+    topics.push_back({{"name", t.name}, {"type", t.type}, {"messages", t.messages}, {"rate_hz", t.rate_hz}, {"first", t.first}});
+  return Json{{"format", bag.format},     {"duration_s", bag.duration_s},
+              {"topics", topics},         {"left", bag.left},
+              {"right", bag.right},       {"imu", bag.imu},
+              {"question", bag.question}, {"no_calibration", bag.no_calibration},
+              {"warnings", bag.warnings}};
+}
+
+}  // namespace fbvins::app

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/mcap_recover.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+#include <vector>
+
+#include "fbvins/io/mcap_reader.hpp"
+#include "fbvins/io/mcap_writer.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::size_t kLargeChunk_bytes = 1'000'000;
+
+/// All that is not a message, which is known when the file has been read once.
+struct Contents {
+  std::vector<McapTopic> topics;
+  std::map<std::string, std::size_t> numbers;  ///< by topic
+  std::vector<McapAttachment> attachments;
+  std::vector<McapMetadata> metadata;
+  RecoveredMcap found;
+};
+
+Result<McapReader> open(const std::string& path) {
+  const auto bytes = open_bytes(path);
+  if (!bytes) return bytes.error();
+  return McapReader::open(*bytes, path);
+}
+
+Result<Contents> survey(const std::string& path) {
+  Result<McapReader> reader = open(path);
+  if (!reader) return reader.error();
+  Contents out;
+  while (reader->next()) ++out.found.messages;
+  const McapDamage& damage = reader->damage();
+  out.found.parts_left_out = damage.parts;
+  out.found.first_damage = damage.first;
+  out.found.was_cut_off = damage.ends_early || damage.no_summary;
+  if (out.found.messages == 0)
+    return Error{ErrorCode::malformed, damage.parts > 0 ? damage.first : path + ": holds no whole message"};
+  for (const auto& [id, channel] : reader->channels()) {
+    if (channel.message_encoding != "cdr" || channel.schema_encoding != "ros2msg")
+      return Error{ErrorCode::unsupported, fmt::format("{}: '{}' has messages in {} by {}: only those of ROS 2 are written again",
+                                                       path, channel.topic, channel.message_encoding, channel.schema_encoding)};
+    if (out.numbers.try_emplace(channel.topic, out.topics.size()).second)
+      out.topics.push_back({channel.topic, channel.schema_name, channel.definition});
+  }
+  out.attachments = reader->attachments();
+  out.metadata = reader->metadata();
+  return out;
+}
+
+Result<void> write(const Contents& contents, McapReader& reader, McapWriter& writer, const McapPart& part, int& written) {
+  for (const McapAttachment& a : contents.attachments)
+    if (Result<void> done = writer.attach(a.name, a.media_type, a.data); !done) return done;
+  for (const McapMetadata& m : contents.metadata)
+    if (Result<void> done = writer.add_metadata(m.name, m.values); !done) return done;
+  while (const auto message = reader.next()) {
+    if (message->log_time < part.from || message->log_time >= part.to) continue;
+    writer.begin_message(contents.numbers.at(message->channel->topic), message->log_time) += message->data;
+    writer.end_message();
+    ++written;
+    if (writer.waiting_bytes() < kLargeChunk_bytes) continue;
+    if (Result<void> done = writer.flush(); !done) return done;
+  }
+  return writer.finish();
+}
+
+}  // namespace
+
+Result<RecoveredMcap> recover_mcap(const std::string& in, const std::string& out, const McapPart& part) {
+  Result<Contents> contents = survey(in);
+  if (!contents) return contents.error();
+  Result<McapReader> reader = open(in);
+  if (!reader) return reader.error();
+  Result<McapWriter> writer = McapWriter::create(out, {"ros2", "fbvins"}, contents->topics);
+  if (!writer) return writer.error();
+  contents->found.messages = 0;
+  const Result<void> written = write(*contents, *reader, *writer, part, contents->found.messages);
+  if (!written) {
+    std::error_code ignored;
+    std::filesystem::remove(out, ignored);
+    return written.error();
+  }
+  return contents->found;
+}
+
+}  // namespace fbvins
