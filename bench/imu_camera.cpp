@@ -2,7 +2,7 @@
 // How accurately cameras are found on an IMU: simulated hand-held recordings of a board, corners with noise, against the truth.
 //
 //   imu_camera [--recordings 20] [--duration 72] [--corner-sigma 0.2] [--cameras 2] [--first-seed 100] [--spacing 0]
-//              [--line-delay 0] [--axes] [--free-stereo] [--trouble]
+//              [--line-delay 0] [--axes] [--free-stereo] [--trouble] [--turning X Y Z] [--moving 1] [--jitter 0]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -65,6 +65,7 @@ int main(int argc, char** argv) {
   test::HandHeldOptions scene;
   scene.duration_s = 72;
   ImuCameraOptions options;
+  std::vector<double> turning;
   bool free_stereo = false, trouble = false;
   app.add_option("--recordings", recordings);
   app.add_option("--first-seed", first_seed);
@@ -74,11 +75,14 @@ int main(int argc, char** argv) {
   app.add_option("--tremor", scene.tremor);
   app.add_option("--line-delay", scene.line_delay_s);
   app.add_option("--jitter", scene.stamp_jitter_s, "of the images' stamps, s");
+  app.add_option("--turning", turning, "factor on the turns about x, y and z of the IMU");
+  app.add_option("--moving", scene.moving, "factor on the translation");
   app.add_option("--spacing", options.knot_spacing_s);
   app.add_flag("--axes", options.imu_axes);
   app.add_flag("--free-stereo", free_stereo);
   app.add_flag("--trouble", trouble, "outliers, blur, dropped readings and spikes, the board out of view");
   CLI11_PARSE(app, argc, argv);
+  if (turning.size() == 3) scene.turning = Vec3(turning[0], turning[1], turning[2]);
   options.line_delay = scene.line_delay_s != 0;
   if (options.imu_axes) {
     scene.axes.gyro << 1.01, 0.004, -0.006, 0.003, 0.995, 0.002, -0.001, 0.005, 1.003;

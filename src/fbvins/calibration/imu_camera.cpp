@@ -15,13 +15,15 @@
 namespace fbvins {
 namespace {
 
-constexpr double kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
+constexpr double kNoBound = 1e9, kFirstSigma_px = 1, kFirstHuber_px = 10;  // while start values are coarse
 constexpr double kHuber_sigmas = 3;
 constexpr double kCornerOutlier_sigmas = 4, kReadingOutlier_sigmas = 6;
 constexpr int kMostIterations = 40, kRounds = 3;
 constexpr double kTogether = 1.08;    // what all corners of an image are off by together, over their noise, that is more than chance
 constexpr double kNoticed = 1.3, kDoubtful = 3, kContradiction = 10;  // and that is doubtful, or no calibration any more
 constexpr double kFreedCamera_m = 0.02, kFreedCamera_rad = 0.05;
+constexpr double kWorstScale = 0.015, kSure = 5, kUnsureScale = 0.02;  // of gravity and of the board's size: wrong, for certain
+constexpr double kWorstAxes = 0.15;
 constexpr double kBlurred = 1.6;      // residuals of an image over those of the median one
 constexpr double kLooseGravity_mps2 = 10;
 constexpr double kRough = 1.1;        // residuals of the readings in sigmas above which closer knots are tried
@@ -196,15 +198,20 @@ Magnitudes magnitudes(Fitter& fitter) {
 
 std::optional<Error> check_magnitudes(const Magnitudes& m, const Board& board, const ImuCameraOptions& options) {
   const double given = options.gravity_mps2, off = std::abs(m.gravity_mps2 - given);
-  if (m.gravity_mps2 > 0.9 && m.gravity_mps2 < 1.1) return error("gravity is measured as 1.0: the accelerometer gives g, m/s^2 are needed");
-  const double tolerance = options.imu_axes ? 0.1 : 0.015;
-  if (off > tolerance * given && off > 5 * m.gravity_sigma)
+  if (off > kWorstScale * given && off > kSure * m.gravity_sigma)
     return error(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}", m.gravity_mps2,
-                             m.gravity_sigma, off < 0.1 * given && !options.imu_axes ? ", or has to be estimated" : ""));
-  if (std::abs(m.scale - 1) > 0.015 && std::abs(m.scale - 1) > 5 * m.scale_sigma)
+                             m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
+  if (std::abs(m.scale - 1) > kWorstScale && std::abs(m.scale - 1) > kSure * m.scale_sigma)
     return error(fmt::format("the board is not as large as its file says: {:.1f} +- {:.1f} mm by the accelerometer instead of {:.1f} mm",
                              1e3 * m.scale * board.size_m, 1e3 * m.scale_sigma * board.size_m, 1e3 * board.size_m));
   return std::nullopt;
+}
+
+std::optional<Error> check_axes(const ImuAxes& axes) {
+  const double off = std::max((axes.gyro - Mat3::Identity()).cwiseAbs().maxCoeff(), (axes.accel - Mat3::Identity()).cwiseAbs().maxCoeff());
+  if (off < kWorstAxes) return std::nullopt;
+  return error(fmt::format("the scale or an axis of the IMU would have to be wrong by {:.0f} %: its unit is wrong, or the recording does not "
+                           "determine it", 100 * off));
 }
 
 std::optional<Error> check_determined(const CameraImuResult& result, const Vec3& turning_radps) {
@@ -227,6 +234,8 @@ std::optional<Error> check_determined(const CameraImuResult& result, const Vec3&
 
 void remark(CameraImuResult& r) {
   const auto say = [&](std::string text) { r.remarks.push_back(std::move(text)); };
+  if (r.board_scale_sigma > kUnsureScale)
+    say(fmt::format("whether the board is as large as its file says is known to {:.0f} % only: move the rig more", 100 * r.board_scale_sigma));
   if (r.corner_sigma_px > 0.7)
     say(fmt::format("corners are seen to {:.2f} px only: blurred images, a wrong lens, or a rolling shutter", r.corner_sigma_px));
   if (r.image_factor > kNoticed)
@@ -247,7 +256,8 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   Result<CalibrationStart> start = gather_imu_camera(input, options);
   if (!start) return start.error();
   start->setup.free_board_scale = true;
-  start->setup.gravity_sigma_mps2 = kLooseGravity_mps2;
+  // Where the accelerometer's scale is asked for, gravity must be known.
+  start->setup.gravity_sigma_mps2 = options.imu_axes ? options.gravity_sigma_mps2 : kLooseGravity_mps2;
   start->setup.corner_sigma_px = std::max(kFirstSigma_px, start->setup.corner_sigma_px);
   start->setup.corner_huber = kFirstHuber_px / start->setup.corner_sigma_px;
   Fitter fitter(*std::move(start));
@@ -272,7 +282,7 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   setup = fitter.problem().setup();
   setup.free_board_scale = false;
   setup.gravity_sigma_mps2 = options.gravity_sigma_mps2;
-  setup.corner_huber = 1e9;  // outliers are known by now
+  setup.corner_huber = kNoBound;  // outliers are known by now
   fitter.problem().fix_board_scale();
   fitter.change(setup);
   if (!fitter.fit() || !fitter.judge() || !fitter.fit() || !fitter.judge()) return undetermined();
@@ -284,6 +294,7 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   result.gyro_rms_sigmas = fitter.gyro_rms(), result.accel_rms_sigmas = fitter.accel_rms();
   result.iterations = fitter.iterations();
   remark(result);
+  if (const auto wrong = check_axes(result.axes)) return *wrong;
   if (const auto wrong = check_determined(result, fitter.start().turning_radps)) return *wrong;
   return result;
 }

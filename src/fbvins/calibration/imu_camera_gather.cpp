@@ -19,6 +19,7 @@ constexpr double kShortest_s = 8;
 constexpr std::size_t kFewestViews = 40;
 constexpr double kPoorFit = 2.5;               // of a pose, over the median
 constexpr double kWorstFit_px = 4;             // median over the images of one camera
+constexpr double kStray_sigmas = 6, kStray_px = 1;
 constexpr double kMargin_s = 0.2;              // of the path before the first and after the last image
 constexpr double kAlone_s = 2;                 // readings further than that from an image with the board are not used
 constexpr double kWeakestTurning_radps = 0.1;  // spread about the second axis
@@ -100,6 +101,9 @@ Result<TurnMatch> check_turns(const TurnMatch& match) {
     return error(fmt::format("the gyroscope turns {:.1f} times as fast as the camera: it gives degrees/s, rad/s are needed", match.gain));
   if (match.gain > 1.25 || match.gain < 0.8)
     return error(fmt::format("the gyroscope turns {:.3g} times as fast as the camera: its unit or scale is wrong", match.gain));
+  if (match.spread_radps(0) < 2 * kWeakestTurning_radps)
+    return error(fmt::format("the rig was hardly turned ({:.1f}, {:.1f} and {:.1f} degrees/s about its axes): turn it quickly about all three",
+                             match.spread_radps(0) * degrees, match.spread_radps(1) * degrees, match.spread_radps(2) * degrees));
   if (match.spread_radps(1) < kWeakestTurning_radps)
     return error(fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
                              match.spread_radps(1) * degrees));
@@ -183,6 +187,15 @@ std::vector<CalibrationView> views_of(const ImuCameraInput& input, const BoardVi
   return out;
 }
 
+/// Corners that are far from where this image's own pose puts them.
+void leave_out_strays(const Camera& camera, const SeenPose& pose, CalibrationView& view) {
+  const Pose<Cn, T> T_CT = pose.T_TC.inverse();
+  for (WeightedCorner& corner : view.corners) {
+    const std::optional<Vec2> pixel = camera.project(T_CT * corner.p_T);
+    corner.used = pixel && (*pixel - corner.pixel).norm() < kStray_sigmas * pose.sigma_px + kStray_px;
+  }
+}
+
 }  // namespace
 
 Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
@@ -198,7 +211,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   if (!match) return match.error();
   auto T_BC = first_extrinsics(input, poses, gyro, *match);
   if (!T_BC) return T_BC.error();
-  std::vector<BodyPose> body = body_poses(poses, *T_BC, match->time_offset_s);
+  std::vector<BodyPose> body = body_poses(*located, *T_BC, match->time_offset_s);
 
   // The path covers what readings and images have in common; its time 0 is `begin_s` after the first reading.
   const double begin_s = std::max(gyro.first_s(), body.front().t_s - kMargin_s);
@@ -208,29 +221,34 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
                              std::max(0.0, end_s - begin_s), kShortest_s));
   for (BodyPose& pose : body) pose.t_s -= begin_s;
   std::erase_if(body, [&](const BodyPose& p) { return p.t_s < 0 || p.t_s > end_s - begin_s; });
-
   CalibrationData data;
   data.cameras = input.cameras;
-  std::map<std::pair<int, std::int64_t>, double> fits;
+  for (const ImuSample& s : input.imu)
+    if (const double t_s = (s.t - origin).seconds() - begin_s; t_s >= 0 && t_s <= end_s - begin_s)
+      data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2});
+  body = agreeing_with_gyro(body, data.readings, match->gyro_bias_radps);
+  if (body.size() < kFewestViews) return error("the board's poses do not follow the turns of the IMU: is it the right board file?");
+
+  std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
   for (const auto& camera : *located)
-    for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = pose.sigma_px;
+    for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = &pose;
   std::vector<double> sigmas;
   for (const BoardView& view : input.views) {
     const double t_s = (view.t - origin).seconds(), at_s = t_s + match->time_offset_s - begin_s;
     const auto fit = fits.find({view.camera, std::llround(t_s * 1e6)});
     if (fit == fits.end() || at_s < 0.25 * kMargin_s || at_s > end_s - begin_s - 0.25 * kMargin_s) continue;
-    sigmas.push_back(fit->second);
-    for (CalibrationView& v : views_of(input, view, t_s - begin_s, options.line_delay)) data.views.push_back(std::move(v));
+    sigmas.push_back(fit->second->sigma_px);
+    for (CalibrationView& v : views_of(input, view, t_s - begin_s, options.line_delay)) {
+      leave_out_strays(input.cameras[static_cast<std::size_t>(v.camera)], *fit->second, v);
+      data.views.push_back(std::move(v));
+    }
   }
   std::map<double, int> sharing;
   for (const CalibrationView& view : data.views) ++sharing[view.t_s];
   for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
-  for (const ImuSample& s : input.imu) {
-    const double t_s = (s.t - origin).seconds() - begin_s;
-    if (t_s < 0 || t_s > end_s - begin_s) continue;
-    const auto next = std::lower_bound(body.begin(), body.end(), t_s, [](const BodyPose& p, double t) { return p.t_s < t; });
-    const bool near = (next != body.end() && next->t_s - t_s < kAlone_s) || (next != body.begin() && t_s - std::prev(next)->t_s < kAlone_s);
-    data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2, near});
+  for (CalibrationReading& r : data.readings) {
+    const auto next = std::lower_bound(body.begin(), body.end(), r.t_s, [](const BodyPose& p, double t) { return p.t_s < t; });
+    r.used = (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
   }
 
   const double rate_hz = rate_of(input.imu);
@@ -244,6 +262,8 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   Vec3 force_T = Vec3::Zero();
   for (const CalibrationReading& r : data.readings) force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
   state.gravity_T = -force_T;
+  if (force_T.norm() > 0.8 && force_T.norm() < 1.2)
+    return error(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
 
   CalibrationSetup setup;
   setup.corner_sigma_px = std::max(0.02, median(sigmas));

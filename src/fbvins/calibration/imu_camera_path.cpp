@@ -7,6 +7,9 @@
 namespace fbvins {
 namespace {
 
+constexpr double kWindow_s = 4;       // in which the gyroscope's drift is nothing
+constexpr double kTilted_rad = 0.05, kTilted = 5;
+
 /// Turns since the first reading by the gyroscope alone.
 class TurnTable {
  public:
@@ -57,6 +60,35 @@ int knots_for(double duration_s, double spacing_s) {
 }
 
 }  // namespace
+
+std::vector<BodyPose> agreeing_with_gyro(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings,
+                                         const Vec3& gyro_bias_radps) {
+  const TurnTable turns(readings, gyro_bias_radps);
+  // Where the gyroscope's frame lies in T, by each pose: the same, but for a slow drift.
+  std::vector<Quat> frames;
+  for (const BodyPose& pose : poses) frames.push_back((pose.T_TB.q * turns.at(pose.t_s).conjugate()).normalized());
+  std::vector<double> off_rad;
+  std::size_t begin = 0, end = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    while (poses[begin].t_s < poses[i].t_s - kWindow_s) ++begin;
+    while (end < poses.size() && poses[end].t_s <= poses[i].t_s + kWindow_s) ++end;
+    Vec3 middle;
+    for (int k = 0; k < 3; ++k) {
+      std::vector<double> all;
+      for (std::size_t j = begin; j < end; ++j) all.push_back(so3_log(frames[i].conjugate() * frames[j])(k));
+      std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+      middle(k) = all[all.size() / 2];
+    }
+    off_rad.push_back(middle.norm());
+  }
+  std::vector<double> sorted = off_rad;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double limit_rad = std::max(kTilted_rad, kTilted * sorted[sorted.size() / 2]);
+  std::vector<BodyPose> out;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (off_rad[i] <= limit_rad) out.push_back(poses[i]);
+  return out;
+}
 
 PoseSpline first_path(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings, const Vec3& gyro_bias_radps,
                       double spacing_s, double duration_s) {

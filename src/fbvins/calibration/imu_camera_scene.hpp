@@ -198,7 +198,7 @@ class HandHeld {
       const Vec3 p_C = (T_TB * out_.truth.T_BC[static_cast<std::size_t>(camera)]).inverse() * p_T;
       if (p_C.z() < 0.1) return std::nullopt;
       pixel = lens.project(p_C);
-      if (!pixel) return std::nullopt;
+      if (!pixel || !lens.inside(*pixel, -100)) return std::nullopt;
       row = pixel->y();
     }
     if (!lens.inside(*pixel, 4)) return std::nullopt;

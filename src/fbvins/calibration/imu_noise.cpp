@@ -14,8 +14,8 @@ namespace {
 constexpr double kWindow_s = 1;
 constexpr double kShortest_s = 20, kComfortable_s = 180;
 constexpr double kMovingGyro_radps = 0.05, kMovingAccel_mps2 = 0.6;  // standard deviations within a window of what does not rest
-constexpr double kTurned_radps = 0.01, kPushed_mps2 = 0.1;           // a window's mean beside that of the recording's middle
-constexpr double kShaken = 3;                                        // standard deviation within a window over the usual one
+constexpr double kTurned_radps = 0.01, kPushed_mps2 = 0.1;           // a window's mean beside that of the one before
+constexpr double kShaken = 3;                                        // standard deviation within a window over a quiet one's
 constexpr double kGap_s = 0.1;
 constexpr double kWorstMisfit = 6;
 
@@ -24,16 +24,6 @@ Error error(std::string message) { return {ErrorCode::invalid_argument, std::mov
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
   return values[values.size() / 2];
-}
-
-Vec3 median(const std::vector<Vec3>& values) {
-  Vec3 out;
-  for (int k = 0; k < 3; ++k) {
-    std::vector<double> all;
-    for (const Vec3& v : values) all.push_back(v(k));
-    out(k) = median(std::move(all));
-  }
-  return out;
 }
 
 /// A second of readings.
@@ -65,25 +55,26 @@ struct Rest {
   int disturbed = 0;               ///< windows that do not rest
 };
 
-/// The longest stretch of windows that are as quiet as most.
+/// The spread of a quiet window: of the quietest tenth, the noisiest.
+double quiet_spread(const std::vector<Window>& windows, double Window::*spread) {
+  std::vector<double> all;
+  for (const Window& w : windows) all.push_back(w.*spread);
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 10), all.end());
+  return all[all.size() / 10];
+}
+
+/// The longest stretch of quiet windows whose means stay what they were.
 Rest longest_rest(const std::vector<Window>& windows) {
-  std::vector<double> gyro_spreads, accel_spreads;
-  std::vector<Vec3> gyros, accels;
-  for (const Window& w : windows) {
-    gyro_spreads.push_back(w.gyro_spread), accel_spreads.push_back(w.accel_spread);
-    gyros.push_back(w.gyro), accels.push_back(w.accel);
-  }
-  const double gyro_limit = std::min(kMovingGyro_radps, kShaken * median(gyro_spreads));
-  const double accel_limit = std::min(kMovingAccel_mps2, kShaken * median(accel_spreads));
-  const Vec3 gyro = median(gyros), accel = median(accels);
+  const double gyro_limit = std::min(kMovingGyro_radps, kShaken * quiet_spread(windows, &Window::gyro_spread));
+  const double accel_limit = std::min(kMovingAccel_mps2, kShaken * quiet_spread(windows, &Window::accel_spread));
   Rest rest, now;
-  bool resting = false;
+  const Window* before = nullptr;
   for (const Window& w : windows) {
-    const bool quiet = w.gyro_spread <= gyro_limit && w.accel_spread <= accel_limit && (w.gyro - gyro).norm() <= kTurned_radps &&
-                       (w.accel - accel).norm() <= kPushed_mps2 && !w.gap;
+    const bool quiet = w.gyro_spread <= gyro_limit && w.accel_spread <= accel_limit && !w.gap;
+    const bool goes_on = quiet && before && (w.gyro - before->gyro).norm() <= kTurned_radps && (w.accel - before->accel).norm() <= kPushed_mps2;
     rest.disturbed += !quiet;
-    if (quiet && !resting) now.begin = w.begin;
-    resting = quiet;
+    if (quiet && !goes_on) now.begin = w.begin;
+    before = quiet ? &w : nullptr;
     if (quiet) now.end = w.end;
     if (quiet && now.end - now.begin > rest.end - rest.begin) rest.begin = now.begin, rest.end = now.end;
   }
