@@ -211,6 +211,13 @@ double ImuCameraProblem::apply_step() {
   return evaluate(false);
 }
 
+double ImuCameraProblem::cost_after(Eigen::VectorXd step) {
+  step_ = std::move(step);
+  const double cost = apply_step();
+  undo_step();
+  return cost;
+}
+
 std::optional<Eigen::MatrixXd> ImuCameraProblem::calibration_covariance() {
   if (!system_->factorise()) return std::nullopt;
   return system_->inverse_tail(layout_.end - layout_.begin);

@@ -115,6 +115,10 @@ class ImuCameraProblem {
   /// The board's size is as its file says.
   void fix_board_scale() { state_.board_scale = 1; }
   const CalibrationLayout& layout() const { return layout_; }
+  /// Of the cost by all unknowns, at the state last linearised.
+  const Eigen::VectorXd& gradient() const { return system_->b(); }
+  /// The cost after a step, which is taken back.
+  double cost_after(Eigen::VectorXd step);
 
   /// Of the calibration's unknowns, at the state last linearised; nullopt where they are not determined.
   std::optional<Eigen::MatrixXd> calibration_covariance();
