@@ -26,6 +26,7 @@ examples:
   fbvins simulate fast --seed 7 --seconds 60 --out fast7
   fbvins simulate normal --set camera.line_delay_us=30 --set world.kind=hall --out rolling
   fbvins simulate --trajectory MH_01.csv --imu imu0.csv --out again     a real flight and its real IMU
+  fbvins simulate board --out board                 a calibration board instead of a flight (docs/calibration.md)
   fbvins simulate dim --options > dim.yaml          every option of a preset with unit, range and meaning
 )";
 
@@ -106,7 +107,10 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->add_flag("--landmarks", arguments->landmarks, "write the corners of the world's surfaces, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
-  command->callback([arguments, &exit_code] { exit_code = simulate_flight(*arguments); });
+  add_simulate_board_command(*command, exit_code);
+  command->callback([arguments, command, &exit_code] {
+    if (command->get_subcommands().empty()) exit_code = simulate_flight(*arguments);
+  });
 }
 
 }  // namespace fbvins::app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The subcommands of `fbvins`, of whatever program (fbvins.cpp, fbvins_live.cpp, fbvins_tools.cpp,
-// fbvins_bags.cpp, fbvins_lab.cpp). Each adds itself to the
+// fbvins_bags.cpp, fbvins_calibrate.cpp, fbvins_lab.cpp). Each adds itself to the
 // command line and, when chosen, sets exit_code.
 #pragma once
 
@@ -30,8 +30,12 @@ inline constexpr const char* kFlyDescription = "fly a mission by the odometry's 
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
 inline constexpr const char* kConvertDescription = "write a recording as ROS bag, flight record or EuRoC folder";
+inline constexpr const char* kCalibrateDescription = "calibrate cameras and IMU from a recording of a board";
+inline constexpr const char* kTargetDescription = "make a calibration board to print";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
 
+void add_calibrate_command(CLI::App& program, int& exit_code);
+void add_target_command(CLI::App& program, int& exit_code);
 void add_run_command(CLI::App& program, int& exit_code);
 void add_eval_command(CLI::App& program, int& exit_code);
 void add_info_command(CLI::App& program, int& exit_code);
@@ -39,6 +43,8 @@ void add_doctor_command(CLI::App& program, int& exit_code);
 void add_convert_command(CLI::App& program, int& exit_code);
 void add_config_command(CLI::App& program, int& exit_code);
 void add_simulate_command(CLI::App& program, int& exit_code);
+/// Below `simulate`.
+void add_simulate_board_command(CLI::App& simulate, int& exit_code);
 void add_report_command(CLI::App& program, int& exit_code);
 void add_bench_command(CLI::App& program, int& exit_code);
 void add_fly_command(CLI::App& program, int& exit_code);

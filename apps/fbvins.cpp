@@ -15,6 +15,8 @@ int main(int argc, char** argv) {
 #endif
                           },
                           {
+                              {"calibrate", kCalibrateDescription, "fbvins-calibrate"},
+                              {"target", kTargetDescription, "fbvins-calibrate"},
                               {"convert", kConvertDescription, kBags},
                               {"live", kLiveDescription, "fbvins-live"},
                               {"view", kViewDescription, "fbvins-live"},

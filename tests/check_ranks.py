@@ -17,14 +17,14 @@ RANKS = {
     "types": 2, "camera": 2,
     "imu": 3, "features": 3, "io": 3, "eval": 3, "mavlink": 3,
     "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4, "calibration": 4,
-    "pipeline": 5, "checkup": 5,
+    "pipeline": 5, "checkup": 5, "boards": 5,
     "live": 6, "doctor": 6,
     "config": 7, "ros2": 7, "v4l2": 7, "web": 7, "realsense": 7, "flight": 7,
     "report": 8,
     "experiment": 9, "tuning": 9,
 }
 # Modules that make or evaluate data lie in lab/; nothing outside lab/ includes them.
-LABORATORY = {"sim", "flight", "report", "experiment", "tuning"}
+LABORATORY = {"sim", "boards", "flight", "report", "experiment", "tuning"}
 # The only includes within a rank (from, to): a camera rig consists of values of types.
 ALLOWED_WITHIN_RANK = {("camera", "types")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')

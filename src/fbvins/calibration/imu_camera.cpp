@@ -59,7 +59,7 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   fit.change(setup);
   if (!fit.solve() || !fit.judge() || !fit.solve() || !fit.judge()) return undetermined();
   fit.problem().linearise();
-  CameraImuResult result = make_result(fit.problem(), fit.start());
+  CameraImuResult result = make_result(fit.problem(), fit.start(), input.variations);
   result.measured_gravity_mps2 = measured.gravity_mps2, result.measured_gravity_sigma_mps2 = measured.gravity_sigma;
   result.board_scale = measured.scale, result.board_scale_sigma = measured.scale_sigma;
   result.image_factor = fit.image_factor();

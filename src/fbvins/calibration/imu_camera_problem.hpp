@@ -122,6 +122,8 @@ class ImuCameraProblem {
 
   /// Of the calibration's unknowns, at the state last linearised; nullopt where they are not determined.
   std::optional<Eigen::MatrixXd> calibration_covariance();
+  /// How the calibration moves if the rig's lenses and extrinsics do, by one standard deviation (C15); after calibration_covariance().
+  Eigen::VectorXd response(const RigVariation& variation);
   /// Standard deviations of the biases at node `index`, after calibration_covariance().
   ImuBias bias_sigma(int index) const;
   /// Degrees of freedom by random signs (C14), after calibration_covariance().
@@ -155,6 +157,7 @@ class ImuCameraProblem {
   double add_bias_walk(bool build);
   double add_smoothness(bool build);
   double add_priors(bool build);
+  double add_images(bool build);  ///< what the rig's numbers enter
   double add_camera_prior(std::size_t camera, bool build);
 
   ViewMotion view_motion(const CalibrationView& view, SplineJacobian* J) const;

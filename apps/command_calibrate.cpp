@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "apps/calibration_report.hpp"
+#include "apps/commands.hpp"
+#include "apps/progress.hpp"
+#include "apps/run_output.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/calibration/detect_board.hpp"
+#include "fbvins/calibration/imu_noise.hpp"
+#include "fbvins/calibration/target_file.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/file_source.hpp"
+#include "fbvins/io/imu_file.hpp"
+#include "fbvins/io/yaml_reader.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(Lenses and extrinsics of one to eight cameras, and with an IMU their place on it and the clocks' offset, from a recording of a
+board (docs/calibration.md). RECORDING is a folder or zip in EuRoC's layout, cam0 to cam7 and imu0; calibrations in it are not used.
+Writes camchain-imucam.yaml and imu.yaml (Kalibr's), calibration.json (Basalt's), camera_info_camN.yaml (ROS), summary.json.
+
+examples:
+  fbvins calibrate board --target april.yaml --out rig
+  fbvins calibrate board --target april.yaml --model auto --cameras-only
+  fbvins calibrate --detections detections.csv --imu imu0.csv --target april.yaml --out rig
+  fbvins calibrate --imu-noise rest --out rig                    the IMU's noise, from a recording at rest
+)";
+
+struct Arguments {
+  std::string recording, detections, target, imu, imu_calibration, imu_noise, out = "out/calibration";
+  std::vector<std::string> models = {"pinhole-radtan"}, resolutions;
+  int threads = 2, max_views = 600;
+  bool save_detections = false, cameras_only = false, quiet = false;
+  ImuCameraOptions imu_options;
+};
+
+/// What is calibrated from.
+struct Material {
+  Detections detections;
+  std::vector<ImuSample> imu;
+  std::optional<ImuNoise> imu_noise;
+  std::vector<std::string> remarks;
+};
+
+Result<Material> detect(const Arguments& a, const Board& board) {
+  Result<BoardRecording> recording = BoardRecording::open(a.recording);
+  if (!recording) return recording.error();
+  Progress progress(recording->images(), a.quiet);
+  const auto next = [&] { return recording->next(); };
+  Result<BoardSearch> found = detect_board(board, next, {.threads = a.threads, .progress = [&](int done) { progress.update(done); }});
+  if (!found) return Error{found.error().code, fmt::format("{}: {}", a.recording, found.error().message)};
+  Material out{std::move(found->detections), recording->imu(), recording->imu_noise(), {}};
+  if (found->unreadable > 0)
+    out.remarks.push_back(fmt::format("{} images could not be read, the first: {}", found->unreadable, found->first_unreadable));
+  return out;
+}
+
+/// "752x480": of all cameras, or one a camera.
+Result<void> set_sizes(const std::vector<std::string>& texts, Detections& detections) {
+  for (int k = 0; k < detections.camera_count() && !texts.empty(); ++k) {
+    const std::string& text = texts[texts.size() == 1 ? 0 : std::min<std::size_t>(k, texts.size() - 1)];
+    ImageSize size;
+    char behind = 0;
+    if (std::sscanf(text.c_str(), "%dx%d%c", &size.width, &size.height, &behind) != 2 || size.width < 1 || size.height < 1)
+      return Error{ErrorCode::invalid_argument, fmt::format("--resolution: '{}' is no size such as 752x480", text)};
+    detections.sizes[k] = size;
+  }
+  return {};
+}
+
+Result<Material> gather(const Arguments& a, const Board& board) {
+  Material out;
+  if (a.detections.empty()) {
+    Result<Material> found = detect(a, board);
+    if (!found) return found;
+    out = *std::move(found);
+  } else {
+    Result<Detections> read = read_detections(a.detections);
+    if (!read) return read.error();
+    out.detections = *std::move(read);
+    if (Result<void> set = set_sizes(a.resolutions, out.detections); !set) return set.error();
+  }
+  if (!a.imu.empty()) {
+    Result<std::vector<ImuSample>> imu = read_imu_csv(a.imu);
+    if (!imu) return imu.error();
+    out.imu = *std::move(imu);
+  }
+  if (!a.imu_calibration.empty()) {
+    Result<std::string> text = read_file(a.imu_calibration, 1u << 20u);
+    if (!text) return text.error();
+    Result<ImuNoise> noise = parse_kalibr_imu({a.imu_calibration, *text});
+    if (!noise) return noise.error();
+    out.imu_noise = *noise;
+  }
+  if (a.cameras_only) out.imu.clear();
+  return out;
+}
+
+/// The rate as it is, since the noise of a reading depends on it.
+ImuNoise noise_of(const Material& material, std::vector<std::string>& remarks) {
+  if (!material.imu_noise) remarks.push_back("no noise of the IMU is given (--imu-calibration): the defaults are taken, and the weight of its readings follows their residuals");
+  ImuNoise noise = material.imu_noise.value_or(ImuNoise{});
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 1; i < material.imu.size(); ++i) steps.push_back((material.imu[i].t - material.imu[i - 1].t).ns);
+  if (steps.empty()) return noise;
+  std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
+  if (steps[steps.size() / 2] > 0) noise.rate_hz = 1e9 / static_cast<double>(steps[steps.size() / 2]);
+  return noise;
+}
+
+/// Refused input: it could be read, but does not determine what is asked for.
+int refuse(const Error& error) {
+  fail(error.message);
+  return kEstimationFailed;
+}
+
+int calibrate(const Arguments& a) {
+  if (a.recording.empty() == a.detections.empty()) return fail("give a recording or --detections");
+  if (a.target.empty()) return fail("--target is missing: the board's description (`fbvins target` writes one)");
+  const Result<Board> board = load_target(a.target);
+  if (!board) return fail(board.error().message);
+  const Result<Material> material = gather(a, *board);
+  if (!material) return fail(material.error().message);
+  std::error_code error;
+  std::filesystem::create_directories(a.out, error);
+  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+  if (a.save_detections)
+    if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done) return fail(done.error().message);
+
+  CalibrationOutcome outcome;
+  outcome.board = *board;
+  outcome.remarks = material->remarks;
+  CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
+  if (!a.quiet) options.tell = [](const std::string& what) { note(what); };
+  Result<CameraCalibration> cameras = calibrate_cameras(material->detections, *board, options);
+  if (!cameras) return refuse(cameras.error());
+  outcome.cameras = *std::move(cameras);
+  if (!material->imu.empty()) {
+    if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
+    outcome.imu_noise = noise_of(*material, outcome.remarks);
+    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
+    for (const CalibratedCamera& camera : outcome.cameras.cameras) {
+      input.cameras.push_back(camera.camera);
+      input.T_CnC0.push_back(camera.T_CnC0);
+    }
+    Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
+    if (!imu) return refuse({imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
+    outcome.imu = *std::move(imu);
+  }
+  if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);
+  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(outcome), bold(a.out));
+  return kOk;
+}
+
+int measure_noise(const Arguments& a) {
+  std::vector<ImuSample> readings;
+  if (std::filesystem::path(a.imu_noise).extension() == ".csv") {
+    Result<std::vector<ImuSample>> read = read_imu_csv(a.imu_noise);
+    if (!read) return fail(read.error().message);
+    readings = *std::move(read);
+  } else {
+    const Result<BoardRecording> recording = BoardRecording::open(a.imu_noise);
+    if (!recording) return fail(recording.error().message);
+    readings = recording->imu();
+  }
+  const Result<ImuNoiseResult> found = measure_imu_noise(readings);
+  if (!found) return refuse(found.error());
+  std::error_code error;
+  std::filesystem::create_directories(a.out, error);
+  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
+  const std::string text = imu_noise_to_kalibr(*found, "/imu0");
+  if (Result<void> done = write_text(a.out + "/imu.yaml", text); !done) return fail(done.error().message);
+  if (a.quiet) return kOk;
+  fmt::print("{:.1f} s at rest\n{}", found->duration_s, text);
+  for (const std::string& warning : found->warnings) fmt::print("note: {}\n", warning);
+  fmt::print("written to {}\n", bold(a.out + "/imu.yaml"));
+  return kOk;
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& program, int& exit_code) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("calibrate", kCalibrateDescription);
+  command->footer(kExamples);
+  command->add_option("RECORDING", a->recording, "folder or zip in EuRoC's layout, with cam0 to cam7");
+  command->add_option("--target", a->target, "the board, as Kalibr describes it");
+  command->add_option("--detections", a->detections, "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
+  command->add_option("--resolution", a->resolutions, "size of the images with --detections, such as 752x480; one, or one a camera")->delimiter(',');
+  command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");
+  command->add_option("--imu-calibration", a->imu_calibration, "the IMU's noise: Kalibr's imu.yaml");
+  command->add_option("--model", a->models, "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
+  command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
+  command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
+  command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")->capture_default_str();
+  command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest (folder or imu0/data.csv)");
+  command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")->check(CLI::Range(10, 100000))->capture_default_str();
+  command->add_option("--threads", a->threads, "threads that look for the board")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_flag("--save-detections", a->save_detections, "write detections.csv");
+  command->add_option("--out", a->out, "folder for the results")->capture_default_str();
+  command->add_flag("--quiet", a->quiet, "print nothing but errors");
+  command->callback([a, &exit_code] { exit_code = a->imu_noise.empty() ? calibrate(*a) : measure_noise(*a); });
+}
+
+}  // namespace fbvins::app

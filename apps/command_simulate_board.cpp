@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/progress.hpp"
+#include "apps/terminal.hpp"
+#include "fbvins/boards/board_flight.hpp"
+#include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/calibration/target_file.hpp"
+
+namespace fbvins::app {
+namespace {
+
+constexpr const char* kExamples =
+    R"(A stereo rig held by hand before a board in a room: images with blur and noise, IMU, exact truth in the folder's own calibration.
+The same options and seed give the same bytes.
+
+examples:
+  fbvins simulate board --out board && fbvins calibrate board --target board/target.yaml
+  fbvins simulate board --lens ds --seconds 30 --seed 7 --out wide
+)";
+
+struct Arguments {
+  BoardFlightOptions options;
+  std::string target, out;
+  bool quiet = false;
+};
+
+int render(Arguments& a) {
+  if (!a.target.empty()) {
+    const Result<Board> board = load_target(a.target);
+    if (!board) return fail(board.error().message);
+    a.options.board = *board;
+  }
+  Progress progress(static_cast<int>(a.options.seconds * a.options.image_rate_hz), a.quiet);
+  const Result<void> done = simulate_board(a.options, a.out, [&](int images, int) { progress.update(images); });
+  if (!done) return fail(done.error().message);
+  if (!a.quiet) fmt::print("{} in {}, with target.yaml\n", a.options.board.describe(), bold(a.out));
+  return kOk;
+}
+
+}  // namespace
+
+void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = simulate.add_subcommand("board", "render a recording of a calibration board");
+  command->footer(kExamples);
+  command->add_option("--out", a->out, "folder for the recording")->required();
+  command->add_option("--target", a->target, "the board; left out: AprilGrid, 6 x 6 tags of 88 mm");
+  command->add_option("--lens", a->options.lens, "lens model of both cameras")->check(CLI::IsMember(lens_names()))->capture_default_str();
+  command->add_option("--seconds", a->options.seconds, "length")->check(CLI::Range(1.0, 3600.0))->capture_default_str();
+  command->add_option("--rate", a->options.image_rate_hz, "images a second")->check(CLI::Range(0.5, 200.0))->capture_default_str();
+  command->add_option("--exposure", a->options.exposure_ms, "ms, in which the motion blurs")->check(CLI::Range(0.0, 50.0))->capture_default_str();
+  command->add_option("--blur", a->options.blur_px, "px, of the lens")->check(CLI::Range(0.0, 5.0))->capture_default_str();
+  command->add_option("--noise", a->options.noise, "grey values")->check(CLI::Range(0.0, 50.0))->capture_default_str();
+  command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")->check(CLI::Range(-400.0, 400.0))->capture_default_str();
+  command->add_option("--seed", a->options.seed, "of motion and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
+  command->callback([a, &exit_code] { exit_code = render(*a); });
+}
+
+}  // namespace fbvins::app

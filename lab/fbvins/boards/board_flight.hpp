@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// A rendered recording of a calibration board with exact truth, as an EuRoC folder. One thread calls; the same options give the
+// same bytes.
+//
+//   Result<void> done = simulate_board({.seconds = 30}, "board", [](int done, int all) { ... });
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "fbvins/calibration/board.hpp"
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/core/result.hpp"
+
+namespace fbvins {
+
+struct BoardFlightOptions {
+  Board board;
+  std::string lens = "pinhole-radtan";  ///< as Camera::model_name() names it
+  double seconds = 60;
+  double image_rate_hz = 20;
+  double exposure_ms = 2;      ///< blurs by motion
+  double blur_px = 0.6;        ///< of the lens, standard deviation
+  double noise = 2;            ///< of a grey value, standard deviation
+  double time_offset_ms = 5;   ///< stamp of the IMU less that of the image at the same instant
+  int seed = 1;
+};
+
+/// The rig that takes the images: what a calibration should find.
+Result<StereoRig> board_flight_rig(const BoardFlightOptions& options);
+
+/// Writes folder/mav0 with the true calibration in its sensor.yaml files, and target.yaml beside it.
+Result<void> simulate_board(const BoardFlightOptions& options, const std::string& folder, const std::function<void(int done, int all)>& progress);
+
+}  // namespace fbvins

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a printed board looks like, point by point: for simulated images. A value; any thread.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fbvins/calibration/board.hpp"
+#include "fbvins/calibration/tag_family.hpp"
+#include "fbvins/core/result.hpp"
+
+namespace fbvins {
+
+class BoardPattern {
+ public:
+  static Result<BoardPattern> create(const Board& board);
+
+  /// Whether the point (m, in T) is black; nullopt beyond the sheet of paper.
+  std::optional<bool> black(double x_m, double y_m) const;
+
+ private:
+  explicit BoardPattern(const Board& board) : board_(board) {}
+
+  Board board_;
+  std::vector<TagCells> tags_;
+};
+
+}  // namespace fbvins

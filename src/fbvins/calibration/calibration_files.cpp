@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/calibration_files.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "fbvins/camera/lens_numbers.hpp"
+
+namespace fbvins {
+namespace {
+
+/// 17 digits name a double without loss.
+std::string list(const std::vector<double>& values) {
+  std::string out;
+  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "" : ", ", value);
+  return "[" + out + "]";
+}
+
+template <class To, class From>
+std::string matrix(const std::string& name, const Pose<To, From>& T) {
+  const Mat3 R = T.R();
+  std::string out = fmt::format("  {}:\n", name);
+  for (int row = 0; row < 3; ++row) out += "  - " + list({R(row, 0), R(row, 1), R(row, 2), T.p[row]}) + "\n";
+  return out + "  - [0.0, 0.0, 0.0, 1.0]\n";
+}
+
+std::string basalt_lens(const Camera& camera) {
+  const std::array<double, 4> f = camera.intrinsics();
+  const std::vector<double> k = camera.distortion();
+  std::string out = fmt::format("\"fx\": {:.17g}, \"fy\": {:.17g}, \"cx\": {:.17g}, \"cy\": {:.17g}", f[0], f[1], f[2], f[3]);
+  const auto add = [&](const char* name, double value) { out += fmt::format(", \"{}\": {:.17g}", name, value); };
+  const std::string model = camera.model_name();
+  if (model == "ds") add("xi", k[0]), add("alpha", k[1]);
+  if (model == "eucm") add("alpha", k[0]), add("beta", k[1]);
+  if (model == "pinhole-equidistant")
+    for (int i = 0; i < 4; ++i) add(fmt::format("k{}", i + 1).c_str(), k[i]);
+  if (model == "pinhole-radtan") {
+    add("k1", k[0]), add("k2", k[1]), add("p1", k[2]), add("p2", k[3]);
+    for (int i = 3; i <= 6; ++i) add(fmt::format("k{}", i).c_str(), 0);
+    // Basalt ends the model where it stops growing; 0: it searches for the radius itself.
+    add("rpmax", 0);
+  }
+  return out;
+}
+
+const char* basalt_name(const std::string& model) {
+  if (model == "pinhole-radtan") return "pinhole-radtan8";
+  if (model == "pinhole-equidistant") return "kb4";
+  return model == "ds" ? "ds" : "eucm";
+}
+
+std::string three(double value) { return list({value, value, value}); }
+
+}  // namespace
+
+RigCalibration rig_calibration(const CameraCalibration& cameras) {
+  RigCalibration out;
+  for (const CalibratedCamera& camera : cameras.cameras) {
+    out.cameras.push_back(camera.camera);
+    out.T_CnC0.push_back(camera.T_CnC0);
+  }
+  return out;
+}
+
+RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImuResult& imu, const ImuNoise& noise) {
+  RigCalibration out = rig_calibration(cameras);
+  for (const CameraOnImu& camera : imu.cameras) out.T_BC.push_back(camera.T_BC);
+  out.time_offset_s = imu.time_offset_s;
+  out.imu_noise = noise;
+  return out;
+}
+
+std::string to_kalibr_camchain(const RigCalibration& rig) {
+  std::string out;
+  for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+    const KalibrCamera camera = kalibr_camera(rig.cameras[k]);
+    out += fmt::format("cam{}:\n", k);
+    if (!rig.T_BC.empty()) out += matrix("T_cam_imu", rig.T_BC[k].inverse());
+    if (k > 0) out += matrix("T_cn_cnm1", rig.T_CnC0[k] * rig.T_CnC0[k - 1].inverse());
+    const std::vector<double> no_distortion(4, 0.0);
+    out += fmt::format("  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n  resolution: [{}, {}]\n"
+                       "  rostopic: /cam{}/image_raw\n",
+                       camera.model, list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
+                       list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
+    if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {:.17g}\n", rig.time_offset_s);
+  }
+  return out;
+}
+
+std::string to_kalibr_imu(const ImuNoise& noise) {
+  return fmt::format("accelerometer_noise_density: {:.17g}\naccelerometer_random_walk: {:.17g}\ngyroscope_noise_density: {:.17g}\n"
+                     "gyroscope_random_walk: {:.17g}\nrostopic: /imu0\nupdate_rate: {:.17g}\n",
+                     noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz, noise.gyro_noise_density_radps_rthz,
+                     noise.gyro_random_walk_radps2_rthz, noise.rate_hz);
+}
+
+Result<std::string> to_basalt(const RigCalibration& rig) {
+  std::string poses, lenses, sizes, vignettes;
+  for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+    const std::string model = rig.cameras[k].model_name();
+    if (model == "omni-radtan") return Error{ErrorCode::unsupported, "Basalt has no model of omni-radtan lenses"};
+    const Pose<Cn, C0> T = rig.T_CnC0[k];
+    const Pose<B, Cn> T_BC = rig.T_BC.empty() ? Pose<B, Cn>(T.inverse().q, T.inverse().p) : rig.T_BC[k];
+    const char* comma = k > 0 ? ",\n" : "\n";
+    poses += fmt::format("{}      {{\"px\": {:.17g}, \"py\": {:.17g}, \"pz\": {:.17g}, \"qx\": {:.17g}, \"qy\": {:.17g}, \"qz\": {:.17g}, \"qw\": {:.17g}}}",
+                         comma, T_BC.p.x(), T_BC.p.y(), T_BC.p.z(), T_BC.q.x(), T_BC.q.y(), T_BC.q.z(), T_BC.q.w());
+    lenses += fmt::format("{}      {{\"camera_type\": \"{}\", \"intrinsics\": {{{}}}}}", comma, basalt_name(model), basalt_lens(rig.cameras[k]));
+    sizes += fmt::format("{}[{}, {}]", k > 0 ? ", " : "", rig.cameras[k].width(), rig.cameras[k].height());
+  }
+  const ImuNoise& n = rig.imu_noise;
+  const std::string zeros9 = list(std::vector<double>(9, 0.0)), zeros12 = list(std::vector<double>(12, 0.0));
+  return fmt::format(
+      "{{\n  \"value0\": {{\n    \"T_imu_cam\": [{}\n    ],\n    \"intrinsics\": [{}\n    ],\n    \"resolution\": [{}],\n"
+      "    \"calib_accel_bias\": {},\n    \"calib_gyro_bias\": {},\n    \"imu_update_rate\": {:.17g},\n"
+      "    \"accel_noise_std\": {},\n    \"gyro_noise_std\": {},\n    \"accel_bias_std\": {},\n    \"gyro_bias_std\": {},\n"
+      "    \"cam_time_offset_ns\": {},\n    \"vignette\": []\n  }}\n}}\n",
+      poses, lenses, sizes, zeros9, zeros12, n.rate_hz, three(n.accel_noise_density_mps2_rthz), three(n.gyro_noise_density_radps_rthz),
+      three(n.accel_random_walk_mps3_rthz), three(n.gyro_random_walk_radps2_rthz), std::llround(1e9 * rig.time_offset_s));
+}
+
+Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
+  const Camera& c = rig.cameras[camera];
+  const std::string model = c.model_name();
+  if (!model.starts_with("pinhole")) return Error{ErrorCode::unsupported, fmt::format("ROS has no model of {} lenses", model)};
+  const std::array<double, 4> f = c.intrinsics();
+  std::vector<double> d = c.distortion();
+  if (model == "pinhole-radtan") d.push_back(0);  // k3
+  return fmt::format(
+      "image_width: {}\nimage_height: {}\ncamera_name: cam{}\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: {}\n"
+      "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  data: {}\n"
+      "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+      "projection_matrix:\n  rows: 3\n  cols: 4\n  data: {}\n",
+      c.width(), c.height(), camera, list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(),
+      list(d), list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
+}
+
+}  // namespace fbvins

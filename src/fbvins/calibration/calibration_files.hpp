@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// A calibration as the files that other programs read. Pure functions.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fbvins/calibration/camera_calibration.hpp"
+#include "fbvins/calibration/imu_camera.hpp"
+
+namespace fbvins {
+
+/// What all formats need of a rig.
+struct RigCalibration {
+  std::vector<Camera> cameras;
+  std::vector<Pose<Cn, C0>> T_CnC0;
+  std::vector<Pose<B, Cn>> T_BC;  ///< empty: without an IMU
+  double time_offset_s = 0;       ///< t_imu = t_image + time_offset_s
+  ImuNoise imu_noise;
+};
+
+RigCalibration rig_calibration(const CameraCalibration& cameras);
+RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImuResult& imu, const ImuNoise& noise);
+
+/// Kalibr's camchain.yaml; with an IMU its camchain-imucam.yaml. Numbers with 17 digits.
+std::string to_kalibr_camchain(const RigCalibration& rig);
+/// Kalibr's imu.yaml.
+std::string to_kalibr_imu(const ImuNoise& noise);
+/// Basalt's calibration.json; an error where a lens model is none of its own. Without an IMU cam0 is the body.
+Result<std::string> to_basalt(const RigCalibration& rig);
+/// ROS CameraInfo of one camera, as camera_calibration writes it; an error for models that ROS does not know.
+Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera);
+
+}  // namespace fbvins

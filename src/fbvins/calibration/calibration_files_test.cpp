@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/calibration_files.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/calibration/simulated_board.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/yaml_reader.hpp"
+
+namespace fbvins {
+namespace {
+
+RigCalibration rig_with(const Camera& camera) {
+  const SimulatedRig simulated = simulated_stereo(camera);
+  RigCalibration rig{simulated.cameras, simulated.T_CnC0, {}, 0.0123456789, {}};
+  const Pose<B, Cn> T_BC0(so3_exp(Vec3(0.3, -1.2, 0.9)), Vec3(0.02, -0.03, 0.05));
+  const Pose<B, C0> same(T_BC0.q, T_BC0.p);
+  rig.T_BC = {T_BC0, same * rig.T_CnC0[1].inverse()};
+  rig.imu_noise.gyro_noise_density_radps_rthz = 1.23456789e-4;
+  return rig;
+}
+
+TEST(CalibrationFiles, WhatIsWrittenForKalibrIsReadBack) {
+  for (const Camera& camera : example_cameras()) {
+    const RigCalibration rig = rig_with(camera);
+    const auto read = parse_kalibr_camchain({"camchain-imucam.yaml", to_kalibr_camchain(rig)});
+    ASSERT_TRUE(read) << camera.model_name() << ": " << read.error().message;
+    EXPECT_EQ(read->left.model_name(), camera.model_name());
+    EXPECT_EQ(read->left.width(), camera.width());
+    EXPECT_EQ(lens_parameters(read->left.model()), lens_parameters(rig.cameras[0].model()));
+    EXPECT_EQ(lens_parameters(read->right.model()), lens_parameters(rig.cameras[1].model()));
+    EXPECT_LT((read->T_BC0.p - rig.T_BC[0].p).norm() + (read->T_BC1.p - rig.T_BC[1].p).norm(), 1e-12);
+    EXPECT_LT(so3_log(read->T_BC1.q.conjugate() * rig.T_BC[1].q).norm(), 1e-12);
+    EXPECT_EQ(read->time_offset_s, rig.time_offset_s);
+  }
+}
+
+TEST(CalibrationFiles, TheSecondCameraIsAlsoFoundThroughTheFirst) {
+  const RigCalibration rig = rig_with(example_cameras()[0]);
+  std::string text = to_kalibr_camchain(rig);
+  const std::size_t second = text.find("T_cam_imu", text.find("cam1:"));
+  text.replace(second, 9, "T_ignored");  // then T_cn_cnm1 counts
+  const auto read = parse_kalibr_camchain({"camchain-imucam.yaml", text});
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_LT((read->T_BC1.p - rig.T_BC[1].p).norm(), 1e-12);
+}
+
+TEST(CalibrationFiles, NoiseOfTheImuIsReadBack) {
+  const RigCalibration rig = rig_with(example_cameras()[0]);
+  const auto read = parse_kalibr_imu({"imu.yaml", to_kalibr_imu(rig.imu_noise)});
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->gyro_noise_density_radps_rthz, rig.imu_noise.gyro_noise_density_radps_rthz);
+  EXPECT_EQ(read->rate_hz, rig.imu_noise.rate_hz);
+}
+
+TEST(CalibrationFiles, ModelsThatAFormatDoesNotKnowAreRefused) {
+  EXPECT_FALSE(to_basalt(rig_with(example_cameras()[4])));
+  EXPECT_TRUE(to_basalt(rig_with(example_cameras()[2])));
+  EXPECT_FALSE(to_ros_camera_info(rig_with(example_cameras()[2]), 0));
+  EXPECT_TRUE(to_ros_camera_info(rig_with(example_cameras()[1]), 0));
+}
+
+}  // namespace
+}  // namespace fbvins

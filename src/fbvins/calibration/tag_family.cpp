@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/tag_family.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#ifdef FBVINS_WITH_APRILTAG
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+#endif
+
+namespace fbvins {
+
+#ifdef FBVINS_WITH_APRILTAG
+
+namespace {
+
+struct FamilyDeleter {
+  void operator()(apriltag_family_t* family) const { tag36h11_destroy(family); }
+};
+using Family = std::unique_ptr<apriltag_family_t, FamilyDeleter>;
+
+}  // namespace
+
+Result<TagCells> tag_cells(int id) {
+  const Family family(tag36h11_create());
+  if (id < 0 || id >= static_cast<int>(family->ncodes))
+    return Error{ErrorCode::invalid_argument, fmt::format("tag36h11 has no tag {}", id)};
+  // All cells are black but for the bits that are set, the first one being the highest.
+  TagCells out{};
+  for (auto& row : out) row.fill(true);
+  for (uint32_t bit = 0; bit < family->nbits; ++bit)
+    out[family->bit_y[bit]][family->bit_x[bit]] = (family->codes[id] >> (family->nbits - 1 - bit) & 1u) == 0;
+  return out;
+}
+
+struct TagDetector::State {
+  Family family{tag36h11_create()};
+  apriltag_detector_t* detector = apriltag_detector_create();
+
+  State() {
+    apriltag_detector_add_family_bits(detector, family.get(), 1);  // one wrong bit is corrected: 11 differ between tags
+    detector->quad_decimate = 1;
+    detector->nthreads = 1;
+  }
+  ~State() { apriltag_detector_destroy(detector); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+};
+
+Result<TagDetector> TagDetector::create() { return TagDetector(std::make_unique<State>()); }
+
+namespace {
+
+/// The image with black parts one pixel smaller: the largest of each pixel and its neighbours.
+Image with_smaller_black(const ImageView& image) {
+  Image wide(image.width, image.height), out(image.width, image.height);
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t* in = image.row(y);
+    std::uint8_t* row = wide.row(y);
+    for (int x = 0; x < image.width; ++x) row[x] = std::max({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, image.width - 1)]});
+  }
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t *above = wide.row(std::max(y - 1, 0)), *here = wide.row(y), *below = wide.row(std::min(y + 1, image.height - 1));
+    std::uint8_t* row = out.row(y);
+    for (int x = 0; x < image.width; ++x) row[x] = std::max({above[x], here[x], below[x]});
+  }
+  return out;
+}
+
+void detect(apriltag_detector_t* detector, const ImageView& image, std::vector<TagSighting>& out) {
+  // The library reads only, but does not say so.
+  image_u8_t view{image.width, image.height, static_cast<int32_t>(image.stride), const_cast<uint8_t*>(image.data)};
+  zarray_t* found = apriltag_detector_detect(detector, &view);
+  for (int i = 0; i < zarray_size(found); ++i) {
+    apriltag_detection_t* detection = nullptr;
+    zarray_get(found, i, &detection);
+    TagSighting sighting;
+    sighting.id = detection->id;
+    for (int k = 0; k < 4; ++k) sighting.corners[k] = Vec2(detection->p[k][0] - 0.5, detection->p[k][1] - 0.5);
+    // One that was found before in the same place.
+    const bool known = std::ranges::any_of(out, [&](const TagSighting& s) {
+      return s.id == sighting.id && (s.corners[0] - sighting.corners[0]).norm() < 0.5 * (s.corners[0] - s.corners[2]).norm();
+    });
+    if (!known) out.push_back(sighting);
+  }
+  apriltag_detections_destroy(found);
+}
+
+}  // namespace
+
+std::vector<TagSighting> TagDetector::find(const ImageView& image, int enough) {
+  std::vector<TagSighting> out;
+  if (image.empty()) return out;
+  // In a blurred image the tags of a grid hang together at their corners, by the squares between them, and few are found. With
+  // black a pixel smaller they come apart; small tags, whose cells would vanish, are found in the image itself.
+  detect(state_->detector, with_smaller_black(image).view(), out);
+  if (static_cast<int>(out.size()) < enough) detect(state_->detector, image, out);
+  std::ranges::stable_sort(out, {}, &TagSighting::id);
+  return out;
+}
+
+#else
+
+namespace {
+
+Error not_built() {
+  return {ErrorCode::unsupported, "tags need libapriltag (Debian: libapriltag-dev), and this program was built without it"};
+}
+
+}  // namespace
+
+struct TagDetector::State {};
+Result<TagCells> tag_cells(int) { return not_built(); }
+Result<TagDetector> TagDetector::create() { return not_built(); }
+std::vector<TagSighting> TagDetector::find(const ImageView&, int) { return {}; }
+
+#endif
+
+TagDetector::TagDetector(std::unique_ptr<State> state) : state_(std::move(state)) {}
+TagDetector::TagDetector(TagDetector&&) noexcept = default;
+TagDetector& TagDetector::operator=(TagDetector&&) noexcept = default;
+TagDetector::~TagDetector() = default;
+
+}  // namespace fbvins
