@@ -28,7 +28,7 @@ ImuCameraProblem wild_problem() {
   for (int v = 0; v < 6; ++v) {
     CalibrationView view{.camera = v % 2, .t_s = 0.05 * v + 0.02, .row = 200, .corners = {}};
     for (int i = v; i < 140; i += 20)
-      view.corners.push_back({i, board.corner(i), Vec2(300 + 10 * rng.normal(), 200 + 10 * rng.normal())});
+      view.corners.push_back({i, board.corner(i), Vec2(300 + 10 * rng.normal(), view.row)});  // in one row: exact derivatives
     data.views.push_back(view);
   }
   for (int i = 0; i < 60; ++i)

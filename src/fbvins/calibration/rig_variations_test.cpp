@@ -46,7 +46,9 @@ Eigen::VectorXd numbers_of(const RigVariation& rig, const CameraCalibration& fro
 
 TEST(RigVariations, AreAFactorOfTheCovariance) {
   Rng rng(1);
-  const auto truth = test::hand_held({.duration_s = 0.1}, 1);
+  test::HandHeldOptions o;
+  o.duration_s = 0.1;
+  const auto truth = test::hand_held(o, 1);
   const CameraCalibration rig = uncertain(truth.input.cameras, truth.input.T_CnC0, rng);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(rig.covariance.rows(), rig.covariance.cols());
   for (const RigVariation& v : rig_variations(rig)) {
@@ -59,7 +61,9 @@ TEST(RigVariations, AreAFactorOfTheCovariance) {
 
 TEST(RigVariations, TheImusCalibrationInheritsThem) {
   Rng rng(2);
-  auto recording = test::hand_held({.duration_s = 12, .image_rate_hz = 10}, 3);
+  test::HandHeldOptions o;
+  o.duration_s = 12, o.image_rate_hz = 10;
+  auto recording = test::hand_held(o, 3);
   const auto exact = calibrate_imu_camera(recording.input, {});
   ASSERT_TRUE(exact) << exact.error().message;
   // The lenses that are given are off by a draw of their uncertainty.
