@@ -149,7 +149,7 @@ int calibrate(const Arguments& a) {
   if (!material->imu.empty()) {
     if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
     outcome.imu_noise = noise_of(*material, outcome.remarks);
-    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise};
+    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
     for (const CalibratedCamera& camera : outcome.cameras.cameras) {
       input.cameras.push_back(camera.camera);
       if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
