@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -102,21 +103,20 @@ std::string lines_of(const std::vector<CalibratedParameter>& parameters) {
 }  // namespace
 
 std::vector<CalibratedParameter> camera_parameters(const CameraCalibration& cameras) {
-  std::vector<double> values;
+  std::map<std::string, std::pair<double, const char*>> values;
   for (std::size_t k = 0; k < cameras.cameras.size(); ++k) {
-    for (const double value : lens_parameters(cameras.cameras[k].camera.model())) values.push_back(value);
-    if (k == 0) continue;
-    const Vec3 r = so3_log(cameras.cameras[k].T_CnC0.q);
-    for (int i = 0; i < 3; ++i) values.push_back(cameras.cameras[k].T_CnC0.p[i]);
-    for (int i = 0; i < 3; ++i) values.push_back(r[i]);
+    const CalibratedCamera& camera = cameras.cameras[k];
+    const std::vector<std::string> names = lens_parameter_names(camera.camera.model());
+    const std::vector<double> lens = lens_parameters(camera.camera.model());
+    for (std::size_t i = 0; i < lens.size(); ++i) values[fmt::format("cam{}.{}", k, names[i])] = {lens[i], i < 4 ? "px" : ""};
+    const Vec3 r = so3_log(camera.T_CnC0.q);
+    for (int i = 0; i < 3; ++i) {
+      values[fmt::format("cam{}.p{}", k, "xyz"[i])] = {camera.T_CnC0.p[i], "m"};
+      values[fmt::format("cam{}.r{}", k, "xyz"[i])] = {r[i], "rad"};
+    }
   }
   std::vector<CalibratedParameter> out;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::string own = cameras.names[i].substr(cameras.names[i].find('.') + 1);
-    const bool pixels = own == "fx" || own == "fy" || own == "cx" || own == "cy";
-    const char* unit = pixels ? "px" : own == "px" || own == "py" || own == "pz" ? "m" : own == "rx" || own == "ry" || own == "rz" ? "rad" : "";
-    out.push_back({cameras.names[i], unit, values[i], cameras.sigma(cameras.names[i])});
-  }
+  for (const std::string& name : cameras.names) out.push_back({name, values[name].second, values[name].first, cameras.sigma(name)});
   return out;
 }
 

@@ -140,19 +140,25 @@ int calibrate(const Arguments& a) {
   outcome.remarks = material->remarks;
   CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
   if (!a.quiet) options.tell = [](const std::string& what) { note(what); };
-  Result<CameraCalibration> cameras = calibrate_cameras(material->detections, *board, options);
+  // Cameras that never see the board together are joined by the IMU, if there is one.
+  const bool apart = !material->imu.empty() && !cameras_connected(material->detections, *board, options.pair_tolerance_s);
+  Result<CameraCalibration> cameras =
+      apart ? calibrate_cameras_apart(material->detections, *board, options) : calibrate_cameras(material->detections, *board, options);
   if (!cameras) return refuse(cameras.error());
   outcome.cameras = *std::move(cameras);
   if (!material->imu.empty()) {
     if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
     outcome.imu_noise = noise_of(*material, outcome.remarks);
-    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise};
+    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
     for (const CalibratedCamera& camera : outcome.cameras.cameras) {
       input.cameras.push_back(camera.camera);
-      input.T_CnC0.push_back(camera.T_CnC0);
+      if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
     }
     Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
     if (!imu) return refuse({imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
+    for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
+      outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
+    if (apart) outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
     outcome.imu = *std::move(imu);
   }
   if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);

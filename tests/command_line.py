@@ -62,7 +62,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_and_version(self):
         self.assertRegex(fbvins("--version").stdout, r"^fbvins \d+\.\d+\.\d+\n$")
-        for command in ([], ["run"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"]):
+        for command in ([], ["run"], ["calibrate"], ["target"], ["simulate", "board"], ["mocap"], ["eval"], ["info"], ["doctor"], ["config"], ["simulate"], ["report"], ["bench"], ["fly"], ["tune"], ["live"], ["view"]):
             done = fbvins(*command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("examples:", done.stdout)
@@ -72,6 +72,38 @@ class CommandLine(unittest.TestCase):
         shutil.copy(PROGRAM, alone)
         done = subprocess.run([alone, "live"], capture_output=True, text=True, timeout=120, check=False)
         self.assert_bad_input(done, f"{self.folder}/fbvins-live", "No such file", "./dev build")
+
+    def test_target_and_calibration_from_detections(self):
+        name = self.folder / "board"
+        self.assertEqual(fbvins("target", "--kind", "chessboard", "--columns", 8, "--rows", 6, "--size", 0.03, "--paper", "A3", "--out", name).returncode, 0)
+        self.assertTrue(name.with_suffix(".pdf").read_bytes().startswith(b"%PDF-1.4"))
+        self.assertIn('width="420mm" height="297mm"', name.with_suffix(".svg").read_text(encoding="utf-8"))
+        self.assert_bad_input(fbvins("target", "--kind", "chessboard", "--size", 0.2, "--out", name), "would fit")
+        rows = ["timestamp_ns,camera,corner,u_px,v_px"]
+        for view in range(14):  # a pinhole camera of 500 px, the board turned to all sides
+            q = times(times((math.cos(0.2), math.sin(0.2) * math.cos(view), math.sin(0.2) * math.sin(view), 0), (math.cos(0.1 * view), 0, 0, math.sin(0.1 * view))), (1, 0, 0, 0))
+            for corner in range(48):
+                x, y, z = turned(q, (0.03 * (corner % 8) - 0.105, 0.03 * (corner // 8) - 0.075, 0))
+                x, y, z = x + 0.06 * math.cos(2 * view), y + 0.04 * math.sin(2 * view), z + 0.35 + 0.01 * view
+                noise = 0.05 * math.sin(12.9898 * corner + 78.233 * view)
+                rows.append(f"{1000 + view},0,{corner},{320.5 + 500 * x / z + noise:.4f},{240.25 + 500 * y / z - noise:.4f}")
+        detections = self.write("detections.csv", "\n".join(rows) + "\n")
+        target, out = name.with_suffix(".yaml"), self.folder / "rig"
+        arguments = ["calibrate", "--detections", detections, "--target", target, "--out", out]
+        done = fbvins(*arguments, "--resolution", "640x480")
+        self.assertEqual(done.returncode, 0, done)
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        for parameter, value, tolerance in (("fx", 500, 1), ("fy", 500, 1), ("cx", 320.5, 1), ("cy", 240.25, 1), ("k1", 0, 0.01)):
+            found = summary["parameters"]["cam0." + parameter]
+            self.assertAlmostEqual(found["value"], value, delta=tolerance)
+            self.assertLess(found["sigma"], tolerance)
+        self.assertIn("resolution: [640, 480]", (out / "camchain.yaml").read_text(encoding="utf-8"))
+        self.assert_bad_input(fbvins("calibrate", "--detections", detections), "--target is missing")
+        self.assert_bad_input(fbvins("calibrate", "--target", target), "give a recording or --detections")
+        self.write("detections.csv", "\n".join(rows[:1 + 3 * 48]) + "\n")
+        done = fbvins(*arguments)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("in 3 images, too few", done.stderr)
 
     def test_wrong_usage(self):
         self.assertEqual(fbvins().returncode, 2)

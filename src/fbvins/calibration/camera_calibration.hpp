@@ -81,4 +81,11 @@ struct CameraCalibration {
 
 Result<CameraCalibration> calibrate_cameras(const Detections& detections, const Board& board, const CameraCalibrationOptions& options);
 
+/// Whether boards that two cameras see at one stamp join all cameras with cam0; calibrate_cameras() refuses others.
+bool cameras_connected(const Detections& detections, const Board& board, double pair_tolerance_s);
+
+/// Each camera by itself, where they are not connected: T_CnC0 are the identity and have no rows in the covariance, until an IMU
+/// joins the cameras (calibrate_imu_camera() without T_CnC0). `poses` are those of cam0.
+Result<CameraCalibration> calibrate_cameras_apart(const Detections& detections, const Board& board, const CameraCalibrationOptions& options);
+
 }  // namespace fbvins

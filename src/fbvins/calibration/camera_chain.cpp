@@ -69,9 +69,9 @@ std::vector<std::vector<PosedView>> joined_by_stamp(std::vector<PosedView> views
   });
   std::vector<std::vector<PosedView>> out;
   for (PosedView& view : views) {
-    const bool same = !out.empty() && (view.view.t - out.back().front().view.t).seconds() <= tolerance_s;
+    const bool same = !out.empty() && (view.view.t - out.back().front().view.t).seconds() <= tolerance_s &&
+                      !view_of(out.back(), view.view.camera);
     if (!same) out.emplace_back();
-    else if (view_of(out.back(), view.view.camera)) continue;
     out.back().push_back(std::move(view));
   }
   return out;

@@ -16,7 +16,7 @@ struct PosedView {
   Pose<Cn, T> T_CnT;
 };
 
-/// Views whose stamps differ by at most `tolerance_s` from the first of them, by time; of a camera that is there twice, the first.
+/// Views of different cameras whose stamps differ by at most `tolerance_s` from the first of them, by time.
 std::vector<std::vector<PosedView>> joined_by_stamp(std::vector<PosedView> views, double tolerance_s);
 
 /// T_CnC0 of each camera, through as many common views as there are. An error where cameras are not connected by such views.

@@ -13,6 +13,7 @@
 
 #include "fbvins/calibration/board.hpp"
 #include "fbvins/calibration/board_view.hpp"
+#include "fbvins/calibration/rig_variations.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/types/imu.hpp"
@@ -26,6 +27,7 @@ struct ImuCameraInput {
   std::vector<BoardView> views;          ///< in any order
   std::vector<ImuSample> imu;            ///< on the IMU's clock, in order
   ImuNoise noise;
+  std::vector<RigVariation> variations = {};  ///< what cameras and T_CnC0 are uncertain by; none: they are exact
 };
 
 struct ImuCameraOptions {

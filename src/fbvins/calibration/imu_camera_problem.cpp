@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace fbvins {
 namespace {
@@ -76,10 +77,16 @@ double ImuCameraProblem::linearise() {
 }
 
 double ImuCameraProblem::evaluate(bool build) {
-  double cost = add_smoothness(build) + add_bias_walk(build) + add_priors(build);
-  for (const CalibrationView& view : data_.views) cost += add_view(view, build);
+  double cost = add_smoothness(build) + add_bias_walk(build) + add_priors(build) + add_images(build);
   for (const CalibrationReading& reading : data_.readings)
     if (reading.used) cost += add_reading(reading, build);
+  return cost;
+}
+
+double ImuCameraProblem::add_images(bool build) {
+  double cost = 0;
+  for (const CalibrationView& view : data_.views) cost += add_view(view, build);
+  for (std::size_t c = 1; c < setup_.T_CnC0.size(); ++c) cost += add_camera_prior(c, build);
   return cost;
 }
 
@@ -146,9 +153,7 @@ double ImuCameraProblem::add_priors(bool build) {
     J_.setZero(1, 96);
     J_.block<1, 3>(0, columns(layout_.gravity, 3)) = state_.gravity_T.transpose() / (gravity * setup_.gravity_sigma_mps2);
   }
-  cost += add_rows(build);
-  for (std::size_t c = 1; c < setup_.T_CnC0.size(); ++c) cost += add_camera_prior(c, build);
-  return cost;
+  return cost + add_rows(build);
 }
 
 double ImuCameraProblem::add_camera_prior(std::size_t camera, bool build) {
@@ -211,9 +216,33 @@ double ImuCameraProblem::apply_step() {
   return evaluate(false);
 }
 
+double ImuCameraProblem::cost_after(Eigen::VectorXd step) {
+  step_ = std::move(step);
+  const double cost = apply_step();
+  undo_step();
+  return cost;
+}
+
 std::optional<Eigen::MatrixXd> ImuCameraProblem::calibration_covariance() {
   if (!system_->factorise()) return std::nullopt;
   return system_->inverse_tail(layout_.end - layout_.begin);
+}
+
+Eigen::VectorXd ImuCameraProblem::response(const RigVariation& variation) {
+  const auto gradient_of_images = [&] {
+    system_->set_zero();
+    add_images(true);
+    return Eigen::VectorXd(system_->b());
+  };
+  const Eigen::VectorXd before = gradient_of_images();
+  std::vector<Camera> cameras = variation.cameras;
+  std::vector<Pose<Cn, C0>> T_CnC0 = setup_.T_CnC0.empty() ? setup_.T_CnC0 : variation.T_CnC0;
+  std::swap(data_.cameras, cameras);
+  std::swap(setup_.T_CnC0, T_CnC0);
+  const Eigen::VectorXd change = gradient_of_images() - before;
+  std::swap(data_.cameras, cameras);
+  std::swap(setup_.T_CnC0, T_CnC0);
+  return -system_->solve(change).segment(layout_.begin, layout_.end - layout_.begin) / variation.sigmas;
 }
 
 ImuBias ImuCameraProblem::bias_sigma(int index) const {

@@ -115,9 +115,15 @@ class ImuCameraProblem {
   /// The board's size is as its file says.
   void fix_board_scale() { state_.board_scale = 1; }
   const CalibrationLayout& layout() const { return layout_; }
+  /// Of the cost by all unknowns, at the state last linearised.
+  const Eigen::VectorXd& gradient() const { return system_->b(); }
+  /// The cost after a step, which is taken back.
+  double cost_after(Eigen::VectorXd step);
 
   /// Of the calibration's unknowns, at the state last linearised; nullopt where they are not determined.
   std::optional<Eigen::MatrixXd> calibration_covariance();
+  /// How the calibration moves if the rig's lenses and extrinsics do, by one standard deviation (C15); after calibration_covariance().
+  Eigen::VectorXd response(const RigVariation& variation);
   /// Standard deviations of the biases at node `index`, after calibration_covariance().
   ImuBias bias_sigma(int index) const;
   /// Degrees of freedom by random signs (C14), after calibration_covariance().
@@ -151,6 +157,7 @@ class ImuCameraProblem {
   double add_bias_walk(bool build);
   double add_smoothness(bool build);
   double add_priors(bool build);
+  double add_images(bool build);  ///< what the rig's numbers enter
   double add_camera_prior(std::size_t camera, bool build);
 
   ViewMotion view_motion(const CalibrationView& view, SplineJacobian* J) const;

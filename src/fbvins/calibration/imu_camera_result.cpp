@@ -82,12 +82,17 @@ void tell_biases(const ImuCameraProblem& problem, const CalibrationStart& start,
 
 }  // namespace
 
-CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start) {
+CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start, const std::vector<RigVariation>& variations) {
   const CalibrationState& state = problem.state();
   const CalibrationLayout& at = problem.layout();
   CameraImuResult out;
   const auto P = problem.calibration_covariance();
   out.covariance = P ? *P : Eigen::MatrixXd::Constant(at.end - at.begin, at.end - at.begin, std::nan(""));
+  tell_biases(problem, start, out);
+  for (const RigVariation& variation : variations) {
+    const Eigen::VectorXd moved = problem.response(variation);
+    out.covariance += moved * moved.transpose();
+  }
   out.parameters = parameters_of(state, at);
   for (std::size_t i = 0; i < out.parameters.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -116,7 +121,6 @@ CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& s
   out.duration_s = state.path.duration_s();
   tell_cameras(problem, start, out);
   tell_readings(problem, start, out);
-  tell_biases(problem, start, out);
   return out;
 }
 
