@@ -92,6 +92,16 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("tune", self.folder / "none.ulg"), "none.ulg")
         self.assert_bad_input(fbvins("bench", self.write("m.yaml", "datasets:\n  - {pth: x}\n")), "m.yaml:2: unknown key 'pth'")
 
+    def test_parameters_of_px4(self):
+        file = self.folder / "vision.params"
+        self.assertEqual(fbvins("px4", "params", "--link", "serial", "-o", file).returncode, 0)
+        rows = [line.split("\t") for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        self.assertTrue(all(len(row) == 5 and row[4] in ("6", "9") for row in rows), rows)
+        self.assertEqual({row[2]: row[3] for row in rows}["SYS_HAS_MAG"], "0")
+        self.assertNotIn("SYS_HAS_MAG", fbvins("px4", "params", "--compass").stdout)
+        self.assert_bad_input(fbvins("px4", "check", "udp:nowhere"), "udp:nowhere")
+        self.assert_bad_input(fbvins("px4", "check"), "ADDRESS")
+
     def test_config_round_trip(self):
         first = fbvins("config", "--all", "--yaml").stdout
         again = fbvins("config", "--all", "--yaml", "--config", self.write("c.yaml", first)).stdout
