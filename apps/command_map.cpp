@@ -7,6 +7,7 @@
 #include <set>
 
 #include "apps/commands.hpp"
+#include "apps/map_edit_commands.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/loop/map_file.hpp"
@@ -20,6 +21,10 @@ constexpr const char* kExamples = R"(examples:
   fbvins map info flat.fbm                       what is in a map
   fbvins map merge monday.fbm tuesday.fbm -o flat.fbm
   fbvins map export flat.fbm --ply points.ply --tum keyframes.txt
+  fbvins map cut flat.fbm --box 0,0,-1,8,5,3 -o kitchen.fbm
+  fbvins map align flat.fbm -o building.fbm --points 0.2,0.1,0,12,4,0  5.3,0.2,0,12,9,0  5.1,3.9,1,8,9,1
+  fbvins map rename flat.fbm "Second floor"
+  fbvins map diff monday.fbm tuesday.fbm
 )";
 
 struct Arguments {
@@ -44,6 +49,7 @@ int info(const Arguments& arguments) {
       std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
   fmt::print("{}: {} keyframes of {} flights, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
              flights.size(), loops, features, map->boosted ? "boosted " : "", points);
+  if (!map->name.empty()) fmt::print("name: {}\n", map->name);
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   return kOk;
@@ -104,6 +110,7 @@ void add_map_command(CLI::App& program, int& exit_code) {
   exporting->add_option("--ply", arguments->ply, "point cloud to write");
   exporting->add_option("--tum", arguments->tum, "trajectory of the keyframes to write");
   exporting->callback([arguments, &exit_code] { exit_code = export_files(*arguments); });
+  add_map_edits(*command, exit_code);
 }
 
 }  // namespace fbvins::app

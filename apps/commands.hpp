@@ -24,7 +24,8 @@ inline constexpr const char* kViewDescription = "show a finished flight in the b
 inline constexpr const char* kEvalDescription = "compute the errors of a trajectory against the ground truth";
 inline constexpr const char* kInfoDescription = "show what is in a recording: rates, gaps, calibration, stamps";
 inline constexpr const char* kDoctorDescription = "find what is wrong with a setup: units, axes, clocks, calibration, images";
-inline constexpr const char* kMapDescription = "inspect, merge and export maps that `run --save-map` wrote";
+inline constexpr const char* kMapDescription = "inspect, merge, cut, align, compare and export maps that `run --save-map` wrote";
+inline constexpr const char* kPx4Description = "parameters of PX4 for vision: a file to load, and a check";
 inline constexpr const char* kRecordDescription = "repair flight records";
 inline constexpr const char* kVocabDescription = "train or inspect a vocabulary of visual words";
 inline constexpr const char* kFlyDescription = "fly a mission by the odometry's poses, in the simulator";
@@ -54,6 +55,7 @@ void add_view_command(CLI::App& program, int& exit_code);
 void add_map_command(CLI::App& program, int& exit_code);
 void add_mocap_command(CLI::App& program, int& exit_code);
 void add_tune_command(CLI::App& program, int& exit_code);
+void add_px4_command(CLI::App& program, int& exit_code);
 void add_record_command(CLI::App& program, int& exit_code);
 void add_vocab_command(CLI::App& program, int& exit_code);
 

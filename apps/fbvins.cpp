@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
                               {"info", kInfoDescription, "fbvins-tools"},
                               {"map", kMapDescription, "fbvins-tools"},
                               {"mocap", kMocapDescription, "fbvins-tools"},
+                              {"px4", kPx4Description, "fbvins-live"},
                               {"record", kRecordDescription, "fbvins-tools"},
                               {"vocab", kVocabDescription, "fbvins-tools"},
 #ifdef FBVINS_WITH_LAB

@@ -124,6 +124,16 @@ class CommandLine(unittest.TestCase):
         self.assert_bad_input(fbvins("tune", self.folder / "none.ulg"), "none.ulg")
         self.assert_bad_input(fbvins("bench", self.write("m.yaml", "datasets:\n  - {pth: x}\n")), "m.yaml:2: unknown key 'pth'")
 
+    def test_parameters_of_px4(self):
+        file = self.folder / "vision.params"
+        self.assertEqual(fbvins("px4", "params", "--link", "serial", "-o", file).returncode, 0)
+        rows = [line.split("\t") for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        self.assertTrue(all(len(row) == 5 and row[4] in ("6", "9") for row in rows), rows)
+        self.assertEqual({row[2]: row[3] for row in rows}["SYS_HAS_MAG"], "0")
+        self.assertNotIn("SYS_HAS_MAG", fbvins("px4", "params", "--compass").stdout)
+        self.assert_bad_input(fbvins("px4", "check", "udp:nowhere"), "udp:nowhere")
+        self.assert_bad_input(fbvins("px4", "check"), "ADDRESS")
+
     def test_config_round_trip(self):
         first = fbvins("config", "--all", "--yaml").stdout
         again = fbvins("config", "--all", "--yaml", "--config", self.write("c.yaml", first)).stdout
@@ -165,6 +175,21 @@ class CommandLine(unittest.TestCase):
         self.assertGreater(found["keyframes_in_map"], in_map["keyframes_in_map"])
         self.assertLess(found["localised_after_s"], 2.0)
 
+        maps = {name: self.folder / f"{name}.fbm" for name in ("a", "cut", "named", "aligned")}
+        self.assertEqual(fbvins("map", "rename", maps["a"], "Hall 3", "-o", maps["named"]).returncode, 0)
+        self.assertIn("name: Hall 3", fbvins("map", "info", maps["named"]).stdout)
+        corners = ["0,0,0,10,20,0", "4,0,0,10,24,0", "0,3,1,7,20,1"]  # turned by 90 degrees
+        done = fbvins("map", "align", maps["named"], "-o", maps["aligned"], "--points", *corners)
+        self.assertEqual(done.returncode, 0, done)
+        self.assertIn("turned by 90.00 degrees, moved by 10.000, 20.000, 0.000 m", done.stdout)
+        self.assert_bad_input(fbvins("map", "align", maps["a"], "-o", maps["cut"], "--points", *corners[:2]), "2 points are given where three are needed")
+        self.assert_bad_input(fbvins("map", "cut", maps["a"], "-o", maps["cut"], "--box", "50,50,50,51,51,51"), "none of its")
+        self.assertEqual(fbvins("map", "cut", maps["aligned"], "-o", maps["cut"], "--box", "-99,-99,-99,99,99,99").returncode, 0)
+        self.assertEqual(json.loads(fbvins("map", "diff", maps["aligned"], maps["cut"], "--json").stdout)["moved_largest_m"], 0)
+        moved = json.loads(fbvins("map", "diff", maps["a"], maps["aligned"], "--json").stdout)
+        self.assertGreater(moved["moved_rms_m"], 15)
+        self.assertAlmostEqual(moved["turned_largest_deg"], 90, delta=1e-3)
+        self.assertEqual((moved["keyframes_only_in_first"], moved["keyframes_only_in_second"]), (0, 0))
         boosted = self.folder / "boosted.fbm"
         self.assertEqual(fbvins(*run, "--boosted-map", "--save-map", boosted).returncode, 0)
         self.assertIn("boosted", fbvins("map", "info", boosted).stdout)

@@ -12,6 +12,7 @@
 #include <variant>
 
 #include "fbvins/mavlink/flight_messages.hpp"
+#include "fbvins/mavlink/parameter_messages.hpp"
 
 namespace fbvins {
 
@@ -168,6 +169,6 @@ StatusTextMessage status_text(MavSeverity severity, const std::string& sentence)
 using MavlinkMessage =
     std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage, StatusTextMessage,
                  PositionTargetMessage, CommandMessage, CommandAckMessage, LandedStateMessage, HilSensorMessage,
-                 HilActuatorControlsMessage, HighresImuMessage, ScaledImuMessage>;
+                 HilActuatorControlsMessage, HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
 
 }  // namespace fbvins

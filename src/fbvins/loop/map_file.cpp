@@ -154,8 +154,17 @@ MapEdge get_edge(Reader& r) {
   return e;
 }
 
-/// The one flag: descriptors are boosted. The checksum covers it.
-constexpr std::uint32_t kBoosted = 1;
+/// Flags, which the checksum covers: descriptors are boosted; a name follows the edges.
+constexpr std::uint32_t kBoosted = 1, kNamed = 2;
+constexpr std::size_t kLongestName = 200;
+
+std::string get_name(Reader& r) {
+  const auto n = r.get<std::uint32_t>();
+  r.check(n > 0 && n <= kLongestName && n <= r.left());
+  std::string name(r.ok() ? n : 0, '\0');
+  r.raw(name.data(), name.size());
+  return name;
+}
 
 Error damaged(const std::string& name, const char* what) {
   return {ErrorCode::malformed, fmt::format("{}: damaged map: {}", name, what)};
@@ -177,11 +186,16 @@ std::string serialise_map(const PlaceMap& map) {
   for (const MapKeyframe& k : map.keyframes())
     if (k.placed) put(body, k);
   for (const MapEdge* e : edges) put(body, *e);
+  const std::string name = map.name.substr(0, kLongestName);
+  if (!name.empty()) {
+    body.put(static_cast<std::uint32_t>(name.size()));
+    body.raw(name.data(), name.size());
+  }
   const std::string bytes = body.take();
   Writer head;
   head.raw(kMagic, sizeof kMagic);
   head.put(kMapVersion);
-  const std::uint32_t flags = map.boosted ? kBoosted : 0;
+  const std::uint32_t flags = (map.boosted ? kBoosted : 0) | (name.empty() ? 0 : kNamed);
   head.put(flags);
   head.put(static_cast<std::uint64_t>(bytes.size()));
   head.put(checksum64(std::as_bytes(std::span(bytes))) ^ flags);
@@ -198,7 +212,7 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   if (version != kMapVersion)
     return Error{ErrorCode::unsupported, fmt::format("{}: map of version {}, this program reads {}", name, version, kMapVersion)};
   const auto flags = head.get<std::uint32_t>();
-  if ((flags & ~kBoosted) != 0) return damaged(name, "unknown flags");
+  if ((flags & ~(kBoosted | kNamed)) != 0) return damaged(name, "unknown flags");
   if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
   if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags))
     return damaged(name, "the checksum differs");
@@ -220,6 +234,7 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
     r.check(map.find(e.from) != nullptr && map.find(e.to) != nullptr && e.from != e.to);
     if (r.ok()) map.edges.push_back(e);
   }
+  if (r.ok() && (flags & kNamed) != 0) map.name = get_name(r);
   if (!r.ok() || !r.at_end()) return damaged(name, "its content makes no sense");
   return map;
 }

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
@@ -80,6 +81,7 @@ class PlaceMap {
   Pose<B, C0> T_BC0;           ///< of the camera that saw the places
   double gravity_mps2 = 9.81;  ///< of the readings on its edges
   bool boosted = false;        ///< descriptors are boosted ones, which compare with such only
+  std::string name;            ///< for people; empty: none
 
  private:
   std::vector<MapKeyframe> keyframes_;
