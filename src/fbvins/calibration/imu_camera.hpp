@@ -49,7 +49,7 @@ struct CameraOnImu {
 };
 
 /// A reading is gyro * w + bias, accel * f + bias; `accel` is lower triangular, which defines the axes of B.
-struct ImuAxes {
+struct ImuTriads {
   Mat3 gyro = Mat3::Identity(), accel = Mat3::Identity();
 };
 
@@ -85,7 +85,7 @@ struct CameraImuResult {
   double line_delay_s = 0, line_delay_sigma_s = 0;    ///< a row is exposed at t_image + time_offset_s + row * line_delay_s
   Vec3 gravity_T = Vec3::Zero();                      ///< in the board's frame, m/s^2
   Mat3 gravity_covariance = Mat3::Zero();
-  ImuAxes axes, axes_sigma;
+  ImuTriads axes, axes_sigma;
   std::vector<BiasAt> biases;
 
   /// What tells a wrong board or unit, estimated before either is taken for right: gravity as the accelerometer reads it, and

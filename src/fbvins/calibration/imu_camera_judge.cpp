@@ -67,7 +67,7 @@ std::optional<Error> check_magnitudes(const Magnitudes& m, const Board& board, d
   return std::nullopt;
 }
 
-std::optional<Error> check_axes(const ImuAxes& axes) {
+std::optional<Error> check_axes(const ImuTriads& axes) {
   const double off = std::max((axes.gyro - Mat3::Identity()).cwiseAbs().maxCoeff(), (axes.accel - Mat3::Identity()).cwiseAbs().maxCoeff());
   if (off < kWorstAxes) return std::nullopt;
   return error(fmt::format("the scale or an axis of the IMU would have to be wrong by {:.0f} %: its unit is wrong, or the recording does not "

@@ -17,7 +17,7 @@ Magnitudes magnitudes(const ImuCameraFit& fit);
 /// Where images and readings contradict one another: because of the cameras' poses on one another, or for another reason.
 std::optional<Error> check_agreement(const ImuCameraFit& fit);
 std::optional<Error> check_magnitudes(const Magnitudes& measured, const Board& board, double gravity_mps2);
-std::optional<Error> check_axes(const ImuAxes& axes);
+std::optional<Error> check_axes(const ImuTriads& axes);
 /// Where the motion leaves a parameter uncertain.
 std::optional<Error> check_determined(const CameraImuResult& result, const Vec3& turning_radps);
 

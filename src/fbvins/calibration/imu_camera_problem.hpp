@@ -55,7 +55,7 @@ struct CalibrationState {
   double time_offset_s = 0, line_delay_s = 0;
   Vec3 gravity_T = Vec3(0, 0, -9.81);
   double board_scale = 1;
-  ImuAxes axes;
+  ImuTriads axes;
 
   ImuBias bias_at(double t_s) const;
 };

@@ -26,7 +26,7 @@ struct HandHeldOptions {
   double time_offset_s = 0.0123, line_delay_s = 0;
   Vec3 turning = Vec3::Ones();  ///< factor on the turns about each axis of B
   double moving = 1;            ///< factor on the translation
-  ImuAxes axes;
+  ImuTriads axes;
   double outlier_share = 0;                   ///< corners elsewhere
   double blur_share = 0;                      ///< images with ten times the noise
   double dropped_share = 0;                   ///< readings missing, in bursts of ten
@@ -97,7 +97,7 @@ struct HandHeldTruth {
   std::vector<Pose<B, Cn>> T_BC;
   double time_offset_s = 0, line_delay_s = 0;
   Vec3 gravity_T;
-  ImuAxes axes;
+  ImuTriads axes;
   std::vector<ImuBias> biases;  ///< at every time of a reading, also of those dropped
   Time first_reading;
   double imu_rate_hz = 200;
