@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kShortest_s = 8;
+constexpr double kShortest_s = 8, kLongest_s = 4 * 3600;
 constexpr double kStray_sigmas = 6, kStray_px = 1;
 constexpr double kMargin_s = 0.2;              // of the path before the first and after the last image
 constexpr double kAlone_s = 2;                 // readings further than that from an image with the board are not used
@@ -44,6 +44,12 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
         return error(fmt::format("corner {} is seen, but the board has corners 0 to {}", corner.index, input.board.corner_count() - 1));
   }
   if (input.imu.size() < 2) return error("there are no IMU readings");
+  const double length_s = (input.imu.back().t - input.imu.front().t).seconds();
+  if (!(length_s < kLongest_s)) return error(fmt::format("the stamps of the IMU's readings span {:.0f} hours", length_s / 3600));
+  const ImuNoise& noise = input.noise;
+  if (!(std::min({noise.gyro_noise_density_radps_rthz, noise.accel_noise_density_mps2_rthz, noise.gyro_random_walk_radps2_rthz,
+                  noise.accel_random_walk_mps3_rthz}) > 0))
+    return error("a noise density or random walk of the IMU is not positive");
   for (std::size_t i = 0; i < input.imu.size(); ++i) {
     if (!input.imu[i].gyro_radps.allFinite() || !input.imu[i].accel_mps2.allFinite())
       return error(fmt::format("IMU reading {} is not a number", i));
@@ -129,6 +135,8 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   for (const ImuSample& s : input.imu)
     if (const double t_s = (s.t - origin).seconds() - begin_s; t_s >= 0 && t_s <= end_s - begin_s)
       data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2});
+  if (body.size() < kFewestBoardViews || data.readings.empty())
+    return error(fmt::format("the board is seen in {} images while the IMU is there: {} are needed", body.size(), kFewestBoardViews));
   body = agreeing_with_gyro(body, data.readings, match->gyro_bias_radps);
   if (body.size() < kFewestBoardViews) return error("the board's poses do not follow the turns of the IMU: is it the right board file?");
 
@@ -146,6 +154,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
       data.views.push_back(std::move(v));
     }
   }
+  if (data.views.empty()) return error("no image of the board lies within the readings of the IMU");
   std::map<double, int> sharing;
   for (const CalibrationView& view : data.views) ++sharing[view.t_s];
   for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];

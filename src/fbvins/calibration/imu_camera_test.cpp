@@ -180,6 +180,12 @@ TEST(ImuCamera, NamesWhatTheRecordingLacks) {
   wrong.T_CnC0[1].p.x() += 0.006;
   expect_refusal(wrong, "relative to one another");
   wrong = good.input;
+  wrong.noise.accel_random_walk_mps3_rthz = 0;
+  expect_refusal(wrong, "not positive");
+  wrong = good.input;
+  wrong.imu.back().t = wrong.imu.back().t + Duration::from_seconds(1e6);
+  expect_refusal(wrong, "hours");
+  wrong = good.input;
   wrong.imu.clear();
   expect_refusal(wrong, "no IMU readings");
   wrong = good.input;
