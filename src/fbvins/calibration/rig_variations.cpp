@@ -19,7 +19,7 @@ RigVariation varied(const CameraCalibration& rig, const Eigen::VectorXd& step) {
     out.cameras.emplace_back(with_parameters(camera.model(), lens.data()), camera.width(), camera.height());
     out.T_CnC0.push_back(rig.cameras[c].T_CnC0);
     // Cameras that were calibrated each by itself have no extrinsics.
-    if (next == step.size() || (!rig.names.empty() && !rig.names[static_cast<std::size_t>(next)].ends_with(".px"))) continue;
+    if (next + 6 > step.size() || (next < std::ssize(rig.names) && rig.names[static_cast<std::size_t>(next)].ends_with(".fx"))) continue;
     out.T_CnC0.back() = out.T_CnC0.back().boxplus(step.segment<3>(next), step.segment<3>(next + 3));
     next += 6;
   }
