@@ -1,12 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/rig_variations.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 
 #include "fbvins/calibration/lens_jacobian.hpp"
 
 namespace fbvins {
 namespace {
+
+/// Cameras that were calibrated each by itself have none.
+bool has_extrinsics(const CameraCalibration& rig, std::size_t camera) {
+  return std::ranges::find(rig.names, fmt::format("cam{}.px", camera)) != rig.names.end();
+}
 
 /// `step` in the order of CameraCalibration::names.
 RigVariation varied(const CameraCalibration& rig, const Eigen::VectorXd& step) {
@@ -18,8 +27,7 @@ RigVariation varied(const CameraCalibration& rig, const Eigen::VectorXd& step) {
     for (double& x : lens) x += step(next++);
     out.cameras.emplace_back(with_parameters(camera.model(), lens.data()), camera.width(), camera.height());
     out.T_CnC0.push_back(rig.cameras[c].T_CnC0);
-    // Cameras that were calibrated each by itself have no extrinsics.
-    if (next + 6 > step.size() || (next < std::ssize(rig.names) && rig.names[static_cast<std::size_t>(next)].ends_with(".fx"))) continue;
+    if (!has_extrinsics(rig, c)) continue;
     out.T_CnC0.back() = out.T_CnC0.back().boxplus(step.segment<3>(next), step.segment<3>(next + 3));
     next += 6;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/rig_variations.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -20,8 +21,10 @@ CameraCalibration uncertain(const std::vector<Camera>& cameras, const std::vecto
     CalibratedCamera camera;
     camera.camera = cameras[c], camera.T_CnC0 = T_CnC0[c];
     out.cameras.push_back(camera);
-    for (int i = 0; i < 8; ++i) sigma.push_back(i < 4 ? 0.1 : 2e-4);
-    if (c > 0) sigma.insert(sigma.end(), {5e-5, 5e-5, 5e-5, 1e-4, 1e-4, 1e-4});
+    for (int i = 0; i < 8; ++i) sigma.push_back(i < 4 ? 0.1 : 2e-4), out.names.push_back(fmt::format("cam{}.lens{}", c, i));
+    if (c == 0) continue;
+    sigma.insert(sigma.end(), {5e-5, 5e-5, 5e-5, 1e-4, 1e-4, 1e-4});
+    for (const char* name : {"px", "py", "pz", "rx", "ry", "rz"}) out.names.push_back(fmt::format("cam{}.{}", c, name));
   }
   const auto n = static_cast<Eigen::Index>(sigma.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Identity(n, n);
