@@ -27,12 +27,12 @@ exit codes of check: 0 all is right, 1 something is wrong, 2 wrong usage, or no 
 )";
 
 struct Arguments {
-  Px4Setup setup;
+  Px4VisionSetup setup;
   std::string link = "none", output, address;
   bool json = false;
 
-  Px4Setup made() const {
-    Px4Setup out = setup;
+  Px4VisionSetup made() const {
+    Px4VisionSetup out = setup;
     out.link = link == "serial" ? Px4Link::serial : link == "ethernet" ? Px4Link::ethernet : Px4Link::none;
     return out;
   }
@@ -52,7 +52,7 @@ int print_parameters(const Arguments& arguments) {
 }
 
 int check(const Arguments& arguments) {
-  const Px4Setup setup = arguments.made();
+  const Px4VisionSetup setup = arguments.made();
   const auto values = read_parameters(arguments.address, px4_parameter_names(setup), {.system_id = arguments.setup.system_id});
   if (!values) return fail(values.error().message);
   if (values->empty()) return fail(arguments.address + ": the flight controller answers no request for a parameter");

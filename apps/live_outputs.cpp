@@ -17,6 +17,7 @@
 #include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
+#include "fbvins/mavlink/vehicle_frames.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -56,6 +57,13 @@ std::string cannot_save_map(const MapArguments& map) {
   return {};
 }
 
+/// How the IMU sits on the vehicle, where the configuration says so.
+std::optional<Quat> vehicle_axes(const MountingOptions& options) {
+  const MountingOptions usual;
+  const bool told = options.imu_axes != usual.imu_axes || options.roll_rad != 0 || options.pitch_rad != 0 || options.yaw_rad != 0;
+  return told ? std::optional(mounting(options).q.conjugate()) : std::nullopt;
+}
+
 }  // namespace
 
 void Troubles::add(const Error& error) {
@@ -90,6 +98,7 @@ Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSy
                               .source = flight.source_name,
                               .frontend = flight.config.frontend.kind,
                               .cannot_save_map = cannot_save_map(flight.map),
+                              .q_B_vehicle = vehicle_axes(flight.config.live.mavlink.mounting),
                               .mark = [&live](std::string text) { live.mark(std::move(text)); },
                               .save_map = [map] { map->request_save(); }});
   if (!page) return page.error();

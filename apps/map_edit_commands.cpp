@@ -52,7 +52,7 @@ int align(const Edit& edit) {
     return fail("--points: six numbers each are needed: x,y,z in the map and in the building");
   auto map = load_map(edit.file);
   if (!map) return fail(map.error().message);
-  std::vector<PointPair> points;
+  std::vector<SurveyedPoint> points;
   for (std::size_t i = 0; i < edit.points.size(); i += kNumbers) {
     const double* n = edit.points.data() + i;
     points.push_back({{n[0], n[1], n[2]}, {n[3], n[4], n[5]}});

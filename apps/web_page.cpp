@@ -77,6 +77,7 @@ Result<LivePage> open_live_page(LivePageOptions options) {
   WebFlight flight{.source = std::move(options.source), .frontend = std::move(options.frontend)};
   flight.can_mark = true;
   flight.cannot_save_map = std::move(options.cannot_save_map);
+  flight.q_B_vehicle = options.q_B_vehicle;
   auto web = options_for(options.where);
   if (!web) return web.error();
   web->try_again = kTryAgain;

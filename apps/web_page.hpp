@@ -29,7 +29,8 @@ struct LivePage {
 };
 struct LivePageOptions {
   std::string where, source, frontend;
-  std::string cannot_save_map;  ///< why not; empty: it can
+  std::string cannot_save_map;      ///< why not; empty: it can
+  std::optional<Quat> q_B_vehicle;  ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
   std::function<void(std::string)> mark;
   std::function<void()> save_map;
 };

@@ -98,6 +98,11 @@ class WebInBrowser(unittest.TestCase):
         self.assertAlmostEqual(numbers(page.text("sigma"))[0], sigma_cm, delta=0.06)
         self.assertEqual(numbers(page.text("images"))[0], len(rows))
 
+    @staticmethod
+    def keys(page):
+        """What the keys of scene and time line name."""
+        return set(json.loads(page.value("JSON.stringify([...document.querySelectorAll('[data-key]')].filter(e => !e.hidden).map(e => e.dataset.key))")))
+
     def test_a_finished_run_shows_its_figures_and_is_wound_back(self):
         _, address = self.serve("view", self.run_folder, "--recording", self.flight)
         page = self.browser.open(address, **DESKTOP)
@@ -110,6 +115,7 @@ class WebInBrowser(unittest.TestCase):
         self.check_figures(page, self.run_folder)
         self.assertIn("Position known to ±", page.text("health-words"))
         self.assertIn("waiting until the vehicle rests", page.text("changes"))
+        self.assertEqual(self.keys(page), {row[-3] for row in poses(self.run_folder)[1]} | {"ellipsoid"}, "keys name only what a folder has: it has no landmarks and no marks")
         page.value(f"{seek}({duration / 2})")
         page.wait_for(f"Math.abs(Number(document.getElementById('seek').value) - {duration / 2}) < 0.2 && "
                       f"Number(document.getElementById('clock').dataset.image) < {0.6 * len(poses(self.run_folder)[1])}")
@@ -128,13 +134,19 @@ class WebInBrowser(unittest.TestCase):
     def test_a_live_flight_with_its_buttons_and_its_record(self):
         live, record, kept = self.folder / "live", self.folder / "flight.mcap", self.folder / "flight.fbm"
         program, address = self.serve("live", "--source", f"replay:{self.flight}", "--laps", "20", "--frontend", "klt", "--out", live, "--record",
-                                      record, "--save-map", kept, "--quiet", FBVINS_WEB_TOKEN="0123456789abcdef")
+                                      record, "--save-map", kept, "--quiet", "--set", "live.mavlink.mounting.imu_axes=camera_fwd",
+                                      "--set", "live.mavlink.mounting.roll_rad=-1.5708", FBVINS_WEB_TOKEN="0123456789abcdef")
         self.assertTrue(address.endswith("#token=0123456789abcdef"))
         page, phone = self.browser.open(address, **DESKTOP), self.browser.open(address, **PHONE)
         for one in (page, phone):
             one.wait_for("document.getElementById('health').dataset.state === 'good'")
             one.wait_for(HAS_IMAGE)
         self.assertLessEqual(phone.value("document.documentElement.scrollWidth"), PHONE["width"], "the phone's page is too wide")
+        page.wait_for("!document.querySelector('[data-key=points]').hidden && !document.querySelector('[data-key=keyframes]').hidden")
+        self.assertNotIn("mark", self.keys(page))
+        self.assertEqual(page.text("attitude-of"), "Roll, pitch, yaw of the vehicle")
+        roll, pitch, _ = numbers(page.text("attitude").replace("\u2212", "-"))
+        self.assertLess(max(abs(roll), abs(pitch)), 60, "the vehicle is upright, however its IMU is mounted")
         page.click("mark")
         phone.wait_for("document.getElementById('changes').textContent.includes('mark')")
         page.click("save-map")  # the map is saved with the next keyframe

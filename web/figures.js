@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The figures of the page, each with its unit in the page itself.
-import { count, rollPitchYaw } from "./words.js";
+import { count, rollPitchYaw, vehicleAngles } from "./words.js";
+
+let vehicle = null;  // quaternion from the vehicle's axes (forward, right, down) to the IMU's; null: not known
+
+/// How the IMU sits on the vehicle, where that is known: roll, pitch and yaw are the vehicle's then.
+export function setVehicle(vehicle_to_imu_wxyz) {
+  vehicle = vehicle_to_imu_wxyz ?? null;
+  document.getElementById("attitude-of").textContent = `Roll, pitch, yaw of the ${vehicle ? "vehicle" : "IMU"}`;
+}
 
 function set(id, text) {
   const element = document.getElementById(id);
@@ -13,7 +21,7 @@ export function showState(state) {
     set("position", fixed(state.position_m, 2));
     set("speed", Math.hypot(...state.velocity_mps).toFixed(2));
     set("distance", state.distance_m.toFixed(1));
-    set("attitude", fixed(rollPitchYaw(state.orientation_wxyz), 1));
+    set("attitude", fixed(vehicle ? vehicleAngles(state.orientation_wxyz, vehicle) : rollPitchYaw(state.orientation_wxyz), 1));
     set("sigma", fixed([100 * state.sigma_m], 1));
     set("tilt", `${fixed([state.tilt_sigma_rad * 180 / Math.PI], 2)}`);
   } else {
@@ -32,7 +40,7 @@ export function showStatus({ counts, shutter_to_pose_ms: latency }) {
 
 export function showMap(map) {
   document.getElementById("map-figure").hidden = false;
-  set("map", `${count(map.keyframes)} / ${count(map.loops)}`);
+  set("map", `${count(map.keyframes)} / ${count(map.loops)}${map.localised ? "" : ", not localised yet"}`);
 }
 
 export function clearFigures() {

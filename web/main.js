@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of `fbvins live --web` and `fbvins view`: passes the stream's messages to the parts that show them.
 import { CameraView } from "./camera.js";
-import { clearFigures, showMap, showState, showStatus } from "./figures.js";
+import { clearFigures, setVehicle, showMap, showState, showStatus } from "./figures.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { NoScene, Scene } from "./scene.js";
@@ -46,7 +46,13 @@ function note(text, bad = false, lasts = true) {
   if (!lasts) note.timer = setTimeout(() => { place.hidden = true; }, NOTE_MS);
 }
 
+/// Shows the entries of the keys for what has been seen; keys name nothing that this flight has not.
+function seen(...names) {
+  for (const name of names) for (const entry of document.querySelectorAll(`[data-key="${name}"]`)) entry.hidden = false;
+}
+
 function clear() {
+  for (const entry of document.querySelectorAll("[data-key]")) entry.hidden = true;
   newest_s = -Infinity;
   for (const part of [camera, plots, timeline, scene]) part.clear();
   clearFigures();
@@ -55,6 +61,7 @@ function clear() {
 const on = {
   hello(message) {
     clear();
+    setVehicle(message.vehicle_to_imu_wxyz);
     document.title = `${message.replay ? "Replay" : "Live"}: ${message.source}`;
     const name = message.source.replace(/\/?([^/]*\/)*(?=[^/])/, "");  // without the folders
     const kind = /^\w+:/.exec(message.source)?.[0] ?? "";
@@ -75,8 +82,8 @@ const on = {
     scene.clear();
   },
   history(message) {
-    for (const [t_s, state, reason] of message.health) timeline.add(t_s, state, reason);
-    for (const [t_s, text] of message.marks) timeline.addMark(t_s, text);
+    for (const [t_s, state, reason] of message.health) { timeline.add(t_s, state, reason); seen(state); }
+    for (const [t_s, text] of message.marks) { timeline.addMark(t_s, text); seen("mark"); }
     for (const row of message.series) plots.add(row);
     for (const [t_s, x, y, z, reset] of message.path) {
       scene.addPath([x, y, z], reset, timeline.stateAt(t_s));
@@ -92,6 +99,7 @@ const on = {
     showState(message);
     showHealth(message.health, healthSentence(message));
     timeline.add(t_s, message.health, message.reason);
+    seen(message.health);
     plots.add([t_s, message.latency_ms, message.dropped, message.features, message.landmarks, message.sigma_m]);
     if (!message.position_m) return;
     if (t_s > newest_s) {
@@ -100,7 +108,8 @@ const on = {
       newest_s = t_s;
     }
     scene.showPose(message.position_m, message.orientation_wxyz, message.position_covariance_m2);
-    if (message.keyframes_m) scene.showKeyframes(message.keyframes_m);
+    seen("ellipsoid");
+    if (message.keyframes_m?.length) { scene.showKeyframes(message.keyframes_m); seen("keyframes"); }
   },
   status({ t_s, status }) {
     showStatus(status);
@@ -108,6 +117,7 @@ const on = {
     if (status.health !== element("health").dataset.state) {
       showHealth(status.health, healthSentence({ health: status.health, reason: status.reason, sigma_m: NaN }));
       timeline.add(t_s, status.health, status.reason);
+      seen(status.health);
     }
     if (status.problem) note(status.problem, true);
     else if (element("note").classList.contains("bad")) element("note").hidden = true;
@@ -118,14 +128,15 @@ const on = {
   },
   mark({ t_s, text }) {
     timeline.addMark(t_s, text);
+    seen("mark");
     note(`Marked ${clock(t_s)}`, false, false);
   },
   note({ text, bad }) { note(text, bad, bad); },
   replay(message) { player.show(message); },
   rewound() { clear(); },
   image(message) { camera.show(message); },
-  points(message) { scene.showPoints(message, true); },
-  cloud(message) { scene.showPoints(message, false); },
+  points(message) { scene.showPoints(message, true); if (message.count) seen("points"); },
+  cloud(message) { scene.showPoints(message, false); if (message.count) seen("cloud"); },
   end() {
     on.ended = true;
     note("The flight has ended. This page shows its last state, and the next flight when the program runs again.");

@@ -65,3 +65,14 @@ export function rollPitchYaw([w, x, y, z]) {
   const yaw = Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
   return [roll, pitch, yaw].map(angle => angle * degrees);
 }
+
+/// Product of quaternions w, x, y, z.
+function product([w, x, y, z], [v, i, j, k]) {
+  return [w * v - x * i - y * j - z * k, w * i + x * v + y * k - z * j, w * j - x * k + y * v + z * i, w * k + x * j - y * i + z * v];
+}
+
+/// Degrees by which a vehicle is rolled to the right, pitched up and turned to the right, seen from the frame of the path (z up): its attitude
+/// is that of its axes forward, right, down in a frame turned upside down. Both quaternions take to the frame of the path and to the IMU.
+export function vehicleAngles(imu_wxyz, vehicle_to_imu_wxyz) {
+  return rollPitchYaw(product([0, 1, 0, 0], product(imu_wxyz, vehicle_to_imu_wxyz)));
+}

@@ -26,7 +26,8 @@ MESSAGES = [common.MAVLink_heartbeat_message, common.MAVLink_timesync_message, c
             common.MAVLink_vision_position_estimate_message, common.MAVLink_vision_speed_estimate_message,
             common.MAVLink_statustext_message, common.MAVLink_set_position_target_local_ned_message, common.MAVLink_command_long_message,
             common.MAVLink_command_ack_message, common.MAVLink_extended_sys_state_message, common.MAVLink_hil_sensor_message,
-            common.MAVLink_hil_actuator_controls_message, common.MAVLink_highres_imu_message, common.MAVLink_scaled_imu_message]
+            common.MAVLink_hil_actuator_controls_message, common.MAVLink_highres_imu_message, common.MAVLink_scaled_imu_message,
+            common.MAVLink_param_request_read_message, common.MAVLink_param_value_message]
 RANGES = {"int8_t": (-2**7, 2**7 - 1), "int16_t": (-2**15, 2**15 - 1), "uint8_t": (0, 2**8 - 1), "uint16_t": (0, 2**16 - 1), "uint32_t": (0, 2**32 - 1),
           "int32_t": (-2**31, 2**31 - 1), "int64_t": (-2**63, 2**63 - 1), "uint64_t": (0, 2**64 - 1)}
 
@@ -55,8 +56,9 @@ def random_message(rng, kind):
 def flat(message):
     """The values in the order of the wire, as text."""
     for name, count in zip(message.ordered_fieldnames, message.array_lengths):
-        value = getattr(message, "_text_raw" if name == "text" else name)
-        if name == "text":
+        is_text = name in ("text", "param_id")
+        value = getattr(message, f"_{name}_raw" if is_text else name)
+        if is_text:
             value = list(value.ljust(count, b"\0"))
         for number in value if isinstance(value, list) else [value]:
             yield f"{number:.9g}" if isinstance(number, float) else str(number)

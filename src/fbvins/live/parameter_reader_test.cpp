@@ -84,14 +84,14 @@ class SmallFlightController {
   std::thread thread_;
 };
 
-std::map<std::string, Px4Parameter> wanted(const Px4Setup& setup) {
+std::map<std::string, Px4Parameter> wanted(const Px4VisionSetup& setup) {
   std::map<std::string, Px4Parameter> out;
   for (const Px4Parameter& p : px4_parameters(setup)) out[p.name] = p;
   return out;
 }
 
 TEST(ParameterReader, ReadsWhatIsThereAlthoughRequestsAreLost) {
-  const Px4Setup setup{.link = Px4Link::serial};
+  const Px4VisionSetup setup{.link = Px4Link::serial};
   auto parameters = wanted(setup);
   parameters["EKF2_EV_CTRL"].value = 11;
   parameters.erase("EKF2_EV_QMIN");

@@ -21,18 +21,18 @@ struct Centred {
   double extent_m = 0;  ///< largest horizontal distance of a point from the mean, in the map
 };
 
-Centred centre_of(const std::vector<PointPair>& points) {
+Centred centre_of(const std::vector<SurveyedPoint>& points) {
   Centred out;
   const double n = static_cast<double>(points.size());
-  for (const PointPair& pair : points) out.mean_M += pair.p_M / n, out.mean_building += pair.p_building / n;
-  for (const PointPair& pair : points) out.extent_m = std::max(out.extent_m, (pair.p_M - out.mean_M).head<2>().norm());
+  for (const SurveyedPoint& pair : points) out.mean_M += pair.p_M / n, out.mean_building += pair.p_building / n;
+  for (const SurveyedPoint& pair : points) out.extent_m = std::max(out.extent_m, (pair.p_M - out.mean_M).head<2>().norm());
   return out;
 }
 
 /// The rotation about the vertical that fits best, in closed form.
-double best_heading(const std::vector<PointPair>& points, const Centred& centre) {
+double best_heading(const std::vector<SurveyedPoint>& points, const Centred& centre) {
   double sine = 0, cosine = 0;
-  for (const PointPair& pair : points) {
+  for (const SurveyedPoint& pair : points) {
     const Vec3 a = pair.p_M - centre.mean_M, b = pair.p_building - centre.mean_building;
     sine += a.x() * b.y() - a.y() * b.x();
     cosine += a.x() * b.x() + a.y() * b.y();
@@ -55,10 +55,10 @@ PlaceMap cut_map(PlaceMap map, const MapBox& box, bool remove_inside) {
   return map;
 }
 
-Result<MapAlignment> align_map(PlaceMap& map, const std::vector<PointPair>& points) {
+Result<MapAlignment> align_map(PlaceMap& map, const std::vector<SurveyedPoint>& points) {
   const auto refuse = [](const std::string& why) { return Error{ErrorCode::invalid_argument, why}; };
   if (points.size() < 3) return refuse(fmt::format("{} points are given where three are needed", points.size()));
-  for (const PointPair& pair : points)
+  for (const SurveyedPoint& pair : points)
     if (!pair.p_M.allFinite() || !pair.p_building.allFinite()) return refuse("a point is not finite");
   const Centred centre = centre_of(points);
   if (centre.extent_m < kApart_m)
@@ -68,7 +68,7 @@ Result<MapAlignment> align_map(PlaceMap& map, const std::vector<PointPair>& poin
   const Quat turn(Eigen::AngleAxisd(out.heading_rad, Vec3::UnitZ()));
   out.moved_m = centre.mean_building - turn * centre.mean_M;
   double squares = 0;
-  for (const PointPair& pair : points) squares += (turn * pair.p_M + out.moved_m - pair.p_building).squaredNorm();
+  for (const SurveyedPoint& pair : points) squares += (turn * pair.p_M + out.moved_m - pair.p_building).squaredNorm();
   out.rms_m = std::sqrt(squares / static_cast<double>(points.size()));
   if (out.rms_m > std::max(kFits_m, kFitsInProportion * centre.extent_m))
     return refuse(fmt::format(

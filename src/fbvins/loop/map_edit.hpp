@@ -25,7 +25,7 @@ struct MapBox {
 PlaceMap cut_map(PlaceMap map, const MapBox& box, bool remove_inside = false);
 
 /// A point in the map's axes and in those of a building.
-struct PointPair {
+struct SurveyedPoint {
   Vec3 p_M = Vec3::Zero(), p_building = Vec3::Zero();
 };
 
@@ -38,7 +38,7 @@ struct MapAlignment {
 /// Turns the map about the vertical and moves it so that the points fit best: M stays gravity-aligned, and its scale is its own.
 /// An error, and no change, for less than three points, points on one spot, and points that do not fit: with the wrong scale,
 /// upside down or mirrored.
-Result<MapAlignment> align_map(PlaceMap& map, const std::vector<PointPair>& points);
+Result<MapAlignment> align_map(PlaceMap& map, const std::vector<SurveyedPoint>& points);
 
 struct MapDifference {
   int in_both = 0, only_first = 0, only_second = 0;  ///< keyframes: the same image is the same keyframe

@@ -58,7 +58,7 @@ TEST(AlignMap, TurnsAboutTheVerticalAndMoves) {
   PlaceMap map = row_of(5);
   const Quat turn(Eigen::AngleAxisd(2.5, Vec3::UnitZ()));
   const Vec3 move(10, -20, 3);
-  std::vector<PointPair> points;
+  std::vector<SurveyedPoint> points;
   for (const Vec3& p : {Vec3(0, 0, 1), Vec3(4, 0, 1), Vec3(2, 3, 0)})
     points.push_back({p, turn * p + move + Vec3(0.01, -0.01, 0)});
   const auto done = align_map(map, points);
@@ -73,7 +73,7 @@ TEST(AlignMap, PointsThatDoNotFitAreRefused) {
   PlaceMap map = row_of(5);
   const std::vector<Vec3> corners = {{0, 0, 0}, {4, 0, 0}, {4, 3, 0}};
   const auto with = [&](auto&& of) {
-    std::vector<PointPair> points;
+    std::vector<SurveyedPoint> points;
     for (const Vec3& p : corners) points.push_back({p, of(p)});
     return align_map(map, points);
   };

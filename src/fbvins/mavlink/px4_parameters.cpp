@@ -18,7 +18,7 @@ Px4Parameter real(const char* name, double value, const char* why, bool reboot =
   return {name, value, false, reboot, why};
 }
 
-void add_link(const Px4Setup& setup, std::vector<Px4Parameter>& out) {
+void add_link(const Px4VisionSetup& setup, std::vector<Px4Parameter>& out) {
   if (setup.link == Px4Link::serial) {
     out.push_back(whole("MAV_1_CONFIG", 102, "MAVLink on TELEM 2", kReboot));
     out.push_back(whole("MAV_1_MODE", 2, "messages for an onboard computer", kReboot));
@@ -44,7 +44,7 @@ std::string number(const Px4Parameter& p, double value) {
 
 }  // namespace
 
-std::vector<Px4Parameter> px4_parameters(const Px4Setup& setup) {
+std::vector<Px4Parameter> px4_parameters(const Px4VisionSetup& setup) {
   std::vector<Px4Parameter> out = {
       whole("EKF2_EV_CTRL", 15, "position, height, velocity and yaw from vision"),
       whole("EKF2_HGT_REF", 3, "height from vision"),
@@ -73,7 +73,7 @@ std::vector<Px4Parameter> px4_parameters(const Px4Setup& setup) {
   return out;
 }
 
-std::string px4_parameter_file(const Px4Setup& setup) {
+std::string px4_parameter_file(const Px4VisionSetup& setup) {
   std::string text =
       "# Parameters of PX4 (v1.14 and later) for the poses of fbvins live --mavlink; docs/px4.md says why.\n"
       "# Restart the flight controller after loading them.\n"
@@ -84,14 +84,14 @@ std::string px4_parameter_file(const Px4Setup& setup) {
   return text;
 }
 
-std::vector<std::string> px4_parameter_names(const Px4Setup& setup) {
+std::vector<std::string> px4_parameter_names(const Px4VisionSetup& setup) {
   std::vector<std::string> out;
   for (const Px4Parameter& p : px4_parameters(setup)) out.push_back(p.name);
   for (const char* name : kImuPlace) out.emplace_back(name);
   return out;
 }
 
-std::vector<Px4Finding> judge_px4(const Px4Setup& setup, const std::map<std::string, double>& values) {
+std::vector<Px4Finding> judge_px4(const Px4VisionSetup& setup, const std::map<std::string, double>& values) {
   std::vector<Px4Finding> out;
   bool reboot = false;
   for (const Px4Parameter& p : px4_parameters(setup)) {

@@ -14,7 +14,7 @@ namespace fbvins {
 
 enum class Px4Link { none, serial, ethernet };  ///< none: the simulator, or set up otherwise
 
-struct Px4Setup {
+struct Px4VisionSetup {
   bool gps = false, compass = false;  ///< fused beside vision
   bool barometer = false;             ///< outdoors, at height
   Px4Link link = Px4Link::none;
@@ -31,13 +31,13 @@ struct Px4Parameter {
 };
 
 /// In the order of the document.
-std::vector<Px4Parameter> px4_parameters(const Px4Setup& setup);
+std::vector<Px4Parameter> px4_parameters(const Px4VisionSetup& setup);
 
 /// As QGroundControl and MAVSDK load it: vehicle, component, name, value and type, separated by tabs.
-std::string px4_parameter_file(const Px4Setup& setup);
+std::string px4_parameter_file(const Px4VisionSetup& setup);
 
 /// The names that judge_px4() looks at: those above, and some that explain.
-std::vector<std::string> px4_parameter_names(const Px4Setup& setup);
+std::vector<std::string> px4_parameter_names(const Px4VisionSetup& setup);
 
 struct Px4Finding {
   bool wrong = true;  ///< false: a remark
@@ -45,6 +45,6 @@ struct Px4Finding {
 };
 
 /// One sentence for each parameter that is wrong or that this PX4 does not have (it is not in `values`), and remarks.
-std::vector<Px4Finding> judge_px4(const Px4Setup& setup, const std::map<std::string, double>& values);
+std::vector<Px4Finding> judge_px4(const Px4VisionSetup& setup, const std::map<std::string, double>& values);
 
 }  // namespace fbvins

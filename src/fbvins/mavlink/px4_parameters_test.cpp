@@ -8,17 +8,17 @@
 namespace fbvins {
 namespace {
 
-std::map<std::string, double> as_wanted(const Px4Setup& setup) {
+std::map<std::string, double> as_wanted(const Px4VisionSetup& setup) {
   std::map<std::string, double> values;
   for (const Px4Parameter& p : px4_parameters(setup)) values[p.name] = p.value;
   return values;
 }
 
 TEST(Px4Parameters, AVehicleThatHasTheFileLoadedIsRight) {
-  for (const Px4Setup& setup : {Px4Setup{},
-                                {.gps = true, .compass = true, .barometer = true},
-                                {.link = Px4Link::serial, .system_id = 7},
-                                {.link = Px4Link::ethernet}})
+  for (const Px4VisionSetup& setup : {Px4VisionSetup{},
+                                      {.gps = true, .compass = true, .barometer = true},
+                                      {.link = Px4Link::serial, .system_id = 7},
+                                      {.link = Px4Link::ethernet}})
     EXPECT_TRUE(judge_px4(setup, as_wanted(setup)).empty());
 }
 

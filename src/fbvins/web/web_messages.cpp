@@ -66,6 +66,7 @@ SharedMessage hello_message(const WebFlight& flight, Time start) {
   json["can_mark"] = flight.can_mark;
   json["can_save_map"] = flight.cannot_save_map.empty();
   json["cannot_save_map"] = flight.cannot_save_map;
+  if (const auto& q = flight.q_B_vehicle) json["vehicle_to_imu_wxyz"] = {q->w(), q->x(), q->y(), q->z()};
   if (flight.replay) json["whole_path"] = path_json(flight.whole_path);
   return text(json);
 }

@@ -71,6 +71,9 @@ TEST(HelloMessage, QuotesWhatPeopleWrote) {
   const Json json = Json::parse(hello_message(flight, Time{1'234'567'890'123'456'789})->bytes);
   EXPECT_EQ(json["start_ns"], "1234567890123456789");
   EXPECT_EQ(json["can_save_map"], false);
+  EXPECT_FALSE(json.contains("vehicle_to_imu_wxyz")) << "how the IMU is mounted is not known";
+  flight.q_B_vehicle = Quat(0, 1, 0, 0);
+  EXPECT_EQ(Json::parse(hello_message(flight, Time{1})->bytes)["vehicle_to_imu_wxyz"], Json({0.0, 1.0, 0.0, 0.0}));
 }
 
 TEST(Command, IsParsedOrIgnored) {
