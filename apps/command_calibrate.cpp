@@ -14,6 +14,7 @@
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
+#include "fbvins/imu/reading_rate.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/imu_file.hpp"
@@ -104,15 +105,11 @@ Result<Material> gather(const Arguments& a, const Board& board) {
   return out;
 }
 
-/// The rate as it is, since the noise of a reading depends on it.
+/// With the measured rate, on which the noise of a single reading depends.
 ImuNoise noise_of(const Material& material, std::vector<std::string>& remarks) {
   if (!material.imu_noise) remarks.push_back("no noise of the IMU is given (--imu-calibration): the defaults are taken, and the weight of its readings follows their residuals");
   ImuNoise noise = material.imu_noise.value_or(ImuNoise{});
-  std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < material.imu.size(); ++i) steps.push_back((material.imu[i].t - material.imu[i - 1].t).ns);
-  if (steps.empty()) return noise;
-  std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
-  if (steps[steps.size() / 2] > 0) noise.rate_hz = 1e9 / static_cast<double>(steps[steps.size() / 2]);
+  if (const double rate_hz = rate_hz_of(material.imu); rate_hz > 0) noise.rate_hz = rate_hz;
   return noise;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/calibration/corner_noise.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 
 namespace fbvins {
@@ -129,8 +130,7 @@ double robust_rms(const LensModel& lens, const Board& board, const std::vector<B
     const auto pixel = project_point(lens, pose * board.corner(corner.index));
     sizes.push_back(pixel ? (*pixel - corner.pixel).norm() : 1e4);
   }
-  std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-  return sizes[sizes.size() / 2] / std::sqrt(2 * std::log(2.0));  // median of a Rayleigh distribution
+  return coordinate_noise(sizes);
 }
 
 /// The board tilted to the other side of the line of sight: nearly the same image when it is small.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/camera_chain.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,9 +28,9 @@ Link agreed(const std::vector<Link>& links, double distance_m) {
   const std::size_t step = std::max<std::size_t>(1, links.size() / 200);
   for (std::size_t i = 0; i < links.size(); i += step) {
     for (std::size_t j = 0; j < links.size(); ++j) differences[j] = difference(links[i], links[j], distance_m);
-    std::ranges::nth_element(differences, differences.begin() + static_cast<std::ptrdiff_t>(links.size() / 2));
-    if (differences[links.size() / 2] >= best_median) continue;
-    best_median = differences[links.size() / 2];
+    const double typical = median(differences);
+    if (typical >= best_median) continue;
+    best_median = typical;
     best = i;
   }
   Vec3 turn = Vec3::Zero(), move = Vec3::Zero();

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "fbvins/calibration/board_pose.hpp"
+#include "fbvins/calibration/corner_noise.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/calibration/rig_adjustment.hpp"
 #include "fbvins/calibration/view_choice.hpp"
@@ -70,9 +71,7 @@ double robust_rms(const RigAdjustment& adjustment) {
   std::vector<double> sizes;
   for (const RigFrame& frame : adjustment.frames())
     for (const SeenCorner& corner : frame.views[0].corners) sizes.push_back(adjustment.residual(frame, frame.views[0], corner).norm());
-  if (sizes.empty()) return kUnfit;
-  std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-  return sizes[sizes.size() / 2] / std::sqrt(2 * std::log(2.0));
+  return sizes.empty() ? kUnfit : coordinate_noise(sizes);
 }
 
 struct Adjusted {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 
+#include "fbvins/calibration/corner_noise.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/optim/levenberg_marquardt.hpp"
 
 namespace fbvins {
@@ -12,11 +14,6 @@ namespace {
 constexpr int kMostIterations = 40;
 constexpr double kCornerOutlier_sigmas = 4, kReadingOutlier_sigmas = 6;
 constexpr double kBlurred = 1.6;  // residuals of an image over those of the median one
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 }  // namespace
 
@@ -83,13 +80,13 @@ void ImuCameraFit::judge_corners() {
       image.push_back(own.back());
     }
   }
-  // By the middle corner, so that outliers do not make an image a bad one: the median of a Rayleigh distribution is 1.1774 sigmas.
+  // By the middle corner, so that outliers do not make an image a bad one.
   std::vector<double> all;
   for (auto& [key, image] : images) {
-    image = {median(image) / 1.1774};
+    image = {coordinate_noise(image)};
     all.push_back(image[0]);
   }
-  const double typical = median(all);
+  const double typical = median_of(all);
   for (std::size_t v = 0; v < errors.size(); ++v) {
     CalibrationView& view = problem_.data().views[v];
     const double rms = images[{view.camera, view.t_s}][0];
@@ -107,7 +104,7 @@ void ImuCameraFit::judge_readings() {
     gyro.push_back(r.head<3>().norm()), accel.push_back(r.tail<3>().norm());
   }
   // The median of the norm of three standard normal numbers is 1.538.
-  const auto typical = [](const std::vector<double>& all) { return std::max(1.0, median(all) / 1.538); };
+  const auto typical = [](const std::vector<double>& all) { return std::max(1.0, median_of(all) / 1.538); };
   const double gyro_limit = kReadingOutlier_sigmas * typical(gyro), accel_limit = kReadingOutlier_sigmas * typical(accel);
   for (std::size_t i = 0; i < readings.size(); ++i)
     readings[i].used = start_.data.readings[i].used && gyro[i] <= gyro_limit && accel[i] <= accel_limit;

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include "fbvins/calibration/detections_file.hpp"
 #include "fbvins/calibration/imu_camera_poses.hpp"
+#include "fbvins/core/angle.hpp"
+#include "fbvins/core/median.hpp"
+#include "fbvins/imu/reading_rate.hpp"
 
 namespace fbvins {
 namespace {
@@ -22,14 +24,8 @@ constexpr double kWeakestTurning_radps = 0.1;  // spread about the second axis
 constexpr double kBiasNode_s = 0.5;
 constexpr double kDefaultSpacing_s = 0.02;
 constexpr int kRowGroups = 16;
-constexpr double kDegree = std::numbers::pi / 180;
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 std::optional<Error> check_input(const ImuCameraInput& input) {
   if (input.cameras.empty() || static_cast<int>(input.cameras.size()) > kMostCameras)
@@ -71,12 +67,6 @@ Result<TurnMatch> check_turns(const TurnMatch& match) {
     return error(fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
                              match.spread_radps(1) * degrees));
   return match;
-}
-
-double rate_of(const std::vector<ImuSample>& imu) {
-  std::vector<double> periods;
-  for (std::size_t i = 0; i + 1 < imu.size(); ++i) periods.push_back((imu[i + 1].t - imu[i].t).seconds());
-  return 1 / median(periods);
 }
 
 /// Corners of neighbouring rows, which are exposed nearly at once, where a line delay is estimated; else all.
@@ -163,7 +153,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     r.used = (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
   }
 
-  const double rate_hz = rate_of(input.imu);
+  const double rate_hz = rate_hz_of(input.imu);
   const double spacing_s = options.knot_spacing_s > 0 ? options.knot_spacing_s : std::max(kDefaultSpacing_s, 2.0 / rate_hz);
   PoseSpline path = first_path(body, data.readings, match->gyro_bias_radps, spacing_s, end_s - begin_s);
   CalibrationState state{.path = std::move(path), .biases = {}, .T_BC = *std::move(T_BC), .axes = {}};
@@ -178,7 +168,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     return error(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
 
   CalibrationSetup setup;
-  setup.corner_sigma_px = std::max(0.02, median(sigmas));
+  setup.corner_sigma_px = std::max(0.02, median_of(sigmas));
   setup.gyro_sigma_radps = input.noise.gyro_noise_density_radps_rthz * std::sqrt(rate_hz);
   setup.accel_sigma_mps2 = input.noise.accel_noise_density_mps2_rthz * std::sqrt(rate_hz);
   setup.gyro_walk_radps2_rthz = input.noise.gyro_random_walk_radps2_rthz;

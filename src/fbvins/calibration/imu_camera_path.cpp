@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/imu_camera_path.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -76,14 +78,11 @@ std::vector<BodyPose> agreeing_with_gyro(const std::vector<BodyPose>& poses, con
     for (int k = 0; k < 3; ++k) {
       std::vector<double> all;
       for (std::size_t j = begin; j < end; ++j) all.push_back(so3_log(frames[i].conjugate() * frames[j])(k));
-      std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
-      middle(k) = all[all.size() / 2];
+      middle(k) = median(all);
     }
     off_rad.push_back(middle.norm());
   }
-  std::vector<double> sorted = off_rad;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double limit_rad = std::max(kTilted_rad, kTilted * sorted[sorted.size() / 2]);
+  const double limit_rad = std::max(kTilted_rad, kTilted * median_of(off_rad));
   std::vector<BodyPose> out;
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (off_rad[i] <= limit_rad) out.push_back(poses[i]);

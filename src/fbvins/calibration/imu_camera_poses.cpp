@@ -8,6 +8,7 @@
 #include <map>
 
 #include "fbvins/calibration/board_pose.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {
@@ -18,11 +19,6 @@ constexpr double kWorstFit_px = 4;   // median over the images of one camera
 constexpr double kWeakestTurns = 0.75;  // correlation of a camera's turns with the IMU's
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// Of a camera on the first one, from images of both at the same time; nullopt without such.
 std::optional<Pose<C0, Cn>> seen_from_first(const std::vector<SeenPose>& first, const std::vector<SeenPose>& other) {
@@ -40,7 +36,7 @@ std::optional<Pose<C0, Cn>> seen_from_first(const std::vector<SeenPose>& first, 
   for (int k = 0; k < 3; ++k) {
     std::vector<double> ps, turns;
     for (const auto& pose : all) ps.push_back(pose.p(k)), turns.push_back(so3_log(q0.conjugate() * pose.q)(k));
-    p(k) = median(ps), turn(k) = median(turns);
+    p(k) = median_of(ps), turn(k) = median_of(turns);
   }
   return Pose<C0, Cn>((q0 * so3_exp(turn)).normalized(), p);
 }
@@ -66,7 +62,7 @@ Result<CameraPoses> locate_all(const ImuCameraInput& input, Time reference) {
     std::sort(poses[c].begin(), poses[c].end(), [](const SeenPose& a, const SeenPose& b) { return a.t_s < b.t_s; });
     std::vector<double> fits;
     for (const SeenPose& pose : poses[c]) fits.push_back(pose.sigma_px);
-    if (const double fit = median(fits); fit > kWorstFit_px)
+    if (const double fit = median_of(fits); fit > kWorstFit_px)
       return error(fmt::format("the corners that camera {} sees do not lie as on this board ({:.1f} px off, in the median): is it the right "
                                "board file and the right lens?", c, fit));
   }
@@ -77,7 +73,7 @@ CameraPoses good_ones(CameraPoses poses) {
   for (std::vector<SeenPose>& camera : poses) {
     std::vector<double> fits;
     for (const SeenPose& pose : camera) fits.push_back(pose.sigma_px);
-    const double limit_px = kPoorFit * median(fits);
+    const double limit_px = kPoorFit * median_of(fits);
     std::erase_if(camera, [&](const SeenPose& pose) { return pose.sigma_px > limit_px; });
   }
   return poses;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fbvins/calibration/allan.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {
@@ -20,11 +21,6 @@ constexpr double kGap_s = 0.1;
 constexpr double kWorstMisfit = 6;
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// A second of readings.
 struct Window {
@@ -122,7 +118,7 @@ Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings)
   if (readings.size() < 2 || readings.back().t <= readings.front().t) return error("there are no IMU readings");
   std::vector<double> periods;
   for (std::size_t i = 0; i + 1 < readings.size(); ++i) periods.push_back((readings[i + 1].t - readings[i].t).seconds());
-  const double period_s = median(periods), length_s = (readings.back().t - readings.front().t).seconds();
+  const double period_s = median_of(periods), length_s = (readings.back().t - readings.front().t).seconds();
   if (!(period_s > 0)) return error("the stamps of the IMU's readings do not grow");
   if (length_s < kShortest_s)
     return error(fmt::format("{:.1f} s of readings are too short for the IMU's noise: {:g} s of rest at least, better several minutes",

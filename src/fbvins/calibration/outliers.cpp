@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "fbvins/calibration/corner_noise.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -28,9 +30,7 @@ double robust_noise_px(RigAdjustment& adjustment) {
   each_corner(adjustment, [&](const RigFrame& frame, const SeenBoard& view, const SeenCorner& corner) {
     sizes.push_back(adjustment.residual(frame, view, corner).norm());
   });
-  if (sizes.empty()) return 0;
-  std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-  return std::max(kSmallestNoise_px, sizes[sizes.size() / 2] / std::sqrt(2 * std::log(2.0)));
+  return sizes.empty() ? 0 : std::max(kSmallestNoise_px, coordinate_noise(sizes));
 }
 
 /// Judges every corner; returns how many judgements changed. Views that do not fit, and frames without views, are removed.

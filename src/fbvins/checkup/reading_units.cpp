@@ -9,7 +9,7 @@
 #include <numbers>
 #include <string>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
 namespace fbvins {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

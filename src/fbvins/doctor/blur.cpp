@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

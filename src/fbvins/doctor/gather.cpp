@@ -11,7 +11,7 @@
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/frontend/track_table.hpp"
 
 namespace fbvins {

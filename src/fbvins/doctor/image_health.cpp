@@ -9,7 +9,7 @@
 #include <cmath>
 #include <map>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "fbvins/doctor/lens_change.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 

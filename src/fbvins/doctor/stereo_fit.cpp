@@ -6,7 +6,7 @@
 
 #include "fbvins/doctor/change_search.hpp"
 #include "fbvins/doctor/stereo_problem.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

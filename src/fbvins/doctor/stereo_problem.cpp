@@ -6,7 +6,7 @@
 
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/features/epipolar_ransac.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {

@@ -9,7 +9,7 @@
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {
@@ -45,12 +46,6 @@ constexpr double kBegun_s = 2;
 /// Nor is it another one after a restart that this has caused.
 constexpr double kRemembered_s = 30;
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// A change of a bias in standard deviations, of which `floor` is the least. Of a consistent estimate the covariance of a change
 /// is what it gained or lost meanwhile.
 double change_sigma(const Vec3& change, const Mat3& before, const Mat3& after, double floor) {
@@ -88,8 +83,8 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
       out.focal = o->sqrt_information(0, 0);
     }
     if (residuals.size() < kFewest) continue;
-    out.of[c] = median_of(residuals);
-    out.shift[c] = Vec2(median_of(x), median_of(y));
+    out.of[c] = median(residuals);
+    out.shift[c] = Vec2(median(x), median(y));
   }
   return out;
 }

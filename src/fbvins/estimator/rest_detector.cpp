@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/rest_detector.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <algorithm>
 #include <vector>
 
@@ -40,12 +42,8 @@ Duration RestDetector::update(const TrackedFrame& frame) {
     if (f.left && before->second.left) motion.push_back((f.left->pixel - *before->second.left).norm());
     else if (f.right && before->second.right) motion.push_back((f.right->pixel - *before->second.right).norm());
   }
-  bool at_rest = static_cast<int>(motion.size()) >= options_.min_features && imu_is_quiet(frame.imu);
-  if (at_rest) {
-    std::nth_element(motion.begin(), motion.begin() + motion.size() / 2, motion.end());
-    at_rest = motion[motion.size() / 2] < options_.max_motion_px;
-  }
-  if (!at_rest) {
+  const bool enough = static_cast<int>(motion.size()) >= options_.min_features;
+  if (!enough || !imu_is_quiet(frame.imu) || median(motion) >= options_.max_motion_px) {
     start(frame);
     return {};
   }

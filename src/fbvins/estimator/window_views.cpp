@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/geometry/so3.hpp"
 #include "fbvins/geometry/symmetric.hpp"
 
@@ -69,10 +70,7 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
     else if (before->right && now.right) motion.push_back(focal_px * parallax(R_new_last[1], *before->right, *now.right));
   }
   if (seen > 0) out.shared_ratio = static_cast<double>(motion.size()) / seen;
-  if (!motion.empty()) {
-    std::nth_element(motion.begin(), motion.begin() + motion.size() / 2, motion.end());
-    out.parallax_px = motion[motion.size() / 2];
-  }
+  out.parallax_px = median(motion);
   return out;
 }
 

@@ -18,7 +18,7 @@
 #include "fbvins/frontend/klt_options.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/frontend/typical_depth.hpp"
 #include "fbvins/frontend/motion_check.hpp"
 
 namespace fbvins {

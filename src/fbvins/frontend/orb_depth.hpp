@@ -11,7 +11,7 @@
 
 #include "fbvins/frontend/frame_images.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/frontend/typical_depth.hpp"
 #include "fbvins/frontend/orb_options.hpp"
 #include "fbvins/frontend/orb_stereo.hpp"
 #include "fbvins/frontend/orb_track.hpp"

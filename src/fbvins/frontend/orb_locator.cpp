@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/frontend/orb_locator.hpp"
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "fbvins/frontend/median.hpp"
+#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/numbers.hpp"
 
@@ -141,9 +142,7 @@ Intervals measure_intervals(const std::vector<Time>& increasing) {
     }
   }
   if (steps.empty()) return out;
-  const auto middle = steps.begin() + std::ssize(steps) / 2;
-  std::nth_element(steps.begin(), middle, steps.end());
-  out.median = *middle;
+  out.median = median(steps);
   out.rate_hz = 1.0 / out.median.seconds();
   return out;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/sensor_check.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,13 +21,6 @@ constexpr double kOneClock_s = 1;             // largest difference of camera's 
 constexpr double kLowestImageRate_hz = 5;
 constexpr double kShortestLook_s = 1;
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::string and_then(bool fine, const std::string& what_to_do) { return fine ? "" : "; " + what_to_do; }
 
 }  // namespace
@@ -41,7 +36,7 @@ double SensorCheck::Arrivals::span_s() const { return stamps.size() < 2 ? 0 : (s
 double SensorCheck::Arrivals::period_s() const {
   std::vector<double> steps;
   for (std::size_t k = 1; k < stamps.size(); ++k) steps.push_back((stamps[k] - stamps[k - 1]).seconds());
-  return median(std::move(steps));
+  return median_of(std::move(steps));
 }
 
 double SensorCheck::Arrivals::largest_gap_s() const {
@@ -53,7 +48,7 @@ double SensorCheck::Arrivals::largest_gap_s() const {
 double SensorCheck::Arrivals::delay_s() const {
   std::vector<double> delays;
   for (std::size_t k = 0; k < stamps.size(); ++k) delays.push_back((host[k] - stamps[k]).seconds());
-  return median(std::move(delays));
+  return median_of(std::move(delays));
 }
 
 void SensorCheck::push(const ImuSample& sample) {

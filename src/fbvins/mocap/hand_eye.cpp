@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/mocap/clock_match.hpp"
 #include "fbvins/mocap/hand_eye_pairs.hpp"
 
@@ -253,12 +254,6 @@ Trajectory<W> thinned(const Trajectory<W>& estimate, double spacing_s) {
   for (const StampedPose<W>& pose : estimate)
     if (out.empty() || pose.t - out.back().t >= spacing) out.push_back(pose);
   return out;
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Runs of pairs with large residuals: there the system took the markers for another orientation, or for another body.

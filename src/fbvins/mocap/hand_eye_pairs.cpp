@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/geometry/heading.hpp"
 
 namespace fbvins {
@@ -80,12 +81,6 @@ RotationFit fit_rotation(const std::vector<Turn>& turns) {
   for (int i = 0; i < 5; ++i) best.q_BK = rotation_between(turns, [&](const Turn& turn) { return fits(turn, best.q_BK); });
   best.share = static_cast<double>(count(best.q_BK)) / static_cast<double>(large);
   return best;
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double angle(const Quat& a, const Quat& b) { return so3_log(a.conjugate() * b).norm(); }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/mocap/marker_curve.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 
@@ -11,12 +13,9 @@ constexpr double kHalfWindow_periods = 2.3, kShortestHalfWindow_s = 0.01, kLarge
 constexpr int kFewest = 4;  // one more than a parabola needs
 
 Duration median_interval(const MarkerTrack& track) {
-  std::vector<std::int64_t> intervals;
-  for (std::size_t i = 1; i < track.size(); ++i) intervals.push_back((track[i].t - track[i - 1].t).ns);
-  if (intervals.empty()) return {};
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return {*middle};
+  std::vector<Duration> intervals;
+  for (std::size_t i = 1; i < track.size(); ++i) intervals.push_back(track[i].t - track[i - 1].t);
+  return median(intervals);
 }
 
 bool earlier(const MarkerPose& a, const MarkerPose& b) { return a.t < b.t; }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/mocap/marker_faults.hpp"
 
+#include "fbvins/core/median.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,12 +17,6 @@ constexpr double kGap_periods = 3;
 constexpr std::size_t kHeld_poses = 3;  // this many identical ones are no measurements
 // Faster than any of these no indoor drone moves; the constants are the noise of a small rigid body.
 constexpr double kFastest_mps = 15, kFastest_radps = 25, kStep_m = 0.05, kStep_rad = 0.17;
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double angle_between(const MarkerPose& a, const MarkerPose& b) { return so3_log(a.T_VK.q.conjugate() * b.T_VK.q).norm(); }
 

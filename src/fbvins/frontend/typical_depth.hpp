@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The median of a few numbers, and the depth that is assumed for a feature without one.
-//
-//   std::vector<double> motion_px = ...;
-//   stats.median_motion_px = median(motion_px);
+// The depth that is assumed for a feature without one. A value.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <vector>
 
-namespace fbvins {
+#include "fbvins/core/median.hpp"
 
-/// The upper one of an even count, 0 of none. Reorders the numbers.
-inline double median(std::vector<double>& numbers) {
-  if (numbers.empty()) return 0;
-  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
-  std::nth_element(numbers.begin(), middle, numbers.end());
-  return *middle;
-}
+namespace fbvins {
 
 /// Depth that is assumed for a feature without one: the median of the others'.
 class TypicalDepth {
