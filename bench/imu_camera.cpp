@@ -11,15 +11,14 @@
 #include <chrono>
 #include <cstdio>
 #include <cmath>
-#include <numbers>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/calibration/imu_camera_scene.hpp"
 
 using namespace fbvins;
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// Errors and normalised squared errors of one block of parameters over all recordings.
 struct Block {

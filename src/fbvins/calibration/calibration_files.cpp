@@ -7,22 +7,16 @@
 #include <cmath>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/calibration_fields.hpp"
 
 namespace fbvins {
 namespace {
-
-/// 17 digits name a double without loss.
-std::string list(const std::vector<double>& values) {
-  std::string out;
-  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "" : ", ", value);
-  return "[" + out + "]";
-}
 
 template <class To, class From>
 std::string matrix(const std::string& name, const Pose<To, From>& T) {
   const Mat3 R = T.R();
   std::string out = fmt::format("  {}:\n", name);
-  for (int row = 0; row < 3; ++row) out += "  - " + list({R(row, 0), R(row, 1), R(row, 2), T.p[row]}) + "\n";
+  for (int row = 0; row < 3; ++row) out += "  - " + yaml_list({R(row, 0), R(row, 1), R(row, 2), T.p[row]}) + "\n";
   return out + "  - [0.0, 0.0, 0.0, 1.0]\n";
 }
 
@@ -51,7 +45,7 @@ const char* basalt_name(const std::string& model) {
   return model == "ds" ? "ds" : "eucm";
 }
 
-std::string three(double value) { return list({value, value, value}); }
+std::string three(double value) { return yaml_list({value, value, value}); }
 
 }  // namespace
 
@@ -82,8 +76,8 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
     const std::vector<double> no_distortion(4, 0.0);
     out += fmt::format("  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n  resolution: [{}, {}]\n"
                        "  rostopic: /cam{}/image_raw\n",
-                       camera.model, list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
-                       list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
+                       camera.model, yaml_list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
+                       yaml_list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
     if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {:.17g}\n", rig.time_offset_s);
   }
   return out;
@@ -110,7 +104,7 @@ Result<std::string> to_basalt(const RigCalibration& rig) {
     sizes += fmt::format("{}[{}, {}]", k > 0 ? ", " : "", rig.cameras[k].width(), rig.cameras[k].height());
   }
   const ImuNoise& n = rig.imu_noise;
-  const std::string zeros9 = list(std::vector<double>(9, 0.0)), zeros12 = list(std::vector<double>(12, 0.0));
+  const std::string zeros9 = yaml_list(std::vector<double>(9, 0.0)), zeros12 = yaml_list(std::vector<double>(12, 0.0));
   return fmt::format(
       "{{\n  \"value0\": {{\n    \"T_imu_cam\": [{}\n    ],\n    \"intrinsics\": [{}\n    ],\n    \"resolution\": [{}],\n"
       "    \"calib_accel_bias\": {},\n    \"calib_gyro_bias\": {},\n    \"imu_update_rate\": {:.17g},\n"
@@ -132,8 +126,8 @@ Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
       "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  data: {}\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n  data: {}\n",
-      c.width(), c.height(), camera, list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(),
-      list(d), list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
+      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(),
+      yaml_list(d), yaml_list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
 }
 
 }  // namespace fbvins

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/imu_camera_judge.hpp"
+#include "fbvins/core/angle.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace fbvins {
 namespace {
@@ -15,7 +15,6 @@ constexpr double kNoticed = 1.3, kContradiction = 10;
 constexpr double kFreedCamera_m = 0.02, kFreedCamera_rad = 0.05;
 constexpr double kWorstScale = 0.015, kSure = 5, kUnsureScale = 0.02;  // of gravity and of the board's size: wrong, for certain
 constexpr double kWorstAxes = 0.15;
-constexpr double kDegree = std::numbers::pi / 180;
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <numbers>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/calibration/imu_camera_scene.hpp"
 
 namespace fbvins {
@@ -16,7 +16,6 @@ using test::hand_held;
 using test::HandHeldOptions;
 using test::HandHeldRecording;
 
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// As quick as a test should be: 12 s, images at 10 Hz.
 HandHeldOptions short_recording() {

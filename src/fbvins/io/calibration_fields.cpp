@@ -36,6 +36,12 @@ std::optional<std::size_t> numbers_before_focal(const std::string& model) {
 
 }  // namespace
 
+std::string yaml_list(const std::vector<double>& values) {
+  std::string out;
+  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "" : ", ", value);  // 17 digits lose nothing
+  return "[" + out + "]";
+}
+
 RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, const std::string& field) {
   const std::vector<double> m = yaml.numbers(map, field, 16);
   if (!yaml.ok()) return {};

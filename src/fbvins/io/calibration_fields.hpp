@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: what EuRoC's and Kalibr's calibration files have in common.
+// Not public: what EuRoC's and Kalibr's calibration files have in common.
 #pragma once
+
+#include <string>
+#include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/camera/check_rig.hpp"
@@ -24,6 +27,9 @@ Pose<To, From> read_transform(YamlReader& yaml, const YAML::Node& map, const std
   const RigidTransform T = read_rigid_transform(yaml, map, field);
   return {T.q, T.p};
 }
+
+/// "[1, 2.5]", each number without loss.
+std::string yaml_list(const std::vector<double>& values);
 
 /// camera_model, intrinsics, resolution, distortion_model and the coefficients in `coefficients_field`.
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field);

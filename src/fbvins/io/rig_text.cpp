@@ -8,25 +8,18 @@
 namespace fbvins {
 namespace {
 
-/// 17 digits name a double without loss.
-std::string list(const std::vector<double>& values) {
-  std::string out;
-  for (const double value : values) out += fmt::format("{}{:.17g}", out.empty() ? "" : ", ", value);
-  return "[" + out + "]";
-}
-
 std::string camera_text(const char* name, const Camera& camera) {
   const KalibrCamera c = kalibr_camera(camera);
   return fmt::format(
       "{}:\n  camera_model: {}\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
       "  distortion_coefficients: {}\n",
-      name, c.model, camera.width(), camera.height(), list(c.intrinsics), c.distortion, list(c.coefficients));
+      name, c.model, camera.width(), camera.height(), yaml_list(c.intrinsics), c.distortion, yaml_list(c.coefficients));
 }
 
 template <class To, class From>
 std::string pose_text(const char* name, const Pose<To, From>& T) {
-  return fmt::format("{}:\n  q_wxyz: {}\n  p_m: {}\n", name, list({T.q.w(), T.q.x(), T.q.y(), T.q.z()}),
-                     list({T.p.x(), T.p.y(), T.p.z()}));
+  return fmt::format("{}:\n  q_wxyz: {}\n  p_m: {}\n", name, yaml_list({T.q.w(), T.q.x(), T.q.y(), T.q.z()}),
+                     yaml_list({T.p.x(), T.p.y(), T.p.z()}));
 }
 
 template <class To, class From>
