@@ -41,14 +41,18 @@ Json pose_json(const Pose<To, From>& T) {
 }
 
 Json board_json(const Board& board) {
-  const char* kind = board.kind == BoardKind::aprilgrid ? "aprilgrid" : board.kind == BoardKind::charuco ? "charuco" : "checkerboard";
+  const char* kind = board.kind == BoardKind::aprilgrid ? "aprilgrid"
+                     : board.kind == BoardKind::charuco ? "charuco"
+                                                        : "checkerboard";
   return {{"kind", kind}, {"columns", board.columns}, {"rows", board.rows}, {"size_m", board.size_m}, {"spacing", board.spacing}};
 }
 
 Json camera_json(const CalibratedCamera& c) {
-  Json out = {{"model", c.camera.model_name()}, {"resolution", {c.camera.width(), c.camera.height()}}, {"T_cam_cam0", pose_json(c.T_CnC0)}};
+  Json out = {{"model", c.camera.model_name()},
+              {"resolution", {c.camera.width(), c.camera.height()}},
+              {"T_cam_cam0", pose_json(c.T_CnC0)}};
   const ReprojectionStatistics& s = c.statistics;
-  out["reprojection"] = {{"rms_px", s.rms_px},           {"largest_px", s.largest_px}, {"views", s.views},
+  out["reprojection"] = {{"rms_px", s.rms_px},   {"largest_px", s.largest_px},     {"views", s.views},
                          {"corners", s.corners}, {"corners_left_out", s.left_out}, {"coverage", s.coverage}};
   for (const auto& [model, px] : c.held_out_px) out["held_out_px"][model] = std::isfinite(px) ? Json(px) : Json();
   return out;
@@ -57,8 +61,12 @@ Json camera_json(const CalibratedCamera& c) {
 Json imu_json(const CameraImuResult& imu) {
   Json out;
   for (const CameraOnImu& c : imu.cameras)
-    out["cameras"].push_back({{"T_imu_cam", pose_json(c.T_BC)}, {"covariance", matrix_json(c.covariance)}, {"rms_px", c.rms_px},
-                              {"views", c.views}, {"corners", c.corners}, {"outliers", c.outliers}});
+    out["cameras"].push_back({{"T_imu_cam", pose_json(c.T_BC)},
+                              {"covariance", matrix_json(c.covariance)},
+                              {"rms_px", c.rms_px},
+                              {"views", c.views},
+                              {"corners", c.corners},
+                              {"outliers", c.outliers}});
   out["time_offset_s"] = imu.time_offset_s;
   out["time_offset_sigma_s"] = imu.time_offset_sigma_s;
   out["line_delay_s"] = imu.line_delay_s;
@@ -96,7 +104,8 @@ RigCalibration rig_of(const CalibrationOutcome& outcome) {
 
 std::string lines_of(const std::vector<CalibratedParameter>& parameters) {
   std::string out;
-  for (const CalibratedParameter& p : parameters) out += fmt::format("  {:<22} {:>14.6f} +- {:<10.2g} {}\n", p.name, p.value, p.sigma, p.unit);
+  for (const CalibratedParameter& p : parameters)
+    out += fmt::format("  {:<22} {:>14.6f} +- {:<10.2g} {}\n", p.name, p.value, p.sigma, p.unit);
   return out;
 }
 
@@ -116,30 +125,34 @@ std::vector<CalibratedParameter> camera_parameters(const CameraCalibration& came
     }
   }
   std::vector<CalibratedParameter> out;
-  for (const std::string& name : cameras.names) out.push_back({name, values[name].second, values[name].first, cameras.sigma(name)});
+  for (const std::string& name : cameras.names)
+    out.push_back({name, values[name].second, values[name].first, cameras.sigma(name)});
   return out;
 }
 
 std::string calibration_text(const CalibrationOutcome& outcome) {
   const CameraCalibration& found = outcome.cameras;
-  std::string out = fmt::format("{}; {} of {} stamps used; noise of a corner {:.3f} px\n", outcome.board.describe(), found.poses.size(), found.stamps,
-                                found.noise_px);
+  std::string out = fmt::format("{}; {} of {} stamps used; noise of a corner {:.3f} px\n", outcome.board.describe(),
+                                found.poses.size(), found.stamps, found.noise_px);
   for (std::size_t k = 0; k < found.cameras.size(); ++k) {
     const CalibratedCamera& c = found.cameras[k];
-    out += fmt::format("cam{}: {}, {} x {}; {} views, {} corners, {} left out; residual {:.3f} px, {:.0f} % of the image covered\n", k,
-                       c.camera.model_name(), c.camera.width(), c.camera.height(), c.statistics.views, c.statistics.corners, c.statistics.left_out,
-                       c.statistics.rms_px, 100 * c.statistics.coverage);
+    out +=
+        fmt::format("cam{}: {}, {} x {}; {} views, {} corners, {} left out; residual {:.3f} px, {:.0f} % of the image covered\n",
+                    k, c.camera.model_name(), c.camera.width(), c.camera.height(), c.statistics.views, c.statistics.corners,
+                    c.statistics.left_out, c.statistics.rms_px, 100 * c.statistics.coverage);
     for (const auto& [model, px] : c.held_out_px) out += fmt::format("  held-out error of {:<20} {:.4f} px\n", model, px);
   }
   for (std::size_t k = 1; k < found.cameras.size(); ++k) {
     const Pose<Cn, C0>& T = found.cameras[k].T_CnC0;
-    out += fmt::format("cam0 to cam{}: baseline {:.3f} mm, turned by {:.4f} degrees\n", k, 1e3 * T.p.norm(), kDegrees * so3_log(T.q).norm());
+    out += fmt::format("cam0 to cam{}: baseline {:.3f} mm, turned by {:.4f} degrees\n", k, 1e3 * T.p.norm(),
+                       kDegrees * so3_log(T.q).norm());
   }
   out += "cameras (cam1.p, cam1.r: T_cam1_cam0)\n" + lines_of(camera_parameters(found));
   if (outcome.imu) {
     const CameraImuResult& imu = *outcome.imu;
-    out += fmt::format("IMU: {} readings in {:.1f} s, {} refused; residuals {:.2f} and {:.2f} sigmas (gyroscope, accelerometer), {:.3f} px\n", imu.readings,
-                       imu.duration_s, imu.readings_refused, imu.gyro_rms_sigmas, imu.accel_rms_sigmas, imu.corner_sigma_px);
+    out += fmt::format(
+        "IMU: {} readings in {:.1f} s, {} refused; residuals {:.2f} and {:.2f} sigmas (gyroscope, accelerometer), {:.3f} px\n",
+        imu.readings, imu.duration_s, imu.readings_refused, imu.gyro_rms_sigmas, imu.accel_rms_sigmas, imu.corner_sigma_px);
     out += lines_of(imu.parameters);
   }
   for (const std::string& remark : all_remarks(outcome)) out += fmt::format("note: {}\n", remark);
@@ -165,13 +178,15 @@ Result<void> write_calibration(const CalibrationOutcome& outcome, const std::str
   std::filesystem::create_directories(folder, error);
   if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
   const RigCalibration rig = rig_of(outcome);
-  std::vector<std::pair<std::string, std::string>> files = {{outcome.imu ? "camchain-imucam.yaml" : "camchain.yaml", to_kalibr_camchain(rig)},
-                                                            {"summary.json", calibration_summary_json(outcome)},
-                                                            {"calibration.txt", calibration_text(outcome)}};
+  std::vector<std::pair<std::string, std::string>> files = {
+      {outcome.imu ? "camchain-imucam.yaml" : "camchain.yaml", to_kalibr_camchain(rig)},
+      {"summary.json", calibration_summary_json(outcome)},
+      {"calibration.txt", calibration_text(outcome)}};
   if (outcome.imu) files.push_back({"imu.yaml", to_kalibr_imu(outcome.imu_noise)});
   if (Result<std::string> basalt = to_basalt(rig); basalt) files.push_back({"calibration.json", *basalt});
   for (std::size_t k = 0; k < rig.cameras.size(); ++k)
-    if (Result<std::string> ros = to_ros_camera_info(rig, static_cast<int>(k)); ros) files.push_back({fmt::format("camera_info_cam{}.yaml", k), *ros});
+    if (Result<std::string> ros = to_ros_camera_info(rig, static_cast<int>(k)); ros)
+      files.push_back({fmt::format("camera_info_cam{}.yaml", k), *ros});
   for (const auto& [name, text] : files)
     if (Result<void> done = write_text(folder + "/" + name, text); !done) return done;
   return {};

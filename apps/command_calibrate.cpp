@@ -56,7 +56,8 @@ Result<Material> detect(const Arguments& a, const Board& board) {
   if (!recording) return recording.error();
   Progress progress(recording->images(), a.quiet);
   const auto next = [&] { return recording->next(); };
-  Result<BoardSearch> found = detect_board(board, next, {.threads = a.threads, .progress = [&](int done) { progress.update(done); }});
+  Result<BoardSearch> found =
+      detect_board(board, next, {.threads = a.threads, .progress = [&](int done) { progress.update(done); }});
   if (!found) return Error{found.error().code, fmt::format("{}: {}", a.recording, found.error().message)};
   Material out{std::move(found->detections), recording->imu(), recording->imu_noise(), {}};
   if (found->unreadable > 0)
@@ -107,7 +108,9 @@ Result<Material> gather(const Arguments& a, const Board& board) {
 
 /// With the measured rate, on which the noise of a single reading depends.
 ImuNoise noise_of(const Material& material, std::vector<std::string>& remarks) {
-  if (!material.imu_noise) remarks.push_back("no noise of the IMU is given (--imu-calibration): the defaults are taken, and the weight of its readings follows their residuals");
+  if (!material.imu_noise)
+    remarks.push_back(
+        "no noise of the IMU is given (--imu-calibration): the defaults are taken, and the weight of its readings follows their residuals");
   ImuNoise noise = material.imu_noise.value_or(ImuNoise{});
   if (const double rate_hz = rate_hz_of(material.imu); rate_hz > 0) noise.rate_hz = rate_hz;
   return noise;
@@ -130,7 +133,8 @@ int calibrate(const Arguments& a) {
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   if (a.save_detections)
-    if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done) return fail(done.error().message);
+    if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
+      return fail(done.error().message);
 
   CalibrationOutcome outcome;
   outcome.board = *board;
@@ -139,14 +143,15 @@ int calibrate(const Arguments& a) {
   if (!a.quiet) options.tell = [](const std::string& what) { note(what); };
   // Cameras that never see the board together are joined by the IMU, if there is one.
   const bool apart = !material->imu.empty() && !cameras_connected(material->detections, *board, options.pair_tolerance_s);
-  Result<CameraCalibration> cameras =
-      apart ? calibrate_cameras_apart(material->detections, *board, options) : calibrate_cameras(material->detections, *board, options);
+  Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material->detections, *board, options)
+                                            : calibrate_cameras(material->detections, *board, options);
   if (!cameras) return refuse(cameras.error());
   outcome.cameras = *std::move(cameras);
   if (!material->imu.empty()) {
     if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
     outcome.imu_noise = noise_of(*material, outcome.remarks);
-    ImuCameraInput input{*board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
+    ImuCameraInput input{
+        *board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
     for (const CalibratedCamera& camera : outcome.cameras.cameras) {
       input.cameras.push_back(camera.camera);
       if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
@@ -155,7 +160,8 @@ int calibrate(const Arguments& a) {
     if (!imu) return refuse({imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
     for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
       outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
-    if (apart) outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
+    if (apart)
+      outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
     outcome.imu = *std::move(imu);
   }
   if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);
@@ -196,20 +202,30 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   command->add_option("RECORDING", a->recording, "folder or zip in EuRoC's layout, with cam0 to cam7");
   command->add_option("--target", a->target, "the board, as Kalibr describes it");
-  command->add_option("--detections", a->detections, "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
-  command->add_option("--resolution", a->resolutions, "size of the images with --detections, such as 752x480; one, or one a camera")->delimiter(',');
+  command->add_option("--detections", a->detections,
+                      "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
+  command
+      ->add_option("--resolution", a->resolutions, "size of the images with --detections, such as 752x480; one, or one a camera")
+      ->delimiter(',');
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");
   command->add_option("--imu-calibration", a->imu_calibration, "the IMU's noise: Kalibr's imu.yaml");
-  command->add_option("--model", a->models, "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
+  command
+      ->add_option("--model", a->models,
+                   "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
       ->delimiter(',')
       ->capture_default_str();
   command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
   command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
   command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
-  command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")->capture_default_str();
+  command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
+      ->capture_default_str();
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest (folder or imu0/data.csv)");
-  command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")->check(CLI::Range(10, 100000))->capture_default_str();
-  command->add_option("--threads", a->threads, "threads that look for the board")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", a->threads, "threads that look for the board")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   command->add_flag("--save-detections", a->save_detections, "write detections.csv");
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors");

@@ -50,13 +50,21 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->footer(kExamples);
   command->add_option("--out", a->out, "folder for the recording")->required();
   command->add_option("--target", a->target, "the board; left out: AprilGrid, 6 x 6 tags of 88 mm");
-  command->add_option("--lens", a->options.lens, "lens model of both cameras")->check(CLI::IsMember(lens_names()))->capture_default_str();
+  command->add_option("--lens", a->options.lens, "lens model of both cameras")
+      ->check(CLI::IsMember(lens_names()))
+      ->capture_default_str();
   command->add_option("--seconds", a->options.seconds, "length")->check(CLI::Range(1.0, 3600.0))->capture_default_str();
-  command->add_option("--rate", a->options.image_rate_hz, "images a second")->check(CLI::Range(0.5, 200.0))->capture_default_str();
-  command->add_option("--exposure", a->options.exposure_ms, "ms, in which the motion blurs")->check(CLI::Range(0.0, 50.0))->capture_default_str();
+  command->add_option("--rate", a->options.image_rate_hz, "images a second")
+      ->check(CLI::Range(0.5, 200.0))
+      ->capture_default_str();
+  command->add_option("--exposure", a->options.exposure_ms, "ms, in which the motion blurs")
+      ->check(CLI::Range(0.0, 50.0))
+      ->capture_default_str();
   command->add_option("--blur", a->options.blur_px, "px, of the lens")->check(CLI::Range(0.0, 5.0))->capture_default_str();
   command->add_option("--noise", a->options.noise, "grey values")->check(CLI::Range(0.0, 50.0))->capture_default_str();
-  command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")->check(CLI::Range(-400.0, 400.0))->capture_default_str();
+  command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")
+      ->check(CLI::Range(-400.0, 400.0))
+      ->capture_default_str();
   command->add_option("--seed", a->options.seed, "of motion and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = render(*a); });

@@ -48,7 +48,8 @@ int make_target(const Arguments& a) {
   for (const Result<void>& done : {write_text(a.out + ".pdf", to_pdf(*page)), write_text(a.out + ".svg", to_svg(*page)),
                                    write_text(a.out + ".yaml", target_to_yaml(board))})
     if (!done) return fail(done.error().message);
-  fmt::print("{} on {}: {}, and .svg, .yaml\nprint it without scaling, then measure the rulers\n", board.describe(), a.paper, bold(a.out + ".pdf"));
+  fmt::print("{} on {}: {}, and .svg, .yaml\nprint it without scaling, then measure the rulers\n", board.describe(), a.paper,
+             bold(a.out + ".pdf"));
   return kOk;
 }
 
@@ -61,10 +62,12 @@ void add_target_command(CLI::App& program, int& exit_code) {
   command->add_option("--kind", a->kind, "aprilgrid, charuco or chessboard")
       ->check(CLI::IsMember({"aprilgrid", "charuco", "chessboard"}))
       ->capture_default_str();
-  command->add_option("--columns", a->columns, "tags, squares (charuco), or inner corners (chessboard) in a row")->capture_default_str();
+  command->add_option("--columns", a->columns, "tags, squares (charuco), or inner corners (chessboard) in a row")
+      ->capture_default_str();
   command->add_option("--rows", a->rows, "of them in a column")->capture_default_str();
   command->add_option("--size", a->size_m, "edge of a tag or square, m; left out: as large as fits")->check(CLI::PositiveNumber);
-  command->add_option("--spacing", a->spacing, "aprilgrid: gap between tags, charuco: marker, as a part of --size (0.3, 0.75)")->check(CLI::PositiveNumber);
+  command->add_option("--spacing", a->spacing, "aprilgrid: gap between tags, charuco: marker, as a part of --size (0.3, 0.75)")
+      ->check(CLI::PositiveNumber);
   command->add_option("--paper", a->paper, "A4, A3, A2, A1 or A0")->capture_default_str();
   command->add_option("--out", a->out, "name of the files, without .pdf")->capture_default_str();
   command->callback([a, &exit_code] { exit_code = make_target(*a); });

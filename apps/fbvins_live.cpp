@@ -3,5 +3,6 @@
 #include "apps/command_line.hpp"
 
 int main(int argc, char** argv) {
-  return fbvins::app::run_command_line(argc, argv, {fbvins::app::add_live_command, fbvins::app::add_view_command, fbvins::app::add_px4_command});
+  return fbvins::app::run_command_line(
+      argc, argv, {fbvins::app::add_live_command, fbvins::app::add_view_command, fbvins::app::add_px4_command});
 }

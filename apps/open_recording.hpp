@@ -44,8 +44,8 @@ class RecordingWarnings {
   std::size_t printed_ = 0;
 };
 
-/// What is in a bag that cannot be opened as a recording yet (fbvins/bags/bag_survey.hpp); none where it is no bag, or this program
-/// reads none.
+/// What is in a bag that cannot be opened as a recording yet (fbvins/bags/bag_survey.hpp); none where it is no bag, or this
+/// program reads none.
 std::optional<BagSurvey> survey_recording(const RecordingArguments& arguments);
 
 /// A TUM or EuRoC file; warns of rows that are left out.

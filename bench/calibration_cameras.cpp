@@ -39,7 +39,8 @@ double nees(const CameraCalibration& found, const Eigen::VectorXd& error, Eigen:
 double straight_nees(const LensModel& found, const LensModel& truth, const Eigen::MatrixXd& covariance) {
   const std::vector<double> got = straight_parameters(found), want = straight_parameters(truth);
   const Eigen::MatrixXd J = straight_jacobian(found);
-  const Eigen::VectorXd e = Eigen::Map<const Eigen::VectorXd>(got.data(), J.rows()) - Eigen::Map<const Eigen::VectorXd>(want.data(), J.rows());
+  const Eigen::VectorXd e =
+      Eigen::Map<const Eigen::VectorXd>(got.data(), J.rows()) - Eigen::Map<const Eigen::VectorXd>(want.data(), J.rows());
   return e.dot((J * covariance * J.transpose()).ldlt().solve(e)) / static_cast<double>(e.size());
 }
 
@@ -48,13 +49,16 @@ void add(const CameraCalibration& found, const SimulatedRig& rig, double noise_p
   Eigen::VectorXd error(size);
   Eigen::Index at = 0;
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
-    const std::vector<double> got = lens_parameters(found.cameras[k].camera.model()), want = lens_parameters(rig.cameras[k].model());
+    const std::vector<double> got = lens_parameters(found.cameras[k].camera.model()),
+                              want = lens_parameters(rig.cameras[k].model());
     const auto count = static_cast<Eigen::Index>(got.size());
     for (Eigen::Index i = 0; i < count; ++i) error[at + i] = got[i] - want[i];
-    row.nees_lens += straight_nees(found.cameras[k].camera.model(), rig.cameras[k].model(), found.covariance.block(at, at, count, count));
+    row.nees_lens +=
+        straight_nees(found.cameras[k].camera.model(), rig.cameras[k].model(), found.covariance.block(at, at, count, count));
     ++row.lenses;
     row.focal_px = std::max({row.focal_px, std::abs(error[at]), std::abs(error[at + 1])});
-    row.axial_px = std::max(row.axial_px, std::abs(straight_parameters(found.cameras[k].camera.model())[0] - straight_parameters(rig.cameras[k].model())[0]));
+    row.axial_px = std::max(row.axial_px, std::abs(straight_parameters(found.cameras[k].camera.model())[0] -
+                                                   straight_parameters(rig.cameras[k].model())[0]));
     row.centre_px = std::max({row.centre_px, std::abs(error[at + 2]), std::abs(error[at + 3])});
     row.focal_square += 0.5 * error.segment<2>(at).squaredNorm();
     row.centre_square += 0.5 * error.segment<2>(at + 2).squaredNorm();
@@ -86,8 +90,9 @@ int main(int argc, char** argv) {
   const int first_seed = argc > 4 ? std::atoi(argv[4]) : 1001;
   const Board board{.columns = 6, .rows = 6, .size_m = 0.088, .spacing = 0.3};
   fmt::print("{} seeds, {} stamps of two cameras, noise {} px\n", seeds, stamps, noise_px);
-  fmt::print("| model | focal px, rms (largest) | near the axis, largest | centre px, rms (largest) | baseline mm, largest | turn deg, largest | noise found / put in "
-             "| NEES lens | NEES extrinsics | beyond 3 sigma | largest, sigmas | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "| model | focal px, rms (largest) | near the axis, largest | centre px, rms (largest) | baseline mm, largest | turn deg, largest | noise found / put in "
+      "| NEES lens | NEES extrinsics | beyond 3 sigma | largest, sigmas | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const std::string only = argc > 5 ? argv[5] : "";
   for (const Camera& left : example_cameras()) {
     if (!only.empty() && left.model_name() != only) continue;
@@ -105,10 +110,12 @@ int main(int argc, char** argv) {
       }
     }
     const int runs = std::max(1, row.runs), lenses = std::max(1, row.lenses);
-    fmt::print("| {} | {:.3f} ({:.3f}) | {:.3f} | {:.3f} ({:.3f}) | {:.4f} | {:.5f} | {:.3f} to {:.3f} | {:.2f} | {:.2f} | {} of {} | {:.1f} | {:.2f} |\n",
-               left.model_name(), std::sqrt(row.focal_square / lenses), row.focal_px, row.axial_px, std::sqrt(row.centre_square / lenses), row.centre_px,
-               row.baseline_mm, row.turn_deg, row.noise_low, row.noise_high, row.nees_lens / lenses, row.nees_extrinsic / runs,
-               row.beyond_3_sigma, row.parameters, row.largest_sigmas, row.seconds / seeds);
+    fmt::print(
+        "| {} | {:.3f} ({:.3f}) | {:.3f} | {:.3f} ({:.3f}) | {:.4f} | {:.5f} | {:.3f} to {:.3f} | {:.2f} | {:.2f} | {} of {} | {:.1f} | {:.2f} |\n",
+        left.model_name(), std::sqrt(row.focal_square / lenses), row.focal_px, row.axial_px,
+        std::sqrt(row.centre_square / lenses), row.centre_px, row.baseline_mm, row.turn_deg, row.noise_low, row.noise_high,
+        row.nees_lens / lenses, row.nees_extrinsic / runs, row.beyond_3_sigma, row.parameters, row.largest_sigmas,
+        row.seconds / seeds);
     std::fflush(stdout);
   }
   return 0;

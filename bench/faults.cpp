@@ -210,8 +210,7 @@ Errors judge(const Flight& flight, const std::vector<Published>& all, Time begin
     }
   std::optional<Similarity> S;
   if (auto aligned = align(before, Alignment::yaw)) S = *aligned;
-  if (S && extent_m(before) < kHeadingNeeds_m)
-    S = laid_on(before.back().truth.T, before.back().estimate.T.cast_frames<W, B>());
+  if (S && extent_m(before) < kHeadingNeeds_m) S = laid_on(before.back().truth.T, before.back().estimate.T.cast_frames<W, B>());
   // The first pose after the fault's beginning must not pay for what the alignment cannot fit.
   for (const Published& p : all) {
     const Odometry& o = p.odometry;

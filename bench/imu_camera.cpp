@@ -9,16 +9,15 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cmath>
+#include <cstdio>
 
-#include "fbvins/core/angle.hpp"
 #include "fbvins/calibration/imu_camera_scene.hpp"
+#include "fbvins/core/angle.hpp"
 
 using namespace fbvins;
 
 namespace {
-
 
 /// Errors and normalised squared errors of one block of parameters over all recordings.
 struct Block {
@@ -87,12 +86,13 @@ int main(int argc, char** argv) {
     scene.axes.gyro << 1.01, 0.004, -0.006, 0.003, 0.995, 0.002, -0.001, 0.005, 1.003;
     scene.axes.accel << 1.006, 0, 0, 0.004, 0.992, 0, -0.003, 0.002, 1.01;
   }
-  if (trouble) scene.outlier_share = 0.01, scene.blur_share = 0.1, scene.dropped_share = 0.02, scene.spike_share = 0.001,
-               scene.hidden_from_s = 10, scene.hidden_to_s = 13;
+  if (trouble)
+    scene.outlier_share = 0.01, scene.blur_share = 0.1, scene.dropped_share = 0.02, scene.spike_share = 0.001,
+    scene.hidden_from_s = 10, scene.hidden_to_s = 13;
 
   Block turn{"rotation", "deg", 1 / kDegree, 0.01}, place{"translation", "mm", 1e3, 0.5}, offset{"time offset", "ms", 1e3, 0.05},
-      gravity{"direction of gravity", "deg", 1 / kDegree, 0}, delay{"line delay", "us", 1e6, 0}, gyro_axes{"gyroscope's axes", "1e-3", 1e3, 0},
-      accel_axes{"accelerometer's axes", "1e-3", 1e3, 0};
+      gravity{"direction of gravity", "deg", 1 / kDegree, 0}, delay{"line delay", "us", 1e6, 0},
+      gyro_axes{"gyroscope's axes", "1e-3", 1e3, 0}, accel_axes{"accelerometer's axes", "1e-3", 1e3, 0};
   Block gyro_bias{"gyroscope bias", "mrad/s", 1e3, 0}, accel_bias{"accelerometer bias", "mm/s2", 1e3, 0};
   double worst_s = 0, mean_s = 0, gyro_rms = 0, accel_rms = 0, corner = 0, scale_nees = 0;
   int refused = 0;
@@ -121,9 +121,11 @@ int main(int argc, char** argv) {
     if (options.imu_axes)
       for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) {
-          gyro_axes.add(one(found->axes.gyro(row, column) - r.truth.axes.gyro(row, column)), square(found->axes_sigma.gyro(row, column)));
+          gyro_axes.add(one(found->axes.gyro(row, column) - r.truth.axes.gyro(row, column)),
+                        square(found->axes_sigma.gyro(row, column)));
           if (column <= row)
-            accel_axes.add(one(found->axes.accel(row, column) - r.truth.axes.accel(row, column)), square(found->axes_sigma.accel(row, column)));
+            accel_axes.add(one(found->axes.accel(row, column) - r.truth.axes.accel(row, column)),
+                           square(found->axes_sigma.accel(row, column)));
         }
     const BiasAt* bias = &found->biases[found->biases.size() / 2];
     const ImuBias& truth = r.truth.bias_at(bias->t);
@@ -131,16 +133,20 @@ int main(int argc, char** argv) {
     accel_bias.add(bias->bias.accel_mps2 - truth.accel_mps2, Mat3(bias->sigma.accel_mps2.cwiseAbs2().asDiagonal()));
     gyro_rms += found->gyro_rms_sigmas, accel_rms += found->accel_rms_sigmas, corner += found->corner_sigma_px;
     scale_nees += std::pow((found->board_scale - 1) / found->board_scale_sigma, 2);
-    fmt::print("{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n", first_seed + i, place.errors.back(),
-               turn.errors.back(), offset.errors.back(), found->board_scale, found->board_scale_sigma, found->measured_gravity_mps2,
-               found->measured_gravity_sigma_mps2, found->knot_spacing_s, found->gyro_rms_sigmas, found->accel_rms_sigmas, found->iterations, took_s);
+    fmt::print(
+        "{}: {:.3f} mm {:.5f} deg {:.4f} ms, scale {:.5f} +- {:.5f}, gravity {:.4f} +- {:.4f}, knots {:g} s, gyro {:.3f} accel {:.3f}, {} iterations, {:.1f} s\n",
+        first_seed + i, place.errors.back(), turn.errors.back(), offset.errors.back(), found->board_scale,
+        found->board_scale_sigma, found->measured_gravity_mps2, found->measured_gravity_sigma_mps2, found->knot_spacing_s,
+        found->gyro_rms_sigmas, found->accel_rms_sigmas, found->iterations, took_s);
     std::fflush(stdout);
   }
   const int done = std::max(1, recordings - refused);
   fmt::print("\n| | RMS | worst | sigma | wanted | NEES | worst sigmas |\n|---|---|---|---|---|---|---|\n");
   for (const Block* b : {&turn, &place, &offset, &gravity, &delay, &gyro_axes, &accel_axes, &gyro_bias, &accel_bias}) b->print();
-  fmt::print("\n{} recordings of {:g} s, {} refused; {:.1f} s each, {:.1f} at most; corners {:.4f} px, gyroscope {:.3f}, accelerometer {:.3f} "
-             "sigmas; NEES of the board's scale {:.2f}\n", recordings, scene.duration_s, refused, mean_s, worst_s, corner / done, gyro_rms / done,
-             accel_rms / done, scale_nees / done);
+  fmt::print(
+      "\n{} recordings of {:g} s, {} refused; {:.1f} s each, {:.1f} at most; corners {:.4f} px, gyroscope {:.3f}, accelerometer {:.3f} "
+      "sigmas; NEES of the board's scale {:.2f}\n",
+      recordings, scene.duration_s, refused, mean_s, worst_s, corner / done, gyro_rms / done, accel_rms / done,
+      scale_nees / done);
   return 0;
 }

@@ -91,8 +91,8 @@ Array<double> columns(const Rows& rows, Function of) {
 inline constexpr std::int64_t kAny = -1;
 
 /// An array of this type and shape in C order: read in place where it is just that, else a copy, where no value changes by it
-/// (float32 as float64, int32 as int64, a view with steps). Raises ValueError with what was expected of `name` and what it is. The
-/// object keeps the memory alive.
+/// (float32 as float64, int32 as int64, a view with steps). Raises ValueError with what was expected of `name` and what it is.
+/// The object keeps the memory alive.
 template <class T>
 struct CheckedArray {
   nb::object keeper;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The MAVLink messages by which a flight controller's parameters are read. Fields and names are those of the protocol's common set, as
-// in messages.hpp.
+// The MAVLink messages by which a flight controller's parameters are read. Fields and names are those of the protocol's common
+// set, as in messages.hpp.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +50,8 @@ struct ParameterValueMessage {
 
   /// PX4 puts the bytes of a whole number into the float.
   double value() const {
-    return param_type == kInt32 ? static_cast<double>(std::bit_cast<std::int32_t>(param_value)) : static_cast<double>(param_value);
+    return param_type == kInt32 ? static_cast<double>(std::bit_cast<std::int32_t>(param_value))
+                                : static_cast<double>(param_value);
   }
 
   template <class V>

@@ -22,7 +22,8 @@ constexpr std::int64_t kStart_ns = 1'000'000'000'000;
 
 /// A number from 0 to 1 of a lattice point.
 double hashed(int a, int b, int c) {
-  auto h = static_cast<std::uint32_t>(a) * 0x9E3779B1u ^ static_cast<std::uint32_t>(b) * 0x85EBCA77u ^ static_cast<std::uint32_t>(c) * 0xC2B2AE3Du;
+  auto h = static_cast<std::uint32_t>(a) * 0x9E3779B1u ^ static_cast<std::uint32_t>(b) * 0x85EBCA77u ^
+           static_cast<std::uint32_t>(c) * 0xC2B2AE3Du;
   h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
   return ((h ^ (h >> 13u)) & 0xFFFFu) / 65535.0;
 }
@@ -49,7 +50,8 @@ double room(const Vec3& origin_T, const Vec3& direction_T) {
 }
 
 /// Poses of the board at four instants of the exposure, about its middle.
-std::vector<Pose<Cn, T>> poses(const SplineTrajectory& hand, const Pose<W, T>& T_WT, const Pose<B, Cn>& T_BC, double middle_s, double exposure_s) {
+std::vector<Pose<Cn, T>> poses(const SplineTrajectory& hand, const Pose<W, T>& T_WT, const Pose<B, Cn>& T_BC, double middle_s,
+                               double exposure_s) {
   constexpr int kInstants = 4;
   std::vector<Pose<Cn, T>> out;
   for (int i = 0; i < kInstants; ++i)
@@ -81,10 +83,12 @@ Result<StereoRig> board_flight_rig(const BoardFlightOptions& options) {
     rig.time_offset_s = 1e-3 * options.time_offset_ms;
     return rig;
   }
-  return Error{ErrorCode::invalid_argument, fmt::format("'{}' is no lens model: {}", options.lens, fmt::join(lens_names(), ", "))};
+  return Error{ErrorCode::invalid_argument,
+               fmt::format("'{}' is no lens model: {}", options.lens, fmt::join(lens_names(), ", "))};
 }
 
-Result<void> simulate_board(const BoardFlightOptions& options, const std::string& folder, const std::function<void(int done, int all)>& progress) {
+Result<void> simulate_board(const BoardFlightOptions& options, const std::string& folder,
+                            const std::function<void(int done, int all)>& progress) {
   const Result<StereoRig> rig = board_flight_rig(options);
   if (!rig) return rig.error();
   const Result<BoardPattern> pattern = BoardPattern::create(options.board);
@@ -119,8 +123,9 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
   imu.vibration_accel_mps2 = imu.vibration_gyro_radps = imu.rumble_accel_mps2_rthz = imu.rumble_gyro_radps_rthz = 0;
   const SimulatedImu readings = simulate_imu(hand, rig->imu_noise, imu, Time{kStart_ns}, seed + 1);
   if (Result<void> done = finish_recording(*recording, readings); !done) return done;
-  const std::string truth = fmt::format("lens: {}\ntime_offset_s: {}\nseed: {}\nexposure_ms: {}\nblur_px: {}\nnoise: {}\n", options.lens,
-                                        rig->time_offset_s, options.seed, options.exposure_ms, options.blur_px, options.noise);
+  const std::string truth =
+      fmt::format("lens: {}\ntime_offset_s: {}\nseed: {}\nexposure_ms: {}\nblur_px: {}\nnoise: {}\n", options.lens,
+                  rig->time_offset_s, options.seed, options.exposure_ms, options.blur_px, options.noise);
   if (Result<void> done = write_whole(folder + "/simulation.yaml", truth); !done) return done;
   return write_whole(folder + "/target.yaml", target_to_yaml(options.board));
 }

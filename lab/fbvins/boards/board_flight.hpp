@@ -19,10 +19,10 @@ struct BoardFlightOptions {
   std::string lens = "pinhole-radtan";  ///< as Camera::model_name() names it
   double seconds = 60;
   double image_rate_hz = 20;
-  double exposure_ms = 2;      ///< blurs by motion
-  double blur_px = 0.6;        ///< of the lens, standard deviation
-  double noise = 2;            ///< of a grey value, standard deviation
-  double time_offset_ms = 5;   ///< stamp of the IMU less that of the image at the same instant
+  double exposure_ms = 2;     ///< blurs by motion
+  double blur_px = 0.6;       ///< of the lens, standard deviation
+  double noise = 2;           ///< of a grey value, standard deviation
+  double time_offset_ms = 5;  ///< stamp of the IMU less that of the image at the same instant
   int seed = 1;
 };
 
@@ -30,6 +30,7 @@ struct BoardFlightOptions {
 Result<StereoRig> board_flight_rig(const BoardFlightOptions& options);
 
 /// Writes folder/mav0 with the true calibration in its sensor.yaml files, and target.yaml beside it.
-Result<void> simulate_board(const BoardFlightOptions& options, const std::string& folder, const std::function<void(int done, int all)>& progress);
+Result<void> simulate_board(const BoardFlightOptions& options, const std::string& folder,
+                            const std::function<void(int done, int all)>& progress);
 
 }  // namespace fbvins

@@ -40,7 +40,8 @@ Pose<W, T> hanging_board(const Board& board) {
   return {R_WT, Vec3(Vec3(0, 0, 1.4) - R_WT * (0.5 * board.corner(board.corner_count() - 1)))};
 }
 
-SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const Pose<B, C0>& T_BC0, double duration_s, std::uint64_t seed) {
+SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const Pose<B, C0>& T_BC0, double duration_s,
+                                   std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Wandering> wander;
   for (int i = 0; i < 6; ++i) wander.emplace_back(rng);

@@ -14,6 +14,7 @@ Pose<W, T> hanging_board(const Board& board);
 
 /// Nearer and farther, to all sides, turned about all axes, the board now in the middle and now at the rim of cam0's image.
 /// `focal_ratio`: focal length over the image's width, to which the distance belongs.
-SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const Pose<B, C0>& T_BC0, double duration_s, std::uint64_t seed);
+SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const Pose<B, C0>& T_BC0, double duration_s,
+                                   std::uint64_t seed);
 
 }  // namespace fbvins

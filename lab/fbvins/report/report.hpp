@@ -22,8 +22,8 @@ struct ReportOptions {
 /// `bench`: results of a matrix (bench_payload of bench_tables.hpp), or null.
 std::string report_html(const std::vector<RunFolder>& runs, const nlohmann::ordered_json& bench, const ReportOptions& options);
 
-/// Writes the page of runs in the folders that `fbvins run` wrote. `truth`: of all of them, where they have none; empty: their own.
-/// Without a title it is that of the recordings. Returns warnings.
+/// Writes the page of runs in the folders that `fbvins run` wrote. `truth`: of all of them, where they have none; empty: their
+/// own. Without a title it is that of the recordings. Returns warnings.
 Result<std::vector<std::string>> write_report(const std::vector<std::string>& folders, const std::string& out,
                                               const std::string& truth = "", const std::string& title = "");
 

@@ -3,8 +3,8 @@
 //
 //   Result<Image> image = grey_image({752, 480, 752, "mono8", false, bytes});
 //
-// Colour becomes luma (ITU-R BT.601 weights), of 16 bit the upper eight of those used are kept, of YUV the brightness; a Bayer mosaic
-// is smoothed by (1 2 1)/4 both ways, which weighs red, green and blue the same (1, 2, 1) at every pixel.
+// Colour becomes luma (ITU-R BT.601 weights), of 16 bit the upper eight of those used are kept, of YUV the brightness; a Bayer
+// mosaic is smoothed by (1 2 1)/4 both ways, which weighs red, green and blue the same (1, 2, 1) at every pixel.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kFewestFreedom = 2;
 constexpr double kCluster_s = 0.08;  // shorter, a sensor's filter and quantisation show
-constexpr double kDrop = 1.92;        // of the log-likelihood at a 95 % bound
+constexpr double kDrop = 1.92;       // of the log-likelihood at a 95 % bound
 constexpr double kSigmas = 1.96;
 
 /// Degrees of freedom for white noise of the signal (N3).
@@ -54,7 +54,8 @@ class NoiseLikelihood {
   }
 
   double at(double log_density, double log_walk) const {
-    const double x = std::clamp((2 * (log_walk + std::log(span_s_) - log_density) - first_) / kGrid, 0.0, static_cast<double>(squares_.size()) - 1.001);
+    const double x = std::clamp((2 * (log_walk + std::log(span_s_) - log_density) - first_) / kGrid, 0.0,
+                                static_cast<double>(squares_.size()) - 1.001);
     const double log_variance = 2 * log_density - std::log(span_s_);
     return -0.5 * ((count_ - 1) * log_variance + between(logs_, x) + between(squares_, x) * std::exp(-log_variance));
   }

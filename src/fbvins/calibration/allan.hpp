@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to calibration: Allan variances, and the white noise and random walk of readings at rest (docs/derivations/calibration.md, N1-N5).
+// Private to calibration: Allan variances, and the white noise and random walk of readings at rest
+// (docs/derivations/calibration.md, N1-N5).
 #pragma once
 
 #include "fbvins/calibration/imu_noise.hpp"

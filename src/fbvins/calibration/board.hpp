@@ -20,9 +20,9 @@ enum class BoardKind { aprilgrid, charuco, chessboard };
 
 struct Board {
   BoardKind kind = BoardKind::aprilgrid;
-  int columns = 6, rows = 6;   ///< AprilGrid: tags; ChArUco: squares; chessboard: inner corners (the first one is the origin)
-  double size_m = 0.088;       ///< AprilGrid: edge of a tag; otherwise edge of a square
-  double spacing = 0.3;        ///< AprilGrid: gap between tags as a part of size_m; ChArUco: marker's edge as a part of size_m
+  int columns = 6, rows = 6;  ///< AprilGrid: tags; ChArUco: squares; chessboard: inner corners (the first one is the origin)
+  double size_m = 0.088;      ///< AprilGrid: edge of a tag; otherwise edge of a square
+  double spacing = 0.3;       ///< AprilGrid: gap between tags as a part of size_m; ChArUco: marker's edge as a part of size_m
 
   int corner_count() const;
   /// Position of a corner, m. AprilGrid: corner = 4 * tag + k, k counting (0,0) (s,0) (s,s) (0,s), tags row by row from the

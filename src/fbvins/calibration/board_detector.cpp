@@ -22,8 +22,9 @@ double shortest_side_px(const TagSighting& tag) {
 
 Result<BoardDetector> BoardDetector::create(const Board& board) {
   if (board.kind != BoardKind::aprilgrid)
-    return Error{ErrorCode::unsupported,
-                 "only AprilGrids are found in images so far: detections of chessboards and ChArUco boards can be given by --detections"};
+    return Error{
+        ErrorCode::unsupported,
+        "only AprilGrids are found in images so far: detections of chessboards and ChArUco boards can be given by --detections"};
   Result<TagDetector> detector = TagDetector::create();
   if (!detector) return detector.error();
   return BoardDetector(board, *std::move(detector));

@@ -105,7 +105,8 @@ TEST(BoardDetector, TagsOfOtherBoardsAndDoubleTagsAreCounted) {
 #endif
 
 TEST(BoardDetector, OtherKindsOfBoardsAreRefused) {
-  const auto detector = BoardDetector::create({.kind = BoardKind::chessboard, .columns = 7, .rows = 5, .size_m = 0.03, .spacing = 0});
+  const auto detector =
+      BoardDetector::create({.kind = BoardKind::chessboard, .columns = 7, .rows = 5, .size_m = 0.03, .spacing = 0});
   ASSERT_FALSE(detector);
   EXPECT_NE(detector.error().message.find("--detections"), std::string::npos);
 }
@@ -122,7 +123,8 @@ TEST(CornerRefine, ASaddleIsFoundAndAnEdgeIsNot) {
     return image;
   };
   const Vec2 at(19.3, 20.6), kAcross(10, 1), kDown(0, 12);
-  const Image saddle = draw([&](double x, double y) { return (x < at.x() + 0.2 * (y - at.y())) == (y < at.y() - 0.1 * (x - at.x())); });
+  const Image saddle =
+      draw([&](double x, double y) { return (x < at.x() + 0.2 * (y - at.y())) == (y < at.y() - 0.1 * (x - at.x())); });
   const auto found = refine_corner(saddle.view(), at + Vec2(0.9, -0.7), kAcross, kDown, 4);
   ASSERT_TRUE(found);
   EXPECT_LT((*found - at).norm(), 0.02);

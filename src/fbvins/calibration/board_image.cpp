@@ -19,7 +19,8 @@ std::vector<double> gaussian(double deviation) {
 }
 
 /// Along rows, then the result turned: twice, it is a blur in both directions.
-std::vector<double> blurred_and_turned(const std::vector<double>& image, int width, int height, const std::vector<double>& kernel) {
+std::vector<double> blurred_and_turned(const std::vector<double>& image, int width, int height,
+                                       const std::vector<double>& kernel) {
   std::vector<double> out(image.size());
   const int reach = static_cast<int>(kernel.size() / 2);
   for (int y = 0; y < height; ++y)
@@ -48,13 +49,15 @@ double BoardCamera::grey(const Vec3& origin_T, const Vec3& direction_T, const Bo
     const auto black = pattern_.black(origin_T.x() + along * direction_T.x(), origin_T.y() + along * direction_T.y());
     if (black) return *black ? options.black : options.white;
   }
-  return background_ ? background_(origin_T, direction_T) : 110 + 30 * std::sin(3 * direction_T.x()) * std::cos(2 * direction_T.y());
+  return background_ ? background_(origin_T, direction_T)
+                     : 110 + 30 * std::sin(3 * direction_T.x()) * std::cos(2 * direction_T.y());
 }
 
 /// Whether the pixel, or the one around each of its corners, sees the sheet of paper.
 bool BoardCamera::near_board(const Vec3& origin_T, const Mat3& R_TC, const Vec3* above, const Vec3* below) const {
   const Vec3 across = above[1] - above[0], down = below[0] - above[0];
-  for (const Vec3& ray : {Vec3(above[0] - across - down), Vec3(above[1] + across - down), Vec3(below[0] - across + down), Vec3(below[1] + across + down)}) {
+  for (const Vec3& ray : {Vec3(above[0] - across - down), Vec3(above[1] + across - down), Vec3(below[0] - across + down),
+                          Vec3(below[1] + across + down)}) {
     const Vec3 direction = R_TC * ray;
     const double along = -origin_T.z() / direction.z();
     if (along > 0 && pattern_.black(origin_T.x() + along * direction.x(), origin_T.y() + along * direction.y())) return true;
@@ -98,7 +101,8 @@ Image BoardCamera::render(const std::vector<Pose<Cn, T>>& T_CnT, const BoardImag
   Image out(width_, height_);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x)
-      out.at(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(light[y * width_ + x] + options.noise * rng.normal()), 0l, 255l));
+      out.at(x, y) =
+          static_cast<std::uint8_t>(std::clamp(std::lround(light[y * width_ + x] + options.noise * rng.normal()), 0l, 255l));
   return out;
 }
 

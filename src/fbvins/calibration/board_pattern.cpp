@@ -32,7 +32,8 @@ std::optional<bool> BoardPattern::black(double x_m, double y_m) const {
   if (column < -1 || row < -1 || column > board_.columns || row > board_.rows) return std::nullopt;
   const bool square = column >= 0 && row >= 0 && x < gap && y < gap;
   if (column < 0 || row < 0 || column == board_.columns || row == board_.rows || x < gap || y < gap) return square;
-  const int cell_x = std::min(7, static_cast<int>((x - gap) / size * 8)), cell_y = std::min(7, static_cast<int>((y - gap) / size * 8));
+  const int cell_x = std::min(7, static_cast<int>((x - gap) / size * 8)),
+            cell_y = std::min(7, static_cast<int>((y - gap) / size * 8));
   return tags_[static_cast<std::size_t>(row * board_.columns + column)][7 - cell_y][cell_x];  // y is upwards, rows from the top
 }
 

@@ -93,7 +93,8 @@ double cost_of(const LensModel& lens, const Board& board, const std::vector<Boar
 }
 
 /// Levenberg-Marquardt; returns the cost.
-double refine(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, double spread_px, Pose<Cn, T>& pose) {
+double refine(const LensModel& lens, const Board& board, const std::vector<BoardCorner>& corners, double spread_px,
+              Pose<Cn, T>& pose) {
   double lambda = 1e-4;
   double cost = cost_of(lens, board, corners, pose, spread_px, nullptr, nullptr);
   for (int i = 0; i < 20; ++i) {

@@ -13,7 +13,7 @@ namespace fbvins {
 
 struct PosedBoard {
   Pose<Cn, T> T_CnT;
-  double rms_px = 0;   ///< robust: 1.48 times the median distance of corners, over sqrt(2)
+  double rms_px = 0;  ///< robust: 1.48 times the median distance of corners, over sqrt(2)
 };
 
 /// From a homography of the rays, then by Gauss-Newton on the pixels; of the two poses that a small tilted board may have, the

@@ -78,12 +78,14 @@ Result<BoardRecording> BoardRecording::open(const std::string& path) {
   state->files = *std::move(files);
   const std::vector<std::string> roots = state->files->folders_holding("cam0/data.csv");
   if (roots.size() != 1)
-    return Error{ErrorCode::not_found, roots.empty() ? fmt::format("{}: no cam0/data.csv in it: not a recording in EuRoC's layout", path)
-                                                     : fmt::format("{}: holds {} recordings, give one of them", path, roots.size())};
+    return Error{ErrorCode::not_found, roots.empty()
+                                           ? fmt::format("{}: no cam0/data.csv in it: not a recording in EuRoC's layout", path)
+                                           : fmt::format("{}: holds {} recordings, give one of them", path, roots.size())};
   state->root = roots.front();
   while (state->cameras < kMostCameras && state->files->exists(fmt::format("{}cam{}/data.csv", state->root, state->cameras)))
     if (Result<void> done = state->list_camera(state->cameras++); !done) return done.error();
-  std::ranges::stable_sort(state->listed, [](const Listed& a, const Listed& b) { return a.t != b.t ? a.t < b.t : a.camera < b.camera; });
+  std::ranges::stable_sort(state->listed,
+                           [](const Listed& a, const Listed& b) { return a.t != b.t ? a.t < b.t : a.camera < b.camera; });
   if (Result<void> done = state->read_imu(); !done) return done.error();
   return BoardRecording(std::move(state));
 }

@@ -13,8 +13,8 @@ namespace fbvins {
 struct Cn {};
 
 struct BoardCorner {
-  int index = 0;               ///< Board::corner
-  Vec2 pixel = Vec2::Zero();   ///< raw image, centre of the top-left pixel at (0, 0)
+  int index = 0;              ///< Board::corner
+  Vec2 pixel = Vec2::Zero();  ///< raw image, centre of the top-left pixel at (0, 0)
 };
 
 struct BoardView {

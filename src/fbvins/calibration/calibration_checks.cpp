@@ -45,7 +45,8 @@ std::string better_board(const Board& board, const ImageSize& size, const std::v
     }
   std::string best;
   for (const auto& [other, words] : others) {
-    const bool fits = std::ranges::all_of(views, [&](const BoardView& v) { return v.corners.back().index < other.corner_count(); });
+    const bool fits =
+        std::ranges::all_of(views, [&](const BoardView& v) { return v.corners.back().index < other.corner_count(); });
     const auto start = fits ? start_camera("pinhole-equidistant", size, other, views) : std::nullopt;
     if (!start || start->rms_px >= best_px) continue;
     best = words;
@@ -62,7 +63,8 @@ Error other_layout(int camera, const Board& board, const std::string& better) {
 Result<void> check_models(const CameraCalibrationOptions& options, int cameras) {
   const std::vector<std::string> names = lens_names();
   if (options.models.size() != 1 && static_cast<int>(options.models.size()) != cameras)
-    return refused(fmt::format("{} lens models are given for {} cameras: give one for all, or one a camera", options.models.size(), cameras));
+    return refused(fmt::format("{} lens models are given for {} cameras: give one for all, or one a camera",
+                               options.models.size(), cameras));
   for (const std::string& model : options.models)
     if (model != kAutoModel && std::ranges::find(names, model) == names.end())
       return refused(fmt::format("'{}' is no lens model: {} or {}", model.substr(0, 40), fmt::join(names, ", "), kAutoModel));
@@ -82,9 +84,10 @@ ImageSize smallest_usual_size(const std::vector<BoardView>& views) {
       right = std::max(right, corner.pixel.x());
       bottom = std::max(bottom, corner.pixel.y());
     }
-  for (const ImageSize size : {ImageSize{320, 240}, {640, 400}, {640, 480}, {512, 512}, {752, 480}, {848, 480}, {848, 800}, {800, 600},
-                               {1024, 768}, {1024, 1024}, {1280, 720}, {1280, 800}, {1280, 960}, {1280, 1024}, {1440, 1080},
-                               {1600, 1200}, {1920, 1080}, {1920, 1200}, {2048, 1536}, {2592, 1944}, {3840, 2160}, {4056, 3040}})
+  for (const ImageSize size :
+       {ImageSize{320, 240}, {640, 400},   {640, 480},   {512, 512},   {752, 480},   {848, 480},   {848, 800},   {800, 600},
+        {1024, 768},         {1024, 1024}, {1280, 720},  {1280, 800},  {1280, 960},  {1280, 1024}, {1440, 1080}, {1600, 1200},
+        {1920, 1080},        {1920, 1200}, {2048, 1536}, {2592, 1944}, {3840, 2160}, {4056, 3040}})
     if (right <= size.width - 1 && bottom <= size.height - 1) return size;
   return {static_cast<int>(std::ceil(right)) + 1, static_cast<int>(std::ceil(bottom)) + 1};
 }
@@ -107,14 +110,17 @@ Result<void> check_input(const Detections& detections, const Board& board, const
     const auto size = detections.sizes.find(view.camera);
     if (size == detections.sizes.end()) continue;
     for (const BoardCorner& corner : view.corners)
-      if (!(corner.pixel.x() >= -1 && corner.pixel.y() >= -1 && corner.pixel.x() <= size->second.width && corner.pixel.y() <= size->second.height))
-        return refused(fmt::format("cam{}: a corner at ({:.1f}, {:.1f}) lies outside of images of {} x {}: the size is another one",
-                                   view.camera, corner.pixel.x(), corner.pixel.y(), size->second.width, size->second.height));
+      if (!(corner.pixel.x() >= -1 && corner.pixel.y() >= -1 && corner.pixel.x() <= size->second.width &&
+            corner.pixel.y() <= size->second.height))
+        return refused(
+            fmt::format("cam{}: a corner at ({:.1f}, {:.1f}) lies outside of images of {} x {}: the size is another one",
+                        view.camera, corner.pixel.x(), corner.pixel.y(), size->second.width, size->second.height));
   }
   for (int k = 0; k < cameras; ++k) {
     if (seen[k] == 0) return refused(fmt::format("cam{} never sees the board", k));
     if (usable[k] < kFewestViews)
-      return refused(fmt::format("cam{} sees the board in {} images, too few: {} at least, 40 and more are better", k, usable[k], kFewestViews));
+      return refused(fmt::format("cam{} sees the board in {} images, too few: {} at least, 40 and more are better", k, usable[k],
+                                 kFewestViews));
   }
   return {};
 }
@@ -122,9 +128,10 @@ Result<void> check_input(const Detections& detections, const Board& board, const
 Error no_start(int camera, const Board& board, const ImageSize& size, const std::vector<BoardView>& views) {
   const std::string better = better_board(board, size, views, 0.3 * largest_plausible_rms_px(size));
   if (!better.empty()) return other_layout(camera, board, better);
-  return refused(fmt::format("no lens of this model explains what cam{} sees: the target file describes another board than was "
-                             "recorded ({}), or the lens needs another model (--model auto tries all)",
-                             camera, board.describe()));
+  return refused(
+      fmt::format("no lens of this model explains what cam{} sees: the target file describes another board than was "
+                  "recorded ({}), or the lens needs another model (--model auto tries all)",
+                  camera, board.describe()));
 }
 
 Result<bool> check_poses(const std::vector<PosedView>& posed, int cameras) {
@@ -135,11 +142,15 @@ Result<bool> check_poses(const std::vector<PosedView>& posed, int cameras) {
   }
   for (int k = 0; k < cameras; ++k) {
     if (usable[k] < kFewestViews)
-      return refused(fmt::format("only {} images of cam{} fit the board and one lens, too few: {} at least; was the board bent or "
-                                 "another one?", usable[k], k, kFewestViews));
+      return refused(
+          fmt::format("only {} images of cam{} fit the board and one lens, too few: {} at least; was the board bent or "
+                      "another one?",
+                      usable[k], k, kFewestViews));
     if (std::min(mirrored[k], usable[k] - mirrored[k]) > 0.2 * usable[k])
-      return refused(fmt::format("cam{} sees the board mirrored in {} of {} images: two different boards were recorded, or images are "
-                                 "mirrored in part", k, mirrored[k], usable[k]));
+      return refused(
+          fmt::format("cam{} sees the board mirrored in {} of {} images: two different boards were recorded, or images are "
+                      "mirrored in part",
+                      k, mirrored[k], usable[k]));
     if ((2 * mirrored[k] > usable[k]) != (2 * mirrored[0] > usable[0]))
       return refused(fmt::format("cam{} sees the board mirrored and cam{} does not: the images of one of them are mirrored",
                                  2 * mirrored[k] > usable[k] ? k : 0, 2 * mirrored[k] > usable[k] ? 0 : k));
@@ -151,19 +162,26 @@ Result<void> check_fit(double noise_px, double single_px, const ImageSize& size,
                        const std::vector<BoardView>& views) {
   constexpr double kPoor_px = 0.5;
   if (single_px > kPoor_px)
-    if (const std::string better = better_board(board, size, views, 0.4 * single_px); !better.empty()) return other_layout(0, board, better);
+    if (const std::string better = better_board(board, size, views, 0.4 * single_px); !better.empty())
+      return other_layout(0, board, better);
   if (cameras > 1 && noise_px > std::max(kPoor_px, 3 * single_px))
-    return refused(fmt::format("each camera alone fits the board to {:.2f} px, but together they do not ({:.2f} px): images with the same "
-                               "stamp were not taken at the same time, or the cameras moved against each other", single_px, noise_px));
+    return refused(
+        fmt::format("each camera alone fits the board to {:.2f} px, but together they do not ({:.2f} px): images with the same "
+                    "stamp were not taken at the same time, or the cameras moved against each other",
+                    single_px, noise_px));
   if (!(noise_px < largest_plausible_rms_px(size)) || noise_px <= 0)
-    return refused(fmt::format("the corners are {:.1f} px from where the calibration expects them: another board, another lens model "
-                               "(--model auto), or a bent board", noise_px));
+    return refused(
+        fmt::format("the corners are {:.1f} px from where the calibration expects them: another board, another lens model "
+                    "(--model auto), or a bent board",
+                    noise_px));
   return {};
 }
 
 Error undetermined(const std::string& what) {
-  return refused(fmt::format("{}: tilt the board or the camera by 30 degrees and more, to all sides, at several distances, and fill the "
-                             "image's corners", what));
+  return refused(
+      fmt::format("{}: tilt the board or the camera by 30 degrees and more, to all sides, at several distances, and fill the "
+                  "image's corners",
+                  what));
 }
 
 Result<void> check_determined(const CameraCalibration& found) {
@@ -174,7 +192,8 @@ Result<void> check_determined(const CameraCalibration& found) {
       return undetermined(fmt::format("the views do not determine the focal length of cam{} (to {:.1f} % only)", k, 100 * focal));
     const double centre_px = std::max(found.sigma(fmt::format("cam{}.cx", k)), found.sigma(fmt::format("cam{}.cy", k)));
     if (!(centre_px <= kLargestCentreSigma * camera.width()))
-      return undetermined(fmt::format("the views do not determine the principal point of cam{} (to {:.1f} px only)", k, centre_px));
+      return undetermined(
+          fmt::format("the views do not determine the principal point of cam{} (to {:.1f} px only)", k, centre_px));
   }
   return {};
 }
@@ -184,16 +203,18 @@ std::vector<std::string> remarks_on(const CameraCalibration& found) {
   for (std::size_t k = 0; k < found.cameras.size(); ++k) {
     const CalibratedCamera& c = found.cameras[k];
     if (c.size_guessed)
-      out.push_back(fmt::format("the size of cam{}'s images is not in the detections: {} x {} is assumed (--resolution gives it)", k,
-                                c.camera.width(), c.camera.height()));
+      out.push_back(fmt::format("the size of cam{}'s images is not in the detections: {} x {} is assumed (--resolution gives it)",
+                                k, c.camera.width(), c.camera.height()));
     if (c.statistics.coverage < 0.6)
-      out.push_back(fmt::format("corners cover {:.0f} % of cam{}'s image: hold the board into its corners, too", 100 * c.statistics.coverage, k));
+      out.push_back(fmt::format("corners cover {:.0f} % of cam{}'s image: hold the board into its corners, too",
+                                100 * c.statistics.coverage, k));
     if (c.camera.sees_backwards())
       out.push_back(fmt::format("cam{} sees more than 180 degrees across: it is calibrated, but no other command takes it", k));
   }
   if (found.seen_mirrored)
-    out.push_back("the board's x and y axes are left-handed in the images, unlike those of a board that `fbvins target` prints; lenses "
-                  "and extrinsics do not depend on it");
+    out.push_back(
+        "the board's x and y axes are left-handed in the images, unlike those of a board that `fbvins target` prints; lenses "
+        "and extrinsics do not depend on it");
   return out;
 }
 

@@ -74,20 +74,22 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
     if (!rig.T_BC.empty()) out += matrix("T_cam_imu", rig.T_BC[k].inverse());
     if (k > 0) out += matrix("T_cn_cnm1", rig.T_CnC0[k] * rig.T_CnC0[k - 1].inverse());
     const std::vector<double> no_distortion(4, 0.0);
-    out += fmt::format("  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n  resolution: [{}, {}]\n"
-                       "  rostopic: /cam{}/image_raw\n",
-                       camera.model, yaml_list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
-                       yaml_list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
+    out += fmt::format(
+        "  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n  resolution: [{}, {}]\n"
+        "  rostopic: /cam{}/image_raw\n",
+        camera.model, yaml_list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
+        yaml_list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
     if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {:.17g}\n", rig.time_offset_s);
   }
   return out;
 }
 
 std::string to_kalibr_imu(const ImuNoise& noise) {
-  return fmt::format("accelerometer_noise_density: {:.17g}\naccelerometer_random_walk: {:.17g}\ngyroscope_noise_density: {:.17g}\n"
-                     "gyroscope_random_walk: {:.17g}\nrostopic: /imu0\nupdate_rate: {:.17g}\n",
-                     noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz, noise.gyro_noise_density_radps_rthz,
-                     noise.gyro_random_walk_radps2_rthz, noise.rate_hz);
+  return fmt::format(
+      "accelerometer_noise_density: {:.17g}\naccelerometer_random_walk: {:.17g}\ngyroscope_noise_density: {:.17g}\n"
+      "gyroscope_random_walk: {:.17g}\nrostopic: /imu0\nupdate_rate: {:.17g}\n",
+      noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz, noise.gyro_noise_density_radps_rthz,
+      noise.gyro_random_walk_radps2_rthz, noise.rate_hz);
 }
 
 Result<std::string> to_basalt(const RigCalibration& rig) {
@@ -98,9 +100,11 @@ Result<std::string> to_basalt(const RigCalibration& rig) {
     const Pose<Cn, C0> T = rig.T_CnC0[k];
     const Pose<B, Cn> T_BC = rig.T_BC.empty() ? Pose<B, Cn>(T.inverse().q, T.inverse().p) : rig.T_BC[k];
     const char* comma = k > 0 ? ",\n" : "\n";
-    poses += fmt::format("{}      {{\"px\": {:.17g}, \"py\": {:.17g}, \"pz\": {:.17g}, \"qx\": {:.17g}, \"qy\": {:.17g}, \"qz\": {:.17g}, \"qw\": {:.17g}}}",
-                         comma, T_BC.p.x(), T_BC.p.y(), T_BC.p.z(), T_BC.q.x(), T_BC.q.y(), T_BC.q.z(), T_BC.q.w());
-    lenses += fmt::format("{}      {{\"camera_type\": \"{}\", \"intrinsics\": {{{}}}}}", comma, basalt_name(model), basalt_lens(rig.cameras[k]));
+    poses += fmt::format(
+        "{}      {{\"px\": {:.17g}, \"py\": {:.17g}, \"pz\": {:.17g}, \"qx\": {:.17g}, \"qy\": {:.17g}, \"qz\": {:.17g}, \"qw\": {:.17g}}}",
+        comma, T_BC.p.x(), T_BC.p.y(), T_BC.p.z(), T_BC.q.x(), T_BC.q.y(), T_BC.q.z(), T_BC.q.w());
+    lenses += fmt::format("{}      {{\"camera_type\": \"{}\", \"intrinsics\": {{{}}}}}", comma, basalt_name(model),
+                          basalt_lens(rig.cameras[k]));
     sizes += fmt::format("{}[{}, {}]", k > 0 ? ", " : "", rig.cameras[k].width(), rig.cameras[k].height());
   }
   const ImuNoise& n = rig.imu_noise;
@@ -110,8 +114,9 @@ Result<std::string> to_basalt(const RigCalibration& rig) {
       "    \"calib_accel_bias\": {},\n    \"calib_gyro_bias\": {},\n    \"imu_update_rate\": {:.17g},\n"
       "    \"accel_noise_std\": {},\n    \"gyro_noise_std\": {},\n    \"accel_bias_std\": {},\n    \"gyro_bias_std\": {},\n"
       "    \"cam_time_offset_ns\": {},\n    \"vignette\": []\n  }}\n}}\n",
-      poses, lenses, sizes, zeros9, zeros12, n.rate_hz, three(n.accel_noise_density_mps2_rthz), three(n.gyro_noise_density_radps_rthz),
-      three(n.accel_random_walk_mps3_rthz), three(n.gyro_random_walk_radps2_rthz), std::llround(1e9 * rig.time_offset_s));
+      poses, lenses, sizes, zeros9, zeros12, n.rate_hz, three(n.accel_noise_density_mps2_rthz),
+      three(n.gyro_noise_density_radps_rthz), three(n.accel_random_walk_mps3_rthz), three(n.gyro_random_walk_radps2_rthz),
+      std::llround(1e9 * rig.time_offset_s));
 }
 
 Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
@@ -126,8 +131,9 @@ Result<std::string> to_ros_camera_info(const RigCalibration& rig, int camera) {
       "distortion_model: {}\ndistortion_coefficients:\n  rows: 1\n  cols: {}\n  data: {}\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
       "projection_matrix:\n  rows: 3\n  cols: 4\n  data: {}\n",
-      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}), model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(),
-      yaml_list(d), yaml_list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
+      c.width(), c.height(), camera, yaml_list({f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1}),
+      model == "pinhole-radtan" ? "plumb_bob" : "equidistant", d.size(), yaml_list(d),
+      yaml_list({f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0}));
 }
 
 }  // namespace fbvins

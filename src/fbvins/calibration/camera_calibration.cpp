@@ -201,7 +201,8 @@ Result<CameraCalibration> calibrate_cameras(const Detections& detections, const 
   tell(fmt::format("adjusting {} of {} stamps", frames.size(), stamps.size()));
   RigAdjustment adjustment(std::move(rig), std::move(frames));
   const double noise_px = adjust_without_outliers(adjustment);
-  if (Result<void> good = check_fit(noise_px, single_px, cameras[0].size, static_cast<int>(cameras.size()), board, cameras[0].views);
+  if (Result<void> good =
+          check_fit(noise_px, single_px, cameras[0].size, static_cast<int>(cameras.size()), board, cameras[0].views);
       !good)
     return good.error();
   const auto unit = unit_covariance(adjustment);

@@ -27,18 +27,18 @@ struct CameraCalibrationOptions {
   /// One for all cameras, or one a camera: as Camera::model_name() names them, or "auto": the model that predicts views best
   /// which it was not fitted to.
   std::vector<std::string> models = {"pinhole-radtan"};
-  int max_views = 600;           ///< stamps that enter the adjustment
-  double pair_tolerance_s = 1e-3;  ///< images of two cameras with stamps that close are one view
+  int max_views = 600;                                ///< stamps that enter the adjustment
+  double pair_tolerance_s = 1e-3;                     ///< images of two cameras with stamps that close are one view
   std::function<void(const std::string&)> tell = {};  ///< progress, a few words
 };
 
 /// Residuals of one camera, px; of a coordinate, not of a distance.
 struct ReprojectionStatistics {
   int views = 0, corners = 0;
-  int left_out = 0;         ///< corners that did not fit
-  double rms_px = 0;        ///< root mean square of the residuals
-  double largest_px = 0;    ///< distance
-  double coverage = 0;      ///< part of the image's 8 x 8 cells that hold corners
+  int left_out = 0;       ///< corners that did not fit
+  double rms_px = 0;      ///< root mean square of the residuals
+  double largest_px = 0;  ///< distance
+  double coverage = 0;    ///< part of the image's 8 x 8 cells that hold corners
 };
 
 struct CalibratedCamera {
@@ -69,23 +69,25 @@ struct CameraCalibration {
   /// Cn) and "cam1.rx" ... (rad, R_CnC0 <- R Exp(r)).
   std::vector<std::string> names;
   Eigen::MatrixXd covariance;
-  double noise_px = 0;            ///< standard deviation of a corner's coordinate, as the residuals show it
-  std::vector<BoardPose> poses;   ///< of the stamps used, by time
+  double noise_px = 0;           ///< standard deviation of a corner's coordinate, as the residuals show it
+  std::vector<BoardPose> poses;  ///< of the stamps used, by time
   std::vector<CornerResidual> residuals;
-  int stamps = 0;                 ///< with a usable view; poses.size() of them were used
-  bool seen_mirrored = false;     ///< x and y of the board are left-handed in the images, unlike those of Kalibr's print
+  int stamps = 0;                    ///< with a usable view; poses.size() of them were used
+  bool seen_mirrored = false;        ///< x and y of the board are left-handed in the images, unlike those of Kalibr's print
   std::vector<std::string> remarks;  ///< sentences for the user
 
   double sigma(const std::string& name) const;  ///< 0 for an unknown name
 };
 
-Result<CameraCalibration> calibrate_cameras(const Detections& detections, const Board& board, const CameraCalibrationOptions& options);
+Result<CameraCalibration> calibrate_cameras(const Detections& detections, const Board& board,
+                                            const CameraCalibrationOptions& options);
 
 /// Whether boards that two cameras see at one stamp join all cameras with cam0; calibrate_cameras() refuses others.
 bool cameras_connected(const Detections& detections, const Board& board, double pair_tolerance_s);
 
 /// Each camera by itself, where they are not connected: T_CnC0 are the identity and have no rows in the covariance, until an IMU
 /// joins the cameras (calibrate_imu_camera() without T_CnC0). `poses` are those of cam0.
-Result<CameraCalibration> calibrate_cameras_apart(const Detections& detections, const Board& board, const CameraCalibrationOptions& options);
+Result<CameraCalibration> calibrate_cameras_apart(const Detections& detections, const Board& board,
+                                                  const CameraCalibrationOptions& options);
 
 }  // namespace fbvins

@@ -18,7 +18,8 @@ Eigen::VectorXd errors_of(const CameraCalibration& found, const SimulatedRig& tr
   Eigen::VectorXd out(static_cast<Eigen::Index>(found.names.size()));
   Eigen::Index row = 0;
   for (std::size_t k = 0; k < truth.cameras.size(); ++k) {
-    const std::vector<double> got = lens_parameters(found.cameras[k].camera.model()), want = lens_parameters(truth.cameras[k].model());
+    const std::vector<double> got = lens_parameters(found.cameras[k].camera.model()),
+                              want = lens_parameters(truth.cameras[k].model());
     for (std::size_t i = 0; i < got.size(); ++i) out[row++] = got[i] - want[i];
     if (k == 0) continue;
     out.segment<3>(row) = found.cameras[k].T_CnC0.p - truth.T_CnC0[k].p;
@@ -41,7 +42,8 @@ TEST(CameraCalibration, EveryModelIsFoundWithItsCovariance) {
     EXPECT_GT(nees, 0.3) << left.model_name();
     EXPECT_LT(nees, 2.0) << left.model_name();
     for (std::size_t k = 0; k < found->names.size(); ++k)
-      EXPECT_LT(std::abs(error[static_cast<Eigen::Index>(k)]), 4 * found->sigma(found->names[k])) << left.model_name() << ' ' << found->names[k];
+      EXPECT_LT(std::abs(error[static_cast<Eigen::Index>(k)]), 4 * found->sigma(found->names[k]))
+          << left.model_name() << ' ' << found->names[k];
   }
 }
 
@@ -95,7 +97,8 @@ TEST(CameraCalibration, CamerasAreChainedThroughOthers) {
   EXPECT_LT((found->cameras[2].T_CnC0.p - rig.T_CnC0[2].p).norm(), 3e-4);
 
   std::erase_if(views.detections.views, [](const BoardView& v) { return v.camera == 1 && (v.t.ns / 50'000'000) % 2 == 1; });
-  EXPECT_TRUE(holds(refusal(views.detections, kBoard, {.models = {"pinhole-equidistant"}}), "cam2 never sees the board at the same time"));
+  EXPECT_TRUE(holds(refusal(views.detections, kBoard, {.models = {"pinhole-equidistant"}}),
+                    "cam2 never sees the board at the same time"));
 }
 
 TEST(CameraCalibration, CamerasWithoutCommonViewsAreFoundEachByItself) {
@@ -180,7 +183,8 @@ TEST(CameraCalibration, AnotherBoardIsRefused) {
   const SimulatedViews views = simulated_views(one_camera(), tall, 30, 0.1, 29);
   Board other = tall;
   std::swap(other.columns, other.rows);
-  EXPECT_TRUE(holds(refusal(views.detections, other), "with 5 columns and 7 rows they would")) << refusal(views.detections, other);
+  EXPECT_TRUE(holds(refusal(views.detections, other), "with 5 columns and 7 rows they would"))
+      << refusal(views.detections, other);
   other = tall;
   other.spacing = 0.2;
   EXPECT_TRUE(holds(refusal(views.detections, other), "with a tagSpacing of 0.3 they would")) << refusal(views.detections, other);

@@ -99,10 +99,11 @@ Result<std::vector<Pose<Cn, C0>>> chain_cameras(const std::vector<std::vector<Po
   std::vector<Pose<Cn, C0>> out;
   for (int k = 0; k < cameras; ++k) {
     if (!known[k])
-      return Error{ErrorCode::invalid_argument,
-                   fmt::format("cam{} never sees the board at the same time as cam0 or a camera that is connected with cam0: record "
-                               "the board where two cameras see it, or check that their images have the same stamps",
-                               k)};
+      return Error{
+          ErrorCode::invalid_argument,
+          fmt::format("cam{} never sees the board at the same time as cam0 or a camera that is connected with cam0: record "
+                      "the board where two cameras see it, or check that their images have the same stamps",
+                      k)};
     out.push_back(*known[k]);
   }
   return out;
@@ -116,7 +117,8 @@ std::vector<RigFrame> rig_frames(const std::vector<std::vector<PosedView>>& stam
     RigFrame frame{stamp.front().view.t, {}, T_CnC0[fullest->view.camera].inverse() * fullest->T_CnT};
     for (const PosedView& posed : stamp) {
       SeenBoard seen{posed.view.camera, {}};
-      for (const BoardCorner& corner : posed.view.corners) seen.corners.push_back({corner.index, board.corner(corner.index), corner.pixel});
+      for (const BoardCorner& corner : posed.view.corners)
+        seen.corners.push_back({corner.index, board.corner(corner.index), corner.pixel});
       frame.views.push_back(std::move(seen));
     }
     out.push_back(std::move(frame));

@@ -70,7 +70,8 @@ std::vector<RigFrame> posed_frames(const Camera& camera, const Board& board, con
 double robust_rms(const RigAdjustment& adjustment) {
   std::vector<double> sizes;
   for (const RigFrame& frame : adjustment.frames())
-    for (const SeenCorner& corner : frame.views[0].corners) sizes.push_back(adjustment.residual(frame, frame.views[0], corner).norm());
+    for (const SeenCorner& corner : frame.views[0].corners)
+      sizes.push_back(adjustment.residual(frame, frame.views[0], corner).norm());
   return sizes.empty() ? kUnfit : coordinate_noise(sizes);
 }
 
@@ -80,7 +81,8 @@ struct Adjusted {
 };
 
 /// Adjusted to the views, with their poses as the given lens has them.
-std::optional<Adjusted> adjusted(const Camera& camera, const Board& board, const std::vector<BoardView>& views, double spread_px) {
+std::optional<Adjusted> adjusted(const Camera& camera, const Board& board, const std::vector<BoardView>& views,
+                                 double spread_px) {
   std::vector<RigFrame> frames = posed_frames(camera, board, views);
   if (2 * frames.size() < views.size() || frames.size() < 3) return std::nullopt;
   RigAdjustment adjustment({{camera.model(), {}}}, std::move(frames));
@@ -152,7 +154,8 @@ std::vector<Adjusted> distinct_rivals(const std::vector<Adjusted>& fitted) {
   for (const Adjusted& other : fitted) {
     const auto* lens = std::get_if<DoubleSphere>(&other.start.camera.model());
     if (!lens || other.start.rms_px > 1.1 * fitted[0].start.rms_px + 0.02) continue;
-    if (std::ranges::all_of(out, [&](const Adjusted& a) { return std::abs(std::get<DoubleSphere>(a.start.camera.model()).xi - lens->xi) > 0.1; }))
+    if (std::ranges::all_of(
+            out, [&](const Adjusted& a) { return std::abs(std::get<DoubleSphere>(a.start.camera.model()).xi - lens->xi) > 0.1; }))
       out.push_back(other);
   }
   return out;

@@ -15,7 +15,8 @@ namespace {
 
 /// A sentence about the only camera, which was called cam0, with its own name.
 std::string renamed(std::string text, int camera) {
-  for (std::size_t at = text.find("cam0"); at != std::string::npos; at = text.find("cam0", at + 4)) text[at + 3] = static_cast<char>('0' + camera);
+  for (std::size_t at = text.find("cam0"); at != std::string::npos; at = text.find("cam0", at + 4))
+    text[at + 3] = static_cast<char>('0' + camera);
   return text;
 }
 

@@ -12,10 +12,10 @@ namespace {
 
 constexpr int kIterations = 25;
 constexpr double kConverged_px = 1e-3;
-constexpr double kLargestMove_px = 0.7;     ///< by which the window may be off the corner
-constexpr double kLeastContrast = 6;        ///< half the difference of the fields, grey values
-constexpr double kLargestMisfit = 0.3;      ///< root mean square of the residuals, as a part of the contrast
-constexpr double kLeastAngle = 0.35;        ///< sine of the angle between the edges
+constexpr double kLargestMove_px = 0.7;  ///< by which the window may be off the corner
+constexpr double kLeastContrast = 6;     ///< half the difference of the fields, grey values
+constexpr double kLargestMisfit = 0.3;   ///< root mean square of the residuals, as a part of the contrast
+constexpr double kLeastAngle = 0.35;     ///< sine of the angle between the edges
 
 using Vec7 = Eigen::Matrix<double, 7, 1>;
 using Mat7 = Eigen::Matrix<double, 7, 7>;
@@ -28,7 +28,11 @@ struct Crossing {
   double level, contrast, blur_px;
 
   Crossing moved(const Vec7& d) const {
-    return {corner + d.head<2>(), {angle[0] + d[2], angle[1] + d[3]}, level + d[4], contrast + d[5], std::clamp(blur_px + d[6], 0.3, 6.0)};
+    return {corner + d.head<2>(),
+            {angle[0] + d[2], angle[1] + d[3]},
+            level + d[4],
+            contrast + d[5],
+            std::clamp(blur_px + d[6], 0.3, 6.0)};
   }
 };
 
@@ -132,7 +136,8 @@ std::vector<Sample> samples_around(const ImageView& image, const Vec2& at, doubl
 
 }  // namespace
 
-std::optional<Vec2> refine_corner(const ImageView& image, const Vec2& start, const Vec2& first, const Vec2& second, double radius_px) {
+std::optional<Vec2> refine_corner(const ImageView& image, const Vec2& start, const Vec2& first, const Vec2& second,
+                                  double radius_px) {
   Crossing m{start, {std::atan2(first.x(), -first.y()), std::atan2(second.x(), -second.y())}, 0, 0, 1};
   // The window follows the corner.
   for (int round = 0; round < 3; ++round) {

@@ -28,7 +28,8 @@ Looked look(const TakenImage& taken, BoardDetector& detector, bool try_mirrored)
   Looked out{{taken.t, taken.camera, {}}, {}};
   std::shared_ptr<const Image> image = taken.image;
   if (!image) {
-    Result<Image> decoded = taken.bytes.empty() ? Result<Image>(Error{ErrorCode::unreadable, "cannot be read"}) : decode_image(taken.bytes);
+    Result<Image> decoded =
+        taken.bytes.empty() ? Result<Image>(Error{ErrorCode::unreadable, "cannot be read"}) : decode_image(taken.bytes);
     if (!decoded) {
       out.problem = fmt::format("{}: {}", taken.name, decoded.error().message);
       return out;
@@ -48,7 +49,8 @@ Looked look(const TakenImage& taken, BoardDetector& detector, bool try_mirrored)
 /// Images are handed out, and their results kept, under one lock.
 class Search {
  public:
-  Search(const std::function<std::optional<TakenImage>()>& next, const BoardSearchOptions& options) : next_(next), options_(options) {}
+  Search(const std::function<std::optional<TakenImage>()>& next, const BoardSearchOptions& options)
+      : next_(next), options_(options) {}
 
   void work(BoardDetector& detector) {
     while (true) {
@@ -85,8 +87,9 @@ Result<void> add(Looked& looked, BoardSearch& out) {
   ++out.images[camera];
   const auto known = out.detections.sizes.emplace(camera, looked.size).first;
   if (known->second != looked.size)
-    return Error{ErrorCode::malformed, fmt::format("cam{}'s images are {} x {} and {} x {}: all must have one size", camera, known->second.width,
-                                                   known->second.height, looked.size.width, looked.size.height)};
+    return Error{ErrorCode::malformed,
+                 fmt::format("cam{}'s images are {} x {} and {} x {}: all must have one size", camera, known->second.width,
+                             known->second.height, looked.size.width, looked.size.height)};
   if (!looked.view.corners.empty()) out.detections.views.push_back(std::move(looked.view));
   return {};
 }
@@ -104,9 +107,11 @@ Result<void> judge(const std::vector<Looked>& results, const Board& board) {
   const auto refused = [](std::string sentence) { return Error{ErrorCode::invalid_argument, std::move(sentence)}; };
   if (readable == 0) return refused("no image of the recording could be read");
   if (mirrored > 0 && with_tags <= mirrored)
-    return refused("the tags are found only in mirrored images: the board was printed mirrored, or the camera mirrors its images");
+    return refused(
+        "the tags are found only in mirrored images: the board was printed mirrored, or the camera mirrors its images");
   if (foreign > with_tags / 2 && foreign > 0)
-    return refused(fmt::format("most tags have numbers that the target file's board ({}) does not have: it describes another board", board.describe()));
+    return refused(fmt::format(
+        "most tags have numbers that the target file's board ({}) does not have: it describes another board", board.describe()));
   if (twice > with_tags / 10 && twice > 1)
     return refused(fmt::format("a tag is there twice in {} images: only one board may be in view", twice));
   if (with_tags == 0) return refused(fmt::format("no tag of tag36h11 was found in {} images", readable));
@@ -115,7 +120,8 @@ Result<void> judge(const std::vector<Looked>& results, const Board& board) {
 
 }  // namespace
 
-Result<BoardSearch> detect_board(const Board& board, const std::function<std::optional<TakenImage>()>& next, const BoardSearchOptions& options) {
+Result<BoardSearch> detect_board(const Board& board, const std::function<std::optional<TakenImage>()>& next,
+                                 const BoardSearchOptions& options) {
   std::vector<BoardDetector> detectors;
   for (int i = 0; i < std::max(1, options.threads); ++i) {
     Result<BoardDetector> detector = BoardDetector::create(board);

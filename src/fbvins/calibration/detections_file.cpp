@@ -116,7 +116,8 @@ Result<Detections> read_detections(const std::string& path) {
 
 std::string detections_to_csv(const Detections& detections) {
   std::string out;
-  for (const auto& [camera, size] : detections.sizes) out += fmt::format("# camera {}: {} x {}\n", camera, size.width, size.height);
+  for (const auto& [camera, size] : detections.sizes)
+    out += fmt::format("# camera {}: {} x {}\n", camera, size.width, size.height);
   out += fmt::format("{}\n", kHeader);
   for (const BoardView& view : detections.views)
     for (const BoardCorner& corner : view.corners)

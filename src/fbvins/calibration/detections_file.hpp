@@ -21,8 +21,8 @@ struct ImageSize {
 };
 
 struct Detections {
-  std::vector<BoardView> views;      ///< by time, then by camera; corners by index
-  std::map<int, ImageSize> sizes;    ///< of cameras whose images' size is known
+  std::vector<BoardView> views;    ///< by time, then by camera; corners by index
+  std::map<int, ImageSize> sizes;  ///< of cameras whose images' size is known
 
   int camera_count() const;  ///< one more than the largest index of a camera
 };

@@ -14,9 +14,10 @@ std::string complaint(const std::string& rows) {
 }
 
 TEST(DetectionsFile, RowsInAnyOrderBecomeViews) {
-  const auto read = parse_detections(std::string("# camera 1: 640 x 400\n") + kHeader +
-                                         "2000000000,0,5,1.5,2.5\n1000000000,1,3,7,8\n2000000000,0,4,-0.25,9\n1000000000,0,3,1,2\n",
-                                     "d.csv");
+  const auto read =
+      parse_detections(std::string("# camera 1: 640 x 400\n") + kHeader +
+                           "2000000000,0,5,1.5,2.5\n1000000000,1,3,7,8\n2000000000,0,4,-0.25,9\n1000000000,0,3,1,2\n",
+                       "d.csv");
   ASSERT_TRUE(read) << read.error().message;
   ASSERT_EQ(read->views.size(), 3u);
   EXPECT_EQ(read->views[0].camera, 0);

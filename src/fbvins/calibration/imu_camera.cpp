@@ -19,7 +19,8 @@ constexpr double kWorthwhile = 0.97;  // what closer knots must bring
 constexpr double kClosestKnots_s = 0.004;
 
 Error undetermined() {
-  return {ErrorCode::invalid_argument, "the recording does not determine the calibration: turn about all three axes and move in all directions"};
+  return {ErrorCode::invalid_argument,
+          "the recording does not determine the calibration: turn about all three axes and move in all directions"};
 }
 
 }  // namespace
@@ -38,7 +39,8 @@ Result<CameraImuResult> calibrate_imu_camera(const ImuCameraInput& input, const 
   setup.corner_huber = kHuber_sigmas;
   fit.change(setup);
   if (!fit.solve() || !fit.judge()) return undetermined();
-  while (options.knot_spacing_s <= 0 && fit.worst_rms() > kRough && fit.problem().state().path.spacing_s() > 2 * kClosestKnots_s) {
+  while (options.knot_spacing_s <= 0 && fit.worst_rms() > kRough &&
+         fit.problem().state().path.spacing_s() > 2 * kClosestKnots_s) {
     ImuCameraFit closer = fit;
     closer.halve_spacing();
     if (!closer.solve() || !closer.judge() || closer.worst_rms() > kWorthwhile * fit.worst_rms()) break;

@@ -22,10 +22,10 @@ namespace fbvins {
 
 struct ImuCameraInput {
   Board board;
-  std::vector<Camera> cameras;           ///< one to eight, by BoardView::camera; lenses are taken as they are
-  std::vector<Pose<Cn, C0>> T_CnC0;      ///< one a camera (the first: identity), or none: found here
-  std::vector<BoardView> views;          ///< in any order
-  std::vector<ImuSample> imu;            ///< on the IMU's clock, in order
+  std::vector<Camera> cameras;       ///< one to eight, by BoardView::camera; lenses are taken as they are
+  std::vector<Pose<Cn, C0>> T_CnC0;  ///< one a camera (the first: identity), or none: found here
+  std::vector<BoardView> views;      ///< in any order
+  std::vector<ImuSample> imu;        ///< on the IMU's clock, in order
   ImuNoise noise;
   std::vector<RigVariation> variations = {};  ///< what cameras and T_CnC0 are uncertain by; none: they are exact
 };
@@ -34,8 +34,8 @@ struct ImuCameraOptions {
   double max_time_offset_s = 5;
   /// How well given T_CnC0 are known. The default keeps them; larger: refined with the readings.
   double camera_sigma_m = 1e-6, camera_sigma_rad = 1e-6;
-  bool imu_axes = false;     ///< estimate scale and axes of both triads
-  bool line_delay = false;   ///< estimate the line delay of a rolling shutter, the same for all cameras
+  bool imu_axes = false;    ///< estimate scale and axes of both triads
+  bool line_delay = false;  ///< estimate the line delay of a rolling shutter, the same for all cameras
   double gravity_mps2 = 9.81;
   double gravity_sigma_mps2 = 0.02;  ///< it differs by that much between places
   double knot_spacing_s = 0;         ///< of the path's spline; 0: chosen by the readings' residuals
@@ -63,7 +63,7 @@ struct ViewFit {
   Time t;
   int camera = 0;
   double rms_px = 0;
-  double noise_factor = 1;  ///< above 1: blurred, its corners count less
+  double noise_factor = 1;           ///< above 1: blurred, its corners count less
   std::vector<int> corners;          ///< Board::corner
   std::vector<Vec2> pixels, errors;  ///< seen; predicted minus seen, px
 };
@@ -94,9 +94,9 @@ struct CameraImuResult {
   double board_scale = 1, board_scale_sigma = 0;
 
   std::vector<std::string> remarks;  ///< sentences for the user
-  double stamp_jitter_s = 0;   ///< standard deviation of the images' stamps; 0: not seen
-  double image_factor = 1;     ///< what moves all corners of an image together, over what each corner's noise explains
-  double corner_sigma_px = 0;  ///< of one coordinate, from the residuals and the degrees of freedom
+  double stamp_jitter_s = 0;         ///< standard deviation of the images' stamps; 0: not seen
+  double image_factor = 1;           ///< what moves all corners of an image together, over what each corner's noise explains
+  double corner_sigma_px = 0;        ///< of one coordinate, from the residuals and the degrees of freedom
   /// Root mean square of residuals over the noise given, degrees of freedom regarded: 1 where the noise is right. Above 1, the
   /// covariances are those of the larger noise.
   double gyro_rms_sigmas = 0, accel_rms_sigmas = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to calibration: fit, judgement of noise and outliers, fit: the parts of a camera-IMU calibration that repeat. A value; one
-// owner.
+// Private to calibration: fit, judgement of noise and outliers, fit: the parts of a camera-IMU calibration that repeat. A value;
+// one owner.
 //
 //   ImuCameraFit fit(start);
 //   if (!fit.solve() || !fit.judge()) ...   // undetermined
@@ -18,15 +18,15 @@ class ImuCameraFit {
 
   /// False where no step can be computed, or the steps do not come to an end.
   bool solve();
-  /// Corners, images and readings are judged by their residuals, and the noise by those that are left. False where the calibration
-  /// is not determined.
+  /// Corners, images and readings are judged by their residuals, and the noise by those that are left. False where the
+  /// calibration is not determined.
   bool judge();
   void change(const CalibrationSetup& setup) { problem_.change(setup); }
   /// The path again with knots half as far apart; the calibration stays.
   void halve_spacing();
 
   double image_factor() const { return image_factor_; }
-  double gyro_rms() const { return gyro_rms_; }    ///< over the noise given
+  double gyro_rms() const { return gyro_rms_; }  ///< over the noise given
   double accel_rms() const { return accel_rms_; }
   double worst_rms() const;
   int iterations() const { return iterations_; }

@@ -37,7 +37,8 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
       return error(fmt::format("a view is of camera {}, but {} are given", view.camera, input.cameras.size()));
     for (const BoardCorner& corner : view.corners)
       if (corner.index < 0 || corner.index >= input.board.corner_count() || !corner.pixel.allFinite())
-        return error(fmt::format("corner {} is seen, but the board has corners 0 to {}", corner.index, input.board.corner_count() - 1));
+        return error(
+            fmt::format("corner {} is seen, but the board has corners 0 to {}", corner.index, input.board.corner_count() - 1));
   }
   if (input.imu.size() < 2) return error("there are no IMU readings");
   const double length_s = (input.imu.back().t - input.imu.front().t).seconds();
@@ -49,7 +50,8 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
   for (std::size_t i = 0; i < input.imu.size(); ++i) {
     if (!input.imu[i].gyro_radps.allFinite() || !input.imu[i].accel_mps2.allFinite())
       return error(fmt::format("IMU reading {} is not a number", i));
-    if (i > 0 && input.imu[i].t <= input.imu[i - 1].t) return error(fmt::format("IMU reading {} is not later than the one before", i));
+    if (i > 0 && input.imu[i].t <= input.imu[i - 1].t)
+      return error(fmt::format("IMU reading {} is not later than the one before", i));
   }
   return std::nullopt;
 }
@@ -57,15 +59,18 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
 Result<TurnMatch> check_turns(const TurnMatch& match) {
   const double degrees = 1 / kDegree;
   if (match.gain > 0.7 * degrees && match.gain < 1.4 * degrees)
-    return error(fmt::format("the gyroscope turns {:.1f} times as fast as the camera: it gives degrees/s, rad/s are needed", match.gain));
+    return error(
+        fmt::format("the gyroscope turns {:.1f} times as fast as the camera: it gives degrees/s, rad/s are needed", match.gain));
   if (match.gain > 1.25 || match.gain < 0.8)
     return error(fmt::format("the gyroscope turns {:.3g} times as fast as the camera: its unit or scale is wrong", match.gain));
   if (match.spread_radps(0) < 2 * kWeakestTurning_radps)
-    return error(fmt::format("the rig was hardly turned ({:.1f}, {:.1f} and {:.1f} degrees/s about its axes): turn it quickly about all three",
-                             match.spread_radps(0) * degrees, match.spread_radps(1) * degrees, match.spread_radps(2) * degrees));
+    return error(fmt::format(
+        "the rig was hardly turned ({:.1f}, {:.1f} and {:.1f} degrees/s about its axes): turn it quickly about all three",
+        match.spread_radps(0) * degrees, match.spread_radps(1) * degrees, match.spread_radps(2) * degrees));
   if (match.spread_radps(1) < kWeakestTurning_radps)
-    return error(fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
-                             match.spread_radps(1) * degrees));
+    return error(
+        fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
+                    match.spread_radps(1) * degrees));
   return match;
 }
 
@@ -116,8 +121,9 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   const double begin_s = std::max(gyro.first_s(), body.front().t_s - kMargin_s);
   const double end_s = std::min(gyro.last_s(), body.back().t_s + kMargin_s);
   if (end_s - begin_s < kShortest_s)
-    return error(fmt::format("images of the board and readings have {:.1f} s in common: {:g} s at least, better a minute, are needed",
-                             std::max(0.0, end_s - begin_s), kShortest_s));
+    return error(
+        fmt::format("images of the board and readings have {:.1f} s in common: {:g} s at least, better a minute, are needed",
+                    std::max(0.0, end_s - begin_s), kShortest_s));
   for (BodyPose& pose : body) pose.t_s -= begin_s;
   std::erase_if(body, [&](const BodyPose& p) { return p.t_s < 0 || p.t_s > end_s - begin_s; });
   CalibrationData data;
@@ -126,9 +132,11 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     if (const double t_s = (s.t - origin).seconds() - begin_s; t_s >= 0 && t_s <= end_s - begin_s)
       data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2});
   if (body.size() < kFewestBoardViews || data.readings.empty())
-    return error(fmt::format("the board is seen in {} images while the IMU is there: {} are needed", body.size(), kFewestBoardViews));
+    return error(
+        fmt::format("the board is seen in {} images while the IMU is there: {} are needed", body.size(), kFewestBoardViews));
   body = agreeing_with_gyro(body, data.readings, match->gyro_bias_radps);
-  if (body.size() < kFewestBoardViews) return error("the board's poses do not follow the turns of the IMU: is it the right board file?");
+  if (body.size() < kFewestBoardViews)
+    return error("the board's poses do not follow the turns of the IMU: is it the right board file?");
 
   std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
   for (const auto& camera : *located)
@@ -150,7 +158,8 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
   for (CalibrationReading& r : data.readings) {
     const auto next = std::lower_bound(body.begin(), body.end(), r.t_s, [](const BodyPose& p, double t) { return p.t_s < t; });
-    r.used = (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
+    r.used =
+        (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
   }
 
   const double rate_hz = rate_hz_of(input.imu);
@@ -162,7 +171,8 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
                       {match->gyro_bias_radps, Vec3::Zero()});
   state.time_offset_s = match->time_offset_s;
   Vec3 force_T = Vec3::Zero();
-  for (const CalibrationReading& r : data.readings) force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
+  for (const CalibrationReading& r : data.readings)
+    force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
   state.gravity_T = -force_T;
   if (force_T.norm() > 0.8 && force_T.norm() < 1.2)
     return error(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
@@ -178,8 +188,13 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   setup.camera_sigma_m = options.camera_sigma_m, setup.camera_sigma_rad = options.camera_sigma_rad;
   setup.free_axes = options.imu_axes, setup.free_line_delay = options.line_delay;
   const double gyro_sigma = setup.gyro_sigma_radps, accel_sigma = setup.accel_sigma_mps2;
-  return CalibrationStart{origin + Duration::from_seconds(begin_s), std::move(data), std::move(state), std::move(setup), gyro_sigma,
-                          accel_sigma, match->spread_radps};
+  return CalibrationStart{origin + Duration::from_seconds(begin_s),
+                          std::move(data),
+                          std::move(state),
+                          std::move(setup),
+                          gyro_sigma,
+                          accel_sigma,
+                          match->spread_radps};
 }
 
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 namespace fbvins {
 
 struct CalibrationStart {
-  Time reference;        ///< the path's start, IMU's clock
+  Time reference;  ///< the path's start, IMU's clock
   CalibrationData data;
   CalibrationState state;
   CalibrationSetup setup;

@@ -48,29 +48,36 @@ std::optional<Error> check_agreement(const ImuCameraFit& fit) {
     setup.camera_sigma_m = kFreedCamera_m, setup.camera_sigma_rad = kFreedCamera_rad;
     freed.change(setup);
     if (freed.solve() && freed.judge() && freed.image_factor() < 0.5 * fit.image_factor())
-      return error("the cameras' poses relative to one another, as given, contradict the images: calibrate the cameras with this board first");
+      return error(
+          "the cameras' poses relative to one another, as given, contradict the images: calibrate the cameras with this board first");
   }
   if (fit.image_factor() < kContradiction) return std::nullopt;
-  return error(fmt::format("the images contradict the readings: the board is off by {:.0f} times the corners' noise; a lens, the stamps of the "
-                           "images (or a rolling shutter) or the noise of the IMU is not as given", fit.image_factor()));
+  return error(fmt::format(
+      "the images contradict the readings: the board is off by {:.0f} times the corners' noise; a lens, the stamps of the "
+      "images (or a rolling shutter) or the noise of the IMU is not as given",
+      fit.image_factor()));
 }
 
 std::optional<Error> check_magnitudes(const Magnitudes& m, const Board& board, double given) {
   const double off = std::abs(m.gravity_mps2 - given);
   if (off > kWorstScale * given && off > kSure * m.gravity_sigma)
-    return error(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}", m.gravity_mps2,
-                             m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
+    return error(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}",
+                             m.gravity_mps2, m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
   if (std::abs(m.scale - 1) > kWorstScale && std::abs(m.scale - 1) > kSure * m.scale_sigma)
-    return error(fmt::format("the board is not as large as its file says: {:.1f} +- {:.1f} mm by the accelerometer instead of {:.1f} mm",
-                             1e3 * m.scale * board.size_m, 1e3 * m.scale_sigma * board.size_m, 1e3 * board.size_m));
+    return error(
+        fmt::format("the board is not as large as its file says: {:.1f} +- {:.1f} mm by the accelerometer instead of {:.1f} mm",
+                    1e3 * m.scale * board.size_m, 1e3 * m.scale_sigma * board.size_m, 1e3 * board.size_m));
   return std::nullopt;
 }
 
 std::optional<Error> check_axes(const ImuTriads& axes) {
-  const double off = std::max((axes.gyro - Mat3::Identity()).cwiseAbs().maxCoeff(), (axes.accel - Mat3::Identity()).cwiseAbs().maxCoeff());
+  const double off =
+      std::max((axes.gyro - Mat3::Identity()).cwiseAbs().maxCoeff(), (axes.accel - Mat3::Identity()).cwiseAbs().maxCoeff());
   if (off < kWorstAxes) return std::nullopt;
-  return error(fmt::format("the scale or an axis of the IMU would have to be wrong by {:.0f} %: its unit is wrong, or the recording does not "
-                           "determine it", 100 * off));
+  return error(fmt::format(
+      "the scale or an axis of the IMU would have to be wrong by {:.0f} %: its unit is wrong, or the recording does not "
+      "determine it",
+      100 * off));
 }
 
 std::optional<Error> check_determined(const CameraImuResult& result, const Vec3& turning_radps) {
@@ -79,12 +86,14 @@ std::optional<Error> check_determined(const CameraImuResult& result, const Vec3&
   for (std::size_t c = 0; c < result.cameras.size(); ++c) {
     const Mat6& P = result.cameras[c].covariance;
     if (const double turn = worst(P.bottomRightCorner<3, 3>()); !(turn < kWorstTurn_rad))
-      return error(fmt::format("the rotation of camera {} on the IMU stays uncertain to {:.2f} degrees: turn about all three axes, for a minute",
-                               c, turn / kDegree));
+      return error(fmt::format(
+          "the rotation of camera {} on the IMU stays uncertain to {:.2f} degrees: turn about all three axes, for a minute", c,
+          turn / kDegree));
     if (const double lever = worst(P.topLeftCorner<3, 3>()); !(lever < kWorstLever_m))
-      return error(fmt::format("the place of camera {} on the IMU stays uncertain to {:.1f} mm: turn faster and about all three axes (now by "
-                               "{:.0f}, {:.0f} and {:.0f} degrees/s)", c, 1e3 * lever, turning_radps(0) / kDegree, turning_radps(1) / kDegree,
-                               turning_radps(2) / kDegree));
+      return error(fmt::format(
+          "the place of camera {} on the IMU stays uncertain to {:.1f} mm: turn faster and about all three axes (now by "
+          "{:.0f}, {:.0f} and {:.0f} degrees/s)",
+          c, 1e3 * lever, turning_radps(0) / kDegree, turning_radps(1) / kDegree, turning_radps(2) / kDegree));
   }
   if (!(result.time_offset_sigma_s < kWorstOffset_s))
     return error(fmt::format("the time offset stays uncertain to {:.1f} ms: turn faster", 1e3 * result.time_offset_sigma_s));
@@ -95,13 +104,17 @@ std::vector<std::string> remarks_on(const CameraImuResult& r) {
   std::vector<std::string> remarks;
   const auto say = [&](std::string text) { remarks.push_back(std::move(text)); };
   if (r.board_scale_sigma > kUnsureScale)
-    say(fmt::format("whether the board is as large as its file says is known to {:.0f} % only: move the rig more", 100 * r.board_scale_sigma));
+    say(fmt::format("whether the board is as large as its file says is known to {:.0f} % only: move the rig more",
+                    100 * r.board_scale_sigma));
   if (r.corner_sigma_px > 0.7)
     say(fmt::format("corners are seen to {:.2f} px only: blurred images, a wrong lens, or a rolling shutter", r.corner_sigma_px));
   if (r.image_factor > kNoticed)
-    say(fmt::format("all corners of an image are off together by {:.1f} times what their noise explains (stamps, lens, vibration); the "
-                    "uncertainties regard it", r.image_factor));
-  if (r.stamp_jitter_s > 0) say(fmt::format("the stamps of the images jitter by {:.2f} ms; the uncertainties regard it", 1e3 * r.stamp_jitter_s));
+    say(fmt::format(
+        "all corners of an image are off together by {:.1f} times what their noise explains (stamps, lens, vibration); the "
+        "uncertainties regard it",
+        r.image_factor));
+  if (r.stamp_jitter_s > 0)
+    say(fmt::format("the stamps of the images jitter by {:.2f} ms; the uncertainties regard it", 1e3 * r.stamp_jitter_s));
   for (const auto& [rms, name] : {std::pair{r.gyro_rms_sigmas, "gyroscope"}, std::pair{r.accel_rms_sigmas, "accelerometer"}}) {
     if (rms > 1.5) say(fmt::format("the {} is {:.1f} times as noisy as given; the uncertainties regard it", name, rms));
     if (rms < 0.5) say(fmt::format("the noise given for the {} is {:.1f} times that of the readings", name, 1 / rms));

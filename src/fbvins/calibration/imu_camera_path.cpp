@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-constexpr double kWindow_s = 4;       // in which the gyroscope's drift is nothing
+constexpr double kWindow_s = 4;  // in which the gyroscope's drift is nothing
 constexpr double kTilted_rad = 0.05, kTilted = 5;
 
 /// Turns since the first reading by the gyroscope alone.
@@ -89,8 +89,8 @@ std::vector<BodyPose> agreeing_with_gyro(const std::vector<BodyPose>& poses, con
   return out;
 }
 
-PoseSpline first_path(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings, const Vec3& gyro_bias_radps,
-                      double spacing_s, double duration_s) {
+PoseSpline first_path(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings,
+                      const Vec3& gyro_bias_radps, double spacing_s, double duration_s) {
   const TurnTable turns(readings, gyro_bias_radps);
   std::vector<Pose<T, B>> knots;
   for (int k = 0; k < knots_for(duration_s, spacing_s); ++k) knots.push_back(pose_at(poses, time_of_knot(k, spacing_s), turns));

@@ -15,14 +15,14 @@ struct BodyPose {
   Pose<T, B> T_TB;
 };
 
-/// Those whose orientation is what the gyroscope makes of the others within seconds: a board seen in part has a second pose, tilted
-/// the other way, which may fit an image better. Both by time.
+/// Those whose orientation is what the gyroscope makes of the others within seconds: a board seen in part has a second pose,
+/// tilted the other way, which may fit an image better. Both by time.
 std::vector<BodyPose> agreeing_with_gyro(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings,
                                          const Vec3& gyro_bias_radps);
 
 /// Knots from time 0 to at least `duration_s`. `poses` by time, at least one.
-PoseSpline first_path(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings, const Vec3& gyro_bias_radps,
-                      double spacing_s, double duration_s);
+PoseSpline first_path(const std::vector<BodyPose>& poses, const std::vector<CalibrationReading>& readings,
+                      const Vec3& gyro_bias_radps, double spacing_s, double duration_s);
 
 /// The same path with knots closer together.
 PoseSpline with_spacing(const PoseSpline& path, double spacing_s);

@@ -14,8 +14,8 @@ namespace fbvins {
 namespace {
 
 constexpr std::size_t kFewestCorners = 8;
-constexpr double kPoorFit = 2.5;     // of a pose, over the median
-constexpr double kWorstFit_px = 4;   // median over the images of one camera
+constexpr double kPoorFit = 2.5;        // of a pose, over the median
+constexpr double kWorstFit_px = 4;      // median over the images of one camera
 constexpr double kWeakestTurns = 0.75;  // correlation of a camera's turns with the IMU's
 
 Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
@@ -55,16 +55,19 @@ Result<CameraPoses> locate_all(const ImuCameraInput& input, Time reference) {
   }
   for (std::size_t c = 0; c < poses.size(); ++c) {
     if (seen[c] >= kFewestBoardViews && 2 * poses[c].size() < seen[c])
-      return error(fmt::format("the corners that camera {} sees do not lie as on this board: is it the right board file and the right lens?", c));
+      return error(fmt::format(
+          "the corners that camera {} sees do not lie as on this board: is it the right board file and the right lens?", c));
     if (poses[c].size() < kFewestBoardViews)
-      return error(fmt::format("camera {} shows the board in {} images with at least {} corners: {} are needed", c, poses[c].size(),
-                               kFewestCorners, kFewestBoardViews));
+      return error(fmt::format("camera {} shows the board in {} images with at least {} corners: {} are needed", c,
+                               poses[c].size(), kFewestCorners, kFewestBoardViews));
     std::sort(poses[c].begin(), poses[c].end(), [](const SeenPose& a, const SeenPose& b) { return a.t_s < b.t_s; });
     std::vector<double> fits;
     for (const SeenPose& pose : poses[c]) fits.push_back(pose.sigma_px);
     if (const double fit = median_of(fits); fit > kWorstFit_px)
-      return error(fmt::format("the corners that camera {} sees do not lie as on this board ({:.1f} px off, in the median): is it the right "
-                               "board file and the right lens?", c, fit));
+      return error(fmt::format(
+          "the corners that camera {} sees do not lie as on this board ({:.1f} px off, in the median): is it the right "
+          "board file and the right lens?",
+          c, fit));
   }
   return poses;
 }
@@ -79,8 +82,8 @@ CameraPoses good_ones(CameraPoses poses) {
   return poses;
 }
 
-Result<std::vector<Pose<B, Cn>>> first_extrinsics(const ImuCameraInput& input, const CameraPoses& poses,
-                                                  const GyroIntegral& gyro, const TurnMatch& match) {
+Result<std::vector<Pose<B, Cn>>> first_extrinsics(const ImuCameraInput& input, const CameraPoses& poses, const GyroIntegral& gyro,
+                                                  const TurnMatch& match) {
   std::vector<Pose<B, Cn>> T_BC = {{match.R_BC, Vec3(Vec3::Zero())}};
   const Pose<B, C0> first = T_BC[0].cast_frames<B, C0>();
   for (std::size_t c = 1; c < input.cameras.size(); ++c) {

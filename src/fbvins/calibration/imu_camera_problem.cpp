@@ -187,7 +187,9 @@ bool ImuCameraProblem::solve(double lambda) {
   return step_.allFinite();
 }
 
-double ImuCameraProblem::step_size() const { return step_.segment(layout_.begin, layout_.end - layout_.begin).lpNorm<Eigen::Infinity>(); }
+double ImuCameraProblem::step_size() const {
+  return step_.segment(layout_.begin, layout_.end - layout_.begin).lpNorm<Eigen::Infinity>();
+}
 
 double ImuCameraProblem::apply_step() {
   before_ = state_;
@@ -248,8 +250,7 @@ Eigen::VectorXd ImuCameraProblem::response(const RigVariation& variation) {
 ImuBias ImuCameraProblem::bias_sigma(int index) const {
   Vec6 sigma;
   const int begin = bias_index_[static_cast<std::size_t>(index)];
-  for (int i = 0; i < 6; ++i)
-    sigma(i) = std::sqrt(system_->solve(Eigen::VectorXd::Unit(system_->size(), begin + i))(begin + i));
+  for (int i = 0; i < 6; ++i) sigma(i) = std::sqrt(system_->solve(Eigen::VectorXd::Unit(system_->size(), begin + i))(begin + i));
   return {Vec3(sigma.head<3>()), Vec3(sigma.tail<3>())};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to calibration: the least-squares problem of camera-IMU calibration (docs/derivations/calibration.md, C1-C14). Unknowns:
-// the path's knots and the biases over time, each coupled to its neighbours, and the calibration, coupled to all.
+// Private to calibration: the least-squares problem of camera-IMU calibration (docs/derivations/calibration.md, C1-C14).
+// Unknowns: the path's knots and the biases over time, each coupled to its neighbours, and the calibration, coupled to all.
 //
 //   ImuCameraProblem problem(data, state, setup);
 //   minimise(problem, options);                   // optim/levenberg_marquardt.hpp
@@ -28,10 +28,10 @@ struct WeightedCorner {
 /// What one camera sees at one instant; with a rolling shutter, in a group of neighbouring rows.
 struct CalibrationView {
   int camera = 0;
-  double t_s = 0;           ///< image's stamp since the path's start, without the offset
-  double row = 0;           ///< of the image, exposed line_delay * row later
+  double t_s = 0;  ///< image's stamp since the path's start, without the offset
+  double row = 0;  ///< of the image, exposed line_delay * row later
   double noise_factor = 1;
-  int sharing = 1;          ///< views with this stamp
+  int sharing = 1;  ///< views with this stamp
   std::vector<WeightedCorner> corners;
 };
 
@@ -49,8 +49,8 @@ struct CalibrationData {
 
 struct CalibrationState {
   PoseSpline path;
-  int intervals_per_bias = 25;       ///< the bias is linear in time between nodes so far apart
-  std::vector<ImuBias> biases;       ///< one every so many intervals of the path, from its start
+  int intervals_per_bias = 25;  ///< the bias is linear in time between nodes so far apart
+  std::vector<ImuBias> biases;  ///< one every so many intervals of the path, from its start
   std::vector<Pose<B, Cn>> T_BC;
   double time_offset_s = 0, line_delay_s = 0;
   Vec3 gravity_T = Vec3(0, 0, -9.81);
@@ -64,10 +64,10 @@ struct CalibrationSetup {
   double corner_sigma_px = 0.2;
   /// What moves all corners of an image together (its stamp, the lens, the rig) over what each corner's noise explains (C11).
   double image_factor = 1;
-  double stamp_jitter_s = 0;  ///< standard deviation of a stamp (C12)
-  double gyro_sigma_radps = 1e-3, accel_sigma_mps2 = 1e-2;         ///< of a single reading
+  double stamp_jitter_s = 0;                                ///< standard deviation of a stamp (C12)
+  double gyro_sigma_radps = 1e-3, accel_sigma_mps2 = 1e-2;  ///< of a single reading
   double gyro_walk_radps2_rthz = 2e-5, accel_walk_mps3_rthz = 3e-3;
-  double corner_huber = 2, reading_huber = 1e9;                    ///< in sigmas
+  double corner_huber = 2, reading_huber = 1e9;  ///< in sigmas
   double gravity_mps2 = 9.81, gravity_sigma_mps2 = 0.02;
   std::vector<Pose<Cn, C0>> T_CnC0;  ///< as given; empty: free
   double camera_sigma_m = 1e-6, camera_sigma_rad = 1e-6;
@@ -76,7 +76,7 @@ struct CalibrationSetup {
 
 /// Where the calibration's unknowns lie, after those of the chain; -1: not estimated.
 struct CalibrationLayout {
-  std::vector<int> cameras;  ///< six each: dp in B, dtheta in C
+  std::vector<int> cameras;                                                          ///< six each: dp in B, dtheta in C
   int time_offset = -1, line_delay = -1, gravity = -1, board_scale = -1, axes = -1;  ///< axes: gyro by rows (9), accel (6)
   int begin = 0, end = 0;
 };
@@ -91,7 +91,7 @@ struct ResidualSum {
 struct ResidualSums {
   ResidualSum corners, gyro, accel;
   double stamp_jitter_s = 0;  ///< as the images' residuals along their motion show it
-  ResidualSum images;  ///< of the corners' residuals the part that another pose of the image's camera would explain
+  ResidualSum images;         ///< of the corners' residuals the part that another pose of the image's camera would explain
 };
 
 class ImuCameraProblem {
@@ -122,7 +122,8 @@ class ImuCameraProblem {
 
   /// Of the calibration's unknowns, at the state last linearised; nullopt where they are not determined.
   std::optional<Eigen::MatrixXd> calibration_covariance();
-  /// How the calibration moves if the rig's lenses and extrinsics do, by one standard deviation (C15); after calibration_covariance().
+  /// How the calibration moves if the rig's lenses and extrinsics do, by one standard deviation (C15); after
+  /// calibration_covariance().
   Eigen::VectorXd response(const RigVariation& variation);
   /// Standard deviations of the biases at node `index`, after calibration_covariance().
   ImuBias bias_sigma(int index) const;
@@ -172,7 +173,7 @@ class ImuCameraProblem {
   void begin_local(int rows, int first_knot);
   int columns(int index, int count);  ///< of the local Jacobian, for `count` unknowns from `index`
   int knot_index(int knot) const { return knot_index_[static_cast<std::size_t>(knot)]; }
-  double add_rows(bool build);        ///< half the square of r_; with J_ to the system
+  double add_rows(bool build);  ///< half the square of r_; with J_ to the system
 
   CalibrationData data_;
   CalibrationState state_, before_;

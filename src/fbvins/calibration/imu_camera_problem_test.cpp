@@ -15,7 +15,8 @@ ImuCameraProblem wild_problem() {
   Rng rng(3);
   std::vector<Pose<T, B>> knots;
   for (int k = 0; k < 14; ++k)
-    knots.push_back({(Quat(0, 1, 0, 0) * so3_exp(test::random_vector(rng, 0.05))).normalized(), Vec3(Vec3(0.2, 0.3, 0.8) + test::random_vector(rng, 0.002))});
+    knots.push_back({(Quat(0, 1, 0, 0) * so3_exp(test::random_vector(rng, 0.05))).normalized(),
+                     Vec3(Vec3(0.2, 0.3, 0.8) + test::random_vector(rng, 0.002))});
   CalibrationState state{.path = PoseSpline(0.05, knots), .intervals_per_bias = 4, .biases = {}, .T_BC = {}, .axes = {}};
   for (int n = 0; n < 4; ++n) state.biases.push_back({test::random_vector(rng, 0.01), test::random_vector(rng, 0.1)});
   for (int c = 0; c < 2; ++c) state.T_BC.push_back({so3_exp(test::random_vector(rng, 0.1)), test::random_vector(rng, 0.05)});
@@ -34,7 +35,8 @@ ImuCameraProblem wild_problem() {
   for (int i = 0; i < 60; ++i)
     data.readings.push_back({0.0071 * i, test::random_vector(rng, 0.3), Vec3(Vec3(0, 9, 2) + test::random_vector(rng, 0.5))});
   CalibrationSetup setup;
-  setup.corner_sigma_px = 5, setup.gyro_sigma_radps = 0.1, setup.accel_sigma_mps2 = 1, setup.corner_huber = 10, setup.reading_huber = 3;
+  setup.corner_sigma_px = 5, setup.gyro_sigma_radps = 0.1, setup.accel_sigma_mps2 = 1, setup.corner_huber = 10,
+  setup.reading_huber = 3;
   setup.gyro_walk_radps2_rthz = 0.1, setup.accel_walk_mps3_rthz = 1, setup.gravity_sigma_mps2 = 1;
   setup.camera_sigma_m = 0.05, setup.camera_sigma_rad = 0.2;
   setup.T_CnC0 = {{}, {so3_exp(Vec3(0.1, 0.2, -0.1)), Vec3(-0.1, 0.02, 0.01)}};
@@ -51,7 +53,8 @@ TEST(ImuCameraProblem, TheGradientIsThatOfFiniteDifferences) {
     const double step = i == problem.layout().time_offset || i == problem.layout().line_delay ? 1e-8 : 1e-6;
     const auto at = [&](double x) { return problem.cost_after(x * Eigen::VectorXd::Unit(gradient.size(), i)); };
     const double numeric = (at(step) - at(-step)) / (2 * step);
-    EXPECT_NEAR(gradient(i), numeric, 2e-5 * (std::abs(numeric) + 10)) << "unknown " << i << ", calibration from " << problem.layout().begin;
+    EXPECT_NEAR(gradient(i), numeric, 2e-5 * (std::abs(numeric) + 10))
+        << "unknown " << i << ", calibration from " << problem.layout().begin;
   }
 }
 

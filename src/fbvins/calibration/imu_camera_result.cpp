@@ -76,13 +76,15 @@ void tell_biases(const ImuCameraProblem& problem, const CalibrationStart& start,
   const int step = std::max(1, count / kBiasesTold);
   for (int n = 0; n < count; n += step) {
     const double t_s = n * state.intervals_per_bias * state.path.spacing_s();
-    out.biases.push_back({start.reference + Duration::from_seconds(t_s), state.biases[static_cast<std::size_t>(n)], problem.bias_sigma(n)});
+    out.biases.push_back(
+        {start.reference + Duration::from_seconds(t_s), state.biases[static_cast<std::size_t>(n)], problem.bias_sigma(n)});
   }
 }
 
 }  // namespace
 
-CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start, const std::vector<RigVariation>& variations) {
+CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start,
+                            const std::vector<RigVariation>& variations) {
   const CalibrationState& state = problem.state();
   const CalibrationLayout& at = problem.layout();
   CameraImuResult out;

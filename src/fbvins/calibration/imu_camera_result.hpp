@@ -7,6 +7,7 @@
 namespace fbvins {
 
 /// All but what the fit's earlier stages have measured. The problem is linearised at its minimum.
-CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start, const std::vector<RigVariation>& variations);
+CameraImuResult make_result(ImuCameraProblem& problem, const CalibrationStart& start,
+                            const std::vector<RigVariation>& variations);
 
 }  // namespace fbvins

@@ -80,7 +80,8 @@ class HandHeldMotion {
   BodyMotion at(double t) const {
     std::array<double, 3> p[3], a[3];
     for (std::size_t i = 0; i < 3; ++i) p[i] = position_[i].at(t), a[i] = angle_[i].at(t);
-    const Quat qx = so3_exp(a[0][0] * Vec3::UnitX()), qy = so3_exp(a[1][0] * Vec3::UnitY()), qz = so3_exp(a[2][0] * Vec3::UnitZ());
+    const Quat qx = so3_exp(a[0][0] * Vec3::UnitX()), qy = so3_exp(a[1][0] * Vec3::UnitY()),
+               qz = so3_exp(a[2][0] * Vec3::UnitZ());
     BodyMotion m;
     m.T_TB = {(middle_.q * qz * qy * qx).normalized(), Vec3(middle_.p + Vec3(p[0][0], p[1][0], p[2][0]))};
     m.a_TB = {p[0][2], p[1][2], p[2][2]};
@@ -112,7 +113,9 @@ struct HandHeldRecording {
   HandHeldTruth truth;
 };
 
-inline Vec3 random_vector(Rng& rng, double sigma) { return Vec3{sigma * rng.normal(), sigma * rng.normal(), sigma * rng.normal()}; }
+inline Vec3 random_vector(Rng& rng, double sigma) {
+  return Vec3{sigma * rng.normal(), sigma * rng.normal(), sigma * rng.normal()};
+}
 
 inline Camera wide_camera() {
   return Camera(PinholeRadtan{458.654, 457.296, 367.215, 248.375, -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}, 752, 480);
@@ -126,7 +129,8 @@ class HandHeld {
     for (int c = 0; c < o_.cameras; ++c) {
       input.cameras.push_back(wide_camera());
       const Vec3 place(-0.021, -0.065 + 0.11 * c, 0.01);
-      out_.truth.T_BC.push_back({(nominal * so3_exp(random_vector(rng_, 0.03))).normalized(), Vec3(place + random_vector(rng_, 0.01))});
+      out_.truth.T_BC.push_back(
+          {(nominal * so3_exp(random_vector(rng_, 0.03))).normalized(), Vec3(place + random_vector(rng_, 0.01))});
     }
     for (const Pose<B, Cn>& T_BC : out_.truth.T_BC)
       input.T_CnC0.push_back((T_BC.inverse() * out_.truth.T_BC[0]).cast_frames<Cn, C0>());
@@ -152,8 +156,10 @@ class HandHeld {
 
   void readings(const HandHeldMotion& motion) {
     const double dt = 1 / o_.imu_rate_hz;
-    const double sg = o_.noise.gyro_noise_density_radps_rthz / std::sqrt(dt), sa = o_.noise.accel_noise_density_mps2_rthz / std::sqrt(dt);
-    const double wg = o_.noise.gyro_random_walk_radps2_rthz * std::sqrt(dt), wa = o_.noise.accel_random_walk_mps3_rthz * std::sqrt(dt);
+    const double sg = o_.noise.gyro_noise_density_radps_rthz / std::sqrt(dt),
+                 sa = o_.noise.accel_noise_density_mps2_rthz / std::sqrt(dt);
+    const double wg = o_.noise.gyro_random_walk_radps2_rthz * std::sqrt(dt),
+                 wa = o_.noise.accel_random_walk_mps3_rthz * std::sqrt(dt);
     ImuBias bias{random_vector(rng_, 0.02), random_vector(rng_, 0.1)};
     out_.truth.first_reading = at(-0.5), out_.truth.imu_rate_hz = o_.imu_rate_hz;
     int dropping = 0;
@@ -161,8 +167,9 @@ class HandHeld {
     for (int i = 0; i < count; ++i) {
       const double t = -0.5 + i * dt;
       const BodyMotion m = motion.at(t);
-      ImuSample s{at(t), o_.axes.gyro * m.w_TB_B + bias.gyro_radps + random_vector(rng_, sg),
-                  o_.axes.accel * (m.T_TB.q.conjugate() * (m.a_TB - out_.truth.gravity_T)) + bias.accel_mps2 + random_vector(rng_, sa)};
+      ImuSample s{
+          at(t), o_.axes.gyro * m.w_TB_B + bias.gyro_radps + random_vector(rng_, sg),
+          o_.axes.accel * (m.T_TB.q.conjugate() * (m.a_TB - out_.truth.gravity_T)) + bias.accel_mps2 + random_vector(rng_, sa)};
       out_.truth.biases.push_back(bias);
       bias.gyro_radps += random_vector(rng_, wg), bias.accel_mps2 += random_vector(rng_, wa);
       if (rng_.uniform() < o_.dropped_share / 10) dropping = 10;
@@ -210,7 +217,9 @@ class HandHeld {
   HandHeldRecording out_;
 };
 
-inline HandHeldRecording hand_held(const HandHeldOptions& options, std::uint64_t seed) { return HandHeld(options, seed).record(); }
+inline HandHeldRecording hand_held(const HandHeldOptions& options, std::uint64_t seed) {
+  return HandHeld(options, seed).record();
+}
 
 /// Error over its covariance: the mean over many is the number of dimensions.
 inline double squared_sigmas(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {

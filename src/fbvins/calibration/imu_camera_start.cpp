@@ -109,7 +109,9 @@ std::optional<Vec3> GyroIntegral::mean_rate(double from_s, double to_s) const {
   if (!(a >= 0) || !(b + 1 < static_cast<double>(sum_.size())) || !(a < b)) return std::nullopt;
   const auto i = static_cast<std::size_t>(a), k = static_cast<std::size_t>(b);
   if (missing_s_[k + 1] - missing_s_[i] > 0) return std::nullopt;
-  const auto sum = [&](std::size_t n, double x) { return Vec3(sum_[n] + (x - static_cast<double>(n)) * (sum_[n + 1] - sum_[n])); };
+  const auto sum = [&](std::size_t n, double x) {
+    return Vec3(sum_[n] + (x - static_cast<double>(n)) * (sum_[n + 1] - sum_[n]));
+  };
   return Vec3((sum(k, b) - sum(i, a)) / (to_s - from_s));
 }
 
@@ -130,8 +132,10 @@ Result<TurnMatch> match_turns(const std::vector<SeenPose>& poses, const GyroInte
     most = std::max(most, coarse.back().pairs);
   }
   if (most == 0)
-    return error(fmt::format("the board is never seen in two images in a row while the IMU is there (offsets of the clocks up to {:g} s "
-                             "were tried)", max_offset_s));
+    return error(
+        fmt::format("the board is never seen in two images in a row while the IMU is there (offsets of the clocks up to {:g} s "
+                    "were tried)",
+                    max_offset_s));
   std::size_t best = 0;
   double mirrored = 0, runner_up = 0;
   for (TurnMatch& match : coarse)
@@ -145,20 +149,27 @@ Result<TurnMatch> match_turns(const std::vector<SeenPose>& poses, const GyroInte
   const double agreement = coarse[best].agreement;
   const bool found = agreement >= kStrong || (agreement >= kWeakest && agreement > kStandsOut * runner_up);
   if (!found && mirrored > kStrong)
-    return error("the IMU turns as the camera does only if its axes are left-handed: one of its axes has the wrong sign, or two are "
-                 "swapped");
+    return error(
+        "the IMU turns as the camera does only if its axes are left-handed: one of its axes has the wrong sign, or two are "
+        "swapped");
   if (!found)
-    return error(fmt::format("at no offset of the clocks up to {:g} s does the IMU turn as the camera does (best correlation {:.2f}): "
-                             "is it the same recording, and was it turned irregularly?", max_offset_s, agreement));
+    return error(
+        fmt::format("at no offset of the clocks up to {:g} s does the IMU turn as the camera does (best correlation {:.2f}): "
+                    "is it the same recording, and was it turned irregularly?",
+                    max_offset_s, agreement));
   if (runner_up > kAmbiguous * agreement)
-    return error(fmt::format("the offset of the clocks is not shown, because the motion repeats itself (another offset more than {:g} s "
-                             "away fits as well): turn irregularly", kPeak_s));
+    return error(
+        fmt::format("the offset of the clocks is not shown, because the motion repeats itself (another offset more than {:g} s "
+                    "away fits as well): turn irregularly",
+                    kPeak_s));
   const double centre_s = coarse[best].time_offset_s;
   std::vector<TurnMatch> fine;
   const int reach = static_cast<int>(1.5 * kCoarse_s / kFine_s);
-  for (int i = -reach; i <= reach; ++i) fine.push_back(match_of(moments_at(pairs, gyro, centre_s + i * kFine_s), centre_s + i * kFine_s));
+  for (int i = -reach; i <= reach; ++i)
+    fine.push_back(match_of(moments_at(pairs, gyro, centre_s + i * kFine_s), centre_s + i * kFine_s));
   const auto top = static_cast<std::size_t>(
-      std::max_element(fine.begin(), fine.end(), [](const auto& a, const auto& b) { return a.agreement < b.agreement; }) - fine.begin());
+      std::max_element(fine.begin(), fine.end(), [](const auto& a, const auto& b) { return a.agreement < b.agreement; }) -
+      fine.begin());
   if (top == 0 || top + 1 == fine.size()) return fine[top];
   const double before = fine[top - 1].agreement, at = fine[top].agreement, after = fine[top + 1].agreement;
   const double curvature = before - 2 * at + after;

@@ -29,18 +29,18 @@ class GyroIntegral {
 
  private:
   double first_s_ = 0, step_s_ = 1e-3;
-  std::vector<Vec3> sum_;       ///< on a grid
+  std::vector<Vec3> sum_;          ///< on a grid
   std::vector<double> missing_s_;  ///< time without readings until then
 };
 
 /// The turns of one camera and those of the IMU, brought together.
 struct TurnMatch {
-  double time_offset_s = 0;   ///< t_imu = t_image + offset
+  double time_offset_s = 0;  ///< t_imu = t_image + offset
   Quat R_BC = Quat::Identity();
   Vec3 gyro_bias_radps = Vec3::Zero();
-  double agreement = 0;       ///< 1: the same turns; as a correlation
-  double mirrored_agreement = 0;  ///< if the IMU's axes were left-handed
-  double gain = 1;            ///< turns of the gyroscope to those of the camera
+  double agreement = 0;              ///< 1: the same turns; as a correlation
+  double mirrored_agreement = 0;     ///< if the IMU's axes were left-handed
+  double gain = 1;                   ///< turns of the gyroscope to those of the camera
   Vec3 spread_radps = Vec3::Zero();  ///< of the camera's rates along their principal axes, largest first
   int pairs = 0;
 };

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kNearest_m = 0.01;
 constexpr double kLatest_s = 0.01;  // of an image whose stamp is not exact
-constexpr double kJitters = 1.5;  // squared sigmas along the motion above which stamps are not exact
+constexpr double kJitters = 1.5;    // squared sigmas along the motion above which stamps are not exact
 constexpr double kUnseenCost = 50;  // of a corner that the estimate puts behind the lens: any constant
 
 }  // namespace
@@ -52,7 +52,8 @@ double ImuCameraProblem::lateness_s(const CalibrationView& view) const {
   return -motion.rate.dot(term.b.head<6>()) / (motion.rate.dot(Hx) + 1 / (kLatest_s * kLatest_s));
 }
 
-std::optional<Vec2> ImuCameraProblem::corner_error(const CalibrationView& view, const WeightedCorner& corner, double late_s) const {
+std::optional<Vec2> ImuCameraProblem::corner_error(const CalibrationView& view, const WeightedCorner& corner,
+                                                   double late_s) const {
   const std::optional<Vec3> p_C = corner_in_camera(view, corner, view_motion(view, nullptr), late_s);
   if (!p_C) return std::nullopt;
   return Vec2(data_.cameras[static_cast<std::size_t>(view.camera)].distort(p_C->head<2>() / p_C->z()) - corner.pixel);
@@ -90,7 +91,8 @@ ImuCameraProblem::ViewTerm ImuCameraProblem::view_term(const CalibrationView& vi
   return term;
 }
 
-ImuCameraProblem::ViewTerm ImuCameraProblem::with_jitter(ViewTerm term, const CalibrationView& view, const ViewMotion& motion) const {
+ImuCameraProblem::ViewTerm ImuCameraProblem::with_jitter(ViewTerm term, const CalibrationView& view,
+                                                         const ViewMotion& motion) const {
   if (setup_.stamp_jitter_s <= 0) return term;
   // Images with one stamp are late together: each is worth its part.
   const double information = 1 / (setup_.stamp_jitter_s * setup_.stamp_jitter_s * view.sharing);
@@ -235,7 +237,8 @@ ResidualSums ImuCameraProblem::residual_sums() {
     probes[2](index_) += J.bottomRows<3>().transpose() * w.tail<3>();
   }
   ResidualSum* all[3] = {&sums.corners, &sums.gyro, &sums.accel};
-  for (int i = 0; i < 3; ++i) all[i]->taken_up = probes[static_cast<std::size_t>(i)].dot(system_->solve(probes[static_cast<std::size_t>(i)]));
+  for (int i = 0; i < 3; ++i)
+    all[i]->taken_up = probes[static_cast<std::size_t>(i)].dot(system_->solve(probes[static_cast<std::size_t>(i)]));
   // (C12)
   if (jitter_chi2 > kJitters * jitter_rows) sums.stamp_jitter_s = std::sqrt((jitter_chi2 - jitter_rows) / jitter_sure);
   sums.images.taken_up = sums.corners.taken_up;

@@ -6,8 +6,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "fbvins/core/angle.hpp"
 #include "fbvins/calibration/imu_camera_scene.hpp"
+#include "fbvins/core/angle.hpp"
 
 namespace fbvins {
 namespace {
@@ -15,7 +15,6 @@ namespace {
 using test::hand_held;
 using test::HandHeldOptions;
 using test::HandHeldRecording;
-
 
 /// As quick as a test should be: 12 s, images at 10 Hz.
 HandHeldOptions short_recording() {
@@ -25,8 +24,8 @@ HandHeldOptions short_recording() {
 }
 
 /// Errors within the sizes and within `sigmas` of their own standard deviations.
-void expect_truth(const HandHeldRecording& r, const Result<CameraImuResult>& found, double worst_m, double worst_rad, double worst_s,
-                  double sigmas = 3.5) {
+void expect_truth(const HandHeldRecording& r, const Result<CameraImuResult>& found, double worst_m, double worst_rad,
+                  double worst_s, double sigmas = 3.5) {
   ASSERT_TRUE(found) << found.error().message;
   for (std::size_t c = 0; c < r.truth.T_BC.size(); ++c) {
     const CameraOnImu& camera = found->cameras[c];
@@ -34,7 +33,8 @@ void expect_truth(const HandHeldRecording& r, const Result<CameraImuResult>& fou
     error << camera.T_BC.p - r.truth.T_BC[c].p, so3_log(r.truth.T_BC[c].q.conjugate() * camera.T_BC.q);
     EXPECT_LT(error.head<3>().norm(), worst_m) << "camera " << c;
     EXPECT_LT(error.tail<3>().norm(), worst_rad) << "camera " << c;
-    for (int k = 0; k < 6; ++k) EXPECT_LT(std::abs(error(k)), sigmas * std::sqrt(camera.covariance(k, k)) + 1e-6) << "camera " << c << ", " << k;
+    for (int k = 0; k < 6; ++k)
+      EXPECT_LT(std::abs(error(k)), sigmas * std::sqrt(camera.covariance(k, k)) + 1e-6) << "camera " << c << ", " << k;
   }
   const double late_s = std::abs(found->time_offset_s - r.truth.time_offset_s);
   EXPECT_LT(late_s, worst_s);
@@ -122,7 +122,8 @@ TEST(ImuCamera, ScaleAndAxesOfTheImu) {
   expect_truth(r, found, 3e-3, 0.2 * kDegree, 0.1e-3);
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column) {
-      EXPECT_NEAR(found->axes.gyro(row, column), o.axes.gyro(row, column), 4 * found->axes_sigma.gyro(row, column)) << row << column;
+      EXPECT_NEAR(found->axes.gyro(row, column), o.axes.gyro(row, column), 4 * found->axes_sigma.gyro(row, column))
+          << row << column;
       EXPECT_LT(found->axes_sigma.gyro(row, column), 2e-3);
       const double largest = column <= row ? 4 * found->axes_sigma.accel(row, column) : 0;
       EXPECT_LE(std::abs(found->axes.accel(row, column) - o.axes.accel(row, column)), largest) << row << column;

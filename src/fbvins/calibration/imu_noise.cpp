@@ -67,7 +67,8 @@ Rest longest_rest(const std::vector<Window>& windows) {
   const Window* before = nullptr;
   for (const Window& w : windows) {
     const bool quiet = w.gyro_spread <= gyro_limit && w.accel_spread <= accel_limit && !w.gap;
-    const bool goes_on = quiet && before && (w.gyro - before->gyro).norm() <= kTurned_radps && (w.accel - before->accel).norm() <= kPushed_mps2;
+    const bool goes_on =
+        quiet && before && (w.gyro - before->gyro).norm() <= kTurned_radps && (w.accel - before->accel).norm() <= kPushed_mps2;
     rest.disturbed += !quiet;
     if (quiet && !goes_on) now.begin = w.begin;
     before = quiet ? &w : nullptr;
@@ -77,7 +78,8 @@ Rest longest_rest(const std::vector<Window>& windows) {
   return rest;
 }
 
-AxisNoise noise_of(const std::vector<ImuSample>& readings, const Rest& rest, double period_s, const Vec3 ImuSample::*sensor, int axis) {
+AxisNoise noise_of(const std::vector<ImuSample>& readings, const Rest& rest, double period_s, const Vec3 ImuSample::*sensor,
+                   int axis) {
   std::vector<double> values;
   for (std::size_t i = rest.begin; i < rest.end; ++i) values.push_back((readings[i].*sensor)(axis));
   return fit_noise(values, period_s);
@@ -98,16 +100,19 @@ void warn(const Rest& rest, double missing_share, ImuNoiseResult& out) {
   if (rest.disturbed > 0)
     say(fmt::format("{} s of the recording are not at rest; the longest rest is used, {:.0f} s", rest.disturbed, out.duration_s));
   if (out.duration_s < kComfortable_s)
-    say(fmt::format("{:.0f} s of rest are short: {:g} s and more show the white noise to some percent, hours the random walk", out.duration_s,
-                    kComfortable_s));
+    say(fmt::format("{:.0f} s of rest are short: {:g} s and more show the white noise to some percent, hours the random walk",
+                    out.duration_s, kComfortable_s));
   for (const auto& [axes, name] : {std::pair{&out.gyro, "gyroscope"}, std::pair{&out.accel, "accelerometer"}}) {
     if (any_only_bounded(*axes))
-      say(fmt::format("the random walk of the {}'s bias is only bounded from above by a rest of {:.0f} s; the bound is what is written",
-                      name, out.duration_s));
+      say(fmt::format(
+          "the random walk of the {}'s bias is only bounded from above by a rest of {:.0f} s; the bound is what is written", name,
+          out.duration_s));
     const double misfit = std::max({(*axes)[0].misfit, (*axes)[1].misfit, (*axes)[2].misfit});
     if (misfit > kWorstMisfit)
-      say(fmt::format("the noise of the {} is not white noise and random walk alone ({:.0f} times the expected difference): look at the "
-                      "curve; the table or something on it may vibrate", name, misfit));
+      say(fmt::format(
+          "the noise of the {} is not white noise and random walk alone ({:.0f} times the expected difference): look at the "
+          "curve; the table or something on it may vibrate",
+          name, misfit));
   }
   if (missing_share > 0.01) say(fmt::format("{:.1f} % of the readings are missing", 100 * missing_share));
 }
@@ -121,8 +126,9 @@ Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings)
   const double period_s = median_of(periods), length_s = (readings.back().t - readings.front().t).seconds();
   if (!(period_s > 0)) return error("the stamps of the IMU's readings do not grow");
   if (length_s < kShortest_s)
-    return error(fmt::format("{:.1f} s of readings are too short for the IMU's noise: {:g} s of rest at least, better several minutes",
-                             length_s, kShortest_s));
+    return error(
+        fmt::format("{:.1f} s of readings are too short for the IMU's noise: {:g} s of rest at least, better several minutes",
+                    length_s, kShortest_s));
   const auto size = static_cast<std::size_t>(std::max(4.0, std::round(kWindow_s / period_s)));
   std::vector<Window> windows;
   for (std::size_t i = 0; i + size <= readings.size(); i += size) windows.push_back(window_of(readings, i, i + size));
@@ -134,12 +140,15 @@ Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings)
     out.duration_s = (readings[rest.end - 1].t - out.start).seconds();
   }
   if (out.duration_s < kShortest_s)
-    return error(fmt::format("the longest rest in {:.0f} s of readings is {:.1f} s: {:g} s at least are needed, on something that does not move",
-                             length_s, out.duration_s, kShortest_s));
+    return error(fmt::format(
+        "the longest rest in {:.0f} s of readings is {:.1f} s: {:g} s at least are needed, on something that does not move",
+        length_s, out.duration_s, kShortest_s));
   Vec3 force = Vec3::Zero();
-  for (std::size_t i = rest.begin; i < rest.end; ++i) force += readings[i].accel_mps2 / static_cast<double>(rest.end - rest.begin);
+  for (std::size_t i = rest.begin; i < rest.end; ++i)
+    force += readings[i].accel_mps2 / static_cast<double>(rest.end - rest.begin);
   if (force.norm() < 9 || force.norm() > 10.6)
-    return error(fmt::format("at rest the accelerometer reads {:.2f} m/s^2 instead of 9.8: its unit or scale is wrong", force.norm()));
+    return error(
+        fmt::format("at rest the accelerometer reads {:.2f} m/s^2 instead of 9.8: its unit or scale is wrong", force.norm()));
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     out.gyro[k] = noise_of(readings, rest, period_s, &ImuSample::gyro_radps, axis);
@@ -160,7 +169,8 @@ std::string imu_noise_to_kalibr(const ImuNoiseResult& result, const std::string&
     std::string text = fmt::format("{}: {:.4g}  # {}; by axis", field, value, unit);
     for (const AxisNoise& axis : axes) {
       const BoundedNoise& n = axis.*which;
-      text += n.only_bounded() ? fmt::format(" < {:.2g}", n.high) : fmt::format(" {:.3g} ({:.2g} to {:.2g})", n.value, n.low, n.high);
+      text +=
+          n.only_bounded() ? fmt::format(" < {:.2g}", n.high) : fmt::format(" {:.3g} ({:.2g} to {:.2g})", n.value, n.low, n.high);
     }
     return text + "\n";
   };
@@ -170,7 +180,8 @@ std::string imu_noise_to_kalibr(const ImuNoiseResult& result, const std::string&
                "m/s^2/sqrt(Hz)");
   text += line("accelerometer_random_walk", result.noise.accel_random_walk_mps3_rthz, result.accel, &AxisNoise::random_walk,
                "m/s^3/sqrt(Hz)");
-  text += line("gyroscope_noise_density", result.noise.gyro_noise_density_radps_rthz, result.gyro, &AxisNoise::density, "rad/s/sqrt(Hz)");
+  text += line("gyroscope_noise_density", result.noise.gyro_noise_density_radps_rthz, result.gyro, &AxisNoise::density,
+               "rad/s/sqrt(Hz)");
   text += line("gyroscope_random_walk", result.noise.gyro_random_walk_radps2_rthz, result.gyro, &AxisNoise::random_walk,
                "rad/s^2/sqrt(Hz)");
   return text + fmt::format("rostopic: {}\nupdate_rate: {:.1f}\n", topic, result.noise.rate_hz);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The noise of an IMU from a recording at rest: Allan deviation, and from it white noise and random walk of the biases with 95 %
-// bounds (docs/derivations/calibration.md, N1-N6). Minutes give the white noise well; the random walk often only a bound, which is
-// said. Pure functions, any thread.
+// bounds (docs/derivations/calibration.md, N1-N6). Minutes give the white noise well; the random walk often only a bound, which
+// is said. Pure functions, any thread.
 //
 //   Result<ImuNoiseResult> found = measure_imu_noise(readings);
 //   write(imu_noise_to_kalibr(*found, "/imu0"));
@@ -36,8 +36,8 @@ struct AxisNoise {
 
 struct ImuNoiseResult {
   std::array<AxisNoise, 3> gyro, accel;
-  ImuNoise noise;            ///< the worst axis; a random walk that is only bounded at its bound; range as in ImuNoise
-  double duration_s = 0;     ///< of the rest
+  ImuNoise noise;         ///< the worst axis; a random walk that is only bounded at its bound; range as in ImuNoise
+  double duration_s = 0;  ///< of the rest
   Time start;
   std::vector<std::string> warnings;  ///< a sentence each
 };

@@ -110,11 +110,16 @@ template <class Model, class Visit>
 void each(Model& m, Visit&& visit) {
   for (auto* value : {&m.fx, &m.fy, &m.cx, &m.cy}) visit(*value);
   using Plain = std::remove_const_t<Model>;
-  if constexpr (std::is_same_v<Plain, PinholeRadtan>) for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
-  if constexpr (std::is_same_v<Plain, KannalaBrandt>) for (auto* value : {&m.k1, &m.k2, &m.k3, &m.k4}) visit(*value);
-  if constexpr (std::is_same_v<Plain, DoubleSphere>) for (auto* value : {&m.xi, &m.alpha}) visit(*value);
-  if constexpr (std::is_same_v<Plain, ExtendedUnified>) for (auto* value : {&m.alpha, &m.beta}) visit(*value);
-  if constexpr (std::is_same_v<Plain, UnifiedRadtan>) for (auto* value : {&m.xi, &m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
+  if constexpr (std::is_same_v<Plain, PinholeRadtan>)
+    for (auto* value : {&m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
+  if constexpr (std::is_same_v<Plain, KannalaBrandt>)
+    for (auto* value : {&m.k1, &m.k2, &m.k3, &m.k4}) visit(*value);
+  if constexpr (std::is_same_v<Plain, DoubleSphere>)
+    for (auto* value : {&m.xi, &m.alpha}) visit(*value);
+  if constexpr (std::is_same_v<Plain, ExtendedUnified>)
+    for (auto* value : {&m.alpha, &m.beta}) visit(*value);
+  if constexpr (std::is_same_v<Plain, UnifiedRadtan>)
+    for (auto* value : {&m.xi, &m.k1, &m.k2, &m.p1, &m.p2}) visit(*value);
 }
 
 void limit(PinholeRadtan&) {}
@@ -150,7 +155,8 @@ Series series(double xi) {
 std::vector<double> straightened(const UnifiedRadtan& m) {
   const double e = 1 + m.xi, k1 = m.k1 / (e * e);
   const Series own = series(m.xi);
-  return {m.fx / e, m.fy / e, m.cx, m.cy, m.xi, own.first + k1, own.second + 3 * own.first * k1 + m.k2 / std::pow(e, 4), m.p1 / e, m.p2 / e};
+  return {m.fx / e, m.fy / e, m.cx, m.cy, m.xi, own.first + k1, own.second + 3 * own.first * k1 + m.k2 / std::pow(e, 4),
+          m.p1 / e, m.p2 / e};
 }
 UnifiedRadtan bent(const UnifiedRadtan&, const std::vector<double>& v) {
   const double e = 1 + v[4];

@@ -15,7 +15,7 @@ namespace fbvins {
 inline constexpr int kMostLensParameters = 9;
 
 struct LensDerivatives {
-  Eigen::Matrix<double, 2, 3> point;                          ///< d(pixel)/d(p_C)
+  Eigen::Matrix<double, 2, 3> point;                         ///< d(pixel)/d(p_C)
   Eigen::Matrix<double, 2, kMostLensParameters> parameters;  ///< d(pixel)/d(parameters); columns beyond their count are zero
 };
 

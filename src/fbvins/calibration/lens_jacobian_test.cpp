@@ -43,8 +43,9 @@ TEST(LensJacobian, DerivativesAreThoseOfFiniteDifferences) {
       for (std::size_t k = 0; k < at.size(); ++k) {
         std::vector<double> more = at, less = at;
         more[k] += h, less[k] -= h;
-        const Vec2 numeric = (*project_point(with_parameters(lens, more.data()), p) -
-                              *project_point(with_parameters(lens, less.data()), p)) / (2 * h);
+        const Vec2 numeric =
+            (*project_point(with_parameters(lens, more.data()), p) - *project_point(with_parameters(lens, less.data()), p)) /
+            (2 * h);
         EXPECT_LT((numeric - d.parameters.col(static_cast<int>(k))).norm(), 1e-5 * (1 + d.parameters.norm()))
             << camera.model_name() << ' ' << lens_parameter_names(lens)[k];
       }

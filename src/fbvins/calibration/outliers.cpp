@@ -44,7 +44,8 @@ int judge_corners(RigAdjustment& adjustment, double noise_px) {
   for (RigFrame& frame : adjustment.frames())
     changed += static_cast<int>(std::erase_if(frame.views, [](const SeenBoard& view) {
       const auto kept = static_cast<std::size_t>(std::ranges::count(view.corners, true, &SeenCorner::kept));
-      return kept < kFewestCorners || static_cast<double>(kept) < (1 - kLargestLeftOut) * static_cast<double>(view.corners.size());
+      return kept < kFewestCorners ||
+             static_cast<double>(kept) < (1 - kLargestLeftOut) * static_cast<double>(view.corners.size());
     }));
   std::erase_if(adjustment.frames(), [](const RigFrame& frame) { return frame.views.empty(); });
   return changed;

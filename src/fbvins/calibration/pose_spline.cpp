@@ -21,7 +21,9 @@ Weights weights(double u, double spacing_s) {
   const auto b5 = bspline_basis<kDegree>(u);
   const auto b4 = bspline_basis<kDegree - 1>(u);
   const auto b3 = bspline_basis<kDegree - 2>(u);
-  const auto at = [](const auto& b, int i) { return i < 0 || i >= static_cast<int>(b.size()) ? 0.0 : b[static_cast<std::size_t>(i)]; };
+  const auto at = [](const auto& b, int i) {
+    return i < 0 || i >= static_cast<int>(b.size()) ? 0.0 : b[static_cast<std::size_t>(i)];
+  };
   Weights w;
   double sum = 0;
   for (int j = kDegree; j >= 0; --j) {
@@ -59,7 +61,7 @@ SplineMotion PoseSpline::at(double t_s, SplineJacobian* J) const {
   const Weights w = weights(t_s / spacing_s_ - first, spacing_s_);
   SplineMotion m;
   m.T_TB.q = knot(first).q;
-  std::array<Mat3, kSplineOrder> R;          // of each step
+  std::array<Mat3, kSplineOrder> R;            // of each step
   std::array<Vec3, kSplineOrder> rate_before;  // w before the step, turned by it
   for (int j = 0; j < kSplineOrder; ++j) {
     const auto k = static_cast<std::size_t>(j);
@@ -86,9 +88,9 @@ SplineMotion PoseSpline::at(double t_s, SplineJacobian* J) const {
     const Vec3& d = turn(first + j - 1);
     const Mat3& inverse = turn_jacobian(first + j - 1);
     const Mat3 right = w.step[k] * so3_right_jacobian(w.step[k] * d);
-    const Mat3 theta_d = after_T * right;                                                                         // (S5)
-    const Mat3 rate_d = after_T * (w.step_rate[k] * Mat3::Identity() + hat(rate_before[k]) * right);              // (S6)
-    const Mat3 theta_own = theta_d * inverse, rate_own = rate_d * inverse;                                        // (S7)
+    const Mat3 theta_d = after_T * right;                                                             // (S5)
+    const Mat3 rate_d = after_T * (w.step_rate[k] * Mat3::Identity() + hat(rate_before[k]) * right);  // (S6)
+    const Mat3 theta_own = theta_d * inverse, rate_own = rate_d * inverse;                            // (S7)
     if (j == kDegree) J->J_theta_delta[k] = theta_own, J->J_rate_delta[k] = rate_own;
     else J->J_theta_delta[k] += theta_own, J->J_rate_delta[k] += rate_own;
     J->J_theta_delta[k - 1] = -theta_d * inverse.transpose();

@@ -27,8 +27,8 @@ inline constexpr int kSplineOrder = 6;  ///< control points at work at any time
 /// For control points first .. first + 5, each perturbed as R <- R Exp(delta), p <- p + dp.
 struct SplineJacobian {
   int first = 0;
-  std::array<Mat3, kSplineOrder> J_theta_delta;        ///< of the rotation, perturbed on the right
-  std::array<Mat3, kSplineOrder> J_rate_delta;         ///< of w_TB_B
+  std::array<Mat3, kSplineOrder> J_theta_delta;             ///< of the rotation, perturbed on the right
+  std::array<Mat3, kSplineOrder> J_rate_delta;              ///< of w_TB_B
   std::array<double, kSplineOrder> p = {}, v = {}, a = {};  ///< d position, velocity, acceleration / dp: times the identity
 };
 

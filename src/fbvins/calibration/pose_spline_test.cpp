@@ -30,8 +30,7 @@ TEST(PoseSpline, RatesAreDerivativesOfThePose) {
   const PoseSpline path(kSpacing_s, wild_knots(12, 1));
   for (double t : {0.03, 0.1, 0.2501, 0.6}) {
     const SplineMotion m = path.at(t);
-    const Eigen::MatrixXd d =
-        numeric_jacobian([&](const Eigen::VectorXd& x) { return moved(path.at(t + x(0)), m); }, 1, 1e-3);
+    const Eigen::MatrixXd d = numeric_jacobian([&](const Eigen::VectorXd& x) { return moved(path.at(t + x(0)), m); }, 1, 1e-3);
     EXPECT_LT((d.block<3, 1>(0, 0) - m.w_TB_B).norm(), 1e-5) << t;
     EXPECT_LT((d.block<3, 1>(6, 0) - m.v_TB).norm(), 1e-6) << t;
     EXPECT_LT((d.block<3, 1>(9, 0) - m.a_TB).norm(), 1e-4) << t;
@@ -80,9 +79,9 @@ TEST(PoseSpline, JacobiansByAllControlPoints) {
       }
       return moved(PoseSpline(kSpacing_s, other).at(t), m);
     };
-    const JacobianCheck check = check_jacobian(
-        f, analytic, {{"rotation", 3}, {"rate", 3}, {"position", 3}, {"velocity", 3}, {"acceleration", 3}},
-        {{"point 0", 6}, {"point 1", 6}, {"point 2", 6}, {"point 3", 6}, {"point 4", 6}, {"point 5", 6}}, 1e-7);
+    const JacobianCheck check =
+        check_jacobian(f, analytic, {{"rotation", 3}, {"rate", 3}, {"position", 3}, {"velocity", 3}, {"acceleration", 3}},
+                       {{"point 0", 6}, {"point 1", 6}, {"point 2", 6}, {"point 3", 6}, {"point 4", 6}, {"point 5", 6}}, 1e-7);
     EXPECT_TRUE(check.ok) << "t = " << t << ": " << check.message;
   }
 }

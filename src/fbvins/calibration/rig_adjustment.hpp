@@ -36,7 +36,7 @@ struct RigCamera {
 };
 
 struct AdjustmentOptions {
-  double spread_px = 0;   ///< residuals beyond it count linearly (Huber); 0: plain least squares
+  double spread_px = 0;     ///< residuals beyond it count linearly (Huber); 0: plain least squares
   bool poses_only = false;  ///< lenses and extrinsics stay
   int max_iterations = 60;
 };
@@ -74,7 +74,8 @@ class RigAdjustment {
   double total_cost(double spread_px) const;
   Eigen::VectorXd camera_step(const std::vector<FrameEquations>& equations, double lambda, bool poses_only,
                               std::vector<PoseFactor>& factors) const;
-  void move_poses(const std::vector<FrameEquations>& equations, const std::vector<PoseFactor>& factors, const Eigen::VectorXd& step);
+  void move_poses(const std::vector<FrameEquations>& equations, const std::vector<PoseFactor>& factors,
+                  const Eigen::VectorXd& step);
 
   std::vector<RigCamera> cameras_;
   std::vector<RigFrame> frames_;

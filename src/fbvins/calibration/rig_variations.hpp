@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lenses and extrinsics of calibrated cameras are uncertain by, as rigs that differ a little: a factor of their covariance, so that
-// what is computed with the rig inherits its uncertainty. Pure functions, any thread.
+// What lenses and extrinsics of calibrated cameras are uncertain by, as rigs that differ a little: a factor of their covariance,
+// so that what is computed with the rig inherits its uncertainty. Pure functions, any thread.
 //
 //   input.variations = rig_variations(cameras);      // of calibrate_cameras(), for calibrate_imu_camera()
 #pragma once

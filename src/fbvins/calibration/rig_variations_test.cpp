@@ -40,7 +40,8 @@ Eigen::VectorXd numbers_of(const RigVariation& rig, const CameraCalibration& fro
     const std::vector<double> a = lens_parameters(rig.cameras[c].model()), b = lens_parameters(from.cameras[c].camera.model());
     for (std::size_t i = 0; i < a.size(); ++i) out.push_back((a[i] - b[i]) / rig.sigmas);
     if (c == 0) continue;
-    const Vec3 p = rig.T_CnC0[c].p - from.cameras[c].T_CnC0.p, r = so3_log(from.cameras[c].T_CnC0.q.conjugate() * rig.T_CnC0[c].q);
+    const Vec3 p = rig.T_CnC0[c].p - from.cameras[c].T_CnC0.p,
+               r = so3_log(from.cameras[c].T_CnC0.q.conjugate() * rig.T_CnC0[c].q);
     for (int i = 0; i < 3; ++i) out.push_back(p(i) / rig.sigmas);
     for (int i = 0; i < 3; ++i) out.push_back(r(i) / rig.sigmas);
   }
@@ -79,7 +80,8 @@ TEST(RigVariations, TheImusCalibrationInheritsThem) {
     Vec3 p = Vec3::Zero(), r = Vec3::Zero();
     for (std::size_t k = 0; k < around_truth.size(); ++k) {
       const double by = draw(static_cast<Eigen::Index>(k)) / around_truth[k].sigmas;
-      const std::vector<double> other = lens_parameters(around_truth[k].cameras[c].model()), own = lens_parameters(rig.cameras[c].camera.model());
+      const std::vector<double> other = lens_parameters(around_truth[k].cameras[c].model()),
+                                own = lens_parameters(rig.cameras[c].camera.model());
       for (std::size_t i = 0; i < lens.size(); ++i) lens[i] += by * (other[i] - own[i]);
       p += by * (around_truth[k].T_CnC0[c].p - rig.cameras[c].T_CnC0.p);
       r += by * so3_log(rig.cameras[c].T_CnC0.q.conjugate() * around_truth[k].T_CnC0[c].q);
@@ -94,7 +96,8 @@ TEST(RigVariations, TheImusCalibrationInheritsThem) {
   ASSERT_TRUE(found) << found.error().message;
   for (std::size_t c = 0; c < 2; ++c) {
     Vec6 error;
-    error << found->cameras[c].T_BC.p - recording.truth.T_BC[c].p, so3_log(recording.truth.T_BC[c].q.conjugate() * found->cameras[c].T_BC.q);
+    error << found->cameras[c].T_BC.p - recording.truth.T_BC[c].p,
+        so3_log(recording.truth.T_BC[c].q.conjugate() * found->cameras[c].T_BC.q);
     EXPECT_LT(test::squared_sigmas(error, found->cameras[c].covariance), 20) << "camera " << c;
     // A centre known to 0.1 px of a focal length of 458 px is a direction known to 0.2 mrad.
     EXPECT_GT(std::sqrt(found->cameras[c].covariance(3, 3)), 1e-4);

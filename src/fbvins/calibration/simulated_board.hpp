@@ -35,7 +35,8 @@ inline SimulatedRig simulated_stereo(const Camera& left) {
 }
 
 /// A view by hand: the board somewhere in the image of `towards`, nearer or farther, tilted by up to 50 degrees, turned.
-inline Pose<C0, T> random_board_pose(const SimulatedRig& rig, int towards, const Board& board, Rng& rng, double largest_tilt_rad = 0.87) {
+inline Pose<C0, T> random_board_pose(const SimulatedRig& rig, int towards, const Board& board, Rng& rng,
+                                     double largest_tilt_rad = 0.87) {
   const Camera& camera = rig.cameras[towards];
   const double u = camera.width() * rng.uniform(0.12, 0.88), v = camera.height() * rng.uniform(0.12, 0.88);
   const auto n = camera.undistort({u, v});

@@ -59,10 +59,12 @@ Image with_smaller_black(const ImageView& image) {
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* in = image.row(y);
     std::uint8_t* row = wide.row(y);
-    for (int x = 0; x < image.width; ++x) row[x] = std::max({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, image.width - 1)]});
+    for (int x = 0; x < image.width; ++x)
+      row[x] = std::max({in[std::max(x - 1, 0)], in[x], in[std::min(x + 1, image.width - 1)]});
   }
   for (int y = 0; y < image.height; ++y) {
-    const std::uint8_t *above = wide.row(std::max(y - 1, 0)), *here = wide.row(y), *below = wide.row(std::min(y + 1, image.height - 1));
+    const std::uint8_t *above = wide.row(std::max(y - 1, 0)), *here = wide.row(y),
+                       *below = wide.row(std::min(y + 1, image.height - 1));
     std::uint8_t* row = out.row(y);
     for (int x = 0; x < image.width; ++x) row[x] = std::max({above[x], here[x], below[x]});
   }

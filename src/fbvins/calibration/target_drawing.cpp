@@ -97,8 +97,7 @@ void draw_rulers(const std::string& board, Drawing& out) {
     out.rectangles.push_back({x0 + mm - kLine_mm / 2, y0 - (mm % 50 == 0 ? 4 : 2), kLine_mm, mm % 50 == 0 ? 4.0 : 2.0});
   const double x1 = kMargin_mm + 4;
   out.rectangles.push_back({x1 - kLine_mm / 2, y0 - up, kLine_mm, static_cast<double>(up)});
-  for (int mm = 0; mm <= up; mm += 10)
-    out.rectangles.push_back({x1, y0 - mm - kLine_mm / 2, mm % 50 == 0 ? 4.0 : 2.0, kLine_mm});
+  for (int mm = 0; mm <= up; mm += 10) out.rectangles.push_back({x1, y0 - mm - kLine_mm / 2, mm % 50 == 0 ? 4.0 : 2.0, kLine_mm});
   out.texts.push_back({x0, y0 + 3.5, 3, fmt::format("{}. {} mm from end to end: measure it", board, across)});
   out.texts.push_back({x1 - 1, y0, 3, fmt::format("{} mm from end to end", up), true});
 }
@@ -127,32 +126,38 @@ double largest_size_m(Board board, std::string_view paper) {
 Result<Drawing> draw_target(const Board& board, std::string_view paper) {
   if (std::string problem = impossible(board); !problem.empty()) return Error{ErrorCode::invalid_argument, problem};
   const auto upright = paper_mm(paper);
-  if (!upright) return Error{ErrorCode::invalid_argument, fmt::format("'{}' is none of the papers A4, A3, A2, A1, A0", paper.substr(0, 20))};
+  if (!upright)
+    return Error{ErrorCode::invalid_argument, fmt::format("'{}' is none of the papers A4, A3, A2, A1, A0", paper.substr(0, 20))};
   const Vec2 page = fits(board, *upright) ? *upright : Vec2(upright->y(), upright->x());
   const Vec2 extent = extent_mm(board), room = room_mm(page);
   if (!fits(board, page))
-    return Error{ErrorCode::invalid_argument,
-                 fmt::format("the board is {:.0f} x {:.0f} mm, and {} has room for {:.0f} x {:.0f} mm: a size of {:g} m would fit", extent.x(),
-                             extent.y(), paper, room.x(), room.y(), largest_size_m(board, paper))};
+    return Error{
+        ErrorCode::invalid_argument,
+        fmt::format("the board is {:.0f} x {:.0f} mm, and {} has room for {:.0f} x {:.0f} mm: a size of {:g} m would fit",
+                    extent.x(), extent.y(), paper, room.x(), room.y(), largest_size_m(board, paper))};
   Drawing out{page.x(), page.y(), {}, {}, Vec2::Zero()};
   const double left = kMargin_mm + kRuler_mm + 0.5 * (room.x() - extent.x()), top = kMargin_mm + 0.5 * (room.y() - extent.y());
-  if (Result<void> drawn = board.kind == BoardKind::aprilgrid ? draw_aprilgrid(board, left, top, out) : draw_squares(board, left, top, out); !drawn)
+  if (Result<void> drawn =
+          board.kind == BoardKind::aprilgrid ? draw_aprilgrid(board, left, top, out) : draw_squares(board, left, top, out);
+      !drawn)
     return drawn.error();
   draw_rulers(board.describe(), out);
   return out;
 }
 
 std::string to_svg(const Drawing& drawing) {
-  std::string out = fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}mm\" "
-                                "height=\"{1}mm\" viewBox=\"0 0 {0} {1}\" shape-rendering=\"crispEdges\">\n"
-                                "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n",
-                                drawing.width_mm, drawing.height_mm);
+  std::string out = fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}mm\" "
+      "height=\"{1}mm\" viewBox=\"0 0 {0} {1}\" shape-rendering=\"crispEdges\">\n"
+      "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n",
+      drawing.width_mm, drawing.height_mm);
   for (const DrawnRectangle& r : drawing.rectangles)
-    out += fmt::format("<rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" height=\"{:.4f}\" fill=\"{}\"/>\n", r.x, r.y, r.width, r.height,
-                       r.black ? "black" : "white");
+    out += fmt::format("<rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" height=\"{:.4f}\" fill=\"{}\"/>\n", r.x, r.y, r.width,
+                       r.height, r.black ? "black" : "white");
   for (const DrawnText& t : drawing.texts)
-    out += fmt::format("<text x=\"{0:.3f}\" y=\"{1:.3f}\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{2}\"{3}>{4}</text>\n", t.x, t.y,
-                       t.height, t.upwards ? fmt::format(" transform=\"rotate(-90 {:.3f} {:.3f})\"", t.x, t.y) : "", escaped(t.text, true));
+    out += fmt::format(
+        "<text x=\"{0:.3f}\" y=\"{1:.3f}\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{2}\"{3}>{4}</text>\n", t.x,
+        t.y, t.height, t.upwards ? fmt::format(" transform=\"rotate(-90 {:.3f} {:.3f})\"", t.x, t.y) : "", escaped(t.text, true));
   return out + "</svg>\n";
 }
 
@@ -168,14 +173,15 @@ std::string to_pdf(const Drawing& drawing) {
   }
   page += "0 g\nBT\n";
   for (const DrawnText& t : drawing.texts)
-    page += fmt::format("/F1 {} Tf {} {:.3f} {:.3f} Tm ({}) Tj\n", t.height, t.upwards ? "0 1 -1 0" : "1 0 0 1", t.x, drawing.height_mm - t.y,
-                        escaped(t.text, false));
+    page += fmt::format("/F1 {} Tf {} {:.3f} {:.3f} Tm ({}) Tj\n", t.height, t.upwards ? "0 1 -1 0" : "1 0 0 1", t.x,
+                        drawing.height_mm - t.y, escaped(t.text, false));
   page += "ET\n";
   const std::string objects[] = {
       "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
       "<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-      fmt::format("<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 5 0 R >> >> >>",
-                  kPoints * drawing.width_mm, kPoints * drawing.height_mm),
+      fmt::format(
+          "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 5 0 R >> >> >>",
+          kPoints * drawing.width_mm, kPoints * drawing.height_mm),
       fmt::format("<< /Length {} >>\nstream\n{}endstream", page.size(), page),
       "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>"};
   std::string out = "%PDF-1.4\n", table;
@@ -185,7 +191,8 @@ std::string to_pdf(const Drawing& drawing) {
     out += fmt::format("{} 0 obj\n{}\nendobj\n", ++number, object);
   }
   const std::size_t start = out.size();
-  return out + fmt::format("xref\n0 {0}\n0000000000 65535 f \n{1}trailer\n<< /Size {0} /Root 1 0 R >>\nstartxref\n{2}\n%%EOF\n", number + 1, table, start);
+  return out + fmt::format("xref\n0 {0}\n0000000000 65535 f \n{1}trailer\n<< /Size {0} /Root 1 0 R >>\nstartxref\n{2}\n%%EOF\n",
+                           number + 1, table, start);
 }
 
 }  // namespace fbvins

@@ -46,7 +46,8 @@ Board read_aprilgrid(YamlReader& yaml) {
 
 Board read_chessboard(YamlReader& yaml) {
   yaml.only(yaml.root(), {"target_type", "targetCols", "targetRows", "colSpacingMeters", "rowSpacingMeters"});
-  Board board{.kind = BoardKind::chessboard, .columns = read_count(yaml, "targetCols", 2), .rows = read_count(yaml, "targetRows", 2)};
+  Board board{
+      .kind = BoardKind::chessboard, .columns = read_count(yaml, "targetCols", 2), .rows = read_count(yaml, "targetRows", 2)};
   board.size_m = read_size_m(yaml, "colSpacingMeters");
   const double row_m = read_size_m(yaml, "rowSpacingMeters");
   if (yaml.ok() && row_m != board.size_m)
@@ -57,7 +58,8 @@ Board read_chessboard(YamlReader& yaml) {
 
 Board read_charuco(YamlReader& yaml) {
   yaml.only(yaml.root(), {"target_type", "squareCols", "squareRows", "squareSize", "markerSize"});
-  Board board{.kind = BoardKind::charuco, .columns = read_count(yaml, "squareCols", 3), .rows = read_count(yaml, "squareRows", 3)};
+  Board board{
+      .kind = BoardKind::charuco, .columns = read_count(yaml, "squareCols", 3), .rows = read_count(yaml, "squareRows", 3)};
   board.size_m = read_size_m(yaml, "squareSize");
   const double marker_m = read_size_m(yaml, "markerSize");
   if (yaml.ok() && !(marker_m < board.size_m)) yaml.complain(yaml.root(), "markerSize", "is not smaller than squareSize");
@@ -76,7 +78,8 @@ Result<Board> parse_target(const std::string& text, const std::string& file) {
   else if (type == "checkerboard") board = read_chessboard(yaml);
   else if (type == "charuco") board = read_charuco(yaml);
   else
-    yaml.complain(yaml.root(), "target_type", fmt::format("'{}' is none of aprilgrid, checkerboard, charuco", type.substr(0, 40)));
+    yaml.complain(yaml.root(), "target_type",
+                  fmt::format("'{}' is none of aprilgrid, checkerboard, charuco", type.substr(0, 40)));
   if (!yaml.ok()) return yaml.error();
   return board;
 }
@@ -89,13 +92,15 @@ Result<Board> load_target(const std::string& path) {
 
 std::string target_to_yaml(const Board& board) {
   if (board.kind == BoardKind::aprilgrid)
-    return fmt::format("target_type: 'aprilgrid'\ntagCols: {}\ntagRows: {}\ntagSize: {}  # m, edge of a tag's black square\n"
-                       "tagSpacing: {}  # gap between tags / tagSize\n",
-                       board.columns, board.rows, board.size_m, board.spacing);
+    return fmt::format(
+        "target_type: 'aprilgrid'\ntagCols: {}\ntagRows: {}\ntagSize: {}  # m, edge of a tag's black square\n"
+        "tagSpacing: {}  # gap between tags / tagSize\n",
+        board.columns, board.rows, board.size_m, board.spacing);
   if (board.kind == BoardKind::chessboard)
-    return fmt::format("target_type: 'checkerboard'\ntargetCols: {}  # inner corners\ntargetRows: {}\n"
-                       "colSpacingMeters: {}\nrowSpacingMeters: {}\n",
-                       board.columns, board.rows, board.size_m, board.size_m);
+    return fmt::format(
+        "target_type: 'checkerboard'\ntargetCols: {}  # inner corners\ntargetRows: {}\n"
+        "colSpacingMeters: {}\nrowSpacingMeters: {}\n",
+        board.columns, board.rows, board.size_m, board.size_m);
   return fmt::format("target_type: 'charuco'\nsquareCols: {}\nsquareRows: {}\nsquareSize: {}  # m\nmarkerSize: {}  # m\n",
                      board.columns, board.rows, board.size_m, board.spacing * board.size_m);
 }

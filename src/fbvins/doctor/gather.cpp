@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/doctor/free_stereo.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
-#include "fbvins/core/median.hpp"
 #include "fbvins/frontend/track_table.hpp"
 
 namespace fbvins {

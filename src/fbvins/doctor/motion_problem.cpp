@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/core/median.hpp"
+#include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/doctor/change_search.hpp"
 #include "fbvins/doctor/stereo_problem.hpp"
-#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/features/epipolar_ransac.hpp"
-#include "fbvins/core/median.hpp"
 #include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {

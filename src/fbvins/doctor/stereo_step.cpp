@@ -5,11 +5,11 @@
 #include <array>
 #include <cmath>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/features/shi_tomasi.hpp"
 #include "fbvins/frontend/klt_follower.hpp"
-#include "fbvins/core/median.hpp"
 
 namespace fbvins {
 namespace {

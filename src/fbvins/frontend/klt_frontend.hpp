@@ -18,8 +18,8 @@
 #include "fbvins/frontend/klt_options.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
 #include "fbvins/frontend/landmark_updates.hpp"
-#include "fbvins/frontend/typical_depth.hpp"
 #include "fbvins/frontend/motion_check.hpp"
+#include "fbvins/frontend/typical_depth.hpp"
 
 namespace fbvins {
 

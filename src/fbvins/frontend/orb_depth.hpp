@@ -11,10 +11,10 @@
 
 #include "fbvins/frontend/frame_images.hpp"
 #include "fbvins/frontend/klt_stereo.hpp"
-#include "fbvins/frontend/typical_depth.hpp"
 #include "fbvins/frontend/orb_options.hpp"
 #include "fbvins/frontend/orb_stereo.hpp"
 #include "fbvins/frontend/orb_track.hpp"
+#include "fbvins/frontend/typical_depth.hpp"
 
 namespace fbvins {
 

@@ -3,15 +3,17 @@
 //
 //   if (Result<void> readable = check_images(contents); !readable) return readable.error();
 //
-// Single damaged images are left out and counted while they are delivered (ImageCounts). That all of a camera's images are of another
-// size or encoding than is understood is a mistake in the setup, and a recording without that camera is not what was asked for.
+// Single damaged images are left out and counted while they are delivered (ImageCounts). That all of a camera's images are of
+// another size or encoding than is understood is a mistake in the setup, and a recording without that camera is not what was
+// asked for.
 #pragma once
 
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {
 
-/// An error where not one of up to eight images of a camera, spread over the recording, can be read: the sentence about the first.
+/// An error where not one of up to eight images of a camera, spread over the recording, can be read: the sentence about the
+/// first.
 Result<void> check_images(const DatasetContents& contents);
 
 /// Up to eight frames with an image `file`, in equal steps from the first to the last.

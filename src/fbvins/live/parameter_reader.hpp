@@ -19,8 +19,8 @@ struct ParameterReaderOptions {
   int tries = 4;
 };
 
-/// Values by name; names that are not answered are left out. An error where the address is none, its port cannot be opened, or no flight
-/// controller is heard.
+/// Values by name; names that are not answered are left out. An error where the address is none, its port cannot be opened, or no
+/// flight controller is heard.
 Result<std::map<std::string, double>> read_parameters(const std::string& address, const std::vector<std::string>& names,
                                                       const ParameterReaderOptions& options);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: the parameters with which PX4 fuses our poses (docs/px4.md), as a file to load and as sentences about those of a vehicle.
-// Pure functions.
+// Private: the parameters with which PX4 fuses our poses (docs/px4.md), as a file to load and as sentences about those of a
+// vehicle. Pure functions.
 //
 //   write(px4_parameter_file({.barometer = true}));
 //   for (const Px4Finding& finding : judge_px4({}, values)) print(finding.sentence);

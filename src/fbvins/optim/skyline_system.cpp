@@ -84,7 +84,8 @@ Eigen::MatrixXd SkylineSystem::inverse_tail(int count) const {
   const int begin = size() - count;
   Eigen::MatrixXd L = Eigen::MatrixXd::Zero(count, count);
   for (int i = 0; i < count; ++i)
-    for (int j = std::max(0, first_[static_cast<std::size_t>(begin + i)] - begin); j <= i; ++j) L(i, j) = L_[at(begin + i, begin + j)];
+    for (int j = std::max(0, first_[static_cast<std::size_t>(begin + i)] - begin); j <= i; ++j)
+      L(i, j) = L_[at(begin + i, begin + j)];
   const Eigen::MatrixXd inverse = L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(count, count));
   return inverse.transpose() * inverse;
 }

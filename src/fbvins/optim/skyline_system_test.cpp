@@ -23,7 +23,8 @@ Both chain_with_border() {
   std::vector<int> first;
   for (int i = 0; i < kChain; ++i) first.push_back(std::max(0, i - kReach));
   first.insert(first.end(), kBorder, 0);
-  Both both{SkylineSystem(first), Eigen::MatrixXd::Zero(kChain + kBorder, kChain + kBorder), Eigen::VectorXd::Zero(kChain + kBorder)};
+  Both both{SkylineSystem(first), Eigen::MatrixXd::Zero(kChain + kBorder, kChain + kBorder),
+            Eigen::VectorXd::Zero(kChain + kBorder)};
   Rng rng(7);
   for (int i = 0; i + kReach < kChain; ++i) {
     const std::vector<int> index = {i + 3, i, kChain + 2, i + kReach, kChain, i + 1, kChain + 1};

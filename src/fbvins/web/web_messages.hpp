@@ -22,7 +22,7 @@ struct WebFlight {
   bool can_mark = false;
   std::string cannot_save_map = {};     ///< why not, in one sentence; empty: it can be saved
   std::vector<PathPoint> whole_path{};  ///< of a replay
-  std::optional<Quat> q_B_vehicle{};    ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
+  std::optional<Quat> q_B_vehicle{};  ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
 };
 
 SharedMessage hello_message(const WebFlight& flight, Time start);
