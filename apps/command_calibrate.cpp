@@ -140,7 +140,7 @@ int calibrate(const Arguments& a) {
   outcome.board = *board;
   outcome.remarks = material->remarks;
   CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
-  if (!a.quiet) options.tell = [](const std::string& what) { note(what); };
+  if (!a.quiet) options.on_progress = [](const std::string& what) { note(what); };
   // Cameras that never see the board together are joined by the IMU, if there is one.
   const bool apart = !material->imu.empty() && !cameras_connected(material->detections, *board, options.pair_tolerance_s);
   Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material->detections, *board, options)

@@ -43,7 +43,7 @@ namespace {
 constexpr double kFalse_m = 0.5, kFalseTilt_rad = 5 * kDegree, kFalse_sigma = 5;
 /// Smaller errors are not counted in standard deviations: the truth has its own.
 constexpr double kTruth_m = 0.05, kTruth_rad = 1.5 * kDegree;
-/// Poses of a smaller extent do not tell the heading of W.
+/// The heading of W is not observable from poses of a smaller extent.
 constexpr double kHeadingNeeds_m = 0.5;
 constexpr double kLateStart = 0.35, kEarlyEnd = 0.75;  ///< of the flight, in which faults begin
 

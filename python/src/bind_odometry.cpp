@@ -113,7 +113,7 @@ void bind_odometry(nb::module_& m) {
       .def_prop_ro("tilt_sigma_rad", [](const Odometry& o) { return o.health.has_pose() ? o.tilt_sigma_rad : kNaN; })
       .def_prop_ro(
           "protection_m", [](const Odometry& o) { return protection_level_m(o.health, o.pose_covariance); },
-          "radius that the position's error exceeds once in 10^4 poses at most, m; inf without a pose")
+          "radius that the position's error is meant to exceed once in 10^4 poses at most, m; inf without a pose")
       .def_ro("reset_counter", &Odometry::reset_counter, "+1 whenever the estimator restarts: W is a new frame then")
       .def("__getstate__", &state_of)
       .def("__setstate__", &set_state)

@@ -24,9 +24,10 @@ std::string landmarks_csv(const Simulation& s) {
 }  // namespace
 
 Result<EurocFolder> create_simulated_recording(const std::string& folder, const StereoRig& rig, bool depth) {
-  StereoRig told = rig;
-  told.time_offset_s = 0;  // as in EuRoC's recordings, whose calibration has none: it is for whoever reads this to find
-  return EurocFolder::create(folder, told, "simulated by fbvins", depth);
+  // EuRoC's own calibration has no time offset: a reader has to estimate it.
+  StereoRig without_offset = rig;
+  without_offset.time_offset_s = 0;
+  return EurocFolder::create(folder, without_offset, "simulated by fbvins", depth);
 }
 
 Result<void> finish_recording(EurocFolder& recording, const SimulatedImu& imu) {

@@ -39,7 +39,7 @@ struct BagContents {
   std::string rig;                            ///< of a bag that `fbvins convert` wrote: all of its calibration (rig_text.hpp)
 };
 
-/// `on_message` is told of every message before it is taken.
+/// `on_message` is called with every message before it is read.
 BagContents read_contents(BagReader& bag, const std::function<void(const BagMessage&, const BagTopic&)>& on_message = {});
 
 /// A message's place as a FrameEntry names it, and back.

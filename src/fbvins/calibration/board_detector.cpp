@@ -24,7 +24,7 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
   if (board.kind != BoardKind::aprilgrid)
     return Error{
         ErrorCode::unsupported,
-        "only AprilGrids are found in images so far: detections of chessboards and ChArUco boards can be given by --detections"};
+        "only AprilGrids are detected in images: detections of chessboards and ChArUco boards can be given by --detections"};
   Result<TagDetector> detector = TagDetector::create();
   if (!detector) return detector.error();
   return BoardDetector(board, *std::move(detector));

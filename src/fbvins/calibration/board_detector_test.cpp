@@ -75,7 +75,7 @@ TEST(BoardDetector, WhatIsPrintedIsWhatIsFound) {
   for (const BoardCorner& corner : seen.corners) {
     const Vec3 p_T = 1e3 * kBoard.corner(corner.index);
     const Vec2 expected = page->origin_mm + Vec2(p_T.x(), -p_T.y()) - Vec2(0.5, 0.5);  // y is upwards on the board
-    EXPECT_LT((corner.pixel - expected).norm(), 0.71) << corner.index;                 // cells are drawn to a whole pixel
+    EXPECT_LT((corner.pixel - expected).norm(), 0.71) << corner.index;                 // edges are rendered on whole pixels
   }
   EXPECT_FALSE(detector.finds_mirrored(image.view()));
   Image mirrored(image.width(), image.height());

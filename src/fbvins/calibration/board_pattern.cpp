@@ -7,7 +7,7 @@ namespace fbvins {
 
 Result<BoardPattern> BoardPattern::create(const Board& board) {
   BoardPattern out(board);
-  if (board.kind == BoardKind::charuco) return Error{ErrorCode::unsupported, "ChArUco boards are not drawn in images so far"};
+  if (board.kind == BoardKind::charuco) return Error{ErrorCode::unsupported, "ChArUco boards cannot be rendered"};
   if (board.kind == BoardKind::chessboard) return out;
   for (int id = 0; id < board.columns * board.rows; ++id) {
     Result<TagCells> cells = tag_cells(id);

@@ -17,7 +17,7 @@
 
 namespace fbvins {
 
-/// An image as it was recorded: decoded by whoever takes it.
+/// An image as it was recorded, not yet decoded.
 struct TakenImage {
   Time t;
   int camera = 0;

@@ -75,7 +75,7 @@ std::vector<RigFrame> thinned(const std::vector<RigFrame>& frames, int most) {
   return out;
 }
 
-/// The frames to adjust: all, or those that tell most about lenses and extrinsics as they are known after a quick adjustment.
+/// The frames to adjust: all, or those with most information about lenses and extrinsics, by a quick adjustment.
 std::vector<RigFrame> chosen_frames(std::vector<RigCamera>& cameras, std::vector<RigFrame> frames, int most) {
   RigAdjustment quick(cameras, thinned(frames, kQuickStamps));
   quick.solve({.spread_px = 1, .max_iterations = 30});
@@ -174,13 +174,13 @@ double CameraCalibration::sigma(const std::string& name) const {
 
 Result<CameraCalibration> calibrate_cameras(const Detections& detections, const Board& board,
                                             const CameraCalibrationOptions& options) {
-  const auto tell = [&](const std::string& what) {
-    if (options.tell) options.tell(what);
+  const auto report = [&](const std::string& what) {
+    if (options.on_progress) options.on_progress(what);
   };
   if (Result<void> good = check_input(detections, board, options); !good) return good.error();
   std::vector<OneCamera> cameras = by_camera(detections, board);
   for (std::size_t k = 0; k < cameras.size(); ++k) {
-    tell(fmt::format("cam{}: start values from {} views", k, cameras[k].views.size()));
+    report(fmt::format("cam{}: start values from {} views", k, cameras[k].views.size()));
     const std::string& model = options.models[options.models.size() == 1 ? 0 : k];
     if (Result<void> good = start(cameras[k], static_cast<int>(k), model, board); !good) return good.error();
   }
@@ -198,7 +198,7 @@ Result<CameraCalibration> calibrate_cameras(const Detections& detections, const 
     single_px = std::max(single_px, cameras[k].start.rms_px);
   }
   std::vector<RigFrame> frames = chosen_frames(rig, rig_frames(stamps, *T_CnC0, board), options.max_views);
-  tell(fmt::format("adjusting {} of {} stamps", frames.size(), stamps.size()));
+  report(fmt::format("adjusting {} of {} stamps", frames.size(), stamps.size()));
   RigAdjustment adjustment(std::move(rig), std::move(frames));
   const double noise_px = adjust_without_outliers(adjustment);
   if (Result<void> good =

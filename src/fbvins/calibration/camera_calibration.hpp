@@ -27,9 +27,9 @@ struct CameraCalibrationOptions {
   /// One for all cameras, or one a camera: as Camera::model_name() names them, or "auto": the model that predicts views best
   /// which it was not fitted to.
   std::vector<std::string> models = {"pinhole-radtan"};
-  int max_views = 600;                                ///< stamps that enter the adjustment
-  double pair_tolerance_s = 1e-3;                     ///< images of two cameras with stamps that close are one view
-  std::function<void(const std::string&)> tell = {};  ///< progress, a few words
+  int max_views = 600;                                       ///< stamps that enter the adjustment
+  double pair_tolerance_s = 1e-3;                            ///< images of two cameras with stamps that close are one view
+  std::function<void(const std::string&)> on_progress = {};  ///< progress, a few words
 };
 
 /// Residuals of one camera, px; of a coordinate, not of a distance.

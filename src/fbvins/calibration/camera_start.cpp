@@ -148,7 +148,7 @@ std::vector<Camera> best_of_table(const std::string& model, const ImageSize& siz
   return out;
 }
 
-/// The double sphere has twins, of another sphere distance xi, that few views cannot tell apart.
+/// The double sphere often has a second solution with another xi, which few views cannot distinguish from the first.
 std::vector<Adjusted> distinct_rivals(const std::vector<Adjusted>& fitted) {
   std::vector<Adjusted> out = {fitted[0]};
   for (const Adjusted& other : fitted) {

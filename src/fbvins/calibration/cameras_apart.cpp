@@ -72,8 +72,8 @@ Result<CameraCalibration> calibrate_cameras_apart(const Detections& detections, 
   for (int k = 0; k < cameras; ++k) {
     CameraCalibrationOptions own = options;
     own.models = {options.models[options.models.size() == 1 ? 0 : k]};
-    own.tell = [&](const std::string& what) {
-      if (options.tell) options.tell(renamed(what, k));
+    own.on_progress = [&](const std::string& what) {
+      if (options.on_progress) options.on_progress(renamed(what, k));
     };
     Result<CameraCalibration> one = calibrate_cameras(only(detections, k), board, own);
     if (!one) return Error{one.error().code, renamed(one.error().message, k)};

@@ -88,8 +88,8 @@ struct CameraImuResult {
   ImuTriads axes, axes_sigma;
   std::vector<BiasAt> biases;
 
-  /// What tells a wrong board or unit, estimated before either is taken for right: gravity as the accelerometer reads it, and
-  /// the true size of the board over that in the file.
+  /// Estimated first, without prior knowledge, since they reveal a wrong board or unit: gravity by the accelerometer, and the
+  /// true size of the board over that in the file.
   double measured_gravity_mps2 = 0, measured_gravity_sigma_mps2 = 0;
   double board_scale = 1, board_scale_sigma = 0;
 

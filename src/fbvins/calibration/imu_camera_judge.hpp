@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to calibration: whether a fit can be believed, in sentences. Pure functions.
+// Private to calibration: whether a fit is plausible, and why not, in a sentence. Pure functions.
 #pragma once
 
 #include <optional>

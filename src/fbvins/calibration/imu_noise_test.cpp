@@ -12,16 +12,16 @@ namespace {
 
 constexpr double kGyro = 1.7e-4, kAccel = 2e-3;
 
-Vec3 drawn(Rng& rng, double sigma) { return Vec3{sigma * rng.normal(), sigma * rng.normal(), sigma * rng.normal()}; }
+Vec3 white_noise(Rng& rng, double sigma) { return Vec3{sigma * rng.normal(), sigma * rng.normal(), sigma * rng.normal()}; }
 
 std::vector<ImuSample> rest(double duration_s, double gyro_walk, double accel_walk, std::uint64_t seed, double rate_hz = 100) {
   Rng rng(seed);
-  Vec3 bg = drawn(rng, 0.01), ba = drawn(rng, 0.05);
+  Vec3 bg = white_noise(rng, 0.01), ba = white_noise(rng, 0.05);
   std::vector<ImuSample> out;
   for (int i = 0; i < static_cast<int>(duration_s * rate_hz); ++i) {
-    out.push_back({Time{} + Duration::from_seconds(i / rate_hz), bg + drawn(rng, kGyro * std::sqrt(rate_hz)),
-                   Vec3(0, 0, 9.81) + ba + drawn(rng, kAccel * std::sqrt(rate_hz))});
-    bg += drawn(rng, gyro_walk / std::sqrt(rate_hz)), ba += drawn(rng, accel_walk / std::sqrt(rate_hz));
+    out.push_back({Time{} + Duration::from_seconds(i / rate_hz), bg + white_noise(rng, kGyro * std::sqrt(rate_hz)),
+                   Vec3(0, 0, 9.81) + ba + white_noise(rng, kAccel * std::sqrt(rate_hz))});
+    bg += white_noise(rng, gyro_walk / std::sqrt(rate_hz)), ba += white_noise(rng, accel_walk / std::sqrt(rate_hz));
   }
   return out;
 }
@@ -74,7 +74,8 @@ TEST(ImuNoise, AShortRestOnlyBoundsTheRandomWalk) {
 TEST(ImuNoise, TakesTheRestOutOfARecordingThatIsDisturbed) {
   std::vector<ImuSample> readings = rest(100, 2e-5, 1e-3, 5);
   Rng rng(6);
-  for (std::size_t i = 2000; i < 2300; ++i) readings[i].gyro_radps += drawn(rng, 0.5), readings[i].accel_mps2 += drawn(rng, 1);
+  for (std::size_t i = 2000; i < 2300; ++i)
+    readings[i].gyro_radps += white_noise(rng, 0.5), readings[i].accel_mps2 += white_noise(rng, 1);
   const auto found = measure_imu_noise(readings);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_NEAR(found->duration_s, 77, 1.5);

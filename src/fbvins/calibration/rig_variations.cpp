@@ -37,7 +37,7 @@ RigVariation varied(const CameraCalibration& rig, const Eigen::VectorXd& step) {
 }  // namespace
 
 std::vector<RigVariation> rig_variations(const CameraCalibration& cameras) {
-  // Scaled to correlations first, so that small numbers (metres) are as well told apart as large ones (pixels).
+  // Scaled to correlations first, so that small numbers (metres) are resolved as well as large ones (pixels).
   const Eigen::VectorXd sigma = cameras.covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd correlation = sigma.cwiseInverse().asDiagonal() * cameras.covariance * sigma.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);

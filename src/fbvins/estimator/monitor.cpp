@@ -28,9 +28,9 @@ constexpr double kContradiction = 1, kMost = 2;
 /// What all that a camera sees is off by, in one direction, added up with this memory: up to 2.3 where all is well. A gyroscope's
 /// axes may be off by this share of the turn.
 constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
-/// The other camera, where only one drifts. After this time of nothing but drift, the landmarks found meanwhile may be what is
-/// wrong, and the camera is heard again.
-constexpr double kOther = 0.5, kHeardAgain_s = 1;
+/// The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
+/// landmarks triangulated without it may be what is wrong.
+constexpr double kOther = 0.5, kReadmitted_s = 1;
 constexpr double kCalm_s = 0.5, kBlind_s = 0.3;
 /// After darkness of this length the velocity has to be found again, and the first predictions are as wrong as it is.
 constexpr double kDark_s = 0.15;
@@ -202,9 +202,9 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   if (one_camera_fits) {
-    left_out_s_ = excess < 0 ? left_out_s_ + dt.seconds() : 0;
-    if (left_out_s_ > kHeardAgain_s) {
-      left_out_s_ = evidence_ = 0;
+    excluded_s_ = excess < 0 ? excluded_s_ + dt.seconds() : 0;
+    if (excluded_s_ > kReadmitted_s) {
+      excluded_s_ = evidence_ = 0;
       drift_[0].setZero(), drift_[1].setZero();
       pass(dt);
       return out;

@@ -75,7 +75,7 @@ class Monitor {
 
   ImuNoise assumed_;
   bool calibrating_;
-  double left_out_s_ = 0;                         ///< one camera's images, for its drift alone
+  double excluded_s_ = 0;                         ///< for how long one camera has been excluded for drift alone
   Vec2 drift_[2] = {Vec2::Zero(), Vec2::Zero()};  ///< left, right: of all that is seen, added up
   double turned_sigma_ = 0;                       ///< by which it may be
   Quat predicted_ = Quat::Identity();

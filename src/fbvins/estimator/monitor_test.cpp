@@ -122,18 +122,18 @@ TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
   }
 }
 
-TEST(Monitor, ACameraThatOnlyDriftsIsHeardAgainAfterASecond) {
+TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
   Scene scene;
   Monitor monitor(assumed(), false);
-  int left_out = 0, heard_again = 0;
+  int excluded = 0, used_again = 0;
   for (int k = 0; k < 100; ++k) {
-    // As landmarks whose depth was found while the camera was left out let it look.
+    // As with landmarks whose depth was estimated while the camera was excluded.
     const bool wrong = monitor.examine(scene.seen({}, turned(0.0015)), scene.calibration, {}, kStep).right_wrong;
-    left_out += wrong;
-    heard_again += !wrong && left_out >= 20;
+    excluded += wrong;
+    used_again += !wrong && excluded >= 20;
   }
-  EXPECT_GE(left_out, 40);
-  EXPECT_GE(heard_again, 5) << "long enough for the window to take its images";
+  EXPECT_GE(excluded, 40);
+  EXPECT_GE(used_again, 5) << "long enough for the window to correct its landmarks";
 }
 
 TEST(Monitor, ALargeMovingThingIsNoContradiction) {
