@@ -54,6 +54,8 @@ int examine_recording(const Arguments& arguments) {
   if (!data) return fail(data.error().message);
   RecordingWarnings warnings;
   warnings.print((*data)->info());
+  if (!(*data)->rig().has_right())
+    return fail(fmt::format("{}: has one camera; the doctor judges a pair", arguments.recording.path));
   EvidenceGatherer gatherer((*data)->rig());
   while (auto event = (*data)->next())
     if (!gatherer.push(*event)) break;

@@ -41,6 +41,7 @@ class CheckedInput final : public SensorInput {
   }
   /// After the source has ended.
   Diagnosis diagnosis(const StereoRig& rig) const {
+    if (!rig.has_right()) return {};  // the doctor judges a pair
     EvidenceGatherer gatherer(rig);
     for (const SensorEvent& event : events_) gatherer.push(event);
     return examine(gatherer.finish(), CalibrationStyle::kalibr);

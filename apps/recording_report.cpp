@@ -54,8 +54,8 @@ Json describe(const Dataset& data) {
                      {"gyro_random_walk_radps2_rthz", rig.imu_noise.gyro_random_walk_radps2_rthz},
                      {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
   json["left"] = camera_json(rig.left, rig.T_BC0, info.left);
-  json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
-  json["baseline_m"] = rig.T_C1C0().p.norm();
+  if (rig.has_right()) json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
+  if (rig.has_right()) json["baseline_m"] = rig.T_C1C0().p.norm();
   json["time_offset_s"] = rig.time_offset_s;
   json["ground_truth_poses"] = info.ground_truth_poses;
   json["warnings"] = info.warnings;

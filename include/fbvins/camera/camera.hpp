@@ -63,7 +63,7 @@ class Camera {
   double max_radius_ = 0;
 };
 
-/// Two cameras and an IMU, rigidly joined.
+/// Two cameras and an IMU, rigidly joined; or one camera, which is `left` then, and `right` has no pixels.
 struct StereoRig {
   Camera left, right;
   Pose<B, C0> T_BC0;
@@ -73,7 +73,16 @@ struct StereoRig {
   /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
   double time_offset_s = 0;
 
+  bool has_right() const { return right.width() > 0; }
   Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
 };
+
+/// The rig with its left camera alone, or its right one, which is the left one then.
+inline StereoRig with_one_camera(StereoRig rig, bool right_one = false) {
+  if (right_one) rig.left = rig.right, rig.T_BC0 = rig.T_BC1.cast_frames<B, C0>();
+  rig.right = {};
+  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  return rig;
+}
 
 }  // namespace fbvins

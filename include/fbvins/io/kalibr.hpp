@@ -15,7 +15,7 @@
 
 namespace fbvins {
 
-/// cam0 is left, cam1 right. Without imu_path the noise figures stay at their defaults.
+/// cam0 is left, cam1 right; without cam1 the rig has one camera. Without imu_path the noise figures stay at their defaults.
 Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt);
 
 }  // namespace fbvins

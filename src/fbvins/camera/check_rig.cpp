@@ -54,12 +54,13 @@ Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
 }  // namespace
 
 Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
-  for (const auto& [camera, side] : {std::pair(&rig.left, "left"), {&rig.right, "right"}})
-    if (Result<void> good = check_camera(*camera, side, origin); !good) return good;
+  if (Result<void> good = check_camera(rig.left, "left", origin); !good) return good;
+  if (rig.has_right())
+    if (Result<void> good = check_camera(rig.right, "right", origin); !good) return good;
   if (!is_transform(rig.T_BC0) || !is_transform(rig.T_BC1))
     return malformed(origin, "a camera's pose in the body has a number that is not finite, or no rotation");
   const double baseline_m = rig.T_C1C0().p.norm();
-  if (!(baseline_m > 1e-3 && baseline_m < 10.0))
+  if (rig.has_right() && !(baseline_m > 1e-3 && baseline_m < 10.0))
     return malformed(origin, fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
   if (!positive(rig.image_rate_hz) || !std::isfinite(rig.time_offset_s))
     return malformed(origin, "the images' rate is not positive, or the time offset is not finite");

@@ -8,6 +8,7 @@
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/types/protection.hpp"
@@ -21,6 +22,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kGap_s = 0.05;
 /// A large correction so soon after a pose that was not good has to be confirmed by gravity.
 constexpr double kTrouble_s = 2;
+/// Of a start with one camera in motion.
+constexpr double kMaxScaleSigmaAtStart = 0.1;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -41,9 +44,10 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
       calibration_(calibrated_),
       scale_sigma_(scale_sigma(rig.T_BC0, rig.T_BC1)),
-      initialiser_(options, imu_noise_, before),
+      one_camera_(!rig.has_right()),
+      initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
-      health_(options),
+      health_(options, one_camera_),
       reading_noise_(imu_noise_),
       monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
       window_(options, weights_of(options)),
@@ -83,7 +87,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   const std::optional<InitialSolution> start = initialiser_.process(frame, rest, calibration_, restart_pose_);
   out.odometry.stats.prepare_ms = timer.lap_ms();
   if (!start) {
-    out.odometry.health = HealthJudge::before_start(frame, initialiser_.reason());
+    out.odometry.health = health_.before_start(frame, initialiser_.reason());
     return;
   }
   open_window(*start);
@@ -94,11 +98,20 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   window_.restart_first_estimates();
   const WindowSolution& solution = solve(out.odometry, kThorough);
   out.odometry.health = judge(frame, out.odometry);
-  if (out.odometry.health.state == HealthState::good) {
+  if (start_is_good(*start, out.odometry)) {
     shrink_window(solution, out);
     return;
   }
   refuse_start(out.odometry);
+}
+
+/// At rest one camera shows no depth: the start is by the readings, and landmarks come with the first motion. In motion its
+/// scale has to be known.
+bool Estimator::start_is_good(const InitialSolution& start, const Odometry& solved) const {
+  if (!one_camera_) return solved.health.state == HealthState::good;
+  if (start.from_rest) return solved.health.has_pose();
+  const Vec3 v = window_.tilt().levelled(window_.newest().state).v_FB;
+  return solved.health.state == HealthState::good && scale_sigma_of(v, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
 }
 
 /// Nothing of it is published.

@@ -61,6 +61,7 @@ class Estimator {
   void shrink_window(const WindowSolution& solution, Estimate& out);
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
+  bool start_is_good(const InitialSolution& start, const Odometry& solved) const;
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
@@ -79,6 +80,7 @@ class Estimator {
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
   double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
+  bool one_camera_;                       ///< the rig has one only
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;

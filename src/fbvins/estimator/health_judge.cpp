@@ -24,9 +24,9 @@ Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
 
 }  // namespace
 
-Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) {
+Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) const {
   if (without_images(frame)) reason = HealthReason::no_images;
-  else if (!frame.has_left || !frame.has_right) reason = HealthReason::one_camera;  // a start needs the pair
+  else if (camera_missing(frame)) reason = HealthReason::one_camera;  // a start needs the pair
   return {HealthState::initialising, reason};
 }
 
@@ -61,10 +61,10 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
   if (no_imu || evidence.after_gap || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
   if (images_missing(frame)) return degraded(HealthReason::no_images);
   if (evidence.broken_features > 0) return degraded(HealthReason::frontend_fault);
-  if (!frame.has_left || !frame.has_right) return degraded(HealthReason::one_camera);
+  if (camera_missing(frame)) return degraded(HealthReason::one_camera);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
   if (few_tracks || evidence.after_dark) return degraded(HealthReason::few_tracks);
-  if (frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
+  if (!one_camera_ && frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
   if (evidence.one_camera_wrong) return degraded(HealthReason::cameras_disagree);
   if (evidence.clipped) return degraded(HealthReason::imu_clipped);
   if (evidence.contradiction) return degraded(HealthReason::contradiction);

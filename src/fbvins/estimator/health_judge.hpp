@@ -15,7 +15,8 @@ namespace fbvins {
 
 class HealthJudge {
  public:
-  explicit HealthJudge(const EstimatorOptions& options) : options_(options) {}
+  /// `one_camera`: the rig has one only.
+  explicit HealthJudge(const EstimatorOptions& options, bool one_camera = false) : options_(options), one_camera_(one_camera) {}
 
   /// A window starts.
   void start() { seen_sigma_m_ = 0; }
@@ -35,14 +36,16 @@ class HealthJudge {
   /// Health at a frame in the window, after its solve.
   Health judge(const TrackedFrame& frame, const NavState<G>& state, int landmarks_in_view, const Evidence& evidence);
   /// Health at a frame before the start; `reason` is what the initialiser waits for.
-  static Health before_start(const TrackedFrame& frame, HealthReason reason);
+  Health before_start(const TrackedFrame& frame, HealthReason reason) const;
   /// To be called after each frame, whether it was judged or not.
   void pass(const TrackedFrame& frame);
 
  private:
   bool images_missing(const TrackedFrame& frame) const;
+  bool camera_missing(const TrackedFrame& frame) const { return !one_camera_ && (!frame.has_left || !frame.has_right); }
 
   EstimatorOptions options_;
+  bool one_camera_;
   std::optional<Time> previous_image_;
   double seen_sigma_m_ = 0;  ///< of the last frame with enough landmarks
   SamplePeriod image_period_;

@@ -125,10 +125,10 @@ TEST(HealthJudge, ImplausibleStatesAreLost) {
 
 TEST(HealthJudge, BeforeTheStartMissingImagesTakePrecedenceOverOtherReasons) {
   TrackedFrame frame = frame_at(0);
-  EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
+  EXPECT_EQ(HealthJudge(EstimatorOptions{}).before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::too_few_features}));
   frame.has_left = frame.has_right = false;
-  EXPECT_EQ(HealthJudge::before_start(frame, HealthReason::too_few_features),
+  EXPECT_EQ(HealthJudge(EstimatorOptions{}).before_start(frame, HealthReason::too_few_features),
             (Health{HealthState::initialising, HealthReason::no_images}));
 }
 

@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/pose_refinement.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/geometry/heading.hpp"
@@ -21,7 +22,9 @@ namespace {
 /// An initial solution is made from so many images, at least this far apart.
 constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
-/// Stereo features needed in each of them. At rest motion is known without them, and fewer are enough: the floor in front of
+/// With one camera, of which scale and gravity have to be told apart by the accelerations meanwhile.
+constexpr double kMinSpacingOneCamera_s = 0.15;
+/// Stereo features, or features of the one camera, needed in each of them. At rest motion is known without them, and fewer are enough: the floor in front of
 /// a landed drone shows few.
 constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
 /// At rest a track that is farther than this from its first pixel is on a moving object.
@@ -37,12 +40,6 @@ WindowPrior held_still() {
   prior.quadratic.g = Eigen::VectorXd::Zero(15);
   prior.quadratic.H = 1e6 * Eigen::MatrixXd::Identity(15, 15);
   return prior;
-}
-
-int stereo_features(const TrackedFrame& frame) {
-  int n = 0;
-  for (const TrackedFeature& f : frame.features) n += f.left && f.right;
-  return n;
 }
 
 /// Removes tracks on moving objects, for a vehicle at rest: those that have left their first pixel.
@@ -69,18 +66,26 @@ void move_to(const Pose<G, B>& origin, InitialSolution& start) {
 
 }  // namespace
 
-Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before)
+Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before,
+                         bool one_camera)
     : gravity_mps2_(options.gravity_mps2),
       noise_(noise),
       before_(before),
+      one_camera_(one_camera),
       structure_(options, WindowWeights{.estimate_tilt = false}) {}
+
+/// By which the motion can be found.
+int Initialiser::usable_features(const TrackedFrame& frame) const {
+  return static_cast<int>(std::ranges::count_if(
+      frame.features, [&](const TrackedFeature& f) { return f.left && (one_camera_ || f.right); }));
+}
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
                                                     const std::optional<Pose<G, B>>& origin) {
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
-  if (stereo_features(frame) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
+  if (usable_features(frame) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
     reason_ = HealthReason::too_few_features;
     reset();
     if (!broken) return std::nullopt;
@@ -103,7 +108,8 @@ void Initialiser::remember(const TrackedFrame& frame) {
   // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
   const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
-  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < kMinSpacing_s) {
+  const double spacing_s = one_camera_ ? kMinSpacingOneCamera_s : kMinSpacing_s;
+  if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < spacing_s) {
     ImuSegment joined = std::move(frames_.back().imu);
     joined.samples.insert(joined.samples.end(), frame.imu.samples.begin() + 1, frame.imu.samples.end());
     joined.longest_gap = std::max(joined.longest_gap, frame.imu.longest_gap);
@@ -132,6 +138,14 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
 }
 
 std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {
+  if (one_camera_) {
+    const std::vector<TrackedFrame> frames(frames_.begin(), frames_.end());
+    std::optional<std::vector<NavState<G>>> states =
+        start_with_one_camera(frames, calibration.T_BC0, noise_, biases, gravity_mps2_);
+    reason_ = HealthReason::alignment_refused;
+    if (!states) return std::nullopt;
+    return InitialSolution{frames, std::move(*states), false, {}};
+  }
   std::vector<Pose<G, B>> poses;
   if (!stereo_structure(calibration, poses)) {
     reason_ = HealthReason::too_few_features;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first states of a flight (paper 2.2.4), from rest or in motion, whichever the data allow:
 //   rest     gravity and gyroscope bias from the IMU; the pose does not move;
-//   motion   stereo structure from motion over the last frames, then visual-inertial alignment.
+//   motion   stereo structure from motion over the last frames, then visual-inertial alignment; with one camera, tracks and
+//            readings together (mono_start.hpp).
 // An initial solution that is not observable or not plausible is refused, and tried again with the
 // next frame. One owner, one thread.
 #pragma once
@@ -28,8 +29,9 @@ struct InitialSolution {
 
 class Initialiser {
  public:
-  /// `before`: the IMU's biases at the end of an earlier flight.
-  Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before = {});
+  /// `before`: the IMU's biases at the end of an earlier flight. `one_camera`: the rig has one only.
+  Initialiser(const EstimatorOptions& options, const ImuNoise& noise, const std::optional<ImuState>& before = {},
+              bool one_camera = false);
 
   void reset() {
     frames_.clear();
@@ -44,6 +46,7 @@ class Initialiser {
 
  private:
   void remember(const TrackedFrame& frame);
+  int usable_features(const TrackedFrame& frame) const;
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
   std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);
@@ -52,6 +55,7 @@ class Initialiser {
   double gravity_mps2_;
   ImuNoise noise_;
   std::optional<ImuState> before_;
+  bool one_camera_;
   std::deque<TrackedFrame> frames_;
   std::deque<ImuSegment> readings_;  ///< of the last moments, to decide whether the body is at rest
   SlidingWindow structure_;

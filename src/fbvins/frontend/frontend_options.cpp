@@ -17,15 +17,20 @@ namespace {
 
 using Made = Result<std::unique_ptr<Frontend>>;
 
+/// `lead(rig)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can.
+template <class Lead>
+std::unique_ptr<Frontend> for_cameras_of(const StereoRig& rig, Lead&& lead) {
+  if (!rig.has_right()) return lead(rig);
+  return std::make_unique<EitherCamera>(rig, lead(rig), lead(mirrored(rig)));
+}
+
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
-  return std::unique_ptr<Frontend>(std::make_unique<EitherCamera>(rig, std::make_unique<KltFrontend>(rig, options.klt),
-                                                                  std::make_unique<KltFrontend>(mirrored(rig), options.klt)));
+  return for_cameras_of(rig, [&](const StereoRig& r) { return std::make_unique<KltFrontend>(r, options.klt); });
 }
 
 std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
                                    const std::shared_ptr<DescriptorStage>& stage) {
-  return std::make_unique<EitherCamera>(rig, std::make_unique<OrbFrontend>(rig, options, stage),
-                                        std::make_unique<OrbFrontend>(mirrored(rig), options, stage));
+  return for_cameras_of(rig, [&](const StereoRig& r) { return std::make_unique<OrbFrontend>(r, options, stage); });
 }
 
 Made make_orb(const StereoRig& rig, const FrontendOptions& options) { return orb_with(rig, options.orb, make_identity_stage()); }

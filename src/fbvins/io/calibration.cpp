@@ -37,12 +37,13 @@ Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml) {
   return pose;
 }
 
-Result<StereoRig> join_euroc(const CameraSensor& left, const CameraSensor& right, const ImuSensor& imu, const std::string& file) {
+Result<StereoRig> join_euroc(const CameraSensor& left, const std::optional<CameraSensor>& right, const ImuSensor& imu,
+                             const std::string& file) {
   StereoRig rig;
   rig.left = left.camera;
-  rig.right = right.camera;
+  if (right) rig.right = right->camera;
   rig.T_BC0 = imu.T_BS.inverse() * left.T_BS;
-  rig.T_BC1 = (imu.T_BS.inverse() * right.T_BS).cast_frames<B, C1>();
+  rig.T_BC1 = (imu.T_BS.inverse() * (right ? right->T_BS : left.T_BS)).cast_frames<B, C1>();
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
   rig.time_offset_s = left.time_offset_s;

@@ -22,8 +22,9 @@ constexpr std::uint64_t kLargestCsv_bytes = std::uint64_t{1} << 30u;
 constexpr Duration kImuLeadIn = {1'000'000'000};
 
 Result<std::string> find_root(const FileSource& files, const std::string& path) {
-  std::vector<std::string> roots = files.folders_holding("cam0/data.csv");
-  if (roots.empty()) roots = files.folders_holding("cam0/sensor.yaml");  // then the CSV is what is missing
+  std::vector<std::string> roots;
+  for (const char* file : {"cam0/data.csv", "cam1/data.csv", "cam0/sensor.yaml"})  // the last: its CSV is what is missing
+    if (roots.empty()) roots = files.folders_holding(file);
   if (roots.empty()) {
     std::error_code ignored;
     const bool bag = std::filesystem::exists(path + "/metadata.yaml", ignored);
@@ -53,11 +54,12 @@ class EurocReader {
   Result<DatasetContents> read(const std::string& path) {
     out_.info.name = dataset_name(path);
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
+    find_cameras();
     for (auto step : {&EurocReader::read_calibration, &EurocReader::read_frames, &EurocReader::read_imu})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
-    out_.loader = make_euroc_loader(std::move(files_), root_, out_.rig);
+    out_.loader = make_euroc_loader(std::move(files_), root_, left_, out_.rig);
     return std::move(out_);
   }
 
@@ -69,6 +71,15 @@ class EurocReader {
   }
   void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
 
+  /// A recording with the folder of one camera only, whichever, is one of that camera.
+  void find_cameras() {
+    const auto has = [&](const char* camera) {
+      return exists(fmt::format("{}/data.csv", camera)) || exists(fmt::format("{}/sensor.yaml", camera));
+    };
+    if (!has("cam0")) left_ = "cam1";
+    two_cameras_ = has("cam0") && has("cam1");
+  }
+
   template <class Parser>
   auto parse_yaml(const std::string& file, Parser parser) const -> decltype(parser(std::declval<YamlReader>())) {
     Result<std::string> yaml = text(file, kLargestYaml_bytes);
@@ -78,7 +89,7 @@ class EurocReader {
 
   Result<void> read_calibration() {
     // Recordings without IMU have no imu0, those calibrated from outside may lack its sensor.yaml.
-    if (options_.rig) return out_.rig = *options_.rig, Result<void>{};
+    if (options_.rig) return take(*options_.rig), Result<void>{};
     ImuSensor imu;
     if (exists("imu0/sensor.yaml") || (options_.kalibr_camchain.empty() && options_.require_imu)) {
       Result<ImuSensor> read = parse_yaml("imu0/sensor.yaml", parse_euroc_imu);
@@ -92,11 +103,16 @@ class EurocReader {
   }
 
   Result<void> read_own_calibration(const ImuSensor& imu) {
-    Result<CameraSensor> left = parse_yaml("cam0/sensor.yaml", parse_euroc_camera);
+    const std::string left_file = left_ + "/sensor.yaml";
+    Result<CameraSensor> left = parse_yaml(left_file, parse_euroc_camera);
     if (!left) return left.error();
-    Result<CameraSensor> right = parse_yaml("cam1/sensor.yaml", parse_euroc_camera);
-    if (!right) return right.error();
-    Result<StereoRig> rig = join_euroc(*left, *right, imu, named("cam1/sensor.yaml"));
+    std::optional<CameraSensor> right;
+    if (two_cameras_) {
+      Result<CameraSensor> read = parse_yaml("cam1/sensor.yaml", parse_euroc_camera);
+      if (!read) return read.error();
+      right = *read;
+    }
+    Result<StereoRig> rig = join_euroc(*left, right, imu, named(two_cameras_ ? "cam1/sensor.yaml" : left_file));
     if (!rig) return rig.error();
     out_.rig = *rig;
     return {};
@@ -106,16 +122,23 @@ class EurocReader {
     const auto& path = options_.kalibr_imu;
     Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path));
     if (!rig) return rig.error();
-    out_.rig = *rig;
+    take(*rig);
     if (path.empty()) out_.rig.imu_noise = imu.noise;
     return {};
+  }
+
+  /// A calibration from outside, of the cameras that were recorded.
+  void take(const StereoRig& rig) {
+    if (!two_cameras_ && rig.has_right()) out_.rig = with_one_camera(rig, left_ == "cam1");
+    else out_.rig = rig;
+    two_cameras_ = out_.rig.has_right();
   }
 
   Result<void> read_frames() {
     std::vector<ImageRow> lists[2];
     CameraInfo* infos[2] = {&out_.info.left, &out_.info.right};
-    for (int i = 0; i < 2; ++i) {
-      const std::string folder = fmt::format("cam{}/", i);
+    for (int i = 0; i < (two_cameras_ ? 2 : 1); ++i) {
+      const std::string folder = i == 0 ? left_ + "/" : "cam1/";
       Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
       if (!csv) return csv.error();
       auto rows = read_image_rows(*csv, named(folder + "data.csv"));
@@ -126,17 +149,17 @@ class EurocReader {
       lists[i] = std::move(rows->rows);
     }
     PairedFrames paired = pair_frames(lists[0], lists[1], Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
-    out_.info.left.unpaired = paired.left_only;
+    out_.info.left.unpaired = two_cameras_ ? paired.left_only : 0;
     out_.info.right.unpaired = paired.right_only;
-    if (paired.left_only == out_.info.left.listed)
+    if (two_cameras_ && paired.left_only == out_.info.left.listed)
       return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam0's", named("cam1/data.csv"),
                                                      options_.pair_tolerance_ms)};
-    if (paired.left_only + paired.right_only > 0)
+    if (two_cameras_ && paired.left_only + paired.right_only > 0)
       warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
                        options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
     if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
-      return Error{cut.error().code, fmt::format("{}: {}", named("cam0/data.csv"), cut.error().message)};
+      return Error{cut.error().code, fmt::format("{}: {}", named(left_ + "/data.csv"), cut.error().message)};
     return find_images();
   }
 
@@ -150,7 +173,7 @@ class EurocReader {
       file.clear();
     };
     for (FrameEntry& frame : out_.frames) {
-      look(frame.left_file, "cam0/data/", out_.info.left.images);
+      look(frame.left_file, left_ + "/data/", out_.info.left.images);
       look(frame.right_file, "cam1/data/", out_.info.right.images);
     }
     const std::size_t emptied =
@@ -232,6 +255,8 @@ class EurocReader {
   std::unique_ptr<FileSource> files_;
   std::string root_;
   const DatasetOptions& options_;
+  std::string left_ = "cam0";  ///< folder of the left, or only, camera
+  bool two_cameras_ = true;
   Pose<B, B> T_BI_;  ///< takes IMU to the recording's body coordinates
   DatasetContents out_;
 };

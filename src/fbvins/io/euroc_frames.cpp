@@ -32,19 +32,23 @@ RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
 
 class EurocLoader : public FrameLoader {
  public:
-  EurocLoader(std::unique_ptr<FileSource> files, std::string root, const StereoRig& rig)
-      : files_(std::move(files)), root_(std::move(root)), left_(rig.left), right_(rig.right) {}
+  EurocLoader(std::unique_ptr<FileSource> files, std::string root, const std::string& left_folder, const StereoRig& rig)
+      : files_(std::move(files)),
+        root_(std::move(root)),
+        left_folder_(left_folder + "/data/"),
+        left_(rig.left),
+        right_(rig.right) {}
 
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
-    out.frame.left = load_image(entry.left_file, "cam0/data/", left_, out.left, out.problem);
+    out.frame.left = load_image(entry.left_file, left_folder_, left_, out.left, out.problem);
     out.frame.right = load_image(entry.right_file, "cam1/data/", right_, out.right, out.problem);
     return out;
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& file, const char* folder, const Camera& camera, ImageCounts& counts,
+  std::shared_ptr<const Image> load_image(const std::string& file, const std::string& folder, const Camera& camera, ImageCounts& counts,
                                           std::string& problem) const {
     if (file.empty()) return nullptr;
     const std::string path = root_ + folder + file;
@@ -68,7 +72,7 @@ class EurocLoader : public FrameLoader {
   }
 
   std::unique_ptr<FileSource> files_;
-  std::string root_;
+  std::string root_, left_folder_;
   Camera left_, right_;
 };
 
@@ -147,8 +151,9 @@ Intervals measure_intervals(const std::vector<Time>& increasing) {
   return out;
 }
 
-std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const StereoRig& rig) {
-  return std::make_unique<EurocLoader>(std::move(files), std::move(root), rig);
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const std::string& left_folder,
+                                               const StereoRig& rig) {
+  return std::make_unique<EurocLoader>(std::move(files), std::move(root), left_folder, rig);
 }
 
 }  // namespace fbvins

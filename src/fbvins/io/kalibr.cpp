@@ -37,15 +37,17 @@ double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::
 
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
   const YAML::Node cam0 = yaml.get(yaml.root(), "cam0"), cam1 = yaml.get(yaml.root(), "cam1");
-  for (const char* name : {"cam0", "cam1"})
-    if (!yaml.get(yaml.root(), name).IsMap()) yaml.complain(yaml.root(), name, "is missing or empty");
+  const bool two = cam1.IsDefined();
+  if (!cam0.IsMap()) yaml.complain(yaml.root(), "cam0", "is missing or empty");
+  if (two && !cam1.IsMap()) yaml.complain(yaml.root(), "cam1", "is empty");
   StereoRig rig;
   rig.left = read_camera(yaml, cam0, "distortion_coeffs");
-  rig.right = read_camera(yaml, cam1, "distortion_coeffs");
   const Pose<C0, B> T_C0B = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
   rig.T_BC0 = T_C0B.inverse();
-  rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
-  rig.time_offset_s = read_time_offset_s(yaml, cam0, cam1);
+  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  if (two) rig.right = read_camera(yaml, cam1, "distortion_coeffs");
+  if (two) rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
+  rig.time_offset_s = read_time_offset_s(yaml, cam0, two ? cam1 : cam0);
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;

@@ -40,8 +40,8 @@ std::string rig_to_yaml(const StereoRig& rig) {
   const ImuNoise& n = rig.imu_noise;
   return "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
          "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
-         camera_text("left", rig.left) + camera_text("right", rig.right) + pose_text("T_BC0", rig.T_BC0) +
-         pose_text("T_BC1", rig.T_BC1) +
+         camera_text("left", rig.left) + (rig.has_right() ? camera_text("right", rig.right) : "") +
+         pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") +
          fmt::format(
              "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
              "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
@@ -55,9 +55,12 @@ Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   YamlReader yaml(file, text);
   StereoRig rig;
   rig.left = read_camera(yaml, yaml.get(yaml.root(), "left"), "distortion_coefficients");
-  rig.right = read_camera(yaml, yaml.get(yaml.root(), "right"), "distortion_coefficients");
   rig.T_BC0 = read_pose<B, C0>(yaml, "T_BC0");
-  rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
+  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  if (yaml.has(yaml.root(), "right")) {
+    rig.right = read_camera(yaml, yaml.get(yaml.root(), "right"), "distortion_coefficients");
+    rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
+  }
   rig.imu_noise = read_imu_noise(yaml, yaml.get(yaml.root(), "imu"), "rate_hz");
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");

@@ -61,13 +61,13 @@ void SensorCheck::push(const ImuSample& sample) {
 void SensorCheck::push(StereoFrame frame) {
   const std::lock_guard lock(mutex_);
   images_.add(frame.t, now_());
-  if (!frame.left || !frame.right) ++alone_;
+  if (rig_.has_right() && (!frame.left || !frame.right)) ++alone_;
   const auto other_size = [&](const std::shared_ptr<const Image>& image, const Camera& camera) {
     if (!image || (image->width() == camera.width() && image->height() == camera.height())) return;
     other_width_ = image->width(), other_height_ = image->height();
   };
   other_size(frame.left, rig_.left);
-  other_size(frame.right, rig_.right);
+  if (rig_.has_right()) other_size(frame.right, rig_.right);
   const bool left = left_.is_repeated(frame.left), right = right_.is_repeated(frame.right);
   if (left || right) ++frozen_;
 }

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/mono_start.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+
+namespace fbvins {
+namespace {
+
+using test::Motion;
+using test::SimulatedFlight;
+
+constexpr int kEvery = 3, kFrames = 10;
+
+SimulatedFlight flight_with_one_camera(const Motion& motion, std::uint64_t seed) {
+  SimulatedFlight flight(motion, seed);
+  flight.rig = with_one_camera(flight.rig);
+  flight.right_camera = [](int) { return false; };
+  return flight;
+}
+
+/// Ten frames, each with all readings since the one before it.
+std::vector<TrackedFrame> spaced_frames(SimulatedFlight& flight) {
+  std::vector<TrackedFrame> out;
+  ImuSegment between;
+  for (int k = 0; k <= kEvery * (kFrames - 1); ++k) {
+    TrackedFrame frame = flight.frame(k);
+    const auto& s = frame.imu.samples;
+    between.samples.insert(between.samples.end(), s.begin() + (between.samples.empty() || s.empty() ? 0 : 1), s.end());
+    if (k % kEvery != 0) continue;
+    frame.imu = std::exchange(between, {});
+    out.push_back(std::move(frame));
+  }
+  return out;
+}
+
+TEST(MonoStart, FindsScaleGravityAndBiases) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    SimulatedFlight flight = flight_with_one_camera(Motion(0.6, 0.3), seed);
+    const std::vector<TrackedFrame> frames = spaced_frames(flight);
+    const auto states = start_with_one_camera(frames, flight.rig.T_BC0, flight.rig.imu_noise, unknown_biases(), 9.81);
+    ASSERT_TRUE(states.has_value()) << seed;
+    const NavState<W> first = flight.truth(0), last = flight.truth(kEvery * (kFrames - 1));
+    const double moved = (last.T_FB.p - first.T_FB.p).norm();
+    EXPECT_NEAR((states->back().T_FB.p - states->front().T_FB.p).norm() / moved, 1, 0.1) << seed;
+    EXPECT_LT((states->back().bias.gyro_radps - flight.bias.gyro_radps).norm(), 0.01) << seed;
+    const Vec3 up_error = states->back().T_FB.q.conjugate() * Vec3::UnitZ() - last.T_FB.q.conjugate() * Vec3::UnitZ();
+    EXPECT_LT(up_error.norm(), 0.03) << seed;
+    EXPECT_NEAR(states->back().v_FB.norm(), last.v_FB.norm(), 0.12 * last.v_FB.norm()) << seed;
+  }
+}
+
+TEST(MonoStart, RefusesAMotionWithoutParallaxOrTooFewTracks) {
+  SimulatedFlight turning = flight_with_one_camera(Motion(0, 0.5), 5);
+  EXPECT_FALSE(start_with_one_camera(spaced_frames(turning), turning.rig.T_BC0, turning.rig.imu_noise, unknown_biases(), 9.81));
+  SimulatedFlight bare = flight_with_one_camera(Motion(0.6, 0.3), 6);
+  bare.max_features = 15;
+  EXPECT_FALSE(start_with_one_camera(spaced_frames(bare), bare.rig.T_BC0, bare.rig.imu_noise, unknown_biases(), 9.81));
+}
+
+TEST(MonoStart, TheScalesDeviationIsThatOfTheVelocityAlongItself) {
+  EXPECT_NEAR(scale_sigma_of(Vec3(2, 0, 0), Vec3(0.01, 9, 9).asDiagonal()), 0.05, 1e-12);
+  EXPECT_TRUE(std::isinf(scale_sigma_of(Vec3::Zero(), Mat3::Identity())));
+}
+
+EstimatorOptions exact_noise() {
+  EstimatorOptions o;
+  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
+  return o;
+}
+
+/// Speed as estimated by that which is true, once the flight has gone on for a while; 0 without a pose.
+double speed_ratio(SimulatedFlight& flight, int frames, int& first_pose) {
+  Estimator estimator(flight.rig, exact_noise());
+  first_pose = -1;
+  double estimated = 0, true_speed = 0;
+  for (int k = 0; k < frames; ++k) {
+    const Odometry o = estimator.process(flight.frame(k)).odometry;
+    if (o.health.has_pose() && first_pose < 0) first_pose = k;
+    if (first_pose < 0 || k < frames / 2) continue;
+    estimated += o.v_WB.norm(), true_speed += flight.truth(k).v_FB.norm();
+    EXPECT_TRUE(o.health.has_pose()) << k;
+  }
+  return estimated / true_speed;
+}
+
+TEST(EstimatorWithOneCamera, StartsInMotionAndKeepsItsScale) {
+  for (const std::uint64_t seed : {11, 12, 13}) {
+    SimulatedFlight flight = flight_with_one_camera(Motion(0.6, 0.3), seed);
+    int first = 0;
+    EXPECT_NEAR(speed_ratio(flight, 240, first), 1, 0.02) << seed;
+    EXPECT_GE(first, 0) << seed;
+    EXPECT_LE(first, 60) << seed;  // three seconds
+  }
+}
+
+}  // namespace
+}  // namespace fbvins
