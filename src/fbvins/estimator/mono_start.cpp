@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "fbvins/core/median.hpp"
 #include "fbvins/geometry/so3.hpp"
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
@@ -29,8 +30,10 @@ constexpr int kRotationIterations = 8, kGravityIterations = 4, kDepthIterations 
 /// At first all points are this far away, for the weights.
 constexpr double kFirstDepth_m = 3;
 constexpr double kHuberSigma = 2;
-/// What the solution has to be: share of the points in front of the camera, residuals in standard deviations, scale.
-constexpr double kInFront = 0.9, kMaxRms_sigma = 3, kMaxScaleSigma = 0.15, kMaxGyroBias_radps = 0.25, kMaxAccelBias_mps2 = 1;
+/// What the solution has to be: share of the points in front of the camera, residuals in standard deviations, way
+/// of the camera as a share of the typical depth, scale, biases.
+constexpr double kInFront = 0.9, kMaxRms_sigma = 3, kLeastParallax_rad = 0.03, kMaxScaleSigma = 0.15, kMaxGyroBias_radps = 0.25,
+                 kMaxAccelBias_mps2 = 1;
 
 /// Directions of one track in the frames that see it, in the body's axes there.
 struct Sight {
@@ -251,7 +254,7 @@ Vec3 position(const Integrated& m, const Vec9& x) {
   return m.p + m.t_s * x.head<3>() + 0.5 * m.t_s * m.t_s * x.segment<3>(3) + m.J_p_ba * x.tail<3>();
 }
 
-/// Depths along the rays at the solution; none for a point that is behind a camera, and its share.
+/// Depths along the rays at the solution; none for a point that is behind a camera. Returns the share of the others.
 double update_depths(const std::vector<Track>& tracks, const std::vector<Integrated>& motion, const Vec3& t_BC, const Vec9& x,
                      std::vector<std::vector<double>>& depths) {
   int used = 0, in_front = 0;
@@ -276,6 +279,16 @@ double update_depths(const std::vector<Track>& tracks, const std::vector<Integra
     else depths[j].clear();
   }
   return used > 0 ? static_cast<double>(in_front) / used : 0;
+}
+
+/// The farthest that the camera has moved from where it was first, by the median depth of the points.
+double parallax(const std::vector<Integrated>& motion, const Vec3& t_BC, const Vec9& x,
+                const std::vector<std::vector<double>>& depths) {
+  std::vector<double> all;
+  for (const std::vector<double>& track : depths) all.insert(all.end(), track.begin(), track.end());
+  double moved_m = 0;
+  for (const Integrated& m : motion) moved_m = std::max(moved_m, (position(m, x) + m.R * t_BC - t_BC).norm());
+  return all.empty() ? 0 : moved_m / median(all);
 }
 
 }  // namespace
@@ -311,6 +324,7 @@ std::optional<std::vector<NavState<G>>> start_with_one_camera(std::span<const Tr
   }
   const double rms = std::sqrt(std::max(0.0, solved.cost) / std::max(1, problem.rows));
   if (in_front < kInFront || rms > kMaxRms_sigma || solved.x.tail<3>().norm() > kMaxAccelBias_mps2) return std::nullopt;
+  if (parallax(motion, T_BC.p, solved.x, depths) < kLeastParallax_rad) return std::nullopt;
   const Vec3 v_last = solved.x.head<3>() + motion.back().t_s * solved.x.segment<3>(3) + motion.back().v;
   const double speed = std::max(solved.x.head<3>().norm(), v_last.norm());
   const Mat3 covariance = std::max(1.0, rms * rms) * solved.velocity_covariance;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
@@ -57,9 +58,10 @@ TEST(MonoStart, FindsScaleGravityAndBiases) {
 
 TEST(MonoStart, RefusesAMotionWithoutParallaxOrTooFewTracks) {
   SimulatedFlight turning = flight_with_one_camera(Motion(0, 0.5), 5);
+  turning.rig.T_BC0.p.setZero();
   EXPECT_FALSE(start_with_one_camera(spaced_frames(turning), turning.rig.T_BC0, turning.rig.imu_noise, unknown_biases(), 9.81));
   SimulatedFlight bare = flight_with_one_camera(Motion(0.6, 0.3), 6);
-  bare.max_features = 15;
+  bare.max_features = 8;
   EXPECT_FALSE(start_with_one_camera(spaced_frames(bare), bare.rig.T_BC0, bare.rig.imu_noise, unknown_biases(), 9.81));
 }
 
