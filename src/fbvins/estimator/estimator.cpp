@@ -22,8 +22,10 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kGap_s = 0.05;
 /// A large correction so soon after a pose that was not good has to be confirmed by gravity.
 constexpr double kTrouble_s = 2;
-/// Of a start with one camera in motion.
+/// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.1;
+/// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
+constexpr double kContradictedOneCamera_s = 2;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -36,10 +38,16 @@ WindowWeights weights_of(const EstimatorOptions& o) {
   return w;
 }
 
+/// With one camera remembered landmarks would hold the scale at what it was thought to be when they left the window.
+EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) {
+  if (!rig.has_right()) options.known_landmarks.enabled = false;
+  return options;
+}
+
 }  // namespace
 
 Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before)
-    : options_(options),
+    : options_(for_cameras_of(rig, options)),
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
       calibration_(calibrated_),
@@ -50,7 +58,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       health_(options, one_camera_),
       reading_noise_(imu_noise_),
       monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
-      window_(options, weights_of(options)),
+      window_(options_, weights_of(options)),
       published_(options.max_step_m, options.max_pending_m) {}
 
 StatePrior Estimator::prior() const {
@@ -98,27 +106,25 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   window_.restart_first_estimates();
   const WindowSolution& solution = solve(out.odometry, kThorough);
   out.odometry.health = judge(frame, out.odometry);
-  if (start_is_good(*start, out.odometry)) {
+  if (start_is_good(out.odometry)) {
     shrink_window(solution, out);
     return;
   }
   refuse_start(out.odometry);
 }
 
-/// At rest one camera shows no depth: the start is by the readings, and landmarks come with the first motion. In motion its
-/// scale has to be known.
-bool Estimator::start_is_good(const InitialSolution& start, const Odometry& solved) const {
-  if (!one_camera_) return solved.health.state == HealthState::good;
-  if (start.from_rest) return solved.health.has_pose();
-  const Vec3 v = window_.tilt().levelled(window_.newest().state).v_FB;
-  return solved.health.state == HealthState::good && scale_sigma_of(v, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
+/// With one camera its scale has to be known, too.
+bool Estimator::start_is_good(const Odometry& solved) const {
+  if (solved.health.state != HealthState::good) return false;
+  const Vec3 v_WB = window_.tilt().levelled(window_.newest().state).v_FB;
+  return !one_camera_ || scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
 }
 
 /// Nothing of it is published.
 void Estimator::refuse_start(Odometry& out) {
   running_ = false;
   calibration_ = calibrated_;
-  initialiser_.reset();
+  if (!one_camera_) initialiser_.reset();  // with one camera the same frames and a later one may do
   window_.clear();
   const EstimatorStats stats = out.stats;
   out = {};
@@ -303,13 +309,18 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
   }
 }
 
+bool Estimator::contradicted_too_long(Time t) {
+  if (!one_camera_ || !monitor_.contradicted()) agreed_ = t;
+  return (t - agreed_).seconds() > kContradictedOneCamera_s;
+}
+
 Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
   return health_.judge(frame, window_.newest().state, landmarks_in_view(window_),
                        {.worst_sigma_m = worst_sigma_m(solved.pose_covariance),
                         .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
                         .contradiction = monitor_.contradicted(),
-                        .hopeless = monitor_.hopeless(),
+                        .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
                         .one_camera_wrong = one_camera_wrong_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),

@@ -60,8 +60,9 @@ class Estimator {
   void fill_covariances(const WindowSolution& solution, Odometry& out);
   void shrink_window(const WindowSolution& solution, Estimate& out);
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
+  bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
-  bool start_is_good(const InitialSolution& start, const Odometry& solved) const;
+  bool start_is_good(const Odometry& solved) const;
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
@@ -90,6 +91,7 @@ class Estimator {
   Monitor monitor_;
   bool one_camera_wrong_ = false;     ///< in the newest frame
   int frames_with_readings_ = 0;      ///< in a row
+  Time agreed_;                       ///< last time without a contradiction, or with two cameras
   std::optional<Time> last_trouble_;  ///< of a pose that was not good
   SlidingWindow window_;
   WindowSolver solver_;

@@ -23,9 +23,9 @@ namespace {
 constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
 /// With one camera, of which scale and gravity have to be told apart by the accelerations meanwhile.
-constexpr double kMinSpacingOneCamera_s = 0.15;
-/// Stereo features, or features of the one camera, needed in each of them. At rest motion is known without them, and fewer are enough: the floor in front of
-/// a landed drone shows few.
+constexpr double kMinSpacingOneCamera_s = 0.25;
+/// Stereo features, or features of the one camera, needed in each of them. At rest motion is known without them, and fewer are
+/// enough: the floor in front of a landed drone shows few.
 constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
 /// At rest a track that is farther than this from its first pixel is on a moving object.
 constexpr double kStill_px = 1.5;
@@ -76,8 +76,8 @@ Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise,
 
 /// By which the motion can be found.
 int Initialiser::usable_features(const TrackedFrame& frame) const {
-  return static_cast<int>(std::ranges::count_if(
-      frame.features, [&](const TrackedFeature& f) { return f.left && (one_camera_ || f.right); }));
+  return static_cast<int>(
+      std::ranges::count_if(frame.features, [&](const TrackedFeature& f) { return f.left && (one_camera_ || f.right); }));
 }
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
@@ -93,7 +93,8 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   remember(frame);
   std::optional<InitialSolution> start;
   const ImuBiasEstimate biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
-  if (at_rest) start = start_from_rest(biases);
+  if (at_rest && one_camera_) reason_ = HealthReason::waiting_for_motion_or_rest;  // rest shows no scale
+  else if (at_rest) start = start_from_rest(biases);
   else if (static_cast<int>(frames_.size()) >= kFrames) start = start_in_motion(biases, calibration);
   else reason_ = HealthReason::waiting_for_motion_or_rest;
   if (start) start->biases = biases;

@@ -2,7 +2,7 @@
 // The first states of a flight (paper 2.2.4), from rest or in motion, whichever the data allow:
 //   rest     gravity and gyroscope bias from the IMU; the pose does not move;
 //   motion   stereo structure from motion over the last frames, then visual-inertial alignment; with one camera, tracks and
-//            readings together (mono_start.hpp).
+//            readings together (mono_start.hpp): at rest one camera shows no depth.
 // An initial solution that is not observable or not plausible is refused, and tried again with the
 // next frame. One owner, one thread.
 #pragma once
