@@ -13,6 +13,7 @@ RecordingOptions options_of(const RecordingArguments& arguments, const DatasetOp
   DatasetOptions with = options;
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
+  with.camera = arguments.camera;
   return {with, arguments.calibration, arguments.imu_calibration, topic(0), topic(1), topic(2)};
 }
 

@@ -79,6 +79,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& argume
   with.kalibr_imu = arguments.imu_calibration;
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
+  with.camera = arguments.camera;
   return open_dataset(arguments.path, with);
 }
 

@@ -85,8 +85,10 @@ void bind_rig(nb::module_& m) {
       .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
       .def_ro("rate_hz", &ImuNoise::rate_hz);
 
-  nb::class_<StereoRig>(m, "Rig",
-                        "Two cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera.")
+  nb::class_<StereoRig>(
+      m, "Rig",
+      "One or two cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera. A\n"
+      "rig of one camera has it as the left one; its right one is 0 px wide.")
       .def(nb::new_(&make_rig), "left"_a, "right"_a, "T_BC0"_a, "T_BC1"_a, "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0,
            "time_offset_s"_a = 0.0,
            "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset.")
@@ -101,6 +103,7 @@ void bind_rig(nb::module_& m) {
       .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s")
       .def("__reduce__", [](const StereoRig& rig) { return reduced("rig", nb::cast(rig_to_yaml(rig))); })
       .def("__repr__", [](const StereoRig& rig) {
+        if (!rig.has_right()) return fmt::format("<fbvins.Rig {}, IMU {:g} Hz>", text_of(rig.left), rig.imu_noise.rate_hz);
         return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
                            rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
       });

@@ -107,8 +107,7 @@ const Refused kRefused[] = {
      ": no cam0/data.csv in it: not a EuRoC dataset (ROS bags are read by fbvins-bags; `fbvins convert` makes a EuRoC folder of one)"},
     {"NoLeftList", [](Files& f) { f.erase(kCam0); }, "/mav0/cam0/data.csv: no such file"},
     {"NoLeftCalibration", [](Files& f) { f.erase("cam0/sensor.yaml"); }, "/mav0/cam0/sensor.yaml: no such file"},
-    {"NoRightCamera", [](Files& f) { std::erase_if(f, [](const auto& e) { return e.first.starts_with("cam1/"); }); },
-     "/mav0/cam1/sensor.yaml: no such file"},
+    {"NoRightCalibration", [](Files& f) { f.erase("cam1/sensor.yaml"); }, "/mav0/cam1/sensor.yaml: no such file"},
     {"NoRightList", [](Files& f) { f.erase(kCam1); }, "/mav0/cam1/data.csv: no such file"},
     {"NoImuRows", [](Files& f) { f.erase(kImu); }, "/mav0/imu0/data.csv: no such file"},
     {"NoImuCalibration", [](Files& f) { f.erase("imu0/sensor.yaml"); }, "/mav0/imu0/sensor.yaml: no such file"},
@@ -600,6 +599,45 @@ TEST_F(ToyDataset, ImuComesJustFarEnoughToInterpolate) {
     else EXPECT_EQ(imu, std::get<StereoFrame>(*event).t);  // in the toy dataset both have the same stamps
   }
   EXPECT_EQ(imu.ns, kToyStart_ns + 1'000'000'000);
+}
+
+/// Stamps and left pixels of all frames, which have no right image.
+std::vector<std::int64_t> left_images(Dataset& data) {
+  std::vector<std::int64_t> out;
+  while (auto event = data.next()) {
+    const auto* frame = std::get_if<StereoFrame>(&*event);
+    if (frame == nullptr) continue;
+    EXPECT_EQ(frame->right, nullptr);
+    out.push_back(frame->t.ns);
+    for (int y = 0; y < kToyHeight; ++y)
+      for (int x = 0; x < kToyWidth; ++x) out.push_back(frame->left->at(x, y));
+  }
+  return out;
+}
+
+TEST_F(ToyDataset, OneCamerasFolderIsARecordingOfThatCamera) {
+  const Pose<B, C0> mounting[2] = {(*open_dataset(path()))->rig().T_BC0,
+                                   (*open_dataset(path()))->rig().T_BC1.cast_frames<B, C0>()};
+  const char* chosen[2] = {"left", "right"};
+  for (int camera = 0; camera < 2; ++camera) {
+    Files files = toy_dataset();
+    std::erase_if(files, [&](const auto& e) { return e.first.starts_with(camera == 0 ? "cam1/" : "cam0/"); });
+    const TemporaryFolder folder;
+    write_folder(files, folder.path() + "/toy/mav0");
+    auto alone = open_dataset(folder.path() + "/toy");
+    ASSERT_TRUE(alone) << alone.error().message;
+    EXPECT_FALSE((*alone)->rig().has_right());
+    EXPECT_EQ((*alone)->rig().T_BC0.p, mounting[camera].p);
+    EXPECT_EQ((*alone)->info().frames, kToyFrames);
+    EXPECT_EQ((*alone)->info().left.unpaired, 0);
+    const auto images = left_images(**alone);
+    EXPECT_EQ(images.size(), static_cast<std::size_t>(kToyFrames * (1 + kToyWidth * kToyHeight)));
+    // The same as one of the two chosen.
+    auto of_two = open_dataset(path(), {.camera = chosen[camera]});
+    ASSERT_TRUE(of_two);
+    EXPECT_EQ((*of_two)->rig().T_BC0.p, mounting[camera].p);
+    EXPECT_EQ(left_images(**of_two), images);
+  }
 }
 
 TEST_F(ToyDataset, TakesAnotherCalibration) {

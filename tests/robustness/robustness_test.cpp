@@ -140,6 +140,25 @@ TEST_P(Flight, IsAsAccurateAsPromised) {
   EXPECT_EQ(flown.count(HealthState::lost, 0, 1e9), 0);
 }
 
+TEST_P(Flight, OneCameraAloneIsEnough) {
+  for (const bool right : {false, true}) {
+    const Alter alone = [&](double, SensorEvent& event) {
+      if (auto* frame = std::get_if<StereoFrame>(&event)) {
+        if (right) frame->left = frame->right;
+        frame->right = nullptr;
+      }
+      return true;
+    };
+    const Flown flown = fly(path(), config_for(frontend()), alone, [&](StereoRig& rig) { rig = with_one_camera(rig, right); });
+    std::printf("%s: %s\n", right ? "right" : "left", flown.text().c_str());
+    EXPECT_LT(flown.rmse_m(), recording().real ? 0.012 : 0.08);
+    EXPECT_EQ(flown.resets(), 0u);
+    EXPECT_EQ(flown.count(HealthState::lost, 0, 1e9), 0);
+    // At rest one camera waits; the simulated flight rests for three seconds.
+    EXPECT_GT(flown.with_pose(), (recording().real ? 0.8 : 0.5) * flown.images);
+  }
+}
+
 TEST_P(Flight, StaysAtRest) {
   const auto folder = recording().real ? real_recording("V1_01_easy_rest_3s") : simulated_recording();
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there; set FBVINS_DATA";

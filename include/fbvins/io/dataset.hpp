@@ -36,6 +36,7 @@ struct DatasetOptions {
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
   std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
+  std::string camera = "both";        ///< or one of a recording's two: "left", "right"
 
   /// Whether the recording's own calibration is replaced.
   bool brings_rig() const { return rig || !kalibr_camchain.empty(); }
@@ -51,6 +52,7 @@ struct DatasetOptions {
     v("require_imu", require_imu, "", "refuse recordings without IMU");
     v("kalibr_camchain", kalibr_camchain, "", "camchain-imucam.yaml that replaces the recording's calibration");
     v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces the recording's IMU noise");
+    v("camera", camera, "both|left|right", "the cameras of a stereo recording that are used");
   }
 };
 

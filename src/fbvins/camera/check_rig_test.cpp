@@ -23,6 +23,12 @@ struct Broken {
 
 TEST(CheckRig, TakesARigThatCanFly) { EXPECT_TRUE(check_rig(good_rig(), "rig").ok()); }
 
+TEST(CheckRig, OneCameraIsEnough) {
+  EXPECT_TRUE(check_rig(with_one_camera(good_rig()), "rig").ok());
+  EXPECT_FALSE(with_one_camera(good_rig()).has_right());
+  EXPECT_EQ(with_one_camera(good_rig(), true).T_BC0.p, good_rig().T_BC1.p);
+}
+
 TEST(CheckRig, RefusesWithASentence) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Broken> all = {

@@ -115,7 +115,9 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
     const auto rig = parse_kalibr_camchain({"c.yaml", text});
     return rig ? std::string("accepted") : rig.error().message;
   };
-  EXPECT_EQ(message("cam1:", "cam2:"), "c.yaml: cam1: is missing or empty");
+  EXPECT_EQ(message("cam0:", "cam2:"), "c.yaml: cam0: is missing or empty");
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", good.substr(0, good.find("cam1:")) + "cam1: 6\n"}).error().message,
+            "c.yaml:14: cam1: is empty");
   EXPECT_EQ(message("T_cam_imu", "T_imu_cam"), "c.yaml: T_cam_imu: is missing");
   EXPECT_EQ(message("distortion_model: equidistant", "distortion_model: fov"),
             "c.yaml:10: distortion_model: 'fov' is not supported, only radial-tangential, radtan, equidistant and none");

@@ -10,9 +10,47 @@
 #include "fbvins/io/mcap_dataset.hpp"
 
 namespace fbvins {
+namespace {
+
+/// One of two cameras, which is the left one then.
+class OneCamera : public FrameLoader {
+ public:
+  OneCamera(std::unique_ptr<FrameLoader> both, bool right) : both_(std::move(both)), right_(right) {}
+
+  LoadedFrame load(const FrameEntry& entry) override {
+    FrameEntry one = entry;  // whose left file is the camera's
+    if (right_) std::swap(one.left_file, one.right_file);
+    LoadedFrame out = both_->load(one);
+    if (!right_) return out;
+    std::swap(out.frame.left, out.frame.right);
+    std::swap(out.left, out.right);
+    return out;
+  }
+
+ private:
+  std::unique_ptr<FrameLoader> both_;
+  bool right_;
+};
+
+DatasetContents with_cameras(DatasetContents contents, const std::string& camera) {
+  if (camera == "both" || !contents.rig.has_right()) return contents;
+  const bool right = camera == "right";
+  contents.rig = with_one_camera(std::move(contents.rig), right);
+  for (FrameEntry& frame : contents.frames) {
+    if (right) frame.left_file = std::move(frame.right_file);
+    frame.right_file.clear();
+  }
+  std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.left_file.empty(); });
+  if (right) contents.info.left = std::move(contents.info.right);
+  contents.info.right = {};
+  contents.loader = std::make_unique<OneCamera>(std::move(contents.loader), right);
+  return contents;
+}
+
+}  // namespace
 
 Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
-    : contents_(std::move(contents)),
+    : contents_(with_cameras(std::move(contents), options.camera)),
       prefetcher_(std::make_unique<FramePrefetcher>(contents_.frames, *contents_.loader, options.prefetch_frames)),
       deliver_rest_(options.max_frames == 0 && options.duration_s == 0) {}
 

@@ -55,6 +55,16 @@ TEST(RigText, GivesBackTheSameBits) {
   }
 }
 
+TEST(RigText, GivesBackARigOfOneCamera) {
+  Rng rng(13);
+  const StereoRig rig = with_one_camera(awkward_rig(rng, true));
+  const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_FALSE(back->has_right());
+  EXPECT_TRUE(same_camera(back->left, rig.left));
+  EXPECT_EQ(back->T_BC1.p, rig.T_BC0.p);
+}
+
 TEST(RigText, GivesBackTheBitsOfWideLenses) {
   Rng rng(12);
   StereoRig rig = awkward_rig(rng, true);
