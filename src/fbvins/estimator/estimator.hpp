@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/carried_up.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
 #include "fbvins/estimator/health_judge.hpp"
@@ -61,6 +62,8 @@ class Estimator {
   void shrink_window(const WindowSolution& solution, Estimate& out);
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
+  void compare_up();
+  void remember_up(const Odometry& out);
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
@@ -86,6 +89,8 @@ class Estimator {
   FrameContract contract_;
   ReadingNoise reading_noise_;
   Monitor monitor_;
+  CarriedUp carried_up_;
+  std::optional<Vec3> tilt_away_B_;   ///< of a new window, from what was known before it, rad
   bool one_camera_wrong_ = false;     ///< in the newest frame
   int frames_with_readings_ = 0;      ///< in a row
   std::optional<Time> last_trouble_;  ///< of a pose that was not good
