@@ -2,6 +2,7 @@
 #include "fbvins/estimator/estimator.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -76,6 +77,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
   const TrackedFrame& frame = contract_.enforced(tracked);
   const Duration rest = rest_.update(frame);
+  carried_up_.carry(frame.t, frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
   else initialise(frame, rest, out);
@@ -84,6 +86,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   odometry.t = frame.t;
   if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
+  if (running_) remember_up(odometry);
   if (odometry.health.state == HealthState::lost) restart();
   health_.pass(frame);
   out.landmarks = {next_update_++, reset_counter_, window_.known().take_new()};
@@ -108,6 +111,8 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   out.odometry.health = judge(frame, out.odometry);
   if (start_is_good(out.odometry)) {
     shrink_window(solution, out);
+    compare_up();
+    if (tilt_away_B_) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
     return;
   }
   refuse_start(out.odometry);
@@ -157,6 +162,7 @@ void Estimator::open_window(const InitialSolution& start) {
   window_.set_pivot(first.T_FB.p);
   published_.restart();
   monitor_.restart();
+  tilt_away_B_.reset();
   frames_with_readings_ = kFramesAfterGap;
   up_sigma_rad_ = 0;
   covariances_.reset();
@@ -198,6 +204,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
   monitor_.take({frame.t, window_.newest().state.bias, out.odometry.gyro_bias_covariance, out.odometry.accel_bias_covariance});
+  compare_up();
   out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
   stats.marginalise_ms = timer.lap_ms();
@@ -319,13 +326,27 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                        {.worst_sigma_m = worst_sigma_m(solved.pose_covariance),
                         .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
-                        .contradiction = monitor_.contradicted(),
+                        .contradiction = monitor_.contradicted() || tilt_away_B_.has_value(),
                         .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
                         .one_camera_wrong = one_camera_wrong_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),
                         .clipped = reading_noise_.clipped(),
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
+}
+
+void Estimator::compare_up() {
+  const NavState<G>& newest = window_.newest().state;
+  tilt_away_B_ =
+      carried_up_.contradiction(newest.T_FB.q.conjugate() * (window_.tilt().q() * Vec3::UnitZ()), newest.bias.gyro_radps);
+}
+
+void Estimator::remember_up(const Odometry& out) {
+  if (reading_noise_.clipped()) carried_up_.forget();
+  if (out.health.state != HealthState::good) return;
+  const NavState<G>& newest = window_.newest().state;
+  carried_up_.take({newest.T_FB.q.conjugate() * (window_.tilt().q() * Vec3::UnitZ()), out.tilt_sigma_rad, newest.bias.gyro_radps,
+                    std::sqrt(out.gyro_bias_covariance.trace())});
 }
 
 /// The pose goes on, but nobody knows any more how it lies in the W of before: told by the reset counter.
@@ -336,6 +357,7 @@ void Estimator::begin_new_W() {
 }
 
 void Estimator::restart() {
+  carried_up_.restart();
   const Pose<W, B>& last = published_.T_WB();
   // The next gauge begins where this W ends, so that the pose goes on from where it was published last.
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
@@ -386,6 +408,7 @@ void Estimator::publish(Odometry& out) {
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);
+  if (tilt_away_B_) out.pose_covariance.bottomRightCorner<3, 3>() += *tilt_away_B_ * tilt_away_B_->transpose();
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

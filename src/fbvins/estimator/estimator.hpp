@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/carried_up.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
 #include "fbvins/estimator/health_judge.hpp"
@@ -63,6 +64,8 @@ class Estimator {
   bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
   bool start_is_good(const Odometry& solved) const;
+  void compare_up();
+  void remember_up(const Odometry& out);
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
@@ -89,6 +92,8 @@ class Estimator {
   FrameContract contract_;
   ReadingNoise reading_noise_;
   Monitor monitor_;
+  CarriedUp carried_up_;
+  std::optional<Vec3> tilt_away_B_;   ///< of a new window, from what was known before it, rad
   bool one_camera_wrong_ = false;     ///< in the newest frame
   int frames_with_readings_ = 0;      ///< in a row
   Time agreed_;                       ///< last time without a contradiction, or with two cameras

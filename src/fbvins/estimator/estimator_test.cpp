@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
 #include "fbvins/types/protection.hpp"
@@ -402,6 +405,30 @@ TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
 }
 
 /// How long the IMU may carry the pose depends on the IMU, and what it says of its error is true.
+TEST(Estimator, ARestartWithAWrongAccelerometerIsNotGood) {
+  for (const double wrong_mps2 : {1.9, -1.7}) {
+    SimulatedFlight flight(Motion(0.5, 0.1), 3);
+    EstimatorOptions options = exact_noise();
+    options.max_blind_m = 0.05;
+    Estimator estimator(flight.rig, options);
+    const Vec3 bias = flight.bias.accel_mps2;
+    int resets = 0, poses = 0;
+    for (int k = 0; k < 300; ++k) {
+      flight.bias.accel_mps2 = bias + (k >= 120 && k < 240 ? Vec3(0, wrong_mps2, 0) : Vec3::Zero());
+      flight.images = [](int i) { return i < 120 || i >= 160; };  // so long that the estimate is lost
+      const Odometry out = estimator.process(flight.frame(k)).odometry;
+      resets = static_cast<int>(out.reset_counter);
+      if (k < 160 || !out.health.has_pose()) continue;
+      ++poses;
+      if (out.health.state != HealthState::good) continue;
+      const Vec3 up = out.T_WB.q.conjugate() * Vec3::UnitZ(), truth = flight.truth(k).T_FB.q.conjugate() * Vec3::UnitZ();
+      EXPECT_LT(std::acos(std::min(1.0, up.dot(truth))), 5 * kDegree) << k;
+    }
+    EXPECT_GE(resets, 1);
+    EXPECT_GT(poses, 20);
+  }
+}
+
 TEST(Estimator, AGoodImuCarriesThePoseForLongerThanABadOne) {
   int carried[2] = {};
   for (const bool good : {true, false}) {

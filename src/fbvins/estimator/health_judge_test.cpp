@@ -150,5 +150,45 @@ TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
   EXPECT_EQ(judged({.gyro_vibration_radps = 0.35}), degraded(HealthReason::imu_vibration));
 }
 
+TEST(HealthJudge, EachReasonInFlightIsReachedAndLeft) {
+  struct Case {
+    HealthReason reason;
+    int in_view;
+    HealthJudge::Evidence evidence;
+    void (*alter)(TrackedFrame&);
+  };
+  const auto as_it_is = [](TrackedFrame&) {};
+  const Case cases[] = {
+      {HealthReason::few_tracks, 9, {}, as_it_is},
+      {HealthReason::few_tracks, kManyTracks, {.after_dark = true}, as_it_is},
+      {HealthReason::no_tracks, 0, {}, as_it_is},
+      {HealthReason::no_images, 0, {}, [](TrackedFrame& f) { f.has_left = f.has_right = false; }},
+      {HealthReason::imu_gap, kManyTracks, {}, [](TrackedFrame& f) { f.imu = {}; }},
+      {HealthReason::imu_gap, kManyTracks, {}, [](TrackedFrame& f) { f.imu.longest_gap = Duration::from_seconds(0.06); }},
+      {HealthReason::imu_gap, kManyTracks, {.after_gap = true}, as_it_is},
+      {HealthReason::one_camera, kManyTracks, {}, [](TrackedFrame& f) { f.has_right = false; }},
+      {HealthReason::frontend_fault, kManyTracks, {.broken_features = 1}, as_it_is},
+      {HealthReason::solver_failed, kManyTracks, {.failed_solves = 1}, as_it_is},
+      {HealthReason::contradiction, kManyTracks, {.contradiction = true}, as_it_is},
+      {HealthReason::cameras_disagree, kManyTracks, {.one_camera_wrong = true}, as_it_is},
+      {HealthReason::imu_clipped, kManyTracks, {.clipped = true}, as_it_is},
+      {HealthReason::imu_vibration, kManyTracks, {.gyro_vibration_radps = 0.35}, as_it_is},
+  };
+  for (const Case& c : cases) {
+    HealthJudge judge{EstimatorOptions{}};
+    judge.start();
+    for (int k = 0; k < 30; ++k) {
+      const bool wrong = k >= 10 && k < 15;
+      TrackedFrame frame = frame_at(0.05 * k);
+      if (wrong) c.alter(frame);
+      const Health health =
+          wrong ? judge.judge(frame, NavState<G>{}, c.in_view, c.evidence) : judge.judge(frame, NavState<G>{}, kManyTracks, {});
+      judge.pass(frame);
+      if (k == 15) continue;  // the first image after a gap is told as one
+      EXPECT_EQ(health, wrong ? degraded(c.reason) : good()) << to_string(c.reason) << " " << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace fbvins

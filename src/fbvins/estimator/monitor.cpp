@@ -28,6 +28,11 @@ constexpr double kContradiction = 1, kMost = 2;
 /// What all that a camera sees is off by, in one direction, added up with this memory: up to 2.3 where all is well. A gyroscope's
 /// axes may be off by this share of the turn.
 constexpr double kDrift_sigma = 4, kDrift_s = 0.5, kScale = 0.005;
+/// A smaller drift that lasts: cumulative sum (CUSUM) of (drift / usual - 1) over time, s. Usual is this much, and this part of
+/// what the axes explain, twice their standard deviation (W23).
+constexpr double kLasting_sigma = 1.5, kLastingScale = 0.4, kLasting_s = 0.5;
+/// What is left of a sudden drift does not last: it is forgotten after this time.
+constexpr double kForgotten_s = 1;
 /// The other camera, where only one drifts. A camera that was excluded for drift alone is used again after this time: the
 /// landmarks triangulated without it may be what is wrong.
 constexpr double kOther = 0.5, kReadmitted_s = 1;
@@ -117,7 +122,7 @@ void Monitor::blind(Duration dt) {
 }
 
 /// `shift`: of the residuals, left and right.
-void Monitor::add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt) {
+void Monitor::add_drift(const Vec2 shift[2], double focal, const Quat& predicted, double patience, Duration dt) {
   const double kept = std::exp(-dt.seconds() / kDrift_s);
   for (int c = 0; c < 2; ++c) {
     drift_[c] = kept * drift_[c] + shift[c];
@@ -125,6 +130,11 @@ void Monitor::add_drift(const Vec2 shift[2], double focal, const Quat& predicted
   }
   turned_sigma_ = kept * turned_sigma_ + kScale * focal * predicted.angularDistance(predicted_);
   predicted_ = predicted;
+  const double drift = std::max(drift_[0].norm(), drift_[1].norm()) / patience;
+  since_sudden_s_ = drift > kDrift_sigma + turned_sigma_ ? 0 : since_sudden_s_ + dt.seconds();
+  if (since_sudden_s_ < kForgotten_s) return;
+  const double more = drift / (kLasting_sigma + kLastingScale * turned_sigma_) - 1;
+  lasting_s_ = std::clamp(lasting_s_ + dt.seconds() * std::min(more, 1.0), 0.0, kLasting_s);
 }
 
 void Monitor::doubt_tilt() {
@@ -176,12 +186,14 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   const CameraGeometry cameras(calibration);
   const Medians at_prediction = medians(sightings, cameras, predicted);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
-  add_drift(at_prediction.shift, at_prediction.focal, predicted.q, dt);
+  add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const double drift = patience * (kDrift_sigma + turned_sigma_), left = drift_[0].norm() / drift,
                right = drift_[1].norm() / drift;
-  const bool drifting = std::max(left, right) > 1;
+  const bool drifting = std::max(left, right) > 1 || lasting_s_ >= kLasting_s;
   if (excess < 0 && !drifting) {
     evidence_ = std::max(0.0, evidence_ + excess);
+    unexplained_s_ = std::max(0.0, unexplained_s_ - dt.seconds());
+    unexplained_ = unexplained_ && unexplained_s_ > 0;
     pass(dt);
     return out;
   }
@@ -193,6 +205,8 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   const bool explained = seen.inliers >= kAgreeing * static_cast<double>(sightings.size()) &&
                          (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
   if (!explained && !one_camera_fits) {
+    unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
+    unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
     blind(dt);
     return out;
   }
@@ -204,7 +218,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   if (one_camera_fits) {
     excluded_s_ = excess < 0 ? excluded_s_ + dt.seconds() : 0;
     if (excluded_s_ > kReadmitted_s) {
-      excluded_s_ = evidence_ = 0;
+      excluded_s_ = evidence_ = lasting_s_ = 0;
       drift_[0].setZero(), drift_[1].setZero();
       pass(dt);
       return out;

@@ -47,8 +47,9 @@ class Monitor {
   /// After each solve: the biases are where a wrong tilt shows, and faults of the IMU that begin without a contradiction.
   void take(const Biases& biases);
 
-  /// A contradiction was seen within the last half second, or gravity has not confirmed the attitude since.
-  bool contradicted() const { return contradicted_ || tilt_doubted_; }
+  /// A contradiction was seen within the last half second, or nothing explains the images, or gravity has not confirmed the
+  /// attitude since.
+  bool contradicted() const { return contradicted_ || tilt_doubted_ || unexplained_; }
   /// The images are right against the readings, as far as is known.
   bool follows_images() const { return contradicted_; }
   /// A contradiction is over that leaves too large a doubt about position and heading for a pose called good. True once.
@@ -68,7 +69,7 @@ class Monitor {
 
  private:
   void blind(Duration dt);
-  void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, Duration dt);
+  void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, double patience, Duration dt);
   void doubt_tilt(const Biases& before);
   Mat3 turns() const { return turns_G_ + turn_G_ * turn_G_.transpose(); }
   void take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G);
@@ -78,9 +79,13 @@ class Monitor {
   double excluded_s_ = 0;                         ///< for how long one camera has been excluded for drift alone
   Vec2 drift_[2] = {Vec2::Zero(), Vec2::Zero()};  ///< left, right: of all that is seen, added up
   double turned_sigma_ = 0;                       ///< by which it may be
+  double lasting_s_ = 0;                          ///< cumulative sum of what it is more than usual
+  double since_sudden_s_ = 1e9;                   ///< since a drift that was a contradiction at once
   Quat predicted_ = Quat::Identity();
   double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare
+  double unexplained_s_ = 0;         ///< for how long images were in contradiction with everything, less those that agreed since
+  bool unexplained_ = false;
   bool contradicted_ = false, tilt_doubted_ = false, hopeless_ = false;
   Vec3 turn_G_ = Vec3::Zero(), shift_G_ = Vec3::Zero();    ///< seen minus predicted, added up
   Mat3 turns_G_ = Mat3::Zero(), shifts_G_ = Mat3::Zero();  ///< their squares, added up

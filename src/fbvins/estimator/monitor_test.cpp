@@ -66,7 +66,7 @@ TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
   Scene scene;
   Monitor monitor(assumed(), false);
   for (int k = 0; k < 100; ++k) {
-    const Monitor::Verdict verdict = monitor.examine(scene.seen({}), scene.calibration, turned(5e-4), kStep);
+    const Monitor::Verdict verdict = monitor.examine(scene.seen({}), scene.calibration, turned(2e-4), kStep);
     EXPECT_FALSE(verdict.imu_contradicts || verdict.left_wrong || verdict.right_wrong);
   }
   EXPECT_FALSE(monitor.contradicted());
@@ -134,6 +134,28 @@ TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
   }
   EXPECT_GE(excluded, 40);
   EXPECT_GE(used_again, 5) << "long enough for the window to correct its landmarks";
+}
+
+TEST(Monitor, ASmallDriftThatLastsIsAContradiction) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  int until = 0;
+  // Of 0.014 rad/s: 3.3 standard deviations are added up, less than a contradiction at once needs.
+  while (until < 100 && !monitor.examine(scene.seen(turned(7e-4)), scene.calibration, {}, kStep).imu_contradicts) ++until;
+  EXPECT_GT(until, 10);
+  EXPECT_LT(until, 60);
+}
+
+TEST(Monitor, WhereNothingExplainsTheImagesThePoseIsNotGood) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  for (int k = 0; k < 10; ++k) {  // half of the points move, and the cameras contradict each other
+    (void)monitor.examine(scene.seen(turned(0.03), turned(-0.03), 40, turned(0.1)), scene.calibration, {}, kStep);
+    if (k > 3) EXPECT_TRUE(monitor.contradicted()) << k;
+  }
+  EXPECT_FALSE(monitor.follows_images());
+  for (int k = 0; k < 20; ++k) (void)monitor.examine(scene.seen({}), scene.calibration, {}, kStep);
+  EXPECT_FALSE(monitor.contradicted());
 }
 
 TEST(Monitor, ALargeMovingThingIsNoContradiction) {

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/carried_up.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "fbvins/core/angle.hpp"
+#include "fbvins/imu/propagation.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kGap_s = 0.05;
+/// A fault has to be older than this to have spoiled what is carried on.
+constexpr double kBefore_s = 2;
+constexpr double kRemembered_s = 30;
+/// No pose is good whose tilt is off by more; and by so many standard deviations of what is carried on.
+constexpr double kTilt_rad = 3 * kDegree, kTilt_sigma = 2;
+
+Vec3 carried(const Vec3& up_B, const ImuSegment& readings, const Vec3& gyro_bias_radps) {
+  return integrate_gyro(readings, gyro_bias_radps).conjugate() * up_B;
+}
+
+}  // namespace
+
+void CarriedUp::carry(Time t, const ImuSegment& readings) {
+  now_ = t;
+  if (readings.empty() || readings.longest_gap.seconds() > kGap_s) return forget();
+  if (before_) before_->up_B = carried(before_->up_B, readings, before_->gyro_bias_radps);
+  if (before_ && (t - since_).seconds() > kRemembered_s) before_.reset();
+  if (!recent_.empty() && (t - recent_.front().t).seconds() > kRemembered_s) recent_.clear();
+  recent_.push_back({t, readings, {}});
+}
+
+void CarriedUp::take(const Known& known) {
+  if (recent_.empty()) return;
+  recent_.back().known = known;
+  auto first = std::find_if(recent_.begin(), recent_.end(), [](const Entry& e) { return e.known.has_value(); });
+  for (auto e = first; e != recent_.end() && (now_ - e->t).seconds() >= kBefore_s; ++e)
+    if (e->known) first = e;
+  recent_.erase(recent_.begin(), first);
+  if ((now_ - recent_.front().t).seconds() >= kBefore_s) before_.reset();  // confirmed
+}
+
+void CarriedUp::restart() {
+  if (!recent_.empty() && recent_.front().known) {
+    before_ = recent_.front().known, since_ = recent_.front().t;
+    for (auto e = std::next(recent_.begin()); e != recent_.end(); ++e)
+      before_->up_B = carried(before_->up_B, e->readings, before_->gyro_bias_radps);
+  }
+  recent_.clear();
+}
+
+std::optional<Vec3> CarriedUp::contradiction(const Vec3& up_B, const Vec3& gyro_bias_radps) const {
+  if (!before_) return std::nullopt;
+  const double dt_s = (now_ - since_).seconds();
+  const double sigma_rad =
+      Vec3(before_->sigma_rad, before_->gyro_sigma_radps * dt_s, (gyro_bias_radps - before_->gyro_bias_radps).norm() * dt_s)
+          .norm();
+  const Vec3 turn = so3_log(Quat::FromTwoVectors(up_B, before_->up_B));
+  if (turn.norm() <= kTilt_rad + kTilt_sigma * sigma_rad) return std::nullopt;
+  return turn;
+}
+
+}  // namespace fbvins

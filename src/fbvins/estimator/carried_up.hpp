@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The direction up, through a restart: as the window knew it two seconds before its last good pose, carried on by the gyroscope.
+// A start takes the tilt from the accelerometer, and where that is what failed, this is what contradicts it
+// (docs/derivations/integrity.md, I14a).
+//
+//   up.carry(frame.t, frame.imu);                 every frame
+//   up.take(frame.t, {...});                      after a good pose
+//   up.restart();                                 the window is gone
+//   if (up.contradiction(up_B, gyro_bias)) ...    of the new one
+//
+// One owner, one thread.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "fbvins/types/imu.hpp"
+
+namespace fbvins {
+
+class CarriedUp {
+ public:
+  struct Known {
+    Vec3 up_B = Vec3::UnitZ();
+    double sigma_rad = 0;
+    Vec3 gyro_bias_radps = Vec3::Zero();
+    double gyro_sigma_radps = 0;
+  };
+
+  /// Readings since the frame before. With a hole in them nothing is known any more.
+  void carry(Time t, const ImuSegment& readings);
+  void take(const Known& known);
+  void restart();
+  /// The gyroscope cannot be relied on.
+  void forget() { *this = {}; }
+  /// The rotation vector in B from the up of the new window to the one carried on, where they contradict each other.
+  /// `gyro_bias_radps`: of the new window; a gyroscope whose bias has moved carries nothing far.
+  std::optional<Vec3> contradiction(const Vec3& up_B, const Vec3& gyro_bias_radps) const;
+
+ private:
+  struct Entry {
+    Time t;
+    ImuSegment readings;  ///< that end there
+    std::optional<Known> known;
+  };
+  std::deque<Entry> recent_;  ///< begins with a known one
+  std::optional<Known> before_;
+  Time since_, now_;  ///< of `before_`, and until when it was carried
+};
+
+}  // namespace fbvins

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/carried_up.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fbvins/core/angle.hpp"
+
+namespace fbvins {
+namespace {
+
+const Vec3 kRate(0.5, -0.2, 0.3), kBias(0.01, 0.02, -0.01);
+
+/// A vehicle that turns steadily, whose window is good until `good_s`.
+class Turning {
+ public:
+  CarriedUp up;
+  Vec3 truth() const { return so3_exp(t_s_ * kRate).conjugate() * Vec3::UnitZ(); }
+  void fly(double seconds, bool good, const Vec3& tilted = Vec3::Zero()) {
+    for (const double end = t_s_ + seconds; t_s_ < end - 1e-6;) {
+      ImuSegment readings;
+      for (int i = 0; i <= 10; ++i)
+        readings.samples.push_back({Time{} + Duration::from_seconds(t_s_ + 0.005 * i), kRate + kBias, Vec3::Zero()});
+      readings.longest_gap = Duration::from_seconds(0.005);
+      t_s_ += 0.05;
+      up.carry(Time{} + Duration::from_seconds(t_s_), readings);
+      if (good) up.take({so3_exp(tilted) * truth(), 0.003, kBias, 0.001});
+    }
+  }
+
+ private:
+  double t_s_ = 0;
+};
+
+TEST(CarriedUp, ContradictsAStartWithAnotherTilt) {
+  Turning vehicle;
+  vehicle.fly(5, true);
+  vehicle.fly(0.5, false);
+  vehicle.up.restart();
+  vehicle.fly(1, false);
+  EXPECT_FALSE(vehicle.up.contradiction(so3_exp(Vec3(2 * kDegree, 0, 0)) * vehicle.truth(), kBias));
+  const auto away = vehicle.up.contradiction(so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth(), kBias);
+  ASSERT_TRUE(away);
+  EXPECT_LT(away->norm(), 8.1 * kDegree);
+  EXPECT_LT((so3_exp(*away) * (so3_exp(Vec3(8 * kDegree, 0, 0)) * vehicle.truth()) - vehicle.truth()).norm(), 0.002);
+}
+
+TEST(CarriedUp, IsFromTwoSecondsBeforeTheEndOfTheGoodPoses) {
+  Turning vehicle;
+  vehicle.fly(5, true);
+  vehicle.fly(1.5, true, Vec3(6 * kDegree, 0, 0));  // what failed had already spoiled the tilt
+  vehicle.up.restart();
+  vehicle.fly(0.5, false);
+  EXPECT_FALSE(vehicle.up.contradiction(vehicle.truth(), kBias));
+}
+
+TEST(CarriedUp, SaysNothingWhereTheGyroscopeCannotCarryIt) {
+  const auto other = [](const Turning& vehicle) { return so3_exp(Vec3(12 * kDegree, 0, 0)) * vehicle.truth(); };
+  Turning vehicle;
+  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias));  // the first start
+  vehicle.fly(5, true);
+  vehicle.up.restart();
+  vehicle.fly(1, false);
+  ASSERT_TRUE(vehicle.up.contradiction(other(vehicle), kBias));
+  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias + Vec3(0, 0, 0.05)));  // its bias has moved
+  Turning later = vehicle;
+  later.fly(30, false);
+  EXPECT_FALSE(later.up.contradiction(other(later), kBias));
+  vehicle.up.carry(Time{} + Duration::from_seconds(7), {});  // readings are missing
+  EXPECT_FALSE(vehicle.up.contradiction(other(vehicle), kBias));
+}
+
+TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPoses) {
+  Turning vehicle;
+  vehicle.fly(5, true);
+  vehicle.up.restart();
+  vehicle.fly(0.5, false);
+  vehicle.fly(2.2, true);
+  EXPECT_FALSE(vehicle.up.contradiction(-vehicle.truth(), kBias));
+}
+
+}  // namespace
+}  // namespace fbvins
