@@ -11,6 +11,7 @@
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/geometry/so3.hpp"
+#include "fbvins/imu/alignment.hpp"
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/imu/static_initialiser.hpp"
 #include "fbvins/optim/robust_loss.hpp"
@@ -31,9 +32,8 @@ constexpr int kRotationIterations = 8, kGravityIterations = 4, kDepthIterations 
 constexpr double kFirstDepth_m = 3;
 constexpr double kHuberSigma = 2;
 /// What the solution has to be: share of the points in front of the camera, residuals in standard deviations, way
-/// of the camera as a share of the typical depth, scale, biases.
-constexpr double kInFront = 0.9, kMaxRms_sigma = 3, kLeastParallax_rad = 0.03, kMaxScaleSigma = 0.15, kMaxGyroBias_radps = 0.25,
-                 kMaxAccelBias_mps2 = 1;
+/// of the camera as a share of the typical depth, scale.
+constexpr double kInFront = 0.9, kMaxRms_sigma = 3, kLeastParallax = 0.03, kMaxScaleSigma = 0.15;
 
 /// Directions of one track in the frames that see it, in the body's axes there.
 struct Sight {
@@ -302,11 +302,15 @@ double scale_sigma_of(const Vec3& velocity, const Mat3& covariance) {
 std::optional<std::vector<NavState<G>>> start_with_one_camera(std::span<const TrackedFrame> frames, const Pose<B, C0>& T_BC,
                                                               const ImuNoise& noise, const ImuBiasEstimate& biases,
                                                               double gravity_mps2) {
+  const AlignmentOptions limits;
+  if (std::ranges::any_of(frames.subspan(1),
+                          [&](const TrackedFrame& f) { return f.imu.longest_gap.seconds() > limits.max_gap_s; }))
+    return std::nullopt;
   const std::vector<Track> tracks = tracks_of(frames, T_BC.R());
   if (tracks.size() < kFewestTracks) return std::nullopt;
   ImuBias bias = biases.bias;
   bias.gyro_radps = gyro_bias(pairs_of(tracks, frames.size()), integrated(frames, noise, bias), biases);
-  if (bias.gyro_radps.norm() > kMaxGyroBias_radps) return std::nullopt;
+  if (bias.gyro_radps.norm() > limits.max_gyro_bias_radps) return std::nullopt;
   const std::vector<Integrated> motion = integrated(frames, noise, bias);
 
   std::vector<std::vector<double>> depths;
@@ -323,8 +327,8 @@ std::optional<std::vector<NavState<G>>> start_with_one_camera(std::span<const Tr
     if (in_front < 0.5) return std::nullopt;
   }
   const double rms = std::sqrt(std::max(0.0, solved.cost) / std::max(1, problem.rows));
-  if (in_front < kInFront || rms > kMaxRms_sigma || solved.x.tail<3>().norm() > kMaxAccelBias_mps2) return std::nullopt;
-  if (parallax(motion, T_BC.p, solved.x, depths) < kLeastParallax_rad) return std::nullopt;
+  if (in_front < kInFront || rms > kMaxRms_sigma || solved.x.tail<3>().norm() > limits.max_accel_bias_mps2) return std::nullopt;
+  if (parallax(motion, T_BC.p, solved.x, depths) < kLeastParallax) return std::nullopt;
   const Vec3 v_last = solved.x.head<3>() + motion.back().t_s * solved.x.segment<3>(3) + motion.back().v;
   const double speed = std::max(solved.x.head<3>().norm(), v_last.norm());
   const Mat3 covariance = std::max(1.0, rms * rms) * solved.velocity_covariance;
