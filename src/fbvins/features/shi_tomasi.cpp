@@ -193,7 +193,7 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   accept(others_, existing, distance_px, wanted);
 }
 
-const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) {
+const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) & {
   corners_.clear();
   if (wanted <= 0 || pyramid.empty()) return corners_;
   const PyramidLevel& image = pyramid.level(0);

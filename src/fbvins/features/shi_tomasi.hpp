@@ -36,8 +36,8 @@ class ShiTomasiDetector {
   /// At most `wanted` new corners of level 0: first the best of each empty cell, then their next best, then
   /// what occupied cells have beside. None is nearer than min_distance_px (two thirds of it for the last
   /// kind) to another or to `existing`. Looks into a limited number of cells, in turn from call to call.
-  /// Valid until the next call.
-  const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted);
+  /// Valid until the next call, so a detector that ends with the expression cannot be asked.
+  const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) &;
   /// The noise estimate of the last detect(), grey values.
   double noise() const { return noise_; }
 

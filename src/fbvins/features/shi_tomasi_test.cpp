@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <utility>
 
 #include "fbvins/features/noise_texture.hpp"
 
@@ -12,6 +13,13 @@ namespace {
 
 constexpr double kMinDistance_px = 22;
 constexpr auto kIdentity = [](const Vec2& p) { return p; };
+
+template <class Detector>
+concept Detects = requires(Detector&& detector, const Pyramid& pyramid) {
+  std::forward<Detector>(detector).detect(pyramid, {}, 1);
+};
+static_assert(Detects<ShiTomasiDetector&> && !Detects<ShiTomasiDetector>,
+              "the corners are the detector's, which has to live longer");
 
 TEST(ShiTomasi, FillsTheImageAndKeepsCornersApart) {
   const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);

@@ -20,7 +20,8 @@ struct Scene {
 
   Scene() {
     take(wall.render(0, 1));
-    for (const Corner& corner : ShiTomasiDetector(22).detect(images.left(), {}, 20))
+    ShiTomasiDetector detector(22);
+    for (const Corner& corner : detector.detect(images.left(), {}, 20))
       if ((corner.px - Vec2(120, 90)).norm() < (track.px - Vec2(120, 90)).norm()) track.px = corner.px;
     track.normalised = wall.camera.undistort(track.px).value();
     track.inverse_depth = 1 / TestWall::kDepth_m;
