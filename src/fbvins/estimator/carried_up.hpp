@@ -4,7 +4,7 @@
 // (docs/derivations/integrity.md, I14a).
 //
 //   up.carry(frame.t, frame.imu);                 every frame
-//   up.take(frame.t, {...});                      after a good pose
+//   up.take({...});                               after a good pose
 //   up.restart();                                 the window is gone
 //   if (up.contradiction(up_B, gyro_bias)) ...    of the new one
 //

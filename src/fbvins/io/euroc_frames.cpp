@@ -48,8 +48,8 @@ class EurocLoader : public FrameLoader {
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& file, const std::string& folder, const Camera& camera, ImageCounts& counts,
-                                          std::string& problem) const {
+  std::shared_ptr<const Image> load_image(const std::string& file, const std::string& folder, const Camera& camera,
+                                          ImageCounts& counts, std::string& problem) const {
     if (file.empty()) return nullptr;
     const std::string path = root_ + folder + file;
     const auto blame = [&](const std::string& sentence) {
@@ -151,8 +151,8 @@ Intervals measure_intervals(const std::vector<Time>& increasing) {
   return out;
 }
 
-std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const std::string& left_folder,
-                                               const StereoRig& rig) {
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
+                                               const std::string& left_folder, const StereoRig& rig) {
   return std::make_unique<EurocLoader>(std::move(files), std::move(root), left_folder, rig);
 }
 

@@ -41,7 +41,7 @@ struct Intervals {
 Intervals measure_intervals(const std::vector<Time>& increasing);
 
 /// `left_folder`: cam0, or cam1 where that is the only camera.
-std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root, const std::string& left_folder,
-                                               const StereoRig& rig);
+std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
+                                               const std::string& left_folder, const StereoRig& rig);
 
 }  // namespace fbvins
