@@ -76,6 +76,7 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   }
   rig.image_rate_hz = o.image_rate_hz;
   rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
+  rig.line_delay_s = o.camera.line_delay_us * 1e-6;
   return rig;
 }
 

@@ -13,6 +13,9 @@ Error malformed(std::string_view origin, const std::string& what) {
   return {ErrorCode::malformed, fmt::format("{}: {}", origin, what)};
 }
 
+/// Slower than any shutter that is sold: a unit other than seconds.
+constexpr double kLongestLineDelay_s = 1e-3;
+
 bool positive(double x) { return x > 0 && std::isfinite(x); }
 
 template <class C>
@@ -64,6 +67,8 @@ Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
     return malformed(origin, fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
   if (!positive(rig.image_rate_hz) || !std::isfinite(rig.time_offset_s))
     return malformed(origin, "the images' rate is not positive, or the time offset is not finite");
+  if (!(std::abs(rig.line_delay_s) <= kLongestLineDelay_s))
+    return malformed(origin, fmt::format("the line delay is {} s, more than {} s a row", rig.line_delay_s, kLongestLineDelay_s));
   return check_imu(rig.imu_noise, origin);
 }
 

@@ -9,7 +9,9 @@
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/landmark_geometry.hpp"
 #include "fbvins/estimator/mono_start.hpp"
+#include "fbvins/estimator/rolling_shutter.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/types/protection.hpp"
@@ -54,6 +56,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       scale_sigma_(scale_sigma(rig.T_BC0, rig.T_BC1)),
       one_camera_(!rig.has_right()),
+      shutter_{rig.line_delay_s, rig.left.height(), rig.right.height()},
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, one_camera_),
@@ -75,7 +78,9 @@ Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gra
 
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
-  const TrackedFrame& frame = contract_.enforced(tracked);
+  const TrackedFrame& whole = contract_.enforced(tracked);
+  if (!shutter_.global()) at_stamp_ = at_stamp(whole);
+  const TrackedFrame& frame = shutter_.global() ? whole : at_stamp_;
   const Duration rest = rest_.update(frame);
   carried_up_.carry(frame.t, frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
@@ -166,6 +171,27 @@ void Estimator::open_window(const InitialSolution& start) {
   frames_with_readings_ = kFramesAfterGap;
   up_sigma_rad_ = 0;
   covariances_.reset();
+}
+
+/// All that follows sees the observations of a rolling shutter as at the image's stamp (S1-S4).
+TrackedFrame Estimator::at_stamp(const TrackedFrame& frame) const {
+  TrackedFrame out = frame;
+  if (!running_) {
+    shutter_.bring_to_stamp(turning_at_end(frame.imu, Vec3::Zero()), calibration_, nullptr, out.features);
+    return out;
+  }
+  const NavState<G> state = predict(frame, frame.imu).state;
+  ShutterMotion motion = turning_at_end(frame.imu, state.bias.gyro_radps);
+  motion.v_B = state.T_FB.q.conjugate() * state.v_FB;
+  const InverseDepth known = [&](const TrackedFeature& feature, bool right) -> std::optional<double> {
+    const std::vector<PointSighting> seen = sightings_of(window_, {feature}, calibration_);
+    if (seen.empty()) return std::nullopt;
+    const Pose<G, C0> T_GC = state.T_FB * ray_camera(calibration_, right);
+    const double depth_m = (T_GC.inverse() * seen.front().p_G).z();
+    return depth_m > kNearestLandmark_m ? std::optional(1 / depth_m) : std::nullopt;
+  };
+  shutter_.bring_to_stamp(motion, calibration_, &known, out.features);
+  return out;
 }
 
 Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) const {

@@ -19,6 +19,7 @@
 #include "fbvins/estimator/monitor.hpp"
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
+#include "fbvins/estimator/rolling_shutter.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/reading_noise.hpp"
@@ -55,6 +56,7 @@ class Estimator {
   void initialise(const TrackedFrame& frame, Duration rest, Estimate& out);
   void open_window(const InitialSolution& start);
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
+  TrackedFrame at_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
   std::vector<TrackedFeature> examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
@@ -85,6 +87,8 @@ class Estimator {
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
   double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
   bool one_camera_;                       ///< the rig has one only
+  RollingShutter shutter_;
+  TrackedFrame at_stamp_;  ///< the newest frame of a rolling shutter
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;

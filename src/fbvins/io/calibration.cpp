@@ -11,6 +11,7 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml) {
   sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients");
   sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
   if (yaml.has(yaml.root(), "timeshift_cam_imu")) sensor.time_offset_s = yaml.number(yaml.root(), "timeshift_cam_imu");
+  if (yaml.has(yaml.root(), "line_delay_us")) sensor.line_delay_s = 1e-6 * yaml.number(yaml.root(), "line_delay_us");
   if (!yaml.ok()) return yaml.error();
   Result<Pose<B, B>> mounting = parse_euroc_mounting(std::move(yaml));
   if (!mounting) return mounting.error();
@@ -47,6 +48,7 @@ Result<StereoRig> join_euroc(const CameraSensor& left, const std::optional<Camer
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
   rig.time_offset_s = left.time_offset_s;
+  rig.line_delay_s = left.line_delay_s;
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }

@@ -18,6 +18,7 @@ struct CameraSensor {
   Pose<B, C0> T_BS;
   double rate_hz = 20;
   double time_offset_s = 0;  ///< timeshift_cam_imu, Kalibr's name: EuRoC has none, recordings of `fbvins convert` do
+  double line_delay_s = 0;   ///< line_delay_us of a rolling shutter
 };
 
 /// EuRoC imu0/sensor.yaml.

@@ -40,13 +40,14 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
 std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, const StereoRig& rig, const std::string& origin) {
   const KalibrCamera c = kalibr_camera(camera);
   const std::string offset = rig.time_offset_s == 0 ? "" : fmt::format("timeshift_cam_imu: {}\n", rig.time_offset_s);
+  const std::string rolling = rig.line_delay_s == 0 ? "" : fmt::format("line_delay_us: {}\n", 1e6 * rig.line_delay_s);
   return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(q, p) +
          fmt::format(
              "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
              "distortion_coefficients: [{}]\n",
              rig.image_rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
              c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", ")) +
-         offset;
+         offset + rolling;
 }
 
 std::string imu_yaml(const ImuNoise& n, const std::string& origin) {

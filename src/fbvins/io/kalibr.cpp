@@ -48,6 +48,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
   if (two) rig.right = read_camera(yaml, cam1, "distortion_coeffs");
   if (two) rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
   rig.time_offset_s = read_time_offset_s(yaml, cam0, two ? cam1 : cam0);
+  if (yaml.has(cam0, "line_delay")) rig.line_delay_s = yaml.number(cam0, "line_delay");
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;
