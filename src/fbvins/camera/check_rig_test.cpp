@@ -46,6 +46,8 @@ TEST(CheckRig, RefusesWithASentence) {
       {[&](StereoRig& r) { r.T_BC0.p.x() = nan; }, "pose in the body"},
       {[](StereoRig& r) { r.T_BC0.q = Quat(2, 0, 0, 0); }, "no rotation"},
       {[&](StereoRig& r) { r.time_offset_s = nan; }, "time offset"},
+      {[&](StereoRig& r) { r.line_delay_s = nan; }, "line delay"},
+      {[&](StereoRig& r) { r.line_delay_s = 40; }, "line delay"},
       {[](StereoRig& r) { r.image_rate_hz = 0; }, "images' rate"},
       {[](StereoRig& r) { r.imu_noise.gyro_noise_density_radps_rthz = 0; }, "gyroscope's noise density is 0, not positive"},
       {[](StereoRig& r) { r.imu_noise.accel_noise_density_mps2_rthz = -1; }, "accelerometer's noise density is -1, not positive"},

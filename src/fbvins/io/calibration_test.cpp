@@ -133,6 +133,20 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   EXPECT_EQ(load_kalibr("/nowhere/c.yaml").error().message, "/nowhere/c.yaml: no such file");
 }
 
+TEST(Calibration, LineDelayOfARollingShutter) {
+  const std::string cam0 = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse());
+  const std::string cam1 = "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());
+  const std::string delay = "  line_delay: 4e-05\n";
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", cam0 + cam1})->line_delay_s, 0);
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", cam0 + delay + cam1 + delay})->line_delay_s, 4e-5);
+  EXPECT_EQ(parse_kalibr_camchain({"c.yaml", cam0 + delay})->line_delay_s, 4e-5);
+  const auto one_alone = parse_kalibr_camchain({"c.yaml", cam0 + delay + cam1});
+  ASSERT_FALSE(one_alone);
+  EXPECT_NE(one_alone.error().message.find("line_delay: differs from cam0's"), std::string::npos) << one_alone.error().message;
+  EXPECT_FALSE(parse_kalibr_camchain({"c.yaml", cam0 + "  line_delay: 40\n"}));  // microseconds
+  EXPECT_DOUBLE_EQ(parse_euroc_camera({"cam0", euroc_camera(kLeft) + "line_delay_us: 40\n"})->line_delay_s, 4e-5);
+}
+
 TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
   const std::string flat =
       "accelerometer_noise_density: 0.01\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.005\n"

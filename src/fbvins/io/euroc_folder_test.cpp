@@ -45,6 +45,7 @@ TEST(EurocFolder, KeepsTimeOffsetAndRange) {
   const std::string folder = empty_folder("euroc_offset");
   StereoRig rig = small_rig();
   rig.time_offset_s = -0.0075;
+  rig.line_delay_s = 41.5e-6;
   rig.imu_noise.max_gyro_radps = 8.5;
   auto recording = EurocFolder::create(folder, rig, "made by hand");
   ASSERT_TRUE(recording) << recording.error().message;
@@ -56,6 +57,7 @@ TEST(EurocFolder, KeepsTimeOffsetAndRange) {
   const auto data = open_dataset(folder);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ((*data)->rig().time_offset_s, -0.0075);
+  EXPECT_DOUBLE_EQ((*data)->rig().line_delay_s, 41.5e-6);
   EXPECT_EQ((*data)->rig().imu_noise.max_gyro_radps, 8.5);
   ASSERT_EQ((*data)->ground_truth().size(), 1u);
   EXPECT_FALSE((*data)->ground_truth()[0].v_WB) << "a truth of poses alone has no velocity, also not one of zero";

@@ -33,6 +33,13 @@ double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::
   return left_s;
 }
 
+double read_line_delay_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& cam1) {
+  const auto read = [&](const YAML::Node& cam) { return yaml.has(cam, "line_delay") ? yaml.number(cam, "line_delay") : 0.0; };
+  const double left_s = read(cam0);
+  if (read(cam1) != left_s) yaml.complain(cam1, "line_delay", "differs from cam0's");
+  return left_s;
+}
+
 }  // namespace
 
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
@@ -48,7 +55,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
   if (two) rig.right = read_camera(yaml, cam1, "distortion_coeffs");
   if (two) rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
   rig.time_offset_s = read_time_offset_s(yaml, cam0, two ? cam1 : cam0);
-  if (yaml.has(cam0, "line_delay")) rig.line_delay_s = yaml.number(cam0, "line_delay");
+  rig.line_delay_s = read_line_delay_s(yaml, cam0, two ? cam1 : cam0);
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;

@@ -25,6 +25,7 @@ StereoRig awkward_rig(Rng& rng, bool fisheye) {
   rig.imu_noise = {1e-4 / 3, 2e-3 / 7, 2e-5 / 3, 3e-3 / 11, 200.0 / 3};
   rig.image_rate_hz = 20.0 / 3;
   rig.time_offset_s = odd() / 100;
+  rig.line_delay_s = odd() / 1e5;
   return rig;
 }
 
@@ -51,6 +52,7 @@ TEST(RigText, GivesBackTheSameBits) {
     EXPECT_TRUE(same(back->imu_noise, rig.imu_noise));
     EXPECT_EQ(back->image_rate_hz, rig.image_rate_hz);
     EXPECT_EQ(back->time_offset_s, rig.time_offset_s);
+    EXPECT_EQ(back->line_delay_s, rig.line_delay_s);
     EXPECT_EQ(back->left.max_normalised_radius(), rig.left.max_normalised_radius());
   }
 }
