@@ -27,7 +27,7 @@ struct RecordingArguments {
   std::string path, calibration, imu_calibration;
   std::vector<std::string> topics;     ///< left, right and, if it is not the only one, IMU
   double start_s = 0, duration_s = 0;  ///< DatasetOptions
-  std::string camera = "both";         ///< the same
+  std::string camera = "all";          ///< the same
 
   void add_to(CLI::App& command);
 };

@@ -19,7 +19,7 @@ void RecordingArguments::add_to(CLI::App& command) {
       ->delimiter(',')
       ->expected(2, 3);
   command.add_option("--camera", camera, "the cameras of a stereo recording that are used (default both)")
-      ->check(CLI::IsMember({"both", "left", "right"}));
+      ->check(CLI::IsMember({"all", "both", "left", "right"}));
   command.add_option("--start", start_s, "seconds to leave out at the start of the recording")->check(CLI::NonNegativeNumber);
   command.add_option("--duration", duration_s, "seconds to use from there, 0 for all")->check(CLI::NonNegativeNumber);
 }

@@ -20,6 +20,9 @@
 
 namespace fbvins {
 
+/// Cameras of a rig at most.
+inline constexpr int kMostCameras = 8;
+
 class Camera {
  public:
   Camera() = default;
@@ -63,11 +66,19 @@ class Camera {
   double max_radius_ = 0;
 };
 
-/// Two cameras and an IMU, rigidly joined; or one camera, which is `left` then, and `right` has no pixels.
+/// A camera and its place in the body.
+struct MountedCamera {
+  Camera camera;
+  Pose<B, C0> T_BC;  ///< C0 is this camera's own frame
+};
+
+/// Cameras and an IMU, rigidly joined. The cameras are numbered: 0 is `left`, 1 is `right`, those from 2 on are `more`. Which of
+/// them see the same things follows from geometry (camera_groups). With one camera `right` has no pixels, and there are no more.
 struct StereoRig {
   Camera left, right;
   Pose<B, C0> T_BC0;
   Pose<B, C1> T_BC1;
+  std::vector<MountedCamera> more;
   ImuNoise imu_noise;
   double image_rate_hz = 20;
   /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
@@ -77,15 +88,30 @@ struct StereoRig {
   double line_delay_s = 0;
 
   bool has_right() const { return right.width() > 0; }
+  int camera_count() const { return (has_right() ? 2 : 1) + static_cast<int>(more.size()); }
+  const Camera& camera(int i) const { return i == 0 ? left : i == 1 ? right : more[static_cast<std::size_t>(i - 2)].camera; }
+  Pose<B, C0> T_BC(int i) const {
+    return i == 0 ? T_BC0 : i == 1 ? T_BC1.cast_frames<B, C0>() : more[static_cast<std::size_t>(i - 2)].T_BC;
+  }
+  MountedCamera mounted(int i) const { return {camera(i), T_BC(i)}; }
   Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
 };
 
-/// The rig with its left camera alone, or its right one, which is the left one then.
-inline StereoRig with_one_camera(StereoRig rig, bool right_one = false) {
-  if (right_one) rig.left = rig.right, rig.T_BC0 = rig.T_BC1.cast_frames<B, C0>();
-  rig.right = {};
-  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+/// The rig with these cameras, one at least, in place of its own.
+inline StereoRig with_cameras(StereoRig rig, const std::vector<MountedCamera>& cameras) {
+  const MountedCamera &first = cameras.front(), &second = cameras.size() > 1 ? cameras[1] : MountedCamera{{}, first.T_BC};
+  rig.left = first.camera;
+  rig.T_BC0 = first.T_BC;
+  rig.right = second.camera;
+  rig.T_BC1 = second.T_BC.cast_frames<B, C1>();
+  rig.more.clear();
+  for (std::size_t i = 2; i < cameras.size(); ++i) rig.more.push_back(cameras[i]);
   return rig;
+}
+
+/// The rig with its left camera alone, or its right one, which is the left one then.
+inline StereoRig with_one_camera(const StereoRig& rig, bool right_one = false) {
+  return with_cameras(rig, {rig.mounted(right_one ? 1 : 0)});
 }
 
 }  // namespace fbvins

@@ -12,6 +12,7 @@
 // comes in the order in which it was recorded.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,7 +37,7 @@ struct DatasetOptions {
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
   std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
-  std::string camera = "both";        ///< or one of a recording's two: "left", "right"
+  std::string camera = "all";         ///< or the first two: "both", or one of these: "left", "right"
 
   /// Whether the recording's own calibration is replaced.
   bool brings_rig() const { return rig || !kalibr_camchain.empty(); }
@@ -52,22 +53,27 @@ struct DatasetOptions {
     v("require_imu", require_imu, "", "refuse recordings without IMU");
     v("kalibr_camchain", kalibr_camchain, "", "camchain-imucam.yaml that replaces the recording's calibration");
     v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces the recording's IMU noise");
-    v("camera", camera, "both|left|right", "the cameras of a stereo recording that are used");
+    v("camera", camera, "all|both|left|right", "the cameras that are used: all, the first two, or one of these");
   }
 };
 
 /// One stereo frame as listed, before its images are read.
 struct FrameEntry {
   Time t;
-  std::string left_file, right_file;           ///< names known to the loader; empty: no image; both empty: recorded without any
+  std::string left_file, right_file;           ///< names known to the loader; empty: no image; all empty: recorded without any
   std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; none: stamps decide
+  std::vector<std::string> more_files = {};    ///< of the cameras from number 2 on
+
+  bool without_images() const {
+    return left_file.empty() && right_file.empty() && std::ranges::all_of(more_files, &std::string::empty);
+  }
 };
 
 /// One stereo frame as read.
 struct LoadedFrame {
   StereoFrame frame;
-  ImageCounts left, right;  ///< what happened, 0 or 1 each
-  std::string problem;      ///< "file: sentence" about the first image that failed
+  ImageCounts left, right, more;  ///< what happened, 0 or 1 for each image
+  std::string problem;            ///< "file: sentence" about the first image that failed
 };
 
 /// Where a Dataset gets its images from. Called by one thread at a time, not always the same.

@@ -30,6 +30,7 @@ struct DatasetInfo {
   std::string name;    ///< last part of the path
   std::string format;  ///< "EuRoC folder", "EuRoC zip" or "MCAP flight record"
   CameraInfo left, right;
+  CameraInfo more;  ///< of the cameras from number 2 on together
   RowCounts imu_rows, ground_truth_rows;
   int frames = 0;  ///< frames that next() will deliver, less those found without any image
   int imu_samples = 0;
@@ -38,7 +39,7 @@ struct DatasetInfo {
   double image_rate_hz = 0, imu_rate_hz = 0;  ///< measured: one over the median interval
   Duration longest_image_gap, longest_imu_gap;
   Time longest_image_gap_start, longest_imu_gap_start;
-  int frames_without_image = 0;  ///< neither camera delivered: the frame is left out (counted once met)
+  int frames_without_image = 0;  ///< no camera delivered: the frame is left out (counted once met)
   std::vector<std::string> warnings;
 };
 

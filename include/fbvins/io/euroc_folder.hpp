@@ -19,16 +19,16 @@ namespace fbvins {
 
 class EurocFolder {
  public:
-  /// Makes folder/mav0/{cam0,cam1,imu0,state_groundtruth_estimate0} with the calibrations; the folder must not hold a mav0.
-  /// `origin`: a few words for the sensors' comments, without a colon. `depth`: frames bring depth images.
+  /// Makes folder/mav0/{cam0, ... for each camera, imu0, state_groundtruth_estimate0} with the calibrations; the folder must not
+  /// hold a mav0. `origin`: a few words for the sensors' comments, without a colon. `depth`: frames bring depth images.
   static Result<EurocFolder> create(const std::string& folder, const StereoRig& rig, const std::string& origin,
                                     bool depth = false);
   ~EurocFolder();
   EurocFolder(EurocFolder&&) noexcept;
   EurocFolder& operator=(EurocFolder&&) noexcept;
 
-  /// A camera without an image has no row. `depth_left_m`: row by row, 0 where nothing is; written as 16-bit PNG in millimetres
-  /// to depth0.
+  /// A camera without an image has no row. Cameras but the right one have the frame's stamp. `depth_left_m`: row by row, 0 where
+  /// nothing is; written as 16-bit PNG in millimetres to depth0.
   Result<void> add(StereoFrame frame, Time right_stamp, std::vector<float> depth_left_m = {});
   /// Writes readings and truth (zeros where it has no velocity or biases), and completes the recording. To be called once.
   Result<void> finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth);

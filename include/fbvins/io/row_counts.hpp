@@ -16,6 +16,12 @@ struct RowCounts {
   std::string first_bad;  ///< "file:line: sentence" about the first row left out
 
   int bad() const { return malformed + not_finite + duplicates + backwards; }
+  RowCounts& operator+=(const RowCounts& other) {
+    rows += other.rows, malformed += other.malformed, not_finite += other.not_finite;
+    duplicates += other.duplicates, backwards += other.backwards;
+    if (first_bad.empty()) first_bad = other.first_bad;
+    return *this;
+  }
 };
 
 }  // namespace fbvins

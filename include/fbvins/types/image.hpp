@@ -2,6 +2,7 @@
 // An 8-bit grey image, rows top to bottom. Immutable once shared.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -59,11 +60,22 @@ class Image {
   std::shared_ptr<const std::uint8_t> foreign_;
 };
 
-/// Two images taken at the same instant. A camera that delivered nothing has a null pointer.
+/// Images taken at the same instant, of the rig's cameras 0 (left), 1 (right) and from 2 on (more). A camera that delivered
+/// nothing has a null pointer, or is missing at the end of `more`.
 struct StereoFrame {
   Time t;
   std::shared_ptr<const Image> left;
   std::shared_ptr<const Image> right;
+  std::vector<std::shared_ptr<const Image>> more = {};
+
+  std::shared_ptr<const Image> image(int camera) const {
+    if (camera < 2) return camera == 0 ? left : right;
+    const auto at = static_cast<std::size_t>(camera - 2);
+    return at < more.size() ? more[at] : nullptr;
+  }
+  bool without_images() const {
+    return !left && !right && std::ranges::all_of(more, [](const auto& image) { return image == nullptr; });
+  }
 };
 
 }  // namespace fbvins

@@ -31,12 +31,21 @@ struct Observation {
   Mat2 sqrt_information = Mat2::Identity();
 };
 
-/// A feature in the newest frame, seen by at least one camera. Features keep their id as long as they are followed.
+/// The two cameras of a rig, by number, that a feature may be seen by: the left and the right one of its group.
+struct CameraPair {
+  std::int8_t left = 0, right = 1;
+  int operator[](bool of_right) const { return of_right ? right : left; }
+  bool has(int camera) const { return camera == left || camera == right; }
+};
+
+/// A feature in the newest frame, seen by at least one camera. Features keep their id, and their cameras, as long as they are
+/// followed.
 struct TrackedFeature {
   TrackId id;
   std::optional<Observation> left;   ///< absent while the left camera delivers no images
   std::optional<Observation> right;  ///< present when matched, or followed, in the right image
   int age_frames = 0;                ///< 0 when detected in this frame
+  CameraPair cameras = {};           ///< which ones left and right are
 };
 
 /// Matches of tracks by descriptor, and how many agree with the verified position of the track.
@@ -71,7 +80,8 @@ struct TrackedFrame {
   FrameId id;
   Time t;
   std::vector<TrackedFeature> features;
-  bool has_left = false, has_right = false;  ///< a usable image of that camera came
+  bool has_left = false, has_right = false;  ///< a usable image of camera 0, of camera 1 came
+  std::vector<bool> has_more = {};           ///< and of the cameras from 2 on
   ImuSegment imu;                            ///< since the frame before
   FrontendStats stats;
   StereoFrame images;  ///< null unless keyframes are wanted, which carry the images

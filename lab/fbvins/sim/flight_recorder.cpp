@@ -26,23 +26,15 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
       motion_(std::move(motion)),
       world_from_flight_(world_from_flight),
       world_(std::move(world)),
-      bake_(bake_light(*world_, options.world.ambient)),
-      left_{Renderer(rig.left, *world_),
-            ImageSensor(options.camera, rig.left, 1.0, static_cast<std::uint64_t>(options.seed) * 2),
-            rig.T_BC0,
-            rig.left.height(),
-            {},
-            {},
-            {},
-            false},
-      right_{Renderer(rig.right, *world_),
-             ImageSensor(options.camera, rig.right, options.camera.right_gain, static_cast<std::uint64_t>(options.seed) * 2 + 1),
-             rig.T_BC1.cast_frames<B, C0>(),
-             rig.right.height(),
-             {},
-             {},
-             {},
-             false} {}
+      bake_(bake_light(*world_, options.world.ambient)) {
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    const auto& [camera, T_BC] = rig.mounted(i);
+    const double gain = i == 1 ? options.camera.right_gain : 1.0;
+    const auto seed = static_cast<std::uint64_t>(options.seed) * 2 + (i < 2 ? 0 : 1'000'000) + static_cast<std::uint64_t>(i);
+    eyes_.push_back(
+        {Renderer(camera, *world_), ImageSensor(options.camera, camera, gain, seed), T_BC, camera.height(), {}, {}, {}, false});
+  }
+}
 
 /// Sums the radiance over an exposure that is centred at t.
 void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples) {
@@ -85,11 +77,17 @@ Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
 
 RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_depth) {
   RenderedFrame rendered;
-  rendered.exposure_s = left_.sensor.exposure_s();
-  auto right = std::async(std::launch::async, [&] { return render_eye(right_, t_s, frame); });
-  rendered.frame.left = std::make_shared<const Image>(render_eye(left_, t_s, frame));
-  if (with_depth) left_.renderer.depth(rendered.depth_left_m);
-  rendered.frame.right = std::make_shared<const Image>(right.get());
+  rendered.exposure_s = eyes_.front().sensor.exposure_s();
+  std::vector<std::future<Image>> others;
+  for (std::size_t i = 1; i < eyes_.size(); ++i)
+    others.push_back(std::async(std::launch::async, [this, i, t_s, frame] { return render_eye(eyes_[i], t_s, frame); }));
+  rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
+  if (with_depth) eyes_.front().renderer.depth(rendered.depth_left_m);
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    auto image = std::make_shared<const Image>(others[i].get());
+    if (i == 0) rendered.frame.right = std::move(image);
+    else rendered.frame.more.push_back(std::move(image));
+  }
   return rendered;
 }
 

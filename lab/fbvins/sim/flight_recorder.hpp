@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders the stereo frames of a flight, left and right on a thread each.
+// Renders the frames of a flight, each camera on a thread of its own.
 // One thread calls; frames in order.
 #pragma once
 
@@ -43,7 +43,7 @@ class FlightRecorder {
   Vec3 world_from_flight_;
   std::shared_ptr<const World> world_;
   LightBake bake_;
-  Eye left_, right_;
+  std::vector<Eye> eyes_;  // of the rig's cameras, in order
 };
 
 }  // namespace fbvins

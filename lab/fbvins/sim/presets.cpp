@@ -80,6 +80,7 @@ constexpr Preset kPresets[] = {
        o.flight.extent_z_m = 2.5;
        o.flight.max_speed_mps = 1.5;
      }},
+    {"quad", [](SimulationOptions& o) { o.rig = "quad"; }},
 };
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/kalibr.hpp"
@@ -48,6 +50,15 @@ std::vector<Vec3> path_of(const SplineTrajectory& flight) {
   return path;
 }
 
+/// Adds cameras like these of the rig, turned about the vertical of an upright rig, which is the left camera's -y, through a
+/// point 5 cm behind it.
+void add_turned(StereoRig& rig, double degrees, std::initializer_list<int> cameras) {
+  const Vec3 axis = -(rig.T_BC0.q * Vec3::UnitY()), through = rig.T_BC0 * Vec3(0, 0, -0.05);
+  const Quat turn(Eigen::AngleAxisd(degrees * kDegree, axis));
+  const Pose<B, B> turned(turn, Vec3(through - turn * through));
+  for (const int i : cameras) rig.more.push_back({rig.camera(i), turned * rig.T_BC(i)});
+}
+
 /// Renders frames for a Dataset.
 class RenderingLoader : public FrameLoader {
  public:
@@ -74,6 +85,8 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
     if (!loaded) return loaded.error();
     rig = *loaded;
   }
+  if (o.rig == "quad") add_turned(rig, 180, {0, 1});
+  if (o.rig == "sides") add_turned(rig, 90, {0}), add_turned(rig, -90, {0});
   rig.image_rate_hz = o.image_rate_hz;
   rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
   rig.line_delay_s = o.camera.line_delay_us * 1e-6;
@@ -153,7 +166,9 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   contents.rig = simulation.rig;
   contents.imu = simulation.imu.samples;
   for (const TrueState& s : simulation.imu.truth) contents.ground_truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
-  for (Time t : simulation.frames) contents.frames.push_back({t - offset, "left", "right"});
+  for (Time t : simulation.frames)
+    contents.frames.push_back(
+        {t - offset, "left", "right", std::nullopt, std::vector<std::string>(simulation.rig.more.size(), "more")});
   DatasetInfo& info = contents.info;
   info.name = name;
   info.format = "simulation";

@@ -73,7 +73,7 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   if (!left) return left.error();
   if (!right) return right.error();
   if (!imu) return imu.error();
-  return join_euroc(*left, *right, *imu, folder);
+  return join_euroc({*left, *right}, *imu, folder);
 }
 
 }  // namespace

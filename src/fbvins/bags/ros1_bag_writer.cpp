@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/little_endian.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -300,6 +301,7 @@ struct Ros1BagWriter::State {
 };
 
 Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start) {
+  if (Result<void> pair = check_is_a_pair_at_most(rig, path); !pair) return pair.error();
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
   auto state = std::make_unique<State>(*std::move(file));

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fbvins/calibration/board_view.hpp"
+#include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 
 namespace fbvins {
@@ -26,8 +27,6 @@ struct Detections {
 
   int camera_count() const;  ///< one more than the largest index of a camera
 };
-
-inline constexpr int kMostCameras = 8;
 
 Result<Detections> read_detections(const std::string& path);
 /// `file` is only for messages.

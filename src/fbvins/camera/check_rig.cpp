@@ -29,7 +29,8 @@ bool all_finite(const std::vector<double>& numbers) {
   return true;
 }
 
-Result<void> check_camera(const Camera& camera, const char* side, std::string_view origin) {
+/// `side`: which camera.
+Result<void> check_camera(const Camera& camera, std::string_view side, std::string_view origin) {
   if (camera.width() < 1 || camera.height() < 1)
     return malformed(origin, fmt::format("the {} camera has {} x {} pixels", side, camera.width(), camera.height()));
   const auto [fx, fy, cx, cy] = camera.intrinsics();
@@ -56,10 +57,24 @@ Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
 
 }  // namespace
 
+Result<void> check_is_a_pair_at_most(const StereoRig& rig, std::string_view origin) {
+  if (rig.more.empty()) return {};
+  return Error{ErrorCode::unsupported,
+               fmt::format("{}: holds two cameras at most, and there are {}: --camera both takes the first two", origin,
+                           rig.camera_count())};
+}
+
 Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
   if (Result<void> good = check_camera(rig.left, "left", origin); !good) return good;
   if (rig.has_right())
     if (Result<void> good = check_camera(rig.right, "right", origin); !good) return good;
+  if (rig.camera_count() > kMostCameras)
+    return malformed(origin, fmt::format("there are {} cameras, more than {}", rig.camera_count(), kMostCameras));
+  if (!rig.has_right() && !rig.more.empty()) return malformed(origin, "there are further cameras, but no second one");
+  for (int i = 2; i < rig.camera_count(); ++i) {
+    if (Result<void> good = check_camera(rig.camera(i), fmt::format("number {}", i), origin); !good) return good;
+    if (!is_transform(rig.T_BC(i))) return malformed(origin, fmt::format("the pose of camera {} is none", i));
+  }
   if (!is_transform(rig.T_BC0) || !is_transform(rig.T_BC1))
     return malformed(origin, "a camera's pose in the body has a number that is not finite, or no rotation");
   const double baseline_m = rig.T_C1C0().p.norm();

@@ -18,9 +18,10 @@ inline constexpr double kAxisSigma = 0.001;
 /// accelerometer (W22), of the mean turning rate for the gyroscope (W23).
 inline Mat3 axis_covariance(double quantity) { return kAxisSigma * kAxisSigma * quantity * quantity * Mat3::Identity(); }
 
-/// Relative standard deviation of all lengths; 0 with one camera, of which the window itself knows the scale and its uncertainty.
-inline double scale_sigma(const Pose<B, C0>& T_BC0, const Pose<B, C1>& T_BC1) {
-  const double baseline_m = (T_BC1.p - T_BC0.p).norm();
+/// Relative standard deviation of all lengths, of two cameras at these places; 0 with one camera, of which the window itself
+/// knows the scale and its uncertainty.
+inline double scale_sigma(const Vec3& left_B, const Vec3& right_B) {
+  const double baseline_m = (right_B - left_B).norm();
   return baseline_m > 0 ? kBaselineSigma_m / baseline_m : 0;
 }
 

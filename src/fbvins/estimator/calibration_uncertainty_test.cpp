@@ -13,7 +13,7 @@ namespace {
 TEST(ScaleUncertainty, IsAsLargeAsThatOfTheBaseline) {
   const Pose<B, C0> left{Quat::Identity(), Vec3(0.02, 0.055, 0.01)};
   const Pose<B, C1> right{Quat::Identity(), Vec3(0.02, -0.055, 0.01)};
-  EXPECT_NEAR(scale_sigma(left, right), 0.0003 / 0.11, 1e-15);
+  EXPECT_NEAR(scale_sigma(left.p, right.p), 0.0003 / 0.11, 1e-15);
 }
 
 TEST(ScaleUncertainty, ErrorsOfRandomScalesAreAsLargeAsItSays) {

@@ -72,13 +72,14 @@ struct Reprojection : ResidualOf<Reprojection> {
   NavState<G> host, target;
   Calibration calibration;
   WindowObservation o;
-  bool same_frame = false, right_ray = false;
+  bool same_frame = false;
+  int camera = 0;  ///< of the ray
 
   template <class T>
   Vec<T> in_host_body(const T* l, const T* c) const {
     const Vec<T> p_C = Vec<T>(l[0], l[1], T(1)) / l[2];
-    const Pose<B, C0> T_BC = ray_camera(calibration, right_ray);
-    const T* d = c + (right_ray ? 6 : 0);
+    const Pose<B, C0> T_BC = calibration.T_BC(camera);
+    const T* d = c + 6 * camera;
     return (T_BC.q.cast<T>() * exp(d + 3)) * p_C + T_BC.p.cast<T>() + Eigen::Map<const Vec<T>>(d);
   }
   template <class T>
@@ -91,9 +92,10 @@ struct Reprojection : ResidualOf<Reprojection> {
   template <class T>
   void fill(T const* const* x, T* r) const {
     const T* c = x[1];
-    const Vec3 t_BC = o.right ? calibration.T_BC1.p : calibration.T_BC0.p;
-    const Quat q_BC = o.right ? calibration.T_BC1.q : calibration.T_BC0.q;
-    const T* d = c + (o.right ? 6 : 0);
+    const Pose<B, C0> T_BC = calibration.T_BC(o.camera);
+    const Vec3 t_BC = T_BC.p;
+    const Quat q_BC = T_BC.q;
+    const T* d = c + 6 * o.camera;
     const Vec<T> t = t_BC.cast<T>() + Eigen::Map<const Vec<T>>(d);
     const Vec<T> p_C = (q_BC.cast<T>() * exp(d + 3)).conjugate() * Vec<T>(in_target_body(x) - t);
     const T offset = T(calibration.time_offset_s) + c[12];

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
@@ -41,10 +42,28 @@ WindowWeights weights_of(const EstimatorOptions& o) {
   return w;
 }
 
-/// With one camera remembered landmarks would hold the scale at what it was thought to be when they left the window.
+/// Where no two cameras see the same things, remembered landmarks would hold the scale at what it was thought to be when they
+/// left the window.
 EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) {
-  if (!rig.has_right()) options.known_landmarks.enabled = false;
+  if (!has_stereo(rig)) options.known_landmarks.enabled = false;
   return options;
+}
+
+Calibration calibration_of(const StereoRig& rig) {
+  Calibration out{rig.T_BC0, rig.T_BC1, 0.0};
+  for (const MountedCamera& camera : rig.more) out.more.push_back(camera.T_BC);
+  return out;
+}
+
+/// Of the pair that was calibrated with the largest baseline.
+double scale_sigma_of_pairs(const StereoRig& rig) {
+  double least = 0;
+  for (const CameraGroup& group : camera_groups(rig)) {
+    if (!group.second) continue;
+    const double sigma = scale_sigma(rig.T_BC(group.first).p, rig.T_BC(*group.second).p);
+    least = least == 0 ? sigma : std::min(least, sigma);
+  }
+  return least;
 }
 
 }  // namespace
@@ -52,14 +71,14 @@ EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) 
 Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, const std::optional<ImuState>& before)
     : options_(for_cameras_of(rig, options)),
       imu_noise_(options.assumed(rig.imu_noise)),
-      calibrated_{rig.T_BC0, rig.T_BC1, 0.0},
+      calibrated_(calibration_of(rig)),
       calibration_(calibrated_),
-      scale_sigma_(scale_sigma(rig.T_BC0, rig.T_BC1)),
-      one_camera_(!rig.has_right()),
-      shutter_{rig.line_delay_s, rig.left.height(), rig.right.height()},
+      scale_sigma_(scale_sigma_of_pairs(rig)),
+      one_camera_(!has_stereo(rig)),
+      shutter_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
-      health_(options, one_camera_),
+      health_(options, rig.camera_count(), !one_camera_),
       reading_noise_(imu_noise_),
       monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
       window_(options_, weights_of(options)),
@@ -114,7 +133,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   window_.restart_first_estimates();
   const WindowSolution& solution = solve(out.odometry, kThorough);
   out.odometry.health = judge(frame, out.odometry);
-  if (start_is_good(out.odometry)) {
+  if (start_is_good(frame, out.odometry)) {
     shrink_window(solution, out);
     compare_up();
     if (tilt_away_B_) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
@@ -123,9 +142,10 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   refuse_start(out.odometry);
 }
 
-/// With one camera its scale has to be known, too.
-bool Estimator::start_is_good(const Odometry& solved) const {
-  if (solved.health.state != HealthState::good) return false;
+/// One pair of several is enough. With one camera its scale has to be known, too.
+bool Estimator::start_is_good(const TrackedFrame& frame, const Odometry& solved) const {
+  const bool a_pair_sees = solved.health.reason == HealthReason::one_camera && frame.stats.stereo > 0;
+  if (solved.health.state != HealthState::good && !a_pair_sees) return false;
   const Vec3 v_WB = window_.tilt().levelled(window_.newest().state).v_FB;
   return !one_camera_ || scale_sigma_of(v_WB, solved.velocity_covariance) < kMaxScaleSigmaAtStart;
 }
@@ -186,7 +206,7 @@ TrackedFrame Estimator::at_stamp(const TrackedFrame& frame) const {
   const InverseDepth known = [&](const TrackedFeature& feature, bool right) -> std::optional<double> {
     const std::vector<PointSighting> seen = sightings_of(window_, {feature}, calibration_);
     if (seen.empty()) return std::nullopt;
-    const Pose<G, C0> T_GC = state.T_FB * ray_camera(calibration_, right);
+    const Pose<G, C0> T_GC = state.T_FB * calibration_.T_BC(feature.cameras[right]);
     const double depth_m = (T_GC.inverse() * seen.front().p_G).z();
     return depth_m > kNearestLandmark_m ? std::optional(1 / depth_m) : std::nullopt;
   };
@@ -256,9 +276,12 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     predicted.state.T_FB = *verdict.seen;
   }
   std::vector<TrackedFeature> believed = frame.features;
-  one_camera_wrong_ = verdict.left_wrong || verdict.right_wrong;
+  one_camera_wrong_ = verdict.wrong.has_value();
   if (!one_camera_wrong_) return believed;
-  for (TrackedFeature& feature : believed) (verdict.left_wrong ? feature.left : feature.right).reset();
+  for (TrackedFeature& feature : believed) {
+    if (verdict.wrong->has(feature.cameras.left)) feature.left.reset();
+    if (verdict.wrong->has(feature.cameras.right)) feature.right.reset();
+  }
   std::erase_if(believed, [](const TrackedFeature& f) { return !f.left && !f.right; });
   return believed;
 }

@@ -65,7 +65,7 @@ class Estimator {
   void hand_on_keyframes(const WindowSolution& solution, int keyframe_zone, std::vector<Keyframe>& out);
   bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
-  bool start_is_good(const Odometry& solved) const;
+  bool start_is_good(const TrackedFrame& frame, const Odometry& solved) const;
   void compare_up();
   void remember_up(const Odometry& out);
   void refuse_start(Odometry& out);

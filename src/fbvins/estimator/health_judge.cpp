@@ -17,7 +17,9 @@ constexpr double kMaxAccelBias_mps2 = 2.5;
 /// Of eight vehicles one shakes up to this in flight, the others half of it at most, and crashes three times as much.
 constexpr double kGyroVibrationDegraded_radps = 0.3;
 
-bool without_images(const TrackedFrame& frame) { return !frame.has_left && !frame.has_right; }
+bool without_images(const TrackedFrame& frame) {
+  return !frame.has_left && !frame.has_right && std::ranges::count(frame.has_more, true) == 0;
+}
 
 Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
 Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
@@ -26,7 +28,7 @@ Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
 
 Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) const {
   if (without_images(frame)) reason = HealthReason::no_images;
-  else if (camera_missing(frame)) reason = HealthReason::one_camera;  // a start needs the pair
+  else if (camera_missing(frame)) reason = HealthReason::one_camera;  // a start needs a pair
   return {HealthState::initialising, reason};
 }
 
@@ -36,7 +38,12 @@ void HealthJudge::pass(const TrackedFrame& frame) {
   previous_image_ = frame.t;
 }
 
-/// Neither camera's image came, or these are the first ones after a gap.
+bool HealthJudge::camera_missing(const TrackedFrame& frame) const {
+  if (!frame.has_left || (cameras_ > 1 && !frame.has_right)) return true;
+  return cameras_ > 2 && std::ranges::count(frame.has_more, true) < cameras_ - 2;
+}
+
+/// No camera's image came, or these are the first ones after a gap.
 bool HealthJudge::images_missing(const TrackedFrame& frame) const {
   if (without_images(frame)) return true;
   const double hole_s = std::max(kImageHole_s, kImageHole_periods * image_period_.median().value_or(Duration{}).seconds());
@@ -64,7 +71,7 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
   if (camera_missing(frame)) return degraded(HealthReason::one_camera);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
   if (few_tracks || evidence.after_dark) return degraded(HealthReason::few_tracks);
-  if (!one_camera_ && frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
+  if (stereo_ && frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
   if (evidence.one_camera_wrong) return degraded(HealthReason::cameras_disagree);
   if (evidence.clipped) return degraded(HealthReason::imu_clipped);
   if (evidence.contradiction) return degraded(HealthReason::contradiction);

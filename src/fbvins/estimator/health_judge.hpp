@@ -15,8 +15,9 @@ namespace fbvins {
 
 class HealthJudge {
  public:
-  /// `one_camera`: the rig has one only.
-  explicit HealthJudge(const EstimatorOptions& options, bool one_camera = false) : options_(options), one_camera_(one_camera) {}
+  /// `stereo`: some of the rig's cameras see the same things.
+  explicit HealthJudge(const EstimatorOptions& options, int cameras = 2, bool stereo = true)
+      : options_(options), cameras_(cameras), stereo_(stereo) {}
 
   /// A window starts.
   void start() { seen_sigma_m_ = 0; }
@@ -42,10 +43,11 @@ class HealthJudge {
 
  private:
   bool images_missing(const TrackedFrame& frame) const;
-  bool camera_missing(const TrackedFrame& frame) const { return !one_camera_ && (!frame.has_left || !frame.has_right); }
+  bool camera_missing(const TrackedFrame& frame) const;
 
   EstimatorOptions options_;
-  bool one_camera_;
+  int cameras_;
+  bool stereo_;
   std::optional<Time> previous_image_;
   double seen_sigma_m_ = 0;  ///< of the last frame with enough landmarks
   SamplePeriod image_period_;

@@ -19,20 +19,20 @@ struct RayInCamera {
   Vec3 a, b;
 };
 
-/// `from_right`: the ray is of the host's right camera.
-RayInCamera ray_in_camera(const Vec2& ray, bool from_right, const PairGeometry& pair, const CameraGeometry& cameras, bool right) {
-  const Vec3 direction_B = cameras.R_BC[from_right] * Vec3(ray.x(), ray.y(), 1);
-  const Mat3& R_CB = cameras.R_CB[right];
-  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC[from_right] + pair.t_th - cameras.t_BC[right])};
+/// `from`: the host's camera that the ray is of.
+RayInCamera ray_in_camera(const Vec2& ray, int from, const PairGeometry& pair, const CameraGeometry& cameras, int camera) {
+  const Vec3 direction_B = cameras.R_BC[from] * Vec3(ray.x(), ray.y(), 1);
+  const Mat3& R_CB = cameras.R_CB[camera];
+  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC[from] + pair.t_th - cameras.t_BC[camera])};
 }
 
 /// The landmark in a camera of a frame, times its inverse depth (W2, W3).
-Vec3 scaled_point(const Landmark& landmark, const Frame& target, bool right, const FrameList& frames,
+Vec3 scaled_point(const Landmark& landmark, const Frame& target, int camera, const FrameList& frames,
                   const Calibration& calibration) {
   const CameraGeometry cameras(calibration);
   PairGeometry pair;
   pair.set(frames.at(landmark.host).state.T_FB, target.state.T_FB);
-  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.right_ray, pair, cameras, right);
+  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.ray_camera(), pair, cameras, camera);
   return line.a + landmark.alpha_beta_rho.z() * line.b;
 }
 
@@ -45,14 +45,15 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
   const Sighting& first = landmark.sightings.front();
   const bool from_right = !first.left;
   const Vec2 ray = from_right ? first.right->normalised : first.left->normalised;
+  const int from = landmark.cameras[from_right];
   double numerator = 0, information = 0;
   const auto each = [&](auto&& visit) {
     for (const Sighting& s : landmark.sightings) {
       PairGeometry pair;
       pair.set(host, frames.at(s.frame).state.T_FB);
       const bool of_host = s.frame == landmark.host;
-      if (s.left && !of_host) visit(ray_in_camera(ray, from_right, pair, cameras, false), *s.left);
-      if (s.right && !(of_host && from_right)) visit(ray_in_camera(ray, from_right, pair, cameras, true), *s.right);
+      if (s.left && !of_host) visit(ray_in_camera(ray, from, pair, cameras, landmark.cameras.left), *s.left);
+      if (s.right && !(of_host && from_right)) visit(ray_in_camera(ray, from, pair, cameras, landmark.cameras.right), *s.right);
     }
   };
   each([&](const RayInCamera& line, const Observation& o) {
@@ -80,14 +81,14 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
 
 Vec3 scaled_point_in_camera(const Landmark& landmark, const Frame& target, const FrameList& frames,
                             const Calibration& calibration) {
-  return scaled_point(landmark, target, false, frames, calibration);
+  return scaled_point(landmark, target, landmark.cameras.left, frames, calibration);
 }
 
 void rehost(Landmark& landmark, FrameId new_host, const FrameList& frames, const Calibration& calibration) {
   const Sighting* sighting = landmark.sighting_in(new_host);
   const bool right_ray = sighting != nullptr && !sighting->left;
   if (landmark.triangulated) {
-    const Vec3 p = scaled_point(landmark, frames.at(new_host), right_ray, frames, calibration);
+    const Vec3 p = scaled_point(landmark, frames.at(new_host), landmark.cameras[right_ray], frames, calibration);
     if (p.z() < kMinScaledDepth) landmark.triangulated = false;
     else landmark.alpha_beta_rho = Vec3(p.x(), p.y(), landmark.alpha_beta_rho.z()) / p.z();
   }

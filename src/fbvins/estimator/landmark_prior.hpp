@@ -34,7 +34,7 @@ struct LandmarkPriorJacobian {
   LandmarkPriorJacobian(const CameraGeometry& cameras, const Pose<G, B>& T_GB, const WindowLandmark& l,
                         const LandmarkPrior& prior) {
     const Mat3 R_GB = T_GB.R();
-    const Mat3 SR_GB = prior.sqrt_information * R_GB, SR_GC = SR_GB * cameras.R_BC[l.right_ray];
+    const Mat3 SR_GB = prior.sqrt_information * R_GB, SR_GC = SR_GB * cameras.R_BC[l.camera];
     const double depth = 1.0 / l.alpha_beta_rho.z();
     const Vec3 p_C = depth * Vec3(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
     host << prior.sqrt_information, -SR_GB * hat(point_in_host(cameras, l));

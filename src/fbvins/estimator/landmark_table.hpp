@@ -16,7 +16,7 @@
 
 namespace fbvins {
 
-/// The observations of a landmark by one frame's cameras, one at least.
+/// The observations of a landmark by the two cameras of its group in one frame, one at least.
 struct Sighting {
   FrameId frame;
   std::optional<Observation> left, right;
@@ -28,6 +28,7 @@ struct Sighting {
 struct Landmark {
   LandmarkId id;
   TrackId track;
+  CameraPair cameras;
   FrameId host;
   bool right_ray = false;  ///< on a ray of the host's right camera: the left one did not see it
   Vec3 alpha_beta_rho = Vec3::Zero();
@@ -36,6 +37,7 @@ struct Landmark {
   int outlier_count = 0;               ///< solves after which observations of it were removed as outliers
   std::vector<Sighting> sightings;     ///< oldest first; a landmark without any is removed
 
+  int ray_camera() const { return cameras[right_ray]; }
   bool seen_in(FrameId frame) const { return sighting_in(frame) != nullptr; }
   const Sighting* sighting_in(FrameId frame) const;
 };

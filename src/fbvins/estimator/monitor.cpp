@@ -66,20 +66,58 @@ bool moved(const Monitor::Biases& from, const Monitor::Biases& to, double accel_
 }
 
 struct Medians {
-  std::optional<double> of[2];                   ///< of the residuals' norms, left, right; none with few landmarks
-  Vec2 shift[2] = {Vec2::Zero(), Vec2::Zero()};  ///< of the residuals themselves
-  double focal = 0;                              ///< standard deviations for a radian
-  double worst() const { return std::max(of[0].value_or(0), of[1].value_or(0)); }
-  double best() const { return std::min(of[0].value_or(0), of[1].value_or(0)); }
+  std::array<std::optional<double>, kMostCameras> norm;  ///< of the residuals' norms; none with few landmarks
+  std::array<Vec2, kMostCameras> shift;                  ///< of the residuals themselves
+  double focal = 0;                                      ///< standard deviations for a radian
+
+  bool of(int camera) const { return norm[static_cast<std::size_t>(camera)].has_value(); }
+  double worst() const {
+    double worst = 0;
+    for (const std::optional<double>& n : norm) worst = std::max(worst, n.value_or(0));
+    return worst;
+  }
 };
 
-Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, const Pose<G, B>& T_GB) {
+CameraPair pair_of(int camera, const std::vector<PointSighting>& sightings) {
+  for (const PointSighting& s : sightings)
+    if (s.feature->cameras.left == camera || s.feature->cameras.right == camera) return s.feature->cameras;
+  return {static_cast<std::int8_t>(camera), static_cast<std::int8_t>(camera)};
+}
+
+/// The camera that is off most, if the others are not, or else its pair, which sees the same things, if the others are not.
+/// `off(camera)`: by how much; `fits(others, this)`.
+template <class Off, class Fits>
+std::optional<CameraPair> suspects(const std::vector<PointSighting>& sightings, const Medians& at, int camera_count, Off&& off,
+                                   Fits&& fits) {
+  int worst = 0;
+  for (int c = 1; c < camera_count; ++c)
+    if (off(c) > off(worst)) worst = c;
+  if (!at.of(worst)) return std::nullopt;
+  const auto alone = static_cast<std::int8_t>(worst);
+  for (const CameraPair cameras : {CameraPair{alone, alone}, pair_of(worst, sightings)}) {
+    double of_others = 0;
+    int others = 0;
+    for (int c = 0; c < camera_count; ++c) {
+      if (cameras.has(c)) continue;
+      others += at.of(c);
+      of_others = std::max(of_others, off(c));
+    }
+    if (others > 0 && fits(of_others, off(worst))) return cameras;
+  }
+  return std::nullopt;
+}
+
+Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, int camera_count,
+                const Pose<G, B>& T_GB) {
   const Mat3 R_BG = T_GB.R().transpose();
   Medians out;
-  for (int c = 0; c < 2; ++c) {
+  out.shift.fill(Vec2::Zero());
+  for (int c = 0; c < camera_count; ++c) {
     std::vector<double> residuals, x, y;
     for (const PointSighting& s : sightings) {
-      const std::optional<Observation>& o = c == 0 ? s.feature->left : s.feature->right;
+      const auto [left, right] = s.feature->cameras;
+      if (c != left && c != right) continue;
+      const std::optional<Observation>& o = c == left ? s.feature->left : s.feature->right;
       if (!o) continue;
       const Vec3 p_C = cameras.R_CB[c] * (R_BG * (s.p_G - T_GB.p) - cameras.t_BC[c]);
       const Vec2 r =
@@ -88,8 +126,8 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
       out.focal = o->sqrt_information(0, 0);
     }
     if (residuals.size() < kFewest) continue;
-    out.of[c] = median(residuals);
-    out.shift[c] = Vec2(median(x), median(y));
+    out.norm[static_cast<std::size_t>(c)] = median(residuals);
+    out.shift[static_cast<std::size_t>(c)] = Vec2(median(x), median(y));
   }
   return out;
 }
@@ -110,7 +148,7 @@ void Monitor::pass(Duration dt) {
 }
 
 void Monitor::blind(Duration dt) {
-  drift_[0].setZero(), drift_[1].setZero();
+  drift_ = none();
   since_reset_s_ += dt.seconds();
   blind_s_ += dt.seconds();
   if (!contradicted_) {
@@ -121,20 +159,26 @@ void Monitor::blind(Duration dt) {
   hopeless_ = hopeless_ || blind_s_ > kBlind_s;
 }
 
-/// `shift`: of the residuals, left and right.
-void Monitor::add_drift(const Vec2 shift[2], double focal, const Quat& predicted, double patience, Duration dt) {
+/// `shift`: of the residuals.
+void Monitor::add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt) {
   const double kept = std::exp(-dt.seconds() / kDrift_s);
-  for (int c = 0; c < 2; ++c) {
+  for (std::size_t c = 0; c < drift_.size(); ++c) {
     drift_[c] = kept * drift_[c] + shift[c];
     drift_[c] *= std::min(1.0, kMost * kDrift_sigma / std::max(1e-9, drift_[c].norm()));
   }
   turned_sigma_ = kept * turned_sigma_ + kScale * focal * predicted.angularDistance(predicted_);
   predicted_ = predicted;
-  const double drift = std::max(drift_[0].norm(), drift_[1].norm()) / patience;
+  const double drift = largest_drift() / patience;
   since_sudden_s_ = drift > kDrift_sigma + turned_sigma_ ? 0 : since_sudden_s_ + dt.seconds();
   if (since_sudden_s_ < kForgotten_s) return;
   const double more = drift / (kLasting_sigma + kLastingScale * turned_sigma_) - 1;
   lasting_s_ = std::clamp(lasting_s_ + dt.seconds() * std::min(more, 1.0), 0.0, kLasting_s);
+}
+
+double Monitor::largest_drift() const {
+  double largest = 0;
+  for (const Vec2& drift : drift_) largest = std::max(largest, drift.norm());
+  return largest;
 }
 
 void Monitor::doubt_tilt() {
@@ -184,12 +228,11 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   }
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const CameraGeometry cameras(calibration);
-  const Medians at_prediction = medians(sightings, cameras, predicted);
+  const int camera_count = calibration.camera_count();
+  const Medians at_prediction = medians(sightings, cameras, camera_count, predicted);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
-  const double drift = patience * (kDrift_sigma + turned_sigma_), left = drift_[0].norm() / drift,
-               right = drift_[1].norm() / drift;
-  const bool drifting = std::max(left, right) > 1 || lasting_s_ >= kLasting_s;
+  const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
   if (excess < 0 && !drifting) {
     evidence_ = std::max(0.0, evidence_ + excess);
     unexplained_s_ = std::max(0.0, unexplained_s_ - dt.seconds());
@@ -198,13 +241,20 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     return out;
   }
   const PoseRefinement seen = refine_pose(sightings, calibration, predicted);
-  const Medians at_seen = medians(sightings, cameras, seen.T_GB);
-  const bool two = at_prediction.of[0] && at_prediction.of[1];
-  const bool one_camera_fits = two && (excess < 0 ? std::min(left, right) < kOther * std::max(left, right)
-                                                  : at_prediction.best() < patience * kUsual_sigma);
+  const Medians at_seen = medians(sightings, cameras, camera_count, seen.T_GB);
+  const auto off = [&](int camera) {
+    const auto c = static_cast<std::size_t>(camera);
+    return excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0);
+  };
+  const auto fits = [&](double others, double worst) { return others < (excess < 0 ? kOther * worst : patience * kUsual_sigma); };
+  const std::optional<CameraPair> wrong = suspects(sightings, at_prediction, camera_count, off, fits);
+  if (excess < 0 && wrong && wrong->left != wrong->right) {
+    pass(dt);  // something moves before one of several pairs
+    return out;
+  }
   const bool explained = seen.inliers >= kAgreeing * static_cast<double>(sightings.size()) &&
                          (excess < 0 || at_seen.worst() < kBetter * at_prediction.worst());
-  if (!explained && !one_camera_fits) {
+  if (!explained && !wrong) {
     unexplained_s_ = std::min(kCalm_s, unexplained_s_ + dt.seconds());
     unexplained_ = unexplained_ || unexplained_s_ > kDark_s;
     blind(dt);
@@ -215,17 +265,16 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     pass(dt);
     return out;
   }
-  if (one_camera_fits) {
+  if (wrong) {
     excluded_s_ = excess < 0 ? excluded_s_ + dt.seconds() : 0;
     if (excluded_s_ > kReadmitted_s) {
       excluded_s_ = evidence_ = lasting_s_ = 0;
-      drift_[0].setZero(), drift_[1].setZero();
+      drift_ = none();
       pass(dt);
       return out;
     }
-    out.left_wrong = excess < 0 ? left > right : *at_prediction.of[0] > *at_prediction.of[1];
-    out.right_wrong = !out.left_wrong;
-    pass(dt);  // the readings agree with the other one
+    out.wrong = wrong;
+    pass(dt);  // the readings agree with the others
     return out;
   }
   const Vec3 turn = so3_log((predicted.q.conjugate() * seen.T_GB.q).normalized());

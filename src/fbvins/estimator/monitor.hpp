@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether cameras and IMU agree. Each image is compared with the prediction by the readings: by the left camera, by the right
-// one, and by the pose that the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
+// Whether cameras and IMU agree. Each image is compared with the prediction by the readings: by each camera, and by the pose that
+// the images alone give. Where they contradict each other, the rest decides who is right, and the wrong
 // one counts less, or not at all (docs/derivations/integrity.md). It decides what a measurement is worth; the window estimates.
 //
 //   const Verdict verdict = monitor.examine(image_of(window, frame, calibration), predicted_pose, dt);
@@ -10,6 +10,7 @@
 // One owner, one thread.
 #pragma once
 
+#include <array>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -22,10 +23,10 @@ namespace fbvins {
 class Monitor {
  public:
   struct Verdict {
-    bool imu_contradicts = false;                  ///< images agree with one another, but not with the readings
-    bool left_wrong = false, right_wrong = false;  ///< this camera alone contradicts the readings
-    std::optional<Pose<G, B>> seen;                ///< by the images alone, where the readings are contradicted
-    ImuNoiseScale noise;                           ///< that makes the contradiction one standard deviation
+    bool imu_contradicts = false;     ///< images agree with one another, but not with the readings
+    std::optional<CameraPair> wrong;  ///< this camera (twice), or this pair, alone contradicts the readings
+    std::optional<Pose<G, B>> seen;   ///< by the images alone, where the readings are contradicted
+    ImuNoiseScale noise;              ///< that makes the contradiction one standard deviation
   };
 
   /// `calibrating`: mounting or time offset are still being found, which contradict the readings, too.
@@ -69,18 +70,25 @@ class Monitor {
 
  private:
   void blind(Duration dt);
-  void add_drift(const Vec2 shift[2], double focal, const Quat& predicted, double patience, Duration dt);
+  using OfEachCamera = std::array<Vec2, kMostCameras>;
+  void add_drift(const OfEachCamera& shift, double focal, const Quat& predicted, double patience, Duration dt);
+  double largest_drift() const;
+  static OfEachCamera none() {
+    OfEachCamera zero;
+    zero.fill(Vec2::Zero());
+    return zero;
+  }
   void doubt_tilt(const Biases& before);
   Mat3 turns() const { return turns_G_ + turn_G_ * turn_G_.transpose(); }
   void take_doubt(const Pose<G, B>& predicted, const Vec3& turn_B, const Vec3& shift_G);
 
   ImuNoise assumed_;
   bool calibrating_;
-  double excluded_s_ = 0;                         ///< for how long one camera has been excluded for drift alone
-  Vec2 drift_[2] = {Vec2::Zero(), Vec2::Zero()};  ///< left, right: of all that is seen, added up
-  double turned_sigma_ = 0;                       ///< by which it may be
-  double lasting_s_ = 0;                          ///< cumulative sum of what it is more than usual
-  double since_sudden_s_ = 1e9;                   ///< since a drift that was a contradiction at once
+  double excluded_s_ = 0;        ///< for how long one camera has been excluded for drift alone
+  OfEachCamera drift_ = none();  ///< of all that is seen, added up
+  double turned_sigma_ = 0;      ///< by which it may be
+  double lasting_s_ = 0;         ///< cumulative sum of what it is more than usual
+  double since_sudden_s_ = 1e9;  ///< since a drift that was a contradiction at once
   Quat predicted_ = Quat::Identity();
   double evidence_ = 0;              ///< cumulative sum (CUSUM)
   double calm_s_ = 0, blind_s_ = 0;  ///< without a contradiction, and without images to compare

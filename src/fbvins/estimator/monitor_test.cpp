@@ -41,6 +41,17 @@ class Scene {
     return out;
   }
   std::vector<PointSighting> seen(const Pose<G, B>& T_GB) { return seen(T_GB, T_GB); }
+  /// Every other point by a second pair of the same kind, each of its cameras from a pose of its own.
+  std::vector<PointSighting> seen_by_four(const Pose<G, B>& camera_2, const Pose<G, B>& camera_3) {
+    std::vector<PointSighting> out = seen({});
+    calibration.more = {rig.T_BC(0), rig.T_BC(1)};
+    for (std::size_t i = 0; i < points_.size(); i += 2) {
+      features_[i].cameras = {2, 3};
+      features_[i].left = observe(rig.T_BC(0).inverse() * (camera_2.inverse() * points_[i]));
+      features_[i].right = observe(rig.T_BC(1).inverse() * (camera_3.inverse() * points_[i]));
+    }
+    return out;
+  }
 
   StereoRig rig = test::SimulatedFlight(test::Motion(0.1, 0.1), 1).rig;
   Calibration calibration{rig.T_BC0, rig.T_BC1, 0.0};
@@ -67,7 +78,7 @@ TEST(Monitor, SaysNothingWhereImagesAndReadingsAgree) {
   Monitor monitor(assumed(), false);
   for (int k = 0; k < 100; ++k) {
     const Monitor::Verdict verdict = monitor.examine(scene.seen({}), scene.calibration, turned(2e-4), kStep);
-    EXPECT_FALSE(verdict.imu_contradicts || verdict.left_wrong || verdict.right_wrong);
+    EXPECT_FALSE(verdict.imu_contradicts || verdict.wrong);
   }
   EXPECT_FALSE(monitor.contradicted());
   EXPECT_TRUE(monitor.doubt({}).isZero(0));
@@ -115,11 +126,42 @@ TEST(Monitor, OneCameraThatContradictsTheOtherIsNamed) {
     const Pose<G, B> wrong = turned(0.02);
     const Monitor::Verdict verdict =
         monitor.examine(scene.seen(left ? wrong : Pose<G, B>{}, left ? Pose<G, B>{} : wrong), scene.calibration, {}, kStep);
-    EXPECT_EQ(verdict.left_wrong, left);
-    EXPECT_EQ(verdict.right_wrong, !left);
+    ASSERT_TRUE(verdict.wrong);
+    EXPECT_EQ(verdict.wrong->left, left ? 0 : 1);
+    EXPECT_EQ(verdict.wrong->right, verdict.wrong->left);
     EXPECT_FALSE(verdict.imu_contradicts);
     EXPECT_TRUE(monitor.doubt({}).isZero(0)) << "the other camera and the readings agree";
   }
+}
+
+TEST(Monitor, OfFourCamerasTheOneThatContradictsIsNamed) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  EXPECT_FALSE(monitor.examine(scene.seen_by_four({}, {}), scene.calibration, {}, kStep).wrong);
+  const Monitor::Verdict verdict = monitor.examine(scene.seen_by_four({}, turned(0.02)), scene.calibration, {}, kStep);
+  ASSERT_TRUE(verdict.wrong);
+  EXPECT_TRUE(verdict.wrong->left == 3 && verdict.wrong->right == 3);
+  EXPECT_FALSE(verdict.imu_contradicts);
+}
+
+TEST(Monitor, APairThatContradictsTheOtherPairIsLeftOut) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  const Monitor::Verdict verdict = monitor.examine(scene.seen_by_four(turned(0.02), turned(0.02)), scene.calibration, {}, kStep);
+  ASSERT_TRUE(verdict.wrong);
+  EXPECT_TRUE(verdict.wrong->has(2) && verdict.wrong->has(3));
+  EXPECT_FALSE(verdict.imu_contradicts);
+}
+
+TEST(Monitor, WhatMovesBeforeOneOfTwoPairsIsNoContradiction) {
+  Scene scene;
+  Monitor monitor(assumed(), false);
+  for (int k = 0; k < 60; ++k) {
+    const Monitor::Verdict verdict =
+        monitor.examine(scene.seen_by_four(turned(0.0012), turned(0.0012)), scene.calibration, {}, kStep);
+    EXPECT_FALSE(verdict.imu_contradicts || verdict.wrong) << k;
+  }
+  EXPECT_FALSE(monitor.contradicted());
 }
 
 TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
@@ -128,7 +170,8 @@ TEST(Monitor, ACameraExcludedForDriftAloneIsUsedAgainAfterASecond) {
   int excluded = 0, used_again = 0;
   for (int k = 0; k < 100; ++k) {
     // As with landmarks whose depth was estimated while the camera was excluded.
-    const bool wrong = monitor.examine(scene.seen({}, turned(0.0015)), scene.calibration, {}, kStep).right_wrong;
+    const auto verdict = monitor.examine(scene.seen({}, turned(0.0015)), scene.calibration, {}, kStep);
+    const bool wrong = verdict.wrong && verdict.wrong->left == 1;
     excluded += wrong;
     used_again += !wrong && excluded >= 20;
   }

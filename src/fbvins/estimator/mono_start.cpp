@@ -48,7 +48,7 @@ std::vector<Track> tracks_of(std::span<const TrackedFrame> frames, const Mat3& R
   std::vector<Track> tracks;
   for (std::size_t k = 0; k < frames.size(); ++k)
     for (const TrackedFeature& f : frames[k].features) {
-      if (!f.left) continue;
+      if (!f.left || f.cameras.left != 0) continue;  // by camera 0 alone
       const auto [at, is_new] = index.try_emplace(f.id, tracks.size());
       if (is_new) tracks.emplace_back();
       const Vec3 ray(f.left->normalised.x(), f.left->normalised.y(), 1);

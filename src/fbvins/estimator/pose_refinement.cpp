@@ -46,9 +46,10 @@ PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Ca
     const Mat3 R_BG = out.T_GB.R().transpose();
     for (const PointSighting& s : sightings) {
       const Vec3 p_B = R_BG * (s.p_G - out.T_GB.p);
-      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[0], cameras.t_BC[0], R_BG);
+      const auto [left, right] = s.feature->cameras;
+      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[left], cameras.t_BC[left], R_BG);
       const int of_left = n.inliers;
-      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[1], cameras.t_BC[1], R_BG);
+      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[right], cameras.t_BC[right], R_BG);
       n.inliers = s.feature->left ? of_left : n.inliers;
     }
     out.inliers = n.inliers;

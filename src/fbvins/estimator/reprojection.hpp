@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "fbvins/camera/camera.hpp"
 #include "fbvins/core/ids.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/calibration.hpp"
@@ -34,46 +35,45 @@ struct PairGeometry {
 
 /// Calibration as matrices, computed once per evaluation.
 struct CameraGeometry {
-  Mat3 R_BC[2];  ///< left, right
-  Mat3 R_CB[2];  ///< left, right
-  Vec3 t_BC[2];  ///< left, right
+  Mat3 R_BC[kMostCameras], R_CB[kMostCameras];  // of those that the rig has
+  Vec3 t_BC[kMostCameras];
   double time_offset_s = 0;
 
-  explicit CameraGeometry(const Calibration& calibration)
-      : R_BC{calibration.T_BC0.R(), calibration.T_BC1.R()},
-        t_BC{calibration.T_BC0.p, calibration.T_BC1.p},
-        time_offset_s(calibration.time_offset_s) {
-    for (int i = 0; i < 2; ++i) R_CB[i] = R_BC[i].transpose();
+  explicit CameraGeometry(const Calibration& calibration) : time_offset_s(calibration.time_offset_s) {
+    for (int i = 0; i < calibration.camera_count(); ++i) {
+      const Pose<B, C0> T_BC = calibration.T_BC(i);
+      R_BC[i] = T_BC.R();
+      R_CB[i] = R_BC[i].transpose();
+      t_BC[i] = T_BC.p;
+    }
   }
 };
-
-/// The host's camera that a landmark's ray belongs to, whichever it is.
-inline Pose<B, C0> ray_camera(const Calibration& calibration, bool right) {
-  return right ? calibration.T_BC1.cast_frames<B, C0>() : calibration.T_BC0;
-}
 
 /// Landmarks with a smaller depth than this (scaled by inverse depth) have no projection.
 inline constexpr double kMinScaledDepth = 1e-3;
 
 struct WindowObservation {
   int frame = 0;
-  bool right = false;
+  int camera = 0;
   Vec2 normalised = Vec2::Zero();
   Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by the time offset
   Mat2 sqrt_information = Mat2::Identity();
 };
 
-/// A point on the ray (alpha, beta, 1) of its host frame's left camera, or of the right one if that alone saw it first, at
-/// inverse depth rho (W1).
+/// A point on the ray (alpha, beta, 1) of a camera of its host frame, the left one of its group, or the right one if that alone
+/// saw it first, at inverse depth rho (W1).
 struct WindowLandmark {
   LandmarkId id = {};  ///< in the sliding window
   int host = 0;
-  bool right_ray = false;     ///< the ray is of the right camera
+  int camera = 0;             ///< that the ray is of
   int first_observation = 0;  ///< its observations are consecutive, sorted by frame
   int observation_count = 0;
   Vec3 alpha_beta_rho = Vec3::Zero();
   int prior = -1;  ///< index into WindowProblem::landmark_priors of a re-observed one
 };
+
+/// Whether online calibration refines the place of a camera.
+inline bool is_refined(int camera) { return camera < 2; }
 
 /// Columns of the stacked Jacobian of one observation.
 enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 = 16, kExtrinsic1 = 22, kTimeOffset = 28 };
@@ -81,14 +81,14 @@ enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 =
 /// The landmark in its host's body, scaled by its inverse depth (W2).
 inline Vec3 scaled_point_in_host(const CameraGeometry& cameras, const WindowLandmark& l) {
   const Vec3& m = l.alpha_beta_rho;
-  return cameras.R_BC[l.right_ray] * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC[l.right_ray];
+  return cameras.R_BC[l.camera] * Vec3(m.x(), m.y(), 1) + m.z() * cameras.t_BC[l.camera];
 }
 
 /// Whitened residual (W5); false where there is no projection.
 inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, const Vec3& x_h, double rho,
                       const WindowObservation& o, Vec3& p_C, Vec2& r) {
   const Vec3 p_B = pair.R_th * x_h + rho * pair.t_th;
-  p_C.noalias() = cameras.R_CB[o.right] * (p_B - rho * cameras.t_BC[o.right]);
+  p_C.noalias() = cameras.R_CB[o.camera] * (p_B - rho * cameras.t_BC[o.camera]);
   if (p_C.z() < kMinScaledDepth) return false;
   const Vec2 expected = p_C.head<2>() / p_C.z();
   r = o.sqrt_information * (expected - o.normalised + cameras.time_offset_s * o.velocity);
@@ -104,7 +104,7 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
   Eigen::Matrix<double, 2, 3> J_projection;  // S * d(x/z, y/z) / d p_C
   J_projection.leftCols<2>() = iz * o.sqrt_information;
   J_projection.col(2).noalias() = -iz * iz * (o.sqrt_information * p_C.head<2>());
-  const Eigen::Matrix<double, 2, 3> A = J_projection * cameras.R_CB[o.right];
+  const Eigen::Matrix<double, 2, 3> A = J_projection * cameras.R_CB[o.camera];
   const Vec3 p_B = pair.R_th_first * x_h + rho * pair.t_th_first;
   for (int k = 0; k < 2; ++k) {
     double* J = rows[k];
@@ -118,19 +118,23 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
       Eigen::Map<Vec3>(J + kTarget) = -translation;
       Eigen::Map<Vec3>(J + kTarget + 3) = a.cross(p_B);
     }
-    const Vec3 c = cameras.R_BC[l.right_ray].transpose() * b;
+    const Vec3 c = cameras.R_BC[l.camera].transpose() * b;
     J[kPoint] = c.x();
     J[kPoint + 1] = c.y();
-    J[kPoint + 2] = b.dot(cameras.t_BC[l.right_ray]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.right]);
+    J[kPoint + 2] = b.dot(cameras.t_BC[l.camera]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.camera]);
     J[kResidual] = r[k];
     if constexpr (Columns == 32) {
       const Vec3 m(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);
-      const int of_ray = l.right_ray ? kExtrinsic1 : kExtrinsic0;
-      Eigen::Map<Vec3>(J + of_ray) = rho * b;
-      Eigen::Map<Vec3>(J + of_ray + 3) = m.cross(c);
-      double* camera = J + (o.right ? kExtrinsic1 : kExtrinsic0);
-      Eigen::Map<Vec3>(camera) -= rho * a;
-      Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
+      if (is_refined(l.camera)) {
+        double* of_ray = J + kExtrinsic0 + 6 * l.camera;
+        Eigen::Map<Vec3>{of_ray} = rho * b;
+        Eigen::Map<Vec3>(of_ray + 3) = m.cross(c);
+      }
+      if (is_refined(o.camera)) {
+        double* camera = J + kExtrinsic0 + 6 * o.camera;
+        Eigen::Map<Vec3>{camera} -= rho * a;
+        Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
+      }
       J[kTimeOffset] = o.sqrt_information.row(k).dot(o.velocity);
     }
   }

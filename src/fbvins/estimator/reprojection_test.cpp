@@ -53,7 +53,7 @@ struct Seen {
 TEST(Reprojection, JacobiansAreDerivatives) {
   for (const bool right : {false, true}) {
     Seen s;
-    s.o.right = right;
+    s.o.camera = right;
     double rows[2][32];
     s.residual(rows);
     Eigen::MatrixXd J(2, 28);

@@ -21,9 +21,10 @@ void shift(Observation& o, double after_s, double inverse_depth, const ShutterMo
 
 /// By least squares, of the left ray with the right observation; zero for a match that is behind the cameras.
 double stereo_inverse_depth(const TrackedFeature& f, const Calibration& calibration) {
-  const Mat3 R_C1B = calibration.T_BC1.R().transpose();
-  const Vec3 a = R_C1B * (calibration.T_BC0.q * f.left->normalised.homogeneous());
-  const Vec3 b = R_C1B * (calibration.T_BC0.p - calibration.T_BC1.p);
+  const Pose<B, C0> T_BL = calibration.T_BC(f.cameras.left), T_BR = calibration.T_BC(f.cameras.right);
+  const Mat3 R_RB = T_BR.R().transpose();
+  const Vec3 a = R_RB * (T_BL.q * f.left->normalised.homogeneous());
+  const Vec3 b = R_RB * (T_BL.p - T_BR.p);
   const Vec2 u = a.head<2>() - a.z() * f.right->normalised, w = b.head<2>() - b.z() * f.right->normalised;
   return std::max(0.0, -u.dot(w) / w.squaredNorm());
 }
@@ -47,18 +48,23 @@ ShutterMotion turning_at_end(const ImuSegment& readings, const Vec3& gyro_bias_r
   return out;
 }
 
+RollingShutter::RollingShutter(const StereoRig& rig) : line_delay_s_(rig.line_delay_s) {
+  for (int i = 0; i < rig.camera_count(); ++i) heights_px_.push_back(rig.camera(i).height());
+}
+
 void RollingShutter::bring_to_stamp(const ShutterMotion& motion, const Calibration& calibration, const InverseDepth* known,
                                     std::vector<TrackedFeature>& features) const {
   if (global()) return;
   for (TrackedFeature& f : features) {
     const double stereo = f.left && f.right ? stereo_inverse_depth(f, calibration) : 0;
-    const auto bring = [&](Observation& o, bool right, int height_px) {
-      const double after_s = (o.pixel.y() - 0.5 * height_px) * line_delay_s;
+    const auto bring = [&](Observation& o, bool right) {
+      const int camera = f.cameras[right];
+      const double after_s = (o.pixel.y() - 0.5 * heights_px_[static_cast<std::size_t>(camera)]) * line_delay_s_;
       const std::optional<double> depth = known ? (*known)(f, right) : std::nullopt;
-      shift(o, after_s, depth.value_or(stereo), motion, right ? calibration.T_BC1.cast_frames<B, C0>() : calibration.T_BC0);
+      shift(o, after_s, depth.value_or(stereo), motion, calibration.T_BC(camera));
     };
-    if (f.left) bring(*f.left, false, left_height_px);
-    if (f.right) bring(*f.right, true, right_height_px);
+    if (f.left) bring(*f.left, false);
+    if (f.right) bring(*f.right, true);
   }
 }
 

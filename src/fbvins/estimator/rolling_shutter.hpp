@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "fbvins/camera/camera.hpp"
 #include "fbvins/types/calibration.hpp"
 #include "fbvins/types/imu.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -31,15 +32,19 @@ ShutterMotion turning_at_end(const ImuSegment& readings, const Vec3& gyro_bias_r
 /// 1/m, along z of the camera; nothing where the point is not known.
 using InverseDepth = std::function<std::optional<double>(const TrackedFeature&, bool right)>;
 
-struct RollingShutter {
-  double line_delay_s = 0;
-  int left_height_px = 0, right_height_px = 0;
+class RollingShutter {
+ public:
+  explicit RollingShutter(const StereoRig& rig);
 
-  bool global() const { return line_delay_s == 0; }
+  bool global() const { return line_delay_s_ == 0; }
   /// Changes the normalised positions; pixels stay as seen. The depth of a point that `known` (may be null) does not have is that
   /// of its stereo match; without one the point counts as far away.
   void bring_to_stamp(const ShutterMotion& motion, const Calibration& calibration, const InverseDepth* known,
                       std::vector<TrackedFeature>& features) const;
+
+ private:
+  double line_delay_s_;
+  std::vector<int> heights_px_;  ///< of the cameras' images
 };
 
 }  // namespace fbvins

@@ -8,7 +8,13 @@
 namespace fbvins {
 namespace {
 
-const RollingShutter kShutter{40e-6, 480, 480};
+RollingShutter shutter_with(double line_delay_s) {
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
+  rig.line_delay_s = line_delay_s;
+  return RollingShutter(rig);
+}
+const RollingShutter kShutter = shutter_with(40e-6);
 
 Calibration cameras() {
   Calibration c;
@@ -70,7 +76,7 @@ TEST(RollingShutter, AGlobalShutterChangesNoBit) {
   const ShutterMotion motion{Vec3(0.8, -1.5, 2), Vec3(5, 10, -15), Vec3(1, -2, 0.5)};
   std::vector<TrackedFeature> features{at_rows(motion, cameras().T_BC0 * Vec3(0.8, -0.9, 3), 20, 40)};
   const Vec2 before = features[0].left->normalised;
-  RollingShutter{0, 480, 480}.bring_to_stamp(motion, cameras(), nullptr, features);
+  shutter_with(0).bring_to_stamp(motion, cameras(), nullptr, features);
   EXPECT_EQ(features[0].left->normalised, before);
 }
 

@@ -45,7 +45,7 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
   for (const TrackedFeature& feature : features) {
     if (landmarks_.rejected(feature.id)) continue;
     auto [landmark, is_new] = landmarks_.of_track(feature.id);
-    if (is_new) landmark.prior = known_.find(feature.id);
+    if (is_new) landmark.prior = known_.find(feature.id), landmark.cameras = feature.cameras;
     Sighting sighting{newest.id, feature.left, feature.right, Vec2::Zero(), Vec2::Zero()};
     if (landmark.sightings.empty()) {
       landmark.host = newest.id;
@@ -85,13 +85,14 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
     WindowLandmark l;
     l.id = landmark->id;
     l.host = frames_.index_of(landmark->host);
-    l.right_ray = landmark->right_ray;
+    l.camera = landmark->ray_camera();
     l.alpha_beta_rho = landmark->alpha_beta_rho;
     l.first_observation = static_cast<int>(out.observations.size());
     for (const Sighting& s : landmark->sightings) {
       const int frame = frames_.index_of(s.frame);
-      if (s.left) out.observations.push_back({frame, false, s.left->normalised, s.left_velocity, s.left->sqrt_information});
-      if (s.right) out.observations.push_back({frame, true, s.right->normalised, s.right_velocity, s.right->sqrt_information});
+      const auto [left, right] = landmark->cameras;
+      if (s.left) out.observations.push_back({frame, left, s.left->normalised, s.left_velocity, s.left->sqrt_information});
+      if (s.right) out.observations.push_back({frame, right, s.right->normalised, s.right_velocity, s.right->sqrt_information});
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;
     if (landmark->prior) {

@@ -26,7 +26,7 @@ int remove_far_observations(Landmark& landmark, const WindowProblem& solved, con
     if (s == nullptr) continue;
     Sighting& sighting = landmark.sightings[static_cast<std::size_t>(s - landmark.sightings.data())];
     // The right position was found from the left one: it goes with it.
-    if (!o.right) sighting.left.reset();
+    if (o.camera == landmark.cameras.left) sighting.left.reset();
     sighting.right.reset();
   }
   std::erase_if(landmark.sightings, [](const Sighting& s) { return !s.left && !s.right; });
@@ -71,7 +71,7 @@ int SlidingWindow::refuse_landmark_priors(const WindowProblem& solved) {
 
 /// A landmark very far from its prior is another one; its factor would spoil the solve.
 void SlidingWindow::refuse_distant_prior(Landmark& landmark, const Calibration& calibration) {
-  const WindowLandmark numbers{.right_ray = landmark.right_ray, .alpha_beta_rho = landmark.alpha_beta_rho};
+  const WindowLandmark numbers{.camera = landmark.ray_camera(), .alpha_beta_rho = landmark.alpha_beta_rho};
   const Pose<G, B>& host = frames_.at(landmark.host).state.T_FB;
   const double distance_sigma = landmark_prior_residual(CameraGeometry(calibration), host, numbers, *landmark.prior).norm();
   if (distance_sigma < kFarFromPrior * kPriorOutlier_sigma) return;
@@ -95,7 +95,7 @@ void SlidingWindow::remember(const WindowProblem& problem, std::span<const Leavi
   for (std::size_t k = 0; k < leaving.size(); ++k) {
     const WindowLandmark& numbers = problem.landmarks[leaving[k].index];
     Landmark& landmark = *landmarks_.find(numbers.id);
-    const Pose<G, C0> T_GC = problem.frames[numbers.host].state.T_FB * ray_camera(problem.calibration, numbers.right_ray);
+    const Pose<G, C0> T_GC = problem.frames[numbers.host].state.T_FB * problem.calibration.T_BC(numbers.camera);
     known_.remember(landmark.track, T_GC, numbers.alpha_beta_rho, information[k]);
     landmark.prior = known_.find(landmark.track);
   }

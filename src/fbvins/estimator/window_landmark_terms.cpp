@@ -14,7 +14,7 @@ namespace {
 /// What an observation without a projection costs: a residual of this many sigmas, with no slope.
 constexpr double kUnprojectableSigma = 100.0;
 
-/// One frame's observations of a landmark: two rows of the left camera, two of the right one.
+/// One frame's observations of a landmark: two rows of each of the two cameras that may see it.
 constexpr int kMostSightings = 2;
 template <int Columns>
 using SightingRows = double[kMostSightings][2][Columns];
@@ -50,12 +50,12 @@ double add_landmark_prior(const WindowProblem& w, const CameraGeometry& cameras,
   point.V += robust.weight * J.point.transpose() * J.point;
   point.w += robust.weight * J.point.transpose() * r;
   out.points.coupling(point, host_block) += robust.weight * J.point.transpose() * J.host;
-  if (w.calibrating()) {
-    const int row = out.layout.calibration_row() + 6 * l.right_ray;
+  if (w.calibrating() && is_refined(l.camera)) {
+    const int row = out.layout.calibration_row() + 6 * l.camera;
     out.H.block<6, 6>(row, row) += robust.weight * J.extrinsic.transpose() * J.extrinsic;
     out.H.block<6, 6>(host, row) += robust.weight * J.host.transpose() * J.extrinsic;
     out.g.segment<6>(row) += robust.weight * J.extrinsic.transpose() * r;
-    out.points.coupling(point, l.right_ray) += robust.weight * J.point.transpose() * J.extrinsic;
+    out.points.coupling(point, l.camera) += robust.weight * J.point.transpose() * J.extrinsic;
   }
   return robust.cost;
 }

@@ -56,7 +56,7 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
       if (p_C.z() < 0.3) continue;
       WindowObservation o;
       o.frame = frame;
-      o.right = right;
+      o.camera = right;
       o.normalised = p_C.head<2>() / p_C.z() + 1e-3 * Vec2(rng.normal(), rng.normal());
       if (rng.below(20) == 0) o.normalised += Vec2(0.02, -0.01);  // an outlier of some ten sigmas
       o.velocity = Vec2(rng.normal(), rng.normal());
@@ -65,8 +65,8 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
       ++l.observation_count;
     }
   }
-  l.right_ray = w.problem.landmarks.size() % 4 == 1;
-  const Vec3 p_C = in_camera(host, l.right_ray);
+  l.camera = w.problem.landmarks.size() % 4 == 1;
+  const Vec3 p_C = in_camera(host, l.camera);
   l.alpha_beta_rho =
       Vec3(p_C.x() / p_C.z() + 1e-3 * rng.normal(), p_C.y() / p_C.z() + 1e-3 * rng.normal(), (1 + 0.05 * rng.normal()) / p_C.z());
   w.problem.landmarks.push_back(l);

@@ -19,7 +19,7 @@ double parallax(const Mat3& R_ba, const Observation& a, const Observation& b) {
 
 /// In G.
 Vec3 position_of(const Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
-  const Pose<G, C0> T_GC = frames.at(landmark.host).state.T_FB * ray_camera(calibration, landmark.right_ray);
+  const Pose<G, C0> T_GC = frames.at(landmark.host).state.T_FB * calibration.T_BC(landmark.ray_camera());
   return T_GC * Vec3(Vec3(landmark.alpha_beta_rho.x(), landmark.alpha_beta_rho.y(), 1) / landmark.alpha_beta_rho.z());
 }
 
@@ -57,7 +57,11 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
   const auto rotation = [&](const Mat3& R_BC) -> Mat3 {
     return (newest.state.T_FB.R() * R_BC).transpose() * keyframe.state.T_FB.R() * R_BC;
   };
-  const Mat3 R_new_last[2] = {rotation(calibration.T_BC0.R()), rotation(calibration.T_BC1.R())};
+  std::vector<Mat3> R_new_last;  // of each camera
+  for (int i = 0; i < calibration.camera_count(); ++i) R_new_last.push_back(rotation(calibration.T_BC(i).R()));
+  const auto moved_px = [&](int camera, const Observation& from, const Observation& to) {
+    return focal_px * parallax(R_new_last[static_cast<std::size_t>(camera)], from, to);
+  };
   int seen = 0;
   std::vector<double> motion;
   for (const Landmark& l : window.landmarks().all()) {
@@ -66,8 +70,8 @@ KeyframeDistance distance_to_last_keyframe(const SlidingWindow& window, const Ca
     const Sighting* before = l.sighting_in(keyframe.id);
     if (before == nullptr) continue;
     const Sighting& now = l.sightings.back();
-    if (before->left && now.left) motion.push_back(focal_px * parallax(R_new_last[0], *before->left, *now.left));
-    else if (before->right && now.right) motion.push_back(focal_px * parallax(R_new_last[1], *before->right, *now.right));
+    if (before->left && now.left) motion.push_back(moved_px(l.cameras.left, *before->left, *now.left));
+    else if (before->right && now.right) motion.push_back(moved_px(l.cameras.right, *before->right, *now.right));
   }
   if (seen > 0) out.shared_ratio = static_cast<double>(motion.size()) / seen;
   out.parallax_px = median(motion);
@@ -132,7 +136,7 @@ Keyframe keyframe_of(const SlidingWindow& window, int frame, const Calibration& 
   out.imu.bias = f.state.bias;
   for (const Landmark& l : window.landmarks().all()) {
     const Sighting* seen = l.triangulated ? l.sighting_in(f.id) : nullptr;
-    if (seen == nullptr || !seen->left) continue;
+    if (seen == nullptr || !seen->left || l.cameras.left != 0) continue;
     const Vec3 p_C = scaled_point_in_camera(l, f, window.frames(), calibration) / l.alpha_beta_rho.z();
     out.landmarks.push_back({l.track, seen->left->pixel, calibration.T_BC0 * p_C});
   }

@@ -123,7 +123,7 @@ class CeresTwin {
       seen->host = p.frames[l.host].state, seen->target = p.frames[seen->o.frame].state;
       seen->calibration = p.calibration;
       seen->same_frame = seen->o.frame == l.host;
-      seen->right_ray = l.right_ray;
+      seen->camera = l.camera;
       std::vector<Block> blocks{landmark, calibration_block()};
       if (!seen->same_frame) blocks.insert(blocks.end(), {frame(l.host), frame(seen->o.frame)});
       add(std::move(seen), 2, blocks, new ceres::HuberLoss(p.weights.huber_sigma));
@@ -131,7 +131,7 @@ class CeresTwin {
     if (l.prior < 0) return;
     auto residual = std::make_unique<LandmarkPriorResidual>();
     residual->seen.host = p.frames[l.host].state, residual->seen.calibration = p.calibration;
-    residual->seen.right_ray = l.right_ray;
+    residual->seen.camera = l.camera;
     residual->prior = p.landmark_priors[l.prior];
     add(std::move(residual), 3, {landmark, calibration_block(), frame(l.host)}, new ceres::HuberLoss(p.weights.huber_sigma));
   }
@@ -256,7 +256,7 @@ Window window_at_rest(std::uint64_t seed) {
   test::add_landmark(w, Vec3(0.1, 0.1, 0.5), 0, rng);
   WindowLandmark& alone = w.problem.landmarks.back();
   auto& seen = w.problem.observations;
-  seen.erase(std::remove_if(seen.begin() + alone.first_observation, seen.end(), [](const auto& o) { return o.right; }),
+  seen.erase(std::remove_if(seen.begin() + alone.first_observation, seen.end(), [](const auto& o) { return o.camera == 1; }),
              seen.end());
   alone.observation_count = static_cast<int>(seen.size()) - alone.first_observation;
   w.problem.prior.quadratic.H = Eigen::MatrixXd::Identity(15, 15) * 1e6;

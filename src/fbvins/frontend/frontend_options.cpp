@@ -11,26 +11,35 @@
 #include "fbvins/frontend/either_camera.hpp"
 #include "fbvins/frontend/klt_frontend.hpp"
 #include "fbvins/frontend/orb_frontend.hpp"
+#include "fbvins/frontend/rig_frontend.hpp"
 
 namespace fbvins {
 namespace {
 
 using Made = Result<std::unique_ptr<Frontend>>;
 
-/// `lead(rig)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can.
+/// `lead(rig)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can. Each group of cameras has
+/// its own.
 template <class Lead>
-std::unique_ptr<Frontend> for_cameras_of(const StereoRig& rig, Lead&& lead) {
-  if (!rig.has_right()) return lead(rig);
-  return std::make_unique<EitherCamera>(rig, lead(rig), lead(mirrored(rig)));
+std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, Lead&& lead) {
+  const std::vector<CameraGroup> groups = camera_groups(rig);
+  std::vector<std::unique_ptr<Frontend>> frontends;
+  for (const CameraGroup& group : groups) {
+    const StereoRig cameras = rig_of(rig, group);
+    if (group.second) frontends.push_back(std::make_unique<EitherCamera>(cameras, lead(cameras), lead(mirrored(cameras))));
+    else frontends.push_back(lead(cameras));
+  }
+  if (groups.size() == 1) return std::move(frontends.front());
+  return std::make_unique<RigFrontend>(groups, std::move(frontends));
 }
 
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
-  return for_cameras_of(rig, [&](const StereoRig& r) { return std::make_unique<KltFrontend>(r, options.klt); });
+  return for_each_group(rig, [&](const StereoRig& r) { return std::make_unique<KltFrontend>(r, options.klt); });
 }
 
 std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
                                    const std::shared_ptr<DescriptorStage>& stage) {
-  return for_cameras_of(rig, [&](const StereoRig& r) { return std::make_unique<OrbFrontend>(r, options, stage); });
+  return for_each_group(rig, [&](const StereoRig& r) { return std::make_unique<OrbFrontend>(r, options, stage); });
 }
 
 Made make_orb(const StereoRig& rig, const FrontendOptions& options) { return orb_with(rig, options.orb, make_identity_stage()); }

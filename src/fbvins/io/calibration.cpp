@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/calibration.hpp"
 
+#include <fmt/format.h>
+
 #include "fbvins/io/calibration_fields.hpp"
 
 namespace fbvins {
@@ -38,17 +40,18 @@ Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml) {
   return pose;
 }
 
-Result<StereoRig> join_euroc(const CameraSensor& left, const std::optional<CameraSensor>& right, const ImuSensor& imu,
-                             const std::string& file) {
-  StereoRig rig;
-  rig.left = left.camera;
-  if (right) rig.right = right->camera;
-  rig.T_BC0 = imu.T_BS.inverse() * left.T_BS;
-  rig.T_BC1 = (imu.T_BS.inverse() * (right ? right->T_BS : left.T_BS)).cast_frames<B, C1>();
+Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const ImuSensor& imu, const std::string& file) {
+  std::vector<MountedCamera> mounted;
+  for (const CameraSensor& camera : cameras) mounted.push_back({camera.camera, imu.T_BS.inverse() * camera.T_BS});
+  StereoRig rig = with_cameras({}, mounted);
+  const CameraSensor& left = cameras.front();
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
   rig.time_offset_s = left.time_offset_s;
   rig.line_delay_s = left.line_delay_s;
+  for (const CameraSensor& camera : cameras)
+    if (camera.line_delay_s != left.line_delay_s)
+      return Error{ErrorCode::unsupported, fmt::format("{}: the cameras have different line delays", file)};
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }

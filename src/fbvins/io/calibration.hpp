@@ -31,10 +31,8 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml);
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml);
 /// Only the T_BS of a sensor.yaml.
 Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml);
-/// Joins the three; `file` is only for messages. Without `right` the rig has one camera. An error where two cameras are
-/// at the same place.
-Result<StereoRig> join_euroc(const CameraSensor& left, const std::optional<CameraSensor>& right, const ImuSensor& imu,
-                             const std::string& file);
+/// The rig of these cameras, one or more, and the IMU; `file` is only for messages. An error where check_rig has one.
+Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const ImuSensor& imu, const std::string& file);
 
 /// Kalibr's camchain-imucam.yaml; imu_noise stays at its defaults.
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml);

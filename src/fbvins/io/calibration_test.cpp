@@ -54,7 +54,7 @@ TEST(Calibration, OurBodyIsTheImuEvenWhereThatOfTheFileIsNot) {
   const auto left = parse_euroc_camera({"cam0", euroc_camera(kLeft)}), right = parse_euroc_camera({"cam1", euroc_camera(kRight)});
   ImuSensor imu;
   imu.T_BS = Pose<B, B>(so3_exp({0.3, 0.2, 0.1}), {1, 2, 3});
-  const auto rig = join_euroc(*left, *right, imu, "x");
+  const auto rig = join_euroc({*left, *right}, imu, "x");
   ASSERT_TRUE(rig);
   expect_same(imu.T_BS * rig->T_BC0.cast_frames<B, B>(), kLeft, 1e-13);
   expect_same(rig->T_C1C0(), kRight.inverse() * kLeft, 1e-13);
@@ -72,6 +72,17 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
     EXPECT_EQ(rig->time_offset_s, -0.004);
     EXPECT_EQ(rig->right.width(), 752);
   }
+}
+
+TEST(Calibration, KalibrsChainGoesOnFromCameraToCamera) {
+  const Pose<B, C0> third = kLeft * Pose<C0, C0>(so3_exp({0, 3, 0}), {0.1, 0.2, 0.3});
+  const std::string text = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" +
+                           kalibr_camera("T_cn_cnm1", kRight.inverse() * kLeft) + "cam2:\n" +
+                           kalibr_camera("T_cn_cnm1", third.inverse() * kRight);
+  const auto rig = parse_kalibr_camchain({"chain.yaml", text});
+  ASSERT_TRUE(rig) << rig.error().message;
+  ASSERT_EQ(rig->camera_count(), 3);
+  expect_same(rig->T_BC(2), third, 1e-14);
 }
 
 TEST(Calibration, KalibrsWideLensesHaveTheirNumbersBeforeTheFocalLengths) {

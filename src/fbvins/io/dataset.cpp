@@ -33,9 +33,16 @@ class OneCamera : public FrameLoader {
 };
 
 DatasetContents with_cameras(DatasetContents contents, const std::string& camera) {
-  if (camera == "both" || !contents.rig.has_right()) return contents;
+  if (camera == "all" || !contents.rig.has_right()) return contents;
+  contents.rig.more.clear();
+  contents.info.more = {};
+  for (FrameEntry& frame : contents.frames) frame.more_files.clear();
+  if (camera == "both") {
+    std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.without_images(); });
+    return contents;
+  }
   const bool right = camera == "right";
-  contents.rig = with_one_camera(std::move(contents.rig), right);
+  contents.rig = with_one_camera(contents.rig, right);
   for (FrameEntry& frame : contents.frames) {
     if (right) frame.left_file = std::move(frame.right_file);
     frame.right_file.clear();
@@ -78,27 +85,28 @@ bool Dataset::imu_is_due() const {
   return next_imu_ == 0 || contents_.imu[next_imu_ - 1].t < image;
 }
 
-/// Nullopt for a frame that lost both of its images, unless it was recorded without any.
+/// Nullopt for a frame that lost all of its images, unless it was recorded without any.
 std::optional<StereoFrame> Dataset::next_frame() {
   const FrameEntry& entry = contents_.frames[next_frame_++];
   std::optional<LoadedFrame> loaded = prefetcher_->next();
-  if (entry.left_file.empty() && entry.right_file.empty()) return std::move(loaded->frame);
+  if (entry.without_images()) return std::move(loaded->frame);
   count(*loaded);
-  if (!loaded->frame.left && !loaded->frame.right) return std::nullopt;
+  if (loaded->frame.without_images()) return std::nullopt;
   return std::move(loaded->frame);
 }
 
 void Dataset::count(const LoadedFrame& loaded) {
   DatasetInfo& info = contents_.info;
-  for (auto [total, here] : {std::pair{&info.left.images, &loaded.left}, std::pair{&info.right.images, &loaded.right}}) {
+  for (auto [total, here] :
+       {std::pair{&info.left.images, &loaded.left}, {&info.right.images, &loaded.right}, {&info.more.images, &loaded.more}}) {
     total->corrupt += here->corrupt;
     total->wrong_size += here->wrong_size;
   }
-  if (!loaded.frame.left && !loaded.frame.right) ++info.frames_without_image;
+  if (loaded.frame.without_images()) ++info.frames_without_image;
   // One sentence for the first of them; the counts say how many.
-  const int failures =
-      info.left.images.corrupt + info.left.images.wrong_size + info.right.images.corrupt + info.right.images.wrong_size;
-  const int now = loaded.left.bad() + loaded.right.bad();
+  int failures = 0;
+  for (const ImageCounts& of : {info.left.images, info.right.images, info.more.images}) failures += of.corrupt + of.wrong_size;
+  const int now = loaded.left.bad() + loaded.right.bad() + loaded.more.bad();
   if (now > 0 && failures == now) info.warnings.push_back(loaded.problem);
 }
 

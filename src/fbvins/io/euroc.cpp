@@ -59,7 +59,7 @@ class EurocReader {
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
-    out_.loader = make_euroc_loader(std::move(files_), root_, left_, out_.rig);
+    out_.loader = make_euroc_loader(std::move(files_), root_, folders(), out_.rig);
     return std::move(out_);
   }
 
@@ -71,13 +71,20 @@ class EurocReader {
   }
   void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
 
-  /// A recording with the folder of one camera only, whichever, is one of that camera.
+  static std::string folder_of(int camera) { return fmt::format("cam{}/", camera); }
+  std::vector<std::string> folders() const {
+    std::vector<std::string> out;
+    for (const int camera : cameras_) out.push_back(folder_of(camera));
+    return out;
+  }
+
+  /// The cameras whose folders are there, whichever. A further one that nobody has calibrated, a colour camera, is left out.
   void find_cameras() {
-    const auto has = [&](const char* camera) {
-      return exists(fmt::format("{}/data.csv", camera)) || exists(fmt::format("{}/sensor.yaml", camera));
-    };
-    if (!has("cam0")) left_ = "cam1";
-    two_cameras_ = has("cam0") && has("cam1");
+    for (int i = 0; i < kMostCameras; ++i) {
+      const bool images = exists(folder_of(i) + "data.csv"), calibration = exists(folder_of(i) + "sensor.yaml");
+      if (i < 2 ? images || calibration : images && (calibration || options_.brings_rig())) cameras_.push_back(i);
+    }
+    if (cameras_.empty()) cameras_ = {0};
   }
 
   template <class Parser>
@@ -103,16 +110,13 @@ class EurocReader {
   }
 
   Result<void> read_own_calibration(const ImuSensor& imu) {
-    const std::string left_file = left_ + "/sensor.yaml";
-    Result<CameraSensor> left = parse_yaml(left_file, parse_euroc_camera);
-    if (!left) return left.error();
-    std::optional<CameraSensor> right;
-    if (two_cameras_) {
-      Result<CameraSensor> read = parse_yaml("cam1/sensor.yaml", parse_euroc_camera);
+    std::vector<CameraSensor> cameras;
+    for (const std::string& folder : folders()) {
+      Result<CameraSensor> read = parse_yaml(folder + "sensor.yaml", parse_euroc_camera);
       if (!read) return read.error();
-      right = *read;
+      cameras.push_back(*read);
     }
-    Result<StereoRig> rig = join_euroc(*left, right, imu, named(two_cameras_ ? "cam1/sensor.yaml" : left_file));
+    Result<StereoRig> rig = join_euroc(cameras, imu, named(folders().back() + "sensor.yaml"));
     if (!rig) return rig.error();
     out_.rig = *rig;
     return {};
@@ -127,39 +131,49 @@ class EurocReader {
     return {};
   }
 
-  /// A calibration from outside, of the cameras that were recorded.
+  /// A calibration from outside, whose cameras have the numbers of the folders; one of a single camera is that of the first
+  /// folder. Cameras that were not recorded, and folders without a calibration, are left out.
   void take(const StereoRig& rig) {
-    if (!two_cameras_ && rig.has_right()) out_.rig = with_one_camera(rig, left_ == "cam1");
-    else out_.rig = rig;
-    two_cameras_ = out_.rig.has_right();
+    if (rig.camera_count() == 1) cameras_.resize(1);
+    else std::erase_if(cameras_, [&](int camera) { return camera >= rig.camera_count(); });
+    std::vector<MountedCamera> mounted;
+    for (const int camera : cameras_) mounted.push_back(rig.mounted(rig.camera_count() == 1 ? 0 : camera));
+    out_.rig = with_cameras(rig, mounted);
   }
 
   Result<void> read_frames() {
-    std::vector<ImageRow> lists[2];
-    CameraInfo* infos[2] = {&out_.info.left, &out_.info.right};
-    for (int i = 0; i < (two_cameras_ ? 2 : 1); ++i) {
-      const std::string folder = i == 0 ? left_ + "/" : "cam1/";
+    std::vector<std::vector<ImageRow>> lists(std::max<std::size_t>(2, cameras_.size()));
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const std::string folder = folder_of(cameras_[i]);
+      CameraInfo& info = i == 0 ? out_.info.left : i == 1 ? out_.info.right : out_.info.more;
       Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
       if (!csv) return csv.error();
       auto rows = read_image_rows(*csv, named(folder + "data.csv"));
       if (!rows) return rows.error();
       warn_about_rows(rows->counts, named(folder + "data.csv"));
-      infos[i]->rows = rows->counts;
-      infos[i]->listed = static_cast<int>(rows->rows.size());
+      info.rows += rows->counts;
+      info.listed += static_cast<int>(rows->rows.size());
       lists[i] = std::move(rows->rows);
     }
-    PairedFrames paired = pair_frames(lists[0], lists[1], Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
-    out_.info.left.unpaired = two_cameras_ ? paired.left_only : 0;
+    const Duration tolerance = Duration::from_seconds(1e-3 * options_.pair_tolerance_ms);
+    const bool pair = cameras_.size() > 1;
+    PairedFrames paired = pair_frames(lists[0], lists[1], tolerance);
+    out_.info.left.unpaired = pair ? paired.left_only : 0;
     out_.info.right.unpaired = paired.right_only;
-    if (two_cameras_ && paired.left_only == out_.info.left.listed)
-      return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam0's", named("cam1/data.csv"),
-                                                     options_.pair_tolerance_ms)};
-    if (two_cameras_ && paired.left_only + paired.right_only > 0)
+    if (pair && paired.left_only == out_.info.left.listed)
+      return Error{ErrorCode::malformed,
+                   fmt::format("{}: no stamp lies within {} ms of one of cam{}'s", named(folder_of(cameras_[1]) + "data.csv"),
+                               options_.pair_tolerance_ms, cameras_[0])};
+    if (pair && paired.left_only + paired.right_only > 0)
       warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
                        options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
+    for (std::size_t i = 2; i < lists.size(); ++i) out_.info.more.unpaired += add_camera(out_.frames, lists[i], i - 2, tolerance);
+    if (out_.info.more.unpaired > 0)
+      warn(fmt::format("{} images of further cameras have no partner within {} ms", out_.info.more.unpaired,
+                       options_.pair_tolerance_ms));
     if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
-      return Error{cut.error().code, fmt::format("{}: {}", named(left_ + "/data.csv"), cut.error().message)};
+      return Error{cut.error().code, fmt::format("{}: {}", named(folders().front() + "data.csv"), cut.error().message)};
     return find_images();
   }
 
@@ -173,15 +187,17 @@ class EurocReader {
       file.clear();
     };
     for (FrameEntry& frame : out_.frames) {
-      look(frame.left_file, left_ + "/data/", out_.info.left.images);
-      look(frame.right_file, "cam1/data/", out_.info.right.images);
+      const std::vector<std::string> in = folders();
+      look(frame.left_file, in[0] + "data/", out_.info.left.images);
+      if (in.size() > 1) look(frame.right_file, in[1] + "data/", out_.info.right.images);
+      for (std::size_t i = 0; i < frame.more_files.size(); ++i)
+        look(frame.more_files[i], in[i + 2] + "data/", out_.info.more.images);
     }
-    const std::size_t emptied =
-        std::erase_if(out_.frames, [](const FrameEntry& f) { return f.left_file.empty() && f.right_file.empty(); });
+    const std::size_t emptied = std::erase_if(out_.frames, [](const FrameEntry& f) { return f.without_images(); });
     out_.info.frames_without_image = static_cast<int>(emptied);
     if (out_.frames.empty())
       return Error{ErrorCode::not_found, fmt::format("{}: no such file, nor any other of the images listed", first_missing)};
-    const int missing = out_.info.left.images.missing + out_.info.right.images.missing;
+    const int missing = out_.info.left.images.missing + out_.info.right.images.missing + out_.info.more.images.missing;
     if (missing > 0) warn(fmt::format("{}: no such file; {} of the images listed are missing", first_missing, missing));
     return {};
   }
@@ -255,9 +271,8 @@ class EurocReader {
   std::unique_ptr<FileSource> files_;
   std::string root_;
   const DatasetOptions& options_;
-  std::string left_ = "cam0";  ///< folder of the left, or only, camera
-  bool two_cameras_ = true;
-  Pose<B, B> T_BI_;  ///< takes IMU to the recording's body coordinates
+  std::vector<int> cameras_;  ///< numbers of the folders: of the left camera, the right one, and those that follow
+  Pose<B, B> T_BI_;           ///< takes IMU to the recording's body coordinates
   DatasetContents out_;
 };
 

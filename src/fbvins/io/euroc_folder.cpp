@@ -99,19 +99,21 @@ std::string depth_png(const std::vector<float>& depth_m, int width, int height) 
 
 /// Makes the folders and writes the calibrations.
 Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, const std::string& origin, bool depth) {
-  std::vector<const char*> folders{"cam0/data", "cam1/data", "imu0", "state_groundtruth_estimate0"};
+  std::vector<std::string> folders{"imu0", "state_groundtruth_estimate0"};
+  for (int i = 0; i < rig.camera_count(); ++i) folders.push_back(fmt::format("cam{}/data", i));
   if (depth) folders.push_back("depth0");
-  for (const char* folder : folders) {
+  for (const std::string& folder : folders) {
     std::error_code error;
     fs::create_directories(mav0 / folder, error);
     if (error) return cannot_write(mav0 / folder);
   }
-  const Pose<B, C0>& left = rig.T_BC0;
-  const Pose<B, C1>& right = rig.T_BC1;
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    const auto& [camera, T_BC] = rig.mounted(i);
+    const fs::path path = mav0 / fmt::format("cam{}/sensor.yaml", i);
+    if (Result<void> done = write_file(path, camera_yaml(camera, T_BC.q, T_BC.p, rig, origin)); !done) return done;
+  }
   for (const auto& [path, text] :
-       {std::pair{mav0 / "cam0/sensor.yaml", camera_yaml(rig.left, left.q, left.p, rig, origin)},
-        {mav0 / "cam1/sensor.yaml", camera_yaml(rig.right, right.q, right.p, rig, origin)},
-        {mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise, origin)},
+       {std::pair{mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise, origin)},
         {mav0 / "state_groundtruth_estimate0/sensor.yaml",
          fmt::format("sensor_type: visual-inertial\ncomment: {}\n", origin) + matrix_text(Quat::Identity(), Vec3::Zero())},
         {mav0 / "body.yaml", fmt::format("comment: {}\n", origin)}})
@@ -135,6 +137,10 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
     const std::string depth = depth_png(images.depth_left_m, frame.left->width(), frame.left->height());
     if (Result<void> done = write_file(mav0 / "depth0" / left, depth); !done) return done;
   }
+  for (std::size_t i = 0; i < frame.more.size(); ++i)
+    if (frame.more[i])
+      if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data", i + 2) / left, encode_png(*frame.more[i])); !done)
+        return done;
   return frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*frame.right)) : Result<void>{};
 }
 
@@ -142,7 +148,7 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
 
 struct EurocFolder::State {
   fs::path mav0;
-  std::string left_rows = "#timestamp [ns],filename\n", right_rows = left_rows;
+  std::vector<std::string> rows;  ///< of each camera
   std::future<Result<void>> writing;
 
   Result<void> wait() { return writing.valid() ? writing.get() : Result<void>{}; }
@@ -154,6 +160,7 @@ Result<EurocFolder> EurocFolder::create(const std::string& folder, const StereoR
   if (Result<void> done = write_calibrations(rig, mav0, origin, depth); !done) return done.error();
   auto state = std::make_unique<State>();
   state->mav0 = mav0;
+  state->rows.assign(static_cast<std::size_t>(rig.camera_count()), "#timestamp [ns],filename\n");
   return EurocFolder(std::move(state));
 }
 
@@ -163,8 +170,10 @@ EurocFolder::EurocFolder(EurocFolder&&) noexcept = default;
 EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
 
 Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<float> depth_left_m) {
-  if (frame.left) state_->left_rows += fmt::format("{0},{0}.png\n", frame.t.ns);
-  if (frame.right) state_->right_rows += fmt::format("{0},{0}.png\n", right_stamp.ns);
+  for (std::size_t i = 0; i < state_->rows.size(); ++i) {
+    const Time stamp = i == 1 ? right_stamp : frame.t;
+    if (frame.image(static_cast<int>(i))) state_->rows[i] += fmt::format("{0},{0}.png\n", stamp.ns);
+  }
   if (Result<void> done = state_->wait(); !done) return done;
   state_->writing = std::async(std::launch::async, [images = Images{std::move(frame), right_stamp, std::move(depth_left_m)},
                                                     mav0 = state_->mav0] { return write_images(images, mav0); });
@@ -174,11 +183,11 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
 Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {
   if (Result<void> done = state_->wait(); !done) return done;
   const fs::path& mav0 = state_->mav0;
-  for (const auto& [path, text] : {std::pair{mav0 / "imu0/data.csv", imu_csv(readings)},
-                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)},
-                                   {mav0 / "cam0/data.csv", state_->left_rows},
-                                   {mav0 / "cam1/data.csv", state_->right_rows}})
+  for (const auto& [path, text] :
+       {std::pair{mav0 / "imu0/data.csv", imu_csv(readings)}, {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)}})
     if (Result<void> done = write_file(path, text); !done) return done;
+  for (std::size_t i = 0; i < state_->rows.size(); ++i)
+    if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data.csv", i), state_->rows[i]); !done) return done;
   return {};
 }
 

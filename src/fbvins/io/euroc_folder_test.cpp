@@ -41,6 +41,57 @@ std::string empty_folder(const std::string& name) {
   return folder;
 }
 
+/// Two frames of four cameras; of the second, `missing` delivers none.
+std::string four_cameras(const std::string& name, const StereoRig& rig, int missing) {
+  const std::string folder = empty_folder(name);
+  auto recording = EurocFolder::create(folder, rig, "made by hand");
+  EXPECT_TRUE(recording.ok());
+  std::vector<ImuSample> readings;
+  for (int i = 0; i < 30; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  for (const Time t : {Time{1'020'000'000}, Time{1'070'000'000}}) {
+    StereoFrame frame{t, pattern(0), pattern(1), {pattern(2), pattern(3)}};
+    if (t.ns > 1'050'000'000) frame.more[static_cast<std::size_t>(missing - 2)] = nullptr;
+    EXPECT_TRUE(recording->add(frame, t).ok());
+  }
+  EXPECT_TRUE(recording->finish(readings, {}).ok());
+  return folder;
+}
+
+StereoRig four_camera_rig() {
+  StereoRig rig = small_rig();
+  const Quat back(0.5, 0.5, -0.5, -0.5);
+  rig.more = {{rig.right, {back, Vec3(-0.25, 0.125, 0)}}, {rig.left, {back, Vec3(-0.25, 0, 0)}}};
+  return rig;
+}
+
+TEST(EurocFolder, KeepsFourCameras) {
+  const StereoRig rig = four_camera_rig();
+  const auto data = open_dataset(four_cameras("euroc_four", rig, 3));
+  ASSERT_TRUE(data) << data.error().message;
+  ASSERT_EQ((*data)->rig().camera_count(), 4);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ((*data)->rig().camera(i).intrinsics(), rig.camera(i).intrinsics());
+    EXPECT_TRUE((*data)->rig().T_BC(i).p.isApprox(rig.T_BC(i).p, 1e-12));
+  }
+  std::vector<StereoFrame> frames;
+  while (auto event = (*data)->next())
+    if (auto* frame = std::get_if<StereoFrame>(&*event)) frames.push_back(std::move(*frame));
+  ASSERT_EQ(frames.size(), 2u);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(same_pixels(*frames[0].image(i), *pattern(i))) << "camera " << i;
+  EXPECT_TRUE(frames[1].image(2));
+  EXPECT_FALSE(frames[1].image(3));
+}
+
+TEST(EurocFolder, OfFourCamerasTheFirstTwoCanBeUsed) {
+  DatasetOptions options;
+  options.camera = "both";
+  const auto data = open_dataset(four_cameras("euroc_both_of_four", four_camera_rig(), 3), options);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ((*data)->rig().camera_count(), 2);
+  while (auto event = (*data)->next())
+    if (auto* frame = std::get_if<StereoFrame>(&*event)) EXPECT_TRUE(frame->more.empty());
+}
+
 TEST(EurocFolder, KeepsTimeOffsetAndRange) {
   const std::string folder = empty_folder("euroc_offset");
   StereoRig rig = small_rig();

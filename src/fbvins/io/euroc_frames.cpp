@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/io/image_decode.hpp"
@@ -32,26 +33,23 @@ RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
 
 class EurocLoader : public FrameLoader {
  public:
-  EurocLoader(std::unique_ptr<FileSource> files, std::string root, const std::string& left_folder, const StereoRig& rig)
-      : files_(std::move(files)),
-        root_(std::move(root)),
-        left_folder_(left_folder + "/data/"),
-        left_(rig.left),
-        right_(rig.right) {}
+  EurocLoader(std::unique_ptr<FileSource> files, std::string root, std::vector<std::string> folders, const StereoRig& rig)
+      : files_(std::move(files)), root_(std::move(root)), folders_(std::move(folders)), rig_(rig) {}
 
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
-    out.frame.left = load_image(entry.left_file, left_folder_, left_, out.left, out.problem);
-    out.frame.right = load_image(entry.right_file, "cam1/data/", right_, out.right, out.problem);
+    out.frame.left = load_image(entry.left_file, 0, out.left, out.problem);
+    out.frame.right = load_image(entry.right_file, 1, out.right, out.problem);
+    for (std::size_t i = 0; i < entry.more_files.size(); ++i)
+      out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.problem));
     return out;
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& file, const std::string& folder, const Camera& camera,
-                                          ImageCounts& counts, std::string& problem) const {
+  std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, std::string& problem) const {
     if (file.empty()) return nullptr;
-    const std::string path = root_ + folder + file;
+    const std::string path = root_ + folders_[static_cast<std::size_t>(camera)] + "data/" + file;
     const auto blame = [&](const std::string& sentence) {
       if (problem.empty()) problem = fmt::format("{}: {}", files_->describe(path), sentence);
     };
@@ -63,7 +61,7 @@ class EurocLoader : public FrameLoader {
       else if (problem.empty()) problem = image.error().message;
       return nullptr;
     }
-    if (const auto sentence = wrong_size(image->width(), image->height(), camera)) {
+    if (const auto sentence = wrong_size(image->width(), image->height(), rig_.camera(camera))) {
       ++counts.wrong_size;
       blame(*sentence);
       return nullptr;
@@ -72,8 +70,9 @@ class EurocLoader : public FrameLoader {
   }
 
   std::unique_ptr<FileSource> files_;
-  std::string root_, left_folder_;
-  Camera left_, right_;
+  std::string root_;
+  std::vector<std::string> folders_;
+  StereoRig rig_;
 };
 
 }  // namespace
@@ -135,6 +134,35 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
   return out;
 }
 
+int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance) {
+  std::vector<Time> stamps;
+  for (const FrameEntry& frame : frames) stamps.push_back(frame.t);
+  const Duration half_interval{measure_intervals(stamps).median.ns / 2};
+  if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
+  for (FrameEntry& frame : frames) frame.more_files.resize(more + 1);
+  std::vector<FrameEntry> alone;
+  int unpaired = 0;
+  for (const ImageRow& image : images) {
+    auto near = std::ranges::lower_bound(stamps, image.t) - stamps.begin();
+    if (near == std::ssize(stamps) ||
+        (near > 0 && image.t - stamps[static_cast<std::size_t>(near) - 1] < stamps[static_cast<std::size_t>(near)] - image.t))
+      --near;
+    FrameEntry& frame = frames[static_cast<std::size_t>(near)];
+    const Duration distance{std::abs((image.t - frame.t).ns)};
+    if (distance <= tolerance && frame.more_files[more].empty()) {
+      frame.more_files[more] = image.file;
+      continue;
+    }
+    ++unpaired;
+    if (distance <= half_interval) continue;
+    alone.push_back({image.t, "", "", std::nullopt, std::vector<std::string>(more + 1)});
+    alone.back().more_files[more] = image.file;
+  }
+  frames.insert(frames.end(), std::make_move_iterator(alone.begin()), std::make_move_iterator(alone.end()));
+  std::ranges::stable_sort(frames, {}, &FrameEntry::t);
+  return unpaired;
+}
+
 Intervals measure_intervals(const std::vector<Time>& increasing) {
   Intervals out;
   std::vector<Duration> steps;
@@ -152,8 +180,8 @@ Intervals measure_intervals(const std::vector<Time>& increasing) {
 }
 
 std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
-                                               const std::string& left_folder, const StereoRig& rig) {
-  return std::make_unique<EurocLoader>(std::move(files), std::move(root), left_folder, rig);
+                                               std::vector<std::string> folders, const StereoRig& rig) {
+  return std::make_unique<EurocLoader>(std::move(files), std::move(root), std::move(folders), rig);
 }
 
 }  // namespace fbvins

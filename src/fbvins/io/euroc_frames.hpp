@@ -33,6 +33,11 @@ struct PairedFrames {
 /// than half the interval from all left ones, where those are missing, is a frame of its own; one that is nearer is left out.
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance);
 
+/// Adds the images of a further camera, the `more`-th from number 2 on: each to the nearest frame within the tolerance (at most
+/// half the median interval), or, farther than half the interval from all, as a frame of its own. Returns how many had no
+/// partner.
+int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance);
+
 struct Intervals {
   Duration median, longest;
   Time longest_start;
@@ -40,8 +45,8 @@ struct Intervals {
 };
 Intervals measure_intervals(const std::vector<Time>& increasing);
 
-/// `left_folder`: cam0, or cam1 where that is the only camera.
+/// `folders`: of the rig's cameras, in their order, with a slash at the end.
 std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,
-                                               const std::string& left_folder, const StereoRig& rig);
+                                               std::vector<std::string> folders, const StereoRig& rig);
 
 }  // namespace fbvins

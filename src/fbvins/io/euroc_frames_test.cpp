@@ -86,5 +86,27 @@ TEST(ImuRows, GyroComesBeforeTheAccelerometer) {
   EXPECT_EQ(parse("7,1,2,3,4,5,inf", sample, problem), RowVerdict::not_finite);
 }
 
+TEST(AddCamera, JoinsTheNearestFrameOrIsOneOfItsOwn) {
+  std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 300}), at_ms({0, 50, 100, 300}), Duration{3 * kMs}).frames;
+  // One that is late, one near none, two where the others have a gap, one of them near a frame.
+  EXPECT_EQ(add_camera(frames, at_ms({1, 52, 120, 200, 299}), 0, Duration{3 * kMs}), 2);
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_FALSE(frames[0].more_files[0].empty());
+  EXPECT_FALSE(frames[1].more_files[0].empty());
+  EXPECT_TRUE(frames[2].more_files[0].empty());
+  EXPECT_TRUE(frames[3].left_file.empty() && frames[3].right_file.empty());
+  EXPECT_EQ(frames[3].t.ns, 200 * kMs);
+  EXPECT_FALSE(frames[3].without_images());
+  EXPECT_FALSE(frames[4].more_files[0].empty());
+}
+
+TEST(AddCamera, FramesOfACameraAloneAreSharedByTheNext) {
+  std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 300}), {}, Duration{3 * kMs}).frames;
+  EXPECT_EQ(add_camera(frames, at_ms({200}), 0, Duration{3 * kMs}), 1);
+  EXPECT_EQ(add_camera(frames, at_ms({201}), 1, Duration{3 * kMs}), 0);
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_FALSE(frames[3].more_files[0].empty() || frames[3].more_files[1].empty());
+}
+
 }  // namespace
 }  // namespace fbvins

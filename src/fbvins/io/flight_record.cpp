@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_definitions.hpp"
 
@@ -96,6 +97,7 @@ std::string health_sentence(const Health& health) {
 }
 
 Result<FlightRecord> FlightRecord::create(const std::string& path, const StereoRig& rig, const FlightRecordOptions& options) {
+  if (Result<void> pair = check_is_a_pair_at_most(rig, path); !pair) return pair.error();
   Result<McapWriter> file = McapWriter::create(path, {"ros2", options.program}, topics());
   if (!file) return file.error();
   const std::string yaml = "application/yaml";

@@ -13,49 +13,54 @@
 namespace fbvins {
 namespace {
 
-/// T_C1B of the second camera: given directly, or through the first one.
-Pose<C1, B> read_second_camera(YamlReader& yaml, const YAML::Node& cam1, const Pose<C0, B>& T_C0B) {
-  if (yaml.has(cam1, "T_cam_imu")) return read_transform<C1, B>(yaml, cam1, "T_cam_imu");
-  return read_transform<C1, C0>(yaml, cam1, "T_cn_cnm1") * T_C0B;
+/// T_CB of a camera: given directly, or through the one before.
+Pose<C0, B> read_next_camera(YamlReader& yaml, const YAML::Node& camera, const Pose<C0, B>& T_before_B) {
+  if (yaml.has(camera, "T_cam_imu")) return read_transform<C0, B>(yaml, camera, "T_cam_imu");
+  return read_transform<C0, C0>(yaml, camera, "T_cn_cnm1") * T_before_B;
 }
 
-double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& cam1) {
+double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& camera) {
   const auto read = [&](const YAML::Node& cam, double otherwise) {
     const double shift_s = yaml.has(cam, "timeshift_cam_imu") ? yaml.number(cam, "timeshift_cam_imu") : otherwise;
     if (std::abs(shift_s) > 10) yaml.complain(cam, "timeshift_cam_imu", fmt::format("{} s is more than 10 s", shift_s));
     return shift_s;
   };
-  const double left_s = read(cam0, 0.0);
-  const double right_s = read(cam1, left_s);
-  // One offset serves both cameras: they must be triggered together.
-  if (std::abs(left_s - right_s) > 3e-3)
-    yaml.complain(cam1, "timeshift_cam_imu", fmt::format("differs from cam0's by {:.1f} ms", 1e3 * (right_s - left_s)));
-  return left_s;
+  const double first_s = read(cam0, 0.0);
+  const double this_s = read(camera, first_s);
+  // One offset serves all cameras: they must be triggered together.
+  if (std::abs(first_s - this_s) > 3e-3)
+    yaml.complain(camera, "timeshift_cam_imu", fmt::format("differs from cam0's by {:.1f} ms", 1e3 * (this_s - first_s)));
+  return first_s;
 }
 
-double read_line_delay_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& cam1) {
+double read_line_delay_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& camera) {
   const auto read = [&](const YAML::Node& cam) { return yaml.has(cam, "line_delay") ? yaml.number(cam, "line_delay") : 0.0; };
-  const double left_s = read(cam0);
-  if (read(cam1) != left_s) yaml.complain(cam1, "line_delay", "differs from cam0's");
-  return left_s;
+  const double first_s = read(cam0);
+  if (read(camera) != first_s) yaml.complain(camera, "line_delay", "differs from cam0's");
+  return first_s;
 }
 
 }  // namespace
 
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
-  const YAML::Node cam0 = yaml.get(yaml.root(), "cam0"), cam1 = yaml.get(yaml.root(), "cam1");
-  const bool two = cam1.IsDefined();
+  const YAML::Node cam0 = yaml.get(yaml.root(), "cam0");
   if (!cam0.IsMap()) yaml.complain(yaml.root(), "cam0", "is missing or empty");
-  if (two && !cam1.IsMap()) yaml.complain(yaml.root(), "cam1", "is empty");
-  StereoRig rig;
-  rig.left = read_camera(yaml, cam0, "distortion_coeffs");
-  const Pose<C0, B> T_C0B = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
-  rig.T_BC0 = T_C0B.inverse();
-  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
-  if (two) rig.right = read_camera(yaml, cam1, "distortion_coeffs");
-  if (two) rig.T_BC1 = read_second_camera(yaml, cam1, T_C0B).inverse();
-  rig.time_offset_s = read_time_offset_s(yaml, cam0, two ? cam1 : cam0);
-  rig.line_delay_s = read_line_delay_s(yaml, cam0, two ? cam1 : cam0);
+  Pose<C0, B> T_CB = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
+  std::vector<MountedCamera> cameras{{read_camera(yaml, cam0, "distortion_coeffs"), T_CB.inverse()}};
+  double time_offset_s = read_time_offset_s(yaml, cam0, cam0), line_delay_s = read_line_delay_s(yaml, cam0, cam0);
+  for (int i = 1; yaml.get(yaml.root(), fmt::format("cam{}", i)).IsDefined(); ++i) {
+    const std::string name = fmt::format("cam{}", i);
+    const YAML::Node camera = yaml.get(yaml.root(), name);
+    if (!camera.IsMap()) yaml.complain(yaml.root(), name, "is empty");
+    if (!yaml.ok()) break;
+    T_CB = read_next_camera(yaml, camera, T_CB);
+    cameras.push_back({read_camera(yaml, camera, "distortion_coeffs"), T_CB.inverse()});
+    time_offset_s = read_time_offset_s(yaml, cam0, camera);
+    line_delay_s = read_line_delay_s(yaml, cam0, camera);
+  }
+  StereoRig rig = with_cameras({}, cameras);
+  rig.time_offset_s = time_offset_s;
+  rig.line_delay_s = line_delay_s;
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;

@@ -42,6 +42,7 @@ struct SimulationOptions {
   int seed = 1;
   double image_rate_hz = 20;
   std::string calibration = "";
+  std::string rig = "stereo";
   FlightOptions flight;
   RecordedOptions recorded;
   ImuModelOptions imu;
@@ -54,6 +55,8 @@ struct SimulationOptions {
     v("seed", seed, "", "of all random numbers", 0, 2'000'000'000);
     v("image_rate_hz", image_rate_hz, "Hz", "stereo frames per second", 1.0, 200.0);
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
+    v("rig", rig, "stereo|quad|sides",
+      "cameras: the two of the calibration; and two more of the same kind that look backwards, or one to each side");
     v.group("flight", flight, "how the rig moves");
     v.group("recorded", recorded, "a recorded flight instead");
     v.group("imu", imu, "errors of the IMU");
@@ -64,7 +67,7 @@ struct SimulationOptions {
 };
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
-/// normal light, handheld, takeoff, hover, tour, hall.
+/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/frontend/rig_frontend.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+
+#include "fbvins/frontend/frontend_options.hpp"
+#include "fbvins/frontend/test_wall.hpp"
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins {
+namespace {
+
+double x_m(int k) { return 0.01 * k; }
+
+/// The wall's pair, and another one that looks backwards at a wall like it: cameras 2 and 3.
+StereoRig two_pairs() {
+  StereoRig rig = TestWall{}.rig();
+  const Pose<B, B> turned(so3_exp(Vec3(0, std::numbers::pi, 0)), Vec3::Zero());
+  rig.more = {{rig.left, turned * rig.T_BC0}, {rig.right, turned * rig.T_BC1.cast_frames<B, C0>()}};
+  return rig;
+}
+
+/// `back`: whether the images of cameras 2 and 3 come.
+SensorPacket packet(int k, bool front = true, bool back = true) {
+  static const TestWall wall;
+  const auto at = [](double x, std::uint64_t seed) { return wall.render(x, seed); };
+  const auto seed = static_cast<std::uint64_t>(4 * k);
+  SensorPacket p;
+  p.id = FrameId{k};
+  p.frame.t = Time{50'000'000LL * k};
+  if (front) p.frame.left = at(x_m(k), seed), p.frame.right = at(x_m(k) + TestWall::kBaseline_m, seed + 1);
+  if (back) p.frame.more = {at(-x_m(k), seed + 2), at(-x_m(k) + TestWall::kBaseline_m, seed + 3)};
+  for (int i = 0; k > 0 && i <= 10; ++i)
+    p.imu.samples.push_back({Time{p.frame.t.ns - 50'000'000 + 5'000'000 * i}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  return p;
+}
+
+std::map<int, int> features_by_camera(const TrackedFrame& frame) {
+  std::map<int, int> count;
+  for (const TrackedFeature& f : frame.features) {
+    count[f.cameras.left] += f.left.has_value();
+    count[f.cameras.right] += f.right.has_value();
+  }
+  return count;
+}
+
+class RigFrontendOf : public testing::TestWithParam<const char*> {
+ protected:
+  RigFrontendOf() : frontend_(*make_frontend(two_pairs(), GetParam())) {}
+  std::unique_ptr<Frontend> frontend_;
+};
+
+TEST_P(RigFrontendOf, EachPairHasItsFeatures) {
+  std::map<TrackId, int> cameras;
+  for (int k = 0; k < 6; ++k) {
+    const TrackedFrame frame = frontend_->process(packet(k), {});
+    EXPECT_TRUE(frame.has_left && frame.has_right);
+    EXPECT_EQ(frame.has_more, (std::vector<bool>{true, true}));
+    std::map<int, int> count = features_by_camera(frame);
+    for (int c = 0; c < 4; ++c) EXPECT_GT(count[c], 30) << "camera " << c << ", image " << k;
+    for (const TrackedFeature& f : frame.features) {
+      EXPECT_EQ(f.cameras.right, f.cameras.left + 1);
+      const auto [at, is_new] = cameras.try_emplace(f.id, f.cameras.left);
+      EXPECT_EQ(at->second, f.cameras.left) << "a track has moved to another pair";
+    }
+    EXPECT_EQ(frame.stats.stereo, std::ranges::count_if(frame.features, [](const auto& f) { return f.left && f.right; }));
+  }
+}
+
+TEST_P(RigFrontendOf, APairWithoutImagesLeavesTheOtherAlone) {
+  for (int k = 0; k < 3; ++k) (void)frontend_->process(packet(k), {});
+  const TrackedFrame blind = frontend_->process(packet(3, false, true), {});
+  EXPECT_FALSE(blind.has_left || blind.has_right);
+  EXPECT_EQ(blind.has_more, (std::vector<bool>{true, true}));
+  std::map<int, int> count = features_by_camera(blind);
+  EXPECT_EQ(count[0] + count[1], 0);
+  EXPECT_GT(count[2], 30);
+  EXPECT_GT(features_by_camera(frontend_->process(packet(4), {}))[0], 30);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, RigFrontendOf, testing::Values("klt", "orb"));
+
+/// Keeps what it is told.
+struct Listener final : Frontend {
+  std::vector<LandmarkUpdate>* told;
+  explicit Listener(std::vector<LandmarkUpdate>& updates) : told(&updates) {}
+  TrackedFrame process(const SensorPacket& packet, const StatePrior&) override {
+    TrackedFrame frame;
+    frame.id = packet.id;
+    TrackedFeature feature;
+    feature.id = TrackId{7};
+    feature.left = Observation{};
+    frame.features = {feature};
+    return frame;
+  }
+  void locate(const LandmarkUpdate& update) override { told->push_back(update); }
+};
+
+TEST(RigFrontend, APositionGoesToTheFrontendOfItsTrack) {
+  std::vector<LandmarkUpdate> told[2];
+  std::vector<std::unique_ptr<Frontend>> frontends;
+  for (auto& updates : told) frontends.push_back(std::make_unique<Listener>(updates));
+  RigFrontend rig({{0, 1}, {2, 3}}, std::move(frontends));
+  const std::vector<TrackedFeature> features = rig.process({}, {}).features;
+  ASSERT_EQ(features.size(), 2U);
+  EXPECT_NE(features[0].id, features[1].id);
+  rig.locate({5, 1, {{features[1].id, Vec3(1, 2, 3)}}});
+  ASSERT_EQ(told[0].size(), 1U);  // none of its own, and no gap in the numbers
+  EXPECT_TRUE(told[0][0].landmarks.empty());
+  EXPECT_EQ(told[0][0].sequence, 5);
+  ASSERT_EQ(told[1].size(), 1U);
+  ASSERT_EQ(told[1][0].landmarks.size(), 1U);
+  EXPECT_EQ(told[1][0].landmarks[0].track, TrackId{7});
+}
+
+}  // namespace
+}  // namespace fbvins
