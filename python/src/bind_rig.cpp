@@ -44,8 +44,10 @@ std::string text_of(const Camera& camera) {
 
 StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
                    double image_rate_hz, double time_offset_s) {
-  StereoRig rig{left,          right,        transform<B, C0>(T_BC0, "T_BC0"), transform<B, C1>(T_BC1, "T_BC1"), imu_noise,
-                image_rate_hz, time_offset_s};
+  StereoRig rig{left, right, transform<B, C0>(T_BC0, "T_BC0"), transform<B, C1>(T_BC1, "T_BC1")};
+  rig.imu_noise = imu_noise;
+  rig.image_rate_hz = image_rate_hz;
+  rig.time_offset_s = time_offset_s;
   if (const Result<void> good = check_rig(rig, "the rig"); !good) throw nb::value_error(good.error().message.c_str());
   return rig;
 }

@@ -14,7 +14,8 @@ RollingShutter shutter_with(double line_delay_s) {
   rig.line_delay_s = line_delay_s;
   return RollingShutter(rig);
 }
-const RollingShutter kShutter = shutter_with(40e-6);
+constexpr double kLineDelay_s = 40e-6;
+const RollingShutter kShutter = shutter_with(kLineDelay_s);
 
 Calibration cameras() {
   Calibration c;
@@ -35,7 +36,7 @@ TrackedFeature at_rows(const ShutterMotion& m, const Vec3& p_stamp_B, double lef
   const auto observed = [&](const Pose<B, C0>& T_BC, double row) {
     Observation o;
     o.pixel = Vec2(300, row);
-    o.normalised = seen(T_BC, body_at(m, (row - 240) * kShutter.line_delay_s).inverse() * p_stamp_B);
+    o.normalised = seen(T_BC, body_at(m, (row - 240) * kLineDelay_s).inverse() * p_stamp_B);
     return o;
   };
   const Calibration c = cameras();

@@ -75,7 +75,7 @@ TEST(Calibration, KalibrGivesTheSameRigByEitherWay) {
 }
 
 TEST(Calibration, KalibrsChainGoesOnFromCameraToCamera) {
-  const Pose<B, C0> third = kLeft * Pose<C0, C0>(so3_exp({0, 3, 0}), {0.1, 0.2, 0.3});
+  const Pose<B, B> third = kLeft * Pose<B, B>(so3_exp({0, 3, 0}), {0.1, 0.2, 0.3});
   const std::string text = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse()) + "cam1:\n" +
                            kalibr_camera("T_cn_cnm1", kRight.inverse() * kLeft) + "cam2:\n" +
                            kalibr_camera("T_cn_cnm1", third.inverse() * kRight);
