@@ -83,7 +83,7 @@ struct StereoRig {
   double image_rate_hz = 20;
   /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
   double time_offset_s = 0;
-  /// Rolling shutter: from one row of an image to the next, in both cameras; 0 for a global shutter. The stamp is the middle
+  /// Rolling shutter: from one row of an image to the next, in all cameras; 0 for a global shutter. The stamp is the middle
   /// row's: row v is taken at t_image + (v - height / 2) * line_delay_s.
   double line_delay_s = 0;
 
