@@ -256,7 +256,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.marginalise_ms = timer.lap_ms();
 }
 
-/// Compares images and readings, and returns the features of the cameras that can be believed. Readings that the images
+/// Compares images and readings, and returns the features of the cameras that agree. Readings that the images
 /// contradict count less.
 std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
   one_camera_wrong_ = false;
@@ -275,15 +275,15 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     predicted = predict(frame, imu);
     predicted.state.T_FB = *verdict.seen;
   }
-  std::vector<TrackedFeature> believed = frame.features;
+  std::vector<TrackedFeature> accepted = frame.features;
   one_camera_wrong_ = verdict.wrong.has_value();
-  if (!one_camera_wrong_) return believed;
-  for (TrackedFeature& feature : believed) {
+  if (!one_camera_wrong_) return accepted;
+  for (TrackedFeature& feature : accepted) {
     if (verdict.wrong->has(feature.cameras.left)) feature.left.reset();
     if (verdict.wrong->has(feature.cameras.right)) feature.right.reset();
   }
-  std::erase_if(believed, [](const TrackedFeature& f) { return !f.left && !f.right; });
-  return believed;
+  std::erase_if(accepted, [](const TrackedFeature& f) { return !f.left && !f.right; });
+  return accepted;
 }
 
 const WindowSolution& Estimator::solve(Odometry& out, const LmOptions& lm) {
