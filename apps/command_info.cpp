@@ -41,8 +41,13 @@ void print_text(const Dataset& data) {
              (info.last_image - info.first_image).seconds(), info.longest_image_gap.seconds());
   fmt::print("{:<14}first {} ns, last {} ns\n", "stamps", info.first_image.ns, info.last_image.ns);
   print_camera("left", data.rig().left, info.left);
-  print_camera("right", data.rig().right, info.right);
-  fmt::print("{:<14}baseline {:.4f} m, time offset {:.6f} s\n", "rig", data.rig().T_C1C0().p.norm(), data.rig().time_offset_s);
+  if (data.rig().has_right()) print_camera("right", data.rig().right, info.right);
+  if (const auto& depth = data.rig().depth)
+    fmt::print("{:<14}{} images, {} to {} m, noise {:.4f} m at 1 m\n", "depth", info.depth.listed, depth->nearest_m,
+               depth->farthest_m, depth->noise_at_1m_m);
+  const std::string baseline =
+      data.rig().has_right() ? fmt::format("baseline {:.4f} m, ", data.rig().T_C1C0().p.norm()) : std::string();
+  fmt::print("{:<14}{}time offset {:.6f} s\n", "rig", baseline, data.rig().time_offset_s);
   fmt::print("{:<14}{} samples at {:.1f} Hz, longest gap {:.3f} s, {} rows left out\n", "imu", info.imu_samples, info.imu_rate_hz,
              info.longest_imu_gap.seconds(), info.imu_rows.bad());
   fmt::print("{:<14}{} poses\n", "ground truth", info.ground_truth_poses);

@@ -18,8 +18,11 @@ void RecordingArguments::add_to(CLI::App& command) {
   command.add_option("--topics", topics, "topics of a bag, if they are not found: LEFT,RIGHT[,IMU]")
       ->delimiter(',')
       ->expected(2, 3);
-  command.add_option("--camera", camera, "the cameras that are used: all (default), the first two (both), or one of these")
-      ->check(CLI::IsMember({"all", "both", "left", "right"}));
+  command
+      .add_option("--camera", camera,
+                  "the cameras that are used: all (default), the first two (both), one of these, or the left "
+                  "one with its depth images (depth)")
+      ->check(CLI::IsMember({"all", "both", "left", "right", "depth"}));
   command.add_option("--start", start_s, "seconds to leave out at the start of the recording")->check(CLI::NonNegativeNumber);
   command.add_option("--duration", duration_s, "seconds to use from there, 0 for all")->check(CLI::NonNegativeNumber);
 }

@@ -55,6 +55,12 @@ Json describe(const Dataset& data) {
                      {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
   json["left"] = camera_json(rig.left, rig.T_BC0, info.left);
   if (rig.has_right()) json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
+  if (rig.depth)
+    json["depth"] = Json{{"images", info.depth.listed},
+                         {"noise_at_1m_m", rig.depth->noise_at_1m_m},
+                         {"nearest_m", rig.depth->nearest_m},
+                         {"farthest_m", rig.depth->farthest_m},
+                         {"scale_sigma", rig.depth->scale_sigma}};
   if (rig.has_right()) json["baseline_m"] = rig.T_C1C0().p.norm();
   json["time_offset_s"] = rig.time_offset_s;
   json["ground_truth_poses"] = info.ground_truth_poses;

@@ -72,13 +72,26 @@ struct MountedCamera {
   Pose<B, C0> T_BC;  ///< C0 is this camera's own frame
 };
 
+/// A sensor of depth images that are registered to the left camera, pixel by pixel. Its noise grows with the square of the
+/// distance, as that of every sensor that triangulates: a constant noise of the inverse depth.
+struct DepthSensor {
+  double noise_at_1m_m = 0.003;  ///< standard deviation at a distance of one metre
+  double nearest_m = 0.2, farthest_m = 8;
+  double scale_sigma = 0.005;  ///< relative standard deviation of what all its distances are wrong by together
+};
+
+/// A depth is observed like a disparity: in a right camera so far away that what it sees of the pixel itself counts nothing.
+inline constexpr double kDepthBaseline_m = 10;
+
 /// Cameras and an IMU, rigidly joined. The cameras are numbered: 0 is `left`, 1 is `right`, those from 2 on are `more`. Which of
 /// them see the same things follows from geometry (camera_groups). With one camera `right` has no pixels, and there are no more.
+/// With one camera and a depth sensor C1 is the frame of the camera in which depths are observed, kDepthBaseline_m to the right.
 struct StereoRig {
   Camera left, right;
   Pose<B, C0> T_BC0;
   Pose<B, C1> T_BC1;
   std::vector<MountedCamera> more;
+  std::optional<DepthSensor> depth;
   ImuNoise imu_noise;
   double image_rate_hz = 20;
   /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
@@ -97,7 +110,7 @@ struct StereoRig {
   Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
 };
 
-/// The rig with these cameras, one at least, in place of its own.
+/// The rig with these cameras, one at least, in place of its own. A depth sensor stays where there is one camera.
 inline StereoRig with_cameras(StereoRig rig, const std::vector<MountedCamera>& cameras) {
   const MountedCamera &first = cameras.front(), &second = cameras.size() > 1 ? cameras[1] : MountedCamera{{}, first.T_BC};
   rig.left = first.camera;
@@ -106,7 +119,15 @@ inline StereoRig with_cameras(StereoRig rig, const std::vector<MountedCamera>& c
   rig.T_BC1 = second.T_BC.cast_frames<B, C1>();
   rig.more.clear();
   for (std::size_t i = 2; i < cameras.size(); ++i) rig.more.push_back(cameras[i]);
+  if (cameras.size() > 1) rig.depth.reset();
+  if (rig.depth) rig.T_BC1.p = rig.T_BC0 * Vec3(kDepthBaseline_m, 0, 0);
   return rig;
+}
+
+/// The rig with its left camera and a depth sensor that is registered to it.
+inline StereoRig with_depth(StereoRig rig, const DepthSensor& sensor) {
+  rig.depth = sensor;
+  return with_cameras(rig, {rig.mounted(0)});
 }
 
 /// The rig with its left camera alone, or its right one, which is the left one then.

@@ -25,7 +25,7 @@ double overlap(const StereoRig& rig, int first, int second);
 /// image.
 std::vector<CameraGroup> camera_groups(const StereoRig& rig);
 
-/// Whether any two cameras overlap, so that depth is seen without motion.
+/// Whether any two cameras overlap, or there is a depth sensor, so that depth is seen without motion.
 bool has_stereo(const StereoRig& rig);
 
 /// The cameras of a group as a rig of their own.

@@ -37,7 +37,7 @@ struct DatasetOptions {
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
   std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
-  std::string camera = "all";         ///< or the first two: "both", or one of these: "left", "right"
+  std::string camera = "all";         ///< or the first two: "both", or one of these: "left", "right"; the left one with "depth"
 
   /// Whether the recording's own calibration is replaced.
   bool brings_rig() const { return rig || !kalibr_camchain.empty(); }
@@ -53,7 +53,8 @@ struct DatasetOptions {
     v("require_imu", require_imu, "", "refuse recordings without IMU");
     v("kalibr_camchain", kalibr_camchain, "", "camchain-imucam.yaml that replaces the recording's calibration");
     v("kalibr_imu", kalibr_imu, "", "imu.yaml that replaces the recording's IMU noise");
-    v("camera", camera, "all|both|left|right", "the cameras that are used: all, the first two, or one of these");
+    v("camera", camera, "all|both|left|right|depth",
+      "the cameras that are used: all, the first two, one of these, or the left one with its depth images");
   }
 };
 
@@ -63,6 +64,7 @@ struct FrameEntry {
   std::string left_file, right_file;           ///< names known to the loader; empty: no image; all empty: recorded without any
   std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; none: stamps decide
   std::vector<std::string> more_files = {};    ///< of the cameras from number 2 on
+  std::string depth_file = {};                 ///< of the depth sensor
 
   bool without_images() const {
     return left_file.empty() && right_file.empty() && std::ranges::all_of(more_files, &std::string::empty);
@@ -72,8 +74,8 @@ struct FrameEntry {
 /// One stereo frame as read.
 struct LoadedFrame {
   StereoFrame frame;
-  ImageCounts left, right, more;  ///< what happened, 0 or 1 for each image
-  std::string problem;            ///< "file: sentence" about the first image that failed
+  ImageCounts left, right, more, depth;  ///< what happened, 0 or 1 for each image
+  std::string problem;                   ///< "file: sentence" about the first image that failed
 };
 
 /// Where a Dataset gets its images from. Called by one thread at a time, not always the same.
@@ -92,6 +94,9 @@ struct DatasetContents {
   std::vector<FrameEntry> frames;  ///< the same
   std::unique_ptr<FrameLoader> loader;
 };
+
+/// The error where a recording of depth images was asked for that has none.
+Error no_depth_images(const std::string& path);
 
 class FramePrefetcher;
 

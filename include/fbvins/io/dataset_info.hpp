@@ -30,7 +30,8 @@ struct DatasetInfo {
   std::string name;    ///< last part of the path
   std::string format;  ///< "EuRoC folder", "EuRoC zip" or "MCAP flight record"
   CameraInfo left, right;
-  CameraInfo more;  ///< of the cameras from number 2 on together
+  CameraInfo more;   ///< of the cameras from number 2 on together
+  CameraInfo depth;  ///< of the depth sensor
   RowCounts imu_rows, ground_truth_rows;
   int frames = 0;  ///< frames that next() will deliver, less those found without any image
   int imu_samples = 0;

@@ -19,8 +19,9 @@ namespace fbvins {
 
 class EurocFolder {
  public:
-  /// Makes folder/mav0/{cam0, ... for each camera, imu0, state_groundtruth_estimate0} with the calibrations; the folder must not
-  /// hold a mav0. `origin`: a few words for the sensors' comments, without a colon. `depth`: frames bring depth images.
+  /// Makes folder/mav0/{cam0, ... for each camera, depth0 for a depth sensor, imu0, state_groundtruth_estimate0} with the
+  /// calibrations; the folder must not hold a mav0. `origin`: a few words for the sensors' comments, without a colon. `depth`:
+  /// frames bring depth images.
   static Result<EurocFolder> create(const std::string& folder, const StereoRig& rig, const std::string& origin,
                                     bool depth = false);
   ~EurocFolder();

@@ -60,6 +60,14 @@ class Image {
   std::shared_ptr<const std::uint8_t> foreign_;
 };
 
+/// Distances along z of the left camera, in millimetres, pixel by pixel of its image: row after row; 0 where none was measured.
+struct DepthImage {
+  int width = 0, height = 0;
+  std::vector<std::uint16_t> mm;
+
+  const std::uint16_t* row(int y) const { return mm.data() + static_cast<std::ptrdiff_t>(y) * width; }
+};
+
 /// Images taken at the same instant, of the rig's cameras 0 (left), 1 (right) and from 2 on (more). A camera that delivered
 /// nothing has a null pointer, or is missing at the end of `more`.
 struct StereoFrame {
@@ -67,6 +75,7 @@ struct StereoFrame {
   std::shared_ptr<const Image> left;
   std::shared_ptr<const Image> right;
   std::vector<std::shared_ptr<const Image>> more = {};
+  std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
 
   std::shared_ptr<const Image> image(int camera) const {
     if (camera < 2) return camera == 0 ? left : right;

@@ -34,6 +34,7 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
     eyes_.push_back(
         {Renderer(camera, *world_), ImageSensor(options.camera, camera, gain, seed), T_BC, camera.height(), {}, {}, {}, false});
   }
+  if (rig.depth) depth_.emplace(options.depth, rig.left, static_cast<std::uint64_t>(options.seed));
 }
 
 /// Sums the radiance over an exposure that is centred at t.
@@ -83,6 +84,12 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
     others.push_back(std::async(std::launch::async, [this, i, t_s, frame] { return render_eye(eyes_[i], t_s, frame); }));
   rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
   if (with_depth) eyes_.front().renderer.depth(rendered.depth_left_m);
+  if (depth_) {
+    std::vector<float> exact_m;
+    gather(eyes_.front(), t_s, 0, 1);
+    eyes_.front().renderer.depth(exact_m);
+    rendered.frame.depth = std::make_shared<const DepthImage>(depth_->measure(exact_m, frame));
+  }
   for (std::size_t i = 0; i < others.size(); ++i) {
     auto image = std::make_shared<const Image>(others[i].get());
     if (i == 0) rendered.frame.right = std::move(image);

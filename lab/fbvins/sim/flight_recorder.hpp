@@ -44,6 +44,7 @@ class FlightRecorder {
   std::shared_ptr<const World> world_;
   LightBake bake_;
   std::vector<Eye> eyes_;  // of the rig's cameras, in order
+  std::optional<DepthModel> depth_;
 };
 
 }  // namespace fbvins

@@ -87,6 +87,9 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
   }
   if (o.rig == "quad") add_turned(rig, 180, {0, 1});
   if (o.rig == "sides") add_turned(rig, 90, {0}), add_turned(rig, -90, {0});
+  if (o.rig == "rgbd")
+    rig = with_depth(rig,
+                     {.noise_at_1m_m = o.depth.noise_at_1m_m, .nearest_m = o.depth.nearest_m, .farthest_m = o.depth.farthest_m});
   rig.image_rate_hz = o.image_rate_hz;
   rig.time_offset_s = o.camera.time_offset_ms * 1e-3;
   rig.line_delay_s = o.camera.line_delay_us * 1e-6;
@@ -166,13 +169,16 @@ DatasetContents contents_of(Simulation simulation, const std::string& name) {
   contents.rig = simulation.rig;
   contents.imu = simulation.imu.samples;
   for (const TrueState& s : simulation.imu.truth) contents.ground_truth.push_back({s.t, s.T_WB, s.v_WB, s.bias});
+  const StereoRig& rig = simulation.rig;
   for (Time t : simulation.frames)
-    contents.frames.push_back(
-        {t - offset, "left", "right", std::nullopt, std::vector<std::string>(simulation.rig.more.size(), "more")});
+    contents.frames.push_back({t - offset, "left", rig.has_right() ? "right" : "", std::nullopt,
+                               std::vector<std::string>(rig.more.size(), "more"), rig.depth ? "depth" : ""});
   DatasetInfo& info = contents.info;
   info.name = name;
   info.format = "simulation";
-  info.frames = info.left.listed = info.right.listed = static_cast<int>(contents.frames.size());
+  info.frames = info.left.listed = static_cast<int>(contents.frames.size());
+  if (rig.has_right()) info.right.listed = info.frames;
+  if (rig.depth) info.depth.listed = info.frames;
   info.imu_samples = static_cast<int>(contents.imu.size());
   info.ground_truth_poses = static_cast<int>(contents.ground_truth.size());
   info.image_rate_hz = simulation.rig.image_rate_hz;

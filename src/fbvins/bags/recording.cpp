@@ -301,6 +301,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const R
   Result<DatasetContents> contents = BagRecording(path, options, options.dataset.rig).read(*std::move(reader));
   if (!contents) return contents.error();
   if (Result<void> readable = check_images(*contents); !readable) return readable.error();
+  if (options.dataset.camera == "depth") return no_depth_images(path);
   return std::make_unique<Dataset>(*std::move(contents), options.dataset);
 }
 

@@ -52,7 +52,7 @@ std::vector<CameraGroup> camera_groups(const StereoRig& rig) {
 }
 
 bool has_stereo(const StereoRig& rig) {
-  return std::ranges::any_of(camera_groups(rig), [](const CameraGroup& group) { return group.second.has_value(); });
+  return rig.depth || std::ranges::any_of(camera_groups(rig), [](const CameraGroup& group) { return group.second.has_value(); });
 }
 
 StereoRig rig_of(const StereoRig& rig, const CameraGroup& group) {

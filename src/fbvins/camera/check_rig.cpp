@@ -55,9 +55,21 @@ Result<void> check_imu(const ImuNoise& noise, std::string_view origin) {
   return {};
 }
 
+Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
+  const DepthSensor& sensor = *rig.depth;
+  if (rig.has_right()) return malformed(origin, "a depth sensor goes with one camera, and there are more");
+  if (!positive(sensor.noise_at_1m_m) || !positive(sensor.nearest_m) || !positive(sensor.scale_sigma) ||
+      !(sensor.farthest_m > sensor.nearest_m) || !std::isfinite(sensor.farthest_m))
+    return malformed(origin, "the depth sensor's noise, range or scale is not positive, or its range is empty");
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_is_a_pair_at_most(const StereoRig& rig, std::string_view origin) {
+  if (rig.depth)
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{}: holds no depth images: --camera left takes the camera without them", origin)};
   if (rig.more.empty()) return {};
   return Error{ErrorCode::unsupported,
                fmt::format("{}: holds two cameras at most, and there are {}: --camera both takes the first two", origin,
@@ -80,6 +92,8 @@ Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
   const double baseline_m = rig.T_C1C0().p.norm();
   if (rig.has_right() && !(baseline_m > 1e-3 && baseline_m < 10.0))
     return malformed(origin, fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
+  if (rig.depth)
+    if (Result<void> good = check_depth(rig, origin); !good) return good;
   if (!positive(rig.image_rate_hz) || !std::isfinite(rig.time_offset_s))
     return malformed(origin, "the images' rate is not positive, or the time offset is not finite");
   if (!(std::abs(rig.line_delay_s) <= kLongestLineDelay_s))

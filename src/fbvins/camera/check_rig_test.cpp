@@ -29,6 +29,15 @@ TEST(CheckRig, OneCameraIsEnough) {
   EXPECT_EQ(with_one_camera(good_rig(), true).T_BC0.p, good_rig().T_BC1.p);
 }
 
+TEST(CheckRig, ADepthSensorGoesWithOneCamera) {
+  const StereoRig rig = with_depth(good_rig(), {});
+  EXPECT_TRUE(check_rig(rig, "rig").ok());
+  EXPECT_EQ(rig.camera_count(), 1);
+  EXPECT_NEAR(rig.T_C1C0().p.x(), -kDepthBaseline_m, 1e-12);
+  EXPECT_FALSE(check_is_a_pair_at_most(rig, "rig").ok());
+  EXPECT_FALSE(with_cameras(rig, {rig.mounted(0), good_rig().mounted(1)}).depth);
+}
+
 TEST(CheckRig, RefusesWithASentence) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Broken> all = {
@@ -54,6 +63,10 @@ TEST(CheckRig, RefusesWithASentence) {
       {[](StereoRig& r) { r.imu_noise.gyro_random_walk_radps2_rthz = 0; }, "gyroscope's random walk"},
       {[&](StereoRig& r) { r.imu_noise.accel_random_walk_mps3_rthz = nan; }, "accelerometer's random walk"},
       {[](StereoRig& r) { r.imu_noise.rate_hz = 0; }, "IMU's rate"},
+      {[](StereoRig& r) { r.depth = DepthSensor{}; }, "a depth sensor goes with one camera"},
+      {[](StereoRig& r) { r = with_depth(r, {.noise_at_1m_m = 0}); }, "depth sensor's noise"},
+      {[&](StereoRig& r) { r = with_depth(r, {.farthest_m = nan}); }, "depth sensor's noise"},
+      {[](StereoRig& r) { r = with_depth(r, {.nearest_m = 2, .farthest_m = 1}); }, "its range is empty"},
   };
   for (const Broken& broken : all) {
     StereoRig rig = good_rig();

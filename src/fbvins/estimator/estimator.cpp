@@ -43,9 +43,10 @@ WindowWeights weights_of(const EstimatorOptions& o) {
 }
 
 /// Where no two cameras see the same things, remembered landmarks would hold the scale at what it was thought to be when they
-/// left the window.
+/// left the window. The place of a camera that only stands for a depth sensor is none to be refined.
 EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) {
   if (!has_stereo(rig)) options.known_landmarks.enabled = false;
+  if (rig.depth) options.estimate_extrinsics = false;
   return options;
 }
 
@@ -55,8 +56,9 @@ Calibration calibration_of(const StereoRig& rig) {
   return out;
 }
 
-/// Of the pair that was calibrated with the largest baseline.
-double scale_sigma_of_pairs(const StereoRig& rig) {
+/// Of the pair that was calibrated with the largest baseline, or of the depth sensor.
+double scale_sigma_of(const StereoRig& rig) {
+  if (rig.depth) return rig.depth->scale_sigma;
   double least = 0;
   for (const CameraGroup& group : camera_groups(rig)) {
     if (!group.second) continue;
@@ -73,14 +75,14 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       imu_noise_(options.assumed(rig.imu_noise)),
       calibrated_(calibration_of(rig)),
       calibration_(calibrated_),
-      scale_sigma_(scale_sigma_of_pairs(rig)),
+      scale_sigma_(scale_sigma_of(rig)),
       one_camera_(!has_stereo(rig)),
       shutter_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
-      health_(options, rig.camera_count(), !one_camera_),
+      health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
       reading_noise_(imu_noise_),
-      monitor_(imu_noise_, options.estimate_extrinsics || options.estimate_time_offset),
+      monitor_(imu_noise_, options_.estimate_extrinsics || options.estimate_time_offset),
       window_(options_, weights_of(options)),
       published_(options.max_step_m, options.max_pending_m) {}
 

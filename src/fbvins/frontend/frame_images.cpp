@@ -16,6 +16,10 @@ bool is_usable(const Image* image, const Camera& camera) {
   return image != nullptr && !image->empty() && image->width() == camera.width() && image->height() == camera.height();
 }
 
+FrameImages::FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(levels) {
+  if (rig.depth) reader_.emplace(*rig.depth, rig.left);
+}
+
 void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
   t_ = frame.t;
   left_.clear();
@@ -26,6 +30,7 @@ void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
   stats.mean_brightness_right = mean_brightness(right_);
   clear_if_of_another_size(left_, rig_.left);
   clear_if_of_another_size(right_, rig_.right);
+  depth_ = reader_ && reader_->is_usable(frame.depth.get()) ? frame.depth : nullptr;
 }
 
 bool FrameImages::forget_before_gap(double longest_s) {

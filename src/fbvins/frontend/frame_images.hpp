@@ -9,7 +9,10 @@
 //   images.advance();
 #pragma once
 
-#include "fbvins/camera/camera.hpp"
+#include <memory>
+#include <optional>
+
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/types/tracking.hpp"
 
@@ -20,7 +23,7 @@ bool is_usable(const Image* image, const Camera& camera);
 
 class FrameImages {
  public:
-  FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(levels) {}
+  FrameImages(const StereoRig& rig, int levels);
 
   /// The newest images. One that is missing, or of another size than the calibration's (its geometry is unknown), is empty.
   void take(const StereoFrame& frame, FrontendStats& stats);
@@ -37,6 +40,11 @@ class FrameImages {
   Time t() const { return t_; }
   const Pyramid& left() const { return left_; }
   const Pyramid& right() const { return right_; }
+  /// Whether depths can be measured in the newest images: in the right one, or because they came.
+  bool has_depth() const { return !right_.empty() || depth_ != nullptr; }
+  bool has_depth_image() const { return depth_ != nullptr; }
+  /// Of the newest depth image, which there is.
+  std::optional<MeasuredInverseDepth> depth_at(const Vec2& left_px) const { return reader_->at(*depth_, left_px); }
   bool has_before() const { return !before_.empty(); }
   bool reaches(Time t, double longest_s) const {
     return has_before() && t >= t_before_ && (t - t_before_).seconds() <= longest_s;
@@ -49,6 +57,8 @@ class FrameImages {
   int levels_;
   Time t_, t_before_;
   Pyramid left_, right_, before_;
+  std::optional<DepthReader> reader_;  // of a rig with a depth sensor
+  std::shared_ptr<const DepthImage> depth_;
 };
 
 }  // namespace fbvins

@@ -21,7 +21,7 @@ KltFrontend::KltFrontend(const StereoRig& rig, const KltFrontendOptions& options
       predictor_(rig.T_BC0),
       tracks_(options.max_features),
       follower_(rig.left),
-      motion_(rig.left, rig.T_C1C0().p.norm()),
+      motion_(rig.left, baseline_for_depths_m(rig)),
       epipolar_(rig.left.focal_px(), kSeed),
       detector_(options.min_distance_px),
       stereo_(rig, options.min_depth_m) {}
@@ -41,7 +41,7 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
     tracks_.drop_ended();
   }
   out.has_left = !images_.left().empty();
-  out.has_right = !images_.right().empty();
+  out.has_right = images_.has_depth();
   stats.pyramid_ms = timer.lap_ms();
   // Without a left image tracks stay as they are; the motion to the next image spans the gap.
   if (!out.has_left) return out;
@@ -166,16 +166,29 @@ void KltFrontend::match_stereo(FrontendStats& stats) {
   inverse_depths.reserve(tracks_.size());
   for (KltTrack& track : tracks_) {
     track.right.reset();
-    if (images_.right().empty()) continue;
-    const StereoMatch match = stereo_.match(tracks_.patches(track).newest, track.px, track.normalised, track.inverse_depth,
-                                            images_.left(), images_.right());
-    if (match.failure != StereoFailure::none) continue;
-    track.right = observe(rig_.right, match.px, match.normalised, options_.sigma_px);
-    track.inverse_depth = match.inverse_depth;
-    inverse_depths.push_back(match.inverse_depth);
+    if (!measure_depth(track)) continue;
+    inverse_depths.push_back(*track.inverse_depth);
     ++stats.stereo;
   }
   typical_depth_.update(inverse_depths);
+}
+
+/// By the depth image, or in the right one.
+bool KltFrontend::measure_depth(KltTrack& track) {
+  if (images_.has_depth_image()) {
+    const auto depth = images_.depth_at(track.px);
+    if (!depth) return false;
+    track.right = observe_depth(track.px, track.normalised, *depth);
+    track.inverse_depth = depth->value;
+    return true;
+  }
+  if (images_.right().empty()) return false;
+  const StereoMatch match = stereo_.match(tracks_.patches(track).newest, track.px, track.normalised, track.inverse_depth,
+                                          images_.left(), images_.right());
+  if (match.failure != StereoFailure::none) return false;
+  track.right = observe(rig_.right, match.px, match.normalised, options_.sigma_px);
+  track.inverse_depth = match.inverse_depth;
+  return true;
 }
 
 }  // namespace fbvins

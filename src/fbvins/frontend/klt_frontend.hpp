@@ -46,6 +46,7 @@ class KltFrontend final : public LeadingFrontend {
   bool start_track(const Vec2& px);
   bool cut_patches(KltTrack& track, KltPatches& patches, const Pyramid& image) const;
   void match_stereo(FrontendStats& stats);
+  bool measure_depth(KltTrack& track);
 
   KltFrontendOptions options_;
   StereoRig rig_;

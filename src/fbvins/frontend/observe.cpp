@@ -13,4 +13,17 @@ Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised
   return observation;
 }
 
+Observation observe_depth(const Vec2& px, const Vec2& left_normalised, const MeasuredInverseDepth& depth) {
+  Observation observation;
+  observation.pixel = px;
+  observation.normalised = left_normalised - Vec2(kDepthBaseline_m * depth.value, 0);
+  observation.sqrt_information = Vec2(1 / (kDepthBaseline_m * depth.sigma), 0).asDiagonal();
+  return observation;
+}
+
+double baseline_for_depths_m(const StereoRig& rig) {
+  constexpr double kDisparity_px = 0.4;
+  return rig.depth ? kDisparity_px / (rig.left.focal_px() * rig.depth->noise_at_1m_m) : rig.T_C1C0().p.norm();
+}
+
 }  // namespace fbvins

@@ -2,13 +2,19 @@
 // Observations of features for the estimator, with their weights. Pure functions.
 #pragma once
 
-#include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
 
 /// `sigma_px`: standard deviation of the position in the raw image.
 Observation observe(const Camera& camera, const Vec2& px, const Vec2& normalised, double sigma_px);
+
+/// A depth measured at a pixel of the left camera, as C1 sees it (StereoRig::depth): across the baseline only.
+Observation observe_depth(const Vec2& px, const Vec2& left_normalised, const MeasuredInverseDepth& depth);
+
+/// The baseline of a stereo pair that measures depths as well as the rig does, m.
+double baseline_for_depths_m(const StereoRig& rig);
 
 /// The tracks observed in the newest image, in their order.
 template <class Tracks>

@@ -21,22 +21,35 @@ OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, doub
       by_alignment_(rig, options.min_depth_m) {}
 
 void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats) {
-  if (wants_features()) by_descriptor_.index(right_features_);
+  if (wants_features() && !images.has_depth_image()) by_descriptor_.index(right_features_);
   inverse_depths_.clear();
   for (OrbTrack& track : tracks) {
     if (!track.observed) continue;
-    const auto px = find(track, tracks.patches(track), images);
-    if (!px) continue;
-    const auto normalised = right_camera_.undistort(*px);
-    if (!normalised) continue;
-    const auto rho = by_descriptor_.inverse_depth(track.normalised, *normalised);
-    if (!rho) continue;
-    track.right = observe(right_camera_, *px, *normalised, sigma_px_);
-    track.inverse_depth = *rho;
-    inverse_depths_.push_back(*rho);
+    if (!(images.has_depth_image() ? take_measured(track, images) : match(track, tracks.patches(track), images))) continue;
+    inverse_depths_.push_back(*track.inverse_depth);
     ++stats.stereo;
   }
   typical_.update(inverse_depths_);
+}
+
+bool OrbDepth::take_measured(OrbTrack& track, const FrameImages& images) {
+  const auto depth = images.depth_at(track.px);
+  if (!depth) return false;
+  track.right = observe_depth(track.px, track.normalised, *depth);
+  track.inverse_depth = depth->value;
+  return true;
+}
+
+bool OrbDepth::match(OrbTrack& track, const OrbPatches& patches, const FrameImages& images) {
+  const auto px = find(track, patches, images);
+  if (!px) return false;
+  const auto normalised = right_camera_.undistort(*px);
+  if (!normalised) return false;
+  const auto rho = by_descriptor_.inverse_depth(track.normalised, *normalised);
+  if (!rho) return false;
+  track.right = observe(right_camera_, *px, *normalised, sigma_px_);
+  track.inverse_depth = *rho;
+  return true;
 }
 
 std::optional<Vec2> OrbDepth::find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images) {

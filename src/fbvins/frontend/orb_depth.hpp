@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the observed tracks in the right image, and with that their depth: by aligning the patch along the epipolar line;
-// where patches are not followed, first by descriptor. Buffers are reused; one instance, one thread.
+// The depth of the observed tracks: by the depth image where the rig has such a sensor, or by the right image, by aligning the
+// patch along the epipolar line; where patches are not followed, first by descriptor. Buffers are reused; one instance, one
+// thread.
 //
 //   OrbDepth depth(rig, options);
 //   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features());
@@ -23,7 +24,7 @@ class OrbDepth {
   /// `sigma_px`: standard deviation of an observation in the right image.
   OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px);
 
-  /// Whether match() uses descriptors.
+  /// Whether match() uses descriptors, of a right image.
   bool wants_features() const { return by_descriptors_; }
   /// If so, to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
@@ -34,6 +35,8 @@ class OrbDepth {
   double typical_inverse_depth() const { return typical_.inverse_depth(); }
 
  private:
+  static bool take_measured(OrbTrack& track, const FrameImages& images);
+  bool match(OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
   std::optional<Vec2> find(const OrbTrack& track, const OrbPatches& patches, const FrameImages& images);
 
   Camera right_camera_;

@@ -35,7 +35,7 @@ OrbFrontend::OrbFrontend(const StereoRig& rig, const OrbFrontendOptions& options
       matcher_(options.search_px),
       locator_(rig.left, {.subpixel = options.subpixel, .fill_in = options.fill_in, .follows = options.follows_patches()}),
       recogniser_(rig.left, options.recognition, extraction(options).levels),
-      outliers_(rig.left, rig.T_C1C0().p.norm(), options.epipolar_px),
+      outliers_(rig.left, baseline_for_depths_m(rig), options.epipolar_px),
       starter_(rig.left, options.max_features, options.min_distance_px),
       depth_(rig, options, sigma_px_),
       examination_(!options.follows_patches()) {}
@@ -55,7 +55,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
     drop_ended();
   }
   out.has_left = !images_.left().empty();
-  out.has_right = !images_.right().empty();
+  out.has_right = images_.has_depth();
   stats.pyramid_ms = timer.lap_ms();
   recogniser_.forget_unlocated(images_.t());
   // Without a left image tracks stay as they are; the motion to the next image spans the gap.
@@ -80,7 +80,8 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {
-    if (depth_.wants_features()) stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
+    if (!images_.has_depth_image() && depth_.wants_features())
+      stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
     depth_.match(tracks_, images_, stats);
   }
   out.features = features_of(tracks_, camera_, sigma_px_);

@@ -21,6 +21,19 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml) {
   return sensor;
 }
 
+Result<DepthSensor> parse_depth_sensor(YamlReader yaml) {
+  DepthSensor sensor;
+  const auto take = [&](const char* key, double& value) {
+    if (yaml.has(yaml.root(), key)) value = yaml.positive(yaml.root(), key);
+  };
+  take("noise_at_1m_m", sensor.noise_at_1m_m);
+  take("nearest_m", sensor.nearest_m);
+  take("farthest_m", sensor.farthest_m);
+  take("scale_sigma", sensor.scale_sigma);
+  if (!yaml.ok()) return yaml.error();
+  return sensor;
+}
+
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml) {
   ImuSensor sensor;
   sensor.noise = read_imu_noise(yaml, yaml.root(), "rate_hz");

@@ -29,6 +29,8 @@ struct ImuSensor {
 
 Result<CameraSensor> parse_euroc_camera(YamlReader yaml);
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml);
+/// depth0/sensor.yaml of a depth sensor that is registered to cam0 (docs/depth.md).
+Result<DepthSensor> parse_depth_sensor(YamlReader yaml);
 /// Only the T_BS of a sensor.yaml.
 Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml);
 /// The rig of these cameras, one or more, and the IMU; `file` is only for messages. An error where check_rig has one.

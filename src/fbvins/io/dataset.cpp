@@ -33,7 +33,13 @@ class OneCamera : public FrameLoader {
 };
 
 DatasetContents with_cameras(DatasetContents contents, const std::string& camera) {
-  if (camera == "all" || !contents.rig.has_right()) return contents;
+  if (camera == "left" && contents.rig.depth) {
+    contents.rig.depth.reset();
+    contents.rig = with_one_camera(contents.rig);
+    contents.info.depth = {};
+    for (FrameEntry& frame : contents.frames) frame.depth_file.clear();
+  }
+  if (camera == "all" || camera == "depth" || !contents.rig.has_right()) return contents;
   contents.rig.more.clear();
   contents.info.more = {};
   for (FrameEntry& frame : contents.frames) frame.more_files.clear();
@@ -97,17 +103,24 @@ std::optional<StereoFrame> Dataset::next_frame() {
 
 void Dataset::count(const LoadedFrame& loaded) {
   DatasetInfo& info = contents_.info;
-  for (auto [total, here] :
-       {std::pair{&info.left.images, &loaded.left}, {&info.right.images, &loaded.right}, {&info.more.images, &loaded.more}}) {
+  for (auto [total, here] : {std::pair{&info.left.images, &loaded.left},
+                             {&info.right.images, &loaded.right},
+                             {&info.more.images, &loaded.more},
+                             {&info.depth.images, &loaded.depth}}) {
     total->corrupt += here->corrupt;
     total->wrong_size += here->wrong_size;
   }
   if (loaded.frame.without_images()) ++info.frames_without_image;
   // One sentence for the first of them; the counts say how many.
   int failures = 0;
-  for (const ImageCounts& of : {info.left.images, info.right.images, info.more.images}) failures += of.corrupt + of.wrong_size;
-  const int now = loaded.left.bad() + loaded.right.bad() + loaded.more.bad();
+  for (const ImageCounts& of : {info.left.images, info.right.images, info.more.images, info.depth.images})
+    failures += of.corrupt + of.wrong_size;
+  const int now = loaded.left.bad() + loaded.right.bad() + loaded.more.bad() + loaded.depth.bad();
   if (now > 0 && failures == now) info.warnings.push_back(loaded.problem);
+}
+
+Error no_depth_images(const std::string& path) {
+  return {ErrorCode::not_found, fmt::format("{}: --camera depth is given, and there are no depth images", path)};
 }
 
 Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const DatasetOptions& options) {
@@ -116,6 +129,7 @@ Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const Dat
     return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
   Result<DatasetContents> contents = is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
   if (!contents) return contents.error();
+  if (options.camera == "depth" && !contents->rig.depth) return no_depth_images(path);
   if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   return std::make_unique<Dataset>(*std::move(contents), options);
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/dataset_description.hpp"
@@ -55,7 +56,8 @@ class EurocReader {
     out_.info.name = dataset_name(path);
     out_.info.format = files_->packed() ? "EuRoC zip" : "EuRoC folder";
     find_cameras();
-    for (auto step : {&EurocReader::read_calibration, &EurocReader::read_frames, &EurocReader::read_imu})
+    for (auto step :
+         {&EurocReader::read_calibration, &EurocReader::read_depth_sensor, &EurocReader::read_frames, &EurocReader::read_imu})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     read_ground_truth();
     describe_frames();
@@ -71,6 +73,7 @@ class EurocReader {
   }
   void warn(std::string sentence) { out_.info.warnings.push_back(std::move(sentence)); }
 
+  static std::string depth(const char* file) { return std::string(kDepthFolder) + file; }
   static std::string folder_of(int camera) { return fmt::format("cam{}/", camera); }
   std::vector<std::string> folders() const {
     std::vector<std::string> out;
@@ -85,6 +88,10 @@ class EurocReader {
       if (i < 2 ? images || calibration : images && (calibration || options_.brings_rig())) cameras_.push_back(i);
     }
     if (cameras_.empty()) cameras_ = {0};
+    // Two cameras see depths themselves: depth images are for one.
+    const bool wanted = options_.camera == "depth" || (options_.camera == "all" && cameras_.size() == 1);
+    has_depth_ = wanted && cameras_.front() == 0 && exists(depth("data.csv")) && exists(depth("sensor.yaml"));
+    if (has_depth_) cameras_.resize(1);
   }
 
   template <class Parser>
@@ -107,6 +114,14 @@ class EurocReader {
     }
     T_BI_ = imu.T_BS;
     return options_.kalibr_camchain.empty() ? read_own_calibration(imu) : read_kalibr_calibration(imu);
+  }
+
+  Result<void> read_depth_sensor() {
+    if (!has_depth_) return {};
+    Result<DepthSensor> sensor = parse_yaml(depth("sensor.yaml"), parse_depth_sensor);
+    if (!sensor) return sensor.error();
+    out_.rig = with_depth(out_.rig, *sensor);
+    return check_rig(out_.rig, named(depth("sensor.yaml")));
   }
 
   Result<void> read_own_calibration(const ImuSensor& imu) {
@@ -168,6 +183,7 @@ class EurocReader {
       warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
                        options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
+    if (Result<void> depths = read_depth_rows(tolerance); !depths) return depths;
     for (std::size_t i = 2; i < lists.size(); ++i) out_.info.more.unpaired += add_camera(out_.frames, lists[i], i - 2, tolerance);
     if (out_.info.more.unpaired > 0)
       warn(fmt::format("{} images of further cameras have no partner within {} ms", out_.info.more.unpaired,
@@ -175,6 +191,25 @@ class EurocReader {
     if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
       return Error{cut.error().code, fmt::format("{}: {}", named(folders().front() + "data.csv"), cut.error().message)};
     return find_images();
+  }
+
+  Result<void> read_depth_rows(Duration tolerance) {
+    if (!has_depth_ || out_.frames.empty()) return {};
+    Result<std::string> csv = text(depth("data.csv"), kLargestCsv_bytes);
+    if (!csv) return csv.error();
+    auto rows = read_image_rows(*csv, named(depth("data.csv")));
+    if (!rows) return rows.error();
+    warn_about_rows(rows->counts, named(depth("data.csv")));
+    CameraInfo& info = out_.info.depth;
+    info.rows = rows->counts;
+    info.listed = static_cast<int>(rows->rows.size());
+    info.unpaired = add_depth(out_.frames, rows->rows, tolerance);
+    if (info.listed > 0 && info.unpaired == info.listed)
+      return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam0's", named(depth("data.csv")),
+                                                     options_.pair_tolerance_ms)};
+    if (info.unpaired > 0)
+      warn(fmt::format("{} depth images have no image within {} ms", info.unpaired, options_.pair_tolerance_ms));
+    return {};
   }
 
   /// Drops names of missing files, and frames of which both files are missing.
@@ -190,6 +225,7 @@ class EurocReader {
       const std::vector<std::string> in = folders();
       look(frame.left_file, in[0] + "data/", out_.info.left.images);
       if (in.size() > 1) look(frame.right_file, in[1] + "data/", out_.info.right.images);
+      look(frame.depth_file, depth("data/"), out_.info.depth.images);
       for (std::size_t i = 0; i < frame.more_files.size(); ++i)
         look(frame.more_files[i], in[i + 2] + "data/", out_.info.more.images);
     }
@@ -197,7 +233,9 @@ class EurocReader {
     out_.info.frames_without_image = static_cast<int>(emptied);
     if (out_.frames.empty())
       return Error{ErrorCode::not_found, fmt::format("{}: no such file, nor any other of the images listed", first_missing)};
-    const int missing = out_.info.left.images.missing + out_.info.right.images.missing + out_.info.more.images.missing;
+    int missing = 0;
+    for (const CameraInfo* of : {&out_.info.left, &out_.info.right, &out_.info.more, &out_.info.depth})
+      missing += of->images.missing;
     if (missing > 0) warn(fmt::format("{}: no such file; {} of the images listed are missing", first_missing, missing));
     return {};
   }
@@ -272,6 +310,7 @@ class EurocReader {
   std::string root_;
   const DatasetOptions& options_;
   std::vector<int> cameras_;  ///< numbers of the folders: of the left camera, the right one, and those that follow
+  bool has_depth_ = false;    ///< images of a depth sensor, which are used
   Pose<B, B> T_BI_;           ///< takes IMU to the recording's body coordinates
   DatasetContents out_;
 };

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
+#include <optional>
 #include <utility>
 
 #include "fbvins/camera/lens_numbers.hpp"
@@ -17,6 +18,8 @@ namespace fbvins {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kRowsHeader = "#timestamp [ns],filename\n";
 
 Error cannot_write(const fs::path& path) {
   return Error{ErrorCode::unwritable, fmt::format("{}: cannot be written", path.string())};
@@ -91,6 +94,13 @@ std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
   return text;
 }
 
+std::string depth_yaml(const DepthSensor& sensor, const std::string& origin) {
+  return fmt::format(
+      "sensor_type: depth\ncomment: {}, registered to cam0 pixel by pixel, in millimetres\n\nnoise_at_1m_m: {}\n"
+      "nearest_m: {}\nfarthest_m: {}\nscale_sigma: {}\n",
+      origin, sensor.noise_at_1m_m, sensor.nearest_m, sensor.farthest_m, sensor.scale_sigma);
+}
+
 std::string depth_png(const std::vector<float>& depth_m, int width, int height) {
   std::vector<std::uint16_t> mm;
   for (float z : depth_m) mm.push_back(static_cast<std::uint16_t>(std::clamp(z * 1000.0f + 0.5f, 0.0f, 65535.0f)));
@@ -102,6 +112,7 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, cons
   std::vector<std::string> folders{"imu0", "state_groundtruth_estimate0"};
   for (int i = 0; i < rig.camera_count(); ++i) folders.push_back(fmt::format("cam{}/data", i));
   if (depth) folders.push_back("depth0");
+  if (rig.depth) folders.push_back("depth0/data");
   for (const std::string& folder : folders) {
     std::error_code error;
     fs::create_directories(mav0 / folder, error);
@@ -112,6 +123,8 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, cons
     const fs::path path = mav0 / fmt::format("cam{}/sensor.yaml", i);
     if (Result<void> done = write_file(path, camera_yaml(camera, T_BC.q, T_BC.p, rig, origin)); !done) return done;
   }
+  if (rig.depth)
+    if (Result<void> done = write_file(mav0 / "depth0/sensor.yaml", depth_yaml(*rig.depth, origin)); !done) return done;
   for (const auto& [path, text] :
        {std::pair{mav0 / "imu0/sensor.yaml", imu_yaml(rig.imu_noise, origin)},
         {mav0 / "state_groundtruth_estimate0/sensor.yaml",
@@ -137,6 +150,10 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
     const std::string depth = depth_png(images.depth_left_m, frame.left->width(), frame.left->height());
     if (Result<void> done = write_file(mav0 / "depth0" / left, depth); !done) return done;
   }
+  if (const DepthImage* depth = frame.depth.get(); depth != nullptr) {
+    const std::string png = encode_png16(depth->mm, depth->width, depth->height);
+    if (Result<void> done = write_file(mav0 / "depth0/data" / left, png); !done) return done;
+  }
   for (std::size_t i = 0; i < frame.more.size(); ++i)
     if (frame.more[i])
       if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data", i + 2) / left, encode_png(*frame.more[i])); !done)
@@ -149,6 +166,7 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
 struct EurocFolder::State {
   fs::path mav0;
   std::vector<std::string> rows;  ///< of each camera
+  std::optional<std::string> depth_rows;
   std::future<Result<void>> writing;
 
   Result<void> wait() { return writing.valid() ? writing.get() : Result<void>{}; }
@@ -160,7 +178,8 @@ Result<EurocFolder> EurocFolder::create(const std::string& folder, const StereoR
   if (Result<void> done = write_calibrations(rig, mav0, origin, depth); !done) return done.error();
   auto state = std::make_unique<State>();
   state->mav0 = mav0;
-  state->rows.assign(static_cast<std::size_t>(rig.camera_count()), "#timestamp [ns],filename\n");
+  state->rows.assign(static_cast<std::size_t>(rig.camera_count()), kRowsHeader);
+  if (rig.depth) state->depth_rows = kRowsHeader;
   return EurocFolder(std::move(state));
 }
 
@@ -174,6 +193,8 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
     const Time stamp = i == 1 ? right_stamp : frame.t;
     if (frame.image(static_cast<int>(i))) state_->rows[i] += fmt::format("{0},{0}.png\n", stamp.ns);
   }
+  if (!state_->depth_rows) frame.depth = nullptr;
+  if (frame.depth) *state_->depth_rows += fmt::format("{0},{0}.png\n", frame.t.ns);
   if (Result<void> done = state_->wait(); !done) return done;
   state_->writing = std::async(std::launch::async, [images = Images{std::move(frame), right_stamp, std::move(depth_left_m)},
                                                     mav0 = state_->mav0] { return write_images(images, mav0); });
@@ -188,7 +209,7 @@ Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const s
     if (Result<void> done = write_file(path, text); !done) return done;
   for (std::size_t i = 0; i < state_->rows.size(); ++i)
     if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data.csv", i), state_->rows[i]); !done) return done;
-  return {};
+  return state_->depth_rows ? write_file(mav0 / "depth0/data.csv", *state_->depth_rows) : Result<void>{};
 }
 
 }  // namespace fbvins

@@ -92,6 +92,94 @@ TEST(EurocFolder, OfFourCamerasTheFirstTwoCanBeUsed) {
     if (auto* frame = std::get_if<StereoFrame>(&*event)) EXPECT_TRUE(frame->more.empty());
 }
 
+std::shared_ptr<const DepthImage> depths(int shift) {
+  auto depth = std::make_shared<DepthImage>(DepthImage{kWidth, kHeight, {}});
+  for (int i = 0; i < kWidth * kHeight; ++i) depth->mm.push_back(static_cast<std::uint16_t>(1000 + 7 * i + shift));
+  return depth;
+}
+
+/// Two frames of one camera and a depth sensor; the second has no depth image.
+std::string depth_recording(const std::string& name) {
+  const std::string folder = empty_folder(name);
+  const StereoRig rig = with_depth(small_rig(), {.noise_at_1m_m = 0.0025, .nearest_m = 0.25, .farthest_m = 5.5});
+  auto recording = EurocFolder::create(folder, rig, "made by hand");
+  EXPECT_TRUE(recording.ok());
+  std::vector<ImuSample> readings;
+  for (int i = 0; i < 30; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  EXPECT_TRUE(recording->add({Time{1'020'000'000}, pattern(0), nullptr, {}, depths(0)}, Time{}).ok());
+  EXPECT_TRUE(recording->add({Time{1'070'000'000}, pattern(1), nullptr}, Time{}).ok());
+  EXPECT_TRUE(recording->finish(readings, {}).ok());
+  return folder;
+}
+
+std::vector<StereoFrame> frames_of(Dataset& data) {
+  std::vector<StereoFrame> frames;
+  while (auto event = data.next())
+    if (auto* frame = std::get_if<StereoFrame>(&*event)) frames.push_back(std::move(*frame));
+  return frames;
+}
+
+TEST(EurocFolder, KeepsDepthImages) {
+  const auto data = open_dataset(depth_recording("euroc_depth"));
+  ASSERT_TRUE(data) << data.error().message;
+  const StereoRig& rig = (*data)->rig();
+  ASSERT_TRUE(rig.depth);
+  EXPECT_EQ(rig.camera_count(), 1);
+  EXPECT_EQ(rig.depth->noise_at_1m_m, 0.0025);
+  EXPECT_EQ(rig.depth->nearest_m, 0.25);
+  EXPECT_EQ(rig.depth->farthest_m, 5.5);
+  const std::vector<StereoFrame> frames = frames_of(**data);
+  ASSERT_EQ(frames.size(), 2u);
+  ASSERT_TRUE(frames[0].depth);
+  EXPECT_EQ(frames[0].depth->mm, depths(0)->mm);
+  EXPECT_FALSE(frames[1].depth);
+  EXPECT_TRUE(frames[1].left);
+}
+
+TEST(EurocFolder, OfADepthRecordingTheCameraAloneCanBeUsed) {
+  DatasetOptions options;
+  options.camera = "left";
+  const auto data = open_dataset(depth_recording("euroc_no_depth"), options);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_FALSE((*data)->rig().depth);
+  for (const StereoFrame& frame : frames_of(**data)) EXPECT_FALSE(frame.depth);
+}
+
+TEST(EurocFolder, ADepthImageThatCannotBeReadIsCounted) {
+  const std::string folder = depth_recording("euroc_bad_depth");
+  std::ofstream(folder + "/mav0/depth0/data/1020000000.png") << "not a PNG";
+  const auto none = open_dataset(folder);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("none of 1 depth images"), std::string::npos) << none.error().message;
+  std::filesystem::remove(folder + "/mav0/depth0/data/1020000000.png");
+  const auto missing = open_dataset(folder);
+  ASSERT_TRUE(missing) << missing.error().message;
+  EXPECT_EQ((*missing)->info().depth.images.missing, 1);
+}
+
+TEST(EurocFolder, WhereTwoCamerasSeeDepthsDepthImagesAreUsedWhenAskedFor) {
+  const std::string folder = four_cameras("euroc_depth_asked", four_camera_rig(), 3);
+  DatasetOptions options;
+  options.camera = "depth";
+  const auto none = open_dataset(folder, options);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("there are no depth images"), std::string::npos) << none.error().message;
+  std::filesystem::copy(depth_recording("euroc_depth_source") + "/mav0/depth0", folder + "/mav0/depth0",
+                        std::filesystem::copy_options::recursive);
+  const auto all = open_dataset(folder);
+  ASSERT_TRUE(all) << all.error().message;
+  EXPECT_FALSE((*all)->rig().depth);
+  EXPECT_EQ((*all)->rig().camera_count(), 4);
+  const auto depth = open_dataset(folder, options);
+  ASSERT_TRUE(depth) << depth.error().message;
+  EXPECT_TRUE((*depth)->rig().depth);
+  EXPECT_EQ((*depth)->rig().camera_count(), 1);
+  const std::vector<StereoFrame> frames = frames_of(**depth);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_TRUE(frames[0].depth);
+  EXPECT_FALSE(frames[0].right);
+}
+
 TEST(EurocFolder, KeepsTimeOffsetAndRange) {
   const std::string folder = empty_folder("euroc_offset");
   StereoRig rig = small_rig();

@@ -31,6 +31,11 @@ RowVerdict parse_stamp(std::string_view field, Time& t, std::string& problem) {
   return RowVerdict::malformed;
 }
 
+int width_of(const Image& image) { return image.width(); }
+int height_of(const Image& image) { return image.height(); }
+int width_of(const DepthImage& image) { return image.width; }
+int height_of(const DepthImage& image) { return image.height; }
+
 class EurocLoader : public FrameLoader {
  public:
   EurocLoader(std::unique_ptr<FileSource> files, std::string root, std::vector<std::string> folders, const StereoRig& rig)
@@ -43,30 +48,38 @@ class EurocLoader : public FrameLoader {
     out.frame.right = load_image(entry.right_file, 1, out.right, out.problem);
     for (std::size_t i = 0; i < entry.more_files.size(); ++i)
       out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.problem));
+    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.left, out.depth, out.problem);
     return out;
   }
 
  private:
   std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, std::string& problem) const {
     if (file.empty()) return nullptr;
-    const std::string path = root_ + folders_[static_cast<std::size_t>(camera)] + "data/" + file;
+    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode_image, rig_.camera(camera), counts, problem);
+  }
+
+  template <class T>
+  std::shared_ptr<const T> load(const std::string& file, std::string_view folder, Result<T> (*decode)(std::string_view),
+                                const Camera& camera, ImageCounts& counts, std::string& problem) const {
+    if (file.empty()) return nullptr;
+    const std::string path = fmt::format("{}{}data/{}", root_, folder, file);
     const auto blame = [&](const std::string& sentence) {
       if (problem.empty()) problem = fmt::format("{}: {}", files_->describe(path), sentence);
     };
     Result<std::string> bytes = files_->read(path, kLargestImage_bytes);
-    Result<Image> image = bytes ? decode_image(*bytes) : Result<Image>(bytes.error());
+    Result<T> image = bytes ? decode(*bytes) : Result<T>(bytes.error());
     if (!image) {
       ++counts.corrupt;
       if (bytes) blame(image.error().message);
       else if (problem.empty()) problem = image.error().message;
       return nullptr;
     }
-    if (const auto sentence = wrong_size(image->width(), image->height(), rig_.camera(camera))) {
+    if (const auto sentence = wrong_size(width_of(*image), height_of(*image), camera)) {
       ++counts.wrong_size;
       blame(*sentence);
       return nullptr;
     }
-    return std::make_shared<const Image>(*std::move(image));
+    return std::make_shared<const T>(*std::move(image));
   }
 
   std::unique_ptr<FileSource> files_;
@@ -74,6 +87,19 @@ class EurocLoader : public FrameLoader {
   std::vector<std::string> folders_;
   StereoRig rig_;
 };
+
+std::vector<Time> stamps_of(const std::vector<FrameEntry>& frames) {
+  std::vector<Time> stamps;
+  for (const FrameEntry& frame : frames) stamps.push_back(frame.t);
+  return stamps;
+}
+
+/// Of increasing stamps, which there are; of two equally near ones the later.
+std::size_t nearest(const std::vector<Time>& stamps, Time t) {
+  const auto after = static_cast<std::size_t>(std::ranges::lower_bound(stamps, t) - stamps.begin());
+  if (after == stamps.size()) return after - 1;
+  return after > 0 && t - stamps[after - 1] < stamps[after] - t ? after - 1 : after;
+}
 
 }  // namespace
 
@@ -134,20 +160,26 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
   return out;
 }
 
+int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, Duration tolerance) {
+  const std::vector<Time> stamps = stamps_of(frames);
+  int unpaired = 0;
+  for (const ImageRow& image : images) {
+    FrameEntry& frame = frames[nearest(stamps, image.t)];
+    if (Duration{std::abs((image.t - frame.t).ns)} <= tolerance && frame.depth_file.empty()) frame.depth_file = image.file;
+    else ++unpaired;
+  }
+  return unpaired;
+}
+
 int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance) {
-  std::vector<Time> stamps;
-  for (const FrameEntry& frame : frames) stamps.push_back(frame.t);
+  const std::vector<Time> stamps = stamps_of(frames);
   const Duration half_interval{measure_intervals(stamps).median.ns / 2};
   if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
   for (FrameEntry& frame : frames) frame.more_files.resize(more + 1);
   std::vector<FrameEntry> alone;
   int unpaired = 0;
   for (const ImageRow& image : images) {
-    auto near = std::ranges::lower_bound(stamps, image.t) - stamps.begin();
-    if (near == std::ssize(stamps) ||
-        (near > 0 && image.t - stamps[static_cast<std::size_t>(near) - 1] < stamps[static_cast<std::size_t>(near)] - image.t))
-      --near;
-    FrameEntry& frame = frames[static_cast<std::size_t>(near)];
+    FrameEntry& frame = frames[nearest(stamps, image.t)];
     const Duration distance{std::abs((image.t - frame.t).ns)};
     if (distance <= tolerance && frame.more_files[more].empty()) {
       frame.more_files[more] = image.file;

@@ -38,12 +38,18 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
 /// partner.
 int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance);
 
+/// Gives each depth image to the nearest frame within the tolerance. Returns how many had none.
+int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, Duration tolerance);
+
 struct Intervals {
   Duration median, longest;
   Time longest_start;
   double rate_hz = 0;  ///< one over the median; 0 for fewer than two stamps
 };
 Intervals measure_intervals(const std::vector<Time>& increasing);
+
+/// Where depth images are, with a slash at the end.
+inline constexpr std::string_view kDepthFolder = "depth0/";
 
 /// `folders`: of the rig's cameras, in their order, with a slash at the end.
 std::unique_ptr<FrameLoader> make_euroc_loader(std::unique_ptr<FileSource> files, std::string root,

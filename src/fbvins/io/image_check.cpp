@@ -17,7 +17,7 @@ Result<void> check_camera(const DatasetContents& contents, std::string FrameEntr
     FrameEntry one_image{frame.t, "", "", std::nullopt};
     one_image.*file = frame.*file;
     const LoadedFrame loaded = contents.loader->load(one_image);
-    if (loaded.frame.left || loaded.frame.right) return {};
+    if (loaded.frame.left || loaded.frame.right || loaded.frame.depth) return {};
     if (first.empty()) first = loaded.problem;
   }
   if (frames.empty()) return {};
@@ -38,7 +38,8 @@ std::vector<FrameEntry> frames_to_try(const std::vector<FrameEntry>& frames, std
 
 Result<void> check_images(const DatasetContents& contents) {
   if (Result<void> left = check_camera(contents, &FrameEntry::left_file, "left"); !left) return left;
-  return check_camera(contents, &FrameEntry::right_file, "right");
+  if (Result<void> right = check_camera(contents, &FrameEntry::right_file, "right"); !right) return right;
+  return check_camera(contents, &FrameEntry::depth_file, "depth");
 }
 
 }  // namespace fbvins

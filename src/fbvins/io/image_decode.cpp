@@ -9,6 +9,8 @@
 namespace fbvins {
 namespace {
 
+constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n";
+
 Result<Image> decode_jpeg(std::string_view bytes) {
   struct Handle {
     tjhandle tj = tjInitDecompress();
@@ -40,9 +42,14 @@ Result<void> check_image_size(std::int64_t width, std::int64_t height) {
 
 Result<Image> decode_image(std::string_view bytes) {
   if (bytes.empty()) return Error{ErrorCode::malformed, "the file is empty"};
-  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return decode_png(bytes);
+  if (bytes.starts_with(kPngSignature)) return decode_png(bytes);
   if (bytes.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes);
   return Error{ErrorCode::malformed, "neither PNG nor JPEG"};
+}
+
+Result<DepthImage> decode_depth(std::string_view bytes) {
+  if (!bytes.starts_with(kPngSignature)) return Error{ErrorCode::malformed, "no PNG, which depth images are"};
+  return decode_png16(bytes);
 }
 
 std::optional<std::string> wrong_size(std::int64_t width, std::int64_t height, const Camera& camera) {

@@ -24,6 +24,9 @@ inline constexpr std::int64_t kLargestImage_px = std::int64_t{64} << 20;
 /// The message says what is wrong with the bytes, without a file name.
 Result<Image> decode_image(std::string_view bytes);
 
+/// A depth image: a 16-bit grey PNG, in millimetres.
+Result<DepthImage> decode_depth(std::string_view bytes);
+
 /// One sentence about an image that is not of its camera's size; none where it is.
 std::optional<std::string> wrong_size(std::int64_t width, std::int64_t height, const Camera& camera);
 

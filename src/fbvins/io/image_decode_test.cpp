@@ -52,6 +52,27 @@ TEST(DecodePng, EightBitGreyIsExact) {
   }
 }
 
+TEST(DecodeDepth, SixteenBitIsExact) {
+  for (bool interlaced : {false, true}) {
+    const auto image = decode_depth(write_png(3, 1, 16, PNG_COLOR_TYPE_GRAY, {0x04, 0xD2, 0xFF, 0xFF, 0, 0}, interlaced));
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->width, 3);
+    EXPECT_EQ(image->height, 1);
+    EXPECT_EQ(image->mm, (std::vector<std::uint16_t>{1234, 65535, 0}));
+  }
+}
+
+TEST(DecodeDepth, WhatIsNoDepthImageIsRefused) {
+  const std::string good = write_png(3, 1, 16, PNG_COLOR_TYPE_GRAY, {0x04, 0xD2, 0xFF, 0xFF, 0, 0});
+  EXPECT_FALSE(decode_depth(""));
+  EXPECT_FALSE(decode_depth("P5 3 1 65535"));
+  EXPECT_FALSE(decode_depth(good.substr(0, good.size() - 20)));
+  const auto grey = decode_depth(write_png(3, 1, 8, PNG_COLOR_TYPE_GRAY, ramp(3)));
+  ASSERT_FALSE(grey);
+  EXPECT_NE(grey.error().message.find("1 channels of 8 bits"), std::string::npos) << grey.error().message;
+  EXPECT_FALSE(decode_depth(write_png(1, 1, 16, PNG_COLOR_TYPE_RGB, ramp(6))));
+}
+
 TEST(DecodePng, SixteenBitIsScaled) {
   const auto image = decode_image(write_png(3, 1, 16, PNG_COLOR_TYPE_GRAY, {0x80, 0x80, 0xFF, 0xFF, 0x12, 0x00}));
   ASSERT_TRUE(image);

@@ -5,6 +5,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "fbvins/io/image_decode.hpp"
@@ -21,7 +22,7 @@ struct PngJob {
   png_structp png = nullptr;
   png_infop info = nullptr;
   png_uint_32 width = 0, height = 0;
-  int channels = 0;
+  int channels = 0, bits = 8;
   std::vector<png_bytep> rows;
 
   ~PngJob() { png_destroy_read_struct(&png, &info, nullptr); }
@@ -42,21 +43,23 @@ void on_read(png_structp png, png_bytep out, std::size_t length) {
 
 void on_warning(png_structp, png_const_charp) {}
 
-/// Reads the header and asks for 8 bits a channel, 1 or 3 channels.
-bool read_header(PngJob& job) {
+/// Reads the header and asks for 8 bits a channel, 1 or 3 channels; for depths for what there is, in the machine's byte order.
+bool read_header(PngJob& job, bool depths) {
   if (setjmp(png_jmpbuf(job.png))) return false;
   png_set_user_limits(job.png, kLargestImageSide_px, kLargestImageSide_px);
   png_set_read_fn(job.png, &job, on_read);
   png_read_info(job.png, job.info);
   png_set_expand_gray_1_2_4_to_8(job.png);
   png_set_palette_to_rgb(job.png);
-  png_set_scale_16(job.png);
+  if (!depths) png_set_scale_16(job.png);
+  else if constexpr (std::endian::native == std::endian::little) png_set_swap(job.png);
   png_set_strip_alpha(job.png);
   png_set_interlace_handling(job.png);
   png_read_update_info(job.png, job.info);
   job.width = png_get_image_width(job.png, job.info);
   job.height = png_get_image_height(job.png, job.info);
   job.channels = png_get_channels(job.png, job.info);
+  job.bits = png_get_bit_depth(job.png, job.info);
   return true;
 }
 
@@ -73,16 +76,22 @@ void to_luma(const std::uint8_t* rgb, int count, std::uint8_t* grey) {
     grey[i] = static_cast<std::uint8_t>((19595u * rgb[3 * i] + 38470u * rgb[3 * i + 1] + 7471u * rgb[3 * i + 2] + 32768u) >> 16u);
 }
 
+Error failure(const PngJob& job) { return {ErrorCode::malformed, fmt::format("damaged PNG: {}", job.message)}; }
+
+/// The header, and whether the image is one.
+Result<void> begin(PngJob& job, std::string_view bytes, bool depths) {
+  job.bytes = bytes;
+  job.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning);
+  if (job.png) job.info = png_create_info_struct(job.png);
+  if (!job.info || !read_header(job, depths)) return failure(job);
+  return check_image_size(job.width, job.height);
+}
+
 }  // namespace
 
 Result<Image> decode_png(std::string_view bytes) {
   PngJob job;
-  job.bytes = bytes;
-  const auto failure = [&] { return Error{ErrorCode::malformed, fmt::format("damaged PNG: {}", job.message)}; };
-  job.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning);
-  if (job.png) job.info = png_create_info_struct(job.png);
-  if (!job.info || !read_header(job)) return failure();
-  if (Result<void> size = check_image_size(job.width, job.height); !size) return size.error();
+  if (Result<void> begun = begin(job, bytes, false); !begun) return begun.error();
   if (job.channels != 1 && job.channels != 3)
     return Error{ErrorCode::unsupported, fmt::format("a PNG of {} channels", job.channels)};
   const int width = static_cast<int>(job.width), height = static_cast<int>(job.height);
@@ -92,9 +101,23 @@ Result<Image> decode_png(std::string_view bytes) {
   job.rows.resize(job.height);
   for (int y = 0; y < height; ++y)
     job.rows[y] = colour.empty() ? image.row(y) : colour.data() + 3 * static_cast<std::size_t>(width) * y;
-  if (!read_pixels(job)) return failure();
+  if (!read_pixels(job)) return failure(job);
   if (!colour.empty())
     for (int y = 0; y < height; ++y) to_luma(job.rows[y], width, image.row(y));
+  return image;
+}
+
+Result<DepthImage> decode_png16(std::string_view bytes) {
+  PngJob job;
+  if (Result<void> begun = begin(job, bytes, true); !begun) return begun.error();
+  if (job.channels != 1 || job.bits != 16)
+    return Error{ErrorCode::unsupported,
+                 fmt::format("{} channels of {} bits where a depth image has one of 16", job.channels, job.bits)};
+  DepthImage image{static_cast<int>(job.width), static_cast<int>(job.height), {}};
+  image.mm.resize(static_cast<std::size_t>(image.width) * job.height);
+  for (std::size_t y = 0; y < job.height; ++y)
+    job.rows.push_back(reinterpret_cast<png_bytep>(image.mm.data() + y * static_cast<std::size_t>(image.width)));
+  if (!read_pixels(job)) return failure(job);
   return image;
 }
 

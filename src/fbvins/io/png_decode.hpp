@@ -10,6 +10,8 @@
 namespace fbvins {
 
 Result<Image> decode_png(std::string_view bytes);
+/// One of 16-bit grey, as depth images are.
+Result<DepthImage> decode_png16(std::string_view bytes);
 
 /// An error for sizes that only a damaged header has.
 Result<void> check_image_size(std::int64_t width, std::int64_t height);

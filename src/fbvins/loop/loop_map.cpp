@@ -11,8 +11,9 @@ namespace fbvins {
 
 Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const MapOptions& options) {
   if (Result<void> valid = validate(options.loop); !valid) return valid.error();
-  if (!rig.has_right())
-    return Error{ErrorCode::unsupported, "a map needs two cameras: places are recognised by the depth of what they show"};
+  if (!rig.has_right() && !rig.depth)
+    return Error{ErrorCode::unsupported,
+                 "a map needs two cameras or a depth sensor: places are recognised by the depth of what they show"};
   Result<PlaceMap> map = PlaceMap{};
   if (!options.file.empty()) map = load_map(options.file);
   if (!map) return map.error();

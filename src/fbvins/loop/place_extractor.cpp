@@ -39,7 +39,9 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
       p_rl_(rig.T_C1C0().p),
       focal_px_(rig.left.focal_px()),
       baseline_m_(p_rl_.norm()),
-      orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {}
+      orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {
+  if (rig.depth) depth_.emplace(*rig.depth, rig.left);
+}
 
 Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
   Place place;
@@ -52,6 +54,11 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
     left_.build(images.left->view(), kSearchLevel + 1);
     right_.build(images.right->view(), kSearchLevel + 1);
   }
+  const bool has_depth_image = depth_ && depth_->is_usable(images.depth.get());
+  const auto depth_of = [&](const Vec2& px, const Vec2& normalised) -> std::optional<MeasuredInverseDepth> {
+    if (has_depth_image) return depth_->at(*images.depth, px);
+    return images.right ? stereo(px, normalised) : std::nullopt;
+  };
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Keypoint& keypoint = found_.keypoints[i];
     const auto xy = rig_.left.undistort(keypoint.pixel);
@@ -60,11 +67,10 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
     feature.x = static_cast<float>(xy->x());
     feature.y = static_cast<float>(xy->y());
     feature.sigma_xy = static_cast<float>(kKeypoint_px * keypoint.scale / focal_px_);
-    if (images.right)
-      if (const auto depth = stereo(keypoint.pixel, *xy)) {
-        feature.inverse_depth = static_cast<float>(depth->inverse_depth);
-        feature.sigma_inverse_depth = static_cast<float>(depth->sigma);
-      }
+    if (const auto depth = depth_of(keypoint.pixel, *xy)) {
+      feature.inverse_depth = static_cast<float>(depth->value);
+      feature.sigma_inverse_depth = static_cast<float>(depth->sigma);
+    }
     place.features.push_back(feature);
     place.descriptors.push_back(found_.descriptors[i]);
   }
@@ -99,7 +105,7 @@ std::optional<Vec2> PlaceExtractor::search(const Vec2& left_normalised) const {
   return best_px;
 }
 
-std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px, const Vec2& left_normalised) {
+std::optional<MeasuredInverseDepth> PlaceExtractor::stereo(const Vec2& left_px, const Vec2& left_normalised) {
   const int search_level = std::min(kSearchLevel, left_.levels() - 1);
   if (!patch_.cut(left_, left_px, search_level, search_level)) return std::nullopt;
   const auto start = search(left_normalised);
@@ -114,7 +120,7 @@ std::optional<PlaceExtractor::Stereo> PlaceExtractor::stereo(const Vec2& left_px
   const auto rho = inverse_depth_along(far, p_rl_, seen);
   const double rho_per_px = 1 / (focal_px_ * baseline_m_);
   if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
-  return Stereo{std::max(*rho, 0.0), kDisparity_px * rho_per_px};
+  return MeasuredInverseDepth{std::max(*rho, 0.0), kDisparity_px * rho_per_px};
 }
 
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include <memory>
 #include <optional>
 
-#include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/depth_reader.hpp"
 #include "fbvins/features/descriptor_stage.hpp"
 #include "fbvins/features/klt.hpp"
 #include "fbvins/features/orb.hpp"
@@ -26,19 +26,17 @@ class PlaceExtractor {
   PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
                  std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
-  /// `R_LB`: gravity-aligned attitude of the body. Empty when the left image is missing; without depth when the right one is.
+  /// `R_LB`: gravity-aligned attitude of the body. Empty when the left image is missing; without depth when right one and depth
+  /// image are.
   Place extract(const StereoFrame& images, const Mat3& R_LB);
 
  private:
-  struct Stereo {
-    double inverse_depth;
-    double sigma;
-  };
-  std::optional<Stereo> stereo(const Vec2& left_px, const Vec2& left_normalised);
+  std::optional<MeasuredInverseDepth> stereo(const Vec2& left_px, const Vec2& left_normalised);
   std::optional<Vec2> search(const Vec2& left_normalised) const;
   std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
 
   StereoRig rig_;
+  std::optional<DepthReader> depth_;
   Vocabulary vocabulary_;
   std::unique_ptr<DescriptorStage> stage_;
   Mat3 R_rl_;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/sim/depth_model.hpp"
 #include "fbvins/sim/flight.hpp"
 #include "fbvins/sim/image_sensor.hpp"
 #include "fbvins/sim/imu_model.hpp"
@@ -47,6 +48,7 @@ struct SimulationOptions {
   RecordedOptions recorded;
   ImuModelOptions imu;
   CameraModelOptions camera;
+  DepthModelOptions depth;
   WorldOptions world;
   LightOptions light;
 
@@ -55,19 +57,22 @@ struct SimulationOptions {
     v("seed", seed, "", "of all random numbers", 0, 2'000'000'000);
     v("image_rate_hz", image_rate_hz, "Hz", "stereo frames per second", 1.0, 200.0);
     v("calibration", calibration, "", "Kalibr camchain-imucam.yaml of the rig; empty: EuRoC's");
-    v("rig", rig, "stereo|quad|sides",
-      "cameras: the two of the calibration; and two more of the same kind that look backwards, or one to each side");
+    v("rig", rig, "stereo|quad|sides|rgbd",
+      "cameras: the two of the calibration; and two more of the same kind that look backwards, or one to each side; or the left "
+      "one with a depth sensor");
     v.group("flight", flight, "how the rig moves");
     v.group("recorded", recorded, "a recorded flight instead");
     v.group("imu", imu, "errors of the IMU");
     v.group("camera", camera, "both cameras");
+    v.group("depth", depth, "the depth sensor of the rig rgbd");
     v.group("world", world, "the place");
     v.group("light", light, "the lamps");
   }
 };
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
-/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs).
+/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs) and rgbd
+/// (one camera and a depth sensor).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
@@ -82,7 +87,7 @@ struct RenderedFrame {
   StereoFrame frame;
   Time right_stamp;
   double exposure_s = 0;
-  std::vector<float> depth_left_m;  ///< row by row, 0 where nothing is; filled on request
+  std::vector<float> depth_left_m;  ///< exact, row by row, 0 where nothing is; filled on request
 };
 
 class FlightRecorder;

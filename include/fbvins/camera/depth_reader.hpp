@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The inverse depth at a pixel of a depth image. One instance may be used by any thread.
+//
+//   DepthReader reader(*rig.depth, rig.left);
+//   if (auto depth = reader.at(*frame.depth, px)) use(depth->value, depth->sigma);
+#pragma once
+
+#include <optional>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+/// Along z of the left camera, 1/m, with its standard deviation.
+struct MeasuredInverseDepth {
+  double value = 0, sigma = 0;
+};
+
+class DepthReader {
+ public:
+  DepthReader(const DepthSensor& sensor, const Camera& left) : sensor_(sensor), width_(left.width()), height_(left.height()) {}
+
+  /// Whether a depth image is registered to the camera: of its size.
+  bool is_usable(const DepthImage* image) const {
+    return image != nullptr && image->width == width_ && image->height == height_ &&
+           image->mm.size() == static_cast<std::size_t>(width_) * height_;
+  }
+  /// Of the plane through the depths around the pixel: on a plane the inverse depth is linear in the (undistorted) image. Nothing
+  /// in a hole, out of range, at the edge of the image, and where an edge of depth passes: there the sensor lies.
+  std::optional<MeasuredInverseDepth> at(const DepthImage& image, const Vec2& px) const;
+
+ private:
+  DepthSensor sensor_;
+  int width_, height_;
+};
+
+}  // namespace fbvins
