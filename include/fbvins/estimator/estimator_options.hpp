@@ -56,6 +56,7 @@ struct EstimatorOptions {
   double accel_walk_scale = 0.4;
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
+  bool estimate_line_delay = false;
   double max_blind_m = 0.5;
   double max_imu_gap_s = 1.0;
   int min_tracks = 10;
@@ -87,6 +88,7 @@ struct EstimatorOptions {
     v("accel_walk_scale", accel_walk_scale, "", "factor on the calibrated accelerometer bias random walk", 0.01, 100.0);
     v("estimate_extrinsics", estimate_extrinsics, "", "refine the camera-IMU poses while flying");
     v("estimate_time_offset", estimate_time_offset, "", "refine the camera-IMU time offset while flying");
+    v("estimate_line_delay", estimate_line_delay, "", "refine the line delay of a rolling shutter while flying");
     v("max_blind_m", max_blind_m, "m",
       "largest standard deviation that flight by the IMU alone, without usable images, may add to the position", 0.01, 100.0);
     v("max_imu_gap_s", max_imu_gap_s, "s", "longest time without IMU readings bridged by the images", 0.01, 10.0);

@@ -13,6 +13,7 @@ struct Calibration {
   Pose<B, C0> T_BC0;
   Pose<B, C1> T_BC1;
   double time_offset_s = 0;            ///< t_imu = t_image + offset, beyond what the input has applied
+  double line_delay_s = 0;             ///< of a rolling shutter, beyond the calibrated one
   std::vector<Pose<B, C0>> more = {};  ///< T_BC of cameras 2, 3 ...
 
   int camera_count() const { return 2 + static_cast<int>(more.size()); }

@@ -29,6 +29,7 @@ struct Observation {
   /// d(pixel)/d(normalised) at this point, divided by the standard deviation of the pixel position:
   /// weighs a residual in normalised coordinates so that it counts in sigmas of the raw image.
   Mat2 sqrt_information = Mat2::Identity();
+  double rows = 0;  ///< of a rolling shutter, below the middle row, whose time is the stamp; filled by the estimator
 };
 
 /// The two cameras of a rig, by number, that a feature may be seen by: the left and the right one of its group.

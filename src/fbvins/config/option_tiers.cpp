@@ -20,6 +20,7 @@ std::span<const std::string_view> user_options() {
                                         "estimator.accel_noise_scale"sv,
                                         "estimator.estimate_extrinsics"sv,
                                         "estimator.estimate_time_offset"sv,
+                                        "estimator.estimate_line_delay"sv,
                                         "estimator.max_blind_m"sv,
                                         "estimator.max_speed_mps"sv,
                                         "loop.max_keyframes"sv};

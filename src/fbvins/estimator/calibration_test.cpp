@@ -142,5 +142,25 @@ TEST(OnlineCalibration, HalvesTheTimeOffset) {
   }
 }
 
+TEST(OnlineCalibration, FindsTheLineDelay) {
+  constexpr double kTrue_s = 40e-6;
+  for (const double given_s : {0.5 * kTrue_s, 1.5 * kTrue_s}) {
+    SimulatedFlight flight(Motion(0.6, 0.5), 49);
+    flight.line_delay_s = kTrue_s;
+    StereoRig rig = flight.rig;
+    rig.line_delay_s = given_s;
+    EstimatorOptions options = exact_noise();
+    options.estimate_line_delay = true;
+    EXPECT_NEAR(given_s + fly(flight, rig, options).line_delay_s, kTrue_s, 0.05 * kTrue_s);
+  }
+}
+
+TEST(OnlineCalibration, AGlobalShutterStaysOne) {
+  SimulatedFlight flight(Motion(0.6, 0.5), 50);
+  EstimatorOptions options = exact_noise();
+  options.estimate_line_delay = true;
+  EXPECT_NEAR(fly(flight, flight.rig, options).line_delay_s, 0, 1e-6);
+}
+
 }  // namespace
 }  // namespace fbvins

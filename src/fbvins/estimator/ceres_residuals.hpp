@@ -98,7 +98,7 @@ struct Reprojection : ResidualOf<Reprojection> {
     const T* d = c + 6 * o.camera;
     const Vec<T> t = t_BC.cast<T>() + Eigen::Map<const Vec<T>>(d);
     const Vec<T> p_C = (q_BC.cast<T>() * exp(d + 3)).conjugate() * Vec<T>(in_target_body(x) - t);
-    const T offset = T(calibration.time_offset_s) + c[12];
+    const T offset = T(calibration.time_offset_s) + c[12] + o.rows * (T(calibration.line_delay_s) + c[13]);
     const T e[2] = {p_C.x() / p_C.z() - o.normalised.x() + offset * o.velocity.x(),
                     p_C.y() / p_C.z() - o.normalised.y() + offset * o.velocity.y()};
     for (int k = 0; k < 2; ++k) r[k] = o.sqrt_information(k, 0) * e[0] + o.sqrt_information(k, 1) * e[1];

@@ -39,6 +39,7 @@ WindowWeights weights_of(const EstimatorOptions& o) {
   w.estimate_tilt = o.up == UpDirection::state;
   w.estimate_extrinsics = o.estimate_extrinsics;
   w.estimate_time_offset = o.estimate_time_offset;
+  w.estimate_line_delay = o.estimate_line_delay;
   return w;
 }
 
@@ -82,7 +83,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
       reading_noise_(imu_noise_),
-      monitor_(imu_noise_, options_.estimate_extrinsics || options.estimate_time_offset),
+      monitor_(imu_noise_, weights_of(options_).calibrating()),
       window_(options_, weights_of(options)),
       published_(options.max_step_m, options.max_pending_m) {}
 
@@ -100,8 +101,9 @@ Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gra
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
   const TrackedFrame& whole = contract_.enforced(tracked);
-  if (!shutter_.global()) at_stamp_ = at_stamp(whole);
-  const TrackedFrame& frame = shutter_.global() ? whole : at_stamp_;
+  const bool by_rows = !shutter_.global() || options_.estimate_line_delay;
+  if (by_rows) at_stamp_ = at_stamp(whole);
+  const TrackedFrame& frame = by_rows ? at_stamp_ : whole;
   const Duration rest = rest_.update(frame);
   carried_up_.carry(frame.t, frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
@@ -183,8 +185,7 @@ void Estimator::open_window(const InitialSolution& start) {
   }
   const NavState<G>& first = window_.frames().oldest().state;
   WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
-  if (options_.estimate_extrinsics || options_.estimate_time_offset)
-    prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
+  if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
   window_.set_prior(std::move(prior));
   window_.set_pivot(first.T_FB.p);
   published_.restart();

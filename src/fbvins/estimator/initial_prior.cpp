@@ -79,6 +79,7 @@ WindowPrior with_calibration_prior(WindowPrior prior, const CalibrationPrior& si
   H.diagonal().head<3>().array() += information(sigmas.position_sigma_m);
   H.diagonal().segment<3>(3).array() += information(sigmas.rotation_sigma_rad);
   H(kTimeOffsetIndex, kTimeOffsetIndex) = information(sigmas.time_offset_sigma_s);
+  H(kLineDelayIndex, kLineDelayIndex) = information(sigmas.line_delay_sigma_s);
 
   prior.quadratic = inserted(prior.quadratic, prior.calibration_row(), H);
   prior.with_calibration = true;

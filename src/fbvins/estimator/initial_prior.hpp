@@ -15,6 +15,7 @@ struct CalibrationPrior {
   double stereo_rotation_sigma_rad = 2e-4;  ///< between the cameras
   double stereo_position_sigma_m = 1e-4;    ///< of the right camera in the left one's frame
   double time_offset_sigma_s = 0.005;
+  double line_delay_sigma_s = 20e-6;
 };
 
 /// Biases of an unknown IMU: zero, with a wide covariance.

@@ -37,9 +37,10 @@ struct PairGeometry {
 struct CameraGeometry {
   Mat3 R_BC[kMostCameras], R_CB[kMostCameras];  // of those that the rig has
   Vec3 t_BC[kMostCameras];
-  double time_offset_s = 0;
+  double time_offset_s = 0, line_delay_s = 0;
 
-  explicit CameraGeometry(const Calibration& calibration) : time_offset_s(calibration.time_offset_s) {
+  explicit CameraGeometry(const Calibration& calibration)
+      : time_offset_s(calibration.time_offset_s), line_delay_s(calibration.line_delay_s) {
     for (int i = 0; i < calibration.camera_count(); ++i) {
       const Pose<B, C0> T_BC = calibration.T_BC(i);
       R_BC[i] = T_BC.R();
@@ -56,8 +57,9 @@ struct WindowObservation {
   int frame = 0;
   int camera = 0;
   Vec2 normalised = Vec2::Zero();
-  Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by the time offset
+  Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by time offset and line delay
   Mat2 sqrt_information = Mat2::Identity();
+  double rows = 0;  ///< Observation::rows
 };
 
 /// A point on the ray (alpha, beta, 1) of a camera of its host frame, the left one of its group, or the right one if that alone
@@ -76,7 +78,16 @@ struct WindowLandmark {
 inline bool is_refined(int camera) { return camera < 2; }
 
 /// Columns of the stacked Jacobian of one observation.
-enum Column { kHost = 0, kTarget = 6, kPoint = 12, kResidual = 15, kExtrinsic0 = 16, kExtrinsic1 = 22, kTimeOffset = 28 };
+enum Column {
+  kHost = 0,
+  kTarget = 6,
+  kPoint = 12,
+  kResidual = 15,
+  kExtrinsic0 = 16,
+  kExtrinsic1 = 22,
+  kTimeOffset = 28,
+  kLineDelay = 29
+};
 
 /// The landmark in its host's body, scaled by its inverse depth (W2).
 inline Vec3 scaled_point_in_host(const CameraGeometry& cameras, const WindowLandmark& l) {
@@ -91,7 +102,7 @@ inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, c
   p_C.noalias() = cameras.R_CB[o.camera] * (p_B - rho * cameras.t_BC[o.camera]);
   if (p_C.z() < kMinScaledDepth) return false;
   const Vec2 expected = p_C.head<2>() / p_C.z();
-  r = o.sqrt_information * (expected - o.normalised + cameras.time_offset_s * o.velocity);
+  r = o.sqrt_information * (expected - o.normalised + (cameras.time_offset_s + o.rows * cameras.line_delay_s) * o.velocity);
   return true;
 }
 
@@ -136,6 +147,7 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
         Eigen::Map<Vec3>(camera + 3) += Vec3(J_projection.row(k)).cross(p_C);
       }
       J[kTimeOffset] = o.sqrt_information.row(k).dot(o.velocity);
+      J[kLineDelay] = o.rows * J[kTimeOffset];
     }
   }
 }

@@ -13,7 +13,8 @@ namespace {
 struct Seen {
   Calibration calibration{{so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)},
                           {so3_exp(Vec3(0.12, -1.21, 0.28)), Vec3(0.1, 0.02, -0.04)},
-                          0.004};
+                          0.004,
+                          2e-5};
   Pose<G, B> host{so3_exp(Vec3(0.3, 0.2, -0.5)), Vec3(1, 2, 3)};
   Pose<G, B> target{so3_exp(Vec3(0.35, 0.1, -0.45)), Vec3(1.2, 1.9, 3.1)};
   WindowLandmark landmark{.alpha_beta_rho = Vec3(0.2, -0.1, 0.4)};
@@ -22,9 +23,11 @@ struct Seen {
   Seen() {
     o.normalised = Vec2(0.15, -0.05);
     o.velocity = Vec2(0.3, -0.7);
+    o.rows = -150;
     o.sqrt_information << 700, 20, -10, 650;
   }
-  /// Moved by (host, target, point, left camera, right camera, time offset).
+  /// Moved by (host, target, point, left camera, right camera, time offset, line delay in
+  /// units of 0.01 s: the check's steps suit numbers of about one).
   Seen moved(const Eigen::VectorXd& d) const {
     Seen s = *this;
     s.host = host.boxplus(d.segment<3>(0), d.segment<3>(3));
@@ -33,6 +36,7 @@ struct Seen {
     s.calibration.T_BC0 = calibration.T_BC0.boxplus(d.segment<3>(15), d.segment<3>(18));
     s.calibration.T_BC1 = calibration.T_BC1.boxplus(d.segment<3>(21), d.segment<3>(24));
     s.calibration.time_offset_s += d(27);
+    s.calibration.line_delay_s += 0.01 * d(28);
     return s;
   }
   /// Fills p_C and r; and the rows of the Jacobian, if wanted.
@@ -56,10 +60,11 @@ TEST(Reprojection, JacobiansAreDerivatives) {
     s.o.camera = right;
     double rows[2][32];
     s.residual(rows);
-    Eigen::MatrixXd J(2, 28);
+    Eigen::MatrixXd J(2, 29);
     for (int k = 0; k < 2; ++k) {
       for (int c = 0; c < 15; ++c) J(k, c) = rows[k][c];
       for (int c = 0; c < 13; ++c) J(k, 15 + c) = rows[k][kExtrinsic0 + c];
+      J(k, 28) = 0.01 * rows[k][kLineDelay];
     }
     const auto check =
         check_jacobian([&](const Eigen::VectorXd& d) -> Eigen::VectorXd { return s.moved(d).residual(); }, J, {{"r", 2}},
@@ -72,7 +77,8 @@ TEST(Reprojection, JacobiansAreDerivatives) {
                         {"theta_BC0", 3},
                         {"p_BC1", 3},
                         {"theta_BC1", 3},
-                        {"time offset", 1}});
+                        {"time offset", 1},
+                        {"line delay", 1}});
     EXPECT_TRUE(check.ok) << (right ? "right: " : "left: ") << check.message;
   }
 }

@@ -54,12 +54,13 @@ RollingShutter::RollingShutter(const StereoRig& rig) : line_delay_s_(rig.line_de
 
 void RollingShutter::bring_to_stamp(const ShutterMotion& motion, const Calibration& calibration, const InverseDepth* known,
                                     std::vector<TrackedFeature>& features) const {
-  if (global()) return;
   for (TrackedFeature& f : features) {
     const double stereo = f.left && f.right ? stereo_inverse_depth(f, calibration) : 0;
     const auto bring = [&](Observation& o, bool right) {
       const int camera = f.cameras[right];
-      const double after_s = (o.pixel.y() - 0.5 * heights_px_[static_cast<std::size_t>(camera)]) * line_delay_s_;
+      o.rows = o.pixel.y() - 0.5 * heights_px_[static_cast<std::size_t>(camera)];
+      if (global()) return;
+      const double after_s = o.rows * line_delay_s_;
       const std::optional<double> depth = known ? (*known)(f, right) : std::nullopt;
       shift(o, after_s, depth.value_or(stereo), motion, calibration.T_BC(camera));
     };

@@ -37,8 +37,8 @@ class RollingShutter {
   explicit RollingShutter(const StereoRig& rig);
 
   bool global() const { return line_delay_s_ == 0; }
-  /// Changes the normalised positions; pixels stay as seen. The depth of a point that `known` (may be null) does not have is that
-  /// of its stereo match; without one the point counts as far away.
+  /// Changes the normalised positions and fills `rows`; pixels stay as seen. The depth of a point that `known` (may be null) does
+  /// not have is that of its stereo match; without one the point counts as far away.
   void bring_to_stamp(const ShutterMotion& motion, const Calibration& calibration, const InverseDepth* known,
                       std::vector<TrackedFeature>& features) const;
 

@@ -84,18 +84,31 @@ class SimulatedFlight {
   }
 
   StereoRig rig;
+  /// Of the images; the rig may be given another one.
+  double line_delay_s = 0;
 
  private:
+  /// The point in a camera at the time of the row that shows it.
+  Vec3 in_camera(int k, const Vec3& p_W, const Camera& camera, const Pose<B, C0>& T_BC) const {
+    double after_s = 0;
+    Vec3 p_C = Vec3::Zero();
+    for (int i = 0; i < (line_delay_s == 0 ? 1 : 4); ++i) {
+      const Pose<W, B> T_WB = motion_.state((stamp(k) - late_).seconds() + after_s, bias).T_FB;
+      p_C = T_BC.inverse() * (T_WB.inverse() * p_W);
+      const auto px = p_C.z() > 0.2 ? camera.project(p_C) : std::nullopt;
+      if (px) after_s = (px->y() - 0.5 * camera.height()) * line_delay_s;
+    }
+    return p_C;
+  }
+
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
-    const Pose<B, W> T_BW = motion_.state((stamp(k) - late_).seconds(), bias).T_FB.inverse();
     std::unordered_set<TrackId> in_use;
     // Tracks that continue first, then new ones up to the limit.
     for (const bool followed : {true, false}) {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
         const auto track = tracks_.find(i);
         if ((track != tracks_.end()) != followed || static_cast<int>(out.features.size()) >= max_features) continue;
-        const Vec3 p_B = T_BW * points_[i];
-        const auto left = observe(rig.left, rig.T_BC0.inverse() * p_B);
+        const auto left = observe(rig.left, in_camera(k, points_[i], rig.left, rig.T_BC0));
         if (!left) continue;
         TrackedFeature f;
         const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
@@ -105,7 +118,7 @@ class SimulatedFlight {
         in_use.insert(f.id);
         f.left = *left;
         if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
-        if (right_camera(k)) f.right = observe(rig.right, rig.T_BC1.inverse() * p_B);
+        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, points_[i], rig.right, rig.T_BC1.cast_frames<B, C0>()));
         if (!left_camera(k)) f.left.reset();
         if (!f.left && !f.right) continue;
         out.stats.tracked += followed;

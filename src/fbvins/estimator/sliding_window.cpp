@@ -91,8 +91,11 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
     for (const Sighting& s : landmark->sightings) {
       const int frame = frames_.index_of(s.frame);
       const auto [left, right] = landmark->cameras;
-      if (s.left) out.observations.push_back({frame, left, s.left->normalised, s.left_velocity, s.left->sqrt_information});
-      if (s.right) out.observations.push_back({frame, right, s.right->normalised, s.right_velocity, s.right->sqrt_information});
+      if (s.left)
+        out.observations.push_back({frame, left, s.left->normalised, s.left_velocity, s.left->sqrt_information, s.left->rows});
+      if (s.right)
+        out.observations.push_back(
+            {frame, right, s.right->normalised, s.right_velocity, s.right->sqrt_information, s.right->rows});
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;
     if (landmark->prior) {

@@ -108,9 +108,10 @@ double standstill_terms(const WindowProblem& w, NormalEquations* out) {
 void fix_inactive_calibration(const WindowWeights& weights, NormalEquations& out) {
   const int begin = out.layout.calibration_row();
   for (int k = 0; k < kCalibrationSize; ++k) {
-    const bool extrinsic = k < kTimeOffsetIndex;
-    const bool active = extrinsic ? weights.estimate_extrinsics : k == kTimeOffsetIndex && weights.estimate_time_offset;
-    if (active) continue;
+    if (k < kTimeOffsetIndex
+            ? weights.estimate_extrinsics
+            : (k == kTimeOffsetIndex && weights.estimate_time_offset) || (k == kLineDelayIndex && weights.estimate_line_delay))
+      continue;
     out.H.row(begin + k).setZero();
     out.H.col(begin + k).setZero();
     out.H(begin + k, begin + k) = 1;

@@ -144,14 +144,14 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
       }
       if constexpr (Columns == 32) {
         const int row = at.calibration_row();
-        H.block<13, 13>(row, row) += gram.template block<13, 13>(kExtrinsic0, kExtrinsic0);
-        g.segment<13>(row) += gram.template block<13, 1>(kExtrinsic0, kResidual);
+        H.block<14, 14>(row, row) += gram.template block<14, 14>(kExtrinsic0, kExtrinsic0);
+        g.segment<14>(row) += gram.template block<14, 1>(kExtrinsic0, kResidual);
         if (!same) {
-          H.block<6, 13>(host_row, row) += gram.template block<6, 13>(kHost, kExtrinsic0);
-          H.block<6, 13>(at.pose_row(target), row) += gram.template block<6, 13>(kTarget, kExtrinsic0);
+          H.block<6, 14>(host_row, row) += gram.template block<6, 14>(kHost, kExtrinsic0);
+          H.block<6, 14>(at.pose_row(target), row) += gram.template block<6, 14>(kTarget, kExtrinsic0);
         }
         for (int k = 0; k < 2; ++k) out.points.coupling(point, k) += gram.template block<3, 6>(kPoint, kExtrinsic0 + 6 * k);
-        out.points.coupling(point, 2).col(0) += gram.template block<3, 1>(kPoint, kTimeOffset);
+        out.points.coupling(point, 2).leftCols<2>() += gram.template block<3, 2>(kPoint, kTimeOffset);
       }
     }
   }

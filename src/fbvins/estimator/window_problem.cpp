@@ -12,6 +12,7 @@ Vec18 calibration_displacement(const Calibration& calibration, const Calibration
   dx.segment<3>(6) = calibration.T_BC1.p - from.T_BC1.p;
   dx.segment<3>(9) = so3_log(from.T_BC1.q.conjugate() * calibration.T_BC1.q);
   dx(kTimeOffsetIndex) = calibration.time_offset_s - from.time_offset_s;
+  dx(kLineDelayIndex) = calibration.line_delay_s - from.line_delay_s;
   return dx;
 }
 

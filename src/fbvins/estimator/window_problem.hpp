@@ -38,11 +38,14 @@ struct WindowWeights {
   bool estimate_tilt = true;             ///< false: G is level
   bool estimate_extrinsics = false;
   bool estimate_time_offset = false;
+  bool estimate_line_delay = false;
+
+  bool calibrating() const { return estimate_extrinsics || estimate_time_offset || estimate_line_delay; }
 };
 
-/// T_BC0 (dp, dtheta), T_BC1 (dp, dtheta), time offset, and padding to whole blocks of six.
+/// T_BC0 (dp, dtheta), T_BC1 (dp, dtheta), time offset, line delay, and padding to whole blocks of six.
 inline constexpr int kCalibrationSize = 18;
-inline constexpr int kTimeOffsetIndex = 12;
+inline constexpr int kTimeOffsetIndex = 12, kLineDelayIndex = 13;
 inline constexpr int kTiltSize = 2;
 using Vec18 = Eigen::Matrix<double, kCalibrationSize, 1>;
 
@@ -72,7 +75,7 @@ struct WindowProblem {
   WindowPrior prior;
   WindowWeights weights;
 
-  bool calibrating() const { return weights.estimate_extrinsics || weights.estimate_time_offset; }
+  bool calibrating() const { return weights.calibrating(); }
   int frame_count() const { return static_cast<int>(frames.size()); }
   /// -1 where there is none.
   int index_of(FrameId id) const;

@@ -54,6 +54,7 @@ void move(WindowProblem& window, const WindowLayout& at, const WindowStep& step)
     window.calibration.T_BC0 = window.calibration.T_BC0.boxplus(c.segment<3>(0), c.segment<3>(3));
     window.calibration.T_BC1 = window.calibration.T_BC1.boxplus(c.segment<3>(6), c.segment<3>(9));
     window.calibration.time_offset_s += c(kTimeOffsetIndex);
+    window.calibration.line_delay_s += c(kLineDelayIndex);
   }
 }
 

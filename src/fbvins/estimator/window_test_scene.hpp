@@ -60,6 +60,7 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
       o.normalised = p_C.head<2>() / p_C.z() + 1e-3 * Vec2(rng.normal(), rng.normal());
       if (rng.below(20) == 0) o.normalised += Vec2(0.02, -0.01);  // an outlier of some ten sigmas
       o.velocity = Vec2(rng.normal(), rng.normal());
+      o.rows = 100 * o.normalised.y();
       o.sqrt_information << 700, 20, -10, 650;
       w.problem.observations.push_back(o);
       ++l.observation_count;
@@ -109,7 +110,7 @@ inline Window make_window(bool calibrating) {
   w.tilt_weight << 20, 30;
   w.frame_weight << Vec3::Constant(1e4), Vec3::Constant(1e4), Vec3::Constant(1e2), Vec3::Constant(1e2), Vec3::Constant(10);
   w.calibration_weight.setZero();
-  w.calibration_weight.head<13>() << Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), 100;
+  w.calibration_weight.head<14>() << Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), Vec3::Constant(300), 100, 5e3;
   const int calibration_size = calibrating ? kCalibrationSize : 0;
   Eigen::VectorXd weight(kTiltSize + calibration_size + 15);
   weight << w.tilt_weight, w.calibration_weight.head(calibration_size), w.frame_weight;
@@ -121,6 +122,7 @@ inline Window make_window(bool calibrating) {
   w.problem.prior.calibration = w.problem.calibration;
   w.problem.weights.estimate_extrinsics = calibrating;
   w.problem.weights.estimate_time_offset = calibrating;
+  w.problem.weights.estimate_line_delay = calibrating;
   return w;
 }
 

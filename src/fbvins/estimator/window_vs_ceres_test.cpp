@@ -38,7 +38,7 @@ class CeresTwin {
     calibration_.fill(0);
     tilt_ = p.tilt.angle_rad;
     for (const WindowLandmark& l : p.landmarks) landmarks_.push_back(l.alpha_beta_rho);
-    problem_.AddParameterBlock(calibration_.data(), 13);
+    problem_.AddParameterBlock(calibration_.data(), 14);
     if (!calibrating_) problem_.SetParameterBlockConstant(calibration_.data());
     for (std::size_t k = 0; k < p.landmarks.size(); ++k) add_landmark(p, k);
     for (int j = 1; j < kFrames; ++j) {
@@ -49,7 +49,7 @@ class CeresTwin {
     }
     add_diagonal(w.tilt_weight, tilt_block());
     add_diagonal(w.frame_weight, frame(0));
-    if (calibrating_) add_diagonal(w.calibration_weight.head<13>(), calibration_block());
+    if (calibrating_) add_diagonal(w.calibration_weight.head<14>(), calibration_block());
     for (int k = 0; k < kFrames; ++k) {
       if (!p.frames[k].standstill) continue;
       auto standstill = std::make_unique<Standstill>();
@@ -97,7 +97,7 @@ class CeresTwin {
  private:
   Block frame(int k) { return {frames_[k].data(), 15}; }
   Block tilt_block() { return {tilt_.data(), 2}; }
-  Block calibration_block() { return {calibration_.data(), 13}; }
+  Block calibration_block() { return {calibration_.data(), 14}; }
 
   void add(std::unique_ptr<Residual> residual, int size, const std::vector<Block>& blocks, ceres::LossFunction* loss = nullptr) {
     auto* cost = new ceres::DynamicAutoDiffCostFunction<Functor, kStride>(new Functor{std::move(residual)});
@@ -140,7 +140,7 @@ class CeresTwin {
   bool calibrating_;
   std::array<std::array<double, 15>, kFrames> frames_;
   Vec2 tilt_;
-  std::array<double, 13> calibration_;
+  std::array<double, 14> calibration_;
   std::vector<Vec3> landmarks_ = [] {
     std::vector<Vec3> v;
     v.reserve(kLandmarks);  // Ceres keeps pointers into it
@@ -163,7 +163,7 @@ class WindowTwins : public testing::TestWithParam<bool> {
     for (int f = 0; f < kFrames; ++f)
       for (int k = 0; k < 15; ++k) rows.push_back(layout.row_of(f, k));
     for (int k = 0; k < kTiltSize; ++k) rows.push_back(layout.tilt_row() + k);
-    for (int k = 0; GetParam() && k < 13; ++k) rows.push_back(layout.calibration_row() + k);
+    for (int k = 0; GetParam() && k < 14; ++k) rows.push_back(layout.calibration_row() + k);
     return rows;
   }
 };
