@@ -15,6 +15,7 @@ namespace fbvins {
 /// Along z of the left camera, 1/m, with its standard deviation.
 struct MeasuredInverseDepth {
   double value = 0, sigma = 0;
+  Vec2 slope_1pm_px = Vec2::Zero();  ///< its derivative by the pixel
 };
 
 class DepthReader {

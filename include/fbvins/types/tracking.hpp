@@ -85,7 +85,8 @@ struct TrackedFrame {
   std::vector<bool> has_more = {};           ///< and of the cameras from 2 on
   ImuSegment imu;                            ///< since the frame before
   FrontendStats stats;
-  StereoFrame images;  ///< null unless keyframes are wanted, which carry the images
+  StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
+  std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
 };
 
 /// A landmark with its last estimated position.

@@ -45,7 +45,7 @@ std::optional<MeasuredInverseDepth> DepthReader::at(const DepthImage& image, con
     if (!(std::abs(off) < kEdge_sigma * sigma)) return std::nullopt;
     squares += off * off;
   }
-  return MeasuredInverseDepth{plane[0], std::sqrt(sigma * sigma + squares / static_cast<double>(count))};
+  return MeasuredInverseDepth{plane[0], std::sqrt(sigma * sigma + squares / static_cast<double>(count)), plane.tail<2>()};
 }
 
 }  // namespace fbvins

@@ -120,6 +120,20 @@ struct LandmarkPriorResidual : ResidualOf<LandmarkPriorResidual> {
   }
 };
 
+/// The distance of a place that a frame sees from a surface of another (D4), from its definition. Of x = (frame, reference).
+struct Surface : ResidualOf<Surface> {
+  NavState<G> frame, reference;
+  SurfaceDistance distance;
+  template <class T>
+  void fill(T const* const* x, T* r) const {
+    const Moved<T> f(frame, x[0]), of(reference, x[1]);
+    const Vec<T> place_G = f.q * distance.p_B.cast<T>() + f.p;
+    const Vec<T> on_it_G = of.q * distance.on_it_B.cast<T>() + of.p;
+    const Vec<T> normal_G = of.q * distance.normal_B.cast<T>();
+    r[0] = distance.inverse_sigma_1pm * normal_G.dot(place_G - on_it_G);
+  }
+};
+
 /// The preintegrated readings. Of x = (frame, next frame, tilt).
 struct Imu : ResidualOf<Imu> {
   NavState<G> from, to;

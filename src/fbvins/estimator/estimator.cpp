@@ -30,6 +30,8 @@ constexpr double kTrouble_s = 2;
 constexpr double kMaxScaleSigmaAtStart = 0.1;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
 constexpr double kContradictedOneCamera_s = 2;
+/// With fewer landmarks surfaces are compared as well.
+constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
 
@@ -79,6 +81,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       scale_sigma_(scale_sigma_of(rig)),
       one_camera_(!has_stereo(rig)),
       shutter_(rig),
+      surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
       health_(options, rig.depth ? 2 : rig.camera_count(), !one_camera_),
@@ -176,6 +179,7 @@ void Estimator::open_window(const InitialSolution& start) {
     f.keyframe = start.from_rest ? i == 0 : i % 2 == 0;
     f.standstill = start.from_rest;
     f.images = start.frames[i].images;
+    f.depth = start.frames[i].depth;
     if (i > 0) {
       Preintegration imu(imu_noise_, f.state.bias);
       imu.integrate(start.frames[i].imu);
@@ -223,6 +227,7 @@ Frame Estimator::predict(const TrackedFrame& frame, const ImuSegment& readings) 
   f.id = frame.id;
   f.t = frame.t;
   f.images = frame.images;
+  f.depth = frame.depth;
   if (readings.empty()) {  // constant velocity
     f.state = last.state;
     f.state.T_FB.p += (frame.t - last.t).seconds() * last.state.v_FB;
@@ -245,6 +250,8 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   const std::vector<TrackedFeature> features = examine(frame, imu, predicted);
   out.imu_noise = imu.noise;
   predicted.standstill = standstill;
+  if (surfaces_.has_sensor() && std::ssize(sightings_of(window_, features, calibration_)) < kEnoughLandmarks)
+    predicted.surfaces = surfaces_.find(predicted, window_.frames(), calibration_);
   window_.add_frame(std::move(predicted), features, calibration_);
   stats.prepare_ms = timer.lap_ms();
   const WindowSolution& solution = solve(out.odometry, LmOptions{.max_iterations = options_.max_iterations});

@@ -21,6 +21,7 @@
 #include "fbvins/estimator/rest_detector.hpp"
 #include "fbvins/estimator/rolling_shutter.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
+#include "fbvins/estimator/surface_view.hpp"
 #include "fbvins/estimator/window_solver.hpp"
 #include "fbvins/imu/reading_noise.hpp"
 #include "fbvins/types/keyframe.hpp"
@@ -88,6 +89,7 @@ class Estimator {
   double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
   bool one_camera_;                       ///< the rig has one only
   RollingShutter shutter_;
+  SurfaceFinder surfaces_;
   TrackedFrame at_stamp_;  ///< the newest frame of a rolling shutter
   Initialiser initialiser_;
   RestDetector rest_;

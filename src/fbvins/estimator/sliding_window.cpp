@@ -62,7 +62,11 @@ void SlidingWindow::add_frame(Frame frame, const std::vector<TrackedFeature>& fe
 
 void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& out) const {
   out.frames.clear();
-  for (const Frame& f : frames_) out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior, f.imu, f.standstill});
+  for (const Frame& f : frames_) {
+    out.frames.push_back({f.id, f.state, f.first_estimate, f.in_prior, f.imu, f.standstill, f.surfaces, -1});
+    if (f.surfaces) out.frames.back().surfaces_of = frames_.index_of(f.surfaces->reference);
+    if (out.frames.back().surfaces_of < 0) out.frames.back().surfaces = nullptr;
+  }
   out.tilt = tilt_;
   out.calibration = calibration;
   out.weights = weights_;

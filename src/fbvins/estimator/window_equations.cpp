@@ -2,6 +2,7 @@
 #include "fbvins/estimator/window_equations.hpp"
 
 #include "fbvins/imu/imu_residual.hpp"
+#include "fbvins/optim/robust_loss.hpp"
 
 namespace fbvins {
 namespace {
@@ -104,6 +105,47 @@ double standstill_terms(const WindowProblem& w, NormalEquations* out) {
   return cost;
 }
 
+/// (D4), (D5): of frame `i` to its reference.
+double surface_term(const WindowProblem& w, int i, NormalEquations* out) {
+  using Vec12 = Eigen::Matrix<double, 12, 1>;
+  const WindowFrame& f = w.frames[i];
+  const Pose<G, B>&T_n = f.state.T_FB, &T_r = w.frames[f.surfaces_of].state.T_FB;
+  const Pose<B, B> T_rn = T_r.inverse() * T_n;
+  const Pose<G, B> first_n = w.linearisation_point(i).T_FB, first_r = w.linearisation_point(f.surfaces_of).T_FB;
+  const Pose<B, B> first_rn = first_r.inverse() * first_n;
+  const Mat3 R_r = first_r.R(), R_nr = first_rn.R().transpose();
+  double cost = 0;
+  Eigen::Matrix<double, 12, 12> H = Eigen::Matrix<double, 12, 12>::Zero();  // of the frame, of its reference
+  Vec12 g = Vec12::Zero();
+  for (const SurfaceDistance& d : f.surfaces->distances) {
+    const double r = d.inverse_sigma_1pm * d.normal_B.dot(T_rn * d.p_B - d.on_it_B);
+    const RobustValue robust = huber(r * r, w.weights.huber_sigma);
+    cost += robust.cost;
+    if (out == nullptr) continue;
+    const Vec3 along_G = R_r * d.normal_B;
+    Vec12 J;
+    J << along_G, d.p_B.cross(R_nr * d.normal_B), -along_G, d.normal_B.cross(first_rn * d.p_B);
+    J *= d.inverse_sigma_1pm;
+    H.noalias() += robust.weight * J * J.transpose();
+    g += robust.weight * r * J;
+  }
+  if (out == nullptr) return cost;
+  const int newest = out->layout.pose_row(i), reference = out->layout.pose_row(f.surfaces_of);
+  out->H.block<6, 6>(newest, newest) += H.topLeftCorner<6, 6>();
+  out->H.block<6, 6>(reference, reference) += H.bottomRightCorner<6, 6>();
+  out->H.block<6, 6>(newest, reference) += H.topRightCorner<6, 6>();  // the reference is the earlier one
+  out->g.segment<6>(newest) += g.head<6>();
+  out->g.segment<6>(reference) += g.tail<6>();
+  return cost;
+}
+
+double surface_terms(const WindowProblem& w, NormalEquations* out) {
+  double cost = 0;
+  for (int i = 0; i < w.frame_count(); ++i)
+    if (w.frames[i].surfaces) cost += surface_term(w, i, out);
+  return cost;
+}
+
 /// Rows of calibration that is not estimated, and of padding: decoupled, unit information, no gradient.
 void fix_inactive_calibration(const WindowWeights& weights, NormalEquations& out) {
   const int begin = out.layout.calibration_row();
@@ -139,7 +181,7 @@ void PairTable::fill(const WindowProblem& window, bool with_first_estimates) {
 double cost_of(const WindowProblem& window, PairTable& pairs) {
   pairs.fill(window, false);
   return prior_term(window, nullptr) + imu_terms(window, nullptr) + standstill_terms(window, nullptr) +
-         landmark_cost(window, pairs);
+         surface_terms(window, nullptr) + landmark_cost(window, pairs);
 }
 
 double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations& out) {
@@ -152,6 +194,7 @@ double linearise(const WindowProblem& window, PairTable& pairs, NormalEquations&
   double cost = prior_term(window, &out);
   cost += imu_terms(window, &out);
   cost += standstill_terms(window, &out);
+  cost += surface_terms(window, &out);
   cost += add_landmarks(window, pairs, out);
   if (window.calibrating()) fix_inactive_calibration(window.weights, out);
   return cost;

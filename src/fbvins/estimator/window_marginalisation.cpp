@@ -21,6 +21,7 @@ void select_factors(const WindowProblem& problem, int leaving, std::span<const L
   for (int i = 0; i < out.frame_count(); ++i) {
     if (i != leaving && i != leaving + 1) out.frames[i].imu = nullptr;
     if (i != leaving) out.frames[i].standstill = false;
+    if (i != leaving && out.frames[i].surfaces_of != leaving) out.frames[i].surfaces = nullptr;
   }
   for (const LeavingLandmark& l : landmarks) {
     WindowLandmark landmark = problem.landmarks[l.index];
@@ -38,6 +39,8 @@ std::vector<std::uint8_t> touched_frames(const WindowProblem& problem) {
   for (int frame : problem.prior.frames) touched[frame] = 1;
   for (std::size_t i = 1; i < problem.frames.size(); ++i)
     if (problem.frames[i].imu != nullptr) touched[i - 1] = touched[i] = 1;
+  for (std::size_t i = 0; i < problem.frames.size(); ++i)
+    if (problem.frames[i].surfaces != nullptr) touched[i] = touched[problem.frames[i].surfaces_of] = 1;
   for (const WindowLandmark& l : problem.landmarks) {
     touched[l.host] = 1;
     for (int k = 0; k < l.observation_count; ++k) touched[problem.observations[l.first_observation + k].frame] = 1;

@@ -56,6 +56,8 @@ WindowProblem without_first_frame(const WindowProblem& p, const std::vector<Leav
   out.tilt = p.tilt;
   out.frames.assign(p.frames.begin() + 1, p.frames.end());
   out.frames[0].imu = nullptr;  // its factor is in the prior
+  for (WindowFrame& f : out.frames)
+    if (--f.surfaces_of < 0) f.surfaces = nullptr;  // the same
   for (int& frame : prior.frames) {
     WindowFrame& f = out.frames[--frame];
     if (!f.in_prior) f.first_estimate = f.state;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
+#include "fbvins/estimator/frame_list.hpp"
 #include "fbvins/estimator/landmark_prior.hpp"
 #include "fbvins/estimator/reprojection.hpp"
 #include "fbvins/estimator/tilt.hpp"
@@ -26,6 +27,8 @@ struct WindowFrame {
   /// From the frame before this one; null where the chain is broken or the prior holds it.
   std::shared_ptr<const Preintegration> imu;
   bool standstill = false;
+  std::shared_ptr<const SurfaceView> surfaces;  ///< null where there are none
+  int surfaces_of = -1;                         ///< index of their reference
 };
 
 /// Terms and weights that are not measurements of a frame.

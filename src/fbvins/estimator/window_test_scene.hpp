@@ -73,6 +73,20 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
   w.problem.landmarks.push_back(l);
 }
 
+/// Places that a frame sees on surfaces of an earlier one, some sigmas off.
+inline void add_surfaces(Window& w, int frame, int reference) {
+  Rng rng(19);
+  auto view = std::make_shared<SurfaceView>();
+  const Pose<B, B> T_rf = w.problem.frames[reference].state.T_FB.inverse() * w.problem.frames[frame].state.T_FB;
+  for (int k = 0; k < 25; ++k) {
+    const Vec3 p_B = noise3(rng, 2);
+    const Vec3 normal_B = noise3(rng, 1).normalized();
+    view->distances.push_back({p_B, normal_B, T_rf * p_B + noise3(rng, 0.02), 80});
+  }
+  w.problem.frames[frame].surfaces = view;
+  w.problem.frames[frame].surfaces_of = reference;
+}
+
 inline Window make_window(bool calibrating) {
   Window w;
   Rng rng(17);
@@ -103,6 +117,7 @@ inline Window make_window(bool calibrating) {
     if (&f != &w.problem.frames[0]) f.state = f.state.boxplus(d);
     f.first_estimate = f.state;
   }
+  add_surfaces(w, 5, 0);
   w.problem.tilt.angle_rad = Vec2(0.03, -0.02);
   w.problem.frames[3].standstill = true;  // not true, to test the term
   w.problem.weights.standstill_velocity_sigma_mps = 0.5;

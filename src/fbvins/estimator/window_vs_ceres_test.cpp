@@ -56,6 +56,8 @@ class CeresTwin {
       standstill->state = p.frames[k].state, standstill->weight = 1 / p.weights.standstill_velocity_sigma_mps;
       add(std::move(standstill), 3, {frame(k)});
     }
+    for (int k = 0; k < kFrames; ++k)
+      if (p.frames[k].surfaces) add_surfaces(p, k);
   }
 
   /// Cost, and residuals with Jacobian (robust weights applied); columns: landmarks, frames, tilt, calibration.
@@ -114,6 +116,14 @@ class CeresTwin {
     diagonal->weight = weight;
     add(std::move(diagonal), block.size, {block});
   }
+  void add_surfaces(const WindowProblem& p, int k) {
+    const WindowFrame& f = p.frames[k];
+    for (const SurfaceDistance& distance : f.surfaces->distances) {
+      auto surface = std::make_unique<Surface>();
+      surface->frame = f.state, surface->reference = p.frames[f.surfaces_of].state, surface->distance = distance;
+      add(std::move(surface), 1, {frame(k), frame(f.surfaces_of)}, new ceres::HuberLoss(p.weights.huber_sigma));
+    }
+  }
   void add_landmark(const WindowProblem& p, std::size_t index) {
     const WindowLandmark& l = p.landmarks[index];
     const Block landmark{landmarks_[index].data(), 3};
@@ -155,7 +165,7 @@ class WindowTwins : public testing::TestWithParam<bool> {
   CeresTwin twin{w};
   WindowSolver solver;
   WindowLayout layout{w.problem};
-  int dense_size() const { return 15 * kFrames + kTiltSize + (GetParam() ? 13 : 0); }
+  int dense_size() const { return 15 * kFrames + kTiltSize + (GetParam() ? 14 : 0); }
 
   /// For each column of the Ceres Jacobian after the landmarks, its row in our dense system.
   std::vector<int> rows_of_columns() const {

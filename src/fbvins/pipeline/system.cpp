@@ -78,6 +78,7 @@ struct System::Impl {
     frame.id = packet.id;
     frame.t = packet.frame.t;
     frame.imu = std::move(packet.imu);
+    frame.depth = packet.frame.depth;
     if (keyframes_wanted()) frame.images = std::move(packet.frame);
     hand_on(estimation, std::move(frame));
   }
