@@ -80,7 +80,8 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   stats.track_ms += timer.lap_ms() - stats.geometry_ms - stats.detect_ms;
 
   if (out.has_right) {
-    if (depth_.wants_features()) stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
+    if (depth_.wants_features())
+      stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features(), depth_.right_mask());
     depth_.match(tracks_, images_, stats);
   }
   out.features = features_of(tracks_, camera_, sigma_px_);
@@ -118,7 +119,7 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
 /// Extracts and describes keypoints of the left image (2.2.1, 2.2.2).
 void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
   CpuTimer timer;
-  stats.boost_ms += describer_.describe(left, view_);
+  stats.boost_ms += describer_.describe(left, view_, camera_.mask().get());
   stats.detect_ms += timer.lap_ms();
 }
 
