@@ -81,6 +81,7 @@ constexpr Preset kPresets[] = {
        o.flight.max_speed_mps = 1.5;
      }},
     {"quad", [](SimulationOptions& o) { o.rig = "quad"; }},
+    {"legs", [](SimulationOptions& o) { o.camera.legs = 3; }},
 };
 
 }  // namespace

@@ -67,7 +67,7 @@ struct SimulationOptions {
 };
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
-/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs).
+/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs), legs (of the vehicle, in view).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
