@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -11,6 +12,8 @@
 #include "apps/terminal.hpp"
 #include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/gather.hpp"
+#include "fbvins/io/output_file.hpp"
+#include "fbvins/io/png_encode.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -26,12 +29,14 @@ examples:
   fbvins doctor flight --calibration camchain-imucam.yaml
   fbvins doctor flight.mcap --all                all measurements, right or wrong, and what could not be judged
   fbvins doctor flight --json
+  fbvins doctor flight --out masks               writes mask0.png, mask1.png of what is fixed in view, if anything is
 
 exit codes: 0 all is well, 1 something is wrong, 2 wrong usage or bad input
 )";
 
 struct Arguments {
   RecordingArguments recording;
+  std::string out;
   bool all = false, json = false;
 };
 
@@ -49,6 +54,20 @@ Json to_json(const Diagnosis& diagnosis) {
   return Json{{"findings", findings}, {"measured", diagnosis.measured}, {"not_judged", diagnosis.not_judged}};
 }
 
+/// mask0.png, mask1.png: of the cameras in which something is fixed in view.
+Result<void> write_masks(const Diagnosis& diagnosis, const std::string& folder) {
+  for (std::size_t i = 0; i < diagnosis.masks.size(); ++i) {
+    if (!diagnosis.masks[i]) continue;
+    std::error_code ignored;  // then the file cannot be written
+    std::filesystem::create_directories(folder, ignored);
+    Result<OutputFile> file = OutputFile::create(fmt::format("{}/mask{}.png", folder, i));
+    if (!file) return file.error();
+    file->write(encode_png(diagnosis.masks[i]->image()));
+    if (Result<void> done = file->close(); !done) return done;
+  }
+  return {};
+}
+
 int examine_recording(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {});
   if (!data) return fail(data.error().message);
@@ -62,6 +81,8 @@ int examine_recording(const Arguments& arguments) {
   warnings.print_at_end((*data)->info());
   const bool kalibr = !arguments.recording.calibration.empty();
   const Diagnosis diagnosis = examine(gatherer.finish(), kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
+  if (!arguments.out.empty())
+    if (Result<void> written = write_masks(diagnosis, arguments.out); !written) return fail(written.error().message);
   if (arguments.json) {
     fmt::print("{}\n", to_json(diagnosis).dump(2));
   } else {
@@ -81,6 +102,7 @@ void add_doctor_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("doctor", kDoctorDescription);
   command->footer(kExamples);
   arguments->recording.add_to(*command);
+  command->add_option("--out", arguments->out, "folder for the masks of what is fixed in view: mask0.png, mask1.png");
   command->add_flag("--all", arguments->all, "print all measurements, and what could not be judged, too");
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = examine_recording(*arguments); });

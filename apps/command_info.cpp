@@ -29,6 +29,7 @@ struct Arguments {
 void print_camera(std::string_view name, const Camera& camera, const CameraInfo& info) {
   fmt::print("{:<14}{} images, {} x {}, {}, focal length {:.1f} px", name, info.listed, camera.width(), camera.height(),
              camera.model_name(), camera.focal_px());
+  if (camera.mask()) fmt::print(", {:.1f} % masked", 100 * camera.mask()->hidden_share());
   if (info.rows.bad() + info.unpaired + info.images.missing > 0)
     fmt::print("; {} rows left out, {} without partner, {} files missing", info.rows.bad(), info.unpaired, info.images.missing);
   fmt::print("\n");

@@ -28,6 +28,7 @@ Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info)
               {"model", camera.model_name()},
               {"width", camera.width()},
               {"height", camera.height()},
+              {"masked_share", camera.mask() ? camera.mask()->hidden_share() : 0.0},
               {"fx_fy_cx_cy_distortion", parameters_of(camera)},
               {"T_BC_row_major", row_major(T_BC)}};
 }

@@ -2,6 +2,7 @@
 // Cameras, IMU and how they are joined.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -15,7 +16,7 @@ namespace fbvins::python {
 namespace {
 
 Camera make_camera(int width, int height, double fx, double fy, double cx, double cy, const std::string& model,
-                   const std::vector<double>& distortion) {
+                   const std::vector<double>& distortion, nb::handle mask) {
   static const std::map<std::string, std::pair<std::string, std::size_t>> kModels = {{"radtan", {"pinhole-radtan", 4}},
                                                                                      {"equidistant", {"pinhole-equidistant", 4}},
                                                                                      {"ds", {"ds", 2}},
@@ -33,7 +34,21 @@ Camera make_camera(int width, int height, double fx, double fy, double cx, doubl
     throw nb::value_error("a camera has a size in pixels and positive focal lengths");
   const std::optional<LensModel> lens = lens_of(name, {fx, fy, cx, cy}, k);
   if (!lens) throw nb::value_error(fmt::format("distortion: {}", outside_of_model(model, k)).c_str());
-  return {*lens, width, height};
+  Camera camera(*lens, width, height);
+  if (mask.is_none()) return camera;
+  const auto seen = checked<std::uint8_t>(mask, "mask", {height, width});
+  Image image(width, height);
+  std::copy_n(seen.data, static_cast<std::size_t>(width) * height, image.row(0));
+  camera.set_mask(std::make_shared<const Mask>(image));
+  return camera;
+}
+
+nb::object mask_of(const Camera& camera) {
+  if (!camera.mask()) return nb::none();
+  const Image image = camera.mask()->image();
+  std::vector<std::uint8_t> pixels(image.row(0), image.row(0) + static_cast<std::size_t>(image.width()) * image.height());
+  return nb::cast(
+      to_array(std::move(pixels), {static_cast<std::size_t>(image.height()), static_cast<std::size_t>(image.width())}));
 }
 
 std::string text_of(const Camera& camera) {
@@ -58,14 +73,16 @@ void bind_rig(nb::module_& m) {
   nb::class_<Camera>(m, "Camera", "A camera: image size and lens model. Lengths in pixels.")
       .def(
           nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
-          "distortion"_a = std::vector<double>{},
+          "distortion"_a = std::vector<double>{}, "mask"_a = nb::none(),
           "model and its distortion: 'radtan' (k1, k2, p1, p2; OpenCV's and Kalibr's), 'equidistant' (k1..k4; Kalibr's, OpenCV's\n"
-          "fisheye), 'ds' (xi, alpha), 'eucm' (alpha, beta) or 'omni' (xi, k1, k2, p1, p2; Kalibr's omni with radtan, MEI).")
+          "fisheye), 'ds' (xi, alpha), 'eucm' (alpha, beta) or 'omni' (xi, k1, k2, p1, p2; Kalibr's omni with radtan, MEI).\n"
+          "mask: uint8 (height, width), 0 where the image does not show the world, 255 elsewhere; None: all of it is used.")
       .def_prop_ro("width", &Camera::width, "px")
       .def_prop_ro("height", &Camera::height, "px")
       .def_prop_ro("model", &Camera::model_name)
       .def_prop_ro("intrinsics", &Camera::intrinsics, "fx, fy, cx, cy in px")
       .def_prop_ro("distortion", &Camera::distortion, "the model's parameters, in the order above")
+      .def_prop_ro("mask", &mask_of, "uint8 (height, width): 0 where the image does not show the world; None without a mask")
       .def("__repr__", &text_of);
 
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")

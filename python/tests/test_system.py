@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import gc
+import pickle
 import sys
 import threading
 import time
@@ -247,3 +248,19 @@ def test_a_rig_of_ones_own(flight):
         backwards = fbvins.Camera(512, 512, 100, 100, 255, 257, model="eucm", distortion=[0.63, 1.04])
         fbvins.Rig(backwards, wide, rig.T_BC0, rig.T_BC1)
     fbvins.System(None, own).finish()
+
+
+def test_a_mask(flight):
+    rig = fbvins.open(flight, max_frames=1).rig
+    assert rig.left.mask is None
+    seen = np.full((480, 752), 255, np.uint8)
+    seen[300:] = 0
+    camera = fbvins.Camera(752, 480, *rig.left.intrinsics, distortion=rig.left.distortion, mask=seen)
+    assert np.array_equal(camera.mask, seen)
+    own = fbvins.Rig(camera, rig.right, rig.T_BC0, rig.T_BC1)
+    assert np.array_equal(pickle.loads(pickle.dumps(own)).left.mask, seen)
+    with pytest.raises(ValueError, match="mask"):
+        fbvins.Camera(752, 480, *rig.left.intrinsics, mask=seen[:100])
+    with pytest.raises(ValueError, match="left camera's mask hides all of the image"):
+        black = fbvins.Camera(752, 480, *rig.left.intrinsics, mask=0 * seen)
+        fbvins.Rig(black, rig.right, rig.T_BC0, rig.T_BC1)

@@ -42,8 +42,10 @@ std::vector<std::string> calibration_seeds() {
   const std::string camera =
       "  T_cam_imu:\n  - [1, 0, 0, 0.5]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n  camera_model: pinhole\n"
       "  distortion_coeffs: [0, 0, 0, 0]\n  distortion_model: equidistant\n  intrinsics: [41, 42, 31, 23]\n  resolution: [64, 48]\n";
-  return {files.at("cam1/sensor.yaml"), files.at("imu0/sensor.yaml"),
-          "cam0:\n" + camera + "cam1:\n  T_cn_cnm1: &a [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n" + camera.substr(80)};
+  return {
+      files.at("cam1/sensor.yaml"), files.at("imu0/sensor.yaml"),
+      files.at("cam0/sensor.yaml") + "mask: m.png\nmask_rectangles: [[0, 0, 9, 9], [60, 40, 9, 9]]\nmask_circles: [[30, 9, 5]]\n",
+      "cam0:\n" + camera + "cam1:\n  T_cn_cnm1: &a [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n" + camera.substr(80)};
 }
 
 std::vector<std::string> trajectory_seeds() {
@@ -146,11 +148,17 @@ void fuzz_csv(std::string_view bytes) {
 
 void fuzz_calibration(std::string_view bytes) {
   const YamlReader yaml("c.yaml", std::string(bytes));
-  const auto camera = parse_euroc_camera(yaml);
+  // The picture of a mask: the calibration's own bytes, which are none, or a good one.
+  const ReadBeside beside = [&](const std::string& name) -> Result<std::string> {
+    return name == "m.png" ? test::make_png(1, {}) : std::string(bytes);
+  };
+  const auto camera = parse_euroc_camera(yaml, beside);
   require_sentence(camera);
   if (camera) {
     require_rigid(camera->T_BS);
     require(camera->camera.focal_px() > 0 && camera->camera.width() > 0);
+    if (const Mask* mask = camera->camera.mask().get())
+      require(mask->width() == camera->camera.width() && mask->height() == camera->camera.height() && mask->hidden_share() < 1);
     // For any coefficients there must be a result, and a consistent one.
     if (const auto ray = camera->camera.undistort({camera->camera.width() / 3.0, 5.0}))
       require((camera->camera.distort(*ray) - Vec2(camera->camera.width() / 3.0, 5.0)).norm() < 1.0);

@@ -10,11 +10,14 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fbvins/camera/lens_models.hpp"
+#include "fbvins/camera/mask.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/types/imu.hpp"
 
@@ -40,6 +43,12 @@ class Camera {
   /// Mean focal length, px.
   double focal_px() const;
 
+  /// What of the image shows something else than the world, of the camera's size (check_rig); null where all of it does.
+  const std::shared_ptr<const Mask>& mask() const { return mask_; }
+  void set_mask(std::shared_ptr<const Mask> mask) { mask_ = std::move(mask); }
+  /// The same camera behind another lens.
+  Camera with_lens(LensModel model) const;
+
   /// Pixel of normalised coordinates (x/z, y/z).
   /// J_pixel_normalised, if given, receives d(pixel)/d(normalised).
   Vec2 distort(const Vec2& normalised, Mat2* J_pixel_normalised = nullptr) const;
@@ -54,16 +63,21 @@ class Camera {
   /// Whether the lens sees more than 180 degrees across or down the image: the middles of two opposite edges look backwards.
   /// False for a polynomial that stops growing within the image, which has no rays there, either.
   bool sees_backwards() const;
+  /// Whether the pixel is in the image, at least so far from its edges and from what the mask hides. A negative border extends
+  /// the image, and the mask does not count then.
   bool inside(const Vec2& pixel, double border_px = 0) const {
     return pixel.x() >= border_px && pixel.y() >= border_px && pixel.x() <= width_ - 1 - border_px &&
-           pixel.y() <= height_ - 1 - border_px;
+           pixel.y() <= height_ - 1 - border_px && !hidden(pixel, border_px);
   }
+  /// Whether the mask hides something at most so far away; without a mask it hides nothing.
+  bool hidden(const Vec2& pixel, double margin_px) const { return mask_ != nullptr && mask_->hides(pixel, margin_px); }
 
  private:
   LensModel model_;
   int width_ = 0;
   int height_ = 0;
   double max_radius_ = 0;
+  std::shared_ptr<const Mask> mask_;
 };
 
 /// A camera and its place in the body.

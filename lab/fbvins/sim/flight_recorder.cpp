@@ -31,8 +31,16 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
     const auto& [camera, T_BC] = rig.mounted(i);
     const double gain = i == 1 ? options.camera.right_gain : 1.0;
     const auto seed = static_cast<std::uint64_t>(options.seed) * 2 + (i < 2 ? 0 : 1'000'000) + static_cast<std::uint64_t>(i);
-    eyes_.push_back(
-        {Renderer(camera, *world_), ImageSensor(options.camera, camera, gain, seed), T_BC, camera.height(), {}, {}, {}, false});
+    eyes_.push_back({Renderer(camera, *world_),
+                     ImageSensor(options.camera, camera, gain, seed),
+                     {},
+                     T_BC,
+                     camera.height(),
+                     {},
+                     {},
+                     {},
+                     false});
+    if (options.camera.legs > 0) eyes_.back().legs.emplace(camera.width(), camera.height(), options.camera.legs, i);
   }
   if (rig.depth) depth_.emplace(options.depth, rig.left, static_cast<std::uint64_t>(options.seed));
 }
@@ -64,6 +72,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
     eye.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
   }
   eye.renderer.radiance(eye.radiance);
+  if (eye.legs) eye.legs->draw(eye.radiance);
 }
 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
+#include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/renderer.hpp"
 #include "fbvins/sim/simulation.hpp"
 
@@ -28,6 +30,7 @@ class FlightRecorder {
   struct Eye {
     Renderer renderer;
     ImageSensor sensor;
+    std::optional<Legs> legs;
     Pose<B, C0> T_BC;  ///< pose of this camera, whichever it is
     int height_px;
     std::vector<float> radiance;

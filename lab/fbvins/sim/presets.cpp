@@ -82,6 +82,7 @@ constexpr Preset kPresets[] = {
      }},
     {"quad", [](SimulationOptions& o) { o.rig = "quad"; }},
     {"rgbd", [](SimulationOptions& o) { o.rig = "rgbd"; }},
+    {"legs", [](SimulationOptions& o) { o.camera.legs = 3; }},
 };
 
 }  // namespace

@@ -34,14 +34,16 @@ Result<StereoRig> with_imu(Result<StereoRig> rig, const std::string& imu_path) {
 /// Its estimator_config.yaml names the other two.
 Result<StereoRig> load_openvins(const std::string& path, const std::string& text, const std::string& imu_path) {
   YamlReader yaml(path, text);
-  if (!holds(text, "relative_config_imucam")) return with_imu(parse_openvins_cameras(std::move(yaml)), imu_path);
+  if (!holds(text, "relative_config_imucam"))
+    return with_imu(parse_openvins_cameras(std::move(yaml), files_beside(path)), imu_path);
   const std::string cameras = yaml.word(yaml.root(), "relative_config_imucam"),
                     imu = yaml.text(yaml.root(), "relative_config_imu");
   if (!yaml.ok()) return yaml.error();
   const Result<std::string> chain = read_file(beside(path, cameras), kLargestYaml_bytes);
   if (!chain) return chain.error();
   const std::string noise = !imu_path.empty() ? imu_path : imu.empty() ? "" : beside(path, imu);
-  return with_imu(parse_openvins_cameras({beside(path, cameras), *chain}), noise);
+  const std::string chain_path = beside(path, cameras);
+  return with_imu(parse_openvins_cameras({chain_path, *chain}, files_beside(chain_path)), noise);
 }
 
 Result<StereoRig> load_vins_fusion(const std::string& path, const std::string& text) {
@@ -67,8 +69,11 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   const auto left_text = text("cam0/sensor.yaml"), right_text = text("cam1/sensor.yaml"), imu_text = text("imu0/sensor.yaml");
   for (const auto* read : {&left_text, &right_text, &imu_text})
     if (!*read) return read->error();
-  const auto left = parse_euroc_camera({"cam0/sensor.yaml", *left_text}),
-             right = parse_euroc_camera({"cam1/sensor.yaml", *right_text});
+  const auto in = [&](const char* camera) -> ReadBeside {
+    return [&, camera](const std::string& name) { return (*files)->read(roots[0] + camera + name, kLargestMask_bytes); };
+  };
+  const auto left = parse_euroc_camera({"cam0/sensor.yaml", *left_text}, in("cam0/")),
+             right = parse_euroc_camera({"cam1/sensor.yaml", *right_text}, in("cam1/"));
   const auto imu = parse_euroc_imu({"imu0/sensor.yaml", *imu_text});
   if (!left) return left.error();
   if (!right) return right.error();

@@ -4,13 +4,14 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/mask_fields.hpp"
 
 namespace fbvins {
 
 class YamlReader;
 
 /// kalibr_imucam_chain.yaml: Kalibr's, but T_imu_cam takes camera to IMU coordinates. Noise figures stay at their defaults.
-Result<StereoRig> parse_openvins_cameras(YamlReader yaml);
+Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read = {});
 
 /// calibration.json (github.com/VladyslavUsenko/basalt, doc/Calibration.md): cameras of the models pinhole, pinhole-radtan8
 /// without its higher coefficients, kb4, ds and eucm.

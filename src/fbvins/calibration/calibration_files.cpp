@@ -79,6 +79,7 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
         "  rostopic: /cam{}/image_raw\n",
         camera.model, yaml_list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
         yaml_list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
+    out += mask_text(rig.cameras[k], "  ");
     if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {:.17g}\n", rig.time_offset_s);
   }
   return out;

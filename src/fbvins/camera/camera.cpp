@@ -77,6 +77,12 @@ Camera::Camera(LensModel model, int width, int height) : model_(std::move(model)
   max_radius_ = std::visit([](const auto& m) { return largest_radius(m); }, model_);
 }
 
+Camera Camera::with_lens(LensModel model) const {
+  Camera out(std::move(model), width_, height_);
+  out.mask_ = mask_;
+  return out;
+}
+
 std::string Camera::model_name() const {
   constexpr const char* kNames[] = {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"};
   static_assert(std::size(kNames) == std::variant_size_v<LensModel>);

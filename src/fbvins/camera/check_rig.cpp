@@ -42,6 +42,12 @@ Result<void> check_camera(const Camera& camera, std::string_view side, std::stri
                  fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
                              "can be used: crop the images, and subtract what is cut off at the left and the top from cx and cy",
                              origin, side)};
+  const Mask* mask = camera.mask().get();
+  if (mask != nullptr && (mask->width() != camera.width() || mask->height() != camera.height()))
+    return malformed(origin, fmt::format("the {} camera's mask has {} x {} pixels, its images {} x {}", side, mask->width(),
+                                         mask->height(), camera.width(), camera.height()));
+  if (mask != nullptr && mask->hides_all(0, 0, mask->width(), mask->height()))
+    return malformed(origin, fmt::format("the {} camera's mask hides all of the image", side));
   return {};
 }
 

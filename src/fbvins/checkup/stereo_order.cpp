@@ -51,7 +51,7 @@ StereoOrder stereo_order(const StereoRig& rig, std::span<const StereoFrame> fram
       continue;
     left.build(frame.left->view(), kKltLevels);
     right.build(frame.right->view(), kKltLevels);
-    const std::vector<Corner>& corners = detector.detect(left, {}, kCorners);
+    const std::vector<Corner>& corners = detector.detect(left, {}, kCorners, rig.left.mask().get());
     order.features += static_cast<int>(corners.size());
     order.as_named += matches(as_named, rig.left, left, right, corners);
     order.as_swapped += matches(as_swapped, other.left, left, right, corners);

@@ -52,6 +52,10 @@ std::string distortion_line(const Camera& camera, bool left, CalibrationStyle st
   return fmt::format("{}{}: [{:.6f}]", file_of(left, style), field, fmt::join(numbers, ", "));
 }
 
+std::string mask_line(bool left, CalibrationStyle style) {
+  return fmt::format("{}mask: mask{}.png", file_of(left, style), left ? 0 : 1);
+}
+
 std::string time_line(double offset_s, CalibrationStyle style) {
   if (style == CalibrationStyle::euroc)
     return fmt::format(

@@ -15,6 +15,8 @@ std::string mounting_lines(const StereoRig& rig, CalibrationStyle style, bool bo
 /// Focal lengths and principal point.
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style);
 std::string distortion_line(const Camera& camera, bool left, CalibrationStyle style);
+/// The mask that the doctor writes.
+std::string mask_line(bool left, CalibrationStyle style);
 std::string time_line(double offset_s, CalibrationStyle style);
 
 }  // namespace fbvins

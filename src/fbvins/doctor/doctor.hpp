@@ -9,6 +9,7 @@
 //   for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,8 @@ struct Diagnosis {
   std::vector<std::string> measured;    ///< one sentence for each measurement, whether right or wrong
   std::vector<std::string> not_judged;  ///< what the recording does not show, and why
   StereoRig rig;                        ///< the calibration with all findings corrected
+  /// Of each camera, the mask of what is fixed in view, and of what is masked already; null where nothing more is.
+  std::vector<std::shared_ptr<const Mask>> masks;
 };
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style = CalibrationStyle::euroc);

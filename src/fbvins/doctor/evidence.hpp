@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the doctor keeps of a recording: feature positions and statistics, but no images. Values.
+// What the doctor keeps of a recording: feature positions and statistics, and a few small images. Values.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/gradient_energies.hpp"
+#include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -36,6 +38,13 @@ struct StereoView {
   std::vector<StereoPoint> points;
 };
 
+/// Both images at half their size.
+struct SmallView {
+  Time t;
+  Vec2 moved_px = Vec2::Zero();  ///< of the scene in the left image since the view before; 0 where that is not known
+  std::shared_ptr<const Image> left, right;
+};
+
 /// Counts of images that equal the one before, and of pairs whose two images are equal, to the last bit.
 struct RepeatedImages {
   int frames = 0, left = 0, right = 0, same_pair = 0;
@@ -59,6 +68,7 @@ struct Evidence {
   std::vector<Time> stamps;  ///< of all stereo images
   std::vector<SeenFrame> frames;
   std::vector<StereoView> stereo;
+  std::vector<SmallView> views;  ///< of the times at which the scene had moved, over the whole recording
   RepeatedImages repeated;
 };
 

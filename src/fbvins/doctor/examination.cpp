@@ -10,6 +10,7 @@
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/blur.hpp"
 #include "fbvins/doctor/depths.hpp"
+#include "fbvins/doctor/fixed_view.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
 namespace fbvins {
@@ -76,10 +77,38 @@ void Examination::images() {
   if (evidence_.swapped) keep(check_stereo_order(evidence_.order));
   right_images_late();
   const FixedFeatures fixed = measure_fixed(evidence_, imu_);
-  keep(check_fixed(fixed));
+  const std::optional<Finding> by_features = check_fixed(fixed);
+  if (by_features && by_features->kind == FindingKind::projector_dots) keep(by_features);  // which a mask does not help
+  else if (!fixed_in_view(fixed.share)) keep(by_features);
   if (has(FindingKind::fixed_in_view)) evidence_ = without(fixed.ids, std::move(evidence_));
   measured(fmt::format("features that stay in place: {:.1f} % ({} pairs of images); that look like bright spots: {:.1f} %",
                        100 * fixed.share, fixed.pairs, 100 * fixed.dots));
+}
+
+/// Whether a mask was found for it.
+bool Examination::fixed_in_view(double share_of_features) {
+  if (evidence_.views.empty()) return false;
+  const FixedInView fixed = find_fixed(evidence_, imu_);
+  evidence_.views.clear();
+  if (!fixed.judged()) not_judged("masks of what is fixed in view: the rig turns too little, or its readings do not say so");
+  else
+    measured(fmt::format("edges that stay in place: {:.1f} % of the left image, {:.1f} % of the right one ({} pairs of images)",
+                         100 * fixed.share[0], 100 * fixed.share[1], fixed.pairs));
+  if (!fixed.any()) return false;
+  Finding& finding = found(FindingKind::fixed_in_view, std::max(fixed.share[0], fixed.share[1]), 0, "of the image");
+  finding.measured = fmt::format(
+      "{:.1f} % of the left image and {:.1f} % of the right one stay as they are while the scene moves, and {:.0f} % of the features",
+      100 * fixed.share[0], 100 * fixed.share[1], 100 * share_of_features);
+  finding.expected = "nothing of the vehicle in view";
+  finding.advice =
+      "give the calibration the masks that `fbvins doctor DATASET --out FOLDER` writes, or move the camera, or clean its lens";
+  out_.masks = {fixed.masks[0], fixed.masks[1]};
+  for (std::size_t i = 0; i < out_.masks.size(); ++i)
+    if (out_.masks[i]) {
+      (i == 0 ? rig_.left : rig_.right).set_mask(out_.masks[i]);
+      finding.corrected += (finding.corrected.empty() ? "" : "\n") + mask_line(i == 0, style_);
+    }
+  return true;
 }
 
 void Examination::blur() {

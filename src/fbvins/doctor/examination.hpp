@@ -54,6 +54,7 @@ class Examination {
 
   void readings();
   void images();
+  bool fixed_in_view(double share_of_features);
   void blur();
   void right_images_late();
   void turns();

@@ -23,8 +23,8 @@ FreeStereo::FreeStereo() : extractor_(kOrb), rng_(1) {}
 
 std::vector<StereoPoint> FreeStereo::match(const StereoRig& rig, const Image& left_image, const Image& right_image,
                                            const Pyramid& left, const Pyramid& right) {
-  extractor_.extract(left_image.view(), left_);
-  extractor_.extract(right_image.view(), right_);
+  extractor_.extract(left_image.view(), left_, rig.left.mask().get());
+  extractor_.extract(right_image.view(), right_, rig.right.mask().get());
   std::vector<StereoPoint> points;
   std::vector<Vec2> a, b;
   KltTemplate patch, back;

@@ -6,6 +6,7 @@
 
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/median.hpp"
+#include "fbvins/doctor/fixed_view.hpp"
 #include "fbvins/doctor/free_stereo.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
 #include "fbvins/doctor/stereo_step.hpp"
@@ -26,6 +27,9 @@ constexpr double kStereoStep_s = 0.25, kDepthStep_s = 0.1;
 constexpr double kMoving_s = 40, kLongest_s = 120;
 /// Median motion of features between images with depths from which the rig is in motion.
 constexpr double kMoving_px = 1.5;
+/// From one image to the next: features that move, fewest of them, and their least share for the scene to move.
+constexpr double kFeatureMoves_px = 0.75, kShareMoves = 0.25;
+constexpr std::size_t kFewestMoving = 8;
 constexpr int kFeatures = 150;
 constexpr double kDistance_px = 22, kNearest_m = 0.25, kLongestGap_s = 0.6;
 
@@ -66,6 +70,7 @@ struct EvidenceGatherer::State {
   void end_prelude();
   void look(StereoFrame frame);
   void follow();
+  void note_scene_motion();
   void detect();
   void match(SeenFrame& seen);
   void note(SeenFrame& seen);
@@ -83,6 +88,7 @@ struct EvidenceGatherer::State {
   TrackTable<KltTrack, KltPatches> tracks;
   ShiTomasiDetector detector;
   FreeStereo free_stereo;
+  ViewSampler sampler;
   StereoRealigner realigner;
   std::optional<KltStereoMatcher> stereo;
   Time last_view, last_depths;
@@ -166,6 +172,8 @@ void EvidenceGatherer::State::look(StereoFrame frame) {
   }
   if (images.left().empty()) return;
   if (images.has_before()) follow();
+  else sampler.interrupt();
+  note_scene_motion();
   detect();
   SeenFrame seen;
   seen.t = frame.t;
@@ -197,10 +205,24 @@ void EvidenceGatherer::State::follow() {
     moving_s += (images.t() - images.t_before()).seconds();
 }
 
+/// By the median feature of those that move: what is fixed in view does not.
+void EvidenceGatherer::State::note_scene_motion() {
+  std::vector<double> x_px, y_px;
+  for (const KltTrack& track : tracks) {
+    const Vec2 moved_px = track.px - track.previous_px;
+    if (track.age_frames > 0 && moved_px.norm() > kFeatureMoves_px) x_px.push_back(moved_px.x()), y_px.push_back(moved_px.y());
+  }
+  if (tracks.size() < kFewestMoving) sampler.interrupt();
+  const bool moves =
+      x_px.size() >= kFewestMoving && static_cast<double>(x_px.size()) > kShareMoves * static_cast<double>(tracks.size());
+  sampler.add(images.t(), moves ? Vec2(median(x_px), median(y_px)) : Vec2::Zero(), images.left(), images.right());
+}
+
 void EvidenceGatherer::State::detect() {
   std::vector<Vec2> occupied;
   for (const KltTrack& track : tracks) occupied.push_back(track.px);
-  for (const Corner& corner : detector.detect(images.left(), occupied, kFeatures - static_cast<int>(tracks.size()))) {
+  for (const Corner& corner :
+       detector.detect(images.left(), occupied, kFeatures - static_cast<int>(tracks.size()), evidence.rig.left.mask().get())) {
     const auto normalised = evidence.rig.left.undistort(corner.px);
     if (!normalised || tracks.full()) continue;
     KltPatches& patches = tracks.free_patches();
@@ -263,6 +285,7 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
 
 Evidence EvidenceGatherer::finish() {
   if (state_->prelude && !state_->held.empty()) state_->end_prelude();
+  state_->evidence.views = state_->sampler.take();
   return std::move(state_->evidence);
 }
 

@@ -33,7 +33,7 @@ Camera changed(const Camera& camera, const LensChange& change) {
         *second += change.radial.y();
       },
       model);
-  return {model, camera.width(), camera.height()};
+  return camera.with_lens(model);
 }
 
 }  // namespace fbvins

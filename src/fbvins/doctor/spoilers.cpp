@@ -102,7 +102,7 @@ Spoiler baseline(std::string name, double factor, const StereoRig& rig) {
 void forget_distortion(Camera& camera) {
   auto model = camera.model();
   std::visit([](auto& m) { m = {m.fx, m.fy, m.cx, m.cy}; }, model);
-  camera = Camera(model, camera.width(), camera.height());
+  camera = camera.with_lens(model);
 }
 
 /// Each `nth` image is the one before.

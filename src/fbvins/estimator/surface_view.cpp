@@ -28,6 +28,7 @@ std::vector<SurfaceFinder::Place> SurfaceFinder::places(const DepthImage& depth,
   std::vector<Place> out;
   for (int y = kStep_px / 2; y < camera_.height(); y += kStep_px)
     for (int x = kStep_px / 2; x < camera_.width(); x += kStep_px) {
+      if (camera_.hidden(Vec2(x, y), 0)) continue;
       const auto measured = reader_->at(depth, Vec2(x, y));
       const auto ray = measured ? camera_.undistort(Vec2(x, y)) : std::nullopt;
       if (!ray) continue;
@@ -45,7 +46,7 @@ SurfaceView SurfaceFinder::distances(const std::vector<Place>& places, const Fra
   for (const Place& place : places) {
     const Vec3 p_C = T_CN * place.p_B;
     const auto px = camera_.project(p_C);
-    const auto surface = px ? reader_->at(*reference.depth, *px) : std::nullopt;
+    const auto surface = px && !camera_.hidden(*px, 0) ? reader_->at(*reference.depth, *px) : std::nullopt;
     if (!surface) continue;
     const Vec2 m = p_C.head<2>() / p_C.z();
     Mat2 J_pixel_normalised;

@@ -13,10 +13,11 @@ constexpr int kSide = kFastCell_px;
 
 }  // namespace
 
-void FastCells::detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out) {
+void FastCells::detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out,
+                       const HiddenOnLevel& hidden) {
   assert(border >= 4);
   out.clear();
-  level_ = level, border_ = border;
+  level_ = level, border_ = border, hidden_ = hidden;
   floor_ = static_cast<std::uint8_t>(floor);
   count_ = level.width - 2 * border;
   if (count_ <= 0 || level.height <= 2 * border) return;
@@ -81,6 +82,7 @@ void FastCells::keep(int x, int y, std::uint8_t strength) {
   Cell& cell = cells_[static_cast<std::size_t>((y / kSide) * columns_ + column)];
   FastCorner* first = cell.strongest;
   if (cell.count == kFastPerCell && first[kFastPerCell - 1].strength >= strength) return;
+  if (hidden_.at(x, y)) return;
   int place = std::min(cell.count, kFastPerCell - 1);
   for (; place > 0 && first[place - 1].strength < strength; --place) first[place] = first[place - 1];
   first[place] = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), strength};

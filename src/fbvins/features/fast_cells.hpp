@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "fbvins/camera/mask.hpp"
 #include "fbvins/features/fast.hpp"
 
 namespace fbvins {
@@ -16,10 +17,21 @@ namespace fbvins {
 /// Side of a cell, and the corners kept of one.
 inline constexpr int kFastCell_px = 32, kFastPerCell = 4;
 
+/// What a mask hides of a level: pixel p of the level lies on (p + 0.5) * scale - 0.5 of the mask.
+struct HiddenOnLevel {
+  const Mask* mask = nullptr;
+  double scale = 1;
+
+  bool at(int x, int y) const {
+    return mask != nullptr && mask->hides(Vec2((x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5), kMaskMargin_px);
+  }
+};
+
 class FastCells {
  public:
   /// Cell by cell, the strongest first, of equal ones the first in reading order. `border` and `floor` as for detect_fast().
-  void detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out);
+  /// What is hidden takes no place in a cell.
+  void detect(const PyramidLevel& level, int border, int floor, std::vector<FastCorner>& out, const HiddenOnLevel& hidden = {});
 
  private:
   struct Cell {
@@ -33,6 +45,7 @@ class FastCells {
 
   // of the level in work
   PyramidLevel level_{};
+  HiddenOnLevel hidden_;
   int border_ = 0, count_ = 0, columns_ = 0;
   std::uint8_t floor_ = 0;
   std::size_t pitch_ = 0;

@@ -20,14 +20,14 @@ OrbExtractor::OrbExtractor(const OrbOptions& options, bool margins) : options_(o
   for (double& share : level_share_) share /= total;
 }
 
-void OrbExtractor::extract(const ImageView& image, OrbFeatures& out) {
+void OrbExtractor::extract(const ImageView& image, OrbFeatures& out, const Mask* mask) {
   out.clear();
   pyramid_.build(image, options_.levels, kOrbScaleFactor);
   double carried = 0;  // what finer levels could not fill goes to coarser ones
   for (int l = 0; l < pyramid_.levels(); ++l) {
     const PyramidLevel& level = pyramid_.level(l);
     carried += level_share_[static_cast<std::size_t>(l)] * options_.max_features;
-    fast_.detect(level, kOrbBorder, kMinThreshold, corners_);
+    fast_.detect(level, kOrbBorder, kMinThreshold, corners_, {mask, pyramid_.scale(l)});
     select(level, static_cast<int>(carried));
     carried -= static_cast<double>(chosen_.size());
     describe(l, out);

@@ -35,8 +35,8 @@ class OrbExtractor {
   /// `margins`: compute Margins as well, which only a stage that changes descriptors needs.
   explicit OrbExtractor(const OrbOptions& options, bool margins = false);
 
-  /// Replaces `out` by the features of the image (none for an empty one).
-  void extract(const ImageView& image, OrbFeatures& out);
+  /// Replaces `out` by the features of the image (none for an empty one), none of them near what its camera's mask hides.
+  void extract(const ImageView& image, OrbFeatures& out, const Mask* mask = nullptr);
 
  private:
   struct Candidate {

@@ -262,5 +262,24 @@ TEST(Orb, AnImageTooSmallForItsHalfHasNoSurroundings) {
   EXPECT_TRUE(std::all_of(margins.around.begin(), margins.around.end(), [](int m) { return m == 0; }));
 }
 
+TEST(OrbExtractor, WhatIsHiddenTakesNoPlace) {
+  const Image image = render_texture(
+      376, 240, NoiseTexture(7, 80), [](const Vec2& p) { return p; }, 120, 35, 1.5, 1);
+  Image seen(376, 240, 255);
+  hide(seen, MaskRectangle{0, 120, 376, 120});
+  hide(seen, MaskCircle{180, 60, 25});
+  const Mask mask(seen);
+  OrbExtractor extractor(OrbOptions{.max_features = 300, .levels = 4});
+  OrbFeatures all, visible;
+  extractor.extract(image.view(), all);
+  extractor.extract(image.view(), visible, &mask);
+  const auto count_visible = [&](const OrbFeatures& features) {
+    return std::count_if(features.keypoints.begin(), features.keypoints.end(),
+                         [&](const Keypoint& k) { return !mask.hides(k.pixel, kMaskMargin_px); });
+  };
+  EXPECT_EQ(count_visible(visible), static_cast<std::ptrdiff_t>(visible.size()));
+  EXPECT_GT(static_cast<double>(visible.size()), 1.3 * static_cast<double>(count_visible(all)));
+}
+
 }  // namespace
 }  // namespace fbvins

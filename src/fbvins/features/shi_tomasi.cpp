@@ -18,6 +18,7 @@ constexpr std::size_t kTooFewFeatures = 40;  // with fewer the whole image is se
 constexpr double kCrowding = 0.65;           // of the smallest distance, where empty cells did not give enough
 constexpr std::size_t kPerCell = 6;          // candidates a cell may offer
 constexpr int kBorder_px = 10;               // no corner is nearer to the image's edge
+constexpr int kHidden = -1;                  // in place of a cell's features: the mask leaves none of it
 /// Smallest response of a corner, (grey/px)^2, and as a multiple of the noise's own response; the larger counts.
 constexpr double kMinResponse = 0.4;
 constexpr double kNoiseFactor = 5.0;
@@ -119,7 +120,7 @@ bool ShiTomasiDetector::far_from_all(const Vec2& px, std::span<const Vec2> exist
   return true;
 }
 
-void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int row, float threshold) {
+void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int row, float threshold, const Mask* mask) {
   cell_corners_.clear();
   const int cell = cell_px_, border = kBorder_px;
   const int x0 = std::max(column * cell, border), x1 = std::min((column + 1) * cell, image.width - border);
@@ -151,6 +152,8 @@ void ShiTomasiDetector::search_cell(const PyramidLevel& image, int column, int r
       // > before, >= after: of two equal neighbours exactly one is the maximum.
       if (v < threshold || !(v > r[x - 1]) || v < r[x + 1] || !(v > r[x - rw]) || v < r[x + rw]) continue;
       if (!(v > r[x - rw - 1]) || !(v > r[x - rw + 1]) || v < r[x + rw - 1] || v < r[x + rw + 1]) continue;
+      // Before the strongest are chosen: what is hidden takes no place from what is seen.
+      if (mask != nullptr && mask->hides(Vec2(x0 + x, y0 + y), kMaskMargin_px)) continue;
       const Vec2 offset(parabola_peak(r[x - 1], v, r[x + 1]), parabola_peak(r[x - rw], v, r[x + rw]));
       cell_corners_.push_back({Vec2(x0 + x, y0 + y) + offset, v});
     }
@@ -167,7 +170,7 @@ void ShiTomasiDetector::accept(std::vector<Corner>& candidates, std::span<const 
 }
 
 void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, bool empty, float threshold,
-                                     std::span<const Vec2> existing, int wanted) {
+                                     std::span<const Vec2> existing, int wanted, const Mask* mask) {
   best_.clear();
   others_.clear();
   // From where the last search stopped, so that every cell has its turn.
@@ -179,9 +182,10 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   int searched = 0;
   for (int i = 0; i < cells && searched < budget; ++i) {
     next = (next + 1) % cells;
-    if ((occupancy_[static_cast<std::size_t>(next)] == 0) != empty) continue;
+    const int occupied = occupancy_[static_cast<std::size_t>(next)];
+    if (occupied == kHidden || (occupied == 0) != empty) continue;
     ++searched;
-    search_cell(image, next % columns, next / columns, threshold);
+    search_cell(image, next % columns, next / columns, threshold, mask);
     std::size_t offered = 0;
     for (const Corner& corner : cell_corners_) {
       if (!far_from_all(corner.px, existing, distance_px)) continue;
@@ -193,7 +197,8 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   accept(others_, existing, distance_px, wanted);
 }
 
-const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) & {
+const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted,
+                                                     const Mask* mask) & {
   corners_.clear();
   if (wanted <= 0 || pyramid.empty()) return corners_;
   const PyramidLevel& image = pyramid.level(0);
@@ -208,9 +213,15 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
     if (column >= 0 && row >= 0 && column < columns && row < rows) ++occupancy_[static_cast<std::size_t>(row * columns + column)];
   }
 
-  search_cells(image, columns, true, threshold, existing, wanted);
+  for (int cell = 0; mask != nullptr && cell < columns * rows; ++cell) {
+    const int x = cell % columns * cell_px_, y = cell / columns * cell_px_;
+    if (mask->hides_all(x, y, std::min(x + cell_px_, image.width), std::min(y + cell_px_, image.height), kMaskMargin_px))
+      occupancy_[static_cast<std::size_t>(cell)] = kHidden;
+  }
+
+  search_cells(image, columns, true, threshold, existing, wanted, mask);
   // Walls without texture leave cells empty for good; the missing corners are taken from the others.
-  if (static_cast<int>(corners_.size()) < wanted) search_cells(image, columns, false, threshold, existing, wanted);
+  if (static_cast<int>(corners_.size()) < wanted) search_cells(image, columns, false, threshold, existing, wanted, mask);
   return corners_;
 }
 

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "fbvins/camera/mask.hpp"
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/geometry/so3.hpp"
 
@@ -35,16 +36,18 @@ class ShiTomasiDetector {
 
   /// At most `wanted` new corners of level 0: first the best of each empty cell, then their next best, then
   /// what occupied cells have beside. None is nearer than min_distance_px (two thirds of it for the last
-  /// kind) to another or to `existing`. Looks into a limited number of cells, in turn from call to call.
+  /// kind) to another or to `existing`, nor near what the mask hides. Looks into a limited number of cells, in turn from call to
+  /// call.
   /// Valid until the next call, so a detector that ends with the expression cannot be asked.
-  const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted) &;
+  const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted,
+                                    const Mask* mask = nullptr) &;
   /// The noise estimate of the last detect(), grey values.
   double noise() const { return noise_; }
 
  private:
-  void search_cell(const PyramidLevel& image, int column, int row, float threshold);
+  void search_cell(const PyramidLevel& image, int column, int row, float threshold, const Mask* mask);
   void search_cells(const PyramidLevel& image, int columns, bool empty, float threshold, std::span<const Vec2> existing,
-                    int wanted);
+                    int wanted, const Mask* mask);
   bool far_from_all(const Vec2& px, std::span<const Vec2> existing, double distance_px) const;
   void accept(std::vector<Corner>& candidates, std::span<const Vec2> existing, double distance_px, int wanted);
 
@@ -55,7 +58,7 @@ class ShiTomasiDetector {
   std::vector<Corner> corners_;        // accepted
   std::vector<Corner> cell_corners_;   // of the cell being searched
   std::vector<Corner> best_, others_;  // candidates of the frame
-  std::vector<int> occupancy_;         // features in each cell
+  std::vector<int> occupancy_;         // features in each cell, or kHidden
   std::vector<float> response_;        // of the cell being searched, with one pixel around
   std::vector<std::int32_t> tensors_;  // rows of structure tensors and their running sums
 };

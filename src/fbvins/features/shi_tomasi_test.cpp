@@ -78,5 +78,41 @@ TEST(ShiTomasi, DimTextureDeliversAndPureNoiseDoesNot) {
   EXPECT_TRUE(detector.detect(pyramid, {}, 60).empty());
 }
 
+/// A bright square of this side and grey value.
+void paint_square(Image& image, int x0, int y0, int side, std::uint8_t grey) {
+  for (int y = y0; y < y0 + side; ++y)
+    for (int x = x0; x < x0 + side; ++x) image.at(x, y) = grey;
+}
+
+TEST(ShiTomasi, WhatIsHiddenTakesNoPlaceInItsCell) {
+  Image image(176, 132, 60), seen(176, 132, 255);
+  paint_square(image, 48, 48, 8, 250);  // a stronger one, in the same cell of 44 px
+  paint_square(image, 76, 76, 8, 90);
+  Pyramid pyramid;
+  pyramid.build(image.view(), 1);
+  ShiTomasiDetector detector(kMinDistance_px);
+  ASSERT_FALSE(detector.detect(pyramid, {}, 1).empty());
+  EXPECT_LT((detector.detect(pyramid, {}, 1).front().px - Vec2(52, 52)).norm(), 8);
+  hide(seen, MaskRectangle{44, 44, 16, 16});
+  const Mask mask(seen);
+  const std::vector<Corner> corners = detector.detect(pyramid, {}, 10, &mask);
+  ASSERT_FALSE(corners.empty());
+  for (const Corner& corner : corners) EXPECT_LT((corner.px - Vec2(80, 80)).norm(), 8);
+}
+
+TEST(ShiTomasi, KeepsItsDistanceFromWhatIsHiddenAndFillsTheRest) {
+  const Image image = render_texture(376, 240, NoiseTexture(5), kIdentity, 120, 35);
+  Image seen(376, 240, 255);
+  hide(seen, MaskRectangle{0, 140, 376, 100});
+  hide(seen, MaskCircle{100, 60, 30});
+  const Mask mask(seen);
+  Pyramid pyramid;
+  pyramid.build(image.view(), 1);
+  ShiTomasiDetector detector(kMinDistance_px);
+  const std::vector<Corner> corners = detector.detect(pyramid, {}, 40, &mask);
+  EXPECT_GE(corners.size(), 25u);
+  for (const Corner& corner : corners) EXPECT_FALSE(mask.hides(corner.px, kMaskMargin_px - 1));
+}
+
 }  // namespace
 }  // namespace fbvins

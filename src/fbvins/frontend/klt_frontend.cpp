@@ -112,7 +112,7 @@ void KltFrontend::detect_corners(FrontendStats& stats) {
   occupied.reserve(tracks_.size());
   for (const KltTrack& track : tracks_) occupied.push_back(track.px);
   const int wanted = options_.max_features - static_cast<int>(tracks_.size());
-  for (const Corner& corner : detector_.detect(images_.left(), occupied, wanted))
+  for (const Corner& corner : detector_.detect(images_.left(), occupied, wanted, rig_.left.mask().get()))
     if (start_track(corner.px)) ++stats.detected;
 }
 

@@ -238,5 +238,27 @@ TEST(KltFrontend, SameInputSameBits) {
   }
 }
 
+TEST(KltFrontend, HasNoFeatureInTheMask) {
+  Wall wall;
+  Image left(320, 240, 255), right(320, 240, 255);
+  hide(left, MaskRectangle{0, 150, 320, 90});
+  hide(right, MaskCircle{160, 90, 40});
+  wall.rig.left.set_mask(std::make_shared<const Mask>(left));
+  wall.rig.right.set_mask(std::make_shared<const Mask>(right));
+  KltFrontend frontend(wall.rig, small_options());
+  int in_right = 0;
+  for (int k = 0; k < 10; ++k) {
+    const TrackedFrame out = frontend.process(wall.packet(k), k > 0 ? wall.prior(k - 1) : StatePrior{});
+    EXPECT_GE(out.features.size(), 25u) << k;
+    for (const TrackedFeature& feature : out.features) {
+      EXPECT_FALSE(wall.rig.left.hidden(feature.left->pixel, kPatchBorder_px));
+      if (!feature.right) continue;
+      EXPECT_FALSE(wall.rig.right.hidden(feature.right->pixel, kPatchBorder_px));
+      ++in_right;
+    }
+  }
+  EXPECT_GT(in_right, 100);
+}
+
 }  // namespace
 }  // namespace fbvins

@@ -77,7 +77,7 @@ StereoMatch KltStereoMatcher::refine(const KltTemplate& patch, const Vec2& left_
                                      const Vec2& start_px, int coarsest, const Pyramid& left, const Pyramid& right) {
   StereoMatch match;
   const KltResult found = klt_align(patch, right, start_px, coarsest, 0);
-  if (!found.ok() || !camera_right_.inside(found.px, kRightBorder_px)) return match;
+  if (!found.ok() || !visible_in_right(camera_right_, found.px)) return match;
   match.px = found.px;
   const auto normalised = camera_right_.undistort(found.px);
   if (!normalised) return match;

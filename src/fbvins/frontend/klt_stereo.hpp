@@ -18,6 +18,11 @@ namespace fbvins {
 /// A match nearer to the right image's edge is not used.
 inline constexpr double kRightBorder_px = 2;
 
+/// Whether a match lies in the right image, with a patch that shows the world.
+inline bool visible_in_right(const Camera& right, const Vec2& px) {
+  return right.inside(px, kRightBorder_px) && !right.hidden(px, kPatchBorder_px);
+}
+
 enum class StereoFailure { none, flow, check, epipolar };
 
 struct StereoMatch {

@@ -58,7 +58,7 @@ std::optional<Vec2> OrbDepth::find(const OrbTrack& track, const OrbPatches& patc
     const Keypoint& keypoint = right_features_.keypoints[static_cast<std::size_t>(k)];
     if (!subpixel_) return keypoint.pixel;
     const KltResult fine = klt_align(patches.newest, images.right(), keypoint.pixel, kNearLevel, 0);
-    if (refiner_.accept(fine, keypoint.pixel, keypoint.scale) && right_camera_.inside(fine.px, kRightBorder_px)) return fine.px;
+    if (refiner_.accept(fine, keypoint.pixel, keypoint.scale) && visible_in_right(right_camera_, fine.px)) return fine.px;
   }
   if (!fill_in_) return std::nullopt;
   const StereoMatch match =

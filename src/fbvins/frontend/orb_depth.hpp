@@ -4,7 +4,7 @@
 // thread.
 //
 //   OrbDepth depth(rig, options);
-//   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features());
+//   if (depth.wants_features()) stats.boost_ms += describer.describe(right_view, depth.right_features(), depth.right_mask());
 //   depth.match(tracks, images, stats);
 #pragma once
 
@@ -28,6 +28,8 @@ class OrbDepth {
   bool wants_features() const { return by_descriptors_; }
   /// If so, to be filled before match().
   OrbFeatures& right_features() { return right_features_; }
+  /// What the right image hides; null: nothing.
+  const Mask* right_mask() const { return right_camera_.mask().get(); }
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
   /// As if these had been matched, 1/m.
   void assume(std::vector<double>& inverse_depths) { typical_.update(inverse_depths); }

@@ -81,7 +81,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
 
   if (out.has_right) {
     if (!images_.has_depth_image() && depth_.wants_features())
-      stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features());
+      stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features(), depth_.right_mask());
     depth_.match(tracks_, images_, stats);
   }
   out.features = features_of(tracks_, camera_, sigma_px_);
@@ -119,7 +119,7 @@ bool OrbFrontend::follow(const ImageView& left, FrontendStats& stats) {
 /// Extracts and describes keypoints of the left image (2.2.1, 2.2.2).
 void OrbFrontend::examine(const ImageView& left, FrontendStats& stats) {
   CpuTimer timer;
-  stats.boost_ms += describer_.describe(left, view_);
+  stats.boost_ms += describer_.describe(left, view_, camera_.mask().get());
   stats.detect_ms += timer.lap_ms();
 }
 

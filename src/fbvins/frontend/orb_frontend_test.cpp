@@ -413,5 +413,29 @@ TEST(OrbFrontend, SameInputSameBits) {
 
 TEST(OrbFrontendOptions, DefaultsAreValid) { EXPECT_TRUE(validate(OrbFrontendOptions{}).ok()); }
 
+TEST(OrbFrontend, HasNoFeatureInTheMask) {
+  StereoRig rig = make_rig();
+  Image left(kWidth, kHeight, 255), right(kWidth, kHeight, 255);
+  hide(left, MaskRectangle{150, 0, 60, kHeight});
+  hide(right, MaskCircle{250, 120, 40});
+  rig.left.set_mask(std::make_shared<const Mask>(left));
+  rig.right.set_mask(std::make_shared<const Mask>(right));
+  for (const bool examine_all : {false, true}) {
+    OrbFrontendOptions options = small_options();
+    options.examine_all = examine_all;
+    int in_right = 0;
+    for (const TrackedFrame& frame : run(packets(), options, rig)) {
+      EXPECT_GT(frame.features.size(), 40u);
+      for (const TrackedFeature& feature : frame.features) {
+        EXPECT_FALSE(rig.left.hidden(feature.left->pixel, kPatchBorder_px));
+        if (!feature.right) continue;
+        EXPECT_FALSE(rig.right.hidden(feature.right->pixel, kPatchBorder_px));
+        ++in_right;
+      }
+    }
+    EXPECT_GT(in_right, 150);
+  }
+}
+
 }  // namespace
 }  // namespace fbvins

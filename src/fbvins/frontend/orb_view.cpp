@@ -11,8 +11,8 @@ double OrbDescriber::improve(const ImageView& image, OrbFeatures& features) {
   return timer.lap_ms();
 }
 
-double OrbDescriber::describe(const ImageView& image, OrbView& view) {
-  extractor_.extract(image, view.features);
+double OrbDescriber::describe(const ImageView& image, OrbView& view, const Mask* mask) {
+  extractor_.extract(image, view.features, mask);
   view.improved = stage_->changes_descriptors();
   if (view.improved) {
     view.raw.keypoints = view.features.keypoints;
@@ -24,8 +24,8 @@ double OrbDescriber::describe(const ImageView& image, OrbView& view) {
   return ms;
 }
 
-double OrbDescriber::describe(const ImageView& image, OrbFeatures& features) {
-  extractor_.extract(image, features);
+double OrbDescriber::describe(const ImageView& image, OrbFeatures& features, const Mask* mask) {
+  extractor_.extract(image, features, mask);
   return improve(image, features);
 }
 

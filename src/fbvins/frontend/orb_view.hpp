@@ -4,7 +4,7 @@
 // Buffers are reused; one instance, one thread.
 //
 //   OrbDescriber describer(orb_options, make_identity_stage());
-//   stats.boost_ms = describer.describe(image.view(), view);
+//   stats.boost_ms = describer.describe(image.view(), view, camera.mask().get());
 #pragma once
 
 #include <cstdint>
@@ -39,10 +39,11 @@ class OrbDescriber {
   OrbDescriber(const OrbOptions& options, std::shared_ptr<DescriptorStage> stage)
       : stage_(std::move(stage)), extractor_(options, stage_->changes_descriptors()) {}
 
-  /// Fills all of the view that depends on the image alone. Returns the CPU time that improving took, ms.
-  double describe(const ImageView& image, OrbView& view);
+  /// Fills all of the view that depends on the image alone, and on its camera's mask. Returns the CPU time that improving took,
+  /// ms.
+  double describe(const ImageView& image, OrbView& view, const Mask* mask = nullptr);
   /// Only the features, of another image.
-  double describe(const ImageView& image, OrbFeatures& features);
+  double describe(const ImageView& image, OrbFeatures& features, const Mask* mask = nullptr);
 
  private:
   double improve(const ImageView& image, OrbFeatures& features);

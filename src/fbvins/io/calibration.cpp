@@ -7,10 +7,10 @@
 
 namespace fbvins {
 
-Result<CameraSensor> parse_euroc_camera(YamlReader yaml) {
+Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read) {
   CameraSensor sensor;
   // EuRoC nests the 16 numbers under T_BS: data; other writers put them directly under T_BS.
-  sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients");
+  sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients", read);
   sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
   if (yaml.has(yaml.root(), "timeshift_cam_imu")) sensor.time_offset_s = yaml.number(yaml.root(), "timeshift_cam_imu");
   if (yaml.has(yaml.root(), "line_delay_us")) sensor.line_delay_s = 1e-6 * yaml.number(yaml.root(), "line_delay_us");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration files to values, checked. Pure functions; each file is parsed once, however many parts of it are read.
+// Calibration files to values, checked. Pure functions, but for pictures of masks, which `read` gets; each file is parsed once,
+// however many parts of it are read.
 //
 // Frames: EuRoC's T_BS takes sensor to body coordinates; Kalibr's T_cam_imu takes IMU to camera
 // coordinates and is inverted here. Our B is the IMU.
@@ -7,10 +8,9 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/mask_fields.hpp"
 
 namespace fbvins {
-
-class YamlReader;
 
 /// One camera's EuRoC sensor.yaml; S is that sensor, B the file's body frame.
 struct CameraSensor {
@@ -27,7 +27,7 @@ struct ImuSensor {
   Pose<B, B> T_BS;  ///< takes IMU to the file's body coordinates; the identity in EuRoC
 };
 
-Result<CameraSensor> parse_euroc_camera(YamlReader yaml);
+Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read = {});
 Result<ImuSensor> parse_euroc_imu(YamlReader yaml);
 /// depth0/sensor.yaml of a depth sensor that is registered to cam0 (docs/depth.md).
 Result<DepthSensor> parse_depth_sensor(YamlReader yaml);
@@ -37,7 +37,7 @@ Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml);
 Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const ImuSensor& imu, const std::string& file);
 
 /// Kalibr's camchain-imucam.yaml; imu_noise stays at its defaults.
-Result<StereoRig> parse_kalibr_camchain(YamlReader yaml);
+Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read = {});
 /// Kalibr's imu.yaml, with or without the `imu0:` level.
 Result<ImuNoise> parse_kalibr_imu(YamlReader yaml);
 

@@ -58,7 +58,7 @@ RigidTransform read_rigid_transform(YamlReader& yaml, const YAML::Node& map, con
   return {Quat(R).normalized(), p};
 }
 
-Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field) {
+Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {
   const std::string model = yaml.word(map, "camera_model");
   const std::optional<std::size_t> before = numbers_before_focal(model);
   if (!before) {
@@ -91,7 +91,9 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
                            : model != "pinhole" ? model
                            : equidistant        ? "pinhole-equidistant"
                                                 : "pinhole-radtan";
-  return {*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height};
+  Camera camera(*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height);
+  camera.set_mask(read_mask(yaml, map, camera, read));
+  return camera;
 }
 
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field) {

@@ -8,6 +8,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
@@ -31,8 +32,9 @@ Pose<To, From> read_transform(YamlReader& yaml, const YAML::Node& map, const std
 /// "[1, 2.5]", each number without loss.
 std::string yaml_list(const std::vector<double>& values);
 
-/// camera_model, intrinsics, resolution, distortion_model and the coefficients in `coefficients_field`.
-Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field);
+/// camera_model, intrinsics, resolution, distortion_model, the coefficients in `coefficients_field`, and the mask, whose picture
+/// `read` gets; without it only shapes may be there.
+Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read = {});
 
 /// The four noise figures; rate_field is "rate_hz" or "update_rate".
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);

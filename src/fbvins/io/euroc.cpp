@@ -127,7 +127,9 @@ class EurocReader {
   Result<void> read_own_calibration(const ImuSensor& imu) {
     std::vector<CameraSensor> cameras;
     for (const std::string& folder : folders()) {
-      Result<CameraSensor> read = parse_yaml(folder + "sensor.yaml", parse_euroc_camera);
+      const ReadBeside beside = [&](const std::string& name) { return text(folder + name, kLargestMask_bytes); };
+      Result<CameraSensor> read =
+          parse_yaml(folder + "sensor.yaml", [&](YamlReader yaml) { return parse_euroc_camera(std::move(yaml), beside); });
       if (!read) return read.error();
       cameras.push_back(*read);
     }

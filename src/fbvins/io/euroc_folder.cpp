@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
 
 namespace fbvins {
@@ -50,7 +51,7 @@ std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, cons
              "distortion_coefficients: [{}]\n",
              rig.image_rate_hz, camera.width(), camera.height(), c.model, fmt::join(c.intrinsics, ", "),
              c.distortion == "radtan" ? "radial-tangential" : c.distortion, fmt::join(c.coefficients, ", ")) +
-         offset + rolling;
+         offset + rolling + mask_text(camera);
 }
 
 std::string imu_yaml(const ImuNoise& n, const std::string& origin) {

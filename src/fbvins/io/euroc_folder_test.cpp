@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/io/png_encode.hpp"
 
 namespace fbvins {
 namespace {
@@ -248,6 +249,30 @@ TEST(EurocFolder, ReadsBackWithImagesReadingsAndTruth) {
     EXPECT_NE(text.str().find("comment: made by hand\n"), std::string::npos) << sensor;
   }
   std::filesystem::remove_all(folder);
+}
+
+TEST(EurocFolder, KeepsMasksAndReadsAPicture) {
+  StereoRig rig = four_camera_rig();
+  Image seen(kWidth, kHeight, 255);
+  hide(seen, MaskCircle{30, 40, 9});
+  rig.left.set_mask(std::make_shared<const Mask>(seen));
+  const std::string folder = four_cameras("euroc_masks", rig, 3);
+  const std::string picture = encode_png(rig.left.mask()->image());
+  std::ofstream(folder + "/mav0/cam3/legs.png", std::ios::binary).write(picture.data(), std::ssize(picture));
+  std::ofstream(folder + "/mav0/cam3/sensor.yaml", std::ios::app) << "mask: legs.png\n";
+  const auto data = open_dataset(folder);
+  ASSERT_TRUE(data) << data.error().message;
+  for (const int camera : {0, 3}) {
+    ASSERT_TRUE((*data)->rig().camera(camera).mask()) << camera;
+    EXPECT_EQ((*data)->rig().camera(camera).mask()->rectangles(), rig.left.mask()->rectangles());
+  }
+  EXPECT_EQ((*data)->rig().camera(1).mask(), nullptr);
+  std::filesystem::remove(folder + "/mav0/cam3/legs.png");
+  const auto without = open_dataset(folder);
+  ASSERT_FALSE(without);
+  EXPECT_NE(without.error().message.find("cam3/sensor.yaml:"), std::string::npos) << without.error().message;
+  EXPECT_NE(without.error().message.find("mask: "), std::string::npos);
+  EXPECT_NE(without.error().message.find("legs.png: no such file"), std::string::npos) << without.error().message;
 }
 
 TEST(EurocFolder, NeverOverwritesARecording) {

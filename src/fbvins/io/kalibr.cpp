@@ -42,11 +42,11 @@ double read_line_delay_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::N
 
 }  // namespace
 
-Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
+Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read) {
   const YAML::Node cam0 = yaml.get(yaml.root(), "cam0");
   if (!cam0.IsMap()) yaml.complain(yaml.root(), "cam0", "is missing or empty");
   Pose<C0, B> T_CB = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
-  std::vector<MountedCamera> cameras{{read_camera(yaml, cam0, "distortion_coeffs"), T_CB.inverse()}};
+  std::vector<MountedCamera> cameras{{read_camera(yaml, cam0, "distortion_coeffs", read), T_CB.inverse()}};
   double time_offset_s = read_time_offset_s(yaml, cam0, cam0), line_delay_s = read_line_delay_s(yaml, cam0, cam0);
   for (int i = 1; yaml.get(yaml.root(), fmt::format("cam{}", i)).IsDefined(); ++i) {
     const std::string name = fmt::format("cam{}", i);
@@ -54,7 +54,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml) {
     if (!camera.IsMap()) yaml.complain(yaml.root(), name, "is empty");
     if (!yaml.ok()) break;
     T_CB = read_next_camera(yaml, camera, T_CB);
-    cameras.push_back({read_camera(yaml, camera, "distortion_coeffs"), T_CB.inverse()});
+    cameras.push_back({read_camera(yaml, camera, "distortion_coeffs", read), T_CB.inverse()});
     time_offset_s = read_time_offset_s(yaml, cam0, camera);
     line_delay_s = read_line_delay_s(yaml, cam0, camera);
   }
@@ -76,7 +76,7 @@ Result<ImuNoise> parse_kalibr_imu(YamlReader yaml) {
 Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path) {
   Result<std::string> camchain = read_file(camchain_path, kLargestYaml_bytes);
   if (!camchain) return camchain.error();
-  Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *std::move(camchain)});
+  Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *std::move(camchain)}, files_beside(camchain_path));
   if (!rig || !imu_path) return rig;
   Result<std::string> imu = read_file(*imu_path, kLargestYaml_bytes);
   if (!imu) return imu.error();

@@ -12,8 +12,9 @@ std::string camera_text(const char* name, const Camera& camera) {
   const KalibrCamera c = kalibr_camera(camera);
   return fmt::format(
       "{}:\n  camera_model: {}\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
-      "  distortion_coefficients: {}\n",
-      name, c.model, camera.width(), camera.height(), yaml_list(c.intrinsics), c.distortion, yaml_list(c.coefficients));
+      "  distortion_coefficients: {}\n{}",
+      name, c.model, camera.width(), camera.height(), yaml_list(c.intrinsics), c.distortion, yaml_list(c.coefficients),
+      mask_text(camera, "  "));
 }
 
 template <class To, class From>

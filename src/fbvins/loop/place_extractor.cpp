@@ -48,7 +48,7 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
   place.focal_px = focal_px_;
   place.up_C0 = (R_LB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
   if (!images.left) return place;
-  orb_.extract(images.left->view(), found_);
+  orb_.extract(images.left->view(), found_, rig_.left.mask().get());
   stage_->improve(images.left->width(), images.left->height(), found_);
   if (images.right) {
     left_.build(images.left->view(), kSearchLevel + 1);
@@ -111,7 +111,7 @@ std::optional<MeasuredInverseDepth> PlaceExtractor::stereo(const Vec2& left_px, 
   const auto start = search(left_normalised);
   if (!start || !patch_.cut(left_, left_px, 0, kAlignLevel)) return std::nullopt;
   const KltResult found = klt_align(patch_, right_, *start, kAlignLevel, 0);
-  if (!found.ok() || !rig_.right.inside(found.px, 2)) return std::nullopt;
+  if (!found.ok() || !rig_.right.inside(found.px, 2) || rig_.right.hidden(found.px, kPatchBorder_px)) return std::nullopt;
   const auto right = rig_.right.undistort(found.px);
   if (!right) return std::nullopt;
   const Vec3 far = R_rl_ * left_normalised.homogeneous(), seen = right->homogeneous();

@@ -62,6 +62,25 @@ TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing)
   EXPECT_EQ(extractor().extract({}, Mat3::Identity()).size(), 0u);
 }
 
+TEST(PlaceExtractor, APlaceHasNoFeatureInTheMask) {
+  StereoRig rig = test_room::rig();
+  Image left(752, 480, 255), right(752, 480, 255);
+  hide(left, MaskRectangle{0, 300, 752, 180});
+  hide(right, MaskRectangle{300, 0, 100, 480});
+  rig.left.set_mask(std::make_shared<const Mask>(left));
+  rig.right.set_mask(std::make_shared<const Mask>(right));
+  const Place place =
+      PlaceExtractor(rig, {.max_features = 200}, test_room::vocabulary()).extract(before_the_wall(), Mat3::Identity());
+  ASSERT_GT(place.size(), 100u);
+  const double disparity_px = test_room::kFocal * test_room::kBaseline / kDepth_m;
+  for (const PlaceFeature& feature : place.features) {
+    const Vec2 px = rig.left.distort(Vec2(feature.x, feature.y));
+    EXPECT_FALSE(rig.left.hidden(px, kPatchBorder_px));
+    if (feature.has_depth() && std::abs(feature.inverse_depth - 1 / kDepth_m) < 0.01)
+      EXPECT_FALSE(rig.right.hidden(px - Vec2(disparity_px, 0), kPatchBorder_px - 1));
+  }
+}
+
 TEST(PlaceExtractor, SameImagesSameBits) {
   PlaceExtractor used = extractor(), fresh = extractor();
   const StereoFrame frame = before_the_wall();

@@ -35,6 +35,7 @@ struct CameraModelOptions {
   double stamp_jitter_us = 20;
   double drop_share = 0;
   double time_offset_ms = 0;
+  int legs = 0;
 
   template <class V>
   void visit(V&& v) {
@@ -57,6 +58,7 @@ struct CameraModelOptions {
     v("stamp_jitter_us", stamp_jitter_us, "us", "jitter of the right image's stamp, standard deviation", 0.0, 2000.0);
     v("drop_share", drop_share, "", "share of stereo frames that are lost", 0.0, 0.9);
     v("time_offset_ms", time_offset_ms, "ms", "IMU stamp less image stamp of the same instant", -100.0, 100.0);
+    v("legs", legs, "", "legs of the vehicle in the view of each camera, at the same pixels in every image", 0, 6);
   }
 };
 

@@ -71,8 +71,8 @@ struct SimulationOptions {
 };
 
 /// normal, dim, flicker, switching, moving-light, weak-texture, moving-objects, glare, fast; and, in
-/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs) and rgbd
-/// (one camera and a depth sensor).
+/// normal light, handheld, takeoff, hover, tour, hall, quad (two stereo pairs), rgbd (one camera and a depth sensor) and legs (of
+/// the vehicle, in view).
 std::vector<std::string> simulation_presets();
 Result<SimulationOptions> simulation_preset(const std::string& name);
 
