@@ -53,7 +53,19 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
   }
   if (looking) end_look();
   if (Result<void> done = system->finish(); !done) return done.error();
+  flight.calibration = system->calibration();
   return flight;
+}
+
+/// What the options let the flight refine.
+std::optional<RefinedCalibration> refined_calibration(const Calibration& found, const StereoRig& rig, const EstimatorOptions& o) {
+  RefinedCalibration out;
+  if (o.estimate_time_offset) out.time_offset_s = rig.time_offset_s + found.time_offset_s;
+  if (o.estimate_line_delay) out.line_delay_s = rig.line_delay_s + found.line_delay_s;
+  if (o.estimate_extrinsics && !rig.depth)
+    for (int i = 0; i < std::min(2, rig.camera_count()); ++i) out.T_BC.push_back(found.T_BC(i));
+  if (!out.time_offset_s && !out.line_delay_s && out.T_BC.empty()) return std::nullopt;
+  return out;
 }
 
 }  // namespace
@@ -80,6 +92,7 @@ RunSummary summarise(const Flight& flight, const Dataset& data, const Config& co
   if (summary.frontend == "boost") summary.booster_weights = booster_weights_path(config.frontend.boost.booster.weights);
   summary.mode = arguments.threaded ? "threaded" : "deterministic";
   summary.wall_s = flight.wall_s;
+  summary.refined = refined_calibration(flight.calibration, data.rig(), config.estimator);
   return summary;
 }
 

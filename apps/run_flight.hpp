@@ -28,6 +28,7 @@ struct FlightArguments {
 struct Flight {
   RunRecord run;
   std::optional<MapRecord> map;  ///< with loop closure
+  Calibration calibration;       ///< as estimated in the end
   double wall_s = 0;
 };
 

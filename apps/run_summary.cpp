@@ -157,6 +157,17 @@ RunSummary summarise(const RunRecord& record, std::vector<Time> images, const Tr
   return s;
 }
 
+Json to_json(const RefinedCalibration& refined) {
+  Json json = Json::object();
+  if (refined.time_offset_s) json["time_offset_s"] = *refined.time_offset_s;
+  if (refined.line_delay_s) json["line_delay_us"] = 1e6 * *refined.line_delay_s;
+  for (std::size_t i = 0; i < refined.T_BC.size(); ++i) {
+    const Pose<B, C0>& T = refined.T_BC[i];
+    json[fmt::format("T_BC{}", i)] = {{"q", {T.q.w(), T.q.x(), T.q.y(), T.q.z()}}, {"p", {T.p.x(), T.p.y(), T.p.z()}}};
+  }
+  return json;
+}
+
 std::string to_json_text(const RunSummary& s) {
   Json result{{"version", FBVINS_VERSION}, {"dataset", s.dataset}, {"frontend", s.frontend}, {"frames", s.frames}};
   if (!s.booster_weights.empty()) result["booster_weights"] = std::filesystem::path(s.booster_weights).filename().string();
@@ -182,6 +193,7 @@ std::string to_json_text(const RunSummary& s) {
                                     {"raw_inliers", s.raw_matches.inliers}};
   result["features_in_sight_a_second_later"] = {{"then", s.survival.then}, {"now", s.survival.now}};
   if (s.map) result["map"] = map_json(*s.map);
+  if (s.refined) result["refined_calibration"] = to_json(*s.refined);
   Json timing{{"mode", s.mode}, {"wall_s", s.wall_s}};
   timing["frontend_ms"] = timing_json(s.frontend_ms);
   timing["boost_ms"] = timing_json(s.boost_ms);

@@ -13,6 +13,12 @@
 
 namespace fbvins::app {
 
+/// The calibration as the flight has refined it: what the options let it refine.
+struct RefinedCalibration {
+  std::optional<double> time_offset_s, line_delay_s;
+  std::vector<Pose<B, C0>> T_BC;  ///< of the left camera, and the right one
+};
+
 struct RunSummary {
   std::string frontend;
   std::string booster_weights;  ///< the file, of the boost frontend
@@ -29,8 +35,9 @@ struct RunSummary {
   std::optional<NeesSummary> nees_levelled;         ///< the same without the truth's own constant tilt
   LevelledStart truth_level;                        ///< that tilt, and the alignment without it
   std::optional<MapSummary> map;                    ///< with loop closure
-  DescriptorMatchCounts matches, raw_matches;       ///< over all frames; none of the klt frontend
-  Survival survival;                                ///< over all frames
+  std::optional<RefinedCalibration> refined;
+  DescriptorMatchCounts matches, raw_matches;  ///< over all frames; none of the klt frontend
+  Survival survival;                           ///< over all frames
   double wall_s = 0;
   std::vector<double> frontend_ms, estimator_ms, boost_ms;  ///< CPU time per frame
   double peak_memory_mb = 0;

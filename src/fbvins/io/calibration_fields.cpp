@@ -34,6 +34,34 @@ std::optional<std::size_t> numbers_before_focal(const std::string& model) {
   return std::nullopt;
 }
 
+/// What is wrong with the intrinsics of a camera that no lens has; empty where they are plausible.
+std::string implausible_centre(const Camera& camera) {
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  const double x = 2 * cx / camera.width(), y = 2 * cy / camera.height();  // 1 in the middle
+  if (std::abs(x - 1) <= 1.0 / 3 && std::abs(y - 1) <= 1.0 / 3) return "";
+  const auto both_near = [&](double factor) { return std::abs(x / factor - 1) < 0.15 && std::abs(y / factor - 1) < 0.15; };
+  return fmt::format("the principal point ({:g}, {:g}) lies outside the middle third of an image of {} x {}{}", cx, cy,
+                     camera.width(), camera.height(),
+                     both_near(2)     ? ": is the calibration that of images twice as large?"
+                     : both_near(0.5) ? ": is the calibration that of images half as large?"
+                                      : "");
+}
+
+/// The same of its distortion: it enlarges the image's edges by more than any lens, or has no rays half way to an edge.
+std::string implausible_distortion(const Camera& camera) {
+  constexpr double kMostEnlarged = 1.5;
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  const Vec2 centre(cx, cy);
+  for (const Vec2& edge : {Vec2(0, cy), Vec2(camera.width() - 1, cy), Vec2(cx, 0), Vec2(cx, camera.height() - 1)}) {
+    if (!camera.undistort(0.5 * (centre + edge))) return "no ray belongs to pixels half way to the image's edge";
+    const auto ray = camera.undistort(edge);
+    const double seen = Vec2((edge.x() - cx) / fx, (edge.y() - cy) / fy).norm();
+    if (ray && seen > kMostEnlarged * ray->norm())
+      return fmt::format("the image's edge is enlarged {:.1f} times, which no lens does", seen / ray->norm());
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string yaml_list(const std::vector<double>& values) {
@@ -92,6 +120,10 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
                            : equidistant        ? "pinhole-equidistant"
                                                 : "pinhole-radtan";
   Camera camera(*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height);
+  if (const std::string problem = implausible_centre(camera); !problem.empty()) yaml.complain(map, "intrinsics", problem);
+  else if (const std::string distorted = implausible_distortion(camera); !distorted.empty())
+    yaml.complain(map, coefficients_field, distorted);
+  if (!yaml.ok()) return {};
   camera.set_mask(read_mask(yaml, map, camera, read));
   return camera;
 }

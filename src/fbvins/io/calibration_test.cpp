@@ -144,6 +144,27 @@ TEST(Calibration, KalibrSaysWhatIsWrong) {
   EXPECT_EQ(load_kalibr("/nowhere/c.yaml").error().message, "/nowhere/c.yaml: no such file");
 }
 
+TEST(Calibration, WhatNoLensHasIsRefused) {
+  struct Case {
+    const char *from, *to, *sentence;
+  };
+  for (const Case& c : {Case{"367.2, 248.3", "367.2, 100", "(367.2, 100) lies outside the middle third of an image of 752 x 480"},
+                        {"458.6, 457.2, 367.2, 248.3", "917.2, 914.4, 734.4, 496.6", "images twice as large?"},
+                        {"458.6, 457.2, 367.2, 248.3", "229.3, 228.6, 183.6, 124.1", "images half as large?"},
+                        {"equidistant\ndistortion_coefficients: [0.1, 0.2, 0.3, 0.4]",
+                         "radial-tangential\ndistortion_coefficients: [26, 0, 0, 0]", "enlarged 2."},
+                        {"equidistant\ndistortion_coefficients: [0.1, 0.2, 0.3, 0.4]",
+                         "radial-tangential\ndistortion_coefficients: [-26, 0, 0, 0]", "no ray belongs to pixels half way"}}) {
+    std::string text = euroc_camera(kLeft);
+    const std::string from = c.from;
+    text.replace(text.find(from), from.size(), c.to);
+    const auto camera = parse_euroc_camera({"cam0.yaml", text});
+    ASSERT_FALSE(camera) << c.sentence;
+    EXPECT_NE(camera.error().message.find(c.sentence), std::string::npos) << camera.error().message;
+    EXPECT_EQ(camera.error().message.rfind("cam0.yaml", 0), 0u) << camera.error().message;
+  }
+}
+
 TEST(Calibration, LineDelayOfARollingShutter) {
   const std::string cam0 = "cam0:\n" + kalibr_camera("T_cam_imu", kLeft.inverse());
   const std::string cam1 = "cam1:\n" + kalibr_camera("T_cam_imu", kRight.inverse());

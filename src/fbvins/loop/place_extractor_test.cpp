@@ -62,6 +62,27 @@ TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing)
   EXPECT_EQ(extractor().extract({}, Mat3::Identity()).size(), 0u);
 }
 
+TEST(PlaceExtractor, TakesDepthsFromTheDepthImage) {
+  const StereoRig rig = with_depth(test_room::rig(), {.noise_at_1m_m = 0.004});
+  PlaceExtractor extractor(rig, {.max_features = 200}, test_room::vocabulary());
+  StereoFrame frame;
+  frame.left = wall(0);
+  auto depth = std::make_shared<DepthImage>(DepthImage{752, 480, std::vector<std::uint16_t>(752 * 480, 3000)});
+  std::fill_n(depth->mm.begin(), 752 * 240, std::uint16_t{0});  // of the lower half alone
+  frame.depth = depth;
+  int with_depth = 0, without = 0;
+  for (const PlaceFeature& f : extractor.extract(frame, Mat3::Identity()).features) {
+    const double row = 240 + test_room::kFocal * f.y;
+    if (row < 237) EXPECT_FALSE(f.has_depth());
+    if (row < 243) continue;
+    with_depth += f.has_depth(), without += !f.has_depth();
+    if (f.has_depth()) EXPECT_NEAR(f.inverse_depth, 1.0 / 3, 1e-4);
+    if (f.has_depth()) EXPECT_NEAR(f.sigma_inverse_depth, 0.004, 1e-4);
+  }
+  EXPECT_GT(with_depth, 30);
+  EXPECT_LT(without, with_depth / 4);  // at the edges
+}
+
 TEST(PlaceExtractor, APlaceHasNoFeatureInTheMask) {
   StereoRig rig = test_room::rig();
   Image left(752, 480, 255), right(752, 480, 255);
