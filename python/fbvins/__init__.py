@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, Iterable, Mapping, Option
 import numpy
 
 from . import _fbvins
-from ._fbvins import (Camera, Config, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
+from ._fbvins import (Camera, Config, DepthSensor, ErrorStatistics, Evaluation, Features, ImuNoise, ImuSample, MapContents, MapUpdate, Odometry,
                       Recording, Rig, StereoFrame, Trajectory, __version__, orb, simulation_presets)
 from ._fbvins import Booster
 from . import calibration
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     AnyConfig = Union[Config, Mapping, PathLike, None]
     AnyTrajectory = Union[Trajectory, Run, PathLike, Tuple["numpy.ndarray", "numpy.ndarray", "numpy.ndarray"]]
 
-__all__ = ["Booster", "Camera", "Config", "Diagnosis", "ErrorStatistics", "Finding", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
+__all__ = ["Booster", "Camera", "Config", "DepthSensor", "Diagnosis", "ErrorStatistics", "Finding", "Evaluation", "Features", "ImuNoise", "ImuSample", "Map", "MapContents",
            "MapUpdate", "Odometry", "Recording", "Rig", "Run", "StereoFrame", "System", "Trajectory", "__version__", "boost",
            "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "report", "run", "simulate", "simulation_presets"]
 

@@ -16,6 +16,8 @@ constexpr const char* kName = "";
 template <>
 constexpr const char* kName<std::uint8_t> = "uint8";
 template <>
+constexpr const char* kName<std::uint16_t> = "uint16";
+template <>
 constexpr const char* kName<std::int8_t> = "int8";
 template <>
 constexpr const char* kName<std::int64_t> = "int64";
@@ -121,6 +123,7 @@ CheckedArray<T> checked(nb::handle object, const char* name, std::initializer_li
 }
 
 template CheckedArray<std::uint8_t> checked(nb::handle, const char*, std::initializer_list<std::int64_t>);
+template CheckedArray<std::uint16_t> checked(nb::handle, const char*, std::initializer_list<std::int64_t>);
 template CheckedArray<std::int8_t> checked(nb::handle, const char*, std::initializer_list<std::int64_t>);
 template CheckedArray<std::int64_t> checked(nb::handle, const char*, std::initializer_list<std::int64_t>);
 template CheckedArray<double> checked(nb::handle, const char*, std::initializer_list<std::int64_t>);

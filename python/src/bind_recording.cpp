@@ -60,6 +60,11 @@ nb::object pixels(const std::shared_ptr<const Image>& image) {
   return nb::cast(nb::ndarray<nb::numpy, const std::uint8_t>(image->row(0), 2, shape, owner));
 }
 
+nb::object depths(const std::shared_ptr<const DepthImage>& depth) {
+  if (!depth) return nb::none();
+  return nb::cast(to_array(depth->mm, {static_cast<std::size_t>(depth->height), static_cast<std::size_t>(depth->width)}));
+}
+
 }  // namespace
 
 void bind_recording(nb::module_& m) {
@@ -72,13 +77,16 @@ void bind_recording(nb::module_& m) {
           "accel", [](const ImuSample& s) { return to_array(s.accel_mps2); }, "(3,), specific force, m/s^2: +g upwards at rest")
       .def("__repr__", [](const ImuSample& s) { return fmt::format("<fbvins.ImuSample t={} ns>", s.t.ns); });
 
-  nb::class_<StereoFrame>(m, "StereoFrame", "Two images taken at the same instant.")
+  nb::class_<StereoFrame>(m, "StereoFrame", "Images taken at the same instant.")
       .def_prop_ro(
           "t", [](const StereoFrame& f) { return f.t.ns; }, "ns of the cameras' clock")
       .def_prop_ro(
           "left", [](const StereoFrame& f) { return pixels(f.left); }, "uint8 (height, width), read-only; None: missing")
       .def_prop_ro(
           "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: missing")
+      .def_prop_ro(
+          "depth", [](const StereoFrame& f) { return depths(f.depth); },
+          "uint16 (height, width), mm, 0 where nothing was measured; None: no depth image")
       .def("__repr__", [](const StereoFrame& f) { return fmt::format("<fbvins.StereoFrame t={} ns>", f.t.ns); });
 
   nb::class_<Dataset>(m, "Recording",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras, IMU and how they are joined.
 #include <fmt/format.h>
+#include <nanobind/stl/optional.h>
 
 #include <algorithm>
 #include <cmath>
@@ -57,9 +58,14 @@ std::string text_of(const Camera& camera) {
                      camera.width(), camera.height(), f[0], f[1], f[2], f[3]);
 }
 
-StereoRig make_rig(const Camera& left, const Camera& right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
-                   double image_rate_hz, double time_offset_s) {
-  StereoRig rig{left, right, transform<B, C0>(T_BC0, "T_BC0"), transform<B, C1>(T_BC1, "T_BC1")};
+StereoRig make_rig(const Camera& left, const Camera* right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
+                   double image_rate_hz, double time_offset_s, const DepthSensor* depth) {
+  if ((right == nullptr) != T_BC1.is_none()) throw nb::value_error("right and T_BC1 go together: give both, or neither");
+  std::vector<MountedCamera> cameras{{left, transform<B, C0>(T_BC0, "T_BC0")}};
+  if (right != nullptr) cameras.push_back({*right, transform<B, C0>(T_BC1, "T_BC1")});
+  if (right != nullptr && depth != nullptr) throw nb::value_error("a depth sensor goes with one camera: without a right one");
+  StereoRig rig = with_cameras({}, cameras);
+  if (depth != nullptr) rig = with_depth(rig, *depth);
   rig.imu_noise = imu_noise;
   rig.image_rate_hz = image_rate_hz;
   rig.time_offset_s = time_offset_s;
@@ -104,19 +110,38 @@ void bind_rig(nb::module_& m) {
       .def_ro("accel_random_walk", &ImuNoise::accel_random_walk_mps3_rthz, "m/s^3/sqrt(Hz)")
       .def_ro("rate_hz", &ImuNoise::rate_hz);
 
+  nb::class_<DepthSensor>(m, "DepthSensor", "A sensor of depth images that are registered to the left camera, pixel by pixel.")
+      .def(
+          "__init__",
+          [](DepthSensor* self, double noise_at_1m, double nearest, double farthest, double scale_sigma) {
+            new (self) DepthSensor{noise_at_1m, nearest, farthest, scale_sigma};
+          },
+          nb::kw_only(), "noise_at_1m"_a = DepthSensor{}.noise_at_1m_m, "nearest"_a = DepthSensor{}.nearest_m,
+          "farthest"_a = DepthSensor{}.farthest_m, "scale_sigma"_a = DepthSensor{}.scale_sigma,
+          "noise_at_1m: standard deviation at one metre, m; it grows with the square of the distance. nearest, farthest: what is\n"
+          "used, m. scale_sigma: relative standard deviation of what all distances are wrong by together.")
+      .def_ro("noise_at_1m", &DepthSensor::noise_at_1m_m, "m")
+      .def_ro("nearest", &DepthSensor::nearest_m, "m")
+      .def_ro("farthest", &DepthSensor::farthest_m, "m")
+      .def_ro("scale_sigma", &DepthSensor::scale_sigma);
+
   nb::class_<StereoRig>(
       m, "Rig",
       "One or two cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera. A\n"
-      "rig of one camera has it as the left one; its right one is 0 px wide.")
-      .def(nb::new_(&make_rig), "left"_a, "right"_a, "T_BC0"_a, "T_BC1"_a, "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0,
-           "time_offset_s"_a = 0.0,
-           "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset.")
+      "rig of one camera has it as the left one, without a right one and T_BC1; its right one is 0 px wide then.")
+      .def(
+          nb::new_(&make_rig), "left"_a, "right"_a.none() = nb::none(), "T_BC0"_a = nb::none(), "T_BC1"_a = nb::none(),
+          "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0, "time_offset_s"_a = 0.0, "depth"_a.none() = nb::none(),
+          "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset. depth:\n"
+          "a DepthSensor, with one camera.")
       .def_ro("left", &StereoRig::left)
       .def_ro("right", &StereoRig::right)
       .def_prop_ro(
           "T_BC0", [](const StereoRig& rig) { return to_array(rig.T_BC0); }, "(4, 4), left camera to IMU, m")
       .def_prop_ro(
           "T_BC1", [](const StereoRig& rig) { return to_array(rig.T_BC1); }, "(4, 4), right camera to IMU, m")
+      .def_prop_ro(
+          "depth", [](const StereoRig& rig) { return rig.depth; }, "the DepthSensor; None without")
       .def_ro("imu_noise", &StereoRig::imu_noise)
       .def_ro("image_rate_hz", &StereoRig::image_rate_hz)
       .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s")

@@ -32,6 +32,16 @@ std::shared_ptr<const Image> image_of(nb::handle object, const char* name, const
   return std::make_shared<const Image>(camera.width(), camera.height(), std::move(keeper));
 }
 
+/// A copy: a depth image is read at a few places, once.
+std::shared_ptr<const DepthImage> depth_of(nb::handle object, const StereoRig& rig) {
+  if (object.is_none()) return nullptr;
+  if (!rig.depth) throw nb::value_error("depth: the rig has no depth sensor");
+  const auto array = checked<std::uint16_t>(object, "depth", {rig.left.height(), rig.left.width()});
+  auto depth = std::make_shared<DepthImage>(DepthImage{rig.left.width(), rig.left.height(), {}});
+  depth->mm.assign(array.data, array.data + static_cast<std::size_t>(depth->width) * depth->height);
+  return depth;
+}
+
 class PySystem {
  public:
   PySystem(const Config& config, const StereoRig& rig, bool threaded, nb::object map, nb::object on_odometry,
@@ -59,10 +69,10 @@ class PySystem {
     push(sample);
     newest_reading_ = sample.t;
   }
-  void push_images(nb::handle t, nb::handle left, nb::handle right) {
+  void push_images(nb::handle t, nb::handle left, nb::handle right, nb::handle depth) {
     const Time stamp{whole_number(t, "t")};
     require_order(stamp, newest_image_, "image");
-    push(StereoFrame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right)});
+    push(StereoFrame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right), {}, depth_of(depth, rig_)});
     newest_image_ = stamp;
   }
   void push(SensorEvent event) {
@@ -210,10 +220,13 @@ void bind_system(nb::module_& m) {
           "both in B. Or many at once: int64 (N,), float64 (N, 3), float64 (N, 3). ValueError for stamps that do not increase and for "
           "numbers that are not finite.")
       .def(
-          "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none(),
-          nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None) -> None"),
-          "A stereo frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size, None where a "
-          "camera delivered nothing. Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
+          "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none() = nb::none(),
+          "depth"_a.none() = nb::none(),
+          nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None = None, "
+                  "depth: numpy.ndarray | None = None) -> None"),
+          "A frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size, None where a "
+          "camera delivered nothing; of a rig with a depth sensor depth uint16 (height, width), mm, 0 where nothing was measured. "
+          "Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
           "write to them afterwards. ValueError for stamps that do not increase.")
       .def(
           "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")

@@ -250,6 +250,33 @@ def test_a_rig_of_ones_own(flight):
     fbvins.System(None, own).finish()
 
 
+def test_a_camera_with_a_depth_sensor():
+    recording = fbvins.simulate("rgbd", seed=5, seconds=2)
+    sensor = recording.rig.depth
+    assert sensor.noise_at_1m == 0.003 and recording.rig.right.width == 0
+    own = fbvins.Rig(recording.rig.left, T_BC0=recording.rig.T_BC0, imu_noise=recording.rig.imu_noise, depth=sensor)
+    assert pickle.loads(pickle.dumps(own)).depth.farthest == sensor.farthest
+    system, n = fbvins.System(None, own), 0
+    for event in recording:
+        if isinstance(event, fbvins.StereoFrame):
+            assert event.right is None and event.depth.dtype == np.uint16 and event.depth.shape == event.left.shape
+            system.push_images(event.t, event.left, depth=event.depth)
+            n += 1
+        else:
+            system.push(event)
+    system.finish()
+    poses = system.poll()
+    assert len(poses) == n and poses[-1].health == "good"
+    with pytest.raises(ValueError, match="depth: a NumPy array of uint16"):
+        fbvins.System(None, own).push_images(0, None, depth=np.zeros((480, 752)))
+    with pytest.raises(ValueError, match="the rig has no depth sensor"):
+        fbvins.System(None, fbvins.Rig(own.left, T_BC0=own.T_BC0)).push_images(0, None, depth=np.zeros((480, 752), np.uint16))
+    with pytest.raises(ValueError, match="goes with one camera"):
+        fbvins.Rig(own.left, own.left, own.T_BC0, np.eye(4), depth=sensor)
+    with pytest.raises(ValueError, match="go together"):
+        fbvins.Rig(own.left, own.left, own.T_BC0)
+
+
 def test_a_mask(flight):
     rig = fbvins.open(flight, max_frames=1).rig
     assert rig.left.mask is None

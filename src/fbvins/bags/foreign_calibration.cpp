@@ -172,8 +172,8 @@ Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read
   const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0"), cam1 = inner(yaml, yaml.root(), "cam1");
   if (!yaml.ok()) return yaml.error();
   StereoRig rig;
-  rig.left = read_camera(yaml, cam0, "distortion_coeffs", read);
-  rig.right = read_camera(yaml, cam1, "distortion_coeffs", read);
+  rig.left = read_real_camera(yaml, cam0, "distortion_coeffs", read);
+  rig.right = read_real_camera(yaml, cam1, "distortion_coeffs", read);
   rig.T_BC0 = mounting<C0>(yaml, cam0);
   rig.T_BC1 = mounting<C1>(yaml, cam1);
   rig.time_offset_s = yaml.number_between(cam0, "timeshift_cam_imu", -10, 10, 0);

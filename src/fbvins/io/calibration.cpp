@@ -10,7 +10,7 @@ namespace fbvins {
 Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read) {
   CameraSensor sensor;
   // EuRoC nests the 16 numbers under T_BS: data; other writers put them directly under T_BS.
-  sensor.camera = read_camera(yaml, yaml.root(), "distortion_coefficients", read);
+  sensor.camera = read_real_camera(yaml, yaml.root(), "distortion_coefficients", read);
   sensor.rate_hz = yaml.positive(yaml.root(), "rate_hz");
   if (yaml.has(yaml.root(), "timeshift_cam_imu")) sensor.time_offset_s = yaml.number(yaml.root(), "timeshift_cam_imu");
   if (yaml.has(yaml.root(), "line_delay_us")) sensor.line_delay_s = 1e-6 * yaml.number(yaml.root(), "line_delay_us");
@@ -22,14 +22,7 @@ Result<CameraSensor> parse_euroc_camera(YamlReader yaml, const ReadBeside& read)
 }
 
 Result<DepthSensor> parse_depth_sensor(YamlReader yaml) {
-  DepthSensor sensor;
-  const auto take = [&](const char* key, double& value) {
-    if (yaml.has(yaml.root(), key)) value = yaml.positive(yaml.root(), key);
-  };
-  take("noise_at_1m_m", sensor.noise_at_1m_m);
-  take("nearest_m", sensor.nearest_m);
-  take("farthest_m", sensor.farthest_m);
-  take("scale_sigma", sensor.scale_sigma);
+  const DepthSensor sensor = read_depth_sensor(yaml, yaml.root());
   if (!yaml.ok()) return yaml.error();
   return sensor;
 }

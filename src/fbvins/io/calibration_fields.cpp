@@ -120,12 +120,34 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
                            : equidistant        ? "pinhole-equidistant"
                                                 : "pinhole-radtan";
   Camera camera(*lens_of(name, {f[0], f[1], f[2], f[3]}, own), width, height);
+  camera.set_mask(read_mask(yaml, map, camera, read));
+  return camera;
+}
+
+Camera read_real_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {
+  Camera camera = read_camera(yaml, map, coefficients_field, read);
+  if (!yaml.ok()) return camera;
   if (const std::string problem = implausible_centre(camera); !problem.empty()) yaml.complain(map, "intrinsics", problem);
   else if (const std::string distorted = implausible_distortion(camera); !distorted.empty())
     yaml.complain(map, coefficients_field, distorted);
-  if (!yaml.ok()) return {};
-  camera.set_mask(read_mask(yaml, map, camera, read));
   return camera;
+}
+
+DepthSensor read_depth_sensor(YamlReader& yaml, const YAML::Node& map) {
+  DepthSensor sensor;
+  const auto take = [&](const char* key, double& value) {
+    if (yaml.has(map, key)) value = yaml.positive(map, key);
+  };
+  take("noise_at_1m_m", sensor.noise_at_1m_m);
+  take("nearest_m", sensor.nearest_m);
+  take("farthest_m", sensor.farthest_m);
+  take("scale_sigma", sensor.scale_sigma);
+  return sensor;
+}
+
+std::string depth_sensor_text(const DepthSensor& sensor, const std::string& indent) {
+  return fmt::format("{0}noise_at_1m_m: {1}\n{0}nearest_m: {2}\n{0}farthest_m: {3}\n{0}scale_sigma: {4}\n",
+                     indent, sensor.noise_at_1m_m, sensor.nearest_m, sensor.farthest_m, sensor.scale_sigma);
 }
 
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field) {

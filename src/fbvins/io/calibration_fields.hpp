@@ -36,6 +36,15 @@ std::string yaml_list(const std::vector<double>& values);
 /// `read` gets; without it only shapes may be there.
 Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read = {});
 
+/// The same of a file that people write and mix up: complains about a principal point outside the middle third of the image and
+/// a distortion that no lens has, too.
+Camera read_real_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read);
+
+/// A depth sensor; keys that are missing have their defaults.
+DepthSensor read_depth_sensor(YamlReader& yaml, const YAML::Node& map);
+/// The same as text, each line after `indent`.
+std::string depth_sensor_text(const DepthSensor& sensor, const std::string& indent);
+
 /// The four noise figures; rate_field is "rate_hz" or "update_rate".
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field);
 

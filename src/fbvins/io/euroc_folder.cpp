@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "fbvins/camera/lens_numbers.hpp"
+#include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
 
@@ -96,10 +97,8 @@ std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
 }
 
 std::string depth_yaml(const DepthSensor& sensor, const std::string& origin) {
-  return fmt::format(
-      "sensor_type: depth\ncomment: {}, registered to cam0 pixel by pixel, in millimetres\n\nnoise_at_1m_m: {}\n"
-      "nearest_m: {}\nfarthest_m: {}\nscale_sigma: {}\n",
-      origin, sensor.noise_at_1m_m, sensor.nearest_m, sensor.farthest_m, sensor.scale_sigma);
+  return fmt::format("sensor_type: depth\ncomment: {}, registered to cam0 pixel by pixel, in millimetres\n\n", origin) +
+         depth_sensor_text(sensor, "");
 }
 
 std::string depth_png(const std::vector<float>& depth_m, int width, int height) {

@@ -46,7 +46,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
   const YAML::Node cam0 = yaml.get(yaml.root(), "cam0");
   if (!cam0.IsMap()) yaml.complain(yaml.root(), "cam0", "is missing or empty");
   Pose<C0, B> T_CB = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
-  std::vector<MountedCamera> cameras{{read_camera(yaml, cam0, "distortion_coeffs", read), T_CB.inverse()}};
+  std::vector<MountedCamera> cameras{{read_real_camera(yaml, cam0, "distortion_coeffs", read), T_CB.inverse()}};
   double time_offset_s = read_time_offset_s(yaml, cam0, cam0), line_delay_s = read_line_delay_s(yaml, cam0, cam0);
   for (int i = 1; yaml.get(yaml.root(), fmt::format("cam{}", i)).IsDefined(); ++i) {
     const std::string name = fmt::format("cam{}", i);
@@ -54,7 +54,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
     if (!camera.IsMap()) yaml.complain(yaml.root(), name, "is empty");
     if (!yaml.ok()) break;
     T_CB = read_next_camera(yaml, camera, T_CB);
-    cameras.push_back({read_camera(yaml, camera, "distortion_coeffs", read), T_CB.inverse()});
+    cameras.push_back({read_real_camera(yaml, camera, "distortion_coeffs", read), T_CB.inverse()});
     time_offset_s = read_time_offset_s(yaml, cam0, camera);
     line_delay_s = read_line_delay_s(yaml, cam0, camera);
   }

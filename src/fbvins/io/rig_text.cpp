@@ -50,7 +50,8 @@ std::string rig_to_yaml(const StereoRig& rig) {
              "image_rate_hz: {:.17g}\ntime_offset_s: {:.17g}\n",
              n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
              n.accel_random_walk_mps3_rthz, n.max_gyro_radps, n.max_accel_mps2, rig.image_rate_hz, rig.time_offset_s) +
-         (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s));
+         (rig.line_delay_s == 0 ? "" : fmt::format("line_delay_s: {:.17g}\n", rig.line_delay_s)) +
+         (rig.depth ? "depth:\n" + depth_sensor_text(*rig.depth, "  ") : "");
 }
 
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
@@ -67,6 +68,7 @@ Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");
   if (yaml.has(yaml.root(), "line_delay_s")) rig.line_delay_s = yaml.number(yaml.root(), "line_delay_s");
+  if (yaml.has(yaml.root(), "depth")) rig = with_depth(rig, read_depth_sensor(yaml, yaml.get(yaml.root(), "depth")));
   if (!yaml.ok()) return yaml.error();
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;

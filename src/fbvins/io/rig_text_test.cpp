@@ -67,6 +67,17 @@ TEST(RigText, GivesBackARigOfOneCamera) {
   EXPECT_EQ(back->T_BC1.p, rig.T_BC0.p);
 }
 
+TEST(RigText, GivesBackADepthSensor) {
+  Rng rng(14);
+  const DepthSensor sensor{.noise_at_1m_m = 0.01 / 3, .nearest_m = 0.1 / 7, .farthest_m = 20.0 / 3, .scale_sigma = 0.1 / 11};
+  const StereoRig rig = with_depth(awkward_rig(rng, false), sensor);
+  const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_TRUE(back->depth);
+  EXPECT_TRUE(same(*back->depth, sensor));
+  EXPECT_EQ(back->T_BC1.p, rig.T_BC1.p);
+}
+
 TEST(RigText, GivesBackTheBitsOfWideLenses) {
   Rng rng(12);
   StereoRig rig = awkward_rig(rng, true);
