@@ -146,8 +146,8 @@ DepthSensor read_depth_sensor(YamlReader& yaml, const YAML::Node& map) {
 }
 
 std::string depth_sensor_text(const DepthSensor& sensor, const std::string& indent) {
-  return fmt::format("{0}noise_at_1m_m: {1}\n{0}nearest_m: {2}\n{0}farthest_m: {3}\n{0}scale_sigma: {4}\n",
-                     indent, sensor.noise_at_1m_m, sensor.nearest_m, sensor.farthest_m, sensor.scale_sigma);
+  return fmt::format("{0}noise_at_1m_m: {1}\n{0}nearest_m: {2}\n{0}farthest_m: {3}\n{0}scale_sigma: {4}\n", indent,
+                     sensor.noise_at_1m_m, sensor.nearest_m, sensor.farthest_m, sensor.scale_sigma);
 }
 
 ImuNoise read_imu_noise(YamlReader& yaml, const YAML::Node& map, const std::string& rate_field) {
