@@ -156,7 +156,11 @@ void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const P
   known_ = true;
   skipped_ = 0;
   if (views_.size() < kMostViews) return;
-  // Every second one goes; the motion over two is the sum.
+  // Every second one goes, the last among them; the motion over two is the sum.
+  if (views_.size() % 2 == 0) {
+    moved_px_ = views_.back().moved_px;
+    known_ = !moved_px_.isZero();
+  }
   std::vector<SmallView> kept;
   for (std::size_t i = 0; i < views_.size(); i += 2) {
     if (i > 0) {
