@@ -39,7 +39,7 @@ std::vector<ImuSample> swinging(bool swings) {
 
 /// `gain` of view i; a scene that moves as the camera does, and the bar, if it is there.
 Evidence evidence(bool bar, bool moves, const std::function<double(int)>& gain) {
-  const NoiseTexture scene(7, 20), paint(9, 20);
+  const NoiseTexture scene(7, 30), paint(9, 20);
   Evidence out;
   out.rig = rig();
   out.imu = swinging(true);
