@@ -174,15 +174,15 @@ const Refused kRefused[] = {
      "/mav0/cam0/sensor.yaml:7: data: its 3x3 part is not a rotation"},
     {"MountingNaN", [](Files& f) { replace(f["cam1/sensor.yaml"], "0.1", "nan"); },
      "/mav0/cam1/sensor.yaml:7: data: holds something that is not a number"},
-    {"MaskMissing", [](Files& f) { f["cam0/sensor.yaml"] += "mask: legs.png\n"; }, "mask: "},
+    {"MaskMissing", [](Files& f) { f["cam0/sensor.yaml"] += "mask: legs.png\n"; }, "/mav0/cam0/sensor.yaml:17: mask: "},
     {"MaskOfAnotherSize",
      [](Files& f) {
        f["cam0/sensor.yaml"] += "mask: legs.png\n";
        f["cam0/legs.png"] = make_png(1, {.width = 32, .height = 24});
      },
-     "mask: legs.png has 32 x 24 pixels, the camera 64 x 48"},
+     "/mav0/cam0/sensor.yaml:17: mask: legs.png has 32 x 24 pixels, the camera 64 x 48"},
     {"MaskOutsideOfTheImage", [](Files& f) { f["cam1/sensor.yaml"] += "mask_circles: [[90, 90, 10]]\n"; },
-     "mask_circles: its number 1 holds no pixel of the image of 64 x 48"},
+     "/mav0/cam1/sensor.yaml:17: mask_circles: its number 1 holds no pixel of the image of 64 x 48"},
     {"FocalLengthNegative", [](Files& f) { replace(f["cam0/sensor.yaml"], "[40.0", "[-40.0"); },
      "/mav0/cam0/sensor.yaml:14: intrinsics: the focal lengths are not positive"},
     {"IntrinsicsThree", [](Files& f) { replace(f["cam0/sensor.yaml"], "31.5, 23.5", "31.5"); },

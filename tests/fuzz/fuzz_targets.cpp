@@ -11,6 +11,7 @@
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/mcap_dataset.hpp"
 #include "fbvins/io/mcap_format.hpp"
+#include "fbvins/io/png_encode.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/io/yaml_reader.hpp"
@@ -148,9 +149,11 @@ void fuzz_csv(std::string_view bytes) {
 
 void fuzz_calibration(std::string_view bytes) {
   const YamlReader yaml("c.yaml", std::string(bytes));
-  // The picture of a mask: the calibration's own bytes, which are none, or a good one.
+  // The picture of a mask: a good one, or these bytes, which are none.
+  Image seen(64, 48, 255);
+  hide(seen, MaskCircle{20, 30, 9});
   const ReadBeside beside = [&](const std::string& name) -> Result<std::string> {
-    return name == "m.png" ? test::make_png(1, {}) : std::string(bytes);
+    return name == "m.png" ? encode_png(seen) : std::string(bytes);
   };
   const auto camera = parse_euroc_camera(yaml, beside);
   require_sentence(camera);

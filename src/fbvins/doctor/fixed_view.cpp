@@ -62,13 +62,14 @@ bool stays(const std::vector<Look>& looks, int x, int y, std::vector<Eigen::Vect
   if (strength < kEdge) return false;
   const Eigen::Vector2f across = mean / strength;
   const auto there = [&](std::size_t i) { return gradients[i].dot(across) > kStrength * strength; };
-  int pairs = 0, stayed = 0;
+  int pairs = 0, stayed = 0, present = there(0);
   for (std::size_t i = 1; i < looks.size(); ++i) {
+    present += there(i);
     if (std::abs(looks[i].moved_px.dot(across)) < kAcross_px) continue;
     ++pairs;
     stayed += there(i - 1) && there(i);
   }
-  return pairs >= kFewestPairs && stayed >= kMostlyThere * pairs;
+  return pairs >= kFewestPairs && stayed >= kMostlyThere * pairs && present >= kMostlyThere * static_cast<double>(looks.size());
 }
 
 /// Black pixels and those at most `by` away from one.
@@ -156,7 +157,11 @@ void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const P
   known_ = true;
   skipped_ = 0;
   if (views_.size() < kMostViews) return;
-  // Every second one goes; the motion over two is the sum.
+  // Every second one goes, the last among them; the motion over two is the sum.
+  if (views_.size() % 2 == 0) {
+    moved_px_ = views_.back().moved_px;
+    known_ = !moved_px_.isZero();
+  }
   std::vector<SmallView> kept;
   for (std::size_t i = 0; i < views_.size(); i += 2) {
     if (i > 0) {

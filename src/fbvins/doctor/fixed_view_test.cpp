@@ -12,7 +12,7 @@
 namespace fbvins {
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240, kViews = 30;
+constexpr int kWidth = 320, kHeight = 240, kViews = 24;
 constexpr double kFocal_px = 250, kApart_s = 0.5;
 
 StereoRig rig() {
@@ -39,7 +39,7 @@ std::vector<ImuSample> swinging(bool swings) {
 
 /// `gain` of view i; a scene that moves as the camera does, and the bar, if it is there.
 Evidence evidence(bool bar, bool moves, const std::function<double(int)>& gain) {
-  const NoiseTexture scene(7, 40), paint(9, 40);
+  const NoiseTexture scene(7, 30), paint(9, 20);
   Evidence out;
   out.rig = rig();
   out.imu = swinging(true);
@@ -79,9 +79,13 @@ double agreement(const Mask& mask) {
 }
 
 constexpr auto kSteady = [](int) { return 1.0; };
+const Evidence& with_bar() {
+  static const Evidence seen = evidence(true, true, kSteady);
+  return seen;
+}
 
 TEST(FixedView, FindsWhatStaysWhileTheSceneMoves) {
-  const Evidence seen = evidence(true, true, kSteady);
+  const Evidence& seen = with_bar();
   const FixedInView fixed = find_fixed(seen, ImuSeries(seen.imu));
   ASSERT_TRUE(fixed.masks[0] && fixed.masks[1]);
   EXPECT_GT(agreement(*fixed.masks[0]), 0.8);
@@ -103,7 +107,7 @@ TEST(FixedView, FindsNothingWhereNothingIsFixed) {
 }
 
 TEST(FixedView, IsNotJudgedWhereTheReadingsShowNoTurn) {
-  Evidence seen = evidence(true, true, kSteady);
+  Evidence seen = with_bar();
   seen.imu = swinging(false);
   EXPECT_FALSE(find_fixed(seen, ImuSeries(seen.imu)).judged());
   seen.imu.clear();
@@ -117,7 +121,7 @@ TEST(FixedView, AnImageThatStaysAsAWholeIsNotTheVehicle) {
 }
 
 TEST(FixedView, WhatIsMaskedAlreadyIsNotFoundAgain) {
-  Evidence seen = evidence(true, true, kSteady);
+  Evidence seen = with_bar();
   Image drawn(kWidth, kHeight, 255);
   hide(drawn, kBar);
   seen.rig.left.set_mask(std::make_shared<const Mask>(drawn));

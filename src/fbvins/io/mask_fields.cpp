@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -15,9 +16,18 @@
 namespace fbvins {
 namespace {
 
-/// Rectangles that make up a mask, and shapes of a calibration, at most: eight cameras' masks then fit into one file, and a
-/// photograph is not taken for a mask.
+/// Rectangles that make up a mask, and shapes of a calibration, at most: eight cameras' masks then fit into one file.
 constexpr std::size_t kMostShapes = 5000;
+/// A drawn mask has few pixels between black and white, at smoothed edges; a photograph has many.
+constexpr double kMostGrey = 0.05;
+constexpr int kBlack = 32, kWhite = 223;
+
+double grey_share(const Image& picture) {
+  const auto pixels = static_cast<std::ptrdiff_t>(picture.width()) * picture.height();
+  const std::uint8_t* first = picture.row(0);
+  return static_cast<double>(std::count_if(first, first + pixels, [](int grey) { return grey > kBlack && grey < kWhite; })) /
+         static_cast<double>(pixels);
+}
 
 /// A list of lists of `count` finite numbers.
 std::vector<std::vector<double>> read_shapes(YamlReader& yaml, const YAML::Node& map, const std::string& field, std::size_t count,
@@ -53,8 +63,11 @@ void hide_picture(YamlReader& yaml, const YAML::Node& map, const ReadBeside& rea
     return yaml.complain(map, "mask",
                          fmt::format("{} has {} x {} pixels, the camera {} x {}", name, picture->width(), picture->height(),
                                      seen.width(), seen.height()));
+  if (grey_share(*picture) > kMostGrey)
+    return yaml.complain(
+        map, "mask", fmt::format("{} is no mask: {:.0f} % of it is neither black nor white", name, 100 * grey_share(*picture)));
   if (Mask(*picture).rectangles().size() > kMostShapes)
-    return yaml.complain(map, "mask", fmt::format("{} is a picture, not a mask: it has too many separate dark parts", name));
+    return yaml.complain(map, "mask", fmt::format("{} is no mask: it has more than {} separate parts", name, kMostShapes));
   seen = *picture;
 }
 
