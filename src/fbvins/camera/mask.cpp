@@ -62,8 +62,8 @@ bool Mask::hides(const Vec2& pixel, double margin_px) const {
 }
 
 bool Mask::hides_all(int x0, int y0, int x1, int y1, double margin_px) const {
-  for (int y = y0; y < y1; ++y)
-    for (int x = x0; x < x1; ++x)
+  for (int y = std::max(y0, 0); y < std::min(y1, height_); ++y)
+    for (int x = std::max(x0, 0); x < std::min(x1, width_); ++x)
       if (distance(x, y) > margin_px) return false;
   return true;
 }

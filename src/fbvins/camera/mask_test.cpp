@@ -82,6 +82,8 @@ TEST(Mask, KnowsCellsOfWhichNothingIsLeft) {
   EXPECT_FALSE(mask.hides_all(0, 0, 21, 10));
   EXPECT_TRUE(mask.hides_all(0, 0, 23, 13, 3));
   EXPECT_FALSE(mask.hides_all(0, 0, 24, 13, 3));
+  EXPECT_TRUE(mask.hides_all(-5, -5, 20, 10));
+  EXPECT_TRUE(mask.hides_all(0, 30, 40, 60));  // an image that is taller than the mask has no feature there
 }
 
 TEST(Mask, ItsRectanglesMakeItAgain) {
