@@ -16,6 +16,7 @@
 #include "fbvins/checkup/finding.hpp"
 #include "fbvins/config/config.hpp"
 #include "fbvins/io/dataset.hpp"
+#include "fbvins/types/calibration.hpp"
 
 namespace fbvins::app {
 

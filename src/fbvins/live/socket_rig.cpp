@@ -94,7 +94,10 @@ Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int
   if (Result<void> good = check_figures(rig); !good) return good.error();
   const ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
                        rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
-  const StereoRig out{*left, *right, *T_BC0, *T_BC1, {}, noise, rig.image_rate_hz, rig.time_offset_s};
+  StereoRig out = with_cameras({}, {{*left, *T_BC0}, {*right, T_BC1->cast_frames<B, C0>()}});
+  out.imu_noise = noise;
+  out.image_rate_hz = rig.image_rate_hz;
+  out.time_offset_s = rig.time_offset_s;
   const double baseline_m = out.T_C1C0().p.norm();
   if (!(baseline_m > kSmallestBaseline_m && baseline_m < kLargestBaseline_m))
     return malformed(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
