@@ -224,8 +224,10 @@ const Refused kRefused[] = {
        });
      },
      "/mav0/cam1/data.csv: no stamp lies within 3 ms of one of cam0's"},
-    {"CalibrationOfAnotherSize", [](Files& f) { replace(f["cam1/sensor.yaml"], "[64, 48]", "[32, 24]"); },
-     "/mav0/cam1/data/1600000000000000123.png: 64 x 48 pixels where the calibration says 32 x 24 (none of 8 right images tried can be used)"},
+    {"CalibrationOfAnotherSize", [](Files& f) { replace(f["cam1/sensor.yaml"], "[64, 48]", "[60, 44]"); },
+     "/mav0/cam1/data/1600000000000000123.png: 64 x 48 pixels where the calibration says 60 x 44 (none of 8 right images tried can be used)"},
+    {"CalibrationOfHalfTheSize", [](Files& f) { replace(f["cam1/sensor.yaml"], "[64, 48]", "[32, 24]"); },
+     "/mav0/cam1/sensor.yaml:14: intrinsics: the principal point (31.5, 23.5) lies outside the middle third of an image of 32 x 24: is the calibration that of images twice as large?"},
     {"NoImageCanBeRead",
      [](Files& f) {
        for (int i = 0; i < kToyFrames; ++i) f[toy_image(0, i)] = "this is no image";
