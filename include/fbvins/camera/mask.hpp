@@ -40,7 +40,7 @@ class Mask {
   int height() const { return height_; }
   /// Whether a hidden pixel lies at most so far away, in x and in y: a square patch of twice that side would show it.
   bool hides(const Vec2& pixel, double margin_px = 0) const;
-  /// Whether no feature may lie in columns x0 to x1 - 1 of rows y0 to y1 - 1, which are within the image.
+  /// Whether that is so of every pixel of columns x0 to x1 - 1 and rows y0 to y1 - 1 that is in the image.
   bool hides_all(int x0, int y0, int x1, int y1, double margin_px = 0) const;
   double hidden_share() const;
   /// 0 where hidden, 255 elsewhere.

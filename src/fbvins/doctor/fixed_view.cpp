@@ -12,11 +12,13 @@ namespace {
 /// Motion of the scene from one view to the next, and views at most: 17 MB of two VGA cameras.
 constexpr double kStep_px = 16;
 constexpr std::size_t kMostViews = 96;
-/// Turn of the rig between two views from which even what is far away, or ahead, has moved in the image.
-constexpr double kTurned_px = 8;
-/// Motion across an edge after which another one lies there.
-constexpr double kAcross_px = 8;
-constexpr int kFewestPairs = 8;
+/// Views are compared with the one so many before: an odd number, so that of a rig that swings two different ones meet.
+constexpr std::size_t kApart = 3;
+/// Motion across an edge after which another one lies there: of the scene, and by the rig's turn alone, which moves what is far
+/// away, or ahead, as well.
+constexpr float kAcross_px = 8, kTurned_px = 8;
+/// Between which the scene moved across an edge; and in the whole recording.
+constexpr int kFewestPairs = 10, kFewestJudged = 20;
 /// Mean gradient of an edge, grey values a pixel of the small image: more than noise and vignetting have.
 constexpr double kEdge = 2;
 /// An edge agrees with its mean where it has this share of its strength: gain and light change.
@@ -47,14 +49,30 @@ Eigen::Vector2f gradient(const Image& image, int x, int y) {
                                   static_cast<float>(b[-1] - a[-1] + 2 * (b[0] - a[0]) + b[1] - a[1]));
 }
 
-/// A view of one camera and the motion that led to it; 0 where it does not count.
+/// A view of one camera, and what happened since the one kApart before; 0 where that is not known.
 struct Look {
   const Image* image;
-  Eigen::Vector2f moved_px;
+  Eigen::Vector2f moved_px = Eigen::Vector2f::Zero();
+  Eigen::Vector3f turned_rad = Eigen::Vector3f::Zero();  ///< of the camera, in its frame
+};
+
+/// One camera's looks, and its pinhole in the small images.
+struct Looks {
+  std::vector<Look> all;
+  float focal_px = 1;
+  Eigen::Vector2f centre_px = Eigen::Vector2f::Zero();
+
+  /// Motion of a far point at a pixel of the small image by a small turn, px of the camera.
+  Eigen::Vector2f motion_px(int x, int y, const Eigen::Vector3f& turned_rad) const {
+    const float u = (static_cast<float>(x) - centre_px.x()) / focal_px, v = (static_cast<float>(y) - centre_px.y()) / focal_px;
+    const float a = turned_rad.x(), b = turned_rad.y(), c = turned_rad.z();
+    return 2 * focal_px * Eigen::Vector2f(u * v * a - (1 + u * u) * b + v * c, (1 + v * v) * a - u * v * b - u * c);
+  }
 };
 
 /// Whether an edge at the pixel stays while the scene moves across it.
-bool stays(const std::vector<Look>& looks, int x, int y, std::vector<Eigen::Vector2f>& gradients) {
+bool stays(const Looks& of, int x, int y, std::vector<Eigen::Vector2f>& gradients) {
+  const std::vector<Look>& looks = of.all;
   Eigen::Vector2f mean = Eigen::Vector2f::Zero();
   for (std::size_t i = 0; i < looks.size(); ++i) mean += gradients[i] = gradient(*looks[i].image, x, y);
   mean /= static_cast<float>(looks.size());
@@ -62,12 +80,14 @@ bool stays(const std::vector<Look>& looks, int x, int y, std::vector<Eigen::Vect
   if (strength < kEdge) return false;
   const Eigen::Vector2f across = mean / strength;
   const auto there = [&](std::size_t i) { return gradients[i].dot(across) > kStrength * strength; };
-  int pairs = 0, stayed = 0, present = there(0);
-  for (std::size_t i = 1; i < looks.size(); ++i) {
+  int pairs = 0, stayed = 0, present = 0;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
     present += there(i);
-    if (std::abs(looks[i].moved_px.dot(across)) < kAcross_px) continue;
+    if (i < kApart || std::abs(looks[i].moved_px.dot(across)) < kAcross_px ||
+        std::abs(of.motion_px(x, y, looks[i].turned_rad).dot(across)) < kTurned_px)
+      continue;
     ++pairs;
-    stayed += there(i - 1) && there(i);
+    stayed += there(i - kApart) && there(i);
   }
   return pairs >= kFewestPairs && stayed >= kMostlyThere * pairs && present >= kMostlyThere * static_cast<double>(looks.size());
 }
@@ -113,10 +133,10 @@ void drop_small(Image& seen, int fewest) {
 }
 
 /// What stays, black, in the small image.
-Image fixed_parts(const std::vector<Look>& looks) {
-  const int width = looks.front().image->width(), height = looks.front().image->height();
+Image fixed_parts(const Looks& looks) {
+  const int width = looks.all.front().image->width(), height = looks.all.front().image->height();
   Image seen(width, height, 255);
-  std::vector<Eigen::Vector2f> gradients(looks.size());
+  std::vector<Eigen::Vector2f> gradients(looks.all.size());
   for (int y = 1; y + 1 < height; ++y)
     for (int x = 1; x + 1 < width; ++x)
       if (stays(looks, x, y, gradients)) seen.at(x, y) = 0;
@@ -126,8 +146,7 @@ Image fixed_parts(const std::vector<Look>& looks) {
   return grown(seen, kSkirt_px);
 }
 
-void judge(FixedInView& out, std::size_t side, const std::vector<Look>& looks, const Camera& camera) {
-  if (looks.empty()) return;
+void judge(FixedInView& out, std::size_t side, const Looks& looks, const Camera& camera) {
   const Image small = fixed_parts(looks);
   const Image before = camera.mask() ? camera.mask()->image() : Image(camera.width(), camera.height(), 255);
   Image seen = before;
@@ -174,22 +193,35 @@ void ViewSampler::add(Time t, const Vec2& moved_px, const Pyramid& left, const P
   stride_ *= 2;
 }
 
-bool FixedInView::judged() const { return pairs >= kFewestPairs; }
+bool FixedInView::judged() const { return pairs >= kFewestJudged; }
 
 FixedInView find_fixed(const Evidence& evidence, const ImuSeries& imu) {
   FixedInView out;
-  std::array<std::vector<Look>, 2> looks;
-  const double focal_px = evidence.rig.left.focal_px();
-  for (std::size_t i = 0; i < evidence.views.size(); ++i) {
-    const SmallView& view = evidence.views[i];
-    if (!view.left || !view.right) continue;
+  std::array<Looks, 2> looks;
+  for (int side = 0; side < 2; ++side) {
+    const auto [fx, fy, cx, cy] = evidence.rig.camera(side).intrinsics();
+    looks[static_cast<std::size_t>(side)].focal_px = static_cast<float>(0.25 * (fx + fy));
+    looks[static_cast<std::size_t>(side)].centre_px = Eigen::Vector2d(0.5 * cx, 0.5 * cy).cast<float>();
+  }
+  std::vector<const SmallView*> views;
+  for (const SmallView& view : evidence.views)
+    if (view.left && view.right) views.push_back(&view);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    Vec2 moved_px = Vec2::Zero();
+    Vec3 turned_rad = Vec3::Zero();
+    bool known = i >= kApart && imu.covers(views[i - kApart]->t, views[i]->t);
+    for (std::size_t k = i - kApart + 1; known && k <= i; ++k) {
+      known = !views[k]->moved_px.isZero();
+      moved_px += views[k]->moved_px;
+    }
     // People who walk past a rig at rest move in the image, too.
-    const bool turned = i > 0 && imu.covers(evidence.views[i - 1].t, view.t) &&
-                        focal_px * imu.turned(evidence.views[i - 1].t, view.t).norm() > kTurned_px;
-    const Eigen::Vector2f moved_px = turned ? Eigen::Vector2f(view.moved_px.cast<float>()) : Eigen::Vector2f::Zero();
-    out.pairs += moved_px.norm() > kAcross_px;
-    looks[0].push_back({view.left.get(), moved_px});
-    looks[1].push_back({view.right.get(), moved_px});
+    if (known) turned_rad = imu.turned(views[i - kApart]->t, views[i]->t);
+    else moved_px.setZero();
+    out.pairs += moved_px.norm() > kAcross_px && evidence.rig.left.focal_px() * turned_rad.norm() > kTurned_px;
+    for (int side = 0; side < 2; ++side)
+      looks[static_cast<std::size_t>(side)].all.push_back(
+          {(side == 0 ? views[i]->left : views[i]->right).get(), moved_px.cast<float>(),
+           Vec3(evidence.rig.T_BC(side).q.conjugate() * turned_rad).cast<float>()});
   }
   if (!out.judged()) return out;
   judge(out, 0, looks[0], evidence.rig.left);

@@ -12,7 +12,7 @@
 namespace fbvins {
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240, kViews = 24;
+constexpr int kWidth = 320, kHeight = 240, kViews = 28;
 constexpr double kFocal_px = 250, kApart_s = 0.5;
 
 StereoRig rig() {
@@ -26,13 +26,14 @@ StereoRig rig() {
 const MaskRectangle kBar{140, 150, 40, 90};
 Vec2 where(int view) { return Vec2(60 * std::sin(1.9 * view), 40 * std::cos(2.7 * view)); }
 
-/// Readings of a rig that swings by 0.1 rad from view to view.
+/// Readings of a rig that swings by 0.1 rad from view to view, about two axes.
 std::vector<ImuSample> swinging(bool swings) {
   std::vector<ImuSample> imu;
   for (int i = 0; i < 200 * kViews * kApart_s + 200; ++i) {
     const double t = 0.005 * i;
-    const double rate = swings ? (static_cast<int>(t / kApart_s + 0.5) % 2 == 0 ? 0.2 : -0.2) : 0.0;
-    imu.push_back({Time{} + Duration::from_seconds(t), Vec3(0, rate, 0), Vec3(0, 0, 9.81)});
+    const int view = static_cast<int>(t / kApart_s + 0.5);
+    const Vec3 rate = swings ? Vec3(view % 4 < 2 ? 0.15 : -0.15, view % 2 == 0 ? 0.2 : -0.2, 0) : Vec3::Zero();
+    imu.push_back({Time{} + Duration::from_seconds(t), rate, Vec3(0, 0, 9.81)});
   }
   return imu;
 }
