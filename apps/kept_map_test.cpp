@@ -134,7 +134,8 @@ class MakeKeptMap : public ::testing::Test {
 
 TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
   std::ofstream(file) << "rubbish";
-  MapArguments arguments{.load = file, .save = file};
+  MapArguments arguments;
+  arguments.load = arguments.save = file;
   const auto map = make_kept_map(arguments, rig(), {});
   ASSERT_TRUE(map) << map.error().message;
   EXPECT_EQ((*map)->keyframes(), 0);
@@ -144,7 +145,8 @@ TEST_F(MakeKeptMap, ADamagedFileIsSetAsideAndTheFlightKeepsANewMap) {
 }
 
 TEST_F(MakeKeptMap, WithoutAFolderTheFlightHasAMapAndKeepsNone) {
-  MapArguments arguments{.save = folder + "/unplugged/flat.fbm"};
+  MapArguments arguments;
+  arguments.save = folder + "/unplugged/flat.fbm";
   const auto map = make_kept_map(arguments, rig(), {});
   ASSERT_TRUE(map) << map.error().message;
   EXPECT_TRUE(*map);

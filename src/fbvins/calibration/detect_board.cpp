@@ -21,7 +21,7 @@ struct Looked {
   ImageSize size;
   int tags = 0, foreign_tags = 0, twice = 0;
   bool mirrored = false;
-  std::string problem;  ///< it could not be read
+  std::string problem = {};  ///< it could not be read
 };
 
 Looked look(const TakenImage& taken, BoardDetector& detector, bool try_mirrored) {

@@ -37,7 +37,7 @@ double wall(double x, double) { return 2 / (1 + 1.7 * (x - 32) / 60); }
 
 TEST(DepthReader, OnATiltedPlaneTheDepthIsThatOfThePixelBetweenTheSamples) {
   const DepthImage image = image_of(wall);
-  for (const Vec2 px : {Vec2(31.4, 20.2), Vec2(40.7, 30.5)}) {
+  for (const Vec2& px : {Vec2(31.4, 20.2), Vec2(40.7, 30.5)}) {
     const auto depth = reader().at(image, px);
     ASSERT_TRUE(depth);
     EXPECT_NEAR(1 / depth->value, wall(px.x(), px.y()), 0.001);
@@ -69,7 +69,7 @@ TEST(DepthReader, SaysNothingInHolesOutOfRangeAndAtTheBorder) {
   EXPECT_FALSE(reader().at(image, Vec2(16, 24)));
   EXPECT_FALSE(reader().at(image, Vec2(48, 24)));
   EXPECT_TRUE(reader().at(image, Vec2(48, 40)));
-  for (const Vec2 px : {Vec2(1, 40), Vec2(62, 40), Vec2(48, 46), Vec2(-5, 40), Vec2(48, 1000)})
+  for (const Vec2& px : {Vec2(1, 40), Vec2(62, 40), Vec2(48, 46), Vec2(-5, 40), Vec2(48, 1000)})
     EXPECT_FALSE(reader().at(image, px));
 }
 

@@ -60,8 +60,8 @@ TEST(KeyframePolicy, AtRestOneInTenSeconds) {
     frame.features = view.features;
     const Odometry o = estimator.process(frame).odometry;
     keyframes += o.stats.keyframe, at_rest += o.stats.standstill;
-    for (const Frame& frame : estimator.window().frames())
-      if (frame.imu) longest_s = std::max(longest_s, frame.imu->dt_s());
+    for (const Frame& f : estimator.window().frames())
+      if (f.imu) longest_s = std::max(longest_s, f.imu->dt_s());
   }
   ASSERT_GT(at_rest, 800);
   EXPECT_GE(keyframes, 3);

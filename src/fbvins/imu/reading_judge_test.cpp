@@ -60,7 +60,7 @@ TEST(ReadingJudge, WhatItAcceptedItAcceptsAgain) {
   ReadingJudge first, second;
   for (int t = 0; t < 5000; t += 5) {
     const ImuSample sample = reading(t % 70 == 0 ? t - 20 : t, t < 2000 ? 0 : (t / 15) % 3);
-    if (first.accepts(sample)) EXPECT_TRUE(second.accepts(sample)) << t;
+    EXPECT_TRUE(!first.accepts(sample) || second.accepts(sample)) << t;
   }
   EXPECT_GT(first.counts().repeated, 0);
   EXPECT_GT(first.counts().backward, 0);

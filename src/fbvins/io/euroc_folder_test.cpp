@@ -90,7 +90,9 @@ TEST(EurocFolder, OfFourCamerasTheFirstTwoCanBeUsed) {
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ((*data)->rig().camera_count(), 2);
   while (auto event = (*data)->next())
-    if (auto* frame = std::get_if<StereoFrame>(&*event)) EXPECT_TRUE(frame->more.empty());
+    if (auto* frame = std::get_if<StereoFrame>(&*event)) {
+      EXPECT_TRUE(frame->more.empty());
+    }
 }
 
 std::shared_ptr<const DepthImage> depths(int shift) {

@@ -127,7 +127,7 @@ TEST(ClockGuard, LateOrWrongStampsAreNoLeap) {
         const bool wrong = stream == c.stream && c.late(index);
         const std::optional<Time> t = guard.mend(stream, at(1000 + s - (wrong ? c.late_s : 0)), at(50.001 + s));
         late += wrong, refused += !t;
-        if (t && !wrong) EXPECT_EQ(*t, at(1000 + s)) << c.what;
+        EXPECT_TRUE(!t || wrong || *t == at(1000 + s)) << c.what;
       };
       give(ClockGuard::imu, k);
       if (k % 10 == 0) give(ClockGuard::camera, k / 10);

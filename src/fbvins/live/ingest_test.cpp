@@ -107,7 +107,7 @@ TEST(Ingest, AReadingOrAnImageThatIsLateChangesNoOtherStamp) {
     if (t % 50 != 0) continue;
     f.now = ms(1000 + t);
     f.ingest.push(StereoFrame{ms(t == 2000 ? t - 150 : t), image(static_cast<std::uint8_t>(t / 50)), image(255)});
-    if (const auto newest = f.ingest.arrivals().newest; t != 2000) EXPECT_EQ(newest, ms(t));
+    EXPECT_TRUE(t == 2000 || f.ingest.arrivals().newest == ms(t));
     ++images;
   }
   const LiveCounts counts = f.ingest.counts();

@@ -73,11 +73,12 @@ TEST(PlaceExtractor, TakesDepthsFromTheDepthImage) {
   int with_depth = 0, without = 0;
   for (const PlaceFeature& f : extractor.extract(frame, Mat3::Identity()).features) {
     const double row = 240 + test_room::kFocal * f.y;
-    if (row < 237) EXPECT_FALSE(f.has_depth());
+    EXPECT_FALSE(row < 237 && f.has_depth());
     if (row < 243) continue;
     with_depth += f.has_depth(), without += !f.has_depth();
-    if (f.has_depth()) EXPECT_NEAR(f.inverse_depth, 1.0 / 3, 1e-4);
-    if (f.has_depth()) EXPECT_NEAR(f.sigma_inverse_depth, 0.004, 1e-4);
+    if (!f.has_depth()) continue;
+    EXPECT_NEAR(f.inverse_depth, 1.0 / 3, 1e-4);
+    EXPECT_NEAR(f.sigma_inverse_depth, 0.004, 1e-4);
   }
   EXPECT_GT(with_depth, 30);
   EXPECT_LT(without, with_depth / 4);  // at the edges
