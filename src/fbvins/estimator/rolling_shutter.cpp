@@ -50,6 +50,7 @@ ShutterMotion turning_at_end(const ImuSegment& readings, const Vec3& gyro_bias_r
 
 RollingShutter::RollingShutter(const StereoRig& rig) : line_delay_s_(rig.line_delay_s) {
   for (int i = 0; i < rig.camera_count(); ++i) heights_px_.push_back(rig.camera(i).height());
+  if (rig.depth) heights_px_.push_back(rig.left.height());  // a depth has its pixel's row
 }
 
 void RollingShutter::bring_to_stamp(const ShutterMotion& motion, const Calibration& calibration, const InverseDepth* known,

@@ -63,6 +63,25 @@ TEST(RollingShutter, ObservationsOfAMovingBodyAreBroughtToTheStamp) {
   }
 }
 
+/// The camera in which depths are seen has the rows of the left one.
+TEST(RollingShutter, DepthsAreBroughtToTheStamp) {
+  StereoRig rig = with_depth({}, {});
+  rig.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480);
+  rig.line_delay_s = kLineDelay_s;
+  const RollingShutter shutter(rig);
+  const Calibration c{rig.T_BC0, rig.T_BC1, 0.0};
+  const ShutterMotion motion{Vec3(0.8, -1.5, 2), Vec3::Zero(), Vec3(0, 0, 1)};
+  const double after_s = (460 - 240) * kLineDelay_s;
+  const Vec3 p_B(0.8, -0.9, 3), at_row_B = body_at(motion, after_s).inverse() * p_B;
+  TrackedFeature f;
+  f.left = Observation{Vec2(300, 460), at_row_B.head<2>() / at_row_B.z(), Mat2::Identity()};
+  f.right = Observation{Vec2(300, 460), f.left->normalised - Vec2(kDepthBaseline_m / at_row_B.z(), 0), Mat2::Identity()};
+  std::vector<TrackedFeature> features{f};
+  shutter.bring_to_stamp(motion, c, nullptr, features);
+  EXPECT_LT((features[0].left->normalised - p_B.head<2>() / p_B.z()).norm(), 1e-4);
+  EXPECT_NEAR(kDepthBaseline_m / (features[0].left->normalised - features[0].right->normalised).x(), 3, 0.001);
+}
+
 TEST(RollingShutter, ATurnNeedsNoDepth) {
   const ShutterMotion motion{Vec3(0.8, -1.5, 2), Vec3::Zero(), Vec3::Zero()};
   const Calibration c = cameras();
