@@ -115,7 +115,7 @@ TEST(LandmarkPrior, JacobiansAreDerivatives) {
   J << analytic.host, analytic.point, analytic.extrinsic;
   const auto check = check_jacobian(
       [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
-        Eigen::VectorXd all = Eigen::VectorXd::Zero(28);
+        Eigen::VectorXd all = Eigen::VectorXd::Zero(29);
         all.segment<6>(0) = d.segment<6>(0);
         all.segment<9>(12) = d.segment<9>(6);
         return residual(s.moved(all));
