@@ -30,8 +30,7 @@ constexpr int kGap_px = 5, kSpeck_px = 1, kSmallest_px = 80;
 constexpr int kSkirt_px = 1;
 /// Of the image: less is nothing to tell, more is a recording that does not move.
 constexpr double kLeastShare = 0.002, kMostShare = 0.6;
-
-/// Distance that a finding keeps from what is hidden already: the edge of a mask that was drawn by hand.
+/// What is found so near to an existing mask is the edge of the same thing, masked by hand a little too small.
 constexpr double kBesideMask_px = 12;
 
 std::shared_ptr<const Image> half_of(const Pyramid& pyramid) {

@@ -10,8 +10,7 @@ namespace {
 constexpr int kStep_px = 20;
 /// Fewer places do not say how the frame lies.
 constexpr std::size_t kFewest = 30;
-/// A place is on a surface of the reference if it is not farther from it than this, and these many sigmas: else something hides
-/// it.
+/// A place farther from the reference's surface than the larger of these is hidden there by something nearer.
 constexpr double kFarthest_m = 0.1, kFarthest_sigma = 5;
 /// What a depth sensor's surfaces are bent by, whatever its noise.
 constexpr double kBent_m = 0.005;

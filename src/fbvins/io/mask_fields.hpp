@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to the readers and writers of calibrations: a camera's mask.
-//   mask: mask.png                                     8 bit, of the images' size, named relative to the calibration; black is
-//   hidden mask_rectangles: [[x, y, width, height], ...]      px; more of the image that is hidden mask_circles: [[x, y, radius],
-//   ...]                px
+// Private to the readers and writers of calibrations: a camera's mask, by any of these keys.
+//
+//   mask: mask.png   8 bit, of the images' size, named relative to the calibration; black is hidden
+//
+//   mask_rectangles: [[x, y, width, height], ...]   px, hidden as well
+//
+//   mask_circles: [[x, y, radius], ...]   px, hidden as well
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A depth sensor that triangulates, with a projector (structured light or active stereo): from exact depths to what it would
-// give. Noise that grows with the square of the distance and is correlated over its matching window; edges that are drawn too
+// give. Noise that grows with the square of the distance and is correlated over its matching window; edges that are too
 // wide; shadows beside near things, that its second eye does not see into; holes; a range. The same input gives the same output.
 // One owner.
 //
@@ -30,7 +30,7 @@ struct DepthModelOptions {
     v("noise_at_1m_m", noise_at_1m_m, "m", "standard deviation at one metre; it grows with the square of the distance", 1e-5,
       0.1);
     v("window_px", window_px, "px", "over which the noise is the same", 1.0, 50.0);
-    v("edge_px", edge_px, "px", "by which near things are drawn too wide, at most", 0.0, 20.0);
+    v("edge_px", edge_px, "px", "by which near things appear too wide, at most", 0.0, 20.0);
     v("baseline_m", baseline_m, "m", "of the sensor's own eyes: it casts the shadows beside near things", 0.0, 1.0);
     v("hole_share", hole_share, "", "share of the image without depth, in patches", 0.0, 1.0);
     v("nearest_m", nearest_m, "m", "nearest distance", 0.01, 100.0);
