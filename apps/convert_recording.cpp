@@ -42,7 +42,7 @@ struct EurocSink {
   Trajectory<W> odometry;
 
   Result<void> add(const ImuSample& reading) { return readings.push_back(reading), Result<void>{}; }
-  Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t); }
+  Result<void> add(const StereoFrame& frame) { return folder.add(frame, frame.t + frame.offsets.of(1)); }
   Result<void> add_truth(Time, const Pose<W, B>&) { return {}; }
   Result<void> add_odometry(Time t, const Pose<W, B>& T_WB) { return odometry.push_back({t, T_WB}), Result<void>{}; }
   Result<void> finish() {

@@ -14,6 +14,7 @@ RecordingOptions options_of(const RecordingArguments& arguments, const DatasetOp
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
   with.camera = arguments.camera;
+  with.pair_tolerance_ms = arguments.pair_tolerance_ms;
   return {with, arguments.calibration, arguments.imu_calibration, topic(0), topic(1), topic(2)};
 }
 

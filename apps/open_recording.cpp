@@ -80,6 +80,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const RecordingArguments& argume
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
   with.camera = arguments.camera;
+  with.pair_tolerance_ms = arguments.pair_tolerance_ms;
   return open_dataset(arguments.path, with);
 }
 

@@ -28,6 +28,7 @@ struct RecordingArguments {
   std::vector<std::string> topics;     ///< left, right and, if it is not the only one, IMU
   double start_s = 0, duration_s = 0;  ///< DatasetOptions
   std::string camera = "all";          ///< the same
+  double pair_tolerance_ms = DatasetOptions{}.pair_tolerance_ms;
 
   void add_to(CLI::App& command);
 };

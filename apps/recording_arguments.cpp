@@ -23,6 +23,11 @@ void RecordingArguments::add_to(CLI::App& command) {
                   "the cameras that are used: all (default), the first two (both), one of these, or the left "
                   "one with its depth images (depth)")
       ->check(CLI::IsMember({"all", "both", "left", "right", "depth"}));
+  command
+      .add_option("--pair-tolerance", pair_tolerance_ms,
+                  "ms by which the stamps of images that are taken at once may differ; images that are farther apart in all of a "
+                  "recording were taken apart")
+      ->check(CLI::Range(0.0, 1000.0));
   command.add_option("--start", start_s, "seconds to leave out at the start of the recording")->check(CLI::NonNegativeNumber);
   command.add_option("--duration", duration_s, "seconds to use from there, 0 for all")->check(CLI::NonNegativeNumber);
 }

@@ -65,6 +65,7 @@ struct FrameEntry {
   std::optional<std::size_t> imu_before = {};  ///< how many IMU samples come before it; none: stamps decide
   std::vector<std::string> more_files = {};    ///< of the cameras from number 2 on
   std::string depth_file = {};                 ///< of the depth sensor
+  ExposureOffsets offsets = {};                ///< of cameras without a common trigger
 
   bool without_images() const {
     return left_file.empty() && right_file.empty() && std::ranges::all_of(more_files, &std::string::empty);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -68,14 +69,43 @@ struct DepthImage {
   const std::uint16_t* row(int y) const { return mm.data() + static_cast<std::ptrdiff_t>(y) * width; }
 };
 
-/// Images taken at the same instant, of the rig's cameras 0 (left), 1 (right) and from 2 on (more). A camera that delivered
-/// nothing has a null pointer, or is missing at the end of `more`.
+/// Of cameras without a common trigger: how long after the frame's t each of them took its image; before it where negative.
+/// Cameras that are missing at the end took theirs at t.
+class ExposureOffsets {
+ public:
+  ExposureOffsets() = default;
+  explicit ExposureOffsets(std::vector<Duration> of_cameras) : of_cameras_(std::move(of_cameras)) {}
+  Duration of(int camera) const {
+    const auto at = static_cast<std::size_t>(camera);
+    return at < of_cameras_.size() ? of_cameras_[at] : Duration{};
+  }
+  void set(int camera, Duration offset) {
+    const auto at = static_cast<std::size_t>(camera);
+    if (at >= of_cameras_.size()) of_cameras_.resize(at + 1);
+    of_cameras_[at] = offset;
+  }
+  bool all_zero() const { return longest().ns == 0; }
+  /// Of all cameras, without its sign.
+  Duration longest() const {
+    Duration out;
+    for (const Duration d : of_cameras_) out.ns = std::max(out.ns, std::abs(d.ns));
+    return out;
+  }
+  bool operator==(const ExposureOffsets&) const = default;
+
+ private:
+  std::vector<Duration> of_cameras_;
+};
+
+/// Images of the rig's cameras 0 (left), 1 (right) and from 2 on (more), taken at the same instant unless `offsets` says
+/// otherwise. A camera that delivered nothing has a null pointer, or is missing at the end of `more`.
 struct StereoFrame {
   Time t;
   std::shared_ptr<const Image> left;
   std::shared_ptr<const Image> right;
   std::vector<std::shared_ptr<const Image>> more = {};
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
+  ExposureOffsets offsets = {};
 
   std::shared_ptr<const Image> image(int camera) const {
     if (camera < 2) return camera == 0 ? left : right;

@@ -29,7 +29,12 @@ struct Observation {
   /// d(pixel)/d(normalised) at this point, divided by the standard deviation of the pixel position:
   /// weighs a residual in normalised coordinates so that it counts in sigmas of the raw image.
   Mat2 sqrt_information = Mat2::Identity();
-  double rows = 0;  ///< of a rolling shutter, below the middle row, whose time is the stamp; filled by the estimator
+  // Filled by the estimator, where not all is seen at the frame's stamp (docs/derivations/rolling_shutter.md):
+  double rows = 0;              ///< of a rolling shutter, below the middle row, whose time is the camera's stamp
+  double after_s = 0;           ///< when it was seen, after the frame's stamp
+  Vec3 lever_B = Vec3::Zero();  ///< how far from its place at the stamp the camera was then, without the velocity's part, m
+  /// Whole, of a body with this velocity at the stamp, m/s.
+  Vec3 displacement_B(const Vec3& v_B) const { return lever_B + after_s * v_B; }
 };
 
 /// The two cameras of a rig, by number, that a feature may be seen by: the left and the right one of its group.
@@ -87,6 +92,7 @@ struct TrackedFrame {
   FrontendStats stats;
   StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
+  ExposureOffsets offsets = {};                  ///< of the cameras' images; filled by the system
 };
 
 /// A landmark with its last estimated position.

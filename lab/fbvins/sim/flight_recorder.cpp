@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/sim/flight_recorder.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <future>
 
 #include "fbvins/core/rng.hpp"
@@ -90,7 +92,8 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
   rendered.exposure_s = eyes_.front().sensor.exposure_s();
   std::vector<std::future<Image>> others;
   for (std::size_t i = 1; i < eyes_.size(); ++i)
-    others.push_back(std::async(std::launch::async, [this, i, t_s, frame] { return render_eye(eyes_[i], t_s, frame); }));
+    others.push_back(std::async(std::launch::async,
+                                [this, i, t_s, frame] { return render_eye(eyes_[i], t_s + offset(i, t_s).seconds(), frame); }));
   rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
   if (with_depth) eyes_.front().renderer.depth(rendered.depth_left_m);
   if (depth_) {
@@ -99,12 +102,21 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
     eyes_.front().renderer.depth(exact_m);
     rendered.frame.depth = std::make_shared<const DepthImage>(depth_->measure(exact_m, frame));
   }
+  for (std::size_t i = 1; i < eyes_.size(); ++i)
+    if (const Duration d = offset(i, t_s); d.ns != 0) rendered.frame.offsets.set(static_cast<int>(i), d);
   for (std::size_t i = 0; i < others.size(); ++i) {
     auto image = std::make_shared<const Image>(others[i].get());
     if (i == 0) rendered.frame.right = std::move(image);
     else rendered.frame.more.push_back(std::move(image));
   }
   return rendered;
+}
+
+/// Of a camera without a common trigger, less than an interval before the first one.
+Duration FlightRecorder::offset(std::size_t camera, double t_s) const {
+  const double before_s = 1e-3 * options_.camera.untriggered_ms + 1e-6 * options_.camera.untriggered_drift_us_per_s * t_s;
+  const double offset_s = -std::fmod(static_cast<double>(camera) * before_s, 1 / options_.image_rate_hz);
+  return Duration::from_seconds(std::max(offset_s, -t_s));
 }
 
 Duration FlightRecorder::right_jitter(std::int64_t frame) const {

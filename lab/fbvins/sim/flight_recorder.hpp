@@ -40,6 +40,7 @@ class FlightRecorder {
   };
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
   Image render_eye(Eye& eye, double t_s, std::int64_t frame);
+  Duration offset(std::size_t camera, double t_s) const;
 
   SimulationOptions options_;
   BodyMotion motion_;

@@ -56,6 +56,11 @@ constexpr Preset kPresets[] = {
        fast(o);
        o.camera.line_delay_us = 20e3 / 480;
      }},
+    {"untriggered",  // the right camera half an interval before the left one, and earlier from image to image
+     [](SimulationOptions& o) {
+       o.camera.untriggered_ms = 25;
+       o.camera.untriggered_drift_us_per_s = 100;
+     }},
     {"handheld", [](SimulationOptions& o) { o.flight.kind = "handheld"; }},
     {"takeoff",
      [](SimulationOptions& o) {

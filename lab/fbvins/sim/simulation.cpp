@@ -112,7 +112,7 @@ RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t
                         Time start) {
   RenderedFrame rendered = recorder.render(t_s, frame, with_depth);
   rendered.frame.t = start + Duration::from_seconds(t_s) - Duration::from_seconds(rig.time_offset_s);
-  rendered.right_stamp = rendered.frame.t + recorder.right_jitter(frame);
+  rendered.right_stamp = rendered.frame.t + rendered.frame.offsets.of(1) + recorder.right_jitter(frame);
   return rendered;
 }
 

@@ -56,6 +56,7 @@ class BagLoader : public FrameLoader {
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
+    out.frame.offsets = entry.offsets;
     out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
     out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
     return out;
@@ -178,7 +179,9 @@ class BagRecording {
     if (paired.left_only == out_.info.left.listed)
       return Error{ErrorCode::malformed, fmt::format("no stamp on {} lies within {} ms of one on {}", topics_.right,
                                                      options_.dataset.pair_tolerance_ms, topics_.left)};
-    if (paired.left_only + paired.right_only > 0)
+    if (paired.untriggered)
+      out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.dataset.pair_tolerance_ms));
+    else if (paired.left_only + paired.right_only > 0)
       out_.info.warnings.push_back(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only,
                                                paired.right_only, options_.dataset.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);

@@ -327,7 +327,7 @@ Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
   if (frame.left)
     if (Result<void> done = state_->add(kLeft, frame.t, image_message(frame.t, kLeftFrame, *frame.left)); !done) return done;
   if (!frame.right) return {};
-  return state_->add(kRight, frame.t, image_message(frame.t, kRightFrame, *frame.right));
+  return state_->add(kRight, frame.t, image_message(frame.t + frame.offsets.of(1), kRightFrame, *frame.right));
 }
 
 Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {

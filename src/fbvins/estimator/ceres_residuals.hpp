@@ -93,7 +93,7 @@ struct Reprojection : ResidualOf<Reprojection> {
   void fill(T const* const* x, T* r) const {
     const T* c = x[1];
     const Pose<B, C0> T_BC = calibration.T_BC(o.camera);
-    const Vec3 t_BC = T_BC.p;
+    const Vec3 t_BC = T_BC.p + o.displacement_B;
     const Quat q_BC = T_BC.q;
     const T* d = c + 6 * o.camera;
     const Vec<T> t = t_BC.cast<T>() + Eigen::Map<const Vec<T>>(d);

@@ -9,10 +9,10 @@
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
+#include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/landmark_geometry.hpp"
 #include "fbvins/estimator/mono_start.hpp"
-#include "fbvins/estimator/rolling_shutter.hpp"
 #include "fbvins/estimator/window_views.hpp"
 #include "fbvins/imu/propagation.hpp"
 #include "fbvins/types/protection.hpp"
@@ -80,7 +80,7 @@ Estimator::Estimator(const StereoRig& rig, const EstimatorOptions& options, cons
       calibration_(calibrated_),
       scale_sigma_(scale_sigma_of(rig)),
       one_camera_(!has_stereo(rig)),
-      shutter_(rig),
+      exposures_(rig),
       surfaces_(rig),
       initialiser_(options, imu_noise_, before, one_camera_),
       keyframe_policy_(options.keyframes, rig.left.focal_px()),
@@ -104,9 +104,9 @@ Vec3 Estimator::gravity_G() const { return window_.tilt().gravity_G(options_.gra
 Estimate Estimator::process(const TrackedFrame& tracked) {
   Estimate out;
   const TrackedFrame& whole = contract_.enforced(tracked);
-  const bool by_rows = !shutter_.global() || options_.estimate_line_delay;
-  if (by_rows) at_stamp_ = at_stamp(whole);
-  const TrackedFrame& frame = by_rows ? at_stamp_ : whole;
+  const bool as_it_is = exposures_.at_stamp(whole) && !options_.estimate_line_delay;
+  if (!as_it_is) referred_ = refer_to_stamp(whole);
+  const TrackedFrame& frame = as_it_is ? whole : referred_;
   const Duration rest = rest_.update(frame);
   carried_up_.carry(frame.t, frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
@@ -200,24 +200,17 @@ void Estimator::open_window(const InitialSolution& start) {
   covariances_.reset();
 }
 
-/// All that follows sees the observations of a rolling shutter as at the image's stamp (S1-S4).
-TrackedFrame Estimator::at_stamp(const TrackedFrame& frame) const {
+/// From here on each observation knows when and from where it was seen (S1-S4).
+TrackedFrame Estimator::refer_to_stamp(const TrackedFrame& frame) const {
   TrackedFrame out = frame;
-  if (!running_) {
-    shutter_.bring_to_stamp(turning_at_end(frame.imu, Vec3::Zero()), calibration_, nullptr, out.features);
-    return out;
+  std::optional<Vec3> gravity_B;
+  ImuBias bias;
+  if (running_) {
+    const NavState<G> state = predict(frame, frame.imu).state;
+    gravity_B = state.T_FB.q.conjugate() * gravity_G();
+    bias = state.bias;
   }
-  const NavState<G> state = predict(frame, frame.imu).state;
-  ShutterMotion motion = turning_at_end(frame.imu, state.bias.gyro_radps);
-  motion.v_B = state.T_FB.q.conjugate() * state.v_FB;
-  const InverseDepth known = [&](const TrackedFeature& feature, bool right) -> std::optional<double> {
-    const std::vector<PointSighting> seen = sightings_of(window_, {feature}, calibration_);
-    if (seen.empty()) return std::nullopt;
-    const Pose<G, C0> T_GC = state.T_FB * calibration_.T_BC(feature.cameras[right]);
-    const double depth_m = (T_GC.inverse() * seen.front().p_G).z();
-    return depth_m > kNearestLandmark_m ? std::optional(1 / depth_m) : std::nullopt;
-  };
-  shutter_.bring_to_stamp(motion, calibration_, &known, out.features);
+  exposures_.refer_to_stamp(ExposureMotion(frame.imu, bias, gravity_B), calibration_, out);
   return out;
 }
 
@@ -277,8 +270,8 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     monitor_.pass(dt);
     return frame.features;
   }
-  const Monitor::Verdict verdict =
-      monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_, predicted.state.T_FB, dt);
+  const Monitor::Verdict verdict = monitor_.examine(sightings_of(window_, frame.features, calibration_), calibration_,
+                                                    predicted.state.T_FB, dt, predicted.state.v_B());
   if (verdict.imu_contradicts) {
     imu.noise.gyro = std::max(imu.noise.gyro, verdict.noise.gyro);
     imu.noise.accel = std::max(imu.noise.accel, verdict.noise.accel);

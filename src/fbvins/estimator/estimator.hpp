@@ -12,6 +12,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/carried_up.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
 #include "fbvins/estimator/health_judge.hpp"
 #include "fbvins/estimator/initialiser.hpp"
@@ -19,7 +20,6 @@
 #include "fbvins/estimator/monitor.hpp"
 #include "fbvins/estimator/published_pose.hpp"
 #include "fbvins/estimator/rest_detector.hpp"
-#include "fbvins/estimator/rolling_shutter.hpp"
 #include "fbvins/estimator/sliding_window.hpp"
 #include "fbvins/estimator/surface_view.hpp"
 #include "fbvins/estimator/window_solver.hpp"
@@ -57,7 +57,7 @@ class Estimator {
   void initialise(const TrackedFrame& frame, Duration rest, Estimate& out);
   void open_window(const InitialSolution& start);
   void track(const TrackedFrame& frame, Duration rest, Estimate& out);
-  TrackedFrame at_stamp(const TrackedFrame& frame) const;
+  TrackedFrame refer_to_stamp(const TrackedFrame& frame) const;
   Frame predict(const TrackedFrame& frame, const ImuSegment& imu) const;
   std::vector<TrackedFeature> examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted);
   const WindowSolution& solve(Odometry& out, const LmOptions& lm);
@@ -88,9 +88,9 @@ class Estimator {
   Calibration calibrated_, calibration_;  ///< as given, and as estimated
   double scale_sigma_;                    ///< standard deviation of the calibrated scale (W21)
   bool one_camera_;                       ///< the rig has one only
-  RollingShutter shutter_;
+  Exposures exposures_;
   SurfaceFinder surfaces_;
-  TrackedFrame at_stamp_;  ///< the newest frame of a rolling shutter
+  TrackedFrame referred_;  ///< the newest frame, where not all of it was seen at its stamp
   Initialiser initialiser_;
   RestDetector rest_;
   KeyframePolicy keyframe_policy_;

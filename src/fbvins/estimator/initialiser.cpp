@@ -24,6 +24,9 @@ constexpr int kFrames = 10;
 constexpr double kMinSpacing_s = 0.045;
 /// With one camera, of which scale and gravity have to be told apart by the accelerations meanwhile.
 constexpr double kMinSpacingOneCamera_s = 0.25;
+/// Images of a pair that are taken farther apart show no structure while the velocity is not known: the motion is found like with
+/// one camera.
+constexpr Duration kMostApart = Duration{2'000'000};
 /// Stereo features, or features of the one camera, needed in each of them. At rest motion is known without them, and fewer are
 /// enough: the floor in front of a landed drone shows few.
 constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
@@ -74,10 +77,14 @@ Initialiser::Initialiser(const EstimatorOptions& options, const ImuNoise& noise,
       one_camera_(one_camera),
       structure_(options, WindowWeights{.estimate_tilt = false}) {}
 
+/// Whether structure cannot be seen in one frame of a body in motion.
+bool Initialiser::by_one_camera(const TrackedFrame& frame) const { return one_camera_ || frame.offsets.longest() > kMostApart; }
+
 /// By which the motion can be found.
-int Initialiser::usable_features(const TrackedFrame& frame) const {
+int Initialiser::usable_features(const TrackedFrame& frame, bool at_rest) const {
+  const bool left_alone = at_rest ? one_camera_ : by_one_camera(frame);
   return static_cast<int>(
-      std::ranges::count_if(frame.features, [&](const TrackedFeature& f) { return f.left && (one_camera_ || f.right); }));
+      std::ranges::count_if(frame.features, [&](const TrackedFeature& f) { return f.left && (left_alone || f.right); }));
 }
 
 std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, Duration rest, const Calibration& calibration,
@@ -85,12 +92,12 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
-  if (usable_features(frame) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
+  if (usable_features(frame, at_rest) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
     reason_ = HealthReason::too_few_features;
     reset();
     if (!broken) return std::nullopt;
   }
-  remember(frame);
+  remember(frame, at_rest);
   std::optional<InitialSolution> start;
   const ImuBiasEstimate biases = before_ ? aged(*before_, frame.t, noise_) : unknown_biases();
   if (at_rest && one_camera_) reason_ = HealthReason::waiting_for_motion_or_rest;  // rest shows no scale
@@ -102,14 +109,15 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   return start;
 }
 
-void Initialiser::remember(const TrackedFrame& frame) {
+void Initialiser::remember(const TrackedFrame& frame, bool at_rest) {
   if (!frame.imu.empty()) readings_.push_back(frame.imu);
   while (readings_.size() > 1 && (frame.t - readings_[1].samples.front().t).seconds() >= RestOptions{}.min_window_s)
     readings_.pop_front();
   // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
   const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
-  const double spacing_s = one_camera_ ? kMinSpacingOneCamera_s : kMinSpacing_s;
+  const bool slowly = one_camera_ || (by_one_camera(frame) && !at_rest);
+  const double spacing_s = slowly ? kMinSpacingOneCamera_s : kMinSpacing_s;
   if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < spacing_s) {
     ImuSegment joined = std::move(frames_.back().imu);
     joined.samples.insert(joined.samples.end(), frame.imu.samples.begin() + 1, frame.imu.samples.end());
@@ -139,7 +147,7 @@ std::optional<InitialSolution> Initialiser::start_from_rest(const ImuBiasEstimat
 }
 
 std::optional<InitialSolution> Initialiser::start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration) {
-  if (one_camera_) {
+  if (by_one_camera(frames_.back())) {
     const std::vector<TrackedFrame> frames(frames_.begin(), frames_.end());
     std::optional<std::vector<NavState<G>>> states =
         start_with_one_camera(frames, calibration.T_BC0, noise_, biases, gravity_mps2_);

@@ -45,8 +45,9 @@ class Initialiser {
   HealthReason reason() const { return reason_; }
 
  private:
-  void remember(const TrackedFrame& frame);
-  int usable_features(const TrackedFrame& frame) const;
+  bool by_one_camera(const TrackedFrame& frame) const;
+  void remember(const TrackedFrame& frame, bool at_rest);
+  int usable_features(const TrackedFrame& frame, bool at_rest) const;
   std::optional<InitialSolution> start_from_rest(const ImuBiasEstimate& biases);
   std::optional<InitialSolution> start_in_motion(const ImuBiasEstimate& biases, const Calibration& calibration);
   bool refine_structure(const Calibration& calibration);

@@ -19,11 +19,13 @@ struct RayInCamera {
   Vec3 a, b;
 };
 
-/// `from`: the host's camera that the ray is of.
-RayInCamera ray_in_camera(const Vec2& ray, int from, const PairGeometry& pair, const CameraGeometry& cameras, int camera) {
+/// `from`: the host's camera that the ray is of. Each camera is displaced from its place at the stamp.
+RayInCamera ray_in_camera(const Vec2& ray, int from, const Vec3& displaced_from_B, const PairGeometry& pair,
+                          const CameraGeometry& cameras, int camera, const Vec3& displaced_B) {
   const Vec3 direction_B = cameras.R_BC[from] * Vec3(ray.x(), ray.y(), 1);
   const Mat3& R_CB = cameras.R_CB[camera];
-  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * cameras.t_BC[from] + pair.t_th - cameras.t_BC[camera])};
+  const Vec3 from_B = cameras.t_BC[from] + displaced_from_B, at_B = cameras.t_BC[camera] + displaced_B;
+  return {R_CB * (pair.R_th * direction_B), R_CB * (pair.R_th * from_B + pair.t_th - at_B)};
 }
 
 /// The landmark in a camera of a frame, times its inverse depth (W2, W3).
@@ -32,7 +34,8 @@ Vec3 scaled_point(const Landmark& landmark, const Frame& target, int camera, con
   const CameraGeometry cameras(calibration);
   PairGeometry pair;
   pair.set(frames.at(landmark.host).state.T_FB, target.state.T_FB);
-  const RayInCamera line = ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.ray_camera(), pair, cameras, camera);
+  const RayInCamera line =
+      ray_in_camera(landmark.alpha_beta_rho.head<2>(), landmark.ray_camera(), Vec3::Zero(), pair, cameras, camera, Vec3::Zero());
   return line.a + landmark.alpha_beta_rho.z() * line.b;
 }
 
@@ -41,19 +44,25 @@ Vec3 scaled_point(const Landmark& landmark, const Frame& target, int camera, con
 bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration& calibration) {
   // Linear in rho: (a + rho b) is parallel to (z, 1) for every observation (W4).
   const CameraGeometry cameras(calibration);
-  const Pose<G, B>& host = frames.at(landmark.host).state.T_FB;
+  const NavState<G>& host = frames.at(landmark.host).state;
   const Sighting& first = landmark.sightings.front();
   const bool from_right = !first.left;
-  const Vec2 ray = from_right ? first.right->normalised : first.left->normalised;
+  const Observation& of_host = from_right ? *first.right : *first.left;
+  const Vec2 ray = of_host.normalised;
   const int from = landmark.cameras[from_right];
+  const Vec3 displaced_from_B = of_host.displacement_B(host.v_B());
   double numerator = 0, information = 0;
   const auto each = [&](auto&& visit) {
     for (const Sighting& s : landmark.sightings) {
       PairGeometry pair;
-      pair.set(host, frames.at(s.frame).state.T_FB);
-      const bool of_host = s.frame == landmark.host;
-      if (s.left && !of_host) visit(ray_in_camera(ray, from, pair, cameras, landmark.cameras.left), *s.left);
-      if (s.right && !(of_host && from_right)) visit(ray_in_camera(ray, from, pair, cameras, landmark.cameras.right), *s.right);
+      const NavState<G>& target = frames.at(s.frame).state;
+      pair.set(host.T_FB, target.T_FB);
+      const auto seen_by = [&](int camera, const Observation& o) {
+        visit(ray_in_camera(ray, from, displaced_from_B, pair, cameras, camera, o.displacement_B(target.v_B())), o);
+      };
+      const bool in_host = s.frame == landmark.host;
+      if (s.left && !in_host) seen_by(landmark.cameras.left, *s.left);
+      if (s.right && !(in_host && from_right)) seen_by(landmark.cameras.right, *s.right);
     }
   };
   each([&](const RayInCamera& line, const Observation& o) {
@@ -74,7 +83,9 @@ bool triangulate(Landmark& landmark, const FrameList& frames, const Calibration&
     else worst = std::max(worst, (o.sqrt_information * (p.head<2>() / p.z() - o.normalised)).squaredNorm());
   });
   if (worst > kMaxError_sigma * kMaxError_sigma) return false;
-  landmark.alpha_beta_rho << ray, rho;
+  const Vec3 p_C = ray.homogeneous() + rho * (cameras.R_CB[from] * displaced_from_B);  // from the camera's place at the stamp
+  if (p_C.z() < kMinScaledDepth) return false;
+  landmark.alpha_beta_rho = Vec3(p_C.x(), p_C.y(), rho) / p_C.z();
   landmark.right_ray = from_right;
   return true;
 }

@@ -108,7 +108,7 @@ std::optional<CameraPair> suspects(const std::vector<PointSighting>& sightings, 
 }
 
 Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometry& cameras, int camera_count,
-                const Pose<G, B>& T_GB) {
+                const Pose<G, B>& T_GB, const Vec3& v_B) {
   const Mat3 R_BG = T_GB.R().transpose();
   Medians out;
   out.shift.fill(Vec2::Zero());
@@ -119,7 +119,7 @@ Medians medians(const std::vector<PointSighting>& sightings, const CameraGeometr
       if (c != left && c != right) continue;
       const std::optional<Observation>& o = c == left ? s.feature->left : s.feature->right;
       if (!o) continue;
-      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (s.p_G - T_GB.p) - cameras.t_BC[c]);
+      const Vec3 p_C = cameras.R_CB[c] * (R_BG * (s.p_G - T_GB.p) - cameras.t_BC[c] - o->displacement_B(v_B));
       const Vec2 r =
           p_C.z() > kMinScaledDepth ? Vec2(o->sqrt_information * (p_C.head<2>() / p_C.z() - o->normalised)) : Vec2(1e3, 1e3);
       residuals.push_back(r.norm()), x.push_back(r.x()), y.push_back(r.y());
@@ -215,7 +215,7 @@ void Monitor::take(const Biases& now) {
 }
 
 Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, const Calibration& calibration,
-                                  const Pose<G, B>& predicted, Duration dt) {
+                                  const Pose<G, B>& predicted, Duration dt, const Vec3& v_B) {
   Verdict out;
   if (sightings.size() < kFewest) {
     blind(dt);
@@ -229,7 +229,7 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
   const double patience = (calibrating_ ? kCalibrating : 1) * std::max(1.0, dt.seconds() / kUsualFor_s);
   const CameraGeometry cameras(calibration);
   const int camera_count = calibration.camera_count();
-  const Medians at_prediction = medians(sightings, cameras, camera_count, predicted);
+  const Medians at_prediction = medians(sightings, cameras, camera_count, predicted, v_B);
   const double excess = at_prediction.worst() / (patience * kUsual_sigma) - 1;
   add_drift(at_prediction.shift, at_prediction.focal, predicted.q, patience, dt);
   const bool drifting = largest_drift() > patience * (kDrift_sigma + turned_sigma_) || lasting_s_ >= kLasting_s;
@@ -240,8 +240,8 @@ Monitor::Verdict Monitor::examine(const std::vector<PointSighting>& sightings, c
     pass(dt);
     return out;
   }
-  const PoseRefinement seen = refine_pose(sightings, calibration, predicted);
-  const Medians at_seen = medians(sightings, cameras, camera_count, seen.T_GB);
+  const PoseRefinement seen = refine_pose(sightings, calibration, predicted, v_B);
+  const Medians at_seen = medians(sightings, cameras, camera_count, seen.T_GB, v_B);
   const auto off = [&](int camera) {
     const auto c = static_cast<std::size_t>(camera);
     return excess < 0 ? drift_[c].norm() : at_prediction.norm[c].value_or(0);

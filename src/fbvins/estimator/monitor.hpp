@@ -34,9 +34,10 @@ class Monitor {
 
   /// A window begins.
   void restart();
-  /// `sightings`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before.
+  /// `sightings`: landmarks of the window seen in the new image; `predicted`: by the readings of `dt` since the image before,
+  /// with the velocity `v_B`, which counts where not all was seen at the stamp.
   Verdict examine(const std::vector<PointSighting>& sightings, const Calibration& calibration, const Pose<G, B>& predicted,
-                  Duration dt);
+                  Duration dt, const Vec3& v_B = Vec3::Zero());
   /// The images go on alone, without readings to compare with.
   void pass(Duration dt);
 

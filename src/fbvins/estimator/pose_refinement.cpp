@@ -16,6 +16,7 @@ struct NormalEquations {
   Vec6 g = Vec6::Zero();
   int inliers = 0;
 
+  /// `t_BC`: of the camera where it saw this.
   void add(const Observation& o, const Vec3& p_B, const Mat3& R_CB, const Vec3& t_BC, const Mat3& R_BG) {
     const Vec3 p_C = R_CB * (p_B - t_BC);
     if (p_C.z() < kMinDepth_m) return;
@@ -38,7 +39,7 @@ struct NormalEquations {
 }  // namespace
 
 PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
-                           int max_iterations) {
+                           const Vec3& v_B, int max_iterations) {
   const CameraGeometry cameras(calibration);
   PoseRefinement out{guess, 0, false};
   for (int i = 0; i < max_iterations; ++i) {
@@ -46,10 +47,12 @@ PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Ca
     const Mat3 R_BG = out.T_GB.R().transpose();
     for (const PointSighting& s : sightings) {
       const Vec3 p_B = R_BG * (s.p_G - out.T_GB.p);
-      const auto [left, right] = s.feature->cameras;
-      if (s.feature->left) n.add(*s.feature->left, p_B, cameras.R_CB[left], cameras.t_BC[left], R_BG);
+      const auto add = [&](const Observation& o, int camera) {
+        n.add(o, p_B, cameras.R_CB[camera], cameras.t_BC[camera] + o.displacement_B(v_B), R_BG);
+      };
+      if (s.feature->left) add(*s.feature->left, s.feature->cameras.left);
       const int of_left = n.inliers;
-      if (s.feature->right) n.add(*s.feature->right, p_B, cameras.R_CB[right], cameras.t_BC[right], R_BG);
+      if (s.feature->right) add(*s.feature->right, s.feature->cameras.right);
       n.inliers = s.feature->left ? of_left : n.inliers;
     }
     out.inliers = n.inliers;

@@ -21,7 +21,8 @@ struct PoseRefinement {
   bool converged = false;  ///< or stopped at max_iterations with inliers
 };
 
+/// `v_B`: the body's velocity, m/s, which counts where not all was seen at the stamp.
 PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Calibration& calibration, Pose<G, B> guess,
-                           int max_iterations = 15);
+                           const Vec3& v_B = Vec3::Zero(), int max_iterations = 15);
 
 }  // namespace fbvins

@@ -59,7 +59,8 @@ struct WindowObservation {
   Vec2 normalised = Vec2::Zero();
   Vec2 velocity = Vec2::Zero();  ///< d(normalised)/dt, 1/s; only used by time offset and line delay
   Mat2 sqrt_information = Mat2::Identity();
-  double rows = 0;  ///< Observation::rows
+  double rows = 0;                     ///< Observation::rows
+  Vec3 displacement_B = Vec3::Zero();  ///< Observation::displacement_B, at the current estimate
 };
 
 /// A point on the ray (alpha, beta, 1) of a camera of its host frame, the left one of its group, or the right one if that alone
@@ -99,7 +100,7 @@ inline Vec3 scaled_point_in_host(const CameraGeometry& cameras, const WindowLand
 inline bool reproject(const CameraGeometry& cameras, const PairGeometry& pair, const Vec3& x_h, double rho,
                       const WindowObservation& o, Vec3& p_C, Vec2& r) {
   const Vec3 p_B = pair.R_th * x_h + rho * pair.t_th;
-  p_C.noalias() = cameras.R_CB[o.camera] * (p_B - rho * cameras.t_BC[o.camera]);
+  p_C.noalias() = cameras.R_CB[o.camera] * (p_B - rho * (cameras.t_BC[o.camera] + o.displacement_B));
   if (p_C.z() < kMinScaledDepth) return false;
   const Vec2 expected = p_C.head<2>() / p_C.z();
   r = o.sqrt_information * (expected - o.normalised + (cameras.time_offset_s + o.rows * cameras.line_delay_s) * o.velocity);
@@ -132,7 +133,7 @@ void fill_jacobian_rows(const CameraGeometry& cameras, const PairGeometry& pair,
     const Vec3 c = cameras.R_BC[l.camera].transpose() * b;
     J[kPoint] = c.x();
     J[kPoint + 1] = c.y();
-    J[kPoint + 2] = b.dot(cameras.t_BC[l.camera]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.camera]);
+    J[kPoint + 2] = b.dot(cameras.t_BC[l.camera]) + a.dot(pair.t_th_first) - a.dot(cameras.t_BC[o.camera] + o.displacement_B);
     J[kResidual] = r[k];
     if constexpr (Columns == 32) {
       const Vec3 m(l.alpha_beta_rho.x(), l.alpha_beta_rho.y(), 1);

@@ -95,11 +95,12 @@ void SlidingWindow::fill_problem(const Calibration& calibration, WindowProblem& 
     for (const Sighting& s : landmark->sightings) {
       const int frame = frames_.index_of(s.frame);
       const auto [left, right] = landmark->cameras;
-      if (s.left)
-        out.observations.push_back({frame, left, s.left->normalised, s.left_velocity, s.left->sqrt_information, s.left->rows});
-      if (s.right)
-        out.observations.push_back(
-            {frame, right, s.right->normalised, s.right_velocity, s.right->sqrt_information, s.right->rows});
+      const auto add = [&](const Observation& o, int camera, const Vec2& velocity) {
+        const Vec3 displacement_B = o.after_s == 0 ? Vec3::Zero() : o.displacement_B(frames_[frame].state.v_B());
+        out.observations.push_back({frame, camera, o.normalised, velocity, o.sqrt_information, o.rows, displacement_B});
+      };
+      if (s.left) add(*s.left, left, s.left_velocity);
+      if (s.right) add(*s.right, right, s.right_velocity);
     }
     l.observation_count = static_cast<int>(out.observations.size()) - l.first_observation;
     if (landmark->prior) {

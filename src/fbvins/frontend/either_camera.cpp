@@ -10,6 +10,9 @@ namespace {
 
 SensorPacket mirrored(SensorPacket packet) {
   std::swap(packet.frame.left, packet.frame.right);
+  const ExposureOffsets offsets = packet.frame.offsets;
+  packet.frame.offsets.set(0, offsets.of(1));
+  packet.frame.offsets.set(1, offsets.of(0));
   return packet;
 }
 

@@ -21,7 +21,8 @@ FrameImages::FrameImages(const StereoRig& rig, int levels) : rig_(rig), levels_(
 }
 
 void FrameImages::take(const StereoFrame& frame, FrontendStats& stats) {
-  t_ = frame.t;
+  t_ = frame.t + frame.offsets.of(0);
+  t_right_ = frame.t + frame.offsets.of(1);
   left_.clear();
   right_.clear();
   if (frame.left) left_.build(frame.left->view(), levels_);

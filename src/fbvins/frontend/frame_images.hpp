@@ -37,7 +37,9 @@ class FrameImages {
   /// Another's image becomes the one before.
   void start_from(Pyramid image, Time t);
 
+  /// When the newest left image was taken, and the right one.
   Time t() const { return t_; }
+  Time t_right() const { return t_right_; }
   const Pyramid& left() const { return left_; }
   const Pyramid& right() const { return right_; }
   /// Whether depths can be measured in the newest images: in the right one, or because they came.
@@ -55,7 +57,7 @@ class FrameImages {
  private:
   StereoRig rig_;
   int levels_;
-  Time t_, t_before_;
+  Time t_, t_right_, t_before_;
   Pyramid left_, right_, before_;
   std::optional<DepthReader> reader_;  // of a rig with a depth sensor
   std::shared_ptr<const DepthImage> depth_;

@@ -135,7 +135,7 @@ bool KltFrontend::cut_patches(KltTrack& track, KltPatches& patches, const Pyrami
 }
 
 Handover KltFrontend::hand_over() {
-  Handover out{images_.t(), images_.take_right(), {}, tracks_.next_id()};
+  Handover out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
   if (out.image.empty()) return out;
   for (const KltTrack& track : tracks_)
     if (const auto handed = seen_by_second(track, rig_.T_C1C0())) out.tracks.push_back(*handed);
@@ -162,6 +162,7 @@ void KltFrontend::take_over(Handover handover) {
 }
 
 void KltFrontend::match_stereo(FrontendStats& stats) {
+  stereo_.place(predictor_.at_exposures(rig_.T_C1C0(), images_.t(), images_.t_right()));
   std::vector<double> inverse_depths;
   inverse_depths.reserve(tracks_.size());
   for (KltTrack& track : tracks_) {

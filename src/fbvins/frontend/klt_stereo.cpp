@@ -28,11 +28,14 @@ constexpr double kInfinity_px = 1.0;
 }  // namespace
 
 KltStereoMatcher::KltStereoMatcher(const StereoRig& rig, double min_depth_m)
-    : min_depth_m_(min_depth_m),
-      camera_right_(rig.right),
-      R_rl_(rig.T_C1C0().R()),
-      p_rl_(rig.T_C1C0().p),
-      focal_px_(rig.right.focal_px()) {}
+    : min_depth_m_(min_depth_m), camera_right_(rig.right), focal_px_(rig.right.focal_px()) {
+  place(rig.T_C1C0());
+}
+
+void KltStereoMatcher::place(const Pose<C1, C0>& T_C1C0) {
+  R_rl_ = T_C1C0.R();
+  p_rl_ = T_C1C0.p;
+}
 
 std::optional<Vec2> KltStereoMatcher::project(const Vec2& left_normalised, double inverse_depth) const {
   const Vec3 ray = R_rl_ * left_normalised.homogeneous() + inverse_depth * p_rl_;

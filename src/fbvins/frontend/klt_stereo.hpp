@@ -37,6 +37,8 @@ class KltStereoMatcher {
   /// `min_depth_m`: smallest depth that is searched for in the right image.
   KltStereoMatcher(const StereoRig& rig, double min_depth_m);
 
+  /// Between the images that are matched next.
+  void place(const Pose<C1, C0>& T_C1C0);
   /// `patch` holds the templates of levels 0 and up around `left_px`. match.failure is the check that failed, if any.
   StereoMatch match(const KltTemplate& patch, const Vec2& left_px, const Vec2& left_normalised,
                     std::optional<double> inverse_depth, const Pyramid& left, const Pyramid& right);

@@ -20,6 +20,11 @@ OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, doub
       by_descriptor_(rig, options.min_depth_m, options.stereo_epipolar_px),
       by_alignment_(rig, options.min_depth_m) {}
 
+void OrbDepth::place(const Pose<C1, C0>& T_C1C0) {
+  by_descriptor_.place(T_C1C0);
+  by_alignment_.place(T_C1C0);
+}
+
 void OrbDepth::match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats) {
   if (wants_features() && !images.has_depth_image()) by_descriptor_.index(right_features_);
   inverse_depths_.clear();

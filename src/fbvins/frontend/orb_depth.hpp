@@ -30,6 +30,8 @@ class OrbDepth {
   OrbFeatures& right_features() { return right_features_; }
   /// What the right image hides; null: nothing.
   const Mask* right_mask() const { return right_camera_.mask().get(); }
+  /// Between the images that are matched next.
+  void place(const Pose<C1, C0>& T_C1C0);
   void match(OrbTracks& tracks, const FrameImages& images, FrontendStats& stats);
   /// As if these had been matched, 1/m.
   void assume(std::vector<double>& inverse_depths) { typical_.update(inverse_depths); }

@@ -82,6 +82,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   if (out.has_right) {
     if (!images_.has_depth_image() && depth_.wants_features())
       stats.boost_ms += describer_.describe(packet.frame.right->view(), depth_.right_features(), depth_.right_mask());
+    depth_.place(predictor_.at_exposures(T_C1C0_, images_.t(), images_.t_right()));
     depth_.match(tracks_, images_, stats);
   }
   out.features = features_of(tracks_, camera_, sigma_px_);
@@ -144,7 +145,7 @@ void OrbFrontend::stand_by(const SensorPacket& packet, const StatePrior& prior) 
 }
 
 Handover OrbFrontend::hand_over() {
-  Handover out{images_.t(), images_.take_right(), {}, tracks_.next_id()};
+  Handover out{images_.t_right(), images_.take_right(), {}, tracks_.next_id()};
   if (out.image.empty()) return out;
   for (const OrbTrack& track : tracks_) {
     std::optional<HandedTrack> handed = seen_by_second(track, T_C1C0_);

@@ -24,13 +24,16 @@ constexpr double kGrazing = 0.05;
 
 OrbStereoMatcher::OrbStereoMatcher(const StereoRig& rig, double min_depth_m, double epipolar_px)
     : min_depth_m_(min_depth_m), epipolar_px_(epipolar_px), right_camera_(rig.right), focal_px_(rig.right.focal_px()) {
-  const Pose<C1, C0> T_rl = rig.T_C1C0();
-  const Vec3 right_centre = -(T_rl.R().transpose() * T_rl.p);
+  place(rig.T_C1C0());
+}
+
+void OrbStereoMatcher::place(const Pose<C1, C0>& T_C1C0) {
+  const Vec3 right_centre = -(T_C1C0.R().transpose() * T_C1C0.p);
   baseline_m_ = right_centre.norm();
   const Vec3 x = right_centre.normalized();
   const Vec3 y = Vec3::UnitZ().cross(x).normalized();
   R_rect_left_ << x.transpose(), y.transpose(), x.cross(y).transpose();
-  R_rect_right_ = R_rect_left_ * T_rl.R().transpose();
+  R_rect_right_ = R_rect_left_ * T_C1C0.R().transpose();
 }
 
 std::optional<Vec2> OrbStereoMatcher::rectify(const Mat3& R, const Vec2& normalised) const {

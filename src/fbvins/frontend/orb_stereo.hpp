@@ -24,6 +24,8 @@ class OrbStereoMatcher {
   /// `min_depth_m`: nearest point that is matched. `epipolar_px`: largest distance from the epipolar line after refinement.
   OrbStereoMatcher(const StereoRig& rig, double min_depth_m, double epipolar_px);
 
+  /// Between the images that are matched next.
+  void place(const Pose<C1, C0>& T_C1C0);
   /// Keeps a reference to `right` until the next call.
   void index(const OrbFeatures& right);
   /// The right keypoint that matches, or -1.

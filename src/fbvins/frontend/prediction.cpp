@@ -97,4 +97,11 @@ CameraMotion MotionPredictor::between(Time a, Time b) const {
   return motion;
 }
 
+Pose<C1, C0> MotionPredictor::at_exposures(const Pose<C1, C0>& T_C1C0, Time left, Time right) const {
+  if (left == right) return T_C1C0;
+  const CameraMotion motion = between(std::min(left, right), std::max(left, right));
+  const Pose<C0, C0> T_later_earlier(Quat(motion.R_ba), motion.p_ba);
+  return T_C1C0 * (right < left ? T_later_earlier.inverse() : T_later_earlier);
+}
+
 }  // namespace fbvins

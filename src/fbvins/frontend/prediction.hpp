@@ -48,6 +48,9 @@ class MotionPredictor {
   void forget_before(Time t);
 
   CameraMotion between(Time a, Time b) const;
+  /// What T_C1C0 is between images that the two cameras took at different times. Without readings it is unchanged, without a
+  /// prior the motion is a turn alone.
+  Pose<C1, C0> at_exposures(const Pose<C1, C0>& T_C1C0, Time left, Time right) const;
   /// Pose of the left camera in G; nothing without a prior that can be propagated to t.
   std::optional<Pose<G, C0>> camera_at(Time t) const;
 

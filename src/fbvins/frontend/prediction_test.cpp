@@ -66,6 +66,26 @@ TEST(MotionPredictor, CarriesTheLastPriorOnForHalfASecondWhenOneIsSkipped) {
   EXPECT_FALSE(predictor.camera_at(at_ms(550)));
 }
 
+TEST(MotionPredictor, PlacesTheSecondCameraWhereItWasAtItsExposure) {
+  const Flight flight;
+  const Pose<C1, C0> T_C1C0(so3_exp(Vec3(0.02, 0.01, -0.01)), Vec3(-0.11, 0.002, 0.001));
+  MotionPredictor predictor(kT_BC0);
+  predictor.add(flight.imu(0.0, 0.3), StatePrior{});
+  EXPECT_EQ(predictor.at_exposures(T_C1C0, at_ms(200), at_ms(200)).p, T_C1C0.p);
+  predictor.add(ImuSegment{}, flight.prior(0.05));
+  for (const double right_s : {0.155, 0.18, 0.21}) {
+    const Pose<G, C1> second = flight.T_GB(right_s) * kT_BC0 * T_C1C0.inverse();
+    const Pose<C1, C0> truth = second.inverse() * (flight.T_GB(0.2) * kT_BC0);
+    const Pose<C1, C0> placed = predictor.at_exposures(T_C1C0, at_ms(200), Time{} + Duration::from_seconds(right_s));
+    EXPECT_LT((placed.p - truth.p).norm(), 1e-3) << right_s;
+    EXPECT_LT(so3_log(placed.q.conjugate() * truth.q).norm(), 1e-4) << right_s;
+  }
+  predictor.forget_state();
+  const Pose<C1, C0> turned = predictor.at_exposures(T_C1C0, at_ms(200), at_ms(180));
+  const Quat truth = (flight.T_GB(0.18) * kT_BC0 * T_C1C0.inverse()).q.conjugate() * (flight.T_GB(0.2) * kT_BC0).q;
+  EXPECT_LT(so3_log(turned.q.conjugate() * truth).norm(), 1e-4) << "without a prior the turn is known";
+}
+
 TEST(CarryPoint, TurnsAndMovesByDepth) {
   const Camera camera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
   CameraMotion motion;

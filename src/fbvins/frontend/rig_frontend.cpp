@@ -9,7 +9,10 @@ namespace {
 
 SensorPacket of_group(const SensorPacket& packet, const CameraGroup& group) {
   SensorPacket out{packet.id, {packet.frame.t, packet.frame.image(group.first), nullptr}, packet.imu};
-  if (group.second) out.frame.right = packet.frame.image(*group.second);
+  out.frame.offsets.set(0, packet.frame.offsets.of(group.first));
+  if (!group.second) return out;
+  out.frame.right = packet.frame.image(*group.second);
+  out.frame.offsets.set(1, packet.frame.offsets.of(*group.second));
   return out;
 }
 

@@ -37,6 +37,9 @@ struct NavState {
   Vec3 v_FB = Vec3::Zero();  ///< m/s, in F
   ImuBias bias;
 
+  /// The velocity in the body's axes.
+  Vec3 v_B() const { return T_FB.q.conjugate() * v_FB; }
+
   NavState boxplus(const Vec15& d) const {
     NavState s = *this;
     s.T_FB = T_FB.boxplus(d.segment<3>(nav::p), d.segment<3>(nav::theta));

@@ -51,7 +51,9 @@ DatasetContents with_cameras(DatasetContents contents, const std::string& camera
   contents.rig = with_one_camera(contents.rig, right);
   for (FrameEntry& frame : contents.frames) {
     if (right) frame.left_file = std::move(frame.right_file);
+    if (right) frame.t = frame.t + frame.offsets.of(1);
     frame.right_file.clear();
+    frame.offsets = {};
   }
   std::erase_if(contents.frames, [](const FrameEntry& frame) { return frame.left_file.empty(); });
   if (right) contents.info.left = std::move(contents.info.right);

@@ -181,7 +181,8 @@ class EurocReader {
       return Error{ErrorCode::malformed,
                    fmt::format("{}: no stamp lies within {} ms of one of cam{}'s", named(folder_of(cameras_[1]) + "data.csv"),
                                options_.pair_tolerance_ms, cameras_[0])};
-    if (pair && paired.left_only + paired.right_only > 0)
+    if (paired.untriggered) warn(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
+    else if (pair && paired.left_only + paired.right_only > 0)
       warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
                        options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);

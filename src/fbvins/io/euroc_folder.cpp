@@ -154,10 +154,12 @@ Result<void> write_images(const Images& images, const fs::path& mav0) {
     const std::string png = encode_png16(depth->mm, depth->width, depth->height);
     if (Result<void> done = write_file(mav0 / "depth0/data" / left, png); !done) return done;
   }
-  for (std::size_t i = 0; i < frame.more.size(); ++i)
+  for (std::size_t i = 0; i < frame.more.size(); ++i) {
+    const Time stamp = frame.t + frame.offsets.of(static_cast<int>(i) + 2);
+    const fs::path path = mav0 / fmt::format("cam{}/data/{}.png", i + 2, stamp.ns);
     if (frame.more[i])
-      if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data", i + 2) / left, encode_png(*frame.more[i])); !done)
-        return done;
+      if (Result<void> done = write_file(path, encode_png(*frame.more[i])); !done) return done;
+  }
   return frame.right ? write_file(mav0 / "cam1/data" / right, encode_png(*frame.right)) : Result<void>{};
 }
 
@@ -190,7 +192,7 @@ EurocFolder& EurocFolder::operator=(EurocFolder&&) noexcept = default;
 
 Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<float> depth_left_m) {
   for (std::size_t i = 0; i < state_->rows.size(); ++i) {
-    const Time stamp = i == 1 ? right_stamp : frame.t;
+    const Time stamp = i == 1 ? right_stamp : frame.t + frame.offsets.of(static_cast<int>(i));
     if (frame.image(static_cast<int>(i))) state_->rows[i] += fmt::format("{0},{0}.png\n", stamp.ns);
   }
   if (!state_->depth_rows) frame.depth = nullptr;

@@ -44,6 +44,7 @@ class EurocLoader : public FrameLoader {
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
+    out.frame.offsets = entry.offsets;
     out.frame.left = load_image(entry.left_file, 0, out.left, out.problem);
     out.frame.right = load_image(entry.right_file, 1, out.right, out.problem);
     for (std::size_t i = 0; i < entry.more_files.size(); ++i)
@@ -101,6 +102,68 @@ std::size_t nearest(const std::vector<Time>& stamps, Time t) {
   return after > 0 && t - stamps[after - 1] < stamps[after] - t ? after - 1 : after;
 }
 
+/// Of cameras with a common trigger at most this share of the images has a neighbour of the other camera that is no partner.
+constexpr double kMostLonely = 1.0 / 3;
+
+/// Partners of images without a common trigger, by number: for each of `stamps` the nearest of `others` to a quarter of the
+/// interval before it, at most half an interval from there, each once; -1: none. Motion before an image is known by its readings,
+/// that after it by extrapolation.
+std::vector<int> partners_without_trigger(const std::vector<Time>& stamps, const std::vector<Time>& others, Duration interval) {
+  std::vector<int> out(stamps.size(), -1);
+  std::size_t first_free = 0;
+  for (std::size_t k = 0; k < stamps.size() && first_free < others.size(); ++k) {
+    const Time wanted = stamps[k] - Duration{interval.ns / 4};
+    const std::size_t i = std::max(nearest(others, wanted), first_free);
+    if (std::abs((others[i] - wanted).ns) > interval.ns / 2) continue;
+    out[k] = static_cast<int>(i);
+    first_free = i + 1;
+  }
+  return out;
+}
+
+/// Whether too many of `stamps` have none of `others` within the tolerance, but one within an interval.
+bool without_trigger(const std::vector<Time>& stamps, const std::vector<Time>& others, Duration tolerance, Duration interval) {
+  if (others.empty()) return false;
+  const auto lonely = std::ranges::count_if(stamps, [&](Time t) {
+    const std::int64_t distance = std::abs((others[nearest(others, t)] - t).ns);
+    return distance > tolerance.ns && distance <= interval.ns;
+  });
+  return static_cast<double>(lonely) > kMostLonely * static_cast<double>(stamps.size());
+}
+
+std::vector<Time> stamps_of(const std::vector<ImageRow>& rows) {
+  std::vector<Time> stamps;
+  for (const ImageRow& row : rows) stamps.push_back(row.t);
+  return stamps;
+}
+
+PairedFrames pair_without_trigger(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration interval) {
+  PairedFrames out;
+  out.untriggered = true;
+  const std::vector<Time> lefts = stamps_of(left);
+  const std::vector<int> partners = partners_without_trigger(lefts, stamps_of(right), interval);
+  std::vector<bool> used(right.size());
+  for (std::size_t l = 0; l < left.size(); ++l) {
+    FrameEntry& frame = out.frames.emplace_back(FrameEntry{left[l].t, left[l].file, ""});
+    if (partners[l] < 0) {
+      ++out.left_only;
+      continue;
+    }
+    const auto r = static_cast<std::size_t>(partners[l]);
+    used[r] = true;
+    frame.right_file = right[r].file;
+    frame.offsets.set(1, right[r].t - left[l].t);
+  }
+  for (std::size_t r = 0; r < right.size(); ++r) {
+    if (used[r]) continue;
+    ++out.right_only;
+    if (std::abs((lefts[nearest(lefts, right[r].t)] - right[r].t).ns) > interval.ns)
+      out.frames.push_back({right[r].t, "", right[r].file});
+  }
+  std::ranges::stable_sort(out.frames, {}, &FrameEntry::t);
+  return out;
+}
+
 }  // namespace
 
 Result<StampedRows<ImageRow>> read_image_rows(std::string_view csv, const std::string& file) {
@@ -136,11 +199,12 @@ RowVerdict ImuRowParser::operator()(std::string_view line, ImuSample& sample, st
 }
 
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance) {
-  std::vector<Time> stamps;
-  for (const ImageRow& row : left) stamps.push_back(row.t);
-  const Duration half_interval{measure_intervals(stamps).median.ns / 2};
+  const std::vector<Time> stamps = stamps_of(left);
+  const Duration interval = measure_intervals(stamps).median, half_interval{interval.ns / 2};
   if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
   const auto distance = [&](std::size_t l, std::size_t r) { return std::abs((left[l].t - right[r].t).ns); };
+  if (interval.ns > 0 && without_trigger(stamps, stamps_of(right), tolerance, interval))
+    return pair_without_trigger(left, right, interval);
   PairedFrames out;
   std::size_t r = 0;
   const auto skip_right = [&](std::size_t next_left) {
@@ -160,6 +224,16 @@ PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<Im
   return out;
 }
 
+std::string untriggered_sentence(const std::vector<FrameEntry>& frames, int camera, double tolerance_ms) {
+  std::vector<double> offsets_ms;
+  for (const FrameEntry& frame : frames)
+    if (const Duration offset = frame.offsets.of(camera); offset.ns != 0) offsets_ms.push_back(1e3 * offset.seconds());
+  return fmt::format(
+      "cameras 0 and {} have no common trigger: their stamps are more than {} ms apart, {:.1f} ms in the median, and count as they "
+      "are",
+      camera, tolerance_ms, median(offsets_ms));
+}
+
 int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, Duration tolerance) {
   const std::vector<Time> stamps = stamps_of(frames);
   int unpaired = 0;
@@ -173,9 +247,19 @@ int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& imag
 
 int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance) {
   const std::vector<Time> stamps = stamps_of(frames);
-  const Duration half_interval{measure_intervals(stamps).median.ns / 2};
+  const Duration interval = measure_intervals(stamps).median, half_interval{interval.ns / 2};
   if (half_interval.ns > 0) tolerance.ns = std::min(tolerance.ns, half_interval.ns);
   for (FrameEntry& frame : frames) frame.more_files.resize(more + 1);
+  if (interval.ns > 0 && without_trigger(stamps, stamps_of(images), tolerance, interval)) {
+    const std::vector<int> partners = partners_without_trigger(stamps, stamps_of(images), interval);
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      if (partners[k] < 0) continue;
+      const ImageRow& image = images[static_cast<std::size_t>(partners[k])];
+      frames[k].more_files[more] = image.file;
+      frames[k].offsets.set(static_cast<int>(more) + 2, image.t - frames[k].t);
+    }
+    return static_cast<int>(images.size()) - static_cast<int>(std::ranges::count_if(partners, [](int i) { return i >= 0; }));
+  }
   std::vector<FrameEntry> alone;
   int unpaired = 0;
   for (const ImageRow& image : images) {

@@ -27,15 +27,21 @@ class ImuRowParser {
 struct PairedFrames {
   std::vector<FrameEntry> frames;     ///< in order of time
   int left_only = 0, right_only = 0;  ///< images without a partner
+  bool untriggered = false;           ///< the cameras have no common trigger: offsets say when the right images were taken
 };
 
 /// Each left image with the nearest right one within the tolerance (at most half the median interval). A right image farther
 /// than half the interval from all left ones, where those are missing, is a frame of its own; one that is nearer is left out.
+/// Where more than a third of the left images have no partner within the tolerance but one within an interval, the cameras have
+/// no common trigger: then each left image has the right one that is nearest to a quarter of the interval before it.
 PairedFrames pair_frames(const std::vector<ImageRow>& left, const std::vector<ImageRow>& right, Duration tolerance);
 
+/// What is said of cameras without a common trigger: `camera` and camera 0.
+std::string untriggered_sentence(const std::vector<FrameEntry>& frames, int camera, double tolerance_ms);
+
 /// Adds the images of a further camera, the `more`-th from number 2 on: each to the nearest frame within the tolerance (at most
-/// half the median interval), or, farther than half the interval from all, as a frame of its own. Returns how many had no
-/// partner.
+/// half the median interval), or, farther than half the interval from all, as a frame of its own; without a common trigger as in
+/// pair_frames. Returns how many had no partner.
 int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, std::size_t more, Duration tolerance);
 
 /// Gives each depth image to the nearest frame within the tolerance. Returns how many had none.

@@ -50,6 +50,41 @@ TEST(PairFrames, RightImagesAreFramesWhereLeftOnesAreMissing) {
   EXPECT_EQ(p.right_only, 5) << "304 ms is too near to 300 ms to be an instant of its own";
 }
 
+std::vector<std::string> offsets_in(const std::vector<FrameEntry>& frames, int camera) {
+  std::vector<std::string> out;
+  for (const FrameEntry& f : frames)
+    out.push_back(f.left_file + "/" + f.right_file + " " + std::to_string(f.offsets.of(camera).ns / kMs));
+  return out;
+}
+
+TEST(PairFrames, WithoutACommonTriggerTheOffsetsAreKept) {
+  const PairedFrames late = pair_frames(at_ms({0, 50, 100, 150}), at_ms({30, 80, 130, 180}), Duration{3 * kMs});
+  EXPECT_TRUE(late.untriggered);
+  EXPECT_EQ(offsets_in(late.frames, 1), (std::vector<std::string>{"0/ 0", "50/30 -20", "100/80 -20", "150/130 -20"}));
+  EXPECT_EQ(late.left_only, 1);
+  EXPECT_EQ(late.right_only, 1);
+  const PairedFrames soon = pair_frames(at_ms({0, 50, 100, 150}), at_ms({5, 55, 105, 155}), Duration{3 * kMs});
+  EXPECT_EQ(offsets_in(soon.frames, 1), (std::vector<std::string>{"0/5 5", "50/55 5", "100/105 5", "150/155 5"}))
+      << "a short way ahead is nearer than a long one back";
+  EXPECT_EQ(
+      untriggered_sentence(soon.frames, 1, 3),
+      "cameras 0 and 1 have no common trigger: their stamps are more than 3 ms apart, 5.0 ms in the median, and count as they are");
+}
+
+TEST(PairFrames, CamerasWithoutATriggerMayHaveOtherRates) {
+  const PairedFrames p = pair_frames(at_ms({0, 50, 100, 150, 200}), at_ms({-10, 23, 57, 90, 123, 157, 190}), Duration{3 * kMs});
+  EXPECT_EQ(offsets_in(p.frames, 1),
+            (std::vector<std::string>{"0/-10 -10", "50/23 -27", "100/90 -10", "150/123 -27", "200/190 -10"}));
+  const PairedFrames slow = pair_frames(at_ms({0, 50, 100, 150, 200}), at_ms({-10, 90, 190}), Duration{3 * kMs});
+  EXPECT_EQ(offsets_in(slow.frames, 1), (std::vector<std::string>{"0/-10 -10", "50/ 0", "100/90 -10", "150/ 0", "200/190 -10"}));
+}
+
+TEST(PairFrames, WithoutATriggerRightImagesAreFramesWhereLeftOnesAreMissing) {
+  const PairedFrames p = pair_frames(at_ms({0, 50, 100, 400}), at_ms({-20, 30, 80, 230, 280, 380}), Duration{3 * kMs});
+  EXPECT_EQ(offsets_in(p.frames, 1),
+            (std::vector<std::string>{"0/-20 -20", "50/30 -20", "100/80 -20", "/230 0", "/280 0", "400/380 -20"}));
+}
+
 TEST(PairFrames, OneSideMayBeEmpty) {
   EXPECT_EQ(pair_frames(at_ms({0, 50}), {}, Duration{kMs}).left_only, 2);
   EXPECT_EQ(pair_frames({}, at_ms({0, 50}), Duration{kMs}).right_only, 2);
@@ -98,6 +133,15 @@ TEST(AddCamera, JoinsTheNearestFrameOrIsOneOfItsOwn) {
   EXPECT_EQ(frames[3].t.ns, 200 * kMs);
   EXPECT_FALSE(frames[3].without_images());
   EXPECT_FALSE(frames[4].more_files[0].empty());
+}
+
+TEST(AddCamera, WithoutACommonTriggerTheOffsetIsKept) {
+  std::vector<FrameEntry> frames = pair_frames(at_ms({0, 50, 100, 150}), at_ms({0, 50, 100, 150}), Duration{3 * kMs}).frames;
+  EXPECT_EQ(add_camera(frames, at_ms({-15, 35, 85, 135}), 0, Duration{3 * kMs}), 0);
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[2].more_files[0], "85");
+  EXPECT_EQ(frames[2].offsets.of(2).ns, -15 * kMs);
+  EXPECT_EQ(frames[2].offsets.of(1).ns, 0);
 }
 
 TEST(AddCamera, FramesOfACameraAloneAreSharedByTheNext) {

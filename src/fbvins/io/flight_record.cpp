@@ -134,7 +134,8 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
   const Time t = frame.t;
   // The two images follow one another, so that a record cut off between them is recognised.
   if (left) write(kLeft, t, [&](std::string& out) { append_image(out, t, kLeftFrame, frame.left.get()); });
-  if (right) write(kRight, t, [&](std::string& out) { append_image(out, t, kRightFrame, frame.right.get()); });
+  const Time right_t = t + frame.offsets.of(1);
+  if (right) write(kRight, t, [&](std::string& out) { append_image(out, right_t, kRightFrame, frame.right.get()); });
   if (left) write(kLeftInfo, t, [&](std::string& out) { append_camera_info(out, t, kLeftFrame, rig_.left); });
   if (right) write(kRightInfo, t, [&](std::string& out) { append_camera_info(out, t, kRightFrame, rig_.right); });
   return flush_if_large();

@@ -8,8 +8,10 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <map>
 
 #include "fbvins/io/dataset_description.hpp"
+#include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/flight_record.hpp"
 #include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
@@ -48,6 +50,7 @@ class McapLoader : public FrameLoader {
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
+    out.frame.offsets = entry.offsets;
     out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
     out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
     return out;
@@ -95,6 +98,7 @@ class RecordReader {
     out_.info.format = "MCAP flight record";
     while (const auto message = reader_.next()) take(*message);
     drop_half_frame();
+    join_without_trigger();
     for (auto step : {&RecordReader::check, &RecordReader::read_calibration, &RecordReader::cut})
       if (Result<void> done = (this->*step)(); !done) return done.error();
     warn();
@@ -175,6 +179,23 @@ class RecordReader {
     if (!was_cut_off() || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();
     if (last.left_file.empty() || last.right_file.empty()) out_.frames.pop_back();
+  }
+
+  /// The images of cameras without a common trigger have stamps of their own: until here each is a frame.
+  void join_without_trigger() {
+    std::vector<ImageRow> left, right;
+    std::map<Time, std::size_t> readings_before;
+    for (const FrameEntry& frame : out_.frames) {
+      readings_before[frame.t] = frame.imu_before.value_or(0);
+      if (!frame.left_file.empty()) left.push_back({frame.t, frame.left_file});
+      if (!frame.right_file.empty()) right.push_back({frame.t, frame.right_file});
+    }
+    if (!std::ranges::is_sorted(left, {}, &ImageRow::t) || !std::ranges::is_sorted(right, {}, &ImageRow::t)) return;
+    PairedFrames paired = pair_frames(left, right, Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
+    if (!paired.untriggered) return;
+    for (FrameEntry& frame : paired.frames) frame.imu_before = readings_before[frame.t];
+    out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
+    out_.frames = std::move(paired.frames);
   }
 
   /// Its writer was: what is finished has a summary.

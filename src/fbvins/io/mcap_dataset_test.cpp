@@ -75,7 +75,7 @@ bool same_event(const SensorEvent& a, const SensorEvent& b) {
     return s->t == o.t && s->gyro_radps == o.gyro_radps && s->accel_mps2 == o.accel_mps2;
   }
   const auto &f = std::get<StereoFrame>(a), &g = std::get<StereoFrame>(b);
-  return f.t == g.t && same_image(f.left, g.left) && same_image(f.right, g.right);
+  return f.t == g.t && f.offsets == g.offsets && same_image(f.left, g.left) && same_image(f.right, g.right);
 }
 
 class FlightRecordTest : public ::testing::Test {
@@ -123,6 +123,21 @@ TEST_F(FlightRecordTest, GivesBackTheEventsAndTheirOrder) {
     EXPECT_EQ((*data)->info().left.unpaired, 1);
     EXPECT_EQ((*data)->info().right.unpaired, 1);
   }
+}
+
+TEST_F(FlightRecordTest, KeepsTheOffsetsOfCamerasWithoutACommonTrigger) {
+  std::vector<SensorEvent> events;
+  for (int k = 0; k < 6; ++k) {
+    events.emplace_back(reading(50 * k));
+    events.emplace_back(frame(50 * k));
+    std::get<StereoFrame>(events.back()).offsets.set(1, Duration{-(20 + k) * kMs});
+  }
+  write(events);
+  auto data = open_dataset(path_, {});
+  ASSERT_TRUE(data) << data.error().message;
+  const std::vector<SensorEvent> back = drain(**data);
+  ASSERT_EQ(back.size(), events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
 }
 
 TEST_F(FlightRecordTest, CanBeReadFromALaterFrameOn) {

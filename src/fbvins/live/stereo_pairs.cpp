@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/stereo_pairs.hpp"
 
+#include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 namespace fbvins {
@@ -12,23 +14,31 @@ constexpr std::size_t kLongestWait = 4;  // images of one camera without any of 
 }  // namespace
 
 void StereoPairs::add(int camera, Time t, std::shared_ptr<const Image> image) {
-  auto& own = waiting_[static_cast<std::size_t>(camera)];
-  if (own.empty() || t > own.back().t) own.push_back({t, std::move(image)});
+  const auto at = static_cast<std::size_t>(camera);
+  if (newest_[at] && t <= *newest_[at]) return;
+  if (newest_[at]) interval_[at] = t - *newest_[at];
+  newest_[at] = t;
+  waiting_[at].push_back({t, std::move(image)});
 }
 
-std::optional<StereoFrame> StereoPairs::next() {
+StereoPairs::Waiting StereoPairs::take(std::deque<Waiting>& from) {
+  Waiting first = std::move(from.front());
+  from.pop_front();
+  return first;
+}
+
+std::optional<StereoFrame> StereoPairs::next() { return without_trigger() ? next_without_trigger() : next_of_pairs(); }
+
+std::optional<StereoFrame> StereoPairs::next_of_pairs() {
   auto& [left, right] = waiting_;
-  const auto take = [](std::deque<Waiting>& from) {
-    Waiting first = std::move(from.front());
-    from.pop_front();
-    return first;
-  };
   if (!left.empty() && !right.empty()) {
     const Duration apart = right.front().t - left.front().t;
     if (apart.ns <= kSameInstant.ns && apart.ns >= -kSameInstant.ns) {
+      apart_ = 0;
       Waiting l = take(left);
       return StereoFrame{l.t, std::move(l.image), take(right).image};
     }
+    ++apart_;
   }
   const bool left_is_alone = !left.empty() && (right.empty() ? left.size() >= kLongestWait : left.front().t < right.front().t);
   if (left_is_alone) {
@@ -39,6 +49,31 @@ std::optional<StereoFrame> StereoPairs::next() {
   if (!right_is_alone) return std::nullopt;
   Waiting r = take(right);
   return StereoFrame{r.t, nullptr, std::move(r.image)};
+}
+
+/// As far as its interval tells, or because it is there.
+bool StereoPairs::next_right_is_later_than(Time t) const {
+  return newest_[1] && (*newest_[1] > t || *newest_[1] + interval_[1] > t);
+}
+
+std::optional<StereoFrame> StereoPairs::next_without_trigger() {
+  auto& [left, right] = waiting_;
+  if (left.empty()) {
+    if (right.size() < kLongestWait) return std::nullopt;
+    Waiting r = take(right);
+    return StereoFrame{r.t, nullptr, std::move(r.image)};
+  }
+  if (!next_right_is_later_than(left.front().t) && left.size() < kLongestWait) return std::nullopt;
+  Waiting l = take(left);
+  StereoFrame frame{l.t, std::move(l.image), nullptr};
+  const Time wanted = l.t - Duration{interval_[0].ns / 4};
+  const auto distance = [&](const Waiting& w) { return std::abs((w.t - wanted).ns); };
+  const auto nearest = std::ranges::min_element(right, {}, distance);
+  if (nearest == right.end() || distance(*nearest) > interval_[0].ns / 2) return frame;
+  frame.offsets.set(1, nearest->t - l.t);
+  frame.right = std::move(nearest->image);
+  right.erase(right.begin(), nearest + 1);
+  return frame;
 }
 
 }  // namespace fbvins

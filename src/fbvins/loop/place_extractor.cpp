@@ -50,14 +50,15 @@ Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
   if (!images.left) return place;
   orb_.extract(images.left->view(), found_, rig_.left.mask().get());
   stage_->improve(images.left->width(), images.left->height(), found_);
-  if (images.right) {
+  const bool stereo_pair = images.right && images.offsets.of(1) == images.offsets.of(0);
+  if (stereo_pair) {
     left_.build(images.left->view(), kSearchLevel + 1);
     right_.build(images.right->view(), kSearchLevel + 1);
   }
   const bool has_depth_image = depth_ && depth_->is_usable(images.depth.get());
   const auto depth_of = [&](const Vec2& px, const Vec2& normalised) -> std::optional<MeasuredInverseDepth> {
     if (has_depth_image) return depth_->at(*images.depth, px);
-    return images.right ? stereo(px, normalised) : std::nullopt;
+    return stereo_pair ? stereo(px, normalised) : std::nullopt;
   };
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Keypoint& keypoint = found_.keypoints[i];

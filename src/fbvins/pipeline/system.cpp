@@ -79,6 +79,7 @@ struct System::Impl {
     frame.t = packet.frame.t;
     frame.imu = std::move(packet.imu);
     frame.depth = packet.frame.depth;
+    frame.offsets = packet.frame.offsets;
     if (keyframes_wanted()) frame.images = std::move(packet.frame);
     hand_on(estimation, std::move(frame));
   }

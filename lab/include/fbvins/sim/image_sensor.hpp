@@ -18,6 +18,8 @@ namespace fbvins {
 struct CameraModelOptions {
   int time_samples = 4;
   double line_delay_us = 0;
+  double untriggered_ms = 0;
+  double untriggered_drift_us_per_s = 0;
   bool auto_exposure = true;
   double target_level = 130;
   double exposure_lag_frames = 8;
@@ -41,6 +43,10 @@ struct CameraModelOptions {
   void visit(V&& v) {
     v("time_samples", time_samples, "", "instants rendered and summed over the exposure; they also antialias", 1, 64);
     v("line_delay_us", line_delay_us, "us", "rolling shutter: time from line to line, 0 for a global shutter", 0.0, 200.0);
+    v("untriggered_ms", untriggered_ms, "ms",
+      "no common trigger: each camera but the first takes its images this long before the one before it", 0.0, 1000.0);
+    v("untriggered_drift_us_per_s", untriggered_drift_us_per_s, "us/s",
+      "how much earlier with each second, as clocks of their own would", 0.0, 1e4);
     v("auto_exposure", auto_exposure, "", "exposure follows the images' mean level");
     v("target_level", target_level, "", "mean grey value that the exposure aims at", 5.0, 250.0);
     v("exposure_lag_frames", exposure_lag_frames, "", "time constant of the exposure control, in frames", 0.0, 200.0);
