@@ -107,6 +107,14 @@ TEST(Doctor, MeasuresARightImageThatIsLate) {
   EXPECT_NEAR(finding->size, 20, 2) << all_of(diagnosis);
 }
 
+TEST(Doctor, DoesNotBlameCamerasWithoutATriggerForWhatTheirStampsSay) {
+  Evidence evidence = test::SyntheticEvidence({.right_late_s = 0.02}).make();
+  evidence.untriggered = true;
+  const Diagnosis diagnosis = examine(evidence);
+  EXPECT_TRUE(diagnosis.findings.empty()) << all_of(diagnosis);
+  EXPECT_EQ(diagnosis.not_judged.size(), 1u);
+}
+
 TEST(Doctor, NamesRightImagesThatComeWholeImagesLate) {
   Evidence evidence = good();
   evidence.step = {.lag = 1, .as_stamped_px = 5, .in_step_px = 0.3, .period_s = 0.05};

@@ -66,6 +66,7 @@ struct Evidence {
   StereoStep step;        ///< right images that were late or early are in order as well
   std::vector<ImuSample> imu;
   std::vector<Time> stamps;  ///< of all stereo images
+  bool untriggered = false;  ///< right images were taken at other times than left ones, as their stamps say
   std::vector<SeenFrame> frames;
   std::vector<StereoView> stereo;
   std::vector<SmallView> views;  ///< of the times at which the scene had moved, over the whole recording

@@ -103,6 +103,10 @@ void Examination::stereo() {
     not_judged("the pair of cameras: features that are fixed in view would be taken for points of the scene");
     return;
   }
+  if (evidence_.untriggered) {
+    not_judged("the pair of cameras: they have no common trigger, so their images are of different moments");
+    return;
+  }
   if (fit.changes.empty() && fit.error_px == 0) {
     not_judged("the pair of cameras: too few points are seen in both images");
     return;
@@ -144,7 +148,7 @@ void Examination::stereo_change(const StereoChange& change) {
     finding.measured = fmt::format("the right image is exposed {:.2f} +- {:.2f} ms {} the left one of the same stamp",
                                    std::abs(finding.size), finding.sigma, finding.size > 0 ? "after" : "before");
     finding.expected = "at the same moment";
-    finding.advice = "trigger both cameras together; cameras that run freely cannot be used";
+    finding.advice = "trigger both cameras together, or give each image the stamp of its own exposure";
   } else {
     lens(change.kind, change.lens, change.amount, sigma, change.explained_px);
   }
