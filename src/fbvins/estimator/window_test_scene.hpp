@@ -61,7 +61,7 @@ inline void add_landmark(Window& w, const Vec3& p_G, int host, Rng& rng) {
       if (rng.below(20) == 0) o.normalised += Vec2(0.02, -0.01);  // an outlier of some ten sigmas
       o.velocity = Vec2(rng.normal(), rng.normal());
       o.rows = 100 * o.normalised.y();
-      o.displacement_B = 0.01 * Vec3(frame - 2, right, 1);  // not true, to test the term
+      o.displacement_B = 0.001 * Vec3(frame - 2, right, 1);  // not true, to test the term
       o.sqrt_information << 700, 20, -10, 650;
       w.problem.observations.push_back(o);
       ++l.observation_count;

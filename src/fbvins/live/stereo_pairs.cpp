@@ -51,9 +51,11 @@ std::optional<StereoFrame> StereoPairs::next_of_pairs() {
   return StereoFrame{r.t, nullptr, std::move(r.image)};
 }
 
-/// As far as its interval tells, or because it is there.
-bool StereoPairs::next_right_is_later_than(Time t) const {
-  return newest_[1] && (*newest_[1] > t || *newest_[1] + interval_[1] > t);
+/// Whether all right images are there that could be a partner of a left one: a later one has come, or the next one comes too
+/// late, as far as the interval tells.
+bool StereoPairs::partners_are_there(Time left) const {
+  if (!newest_[1]) return false;
+  return *newest_[1] > left || *newest_[1] + interval_[1] > left + Duration{interval_[0].ns / 4};
 }
 
 std::optional<StereoFrame> StereoPairs::next_without_trigger() {
@@ -63,7 +65,7 @@ std::optional<StereoFrame> StereoPairs::next_without_trigger() {
     Waiting r = take(right);
     return StereoFrame{r.t, nullptr, std::move(r.image)};
   }
-  if (!next_right_is_later_than(left.front().t) && left.size() < kLongestWait) return std::nullopt;
+  if (!partners_are_there(left.front().t) && left.size() < kLongestWait) return std::nullopt;
   Waiting l = take(left);
   StereoFrame frame{l.t, std::move(l.image), nullptr};
   const Time wanted = l.t - Duration{interval_[0].ns / 4};

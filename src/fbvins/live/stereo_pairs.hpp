@@ -31,7 +31,7 @@ class StereoPairs {
   static Waiting take(std::deque<Waiting>& from);
   std::optional<StereoFrame> next_of_pairs();
   std::optional<StereoFrame> next_without_trigger();
-  bool next_right_is_later_than(Time t) const;
+  bool partners_are_there(Time left) const;
 
   std::array<std::deque<Waiting>, 2> waiting_;
   std::array<std::optional<Time>, 2> newest_;
