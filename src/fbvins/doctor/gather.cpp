@@ -269,7 +269,7 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
   if (s.enough()) return false;
   StereoFrame frame = std::get<StereoFrame>(event);
   s.evidence.stamps.push_back(frame.t);
-  s.evidence.untriggered = s.evidence.untriggered || !frame.offsets.all_zero();
+  s.evidence.untriggered = s.evidence.untriggered || frame.offsets.of(1) != frame.offsets.of(0);
   s.count_repeated(frame);
   if (!s.prelude) {
     if (s.evidence.swapped) std::swap(frame.left, frame.right);
