@@ -8,38 +8,14 @@
 // Values; const members may be called from any thread.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/imu/exposure_motion.hpp"
 #include "fbvins/types/calibration.hpp"
-#include "fbvins/types/imu.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
-
-/// How the body turned and accelerated about the stamp of a frame, by the readings that end there. In B at the stamp.
-class ExposureMotion {
- public:
-  /// Without readings the body neither turns nor accelerates; without gravity it is not known to accelerate.
-  ExposureMotion(const ImuSegment& readings, const ImuBias& bias, const std::optional<Vec3>& gravity_B_mps2 = std::nullopt);
-
-  /// The body's axes `after_s` after the stamp. Before it by the readings, after it by the rate and its slope at the end.
-  Quat turn(double after_s) const;
-  /// How far the body had moved by then if it was at rest at the stamp, m.
-  Vec3 moved(double after_s) const { return 0.5 * after_s * after_s * accel_mps2_; }
-
- private:
-  /// At a reading: turn from the stamp, and the rate.
-  struct Knot {
-    double after_s;
-    Quat q;
-    Vec3 rate_radps;
-  };
-  std::vector<Knot> knots_;  // from the newest back
-  Vec3 slope_radps2_ = Vec3::Zero();
-  Vec3 accel_mps2_ = Vec3::Zero();
-};
 
 class Exposures {
  public:

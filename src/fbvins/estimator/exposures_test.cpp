@@ -133,11 +133,5 @@ TEST(Exposures, WhatIsSeenAtTheStampKeepsEveryBit) {
   EXPECT_FALSE(exposures.at_stamp(frame));
 }
 
-TEST(Exposures, WithoutReadingsNothingTurns) {
-  const ExposureMotion none({}, {});
-  EXPECT_EQ(none.turn(-0.02).coeffs(), Quat::Identity().coeffs());
-  EXPECT_EQ(none.moved(0.01), Vec3::Zero());
-}
-
 }  // namespace
 }  // namespace fbvins

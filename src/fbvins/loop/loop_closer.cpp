@@ -83,7 +83,7 @@ MapUpdate LoopCloser::process(const Keyframe& keyframe) {
     return update;
   }
   CpuTimer timer;
-  Place place = extractor_.extract(keyframe.images, (keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).toRotationMatrix());
+  Place place = extractor_.extract(keyframe);
   const double extract_ms = timer.lap_ms();
   MapUpdate update = process(std::move(place), keyframe);
   update.stats.extract_ms = extract_ms;

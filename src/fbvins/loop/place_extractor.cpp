@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "fbvins/geometry/triangulation.hpp"
+#include "fbvins/imu/exposure_motion.hpp"
 
 namespace fbvins {
 namespace {
@@ -28,6 +29,19 @@ constexpr double kKeypoint_px = 0.7, kDisparity_px = 0.25;
 /// Negative disparities down to this are taken for points at infinity, not for wrong matches.
 constexpr double kInfinity_px = 1.0;
 
+/// Where the left camera was when it took its image, as seen from the right one when it took its own (S3, S4). None without
+/// readings.
+std::optional<Pose<C1, C0>> between_exposures(const StereoRig& rig, const Keyframe& keyframe, const Mat3& R_LB) {
+  const ExposureOffsets& offsets = keyframe.images.offsets;
+  if (offsets.of(0) == offsets.of(1)) return rig.T_C1C0();
+  if (keyframe.imu.segments.empty()) return std::nullopt;
+  const Vec3 gravity_B = R_LB.transpose() * Vec3(0, 0, -keyframe.imu.gravity_mps2);
+  const Vec3 v_B = keyframe.T_WB.q.conjugate() * keyframe.v_WB;
+  const ExposureMotion motion(keyframe.imu.segments.back(), keyframe.imu.bias, gravity_B);
+  const auto body = [&](int camera) { return motion.body(offsets.of(camera).seconds(), v_B); };
+  return (body(1) * rig.T_BC1).inverse() * (body(0) * rig.T_BC0);
+}
+
 }  // namespace
 
 PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
@@ -35,23 +49,26 @@ PlaceExtractor::PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions
     : rig_(rig),
       vocabulary_(std::move(vocabulary)),
       stage_(std::move(stage)),
-      R_rl_(rig.T_C1C0().R()),
-      p_rl_(rig.T_C1C0().p),
       focal_px_(rig.left.focal_px()),
-      baseline_m_(p_rl_.norm()),
       orb_(OrbOptions{.max_features = options.max_features, .levels = kLevels}, stage_->changes_descriptors()) {
   if (rig.depth) depth_.emplace(*rig.depth, rig.left);
 }
 
-Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB) {
+Place PlaceExtractor::extract(const Keyframe& keyframe) {
+  const Mat3 R_LB = (keyframe.gauge.q_LG * keyframe.gauge.T_GB.q).toRotationMatrix();
+  return extract(keyframe.images, R_LB, between_exposures(rig_, keyframe, R_LB));
+}
+
+Place PlaceExtractor::extract(const StereoFrame& images, const Mat3& R_LB, const std::optional<Pose<C1, C0>>& T_C1C0) {
   Place place;
   place.focal_px = focal_px_;
   place.up_C0 = (R_LB * rig_.T_BC0.R()).transpose() * Vec3::UnitZ();
   if (!images.left) return place;
   orb_.extract(images.left->view(), found_, rig_.left.mask().get());
   stage_->improve(images.left->width(), images.left->height(), found_);
-  const bool stereo_pair = images.right && images.offsets.of(1) == images.offsets.of(0);
+  const bool stereo_pair = images.right && T_C1C0;
   if (stereo_pair) {
+    R_rl_ = T_C1C0->R(), p_rl_ = T_C1C0->p;
     left_.build(images.left->view(), kSearchLevel + 1);
     right_.build(images.right->view(), kSearchLevel + 1);
   }
@@ -119,8 +136,11 @@ std::optional<MeasuredInverseDepth> PlaceExtractor::stereo(const Vec2& left_px, 
   const auto off_line = distance_from_epipolar_line(far, p_rl_, seen);
   if (!off_line || *off_line * focal_px_ > kEpipolar_px) return std::nullopt;
   const auto rho = inverse_depth_along(far, p_rl_, seen);
-  const double rho_per_px = 1 / (focal_px_ * baseline_m_);
-  if (!rho || *rho < -kInfinity_px * rho_per_px || *rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
+  if (!rho || far.z() + *rho * p_rl_.z() <= 0) return std::nullopt;
+  // d(seen)/d(rho): by the part of the baseline that is across the ray
+  const double across_m = (p_rl_.head<2>() - p_rl_.z() * seen.head<2>()).norm() / (far.z() + *rho * p_rl_.z());
+  const double rho_per_px = 1 / (focal_px_ * across_m);
+  if (*rho < -kInfinity_px * rho_per_px || *rho > kNearerThanSearched / kMinDepth_m) return std::nullopt;
   return MeasuredInverseDepth{std::max(*rho, 0.0), kDisparity_px * rho_per_px};
 }
 

@@ -4,7 +4,7 @@
 // instance, one thread.
 //
 //   PlaceExtractor extractor(rig, {}, vocabulary);
-//   Place place = extractor.extract(keyframe.images, R_LB);
+//   Place place = extractor.extract(keyframe);
 #pragma once
 
 #include <memory>
@@ -17,6 +17,7 @@
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/place.hpp"
 #include "fbvins/types/image.hpp"
+#include "fbvins/types/keyframe.hpp"
 
 namespace fbvins {
 
@@ -26,11 +27,14 @@ class PlaceExtractor {
   PlaceExtractor(const StereoRig& rig, const PlaceExtractorOptions& options, Vocabulary vocabulary,
                  std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 
-  /// `R_LB`: gravity-aligned attitude of the body. Empty when the left image is missing; without depth when right one and depth
-  /// image are.
-  Place extract(const StereoFrame& images, const Mat3& R_LB);
+  /// Empty when the left image is missing; without depth when the right one and the depth image are. Images that the two cameras
+  /// took at different times are matched with the baseline that they had then (S3, S4); without readings there is no depth.
+  Place extract(const Keyframe& keyframe);
+  /// Images of one instant. `R_LB`: gravity-aligned attitude of the body.
+  Place extract(const StereoFrame& images, const Mat3& R_LB) { return extract(images, R_LB, rig_.T_C1C0()); }
 
  private:
+  Place extract(const StereoFrame& images, const Mat3& R_LB, const std::optional<Pose<C1, C0>>& T_C1C0);
   std::optional<MeasuredInverseDepth> stereo(const Vec2& left_px, const Vec2& left_normalised);
   std::optional<Vec2> search(const Vec2& left_normalised) const;
   std::optional<Vec2> project(const Vec2& left_normalised, double inverse_depth) const;
@@ -39,9 +43,9 @@ class PlaceExtractor {
   std::optional<DepthReader> depth_;
   Vocabulary vocabulary_;
   std::unique_ptr<DescriptorStage> stage_;
-  Mat3 R_rl_;
+  Mat3 R_rl_;  // of the images at hand
   Vec3 p_rl_;
-  double focal_px_, baseline_m_;
+  double focal_px_;
   OrbExtractor orb_;
   OrbFeatures found_;
   Pyramid left_, right_;

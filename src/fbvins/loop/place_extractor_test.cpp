@@ -62,6 +62,32 @@ TEST(PlaceExtractor, WithoutTheRightImageThereIsNoDepthWithoutTheLeftOneNothing)
   EXPECT_EQ(extractor().extract({}, Mat3::Identity()).size(), 0u);
 }
 
+/// The right camera took its image 25 ms before the left one, in a flight to the left: the baseline is 5 cm longer.
+TEST(PlaceExtractor, CamerasWithoutACommonTriggerHaveTheBaselineOfTheirExposures) {
+  Keyframe keyframe;
+  keyframe.t = Time{1'000'000'000};
+  keyframe.v_WB = Vec3(0, 2, 0);
+  keyframe.images.left = wall(0);
+  keyframe.images.right = wall(test_room::kFocal * (test_room::kBaseline + 0.05) / kDepth_m);
+  keyframe.images.offsets.set(1, Duration{-25'000'000});
+  const auto with_depth = [&] {
+    int right = 0, wrong = 0;
+    for (const PlaceFeature& f : extractor().extract(keyframe).features) {
+      if (!f.has_depth()) continue;
+      (std::abs(f.inverse_depth - 1 / kDepth_m) < 3 * f.sigma_inverse_depth ? right : wrong)++;
+    }
+    return std::pair(right, wrong);
+  };
+  EXPECT_EQ(with_depth(), std::pair(0, 0)) << "without readings it is not known where they were";
+  ImuSegment readings;
+  for (int i = -10; i <= 0; ++i)
+    readings.samples.push_back({keyframe.t + Duration{i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
+  keyframe.imu.segments = {readings};
+  const auto [right, wrong] = with_depth();
+  EXPECT_GT(right, 80);
+  EXPECT_LT(wrong, right / 20);
+}
+
 TEST(PlaceExtractor, TakesDepthsFromTheDepthImage) {
   const StereoRig rig = with_depth(test_room::rig(), {.noise_at_1m_m = 0.004});
   PlaceExtractor extractor(rig, {.max_features = 200}, test_room::vocabulary());
