@@ -19,7 +19,8 @@ TEST(ReadingJudge, RefusesWhatTheSensorCannotHaveMeasured) {
   int t = 0;
   for (const double wrong :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e6, 3e38, 1e200, -41.0}) {
-    ImuSample gyro = reading(t += 5, 0.01 * t), accel = reading(t += 5, 0.01 * t);
+    ImuSample gyro = reading(t + 5, 0.01 * t), accel = reading(t + 10, 0.01 * t);
+    t += 10;
     gyro.gyro_radps.z() = accel.accel_mps2.x() = wrong;
     EXPECT_FALSE(judge.accepts(gyro)) << wrong;
     EXPECT_FALSE(judge.accepts(accel)) << wrong;
