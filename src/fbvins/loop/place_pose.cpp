@@ -33,45 +33,62 @@ constexpr double kDivergedStep = 5, kArrivedStep = 1e-6;
 
 const PlaceFeature& at(const Place& place, int i) { return place.features[static_cast<std::size_t>(i)]; }
 
-/// Residual of one match in (x, y, inverse depth) of the query (L4): 3 rows, or 2 where the query has no depth.
-struct MatchTerm {
+Vec3 measured(const PlaceFeature& f) { return {f.x, f.y, f.inverse_depth}; }
+Vec3 variances(const PlaceFeature& f) {
+  const double xy = f.sigma_xy, rho = f.sigma_inverse_depth;
+  return {xy * xy, xy * xy, rho * rho};
+}
+
+/// One match: the point of the candidate as both views see it, (x, y, inverse depth), and the residual in the same of the query
+/// (L3), which has 3 rows, or 2 where the query has no depth.
+class MatchTerm {
+ public:
+  explicit MatchTerm(const PlaceFeature& candidate) : point(measured(candidate)) {}
+
+  Vec3 point;
   Vec3 r = Vec3::Zero();
   Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
   Mat3 information = Mat3::Zero();  ///< zero where a row does not exist
   double chi2 = 0;
-};
 
-/// False when the point is behind the query's camera.
-bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const Vec3& t, MatchTerm& term) {
-  const Vec3 p_c = c.p_C0(), p = R * p_c + t;
-  if (!(p.z() > kNearest_m)) return false;
-  const double iz = 1 / p.z();
-  Mat3 J_p;  // d(x, y, inverse depth)/d(point)
-  J_p << iz, 0, -p.x() * iz * iz, 0, iz, -p.y() * iz * iz, 0, 0, -iz * iz;
-  term.r = Vec3(p.x() * iz - q.x, p.y() * iz - q.y, iz - q.inverse_depth);
-  term.J.leftCols<3>() = J_p;
-  term.J.rightCols<3>() = -J_p * R * hat(p_c);
-  // The candidate's own errors, carried into the query's view: p_c = (x, y, 1) / rho.
-  const double d = 1 / static_cast<double>(c.inverse_depth);
-  Mat3 J_c;
-  J_c << d, 0, -p_c.x() * d, 0, d, -p_c.y() * d, 0, 0, -d * d;
-  const Mat3 A = J_p * R * J_c;
-  const double sxy2 = static_cast<double>(c.sigma_xy) * c.sigma_xy,
-               srho2 = static_cast<double>(c.sigma_inverse_depth) * c.sigma_inverse_depth;
-  Mat3 S = A * Vec3(sxy2, sxy2, srho2).asDiagonal() * A.transpose();
-  const double qxy2 = static_cast<double>(q.sigma_xy) * q.sigma_xy;
-  S(0, 0) += qxy2, S(1, 1) += qxy2;
-  term.information.setZero();
-  if (q.has_depth()) {
-    S(2, 2) += static_cast<double>(q.sigma_inverse_depth) * q.sigma_inverse_depth;
-    term.information = S.inverse();
-  } else {
-    term.r.z() = 0;
-    term.information.topLeftCorner<2, 2>() = S.topLeftCorner<2, 2>().inverse().eval();
+  /// With the pose at hand. False when the point is behind the query's camera.
+  bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const Vec3& t) {
+    const Vec3 ray(point.x(), point.y(), 1), P = R * ray + point.z() * t;  // the point, times its inverse depth
+    if (!(P.z() > kNearest_m * point.z())) return false;
+    const double iz = 1 / P.z();
+    const Vec3 expected(P.x() * iz, P.y() * iz, point.z() * iz);
+    Mat3 J_P;  // d(x, y, inverse depth)/dP
+    J_P << iz, 0, -expected.x() * iz, 0, iz, -expected.y() * iz, 0, 0, -expected.z() * iz;
+    J.leftCols<3>() = point.z() * J_P;
+    J.rightCols<3>() = -J_P * R * hat(ray);
+    A_.leftCols<2>() = J_P * R.leftCols<2>();
+    A_.col(2) = J_P * t + Vec3(0, 0, iz);
+    c_ = measured(c) - point, c_variances_ = variances(c);
+    r = expected + A_ * c_ - measured(q);
+    Mat3 S = A_ * c_variances_.asDiagonal() * A_.transpose();
+    S.diagonal() += variances(q);
+    information.setZero();
+    if (q.has_depth()) {
+      information = S.inverse();
+    } else {
+      r.z() = 0;
+      information.topLeftCorner<2, 2>() = S.topLeftCorner<2, 2>().inverse().eval();
+    }
+    chi2 = r.dot(information * r);
+    return true;
   }
-  term.chi2 = term.r.dot(term.information * term.r);
-  return true;
-}
+
+  /// The point that fits both views best, after this step of the pose (L4).
+  void follow(const Vec6& step) {
+    const Vec3 left = r + J * step;
+    point += c_ - c_variances_.asDiagonal() * (A_.transpose() * (information * left));
+    point.z() = std::max(point.z(), 0.0);
+  }
+
+ private:
+  Mat3 A_ = Mat3::Identity();  // d(r)/d(point)
+  Vec3 c_ = Vec3::Zero(), c_variances_ = Vec3::Zero();
+};
 
 double chi2_gate(const PlaceFeature& q) { return kOutlier_sigma * kOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0); }
 
@@ -140,34 +157,42 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
                          const CameraFromCamera& start) {
   RelativePose out;
   out.T_qc = start;
-  MatchTerm term;
+  struct Matched {
+    const DescriptorMatch* match;
+    MatchTerm term;
+    bool in_view = false;
+  };
+  std::vector<Matched> terms;
+  for (const DescriptorMatch& m : matches)
+    if (at(candidate, m.b).has_point()) terms.push_back({&m, MatchTerm(at(candidate, m.b))});
+  const auto evaluate = [&](Matched& m) {
+    return m.in_view = m.term.evaluate(at(query, m.match->a), at(candidate, m.match->b), out.T_qc.R(), out.T_qc.p);
+  };
   for (int iteration = 0; iteration < kRefinements; ++iteration) {
-    const Mat3 R = out.T_qc.R();
     Mat6 H = Mat6::Zero();
     Vec6 b = Vec6::Zero();
-    for (const DescriptorMatch& m : matches) {
-      const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
-      if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
-      const double s = std::sqrt(term.chi2);
+    for (Matched& m : terms) {
+      if (!evaluate(m)) continue;
+      const double s = std::sqrt(m.term.chi2);
       const double weight = s <= kHuber_sigma ? 1 : (s > kGross_sigma ? 0 : kHuber_sigma / s);
-      const Eigen::Matrix<double, 6, 3> JtW = weight * term.J.transpose() * term.information;
-      H += JtW * term.J;
-      b -= JtW * term.r;
+      const Eigen::Matrix<double, 6, 3> JtW = weight * m.term.J.transpose() * m.term.information;
+      H += JtW * m.term.J;
+      b -= JtW * m.term.r;
     }
     H.diagonal().array() += kDamping;
     const Vec6 step = H.ldlt().solve(b);
     if (!step.allFinite() || step.norm() > kDivergedStep) return out;
     out.T_qc = out.T_qc.boxplus(step.head<3>(), step.tail<3>());
+    for (Matched& m : terms)
+      if (m.in_view) m.term.follow(step);
     if (step.norm() < kArrivedStep) break;
   }
-  const Mat3 R = out.T_qc.R();
-  for (const DescriptorMatch& m : matches) {
-    const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
-    if (!c.has_point() || !evaluate(q, c, R, out.T_qc.p, term)) continue;
-    if (term.chi2 > chi2_gate(q)) continue;
-    out.inliers.push_back(m);
+  for (Matched& m : terms) {
+    const PlaceFeature& q = at(query, m.match->a);
+    if (!evaluate(m) || m.term.chi2 > chi2_gate(q)) continue;
+    out.inliers.push_back(*m.match);
     out.with_depth_both += q.has_depth();
-    out.information += term.J.transpose() * term.information * term.J;
+    out.information += m.term.J.transpose() * m.term.information * m.term.J;
   }
   return out;
 }
