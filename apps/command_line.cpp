@@ -40,6 +40,7 @@ int hand_over(const HandedOver& command, char** argv) {
 
 int run_command_line(int argc, char** argv, std::initializer_list<AddCommand> commands,
                      std::initializer_list<HandedOver> elsewhere) {
+  keep_standard_streams();
   CLI::App program{"FB-VINS: stereo visual-inertial odometry", "fbvins"};
   program.set_version_flag("--version", "fbvins " FBVINS_VERSION);
   program.footer(kExamples);

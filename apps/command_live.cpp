@@ -157,7 +157,7 @@ void save(const Arguments& arguments, const Config& config, const Source& source
   const std::string& folder = arguments.outputs.out;
   const LiveSummary summary = summarise(tally, arguments.source, config.frontend.kind, source, folder);
   if (!folder.empty()) troubles.add(write_results(folder, config, source, summary));
-  if (!arguments.outputs.quiet) std::fputs(to_text(summary).c_str(), stderr);
+  if (!arguments.outputs.quiet) tell(to_text(summary));
 }
 
 int run(Arguments arguments) {

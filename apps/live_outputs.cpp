@@ -77,8 +77,8 @@ Result<void> add_outputs(const OutputArguments& arguments, const LiveFlight& fli
   if (!arguments.record.empty()) add_record(arguments, flight, live, troubles);
   if (const char* address = std::getenv("NOTIFY_SOCKET")) {
     auto sink = ServiceSink::create(address, stderr);
-    if (!sink) return sink.error();
-    live.add_sink(*std::move(sink));
+    if (sink) live.add_sink(*std::move(sink));
+    else troubles.add(sink.error());
   } else if (!arguments.quiet) {
     live.add_sink(std::make_unique<StatusSink>(stdout));
   }

@@ -25,7 +25,7 @@ Progress::Progress(int total, bool quiet)
     : total_(std::max(total, 1)), quiet_(quiet), terminal_(stderr_is_terminal()), start_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
-  if (!quiet_ && terminal_) fmt::print(stderr, "\r\033[K");
+  if (!quiet_ && terminal_) tell("\r\033[K");
 }
 
 double Progress::elapsed_s() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
@@ -44,14 +44,13 @@ void Progress::update(int done) {
     if (elapsed - last_drawn_s_ < kRedraw_s && done < total_) return;
     last_drawn_s_ = elapsed;
     const int filled = static_cast<int>(static_cast<long long>(kBarWidth) * done / total_);
-    fmt::print(stderr, "\r\033[K[{:#>{}}{:.>{}}] {}", "", filled, "", kBarWidth - filled, describe(done, elapsed));
-    std::fflush(stderr);
+    tell(fmt::format("\r\033[K[{:#>{}}{:.>{}}] {}", "", filled, "", kBarWidth - filled, describe(done, elapsed)));
     return;
   }
   const int tenth = static_cast<int>(10LL * done / total_);
   if (tenth == last_tenth_) return;
   last_tenth_ = tenth;
-  fmt::print(stderr, "{}\n", describe(done, elapsed));
+  tell(describe(done, elapsed) + "\n");
 }
 
 }  // namespace fbvins::app

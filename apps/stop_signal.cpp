@@ -80,7 +80,8 @@ StopSignals::StopSignals() {
   action.sa_mask = stop_signals();
   for (const int signal : kSignals)
     if (signal != SIGHUP || !ignored(signal)) sigaction(signal, &action, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
+  // A reader that is gone, and a file at the limit of its size, are errors of that write.
+  for (const int signal : {SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_IGN);
   const sigset_t set = stop_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   taker_ = std::thread(take_signals);

@@ -12,6 +12,13 @@ bool stderr_is_terminal();
 /// Bold on a terminal, unless NO_COLOR is set (no-color.org).
 std::string bold(std::string_view text);
 
+/// Opens /dev/null for those of stdin, stdout and stderr that are closed, before a file gets their number.
+void keep_standard_streams();
+
+/// Text on stderr. What cannot be written, because the disk is full or nobody reads the pipe, is lost: no output of a flight
+/// waits for it.
+void tell(std::string_view text);
+
 /// One line on stderr, with the program's name.
 void note(std::string_view message);
 void warn(std::string_view message);

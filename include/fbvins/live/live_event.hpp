@@ -17,14 +17,15 @@
 
 namespace fbvins {
 
-/// The body at an IMU reading: the newest estimate propagated to it. Without a pose (`health`) only times and health are valid.
+/// The body at an IMU reading: the newest estimate propagated to it; while the IMU is silent, at each image. Without a pose
+/// (`health`) only times and health are valid.
 struct LivePose {
-  Time t;                                   ///< of the reading, on the images' clock
+  Time t;                                   ///< of the reading or image, on the images' clock
   Time host_t;                              ///< the same moment on this machine's CLOCK_MONOTONIC
   Time estimate_t;                          ///< of the image whose estimate was propagated
   Pose<W, B> T_WB;                          ///< converges to each new estimate without a step (LiveOptions::smoothing_s)
   Vec3 v_WB = Vec3::Zero();                 ///< m/s, in W
-  Vec3 w_WB_B = Vec3::Zero();               ///< rad/s, in B, bias removed
+  Vec3 w_WB_B = Vec3::Zero();               ///< rad/s, in B, bias removed; zero while the IMU is silent
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W [m], dtheta in B [rad])
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB, m^2/s^2
   double tilt_sigma_rad = 0;                ///< that of the propagated estimate
@@ -39,7 +40,7 @@ struct LiveCounts {
   std::int64_t images_estimated = 0;    ///< of these, with an answer of the estimator, a pose or not
   std::int64_t images_dropped = 0;      ///< because the stages were busy with older ones
   std::int64_t images_incomplete = 0;   ///< one camera missing or frozen
-  std::int64_t images_late = 0;         ///< dropped: with a stamp before a newer image's, or one that no clock gives
+  std::int64_t images_late = 0;         ///< dropped: with a stamp before a newer image's, or one that no clock gives, or twice
   std::int64_t keyframes_left_out = 0;  ///< not in the map, because it was busy with older ones
   std::int64_t imu_refused = 0;         ///< not finite, beyond the sensor's range, or the same again and again
   std::int64_t imu_late = 0;            ///< dropped: a later one had gone on before, or the stamp is one that no clock gives

@@ -370,6 +370,17 @@ TEST(Estimator, AStartNeedsBothCamerasAndSaysSo) {
   }
 }
 
+/// In motion and at rest: images in which one camera is missing are passed over.
+TEST(Estimator, AStartDoesNotNeedEveryImageOfBothCameras) {
+  for (const Motion& motion : {Motion(0.6, 0.3), Motion(0, 0)}) {
+    SimulatedFlight flight(motion, 14);
+    flight.left_camera = [](int k) { return k % 7 != 3; };
+    const Flown flown = fly(flight, 60);
+    EXPECT_LT(flown.first_pose(), 30);
+    EXPECT_TRUE(flown.odometry.back().health.has_pose());
+  }
+}
+
 TEST(Estimator, ARefusedStartIsNotPublished) {
   SimulatedFlight flight(Motion(0.6, 0.3), 1);
   EstimatorOptions options = exact_noise();

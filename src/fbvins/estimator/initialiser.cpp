@@ -5,6 +5,7 @@
 #include <cmath>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "fbvins/estimator/initial_prior.hpp"
 #include "fbvins/estimator/mono_start.hpp"
@@ -34,6 +35,8 @@ constexpr int kMinFeatures = 20, kMinFeaturesAtRest = 8;
 constexpr double kStill_px = 1.5;
 constexpr int kMinStructureInliers = 12;
 constexpr double kMinInlierShare = 0.6;
+/// Images in which one camera is missing are passed over, for this long at most.
+constexpr double kLongestSkip_s = 0.15;
 constexpr std::size_t kFramesPerRefinement = 3;
 
 /// Prior on all fifteen numbers of the first frame: images alone determine neither origin nor velocity.
@@ -55,6 +58,14 @@ void leave_out_moving(std::vector<TrackedFrame>& frames) {
         moving.insert(f.id);
   for (TrackedFrame& frame : frames)
     std::erase_if(frame.features, [&](const TrackedFeature& f) { return moving.contains(f.id); });
+}
+
+/// Consecutive segments as one; neighbours share a stamp.
+ImuSegment joined(ImuSegment first, const ImuSegment& second) {
+  if (first.empty()) return second;
+  first.samples.insert(first.samples.end(), second.samples.begin() + 1, second.samples.end());
+  first.longest_gap = std::max(first.longest_gap, second.longest_gap);
+  return first;
 }
 
 /// Rotates about the vertical and translates G so that the first state has the position and heading of `origin`.
@@ -92,6 +103,13 @@ std::optional<InitialSolution> Initialiser::process(const TrackedFrame& frame, D
   // After a break in the images or readings the earlier frames are of no use: frames must be consecutive.
   const bool broken = !frames_.empty() && frame.imu.empty();
   const bool at_rest = rest.seconds() >= RestOptions{}.min_window_s;
+  const bool halved =
+      frame.has_left != frame.has_right && !broken && !frames_.empty() && (frame.t - frames_.back().t).seconds() < kLongestSkip_s;
+  if (halved && usable_features(frame, at_rest) < kMinFeaturesAtRest) {
+    skipped_ = joined(std::move(skipped_), frame.imu);
+    readings_.push_back(frame.imu);
+    return std::nullopt;
+  }
   if (usable_features(frame, at_rest) < (at_rest ? kMinFeaturesAtRest : kMinFeatures) || broken) {
     reason_ = HealthReason::too_few_features;
     reset();
@@ -116,13 +134,11 @@ void Initialiser::remember(const TrackedFrame& frame, bool at_rest) {
   // With a fast camera the frames would span too short a time: the newest replaces one that is too close to its predecessor.
   const std::size_t n = frames_.size();
   TrackedFrame newest = frame;
+  newest.imu = joined(std::exchange(skipped_, {}), frame.imu);
   const bool slowly = one_camera_ || (by_one_camera(frame) && !at_rest);
   const double spacing_s = slowly ? kMinSpacingOneCamera_s : kMinSpacing_s;
   if (n >= 2 && (frame.t - frames_[n - 2].t).seconds() < spacing_s) {
-    ImuSegment joined = std::move(frames_.back().imu);
-    joined.samples.insert(joined.samples.end(), frame.imu.samples.begin() + 1, frame.imu.samples.end());
-    joined.longest_gap = std::max(joined.longest_gap, frame.imu.longest_gap);
-    newest.imu = std::move(joined);
+    newest.imu = joined(std::move(frames_.back().imu), newest.imu);
     frames_.pop_back();
   }
   frames_.push_back(std::move(newest));

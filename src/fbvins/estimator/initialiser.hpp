@@ -36,6 +36,7 @@ class Initialiser {
   void reset() {
     frames_.clear();
     readings_.clear();
+    skipped_ = {};
   }
   /// Takes the next frame; a solution when there is one, else reason() says what is missing.
   /// `rest`: how long the body has stood still. G is placed so that the first frame has the
@@ -61,6 +62,7 @@ class Initialiser {
   std::deque<ImuSegment> readings_;  ///< of the last moments, to decide whether the body is at rest
   SlidingWindow structure_;
   WindowSolver solver_;
+  ImuSegment skipped_;  ///< readings of images since the last frame, in which a camera was missing
   HealthReason reason_ = HealthReason::waiting_for_motion_or_rest;
 };
 

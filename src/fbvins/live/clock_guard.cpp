@@ -19,20 +19,35 @@ constexpr double kShortestMisfit_s = 0.25, kPaceShare = 0.2, kPaceJitter_s = 0.0
 /// Camera and IMU share a clock: two jumps that agree within these are the same one.
 constexpr double kSameLeap_s = 0.05, kSameLeapWithin_s = 5;
 constexpr double kWindow_s = 5;
+/// Two stamps are in step if they are this much apart, at most, from what passed between them.
+constexpr double kInStep_s = 0.1;
+/// A stamp is early if it is less late than any of its stream in the last seconds by more than this, and this many periods: data
+/// that come in a block are less late by a period each.
+constexpr double kEarly_s = 0.03, kEarly_periods = 1.5;
 
 }  // namespace
 
-double ClockGuard::lateness_s(Time t, Time host) const {
-  return (host - *first_host_).seconds() - (t - *first_).seconds() / rate_;
-}
-double ClockGuard::shortest_lateness_s() const { return std::min(current_s_, previous_s_); }
-
-std::optional<Time> ClockGuard::mend(Stream stream, Time raw, Time host) {
-  if (!first_) {
-    first_ = raw;
-    first_host_ = window_start_ = host;
+void ClockGuard::ShortestLateness::add(double lateness_s, Time host) {
+  if (!window_start_) window_start_ = host;
+  if ((host - *window_start_).seconds() > kWindow_s) {
+    previous_s_ = current_s_;
+    current_s_ = std::numeric_limits<double>::infinity();
+    window_start_ = host;
   }
+  current_s_ = std::min(current_s_, lateness_s);
+}
+
+double ClockGuard::lateness_s(Time t, Time host) const {
+  return (host - first_->host).seconds() - (t - first_->raw).seconds() / rate_;
+}
+double ClockGuard::shortest_lateness_s() const {
+  return std::min(states_[imu].lateness.value_s(), states_[camera].lateness.value_s());
+}
+
+std::optional<ClockGuard::Event> ClockGuard::mend(Stream stream, Time raw, Time host) {
   State& s = states_[stream];
+  if (!s.newest) return begin(stream, raw, host);
+  int held_back = 0;
   if (!fits(s, raw + s.correction, host) || continues(s.misfits, raw, host)) {
     if (!go_on_as_a_clock(s.misfits, raw, host)) return std::nullopt;
     const Duration before = s.correction;
@@ -40,17 +55,48 @@ std::optional<Time> ClockGuard::mend(Stream stream, Time raw, Time host) {
     s.correction_before = before;
     s.leapt_host = host;
     ++leaps_;
+    held_back = s.misfits.count - 1;
+  } else if (is_early(s, raw + s.correction, host)) {
+    if (++s.early < kFewestMisfits) return std::nullopt;
+    held_back = s.early - 1;
   }
   s.misfits = {};
+  s.early = 0;
   const Time t = raw + s.correction;
   learn(s, t, host);
-  return t;
+  return Event{t, held_back};
+}
+
+/// The first stamps may be wrong, too: a stream begins when one is in step with the one before, or with the other stream.
+std::optional<ClockGuard::Event> ClockGuard::begin(Stream stream, Time raw, Time host) {
+  State &s = states_[stream], &other = states_[1 - stream];
+  const Arrival now{raw, host};
+  const bool with_own = s.unconfirmed && in_step(*s.unconfirmed, now);
+  const bool with_other = other.newest && in_step({*other.newest - other.correction, *other.newest_host}, now);
+  const bool both_begin = !other.newest && other.unconfirmed && in_step(*other.unconfirmed, now);
+  s.unconfirmed = now;
+  if (!with_own && !with_other && !both_begin) return std::nullopt;
+  if (with_other) s.correction = other.correction;
+  if (!first_) first_ = now;
+  if (both_begin) learn(other, other.unconfirmed->raw, other.unconfirmed->host);
+  const Time t = raw + s.correction;
+  learn(s, t, host);
+  return Event{t, with_own ? 1 : 0, both_begin};
+}
+
+bool ClockGuard::in_step(const Arrival& a, const Arrival& b) const {
+  return std::abs((b.host - a.host).seconds() - (b.raw - a.raw).seconds() / rate_) < kInStep_s;
+}
+
+bool ClockGuard::is_early(const State& s, Time t, Time host) const {
+  const std::optional<Duration> period = s.period.median();
+  return period && lateness_s(t, host) < s.lateness.value_s() - std::max(kEarly_s, kEarly_periods * period->seconds() / rate_);
 }
 
 bool ClockGuard::fits(const State& s, Time t, Time host) const {
-  if (s.newest && (t - *s.newest).seconds() < -kBack_s) return false;
+  if ((t - *s.newest).seconds() < -kBack_s) return false;
   // In seconds of the host's clock, so that the speed of a replay does not matter.
-  return lateness_s(t, host) >= shortest_lateness_s() - kAhead_s || !std::isfinite(shortest_lateness_s());
+  return lateness_s(t, host) >= shortest_lateness_s() - kAhead_s;
 }
 
 /// After a jump back by a fraction of a second stamps pass the newest one of before while the jump is not yet established; what
@@ -73,15 +119,10 @@ bool ClockGuard::go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const {
 /// correction, where that has jumped just now by about the same; or the correction of before, where the clock jumped back.
 Duration ClockGuard::correction_after_leap(Stream stream, Time raw, Time host) const {
   const State &s = states_[stream], &other = states_[1 - stream];
-  Duration own = s.correction;
-  if (s.newest) {
-    const double passed_s = (host - *s.newest_host).seconds() * rate_;
-    const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
-    const double steps = std::max(1.0, std::round(passed_s / period_s));
-    own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
-  } else {
-    own = *first_ + Duration::from_seconds(((host - *first_host_).seconds() - shortest_lateness_s()) * rate_) - raw;
-  }
+  const double passed_s = (host - *s.newest_host).seconds() * rate_;
+  const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
+  const double steps = std::max(1.0, std::round(passed_s / period_s));
+  const Duration own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
   const bool other_leapt = (host - other.leapt_host).seconds() < kSameLeapWithin_s;
   const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameLeap_s; };
   if (other_leapt && about(other.correction)) return other.correction;
@@ -92,18 +133,13 @@ void ClockGuard::learn(State& s, Time t, Time host) {
   if (s.newest) s.period.add(t - *s.newest);
   if (!s.newest || t > *s.newest) s.newest = t;
   s.newest_host = host;
-  if ((host - window_start_).seconds() > kWindow_s) {
-    previous_s_ = current_s_;
-    current_s_ = std::numeric_limits<double>::infinity();
-    window_start_ = host;
-  }
-  current_s_ = std::min(current_s_, lateness_s(t, host));
+  s.lateness.add(lateness_s(t, host), host);
 }
 
 Time ClockGuard::host_of(Time t) const {
   if (!first_) return {};
-  const double since_first_s = (t - *first_).seconds() / rate_;
-  return *first_host_ + Duration::from_seconds(since_first_s + shortest_lateness_s());
+  const double since_first_s = (t - first_->raw).seconds() / rate_;
+  return first_->host + Duration::from_seconds(since_first_s + shortest_lateness_s());
 }
 
 }  // namespace fbvins

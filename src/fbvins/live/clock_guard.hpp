@@ -3,14 +3,16 @@
 // sets the time), stamps are shifted so that they continue where they were. A stamp far before the newest one, or ahead of any
 // possible arrival, does not fit. Events that do not fit are a jump only if they go on for a while at the clock's own pace, with
 // none between them that fits; otherwise they are late, or their stamps wrong, and the clock is left alone. Data that are
-// merely late by some constant, bunched or missing fit.
+// merely late by some constant, bunched or missing fit. A stream begins with the first two stamps that are in step, and a stamp
+// that is earlier than its stream has been delivered so far counts when two more are.
 //
-//   if (std::optional<Time> t = guard.mend(ClockGuard::camera, frame.t, host_now))   // frame.t itself as long as no clock jumps
-//     Time shutter = guard.host_of(*t);                                             // when that was on this machine's clock
+//   if (auto event = guard.mend(ClockGuard::camera, frame.t, host_now))   // event->t is frame.t as long as no clock jumps
+//     Time shutter = guard.host_of(event->t);                            // when that was on this machine's clock
 //
 // Threads: one owner.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>
@@ -26,9 +28,14 @@ class ClockGuard {
   /// clock_rate: seconds of the sensors' clock in one second of this machine's.
   explicit ClockGuard(double clock_rate) : rate_(clock_rate) {}
 
+  struct Event {
+    Time t;
+    int held_back = 0;  ///< so many events of the stream that were refused just before it are good, with the stamps of `mended`
+    bool other_too = false;  ///< and so is the last one of the other stream, which had not begun
+  };
   /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump. Nothing where it does not
-  /// fit and no jump is established: the event is of no use, unless a jump is established by the next ones (`mended`).
-  std::optional<Time> mend(Stream stream, Time raw, Time host);
+  /// fit: the event is of no use, unless the next ones say so.
+  std::optional<Event> mend(Stream stream, Time raw, Time host);
   /// An earlier stamp of this stream, with the correction of today.
   Time mended(Stream stream, Time raw) const { return raw + states_[stream].correction; }
   /// Converts a time of the (corrected) sensors' clock to this machine's. The offset is that of the event of the last seconds
@@ -37,6 +44,20 @@ class ClockGuard {
   int leaps() const { return leaps_; }
 
  private:
+  /// As it came.
+  struct Arrival {
+    Time raw, host;
+  };
+  /// Of the last five to ten seconds, because clocks drift.
+  class ShortestLateness {
+   public:
+    void add(double lateness_s, Time host);
+    double value_s() const { return std::min(current_s_, previous_s_); }
+
+   private:
+    double current_s_ = std::numeric_limits<double>::infinity(), previous_s_ = std::numeric_limits<double>::infinity();
+    std::optional<Time> window_start_;
+  };
   /// Events in a row that do not fit.
   struct Misfits {
     int count = 0;
@@ -47,9 +68,15 @@ class ClockGuard {
     std::optional<Time> newest, newest_host;
     Time leapt_host{std::numeric_limits<std::int64_t>::min() / 2};
     SamplePeriod period;
+    ShortestLateness lateness;
+    std::optional<Arrival> unconfirmed;  ///< the last one, before the stream has begun
     Misfits misfits;
+    int early = 0;  ///< in a row
   };
 
+  std::optional<Event> begin(Stream stream, Time raw, Time host);
+  bool in_step(const Arrival& a, const Arrival& b) const;
+  bool is_early(const State& s, Time t, Time host) const;
   bool fits(const State& s, Time t, Time host) const;
   bool continues(const Misfits& misfits, Time raw, Time host) const;
   bool go_on_as_a_clock(Misfits& misfits, Time raw, Time host) const;
@@ -60,10 +87,7 @@ class ClockGuard {
 
   double rate_;
   std::array<State, 2> states_;
-  std::optional<Time> first_, first_host_;
-  /// Shortest lateness in the current window so far and in the one before: a sliding minimum, as the clocks drift.
-  double current_s_ = std::numeric_limits<double>::infinity(), previous_s_ = std::numeric_limits<double>::infinity();
-  Time window_start_;
+  std::optional<Arrival> first_;  ///< that counts
   int leaps_ = 0;
 };
 

@@ -8,8 +8,11 @@ namespace fbvins {
 
 namespace {
 
-/// Readings kept until it is known whether the clock has jumped.
+/// Readings kept until it is known whether their stamps are good.
 constexpr std::size_t kMostMisfits = 2000;
+/// An image that repeats the one before is the same one, come twice, if its stamp is no later than this; otherwise the camera is
+/// frozen.
+constexpr Duration kSameImage{10'000'000};
 
 }  // namespace
 
@@ -30,20 +33,24 @@ void Ingest::push(const ImuSample& sample) {
     ++counts_.imu_refused;
     return;
   }
-  const int leaps = clock_.leaps();
-  const std::optional<Time> t = clock_.mend(ClockGuard::imu, sample.t - time_offset_, host);
-  if (!t) {
+  const std::optional<ClockGuard::Event> event = clock_.mend(ClockGuard::imu, sample.t - time_offset_, host);
+  if (!event) {
     misfits_.push_back(sample);
     if (misfits_.size() <= kMostMisfits) return;
     misfits_.pop_front();
     ++counts_.imu_late;
     return;
   }
-  if (clock_.leaps() > leaps)
-    for (const ImuSample& s : misfits_) put_in_order(s, clock_.mended(ClockGuard::imu, s.t - time_offset_), host);
-  else counts_.imu_late += static_cast<std::int64_t>(misfits_.size());
+  const std::size_t lost = misfits_.size() - std::min(misfits_.size(), static_cast<std::size_t>(event->held_back));
+  counts_.imu_late += static_cast<std::int64_t>(lost);
+  for (std::size_t k = lost; k < misfits_.size(); ++k)
+    put_in_order(misfits_[k], clock_.mended(ClockGuard::imu, misfits_[k].t - time_offset_), host);
   misfits_.clear();
-  put_in_order(sample, *t, host);
+  if (event->other_too && held_image_) {
+    const Time t = clock_.mended(ClockGuard::camera, held_image_->t);
+    take(*std::exchange(held_image_, std::nullopt), t, host);
+  }
+  put_in_order(sample, event->t, host);
 }
 
 /// `t`: the reading's stamp on the images' clock, corrected.
@@ -53,27 +60,48 @@ void Ingest::put_in_order(ImuSample sample, Time t, Time host) {
 }
 
 void Ingest::push(StereoFrame frame) {
-  {
-    const std::lock_guard order(order_mutex_);
-    const Time host = now_();
-    ++counts_.images;
-    const std::optional<Time> t = clock_.mend(ClockGuard::camera, frame.t, host);
-    if (!t || (newest_image_ && *t <= *newest_image_)) {
-      ++counts_.images_late;
-      return;
-    }
-    frame.t = *t;
-    if (newest_image_) image_period_.add(frame.t - *newest_image_);
-    newest_image_ = frame.t;
-    arrivals_.image_period = image_period_.median();
-    if (frozen_[0].is_repeated(frame.left)) frame.left.reset();
-    if (frozen_[1].is_repeated(frame.right)) frame.right.reset();
-    if (frame.left == nullptr || frame.right == nullptr) ++counts_.images_incomplete;
-    if (frame.left != nullptr) arrivals_.left = host;
-    if (frame.right != nullptr) arrivals_.right = host;
-    if (frame.left != nullptr || frame.right != nullptr) arrivals_.image = host;
-    arrivals_.newest = std::max(arrivals_.newest, frame.t);
+  const std::lock_guard order(order_mutex_);
+  const Time host = now_();
+  ++counts_.images;
+  const std::optional<ClockGuard::Event> event = clock_.mend(ClockGuard::camera, frame.t, host);
+  if (std::optional<StereoFrame> held = std::exchange(held_image_, std::nullopt)) {
+    const Time t = clock_.mended(ClockGuard::camera, held->t);
+    if (event && event->held_back > 0) take(std::move(*held), t, host);
+    else ++counts_.images_late;
   }
+  if (!event) {
+    if (newest_image_) ++counts_.images_late;
+    else held_image_ = std::move(frame);
+    return;
+  }
+  if (event->other_too && !misfits_.empty()) {
+    put_in_order(misfits_.back(), clock_.mended(ClockGuard::imu, misfits_.back().t - time_offset_), host);
+    misfits_.pop_back();
+  }
+  take(std::move(frame), event->t, host);
+}
+
+/// `t`: the frame's stamp, corrected.
+void Ingest::take(StereoFrame frame, Time t, Time host) {
+  if (newest_image_ && t <= *newest_image_) {
+    ++counts_.images_late;
+    return;
+  }
+  frame.t = t;
+  if (frozen_[0].is_repeated(frame.left)) frame.left.reset();
+  if (frozen_[1].is_repeated(frame.right)) frame.right.reset();
+  if (newest_image_ && frame.left == nullptr && frame.right == nullptr && t - *newest_image_ < kSameImage) {
+    ++counts_.images_late;
+    return;
+  }
+  if (newest_image_) image_period_.add(frame.t - *newest_image_);
+  newest_image_ = frame.t;
+  arrivals_.image_period = image_period_.median();
+  if (frame.left == nullptr || frame.right == nullptr) ++counts_.images_incomplete;
+  if (frame.left != nullptr) arrivals_.left = host;
+  if (frame.right != nullptr) arrivals_.right = host;
+  if (frame.left != nullptr || frame.right != nullptr) arrivals_.image = host;
+  arrivals_.newest = std::max(arrivals_.newest, frame.t);
   const std::lock_guard lock(mutex_);
   if (closed_) return;
   if (image_waits_) drop_waiting_image();

@@ -60,6 +60,7 @@ class Ingest final : public SensorInput {
  private:
   void put_in_order(ImuSample sample, Time t, Time host);
   void release(const ImuSample& sample);
+  void take(StereoFrame frame, Time t, Time host);
   void drop_waiting_image();
   std::optional<SensorEvent> take_first();
 
@@ -67,8 +68,9 @@ class Ingest final : public SensorInput {
   OnReading on_reading_;
   mutable std::mutex order_mutex_;  ///< keeps readings in order up to the end of on_reading; taken before mutex_
   Duration time_offset_;
-  ClockGuard clock_;               ///< on the images' clock
-  std::deque<ImuSample> misfits_;  ///< readings whose stamps do not fit, until it is known whether the clock has jumped
+  ClockGuard clock_;                       ///< on the images' clock
+  std::deque<ImuSample> misfits_;          ///< readings whose stamps do not fit, until the next ones say whether they are good
+  std::optional<StereoFrame> held_image_;  ///< the same of the image before the first one that counts
   ImuOrder order_;
   ReadingJudge judge_;
   SamplePeriod image_period_;

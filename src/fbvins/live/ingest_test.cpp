@@ -30,6 +30,11 @@ struct Fixture {
     now = ms(1000 + t_ms);
     ingest.push(StereoFrame{ms(t_ms), image(left), image(right)});
   }
+  /// The clock is known, nothing waits.
+  void begin() {
+    read(-10), read(-5);
+    while (ingest.pop_waiting()) continue;
+  }
   std::vector<SensorEvent> all() {
     ingest.close();
     std::vector<SensorEvent> events;
@@ -63,6 +68,7 @@ TEST(Ingest, OnlyTheNewestImageWaitsAndNoReadingIsLost) {
 
 TEST(Ingest, AnImageThatIsTakenInTimeIsNotDropped) {
   Fixture f;
+  f.begin();
   for (std::int64_t t = 0; t < 500; t += 50) {
     f.see(t, static_cast<std::uint8_t>(t / 50), static_cast<std::uint8_t>(t / 50 + 100));
     ASSERT_TRUE(f.ingest.pop());
@@ -88,6 +94,7 @@ TEST(FrozenCamera, BuffersThatComeInTurnsAreRepeated) {
 
 TEST(Ingest, AFrozenCameraGivesNoImage) {
   Fixture f;
+  f.begin();
   f.see(0, 1, 101), f.ingest.pop();
   f.see(50, 2, 101);  // the right camera repeats itself
   const auto event = f.ingest.pop();
@@ -97,6 +104,20 @@ TEST(Ingest, AFrozenCameraGivesNoImage) {
   EXPECT_EQ(f.ingest.counts().images_incomplete, 1);
   EXPECT_EQ(*f.ingest.arrivals().left, ms(1050));
   EXPECT_EQ(*f.ingest.arrivals().right, ms(1000));
+}
+
+TEST(Ingest, AnImageThatComesTwiceIsOne) {
+  Fixture f;
+  f.begin();
+  for (std::int64_t t = 0; t < 500; t += 50) {
+    f.see(t, static_cast<std::uint8_t>(t / 50), static_cast<std::uint8_t>(t / 50 + 100));
+    const auto event = f.ingest.pop_waiting();
+    ASSERT_TRUE(event);
+    EXPECT_NE(std::get<StereoFrame>(*event).left, nullptr);
+    f.see(t + 1, static_cast<std::uint8_t>(t / 50), static_cast<std::uint8_t>(t / 50 + 100));
+    EXPECT_FALSE(f.ingest.pop_waiting());
+  }
+  EXPECT_EQ(f.ingest.counts().images_late, 10);
 }
 
 TEST(Ingest, AReadingOrAnImageThatIsLateChangesNoOtherStamp) {
@@ -117,6 +138,16 @@ TEST(Ingest, AReadingOrAnImageThatIsLateChangesNoOtherStamp) {
   EXPECT_EQ(counts.images_late, 1);
   EXPECT_EQ(f.told.size(), 599u);
   EXPECT_EQ(f.told.back(), ms(2995));
+}
+
+/// The first stamp may be the wrong one.
+TEST(Ingest, AFirstStampThatIsWrongIsNotTheClock) {
+  Fixture f;
+  for (std::int64_t t = 0; t < 1000; t += 5) f.read(t, t == 0 ? 3'600'000 : t);
+  EXPECT_EQ(f.ingest.counts().clock_leaps, 0);
+  EXPECT_EQ(f.ingest.counts().imu_late, 1);
+  EXPECT_EQ(f.told.front(), ms(5));
+  EXPECT_EQ(f.told.size(), 199u);
 }
 
 /// A jump is established a quarter of a second after it; the readings of that time are not lost.
@@ -162,8 +193,6 @@ TEST(Ingest, ReadingsAreOnTheImagesClock) {
 TEST(Ingest, TwoThreadsMayPush) {
   // Everything arrives at once and a second late: no stamp is ahead of its arrival.
   Ingest ingest(LiveOptions{}, 1, [] { return ms(5000); }, {});
-  ingest.push(StereoFrame{ms(4000), image(201), image(202)});
-  ingest.pop();
   std::jthread imu([&] {
     for (std::int64_t t = 4001; t <= 6000; ++t) ingest.push(reading(t));
   });

@@ -26,6 +26,7 @@ constexpr Duration kStatusPeriod = Duration::from_seconds(1);
 // sensors' threads -> Ingest -[one waiting image, all readings]-> feeder -> System -> Odometry
 //                       '-[each reading, at once]-> PosePropagator -> LivePose        '-> rebase
 //                                                                     all of it -> Hub -> sinks
+// While the IMU is silent the estimates of the images are the LivePoses.
 struct LiveSystem::Impl {
   Impl(const SystemOptions& system_options, const LiveOptions& options, const StereoRig& rig, double clock_rate,
        std::uint32_t first_reset_counter, System made)
@@ -80,16 +81,19 @@ struct LiveSystem::Impl {
     const Time image_host_t = ingest.host_of(o.t);
     const Duration latency = host_now() - image_host_t;
     shutter_to_pose.add(latency);
+    std::optional<LivePose> pose;  // of the image, where no readings carry it on
     {
       const std::lock_guard lock(pose_mutex);
-      propagator.rebase(o);
+      pose = propagator.rebase(o);
       estimated = o.health;
       resets += o.reset_counter - reset_counter;
       reset_counter = o.reset_counter;
       ++images_estimated;
       if (o.health.has_pose())
         estimate_host_t = image_host_t, estimate_sigma_m = newest_sigma_m = worst_sigma_m(o.pose_covariance);
+      if (pose) pose->reset_counter = reset_counter, pose->host_t = image_host_t;
     }
+    if (pose) hub.publish(*std::move(pose));
     if (views_wanted) hub.publish(views.view_of(o, latency.seconds() * 1e3));
     hub.publish(std::move(o));
     look(false);

@@ -34,7 +34,8 @@ NavState<W> PosePropagator::newest_state() const {
   return since_->predict(estimated_state(), -gravity_mps2_ * estimate_->up_W);
 }
 
-void PosePropagator::rebase(const Odometry& estimate) {
+std::optional<LivePose> PosePropagator::rebase(const Odometry& estimate) {
+  const Time read_until = newest_t_;
   const bool same_world = estimate_ && estimate_->reset_counter == estimate.reset_counter;
   std::optional<NavState<W>> before;  // what was published so far for the same moment
   if (since_ && same_world && smoothing_s_ > 0 && estimate.health.has_pose()) {
@@ -45,24 +46,31 @@ void PosePropagator::rebase(const Odometry& estimate) {
   estimate_ = estimate;
   offset_.setZero();
   since_.reset();
-  if (!estimate.health.has_pose()) return;
+  if (!estimate.health.has_pose()) return std::nullopt;
   const Time until = std::max(newest_t_, estimate.t);
   since_.emplace(noise_, estimate.bias);
   newest_t_ = estimate.t;
   propagate_to(until);
+  if (read_until < estimate.t) return newest_pose(estimate.t, estimate.bias.gyro_radps);  // nothing better to be smooth with
   if (before) offset_.head<nav::bg>() = before->boxminus(newest_state()).head<nav::bg>();
+  return std::nullopt;
 }
 
 std::optional<LivePose> PosePropagator::add(const ImuSample& reading) {
   if (!readings_.add(reading)) return std::nullopt;
-  LivePose pose;
-  pose.t = reading.t - time_offset_;
-  if (since_ && newest_t_ < pose.t) {
-    decay_offset((pose.t - newest_t_).seconds());
-    propagate_to(pose.t);
+  const Time t = reading.t - time_offset_;
+  if (since_ && newest_t_ < t) {
+    decay_offset((t - newest_t_).seconds());
+    propagate_to(t);
     if (since_->dt_s() > kLongest_s) since_.reset();
   }
-  if (!since_) newest_t_ = pose.t;
+  if (!since_) newest_t_ = t;
+  return newest_pose(t, reading.gyro_radps);
+}
+
+LivePose PosePropagator::newest_pose(Time t, const Vec3& gyro_radps) const {
+  LivePose pose;
+  pose.t = t;
   if (!estimate_) return pose;
   pose.estimate_t = estimate_->t;
   pose.health = estimate_->health;
@@ -77,7 +85,7 @@ std::optional<LivePose> PosePropagator::add(const ImuSample& reading) {
   const Mat15 P = since_->predict_covariance(estimate_->T_WB.q, estimate_->bias, covariance_of(*estimate_));
   pose.T_WB = out.T_FB;
   pose.v_WB = out.v_FB;
-  pose.w_WB_B = reading.gyro_radps - out.bias.gyro_radps;
+  pose.w_WB_B = gyro_radps - out.bias.gyro_radps;
   pose.pose_covariance = P.topLeftCorner<6, 6>();
   pose.velocity_covariance = P.block<3, 3>(nav::v, nav::v);
   return pose;

@@ -30,7 +30,8 @@ class PosePropagator {
         gravity_mps2_(gravity_mps2),
         readings_(noise, time_offset) {}
 
-  void rebase(const Odometry& estimate);
+  /// Where no reading has reached the estimate's image, because the IMU is silent: the pose at the image.
+  std::optional<LivePose> rebase(const Odometry& estimate);
   /// The pose at this reading, with the health of the propagated estimate; nothing for a reading that is refused (ReadingJudge).
   std::optional<LivePose> add(const ImuSample& reading);
 
@@ -38,6 +39,7 @@ class PosePropagator {
   void propagate_to(Time t);
   NavState<W> estimated_state() const { return {estimate_->T_WB, estimate_->v_WB, estimate_->bias}; }
   NavState<W> newest_state() const;
+  LivePose newest_pose(Time t, const Vec3& gyro_radps) const;
   void decay_offset(double dt_s);
 
   ImuNoise noise_;

@@ -221,6 +221,31 @@ TEST(PosePropagator, LostMeansNoPose) {
   EXPECT_TRUE(pose.T_WB.p.isZero());
 }
 
+/// Images at 20 Hz go on where the IMU is silent, and so does the pose.
+TEST(PosePropagator, WhileTheImuIsSilentThePoseIsThatOfTheImages) {
+  const Motion motion;
+  PosePropagator propagator({}, {}, 0.1);
+  for (int k = 0; k <= 100; ++k) {
+    propagator.add(motion.reading(k * kPeriod_s));
+    if (k % 10 == 0) {
+      EXPECT_FALSE(propagator.rebase(motion.estimate(k * kPeriod_s)));
+    }
+  }
+  for (double s = 0.55; s < 2; s += 0.05) {
+    const Odometry estimate = motion.estimate(s);
+    const std::optional<LivePose> pose = propagator.rebase(estimate);
+    ASSERT_TRUE(pose);
+    EXPECT_EQ(pose->t, estimate.t);
+    EXPECT_EQ(pose->estimate_t, estimate.t);
+    EXPECT_EQ(pose->health, estimate.health);
+    EXPECT_EQ(pose->T_WB.p, estimate.T_WB.p);
+    EXPECT_EQ(pose->w_WB_B, Vec3::Zero());
+    EXPECT_TRUE(pose->pose_covariance.isApprox(estimate.pose_covariance, 1e-9));
+  }
+  const LivePose again = *propagator.add(motion.reading(2));
+  EXPECT_LT((again.T_WB.p - motion.state(2).T_FB.p).norm(), 0.02);
+}
+
 TEST(PosePropagator, TheCovarianceHasTheNoiseAndTheGaps) {
   const Motion motion;
   const auto sigma_m = [&](const ImuNoise& noise, int gap_readings) {

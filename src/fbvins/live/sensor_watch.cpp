@@ -27,7 +27,9 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   if (blind_s > silent_s) {
     const double blind2 = estimated.newest_sigma_m * estimated.newest_sigma_m - estimated.sigma_m * estimated.sigma_m;
     if (blind2 > max_blind_m_ * max_blind_m_) return {HealthState::lost, HealthReason::no_images};
-    if (silence_s(arrivals.imu) > max_imu_gap_s_) return {HealthState::lost, HealthReason::imu_gap};
+    // Images that come wait for readings that do not, and go on without them.
+    if (silence_s(arrivals.imu) > max_imu_gap_s_ && silence_s(arrivals.image) > silent_s)
+      return {HealthState::lost, HealthReason::imu_gap};
   }
   // Images come, and their estimates are late: the estimator knows why, where it waits for readings.
   const bool images_come = reason == HealthReason::no_images && silence_s(arrivals.image) <= silent_s;

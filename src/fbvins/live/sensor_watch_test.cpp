@@ -68,6 +68,7 @@ TEST(SensorWatch, LateEstimatesKeepTheirReason) {
   EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.99, 9.99), at(0), at(10)), gap);
   EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(9.99, 9.7, 9.7), at(0), at(10)),
             (Health{HealthState::degraded, HealthReason::no_images}));
+  EXPECT_EQ(watch.judge({gap, at(9.7)}, arrivals(4, 9.99, 9.99), at(0), at(10)), gap) << "the IMU is silent for good";
 }
 
 TEST(SensorWatch, BeforeTheFirstPoseItOnlySaysWhatIsMissing) {

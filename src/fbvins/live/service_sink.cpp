@@ -71,7 +71,7 @@ void ServiceSink::log(const LiveStatus& status, const std::string& sentence) {
   constexpr int kError = 3, kWarning = 4, kInfo = 6;  // syslog(3)
   const HealthState state = status.health.state;
   const int level = state == HealthState::lost ? kError : state == HealthState::good && status.problem.empty() ? kInfo : kWarning;
-  fmt::print(journal_, "<{}>{}\n", level, sentence);
+  std::fputs(fmt::format("<{}>{}\n", level, sentence).c_str(), journal_);  // a full disk stops no watchdog
   std::fflush(journal_);
   logged_ = sentence;
   logged_at_ = status.host_t;

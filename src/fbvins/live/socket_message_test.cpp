@@ -107,6 +107,8 @@ TEST(SocketMessage, CalibrationsThatCannotBeAreRefused) {
   EXPECT_EQ(with([](auto& r) { r.right.T_BC[3] = kNan; }),
             "calibration: the right camera's T_BC is not a rotation and a translation");
   EXPECT_EQ(with([](auto& r) { r.right = r.left; }), "calibration: the two cameras are 0 m apart, not between 1 mm and 10 m");
+  EXPECT_NE(with([](auto& r) { r.left.distortion[0] = 1e30; }).find("calibration: the left camera sees more than 180 degrees"),
+            std::string::npos);
   EXPECT_EQ(with([](auto& r) { r.imu_rate_hz = 0; }), "calibration: a noise density or a rate is not positive");
   EXPECT_EQ(with([](auto& r) { r.time_offset_s = kNan; }), "calibration: the time offset is more than 10 s");
 }

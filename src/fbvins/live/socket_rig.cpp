@@ -6,13 +6,14 @@
 #include <cassert>
 #include <cmath>
 
+#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/live/socket_message.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr double kLargestOffset_s = 10, kSmallestBaseline_m = 1e-3, kLargestBaseline_m = 10;
+constexpr double kLargestOffset_s = 10;
 /// Matrices typed by hand carry three or four digits.
 constexpr double kRotationTolerance = 1e-3;
 
@@ -98,9 +99,7 @@ Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int
   out.imu_noise = noise;
   out.image_rate_hz = rig.image_rate_hz;
   out.time_offset_s = rig.time_offset_s;
-  const double baseline_m = out.T_C1C0().p.norm();
-  if (!(baseline_m > kSmallestBaseline_m && baseline_m < kLargestBaseline_m))
-    return malformed(fmt::format("the two cameras are {:.3g} m apart, not between 1 mm and 10 m", baseline_m));
+  if (Result<void> good = check_rig(out, "calibration"); !good) return good.error();
   return out;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/status_sink.hpp"
 
+#include <poll.h>
+
 #include <nlohmann/json.hpp>
 
 #include "fbvins/types/quality.hpp"
@@ -41,6 +43,9 @@ Result<void> StatusSink::take(const LiveEvent& event) {
   if (const auto* pose = std::get_if<LivePose>(&event)) newest_ = *pose;
   const auto* status = std::get_if<LiveStatus>(&event);
   if (status == nullptr) return {};
+  // A line is shorter than PIPE_BUF: a pipe that is writable takes all of it.
+  pollfd stream{fileno(file_), POLLOUT, 0};
+  if (poll(&stream, 1, 0) == 0) return {};
   const std::string line = to_json_line(*status, newest_) + "\n";
   const bool written = std::fwrite(line.data(), 1, line.size(), file_) == line.size() && std::fflush(file_) == 0;
   if (!written) return Error{ErrorCode::unwritable, "the status cannot be written"};
