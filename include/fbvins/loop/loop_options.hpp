@@ -31,8 +31,8 @@ struct PlaceVerifierOptions {
 
 /// How fast the odometry may drift: variances grow with the path flown.
 struct DriftOptions {
-  double position_m = 0.0033;
-  double yaw_rad = 0.033 * kDegree;
+  double position_m = 0.006;
+  double yaw_rad = 0.06 * kDegree;
 
   template <class V>
   void visit(V&& v) {

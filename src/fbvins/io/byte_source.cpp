@@ -58,7 +58,7 @@ class MemoryBytes : public ByteSource {
 }  // namespace
 
 Result<std::shared_ptr<ByteSource>> open_bytes(const std::string& path) {
-  FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));  // no FIFO holds it up
   if (!file)
     return Error{errno == ENOENT ? ErrorCode::not_found : ErrorCode::unreadable,
                  fmt::format("{}: {}", path, std::strerror(errno))};

@@ -26,7 +26,7 @@ Error system_error(ErrorCode code, const std::string& path) { return {code, fmt:
 }  // namespace
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& path) {
-  const OpenFile file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  const OpenFile file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};  // no FIFO holds it up
   if (file.fd < 0) return system_error(errno == ENOENT ? ErrorCode::not_found : ErrorCode::unreadable, path);
   struct stat status {};
   if (::fstat(file.fd, &status) != 0) return system_error(ErrorCode::unreadable, path);
