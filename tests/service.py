@@ -4,10 +4,12 @@
 
 usage: service.py FBVINS C++COMPILER
 """
+import fcntl
 import json
 import os
 import pathlib
 import re
+import resource
 import signal
 import socket
 import subprocess
@@ -154,6 +156,44 @@ class Service(unittest.TestCase):
         self.assertIn("unplugged", messages, "and in the status during the flight")
         self.assertTrue((folder / "flat.fbm").exists() and (folder / "run" / "summary.json").exists(), err)
 
+    def fly_to_its_end(self, name, **streams):
+        """A flight of its own streams, with all files; returns their folder and the exit code."""
+        folder = self.folder / name
+        folder.mkdir()
+        done = subprocess.run([PROGRAM, "live", "--source", f"replay:{self.flight}", "--record", folder / "flight.mcap", "--map", folder / "flat.fbm",
+                               "--imu-state", folder / "imu.yaml", "--out", folder / "run"], timeout=120, check=False, **streams)
+        for file in ("flat.fbm", "imu.yaml", "run/summary.json", "run/trajectory_tum.txt"):
+            self.assertTrue((folder / file).exists(), file)
+        return folder, done.returncode
+
+    def test_no_file_gets_the_number_of_a_closed_stream(self):
+        def close():
+            for number in (0, 1, 2):
+                os.close(number)
+
+        folder, code = self.fly_to_its_end("closed", preexec_fn=close)
+        self.assertEqual(code, 0)
+        self.assertEqual((folder / "flight.mcap").read_bytes()[:5], b"\x89MCAP")
+        for file in ("run/trajectory_tum.txt", "run/trajectory.csv"):
+            self.assertNotIn("{", (folder / file).read_text(), file)
+
+    def test_full_streams_cost_no_file(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            _, code = self.fly_to_its_end("full", stdout=full, stderr=full)
+        self.assertEqual(code, 2, "the status could not be written")
+
+    def test_a_pipe_that_nobody_reads_holds_up_nothing(self):
+        unread, pipe = os.pipe()
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, 4096)
+        _, code = self.fly_to_its_end("unread", stdout=pipe, stderr=pipe)
+        self.assertEqual(code, 0)
+        os.close(unread), os.close(pipe)
+
+    def test_a_record_at_the_largest_size_of_a_file_costs_no_other(self):
+        _, code = self.fly_to_its_end("largest", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4 << 20, 4 << 20)), stdout=subprocess.DEVNULL,
+                                     stderr=subprocess.DEVNULL)
+        self.assertEqual(code, 2, "what went wrong is the result")
+
     def test_a_kept_map_outlives_a_killed_program(self):
         kept = self.folder / "kept.fbm"
         arguments = ("--map", str(kept), "--laps", "1000")
@@ -178,6 +218,7 @@ class Service(unittest.TestCase):
                               env=dict(os.environ, NOTIFY_SOCKET=str(self.folder / "none")))
         self.assertEqual(done.returncode, 2)
         self.assertIn("NOTIFY_SOCKET=", done.stderr)
+        self.assertIn("images 80, with a pose", done.stderr, "it flies nevertheless")
 
 
 if __name__ == "__main__":
