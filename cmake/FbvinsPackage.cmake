@@ -21,7 +21,7 @@ if(CMAKE_CROSSCOMPILING)
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
   string(JOIN ", " CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libc6 (>= 2.36)" "libstdc++6 (>= 12)" libgcc-s1 "libfmt9 (>= 9.1.0+ds1)"
     "libyaml-cpp0.7 (>= 0.7.0)" libzip4 libpng16-16 zlib1g libturbojpeg0 libceres3 libcholmod3 libspqr2 libcxsparse3 libgoogle-glog0v6 "liblapack3 | liblapack.so.3"
-    "libblas3 | libblas.so.3" libatlas3-base libddsc0debian liblz4-1 libbz2-1.0 libzstd1 libsqlite3-0 libnettle8 passwd)
+    "libblas3 | libblas.so.3" libatlas3-base libddsc0debian liblz4-1 libbz2-1.0 libzstd1 libsqlite3-0 libnettle8 libapriltag3 passwd)
 else()
   set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS passwd)
