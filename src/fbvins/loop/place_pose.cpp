@@ -165,14 +165,15 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
   std::vector<Matched> terms;
   for (const DescriptorMatch& m : matches)
     if (at(candidate, m.b).has_point()) terms.push_back({&m, MatchTerm(at(candidate, m.b))});
-  const auto evaluate = [&](Matched& m) {
-    return m.in_view = m.term.evaluate(at(query, m.match->a), at(candidate, m.match->b), out.T_qc.R(), out.T_qc.p);
+  const auto evaluate = [&](Matched& m, const Mat3& R) {
+    return m.in_view = m.term.evaluate(at(query, m.match->a), at(candidate, m.match->b), R, out.T_qc.p);
   };
   for (int iteration = 0; iteration < kRefinements; ++iteration) {
+    const Mat3 R = out.T_qc.R();
     Mat6 H = Mat6::Zero();
     Vec6 b = Vec6::Zero();
     for (Matched& m : terms) {
-      if (!evaluate(m)) continue;
+      if (!evaluate(m, R)) continue;
       const double s = std::sqrt(m.term.chi2);
       const double weight = s <= kHuber_sigma ? 1 : (s > kGross_sigma ? 0 : kHuber_sigma / s);
       const Eigen::Matrix<double, 6, 3> JtW = weight * m.term.J.transpose() * m.term.information;
@@ -187,9 +188,10 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
       if (m.in_view) m.term.follow(step);
     if (step.norm() < kArrivedStep) break;
   }
+  const Mat3 R = out.T_qc.R();
   for (Matched& m : terms) {
     const PlaceFeature& q = at(query, m.match->a);
-    if (!evaluate(m) || m.term.chi2 > chi2_gate(q)) continue;
+    if (!evaluate(m, R) || m.term.chi2 > chi2_gate(q)) continue;
     out.inliers.push_back(*m.match);
     out.with_depth_both += q.has_depth();
     out.information += m.term.J.transpose() * m.term.information * m.term.J;
