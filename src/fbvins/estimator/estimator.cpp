@@ -138,6 +138,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   solve(out.odometry, kThorough);
   // The first solve may have moved the first frame far: the prior is linearised anew at its state.
   window_.restart_first_estimates();
+  window_.set_pivot(window_.newest().state.T_FB.p);
   const WindowSolution& solution = solve(out.odometry, kThorough);
   out.odometry.health = judge(frame, out.odometry);
   if (start_is_good(frame, out.odometry)) {
@@ -191,7 +192,6 @@ void Estimator::open_window(const InitialSolution& start) {
   WindowPrior prior = first_frame_prior(first, start.biases, options_.up == UpDirection::state);
   if (weights_of(options_).calibrating()) prior = with_calibration_prior(std::move(prior), CalibrationPrior{}, calibrated_);
   window_.set_prior(std::move(prior));
-  window_.set_pivot(first.T_FB.p);
   published_.restart();
   monitor_.restart();
   tilt_away_B_.reset();

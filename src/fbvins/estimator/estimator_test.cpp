@@ -33,7 +33,7 @@ EstimatorOptions exact_noise() {
 struct Flown {
   std::vector<Odometry> odometry;
   std::vector<NavState<W>> truth;
-  int gauge_frame = -1;  ///< the frame whose pose defines W's origin and heading
+  int gauge_frame = -1;  ///< the frame of the first pose, which defines W's position and heading
   Pose<W, B> gauge_pose;
 
   int first_pose() const {
@@ -61,9 +61,8 @@ Flown fly(Flight& flight, int frames, const EstimatorOptions& options = exact_no
     out.odometry.push_back(estimator.process(flight.frame(k)).odometry);
     out.truth.push_back(flight.truth(k));
     if (out.gauge_frame < 0 && out.odometry.back().health.has_pose()) {
-      const Frame& oldest = estimator.window().frames().oldest();
-      out.gauge_frame = static_cast<int>(oldest.id.value);
-      out.gauge_pose = oldest.state.T_FB.cast_frames<W, B>();  // W and G begin together
+      out.gauge_frame = k;
+      out.gauge_pose = out.odometry.back().T_WB;
     }
   }
   return out;
@@ -553,6 +552,21 @@ TEST(Estimator, HandsOnKeyframesInOrderWithTheirLandmarks) {
     }
   }
   EXPECT_GT(keyframes, 10);
+}
+
+TEST(Estimator, LearningTheTiltDoesNotMoveTheFirstPose) {
+  SimulatedFlight flight(Motion(0.6, 0.3), 14);
+  flight.bias.accel_mps2 = Vec3(0.3, 0.25, -0.3);  // taken for a tilt at the start
+  Estimator estimator(flight.rig, exact_noise());
+  std::optional<Odometry> first;
+  for (int k = 0; k < 120; ++k) {
+    const Odometry now = estimator.process(flight.frame(k)).odometry;
+    if (!first && now.health.has_pose()) first = now;
+  }
+  ASSERT_TRUE(first);
+  const Pose<W, B> levelled = estimator.window().tilt().levelled(first->gauge.T_GB);
+  EXPECT_GT(levelled.q.angularDistance(first->T_WB.q), 0.015);
+  EXPECT_LT((levelled.p - first->T_WB.p).norm(), 1e-3);
 }
 
 TEST(Estimator, TheGaugeIsTheWindowsOwnFrameWithUpBeside) {

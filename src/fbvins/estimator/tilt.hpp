@@ -3,7 +3,7 @@
 //
 // G is level when a flight begins, as far as the tilt is known then. The window never turns it, so that remembered landmarks
 // stay valid. What is learned of gravity later changes the tilt instead, a state of the window; published poses are
-// levelled, about the place where the flight began, in small steps (published_pose.hpp). Only this takes G to W. A value.
+// levelled, about the position of the first pose, in small steps (published_pose.hpp). Only this takes G to W. A value.
 //
 //   NavState<W> level = window.tilt().levelled(window.newest().state);
 #pragma once
