@@ -12,22 +12,24 @@ namespace {
 
 constexpr int kP = kKltPatch;
 
-/// Window: a separable bump that falls smoothly towards the edge, so that what enters or leaves
+/// A separable bump that falls smoothly towards `reach` from the feature, so that what enters or leaves
 /// the patch at its rim does not pull the result. Sum 1.
 struct Window {
   alignas(64) float w[kP * kP];
-  constexpr Window() : w{} {
+  constexpr explicit Window(double reach) : w{} {
     double side[kP] = {}, sum = 0;
     for (int i = 0; i < kP; ++i) {
-      const double u = (i - 0.5 * (kP - 1)) / (0.5 * kP + 0.5);
-      side[i] = (1.0 - u * u);
+      const double u = (i - 0.5 * (kP - 1)) / reach;
+      side[i] = u * u < 1 ? 1.0 - u * u : 0.0;
       sum += side[i];
     }
     for (int y = 0; y < kP; ++y)
       for (int x = 0; x < kP; ++x) w[y * kP + x] = static_cast<float>(side[y] * side[x] / (sum * sum));
   }
 };
-constexpr Window kWindow;
+constexpr Window kWide(0.5 * kP + 0.5), kNarrow(6);
+
+const float* weights(KltWindow window) { return window == KltWindow::wide ? kWide.w : kNarrow.w; }
 
 /// Bilinear weights and the address of the patch's first sample.
 struct Place {
@@ -58,9 +60,10 @@ bool place_patch(const PyramidLevel& level, double x, double y, int margin, Plac
 constexpr float kMinVariance = 0.05f;
 constexpr float kMinGradientVariance = 0.003f;
 
-bool finish_template(const float* grid, KltLevelTemplate& out) {
+bool finish_template(const float* grid, KltWindow window, KltLevelTemplate& out) {
   klt::TemplateMoments m;
-  klt::differentiate(grid, kWindow.w, out.wt, out.wgx, out.wgy, m);
+  out.window = window;
+  klt::differentiate(grid, weights(window), out.wt, out.wgx, out.wgy, m);
   const float vtt = m.tt - m.t * m.t;
   if (!(vtt > kMinVariance)) return false;
   const float cx = (m.tgx - m.t * m.gx) / vtt, cy = (m.tgy - m.t * m.gy) / vtt;
@@ -71,7 +74,7 @@ bool finish_template(const float* grid, KltLevelTemplate& out) {
   const float det = hxx * hyy - hxy * hxy;
   const float smallest = half_trace - std::sqrt(std::max(0.0f, half_trace * half_trace - det));
   if (!(smallest > kMinGradientVariance)) return false;
-  klt::orthogonalise(kWindow.w, m.t, m.gx, m.gy, cx, cy, out.wt, out.wgx, out.wgy);
+  klt::orthogonalise(weights(window), m.t, m.gx, m.gy, cx, cy, out.wt, out.wgx, out.wgy);
   out.ihxx = hyy / det;
   out.ihxy = -hxy / det;
   out.ihyy = hxx / det;
@@ -147,13 +150,13 @@ Likeness likeness_of(const klt::PatchMoments& m, const KltLevelTemplate& patch) 
 
 Likeness likeness_at(const Place& place, const KltLevelTemplate& patch) {
   klt::PatchMoments m;
-  klt::patch_moments(place.p, place.stride, place.fx, place.fy, patch.wt, kWindow.w, m);
+  klt::patch_moments(place.p, place.stride, place.fx, place.fy, patch.wt, weights(patch.window), m);
   return likeness_of(m, patch);
 }
 
 }  // namespace
 
-bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest) {
+bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest, KltWindow window) {
   for (int l = finest; l <= std::min(coarsest, pyramid.levels() - 1); ++l) {
     KltLevelTemplate& out = levels[static_cast<std::size_t>(l)];
     out.valid = false;
@@ -162,7 +165,7 @@ bool KltTemplate::cut(const Pyramid& pyramid, const Vec2& px, int finest, int co
     if (!place_patch(pyramid.level(l), px.x() * scale, px.y() * scale, 1, place)) continue;
     alignas(64) float grid[klt::kGrid * klt::kGridStride];
     klt::sample_grid(place.p - place.stride - 1, place.stride, place.fx, place.fy, grid);
-    out.valid = finish_template(grid, out);
+    out.valid = finish_template(grid, window, out);
   }
   for (int l = std::max(finest, pyramid.levels()); l <= coarsest; ++l) levels[static_cast<std::size_t>(l)].valid = false;
   return levels[static_cast<std::size_t>(finest)].valid;
@@ -199,7 +202,7 @@ bool KltTemplate::cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now) 
   const Eigen::Matrix2f J = J_anchor_now.cast<float>();
   klt::sample_warped(anchor.pixels.data(), KltAnchor::kSide, static_cast<float>(corner.x()), static_cast<float>(corner.y()),
                      J(0, 0), J(0, 1), J(1, 0), J(1, 1), grid);
-  out.valid = finish_template(grid, out);
+  out.valid = finish_template(grid, KltWindow::wide, out);
   return out.valid;
 }
 
@@ -247,7 +250,7 @@ float klt_correlation_about(const KltLevelTemplate& patch, const PyramidLevel& l
   Place place;
   if (!patch.valid || !place_patch(level, px.x() + 0.5, px.y() + 0.5, 0, place)) return -1;
   klt::PatchMoments m;
-  klt::pixel_moments(place.p, place.stride, patch.wt, kWindow.w, m);
+  klt::pixel_moments(place.p, place.stride, patch.wt, weights(patch.window), m);
   return likeness_of(m, patch).correlation;
 }
 

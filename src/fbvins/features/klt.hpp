@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "fbvins/features/pyramid.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -27,6 +28,10 @@ inline constexpr int kKltReach = kKltPatch / 2 + 2;
 /// A feature nearer to the image's edge than this has no whole patch.
 inline constexpr double kPatchBorder_px = kKltReach - 2;
 
+/// How fast the weights of the samples fall with the distance from the feature. At the edge of a thing a wide patch shows what is
+/// behind it as well, and its displacement is a mean of both; a narrow one is for the last step of a match that is nearly right.
+enum class KltWindow : std::uint8_t { wide, narrow };
+
 /// What one pyramid level needs of the template: the projections onto gradient and grey value.
 struct alignas(64) KltLevelTemplate {
   static constexpr int kSamples = kKltPatch * kKltPatch;
@@ -34,6 +39,7 @@ struct alignas(64) KltLevelTemplate {
   float ihxx = 0, ihxy = 0, ihyy = 0;                ///< inverse of the 2x2 normal matrix
   float ctx = 0, cty = 0;                            ///< regression of the gradients on T
   float energy = 0;                                  ///< weighted sum of (T - mean T)^2
+  KltWindow window = KltWindow::wide;
   bool valid = false;
 };
 
@@ -53,7 +59,7 @@ struct KltTemplate {
 
   /// Cuts the patch around `px` (level-0 pixels) from levels finest..coarsest.
   /// False when the feature is too close to the border or the finest patch has no texture in some direction.
-  bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest);
+  bool cut(const Pyramid& pyramid, const Vec2& px, int finest, int coarsest, KltWindow window = KltWindow::wide);
   /// Level 0 from an anchor: an offset d from the feature in the new image shows what the anchor has at
   /// J_anchor_now * d. False when the warp leaves the block or the patch has no texture.
   bool cut_warped(const KltAnchor& anchor, const Mat2& J_anchor_now);

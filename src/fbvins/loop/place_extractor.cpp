@@ -22,6 +22,8 @@ constexpr double kStep_px = 2.0;
 constexpr int kMaxStepsOfAPiece = 64;
 /// Largest distance from the epipolar curve after refinement.
 constexpr double kEpipolar_px = 1.0;
+/// Where a narrow patch moves farther than this, a wide one shows two things.
+constexpr double kOtherThing_px = 1.0;
 /// Refinement may leave the depths that were searched by this factor.
 constexpr double kNearerThanSearched = 1.1;
 /// Standard deviations: of a keypoint, times the scale of its level, and of a disparity.
@@ -128,8 +130,11 @@ std::optional<MeasuredInverseDepth> PlaceExtractor::stereo(const Vec2& left_px, 
   if (!patch_.cut(left_, left_px, search_level, search_level)) return std::nullopt;
   const auto start = search(left_normalised);
   if (!start || !patch_.cut(left_, left_px, 0, kAlignLevel)) return std::nullopt;
-  const KltResult found = klt_align(patch_, right_, *start, kAlignLevel, 0);
-  if (!found.ok() || !rig_.right.inside(found.px, 2) || rig_.right.hidden(found.px, kPatchBorder_px)) return std::nullopt;
+  const KltResult near = klt_align(patch_, right_, *start, kAlignLevel, 0);
+  if (!near.ok() || !patch_.cut(left_, left_px, 0, 0, KltWindow::narrow)) return std::nullopt;
+  const KltResult found = klt_align(patch_, right_, near.px, 0, 0);
+  if (!found.ok() || (found.px - near.px).norm() > kOtherThing_px) return std::nullopt;
+  if (!rig_.right.inside(found.px, 2) || rig_.right.hidden(found.px, kPatchBorder_px)) return std::nullopt;
   const auto right = rig_.right.undistort(found.px);
   if (!right) return std::nullopt;
   const Vec3 far = R_rl_ * left_normalised.homogeneous(), seen = right->homogeneous();
