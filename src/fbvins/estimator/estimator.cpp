@@ -362,7 +362,10 @@ void Estimator::hand_on_keyframes(const WindowSolution& solution, int keyframe_z
     keyframe.images = window_.take_images(i);
     const std::optional<Mat17> covariance = solution.covariance(frame.id);
     keyframe.gauge = gauge_state_of(window_, frame.state);
-    if (covariance) keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
+    if (covariance) {
+      keyframe.gauge.up_sigma_rad = up_sigma_rad(*covariance);
+      keyframe.pose_covariance = window_.known().with_map_covariance(frame.state.T_FB, covariance->topLeftCorner<6, 6>());
+    }
     keyframe.reset_counter = reset_counter_;
     out.push_back(std::move(keyframe));
   }

@@ -49,7 +49,7 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
       verifier_(verification_for(map, options.verification)),
       map_(std::move(map)),
       search_(vocabulary.words(), rig.T_BC0, options.max_distance_m),
-      frame_(options.drift),
+      drift_(options.drift),
       follower_(options.follow_mps, options.follow_radps),
       thinning_(options.thin_above, options.max_keyframes) {
   // Places belong to the camera; another rig may have its body elsewhere.
@@ -96,6 +96,7 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
               .reset_counter = keyframe.reset_counter,
               .began_map = map_.empty(),
               .q_LG = keyframe.gauge.q_LG};
+  drift_.restart();
   relocaliser_.forget();
   frame_.forget();
   follower_.forget();
@@ -124,7 +125,8 @@ void LoopCloser::advance(const Keyframe& keyframe) {
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
   if (session_.T_GB) session_.path_m += (T_GB.p - session_.T_GB->p).norm();
   session_.T_GB = T_GB;
-  frame_.advance(T_GB, keyframe.t);
+  drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
+  frame_.advance(T_GB, keyframe.t, drift_.rate());
   const std::vector<ImuSegment>& read = keyframe.imu.segments;
   const MapKeyframe* newest = map_.find(session_.newest);
   if (newest == nullptr || read.empty() || (keyframe.t - newest->t).seconds() > kLongestImu_s) session_.readings_missing = true;
@@ -272,7 +274,7 @@ std::shared_ptr<const Preintegration> LoopCloser::readings_since_newest(Time t, 
 void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update) {
   std::optional<MapEdge> odometry;
   if (const MapKeyframe* previous = map_.find(session_.newest); previous != nullptr)
-    odometry = odometry_edge(*previous, query.T_GB, query.t, options_.drift);
+    odometry = odometry_edge(*previous, query.T_GB, query.t, drift_.rate());
   if (odometry) odometry->imu = readings_since_newest(query.t, imu);
   session_.readings.clear();
   session_.readings_missing = false;

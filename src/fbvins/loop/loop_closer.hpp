@@ -18,6 +18,7 @@
 #include "fbvins/loop/flight_anchors.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
+#include "fbvins/loop/odometry_drift.hpp"
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_map.hpp"
 #include "fbvins/loop/place_verifier.hpp"
@@ -95,6 +96,7 @@ class LoopCloser final : public Mapper {
   PlaceVerifier verifier_;
   PlaceMap map_;
   CandidateSearch search_;
+  OdometryDrift drift_;
   MapFrame frame_;
   MapFrameFollower follower_;
   Relocaliser relocaliser_;

@@ -48,10 +48,10 @@ void MapFrame::reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad) {
   known_ = true;
 }
 
-void MapFrame::advance(const Pose<G, B>& T_GB, Time t) {
+void MapFrame::advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& rate) {
   if (last_ && known_) {
     const Vec3 step = T_GB.p - last_->T_GB.p;
-    const DriftVariance drift = drift_over(options_, step.norm(), std::abs((t - last_->t).seconds()));
+    const DriftVariance drift = drift_over(rate, step.norm(), std::abs((t - last_->t).seconds()));
     Mat4 F = Mat4::Identity();  // a yaw error turns the step
     F.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MG_.q * step);
     P_ = F * P_ * F.transpose();

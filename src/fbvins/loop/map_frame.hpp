@@ -4,10 +4,10 @@
 // the flight's own estimate of gravity. And a follower of T_MW of limited speed, for controllers that fly in M.
 // Values; one thread at a time.
 //
-//   MapFrame frame(options);
+//   MapFrame frame;
 //   frame.level(q_LG);
 //   frame.reset(T_MG, 0.05, 0.01);
-//   frame.advance(T_GB, t);                       // every keyframe
+//   frame.advance(T_GB, t, drift);                // every keyframe
 //   if (frame.mahalanobis2(seen) < 25) frame.update(seen);
 //   Pose<M, B> T_MB = frame.T_MG() * T_GB;
 #pragma once
@@ -42,8 +42,6 @@ Quat about_z(double yaw_rad);
 
 class MapFrame {
  public:
-  explicit MapFrame(const DriftOptions& options) : options_(options) {}
-
   bool known() const { return known_; }
   const Pose<M, G>& T_MG() const { return T_MG_; }
   /// The turn about z from G, level, to M.
@@ -59,8 +57,8 @@ class MapFrame {
   /// Sets the frame, with standard deviations of position and of yaw. Of T_MG only the yaw and where it puts the body are
   /// kept: its tilt follows from q_LG.
   void reset(const Pose<M, G>& T_MG, double sigma_m, double sigma_rad);
-  /// Predicts: the odometry's next pose.
-  void advance(const Pose<G, B>& T_GB, Time t);
+  /// Predicts: the odometry's next pose, and how fast it drifts.
+  void advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
   double mahalanobis2(const MeasuredPose& seen) const;
   void update(const MeasuredPose& seen);
 
@@ -74,7 +72,6 @@ class MapFrame {
   Vec3 body() const { return last_ ? last_->T_GB.p : Vec3(Vec3::Zero()); }
   void put(double yaw_rad, const Vec3& p_MB);
 
-  DriftOptions options_;
   bool known_ = false;
   Quat q_LG_ = Quat::Identity();
   double yaw_rad_ = 0;

@@ -26,7 +26,7 @@ TEST(Yaw, IsTheTurnAboutZ) {
 }
 
 TEST(MapFrame, IsUnknownUntilItIsSetAndKeepsYawAndPositionOnly) {
-  MapFrame frame({});
+  MapFrame frame;
   EXPECT_FALSE(frame.known());
   frame.reset({so3_exp(Vec3(0.1, 0, 0)) * about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
   EXPECT_TRUE(frame.known());
@@ -37,8 +37,8 @@ TEST(MapFrame, IsUnknownUntilItIsSetAndKeepsYawAndPositionOnly) {
 }
 
 TEST(MapFrame, BetterKnownGravityTurnsItAboutTheBody) {
-  MapFrame frame({});
-  frame.advance(body_at(Vec3(5, 0, 1)), Time{0});
+  MapFrame frame;
+  frame.advance(body_at(Vec3(5, 0, 1)), Time{0}, {});
   frame.reset({about_z(0.5), Vec3(1, 2, 3)}, 0.1, 0.01);
   const Vec3 p_MB = frame.T_MG() * Vec3(5, 0, 1);
   const Quat q_LG = so3_exp(Vec3(0.03, -0.02, 0));
@@ -52,11 +52,12 @@ TEST(MapFrame, BetterKnownGravityTurnsItAboutTheBody) {
 }
 
 TEST(MapFrame, FlyingWidensTheCovarianceAndAPlaceNarrowsIt) {
-  MapFrame frame({.position_m = 0.01, .yaw_rad = 0.002});
-  frame.advance(body_at(Vec3::Zero()), Time{0});
+  const DriftOptions drift{.position_m = 0.01, .yaw_rad = 0.002};
+  MapFrame frame;
+  frame.advance(body_at(Vec3::Zero()), Time{0}, drift);
   frame.reset({}, 0.01, 0.001);
   const Mat4 before = frame.covariance();
-  frame.advance(body_at(Vec3(9, 0, 0)), Time{1'000'000'000});
+  frame.advance(body_at(Vec3(9, 0, 0)), Time{1'000'000'000}, drift);
   const Mat4 flown = frame.covariance();
   EXPECT_GT(flown(0, 0), before(0, 0) + 8 * 0.01 * 0.01);
   EXPECT_GT(flown(1, 1), flown(0, 0)) << "a yaw error turns the step sideways";
@@ -72,8 +73,8 @@ TEST(MapFrame, FlyingWidensTheCovarianceAndAPlaceNarrowsIt) {
 }
 
 TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
-  MapFrame frame({});
-  frame.advance(body_at(Vec3::Zero()), Time{0});
+  MapFrame frame;
+  frame.advance(body_at(Vec3::Zero()), Time{0}, {});
   frame.reset({}, 0.3, 0.02);
   MeasuredPose seen{{Quat::Identity(), Vec3(0.5, 0, 0)}, Mat4::Zero()};
   seen.covariance.diagonal() << 0.16, 0.16, 0.16, 1e-4;  // 0.09 + 0.16 = 0.25
