@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <string_view>
 
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
@@ -21,17 +23,17 @@ namespace {
 constexpr const char* kExamples =
     R"(Finds what is wrong with a setup: units, signs and axes of the IMU, its time offset and rotation to the cameras, the
 calibration between the cameras, and the images themselves. Each finding says what was measured with its standard deviation,
-what it should be, what to do, and gives the corrected line of the calibration. Nothing is printed if all is well.
+what it should be, what to do, and gives the corrected line of the calibration. The last lines say what was judged and what was not.
 The first 40 s of motion are used; a recording shows most if the rig is rotated and moved about all axes.
 
 examples:
   fbvins doctor MH_01_easy
   fbvins doctor flight --calibration camchain-imucam.yaml
-  fbvins doctor flight.mcap --all                all measurements, right or wrong, and what could not be judged
+  fbvins doctor flight.mcap --all                all measurements, right or wrong
   fbvins doctor flight --json
   fbvins doctor flight --out masks               writes mask0.png, mask1.png of what is fixed in view, if anything is
 
-exit codes: 0 all is well, 1 something is wrong, 2 wrong usage or bad input
+exit codes: 0 nothing wrong in what was judged, 1 something is wrong, 2 wrong usage or bad input
 )";
 
 struct Arguments {
@@ -68,6 +70,19 @@ Result<void> write_masks(const Diagnosis& diagnosis, const std::string& folder) 
   return {};
 }
 
+std::string counted(std::size_t n, std::string_view what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
+
+void print(const Diagnosis& diagnosis, bool all) {
+  for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
+  if (all)
+    for (const std::string& text : diagnosis.measured) fmt::print("measured: {}\n", text);
+  for (const std::string& text : diagnosis.not_judged) fmt::print("not judged: {}\n", text);
+  const std::size_t findings = diagnosis.findings.size(), gaps = diagnosis.not_judged.size();
+  fmt::print("{} in {}{}\n", findings == 0 ? "nothing wrong" : counted(findings, "finding"),
+             counted(diagnosis.measured.size(), "measurement"),
+             gaps == 0 ? "" : fmt::format("; {} could not be judged", counted(gaps, "point")));
+}
+
 int examine_recording(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {});
   if (!data) return fail(data.error().message);
@@ -86,11 +101,7 @@ int examine_recording(const Arguments& arguments) {
   if (arguments.json) {
     fmt::print("{}\n", to_json(diagnosis).dump(2));
   } else {
-    for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
-    if (arguments.all) {
-      for (const std::string& text : diagnosis.measured) fmt::print("measured: {}\n", text);
-      for (const std::string& text : diagnosis.not_judged) fmt::print("not judged: {}\n", text);
-    }
+    print(diagnosis, arguments.all);
   }
   return diagnosis.findings.empty() ? kOk : kSensorsWrong;
 }
@@ -103,7 +114,7 @@ void add_doctor_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   arguments->recording.add_to(*command);
   command->add_option("--out", arguments->out, "folder for the masks of what is fixed in view: mask0.png, mask1.png");
-  command->add_flag("--all", arguments->all, "print all measurements, and what could not be judged, too");
+  command->add_flag("--all", arguments->all, "print all measurements, too");
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = examine_recording(*arguments); });
 }

@@ -102,6 +102,29 @@ TEST(Checkup, NamesWrongStamps) {
   EXPECT_EQ(findings.front().corrected, "rate_hz: 200");
 }
 
+TEST(Checkup, NamesGaps) {
+  const auto only = [](const std::vector<Finding>& findings, FindingKind kind) {
+    return findings.size() == 1 && findings[0].kind == kind;
+  };
+  auto gap = readings();
+  gap.erase(gap.begin() + 400, gap.begin() + 412);
+  const auto found = check_stamps(gap, stamps(), rig());
+  ASSERT_TRUE(only(found, FindingKind::imu_gaps));
+  EXPECT_EQ(found[0].measured.substr(0, 43), "12 readings (1.0 %) are missing in 1 gap, t") << found[0].measured;
+  auto single = readings();
+  single.erase(single.begin() + 400);
+  EXPECT_TRUE(check_stamps(single, stamps(), rig()).empty()) << "one reading is nothing";
+  auto short_one = readings();
+  short_one.resize(short_one.size() / 2);
+  EXPECT_TRUE(only(check_stamps(short_one, stamps(), rig()), FindingKind::imu_gaps)) << "the IMU ends before the images";
+  auto sevenths = stamps();
+  for (std::size_t i = sevenths.size() / 7; i > 0; --i) sevenths.erase(sevenths.begin() + static_cast<std::ptrdiff_t>(7 * i - 1));
+  EXPECT_TRUE(only(check_stamps(readings(), sevenths, rig()), FindingKind::image_gaps));
+  auto pause = stamps();
+  pause.erase(pause.begin() + 20, pause.begin() + 32);
+  EXPECT_TRUE(only(check_stamps(readings(), pause, rig()), FindingKind::image_gaps));
+}
+
 TEST(Checkup, LostImagesAreNoIrregularStamps) {
   auto images = stamps();
   images.erase(images.begin() + 20);

@@ -15,6 +15,7 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::saturation: return "saturation";
     case FindingKind::vibration: return "vibration";
     case FindingKind::imu_stamps: return "imu_stamps";
+    case FindingKind::imu_gaps: return "imu_gaps";
     case FindingKind::clocks_apart: return "clocks_apart";
     case FindingKind::time_offset: return "time_offset";
     case FindingKind::imu_camera_rotation: return "imu_camera_rotation";
@@ -31,6 +32,7 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::principal_point: return "principal_point";
     case FindingKind::distortion: return "distortion";
     case FindingKind::image_stamps: return "image_stamps";
+    case FindingKind::image_gaps: return "image_gaps";
     case FindingKind::frozen_images: return "frozen_images";
     case FindingKind::blur: return "blur";
     case FindingKind::rolling_shutter: return "rolling_shutter";

@@ -20,6 +20,7 @@ enum class FindingKind {
   saturation,
   vibration,
   imu_stamps,
+  imu_gaps,
   // camera and IMU
   clocks_apart,
   time_offset,
@@ -40,6 +41,7 @@ enum class FindingKind {
   distortion,
   // the images
   image_stamps,
+  image_gaps,
   frozen_images,
   blur,
   rolling_shutter,

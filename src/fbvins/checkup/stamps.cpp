@@ -5,6 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "fbvins/core/median.hpp"
 
@@ -19,6 +23,45 @@ constexpr double kMostRepeated = 0.1;
 /// Root mean square deviation of the images' stamps from regular ones. Stamps of triggered cameras are a hundred times
 /// better.
 constexpr double kMostIrregular_s = 2e-3;
+
+/// From this multiple of the usual step on something is missing: readings are often stamped less regularly than images.
+constexpr double kReadingGap = 2.5, kImageGap = 1.5;
+/// What of it is reported.
+constexpr double kLongestReadingGap_s = 0.05, kMostReadingsMissing = 0.02;
+constexpr double kLongestImageGap_s = 0.5, kMostImagesMissing = 0.05;
+/// Images before the first reading or after the last one, for so long.
+constexpr double kLongestWithoutReadings_s = 0.5;
+
+struct Gaps {
+  int count = 0;
+  double missing = 0, share = 0;  ///< what is missing, and out of all that there should be
+  double longest_s = 0;
+  Time longest_from;
+};
+
+Gaps gaps_between(std::span<const Time> stamps, double period_s, double gap_periods) {
+  Gaps gaps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    const double step = (stamps[i] - stamps[i - 1]).seconds();
+    if (step > gaps.longest_s) gaps.longest_s = step, gaps.longest_from = stamps[i - 1];
+    if (step < gap_periods * period_s) continue;
+    ++gaps.count;
+    gaps.missing += std::round(step / period_s) - 1;
+  }
+  gaps.share = gaps.missing / (gaps.missing + static_cast<double>(stamps.size()));
+  return gaps;
+}
+
+std::string to_text(const Gaps& gaps, std::string_view what) {
+  return fmt::format("{:.0f} {} ({:.1f} %) are missing in {} gap{}, the longest of {:.3f} s after {} ns", gaps.missing, what,
+                     100 * gaps.share, gaps.count, gaps.count == 1 ? "" : "s", gaps.longest_s, gaps.longest_from.ns);
+}
+
+Finding gap_of(FindingKind kind, double longest_s) {
+  Finding finding;
+  finding.kind = kind, finding.size = longest_s, finding.unit = "s";
+  return finding;
+}
 
 double typical_step_s(std::vector<double> steps) { return median(steps); }
 
@@ -48,6 +91,15 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
     finding.advice = "the driver repeats readings or the IMU hangs: hand on each reading once, at the sensor's own rate";
     findings.push_back(finding);
   }
+  std::vector<Time> stamps;
+  for (const ImuSample& sample : samples) stamps.push_back(sample.t);
+  const Gaps gaps = gaps_between(stamps, 1 / rate, kReadingGap);
+  if (gaps.longest_s < kLongestReadingGap_s && gaps.share < kMostReadingsMissing) return;
+  finding = gap_of(FindingKind::imu_gaps, gaps.longest_s);
+  finding.measured = to_text(gaps, "readings");
+  finding.expected = fmt::format("a reading every {:.1f} ms", 1e3 / rate);
+  finding.advice = "look for full buffers, a bus or a disk that is too slow, and a driver that waits";
+  findings.push_back(finding);
 }
 
 void check_images(std::span<const Time> images, std::vector<Finding>& findings) {
@@ -62,6 +114,14 @@ void check_images(std::span<const Time> images, std::vector<Finding>& findings) 
     if (periods > 4) continue;  // a pause
     sum += std::pow(step - periods * period, 2);
     ++regular;
+  }
+  const Gaps gaps = gaps_between(images, period, kImageGap);
+  if (gaps.longest_s > kLongestImageGap_s || gaps.share > kMostImagesMissing) {
+    Finding finding = gap_of(FindingKind::image_gaps, gaps.longest_s);
+    finding.measured = to_text(gaps, "images");
+    finding.expected = fmt::format("an image every {:.0f} ms", 1e3 * period);
+    finding.advice = "look for a bus, a disk or a compression that is too slow; fewer images at equal intervals are better";
+    findings.push_back(std::move(finding));
   }
   const double irregular = std::sqrt(sum / std::max(regular, 1) / 2);
   if (irregular < kMostIrregular_s) return;
@@ -80,7 +140,18 @@ void check_clocks(std::span<const ImuSample> samples, std::span<const Time> imag
   const Duration offset = Duration::from_seconds(rig.time_offset_s);
   const auto covered = std::count_if(images.begin(), images.end(),
                                      [&](Time t) { return t + offset >= samples.front().t && t + offset <= samples.back().t; });
-  if (2 * static_cast<std::size_t>(covered) >= images.size()) return;
+  if (2 * static_cast<std::size_t>(covered) >= images.size()) {
+    const double before_s = (samples.front().t - images.front() - offset).seconds();
+    const double after_s = (images.back() + offset - samples.back().t).seconds();
+    if (std::max(before_s, after_s) < kLongestWithoutReadings_s) return;
+    Finding finding = gap_of(FindingKind::imu_gaps, std::max(before_s, after_s));
+    finding.measured = before_s > after_s ? fmt::format("the readings begin {:.3f} s after the first image", before_s)
+                                          : fmt::format("the readings end {:.3f} s before the last image", after_s);
+    finding.expected = "there are readings for every image";
+    finding.advice = "record the IMU for as long as the cameras";
+    findings.push_back(std::move(finding));
+    return;
+  }
   Finding finding;
   finding.kind = FindingKind::clocks_apart;
   finding.size = (samples.front().t - images.front()).seconds(), finding.unit = "s";

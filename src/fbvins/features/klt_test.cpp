@@ -84,6 +84,39 @@ TEST(Klt, NoiseOfTwoGreyValues) {
   EXPECT_LT(s.p95, 0.2);
 }
 
+/// Something near, from x = 150 on, before something far that moves by `behind` less.
+Image edge_of_a_thing(double moved, double behind) {
+  return render_texture(
+      kWidth, kHeight, NoiseTexture(11),
+      [&](const Vec2& p) {
+        return p.x() >= 150 + moved ? Vec2(p.x() - moved, p.y()) : Vec2(p.x() - moved + behind + 400, p.y());
+      },
+      120, 35, 0, 1);
+}
+
+TEST(Klt, ANarrowWindowSeesLessOfWhatIsBehind) {
+  Pyramid then, now;
+  then.build(edge_of_a_thing(0, 0).view(), 1);
+  now.build(edge_of_a_thing(1, 2).view(), 1);
+  double wide = 0, narrow = 0;
+  int n = 0;
+  KltTemplate patch;
+  for (double y = 20; y < kHeight - 20; y += 4) {
+    const Vec2 px(155, y);
+    std::vector<double> errors;
+    for (const KltWindow window : {KltWindow::wide, KltWindow::narrow}) {
+      if (!patch.cut(then, px, 0, 0, window)) continue;
+      const KltResult found = klt_align(patch, now, px, 0, 0);
+      if (found.ok()) errors.push_back(found.px.x() - px.x() - 1);
+    }
+    if (errors.size() < 2) continue;
+    wide += errors[0] * errors[0], narrow += errors[1] * errors[1], ++n;
+  }
+  ASSERT_GT(n, 30);
+  EXPECT_GT(std::sqrt(wide / n), 0.05);
+  EXPECT_LT(std::sqrt(narrow / n), 0.6 * std::sqrt(wide / n));
+}
+
 TEST(Klt, RefusesWhatIsNotThere) {
   const Image then = view(120, 35, Vec2::Zero());
   const Image other = render_texture(
