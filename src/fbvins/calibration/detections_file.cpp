@@ -78,7 +78,7 @@ Result<void> sort_corners(BoardView& view, const std::string& file) {
 }  // namespace
 
 int Detections::camera_count() const {
-  int count = 0;
+  int count = sizes.empty() ? 0 : sizes.rbegin()->first + 1;  // one may never see the board
   for (const BoardView& view : views) count = std::max(count, view.camera + 1);
   return count;
 }

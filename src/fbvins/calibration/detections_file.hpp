@@ -25,7 +25,7 @@ struct Detections {
   std::vector<BoardView> views;    ///< by time, then by camera; corners by index
   std::map<int, ImageSize> sizes;  ///< of cameras whose images' size is known
 
-  int camera_count() const;  ///< one more than the largest index of a camera
+  int camera_count() const;  ///< one more than the largest index of a camera, whether it sees the board or not
 };
 
 Result<Detections> read_detections(const std::string& path);

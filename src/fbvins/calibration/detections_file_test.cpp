@@ -40,6 +40,8 @@ TEST(DetectionsFile, WhatIsWrittenIsReadBack) {
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(detections_to_csv(*read), text);
   EXPECT_EQ(read->sizes, detections.sizes);
+  detections.sizes[2] = {640, 480};
+  EXPECT_EQ(detections.camera_count(), 3) << "a camera that never sees the board";
   EXPECT_EQ(read->views[0].corners[1].pixel, Vec2(3.0625, 470.125));
 }
 

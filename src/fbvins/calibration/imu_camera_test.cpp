@@ -166,6 +166,10 @@ TEST(ImuCamera, NamesWrongUnitsAndSizes) {
   wrong.board.size_m *= 1.1;  // the true tags are 88 mm
   expect_refusal(wrong, "88.");
   wrong = r.input;
+  for (BoardView& view : wrong.views)
+    for (BoardCorner& corner : view.corners) corner.pixel.x() = wrong.cameras[0].width() - 1 - corner.pixel.x();
+  expect_refusal(wrong, "mirrored");
+  wrong = r.input;
   wrong.board.columns = 4, wrong.board.rows = 9;
   expect_refusal(wrong, "do not lie as on this board");
 }
