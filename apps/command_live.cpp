@@ -8,6 +8,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/config_arguments.hpp"
+#include "apps/first_look.hpp"
 #include "apps/imu_state.hpp"
 #include "apps/kept_map.hpp"
 #include "apps/live_check.hpp"
@@ -90,11 +91,12 @@ Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
 Result<void> fly(Source& source, LiveSystem& live, const std::vector<SensorFault>& faults) {
   const StopSignal stop([&] { source.stop(); });
   live.on_failure([&] { source.stop(); });
+  FirstLook look(live.input(), source.rig(), [](const Finding& finding) { warn(to_text(finding)); });
   Result<void> ended;
   if (faults.empty()) {
-    ended = source.run(live.input());
+    ended = source.run(look);
   } else {
-    FaultyInput faulty(live.input(), faults);
+    FaultyInput faulty(look, faults);
     ended = source.run(faulty);
   }
   const Result<void> done = live.finish();

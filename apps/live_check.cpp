@@ -15,6 +15,7 @@
 #include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/gather.hpp"
 #include "fbvins/live/sensor_check.hpp"
+#include "fbvins/types/owned_images.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -35,9 +36,7 @@ class CheckedInput final : public SensorInput {
     check_.push(frame);
     const std::lock_guard lock(mutex_);
     if (images_++ >= kMostImages) return;
-    frame.left = own(frame.left);
-    frame.right = own(frame.right);
-    events_.emplace_back(std::move(frame));
+    events_.emplace_back(owned(std::move(frame)));
   }
   /// After the source has ended.
   Diagnosis diagnosis(const StereoRig& rig) const {
@@ -48,13 +47,6 @@ class CheckedInput final : public SensorInput {
   }
 
  private:
-  /// A copy of images in a driver's buffers, of which there are few.
-  static std::shared_ptr<const Image> own(const std::shared_ptr<const Image>& image) {
-    if (!image || !image->foreign()) return image;
-    auto copy = std::make_shared<Image>(*image);
-    copy->row(0);
-    return copy;
-  }
   SensorCheck& check_;
   std::mutex mutex_;
   std::vector<SensorEvent> events_;

@@ -68,6 +68,14 @@ TEST(Checkup, NamesUnits) {
   EXPECT_TRUE(says(check_reading_units(in_degrees), FindingKind::gyro_units));
 }
 
+TEST(Checkup, NamesExchangedSensors) {
+  auto samples = readings();
+  for (ImuSample& sample : samples) std::swap(sample.gyro_radps, sample.accel_mps2);
+  const auto findings = check_reading_units(samples);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_NE(findings[0].advice.find("exchanged"), std::string::npos);
+}
+
 TEST(Checkup, UnitsTooCloseToBeDistinguishedAreBothNamed) {
   const auto advice = [](double factor) {
     auto samples = readings();
@@ -100,6 +108,12 @@ TEST(Checkup, NamesWrongStamps) {
   const auto findings = check_stamps(readings(), stamps(), faster);
   ASSERT_TRUE(says(findings, FindingKind::imu_stamps));
   EXPECT_EQ(findings.front().corrected, "rate_hz: 200");
+  auto in_microseconds = readings();
+  for (ImuSample& sample : in_microseconds) sample.t.ns /= 1000;
+  const auto unit = check_stamps(in_microseconds, {}, rig());
+  ASSERT_TRUE(says(unit, FindingKind::imu_stamps));
+  EXPECT_NE(unit.front().advice.find("microseconds"), std::string::npos);
+  EXPECT_EQ(unit.front().corrected, "");
 }
 
 TEST(Checkup, NamesGaps) {

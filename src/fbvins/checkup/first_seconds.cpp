@@ -6,6 +6,7 @@
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/types/owned_images.hpp"
 
 namespace fbvins {
 namespace {
@@ -25,7 +26,7 @@ void FirstSeconds::push(const SensorEvent& event) {
   const StereoFrame& frame = std::get<StereoFrame>(event);
   images_.push_back(frame.t);
   const double due_s = kLook_s * static_cast<double>(kept_.size()) / kKept;
-  if (kept_.size() < kKept && (frame.t - images_.front()).seconds() >= due_s) kept_.push_back(frame);
+  if (kept_.size() < kKept && (frame.t - images_.front()).seconds() >= due_s) kept_.push_back(owned(frame));
 }
 
 bool FirstSeconds::is_over() const { return !images_.empty() && (images_.back() - images_.front()).seconds() >= kLook_s; }

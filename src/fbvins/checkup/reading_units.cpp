@@ -8,6 +8,8 @@
 #include <iterator>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "fbvins/core/median.hpp"
 #include "fbvins/imu/nav_state.hpp"
@@ -19,6 +21,8 @@ constexpr double kPart_s = 0.5;
 constexpr std::size_t kFewestParts = 4;
 /// Gravity may differ by this share: 3 % of an accelerometer's scale, a bias of 0.5 m/s^2, a second of climbing.
 constexpr double kGravityTolerance = 0.15;
+/// Less than this share of gravity is none.
+constexpr double kNoGravity = 0.3;
 /// Half of all readings turn faster than this: no vehicle that a camera could follow.
 constexpr double kSpinning_radps = 6;
 
@@ -62,11 +66,29 @@ void check_accelerometer(std::span<const ImuSample> samples, std::vector<Finding
   finding.unit = "of gravity";
   finding.measured = fmt::format("the accelerometer's mean reading is {:.4g} +- {:.2g}", seen.norm_mps2, seen.sigma_mps2);
   finding.expected = "gravity alone is 9.81 m/s^2";
-  finding.advice = seen.norm_mps2 < 0.3 * kGravity_mps2
+  finding.advice = seen.norm_mps2 < kNoGravity * kGravity_mps2
                        ? "gravity seems to have been taken out: give the readings as the sensor has them"
                        : "find out the unit of the readings, and give m/s^2";
   if (std::string unit = advice_on_unit(seen.norm_mps2); !unit.empty()) finding.advice = std::move(unit);
   findings.push_back(std::move(finding));
+}
+
+/// Whether gyroscope and accelerometer are.
+bool exchanged(std::span<const ImuSample> samples) {
+  std::vector<ImuSample> other(samples.begin(), samples.end());
+  for (ImuSample& sample : other) std::swap(sample.gyro_radps, sample.accel_mps2);
+  const GravitySeen seen = gravity_seen(samples), there = gravity_seen(other);
+  return there.sigma_mps2 > 0 && near_to(there.norm_mps2, kGravity_mps2) && seen.norm_mps2 < kNoGravity * kGravity_mps2;
+}
+
+Finding exchanged_finding() {
+  Finding finding;
+  finding.kind = FindingKind::accel_units;
+  finding.unit = "of gravity";
+  finding.measured = "the gyroscope's mean reading is gravity's 9.8, and the accelerometer's is near zero";
+  finding.expected = "the accelerometer measures gravity";
+  finding.advice = "gyroscope and accelerometer are exchanged: exchange them";
+  return finding;
 }
 
 void check_gyroscope(std::span<const ImuSample> samples, std::vector<Finding>& findings) {
@@ -110,6 +132,7 @@ GravitySeen gravity_seen(std::span<const ImuSample> samples) {
 std::vector<Finding> check_reading_units(std::span<const ImuSample> samples) {
   std::vector<Finding> findings;
   if (samples.size() < 2 || (samples.back().t - samples.front().t).seconds() < kFewestParts * kPart_s) return findings;
+  if (exchanged(samples)) return {exchanged_finding()};
   check_accelerometer(samples, findings);
   check_gyroscope(samples, findings);
   return findings;

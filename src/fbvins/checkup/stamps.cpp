@@ -65,6 +65,13 @@ Finding gap_of(FindingKind kind, double longest_s) {
 
 double typical_step_s(std::vector<double> steps) { return median(steps); }
 
+/// In which unit stamps are, where they go so many times as slowly as nanoseconds would; null where in none.
+const char* unit_of_stamps(double slower) {
+  if (std::abs(slower / 1e3 - 1) < kRateTolerance) return "microseconds";
+  if (std::abs(slower / 1e6 - 1) < kRateTolerance) return "milliseconds";
+  return nullptr;
+}
+
 void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, std::vector<Finding>& findings) {
   std::vector<double> steps;
   int repeated = 0;
@@ -79,8 +86,12 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
     finding.size = rate, finding.unit = "Hz";
     finding.measured = fmt::format("the IMU gives {:.1f} readings a second", rate);
     finding.expected = fmt::format("the calibration says {:.1f}", said);
-    finding.advice = "correct the rate, on which the covariance rests";
-    finding.corrected = fmt::format("rate_hz: {:.0f}", rate);
+    if (const char* unit = unit_of_stamps(rate / said)) {
+      finding.advice = fmt::format("the stamps look like {}: give nanoseconds", unit);
+    } else {
+      finding.advice = "correct the rate, on which the covariance rests";
+      finding.corrected = fmt::format("rate_hz: {:.0f}", rate);
+    }
     findings.push_back(finding);
   }
   const double share = repeated / static_cast<double>(steps.size());
