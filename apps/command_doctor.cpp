@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
@@ -70,19 +69,6 @@ Result<void> write_masks(const Diagnosis& diagnosis, const std::string& folder) 
   return {};
 }
 
-std::string counted(std::size_t n, std::string_view what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
-
-void print(const Diagnosis& diagnosis, bool all) {
-  for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
-  if (all)
-    for (const std::string& text : diagnosis.measured) fmt::print("measured: {}\n", text);
-  for (const std::string& text : diagnosis.not_judged) fmt::print("not judged: {}\n", text);
-  const std::size_t findings = diagnosis.findings.size(), gaps = diagnosis.not_judged.size();
-  fmt::print("{} in {}{}\n", findings == 0 ? "nothing wrong" : counted(findings, "finding"),
-             counted(diagnosis.measured.size(), "measurement"),
-             gaps == 0 ? "" : fmt::format("; {} could not be judged", counted(gaps, "point")));
-}
-
 int examine_recording(const Arguments& arguments) {
   const auto data = open_recording(arguments.recording, {});
   if (!data) return fail(data.error().message);
@@ -101,7 +87,7 @@ int examine_recording(const Arguments& arguments) {
   if (arguments.json) {
     fmt::print("{}\n", to_json(diagnosis).dump(2));
   } else {
-    print(diagnosis, arguments.all);
+    fmt::print("{}\n", to_text(diagnosis, arguments.all));
   }
   return diagnosis.findings.empty() ? kOk : kSensorsWrong;
 }

@@ -144,7 +144,7 @@ def doctor(recording: Union[Recording, PathLike], *, calibration: Optional[PathL
     """What is wrong with a setup, from its recording (a path, or a Recording that has not been iterated): units, axes, clocks, calibration, images, as
     `fbvins doctor` finds it."""
     found = _fbvins.doctor(_opened(recording, calibration, imu_calibration, topics), calibration is not None)
-    return Diagnosis([Finding(**finding) for finding in found["findings"]], found["measured"], found["not_judged"], found["rig"])
+    return Diagnosis([Finding(**finding) for finding in found["findings"]], found["measured"], found["not_judged"], found["text"], found["rig"])
 
 
 def convert(recording: Union[Recording, PathLike], out: PathLike, *, calibration: Optional[PathLike] = None,

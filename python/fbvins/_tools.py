@@ -33,15 +33,16 @@ class Diagnosis:
     findings: list[Finding]
     measured: list[str]  #: a sentence for each measurement, right or wrong
     not_judged: list[str]  #: what the recording does not show
+    text: str  #: all of it, as `fbvins doctor` prints it
     rig: Rig  #: the calibration with all findings corrected
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether nothing is wrong in what was judged."""
         return not self.findings
 
     def __str__(self) -> str:
-        return "\n".join(finding.text for finding in self.findings) or "nothing is wrong"
+        return self.text
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(str(self))}</pre>"

@@ -65,6 +65,7 @@ nb::dict examine_recording(Dataset& data, bool kalibr) {
   out["findings"] = findings;
   out["measured"] = diagnosis.measured;
   out["not_judged"] = diagnosis.not_judged;
+  out["text"] = to_text(diagnosis);
   out["rig"] = diagnosis.rig;
   return out;
 }

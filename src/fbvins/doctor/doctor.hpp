@@ -6,7 +6,7 @@
 //   EvidenceGatherer gatherer(rig);
 //   while (auto event = data.next()) if (!gatherer.push(*event)) break;
 //   Diagnosis diagnosis = examine(gatherer.finish());
-//   for (const Finding& finding : diagnosis.findings) fmt::print("{}\n", to_text(finding));
+//   fmt::print("{}\n", to_text(diagnosis));
 #pragma once
 
 #include <memory>
@@ -33,6 +33,10 @@ struct Diagnosis {
   /// Of each camera, the mask of what is fixed in view, and of what is masked already; null where nothing more is.
   std::vector<std::shared_ptr<const Mask>> masks;
 };
+
+/// The findings, what was not judged, and in the last line how much was measured; with `all` each measurement. No line end after
+/// it.
+std::string to_text(const Diagnosis& diagnosis, bool all = false);
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style = CalibrationStyle::euroc);
 

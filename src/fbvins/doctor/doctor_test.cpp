@@ -61,6 +61,20 @@ void expect_named(const std::string& name) {
   FAIL() << "there is no spoiler '" << name << "'";
 }
 
+TEST(Diagnosis, TheLastLineSaysWhatWasJudged) {
+  Diagnosis diagnosis;
+  diagnosis.measured = {"gravity"};
+  EXPECT_EQ(to_text(diagnosis), "nothing wrong in 1 measurement");
+  diagnosis.not_judged = {"axes: the rig hardly turned"};
+  diagnosis.findings.resize(2);
+  const std::string text = to_text(diagnosis);
+  EXPECT_NE(text.find("not judged: axes: the rig hardly turned\n2 findings in 1 measurement; 1 point could not be judged"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("measured: "), std::string::npos);
+  EXPECT_NE(to_text(diagnosis, true).find("measured: gravity\n"), std::string::npos);
+}
+
 TEST(Doctor, IsSilentWhereAllIsWell) {
   const Diagnosis diagnosis = examine(good());
   EXPECT_TRUE(diagnosis.findings.empty()) << all_of(diagnosis);
