@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
+#include <thread>
 #include <vector>
 
 namespace fbvins::app {

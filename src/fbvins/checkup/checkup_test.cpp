@@ -125,6 +125,9 @@ TEST(Checkup, NamesGaps) {
   const auto found = check_stamps(gap, stamps(), rig());
   ASSERT_TRUE(only(found, FindingKind::imu_gaps));
   EXPECT_EQ(found[0].measured.substr(0, 43), "12 readings (1.0 %) are missing in 1 gap, t") << found[0].measured;
+  std::vector<ImuSample> slow;
+  for (std::size_t i = 0; i < readings().size(); i += 12) slow.push_back(readings()[i]);
+  EXPECT_FALSE(says(check_stamps(slow, stamps(), rig()), FindingKind::imu_gaps)) << "a slow IMU has no gaps";
   auto single = readings();
   single.erase(single.begin() + 400);
   EXPECT_TRUE(check_stamps(single, stamps(), rig()).empty()) << "one reading is nothing";

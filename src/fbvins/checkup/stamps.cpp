@@ -105,7 +105,7 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
   std::vector<Time> stamps;
   for (const ImuSample& sample : samples) stamps.push_back(sample.t);
   const Gaps gaps = gaps_between(stamps, 1 / rate, kReadingGap);
-  if (gaps.longest_s < kLongestReadingGap_s && gaps.share < kMostReadingsMissing) return;
+  if (gaps.count == 0 || (gaps.longest_s < kLongestReadingGap_s && gaps.share < kMostReadingsMissing)) return;
   finding = gap_of(FindingKind::imu_gaps, gaps.longest_s);
   finding.measured = to_text(gaps, "readings");
   finding.expected = fmt::format("a reading every {:.1f} ms", 1e3 / rate);
@@ -127,7 +127,7 @@ void check_images(std::span<const Time> images, std::vector<Finding>& findings) 
     ++regular;
   }
   const Gaps gaps = gaps_between(images, period, kImageGap);
-  if (gaps.longest_s > kLongestImageGap_s || gaps.share > kMostImagesMissing) {
+  if (gaps.count > 0 && (gaps.longest_s > kLongestImageGap_s || gaps.share > kMostImagesMissing)) {
     Finding finding = gap_of(FindingKind::image_gaps, gaps.longest_s);
     finding.measured = to_text(gaps, "images");
     finding.expected = fmt::format("an image every {:.0f} ms", 1e3 * period);
