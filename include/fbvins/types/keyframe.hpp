@@ -35,7 +35,7 @@ struct Keyframe {
   Time t;
   Pose<W, B> T_WB;
   Vec3 v_WB = Vec3::Zero();
-  GaugeState gauge;                 ///< in the estimator's own frame, not levelled
+  GaugeState gauge;  ///< in the estimator's own frame, not levelled
   /// Of gauge.T_GB, as (dp in G, dtheta in B), since G began; zero: unknown.
   Mat6 pose_covariance = Mat6::Zero();
   Pose<W, G> T_WG;                  ///< of the newest published pose when this was handed on; set by the pipeline
