@@ -18,15 +18,20 @@ double within(double rate, double assumed) { return std::clamp(rate, assumed / k
 }  // namespace
 
 void OdometryDrift::take(const Mat6& covariance, const GaugeState& gauge, double path_m) {
-  if (covariance.isZero(0) || !covariance.allFinite() || path_m < kShortestPath_m) return;
+  if (covariance.isZero(0) || !covariance.allFinite()) return;
   const Mat3 P_theta = covariance.bottomRightCorner<3, 3>();
   const Vec3 up_B = gauge.T_GB.q.conjugate() * gauge.up_G();
   // A wrong attitude displaces the position as well, which the graph does itself: of the position only what remains is drift.
   const Mat3 P_p = covariance.topLeftCorner<3, 3>() -
                    covariance.topRightCorner<3, 3>() * P_theta.ldlt().solve(Mat3(covariance.bottomLeftCorner<3, 3>()));
+  const Uncertainty now_is{path_m, P_p.trace() / 3, up_B.dot(P_theta * up_B)};
+  if (!first_) first_ = now_is;
+  const double way_m = path_m - first_->path_m;
+  if (way_m < kShortestPath_m) return;
+  const auto rate = [&](double variance, double at_first) { return std::sqrt(std::max(0.0, variance - at_first) / way_m); };
   DriftOptions now;
-  now.position_m = within(std::sqrt(std::max(0.0, P_p.trace() / 3 / path_m)), assumed_.position_m);
-  now.yaw_rad = within(std::sqrt(std::max(0.0, up_B.dot(P_theta * up_B) / path_m)), assumed_.yaw_rad);
+  now.position_m = within(rate(now_is.position_m2, first_->position_m2), assumed_.position_m);
+  now.yaw_rad = within(rate(now_is.yaw_rad2, first_->yaw_rad2), assumed_.yaw_rad);
   // Re-observed landmarks stop the growth, while the steps between keyframes err as before: so the fastest growth so far.
   if (known_) now = {std::max(now.position_m, rate_.position_m), std::max(now.yaw_rad, rate_.yaw_rad)};
   rate_ = now;

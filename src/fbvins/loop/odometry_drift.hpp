@@ -7,6 +7,8 @@
 //   MapEdge edge = odometry_edge(from, T_GB, t, drift.rate());
 #pragma once
 
+#include <optional>
+
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/types/gauge.hpp"
@@ -18,14 +20,20 @@ class OdometryDrift {
   explicit OdometryDrift(const DriftOptions& assumed) : assumed_(assumed), rate_(assumed) {}
 
   /// A flight begins.
-  void restart() { rate_ = assumed_, known_ = false; }
-  /// `covariance`: of gauge.T_GB, as (dp in G, dtheta in B), since G began; zero: unknown. `path_m`: flown since then.
+  void restart() { rate_ = assumed_, known_ = false, first_.reset(); }
+  /// `covariance`: of gauge.T_GB, as (dp in G, dtheta in B); zero: unknown. What it was at first does not count, because G may
+  /// be older than the flight: a correction can begin a new W in the same G. `path_m`: flown.
   void take(const Mat6& covariance, const GaugeState& gauge, double path_m);
   const DriftOptions& rate() const { return rate_; }
 
  private:
+  struct Uncertainty {
+    double path_m, position_m2, yaw_rad2;
+  };
+
   DriftOptions assumed_, rate_;
   bool known_ = false;
+  std::optional<Uncertainty> first_;
 };
 
 }  // namespace fbvins

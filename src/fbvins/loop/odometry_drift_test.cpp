@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
@@ -28,15 +30,30 @@ GaugeState turned() {
   return gauge;
 }
 
-TEST(OdometryDrift, IsTheCovariancePerMetreWithoutWhatTheYawDoes) {
+/// At the beginning of a flight, where nothing is uncertain.
+OdometryDrift begun() {
   OdometryDrift drift(kAssumed);
+  drift.take(covariance(turned(), 0, 1e-6, Vec3::Zero()), turned(), 0);
+  return drift;
+}
+
+TEST(OdometryDrift, WhatWasUncertainBeforeTheFlightIsNoDrift) {
+  OdometryDrift drift(kAssumed);
+  drift.take(covariance(turned(), 0.5, 0.1, Vec3::Zero()), turned(), 0);
+  drift.take(covariance(turned(), std::sqrt(0.25 + 1.44e-4), std::sqrt(0.01 + 4e-6), Vec3::Zero()), turned(), 16);
+  EXPECT_NEAR(drift.rate().position_m, 0.003, 1e-5);
+  EXPECT_NEAR(drift.rate().yaw_rad, 0.0005, 1e-6);
+}
+
+TEST(OdometryDrift, IsTheCovariancePerMetreWithoutWhatTheYawDoes) {
+  OdometryDrift drift = begun();
   drift.take(covariance(turned(), 0.008, 0.002, Vec3(12, -5, 1)), turned(), 16);
   EXPECT_NEAR(drift.rate().position_m, 0.002, 1e-5);
   EXPECT_NEAR(drift.rate().yaw_rad, 0.0005, 1e-6);
 }
 
 TEST(OdometryDrift, IsWhatIsAssumedUntilItIsKnown) {
-  OdometryDrift drift(kAssumed);
+  OdometryDrift drift = begun();
   drift.take(Mat6::Zero(), turned(), 16);
   EXPECT_EQ(drift.rate().position_m, kAssumed.position_m);
   drift.take(covariance(turned(), 0.0005, 0.0001, Vec3::Zero()), turned(), 1);
@@ -48,7 +65,7 @@ TEST(OdometryDrift, IsWhatIsAssumedUntilItIsKnown) {
 }
 
 TEST(OdometryDrift, RevisitedPlacesDoNotMakeTheStepsBetter) {
-  OdometryDrift drift(kAssumed);
+  OdometryDrift drift = begun();
   drift.take(covariance(turned(), 0.009, 0.0018, Vec3::Zero()), turned(), 9);
   drift.take(covariance(turned(), 0.009, 0.0018, Vec3::Zero()), turned(), 100);
   EXPECT_NEAR(drift.rate().position_m, 0.003, 1e-5);
@@ -56,7 +73,7 @@ TEST(OdometryDrift, RevisitedPlacesDoNotMakeTheStepsBetter) {
 }
 
 TEST(OdometryDrift, StaysWithinLimits) {
-  OdometryDrift drift(kAssumed);
+  OdometryDrift drift = begun();
   drift.take(covariance(turned(), 1e-5, 1e-6, Vec3::Zero()), turned(), 9);
   EXPECT_DOUBLE_EQ(drift.rate().position_m, kAssumed.position_m / 4);
   drift.take(covariance(turned(), 3, 1, Vec3::Zero()), turned(), 9);
