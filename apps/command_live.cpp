@@ -129,6 +129,9 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
                               KeptMap* kept, LiveTally& tally, Troubles& troubles) {
   std::unique_ptr<ResetCounterSink> counter;
   if (!arguments.outputs.reset_counter.empty()) counter = std::make_unique<ResetCounterSink>(arguments.outputs.reset_counter);
+  if (counter && counter->was_unreadable())
+    warn(fmt::format("{}: there is no reset counter in it; the first one is {}", arguments.outputs.reset_counter,
+                     counter->first()));
   SystemParts parts{.mapper = kept, .imu_state = imu_state_for_flight(arguments.imu_state, source.rig().imu_noise)};
   auto live = LiveSystem::create(config, config.live, source.rig(), source.clock_rate(), std::move(parts),
                                  counter ? counter->first() : 0);

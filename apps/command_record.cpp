@@ -24,7 +24,8 @@ int recover(const Arguments& arguments) {
   if (!done) return fail(done.error().message);
   if (done->parts_left_out > 0)
     warn(fmt::format("{} ({} parts of the file are left out)", done->first_damage, done->parts_left_out));
-  fmt::print("{}: {} messages{}\n", arguments.output, done->messages, done->was_cut_off ? "" : "; the record was whole already");
+  fmt::print("{}: {} messages{}\n", arguments.output, done->messages,
+             done->was_cut_off || done->parts_left_out > 0 ? "" : "; the record was whole already");
   return kOk;
 }
 

@@ -57,11 +57,11 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
   const bool no_imu = frame.imu.empty();
 
   if (!state.T_FB.p.allFinite() || evidence.failed_solves >= kFailedSolvesUntilLost) return lost(HealthReason::solver_failed);
+  if (few_tracks && blind2 > options_.max_blind_m * options_.max_blind_m)
+    return lost(images_missing(frame) ? HealthReason::no_images : HealthReason::no_tracks);
   if (state.v_FB.norm() > options_.max_speed_mps) return lost(HealthReason::implausible_speed);
   if (state.bias.gyro_radps.norm() > kMaxGyroBias_radps || state.bias.accel_mps2.norm() > kMaxAccelBias_mps2)
     return lost(HealthReason::implausible_bias);
-  if (few_tracks && blind2 > options_.max_blind_m * options_.max_blind_m)
-    return lost(images_missing(frame) ? HealthReason::no_images : HealthReason::no_tracks);
   if (few_tracks && (no_imu || frame.imu.longest_gap.seconds() > options_.max_imu_gap_s)) return lost(HealthReason::imu_gap);
   if (evidence.hopeless) return lost(HealthReason::contradiction);
   if (evidence.failed_solves > 0) return degraded(HealthReason::solver_failed);

@@ -10,7 +10,8 @@ namespace {
 /// A stamp is ahead of any possible arrival if it is this much less late, against this machine's clock, than any of the last
 /// seconds.
 constexpr double kAhead_s = 0.2;
-/// Readings that merely arrive out of order go back by less.
+/// Data that merely arrive out of order are less behind where their stream was due; this is the same for all rates, so that a
+/// jump is seen in both streams or in neither.
 constexpr double kBack_s = 0.1;
 /// A jump is established by this many events that do not fit, over this time at least, whose stamps keep this machine's pace
 /// to a share of that time and some jitter: longer than late data take to arrive in one block.
@@ -94,7 +95,8 @@ bool ClockGuard::is_early(const State& s, Time t, Time host) const {
 }
 
 bool ClockGuard::fits(const State& s, Time t, Time host) const {
-  if ((t - *s.newest).seconds() < -kBack_s) return false;
+  const double due_s = s.period.median().value_or(Duration{}).seconds();
+  if ((t - *s.newest).seconds() < std::min(0.0, due_s - kBack_s)) return false;
   // In seconds of the host's clock, so that the speed of a replay does not matter.
   return lateness_s(t, host) >= shortest_lateness_s() - kAhead_s;
 }

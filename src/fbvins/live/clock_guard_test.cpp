@@ -223,6 +223,23 @@ TEST(ClockGuard, AJumpBackIsUndoneExactly) {
   EXPECT_EQ(last->t, at(1000 + 5999 * 0.005));
 }
 
+/// Forwards it is no more than early, and so it is taken; backwards, IMU and camera must agree on what it is.
+TEST(ClockGuard, AJumpTooSmallToBeSeenForwardsIsSeenByBothStreamsBackwards) {
+  for (const double size_s : {0.08, 0.12, 0.15, 0.19}) {
+    ClockGuard guard(1);
+    double apart_s = 0;
+    for (int k = 0; k < 4000; ++k) {
+      const double s = k * 0.005, stamp = 1000 + s + (s > 8 && s < 12 ? size_s : 0.0);
+      const auto imu = guard.mend(ClockGuard::imu, at(stamp), at(50 + s));
+      if (k % 10 != 0) continue;
+      const auto image = guard.mend(ClockGuard::camera, at(stamp), at(50 + s));
+      if (image && imu) apart_s = std::max(apart_s, std::abs((image->t - imu->t).seconds()));
+    }
+    EXPECT_LT(apart_s, 1e-6) << size_s;
+    EXPECT_EQ(guard.leaps(), size_s > 0.1 ? 2 : 0) << size_s;
+  }
+}
+
 TEST(ClockGuard, SaysWhenAStampWasOnThisMachine) {
   ClockGuard guard(1);
   double worst_s = 0;

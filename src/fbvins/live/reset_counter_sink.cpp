@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "fbvins/io/byte_source.hpp"
@@ -14,29 +15,33 @@ namespace {
 
 /// What flight controllers compare has eight bits (MAVLink's ODOMETRY).
 constexpr std::uint32_t kDifferent = 256;
-/// After a file that cannot be read: far from the small numbers of most flights.
 constexpr std::uint32_t kUnknown = 128;
 constexpr std::uint64_t kLargestFile_bytes = 100;
 
-std::uint32_t after_the_one_in(const std::string& file) {
+bool exists(const std::string& file) {
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) return 0;
+  return std::filesystem::exists(file, ignored);
+}
+
+std::optional<std::uint32_t> counter_in(const std::string& file) {
   const auto bytes = open_bytes(file);
-  if (!bytes || (*bytes)->size() > kLargestFile_bytes) return kUnknown;
+  if (!bytes || (*bytes)->size() > kLargestFile_bytes) return std::nullopt;
   const std::string text = (*bytes)->read(0, (*bytes)->size());
   std::uint32_t last = 0;
   const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), last);
-  return wrong == std::errc() && end != text.data() + text.size() && *end == '\n' ? (last + 1) % kDifferent : kUnknown;
+  if (wrong != std::errc() || end == text.data() + text.size() || *end != '\n') return std::nullopt;
+  return last;
 }
 
 }  // namespace
 
-ResetCounterSink::ResetCounterSink(std::string file, WriteFile write)
-    : file_(std::move(file)),
-      write_(std::move(write)),
-      first_(after_the_one_in(file_)),
-      kept_(first_),
-      first_kept_(keep(first_)) {}
+ResetCounterSink::ResetCounterSink(std::string file, WriteFile write) : file_(std::move(file)), write_(std::move(write)) {
+  const std::optional<std::uint32_t> last = counter_in(file_);
+  unreadable_ = !last && exists(file_);
+  if (last) first_ = (*last + 1) % kDifferent;
+  else if (unreadable_) first_ = kUnknown;
+  first_kept_ = keep(first_);
+}
 
 Result<void> ResetCounterSink::keep(std::uint32_t counter) {
   kept_ = counter;

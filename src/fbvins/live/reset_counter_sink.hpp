@@ -22,6 +22,8 @@ class ResetCounterSink final : public Sink {
   explicit ResetCounterSink(std::string file, WriteFile write = write_file_atomically);
 
   std::uint32_t first() const { return first_; }
+  /// There is a file, but no counter in it: the first one is then 128, far from what most flights reach.
+  bool was_unreadable() const { return unreadable_; }
   std::string_view name() const override { return "reset counter"; }
   Result<void> take(const LiveEvent& event) override;
 
@@ -30,7 +32,8 @@ class ResetCounterSink final : public Sink {
 
   std::string file_;
   WriteFile write_;
-  std::uint32_t first_, kept_;
+  bool unreadable_ = false;
+  std::uint32_t first_ = 0, kept_ = 0;
   Result<void> first_kept_;
 };
 

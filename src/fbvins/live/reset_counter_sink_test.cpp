@@ -42,9 +42,12 @@ TEST_F(ResetCounter, StaysWithinTheEightBitsOfMavlink) {
 TEST_F(ResetCounter, ADamagedFileIsReplaced) {
   for (const char* text : {"", "12", "many\n", "-3\n", "99999999999\n"}) {
     std::ofstream(file_) << text;
-    const std::uint32_t first = ResetCounterSink(file_).first();
-    EXPECT_EQ(first, 128u) << text;
-    EXPECT_EQ(ResetCounterSink(file_).first(), 129u) << text;
+    const ResetCounterSink damaged(file_);
+    EXPECT_TRUE(damaged.was_unreadable()) << text;
+    EXPECT_EQ(damaged.first(), 128u) << text;
+    const ResetCounterSink next(file_);
+    EXPECT_FALSE(next.was_unreadable()) << text;
+    EXPECT_EQ(next.first(), 129u) << text;
   }
 }
 
