@@ -140,7 +140,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
   if (counter) live->add_sink(std::move(counter));
   if (Result<void> added = add_outputs(arguments.outputs, flight, *live, tally, troubles); !added) return added;
-  if (Result<void> added = graph.add_sink(source, *live); !added) return added;
+  if (Result<void> added = graph.add_sink(source, config.live, *live); !added) return added;
   const auto faults = faults_of(arguments);
   if (!faults) return faults.error();
   if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)
@@ -170,7 +170,7 @@ int run(Arguments arguments) {
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
   if (const auto faults = faults_of(arguments); !faults) return fail(faults.error().message);
-  const auto graph = RosGraph::join(arguments.ros2, arguments.source);
+  const auto graph = RosGraph::join(arguments.ros2, arguments.source, config->live.ros2);
   if (!graph) return fail(graph.error().message);
   const auto source = source_of(arguments, *graph);
   if (!source) return fail(source.error().message);

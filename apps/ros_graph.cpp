@@ -16,7 +16,7 @@ constexpr std::string_view kSourceKind = "ros2:";
 
 #ifdef FBVINS_WITH_ROS2
 
-Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source) {
+Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source, const Ros2Options& options) {
   RosGraph graph;
   graph.publishes_ = !address.empty();
   if (source.starts_with(kSourceKind)) graph.topics_ = source.substr(kSourceKind.size());
@@ -25,7 +25,9 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
     if (const auto topics = parse_ros2_topics(graph.topics_); !topics) return topics.error();
   const auto parsed = parse_ros2_address(graph.publishes_ ? address : "0");
   if (!parsed) return parsed.error();
-  auto node = Ros2Node::join(*parsed);
+  const auto name = parse_ros2_node(options.node);
+  if (!name) return name.error();
+  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble);
   if (!node) return node.error();
   graph.node_ = std::move(*node);
   return graph;
@@ -37,9 +39,9 @@ Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions& optio
   return std::unique_ptr<Source>(std::move(*source));
 }
 
-Result<void> RosGraph::add_sink(const Source& source, LiveSystem& live) const {
+Result<void> RosGraph::add_sink(const Source& source, const LiveOptions& options, LiveSystem& live) const {
   if (!publishes_) return {};
-  auto sink = Ros2Sink::create(node_, source.rig().imu_noise);
+  auto sink = Ros2Sink::create(node_, source.rig(), options);
   if (!sink) return sink.error();
   live.add_sink(std::move(*sink));
   return {};
@@ -47,14 +49,14 @@ Result<void> RosGraph::add_sink(const Source& source, LiveSystem& live) const {
 
 #else
 
-Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source) {
+Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source, const Ros2Options&) {
   if (address.empty() && !source.starts_with(kSourceKind)) return RosGraph{};
   return Error{ErrorCode::invalid_argument, "this program was built without CycloneDDS, which ROS 2 topics need"};
 }
 Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions&) const {
   return Error{ErrorCode::invalid_argument, "this program was built without ROS 2 topics"};
 }
-Result<void> RosGraph::add_sink(const Source&, LiveSystem&) const { return {}; }
+Result<void> RosGraph::add_sink(const Source&, const LiveOptions&, LiveSystem&) const { return {}; }
 
 #endif
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/live/live_options.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
 
@@ -19,11 +20,11 @@ namespace fbvins::app {
 class RosGraph {
  public:
   /// `address`: DOMAIN[:INTERFACE], empty: publish nothing. `source`: the flight's source, of any kind.
-  static Result<RosGraph> join(const std::string& address, const std::string& source);
+  static Result<RosGraph> join(const std::string& address, const std::string& source, const Ros2Options& options);
 
   bool has_source() const { return !topics_.empty(); }
   Result<std::unique_ptr<Source>> open_source(const SourceOptions& options) const;
-  Result<void> add_sink(const Source& source, LiveSystem& live) const;
+  Result<void> add_sink(const Source& source, const LiveOptions& options, LiveSystem& live) const;
 
  private:
   std::shared_ptr<Ros2Node> node_;

@@ -23,7 +23,7 @@ from types import new_class
 try:
     import cyclonedds._clayer as clayer  # reads and writes encoded bytes instead of values
     import numpy as np
-    from cyclonedds import core, domain, pub, qos, sub, topic
+    from cyclonedds import builtin, core, domain, pub, qos, sub, topic
     from cyclonedds.idl import IdlStruct, types
     from mcap.reader import make_reader
     from rosbags.typesys import Stores, get_typestore
@@ -42,8 +42,11 @@ IMAGE_RATE_HZ = 30
 SECONDS = 8
 TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
          "/fbvins/odometry": "nav_msgs/msg/Odometry", "/fbvins/path": "nav_msgs/msg/Path", "/tf": "tf2_msgs/msg/TFMessage",
-         "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
-STORE = get_typestore(Stores.ROS2_HUMBLE)
+         "/tf_static": "tf2_msgs/msg/TFMessage", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+         "ros_discovery_info": "rmw_dds_common/msg/ParticipantEntitiesInfo"}
+LATCHED = ("/tf_static", "ros_discovery_info")
+PUBLISHED = ("/fbvins/odometry", "/fbvins/path", "/tf", "/tf_static", "/diagnostics", "ros_discovery_info")
+STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 class Failure(Exception):
@@ -59,11 +62,12 @@ def bytes_topic(participant, name):
     """A topic with the name that ROS 2's middleware gives it in DDS. Its values are written and read as bytes."""
     package, message = TYPES[name].split("/msg/")
     kind = new_class(message + "_", (IdlStruct,), {"typename": f"{package}.msg.dds_.{message}_"}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
-    return topic.Topic(participant, "rt" + name, dataclasses.dataclass(kind))
+    return topic.Topic(participant, "rt" + name if name.startswith("/") else name, dataclasses.dataclass(kind))
 
 
-def reliable(depth):
-    return qos.Qos(qos.Policy.Reliability.Reliable(max_blocking_time=10**9), qos.Policy.History.KeepLast(depth))
+def reliable(depth, latched=False):
+    durability = qos.Policy.Durability.TransientLocal if latched else qos.Policy.Durability.Volatile
+    return qos.Qos(qos.Policy.Reliability.Reliable(max_blocking_time=10**9), qos.Policy.History.KeepLast(depth), durability)
 
 
 class Listener(threading.Thread):
@@ -71,7 +75,7 @@ class Listener(threading.Thread):
 
     def __init__(self, participant, names):
         super().__init__(daemon=True)
-        self.readers = {name: sub.DataReader(participant, bytes_topic(participant, name), qos=reliable(5000)) for name in names}
+        self.readers = {name: sub.DataReader(participant, bytes_topic(participant, name), qos=reliable(5000, name in LATCHED)) for name in names}
         self.messages = {name: [] for name in names}
         self.ended = threading.Event()
 
@@ -144,7 +148,7 @@ def check_values(messages, out):
     count = 0
     for data in messages["/fbvins/odometry"]:
         m = STORE.deserialize_cdr(data, TYPES["/fbvins/odometry"])
-        require((m.header.frame_id, m.child_frame_id) == ("odom", "body"), "frames of the odometry")
+        require((m.header.frame_id, m.child_frame_id) == ("odom", "base_link"), "frames of the odometry")
         p, q = m.pose.pose.position, m.pose.pose.orientation
         stamp = m.header.stamp.sec * 10**9 + m.header.stamp.nanosec
         nearest = min((abs(t - stamp), t) for t in poses)
@@ -155,9 +159,29 @@ def check_values(messages, out):
             break
     require(len(messages["/fbvins/odometry"]) >= 0.95 * len(poses), "odometry at IMU rate")
     transforms = STORE.deserialize_cdr(messages["/tf"][-1], TYPES["/tf"]).transforms
-    require([(t.header.frame_id, t.child_frame_id) for t in transforms] == [("odom", "body")], "the transform odom -> body")
+    require([(t.header.frame_id, t.child_frame_id) for t in transforms] == [("odom", "base_link")], "the transform odom -> base_link")
+    fixed = STORE.deserialize_cdr(messages["/tf_static"][-1], TYPES["/tf_static"]).transforms
+    require([(t.header.frame_id, t.child_frame_id) for t in fixed] == [("base_link", "imu_link"), ("imu_link", "camera0_optical"), ("imu_link", "camera1_optical")],
+            "the fixed transforms")
     status = [STORE.deserialize_cdr(data, TYPES["/diagnostics"]).status[0] for data in messages["/diagnostics"]]
     require(any(s.message == "good" for s in status) and all(any(v.key == "images_dropped" for v in s.values) for s in status), "diagnostics")
+
+
+def check_node(messages, hashes):
+    """What ROS's tools are told of the node: which topics it has, and the hashes of their types."""
+    told = STORE.deserialize_cdr(messages["ros_discovery_info"][-1], TYPES["ros_discovery_info"]).node_entities_info_seq
+    require([(n.node_namespace, n.node_name, len(n.reader_gid_seq), len(n.writer_gid_seq)) for n in told] == [("/", "fbvins", 3, 5)],
+            f"the node as it is told: {told}")
+    for name in PUBLISHED:
+        if name.startswith("/"):
+            require(hashes.get("rt" + name) == f"typehash={STORE.hash_rihs01(TYPES[name])};", f"{name}: the hash of its type is {hashes.get('rt' + name)}")
+
+
+def type_hashes(participant):
+    """Of all publishers that say one, by topic."""
+    endpoints = builtin.BuiltinDataReader(participant, builtin.BuiltinTopicDcpsPublication).take(100)
+    data = {e.topic_name: e.qos[qos.Policy.Userdata] for e in endpoints if qos.Policy.Userdata in e.qos}
+    return {name: bytes(policy.data).decode() for name, policy in data.items()}
 
 
 def fly(program, folder):
@@ -168,7 +192,7 @@ def fly(program, folder):
     kalibr_files(flight, folder)
     os.environ["CYCLONEDDS_URI"] = LOOPBACK
     participant = domain.DomainParticipant(DOMAIN)
-    listener = Listener(participant, ["/fbvins/odometry", "/fbvins/path", "/tf", "/diagnostics"])
+    listener = Listener(participant, PUBLISHED)
     listener.start()
     with open(folder / "log.txt", "w", encoding="utf-8") as log:
         live = subprocess.Popen([program, "live", "--source", "ros2:/camera/left,/camera/right,/imu", "--ros2", str(DOMAIN), "--calibration", folder / "camchain.yaml",
@@ -176,6 +200,7 @@ def fly(program, folder):
         try:
             images = publish(participant, record)
             time.sleep(1)
+            hashes = type_hashes(participant)
             live.send_signal(signal.SIGINT)
             require(live.wait(timeout=60) == 0, "fbvins live failed: " + (folder / "log.txt").read_text(encoding="utf-8"))
         finally:
@@ -191,6 +216,7 @@ def fly(program, folder):
           f"{', '.join(f'{len(m)} messages on {name}' for name, m in listener.messages.items())}")
     check_bytes(listener.messages)
     check_values(listener.messages, out)
+    check_node(listener.messages, hashes)
 
 
 def main():

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fbvins/live/mavlink_options.hpp"
+#include "fbvins/live/ros2_options.hpp"
 
 namespace fbvins {
 
@@ -12,6 +13,7 @@ struct LiveOptions {
   double imu_silence_s = 0.1;
   double imu_reorder_wait_s = 0.01;
   MavlinkOptions mavlink = {};
+  Ros2Options ros2 = {};
 
   template <class V>
   void visit(V&& v) {
@@ -20,6 +22,7 @@ struct LiveOptions {
     v("imu_silence_s", imu_silence_s, "s", "without an IMU reading for this long health is degraded", 0.01, 10.0);
     v("imu_reorder_wait_s", imu_reorder_wait_s, "s", "longest wait for a missing IMU reading", 0.0, 0.1);
     v.group("mavlink", mavlink, "poses to a flight controller (--mavlink)");
+    v.group("ros2", ros2, "topics of ROS 2 (--ros2)");
   }
 };
 

@@ -114,8 +114,8 @@ void append_odometry(std::string& out, const RosOdometry& o) {
   twist_covariance.topLeftCorner<3, 3>() = R_WB.transpose() * o.velocity_covariance * R_WB;
   twist_covariance.bottomRightCorner<3, 3>() = o.rate_covariance;
   CdrWriter cdr(out);
-  put_header(cdr, o.t, kOdometryFrame);
-  cdr.text(kBodyFrame);
+  put_header(cdr, o.t, o.frame);
+  cdr.text(o.child_frame);
   put(cdr, o.T_WB.p);
   put(cdr, o.T_WB.q);
   put(cdr, pose_covariance);
@@ -131,12 +131,12 @@ void append_pose(std::string& out, Time t, std::string_view frame, const Pose<W,
   put(cdr, T.q);
 }
 
-void append_path(std::string& out, Time t, const Trajectory<W>& path) {
+void append_path(std::string& out, Time t, const Trajectory<W>& path, std::string_view frame) {
   CdrWriter cdr(out);
-  put_header(cdr, t, kOdometryFrame);
+  put_header(cdr, t, frame);
   cdr.count(path.size());
   for (const StampedPose<W>& pose : path) {
-    put_header(cdr, pose.t, kOdometryFrame);
+    put_header(cdr, pose.t, frame);
     put(cdr, pose.T.p);
     put(cdr, pose.T.q);
   }
@@ -189,6 +189,24 @@ void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> lan
     for (const float number : {l.pixel[0], l.pixel[1], l.age_frames, l.depth_m}) cdr.put(number);
   }
   cdr.put(std::uint8_t{0});  // not dense: some are NaN
+}
+
+void append_node(std::string& out, const DdsGuid& participant, const RosNode& node, bool humble) {
+  CdrWriter cdr(out);
+  const auto put_guid = [&](const DdsGuid& guid) {
+    cdr.raw(guid.data(), guid.size());
+    if (humble) out.append(8, '\0');
+  };
+  const auto put_guids = [&](const std::vector<DdsGuid>& guids) {
+    cdr.count(guids.size());
+    for (const DdsGuid& guid : guids) put_guid(guid);
+  };
+  put_guid(participant);
+  cdr.count(1);
+  cdr.text(node.name_space);
+  cdr.text(node.name);
+  put_guids(node.readers);
+  put_guids(node.writers);
 }
 
 void append_log(std::string& out, Time t, std::string_view name, std::string_view text) {

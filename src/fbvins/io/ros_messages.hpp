@@ -40,6 +40,7 @@ RosLens ros_lens(const Camera& camera);
 void append_camera_info(std::string& out, Time t, std::string_view frame, const Camera& camera);
 
 /// A pose with its derivatives, in our conventions; the message has ROS's: velocities in the body, angles about the axes of W.
+/// The body may be any frame that is fixed to it.
 struct RosOdometry {
   Time t;
   Pose<W, B> T_WB;
@@ -47,6 +48,7 @@ struct RosOdometry {
   Mat6 pose_covariance = Mat6::Zero();      ///< of (dp in W, dtheta in B)
   Mat3 velocity_covariance = Mat3::Zero();  ///< of v_WB
   Mat3 rate_covariance = Mat3::Zero();      ///< of w_WB_B
+  std::string_view frame = kOdometryFrame, child_frame = kBodyFrame;
 };
 void append_odometry(std::string& out, const RosOdometry& odometry);
 
@@ -54,7 +56,7 @@ void append_odometry(std::string& out, const RosOdometry& odometry);
 void append_pose(std::string& out, Time t, std::string_view frame, const Pose<W, B>& T);
 
 /// nav_msgs/Path of poses in W.
-void append_path(std::string& out, Time t, const Trajectory<W>& path);
+void append_path(std::string& out, Time t, const Trajectory<W>& path, std::string_view frame = kOdometryFrame);
 
 struct RosTransform {
   std::string_view to, from;  ///< frames: takes coordinates in `from` to `to`, ROS's parent
@@ -73,6 +75,15 @@ struct RosLandmark {
   float depth_m = 0;
 };
 void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks);
+
+/// rmw_dds_common/ParticipantEntitiesInfo: one node in a participant, with the topics that it reads and writes. DDS's identifiers
+/// have 16 bytes; Humble's message has room for 24.
+using DdsGuid = std::array<std::uint8_t, 16>;
+struct RosNode {
+  std::string name_space, name;  ///< "/", "fbvins"
+  std::vector<DdsGuid> readers, writers;
+};
+void append_node(std::string& out, const DdsGuid& participant, const RosNode& node, bool humble);
 
 /// rcl_interfaces/Log of level INFO.
 void append_log(std::string& out, Time t, std::string_view name, std::string_view text);

@@ -3,6 +3,8 @@
 
 #include <numbers>
 
+#include "fbvins/types/motion_at.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -54,25 +56,23 @@ std::optional<VehicleState> VehicleFrames::state(const Odometry& odometry) {
   const bool finite = odometry.T_WB.p.allFinite() && odometry.T_WB.q.coeffs().allFinite() && odometry.v_WB.allFinite() &&
                       odometry.w_WB_B.allFinite();
   if (!odometry.health.has_pose() || !finite) return std::nullopt;
-  const Pose<W, BodyFrd> T_WF = odometry.T_WB * T_BF_;
+  const MotionAt<BodyFrd> at = motion_at(T_BF_, odometry);
   if (reset_counter_ != odometry.reset_counter) {
     reset_counter_ = odometry.reset_counter;
-    begin(T_WF);
+    begin(at.T_WX);
   }
 
-  const Mat3 R_LW = T_LW_.R(), R_WB = odometry.T_WB.R(), R_FW = T_WF.R().transpose();
+  const Mat3 R_LW = T_LW_.R(), R_FW = at.T_WX.R().transpose();
   VehicleState state;
-  state.T_LF = T_LW_ * T_WF;
+  state.T_LF = T_LW_ * at.T_WX;
   last_ = state.T_LF;
-  state.v_LF_F = R_FW * (odometry.v_WB + R_WB * odometry.w_WB_B.cross(T_BF_.p));
-  state.w_LF_F = T_BF_.q.conjugate() * odometry.w_WB_B;
-  // The IMU's position and attitude errors, carried to the vehicle's origin and seen in L.
-  Mat6 J = Mat6::Zero();
-  J.topLeftCorner<3, 3>() = R_LW;
-  J.topRightCorner<3, 3>() = -R_LW * R_WB * hat(T_BF_.p);
-  J.bottomRightCorner<3, 3>() = R_LW * R_WB;
-  state.pose_covariance = J * odometry.pose_covariance * J.transpose();
-  state.velocity_covariance = R_FW * odometry.velocity_covariance * R_FW.transpose();
+  state.v_LF_F = R_FW * at.v_WX;
+  state.w_LF_F = at.w_WX_X;
+  Mat6 to_L = Mat6::Zero();
+  to_L.topLeftCorner<3, 3>() = R_LW;
+  to_L.bottomRightCorner<3, 3>() = state.T_LF.R();
+  state.pose_covariance = to_L * at.pose_covariance * to_L.transpose();
+  state.velocity_covariance = R_FW * at.velocity_covariance * R_FW.transpose();
   state.health = odometry.health;
   state.reset_counter = odometry.reset_counter;
   return state;

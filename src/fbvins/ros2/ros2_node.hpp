@@ -2,8 +2,8 @@
 // A process in ROS 2's graph, by DDS alone: topics are named and typed as ROS 2's middleware does (rt/<name>,
 // <package>::msg::dds_::<Message>_), messages are the bytes of ros_messages.hpp.
 //
-//   auto node = Ros2Node::join({.domain = 0});
-//   auto odometry = Ros2Publisher::create(*node, "/fbvins/odometry", "nav_msgs/msg/Odometry");
+//   auto node = Ros2Node::join({.domain = 0}, *parse_ros2_node("fbvins"));
+//   auto odometry = Ros2Publisher::create(*node, (*node)->own_topic("odometry"), "nav_msgs/msg/Odometry");
 //   odometry->publish(bytes);
 //
 // Threads: a node from any, a publisher from one at a time; a subscriber's function is called on a thread of DDS.
@@ -13,11 +13,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/ros_messages.hpp"
 
 struct ddsi_sertype;
 
@@ -48,13 +50,34 @@ class DdsEntity {
   std::int32_t handle_ = 0;
 };
 
+struct Ros2Name {
+  std::string name_space = "/", name = "fbvins";
+};
+/// NAME or /NAMESPACE/NAME; letters, digits and underscores, not beginning with a digit.
+Result<Ros2Name> parse_ros2_node(const std::string& text);
+
+/// Tools such as `ros2 node list` see it by the topic ros_discovery_info, on which it says what it publishes and subscribes.
 class Ros2Node {
  public:
-  static Result<std::shared_ptr<Ros2Node>> join(const Ros2Address& address);
+  /// `humble`: for the tools of ROS 2 Humble, instead of those since Iron.
+  static Result<std::shared_ptr<Ros2Node>> join(const Ros2Address& address, const Ros2Name& name = {}, bool humble = false);
   std::int32_t participant() const { return participant_.handle(); }
+  /// "odometry" -> "/fbvins/odometry"
+  std::string own_topic(const std::string& name) const;
+
+  // Of the entities of this node, by their handles.
+  Result<void> tell_of_writer(std::int32_t writer);
+  Result<void> tell_of_reader(std::int32_t reader);
+  void forget_reader(std::int32_t reader);
 
  private:
-  DdsEntity domain_, participant_;
+  Result<void> tell();
+
+  DdsEntity domain_, participant_, graph_topic_, graph_;
+  const ddsi_sertype* graph_type_ = nullptr;
+  std::mutex mutex_;
+  RosNode self_;  ///< guarded by mutex_
+  bool humble_ = false;
 };
 
 /// Quality of service: resent until received or sent once; last values for late subscribers or none; length of the queue.

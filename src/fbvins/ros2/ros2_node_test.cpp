@@ -24,6 +24,16 @@ TEST(Ros2Address, IsADomainAndPerhapsAnInterface) {
     EXPECT_FALSE(parse_ros2_address(wrong)) << wrong;
 }
 
+TEST(Ros2Name, IsANameAndPerhapsANamespace) {
+  EXPECT_EQ(parse_ros2_node("fbvins")->name, "fbvins");
+  EXPECT_EQ(parse_ros2_node("fbvins")->name_space, "/");
+  EXPECT_EQ(parse_ros2_node("/fbvins")->name_space, "/");
+  EXPECT_EQ(parse_ros2_node("/a/b1/nav")->name_space, "/a/b1");
+  EXPECT_EQ(parse_ros2_node("/a/b1/nav")->name, "nav");
+  for (const char* wrong : {"", "/", "a/b", "/a/", "1a", "/1a/b", "a b", "//a", "/a//b", "a-b"})
+    EXPECT_FALSE(parse_ros2_node(wrong)) << wrong;
+}
+
 TEST(Ros2Node, BytesArriveAsTheyWereSent) {
   Heard heard;
   auto subscriber = Ros2Subscriber::create(node(), "/bytes", "std_msgs/msg/String", 2000, heard.function());

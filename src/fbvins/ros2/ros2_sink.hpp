@@ -1,42 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
-// Publishes the flight in ROS 2: /fbvins/odometry (at IMU rate), /tf (odom -> body, map -> odom), /fbvins/path, /diagnostics.
-// Frames and conventions are those of a flight record (docs/flight_record.md), stamps the sensors' own.
+// Publishes the flight in ROS 2: <node>/odometry (at IMU rate), /tf (odom -> base_link, map -> odom), /tf_static (the mounting
+// and the cameras), <node>/path, /diagnostics. Conventions are those of a flight record (docs/flight_record.md); names of frames
+// and the clock of the stamps are options.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/live/live_options.hpp"
 #include "fbvins/live/sink.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
+#include "fbvins/types/motion_at.hpp"
 #include "fbvins/types/trajectory.hpp"
 
 namespace fbvins {
 
+struct BaseLink {};  ///< the vehicle as REP 105 has it: x forward, y left, z up; where there is none, the IMU
+
 class Ros2Sink final : public Sink {
  public:
-  static Result<std::unique_ptr<Ros2Sink>> create(const std::shared_ptr<Ros2Node>& node, const ImuNoise& noise);
+  static Result<std::unique_ptr<Ros2Sink>> create(const std::shared_ptr<Ros2Node>& node, const StereoRig& rig,
+                                                  const LiveOptions& options = {});
 
   std::string_view name() const override { return "ROS 2"; }
   Result<void> take(const LiveEvent& event) override;
 
  private:
-  Ros2Sink(Ros2Publisher odometry, Ros2Publisher transforms, Ros2Publisher path, Ros2Publisher diagnostics)
-      : odometry_(std::move(odometry)),
-        transforms_(std::move(transforms)),
-        path_(std::move(path)),
-        diagnostics_(std::move(diagnostics)) {}
+  Ros2Sink(const LiveOptions& options, Ros2Publisher odometry, Ros2Publisher transforms, Ros2Publisher fixed, Ros2Publisher path,
+           Ros2Publisher diagnostics);
   Result<void> take(const LivePose& pose);
   Result<void> take(const Odometry& odometry);
   Result<void> take(const LiveStatus& status);
+  Result<void> publish_fixed(const StereoRig& rig);
+  Time ros_time(Time sensors, Time host) const;
+  const std::string& base_frame() const { return options_.base_frame.empty() ? options_.imu_frame : options_.base_frame; }
 
-  Ros2Publisher odometry_, transforms_, path_, diagnostics_;
+  Ros2Options options_;
+  Pose<B, BaseLink> T_B_base_;
+  Ros2Publisher odometry_, transforms_, fixed_, path_, diagnostics_;
   double reading_variance_ = 0;              // of one gyroscope reading, (rad/s)^2
   Mat3 rate_covariance_ = Mat3::Zero();      // of w_WB_B
   std::optional<MapUpdate> map_;             // the newest, if T_MW is known
-  Trajectory<W> way_;                        // the path, a pose every kPathStep_m
+  Trajectory<W> way_;                        // the path of base_link, a pose every kPathStep_m
   std::uint32_t reset_counter_ = 0;          // of the path
-  std::optional<Time> transformed_, shown_;  // when the last of each was sent, sensors' time
+  std::optional<Time> transformed_, shown_;  // when the last of each was sent, in the messages' time
+  Duration ahead_;                           // of the messages' time before the sensors', at the newest pose
 };
 
 }  // namespace fbvins
