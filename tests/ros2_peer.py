@@ -4,6 +4,9 @@
 readings, and receives what FBVINS publishes; `rosbags` encodes the same values, and the bytes must be the same.
 
 usage: ros2_peer.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
+Environment: FBVINS_DDS_PEER, a program that does both with another DDS instead: PEER DOMAIN MESSAGES RECEIVED TOPIC=TYPE...; `!` after
+a type: transient local. It publishes MESSAGES on the loopback, at the times of their stamps, says "published", and writes RECEIVED until
+SIGTERM. Both files: topic, type (MESSAGES), stamp in ns as 64 bits (MESSAGES), bytes; a text or bytes begin with their length as 32 bits.
 exit 77 (skipped) where cyclonedds and rosbags are not installed, or FBVINS was built without CycloneDDS
 """
 import csv
@@ -13,6 +16,7 @@ import os
 import pathlib
 import random
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -58,11 +62,21 @@ def require(fact, sentence):
         raise Failure(sentence)
 
 
-def bytes_topic(participant, name):
-    """A topic with the name that ROS 2's middleware gives it in DDS. Its values are written and read as bytes."""
+def wire_topic(name):
+    """As ROS 2's middleware names it in DDS."""
+    return "rt" + name if name.startswith("/") else name
+
+
+def wire_type(name):
     package, message = TYPES[name].split("/msg/")
-    kind = new_class(message + "_", (IdlStruct,), {"typename": f"{package}.msg.dds_.{message}_"}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
-    return topic.Topic(participant, "rt" + name if name.startswith("/") else name, dataclasses.dataclass(kind))
+    return f"{package}::msg::dds_::{message}_"
+
+
+def bytes_topic(participant, name):
+    """A topic whose values are written and read as bytes."""
+    wire = wire_type(name)
+    kind = new_class(wire.split("::")[-1], (IdlStruct,), {"typename": wire.replace("::", ".")}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
+    return topic.Topic(participant, wire_topic(name), dataclasses.dataclass(kind))
 
 
 def reliable(depth, latched=False):
@@ -84,6 +98,52 @@ class Listener(threading.Thread):
             for name, reader in self.readers.items():
                 taken = clayer.ddspy_take(reader._ref, core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any, 1000)
                 self.messages[name] += [data for data, info in taken if info.valid_data]
+
+
+class InThisProcess:
+    """The peer: CycloneDDS for Python."""
+
+    def __init__(self, participant, messages, _folder):
+        self.messages, self.participant = messages, participant
+        self.listener = Listener(participant, PUBLISHED)
+        self.listener.start()
+
+    def publish(self):
+        publish(self.participant, self.messages)
+
+    def stop(self):
+        self.listener.ended.set()
+        self.listener.join()
+        return self.listener.messages
+
+
+class AnotherProgram:
+    """The peer: FBVINS_DDS_PEER."""
+
+    def __init__(self, _participant, messages, folder):
+        self.received = folder / "received.bin"
+        with open(folder / "messages.bin", "wb") as file:
+            for name, stamp_ns, data in messages:
+                for field in (wire_topic(name).encode(), wire_type(name).encode(), stamp_ns, data):
+                    file.write(struct.pack("<q", field) if isinstance(field, int) else struct.pack("<I", len(field)) + field)
+        topics = [f"{wire_topic(name)}={wire_type(name)}{'!' if name in LATCHED else ''}" for name in PUBLISHED]
+        self.program = subprocess.Popen([os.environ["FBVINS_DDS_PEER"], str(DOMAIN), folder / "messages.bin", self.received, *topics], stdout=subprocess.PIPE, text=True)
+
+    def publish(self):
+        require("published" in self.program.stdout.readline(), "the other program published nothing")
+
+    def stop(self):
+        self.program.terminate()
+        self.program.wait(timeout=60)
+        messages = {name: [] for name in PUBLISHED}
+        names = {wire_topic(name): name for name in PUBLISHED}
+        with open(self.received, "rb") as file:
+            def field():
+                size = file.read(4)
+                return file.read(struct.unpack("<I", size)[0]) if size else None
+            while (name := field()) is not None:
+                messages[names[name.decode()]].append(field())
+        return messages
 
 
 def kalibr_files(flight, folder):
@@ -117,11 +177,15 @@ def wait_until(fact, what, seconds=60):
         time.sleep(0.02)
 
 
-def publish(participant, record):
-    """Publishes the record's messages at the times of their stamps."""
-    writers = {name: pub.DataWriter(participant, bytes_topic(participant, name), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
+def messages_of(record):
+    """Images and readings of a flight record: topic, stamp in ns, bytes."""
     with open(record, "rb") as file:
-        messages = [(channel.topic, message.log_time, message.data) for _, channel, message in make_reader(file).iter_messages(topics=list(writers))]
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in make_reader(file).iter_messages(topics=["/imu", "/camera/left", "/camera/right"])]
+
+
+def publish(participant, messages):
+    """At the times of their stamps."""
+    writers = {name: pub.DataWriter(participant, bytes_topic(participant, name), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
     for name, writer in writers.items():
         wait_until(lambda w=writer: len(w.get_matched_subscriptions()) > 0, f"a subscription of {name}")
     time.sleep(0.5)  # FBVINS's readers become reliable ones once they discover these writers
@@ -129,7 +193,6 @@ def publish(participant, record):
     for name, stamp_ns, data in messages:
         time.sleep(max(0.0, (stamp_ns - first) * 1e-9 - (time.monotonic() - start)))
         require(clayer.ddspy_write(writers[name]._ref, data.ljust((len(data) + 3) & ~3, b"\0")) >= 0, f"a message of {name} could not be written")
-    return sum(name == "/camera/left" for name, _, _ in messages)
 
 
 def check_bytes(messages):
@@ -192,31 +255,31 @@ def fly(program, folder):
     kalibr_files(flight, folder)
     os.environ["CYCLONEDDS_URI"] = LOOPBACK
     participant = domain.DomainParticipant(DOMAIN)
-    listener = Listener(participant, PUBLISHED)
-    listener.start()
+    sent = messages_of(record)
+    images = sum(name == "/camera/left" for name, _, _ in sent)
+    peer = (AnotherProgram if "FBVINS_DDS_PEER" in os.environ else InThisProcess)(participant, sent, folder)
     with open(folder / "log.txt", "w", encoding="utf-8") as log:
         live = subprocess.Popen([program, "live", "--source", "ros2:/camera/left,/camera/right,/imu", "--ros2", str(DOMAIN), "--calibration", folder / "camchain.yaml",
                                  "--imu-calibration", folder / "imu.yaml", "--out", out, "--quiet"], stderr=log)
         try:
-            images = publish(participant, record)
+            peer.publish()
             time.sleep(1)
             hashes = type_hashes(participant)
             live.send_signal(signal.SIGINT)
             require(live.wait(timeout=60) == 0, "fbvins live failed: " + (folder / "log.txt").read_text(encoding="utf-8"))
         finally:
             live.kill()
-    listener.ended.set()
-    listener.join()
+    messages = peer.stop()
     said = (folder / "log.txt").read_text(encoding="utf-8")
     require(said == "", "it said: " + said)
     counts = json.loads((out / "summary.json").read_text(encoding="utf-8"))["live"]
     require(counts["images"] == images, f"{images} images were sent and {counts['images']} arrived")
     require(counts["images_incomplete"] == 0, f"{counts['images_incomplete']} images arrived without their partner")
     print(f"{images} stereo images at {IMAGE_RATE_HZ} Hz: {counts['images']} arrived, {counts['images_dropped']} dropped; "
-          f"{', '.join(f'{len(m)} messages on {name}' for name, m in listener.messages.items())}")
-    check_bytes(listener.messages)
-    check_values(listener.messages, out)
-    check_node(listener.messages, hashes)
+          f"{', '.join(f'{len(m)} messages on {name}' for name, m in messages.items())}")
+    check_bytes(messages)
+    check_values(messages, out)
+    check_node(messages, hashes)
 
 
 def main():
