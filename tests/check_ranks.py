@@ -14,7 +14,7 @@ import tempfile
 RANKS = {
     "core": 0,
     "geometry": 1, "optim": 1,
-    "types": 2, "camera": 2,
+    "types": 2, "camera": 2, "page": 2,
     "imu": 3, "features": 3, "io": 3, "eval": 3, "mavlink": 3,
     "frontend": 4, "estimator": 4, "loop": 4, "mocap": 4, "bags": 4, "sim": 4, "calibration": 4,
     "pipeline": 5, "checkup": 5, "boards": 5,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/report/flight_curves.hpp"
 
-#include "fbvins/report/curves.hpp"
+#include "fbvins/page/curves.hpp"
 
 namespace fbvins {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON text, and curves as such. Private to the report; one owner.
+// JSON text, and curves as such. Private; one owner.
 //
 //   Curves curves(t.size(), 1500);
 //   curves.add("t", t);
