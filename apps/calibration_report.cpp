@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "apps/calibration_page.hpp"
 #include "apps/run_output.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 
@@ -77,6 +78,8 @@ Json imu_json(const CameraImuResult& imu) {
   out["board_scale"] = imu.board_scale;
   out["board_scale_sigma"] = imu.board_scale_sigma;
   out["corner_sigma_px"] = imu.corner_sigma_px;
+  out["image_factor"] = imu.image_factor;
+  out["stamp_jitter_s"] = imu.stamp_jitter_s;
   out["gyro_rms_sigmas"] = imu.gyro_rms_sigmas;
   out["accel_rms_sigmas"] = imu.accel_rms_sigmas;
   out["readings"] = imu.readings;
@@ -88,13 +91,6 @@ Json imu_json(const CameraImuResult& imu) {
     out["biases"].push_back({{"t_ns", b.t.ns},
                              {"gyro_radps", {b.bias.gyro_radps.x(), b.bias.gyro_radps.y(), b.bias.gyro_radps.z()}},
                              {"accel_mps2", {b.bias.accel_mps2.x(), b.bias.accel_mps2.y(), b.bias.accel_mps2.z()}}});
-  return out;
-}
-
-std::vector<std::string> all_remarks(const CalibrationOutcome& outcome) {
-  std::vector<std::string> out = outcome.cameras.remarks;
-  if (outcome.imu) out.insert(out.end(), outcome.imu->remarks.begin(), outcome.imu->remarks.end());
-  out.insert(out.end(), outcome.remarks.begin(), outcome.remarks.end());
   return out;
 }
 
@@ -110,6 +106,13 @@ std::string lines_of(const std::vector<CalibratedParameter>& parameters) {
 }
 
 }  // namespace
+
+std::vector<std::string> all_remarks(const CalibrationOutcome& outcome) {
+  std::vector<std::string> out = outcome.cameras.remarks;
+  if (outcome.imu) out.insert(out.end(), outcome.imu->remarks.begin(), outcome.imu->remarks.end());
+  out.insert(out.end(), outcome.remarks.begin(), outcome.remarks.end());
+  return out;
+}
 
 std::vector<CalibratedParameter> camera_parameters(const CameraCalibration& cameras) {
   std::map<std::string, std::pair<double, const char*>> values;
@@ -155,6 +158,7 @@ std::string calibration_text(const CalibrationOutcome& outcome) {
         imu.readings, imu.duration_s, imu.readings_refused, imu.gyro_rms_sigmas, imu.accel_rms_sigmas, imu.corner_sigma_px);
     out += lines_of(imu.parameters);
   }
+  for (const WeakPart& part : outcome.weak) out += fmt::format("weak: {}\n", sentence(part));
   for (const std::string& remark : all_remarks(outcome)) out += fmt::format("note: {}\n", remark);
   return out;
 }
@@ -169,6 +173,10 @@ std::string calibration_summary_json(const CalibrationOutcome& outcome) {
   out["parameters"] = parameters_json(camera_parameters(found));
   out["covariance"] = {{"names", found.names}, {"matrix", matrix_json(found.covariance)}};
   if (outcome.imu) out["imu"] = imu_json(*outcome.imu);
+  out["weak"] = Json::array();
+  for (const WeakPart& part : outcome.weak)
+    out["weak"].push_back(
+        {{"what", part.what}, {"sigma", part.sigma}, {"aim", part.aim}, {"unit", part.unit}, {"advice", part.advice}});
   out["remarks"] = all_remarks(outcome);
   return out.dump(1) + "\n";
 }
@@ -181,7 +189,8 @@ Result<void> write_calibration(const CalibrationOutcome& outcome, const std::str
   std::vector<std::pair<std::string, std::string>> files = {
       {outcome.imu ? "camchain-imucam.yaml" : "camchain.yaml", to_kalibr_camchain(rig)},
       {"summary.json", calibration_summary_json(outcome)},
-      {"calibration.txt", calibration_text(outcome)}};
+      {"calibration.txt", calibration_text(outcome)},
+      {"calibration.html", calibration_html(outcome)}};
   if (outcome.imu) files.push_back({"imu.yaml", to_kalibr_imu(outcome.imu_noise)});
   if (Result<std::string> basalt = to_basalt(rig); basalt) files.push_back({"calibration.json", *basalt});
   for (std::size_t k = 0; k < rig.cameras.size(); ++k)

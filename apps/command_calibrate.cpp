@@ -26,7 +26,8 @@ namespace {
 constexpr const char* kExamples =
     R"(Lenses and extrinsics of one to eight cameras, and with an IMU their place on it and the clocks' offset, from a recording of a
 board (docs/calibration.md). RECORDING is a folder or zip in EuRoC's layout, cam0 to cam7 and imu0; calibrations in it are not used.
-Writes camchain-imucam.yaml and imu.yaml (Kalibr's), calibration.json (Basalt's), camera_info_camN.yaml (ROS), summary.json.
+Writes camchain-imucam.yaml and imu.yaml (Kalibr's), calibration.json (Basalt's), camera_info_camN.yaml (ROS), summary.json,
+and calibration.html, a page to look at.
 
 examples:
   fbvins calibrate board --target april.yaml --out rig
@@ -164,6 +165,7 @@ int calibrate(const Arguments& a) {
       outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
     outcome.imu = *std::move(imu);
   }
+  outcome.weak = weak_parts(outcome.cameras, outcome.imu ? &*outcome.imu : nullptr);
   if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);
   if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(outcome), bold(a.out));
   return kOk;

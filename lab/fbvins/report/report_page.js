@@ -79,11 +79,6 @@ function withBounds(parent, run, title, unit, error, sigma, note) {
 
 const STAGES = ["pyramid", "track", "stereo", "detect", "geometry", "boost", "prepare", "solve", "marginalise"];
 function totalTime(run) { return run.timing.t.map((_, i) => STAGES.reduce((sum, s) => sum + (run.timing[s] && finite(run.timing[s][i]) ? run.timing[s][i] : 0), 0)); }
-function histogram(values, limit, bins = 48) {
-  const counts = new Array(bins).fill(0);
-  for (const v of values) counts[Math.min(bins - 1, Math.floor(v / limit * bins))] += 1 / values.length;
-  return { x: counts.map((_, i) => i * limit / bins), y: counts };
-}
 
 function insideOfRun(parent, run) {
   const column = el("div", { class: "stack" });

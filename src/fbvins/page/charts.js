@@ -325,44 +325,45 @@ function chunked(values, pick) {
 
 // --- plots over a quantity other than time -----------------------------------------------------------------------------
 class XYChart {
-  /** series: [{name, color, x, y, step?}] */
-  constructor(parent, { series, xUnit = "", yName = "", height = 200, yMax, yFormat = v => number(v), xMax, marks = [], bars = false }) {
-    Object.assign(this, { series, xUnit, yName, height, yMax, yFormat, xMax, marks, bars });
+  /** series: [{name, color, x, y, dash?}]; both axes begin at 0, that of y below it where a series does. */
+  constructor(parent, { series, xUnit = "", xName = "", yName = "", height = 200, yMax, yFormat = v => number(v), xMax, marks = [], bars = false }) {
+    Object.assign(this, { series, xUnit, xName, yName, height, yMax, yFormat, xMax, marks, bars });
     this.node = svg("svg", { role: "img" });
     parent.append(this.node);
     charts.push(this);
   }
   draw() {
-    const width = Math.max(280, this.node.parentElement.clientWidth - 36), height = this.height, left = 46, right = 10, top = 8, bottom = 24;
-    let x1 = this.xMax || 0, y1 = this.yMax || 0;
-    for (const s of this.series) { if (!this.xMax) for (const v of s.x) x1 = Math.max(x1, v); if (!this.yMax) for (const v of s.y) y1 = Math.max(y1, v); }
+    const width = Math.max(280, this.node.parentElement.clientWidth - 36), height = this.height, left = 52, right = 10, top = this.yName ? 20 : 8, bottom = this.xName ? 40 : 24;
+    let x1 = this.xMax || 0, y0 = 0, y1 = this.yMax || 0;
+    for (const s of this.series) { if (!this.xMax) for (const v of s.x) x1 = Math.max(x1, v); if (!this.yMax) for (const v of s.y) { y1 = Math.max(y1, v); y0 = Math.min(y0, v); } }
     x1 = x1 || 1; y1 = y1 || 1;
-    const x = v => left + Math.min(v / x1, 1) * (width - left - right), y = v => height - bottom - v / y1 * (height - top - bottom);
+    const x = v => left + Math.min(v / x1, 1) * (width - left - right), y = v => height - bottom - (v - y0) / (y1 - y0) * (height - top - bottom);
     this.node.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.node.replaceChildren();
-    for (const v of niceTicks(0, y1, 4)) {
+    for (const v of niceTicks(y0, y1, 4)) {
       this.node.append(svg("line", { class: "grid-line", x1: left, x2: width - right, y1: y(v), y2: y(v) }));
       this.node.append(svg("text", { x: left - 8, y: y(v) + 4, "text-anchor": "end" }, this.yFormat(v)));
     }
     for (const v of niceTicks(0, x1, Math.max(3, (width - left) / 90))) {
       this.node.append(svg("line", { class: "grid-line", x1: x(v), x2: x(v), y1: top, y2: height - bottom }));
-      this.node.append(svg("text", { x: x(v), y: height - 6, "text-anchor": "middle" }, number(v) + " " + this.xUnit));
+      this.node.append(svg("text", { x: x(v), y: height - bottom + 18, "text-anchor": "middle" }, number(v) + " " + this.xUnit));
     }
+    this.node.append(svg("text", { class: "axis-name", x: width - right, y: height - 2, "text-anchor": "end" }, this.xName));
     this.node.append(svg("line", { class: "axis", x1: left, x2: width - right, y1: height - bottom, y2: height - bottom }));
-    this.node.append(svg("text", { class: "axis-name", x: left + 4, y: top + 8 }, this.yName));
-    nameAxes(this.node, this.xUnit, this.yName);
+    this.node.append(svg("text", { class: "axis-name", x: 0, y: 10 }, this.yName));
+    nameAxes(this.node, this.xName ? `${this.xName} [${this.xUnit}]` : this.xUnit, this.yName);
     let points = 0;
     for (const s of this.series) {
       let d = "";
       s.x.forEach((v, i) => {
-        if (this.bars) {
+        if (this.bars && !s.dash) {
           const next = i + 1 < s.x.length ? s.x[i + 1] : v + (s.x[1] - s.x[0] || 1);
           d += `${d ? "L" : `M${x(v).toFixed(1)},${y(0).toFixed(1)}L`}${x(v).toFixed(1)},${y(s.y[i]).toFixed(1)}L${x(next).toFixed(1)},${y(s.y[i]).toFixed(1)}`;
         } else d += `${d ? "L" : "M"}${x(v).toFixed(1)},${y(s.y[i]).toFixed(1)}`;
         ++points;
       });
-      if (this.bars && d) this.node.append(svg("path", { d: d + `L${width - right},${y(0)}Z`, fill: s.color, opacity: .12 }));
-      this.node.append(svg("path", { class: "curve", d, stroke: s.color }));
+      if (this.bars && !s.dash && d) this.node.append(svg("path", { d: d + `L${width - right},${y(0)}Z`, fill: s.color, opacity: .12 }));
+      this.node.append(svg("path", { class: "curve", d, stroke: s.color, ...(s.dash ? { "stroke-dasharray": s.dash } : {}) }));
     }
     for (const m of this.marks) {
       this.node.append(svg("line", { x1: x(m.x), x2: x(m.x), y1: top, y2: height - bottom, stroke: m.color, "stroke-dasharray": "4 3", opacity: .8 }));
@@ -370,6 +371,13 @@ class XYChart {
     }
     this.node.setAttribute("data-points", points);
   }
+}
+
+/** Shares of the values in steps up to the limit; the last one holds all beyond. */
+function histogram(values, limit, bins = 48) {
+  const counts = new Array(bins).fill(0);
+  for (const v of values) counts[Math.min(bins - 1, Math.floor(v / limit * bins))] += 1 / values.length;
+  return { x: counts.map((_, i) => i * limit / bins), y: counts };
 }
 
 // --- tables ----------------------------------------------------------------------------------------------------------
