@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -8,8 +9,10 @@
 
 #include "apps/calibration_report.hpp"
 #include "apps/commands.hpp"
+#include "apps/open_cameras.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_output.hpp"
+#include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
@@ -25,20 +28,22 @@ namespace {
 
 constexpr const char* kExamples =
     R"(Lenses and extrinsics of one to eight cameras, and with an IMU their place on it and the clocks' offset, from a recording of a
-board (docs/calibration.md). RECORDING is a folder or zip in EuRoC's layout, cam0 to cam7 and imu0; calibrations in it are not used.
+board (docs/calibration.md). RECORDING is what `fbvins run` reads: a folder or zip in EuRoC's layout with cam0 to cam7 and imu0, a
+flight record, a ROS bag, an MCAP file; calibrations in it are not used. An interrupted search for the board goes on where it was.
 Writes camchain-imucam.yaml and imu.yaml (Kalibr's), calibration.json (Basalt's), camera_info_camN.yaml (ROS), summary.json,
 and calibration.html, a page to look at.
 
 examples:
   fbvins calibrate board --target april.yaml --out rig
   fbvins calibrate board --target april.yaml --model auto --cameras-only
+  fbvins calibrate board.bag --topics /left,/right,/imu --target april.yaml --out rig
   fbvins calibrate --detections detections.csv --imu imu0.csv --target april.yaml --out rig
   fbvins calibrate --imu-noise rest --out rig                    the IMU's noise, from a recording at rest
 )";
 
 struct Arguments {
   std::string recording, detections, target, imu, imu_calibration, imu_noise, out = "out/calibration";
-  std::vector<std::string> models = {"pinhole-radtan"}, resolutions;
+  std::vector<std::string> models = {"pinhole-radtan"}, resolutions, topics;
   int threads = 2, max_views = 600;
   bool save_detections = false, cameras_only = false, quiet = false;
   ImuCameraOptions imu_options;
@@ -50,17 +55,35 @@ struct Material {
   std::vector<ImuSample> imu;
   std::optional<ImuNoise> imu_noise;
   std::vector<std::string> remarks;
+  int stopped_after = -1;  ///< images, where the search for the board was interrupted: there is nothing else then
 };
 
+/// Beside the results, until these are there.
+std::string kept_folder(const Arguments& a) { return a.out + "/detecting"; }
+
+void tell(const CameraRecording& recording, bool quiet) {
+  for (const std::string& warning : recording.warnings) warn(warning);
+  if (!quiet)
+    note(fmt::format("cameras: {}; IMU: {}", fmt::join(recording.cameras, ", "),
+                     recording.imu_name.empty() ? "none" : recording.imu_name));
+}
+
 Result<Material> detect(const Arguments& a, const Board& board) {
-  Result<BoardRecording> recording = BoardRecording::open(a.recording);
+  const Result<CameraRecording> recording = open_cameras(a.recording, a.topics);
   if (!recording) return recording.error();
-  Progress progress(recording->images(), a.quiet);
-  const auto next = [&] { return recording->next(); };
-  Result<BoardSearch> found =
-      detect_board(board, next, {.threads = a.threads, .progress = [&](int done) { progress.update(done); }});
+  tell(*recording, a.quiet);
+  const StopSignals signals;
+  Progress progress(static_cast<int>(recording->images.size()), a.quiet);
+  BoardSearchOptions options{.threads = a.threads, .keep = kept_folder(a)};
+  options.progress = [&](int done) { progress.update(done); };
+  options.resumed = [&](int done) {
+    progress.begin_at(done);
+    if (!a.quiet) note(fmt::format("goes on after {} of {} images", done, recording->images.size()));
+  };
+  options.stop = stop_is_wanted;
+  Result<BoardSearch> found = detect_board(board, *recording, options);
   if (!found) return Error{found.error().code, fmt::format("{}: {}", a.recording, found.error().message)};
-  Material out{std::move(found->detections), recording->imu(), recording->imu_noise(), {}};
+  Material out{std::move(found->detections), recording->imu, recording->imu_noise, {}, found->stopped_after};
   if (found->unreadable > 0)
     out.remarks.push_back(fmt::format("{} images could not be read, the first: {}", found->unreadable, found->first_unreadable));
   return out;
@@ -118,8 +141,10 @@ ImuNoise noise_of(const Material& material, std::vector<std::string>& remarks) {
 }
 
 /// Refused input: it could be read, but does not determine what is asked for.
-int refuse(const Error& error) {
+int refuse(const Arguments& a, const Error& error) {
   fail(error.message);
+  if (!a.recording.empty() && !a.quiet)
+    note(fmt::format("the corners that were found are kept in {}: another --model, say, starts from them", kept_folder(a)));
   return kEstimationFailed;
 }
 
@@ -130,6 +155,10 @@ int calibrate(const Arguments& a) {
   if (!board) return fail(board.error().message);
   const Result<Material> material = gather(a, *board);
   if (!material) return fail(material.error().message);
+  if (material->stopped_after >= 0) {
+    fail(fmt::format("interrupted after {} images: the same command goes on from there", material->stopped_after));
+    return kInterrupted;
+  }
   std::error_code error;
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
@@ -146,7 +175,7 @@ int calibrate(const Arguments& a) {
   const bool apart = !material->imu.empty() && !cameras_connected(material->detections, *board, options.pair_tolerance_s);
   Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material->detections, *board, options)
                                             : calibrate_cameras(material->detections, *board, options);
-  if (!cameras) return refuse(cameras.error());
+  if (!cameras) return refuse(a, cameras.error());
   outcome.cameras = *std::move(cameras);
   if (!material->imu.empty()) {
     if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
@@ -158,7 +187,7 @@ int calibrate(const Arguments& a) {
       if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
     }
     Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
-    if (!imu) return refuse({imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
+    if (!imu) return refuse(a, {imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
     for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
       outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
     if (apart)
@@ -167,6 +196,7 @@ int calibrate(const Arguments& a) {
   }
   outcome.weak = weak_parts(outcome.cameras, outcome.imu ? &*outcome.imu : nullptr);
   if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);
+  if (!a.recording.empty()) forget_kept_detections(kept_folder(a));
   if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(outcome), bold(a.out));
   return kOk;
 }
@@ -178,12 +208,15 @@ int measure_noise(const Arguments& a) {
     if (!read) return fail(read.error().message);
     readings = *std::move(read);
   } else {
-    const Result<BoardRecording> recording = BoardRecording::open(a.imu_noise);
+    Result<CameraRecording> recording = open_cameras(a.imu_noise, a.topics);
     if (!recording) return fail(recording.error().message);
-    readings = recording->imu();
+    readings = std::move(recording->imu);
   }
   const Result<ImuNoiseResult> found = measure_imu_noise(readings);
-  if (!found) return refuse(found.error());
+  if (!found) {
+    fail(found.error().message);
+    return kEstimationFailed;
+  }
   std::error_code error;
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
@@ -202,7 +235,8 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   auto a = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("calibrate", kCalibrateDescription);
   command->footer(kExamples);
-  command->add_option("RECORDING", a->recording, "folder or zip in EuRoC's layout, with cam0 to cam7");
+  command->add_option("RECORDING", a->recording, "EuRoC folder or zip with cam0 to cam7, flight record, ROS bag, or MCAP file");
+  command->add_option("--topics", a->topics, "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU]")->delimiter(',');
   command->add_option("--target", a->target, "the board, as Kalibr describes it");
   command->add_option("--detections", a->detections,
                       "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");

@@ -31,7 +31,7 @@ Progress::~Progress() {
 double Progress::elapsed_s() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
 std::string Progress::describe(int done, double elapsed) const {
-  const double rate = elapsed > 0 ? done / elapsed : 0;
+  const double rate = elapsed > 0 ? (done - begun_at_) / elapsed : 0;
   const std::string left = rate > 0 ? clock_text((total_ - done) / rate) + " left" : "";
   return fmt::format("{:3} %  {}/{} frames  {:.0f}/s  {}", 100LL * done / total_, done, total_, rate, left);
 }

@@ -18,6 +18,8 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void update(int done);
+  /// So many steps were done before: the time left is that of the others.
+  void begin_at(int done) { begun_at_ = done; }
   double elapsed_s() const;
 
  private:
@@ -28,6 +30,7 @@ class Progress {
   std::chrono::steady_clock::time_point start_;
   double last_drawn_s_ = -1;
   int last_tenth_ = 0;
+  int begun_at_ = 0;
 };
 
 }  // namespace fbvins::app

@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A rendered recording of a board through `fbvins calibrate`: the calibration is the one that was put in, and its page shows it.
+"""A rendered recording of a board through `fbvins calibrate`: the calibration is the one that was put in, its page shows it, a bag and a
+flight record give the same, and so does a search for the board that was killed and started again.
 
 usage: calibrate.py FBVINS
 """
 import json
 import math
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
+import time
 
 import browser
 import page_checks
@@ -50,13 +53,47 @@ def check_page(folder):
         page_checks.check_layout(chromium, folder / "calibration.html")
 
 
+def check_bag(board, folder, rig):
+    """Killed while it looks for the board, and started again: the same bytes as of the folder without any interruption."""
+    bag, out = folder / "board.bag", folder / "from_bag"
+    fbvins("convert", board, bag)
+    command = [PROGRAM, "calibrate", bag, "--target", board / "target.yaml", "--save-detections", "--out", out]
+    first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    end = time.monotonic() + 120
+    while not list(out.glob("detecting/*.found")) and time.monotonic() < end:
+        time.sleep(0.02)
+    first.kill()
+    first.wait()
+    again = subprocess.run(command, capture_output=True, text=True, timeout=600, check=True)
+    assert re.search("goes on after (50|80) of 80 images", again.stderr) and "/cam0/image_raw, /cam1/image_raw; IMU: /imu" in again.stderr, again.stderr
+    for name in ("detections.csv", "summary.json", "camchain-imucam.yaml"):
+        assert (out / name).read_bytes() == (rig / name).read_bytes(), f"{name}: other bytes than from the folder"
+    assert not (out / "detecting").exists()
+
+
+def check_record(board, folder, rig):
+    """The right camera of a flight record alone, without a calibration to be asked for."""
+    record, out = folder / "board.mcap", folder / "from_record"
+    fbvins("convert", board, record)
+    fbvins("calibrate", record, "--topics", "/camera/right", "--cameras-only", "--target", board / "target.yaml", "--save-detections", "--out", out)
+    rows = [line.split(",") for line in (rig / "detections.csv").read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    found = [line.split(",") for line in (out / "detections.csv").read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    assert found == [[t, "0", *rest] for t, camera, *rest in rows if camera == "1"] != []
+    refused = subprocess.run([PROGRAM, "calibrate", record, "--topics", "/left", "--target", board / "target.yaml", "--out", out],
+                             capture_output=True, text=True, timeout=60, check=False)
+    assert refused.returncode == 2 and "there are images on /camera/left, /camera/right, readings on /imu" in refused.stderr, refused
+
+
 def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         board, rig = folder / "board", folder / "rig"
         fbvins("simulate", "board", "--seconds", "8", "--rate", "5", "--seed", "3", "--out", board)
-        fbvins("calibrate", board, "--target", board / "target.yaml", "--out", rig)
+        fbvins("calibrate", board, "--target", board / "target.yaml", "--save-detections", "--out", rig)
         check_truth(summary_of(rig))
+        if pathlib.Path(PROGRAM).with_name("fbvins-bags").exists():
+            check_bag(board, folder, rig)
+            check_record(board, folder, rig)
         if browser.PROGRAM:
             check_page(rig)
     print("calibrated; " + ("the page draws every plot and shows the right figures" if browser.PROGRAM else "no Chromium here to open the page with"))

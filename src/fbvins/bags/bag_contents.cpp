@@ -2,14 +2,13 @@
 #include "fbvins/bags/bag_contents.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
 #include <deque>
-#include <span>
 
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/quoted.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -66,89 +65,6 @@ void take_stream_transform(const BagMessage& message, const BagTopic& about, Bag
   out.transforms.push_back(*std::move(transform));
 }
 
-template <class Map>
-std::vector<std::string> names(const Map& map) {
-  std::vector<std::string> out;
-  for (const auto& [name, value] : map) out.push_back(name);
-  return out;
-}
-
-/// The topic named, or an error that lists those there are.
-template <class Map>
-Result<std::string> named_topic(const Map& map, const std::string& name, const char* what) {
-  if (map.contains(name)) return name;
-  return Error{ErrorCode::not_found, fmt::format("there is no {} on '{}'; there are {}", what, name,
-                                                 printable(fmt::format("{}", fmt::join(names(map), ", "))))};
-}
-
-using Words = std::pair<const char*, const char*>;
-constexpr Words kCameras[] = {{"left", "right"},      {"cam0", "cam1"},    {"infra1", "infra2"}, {"Infrared_1", "Infrared_2"},
-                              {"camera0", "camera1"}, {"image0", "image1"}};
-constexpr Words kMotion[] = {{"Gyro", "Accel"}, {"gyro", "accel"}};
-
-/// The name that differs from `topic` in these words only; empty where there is none.
-std::string partner_by_words(const std::string& topic, const std::vector<std::string>& topics, std::span<const Words> all) {
-  for (const auto& [one, other] : all) {
-    const std::size_t at = topic.find(one);
-    if (at == std::string::npos) continue;
-    std::string partner = topic;
-    partner.replace(at, std::string_view(one).size(), other);
-    if (std::find(topics.begin(), topics.end(), partner) != topics.end()) return partner;
-  }
-  return "";
-}
-
-using TopicPair = std::pair<std::string, std::string>;
-
-/// All that differ in left and right only, each once.
-std::vector<TopicPair> pairs_by_words(const std::vector<std::string>& topics, std::span<const Words> all) {
-  std::vector<TopicPair> out;
-  for (const Words& words : all)
-    for (const std::string& topic : topics)
-      if (const std::string partner = partner_by_words(topic, topics, {&words, 1}); !partner.empty())
-        if (const TopicPair pair(topic, partner); std::find(out.begin(), out.end(), pair) == out.end()) out.push_back(pair);
-  return out;
-}
-
-/// Without those that are the same images compressed.
-std::vector<std::string> image_topics(const BagContents& contents) {
-  std::vector<std::string> out = names(contents.images);
-  std::erase_if(out, [&](const std::string& topic) {
-    constexpr std::string_view kCompressed = "/compressed";
-    return topic.ends_with(kCompressed) && contents.images.contains(topic.substr(0, topic.size() - kCompressed.size()));
-  });
-  return out;
-}
-
-std::string listed(const std::vector<std::string>& topics) { return printable(fmt::format("{}", fmt::join(topics, ", "))); }
-
-Result<TopicPair> find_images(const BagContents& contents) {
-  const std::vector<std::string> all = image_topics(contents);
-  if (all.size() < 2)
-    return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics{}, not on two", all.size(),
-                                                     all.empty() ? "" : fmt::format(" ({})", listed(all)))};
-  const std::vector<TopicPair> pairs = pairs_by_words(all, kCameras);
-  if (pairs.size() == 1) return pairs.front();
-  if (pairs.empty() && all.size() == 2) return std::pair(all[0], all[1]);
-  if (pairs.empty())
-    return Error{
-        ErrorCode::unsupported,
-        fmt::format("has {} image topics ({}): say which are left and right with --topics LEFT,RIGHT", all.size(), listed(all))};
-  std::vector<std::string> each;
-  for (const auto& [left, right] : pairs) each.push_back(left + " and " + right);
-  return Error{ErrorCode::unsupported,
-               fmt::format("has {} stereo pairs ({}): say which with --topics LEFT,RIGHT", pairs.size(), listed(each))};
-}
-
-Result<std::string> find_imu(const BagContents& contents) {
-  const std::vector<std::string> all = names(contents.imu);
-  if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
-  if (all.size() == 1) return all.front();
-  if (const auto pairs = pairs_by_words(all, kMotion); pairs.size() == 1 && all.size() == 2) return pairs.front().first;
-  return Error{ErrorCode::unsupported,
-               fmt::format("has {} IMU topics ({}): say which it is with --topics LEFT,RIGHT,IMU", all.size(), listed(all))};
-}
-
 /// The camera_info that belongs to an image topic: beside it or below it, or where librealsense has it.
 const BagCamera* camera_for(const BagContents& contents, std::string topic) {
   if (topic.ends_with("/compressed")) topic.erase(topic.rfind('/'));
@@ -176,7 +92,33 @@ std::optional<Pose<B, B>> find_transform(const std::vector<BagTransform>& transf
   return end == found.end() ? std::nullopt : std::optional(end->second);
 }
 
+/// Joins a gyroscope and an accelerometer on topics of their own, both in order of stamps: a reading for each of the gyroscope's.
+std::vector<ImuSample> merged(const std::vector<ImuSample>& gyro, const std::vector<ImuSample>& accel) {
+  MotionMerge merge;
+  std::vector<ImuSample> out;
+  auto next = accel.begin();
+  for (const ImuSample& reading : gyro) {
+    merge.add_gyro(reading.t, reading.gyro_radps);
+    for (; next != accel.end() && (next == accel.begin() || std::prev(next)->t < reading.t); ++next)
+      merge.add_accel(next->t, next->accel_mps2);
+    while (const auto sample = merge.next()) out.push_back(*sample);
+  }
+  return out;
+}
+
+std::vector<ImuSample> ordered(ImuTopic& topic, RowCounts& counts) {
+  counts.malformed += topic.malformed;
+  counts.rows += topic.malformed;
+  return in_order(std::move(topic.samples), counts);
+}
+
 }  // namespace
+
+std::vector<ImuSample> readings_on(BagContents& contents, const std::string& imu, const std::string& accel, RowCounts& counts) {
+  std::vector<ImuSample> readings = ordered(contents.imu.at(imu), counts);
+  if (accel.empty()) return readings;
+  return merged(readings, ordered(contents.imu.at(accel), counts));
+}
 
 std::string place_name(const MessagePlace& place) { return fmt::format("{}+{}+{}", place.chunk, place.offset, place.length); }
 
@@ -208,29 +150,6 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
       if (const auto point = pose_of(message->data, about.encoding, about.type)) out.ground_truth.push_back(*point);
     }
   }
-  return out;
-}
-
-Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed) {
-  ChosenTopics out;
-  if (named.left.empty() != named.right.empty())
-    return Error{ErrorCode::invalid_argument, "one image topic is named and the other is not"};
-  if (!named.left.empty()) {
-    const auto left = named_topic(contents.images, named.left, "image"),
-               right = named_topic(contents.images, named.right, "image");
-    if (!left) return left.error();
-    if (!right) return right.error();
-    out.left = *left, out.right = *right;
-  } else {
-    const auto images = find_images(contents);
-    if (!images) return images.error();
-    out.left = images->first, out.right = images->second;
-  }
-  const auto imu = named.imu.empty() ? find_imu(contents) : named_topic(contents.imu, named.imu, "IMU");
-  if (imu) {
-    out.imu = *imu;
-    out.accel = partner_by_words(*imu, names(contents.imu), kMotion);
-  } else if (imu_needed || !contents.imu.empty()) return imu.error();
   return out;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to bags: all that a bag holds except the images, read in one pass, and the choice of a recording's topics.
-// One thread.
+// Private to bags: all that a bag holds except the images, read in one pass. One thread.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <optional>
@@ -46,13 +46,25 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
 std::string place_name(const MessagePlace& place);
 MessagePlace place_of(const std::string& name);
 
+/// In order of stamps, each once.
+template <class Row>
+std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
+  counts.rows += static_cast<int>(rows.size());
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t < b.t; });
+  const auto end = std::unique(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t == b.t; });
+  counts.duplicates += static_cast<int>(rows.end() - end);
+  rows.erase(end, rows.end());
+  return rows;
+}
+
+/// Readings in order; with a gyroscope and an accelerometer on topics of their own a reading for each of the
+/// gyroscope's. `accel`: empty without.
+std::vector<ImuSample> readings_on(BagContents& contents, const std::string& imu, const std::string& accel, RowCounts& counts);
+
 struct ChosenTopics {
   std::string left, right, imu;
   std::string accel;  ///< of a separate accelerometer: `imu` is the gyroscope's then; found by its name, never given
 };
-/// Those in `named`, else the only ones of their kind or those with left and right, gyroscope and accelerometer in their names.
-/// The error lists the topics there are.
-Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
 
 /// All of the calibration, noise figures included, where the bag has it for these topics.
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics);

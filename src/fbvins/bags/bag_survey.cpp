@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "fbvins/bags/bag_contents.hpp"
+#include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/io/quoted.hpp"
 
 namespace fbvins {

@@ -11,6 +11,7 @@
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/recording.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {

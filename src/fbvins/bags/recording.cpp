@@ -10,8 +10,8 @@
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/grey_image.hpp"
+#include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/core/options.hpp"
-#include "fbvins/imu/motion_merge.hpp"
 #include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -82,31 +82,6 @@ class BagLoader : public FrameLoader {
   Side left_, right_;
   int used_bits_ = 16;
 };
-
-/// In order of stamps, each once.
-template <class Row>
-std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
-  counts.rows += static_cast<int>(rows.size());
-  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t < b.t; });
-  const auto end = std::unique(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.t == b.t; });
-  counts.duplicates += static_cast<int>(rows.end() - end);
-  rows.erase(end, rows.end());
-  return rows;
-}
-
-/// Joins a gyroscope and an accelerometer on topics of their own, both in order of stamps: a reading for each of the gyroscope's.
-std::vector<ImuSample> merged(const std::vector<ImuSample>& gyro, const std::vector<ImuSample>& accel) {
-  MotionMerge merge;
-  std::vector<ImuSample> out;
-  auto next = accel.begin();
-  for (const ImuSample& reading : gyro) {
-    merge.add_gyro(reading.t, reading.gyro_radps);
-    for (; next != accel.end() && (next == accel.begin() || std::prev(next)->t < reading.t); ++next)
-      merge.add_accel(next->t, next->accel_mps2);
-    while (const auto sample = merge.next()) out.push_back(*sample);
-  }
-  return out;
-}
 
 /// Makes a recording of a bag step by step.
 class BagRecording {
@@ -186,16 +161,8 @@ class BagRecording {
                                                paired.right_only, options_.dataset.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
     if (topics_.imu.empty()) return {};
-    out_.imu = readings_on(topics_.imu);
-    if (!topics_.accel.empty()) out_.imu = merged(out_.imu, readings_on(topics_.accel));
+    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, out_.info.imu_rows);
     return {};
-  }
-
-  std::vector<ImuSample> readings_on(const std::string& topic) {
-    ImuTopic& imu = contents_.imu.at(topic);
-    out_.info.imu_rows.malformed += imu.malformed;
-    out_.info.imu_rows.rows += imu.malformed;
-    return in_order(std::move(imu.samples), out_.info.imu_rows);
   }
 
   Result<void> cut() {

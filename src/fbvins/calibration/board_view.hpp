@@ -15,12 +15,14 @@ struct Cn {};
 struct BoardCorner {
   int index = 0;              ///< Board::corner
   Vec2 pixel = Vec2::Zero();  ///< raw image, centre of the top-left pixel at (0, 0)
+  bool operator==(const BoardCorner&) const = default;
 };
 
 struct BoardView {
   Time t;          ///< the image's stamp, camera's clock
   int camera = 0;  ///< 0: cam0
   std::vector<BoardCorner> corners;
+  bool operator==(const BoardView&) const = default;
 };
 
 }  // namespace fbvins

@@ -15,6 +15,7 @@ namespace fbvins {
 namespace {
 
 constexpr int kFewestViews = 6;
+constexpr double kLeastBaseline_m = 1e-3;     ///< as every reader of calibrations demands it
 constexpr double kLargestFocalSigma = 5e-3;   ///< of the focal length near the axis
 constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
 
@@ -195,6 +196,17 @@ Result<void> check_determined(const CameraCalibration& found) {
       return undetermined(
           fmt::format("the views do not determine the principal point of cam{} (to {:.1f} px only)", k, centre_px));
   }
+  return {};
+}
+
+Result<void> check_places(const CameraCalibration& found) {
+  for (std::size_t k = 1; k < found.cameras.size(); ++k)
+    for (std::size_t j = 0; j < k; ++j) {
+      const double apart_m = (found.cameras[k].T_CnC0 * found.cameras[j].T_CnC0.inverse().p).norm();
+      if (apart_m < kLeastBaseline_m)
+        return refused(fmt::format("cam{} and cam{} are in one place, to {:.2f} mm: these are the images of one camera twice", j,
+                                   k, 1e3 * apart_m));
+    }
   return {};
 }
 

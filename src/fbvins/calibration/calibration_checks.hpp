@@ -27,6 +27,8 @@ Result<void> check_fit(double noise_px, double single_px, const ImageSize& size,
                        const std::vector<BoardView>& views);
 Error undetermined(const std::string& what);
 Result<void> check_determined(const CameraCalibration& found);
+/// No camera is there twice.
+Result<void> check_places(const CameraCalibration& found);
 std::vector<std::string> remarks_on(const CameraCalibration& found);
 
 }  // namespace fbvins

@@ -211,6 +211,7 @@ Result<CameraCalibration> calibrate_cameras(const Detections& detections, const 
   out.stamps = static_cast<int>(stamps.size());
   out.seen_mirrored = *mirrored;
   if (Result<void> good = check_determined(out); !good) return good.error();
+  if (Result<void> good = check_places(out); !good) return good.error();
   out.remarks = remarks_on(out);
   return out;
 }

@@ -213,6 +213,13 @@ TEST(CameraCalibration, WrongInputIsRefusedWithOneSentence) {
   for (BoardView& view : spoilt.views)
     if (view.camera == 1) view.t = view.t + Duration{50'000'000};
   EXPECT_TRUE(holds(refusal(spoilt, kBoard), "were not taken at the same time")) << refusal(spoilt, kBoard);
+  spoilt = views.detections;  // one camera's images under two names
+  std::erase_if(spoilt.views, [](const BoardView& v) { return v.camera == 1; });
+  for (std::size_t i = 0, n = spoilt.views.size(); i < n; ++i) {
+    spoilt.views.push_back(spoilt.views[i]);
+    spoilt.views.back().camera = 1;
+  }
+  EXPECT_TRUE(holds(refusal(spoilt, kBoard), "cam0 and cam1 are in one place")) << refusal(spoilt, kBoard);
 }
 
 }  // namespace

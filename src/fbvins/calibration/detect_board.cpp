@@ -5,36 +5,24 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "fbvins/calibration/board_detector.hpp"
-#include "fbvins/io/image_decode.hpp"
+#include "fbvins/calibration/kept_detections.hpp"
+#include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr int kMirrorTries = 40;  ///< images without a tag that are looked at mirrored
 
-/// What one image gave.
-struct Looked {
-  BoardView view;
-  ImageSize size;
-  int tags = 0, foreign_tags = 0, twice = 0;
-  bool mirrored = false;
-  std::string problem = {};  ///< it could not be read
-};
-
-Looked look(const TakenImage& taken, BoardDetector& detector, bool try_mirrored) {
-  Looked out{{taken.t, taken.camera, {}}, {}};
-  std::shared_ptr<const Image> image = taken.image;
+ImageFinding look(const ListedImage& listed, const CameraRecording::Decode& decode, BoardDetector& detector, bool try_mirrored) {
+  ImageFinding out{{listed.t, listed.camera, {}}, {}};
+  const Result<Image> image = decode();
   if (!image) {
-    Result<Image> decoded =
-        taken.bytes.empty() ? Result<Image>(Error{ErrorCode::unreadable, "cannot be read"}) : decode_image(taken.bytes);
-    if (!decoded) {
-      out.problem = fmt::format("{}: {}", taken.name, decoded.error().message);
-      return out;
-    }
-    image = std::make_shared<const Image>(*std::move(decoded));
+    out.problem = printable(fmt::format("{}: {}", listed.name, image.error().message));
+    return out;
   }
   out.size = {image->width(), image->height()};
   BoardSighting seen = detector.find(image->view());
@@ -46,38 +34,81 @@ Looked look(const TakenImage& taken, BoardDetector& detector, bool try_mirrored)
   return out;
 }
 
-/// Images are handed out, and their results kept, under one lock.
+bool tried_mirrored(std::size_t index) { return index % 10 == 0 && index < 10 * kMirrorTries; }
+
+/// Images are handed out, and their findings kept, under one lock.
 class Search {
  public:
-  Search(const std::function<std::optional<TakenImage>()>& next, const BoardSearchOptions& options)
-      : next_(next), options_(options) {}
+  Search(const Board& board, const CameraRecording& recording, const BoardSearchOptions& options)
+      : recording_(recording), options_(options), found_(recording.images.size()) {
+    if (!options.keep.empty()) kept_.emplace(options.keep, board, recording.images);
+  }
+
+  /// Takes up what was kept, if the first image that shows the board still gives the same.
+  void resume(BoardDetector& detector) {
+    if (!kept_) return;
+    ImageFindings known = kept_->read();
+    const auto shown = std::ranges::find_if(known, [](const auto& finding) { return finding && !finding->view.corners.empty(); });
+    if (shown == known.end()) return;
+    if (const auto index = static_cast<std::size_t>(shown - known.begin()); look_at(index, detector) != **shown)
+      return kept_->forget();
+    found_ = std::move(known);
+    done_ = static_cast<int>(std::ranges::count_if(found_, [](const auto& finding) { return finding.has_value(); }));
+    if (options_.resumed) options_.resumed(done_);
+  }
 
   void work(BoardDetector& detector) {
-    while (true) {
-      std::unique_lock lock(mutex_);
-      std::optional<TakenImage> taken = next_();
-      if (!taken) return;
-      const std::size_t index = results_.size();
-      results_.emplace_back();
+    std::unique_lock lock(mutex_);
+    while (failure_.ok() && !stopped_) {
+      while (next_ < found_.size() && found_[next_]) ++next_;
+      if (next_ == found_.size()) return;
+      if (options_.stop && options_.stop()) {
+        stopped_ = true;
+        return;
+      }
+      const std::size_t index = next_++;
+      const CameraRecording::Decode decode = recording_.take(index);
       lock.unlock();
-      Looked looked = look(*taken, detector, index % 10 == 0 && index < 10 * kMirrorTries);
+      ImageFinding finding = look(recording_.images[index], decode, detector, tried_mirrored(index));
       lock.lock();
-      results_[index] = std::move(looked);
-      if (options_.progress) options_.progress(++done_);
+      found_[index] = std::move(finding);
+      keep_if_complete(index / KeptDetections::kImagesOfPart);
+      ++done_;
+      if (options_.progress) options_.progress(done_);
     }
   }
 
-  std::vector<Looked>& results() { return results_; }
+  ImageFindings& found() { return found_; }
+  const Result<void>& failure() const { return failure_; }
+  bool stopped() const { return stopped_; }
+  int done() const { return done_; }
 
  private:
-  const std::function<std::optional<TakenImage>()>& next_;
+  ImageFinding look_at(std::size_t index, BoardDetector& detector) const {
+    return look(recording_.images[index], recording_.take(index), detector, tried_mirrored(index));
+  }
+
+  void keep_if_complete(std::size_t part) {
+    if (!kept_) return;
+    const std::size_t first = part * KeptDetections::kImagesOfPart;
+    const std::size_t end = std::min(found_.size(), first + KeptDetections::kImagesOfPart);
+    for (std::size_t i = first; i < end; ++i)
+      if (!found_[i]) return;
+    if (Result<void> kept = kept_->keep(part, found_); !kept && failure_) failure_ = kept;
+  }
+
+  const CameraRecording& recording_;
   const BoardSearchOptions& options_;
+  std::optional<KeptDetections> kept_;
   std::mutex mutex_;
-  std::vector<Looked> results_;
+  ImageFindings found_;
+  std::size_t next_ = 0;
   int done_ = 0;
+  bool stopped_ = false;
+  Result<void> failure_;
 };
 
-Result<void> add(Looked& looked, BoardSearch& out) {
+Result<void> add(ImageFinding& looked, BoardSearch& out) {
   if (!looked.problem.empty()) {
     if (out.unreadable++ == 0) out.first_unreadable = looked.problem;
     return {};
@@ -95,14 +126,14 @@ Result<void> add(Looked& looked, BoardSearch& out) {
 }
 
 /// Why a board was not found, or not one board.
-Result<void> judge(const std::vector<Looked>& results, const Board& board) {
+Result<void> judge(const ImageFindings& found, const Board& board) {
   int with_tags = 0, twice = 0, foreign = 0, mirrored = 0, readable = 0;
-  for (const Looked& looked : results) {
-    readable += looked.problem.empty();
-    with_tags += looked.tags > 0;
-    twice += looked.twice > 0;
-    foreign += looked.foreign_tags > looked.tags;
-    mirrored += looked.mirrored;
+  for (const std::optional<ImageFinding>& looked : found) {
+    readable += looked->problem.empty();
+    with_tags += looked->tags > 0;
+    twice += looked->twice > 0;
+    foreign += looked->foreign_tags > looked->tags;
+    mirrored += looked->mirrored;
   }
   const auto refused = [](std::string sentence) { return Error{ErrorCode::invalid_argument, std::move(sentence)}; };
   if (readable == 0) return refused("no image of the recording could be read");
@@ -120,23 +151,28 @@ Result<void> judge(const std::vector<Looked>& results, const Board& board) {
 
 }  // namespace
 
-Result<BoardSearch> detect_board(const Board& board, const std::function<std::optional<TakenImage>()>& next,
-                                 const BoardSearchOptions& options) {
+Result<BoardSearch> detect_board(const Board& board, const CameraRecording& recording, const BoardSearchOptions& options) {
   std::vector<BoardDetector> detectors;
   for (int i = 0; i < std::max(1, options.threads); ++i) {
     Result<BoardDetector> detector = BoardDetector::create(board);
     if (!detector) return detector.error();
     detectors.push_back(*std::move(detector));
   }
-  Search search(next, options);
+  Search search(board, recording, options);
+  search.resume(detectors[0]);
   std::vector<std::thread> threads;
   for (std::size_t i = 1; i < detectors.size(); ++i) threads.emplace_back([&, i] { search.work(detectors[i]); });
   search.work(detectors[0]);
   for (std::thread& thread : threads) thread.join();
-  if (Result<void> good = judge(search.results(), board); !good) return good.error();
+  if (!search.failure()) return search.failure().error();
   BoardSearch out;
-  for (Looked& looked : search.results())
-    if (Result<void> good = add(looked, out); !good) return good.error();
+  if (search.stopped()) {
+    out.stopped_after = search.done();
+    return out;
+  }
+  if (Result<void> good = judge(search.found(), board); !good) return good.error();
+  for (std::optional<ImageFinding>& looked : search.found())
+    if (Result<void> good = add(*looked, out); !good) return good.error();
   std::ranges::stable_sort(out.detections.views,
                            [](const BoardView& a, const BoardView& b) { return a.t != b.t ? a.t < b.t : a.camera < b.camera; });
   return out;

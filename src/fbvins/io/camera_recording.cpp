@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/io/camera_recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/io/calibration.hpp"
+#include "fbvins/io/euroc_frames.hpp"
+#include "fbvins/io/image_decode.hpp"
+#include "fbvins/io/yaml_reader.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr std::uint64_t kLargestCsv_bytes = std::uint64_t{1} << 30u, kLargestImage_bytes = std::uint64_t{1} << 28u,
+                        kLargestYaml_bytes = 1u << 20u;
+
+/// Reads a EuRoC folder step by step.
+class EurocCameras {
+ public:
+  EurocCameras(std::shared_ptr<const FileSource> files, std::string root) : files_(std::move(files)), root_(std::move(root)) {}
+
+  Result<CameraRecording> read() {
+    for (int k = 0; k < kMostCameras && files_->exists(fmt::format("{}cam{}/data.csv", root_, k)); ++k)
+      if (Result<void> done = list_camera(k); !done) return done.error();
+    if (Result<void> done = read_imu(); !done) return done.error();
+    sort_by_time(out_.images);
+    out_.take = [files = files_, images = out_.images](std::size_t index) -> CameraRecording::Decode {
+      Result<std::string> bytes = files->read(images[index].name, kLargestImage_bytes);
+      if (!bytes) return [error = bytes.error()]() -> Result<Image> { return error; };
+      return [bytes = *std::move(bytes)] { return decode_image(bytes); };
+    };
+    return std::move(out_);
+  }
+
+ private:
+  Result<void> list_camera(int camera) {
+    const std::string folder = fmt::format("{}cam{}/", root_, camera);
+    Result<std::string> csv = files_->read(folder + "data.csv", kLargestCsv_bytes);
+    if (!csv) return csv.error();
+    auto rows = read_image_rows(*csv, files_->describe(folder + "data.csv"));
+    if (!rows) return rows.error();
+    for (const ImageRow& row : rows->rows) out_.images.push_back({row.t, camera, folder + "data/" + row.file});
+    out_.cameras.push_back(fmt::format("cam{}", camera));
+    return {};
+  }
+
+  Result<void> read_imu() {
+    const std::string csv_file = root_ + "imu0/data.csv", yaml_file = root_ + "imu0/sensor.yaml";
+    if (!files_->exists(csv_file)) return {};
+    Result<std::string> csv = files_->read(csv_file, kLargestCsv_bytes);
+    if (!csv) return csv.error();
+    auto rows = read_stamped_rows<ImuSample>(*csv, files_->describe(csv_file), ImuRowParser{});
+    if (!rows) return rows.error();
+    out_.imu_name = "imu0";
+    out_.imu = std::move(rows->rows);
+    if (!files_->exists(yaml_file)) return {};
+    Result<std::string> yaml = files_->read(yaml_file, kLargestYaml_bytes);
+    if (!yaml) return yaml.error();
+    Result<ImuSensor> sensor = parse_euroc_imu({files_->describe(yaml_file), *std::move(yaml)});
+    if (!sensor) return sensor.error();
+    out_.imu_noise = sensor->noise;
+    return {};
+  }
+
+  std::shared_ptr<const FileSource> files_;
+  std::string root_;
+  CameraRecording out_;
+};
+
+}  // namespace
+
+void sort_by_time(std::vector<ListedImage>& images) {
+  std::ranges::stable_sort(
+      images, [](const ListedImage& a, const ListedImage& b) { return a.t != b.t ? a.t < b.t : a.camera < b.camera; });
+}
+
+Result<CameraRecording> open_euroc_cameras(const std::string& path) {
+  Result<std::unique_ptr<FileSource>> files = open_file_source(path);
+  if (!files) return files.error();
+  const std::vector<std::string> roots = (*files)->folders_holding("cam0/data.csv");
+  if (roots.size() != 1)
+    return Error{ErrorCode::not_found,
+                 roots.empty() ? fmt::format("{}: no cam0/data.csv in it: neither a recording in EuRoC's layout nor a bag", path)
+                               : fmt::format("{}: holds {} recordings, give one of them", path, roots.size())};
+  return EurocCameras(*std::move(files), roots.front()).read();
+}
+
+}  // namespace fbvins
