@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <map>
 #include <memory>
 
 #include "apps/commands.hpp"
@@ -23,8 +25,15 @@ examples:
   fbvins simulate board --lens ds --seconds 30 --seed 7 --out wide
 )";
 
+const std::map<std::string, bool HandMotion::*> kMovements = {{"distance", &HandMotion::distance},
+                                                              {"across", &HandMotion::across},
+                                                              {"up", &HandMotion::up},
+                                                              {"aim", &HandMotion::aim},
+                                                              {"roll", &HandMotion::roll}};
+
 struct Arguments {
   BoardFlightOptions options;
+  std::vector<std::string> movements;
   std::string target, out;
   bool quiet = false;
 };
@@ -35,6 +44,8 @@ int render(Arguments& a) {
     if (!board) return fail(board.error().message);
     a.options.board = *board;
   }
+  for (const auto& [name, movement] : kMovements)
+    a.options.motion.*movement = a.movements.empty() || std::ranges::find(a.movements, name) != a.movements.end();
   Progress progress(static_cast<int>(a.options.seconds * a.options.image_rate_hz), a.quiet);
   const Result<void> done = simulate_board(a.options, a.out, [&](int images, int) { progress.update(images); });
   if (!done) return fail(done.error().message);
@@ -65,6 +76,11 @@ void add_simulate_board_command(CLI::App& simulate, int& exit_code) {
   command->add_option("--time-offset", a->options.time_offset_ms, "ms, IMU's stamp less image's")
       ->check(CLI::Range(-400.0, 400.0))
       ->capture_default_str();
+  command
+      ->add_option("--motion", a->movements, "the hand's only movements: distance, across, up, aim (at the board's parts), roll")
+      ->delimiter(',')
+      ->check(CLI::IsMember(kMovements));
+  command->add_option("--missing-tags", a->options.missing_tags, "numbers of tags whose places stay white")->delimiter(',');
   command->add_option("--seed", a->options.seed, "of motion and noise")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = render(*a); });

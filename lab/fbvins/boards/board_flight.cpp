@@ -7,7 +7,6 @@
 #include <cmath>
 #include <future>
 
-#include "fbvins/boards/board_motion.hpp"
 #include "fbvins/calibration/board_image.hpp"
 #include "fbvins/calibration/simulated_board.hpp"
 #include "fbvins/calibration/target_file.hpp"
@@ -59,6 +58,17 @@ std::vector<Pose<Cn, T>> poses(const SplineTrajectory& hand, const Pose<W, T>& T
   return out;
 }
 
+Result<BoardPattern> pattern_of(const BoardFlightOptions& options) {
+  Result<BoardPattern> pattern = BoardPattern::create(options.board);
+  const int tags = options.board.kind == BoardKind::aprilgrid ? options.board.columns * options.board.rows : 0;
+  for (const int tag : options.missing_tags) {
+    if (tag < 0 || tag >= tags)
+      return Error{ErrorCode::invalid_argument, fmt::format("the board has no tag {}: {}", tag, options.board.describe())};
+    if (pattern) pattern->leave_out(tag);
+  }
+  return pattern;
+}
+
 Result<void> write_whole(const std::string& path, const std::string& text) {
   Result<OutputFile> file = OutputFile::create(path);
   if (!file) return file.error();
@@ -91,13 +101,13 @@ Result<void> simulate_board(const BoardFlightOptions& options, const std::string
                             const std::function<void(int done, int all)>& progress) {
   const Result<StereoRig> rig = board_flight_rig(options);
   if (!rig) return rig.error();
-  const Result<BoardPattern> pattern = BoardPattern::create(options.board);
+  const Result<BoardPattern> pattern = pattern_of(options);
   if (!pattern) return pattern.error();
   Result<EurocFolder> recording = create_simulated_recording(folder, *rig);
   if (!recording) return recording.error();
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  const SplineTrajectory hand =
-      hand_before_board(options.board, rig->left.focal_px() / rig->left.width(), rig->T_BC0, options.seconds + 1, seed);
+  const SplineTrajectory hand = hand_before_board(options.board, rig->left.focal_px() / rig->left.width(), rig->T_BC0,
+                                                  options.seconds + 1, seed, options.motion);
   const Pose<W, T> T_WT = hanging_board(options.board);
   const BoardCamera cameras[2] = {{rig->left, *pattern, room}, {rig->right, *pattern, room}};
   const Pose<B, Cn> T_BC[2] = {rig->T_BC0.cast_frames<B, Cn>(), rig->T_BC1.cast_frames<B, Cn>()};

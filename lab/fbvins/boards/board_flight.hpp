@@ -7,7 +7,9 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
+#include "fbvins/boards/board_motion.hpp"
 #include "fbvins/calibration/board.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
@@ -24,6 +26,8 @@ struct BoardFlightOptions {
   double noise = 2;           ///< of a grey value, standard deviation
   double time_offset_ms = 5;  ///< stamp of the IMU less that of the image at the same instant
   int seed = 1;
+  std::vector<int> missing_tags = {};  ///< places of the board that stay white
+  HandMotion motion = {};              ///< for recordings that do not determine a calibration
 };
 
 /// The rig that takes the images: what a calibration should find.

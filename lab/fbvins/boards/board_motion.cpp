@@ -41,10 +41,11 @@ Pose<W, T> hanging_board(const Board& board) {
 }
 
 SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const Pose<B, C0>& T_BC0, double duration_s,
-                                   std::uint64_t seed) {
+                                   std::uint64_t seed, const HandMotion& motion) {
   Rng rng(seed);
   std::vector<Wandering> wander;
   for (int i = 0; i < 6; ++i) wander.emplace_back(rng);
+  const auto made = [&](bool movement, std::size_t which, double t) { return movement ? wander[which].at(t) : 0.0; };
   constexpr double kKnot_s = 0.1;
   const double extent_m = board.corner(board.corner_count() - 1).norm();
   const Vec3 centre_T = 0.5 * board.corner(board.corner_count() - 1);
@@ -53,15 +54,16 @@ SplineTrajectory hand_before_board(const Board& board, double focal_ratio, const
   std::vector<Quat> rotations;
   for (int knot = 0; knot < static_cast<int>(duration_s / kKnot_s) + 7; ++knot) {
     const double t = knot * kKnot_s;
-    const double distance_m = extent_m * focal_ratio * (1.7 + 0.7 * wander[0].at(t));
+    const double distance_m = extent_m * focal_ratio * (1.7 + 0.7 * made(motion.distance, 0, t));
     // The camera's direction from the board, up to 45 degrees to each side, and the point at which it looks.
-    const double across = 0.8 * wander[1].at(t), up = 0.8 * wander[2].at(t);
+    const double across = 0.8 * made(motion.across, 1, t), up = 0.8 * made(motion.up, 2, t);
     const Vec3 from = distance_m * Vec3(std::sin(across), std::sin(up) * std::cos(across), std::cos(up) * std::cos(across));
-    const Vec3 aim_T = centre_T + 0.45 * distance_m / focal_ratio * 0.55 * Vec3(wander[3].at(t), 0.7 * wander[4].at(t), 0);
+    const Vec3 aim_T =
+        centre_T + 0.45 * distance_m / focal_ratio * 0.55 * Vec3(made(motion.aim, 3, t), 0.7 * made(motion.aim, 4, t), 0);
     const Vec3 p_TC = centre_T + from, z = (aim_T - p_TC).normalized(), x = Vec3(0, -1, 0).cross(z).normalized();
     Mat3 R_TC;
     R_TC << x, z.cross(x), z;
-    const Pose<T, C0> T_TC0(Quat(R_TC) * so3_exp(Vec3(0, 0, 0.9 * wander[5].at(t))), p_TC);
+    const Pose<T, C0> T_TC0(Quat(R_TC) * so3_exp(Vec3(0, 0, 0.9 * made(motion.roll, 5, t))), p_TC);
     const Pose<W, B> T_WB = T_WT * T_TC0 * T_BC0.inverse();
     positions.push_back(T_WB.p);
     rotations.push_back(T_WB.q);

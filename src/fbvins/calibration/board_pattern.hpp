@@ -15,6 +15,9 @@ class BoardPattern {
  public:
   static Result<BoardPattern> create(const Board& board);
 
+  /// Leaves the tag's place white.
+  void leave_out(int tag) { tags_.at(static_cast<std::size_t>(tag)) = {}; }
+
   /// Whether the point (m, in T) is black; nullopt beyond the sheet of paper.
   std::optional<bool> black(double x_m, double y_m) const;
 
