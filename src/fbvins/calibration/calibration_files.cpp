@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "fbvins/camera/lens_numbers.hpp"
@@ -12,11 +13,24 @@
 namespace fbvins {
 namespace {
 
+/// With a point: Kalibr wants floating point numbers, and PyYAML takes 458 for an integer, 1e-5 for a word.
+std::string kalibr_number(double value) {
+  std::string out = fmt::format("{:.17g}", value);
+  if (out.find('.') == std::string::npos) out.insert(std::min(out.find('e'), out.size()), ".0");
+  return out;
+}
+
+std::string kalibr_list(const std::vector<double>& values) {
+  std::string out;
+  for (const double value : values) out += (out.empty() ? "" : ", ") + kalibr_number(value);
+  return "[" + out + "]";
+}
+
 template <class To, class From>
 std::string matrix(const std::string& name, const Pose<To, From>& T) {
   const Mat3 R = T.R();
   std::string out = fmt::format("  {}:\n", name);
-  for (int row = 0; row < 3; ++row) out += "  - " + yaml_list({R(row, 0), R(row, 1), R(row, 2), T.p[row]}) + "\n";
+  for (int row = 0; row < 3; ++row) out += "  - " + kalibr_list({R(row, 0), R(row, 1), R(row, 2), T.p[row]}) + "\n";
   return out + "  - [0.0, 0.0, 0.0, 1.0]\n";
 }
 
@@ -73,24 +87,24 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
     out += fmt::format("cam{}:\n", k);
     if (!rig.T_BC.empty()) out += matrix("T_cam_imu", rig.T_BC[k].inverse());
     if (k > 0) out += matrix("T_cn_cnm1", rig.T_CnC0[k] * rig.T_CnC0[k - 1].inverse());
-    const std::vector<double> no_distortion(4, 0.0);
     out += fmt::format(
         "  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n  resolution: [{}, {}]\n"
         "  rostopic: /cam{}/image_raw\n",
-        camera.model, yaml_list(camera.distortion == "none" ? no_distortion : camera.coefficients), camera.distortion,
-        yaml_list(camera.intrinsics), rig.cameras[k].width(), rig.cameras[k].height(), k);
+        camera.model, kalibr_list(camera.coefficients), camera.distortion, kalibr_list(camera.intrinsics), rig.cameras[k].width(),
+        rig.cameras[k].height(), k);
     out += mask_text(rig.cameras[k], "  ");
-    if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {:.17g}\n", rig.time_offset_s);
+    if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {}\n", kalibr_number(rig.time_offset_s));
   }
   return out;
 }
 
 std::string to_kalibr_imu(const ImuNoise& noise) {
   return fmt::format(
-      "accelerometer_noise_density: {:.17g}\naccelerometer_random_walk: {:.17g}\ngyroscope_noise_density: {:.17g}\n"
-      "gyroscope_random_walk: {:.17g}\nrostopic: /imu0\nupdate_rate: {:.17g}\n",
-      noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz, noise.gyro_noise_density_radps_rthz,
-      noise.gyro_random_walk_radps2_rthz, noise.rate_hz);
+      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
+      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
+      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
+      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
+      kalibr_number(noise.rate_hz));
 }
 
 Result<std::string> to_basalt(const RigCalibration& rig) {

@@ -35,6 +35,21 @@ TEST(CalibrationFiles, WhatIsWrittenForKalibrIsReadBack) {
   }
 }
 
+/// Kalibr's reader (kalibr_common/ConfigReader.py) asks for as many coefficients as the model has, and for floating point
+/// numbers.
+TEST(CalibrationFiles, KalibrsReaderTakesWhatIsWritten) {
+  const Camera round(DoubleSphere{400, 401, 320, 240, 1e-4, 0.5}, 640, 480);
+  const std::string text = to_kalibr_camchain(rig_with(round));
+  EXPECT_NE(text.find("distortion_coeffs: []\n  distortion_model: none\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("intrinsics: [0.0001, 0.5, 400.0, 401.0, 320.0, 240.0]"), std::string::npos) << text;
+  EXPECT_NE(to_kalibr_camchain(rig_with(example_cameras()[0])).find("distortion_coeffs: [-0.28"), std::string::npos);
+  ImuNoise noise;
+  noise.gyro_random_walk_radps2_rthz = 0x1p-20, noise.accel_noise_density_mps2_rthz = 1;
+  const std::string imu = to_kalibr_imu(noise);
+  EXPECT_NE(imu.find("gyroscope_random_walk: 9.5367431640625e-07\n"), std::string::npos) << imu;
+  EXPECT_NE(imu.find("accelerometer_noise_density: 1.0\n"), std::string::npos) << imu;
+}
+
 TEST(CalibrationFiles, TheSecondCameraIsAlsoFoundThroughTheFirst) {
   const RigCalibration rig = rig_with(example_cameras()[0]);
   std::string text = to_kalibr_camchain(rig);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -15,7 +16,8 @@
 namespace fbvins {
 namespace {
 
-constexpr int kMirrorTries = 40;  ///< images without a tag that are looked at mirrored
+constexpr int kMirrorTries = 40;  ///< images that are looked at mirrored if they show no tag
+constexpr int kMirrorStep = 11;   ///< every so many, so that each of up to eight cameras has its share
 
 ImageFinding look(const ListedImage& listed, const CameraRecording::Decode& decode, BoardDetector& detector, bool try_mirrored) {
   ImageFinding out{{listed.t, listed.camera, {}}, {}};
@@ -34,7 +36,7 @@ ImageFinding look(const ListedImage& listed, const CameraRecording::Decode& deco
   return out;
 }
 
-bool tried_mirrored(std::size_t index) { return index % 10 == 0 && index < 10 * kMirrorTries; }
+bool tried_mirrored(std::size_t index) { return index % kMirrorStep == 0 && index < kMirrorStep * kMirrorTries; }
 
 /// Images are handed out, and their findings kept, under one lock.
 class Search {
@@ -125,21 +127,34 @@ Result<void> add(ImageFinding& looked, BoardSearch& out) {
   return {};
 }
 
+/// The camera whose tags are found in mirrored images only; -1: none.
+int mirrored_camera(const ImageFindings& found) {
+  std::map<int, std::pair<int, int>> cameras;  // with tags, mirrored
+  for (const std::optional<ImageFinding>& looked : found) {
+    auto& [with_tags, mirrored] = cameras[looked->view.camera];
+    with_tags += looked->tags > 0, mirrored += looked->mirrored;
+  }
+  for (const auto& [camera, counts] : cameras)
+    if (counts.second > 0 && counts.first <= counts.second) return camera;
+  return -1;
+}
+
 /// Why a board was not found, or not one board.
 Result<void> judge(const ImageFindings& found, const Board& board) {
-  int with_tags = 0, twice = 0, foreign = 0, mirrored = 0, readable = 0;
+  int with_tags = 0, twice = 0, foreign = 0, readable = 0;
   for (const std::optional<ImageFinding>& looked : found) {
     readable += looked->problem.empty();
     with_tags += looked->tags > 0;
     twice += looked->twice > 0;
     foreign += looked->foreign_tags > looked->tags;
-    mirrored += looked->mirrored;
   }
   const auto refused = [](std::string sentence) { return Error{ErrorCode::invalid_argument, std::move(sentence)}; };
   if (readable == 0) return refused("no image of the recording could be read");
-  if (mirrored > 0 && with_tags <= mirrored)
-    return refused(
-        "the tags are found only in mirrored images: the board was printed mirrored, or the camera mirrors its images");
+  if (const int camera = mirrored_camera(found); camera >= 0)
+    return refused(fmt::format(
+        "the tags are found only where the images of cam{} are mirrored: the board was printed mirrored, or the camera "
+        "mirrors its images",
+        camera));
   if (foreign > with_tags / 2 && foreign > 0)
     return refused(fmt::format(
         "most tags have numbers that the target file's board ({}) does not have: it describes another board", board.describe()));

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr int kImages = 120, kFew = 60;  // two whole parts and a short one; one and a short one
 const Board kBoard{.columns = 3, .rows = 3, .size_m = 0.088, .spacing = 0.3};
 
-class KeptDetection : public ::testing::Test {
+class DetectBoard : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::remove_all(folder_);
@@ -45,7 +45,7 @@ class KeptDetection : public ::testing::Test {
   std::vector<ListedImage> images_, few_;
 };
 
-TEST_F(KeptDetection, IsReadAsItWasFoundToTheBit) {
+TEST_F(DetectBoard, IsReadAsItWasFoundToTheBit) {
   const ImageFindings found = random_findings(images_);
   const KeptDetections kept(folder_, kBoard, images_);
   for (const std::size_t part : {2, 0}) ASSERT_TRUE(kept.keep(part, found));
@@ -56,7 +56,7 @@ TEST_F(KeptDetection, IsReadAsItWasFoundToTheBit) {
   }
 }
 
-TEST_F(KeptDetection, OfOtherImagesOrAnotherBoardIsForgotten) {
+TEST_F(DetectBoard, OfOtherImagesOrAnotherBoardIsForgotten) {
   const ImageFindings found = random_findings(images_);
   std::vector<ListedImage> others = images_;
   others[30].t.ns += 1;
@@ -70,7 +70,7 @@ TEST_F(KeptDetection, OfOtherImagesOrAnotherBoardIsForgotten) {
   }
 }
 
-TEST_F(KeptDetection, ADamagedFileIsLookedForAgain) {
+TEST_F(DetectBoard, ADamagedFileIsLookedForAgain) {
   const ImageFindings found = random_findings(images_);
   const KeptDetections kept(folder_, kBoard, images_);
   for (const std::size_t part : {0, 1, 2}) ASSERT_TRUE(kept.keep(part, found));
@@ -102,7 +102,7 @@ CameraRecording rendered(const std::vector<ListedImage>& images, std::atomic<int
   return out;
 }
 
-TEST_F(KeptDetection, AnInterruptedSearchGoesOnAndFindsTheSame) {
+TEST_F(DetectBoard, AnInterruptedSearchGoesOnAndFindsTheSame) {
   std::atomic<int> looks = 0;
   const CameraRecording recording = rendered(few_, looks);
   const auto whole = detect_board(kBoard, recording, {.threads = 1});
@@ -127,7 +127,7 @@ TEST_F(KeptDetection, AnInterruptedSearchGoesOnAndFindsTheSame) {
   EXPECT_EQ(rest->first_unreadable, whole->first_unreadable);
 }
 
-TEST_F(KeptDetection, OtherPixelsUnderTheSameNamesAreLookedAt) {
+TEST_F(DetectBoard, OtherPixelsUnderTheSameNamesAreLookedAt) {
   std::atomic<int> looks = 0;
   CameraRecording recording = rendered(few_, looks);
   ASSERT_TRUE(detect_board(kBoard, recording, {.threads = 1, .keep = folder_}));
@@ -136,6 +136,22 @@ TEST_F(KeptDetection, OtherPixelsUnderTheSameNamesAreLookedAt) {
   looks = 0;
   ASSERT_TRUE(detect_board(kBoard, recording, {.threads = 1, .keep = folder_}));
   EXPECT_EQ(looks, kFew + 1);
+}
+
+TEST_F(DetectBoard, TheCameraThatMirrorsIsNamed) {
+  std::atomic<int> looks = 0;
+  CameraRecording recording = rendered(few_, looks);
+  recording.take = [&, plain = recording.take](std::size_t index) {
+    return [decode = plain(index), mirrored = few_[index].camera == 1]() -> Result<Image> {
+      Result<Image> image = decode();
+      if (image && mirrored)
+        for (int y = 0; y < image->height(); ++y) std::reverse(&image->at(0, y), &image->at(0, y) + image->width());
+      return image;
+    };
+  };
+  const auto found = detect_board(kBoard, recording, {.threads = 2});
+  ASSERT_FALSE(found);
+  EXPECT_NE(found.error().message.find("the images of cam1 are mirrored"), std::string::npos) << found.error().message;
 }
 
 #endif
