@@ -14,6 +14,7 @@
 #include "apps/run_output.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/calibration/board_detector.hpp"
 #include "fbvins/calibration/detect_board.hpp"
 #include "fbvins/calibration/imu_noise.hpp"
 #include "fbvins/calibration/target_file.hpp"
@@ -69,6 +70,8 @@ void tell(const CameraRecording& recording, bool quiet) {
 }
 
 Result<Material> detect(const Arguments& a, const Board& board) {
+  if (const auto detector = BoardDetector::create(board); !detector)
+    return Error{detector.error().code, fmt::format("{}: {}", a.target, detector.error().message)};
   const Result<CameraRecording> recording = open_cameras(a.recording, a.topics);
   if (!recording) return recording.error();
   tell(*recording, a.quiet);
@@ -148,56 +151,60 @@ int refuse(const Arguments& a, const Error& error) {
   return kEstimationFailed;
 }
 
+/// Cameras, then the IMU. An error where the material does not determine what is asked for.
+Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const Material& material) {
+  CalibrationOutcome outcome;
+  outcome.board = board;
+  outcome.remarks = material.remarks;
+  CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
+  if (!a.quiet) options.on_progress = [](const std::string& what) { note(what); };
+  // Cameras that never see the board together are joined by the IMU, if there is one.
+  const bool apart = !material.imu.empty() && !cameras_connected(material.detections, board, options.pair_tolerance_s);
+  Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material.detections, board, options)
+                                            : calibrate_cameras(material.detections, board, options);
+  if (!cameras) return cameras.error();
+  outcome.cameras = *std::move(cameras);
+  if (material.imu.empty()) return outcome;
+  if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material.imu.size()));
+  outcome.imu_noise = noise_of(material, outcome.remarks);
+  ImuCameraInput input{
+      board, {}, {}, material.detections.views, material.imu, outcome.imu_noise, rig_variations(outcome.cameras)};
+  for (const CalibratedCamera& camera : outcome.cameras.cameras) {
+    input.cameras.push_back(camera.camera);
+    if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
+  }
+  Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
+  if (!imu) return Error{imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"};
+  for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
+    outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
+  if (apart) outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
+  outcome.imu = *std::move(imu);
+  return outcome;
+}
+
 int calibrate(const Arguments& a) {
   if (a.recording.empty() == a.detections.empty()) return fail("give a recording or --detections");
   if (a.target.empty()) return fail("--target is missing: the board's description (`fbvins target` writes one)");
   const Result<Board> board = load_target(a.target);
   if (!board) return fail(board.error().message);
+  std::error_code error;
+  std::filesystem::create_directories(a.out, error);
+  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   const Result<Material> material = gather(a, *board);
   if (!material) return fail(material.error().message);
   if (material->stopped_after >= 0) {
     fail(fmt::format("interrupted after {} images: the same command goes on from there", material->stopped_after));
     return kInterrupted;
   }
-  std::error_code error;
-  std::filesystem::create_directories(a.out, error);
-  if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
   if (a.save_detections)
     if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
       return fail(done.error().message);
-
-  CalibrationOutcome outcome;
-  outcome.board = *board;
-  outcome.remarks = material->remarks;
-  CameraCalibrationOptions options{.models = a.models, .max_views = a.max_views};
-  if (!a.quiet) options.on_progress = [](const std::string& what) { note(what); };
-  // Cameras that never see the board together are joined by the IMU, if there is one.
-  const bool apart = !material->imu.empty() && !cameras_connected(material->detections, *board, options.pair_tolerance_s);
-  Result<CameraCalibration> cameras = apart ? calibrate_cameras_apart(material->detections, *board, options)
-                                            : calibrate_cameras(material->detections, *board, options);
-  if (!cameras) return refuse(a, cameras.error());
-  outcome.cameras = *std::move(cameras);
-  if (!material->imu.empty()) {
-    if (!a.quiet) note(fmt::format("cameras on the IMU: {} readings", material->imu.size()));
-    outcome.imu_noise = noise_of(*material, outcome.remarks);
-    ImuCameraInput input{
-        *board, {}, {}, material->detections.views, material->imu, outcome.imu_noise, rig_variations(outcome.cameras)};
-    for (const CalibratedCamera& camera : outcome.cameras.cameras) {
-      input.cameras.push_back(camera.camera);
-      if (!apart) input.T_CnC0.push_back(camera.T_CnC0);
-    }
-    Result<CameraImuResult> imu = calibrate_imu_camera(input, a.imu_options);
-    if (!imu) return refuse(a, {imu.error().code, imu.error().message + " (--cameras-only calibrates the cameras alone)"});
-    for (std::size_t k = 0; apart && k < imu->cameras.size(); ++k)
-      outcome.cameras.cameras[k].T_CnC0 = imu->cameras[k].T_BC.inverse() * imu->cameras[0].T_BC.cast_frames<B, C0>();
-    if (apart)
-      outcome.remarks.push_back("cameras without common views of the board: their poses to one another come from the IMU");
-    outcome.imu = *std::move(imu);
-  }
-  outcome.weak = weak_parts(outcome.cameras, outcome.imu ? &*outcome.imu : nullptr);
-  if (Result<void> done = write_calibration(outcome, a.out); !done) return fail(done.error().message);
+  Result<CalibrationOutcome> outcome = solve(a, *board, *material);
+  if (!outcome) return refuse(a, outcome.error());
+  outcome->weak = weak_parts(outcome->cameras, outcome->imu ? &*outcome->imu : nullptr);
+  if (Result<void> done = write_calibration(*outcome, a.out); !done) return fail(done.error().message);
   if (!a.recording.empty()) forget_kept_detections(kept_folder(a));
-  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(outcome), bold(a.out));
+  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(*outcome), bold(a.out));
   return kOk;
 }
 

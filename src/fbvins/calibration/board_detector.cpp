@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/board_detector.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "fbvins/calibration/corner_refine.hpp"
@@ -24,7 +26,9 @@ Result<BoardDetector> BoardDetector::create(const Board& board) {
   if (board.kind != BoardKind::aprilgrid)
     return Error{
         ErrorCode::unsupported,
-        "only AprilGrids are detected in images: detections of chessboards and ChArUco boards can be given by --detections"};
+        fmt::format("only AprilGrids are found in images: record one that `fbvins target` prints, or give the corners of this "
+                    "{} by --detections",
+                    board.kind == BoardKind::charuco ? "ChArUco board" : "chessboard")};
   Result<TagDetector> detector = TagDetector::create();
   if (!detector) return detector.error();
   return BoardDetector(board, *std::move(detector));
