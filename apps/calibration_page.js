@@ -111,7 +111,8 @@ function keyFigures(parent) {
 function weakness(parent) {
   const box = card("Poorly determined", data.weak.length ? "one standard deviation, and what would be wanted" : "");
   box.id = "weak";
-  if (data.weak.length) box.append(table(["what", "known to", "wanted", "record this"], data.weak.map(([what, sigma, aim, unit, advice]) => [what, `${number(sigma, 2)} ${unit}`, `${number(aim, 2)} ${unit}`, { text: advice, class: "text" }])));
+  const size = (value, unit) => number(value, 2) + (unit === "degrees" ? "°" : " " + unit);
+  if (data.weak.length) box.append(table(["what", "record this", "known to", "wanted"], data.weak.map(([what, sigma, aim, unit, advice]) => [what, advice, size(sigma, unit), size(aim, unit)]), 2));
   else box.append(el("p", { class: "note" }, "Nothing: all that was asked for is determined as well as the odometry needs it."));
   parent.append(box);
   if (!data.remarks.length) return;

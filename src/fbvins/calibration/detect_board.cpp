@@ -50,6 +50,8 @@ class Search {
   void resume(BoardDetector& detector) {
     if (!kept_) return;
     ImageFindings known = kept_->read();
+    for (std::optional<ImageFinding>& finding : known)
+      if (finding && !finding->problem.empty()) finding.reset();  // perhaps it can be read now
     const auto shown = std::ranges::find_if(known, [](const auto& finding) { return finding && !finding->view.corners.empty(); });
     if (shown == known.end()) return;
     if (const auto index = static_cast<std::size_t>(shown - known.begin()); look_at(index, detector) != **shown)
