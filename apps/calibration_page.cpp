@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fbvins/calibration/lens_certainty.hpp"
 #include "fbvins/calibration/residual_summary.hpp"

@@ -243,26 +243,30 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   CLI::App* command = program.add_subcommand("calibrate", kCalibrateDescription);
   command->footer(kExamples);
   command->add_option("RECORDING", a->recording, "EuRoC folder or zip with cam0 to cam7, flight record, ROS bag, or MCAP file");
-  command->add_option("--topics", a->topics, "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU]")->delimiter(',');
+  command->add_option("--topics", a->topics, "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_option("--target", a->target, "the board, as Kalibr describes it");
   command->add_option("--detections", a->detections,
                       "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
   command
       ->add_option("--resolution", a->resolutions, "size of the images with --detections, such as 752x480; one, or one a camera")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");
   command->add_option("--imu-calibration", a->imu_calibration, "the IMU's noise: Kalibr's imu.yaml");
   command
       ->add_option("--model", a->models,
                    "lens: pinhole-radtan, pinhole-equidistant, ds, eucm, omni-radtan or auto; one, or one a camera")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
   command->add_flag("--cameras-only", a->cameras_only, "leave the IMU out");
   command->add_flag("--imu-axes", a->imu_options.imu_axes, "estimate scale and axes of the IMU, too");
   command->add_flag("--line-delay", a->imu_options.line_delay, "estimate the line delay of a rolling shutter, too");
   command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
       ->capture_default_str();
-  command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest (folder or imu0/data.csv)");
+  command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
   command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();
