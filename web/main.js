@@ -115,7 +115,7 @@ const on = {
     showStatus(status);
     // Between images health changes when sensors are silent.
     if (status.health !== element("health").dataset.state) {
-      showHealth(status.health, healthSentence({ health: status.health, reason: status.reason, sigma_m: NaN }));
+      showHealth(status.health, healthSentence({ ...status, sigma_m: NaN }));
       timeline.add(t_s, status.health, status.reason);
       seen(status.health);
     }

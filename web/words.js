@@ -23,12 +23,14 @@ const REASONS = {
   cameras_disagree: "the two cameras contradict each other",
   imu_clipped: "the IMU is at the end of its range",
   imu_vibration: "strong vibration spoils the IMU's readings",
+  correction_owed: "the pose is being corrected",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }
 
 export function healthSentence(state) {
-  const why = reasonWords(state.reason);
+  const without = state.without_cameras ?? [];
+  const why = reasonWords(state.reason) + (without.length ? `, without camera ${without.join(", ")}` : "");
   switch (state.health) {
     case "good": return `Position known to ±${length(3 * state.sigma_m)} (3σ).`;
     case "degraded": return `${sentence(why || "worse than it could be")} Position ±${length(3 * state.sigma_m)} (3σ).`;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -39,8 +40,9 @@ enum class HealthReason {
   cameras_disagree,  ///< one camera contradicts the other and the IMU: its images are not used
   imu_clipped,       ///< an axis of the IMU is at the end of its range
   imu_vibration,     ///< readings are shaken so much that they say little
+  correction_owed,   ///< a correction larger than a good pose may be wrong is published step by step
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::imu_vibration;
+inline constexpr HealthReason kLastHealthReason = HealthReason::correction_owed;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);
@@ -48,10 +50,15 @@ std::string_view to_string(HealthReason reason);
 struct Health {
   HealthState state = HealthState::initialising;
   HealthReason reason = HealthReason::none;
+  std::uint8_t without_cameras = 0;  ///< bit c: camera c, which delivers nothing or contradicts the others, is not used
 
   bool has_pose() const { return state == HealthState::good || state == HealthState::degraded; }
   bool operator==(const Health&) const = default;
 };
+/// In one sentence: "good", "degraded: one_camera, without camera 1".
+std::string to_sentence(const Health& health);
+/// The numbers of Health::without_cameras.
+std::vector<int> cameras_in(std::uint8_t bits);
 
 struct EstimatorStats {
   int frames_in_window = 0;

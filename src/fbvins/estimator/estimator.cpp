@@ -26,6 +26,8 @@ constexpr int kFramesAfterGap = 6;
 constexpr double kGap_s = 0.05;
 /// A large correction so soon after a pose that was not good has to be confirmed by gravity.
 constexpr double kTrouble_s = 2;
+/// Otherwise so many times what a good pose may owe is made up for at once.
+constexpr double kAtOnce = 2;
 /// Of a start with one camera.
 constexpr double kMaxScaleSigmaAtStart = 0.1;
 /// One camera that contradicts the readings for so long cannot be followed: its own motion has no scale.
@@ -262,7 +264,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
 /// Compares images and readings, and returns the features of the cameras that agree. Readings that the images
 /// contradict count less.
 std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSegment& imu, Frame& predicted) {
-  one_camera_wrong_ = false;
+  wrong_cameras_ = 0;
   const Duration dt = frame.t - window_.newest().t;
   // After a gap the images have to say first how fast the vehicle is.
   frames_with_readings_ = imu.empty() || imu.longest_gap.seconds() > kGap_s ? 0 : frames_with_readings_ + 1;
@@ -279,8 +281,8 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
     predicted.state.T_FB = *verdict.seen;
   }
   std::vector<TrackedFeature> accepted = frame.features;
-  one_camera_wrong_ = verdict.wrong.has_value();
-  if (!one_camera_wrong_) return accepted;
+  if (!verdict.wrong) return accepted;
+  wrong_cameras_ = static_cast<std::uint8_t>(1u << verdict.wrong->left | 1u << verdict.wrong->right);
   for (TrackedFeature& feature : accepted) {
     if (verdict.wrong->has(feature.cameras.left)) feature.left.reset();
     if (verdict.wrong->has(feature.cameras.right)) feature.right.reset();
@@ -383,7 +385,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .broken_features = contract_.broken(),
                         .contradiction = monitor_.contradicted() || tilt_away_B_.has_value(),
                         .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
-                        .one_camera_wrong = one_camera_wrong_,
+                        .wrong_cameras = wrong_cameras_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
                         .after_dark = monitor_.settling(),
                         .clipped = reading_noise_.clipped(),
@@ -443,6 +445,22 @@ void Estimator::carry_covariances(Odometry& out) {
   out.accel_bias_covariance = last.accel_bias;
 }
 
+/// At once as a new W where steps would mislead whoever follows the pose: after trouble, when the pose was wrong until now, and
+/// where it is large (W24). In a fast flight's first seconds, when its tilt becomes known far from the start, steps are better.
+void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
+  const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
+  if (!after_trouble && !published_.owes_too_much(kAtOnce)) {
+    out.health = {HealthState::degraded, HealthReason::correction_owed};
+    return;
+  }
+  begin_new_W();
+  published_.follow({}, level);
+  monitor_.count_reset();
+  if (!after_trouble) return;
+  monitor_.doubt_tilt();
+  out.health = {HealthState::degraded, HealthReason::contradiction};
+}
+
 /// Publishes the pose of the newest frame, continuing from the one published before (W17-W20).
 void Estimator::publish(Odometry& out) {
   const NavState<G>& newest = window_.newest().state;
@@ -450,16 +468,8 @@ void Estimator::publish(Odometry& out) {
   carry_covariances(out);
   if (monitor_.take_reset()) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
-  if (out.health.state == HealthState::good && published_.owes_too_much()) {
-    begin_new_W();
-    published_.follow({}, level.T_FB);
-    monitor_.count_reset();
-    if (last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s) {
-      monitor_.doubt_tilt();
-      out.health = {HealthState::degraded, HealthReason::contradiction};
-    }
-  }
-  if (out.health.state != HealthState::good) last_trouble_ = out.t;
+  if (out.health.state == HealthState::good && published_.owes_too_much()) settle_correction(level.T_FB, out);
+  if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_owed) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);

@@ -72,6 +72,7 @@ class Estimator {
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
+  void settle_correction(const Pose<W, B>& level, Odometry& out);
   void carry_covariances(Odometry& out);
   void publish(Odometry& out);
   Vec3 gravity_G() const;
@@ -100,7 +101,7 @@ class Estimator {
   Monitor monitor_;
   CarriedUp carried_up_;
   std::optional<Vec3> tilt_away_B_;   ///< of a new window, from what was known before it, rad
-  bool one_camera_wrong_ = false;     ///< in the newest frame
+  std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row
   Time agreed_;                       ///< last time without a contradiction, or with two cameras
   std::optional<Time> last_trouble_;  ///< of a pose that was not good

@@ -283,7 +283,7 @@ TEST(Estimator, FliesOnWithOneCamera) {
   flight.right_camera = [](int k) { return k < 60 || k >= 120; };
   const Flown flown = fly(flight, 180);
   const int first = flown.first_pose();
-  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera}));
+  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera, 0b10}));
   for (int k = first; k < 180; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
 }
 
@@ -291,7 +291,7 @@ TEST(Estimator, FliesOnWithTheRightCameraAlone) {
   SimulatedFlight flight(Motion(0.6, 0.3), 9);
   flight.left_camera = [](int k) { return k < 60 || k >= 160; };
   const Flown flown = fly(flight, 220);
-  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera}));
+  EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera, 0b01}));
   EXPECT_GT(flown.odometry[155].stats.landmarks, 40) << "new ones, too";
   for (int k = flown.first_pose(); k < 220; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
@@ -340,7 +340,8 @@ TEST(Estimator, FliesOnWhereOneOfTwoPairsIsBlind) {
     FourCameras flight(Motion(0.6, 0.3), 9);
     (front ? flight.front : flight.back).images = [](int k) { return k < 60 || k >= 160; };
     const Flown flown = fly(flight, 220);
-    EXPECT_EQ(flown.odometry[100].health, (Health{HealthState::degraded, HealthReason::one_camera}));
+    const std::uint8_t blind = front ? 0b0011 : 0b1100;
+    EXPECT_EQ(flown.odometry[100].health, (Health{HealthState::degraded, HealthReason::one_camera, blind}));
     for (int k = flown.first_pose(); k < 220; ++k) {
       EXPECT_TRUE(flown.odometry[k].health.has_pose());
       EXPECT_LT(flown.position_error(k), 0.05) << k;
@@ -363,8 +364,9 @@ TEST(Estimator, AStartNeedsBothCamerasAndSaysSo) {
     flight.left_camera = [&](int k) { return left || k >= 30; };
     flight.right_camera = [&](int k) { return !left || k >= 30; };
     const Flown flown = fly(flight, 60);
+    const std::uint8_t missing = left ? 0b10 : 0b01;
     for (int k = 0; k < 30; ++k)
-      EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::initialising, HealthReason::one_camera})) << k;
+      EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::initialising, HealthReason::one_camera, missing})) << k;
     EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
   }
 }
@@ -590,6 +592,29 @@ TEST(Estimator, TheGaugeIsTheWindowsOwnFrameWithUpBeside) {
     EXPECT_LT(o.gauge.up_sigma_rad, 0.1);
   }
   EXPECT_GT(poses, 30);
+}
+
+/// A correction that is larger than estimator.max_pending_m: degraded; twice as large: a new W.
+TEST(Estimator, ACorrectionWithoutTroubleIsMadeInStepsAndThePoseIsNotGoodMeanwhile) {
+  struct Told {
+    int owed = 0, resets = 0;
+  };
+  const auto told_with = [](double max_pending_m) {
+    EstimatorOptions options;
+    options.max_pending_m = max_pending_m;
+    SimulatedFlight flight(Motion(1.5, 0.3), 9);
+    Told told;
+    for (const Odometry& o : fly(flight, 200, options).odometry) {
+      told.owed += o.health == Health{HealthState::degraded, HealthReason::correction_owed};
+      told.resets = static_cast<int>(o.reset_counter);
+    }
+    return told;
+  };
+  EXPECT_EQ(told_with(0.1).owed, 0);
+  const Told steps = told_with(0.007), at_once = told_with(0.003);
+  EXPECT_GT(steps.owed, 0);
+  EXPECT_EQ(steps.resets, 0);
+  EXPECT_GT(at_once.resets, 0);
 }
 
 }  // namespace

@@ -22,13 +22,16 @@ bool without_images(const TrackedFrame& frame) {
 }
 
 Health lost(HealthReason reason) { return {HealthState::lost, reason}; }
-Health degraded(HealthReason reason) { return {HealthState::degraded, reason}; }
+Health degraded(HealthReason reason, std::uint8_t without_cameras = 0) {
+  return {HealthState::degraded, reason, without_cameras};
+}
 
 }  // namespace
 
 Health HealthJudge::before_start(const TrackedFrame& frame, HealthReason reason) const {
   if (without_images(frame)) reason = HealthReason::no_images;
-  else if (camera_missing(frame)) reason = HealthReason::one_camera;  // a start needs a pair
+  else if (const std::uint8_t missing = missing_cameras(frame); missing != 0)  // a start needs a pair
+    return {HealthState::initialising, HealthReason::one_camera, missing};
   return {HealthState::initialising, reason};
 }
 
@@ -38,9 +41,15 @@ void HealthJudge::pass(const TrackedFrame& frame) {
   previous_image_ = frame.t;
 }
 
-bool HealthJudge::camera_missing(const TrackedFrame& frame) const {
-  if (!frame.has_left || (cameras_ > 1 && !frame.has_right)) return true;
-  return cameras_ > 2 && std::ranges::count(frame.has_more, true) < cameras_ - 2;
+/// Bits, as in Health.
+std::uint8_t HealthJudge::missing_cameras(const TrackedFrame& frame) const {
+  unsigned missing = 0;
+  for (int c = 0; c < cameras_; ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    const bool here = c == 0 ? frame.has_left : c == 1 ? frame.has_right : k - 2 < frame.has_more.size() && frame.has_more[k - 2];
+    if (!here) missing |= 1u << c;
+  }
+  return static_cast<std::uint8_t>(missing);
 }
 
 /// No camera's image came, or these are the first ones after a gap.
@@ -68,11 +77,11 @@ Health HealthJudge::judge(const TrackedFrame& frame, const NavState<G>& state, i
   if (no_imu || evidence.after_gap || frame.imu.longest_gap.seconds() > kImuGapDegraded_s) return degraded(HealthReason::imu_gap);
   if (images_missing(frame)) return degraded(HealthReason::no_images);
   if (evidence.broken_features > 0) return degraded(HealthReason::frontend_fault);
-  if (camera_missing(frame)) return degraded(HealthReason::one_camera);
+  if (const std::uint8_t missing = missing_cameras(frame); missing != 0) return degraded(HealthReason::one_camera, missing);
   if (landmarks_in_view == 0) return degraded(HealthReason::no_tracks);
   if (few_tracks || evidence.after_dark) return degraded(HealthReason::few_tracks);
   if (stereo_ && frame.stats.stereo == 0) return degraded(HealthReason::one_camera);
-  if (evidence.one_camera_wrong) return degraded(HealthReason::cameras_disagree);
+  if (evidence.wrong_cameras != 0) return degraded(HealthReason::cameras_disagree, evidence.wrong_cameras);
   if (evidence.clipped) return degraded(HealthReason::imu_clipped);
   if (evidence.contradiction) return degraded(HealthReason::contradiction);
   if (evidence.gyro_vibration_radps > kGyroVibrationDegraded_radps) return degraded(HealthReason::imu_vibration);

@@ -27,10 +27,10 @@ class HealthJudge {
     int failed_solves = 0;
     int broken_features = 0;  ///< that were left out
     bool contradiction = false;
-    bool hopeless = false;  ///< and the estimate cannot recover from it
-    bool one_camera_wrong = false;
-    bool after_gap = false;   ///< of the readings
-    bool after_dark = false;  ///< and the velocity is being found again
+    bool hopeless = false;           ///< and the estimate cannot recover from it
+    std::uint8_t wrong_cameras = 0;  ///< bits, as in Health; they contradict the others and the readings
+    bool after_gap = false;          ///< of the readings
+    bool after_dark = false;         ///< and the velocity is being found again
     bool clipped = false;
     double gyro_vibration_radps = 0;
   };
@@ -43,7 +43,7 @@ class HealthJudge {
 
  private:
   bool images_missing(const TrackedFrame& frame) const;
-  bool camera_missing(const TrackedFrame& frame) const;
+  std::uint8_t missing_cameras(const TrackedFrame& frame) const;
 
   EstimatorOptions options_;
   int cameras_;

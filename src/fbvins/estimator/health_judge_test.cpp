@@ -90,7 +90,8 @@ TEST(HealthJudge, OneImageIsOneCamera) {
     TrackedFrame one = frame_at(0.05);
     (left ? one.has_right : one.has_left) = false;
     one.stats.stereo = 0;
-    EXPECT_EQ(judged.next(one, left ? kManyTracks : 0), degraded(HealthReason::one_camera)) << left;
+    const std::uint8_t missing = left ? 0b10 : 0b01;
+    EXPECT_EQ(judged.next(one, left ? kManyTracks : 0), (Health{HealthState::degraded, HealthReason::one_camera, missing}));
   }
   Judged judged;
   TrackedFrame blocked = frame_at(0.05);  // both came, and nothing matches
@@ -141,7 +142,8 @@ TEST(HealthJudge, WhatSpeaksAgainstAPoseIsSaidWithItsReason) {
   EXPECT_EQ(judged({}), good());
   EXPECT_EQ(judged({.contradiction = true}), degraded(HealthReason::contradiction));
   EXPECT_EQ(judged({.contradiction = true, .hopeless = true}), lost(HealthReason::contradiction));
-  EXPECT_EQ(judged({.contradiction = true, .one_camera_wrong = true}), degraded(HealthReason::cameras_disagree));
+  EXPECT_EQ(judged({.contradiction = true, .wrong_cameras = 0b01}),
+            (Health{HealthState::degraded, HealthReason::cameras_disagree, 0b01}));
   EXPECT_EQ(judged({.after_gap = true}), degraded(HealthReason::imu_gap));
   EXPECT_EQ(judged({.contradiction = true, .clipped = true}), degraded(HealthReason::imu_clipped))
       << "the cause before its effect";
@@ -170,7 +172,7 @@ TEST(HealthJudge, EachReasonInFlightIsReachedAndLeft) {
       {HealthReason::frontend_fault, kManyTracks, {.broken_features = 1}, as_it_is},
       {HealthReason::solver_failed, kManyTracks, {.failed_solves = 1}, as_it_is},
       {HealthReason::contradiction, kManyTracks, {.contradiction = true}, as_it_is},
-      {HealthReason::cameras_disagree, kManyTracks, {.one_camera_wrong = true}, as_it_is},
+      {HealthReason::cameras_disagree, kManyTracks, {.wrong_cameras = 0b10}, as_it_is},
       {HealthReason::imu_clipped, kManyTracks, {.clipped = true}, as_it_is},
       {HealthReason::imu_vibration, kManyTracks, {.gyro_vibration_radps = 0.35}, as_it_is},
   };
@@ -185,7 +187,10 @@ TEST(HealthJudge, EachReasonInFlightIsReachedAndLeft) {
           wrong ? judge.judge(frame, NavState<G>{}, c.in_view, c.evidence) : judge.judge(frame, NavState<G>{}, kManyTracks, {});
       judge.pass(frame);
       if (k == 15) continue;  // the first image after a gap is told as one
-      EXPECT_EQ(health, wrong ? degraded(c.reason) : good()) << to_string(c.reason) << " " << k;
+      EXPECT_EQ(health.state, wrong ? HealthState::degraded : HealthState::good) << to_string(c.reason) << " " << k;
+      EXPECT_EQ(health.reason, wrong ? c.reason : HealthReason::none) << k;
+      const bool of_cameras = health.reason == HealthReason::one_camera || health.reason == HealthReason::cameras_disagree;
+      EXPECT_EQ(health.without_cameras, of_cameras ? 0b10 : 0) << to_string(c.reason) << " " << k;
     }
   }
 }

@@ -20,12 +20,12 @@ namespace fbvins {
 /// Ratio of the limits on corrections of attitude and of position: 0.1 degrees for 3 mm.
 inline constexpr double kRotationPerStep_radpm = 0.1 * (3.14159265358979323846 / 180) / 0.003;
 
-/// Likewise for corrections that are made at once: 3 degrees for 10 cm.
+/// Likewise for corrections that are too large for a good pose: 3 degrees for 10 cm.
 inline constexpr double kRotationPending_radpm = 3 * kDegree / 0.1;
 
 class PublishedPose {
  public:
-  /// Largest correction of the position per frame, and the largest that is paid so; 0: no limit.
+  /// Largest correction of the position per frame, and the largest that a good pose may owe; 0: no limit.
   PublishedPose(double max_step_m, double max_pending_m) : max_step_m_(max_step_m), max_pending_m_(max_pending_m) {}
 
   /// A new W begins: the next pose is published as the window has it.
@@ -35,11 +35,11 @@ class PublishedPose {
   /// Fills pose, velocity, up and tilt; adds the pending correction to the covariances in `out`, which are of the level state.
   void fill(const NavState<W>& level, Odometry& out);
 
-  /// The pending correction is larger than a pose called good may be wrong, and so large that paying it slowly would mislead
-  /// whoever follows the pose.
-  bool owes_too_much() const {
+  /// The pending correction is larger than a pose called good may be wrong; or so many times as large.
+  bool owes_too_much(double times = 1) const {
+    const double most_m = times * max_pending_m_;
     return max_step_m_ > 0 && max_pending_m_ > 0 &&
-           (pending_.head<3>().norm() > max_pending_m_ || pending_.tail<3>().norm() > kRotationPending_radpm * max_pending_m_);
+           (pending_.head<3>().norm() > most_m || pending_.tail<3>().norm() > kRotationPending_radpm * most_m);
   }
 
   const Pose<W, B>& T_WB() const { return T_WB_; }

@@ -122,6 +122,7 @@ TEST(PublishedPose, ALargeCorrectionIsTooMuchToPaySlowly) {
       published.follow({}, flown(0));
       published.follow(motion(1), Pose<W, W>{so3_exp(Vec3(0, 0, degrees * kDegree)), Vec3(shift_m, 0, 0)} * flown(1));
       EXPECT_EQ(published.owes_too_much(), degrees > 3.1 || shift_m > 0.103) << degrees << " " << shift_m;
+      EXPECT_FALSE(published.owes_too_much(1.5));
     }
   PublishedPose at_once(0, kPending_m);
   at_once.follow({}, flown(0));

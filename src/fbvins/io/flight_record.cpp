@@ -64,7 +64,7 @@ RosDiagnostic diagnostic_of(const Odometry& o) {
   const EstimatorStats& s = o.stats;
   return {health_level(o.health),
           "odometry",
-          health_sentence(o.health),
+          to_sentence(o.health),
           {{"state", std::string(to_string(o.health.state))},
            {"reason", std::string(to_string(o.health.reason))},
            {"reset_counter", fmt::to_string(o.reset_counter)},
@@ -89,11 +89,6 @@ RosDiagnostic diagnostic_of(const Odometry& o) {
 std::uint8_t health_level(const Health& health) {
   if (health.state == HealthState::good) return 0;
   return health.state == HealthState::lost ? 2 : 1;
-}
-
-std::string health_sentence(const Health& health) {
-  if (health.reason == HealthReason::none) return std::string(to_string(health.state));
-  return fmt::format("{}: {}", to_string(health.state), to_string(health.reason));
 }
 
 Result<FlightRecord> FlightRecord::create(const std::string& path, const StereoRig& rig, const FlightRecordOptions& options) {

@@ -34,9 +34,8 @@ struct FlightRecordOptions {
   bool images = true;              ///< without them the flight can be looked at, not run again
 };
 
-/// A diagnostic's level, and its message.
+/// A diagnostic's level; its message is to_sentence(health).
 std::uint8_t health_level(const Health& health);
-std::string health_sentence(const Health& health);
 
 class FlightRecord {
  public:

@@ -15,7 +15,7 @@ std::string text(const LatencySummary& s) {
 }  // namespace
 
 RosDiagnostic diagnostic_of(const LiveStatus& s) {
-  RosDiagnostic out{health_level(s.health), "live", s.problem.empty() ? health_sentence(s.health) : s.problem, {}};
+  RosDiagnostic out{health_level(s.health), "live", s.problem.empty() ? to_sentence(s.health) : s.problem, {}};
   out.values = {{"state", std::string(to_string(s.health.state))},  {"reason", std::string(to_string(s.health.reason))},
                 {"reset_counter", fmt::to_string(s.reset_counter)}, {"host_ns", fmt::to_string(s.host_t.ns)},
                 {"shutter_to_pose_ms", text(s.shutter_to_pose)},    {"pose_age_ms", text(s.pose_age)}};

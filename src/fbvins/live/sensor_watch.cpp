@@ -18,12 +18,13 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
       std::max(options_.camera_silence_s, kOverdue_periods * arrivals.image_period.value_or(Duration{}).seconds());
   double blind_s = silence_s(arrivals.image);
   if (said.has_pose() && estimated.image) blind_s = std::max(blind_s, silence_s(estimated.image));
+  const unsigned silent = (silence_s(arrivals.left) > silent_s ? 1u : 0u) | (silence_s(arrivals.right) > silent_s ? 2u : 0u);
   HealthReason reason = HealthReason::none;
   if (silence_s(arrivals.imu) > options_.imu_silence_s) reason = HealthReason::imu_gap;
   else if (blind_s > silent_s) reason = HealthReason::no_images;
-  else if (silence_s(arrivals.left) > silent_s || silence_s(arrivals.right) > silent_s) reason = HealthReason::one_camera;
+  else if (silent != 0) reason = HealthReason::one_camera;
   if (reason == HealthReason::none) return said;
-  if (!said.has_pose()) return {said.state, reason == HealthReason::one_camera ? said.reason : reason};
+  if (!said.has_pose()) return reason == HealthReason::one_camera ? said : Health{said.state, reason};
   if (blind_s > silent_s) {
     const double blind2 = estimated.newest_sigma_m * estimated.newest_sigma_m - estimated.sigma_m * estimated.sigma_m;
     if (blind2 > max_blind_m_ * max_blind_m_) return {HealthState::lost, HealthReason::no_images};
@@ -34,7 +35,7 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
   // Images come, and their estimates are late: the estimator knows why, where it waits for readings.
   const bool images_come = reason == HealthReason::no_images && silence_s(arrivals.image) <= silent_s;
   if (images_come && said.state == HealthState::degraded) return said;
-  return {HealthState::degraded, reason};
+  return {HealthState::degraded, reason, static_cast<std::uint8_t>(reason == HealthReason::one_camera ? silent : 0)};
 }
 
 }  // namespace fbvins

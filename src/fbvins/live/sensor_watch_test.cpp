@@ -27,7 +27,7 @@ TEST(SensorWatch, SaysWhatTheEstimatorSaysWhileAllIsWell) {
 TEST(SensorWatch, SilenceIsSeenAndNamed) {
   using enum HealthReason;
   EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.7), 10), (Health{HealthState::degraded, no_images}));
-  EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.99), 10), (Health{HealthState::degraded, one_camera}));
+  EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.99), 10), (Health{HealthState::degraded, one_camera, 0b01}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.99, 9.99), 10), (Health{HealthState::degraded, imu_gap}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.7, 9.7), 10), (Health{HealthState::degraded, imu_gap}));
 }

@@ -44,7 +44,7 @@ Result<void> ServiceSink::take(const LiveEvent& event) {
   const auto* status = std::get_if<LiveStatus>(&event);
   if (status == nullptr) return {};
   // A problem of one output does not hide the health.
-  std::string sentence = health_sentence(status->health);
+  std::string sentence = to_sentence(status->health);
   if (!status->problem.empty()) sentence += "; " + status->problem;
   std::replace(sentence.begin(), sentence.end(), '\n', ' ');
   log(*status, sentence);

@@ -20,6 +20,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
   nlohmann::ordered_json json{{"t_ns", status.t.ns}, {"host_ns", status.host_t.ns}};
   json["health"] = to_string(status.health.state);
   json["reason"] = to_string(status.health.reason);
+  if (status.health.without_cameras != 0) json["without_cameras"] = cameras_in(status.health.without_cameras);
   json["reset_counter"] = status.reset_counter;
   if (newest.health.has_pose()) {
     const Vec3& p = newest.T_WB.p;

@@ -92,9 +92,7 @@ VisionSpeedMessage vision_speed_message(const VehicleState& state, std::uint64_t
 }
 
 StatusTextMessage health_message(const Health& health) {
-  const bool why = health.reason != HealthReason::none;
-  const std::string sentence =
-      fmt::format("VIO {}{}{}", to_string(health.state), why ? ": " : "", why ? to_string(health.reason) : "");
+  const std::string sentence = "VIO " + to_sentence(health);
   switch (health.state) {
     case HealthState::good: return status_text(MavSeverity::notice, sentence);
     case HealthState::degraded: return status_text(MavSeverity::warning, sentence);

@@ -331,7 +331,8 @@ double error_without(bool left, double back_s, const std::string& frontend) {
     EXPECT_EQ(o.reset_counter, 0u);
     EXPECT_TRUE(o.health.has_pose() || t_s < 0.6) << t_s << " s: " << to_string(o.health.reason);
     const bool alone = t_s >= 2.5 && t_s<back_s, again = t_s> back_s + 0.2;
-    const Health expected = alone ? Health{HealthState::degraded, HealthReason::one_camera} : Health{HealthState::good};
+    const std::uint8_t dead = left ? 0b01 : 0b10;
+    const Health expected = alone ? Health{HealthState::degraded, HealthReason::one_camera, dead} : Health{HealthState::good};
     if (alone || again) {
       EXPECT_EQ(o.health, expected) << t_s << " s: " << to_string(o.health.reason);
     }
@@ -372,8 +373,9 @@ TEST(SystemInput, AnImageOfAnotherSizeCountsAsMissing) {
   ASSERT_TRUE(system.finish().ok());
   using enum HealthReason;
   ASSERT_EQ(health.size(), 3u);
-  for (std::size_t k = 0; k < 3; ++k)
-    EXPECT_EQ(health[k], (Health{HealthState::initialising, k < 2 ? one_camera : no_images})) << k;
+  EXPECT_EQ(health[0], (Health{HealthState::initialising, one_camera, 0b10}));
+  EXPECT_EQ(health[1], (Health{HealthState::initialising, one_camera, 0b01}));
+  EXPECT_EQ(health[2], (Health{HealthState::initialising, no_images}));
 }
 
 TEST(SystemParts, ARigThatCannotFlyIsRefused) {

@@ -32,8 +32,26 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::cameras_disagree: return "cameras_disagree";
     case HealthReason::imu_clipped: return "imu_clipped";
     case HealthReason::imu_vibration: return "imu_vibration";
+    case HealthReason::correction_owed: return "correction_owed";
   }
   return "unknown";
+}
+
+std::string to_sentence(const Health& health) {
+  std::string out(to_string(health.state));
+  if (health.reason != HealthReason::none) out.append(": ").append(to_string(health.reason));
+  const std::vector<int> without = cameras_in(health.without_cameras);
+  if (without.empty()) return out;
+  out += without.size() == 1 ? ", without camera" : ", without cameras";
+  for (const int camera : without) out.append(" ").append(std::to_string(camera));
+  return out;
+}
+
+std::vector<int> cameras_in(std::uint8_t bits) {
+  std::vector<int> out;
+  for (int c = 0; c < 8; ++c)
+    if ((bits >> c & 1) != 0) out.push_back(c);
+  return out;
 }
 
 }  // namespace fbvins
