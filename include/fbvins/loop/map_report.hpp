@@ -10,7 +10,9 @@ namespace fbvins {
 struct PoseGraphReport {
   int solves = 0;
   int iterations = 0;
-  int rejected = 0;  ///< loops with a weight below a tenth
+  int rejected = 0;          ///< loops with a weight below a tenth
+  int anchors = 0;           ///< that count
+  int anchors_rejected = 0;  ///< with a weight below a tenth
   double initial_cost = 0, final_cost = 0;
 };
 
@@ -19,6 +21,7 @@ struct PoseGraphReport {
 struct Plausibility {
   double held_out = 0;  ///< observations of points held out of the adjustment, robust
   double imu = 0;       ///< the readings, with the motions, biases and gravity that suit the poses best; 0 without readings
+  double anchors = 0;   ///< of an anchored map: its anchors, without outliers
   double odometry = 0;  ///< the steps between keyframes against the odometry and its drift
 };
 

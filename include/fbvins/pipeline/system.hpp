@@ -29,6 +29,7 @@
 #include "fbvins/core/result.hpp"
 #include "fbvins/frontend/frontend.hpp"
 #include "fbvins/pipeline/system_options.hpp"
+#include "fbvins/types/anchor.hpp"
 #include "fbvins/types/calibration.hpp"
 #include "fbvins/types/imu_state.hpp"
 #include "fbvins/types/input_counts.hpp"
@@ -72,6 +73,9 @@ class System {
   /// Takes the next sensor event, in order of time. Blocks while the stages are behind (threaded). Returns the error of the
   /// stage that failed, if one has; the event is dropped then.
   Result<void> push(SensorEvent event);
+  /// A measurement for the mapper, of the images' clock; between the events, best before the next image. One that comes late is
+  /// used as long as the map remembers the motion then (some seconds). An error, and no change, for one that is impossible.
+  Result<void> push(Anchor anchor);
   /// Processes what is waiting and ends; no callback comes afterwards. Returns the same on every call.
   Result<void> finish();
   /// The first failure of a stage, or success.

@@ -7,6 +7,7 @@
 
 #include "fbvins/core/ids.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/anchor.hpp"
 #include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
@@ -42,7 +43,8 @@ struct Keyframe {
   std::uint32_t reset_counter = 0;  ///< a new value: W is a new frame, with no known relation to the old
   StereoFrame images;
   std::vector<KeyframeLandmark> landmarks;
-  KeyframeImu imu;  ///< set by the pipeline, except for the bias
+  KeyframeImu imu;                   ///< set by the pipeline, except for the bias
+  std::vector<Anchor> anchors = {};  ///< that came since the keyframe before, none later than this one; set by the pipeline
 };
 
 }  // namespace fbvins

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
@@ -28,10 +29,12 @@ struct CorrectedKeyframe {
 };
 
 struct LoopStats {
-  int keyframes = 0;   ///< in the map
-  int candidates = 0;  ///< places compared with this keyframe in detail
-  int accepted = 0;    ///< candidates that became constraints
-  int refused = 0;     ///< verified by the images, but inconsistent with the odometry
+  int keyframes = 0;        ///< in the map
+  int candidates = 0;       ///< places compared with this keyframe in detail
+  int accepted = 0;         ///< candidates that became constraints
+  int refused = 0;          ///< verified by the images, but inconsistent with the odometry
+  int anchors = 0;          ///< that moved M
+  int anchors_refused = 0;  ///< that contradict the odometry and the others, or came too late
   bool optimised = false;
   double extract_ms = 0, recognise_ms = 0, verify_ms = 0, optimise_ms = 0;
   double total_ms() const { return extract_ms + recognise_ms + verify_ms + optimise_ms; }
@@ -42,10 +45,13 @@ struct MapUpdate {
   FrameId frame;         ///< the keyframe
   FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
   Time t;
-  bool localised = false;           ///< false: where W is in M is not known (a loaded map, or after a restart)
-  Pose<M, G> T_MG;                  ///< best estimate; jumps when a place is recognised. M is level
-  Pose<M, W> T_MW;                  ///< the same for W as it was published when the keyframe was handed on
-  Pose<M, W> T_MW_smooth;           ///< follows T_MW at a bounded speed: for a controller
+  bool localised = false;  ///< false: where W is in M is not known (a loaded map, or after a restart)
+  Pose<M, G> T_MG;         ///< best estimate; jumps when a place is recognised. M is level
+  Pose<M, W> T_MW;         ///< the same for W as it was published when the keyframe was handed on
+  Pose<M, W> T_MW_smooth;  ///< follows T_MW at a bounded speed: for a controller
+  bool anchored = false;   ///< M is the frame of the building
+  /// M is another frame from this update on, T_MW_smooth as well: takes coordinates in the M of before to those in the new one.
+  std::optional<Pose<M, M>> M_moved = {};
   std::uint32_t reset_counter = 0;  ///< of the odometry: which frame W this refers to
   std::uint32_t map_session = 0;    ///< counts the odometry frames W that were joined to this map
   std::vector<LoopConstraint> loops;

@@ -9,6 +9,7 @@
 #include "fbvins/core/ids.hpp"
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/types/anchor.hpp"
 #include "fbvins/types/gauge.hpp"
 #include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
@@ -20,6 +21,7 @@ struct SensorPacket {
   FrameId id;
   StereoFrame frame;
   ImuSegment imu;
+  std::vector<Anchor> anchors = {};  ///< that came since the image before, of any stamp
 };
 
 /// Where a feature is seen in one camera.
@@ -93,6 +95,7 @@ struct TrackedFrame {
   StereoFrame images;                            ///< null unless keyframes are wanted, which carry the images
   std::shared_ptr<const DepthImage> depth = {};  ///< of a rig with a depth sensor
   ExposureOffsets offsets = {};                  ///< of the cameras' images; filled by the system
+  std::vector<Anchor> anchors = {};              ///< for the map
 };
 
 /// A landmark with its last estimated position.

@@ -19,6 +19,8 @@ constexpr int kMaxIterations = 25;  // of one solve
 constexpr double kRobust_sigma = 2;
 /// Observations of which the root mean square of the three rows exceeds this are wrong matches.
 constexpr double kOutlier_sigma = 3.5;
+/// An anchor that is farther than this from the map as the graph has it is wrong.
+constexpr double kAnchorOutlier_sigma = 4;
 /// One track in so many is held out.
 constexpr std::size_t kHeldOut = 8;
 /// Time over which the odometry's drift exceeds the scatter of single keyframes.
@@ -68,6 +70,7 @@ Adjustment::Adjustment(const PlaceMap& map) : map_(map), has_readings_(map.size(
     steps_.push_back({a, b, &e});
     if (e.imu) has_readings_[a] = has_readings_[b] = true;
   }
+  if (map.anchored) choose_anchors();
 }
 
 void Adjustment::add(const FeatureTrack& track) {
@@ -102,15 +105,60 @@ std::size_t Adjustment::points() const {
   return seen.size();
 }
 
+/// Those that fit the map as the graph has it; the others are wrong.
+void Adjustment::choose_anchors() {
+  for (const MapAnchor& anchor : map_.anchors) {
+    const auto at = static_cast<std::size_t>(map_.find(anchor.keyframe) - map_.keyframes().data());
+    const MapKeyframe& k = keyframe(at);
+    const Mat6 L = tilt_error(anchor.measured, k.T_MB.q, map_.T_BC0.q * k.place.up_C0, kTilt_rad);
+    const Vec6 r = residual(anchor.measured, k.T_MB.q, k.T_MB.p);
+    const double chi2 = r.dot(widened(anchor.measured.information, L) * r);
+    if (k.placed && chi2 < kAnchorOutlier_sigma * kAnchorOutlier_sigma) anchors_.push_back({at, &anchor.measured});
+  }
+}
+
+/// With the frame of the anchors as M, nothing is held; what they do not determine is expected to stay about where it is. M is
+/// level then by definition.
+void Adjustment::add_anchors(ceres::Problem& problem, AdjustmentState& x) const {
+  const auto add = [&](std::size_t at, const PartialPose& measured, ceres::LossFunction* loss) {
+    auto* cost = new ceres::AutoDiffCostFunction<AnchorCost<6>, 6, 6>(
+        new AnchorCost<6>{keyframe(at).T_MB.q, measured, root_of(measured.information)});
+    problem.AddResidualBlock(cost, loss, x.poses[at].data());
+  };
+  for (const Anchored& a : anchors_)
+    if (problem.HasParameterBlock(x.poses[a.keyframe].data())) add(a.keyframe, *a.measured, new ceres::CauchyLoss(kRobust_sigma));
+  for (std::size_t i = 0; i < x.poses.size(); ++i)
+    if (problem.HasParameterBlock(x.poses[i].data()) && (i == 0 || keyframe(i).session != keyframe(i - 1).session))
+      add(i, about_here(keyframe(i).T_MB), nullptr);
+  hold_level(problem, x);
+}
+
+void Adjustment::hold_level(ceres::Problem& problem, AdjustmentState& x) {
+  if (problem.HasParameterBlock(x.tilt.data())) problem.SetParameterBlockConstant(x.tilt.data());
+}
+
+double Adjustment::anchors_cost(const AdjustmentState& x) const {
+  double sum = 0;
+  int rows = 0;
+  for (const Anchored& a : anchors_) {
+    const Pose<M, B> T_MB = pose(x, a.keyframe);
+    const Vec6 r = residual(*a.measured, T_MB.q, T_MB.p);
+    sum += r.dot(a.measured->information * r);
+    rows += static_cast<int>((a.measured->information.diagonal().array() > 0).count());
+  }
+  return rows == 0 ? 0 : sum / rows;
+}
+
 int Adjustment::solve(AdjustmentState& x, double drift) const {
   ceres::Problem problem;
   add_observations(problem, observations_, x);
   add_readings(problem, x);
   add_edges(problem, x, drift);
   add_verticals(problem, x);
+  if (map_.anchored) add_anchors(problem, x);
   const auto first = std::find_if(x.poses.begin(), x.poses.end(), [&](auto& p) { return problem.HasParameterBlock(p.data()); });
   if (first == x.poses.end()) return 0;  // no pose is observed or in an edge
-  problem.SetParameterBlockConstant(first->data());
+  if (!map_.anchored) problem.SetParameterBlockConstant(first->data());
   ceres::Solver::Options solver = repeatable_solver(ceres::SPARSE_SCHUR, kMaxIterations);
   // The points go first; they are many, and see one another only through keyframes.
   solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -202,11 +250,12 @@ Plausibility Adjustment::judged(AdjustmentState x) const {
   ceres::Problem problem;
   add_observations(problem, held_out_, x);
   add_readings(problem, x);
+  if (map_.anchored) hold_level(problem, x);
   for (PoseBlock& pose : x.poses)
     if (problem.HasParameterBlock(pose.data())) problem.SetParameterBlockConstant(pose.data());
   ceres::Solver::Summary summary;
   ceres::Solve(repeatable_solver(ceres::SPARSE_NORMAL_CHOLESKY, kMaxIterations), &problem, &summary);
-  return {held_out_cost(x), imu_cost(x), odometry_cost(x)};
+  return {held_out_cost(x), imu_cost(x), anchors_cost(x), odometry_cost(x)};
 }
 
 double Adjustment::held_out_cost(const AdjustmentState& x) const {

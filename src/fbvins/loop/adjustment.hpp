@@ -37,8 +37,8 @@ class Adjustment {
   bool empty() const { return observations_.empty(); }
 
   const AdjustmentState& start() const { return start_; }
-  /// Returns the iterations. The first placed keyframe stays. `drift`: variance of the odometry's steps, in units of the drift
-  /// that its edges were given.
+  /// Returns the iterations. The first placed keyframe stays, unless anchors hold the map. `drift`: variance of the odometry's
+  /// steps, in units of the drift that its edges were given.
   int solve(AdjustmentState& x, double drift = 1) const;
   /// That variance as a solution shows it, over stretches long enough for drift to exceed the solution's own scatter.
   double drift_found(const AdjustmentState& x) const;
@@ -58,6 +58,10 @@ class Adjustment {
     std::size_t keyframe, point;
     const PlaceFeature* feature;
   };
+  struct Anchored {
+    std::size_t keyframe;
+    const PartialPose* measured;
+  };
   struct Step {
     std::size_t from, to;
     const MapEdge* edge;
@@ -73,6 +77,10 @@ class Adjustment {
   void add_readings(ceres::Problem& problem, AdjustmentState& x) const;
   void add_edges(ceres::Problem& problem, AdjustmentState& x, double drift) const;
   void add_verticals(ceres::Problem& problem, AdjustmentState& x) const;
+  void choose_anchors();
+  void add_anchors(ceres::Problem& problem, AdjustmentState& x) const;
+  static void hold_level(ceres::Problem& problem, AdjustmentState& x);
+  double anchors_cost(const AdjustmentState& x) const;
   double held_out_cost(const AdjustmentState& x) const;
   double imu_cost(const AdjustmentState& x) const;
   double odometry_cost(const AdjustmentState& x) const;
@@ -81,6 +89,7 @@ class Adjustment {
   AdjustmentState start_;
   std::vector<Observation> observations_, held_out_;
   std::vector<Step> steps_;         ///< all edges between placed keyframes
+  std::vector<Anchored> anchors_;   ///< that fit
   std::vector<bool> has_readings_;  ///< of a keyframe: an edge to or from it has readings
 };
 

@@ -21,8 +21,8 @@ constexpr double kLeastDrift = 0.01;
 constexpr double kBetter = 0.985;
 /// The criteria are means of thousands of squared residuals: an increase by this factor is not chance.
 constexpr double kWorse = 1.02;
-/// Readings that fit to their noise need not fit better, nor steps within twice the standard deviation of the drift.
-constexpr double kImuFits = 1, kDriftLimit = 4;
+/// Readings and anchors that fit to their noise need not fit better, nor steps within twice the standard deviation of the drift.
+constexpr double kImuFits = 1, kAnchorsFit = 1, kDriftLimit = 4;
 
 /// Why the result does not fit better than the start; empty where it does.
 std::string objection(const Plausibility& before, const Plausibility& after) {
@@ -35,6 +35,9 @@ std::string objection(const Plausibility& before, const Plausibility& after) {
   if (after.imu > std::max(kImuFits, kWorse * before.imu))
     return fmt::format("the IMU's readings fit worse than before: {:.2f} -> {:.2f} squared standard deviations", before.imu,
                        after.imu);
+  if (after.anchors > std::max(kAnchorsFit, kWorse * before.anchors))
+    return fmt::format("the anchors fit worse than before: {:.2f} -> {:.2f} squared standard deviations", before.anchors,
+                       after.anchors);
   if (after.odometry > std::max(kDriftLimit, kWorse * before.odometry))
     return fmt::format("the odometry cannot have drifted so: {:.2f} -> {:.2f} squared standard deviations of its steps",
                        before.odometry, after.odometry);

@@ -124,6 +124,36 @@ TEST(FinalAdjustment, AResultThatFitsNoBetterIsRefusedAndTheMapStays) {
   EXPECT_EQ(serialise_map(m.map), before);
 }
 
+/// Poses in the building's frame, without a fit.
+double error_in_building_m(const Mapped& m, const Pose<A, G>& T_AR) {
+  double sum = 0;
+  for (std::size_t i = 0; i < m.map.size(); ++i) sum += (m.map.keyframes()[i].T_MB.p - T_AR * m.frames[i].truth.p).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(m.map.size()));
+}
+
+TEST(FinalAdjustment, KeepsAnAnchoredMapInTheBuilding) {
+  const Pose<A, G> T_AR(so3_exp(Vec3(0, 0, 2.1)), Vec3(8, -5, 2));
+  for (const bool with_readings : {false, true}) {
+    Mapped m = with_readings ? mapped_with_readings(5, Quat::Identity()) : mapped(5);
+    Rng rng(4);
+    m.map.move(T_AR.cast_frames<M, M>());
+    for (std::size_t i = 0; i < m.map.size(); ++i) {
+      const Vec3 noise = 0.05 * Vec3(rng.normal(), rng.normal(), rng.normal());
+      PositionAnchor a{.p_A = T_AR * m.frames[i].truth.p + noise, .covariance = 0.0025 * Mat3::Identity()};
+      if (i % 5 == 0) a.p_A += 30 * noise;
+      m.map.add_anchor({m.map.keyframes()[i].id, measurement_of(a)});
+    }
+    m.map.anchored = true;
+    m.map.optimise({});
+    const double before = error_in_building_m(m, T_AR);
+    const FinalAdjustmentReport report = adjust_map(m.map, {});
+    EXPECT_EQ(report.refused, "");
+    EXPECT_EQ(report.tilt_rad, 0);
+    EXPECT_LT(error_in_building_m(m, T_AR), before);
+    EXPECT_LT(error_in_building_m(m, T_AR), 0.012);
+  }
+}
+
 TEST(FinalAdjustment, SameBitsAndNothingToDo) {
   Mapped a = mapped(5), b = a;
   adjust_map(a.map, {});

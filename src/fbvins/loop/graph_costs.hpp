@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Residuals of keyframe poses for automatic differentiation, shared by the pose graph and the final adjustment
-// (docs/derivations/loop.md, L8-L10). A node is x = (p, yaw about M's z) or (p, dtheta in B), about a starting orientation.
+// (docs/derivations/loop.md, L8-L10, L22). A node is x = (p, yaw about M's z) or (p, dtheta in B), about a starting orientation.
 #pragma once
 
 #include <ceres/solver.h>
@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "fbvins/geometry/pose.hpp"
+#include "fbvins/loop/partial_pose.hpp"
 
 namespace fbvins {
 
@@ -58,6 +59,26 @@ struct EdgeCost {
     Eigen::Matrix<T, 6, 1> r;
     r.template head<3>() = Ra.conjugate() * Eigen::Matrix<T, 3, 1>(pb - pa) - T_ab.p.cast<T>();
     const Eigen::Quaternion<T> e = T_ab.q.conjugate().cast<T>() * (Ra.conjugate() * Rb);
+    r.template tail<3>() = e.vec() * (e.w() < T(0) ? T(-2) : T(2));
+    Eigen::Map<Eigen::Matrix<T, 6, 1>>(out, 6) = root.cast<T>() * r;
+    return true;
+  }
+};
+
+/// A measurement of a node by itself.
+template <int Dof>
+struct AnchorCost {
+  Quat q;
+  PartialPose measured;
+  Mat6 root;  // of the weighted information
+
+  template <class T>
+  bool operator()(const T* a, T* out) const {
+    using V3 = Eigen::Matrix<T, 3, 1>;
+    const Eigen::Quaternion<T> R = orientation<Dof>(q, a);
+    Eigen::Matrix<T, 6, 1> r;
+    r.template head<3>() = R * V3(measured.p_B.cast<T>()) + Eigen::Map<const V3>(a) - V3(measured.T_AB.p.template cast<T>());
+    const Eigen::Quaternion<T> e = measured.T_AB.q.conjugate().cast<T>() * R;
     r.template tail<3>() = e.vec() * (e.w() < T(0) ? T(-2) : T(2));
     Eigen::Map<Eigen::Matrix<T, 6, 1>>(out, 6) = root.cast<T>() * r;
     return true;

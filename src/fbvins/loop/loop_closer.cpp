@@ -21,7 +21,8 @@ constexpr double kFoundSigma_m = 0.05, kFoundSigma_rad = 0.01;
 /// Search radius around a predicted feature: the narrowest plus three standard deviations (for a point at a typical depth);
 /// from the widest on the prediction is not used.
 constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDepth_m = 2, kWidestPrediction_px = 45;
-/// New loops after which the graph is optimised; in a large map one for every kOptimiseShare keyframes.
+/// New loops and keyframes with anchors after which the graph is optimised; in a large map one for every kOptimiseShare
+/// keyframes.
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
@@ -62,6 +63,7 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
     session_.number = std::max(session_.number, k.session);
   }
   map_.T_BC0 = T_BC0_;
+  map_.anchored = map_.anchored && !map_.empty();
 }
 
 /// Whether a keyframe would add nothing to the map, in which the flight knows where it is: it shows the newest place, or none,
@@ -79,6 +81,7 @@ MapUpdate LoopCloser::process(const Keyframe& keyframe) {
   if (adds_nothing(keyframe)) {
     MapUpdate update = begin_update(keyframe);
     advance(keyframe);
+    take_anchors(keyframe, update);
     end_update(keyframe, update);
     return update;
   }
@@ -97,6 +100,7 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
               .began_map = map_.empty(),
               .q_LG = keyframe.gauge.q_LG};
   drift_.restart();
+  motion_.forget();
   relocaliser_.forget();
   frame_.forget();
   follower_.forget();
@@ -105,17 +109,20 @@ void LoopCloser::begin_session(const Keyframe& keyframe) {
 }
 
 /// Gravity has become better known. Where the flight began the map, M is aligned with it as a whole, which changes no
-/// relative pose; where it has joined an older one, M is gravity-aligned already, and the flight's own keyframes are rotated.
+/// relative pose; where anchors hold it, the body stays where it is. Where the flight has joined an older one, M is
+/// gravity-aligned already, and the flight's own keyframes are rotated.
 void LoopCloser::level(const Quat& q_LG) {
   const Quat turned = q_LG * session_.q_LG.conjugate();
+  const Quat turned_in_M = frame_.yaw() * turned * frame_.yaw().conjugate();
   session_.q_LG = q_LG;
   if (angle_between(turned, Quat::Identity()) == 0) return;
   map_.level(session_.number, q_LG);
-  if (session_.began_map) {
-    if (!map_.empty()) frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
+  if (session_.began_map && !map_.empty()) {
+    if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
+    else frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
   } else {
     for (MapKeyframe& k : map_.keyframes())
-      if (k.session == session_.number) k.T_MB.q = (frame_.yaw() * turned * frame_.yaw().conjugate() * k.T_MB.q).normalized();
+      if (k.session == session_.number) k.T_MB.q = (turned_in_M * k.T_MB.q).normalized();
   }
   frame_.level(q_LG);
 }
@@ -125,6 +132,7 @@ void LoopCloser::advance(const Keyframe& keyframe) {
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
   if (session_.T_GB) session_.path_m += (T_GB.p - session_.T_GB->p).norm();
   session_.T_GB = T_GB;
+  motion_.add(keyframe);
   drift_.take(keyframe.pose_covariance, keyframe.gauge, session_.path_m);
   frame_.advance(T_GB, keyframe.t, drift_.rate());
   const std::vector<ImuSegment>& read = keyframe.imu.segments;
@@ -165,6 +173,7 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   update.stats.keyframes = static_cast<int>(map_.size());
   update.localised = frame_.known();
   update.map_session = session_.number;
+  update.anchored = map_.anchored;
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
   update.T_MW = update.T_MG * keyframe.T_WG.inverse();
@@ -184,6 +193,7 @@ MapUpdate LoopCloser::process(Place place, const Keyframe& keyframe) {
   update.stats.verify_ms = timer.lap_ms();
   update.stats.candidates = static_cast<int>(candidates.size());
   add(std::move(query), keyframe.imu, found, update);
+  take_anchors(keyframe, update);
   if (optimisation_due()) optimise(update);
   while (const auto id = thinning_.next(map_)) take_out(*id);
   update.stats.optimise_ms = timer.lap_ms();
@@ -289,19 +299,19 @@ void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vecto
     map_.edges.push_back(e);
     update.loops.push_back({e.from, id, e.T_from_to, e.information, 0});
   }
-  loops_since_optimised_ += static_cast<int>(found.size());
+  news_since_optimised_ += static_cast<int>(found.size());
   thinning_.note(id, found, size_before);
   flight_.add(t, id);
   session_.newest = id;
 }
 
 bool LoopCloser::optimisation_due() const {
-  return frame_.known() && loops_since_optimised_ >= std::max(kOptimiseAfter, static_cast<int>(map_.size()) / kOptimiseShare);
+  return frame_.known() && news_since_optimised_ >= std::max(kOptimiseAfter, static_cast<int>(map_.size()) / kOptimiseShare);
 }
 
 void LoopCloser::optimise(MapUpdate& update) {
   map_.optimise({options_.degrees_of_freedom});
-  loops_since_optimised_ = 0;
+  news_since_optimised_ = 0;
   if (const MapKeyframe* newest = map_.find(session_.newest); newest != nullptr && frame_.known()) {
     const Mat4 P = frame_.covariance();
     frame_.reset(newest->T_MB * newest->T_GB.inverse(), std::sqrt(P.topLeftCorner<3, 3>().trace() / 3), std::sqrt(P(3, 3)));

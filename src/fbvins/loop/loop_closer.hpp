@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Keyframe -> MapUpdate: recognises places, verifies them by their images and against the odometry's own uncertainty,
-// corrects the map frame at once and the whole map now and then (docs/derivations/loop.md).
+// corrects the map frame at once and the whole map now and then. Anchors do so as well, and make M the frame of their building
+// (docs/derivations/loop.md).
 // A plain synchronous stage; one instance is used by one thread at a time.
 //
 //   LoopCloser closer(rig, LoopOptions{}, *vocabulary);
@@ -14,6 +15,7 @@
 #include <optional>
 #include <vector>
 
+#include "fbvins/loop/anchor_fit.hpp"
 #include "fbvins/loop/candidate_search.hpp"
 #include "fbvins/loop/flight_anchors.hpp"
 #include "fbvins/loop/loop_options.hpp"
@@ -22,6 +24,7 @@
 #include "fbvins/loop/place_extractor.hpp"
 #include "fbvins/loop/place_map.hpp"
 #include "fbvins/loop/place_verifier.hpp"
+#include "fbvins/loop/recent_motion.hpp"
 #include "fbvins/loop/relocaliser.hpp"
 #include "fbvins/loop/thinning.hpp"
 #include "fbvins/types/mapper.hpp"
@@ -86,6 +89,10 @@ class LoopCloser final : public Mapper {
   void join_session(const Pose<M, G>& T_MG);
   std::shared_ptr<const Preintegration> readings_since_newest(Time t, const KeyframeImu& imu) const;
   void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
+  void take_anchors(const Keyframe& keyframe, MapUpdate& update);
+  std::optional<MapAnchor> attached(const Anchor& anchor) const;
+  std::vector<AnchoredPose> anchored_poses() const;
+  void find_building(MapUpdate& update);
   bool optimisation_due() const;
   void optimise(MapUpdate& update);
   void take_out(KeyframeId id);
@@ -102,8 +109,9 @@ class LoopCloser final : public Mapper {
   Relocaliser relocaliser_;
   Thinning thinning_;
   FlightAnchors flight_;
+  RecentMotion motion_;
   Session session_;
-  int loops_since_optimised_ = 0;
+  int news_since_optimised_ = 0;  ///< loops, and keyframes with anchors
 };
 
 }  // namespace fbvins

@@ -57,6 +57,7 @@ PlaceMap cut_map(PlaceMap map, const MapBox& box, bool remove_inside) {
 
 Result<MapAlignment> align_map(PlaceMap& map, const std::vector<SurveyedPoint>& points) {
   const auto refuse = [](const std::string& why) { return Error{ErrorCode::invalid_argument, why}; };
+  if (map.anchored) return refuse("the map is anchored: its anchors put it into the axes of its building already");
   if (points.size() < 3) return refuse(fmt::format("{} points are given where three are needed", points.size()));
   for (const SurveyedPoint& pair : points)
     if (!pair.p_M.allFinite() || !pair.p_building.allFinite()) return refuse("a point is not finite");

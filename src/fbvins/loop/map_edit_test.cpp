@@ -82,6 +82,9 @@ TEST(AlignMap, PointsThatDoNotFitAreRefused) {
             "2 points are given where three are needed");
   EXPECT_NE(with([](const Vec3& p) { return Vec3(p.x(), -p.y(), p.z()); }).error().message.find("mirrored"), std::string::npos);
   EXPECT_FALSE(with([](const Vec3& p) { return Vec3(2 * p); })) << "another scale";
+  map.anchored = true;
+  EXPECT_NE(with([](const Vec3& p) { return p; }).error().message.find("anchored"), std::string::npos);
+  map.anchored = false;
   EXPECT_FALSE(with([](const Vec3& p) { return Vec3(p.x(), p.z(), p.y()); })) << "other axes";
   EXPECT_NE(
       align_map(map, {{{1, 1, 0}, {0, 0, 0}}, {{1, 1, 5}, {0, 0, 5}}, {{1, 1, 9}, {0, 0, 9}}}).error().message.find("heading"),

@@ -130,13 +130,24 @@ MapKeyframe get_keyframe(Reader& r) {
   return k;
 }
 
+void put_information(Writer& w, const Mat6& information) {
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) w.put(information(i, j));
+}
+
+Mat6 get_information(Reader& r) {
+  Mat6 information;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) information(i, j) = information(j, i) = r.get<double>();
+  return information;
+}
+
 void put(Writer& w, const MapEdge& e) {
   w.put(e.from.value);
   w.put(e.to.value);
   w.put(static_cast<std::uint32_t>(e.kind));
   w.put(e.T_from_to);
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) w.put(e.information(i, j));
+  put_information(w, e.information);
 }
 
 MapEdge get_edge(Reader& r) {
@@ -147,15 +158,31 @@ MapEdge get_edge(Reader& r) {
   r.check(kind <= 1);
   e.kind = static_cast<MapEdge::Kind>(kind);
   e.T_from_to = r.pose<Pose<B, B>>();
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) e.information(i, j) = e.information(j, i) = r.get<double>();
+  e.information = get_information(r);
   // The pose graph takes roots of it.
   r.check(e.information.allFinite() && Eigen::LLT<Mat6>(e.information).info() == Eigen::Success);
   return e;
 }
 
-/// Flags, which the checksum covers: descriptors are boosted; a name follows the edges.
-constexpr std::uint32_t kBoosted = 1, kNamed = 2;
+void put(Writer& w, const MapAnchor& a) {
+  w.put(a.keyframe.value);
+  w.put(a.measured.p_B);
+  w.put(a.measured.T_AB);
+  put_information(w, a.measured.information);
+}
+
+MapAnchor get_anchor(Reader& r) {
+  MapAnchor a;
+  a.keyframe.value = r.get<std::int64_t>();
+  a.measured.p_B = r.vec3();
+  a.measured.T_AB = r.pose<Pose<A, B>>();
+  a.measured.information = get_information(r);
+  r.check(a.measured.information.allFinite() && is_information(a.measured.information));
+  return a;
+}
+
+/// Flags, which the checksum covers: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame.
+constexpr std::uint32_t kBoosted = 1, kNamed = 2, kAnchors = 4, kAnchored = 8;
 constexpr std::size_t kLongestName = 200;
 
 std::string get_name(Reader& r) {
@@ -191,11 +218,19 @@ std::string serialise_map(const PlaceMap& map) {
     body.put(static_cast<std::uint32_t>(name.size()));
     body.raw(name.data(), name.size());
   }
+  std::vector<const MapAnchor*> anchors;
+  for (const MapAnchor& a : map.anchors)
+    if (kept.count(a.keyframe) > 0) anchors.push_back(&a);
+  if (!anchors.empty()) {
+    body.put(static_cast<std::uint32_t>(anchors.size()));
+    for (const MapAnchor* a : anchors) put(body, *a);
+  }
   const std::string bytes = body.take();
   Writer head;
   head.raw(kMagic, sizeof kMagic);
   head.put(kMapVersion);
-  const std::uint32_t flags = (map.boosted ? kBoosted : 0) | (name.empty() ? 0 : kNamed);
+  const std::uint32_t flags = (map.boosted ? kBoosted : 0) | (name.empty() ? 0 : kNamed) | (anchors.empty() ? 0 : kAnchors) |
+                              (map.anchored ? kAnchored : 0);
   head.put(flags);
   head.put(static_cast<std::uint64_t>(bytes.size()));
   head.put(checksum64(std::as_bytes(std::span(bytes))) ^ flags);
@@ -212,7 +247,7 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   if (version != kMapVersion)
     return Error{ErrorCode::unsupported, fmt::format("{}: map of version {}, this program reads {}", name, version, kMapVersion)};
   const auto flags = head.get<std::uint32_t>();
-  if ((flags & ~(kBoosted | kNamed)) != 0) return damaged(name, "unknown flags");
+  if ((flags & ~(kBoosted | kNamed | kAnchors | kAnchored)) != 0) return damaged(name, "unknown flags");
   if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
   if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags))
     return damaged(name, "the checksum differs");
@@ -220,6 +255,7 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   Reader r(bytes.subspan(kHeaderBytes));
   PlaceMap map;
   map.boosted = (flags & kBoosted) != 0;
+  map.anchored = (flags & kAnchored) != 0;
   const auto keyframes = r.get<std::uint32_t>(), edges = r.get<std::uint32_t>();
   map.T_BC0 = r.pose<Pose<B, C0>>();
   KeyframeId last;
@@ -235,6 +271,12 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
     if (r.ok()) map.edges.push_back(e);
   }
   if (r.ok() && (flags & kNamed) != 0) map.name = get_name(r);
+  const std::uint32_t anchors = r.ok() && (flags & kAnchors) != 0 ? r.get<std::uint32_t>() : 0;
+  for (std::uint32_t i = 0; i < anchors && r.ok(); ++i) {
+    MapAnchor a = get_anchor(r);
+    r.check(map.find(a.keyframe) != nullptr);
+    if (r.ok()) map.anchors.push_back(a);
+  }
   if (!r.ok() || !r.at_end()) return damaged(name, "its content makes no sense");
   return map;
 }

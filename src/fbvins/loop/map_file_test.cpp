@@ -43,6 +43,15 @@ PlaceMap map_of(int keyframes, std::uint64_t seed) {
   return map;
 }
 
+PlaceMap anchored_map_of(int keyframes, std::uint64_t seed) {
+  PlaceMap map = map_of(keyframes, seed);
+  map.anchored = true;
+  map.add_anchor({KeyframeId{0}, measurement_of(PositionAnchor{.p_A = Vec3(1, 2, 3), .p_B = Vec3(0.1, 0, 0)})});
+  map.add_anchor({KeyframeId{1}, measurement_of(HeightAnchor{.z_A_m = 1})});
+  map.add_anchor({KeyframeId{2}, measurement_of(TagAnchor{.T_BT = {so3_exp(Vec3(1, 0, 0.2)), Vec3(2, 0, 0)}})});
+  return map;
+}
+
 std::span<const std::byte> view(const std::string& s) { return std::as_bytes(std::span(s)); }
 
 class MapFile : public testing::Test {
@@ -69,6 +78,22 @@ TEST_F(MapFile, RemembersWhichDescriptorsItHolds) {
   EXPECT_TRUE(parse_map(view(serialise_map(map)), "map")->boosted);
 }
 
+TEST_F(MapFile, AnchorsAreKept) {
+  PlaceMap map = anchored_map_of(5, 1);
+  for (const char* name : {"", "Hall 3"}) {
+    map.name = name;
+    const auto parsed = parse_map(view(serialise_map(map)), "map");
+    ASSERT_TRUE(parsed.ok()) << parsed.error().message;
+    EXPECT_TRUE(parsed->anchored);
+    ASSERT_EQ(parsed->anchors.size(), 3u);
+    EXPECT_EQ(parsed->anchors[2].measured.information, map.anchors[2].measured.information);
+    EXPECT_EQ(serialise_map(*parsed), serialise_map(map));
+  }
+  map.keyframes()[1].placed = false;
+  EXPECT_EQ(parse_map(view(serialise_map(map)), "map")->anchors.size(), 2u);
+  EXPECT_FALSE(parse_map(view(serialise_map(map_of(5, 1))), "map")->anchored);
+}
+
 TEST_F(MapFile, PlacesWithoutAPoseAreLeftOut) {
   PlaceMap map = map_of(10, 1);
   map.keyframes()[9].placed = false;
@@ -80,7 +105,7 @@ TEST_F(MapFile, PlacesWithoutAPoseAreLeftOut) {
 }
 
 TEST_F(MapFile, EveryDamageIsAnErrorWithASentence) {
-  const std::string good = serialise_map(map_of(5, 2));
+  const std::string good = serialise_map(anchored_map_of(5, 2));
   Rng rng(3);
   for (int i = 0; i < 2000; ++i) {
     std::string bad = good;
@@ -95,7 +120,7 @@ TEST_F(MapFile, EveryDamageIsAnErrorWithASentence) {
 
 TEST_F(MapFile, ContentThatPassesTheChecksumIsCheckedAllTheSame) {
   // Wrong counts and values, with the checksum made right: an error, never a crash.
-  const std::string good = serialise_map(map_of(5, 2));
+  const std::string good = serialise_map(anchored_map_of(5, 2));
   Rng rng(4);
   for (int i = 0; i < 3000; ++i) {
     std::string bad = good;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/loop/pose_graph.hpp"
+
 namespace fbvins {
 namespace {
 
@@ -79,6 +81,32 @@ void MapFrame::update(const MeasuredPose& seen) {
   const Vec4 d = K * v;
   const Mat4 A = Mat4::Identity() - K;
   P_ = A * P_ * A.transpose() + K * seen.covariance * K.transpose();
+  put(yaw_rad_ + d[3], T_MG_ * body() + d.head<3>());
+}
+
+MapFrame::Whitened MapFrame::innovation(const PartialPose& seen, const Pose<G, B>& T_GB) const {
+  const Pose<M, B> T_MB = T_MG_ * T_GB;
+  const Vec3 up_B = T_MB.q.conjugate() * Vec3::UnitZ();
+  const Mat6 S = root_of(widened(seen.information, tilt_error(seen, T_MB.q, up_B, kTilt_rad)));
+  Eigen::Matrix<double, 6, 4> H = Eigen::Matrix<double, 6, 4>::Zero();
+  H.topLeftCorner<3, 3>().setIdentity();
+  H.topRightCorner<3, 1>() = Vec3::UnitZ().cross(T_MB * seen.p_B - T_MG_ * body());
+  H.bottomRightCorner<3, 1>() = up_B;
+  return {-S * residual(seen, T_MB.q, T_MB.p), S * H};
+}
+
+double MapFrame::mahalanobis2(const PartialPose& seen, const Pose<G, B>& T_GB) const {
+  const auto [v, H] = innovation(seen, T_GB);
+  return v.dot(Mat6(H * P_ * H.transpose() + Mat6::Identity()).ldlt().solve(v));
+}
+
+void MapFrame::update(const PartialPose& seen, const Pose<G, B>& T_GB) {
+  const auto [v, H] = innovation(seen, T_GB);
+  const Mat6 S = H * P_ * H.transpose() + Mat6::Identity();
+  const Eigen::Matrix<double, 4, 6> K = S.ldlt().solve(H * P_).transpose();
+  const Vec4 d = K * v;
+  const Mat4 remains = Mat4::Identity() - K * H;
+  P_ = remains * P_ * remains.transpose() + K * K.transpose();
   put(yaw_rad_ + d[3], T_MG_ * body() + d.head<3>());
 }
 

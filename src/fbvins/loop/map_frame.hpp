@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The present pose of a flight's gauge G in the map M: a Kalman filter over position and yaw of the body in M, predicted with
 // the odometry's drift and updated by recognised places (docs/derivations/loop.md, L12-L14); its tilt is not filtered but
-// the flight's own estimate of gravity. And a follower of T_MW of limited speed, for controllers that fly in M.
-// Values; one thread at a time.
+// the flight's own estimate of gravity. Where M is the frame of anchors, they update it as well (L23). And a follower of T_MW of
+// limited speed, for controllers that fly in M. Values; one thread at a time.
 //
 //   MapFrame frame;
 //   frame.level(q_LG);
@@ -17,6 +17,7 @@
 #include "fbvins/core/time.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/loop/loop_options.hpp"
+#include "fbvins/loop/partial_pose.hpp"
 #include "fbvins/types/gauge.hpp"
 
 namespace fbvins {
@@ -61,12 +62,21 @@ class MapFrame {
   void advance(const Pose<G, B>& T_GB, Time t, const DriftOptions& drift);
   double mahalanobis2(const MeasuredPose& seen) const;
   void update(const MeasuredPose& seen);
+  /// The same for an anchor that measures the body at `T_GB`, which may be an earlier pose; M is the anchors' frame.
+  double mahalanobis2(const PartialPose& seen, const Pose<G, B>& T_GB) const;
+  void update(const PartialPose& seen, const Pose<G, B>& T_GB);
 
  private:
   struct Stamped {
     Time t;
     Pose<G, B> T_GB;
   };
+  /// Measured minus predicted, of unit variance, and the derivatives of the prediction by the state.
+  struct Whitened {
+    Vec6 v;
+    Eigen::Matrix<double, 6, 4> H;
+  };
+  Whitened innovation(const PartialPose& seen, const Pose<G, B>& T_GB) const;
   Vec4 innovation(const MeasuredPose& seen) const;
   /// Where the body is in G; its origin before the odometry has begun.
   Vec3 body() const { return last_ ? last_->T_GB.p : Vec3(Vec3::Zero()); }

@@ -81,6 +81,34 @@ TEST(MapFrame, MahalanobisIsOneAtOneStandardDeviation) {
   EXPECT_NEAR(frame.mahalanobis2(seen), 1, 1e-9);
 }
 
+TEST(MapFrame, AnAnchorsGateAndUpdateAreThoseOfItsPoint) {
+  const Quat q_LG = so3_exp(Vec3(0.02, -0.03, 0));
+  MapFrame frame;
+  frame.level(q_LG);
+  frame.advance(body_at(Vec3(5, 0, 1)), Time{0}, {});
+  frame.reset({about_z(0.5) * q_LG, Vec3(1, 2, 3)}, 0.3, 0.1);
+  const Pose<G, B> before = body_at(Vec3(2, 1, 1));  // three metres behind
+  PositionAnchor a{.p_A = frame.T_MG() * Vec3(2, 1, 1.5), .covariance = 0.16 * Mat3::Identity(), .p_B = Vec3(0, 0, 0.5)};
+  EXPECT_NEAR(frame.mahalanobis2(measurement_of(a), before), 0, 1e-9);
+  a.p_A.z() += 0.5;  // a standard deviation: 0.09 + 0.16
+  EXPECT_NEAR(frame.mahalanobis2(measurement_of(a), before), 1, 0.01);
+  const Mat4 P = frame.covariance();
+  frame.update(measurement_of(a), before);
+  for (int i = 0; i < 4; ++i) EXPECT_LT(frame.covariance()(i, i), P(i, i));
+  EXPECT_GT(frame.T_MG().p.z(), 3.1);
+  // The truth is turned by 0.1 rad about the body now: a precise point behind shows it.
+  const Vec3 body_M = frame.T_MG() * Vec3(5, 0, 1);
+  PositionAnchor behind{.p_A = body_M + about_z(0.1) * (frame.T_MG() * Vec3(2, 1, 1) - body_M),
+                        .covariance = 1e-6 * Mat3::Identity()};
+  const Quat q_before = frame.yaw();
+  PositionAnchor here{.p_A = body_M, .covariance = 1e-6 * Mat3::Identity()};
+  for (int i = 0; i < 5; ++i) {
+    frame.update(measurement_of(here), body_at(Vec3(5, 0, 1)));
+    frame.update(measurement_of(behind), before);
+  }
+  EXPECT_NEAR(yaw_of(frame.yaw() * q_before.conjugate()), 0.1, 0.01);
+}
+
 TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
   MapFrameFollower follower(0.2, 0.05);
   const Pose<W, B> T_WB(Quat::Identity(), Vec3(30, 0, 0));  // far from the origin: a change of yaw must not move the body

@@ -9,6 +9,8 @@
 namespace fbvins {
 namespace {
 
+constexpr std::size_t kMostAnchors = 20000;
+
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
   const auto it =
@@ -94,6 +96,10 @@ void PlaceMap::remove(KeyframeId id) {
       const MapEdge moved = composed(*bridge, e.from == id ? e : reversed(e), MapEdge::Kind::loop);
       if (moved.from != moved.to) added.push_back(moved);
     }
+  for (MapAnchor& a : anchors)
+    if (a.keyframe == id && bridge != nullptr)
+      a = {bridge->from, carried(a.measured, bridge->T_from_to, bridge->information.inverse())};
+  std::erase_if(anchors, [&](const MapAnchor& a) { return a.keyframe == id; });
   std::erase_if(edges, [&](const MapEdge& e) { return e.from == id || e.to == id; });
   edges.insert(edges.end(), added.begin(), added.end());
   keyframes_.erase(keyframes_.begin() + (gone - keyframes_.data()));
@@ -101,9 +107,22 @@ void PlaceMap::remove(KeyframeId id) {
 
 Pose<M, M> PlaceMap::turn(const Quat& rotation, const Vec3& pivot_M) {
   const Pose<M, M> T(rotation, Vec3(pivot_M - rotation * pivot_M));
+  move(T);
+  return T;
+}
+
+void PlaceMap::move(const Pose<M, M>& T) {
   for (MapKeyframe& k : keyframes_)
     if (k.placed) k.T_MB = T * k.T_MB;
-  return T;
+}
+
+void PlaceMap::add_anchor(MapAnchor anchor) {
+  anchors.push_back(std::move(anchor));
+  if (anchors.size() <= kMostAnchors) return;
+  const auto begin = anchors.begin(), middle = begin + kMostAnchors / 2;
+  auto kept = begin;
+  for (auto a = begin; a < middle; a += 2) *kept++ = *a;
+  anchors.erase(kept, middle);
 }
 
 void PlaceMap::level(std::uint32_t session, const Quat& q_LG) {
@@ -111,30 +130,45 @@ void PlaceMap::level(std::uint32_t session, const Quat& q_LG) {
     if (k.session == session) k.place.up_C0 = (q_LG * k.T_GB.q * T_BC0.q).conjugate() * Vec3::UnitZ();
 }
 
-PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
-  if (keyframes_.empty()) return {};
-  PoseGraph graph;
-  const auto index_of = [&](KeyframeId id) { return static_cast<int>(find(id) - keyframes_.data()); };
-  // Keyframes connected to the first one; the others have no place in M yet and stay as they are.
+/// Keyframes connected to the first one or to an anchored one; the others have no place in M yet and stay as they are.
+std::vector<bool> PlaceMap::in_graph() const {
   std::vector<std::vector<int>> neighbours(keyframes_.size());
   for (const MapEdge& e : edges) {
     neighbours[static_cast<std::size_t>(index_of(e.from))].push_back(index_of(e.to));
     neighbours[static_cast<std::size_t>(index_of(e.to))].push_back(index_of(e.from));
   }
   std::vector<bool> joined(keyframes_.size(), false);
-  std::vector<int> open{0};
-  joined[0] = true;
+  std::vector<int> open;
+  const auto join = [&](int i) {
+    if (!joined[static_cast<std::size_t>(i)]) joined[static_cast<std::size_t>(i)] = true, open.push_back(i);
+  };
+  join(0);
+  for (const MapAnchor& a : anchors)
+    if (const int i = index_of(a.keyframe); anchored && keyframes_[static_cast<std::size_t>(i)].placed) join(i);
   while (!open.empty()) {
     const int at = open.back();
     open.pop_back();
-    for (const int n : neighbours[static_cast<std::size_t>(at)])
-      if (!joined[static_cast<std::size_t>(n)]) joined[static_cast<std::size_t>(n)] = true, open.push_back(n);
+    for (const int n : neighbours[static_cast<std::size_t>(at)]) join(n);
   }
+  return joined;
+}
+
+PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
+  if (keyframes_.empty()) return {};
+  PoseGraph graph;
+  const std::vector<bool> joined = in_graph();
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
-    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, i == 0 || !joined[i]);
+    graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !joined[i] || (i == 0 && !anchored));
   for (const MapEdge& e : edges) {
     const int a = index_of(e.from), b = index_of(e.to);
     if (joined[static_cast<std::size_t>(a)]) graph.add_edge({a, b, e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1});
+  }
+  if (anchored) {
+    for (const MapAnchor& a : anchors)
+      if (joined[static_cast<std::size_t>(index_of(a.keyframe))]) graph.add_anchor({index_of(a.keyframe), a.measured});
+    for (std::size_t i = 0; i < keyframes_.size(); ++i)
+      if (joined[i] && (i == 0 || keyframes_[i].session != keyframes_[i - 1].session))
+        graph.add_anchor({static_cast<int>(i), about_here(keyframes_[i].T_MB), true});
   }
   const PoseGraphReport report = graph.optimise(options);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_MB = graph.poses()[i];

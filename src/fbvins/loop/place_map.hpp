@@ -55,11 +55,17 @@ struct MapEdge {
   std::shared_ptr<const Preintegration> imu = {};
 };
 
+/// An anchor, as a measurement of the keyframe nearest to it on the flight.
+struct MapAnchor {
+  KeyframeId keyframe;
+  PartialPose measured;
+};
+
 class PlaceMap {
  public:
   /// Adds it, under a new id unless it has one.
   KeyframeId add(MapKeyframe keyframe);
-  /// Removes it; its neighbours are joined directly: composed odometry, loops moved to the keyframe before it.
+  /// Removes it; its neighbours are joined directly: composed odometry, loops and anchors moved to the keyframe before it.
   void remove(KeyframeId id);
 
   bool empty() const { return keyframes_.empty(); }
@@ -69,21 +75,31 @@ class PlaceMap {
   const MapKeyframe* find(KeyframeId id) const;
   MapKeyframe* find(KeyframeId id);
 
-  /// Turns all keyframes that have a place in M about `pivot_M`. Returns the motion.
+  /// Moves all keyframes that have a place in M.
+  void move(const Pose<M, M>& T);
+  /// Turns them about `pivot_M`. Returns the motion.
   Pose<M, M> turn(const Quat& rotation, const Vec3& pivot_M);
   /// Sets the verticals of all keyframes of a session from `q_LG`, which turns its gauge level.
   void level(std::uint32_t session, const Quat& q_LG);
 
-  /// Optimises the keyframes that edges connect to the first one.
+  /// A map that is longer flown in keeps every second of its older anchors, so that their number stays bounded.
+  void add_anchor(MapAnchor anchor);
+
+  /// Optimises the keyframes that edges connect to the first one or, in an anchored map, to one with an anchor.
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   std::vector<MapEdge> edges;
+  std::vector<MapAnchor> anchors;
+  bool anchored = false;       ///< M is the frame A of the anchors
   Pose<B, C0> T_BC0;           ///< of the camera that saw the places
   double gravity_mps2 = 9.81;  ///< of the readings on its edges
   bool boosted = false;        ///< descriptors are boosted ones, which compare with such only
   std::string name;            ///< for people; empty: none
 
  private:
+  std::vector<bool> in_graph() const;
+  int index_of(KeyframeId id) const { return static_cast<int>(find(id) - keyframes_.data()); }
+
   std::vector<MapKeyframe> keyframes_;
   std::int64_t next_id_ = 0;
 };

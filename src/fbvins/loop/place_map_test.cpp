@@ -137,5 +137,42 @@ TEST(ComposeCovariance, AgreesWithSamples) {
   EXPECT_LT((sampled - cov).norm(), 0.05 * cov.norm());
 }
 
+TEST(PlaceMap, AnchorsOfARemovedKeyframeGoToItsNeighbour) {
+  PlaceMap map = chain(3);
+  const auto anchor_of = [&](int i) {
+    return MapAnchor{KeyframeId{i}, measurement_of(PositionAnchor{.p_A = map.keyframes()[static_cast<std::size_t>(i)].T_MB.p})};
+  };
+  map.add_anchor(anchor_of(0)), map.add_anchor(anchor_of(1)), map.add_anchor(anchor_of(2));
+  map.remove(KeyframeId{1});
+  ASSERT_EQ(map.anchors.size(), 3u);
+  const MapAnchor& moved = map.anchors[1];
+  const Pose<M, B>& T_MB = map.find(moved.keyframe)->T_MB;
+  EXPECT_LT(residual(moved.measured, T_MB.q, T_MB.p).head<3>().norm(), 1e-9);
+  EXPECT_LT(moved.measured.information(0, 0), 0.9) << "by an uncertain way";
+}
+
+TEST(PlaceMap, AnchorsOfALongTimeAreThinned) {
+  PlaceMap map = chain(1);
+  for (int i = 0; i < 50000; ++i) map.add_anchor({KeyframeId{0}, measurement_of(HeightAnchor{.z_A_m = static_cast<double>(i)})});
+  EXPECT_LE(map.anchors.size(), 20000u);
+  EXPECT_GT(map.anchors.size(), 10000u);
+  EXPECT_EQ(map.anchors.back().measured.T_AB.p.z(), 49999);
+}
+
+TEST(PlaceMap, AnAnchoredOneMovesToItsAnchorsAndAnotherStays) {
+  for (const bool anchored : {false, true}) {
+    PlaceMap map = chain(4);
+    map.anchored = anchored;
+    const Pose<A, M> T_AM(so3_exp(Vec3(0, 0, 0.3)), Vec3(0.2, -0.1, 0.4));
+    for (const MapKeyframe& k : map.keyframes()) {
+      map.add_anchor({k.id, measurement_of(PositionAnchor{.p_A = T_AM * k.T_MB.p, .covariance = 1e-6 * Mat3::Identity()})});
+    }
+    const Vec3 first = map.keyframes()[0].T_MB.p;
+    map.optimise({});
+    if (anchored) EXPECT_LT((map.keyframes()[0].T_MB.p - T_AM * first).norm(), 1e-3);
+    else EXPECT_EQ(map.keyframes()[0].T_MB.p, first);
+  }
+}
+
 }  // namespace
 }  // namespace fbvins

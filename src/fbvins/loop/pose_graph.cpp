@@ -18,6 +18,8 @@ constexpr int kMaxIterations = 12;  // of one solve
 constexpr double kOutlier_sigma = 4.0, kRejectedWeight = 0.1;
 /// Factor by which each round of graduated non-convexity reduces mu.
 constexpr double kMuStep = 2.0;
+/// Anchors may be off by the size of a building: beyond this they do not make mu larger, which would cost solves.
+constexpr double kLargestChi2 = 1e4;
 /// A loop that counts for nothing still keeps its block of the problem definite.
 constexpr double kMinWeight = 1e-6;
 
@@ -29,6 +31,23 @@ void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& infor
   auto* cost =
       new ceres::AutoDiffCostFunction<EdgeCost<Dof>, 6, Dof, Dof>(new EdgeCost<Dof>{poses[a].q, poses[b].q, e.T_ab, root});
   problem.AddResidualBlock(cost, nullptr, x[a].data(), x[b].data());
+}
+
+template <int Dof>
+void add_cost(ceres::Problem& problem, const PoseGraphAnchor& anchor, const Mat6& information,
+              const std::vector<Pose<M, B>>& poses, std::vector<std::array<double, 6>>& x) {
+  const auto i = static_cast<std::size_t>(anchor.node);
+  const double weight = anchor.certain ? 1 : std::max(anchor.weight, kMinWeight);
+  auto* cost = new ceres::AutoDiffCostFunction<AnchorCost<Dof>, 6, Dof>(
+      new AnchorCost<Dof>{poses[i].q, anchor.measured, std::sqrt(weight) * root_of(information)});
+  problem.AddResidualBlock(cost, nullptr, x[i].data());
+}
+
+/// Geman-McClure's weight of a squared residual (L11).
+double weight_of(double chi2, double mu) {
+  constexpr double c2 = kOutlier_sigma * kOutlier_sigma;
+  const double s = mu * c2 / (chi2 + mu * c2);
+  return s * s;
 }
 
 }  // namespace
@@ -68,6 +87,19 @@ Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOpti
   return weight * 0.5 * (information + information.transpose());
 }
 
+double PoseGraph::chi2(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const {
+  const Pose<M, B>& T_MB = poses_[static_cast<std::size_t>(anchor.node)];
+  const Vec6 r = residual(anchor.measured, T_MB.q, T_MB.p);
+  return r.dot(information_of(anchor, options) * r);
+}
+
+/// As for loops (L9), the error of roll and pitch, which a node of four degrees of freedom cannot correct, is the measurement's.
+Mat6 PoseGraph::information_of(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const {
+  if (options.degrees_of_freedom == 6) return anchor.measured.information;
+  const auto i = static_cast<std::size_t>(anchor.node);
+  return widened(anchor.measured.information, tilt_error(anchor.measured, poses_[i].q, up_B_[i], kTilt_rad));
+}
+
 int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   ceres::Problem problem;
   std::vector<std::array<double, 6>> x(poses_.size());
@@ -77,6 +109,11 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
     if (options.degrees_of_freedom == 4) add_cost<4>(problem, e, weighted_information(e, options), poses_, x);
     else add_cost<6>(problem, e, weighted_information(e, options), poses_, x);
     used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
+  }
+  for (const PoseGraphAnchor& a : anchors_) {
+    if (options.degrees_of_freedom == 4) add_cost<4>(problem, a, information_of(a, options), poses_, x);
+    else add_cost<6>(problem, a, information_of(a, options), poses_, x);
+    used[static_cast<std::size_t>(a.node)] = true;
   }
   const double per_sigma = 1 / kTilt_rad;
   std::array<double, 2> level{0, 0};
@@ -103,30 +140,32 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
   return summary.num_successful_steps;
 }
 
+void PoseGraph::weigh(double mu, const PoseGraphOptions& options) {
+  for (PoseGraphEdge& e : edges_)
+    if (e.loop) e.weight = weight_of(chi2(e, options), mu);
+  for (PoseGraphAnchor& a : anchors_)
+    if (!a.certain) a.weight = weight_of(chi2(a, options), mu);
+}
+
 PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
-  constexpr double c2 = kOutlier_sigma * kOutlier_sigma;
   PoseGraphReport report;
   double worst = 0;
-  for (PoseGraphEdge& e : edges_)
+  for (const PoseGraphEdge& e : edges_)
     if (e.loop) worst = std::max(worst, chi2(e, options));
+  for (const PoseGraphAnchor& a : anchors_)
+    if (!a.certain) worst = std::max(worst, std::min(kLargestChi2, chi2(a, options)));
   // mu large: nearly convex, every loop counts; mu = 1: Geman-McClure.
-  double mu = std::max(1.0, 2 * worst / c2);
+  double mu = std::max(1.0, 2 * worst / (kOutlier_sigma * kOutlier_sigma));
   for (;;) {
-    for (PoseGraphEdge& e : edges_) {
-      if (!e.loop) continue;
-      const double s = mu * c2 / (chi2(e, options) + mu * c2);
-      e.weight = s * s;
-    }
+    weigh(mu, options);
     report.iterations += solve(options, report);
     if (mu <= 1.0) break;
     mu = std::max(1.0, mu / kMuStep);
   }
-  for (PoseGraphEdge& e : edges_) {
-    if (!e.loop) continue;
-    const double s = c2 / (chi2(e, options) + c2);
-    e.weight = s * s;
-    report.rejected += e.weight < kRejectedWeight;
-  }
+  weigh(1, options);
+  for (const PoseGraphEdge& e : edges_) report.rejected += e.loop && e.weight < kRejectedWeight;
+  for (const PoseGraphAnchor& a : anchors_)
+    if (!a.certain) ++(a.weight < kRejectedWeight ? report.anchors_rejected : report.anchors);
   return report;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keyframes as nodes, relative poses as edges; least squares over all of them (docs/derivations/loop.md, L8-L11).
+// Keyframes as nodes, relative poses as edges; least squares over all of them (docs/derivations/loop.md, L8-L11, L22).
 // Four degrees of freedom a node by default: roll and pitch are known from gravity, to within an error that
-// the covariance of loops contains. With six, gravity is a measurement of every node. Edges marked as loops may be
-// wrong: graduated non-convexity (H. Yang et al., RA-L 2020, with Geman-McClure) finds weights that leave false ones
-// out. One thread; the same input gives the same bits.
+// the covariance of loops contains. With six, gravity is a measurement of every node. Anchors measure a node by itself, in the
+// frame of the building. Edges marked as loops and anchors may be wrong: graduated non-convexity (H. Yang et al., RA-L 2020, with
+// Geman-McClure) finds weights that leave false ones out. One thread; the same input gives the same bits.
 //
 //   PoseGraph graph;
 //   int a = graph.add_node(T_MB_a, up_a), b = graph.add_node(T_MB_b, up_b);
@@ -16,6 +16,7 @@
 #include "fbvins/core/angle.hpp"
 #include "fbvins/geometry/pose.hpp"
 #include "fbvins/loop/map_report.hpp"
+#include "fbvins/loop/partial_pose.hpp"
 
 namespace fbvins {
 
@@ -34,28 +35,42 @@ struct PoseGraphEdge {
   double weight = 1;                    ///< found by optimise(): 0 a false loop, 1 a good one
 };
 
+struct PoseGraphAnchor {
+  int node = 0;
+  PartialPose measured;
+  bool certain = false;  ///< cannot be an outlier
+  double weight = 1;     ///< as of an edge
+};
+
 class PoseGraph {
  public:
   /// `up_B`: the vertical, upwards, as the odometry estimates it.
   int add_node(const Pose<M, B>& T_MB, const Vec3& up_B, bool fixed = false);
   void add_edge(PoseGraphEdge edge) { edges_.push_back(edge); }
 
-  /// Fixed nodes stay. Fix one in each connected part: without it the gauge is free.
+  void add_anchor(PoseGraphAnchor anchor) { anchors_.push_back(std::move(anchor)); }
+
+  /// Fixed nodes stay. Fix one in each connected part, or give it anchors: without them the gauge is free.
   PoseGraphReport optimise(const PoseGraphOptions& options);
 
   const std::vector<Pose<M, B>>& poses() const { return poses_; }
   const std::vector<PoseGraphEdge>& edges() const { return edges_; }
   /// Squared Mahalanobis length of an edge's residual at the present poses.
   double chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
+  double chi2(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const;
+  const std::vector<PoseGraphAnchor>& anchors() const { return anchors_; }
 
  private:
   Mat6 weighted_information(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
+  Mat6 information_of(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const;
+  void weigh(double mu, const PoseGraphOptions& options);
   int solve(const PoseGraphOptions& options, PoseGraphReport& report);
 
   std::vector<Pose<M, B>> poses_;
   std::vector<Vec3> up_B_;  ///< the vertical as the odometry estimated it
   std::vector<bool> fixed_;
   std::vector<PoseGraphEdge> edges_;
+  std::vector<PoseGraphAnchor> anchors_;
 };
 
 /// (dp in a, dtheta in b) of an edge at two poses.

@@ -115,6 +115,36 @@ TEST(PoseGraph, FourDegreesOfFreedomKeepRollAndPitch) {
     EXPECT_NEAR((graph.poses()[i].q.conjugate() * Vec3::UnitZ() - f.odometry[i].q.conjugate() * Vec3::UnitZ()).norm(), 0, 1e-9);
 }
 
+/// The truth moved to the frame of a building, of which every fifth node has a position; `wrong_share` of them are elsewhere.
+double anchored_error(const Flight& f, double wrong_share, int dof, PoseGraphReport& report) {
+  const Pose<A, M> T_AM(Quat(Eigen::AngleAxisd(0.4, Vec3::UnitZ())), Vec3(1, 2, -0.5));
+  Rng rng(11);
+  PoseGraph graph;
+  for (const Pose<M, B>& T : f.odometry) graph.add_node(T, T.q.conjugate() * Vec3::UnitZ());
+  for (const PoseGraphEdge& e : f.edges) graph.add_edge(e);
+  for (std::size_t i = 0; i < f.truth.size(); i += 5) {
+    PositionAnchor a{.p_A = T_AM * f.truth[i].p + noise(rng, 0.05), .covariance = 0.0025 * Mat3::Identity()};
+    if (rng.uniform() < wrong_share) a.p_A += noise(rng, 2);
+    graph.add_anchor({static_cast<int>(i), measurement_of(a)});
+  }
+  report = graph.optimise({.degrees_of_freedom = dof});
+  double sum = 0;
+  for (std::size_t i = 0; i < f.truth.size(); ++i) sum += (graph.poses()[i].p - T_AM * f.truth[i].p).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(f.truth.size()));
+}
+
+TEST_P(PoseGraphDof, AnchorsMoveEverythingAndWrongOnesCountForNothing) {
+  const Flight f = flight(300, 60, 0, 3);
+  PoseGraphReport clean, dirty;
+  const double right = anchored_error(f, 0, GetParam(), clean), with_wrong = anchored_error(f, 0.2, GetParam(), dirty);
+  EXPECT_LT(right, 0.03);
+  EXPECT_LT(with_wrong, 0.04);
+  EXPECT_EQ(clean.anchors, 60);
+  EXPECT_EQ(clean.anchors_rejected, 0);
+  EXPECT_GT(dirty.anchors_rejected, 6);
+  EXPECT_EQ(dirty.anchors + dirty.anchors_rejected, 60);
+}
+
 TEST(ComposeCovariance, AgreesWithSampling) {
   const Pose<B, B> A(so3_exp(Vec3(0.3, -0.5, 0.8)), Vec3(1, 2, -0.5)), C(so3_exp(Vec3(-0.2, 0.1, 0.4)), Vec3(0.4, -1, 0.3));
   const Mat6 cov_a = information(1 / 0.02, 1 / 0.01).inverse().inverse(),

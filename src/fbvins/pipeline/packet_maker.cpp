@@ -20,6 +20,7 @@ std::optional<SensorPacket> PacketMaker::next(bool flush) {
   SensorPacket packet;
   packet.id = FrameId{next_frame_++};
   packet.frame = std::move(waiting_.front());
+  packet.anchors = std::exchange(anchors_, {});
   waiting_.pop_front();
   if (previous_image_) packet.imu = imu_.between(*previous_image_, t);
   imu_.forget_before(t);

@@ -5,6 +5,8 @@
 
 #include <deque>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "fbvins/imu/imu_history.hpp"
 #include "fbvins/pipeline/input_options.hpp"
@@ -21,6 +23,8 @@ class PacketMaker {
 
   void push(const ImuSample& sample) { imu_.add(sample); }
   void push(StereoFrame frame);
+  /// Goes with the next image that comes out.
+  void push(Anchor anchor) { anchors_.push_back(std::move(anchor)); }
   /// The next image that is ready; with `flush`, the next image even if its readings never came.
   std::optional<SensorPacket> next(bool flush = false);
   InputCounts counts() const;
@@ -29,6 +33,7 @@ class PacketMaker {
   InputOptions options_;
   ImuHistory imu_;
   std::deque<StereoFrame> waiting_;
+  std::vector<Anchor> anchors_;
   std::optional<Time> newest_image_, previous_image_;
   std::int64_t next_frame_ = 0;
   int backward_ = 0;

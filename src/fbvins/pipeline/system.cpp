@@ -9,6 +9,7 @@
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/pipeline/feedback.hpp"
+#include "fbvins/pipeline/keyframe_anchors.hpp"
 #include "fbvins/pipeline/keyframe_readings.hpp"
 #include "fbvins/pipeline/packet_maker.hpp"
 #include "fbvins/pipeline/stage_runner.hpp"
@@ -39,6 +40,7 @@ struct System::Impl {
   Mapper* mapper;
   KeyframeImu imu_model;  ///< noise and gravity, the same for all keyframes
   KeyframeReadings readings;
+  KeyframeAnchors anchors;
   Feedback feedback;
 
   std::function<void(const TrackedFrame&)> on_tracked_frame;
@@ -80,6 +82,7 @@ struct System::Impl {
     frame.imu = std::move(packet.imu);
     frame.depth = packet.frame.depth;
     frame.offsets = packet.frame.offsets;
+    frame.anchors = std::move(packet.anchors);
     if (keyframes_wanted()) frame.images = std::move(packet.frame);
     hand_on(estimation, std::move(frame));
   }
@@ -88,7 +91,7 @@ struct System::Impl {
     if (on_tracked_frame) on_tracked_frame(frame);
     Estimate estimate = estimator.process(frame);
     frame.imu.noise = estimate.imu_noise;
-    if (keyframes_wanted()) complete(estimate, frame.imu);
+    if (keyframes_wanted()) complete(estimate, frame);
     if (on_window) on_window(estimator.snapshot());
     if (on_odometry) on_odometry(estimate.odometry);
     if (on_keyframe)
@@ -102,12 +105,14 @@ struct System::Impl {
   bool keyframes_wanted() const { return on_keyframe || mapper != nullptr; }
 
   /// Fills the parts of keyframes that the estimator does not know.
-  void complete(Estimate& estimate, const ImuSegment& imu) {
-    readings.add(imu);
+  void complete(Estimate& estimate, TrackedFrame& frame) {
+    readings.add(frame.imu);
+    anchors.add(std::move(frame.anchors));
     const Pose<W, G> T_WG = estimate.odometry.T_WB * estimate.odometry.gauge.T_GB.inverse();
     for (Keyframe& keyframe : estimate.keyframes) {
       keyframe.T_WG = T_WG;
       keyframe.imu = {readings.until(keyframe.t), keyframe.imu.bias, imu_model.noise, imu_model.gravity_mps2};
+      keyframe.anchors = anchors.until(keyframe.t);
     }
   }
 
@@ -138,6 +143,7 @@ struct System::Impl {
     if (mode != RunMode::live) return hand_on(mapping, std::move(task));
     if (!mapping.queue.push_if_room(task)) {
       readings.take_back(std::move(task.keyframe.imu.segments));
+      anchors.add(std::move(task.keyframe.anchors));
       ++keyframes_left_out;
     }
   }
@@ -209,6 +215,14 @@ Result<void> System::push(SensorEvent event) {
   if (auto* sample = std::get_if<ImuSample>(&event)) impl_->packet_maker.push(*sample);
   else impl_->packet_maker.push(std::get<StereoFrame>(std::move(event)));
   impl_->forward(false);
+  return impl_->status.get();
+}
+
+Result<void> System::push(Anchor anchor) {
+  if (impl_->finished && impl_->status.get())
+    return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
+  if (const std::string why = impossible(anchor); !why.empty()) return Error{ErrorCode::invalid_argument, why};
+  impl_->packet_maker.push(std::move(anchor));
   return impl_->status.get();
 }
 

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of LoopCloser that ties the map to a building (docs/derivations/loop.md, L21-L25).
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/loop/anchor_fit.hpp"
+#include "fbvins/loop/loop_closer.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Anchors of one keyframe: of a sensor that is faster, some are left out, evenly.
+constexpr std::size_t kMostOfAKeyframe = 8;
+
+Vec6 sigma_of(double position_m2, double yaw_rad2) {
+  Vec6 sigma;
+  sigma << Vec3::Constant(std::sqrt(position_m2)), Vec3::Constant(std::sqrt(yaw_rad2));
+  return sigma;
+}
+
+}  // namespace
+
+/// Attached to the newest keyframe of the map, by the odometry's motion between the two.
+std::optional<MapAnchor> LoopCloser::attached(const Anchor& anchor) const {
+  const MapKeyframe* newest = map_.find(session_.newest);
+  const std::optional<Pose<G, B>> T_GB = motion_.at(stamp_of(anchor));
+  if (newest == nullptr || !T_GB) return std::nullopt;
+  const Pose<B, B> T = newest->T_GB.inverse() * *T_GB;
+  const DriftVariance drift = drift_over(drift_.rate(), T.p.norm(), std::abs((stamp_of(anchor) - newest->t).seconds()));
+  const Mat6 covariance = sigma_of(drift.position_m2, drift.yaw_rad2).cwiseAbs2().asDiagonal();
+  return MapAnchor{newest->id, carried(measurement_of(anchor), T, covariance)};
+}
+
+/// All anchors are kept, also those that contradict the present estimate: the graph finds which of them are wrong.
+void LoopCloser::take_anchors(const Keyframe& keyframe, MapUpdate& update) {
+  const double gate = options_.gate_sigma * options_.gate_sigma;
+  const std::size_t count = keyframe.anchors.size(), most = std::min(count, kMostOfAKeyframe);
+  bool taken = false;
+  for (std::size_t i = 0; i < most; ++i) {
+    const std::optional<MapAnchor> anchor = attached(keyframe.anchors[i * count / most]);
+    if (!anchor) {
+      ++update.stats.anchors_refused;
+      continue;
+    }
+    taken = true;
+    map_.add_anchor(*anchor);
+    if (!map_.anchored || !frame_.known()) continue;
+    const Pose<G, B>& T_GB = map_.find(anchor->keyframe)->T_GB;
+    const bool fits = frame_.mahalanobis2(anchor->measured, T_GB) < gate;
+    if (fits) frame_.update(anchor->measured, T_GB);
+    ++(fits ? update.stats.anchors : update.stats.anchors_refused);
+  }
+  if (!taken) return;
+  if (!map_.anchored || !frame_.known()) find_building(update);
+  if (!map_.anchored || !frame_.known()) return;
+  ++news_since_optimised_;
+  MapKeyframe& newest = *map_.find(session_.newest);
+  if (newest.t == keyframe.t) newest.T_MB = frame_.T_MG() * newest.T_GB;
+}
+
+/// What anchors say of poses in M or, of a flight that is not localised in an anchored map, in its own gauge, level.
+std::vector<AnchoredPose> LoopCloser::anchored_poses() const {
+  std::vector<AnchoredPose> poses;
+  for (const MapAnchor& anchor : map_.anchors) {
+    const MapKeyframe& k = *map_.find(anchor.keyframe);
+    const bool own = k.session == session_.number;
+    if (map_.anchored ? !own : !k.placed) continue;
+    AnchoredPose pose{k.T_MB.q, k.T_MB.p, anchor.measured, k.id};
+    if (map_.anchored) pose.q_XB = session_.q_LG * k.T_GB.q, pose.p_XB = session_.q_LG * k.T_GB.p;
+    if (own) {
+      const DriftVariance drift = drift_over(drift_.rate(), session_.path_m - k.path_m, (motion_.newest() - k.t).seconds());
+      const double away_m2 = (session_.T_GB->p - k.T_GB.p).squaredNorm();
+      pose.measured.information =
+          widened(pose.measured.information, sigma_of(drift.position_m2 + drift.yaw_rad2 * away_m2, drift.yaw_rad2).asDiagonal());
+    }
+    poses.push_back(std::move(pose));
+  }
+  return poses;
+}
+
+/// Where M lies in the building or, once that is known, where a flight that is not localised lies in M.
+void LoopCloser::find_building(MapUpdate& update) {
+  if (map_.anchored == frame_.known()) return;  // a flight that is not localised in M says nothing of M
+  const Pose<G, B>& T_GB = *session_.T_GB;
+  const std::optional<AnchorFit> fit =
+      fit_anchors(anchored_poses(), frame_.known() ? frame_.T_MG() * T_GB.p : Vec3(session_.q_LG * T_GB.p));
+  if (!fit) return;
+  const double sigma_m = std::sqrt(fit->covariance.topLeftCorner<3, 3>().trace() / 3);
+  const double sigma_rad = std::sqrt(fit->covariance(3, 3));
+  if (frame_.known()) {
+    const Pose<M, M> T(fit->q_AX, fit->p_AX);
+    map_.move(T);
+    map_.anchored = true;
+    frame_.reset(T * frame_.T_MG(), sigma_m, sigma_rad);
+    follower_.forget();
+    update.M_moved = T;
+  } else {
+    frame_.reset({fit->q_AX * session_.q_LG, fit->p_AX}, sigma_m, sigma_rad);
+    join_session(frame_.T_MG());
+  }
+  optimise(update);
+}
+
+}  // namespace fbvins
