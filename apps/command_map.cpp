@@ -50,6 +50,7 @@ int info(const Arguments& arguments) {
   fmt::print("{}: {} keyframes of {} flights, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
              flights.size(), loops, features, map->boosted ? "boosted " : "", points);
   if (!map->name.empty()) fmt::print("name: {}\n", map->name);
+  if (map->anchored) fmt::print("in the frame of a building, by {} anchors\n", map->anchors.size());
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
   return kOk;

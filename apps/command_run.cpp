@@ -21,7 +21,7 @@ constexpr const char* kExamples =
     R"(Writes into --out: trajectory_tum.txt, trajectory.csv (EuRoC columns, covariance, health), covariance.csv, gauge.csv,
 statistics.csv, config.yaml (the effective configuration), summary.json, summary.txt, timing.csv (docs/outputs.md). The same
 input and configuration give the same bytes in the first six, with --threaded as well. Loop closure (--loop, --save-map,
---load-map, --final-ba) adds poses in the map frame M: map_trajectory_tum.txt (known after the run), map_causal_tum.txt and
+--load-map, --final-ba, --positions, --tags) adds poses in the map frame M: map_trajectory_tum.txt (known after the run), map_causal_tum.txt and
 map_bounded_tum.txt (as known at each moment, with and without steps), and map_updates.csv; the odometry stays the same.
 
 examples:
@@ -103,6 +103,10 @@ void add_run_command(CLI::App& program, int& exit_code) {
   command->add_flag("--boosted-map", arguments->flight.map.boosted, "a new map of boosted descriptors; with loop closure");
   command->add_option("--vocabulary", arguments->flight.map.vocabulary,
                       "vocabulary file for loop closure, instead of the one that ships");
+  command->add_option("--positions", arguments->flight.map.positions,
+                      "CSV of positions or heights in the building's frame; with loop closure (docs/maps.md)");
+  command->add_option("--tags", arguments->flight.map.tags,
+                      "YAML of AprilTags at known places in the building; with loop closure (docs/maps.md)");
   command->add_flag("--quiet", arguments->quiet, "print nothing but errors and warnings");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -7,11 +7,12 @@
 
 #include "apps/commands.hpp"
 #include "apps/progress.hpp"
+#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
+#include "fbvins/boards/hung_tags.hpp"
 #include "fbvins/config/option_fields.hpp"
 #include "fbvins/config/yaml.hpp"
 #include "fbvins/core/options.hpp"
-#include "fbvins/io/output_file.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
 
 namespace fbvins::app {
@@ -33,8 +34,8 @@ examples:
 struct Arguments {
   std::string preset = "normal", config, out, trajectory, imu;
   std::vector<std::string> assignments;
-  int seed = -1, max_images = 0;
-  double seconds = 0;
+  int seed = -1, max_images = 0, tags = 0;
+  double seconds = 0, tag_size_m = 0.2;
   bool options = false, depth = false, landmarks = false, quiet = false;
 };
 
@@ -56,10 +57,7 @@ Result<SimulationOptions> options_of(const Arguments& arguments) {
 }
 
 Result<void> write_options(SimulationOptions options, const std::string& folder) {
-  Result<OutputFile> file = OutputFile::create(folder + "/simulation.yaml");
-  if (!file) return file.error();
-  file->write(write_yaml(fields_of(options)));
-  return file->close();
+  return write_text(folder + "/simulation.yaml", write_yaml(fields_of(options)));
 }
 
 int simulate_flight(const Arguments& arguments) {
@@ -70,13 +68,20 @@ int simulate_flight(const Arguments& arguments) {
     return kOk;
   }
   if (arguments.out.empty()) return fail("--out FOLDER is needed");
-  Result<Simulation> simulation = prepare_simulation(*options);
+  Result<TagSurvey> tags = TagSurvey{};
+  Result<Simulation> simulation = prepare_simulation(*options, [&](World& world, const Simulation& s) {
+    if (arguments.tags > 0) tags = hang_tags(world, s, arguments.tags, arguments.tag_size_m);
+  });
   if (!simulation) return fail(simulation.error().message);
+  if (!tags) return fail(tags.error().message);
 
   const EurocWriterOptions writer{arguments.depth, arguments.landmarks, arguments.max_images};
   Progress progress(static_cast<int>(simulation->frames.size()), arguments.quiet);
   const Result<void> written = write_euroc(*simulation, arguments.out, writer, [&](int done, int) { progress.update(done); });
   if (!written) return fail(written.error().message);
+  if (arguments.tags > 0)
+    if (Result<void> saved = write_text(arguments.out + "/tags.yaml", tags_to_yaml(*tags)); !saved)
+      return fail(saved.error().message);
   if (Result<void> saved = write_options(*options, arguments.out); !saved) return fail(saved.error().message);
   if (!arguments.quiet)
     fmt::print("{} stereo frames, {} IMU samples in {}\n", simulation->frames.size(), simulation->imu.samples.size(),
@@ -103,6 +108,10 @@ void add_simulate_command(CLI::App& program, int& exit_code) {
   command->add_option("--imu", arguments->imu, "with --trajectory: its real IMU readings, used unchanged (EuRoC CSV)");
   command->add_option("--max-images", arguments->max_images, "stop after this many stereo images, 0 for all")
       ->check(CLI::NonNegativeNumber);
+  command->add_option("--tags", arguments->tags, "hang so many AprilTags on walls, their poses in tags.yaml (docs/maps.md)")
+      ->check(CLI::Range(0, 100));
+  command->add_option("--tag-size", arguments->tag_size_m, "edge of a tag's black square, m (default 0.2)")
+      ->check(CLI::Range(0.02, 2.0));
   command->add_flag("--depth", arguments->depth, "write left depth images in millimetres, too");
   command->add_flag("--landmarks", arguments->landmarks, "write the corners of the world's surfaces, too");
   command->add_flag("--options", arguments->options, "print the effective options and stop");

@@ -22,16 +22,37 @@ Result<void> keep_imu_state(const std::string& path, const RunRecord& run, const
   return save_imu_state(path, state, imu);
 }
 
+/// Sends the anchors that are not later than the next image.
+class AnchorFeed {
+ public:
+  explicit AnchorFeed(std::vector<Anchor> anchors) : anchors_(std::move(anchors)) {}
+  Result<void> send_until(Time t, System& system) {
+    for (; next_ < anchors_.size() && stamp_of(anchors_[next_]) <= t; ++next_)
+      if (Result<void> taken = system.push(anchors_[next_]); !taken) return taken;
+    return {};
+  }
+
+ private:
+  std::vector<Anchor> anchors_;
+  std::size_t next_ = 0;
+};
+
 Result<Flight> process(const FlightArguments& arguments, const Config& config, Dataset& data, LoopMap* map,
                        const FlightListener& listener) {
   const auto imu_state = load_imu_state(arguments.imu_state, data.rig().imu_noise);
   if (!imu_state) return imu_state.error();
+  auto positions = positions_of(arguments.map);
+  if (!positions) return positions.error();
+  AnchorFeed anchors(*std::move(positions));
+  std::unique_ptr<Mapper> with_tags;
+  const Result<Mapper*> mapper = mapper_of(arguments.map, data.rig(), map, with_tags);
+  if (!mapper) return mapper.error();
   Flight flight;
   if (map != nullptr) flight.map.emplace();
   flight.run.tracked.reserve(data.frames().size());
   flight.run.odometry.reserve(data.frames().size());
   Result<System> system = System::create(config, data.rig(), arguments.threaded ? RunMode::threaded : RunMode::deterministic,
-                                         {.mapper = map, .imu_state = *imu_state});
+                                         {.mapper = *mapper, .imu_state = *imu_state});
   if (!system) return system.error();
   SurvivalMeter survival;
   system->on_tracked_frame([&](const TrackedFrame& f) { flight.run.tracked.push_back({f.id, f.t, f.stats, survival.add(f)}); });
@@ -47,7 +68,10 @@ Result<Flight> process(const FlightArguments& arguments, const Config& config, D
   while (auto event = data.next()) {
     if (looking) look.push(*event);
     if (looking && look.is_over()) end_look();
-    const bool is_frame = std::holds_alternative<StereoFrame>(*event);
+    const auto* frame = std::get_if<StereoFrame>(&*event);
+    const bool is_frame = frame != nullptr;
+    if (is_frame)
+      if (Result<void> sent = anchors.send_until(frame->t, *system); !sent) return sent.error();
     if (Result<void> taken = system->push(std::move(*event)); !taken) return taken.error();
     if (is_frame && listener.on_frame) listener.on_frame(++frames);
   }

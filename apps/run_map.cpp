@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
+#include "fbvins/calibration/tag_finder.hpp"
 #include "fbvins/core/stage_timer.hpp"
+#include "fbvins/io/anchor_file.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/loop/map_frame.hpp"
 
@@ -14,7 +17,7 @@ namespace {
 
 constexpr const char* kUpdatesHeader =
     "#timestamp [ns],frame,applies_from,localised,session,x [m],y [m],z [m],yaw [rad],keyframes,candidates,accepted,refused,"
-    "optimised\n";
+    "optimised,anchors,anchors_refused,anchored\n";
 
 Result<void> check_folder_of(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
@@ -23,6 +26,7 @@ Result<void> check_folder_of(const std::string& path) {
 }
 
 /// T_MB of every frame that has a pose, with the update that was known when the frame came.
+/// Where M becomes another frame, the poses begin anew.
 /// Before the first update a new map begins where the odometry began, and is level; in an old one the flight has to be localised.
 void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   MapUpdate begin;
@@ -30,7 +34,10 @@ void compose_causal(const RunRecord& run, bool new_map, MapRecord& record) {
   const MapUpdate* now = &begin;
   auto next = record.updates.begin();
   for (const Odometry& o : run.odometry) {
-    for (; next != record.updates.end() && next->applies_from <= o.id; ++next) now = &*next;
+    for (; next != record.updates.end() && next->applies_from <= o.id; ++next) {
+      now = &*next;
+      if (now->M_moved) record.causal.clear(), record.bounded.clear();
+    }
     if (now == &begin) {
       begin.reset_counter = o.reset_counter;
       begin.T_MG = {o.gauge.q_LG, Vec3::Zero()};
@@ -83,10 +90,25 @@ Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const S
       rig, {.file = arguments.load, .vocabulary = arguments.vocabulary, .boosted = arguments.boosted, .loop = options});
 }
 
+Result<std::vector<Anchor>> positions_of(const MapArguments& arguments) {
+  if (arguments.positions.empty()) return std::vector<Anchor>{};
+  return read_anchors(arguments.positions);
+}
+
+Result<Mapper*> mapper_of(const MapArguments& arguments, const StereoRig& rig, LoopMap* map, std::unique_ptr<Mapper>& with_tags) {
+  if (arguments.tags.empty()) return map;
+  Result<TagSurvey> survey = load_tags(arguments.tags);
+  if (!survey) return survey.error();
+  Result<TagFinder> finder = TagFinder::create(rig, *std::move(survey));
+  if (!finder) return finder.error();
+  with_tags = std::make_unique<TagMapper>(*std::move(finder), *map);
+  return with_tags.get();
+}
+
 void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record) {
   compose_causal(run, arguments.load.empty(), record);
   CpuTimer timer;
-  record.loops_left_out = map.finish().rejected;
+  record.graph = map.finish();
   record.finish_ms = timer.lap_ms();
   record.keyframes_in_map = map.keyframes();
   record.final = corrected(map, run);
@@ -109,10 +131,10 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
   if (Result<void> done = write_tum(record.bounded, folder + "/map_bounded_tum.txt"); !done) return done;
   std::string text = kUpdatesHeader;
   for (const MapUpdate& u : record.updates)
-    text +=
-        fmt::format("{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{},{},{},{},{}\n", u.t.ns, u.frame.value, u.applies_from.value,
-                    u.localised ? 1 : 0, u.map_session, u.T_MW.p.x(), u.T_MW.p.y(), u.T_MW.p.z(), yaw_of(u.T_MW.q),
-                    u.stats.keyframes, u.stats.candidates, u.stats.accepted, u.stats.refused, u.stats.optimised ? 1 : 0);
+    text += fmt::format("{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{},{},{},{},{},{},{},{}\n", u.t.ns, u.frame.value,
+                        u.applies_from.value, u.localised ? 1 : 0, u.map_session, u.T_MW.p.x(), u.T_MW.p.y(), u.T_MW.p.z(),
+                        yaw_of(u.T_MW.q), u.stats.keyframes, u.stats.candidates, u.stats.accepted, u.stats.refused,
+                        u.stats.optimised ? 1 : 0, u.stats.anchors, u.stats.anchors_refused, u.anchored ? 1 : 0);
   return write_text(folder + "/map_updates.csv", text);
 }
 
@@ -121,12 +143,17 @@ MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajec
   for (const MapUpdate& u : record.updates) {
     s.loops += u.stats.accepted;
     s.refused += u.stats.refused;
+    s.anchors += u.stats.anchors;
+    s.anchors_refused += u.stats.anchors_refused;
     s.mean_ms += u.stats.total_ms() / static_cast<double>(record.updates.size());
   }
   s.keyframes = static_cast<int>(record.updates.size());
   s.keyframes_in_map = record.keyframes_in_map;
-  s.left_out = record.loops_left_out;
+  s.left_out = record.graph.rejected;
+  s.anchors_left_out = record.graph.anchors_rejected;
   const Trajectory<W> poses = run.poses();
+  const auto anchored = std::ranges::find_if(record.updates, [](const MapUpdate& u) { return u.anchored && u.localised; });
+  if (anchored != record.updates.end() && !poses.empty()) s.anchored_after_s = (anchored->t - poses.front().t).seconds();
   if (!record.causal.empty()) s.localised_after_s = (record.causal.front().t - poses.front().t).seconds();
   s.causal = evaluated(truth, record.causal);
   s.bounded = evaluated(truth, record.bounded);

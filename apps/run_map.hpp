@@ -19,7 +19,8 @@ namespace fbvins::app {
 struct MapArguments {
   bool loop = false, final_ba = false, boosted = false;
   std::string load, save, vocabulary;
-  bool wanted() const { return loop || final_ba || !load.empty() || !save.empty(); }
+  std::string positions, tags;  ///< files of anchors
+  bool wanted() const { return loop || final_ba || !load.empty() || !save.empty() || !positions.empty() || !tags.empty(); }
 };
 
 /// Null if no loop closure is wanted. Errors: of the vocabulary, the old map, the folder of the new one.
@@ -31,11 +32,17 @@ struct MapRecord {
   Trajectory<M> causal, bounded;   ///< T_MB at each frame, with T_MG as it was known then; with the smooth T_MW
   Trajectory<M> final;             ///< after the last optimisation of the graph
   Trajectory<M> adjusted;          ///< after bundle adjustment, where asked for
-  int keyframes_in_map = 0, loops_left_out = 0;
+  int keyframes_in_map = 0;
+  PoseGraphReport graph;                ///< of the last optimisation
   double finish_ms = 0, adjust_ms = 0;  ///< CPU
   std::optional<FinalAdjustmentReport> adjustment;
   std::string not_saved;  ///< why the map could not be written; empty: it was, or need not be
 };
+
+/// The anchors of --positions, in order of time; none without it.
+Result<std::vector<Anchor>> positions_of(const MapArguments& arguments);
+/// The map itself or, with --tags, one that finds them in its keyframes, which is kept in `with_tags`.
+Result<Mapper*> mapper_of(const MapArguments& arguments, const StereoRig& rig, LoopMap* map, std::unique_ptr<Mapper>& with_tags);
 
 /// Ends the map (last optimisation, bundle adjustment where asked for) and composes the trajectories.
 void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& run, MapRecord& record);
@@ -46,6 +53,8 @@ Result<void> write_map_record(const MapRecord& record, const std::string& folder
 /// Counts, times, and errors of the trajectories where there is ground truth.
 struct MapSummary {
   int keyframes = 0, keyframes_in_map = 0, loops = 0, refused = 0, left_out = 0;
+  int anchors = 0, anchors_refused = 0, anchors_left_out = 0;
+  std::optional<double> anchored_after_s;   ///< from the first pose to the first known T_MW of an anchored map
   std::optional<double> localised_after_s;  ///< from the first pose to the first known T_MW
   std::optional<Evaluation> causal, bounded, final, adjusted;
   double mean_ms = 0, finish_ms = 0, adjust_ms = 0;  ///< CPU: of a keyframe, at the end, of the bundle adjustment

@@ -65,6 +65,9 @@ Json map_json(const MapSummary& m) {
   Json json{{"keyframes", m.keyframes}, {"keyframes_in_map", m.keyframes_in_map}, {"loops", m.loops}};
   json["refused"] = m.refused;
   json["left_out"] = m.left_out;
+  if (m.anchored_after_s || m.anchors_refused > 0)
+    json["anchors"] = {{"used", m.anchors}, {"refused", m.anchors_refused}, {"left_out", m.anchors_left_out}};
+  if (m.anchored_after_s) json["anchored_after_s"] = *m.anchored_after_s;
   if (m.localised_after_s) json["localised_after_s"] = *m.localised_after_s;
   if (m.causal) json["causal"] = to_json(*m.causal, Alignment::se3);
   if (m.bounded) json["bounded"] = to_json(*m.bounded, Alignment::se3);
@@ -78,6 +81,10 @@ std::string map_text(const MapSummary& m) {
   std::string text = fmt::format("map: {} keyframes of {}, {} loops, {} refused by the odometry, {} left out by the graph\n",
                                  m.keyframes_in_map, m.keyframes, m.loops, m.refused, m.left_out);
   if (!m.localised_after_s) text += "map: never localised\n";
+  if (m.anchored_after_s)
+    text += fmt::format(
+        "map: in the building's frame after {:.1f} s, {} anchors, {} refused by the odometry, {} left out by the graph\n",
+        *m.anchored_after_s, m.anchors, m.anchors_refused, m.anchors_left_out);
   const auto line = [&](const char* what, const std::optional<Evaluation>& e) {
     if (e) text += fmt::format("ATE RMSE in M, {:<38}{:8.4f} m\n", what, e->absolute_m.rmse);
   };

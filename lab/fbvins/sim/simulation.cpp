@@ -116,7 +116,7 @@ RenderedFrame render_at(FlightRecorder& recorder, const StereoRig& rig, double t
   return rendered;
 }
 
-Result<Simulation> prepare_simulation(const SimulationOptions& o) {
+Result<Simulation> prepare_simulation(const SimulationOptions& o, const std::function<void(World&, const Simulation&)>& change) {
   if (Result<void> valid = validate(o); !valid) return valid.error();
   const bool is_recorded = !o.recorded.trajectory.empty();
   if (o.world.kind == "corridors" && (is_recorded || o.flight.kind != "tour"))
@@ -152,7 +152,9 @@ Result<Simulation> prepare_simulation(const SimulationOptions& o) {
     s.world_from_flight = Vec3(0, 0, 0.5 - lowest);
     for (Vec3& p : path) p += s.world_from_flight;
   }
-  s.world = std::make_shared<const World>(build_world(o.world, plan_for(o, path), path, seed));
+  World world = build_world(o.world, plan_for(o, path), path, seed);
+  if (change) change(world, s);
+  s.world = std::make_shared<const World>(std::move(world));
   s.recorder = std::make_shared<FlightRecorder>(
       o, s.rig, [flight = s.flight](double t) { return flight.at(t); }, s.world_from_flight, s.world);
   return s;

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "fbvins/calibration/corner_noise.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
@@ -162,8 +163,9 @@ std::optional<PosedBoard> find_board_pose(const Camera& camera, const Board& boa
   constexpr double kSpread_px = 2;
   double cost = refine(camera.model(), board, corners, kSpread_px, *pose);
   Pose<Cn, T> other = tilted_back(*pose, board, corners);
-  if (refine(camera.model(), board, corners, kSpread_px, other) < cost) *pose = other;
-  return PosedBoard{*pose, robust_rms(camera.model(), board, corners, *pose)};
+  double other_cost = refine(camera.model(), board, corners, kSpread_px, other);
+  if (other_cost < cost) std::swap(*pose, other), std::swap(cost, other_cost);
+  return PosedBoard{*pose, robust_rms(camera.model(), board, corners, *pose), other, other_cost - cost};
 }
 
 }  // namespace fbvins

@@ -14,6 +14,10 @@ namespace fbvins {
 struct PosedBoard {
   Pose<Cn, T> T_CnT;
   double rms_px = 0;  ///< robust: 1.48 times the median distance of corners, over sqrt(2)
+  /// The board tilted to the other side, which nearly gives the same image when it is small, and by how much its cost (half the
+  /// sum of squares) is larger.
+  Pose<Cn, T> other;
+  double other_costs_px2 = 0;
 };
 
 /// From a homography of the rays, then by Gauss-Newton on the pixels; of the two poses that a small tilted board may have, the

@@ -103,6 +103,14 @@ std::vector<TagSighting> TagDetector::find(const ImageView& image, int enough) {
   return out;
 }
 
+std::vector<TagSighting> TagDetector::find_alone(const ImageView& image) {
+  std::vector<TagSighting> out;
+  if (image.empty()) return out;
+  detect(state_->detector, image, out);
+  std::ranges::stable_sort(out, {}, &TagSighting::id);
+  return out;
+}
+
 #else
 
 namespace {
@@ -117,6 +125,7 @@ struct TagDetector::State {};
 Result<TagCells> tag_cells(int) { return not_built(); }
 Result<TagDetector> TagDetector::create() { return not_built(); }
 std::vector<TagSighting> TagDetector::find(const ImageView&, int) { return {}; }
+std::vector<TagSighting> TagDetector::find_alone(const ImageView&) { return {}; }
 
 #endif
 

@@ -35,6 +35,9 @@ class TagDetector {
 
   /// By id; corners to about a pixel. Where fewer than `enough` are found in one way, another one is tried.
   std::vector<TagSighting> find(const ImageView& image, int enough);
+  /// The same of tags that stand alone, with white around: corners to some tenths of a pixel, where the lines along the edges
+  /// meet.
+  std::vector<TagSighting> find_alone(const ImageView& image);
 
  private:
   struct State;

@@ -34,7 +34,8 @@ Result<Vec3> three(const std::vector<std::string_view>& fields, std::size_t firs
 Result<Anchor> parse_row(std::string_view line, std::vector<std::string_view>& fields) {
   split_at_commas(line, fields);
   if (fields.size() != 7 && fields.size() != 10)
-    return malformed(fmt::format("{} columns where timestamp_ns,x,y,z,sx,sy,sz or three more, px,py,pz, are expected", fields.size()));
+    return malformed(
+        fmt::format("{} columns where timestamp_ns,x,y,z,sx,sy,sz or three more, px,py,pz, are expected", fields.size()));
   const auto t = parse_nanoseconds(fields[0]);
   if (!t) return malformed(fmt::format("'{}' is not a stamp in nanoseconds", fields[0].substr(0, 40)));
   const Result<Vec3> p_A = three(fields, 1), sigma = three(fields, 4);

@@ -3,8 +3,8 @@
 //
 //   Result<std::vector<Anchor>> anchors = read_anchors("positions.csv");
 //
-// timestamp_ns,x,y,z,sx,sy,sz[,px,py,pz]: position and standard deviations in metres, and the point of the body that was measured.
-// Where x and y are empty or nan, it is a height.
+// timestamp_ns,x,y,z,sx,sy,sz[,px,py,pz]: position and standard deviations in metres, and the point of the body that was
+// measured. Where x and y are empty or nan, it is a height.
 #pragma once
 
 #include <string>

@@ -17,7 +17,7 @@ constexpr int kLeastAnchors = 3, kLeastKeyframes = 2;
 constexpr double kLeastShare = 0.6;
 constexpr double kOutlier_sigma = 4;
 /// Of more anchors, so many are taken, evenly: to judge hypotheses, and to make them, of every two of which there is one.
-constexpr std::size_t kMostJudges = 200, kMostInPairs = 24;
+constexpr std::size_t kMostJudges = 100, kMostInPairs = 24;
 constexpr double kShortestBase_m = 0.5;
 constexpr int kIterations = 8;
 

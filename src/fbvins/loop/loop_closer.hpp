@@ -91,6 +91,7 @@ class LoopCloser final : public Mapper {
   void add(MapKeyframe query, const KeyframeImu& imu, const std::vector<MapEdge>& found, MapUpdate& update);
   void take_anchors(const Keyframe& keyframe, MapUpdate& update);
   std::optional<MapAnchor> attached(const Anchor& anchor) const;
+  AnchoredPose anchored_pose(const MapAnchor& anchor) const;
   std::vector<AnchoredPose> anchored_poses() const;
   void find_building(MapUpdate& update);
   bool optimisation_due() const;

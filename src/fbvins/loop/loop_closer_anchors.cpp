@@ -11,6 +11,8 @@ namespace {
 
 /// Anchors of one keyframe: of a sensor that is faster, some are left out, evenly.
 constexpr std::size_t kMostOfAKeyframe = 8;
+/// Anchors by which M is found: of more, evenly so many.
+constexpr std::size_t kMostToFind = 400;
 
 Vec6 sigma_of(double position_m2, double yaw_rad2) {
   Vec6 sigma;
@@ -58,23 +60,28 @@ void LoopCloser::take_anchors(const Keyframe& keyframe, MapUpdate& update) {
   if (newest.t == keyframe.t) newest.T_MB = frame_.T_MG() * newest.T_GB;
 }
 
-/// What anchors say of poses in M or, of a flight that is not localised in an anchored map, in its own gauge, level.
+/// What an anchor says of a pose in M or, of a flight that is not localised in an anchored map, in its own gauge, level.
+AnchoredPose LoopCloser::anchored_pose(const MapAnchor& anchor) const {
+  const MapKeyframe& k = *map_.find(anchor.keyframe);
+  AnchoredPose pose{k.T_MB.q, k.T_MB.p, anchor.measured, k.id};
+  if (map_.anchored) pose.q_XB = session_.q_LG * k.T_GB.q, pose.p_XB = session_.q_LG * k.T_GB.p;
+  if (k.session != session_.number) return pose;
+  const DriftVariance drift = drift_over(drift_.rate(), session_.path_m - k.path_m, (motion_.newest() - k.t).seconds());
+  const double away_m2 = (session_.T_GB->p - k.T_GB.p).squaredNorm();
+  pose.measured.information =
+      widened(pose.measured.information, sigma_of(drift.position_m2 + drift.yaw_rad2 * away_m2, drift.yaw_rad2).asDiagonal());
+  return pose;
+}
+
 std::vector<AnchoredPose> LoopCloser::anchored_poses() const {
-  std::vector<AnchoredPose> poses;
+  std::vector<const MapAnchor*> usable;
   for (const MapAnchor& anchor : map_.anchors) {
     const MapKeyframe& k = *map_.find(anchor.keyframe);
-    const bool own = k.session == session_.number;
-    if (map_.anchored ? !own : !k.placed) continue;
-    AnchoredPose pose{k.T_MB.q, k.T_MB.p, anchor.measured, k.id};
-    if (map_.anchored) pose.q_XB = session_.q_LG * k.T_GB.q, pose.p_XB = session_.q_LG * k.T_GB.p;
-    if (own) {
-      const DriftVariance drift = drift_over(drift_.rate(), session_.path_m - k.path_m, (motion_.newest() - k.t).seconds());
-      const double away_m2 = (session_.T_GB->p - k.T_GB.p).squaredNorm();
-      pose.measured.information =
-          widened(pose.measured.information, sigma_of(drift.position_m2 + drift.yaw_rad2 * away_m2, drift.yaw_rad2).asDiagonal());
-    }
-    poses.push_back(std::move(pose));
+    if (map_.anchored ? k.session == session_.number : k.placed) usable.push_back(&anchor);
   }
+  std::vector<AnchoredPose> poses;
+  const std::size_t count = std::min(usable.size(), kMostToFind);
+  for (std::size_t i = 0; i < count; ++i) poses.push_back(anchored_pose(*usable[i * usable.size() / count]));
   return poses;
 }
 

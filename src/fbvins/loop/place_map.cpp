@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::size_t kMostAnchors = 20000;
+constexpr std::size_t kMostAnchors = 5000;
 
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {

@@ -34,12 +34,12 @@ void add_cost(ceres::Problem& problem, const PoseGraphEdge& e, const Mat6& infor
 }
 
 template <int Dof>
-void add_cost(ceres::Problem& problem, const PoseGraphAnchor& anchor, const Mat6& information,
-              const std::vector<Pose<M, B>>& poses, std::vector<std::array<double, 6>>& x) {
+void add_cost(ceres::Problem& problem, const PoseGraphAnchor& anchor, const std::vector<Pose<M, B>>& poses,
+              std::vector<std::array<double, 6>>& x) {
   const auto i = static_cast<std::size_t>(anchor.node);
   const double weight = anchor.certain ? 1 : std::max(anchor.weight, kMinWeight);
   auto* cost = new ceres::AutoDiffCostFunction<AnchorCost<Dof>, 6, Dof>(
-      new AnchorCost<Dof>{poses[i].q, anchor.measured, std::sqrt(weight) * root_of(information)});
+      new AnchorCost<Dof>{poses[i].q, anchor.measured, std::sqrt(weight) * anchor.root});
   problem.AddResidualBlock(cost, nullptr, x[i].data());
 }
 
@@ -87,10 +87,9 @@ Mat6 PoseGraph::weighted_information(const PoseGraphEdge& e, const PoseGraphOpti
   return weight * 0.5 * (information + information.transpose());
 }
 
-double PoseGraph::chi2(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const {
+double PoseGraph::chi2(const PoseGraphAnchor& anchor) const {
   const Pose<M, B>& T_MB = poses_[static_cast<std::size_t>(anchor.node)];
-  const Vec6 r = residual(anchor.measured, T_MB.q, T_MB.p);
-  return r.dot(information_of(anchor, options) * r);
+  return (anchor.root * residual(anchor.measured, T_MB.q, T_MB.p)).squaredNorm();
 }
 
 /// As for loops (L9), the error of roll and pitch, which a node of four degrees of freedom cannot correct, is the measurement's.
@@ -111,8 +110,8 @@ int PoseGraph::solve(const PoseGraphOptions& options, PoseGraphReport& report) {
     used[static_cast<std::size_t>(e.a)] = used[static_cast<std::size_t>(e.b)] = true;
   }
   for (const PoseGraphAnchor& a : anchors_) {
-    if (options.degrees_of_freedom == 4) add_cost<4>(problem, a, information_of(a, options), poses_, x);
-    else add_cost<6>(problem, a, information_of(a, options), poses_, x);
+    if (options.degrees_of_freedom == 4) add_cost<4>(problem, a, poses_, x);
+    else add_cost<6>(problem, a, poses_, x);
     used[static_cast<std::size_t>(a.node)] = true;
   }
   const double per_sigma = 1 / kTilt_rad;
@@ -144,16 +143,17 @@ void PoseGraph::weigh(double mu, const PoseGraphOptions& options) {
   for (PoseGraphEdge& e : edges_)
     if (e.loop) e.weight = weight_of(chi2(e, options), mu);
   for (PoseGraphAnchor& a : anchors_)
-    if (!a.certain) a.weight = weight_of(chi2(a, options), mu);
+    if (!a.certain) a.weight = weight_of(chi2(a), mu);
 }
 
 PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
   PoseGraphReport report;
+  for (PoseGraphAnchor& a : anchors_) a.root = root_of(information_of(a, options));
   double worst = 0;
   for (const PoseGraphEdge& e : edges_)
     if (e.loop) worst = std::max(worst, chi2(e, options));
   for (const PoseGraphAnchor& a : anchors_)
-    if (!a.certain) worst = std::max(worst, std::min(kLargestChi2, chi2(a, options)));
+    if (!a.certain) worst = std::max(worst, std::min(kLargestChi2, chi2(a)));
   // mu large: nearly convex, every loop counts; mu = 1: Geman-McClure.
   double mu = std::max(1.0, 2 * worst / (kOutlier_sigma * kOutlier_sigma));
   for (;;) {

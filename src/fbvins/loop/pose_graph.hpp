@@ -38,8 +38,9 @@ struct PoseGraphEdge {
 struct PoseGraphAnchor {
   int node = 0;
   PartialPose measured;
-  bool certain = false;  ///< cannot be an outlier
-  double weight = 1;     ///< as of an edge
+  bool certain = false;      ///< cannot be an outlier
+  double weight = 1;         ///< as of an edge
+  Mat6 root = Mat6::Zero();  ///< of the information, with the error of roll and pitch; set by optimise()
 };
 
 class PoseGraph {
@@ -57,7 +58,7 @@ class PoseGraph {
   const std::vector<PoseGraphEdge>& edges() const { return edges_; }
   /// Squared Mahalanobis length of an edge's residual at the present poses.
   double chi2(const PoseGraphEdge& edge, const PoseGraphOptions& options) const;
-  double chi2(const PoseGraphAnchor& anchor, const PoseGraphOptions& options) const;
+  double chi2(const PoseGraphAnchor& anchor) const;
   const std::vector<PoseGraphAnchor>& anchors() const { return anchors_; }
 
  private:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/pipeline/packet_maker.hpp"
 
+#include <utility>
+
 namespace fbvins {
 
 void PacketMaker::push(StereoFrame frame) {
@@ -10,6 +12,12 @@ void PacketMaker::push(StereoFrame frame) {
   }
   newest_image_ = frame.t;
   waiting_.push_back(std::move(frame));
+}
+
+void PacketMaker::push(Anchor anchor) {
+  constexpr std::size_t kMost = 1024;  // where no images come
+  if (anchors_.size() >= kMost) anchors_.erase(anchors_.begin());
+  anchors_.push_back(std::move(anchor));
 }
 
 std::optional<SensorPacket> PacketMaker::next(bool flush) {

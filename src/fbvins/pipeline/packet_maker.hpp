@@ -5,7 +5,6 @@
 
 #include <deque>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "fbvins/imu/imu_history.hpp"
@@ -24,7 +23,7 @@ class PacketMaker {
   void push(const ImuSample& sample) { imu_.add(sample); }
   void push(StereoFrame frame);
   /// Goes with the next image that comes out.
-  void push(Anchor anchor) { anchors_.push_back(std::move(anchor)); }
+  void push(Anchor anchor);
   /// The next image that is ready; with `flush`, the next image even if its readings never came.
   std::optional<SensorPacket> next(bool flush = false);
   InputCounts counts() const;

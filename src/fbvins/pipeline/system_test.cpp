@@ -168,10 +168,31 @@ std::unique_ptr<LoopCloser> loop_closer() {
 struct MapOutcome {
   std::vector<std::string> odometry, updates;
   std::string map;
-  int loops = 0;
+  int loops = 0, moved = 0;
 };
 
-MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEvent>& events) {
+/// In a building: the camera's y points down, and it looks along x.
+Pose<A, B> in_building(double t_s) {
+  Mat3 R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {R, Vec3(10, 5 - sway_m(t_s), 2)};
+}
+
+/// A tag on the wall, seen at 10 Hz beside the images; every fifth one is taken for another.
+std::vector<Anchor> tags(int images) {
+  std::vector<Anchor> out;
+  const Pose<A, Tag> on_wall(Quat(0.5, 0.5, -0.5, -0.5), Vec3(12, 5, 2)), other(Quat::Identity(), Vec3(3, 1, 2));
+  for (int k = 0; k < images / 2; ++k) {
+    TagAnchor tag{.t = Time{(100 * k + 20) * kMs}, .T_AT = k % 5 == 4 ? other : on_wall};
+    tag.T_BT = in_building(tag.t.seconds()).inverse() * on_wall;
+    tag.covariance.diagonal() << Vec3::Constant(1e-4), Vec3::Constant(1e-4);
+    out.push_back(tag);
+  }
+  return out;
+}
+
+MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEvent>& events,
+                        const std::vector<Anchor>& anchors = {}) {
   const std::unique_ptr<LoopCloser> loop = with_map ? loop_closer() : nullptr;
   System system = system_of(mode, {.mapper = loop.get()});
   MapOutcome outcome;
@@ -186,9 +207,17 @@ MapOutcome fly_with_map(RunMode mode, bool with_map, const std::vector<SensorEve
     EXPECT_GT(u.applies_from, u.frame);
     EXPECT_GE(u.applies_from.value, newest_update);
     newest_update = u.applies_from.value;
+    outcome.moved += u.M_moved.has_value();
   });
-  push_all(system, events);
+  std::size_t next = 0;
+  for (const SensorEvent& event : events) {
+    const Time t = std::visit([](const auto& e) { return e.t; }, event);
+    for (; next < anchors.size() && stamp_of(anchors[next]) <= t; ++next) EXPECT_TRUE(system.push(anchors[next]));
+    EXPECT_TRUE(system.push(event));
+  }
+  EXPECT_FALSE(system.push(HeightAnchor{.sigma_m = -1})) << "it is impossible, and nothing else happens";
   EXPECT_TRUE(system.finish().ok());
+  EXPECT_FALSE(system.push(HeightAnchor{}));
   if (loop) outcome.map = serialise_map(loop->map());
   return outcome;
 }
@@ -204,6 +233,27 @@ TEST(LoopClosureInTheSystem, ThreadsGiveTheSameMapAndTheOdometryDoesNotChange) {
   EXPECT_GT(alone.loops, 0);
   EXPECT_EQ(threaded.updates, alone.updates);
   EXPECT_EQ(threaded.map, alone.map);
+}
+
+TEST(LoopClosureInTheSystem, AnchorsMakeMTheBuildingsFrame) {
+  const std::vector<SensorEvent> events = sway(130);
+  const MapOutcome without = fly_with_map(RunMode::deterministic, true, events);
+  const MapOutcome alone = fly_with_map(RunMode::deterministic, true, events, tags(130));
+  const MapOutcome threaded = fly_with_map(RunMode::threaded, true, events, tags(130));
+  EXPECT_EQ(without.moved, 0);
+  EXPECT_EQ(alone.moved, 1);
+  EXPECT_EQ(alone.odometry, without.odometry) << "anchors never move W";
+  EXPECT_EQ(threaded.updates, alone.updates);
+  EXPECT_EQ(threaded.map, alone.map);
+  const auto map = parse_map(std::as_bytes(std::span(alone.map)), "map");
+  ASSERT_TRUE(map.ok());
+  ASSERT_TRUE(map->anchored);
+  EXPECT_GT(map->anchors.size(), 30u);
+  for (const MapKeyframe& k : map->keyframes()) {
+    const Pose<A, B> truth = in_building(k.t.seconds());
+    EXPECT_LT((k.T_MB.p - truth.p).norm(), 0.01) << k.t.seconds();
+    EXPECT_LT(so3_log(k.T_MB.q.conjugate() * truth.q).norm(), 0.01) << k.t.seconds();
+  }
 }
 
 /// With the IMU's clock beside the cameras', and the offset known, everything is the same to the last bit: the odometry with

@@ -9,6 +9,7 @@
 // simulate() is a pure function, but for reading a recorded flight's files; the Dataset is used as any other.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -104,7 +105,9 @@ struct Simulation {
   std::shared_ptr<FlightRecorder> recorder;
 };
 
-Result<Simulation> prepare_simulation(const SimulationOptions& options);
+/// `change` adds to the world what its options do not have; the flight and its times are known by then.
+Result<Simulation> prepare_simulation(const SimulationOptions& options,
+                                      const std::function<void(World&, const Simulation&)>& change = {});
 /// Renders a frame; frames in order (exposure follows the image before). Stamps on the cameras' clock.
 RenderedFrame render_frame(Simulation& simulation, std::size_t index, bool with_depth = false);
 
