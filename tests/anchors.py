@@ -42,7 +42,8 @@ def worst_m(out, truth):
     """Of the poses in M against the truth, without any alignment."""
     stamps = sorted(truth)
     worst, poses = 0.0, 0
-    for line in (out / "map_trajectory_tum.txt").read_text(encoding="utf-8").splitlines():
+    lines = (out / "map_trajectory_tum.txt").read_text(encoding="utf-8").splitlines()
+    for line in (line for line in lines if not line.startswith("#")):
         seconds, x, y, z = line.split()[:4]
         whole, part = seconds.split(".")
         t = int(whole) * 10**9 + int(part)

@@ -58,7 +58,7 @@ TEST(TagFinder, PosesAreAsCertainAsTheySay) {
       EXPECT_LT(e.head<3>().norm(), 0.02 * distance_m);
       nees += size, ++found;
     }
-  EXPECT_GE(found, 11);
+  EXPECT_GE(found, 5) << "the squares of a grid touch the tag and hide some";
   EXPECT_LT(nees / found, 6) << "the simulated corners are better than those of a real lens";
   EXPECT_GT(nees / found, 0.02);
 }
