@@ -31,6 +31,7 @@ class FirstLook final : public SensorInput {
     if (looking_) look_at(frame);
     next_.push(std::move(frame));
   }
+  void push_anchor(Anchor anchor) override { next_.push_anchor(std::move(anchor)); }
 
  private:
   void look_at(const SensorEvent& event);

@@ -87,11 +87,13 @@ def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, l
         options: Optional[Mapping] = None, threaded: bool = False, final_ba: bool = False, boosted_map: bool = False,
         load_map: Optional[PathLike] = None, save_map: Optional[PathLike] = None, vocabulary: Optional[PathLike] = None,
         imu_state: Optional[PathLike] = None, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
-        max_images: int = 0, progress: Optional[Callable[[int, int], object]] = None) -> Run:
+        positions: Optional[PathLike] = None, tags: Optional[PathLike] = None, max_images: int = 0,
+        progress: Optional[Callable[[int, int], object]] = None) -> Run:
     """Estimates a whole recording, as `fbvins run` does: the same results to the byte.
 
     recording: a path, or a Recording that has not been iterated yet.  frontend: "klt", "orb" or "boost"; None: as configured.
-    loop: loop closure with a map; load_map, save_map, final_ba, boosted_map imply it.  config: a Config, a file or a dict of options;
+    loop: loop closure with a map; load_map, save_map, final_ba, boosted_map, positions, tags imply it.  positions, tags: files of anchors
+    (docs/maps.md), by which the map comes into the frame of a building.  config: a Config, a file or a dict of options;
     `options` override it.  imu_state: file that carries the IMU's biases from flight to flight.  progress(done, all) is called every 16 images.
     """
     if isinstance(recording, Recording):
@@ -111,7 +113,7 @@ def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, l
     else:
         effective = _configured(config, changed)
     return Run(_fbvins.run(recording, effective, threaded, loop, final_ba, boosted_map, _path(load_map), _path(save_map), _path(vocabulary),
-                           _path(imu_state), progress))
+                           _path(imu_state), _path(positions), _path(tags), progress))
 
 
 def _opened(recording: Union[Recording, PathLike], calibration: Optional[PathLike], imu_calibration: Optional[PathLike],

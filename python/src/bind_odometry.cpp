@@ -140,6 +140,13 @@ void bind_odometry(nb::module_& m) {
           "T_MW_smooth", [](const MapUpdate& u) { return to_array(u.T_MW_smooth); }, "(4, 4), without jumps, for control")
       .def_prop_ro(
           "T_MG", [](const MapUpdate& u) { return to_array(u.T_MG); }, "(4, 4)")
+      .def_ro("anchored", &MapUpdate::anchored, "M is the frame of the building, by anchors")
+      .def_prop_ro(
+          "M_moved", [](const MapUpdate& u) { return u.M_moved ? nb::cast(to_array(*u.M_moved)) : nb::object(nb::none()); },
+          "None, or (4, 4) where M is another frame from this update on: takes coordinates in the M of before to the new one")
+      .def_prop_ro(
+          "anchors", [](const MapUpdate& u) { return u.stats.anchors; }, "anchors that moved M")
+      .def_prop_ro("anchors_refused", [](const MapUpdate& u) { return u.stats.anchors_refused; })
       .def_prop_ro(
           "loops", [](const MapUpdate& u) { return u.loops.size(); }, "places recognised")
       .def_prop_ro(

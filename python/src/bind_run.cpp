@@ -27,10 +27,10 @@ constexpr int kFramesBetweenChecks = 16;
 
 PyRun run(Dataset& data, const Config& config, bool threaded, bool loop, bool final_ba, bool boosted_map,
           const std::string& load_map, const std::string& save_map, const std::string& vocabulary, const std::string& imu_state,
-          nb::handle progress) {
+          const std::string& positions, const std::string& tags, nb::handle progress) {
   if (data.begun()) throw nb::value_error("this recording has been iterated already: open it again");
   app::FlightArguments arguments;
-  arguments.map = {loop, final_ba, boosted_map, load_map, save_map, vocabulary};
+  arguments.map = {loop, final_ba, boosted_map, load_map, save_map, vocabulary, positions, tags};
   arguments.imu_state = imu_state;
   arguments.threaded = threaded;
   const int all = static_cast<int>(data.frames().size());
@@ -204,7 +204,7 @@ void bind_run(nb::module_& m) {
   });
 
   m.def("run", &run, "recording"_a, "config"_a, "threaded"_a, "loop"_a, "final_ba"_a, "boosted_map"_a, "load_map"_a, "save_map"_a,
-        "vocabulary"_a, "imu_state"_a, "progress"_a.none());
+        "vocabulary"_a, "imu_state"_a, "positions"_a, "tags"_a, "progress"_a.none());
 }
 
 }  // namespace fbvins::python

@@ -78,6 +78,21 @@ class PySystem {
   void push(SensorEvent event) {
     done([&] { return system_->push(std::move(event)); });
   }
+  /// `covariance`: (3, 3), or the standard deviation of each axis.
+  void push_position(nb::handle t, nb::handle position, nb::handle covariance, nb::handle point) {
+    PositionAnchor anchor{.t = Time{whole_number(t, "t")}, .p_A = vector3(position, "position"), .p_B = point_of(point)};
+    if (nb::isinstance<nb::float_>(covariance) || nb::isinstance<nb::int_>(covariance)) {
+      const auto sigma_m = nb::cast<double>(covariance);
+      anchor.covariance = sigma_m * sigma_m * Mat3::Identity();
+    } else {
+      const auto given = checked<double>(covariance, "covariance", {3, 3});
+      anchor.covariance = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(given.data);
+    }
+    push_anchor(std::move(anchor));
+  }
+  void push_height(nb::handle t, double height, double sigma, nb::handle point) {
+    push_anchor(HeightAnchor{Time{whole_number(t, "t")}, height, sigma, point_of(point)});
+  }
   void finish() {
     done([&] { return system_->finish(); });
   }
@@ -101,6 +116,12 @@ class PySystem {
   }
 
  private:
+  static Vec3 point_of(nb::handle point) { return point.is_none() ? Vec3(Vec3::Zero()) : vector3(point, "point"); }
+  void push_anchor(Anchor anchor) {
+    if (map_.is_none()) throw nb::value_error("anchors are for a map: System(map=...) has none");
+    if (const std::string why = impossible(anchor); !why.empty()) throw nb::value_error(why.c_str());
+    done([&] { return system_->push(std::move(anchor)); });
+  }
   void push_readings(nb::handle t, nb::handle gyro, nb::handle accel) {
     const auto stamps = checked<std::int64_t>(t, "t", {kAny});
     const auto n = static_cast<std::int64_t>(stamps.rows());
@@ -232,6 +253,17 @@ void bind_system(nb::module_& m) {
           "push", [](PySystem& s, const ImuSample& sample) { s.push(sample); }, "event"_a, "An event of a Recording.")
       .def(
           "push", [](PySystem& s, const StereoFrame& frame) { s.push(frame); }, "event"_a)
+      .def(
+          "push_position", &PySystem::push_position, "t"_a, "position"_a, "covariance"_a, "point"_a.none() = nb::none(),
+          nb::sig("def push_position(self, t: int, position: numpy.ndarray, covariance: float | numpy.ndarray, "
+                  "point: numpy.ndarray | None = None) -> None"),
+          "For the map: where a point of the body is in the building's frame, measured from outside. t in ns of the cameras' clock, "
+          "position (3,) in m, covariance a standard deviation in m or (3, 3) in m^2, point (3,) in m in B, None for its origin. "
+          "Best before the next images; one that is late by more than some seconds is not used. ValueError without a map and for "
+          "numbers that are impossible.")
+      .def("push_height", &PySystem::push_height, "t"_a, "height"_a, "sigma"_a, "point"_a.none() = nb::none(),
+           nb::sig("def push_height(self, t: int, height: float, sigma: float, point: numpy.ndarray | None = None) -> None"),
+           "The same of a height above z = 0 of the building alone, m.")
       .def("finish", &PySystem::finish,
            "Processes all waiting events and ends; afterwards only results already waiting for poll() are left.")
       .def("poll", &PySystem::poll, "The Odometry of all images processed since the last call; empty with on_odometry.")

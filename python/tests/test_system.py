@@ -87,6 +87,33 @@ def test_the_map_beside_it(flight, tmp_path):
     assert again.keyframes == flat.keyframes
 
 
+def test_positions_bring_the_map_into_the_building(flight):
+    recording, truth = fbvins.open(flight), fbvins.open(flight).ground_truth
+    flat = fbvins.Map(recording.rig)
+    system = fbvins.System({"frontend.kind": "klt"}, recording.rig, map=flat)
+    shift, rng = np.array([20.0, -3.0, 5.0]), np.random.default_rng(3)
+    waiting = [(int(t), p + shift + rng.normal(0, 0.02, 3)) for t, p in zip(truth.t[::20], truth.p[::20])]
+    for event in recording:
+        if isinstance(event, fbvins.StereoFrame):
+            while waiting and waiting[0][0] <= event.t:
+                system.push_position(*waiting.pop(0), 0.02)
+        system.push(event)
+    with pytest.raises(ValueError, match="impossible"):
+        system.push_position(0, np.array([np.nan, 0, 0]), 0.1)
+    with pytest.raises(ValueError, match="impossible"):
+        system.push_height(0, 1.0, 0.0)
+    system.finish()
+    flat.finish()
+    updates = system.poll_map()
+    moved = [u for u in updates if u.M_moved is not None]
+    assert len(moved) == 1 and moved[0].anchored and moved[0].M_moved.shape == (4, 4) and not updates[0].anchored
+    in_map = flat.corrected([o for o in system.poll() if o.has_pose])
+    at = np.searchsorted(truth.t, in_map.t).clip(max=len(truth.t) - 1)
+    assert np.linalg.norm(in_map.p - shift - truth.p[at], axis=1).max() < 0.1
+    with pytest.raises(ValueError, match="none"):
+        fbvins.System(None, recording.rig).push_height(0, 1.0, 0.1)
+
+
 @pytest.mark.parametrize("threaded", [False, True])
 def test_an_exception_in_a_callback_is_raised_unchanged(flight, threaded):
     class Mine(Exception):

@@ -17,7 +17,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 0,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 1,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_READINGS = 512,
   FBVINS_SOCKET_LARGEST_MESSAGE = 32768  ///< bytes
@@ -29,6 +29,7 @@ enum {
   FBVINS_SOCKET_IMU = 2,
   FBVINS_SOCKET_FRAME = 3,
   FBVINS_SOCKET_GOODBYE = 4,   ///< either way
+  FBVINS_SOCKET_POSITION = 5,  ///< sender to estimator, since version 1.1
   FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
   FBVINS_SOCKET_RELEASED = 66,
   FBVINS_SOCKET_STATUS = 67
@@ -113,6 +114,20 @@ typedef struct FbvinsSocketFrame {
   uint32_t images;    ///< which of the two the slot holds
 } FbvinsSocketFrame;
 
+/// FbvinsSocketPosition::measured
+enum { FBVINS_SOCKET_WHERE = 0, FBVINS_SOCKET_HEIGHT = 1 };
+
+/// Where a point of the body is in the building, by a sensor outside (docs/maps.md, Anchors), or how high it is.
+typedef struct FbvinsSocketPosition {
+  FbvinsSocketHeader header;
+  int64_t t_ns;             ///< of the cameras' clock
+  double p_A[3];            ///< in the building's frame, m
+  double covariance_m2[6];  ///< xx xy xz yy yz zz
+  double p_B[3];            ///< the point of the body that is measured, m
+  uint32_t measured;        ///< of a height alone only z and zz count
+  uint32_t reserved;
+} FbvinsSocketPosition;
+
 /// FbvinsSocketGoodbye::reason
 enum {
   FBVINS_SOCKET_DONE = 0,
@@ -156,7 +171,7 @@ typedef struct FbvinsSocketStatus {
   uint64_t frames;
   uint64_t frames_missed;  ///< gaps in FbvinsSocketFrame::sequence
   uint64_t readings;
-  uint64_t readings_refused;  ///< not finite
+  uint64_t readings_refused;  ///< not finite; impossible positions as well
   uint32_t slots_held;
   uint32_t health;
   uint32_t reset_counter;  ///< +1 whenever the estimator started again

@@ -7,6 +7,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/sink.hpp"
+#include "fbvins/types/anchor.hpp"
 #include "fbvins/types/sensor_event.hpp"
 
 namespace fbvins {
@@ -18,6 +19,8 @@ class SensorInput {
   virtual ~SensorInput() = default;
   virtual void push(const ImuSample& sample) = 0;
   virtual void push(StereoFrame frame) = 0;
+  /// A measurement for the map, on the cameras' clock. Who has no map leaves it.
+  virtual void push_anchor(Anchor anchor) { (void)anchor; }
 };
 
 class Source {

@@ -10,6 +10,8 @@ namespace {
 
 /// Readings kept until it is known whether their stamps are good.
 constexpr std::size_t kMostMisfits = 2000;
+/// Anchors that wait for the next event; more come from a sensor gone mad.
+constexpr std::size_t kMostAnchors = 1024;
 /// An image that repeats the one before is the same one, come twice, if its stamp is no later than this; otherwise the camera is
 /// frozen.
 constexpr Duration kSameImage{10'000'000};
@@ -108,6 +110,19 @@ void Ingest::take(StereoFrame frame, Time t, Time host) {
   queue_.push_back(std::move(frame));
   image_waits_ = true;
   filled_.notify_one();
+}
+
+void Ingest::push_anchor(Anchor anchor) {
+  const std::lock_guard order(order_mutex_);
+  std::visit([this](auto& a) { a.t = clock_.mended(ClockGuard::camera, a.t); }, anchor);
+  const std::lock_guard lock(mutex_);
+  if (closed_ || anchors_.size() >= kMostAnchors) return;
+  anchors_.push_back(std::move(anchor));
+}
+
+std::vector<Anchor> Ingest::take_anchors() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(anchors_, {});
 }
 
 void Ingest::tick() {

@@ -13,6 +13,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "fbvins/core/sample_period.hpp"
 #include "fbvins/imu/reading_judge.hpp"
@@ -37,6 +38,8 @@ class Ingest final : public SensorInput {
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
+  /// Its stamp is corrected as those of the images are.
+  void push_anchor(Anchor anchor) override;
   /// Releases readings that have waited long enough (ImuOrder); to be called every few milliseconds.
   void tick();
 
@@ -44,6 +47,8 @@ class Ingest final : public SensorInput {
   std::optional<SensorEvent> pop();
   /// The next event if there is one: for callers of a single thread.
   std::optional<SensorEvent> pop_waiting();
+  /// Anchors that have come since the last call.
+  std::vector<Anchor> take_anchors();
   void close();
 
   struct Arrival {
@@ -82,6 +87,7 @@ class Ingest final : public SensorInput {
   mutable std::mutex mutex_;
   std::condition_variable filled_;
   std::deque<SensorEvent> queue_;
+  std::vector<Anchor> anchors_;
   bool image_waits_ = false, closed_ = false;
   std::int64_t images_dropped_ = 0;
 };

@@ -66,6 +66,19 @@ TEST(Ingest, OnlyTheNewestImageWaitsAndNoReadingIsLost) {
   EXPECT_EQ(f.told.size(), 100u);
 }
 
+TEST(Ingest, AnchorsAreHandedOnOnceAndBounded) {
+  Fixture f;
+  f.begin();
+  f.ingest.push_anchor(HeightAnchor{.t = ms(3)});
+  f.ingest.push_anchor(PositionAnchor{.t = ms(4)});
+  const std::vector<Anchor> anchors = f.ingest.take_anchors();
+  ASSERT_EQ(anchors.size(), 2u);
+  EXPECT_EQ(stamp_of(anchors[1]), ms(4)) << "no clock has jumped";
+  EXPECT_TRUE(f.ingest.take_anchors().empty());
+  for (int i = 0; i < 5000; ++i) f.ingest.push_anchor(HeightAnchor{});
+  EXPECT_EQ(f.ingest.take_anchors().size(), 1024u);
+}
+
 TEST(Ingest, AnImageThatIsTakenInTimeIsNotDropped) {
   Fixture f;
   f.begin();

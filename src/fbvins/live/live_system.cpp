@@ -110,7 +110,8 @@ struct LiveSystem::Impl {
   void feed() {
     while (std::optional<SensorEvent> event = ingest.pop()) {
       std::visit([this](const auto& e) { hub.publish(e); }, *event);
-      if (Result<void> taken = system.push(std::move(*event)); !taken) return;  // the watcher reports it
+      for (Anchor& anchor : ingest.take_anchors()) (void)system.push(std::move(anchor));  // impossible ones are left out
+      if (Result<void> taken = system.push(std::move(*event)); !taken) return;            // the watcher reports it
     }
   }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstring>
 
 #include "fbvins/io/image_decode.hpp"
@@ -16,6 +17,7 @@ constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
 static_assert(sizeof(FbvinsSocketHello) == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
 static_assert(sizeof(FbvinsSocketReading) == 56 && sizeof(FbvinsSocketFrame) == 32 && sizeof(FbvinsSocketGoodbye) == 256);
+static_assert(sizeof(FbvinsSocketPosition) == 120);
 static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
 
 Error malformed(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -107,6 +109,24 @@ Result<SocketMessage> parse_frame(std::span<const std::byte> bytes) {
   return SocketMessage(SocketFrame{{frame->t_ns}, frame->sequence, static_cast<int>(frame->slot), left, right});
 }
 
+Result<SocketMessage> parse_position(std::span<const std::byte> bytes) {
+  const auto position = read<FbvinsSocketPosition>(bytes, "position");
+  if (!position) return position.error();
+  if (!is_stamp(position->t_ns)) return malformed(fmt::format("position: stamp {} ns", position->t_ns));
+  const auto& c = position->covariance_m2;
+  Anchor anchor;
+  if (position->measured == FBVINS_SOCKET_HEIGHT) {
+    anchor = HeightAnchor{{position->t_ns}, position->p_A[2], std::sqrt(c[5]), Vec3(position->p_B)};
+  } else if (position->measured == FBVINS_SOCKET_WHERE) {
+    Mat3 covariance;
+    covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+    anchor = PositionAnchor{{position->t_ns}, Vec3(position->p_A), covariance, Vec3(position->p_B)};
+  } else {
+    return malformed(fmt::format("position: measured is {}, not 0 or 1", position->measured));
+  }
+  return SocketMessage(impossible(anchor).empty() ? SocketPosition{std::move(anchor)} : SocketPosition{});
+}
+
 Result<SocketMessage> parse_goodbye(std::span<const std::byte> bytes) {
   const auto goodbye = read<FbvinsSocketGoodbye>(bytes, "goodbye");
   if (!goodbye) return goodbye.error();
@@ -125,6 +145,7 @@ Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
     case FBVINS_SOCKET_IMU: return parse_imu(bytes);
     case FBVINS_SOCKET_FRAME: return parse_frame(bytes);
     case FBVINS_SOCKET_GOODBYE: return parse_goodbye(bytes);
+    case FBVINS_SOCKET_POSITION: return parse_position(bytes);
     default: return SocketMessage(SocketUnknown{header->type});
   }
 }

@@ -18,6 +18,7 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/socket_protocol.hpp"
+#include "fbvins/types/anchor.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -52,16 +53,20 @@ struct SocketFrame {
   bool left = false, right = false;
 };
 
+struct SocketPosition {
+  std::optional<Anchor> anchor;  ///< none: left out, being impossible
+};
+
 struct SocketGoodbye {
   std::string text;  ///< printable
 };
 
-/// A type that version 1.0 does not have.
+/// A type that this version does not have.
 struct SocketUnknown {
   std::uint32_t type = 0;
 };
 
-using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketGoodbye, SocketUnknown>;
+using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketPosition, SocketGoodbye, SocketUnknown>;
 
 /// ErrorCode::unsupported: another major version; ErrorCode::malformed: anything else.
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);

@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.0 of the protocol, this program 1.0");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.0 of the protocol, this program 1.1");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -111,6 +111,36 @@ TEST(SocketMessage, CalibrationsThatCannotBeAreRefused) {
             std::string::npos);
   EXPECT_EQ(with([](auto& r) { r.imu_rate_hz = 0; }), "calibration: a noise density or a rate is not positive");
   EXPECT_EQ(with([](auto& r) { r.time_offset_s = kNan; }), "calibration: the time offset is more than 10 s");
+}
+
+TEST(SocketMessage, PositionsAndHeights) {
+  FbvinsSocketPosition position{};
+  position.header = {FBVINS_SOCKET_POSITION, sizeof(position)};
+  position.t_ns = 77;
+  const double p_A[] = {1, 2, 3}, covariance[] = {0.04, 0.01, 0, 0.09, 0, 0.25}, p_B[] = {0.1, 0, -0.2};
+  std::copy_n(p_A, 3, position.p_A), std::copy_n(covariance, 6, position.covariance_m2), std::copy_n(p_B, 3, position.p_B);
+  const auto anchor_of = [&] {
+    const auto message = parse_socket_message(bytes_of(position));
+    EXPECT_TRUE(message);
+    return std::get<SocketPosition>(*message).anchor;
+  };
+  const auto where = std::get<PositionAnchor>(*anchor_of());
+  EXPECT_EQ(where.t, Time{77});
+  EXPECT_EQ(where.p_A, Vec3(1, 2, 3));
+  EXPECT_EQ(where.p_B, Vec3(0.1, 0, -0.2));
+  EXPECT_EQ(where.covariance(1, 0), 0.01);
+  EXPECT_EQ(where.covariance(1, 1), 0.09);
+  position.measured = FBVINS_SOCKET_HEIGHT;
+  const auto height = std::get<HeightAnchor>(*anchor_of());
+  EXPECT_EQ(height.z_A_m, 3);
+  EXPECT_EQ(height.sigma_m, 0.5);
+  position.covariance_m2[5] = -1;
+  EXPECT_FALSE(anchor_of()) << "left out, and the connection stays";
+  position.measured = 2;
+  EXPECT_EQ(refusal(bytes_of(position)), "position: measured is 2, not 0 or 1");
+  position.t_ns = -1;
+  EXPECT_EQ(refusal(bytes_of(position)), "position: stamp -1 ns");
+  EXPECT_EQ(refusal(bytes_of(position, 40)), "a message of 40 bytes says that it has 120");
 }
 
 TEST(SocketMessage, ReadingsThatAreNotFiniteAreLeftOutAndCounted) {

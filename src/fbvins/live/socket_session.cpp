@@ -95,11 +95,17 @@ void SocketSession::take(const SocketMessage& message, SensorInput& input) {
     counts_.readings += imu->readings.size();
     counts_.readings_refused += static_cast<std::uint64_t>(imu->refused);
   } else if (const auto* frame = std::get_if<SocketFrame>(&message)) take(*frame, input);
+  else if (const auto* position = std::get_if<SocketPosition>(&message)) take(*position, input);
   else if (const auto* goodbye = std::get_if<SocketGoodbye>(&message))
     ended_ = goodbye->text.empty() ? "said goodbye" : fmt::format("said goodbye: {}", goodbye->text);
   else if (std::holds_alternative<SocketHello>(message)) fail({ErrorCode::malformed, "a second hello"});
   else if (hello_->minor <= FBVINS_SOCKET_MINOR)  // else it is of a later version, which must do without an answer
     fail({ErrorCode::malformed, fmt::format("no message has type {}", std::get<SocketUnknown>(message).type)});
+}
+
+void SocketSession::take(const SocketPosition& position, SensorInput& input) {
+  if (position.anchor) input.push_anchor(*position.anchor);
+  else ++counts_.readings_refused;
 }
 
 void SocketSession::take(const SocketFrame& frame, SensorInput& input) {

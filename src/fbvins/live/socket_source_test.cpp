@@ -28,11 +28,15 @@ class Inbox final : public SensorInput {
   void push(StereoFrame frame) override {
     change([&] { frames_.push_back(std::move(frame)); });
   }
+  void push_anchor(Anchor anchor) override {
+    change([&] { anchors_.push_back(std::move(anchor)); });
+  }
   void say(const std::string& what) {
     change([&] { said_.push_back(what); });
   }
 
   std::vector<ImuSample> readings(std::size_t count) { return wait_for(readings_, count); }
+  std::vector<Anchor> anchors(std::size_t count) { return wait_for(anchors_, count); }
   std::vector<StereoFrame> frames(std::size_t count) { return wait_for(frames_, count); }
   void drop_frames() {
     change([&] { frames_.clear(); });
@@ -62,6 +66,7 @@ class Inbox final : public SensorInput {
   std::condition_variable changed_;
   std::vector<ImuSample> readings_;
   std::vector<StereoFrame> frames_;
+  std::vector<Anchor> anchors_;
   std::vector<std::string> said_;
 };
 
@@ -112,6 +117,20 @@ class SocketSourceTest : public testing::Test {
   std::unique_ptr<Sink> status_;
   std::thread thread_;
 };
+
+TEST_F(SocketSourceTest, PositionsArriveAndImpossibleOnesAreLeftOut) {
+  TestSender sender(path());
+  ASSERT_EQ(sender.begin(), std::uint32_t{FBVINS_SOCKET_WELCOME});
+  FbvinsSocketPosition position{};
+  position.header = {FBVINS_SOCKET_POSITION, sizeof(position)};
+  sender.send(test::bytes_of(position));  // without a covariance
+  position.t_ns = 30, position.p_A[2] = 1.5, position.covariance_m2[5] = 0.01, position.measured = FBVINS_SOCKET_HEIGHT;
+  sender.send(test::bytes_of(position));
+  const std::vector<Anchor> anchors = inbox_.anchors(1);
+  ASSERT_EQ(anchors.size(), 1u);
+  EXPECT_EQ(stamp_of(anchors[0]), Time{30});
+  EXPECT_EQ(std::get<HeightAnchor>(anchors[0]).z_A_m, 1.5);
+}
 
 TEST_F(SocketSourceTest, ReadingsAndFramesArriveAsTheyWereSent) {
   TestSender sender(path());
