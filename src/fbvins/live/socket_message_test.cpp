@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.0 of the protocol, this program 1.1");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.1 of the protocol, this program 1.1");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
