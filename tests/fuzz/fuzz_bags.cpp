@@ -8,6 +8,7 @@
 #include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/bags/packed_bags.hpp"
 #include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/bags/topic_choice.hpp"
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/io/mcap_format.hpp"
 #include "fbvins/io/mcap_writer.hpp"

@@ -48,6 +48,7 @@ void check(const SocketFrame& frame) {
   require(frame.t.ns >= 0 && frame.slot >= 0 && frame.slot < FBVINS_SOCKET_MOST_SLOTS && (frame.left || frame.right));
 }
 
+void check(const SocketPosition& position) { require(!position.anchor || impossible(*position.anchor).empty()); }
 void check(const SocketGoodbye& goodbye) { require(goodbye.text.find('\n') == std::string::npos); }
 void check(const SocketUnknown&) {}
 
@@ -61,6 +62,8 @@ std::vector<std::string> socket_seeds() {
   return {bytes_of(FBVINS_SOCKET_HELLO, hello),
           bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
           bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT}),
+          bytes_of(FBVINS_SOCKET_POSITION,
+                   FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),
           bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};
 }
 
