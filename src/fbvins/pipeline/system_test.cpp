@@ -423,8 +423,8 @@ TEST(SystemInput, AnImageOfAnotherSizeCountsAsMissing) {
   ASSERT_TRUE(system.finish().ok());
   using enum HealthReason;
   ASSERT_EQ(health.size(), 3u);
-  EXPECT_EQ(health[0], (Health{HealthState::initialising, one_camera, 0b10}));
-  EXPECT_EQ(health[1], (Health{HealthState::initialising, one_camera, 0b01}));
+  EXPECT_EQ(health[0], (Health{HealthState::initialising, one_camera, 0b01}));
+  EXPECT_EQ(health[1], (Health{HealthState::initialising, one_camera, 0b10}));
   EXPECT_EQ(health[2], (Health{HealthState::initialising, no_images}));
 }
 
