@@ -8,7 +8,6 @@
 #include <array>
 #include <charconv>
 #include <iterator>
-#include <ranges>
 #include <utility>
 
 #include "fbvins/ros2/cdr_type.hpp"
@@ -139,8 +138,11 @@ Result<Ros2Name> parse_ros2_node(const std::string& text) {
   if (good && last != std::string::npos && last > 0) {
     out.name_space = text.substr(0, last);
     good = out.name_space.size() > 1;
-    for (const auto part : std::views::split(std::string_view(out.name_space).substr(1), '/'))
-      good = good && is_ros_name(std::string_view(part.begin(), part.end()));
+    for (std::size_t begin = 1, end = 0; begin < out.name_space.size(); begin = end + 1) {
+      end = std::min(out.name_space.find('/', begin), out.name_space.size());
+      good = good && is_ros_name(std::string_view(out.name_space).substr(begin, end - begin));
+    }
+    good = good && out.name_space.back() != '/';
   }
   if (good) return out;
   return Error{ErrorCode::invalid_argument,
