@@ -23,7 +23,7 @@ const REASONS = {
   cameras_disagree: "the two cameras contradict each other",
   imu_clipped: "the IMU is at the end of its range",
   imu_vibration: "strong vibration spoils the IMU's readings",
-  correction_owed: "the pose is being corrected",
+  correction_pending: "the pose is being corrected",
 };
 
 export function reasonWords(reason) { return REASONS[reason] ?? reason.replaceAll("_", " "); }

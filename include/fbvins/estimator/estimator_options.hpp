@@ -97,8 +97,8 @@ struct EstimatorOptions {
     v("max_step_m", max_step_m, "m",
       "largest correction of the published position from one image to the next, attitude in proportion; 0: no limit", 0.0, 1.0);
     v("max_pending_m", max_pending_m, "m",
-      "no good pose has a larger correction before it (attitude: 3 degrees for 0.1 m); twice as large, or after trouble, it is made "
-      "at once and counted as a reset; 0: no limit",
+      "no good pose has a larger correction before it (attitude: 3 degrees for 0.1 m); twice as large, or soon after a pose that "
+      "was not good, it is made at once and counted as a reset; 0: no limit",
       0.0, 100.0);
   }
 };

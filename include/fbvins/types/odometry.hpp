@@ -40,9 +40,9 @@ enum class HealthReason {
   cameras_disagree,  ///< one camera contradicts the other and the IMU: its images are not used
   imu_clipped,       ///< an axis of the IMU is at the end of its range
   imu_vibration,     ///< readings are shaken so much that they say little
-  correction_owed,   ///< a correction larger than a good pose may be wrong is published step by step
+  correction_pending,   ///< a correction larger than a good pose may be wrong is published step by step
 };
-inline constexpr HealthReason kLastHealthReason = HealthReason::correction_owed;
+inline constexpr HealthReason kLastHealthReason = HealthReason::correction_pending;
 
 std::string_view to_string(HealthState state);
 std::string_view to_string(HealthReason reason);

@@ -445,12 +445,13 @@ void Estimator::carry_covariances(Odometry& out) {
   out.accel_bias_covariance = last.accel_bias;
 }
 
-/// At once as a new W where steps would mislead whoever follows the pose: after trouble, when the pose was wrong until now, and
-/// where it is large (W24). In a fast flight's first seconds, when its tilt becomes known far from the start, steps are better.
+/// A large pending correction is published at once, as a new W, if the pose was not good shortly before, or if it is twice the
+/// limit (W24). Otherwise it is published in steps, and the pose is not good meanwhile: a fast flight whose tilt becomes known
+/// far from its start.
 void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
   if (!after_trouble && !published_.owes_too_much(kAtOnce)) {
-    out.health = {HealthState::degraded, HealthReason::correction_owed};
+    out.health = {HealthState::degraded, HealthReason::correction_pending};
     return;
   }
   begin_new_W();
@@ -469,7 +470,7 @@ void Estimator::publish(Odometry& out) {
   if (monitor_.take_reset()) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   if (out.health.state == HealthState::good && published_.owes_too_much()) settle_correction(level.T_FB, out);
-  if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_owed) last_trouble_ = out.t;
+  if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);

@@ -605,7 +605,7 @@ TEST(Estimator, ACorrectionWithoutTroubleIsMadeInStepsAndThePoseIsNotGoodMeanwhi
     SimulatedFlight flight(Motion(1.5, 0.3), 9);
     Told told;
     for (const Odometry& o : fly(flight, 200, options).odometry) {
-      told.owed += o.health == Health{HealthState::degraded, HealthReason::correction_owed};
+      told.owed += o.health == Health{HealthState::degraded, HealthReason::correction_pending};
       told.resets = static_cast<int>(o.reset_counter);
     }
     return told;

@@ -14,7 +14,7 @@ const Pose<A, B> kT_AB(so3_exp(Vec3(0.1, -0.2, 2.0)), Vec3(4, -1, 1.5));
 
 Vec3 noise(Rng& rng, double sigma) { return sigma * Vec3(rng.normal(), rng.normal(), rng.normal()); }
 
-/// Mean squared whitened residual of a true pose against measurements drawn with their own covariance.
+/// Mean squared whitened residual of a true pose against measurements sampled from their own covariance.
 template <class Draw>
 double mean_nees(Draw draw) {
   Rng rng(3);
@@ -36,9 +36,9 @@ TEST(PartialPose, APositionIsThatOfItsPoint) {
   EXPECT_LT(residual(exact, kT_AB.q, kT_AB.p).head<3>().norm(), 1e-12);
   EXPECT_EQ(exact.information.bottomRightCorner(3, 3).norm(), 0);
   EXPECT_NEAR(mean_nees([&](Rng& rng) {
-                PositionAnchor drawn = a;
-                drawn.p_A += Vec3(0.1 * rng.normal(), 0.2 * rng.normal(), 0.3 * rng.normal());
-                return measurement_of(drawn);
+                PositionAnchor sampled = a;
+                sampled.p_A += Vec3(0.1 * rng.normal(), 0.2 * rng.normal(), 0.3 * rng.normal());
+                return measurement_of(sampled);
               }),
               3, 0.15);
 }

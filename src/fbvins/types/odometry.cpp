@@ -32,7 +32,7 @@ std::string_view to_string(HealthReason reason) {
     case HealthReason::cameras_disagree: return "cameras_disagree";
     case HealthReason::imu_clipped: return "imu_clipped";
     case HealthReason::imu_vibration: return "imu_vibration";
-    case HealthReason::correction_owed: return "correction_owed";
+    case HealthReason::correction_pending: return "correction_pending";
   }
   return "unknown";
 }
