@@ -95,8 +95,8 @@ bool ClockGuard::is_early(const State& s, Time t, Time host) const {
 }
 
 bool ClockGuard::fits(const State& s, Time t, Time host) const {
-  const double due_s = s.period.median().value_or(Duration{}).seconds();
-  if ((t - *s.newest).seconds() < std::min(0.0, due_s - kBack_s)) return false;
+  const double after_s = (t - *s.newest).seconds();
+  if (after_s < 0 && after_s < s.period.median().value_or(Duration{}).seconds() - kBack_s) return false;
   // In seconds of the host's clock, so that the speed of a replay does not matter.
   return lateness_s(t, host) >= shortest_lateness_s() - kAhead_s;
 }
