@@ -85,6 +85,22 @@ void bind_recording(nb::module_& m) {
       .def_prop_ro(
           "right", [](const StereoFrame& f) { return pixels(f.right); }, "uint8 (height, width), read-only; None: missing")
       .def_prop_ro(
+          "more",
+          [](const StereoFrame& f) {
+            nb::list out;
+            for (const std::shared_ptr<const Image>& image : f.more) out.append(pixels(image));
+            return out;
+          },
+          nb::sig("def more(self) -> list[numpy.ndarray | None]"), "the same of the cameras from number 2 on")
+      .def_prop_ro(
+          "offsets",
+          [](const StereoFrame& f) {
+            std::vector<std::int64_t> out;
+            for (int i = 0; i < 2 + static_cast<int>(f.more.size()); ++i) out.push_back(f.offsets.of(i).ns);
+            return out;
+          },
+          "how long after t each camera took its image, ns: zeros with a common trigger")
+      .def_prop_ro(
           "depth", [](const StereoFrame& f) { return depths(f.depth); },
           "uint16 (height, width), mm, 0 where nothing was measured; None: no depth image")
       .def("__repr__", [](const StereoFrame& f) { return fmt::format("<fbvins.StereoFrame t={} ns>", f.t.ns); });

@@ -2,6 +2,7 @@
 // Cameras, IMU and how they are joined.
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 
 #include <algorithm>
 #include <cmath>
@@ -59,10 +60,13 @@ std::string text_of(const Camera& camera) {
 }
 
 StereoRig make_rig(const Camera& left, const Camera* right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
-                   double image_rate_hz, double time_offset_s, const DepthSensor* depth) {
+                   double image_rate_hz, double time_offset_s, const DepthSensor* depth,
+                   const std::vector<std::pair<Camera, nb::object>>& more) {
   if ((right == nullptr) != T_BC1.is_none()) throw nb::value_error("right and T_BC1 go together: give both, or neither");
   std::vector<MountedCamera> cameras{{left, transform<B, C0>(T_BC0, "T_BC0")}};
   if (right != nullptr) cameras.push_back({*right, transform<B, C0>(T_BC1, "T_BC1")});
+  if (right == nullptr && !more.empty()) throw nb::value_error("more: further cameras go with a left and a right one");
+  for (const auto& [camera, T_BC] : more) cameras.push_back({camera, transform<B, C0>(T_BC, "more")});
   if (right != nullptr && depth != nullptr) throw nb::value_error("a depth sensor goes with one camera: without a right one");
   StereoRig rig = with_cameras({}, cameras);
   if (depth != nullptr) rig = with_depth(rig, *depth);
@@ -127,19 +131,29 @@ void bind_rig(nb::module_& m) {
 
   nb::class_<StereoRig>(
       m, "Rig",
-      "One or two cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera. A\n"
+      "One to eight cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera. A\n"
       "rig of one camera has it as the left one, without a right one and T_BC1; its right one is 0 px wide then.")
       .def(
           nb::new_(&make_rig), "left"_a, "right"_a.none() = nb::none(), "T_BC0"_a = nb::none(), "T_BC1"_a = nb::none(),
           "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0, "time_offset_s"_a = 0.0, "depth"_a.none() = nb::none(),
+          "more"_a = std::vector<std::pair<Camera, nb::object>>{},
           "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset. depth:\n"
-          "a DepthSensor, with one camera.")
+          "a DepthSensor, with one camera. more: the cameras from number 2 on, each (Camera, T_BC).")
       .def_ro("left", &StereoRig::left)
       .def_ro("right", &StereoRig::right)
       .def_prop_ro(
           "T_BC0", [](const StereoRig& rig) { return to_array(rig.T_BC0); }, "(4, 4), left camera to IMU, m")
       .def_prop_ro(
           "T_BC1", [](const StereoRig& rig) { return to_array(rig.T_BC1); }, "(4, 4), right camera to IMU, m")
+      .def_prop_ro(
+          "more",
+          [](const StereoRig& rig) {
+            nb::list out;
+            for (const MountedCamera& mounted : rig.more) out.append(nb::make_tuple(mounted.camera, to_array(mounted.T_BC)));
+            return out;
+          },
+          nb::sig("def more(self) -> list[tuple[Camera, numpy.ndarray]]"),
+          "The cameras from number 2 on, each with its T_BC, (4, 4), m")
       .def_prop_ro(
           "depth", [](const StereoRig& rig) { return rig.depth; }, "the DepthSensor; None without")
       .def_ro("imu_noise", &StereoRig::imu_noise)
@@ -148,6 +162,9 @@ void bind_rig(nb::module_& m) {
       .def("__reduce__", [](const StereoRig& rig) { return reduced("rig", nb::cast(rig_to_yaml(rig))); })
       .def("__repr__", [](const StereoRig& rig) {
         if (!rig.has_right()) return fmt::format("<fbvins.Rig {}, IMU {:g} Hz>", text_of(rig.left), rig.imu_noise.rate_hz);
+        if (!rig.more.empty())
+          return fmt::format("<fbvins.Rig {} and {} further cameras, IMU {:g} Hz>", text_of(rig.left), rig.camera_count() - 1,
+                             rig.imu_noise.rate_hz);
         return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
                            rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
       });

@@ -69,10 +69,21 @@ class PySystem {
     push(sample);
     newest_reading_ = sample.t;
   }
-  void push_images(nb::handle t, nb::handle left, nb::handle right, nb::handle depth) {
+  void push_images(nb::handle t, nb::handle left, nb::handle right, nb::handle depth, const std::vector<nb::object>& more,
+                   const std::vector<std::int64_t>& offsets) {
     const Time stamp{whole_number(t, "t")};
     require_order(stamp, newest_image_, "image");
-    push(StereoFrame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right), {}, depth_of(depth, rig_)});
+    if (more.size() > rig_.more.size())
+      throw nb::value_error(fmt::format("more: the rig has {} further cameras, not {}", rig_.more.size(), more.size()).c_str());
+    std::vector<std::shared_ptr<const Image>> further;
+    for (std::size_t i = 0; i < more.size(); ++i) further.push_back(image_of(more[i], "more", rig_.more[i].camera));
+    if (offsets.size() > static_cast<std::size_t>(rig_.camera_count()))
+      throw nb::value_error(fmt::format("offsets: the rig has {} cameras, not {}", rig_.camera_count(), offsets.size()).c_str());
+    StereoFrame frame{stamp, image_of(left, "left", rig_.left), image_of(right, "right", rig_.right), std::move(further),
+                      depth_of(depth, rig_)};
+    for (std::size_t i = 0; i < offsets.size(); ++i)
+      if (offsets[i] != 0) frame.offsets.set(static_cast<int>(i), Duration{offsets[i]});
+    push(std::move(frame));
     newest_image_ = stamp;
   }
   void push(SensorEvent event) {
@@ -242,11 +253,13 @@ void bind_system(nb::module_& m) {
           "numbers that are not finite.")
       .def(
           "push_images", &PySystem::push_images, "t"_a, "left"_a.none(), "right"_a.none() = nb::none(),
-          "depth"_a.none() = nb::none(),
+          "depth"_a.none() = nb::none(), "more"_a = std::vector<nb::object>{}, "offsets"_a = std::vector<std::int64_t>{},
           nb::sig("def push_images(self, t: int, left: numpy.ndarray | None, right: numpy.ndarray | None = None, "
-                  "depth: numpy.ndarray | None = None) -> None"),
+                  "depth: numpy.ndarray | None = None, more: list[numpy.ndarray | None] = [], offsets: list[int] = []) -> None"),
           "A frame: t in ns of the cameras' clock, images uint8 (height, width) of the rig's size, None where a "
-          "camera delivered nothing; of a rig with a depth sensor depth uint16 (height, width), mm, 0 where nothing was measured. "
+          "camera delivered nothing; more: those of the cameras from number 2 on; offsets: of cameras without a common trigger, how "
+          "long after t each took its image, ns; of a rig with a depth sensor depth uint16 (height, width), mm, 0 where nothing was "
+          "measured. "
           "Arrays in C order are not copied, and other threads read them later: pass new arrays, do not "
           "write to them afterwards. ValueError for stamps that do not increase.")
       .def(

@@ -271,10 +271,57 @@ def test_a_rig_of_ones_own(flight):
     assert wide.model == "ds" and wide.distortion == [-0.17, 0.59] and wide.intrinsics == [158, 158, 255, 257]
     with pytest.raises(ValueError, match="alpha is 1.5, not between 0 and 1"):
         fbvins.Camera(512, 512, 158, 158, 255, 257, model="ds", distortion=[-0.17, 1.5])
-    with pytest.raises(ValueError, match="left camera sees more than 180 degrees"):
-        backwards = fbvins.Camera(512, 512, 100, 100, 255, 257, model="eucm", distortion=[0.63, 1.04])
-        fbvins.Rig(backwards, wide, rig.T_BC0, rig.T_BC1)
+    backwards = fbvins.Camera(512, 512, 100, 100, 255, 257, model="eucm", distortion=[0.63, 1.04])  # more than 180 degrees
+    fbvins.System(None, fbvins.Rig(backwards, wide, rig.T_BC0, rig.T_BC1)).finish()
     fbvins.System(None, own).finish()
+
+
+def test_four_cameras():
+    recording = fbvins.simulate("quad", seed=5, seconds=2)
+    rig = recording.rig
+    own = fbvins.Rig(rig.left, rig.right, rig.T_BC0, rig.T_BC1, imu_noise=rig.imu_noise, more=rig.more)
+    assert len(own.more) == 2 and np.array_equal(own.more[1][1], rig.more[1][1])
+    again = pickle.loads(pickle.dumps(own))
+    assert np.array_equal(again.more[0][1], own.more[0][1]) and "3 further cameras" in repr(again)
+    alone = fbvins.Rig(rig.left, rig.right, rig.T_BC0, rig.T_BC1, imu_noise=rig.imu_noise)
+    system, pair = fbvins.System(None, own), fbvins.System(None, alone)
+    for event in recording:
+        if isinstance(event, fbvins.StereoFrame):
+            assert len(event.more) == 2 and event.more[0].shape == event.left.shape
+            system.push_images(event.t, event.left, event.right, more=event.more)
+            pair.push_images(event.t, event.left, event.right)
+        else:
+            system.push(event)
+            pair.push(event)
+    system.finish()
+    pair.finish()
+    newest = system.poll()[-1]
+    assert newest.health == "good" and not np.array_equal(newest.T_WB, pair.poll()[-1].T_WB)
+    with pytest.raises(ValueError, match="more: the rig has 2 further cameras, not 3"):
+        fbvins.System(None, own).push_images(0, None, more=[None, None, None])
+    with pytest.raises(ValueError, match="go with a left and a right one"):
+        fbvins.Rig(rig.left, T_BC0=rig.T_BC0, more=rig.more)
+
+
+def test_cameras_without_a_common_trigger():
+    recording = fbvins.simulate("untriggered", seed=5, seconds=2)
+    system, as_it_is, wrong = (fbvins.System(None, recording.rig) for _ in range(3))
+    for event in recording:
+        as_it_is.push(event)
+        if isinstance(event, fbvins.StereoFrame):
+            assert event.offsets[0] == 0 and event.offsets[1] <= 0
+            system.push_images(event.t, event.left, event.right, offsets=event.offsets)
+            wrong.push_images(event.t, event.left, event.right)
+        else:
+            system.push(event)
+            wrong.push(event)
+    poses = []
+    for one in (system, as_it_is, wrong):
+        one.finish()
+        poses.append(one.poll()[-1].T_WB)
+    assert np.array_equal(poses[0], poses[1]) and not np.array_equal(poses[0], poses[2])
+    with pytest.raises(ValueError, match="offsets: the rig has 2 cameras, not 3"):
+        fbvins.System(None, recording.rig).push_images(0, None, offsets=[0, 0, 0])
 
 
 def test_a_camera_with_a_depth_sensor():

@@ -15,7 +15,7 @@ std::string bytes_of(std::uint32_t type, Struct message, std::size_t size = size
   return {reinterpret_cast<const char*>(&message), size};
 }
 
-FbvinsSocketRig seed_rig() {
+SocketRig seed_rig() {
   StereoRig rig;
   rig.left = rig.right = Camera(PinholeRadtan{40, 41, 31.5, 23.5, -0.25, 0.0625}, 64, 48);
   rig.T_BC1.p.x() = 0.125;
@@ -35,8 +35,11 @@ std::string with_its_size(std::string_view bytes) {
 void check(const SocketHello& hello) {
   const FrameLayout& layout = hello.layout;
   require(layout.slots >= 2 && layout.slots <= FBVINS_SOCKET_MOST_SLOTS && layout.bytes() <= (std::size_t{1} << 30U));
-  require(layout.right_offset_bytes >= layout.image_bytes());
-  require(layout.right_offset_bytes + layout.image_bytes() <= layout.slot_bytes);
+  require(layout.cameras >= 1 && layout.cameras <= kMostCameras && layout.image_bytes() <= layout.slot_bytes);
+  for (int i = 1; i < layout.cameras; ++i) {
+    const std::size_t at = layout.offset_bytes[static_cast<std::size_t>(i)];
+    require(at >= layout.image_bytes() && at + layout.image_bytes() <= layout.slot_bytes);
+  }
   if (hello.rig) require(parse_socket_rig(*hello.rig, layout.width_px, layout.height_px).ok());
 }
 
@@ -45,7 +48,7 @@ void check(const SocketImu& imu) {
 }
 
 void check(const SocketFrame& frame) {
-  require(frame.t.ns >= 0 && frame.slot >= 0 && frame.slot < FBVINS_SOCKET_MOST_SLOTS && (frame.left || frame.right));
+  require(frame.t.ns >= 0 && frame.slot >= 0 && frame.slot < FBVINS_SOCKET_MOST_SLOTS && frame.images != 0);
 }
 
 void check(const SocketPosition& position) { require(!position.anchor || impossible(*position.anchor).empty()); }
@@ -56,15 +59,21 @@ void check(const SocketUnknown&) {}
 
 std::vector<std::string> socket_seeds() {
   const FbvinsSocketHello hello{{}, FBVINS_SOCKET_MAGIC, 1, 0, FBVINS_SOCKET_HAS_RIG, "seed", 64, 48, 4, 8192, 4096,
-                                0,  seed_rig()};
+                                0,  seed_rig().pair};
+  FbvinsSocketHello three = hello;
+  three.flags |= FBVINS_SOCKET_HAS_CAMERAS;
+  three.minor = 2, three.cameras = 3, three.slot_bytes = 12288, three.more_offset_bytes[0] = 8192;
+  three.more[0] = three.rig.left;
+  three.more[0].T_BC[7] = 0.25;
   FbvinsSocketImu imu{{}, 3, 0, {}};
   for (int i = 0; i < 3; ++i) imu.readings[i] = {100 + i, {0.1, 0.2, 0.3}, {0, 0, 9.81}};
-  return {bytes_of(FBVINS_SOCKET_HELLO, hello),
-          bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
-          bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT}),
-          bytes_of(FBVINS_SOCKET_POSITION,
-                   FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),
-          bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};
+  return {
+      bytes_of(FBVINS_SOCKET_HELLO, hello),
+      bytes_of(FBVINS_SOCKET_HELLO, three),
+      bytes_of(FBVINS_SOCKET_IMU, imu, offsetof(FbvinsSocketImu, readings) + 3 * sizeof(FbvinsSocketReading)),
+      bytes_of(FBVINS_SOCKET_FRAME, FbvinsSocketFrame{{}, 42, 7, 3, FBVINS_SOCKET_LEFT | FBVINS_SOCKET_RIGHT}),
+      bytes_of(FBVINS_SOCKET_POSITION, FbvinsSocketPosition{{}, 42, {1, 2, 3}, {0.01, 0, 0, 0.01, 0, 0.01}, {0, 0, 0.1}, 0, 0}),
+      bytes_of(FBVINS_SOCKET_GOODBYE, FbvinsSocketGoodbye{{}, FBVINS_SOCKET_DONE, 0, "done"})};
 }
 
 void fuzz_socket(std::string_view bytes) {

@@ -48,8 +48,11 @@ class Camera {
   void set_mask(std::shared_ptr<const Mask> mask) { mask_ = std::move(mask); }
   /// The same camera behind another lens.
   Camera with_lens(LensModel model) const;
+  /// The same camera in axes that are turned inside its lens: its frame F with p_lens = R_lens * p_F, in which all that follows
+  /// is meant. Such a camera sees its own half space, what is behind the lens' plane included (lens_faces.hpp).
+  Camera turned(const Mat3& R_lens) const;
 
-  /// Pixel of normalised coordinates (x/z, y/z).
+  /// Pixel of normalised coordinates (x/z, y/z); not finite where a turned camera's lens has none.
   /// J_pixel_normalised, if given, receives d(pixel)/d(normalised).
   Vec2 distort(const Vec2& normalised, Mat2* J_pixel_normalised = nullptr) const;
   /// Normalised coordinates of a pixel, in closed form (ds, eucm) or by Newton's method on distort(); nullopt where the
@@ -58,6 +61,10 @@ class Camera {
   /// Pixel of a point in the camera's frame; nullopt behind the camera or outside the model's domain.
   /// Does not check the image's borders.
   std::optional<Vec2> project(const Vec3& p_C) const;
+  /// Direction of a pixel, of length 1, behind the camera's plane too; nullopt where the lens has none.
+  std::optional<Vec3> ray(const Vec2& pixel) const;
+  /// Pixel of a point in any direction; nullopt outside the model's domain. Does not check the image's borders.
+  std::optional<Vec2> pixel_of(const Vec3& p_C) const;
   /// Largest |(x/z, y/z)| at which the radial distortion still grows outwards: the model's domain.
   double max_normalised_radius() const { return max_radius_; }
   /// Whether the lens sees more than 180 degrees across or down the image: the middles of two opposite edges look backwards.
@@ -73,10 +80,14 @@ class Camera {
   bool hidden(const Vec2& pixel, double margin_px) const { return mask_ != nullptr && mask_->hides(pixel, margin_px); }
 
  private:
+  bool in_domain(const Vec3& p_lens) const;
+
   LensModel model_;
   int width_ = 0;
   int height_ = 0;
-  double max_radius_ = 0;
+  double max_radius_ = 0, max_plane_radius_ = 0, widest_rad_ = 0;
+  Mat3 R_lens_ = Mat3::Identity();
+  bool is_turned_ = false;
   std::shared_ptr<const Mask> mask_;
 };
 

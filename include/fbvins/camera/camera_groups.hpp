@@ -17,8 +17,8 @@ struct CameraGroup {
   std::optional<int> second;
 };
 
-/// Share of the first camera's image that the second one sees as well, of things three metres away; 0 where the images are turned
-/// against each other by more than 45 degrees, or the cameras are at one place: neither can be matched to a depth.
+/// Share of what the first camera's image shows that the second one sees as well, of things three metres away; 0 where the images
+/// are turned against each other by more than 45 degrees, or the cameras are at one place: neither can be matched to a depth.
 double overlap(const StereoRig& rig, int first, int second);
 
 /// Each camera once, in order: with the camera that it overlaps with most, of those that are left, if that is a third of its

@@ -17,8 +17,9 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 1,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 2,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
+  FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
   FBVINS_SOCKET_LARGEST_MESSAGE = 32768  ///< bytes
 };
@@ -71,10 +72,14 @@ typedef struct FbvinsSocketRig {
 #define FBVINS_SOCKET_MAGIC "fb-vins"  ///< with its 0: eight bytes
 
 /// FbvinsSocketHello::flags
-enum { FBVINS_SOCKET_HAS_RIG = 1 };
+enum {
+  FBVINS_SOCKET_HAS_RIG = 1,
+  FBVINS_SOCKET_HAS_CAMERAS = 2  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
+};
 
 /// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
-/// Slot k begins at k * slot_bytes: the left image, row after row, and at right_offset_bytes the right one.
+/// Slot k begins at k * slot_bytes: the left image, row after row, at right_offset_bytes the right one, and at
+/// more_offset_bytes[i] that of camera 2 + i. All cameras have images of one size.
 typedef struct FbvinsSocketHello {
   FbvinsSocketHeader header;
   char magic[8];
@@ -87,6 +92,11 @@ typedef struct FbvinsSocketHello {
   uint32_t right_offset_bytes;
   uint32_t reserved;
   FbvinsSocketRig rig;  ///< with FBVINS_SOCKET_HAS_RIG; else 0
+  // Since version 1.2, with FBVINS_SOCKET_HAS_CAMERAS; else 0 or left out:
+  uint32_t cameras;  ///< 1 (`left`) to FBVINS_SOCKET_MOST_CAMERAS
+  uint32_t reserved_too;
+  uint32_t more_offset_bytes[FBVINS_SOCKET_MOST_CAMERAS - 2];
+  FbvinsSocketCamera more[FBVINS_SOCKET_MOST_CAMERAS - 2];  ///< of the rig: cameras 2, 3 ...
 } FbvinsSocketHello;
 
 typedef struct FbvinsSocketReading {
@@ -103,7 +113,7 @@ typedef struct FbvinsSocketImu {
   FbvinsSocketReading readings[FBVINS_SOCKET_MOST_READINGS];
 } FbvinsSocketImu;
 
-/// FbvinsSocketFrame::images
+/// FbvinsSocketFrame::images; camera i has bit i.
 enum { FBVINS_SOCKET_LEFT = 1, FBVINS_SOCKET_RIGHT = 2 };
 
 typedef struct FbvinsSocketFrame {
@@ -111,7 +121,9 @@ typedef struct FbvinsSocketFrame {
   int64_t t_ns;
   uint64_t sequence;  ///< +1 for each frame that the cameras made, sent or not: gaps are counted
   uint32_t slot;      ///< the estimator's until FbvinsSocketReleased
-  uint32_t images;    ///< which of the two the slot holds
+  uint32_t images;    ///< which of the cameras' images the slot holds
+  // Since version 1.2, or left out:
+  int64_t offset_ns[FBVINS_SOCKET_MOST_CAMERAS];  ///< camera i took its image at t_ns + offset_ns[i]
 } FbvinsSocketFrame;
 
 /// FbvinsSocketPosition::measured

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <future>
 
+#include "fbvins/camera/lens_faces.hpp"
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
@@ -33,15 +34,11 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
     const auto& [camera, T_BC] = rig.mounted(i);
     const double gain = i == 1 ? options.camera.right_gain : 1.0;
     const auto seed = static_cast<std::uint64_t>(options.seed) * 2 + (i < 2 ? 0 : 1'000'000) + static_cast<std::uint64_t>(i);
-    eyes_.push_back({Renderer(camera, *world_),
-                     ImageSensor(options.camera, camera, gain, seed),
-                     {},
-                     T_BC,
-                     camera.height(),
-                     {},
-                     {},
-                     {},
-                     false});
+    eyes_.push_back({{}, ImageSensor(options.camera, camera, gain, seed), {}, camera.height()});
+    if (camera.sees_backwards())
+      for (const auto& [face, T_BF] : faces_of({camera, T_BC}))
+        eyes_.back().faces.push_back({Renderer(face, *world_, face.mask().get()), T_BF, face.mask()});
+    else eyes_.back().faces.push_back({Renderer(camera, *world_), T_BC, nullptr});
     if (options.camera.legs > 0) eyes_.back().legs.emplace(camera.width(), camera.height(), options.camera.legs, i);
   }
   if (rig.depth) depth_.emplace(options.depth, rig.left, static_cast<std::uint64_t>(options.seed));
@@ -49,32 +46,50 @@ FlightRecorder::FlightRecorder(const SimulationOptions& options, const StereoRig
 
 /// Sums the radiance over an exposure that is centred at t.
 void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples) {
-  eye.renderer.begin();
-  const double ambient = options_.world.ambient, line_s = options_.camera.line_delay_us * 1e-6;
+  for (Face& face : eye.faces) face.renderer.begin();
   for (int i = 0; i < samples; ++i) {
-    // The middle line is read at t.
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
-    const double first_line = t - 0.5 * line_s * eye.height_px;
-    const MotionState m = motion_(line_s > 0 ? first_line : t);
-    Pose<W, C0> T_WC = m.T_WB * eye.T_BC;
-    T_WC.p += world_from_flight_;
-    const LightState lamps = light_at(options_.light, *world_, t, static_cast<std::uint64_t>(options_.seed));
-    eye.facets = world_->facets;
-    for (Facet& f : eye.facets)
-      if (f.lamp_group >= 0) f.emission *= static_cast<float>(lamps.group[static_cast<std::size_t>(f.lamp_group)]);
-    append_movers(*world_, t, T_WC.p, eye.facets);
-    mix_light(bake_, *world_, eye.facets, lamps, ambient, eye.light);
-    Instant instant;
-    instant.q_WC = T_WC.q;
-    instant.p_WC = T_WC.p;
-    instant.w_WC_C = eye.T_BC.q.conjugate() * m.w_WB_B;
-    instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(eye.T_BC.p);
-    instant.line_s = line_s;
-    instant.shift_px = place_in_pixel(i);
-    eye.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
+    for (Face& face : eye.faces) add_instant(eye, face, t, i, samples);
   }
-  eye.renderer.radiance(eye.radiance);
+  eye.faces.front().renderer.radiance(eye.radiance);
+  if (eye.faces.front().shown != nullptr) join_faces(eye);
   if (eye.legs) eye.legs->draw(eye.radiance);
+}
+
+/// Each pixel from a face that shows it; black where none does.
+void FlightRecorder::join_faces(Eye& eye) {
+  std::vector<float> of_face;
+  std::fill(eye.radiance.begin(), eye.radiance.end(), 0.0f);
+  for (const Face& face : eye.faces) {
+    face.renderer.radiance(of_face);
+    const int width = face.shown->width();
+    for (std::size_t i = 0; i < of_face.size(); ++i) {
+      const auto at = static_cast<int>(i);
+      if (!face.shown->hides(Vec2(at % width, at / width))) eye.radiance[i] = of_face[i];
+    }
+  }
+}
+
+/// The middle line is read at t.
+void FlightRecorder::add_instant(Eye& eye, Face& face, double t_s, int sample, int samples) {
+  const double line_s = options_.camera.line_delay_us * 1e-6, first_line = t_s - 0.5 * line_s * eye.height_px;
+  const MotionState m = motion_(line_s > 0 ? first_line : t_s);
+  Pose<W, C0> T_WC = m.T_WB * face.T_BC;
+  T_WC.p += world_from_flight_;
+  const LightState lamps = light_at(options_.light, *world_, t_s, static_cast<std::uint64_t>(options_.seed));
+  eye.facets = world_->facets;
+  for (Facet& f : eye.facets)
+    if (f.lamp_group >= 0) f.emission *= static_cast<float>(lamps.group[static_cast<std::size_t>(f.lamp_group)]);
+  append_movers(*world_, t_s, T_WC.p, eye.facets);
+  mix_light(bake_, *world_, eye.facets, lamps, options_.world.ambient, eye.light);
+  Instant instant;
+  instant.q_WC = T_WC.q;
+  instant.p_WC = T_WC.p;
+  instant.w_WC_C = face.T_BC.q.conjugate() * m.w_WB_B;
+  instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(face.T_BC.p);
+  instant.line_s = line_s;
+  instant.shift_px = place_in_pixel(sample);
+  face.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
 }
 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {
@@ -95,11 +110,11 @@ RenderedFrame FlightRecorder::render(double t_s, std::int64_t frame, bool with_d
     others.push_back(std::async(std::launch::async,
                                 [this, i, t_s, frame] { return render_eye(eyes_[i], t_s + offset(i, t_s).seconds(), frame); }));
   rendered.frame.left = std::make_shared<const Image>(render_eye(eyes_.front(), t_s, frame));
-  if (with_depth) eyes_.front().renderer.depth(rendered.depth_left_m);
+  if (with_depth) eyes_.front().faces.front().renderer.depth(rendered.depth_left_m);
   if (depth_) {
     std::vector<float> exact_m;
     gather(eyes_.front(), t_s, 0, 1);
-    eyes_.front().renderer.depth(exact_m);
+    eyes_.front().faces.front().renderer.depth(exact_m);
     rendered.frame.depth = std::make_shared<const DepthImage>(depth_->measure(exact_m, frame));
   }
   for (std::size_t i = 1; i < eyes_.size(); ++i)

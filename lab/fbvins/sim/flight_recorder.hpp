@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "fbvins/sim/legs.hpp"
 #include "fbvins/sim/renderer.hpp"
@@ -27,18 +28,25 @@ class FlightRecorder {
   Duration right_jitter(std::int64_t frame) const;
 
  private:
-  struct Eye {
+  /// A lens, or a face of one that sees more than 180 degrees.
+  struct Face {
     Renderer renderer;
+    Pose<B, C0> T_BC;                   ///< pose of this camera, whichever it is
+    std::shared_ptr<const Mask> shown;  ///< what of the image is this face's; null: all
+  };
+  struct Eye {
+    std::vector<Face> faces;
     ImageSensor sensor;
     std::optional<Legs> legs;
-    Pose<B, C0> T_BC;  ///< pose of this camera, whichever it is
     int height_px;
-    std::vector<float> radiance;
-    MixedLight light;
-    std::vector<Facet> facets;
+    std::vector<float> radiance = {};
+    MixedLight light = {};
+    std::vector<Facet> facets = {};
     bool settled = false;
   };
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
+  static void join_faces(Eye& eye);
+  void add_instant(Eye& eye, Face& face, double t_s, int sample, int samples);
   Image render_eye(Eye& eye, double t_s, std::int64_t frame);
   Duration offset(std::size_t camera, double t_s) const;
 

@@ -49,14 +49,17 @@ ImageSensor::ImageSensor(const CameraModelOptions& options, const Camera& camera
       seed_(seed),
       exposure_ms_(options.max_exposure_ms),
       log_product_(std::log(options.max_exposure_ms)) {
+  const bool wide = camera.sees_backwards();
   falloff_.resize(static_cast<std::size_t>(width_) * height_);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
-      const double r2 = camera.undistort(Vec2(x, y)).value_or(Vec2::Zero()).squaredNorm();
-      // 1 on the axis, 1 - vignetting at 45 degrees.
+      // 1 on the axis, 1 - vignetting at 45 degrees; a lens that sees backwards is built to be as bright towards its edge.
+      const double r2 = wide ? 0 : camera.undistort(Vec2(x, y)).value_or(Vec2::Zero()).squaredNorm();
       falloff_[static_cast<std::size_t>(y) * width_ + x] =
           static_cast<float>(1 / (1 + r2 * options.vignetting / (1 - options.vignetting)));
     }
+  // The exposure is that of what a lens shows, not of the black around its circle.
+  lit_pixels_ = static_cast<double>(falloff_.size()) * (wide && camera.mask() ? 1 - camera.mask()->hidden_share() : 1);
 }
 
 void ImageSensor::follow(double mean_radiance, double share) {
@@ -73,7 +76,7 @@ void ImageSensor::settle(const std::vector<float>& radiance) {
   double sum = 0;
   const double white = 3.0;  // brighter pixels saturate and count as this
   for (std::size_t i = 0; i < radiance.size(); ++i) sum += std::min<double>(white, radiance[i] * falloff_[i]);
-  follow(brightness_ * sum / static_cast<double>(radiance.size()), 1.0);
+  follow(brightness_ * sum / lit_pixels_, 1.0);
 }
 
 Image ImageSensor::expose(std::vector<float>& radiance, std::int64_t frame) {
@@ -83,7 +86,7 @@ Image ImageSensor::expose(std::vector<float>& radiance, std::int64_t frame) {
   if (options_.blur_px > 0) blur(radiance);
   double sum = 0;
   for (float v : radiance) sum += std::min(v, 255.0f);
-  const double mean = std::max(1.0, sum / static_cast<double>(radiance.size()));
+  const double mean = std::max(1.0, sum / lit_pixels_);
 
   Image image(width_, height_);
   const float read = static_cast<float>(options_.read_noise * gain_);

@@ -87,6 +87,8 @@ constexpr Preset kPresets[] = {
      }},
     {"quad", [](SimulationOptions& o) { o.rig = "quad"; }},
     {"rgbd", [](SimulationOptions& o) { o.rig = "rgbd"; }},
+    {"fisheye", [](SimulationOptions& o) { o.rig = "fisheye"; }},
+    {"back-to-back", [](SimulationOptions& o) { o.rig = "back-to-back"; }},
     {"legs", [](SimulationOptions& o) { o.camera.legs = 3; }},
 };
 

@@ -47,16 +47,16 @@ void store(float* out, const Vec3& v) {
 
 }  // namespace
 
-Renderer::Renderer(const Camera& camera, const World& world)
+Renderer::Renderer(const Camera& camera, const World& world, const Mask* part)
     : world_(world),
       width_(camera.width()),
       height_(camera.height()),
       tiles_x_((width_ + kTile - 1) / kTile),
       tiles_y_((height_ + kTile - 1) / kTile) {
-  make_rays(camera);
+  make_rays(camera, part);
 }
 
-void Renderer::make_rays(const Camera& camera) {
+void Renderer::make_rays(const Camera& camera, const Mask* part) {
   const std::size_t count = static_cast<std::size_t>(tiles_x_) * tiles_y_;
   ray_x_.assign(count * kRays, 0);
   ray_y_.assign(count * kRays, 0);
@@ -73,6 +73,10 @@ void Renderer::make_rays(const Camera& camera) {
       const std::size_t index = static_cast<std::size_t>(ty) * tiles_x_ + tx;
       Tile& tile = tiles_[index];
       float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
+      if (part != nullptr && part->hides_all(tx * kTile, ty * kTile, (tx + 1) * kTile, (ty + 1) * kTile)) {
+        tile.x0 = x0, tile.x1 = x1, tile.y0 = y0, tile.y1 = y1;  // no facet is in it
+        continue;
+      }
       for (int k = 0; k < kRays; ++k) {
         const int px = std::min(width_ - 1, tx * kTile + k % kTile), py = std::min(height_ - 1, ty * kTile + k / kTile);
         const Vec2 n = ray(px, py);

@@ -34,7 +34,8 @@ struct Instant {
 
 class Renderer {
  public:
-  Renderer(const Camera& camera, const World& world);
+  /// `part`: what is to be rendered of the image; null: all.
+  Renderer(const Camera& camera, const World& world, const Mask* part = nullptr);
 
   void begin();
   void add(const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);
@@ -60,7 +61,7 @@ class Renderer {
     float occluder_w = 0;
     std::vector<int> views;
   };
-  void make_rays(const Camera& camera);
+  void make_rays(const Camera& camera, const Mask* part);
   void look(const Instant& instant, const std::vector<Facet>& facets);
   void distribute(int first_row, int last_row);
   void render_tile(int index, const Instant& instant, const std::vector<Facet>& facets, const MixedLight& light, float weight);

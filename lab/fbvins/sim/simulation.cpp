@@ -53,10 +53,31 @@ std::vector<Vec3> path_of(const SplineTrajectory& flight) {
 /// Adds cameras like these of the rig, turned about the vertical of an upright rig, which is the left camera's -y, through a
 /// point 5 cm behind it.
 void add_turned(StereoRig& rig, double degrees, std::initializer_list<int> cameras) {
+  std::vector<MountedCamera> all;
+  for (int i = 0; i < rig.camera_count(); ++i) all.push_back(rig.mounted(i));
   const Vec3 axis = -(rig.T_BC0.q * Vec3::UnitY()), through = rig.T_BC0 * Vec3(0, 0, -0.05);
   const Quat turn(Eigen::AngleAxisd(degrees * kDegree, axis));
   const Pose<B, B> turned(turn, Vec3(through - turn * through));
-  for (const int i : cameras) rig.more.push_back({rig.camera(i), turned * rig.T_BC(i)});
+  for (const int i : cameras) all.push_back({rig.camera(i), turned * rig.T_BC(i)});
+  rig = with_cameras(rig, all);
+}
+
+/// 200 degrees across a circle of 800 pixels, outside of which the image is black.
+Camera fisheye() {
+  constexpr double kRadius_px = 400;
+  const Vec2 centre(423.5, 399.5);
+  Image seen(848, 800, 0);
+  for (int y = 0; y < seen.height(); ++y)
+    for (int x = 0; x < seen.width(); ++x)
+      if ((Vec2(x, y) - centre).norm() <= kRadius_px) seen.at(x, y) = 255;
+  Camera camera(KannalaBrandt{229, 229, centre.x(), centre.y(), 0, 0, 0, 0}, seen.width(), seen.height());
+  camera.set_mask(std::make_shared<const Mask>(seen));
+  return camera;
+}
+
+void put_lens(StereoRig& rig, const Camera& camera) {
+  rig.left = camera;
+  if (rig.has_right()) rig.right = camera;
 }
 
 /// Renders frames for a Dataset.
@@ -84,6 +105,12 @@ Result<StereoRig> simulated_rig(const SimulationOptions& o) {
     Result<StereoRig> loaded = load_kalibr(o.calibration);
     if (!loaded) return loaded.error();
     rig = *loaded;
+  }
+  if (o.rig == "fisheye") put_lens(rig, fisheye());
+  if (o.rig == "back-to-back") {
+    rig = with_one_camera(rig);
+    put_lens(rig, fisheye());
+    add_turned(rig, 180, {0});
   }
   if (o.rig == "quad") add_turned(rig, 180, {0, 1});
   if (o.rig == "sides") add_turned(rig, 90, {0}), add_turned(rig, -90, {0});

@@ -220,8 +220,6 @@ std::vector<std::string> remarks_on(const CameraCalibration& found) {
     if (c.statistics.coverage < 0.6)
       out.push_back(fmt::format("corners cover {:.0f} % of cam{}'s image: hold the board into its corners, too",
                                 100 * c.statistics.coverage, k));
-    if (c.camera.sees_backwards())
-      out.push_back(fmt::format("cam{} sees more than 180 degrees across: it is calibrated, but no other command takes it", k));
   }
   if (found.seen_mirrored)
     out.push_back(

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lens models as functions of their parameters: what a calibration varies. Unlike Camera::project these take rays up to the
-// model's own limit, also those that point backwards. Pure functions, any thread.
+// Lens models as functions of their parameters: what a calibration varies. Pure functions, any thread.
 #pragma once
 
 #include <optional>
@@ -8,16 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/lens_projection.hpp"
 
 namespace fbvins {
-
-inline constexpr int kMostLensParameters = 9;
-
-struct LensDerivatives {
-  Eigen::Matrix<double, 2, 3> point;                         ///< d(pixel)/d(p_C)
-  Eigen::Matrix<double, 2, kMostLensParameters> parameters;  ///< d(pixel)/d(parameters); columns beyond their count are zero
-};
 
 /// fx, fy, cx, cy, then the others in the order of the model's struct.
 std::vector<double> lens_parameters(const LensModel& lens);
@@ -42,8 +34,5 @@ std::vector<std::string> lens_names();
 /// A lens of that model with focal length and centre, and no distortion (ds, eucm: alpha 0.5; omni: xi 1); nullopt for another
 /// name.
 std::optional<LensModel> plain_lens(std::string_view name, double focal_px, const Vec2& centre_px);
-
-/// Pixel of a point in the camera's frame; nullopt outside of the model's domain.
-std::optional<Vec2> project_point(const LensModel& lens, const Vec3& p_C, LensDerivatives* derivatives = nullptr);
 
 }  // namespace fbvins

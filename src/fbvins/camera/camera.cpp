@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/camera/camera.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <type_traits>
 
+#include "fbvins/camera/lens_projection.hpp"
 #include "fbvins/camera/lenses.hpp"
 
 namespace fbvins {
@@ -34,19 +39,19 @@ double largest_radius(const Model& m) {
   return kLargestRadius;
 }
 
-/// Solves radial(r) = target on [0, largest] by Newton's method inside a shrinking bracket. Gives the end of the
+/// Solves radial_at(r).value = target on [0, largest] by Newton's method inside a shrinking bracket. Gives the end of the
 /// bracket where there is no solution (the 2-D iteration that follows then leaves the domain).
-template <class Model>
-double invert_radial(const Model& m, double target, double largest) {
+template <class Function>
+double invert_radial(const Function& radial_at, double target, double largest, double tolerance) {
   double lo = 0, hi = largest;
   double r = std::min(target, largest);
   for (int i = 0; i < 50; ++i) {
-    const Radial f = radial(m, r);
+    const Radial f = radial_at(r);
     const double error = f.value - target;
     (error > 0 ? hi : lo) = r;
     double next = r - error / f.derivative;
     if (!(next >= lo && next <= hi)) next = 0.5 * (lo + hi);
-    if (std::abs(next - r) <= 1e-6 * (1.0 + r)) return next;  // only a start for the 2-D iteration
+    if (std::abs(next - r) <= tolerance * (1.0 + r)) return next;
     r = next;
   }
   return r;
@@ -57,7 +62,9 @@ template <class Model>
 std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, double max_radius) {
   const double distorted_radius = target.norm();
   Vec2 n = target;
-  if (distorted_radius > 1e-12) n *= invert_radial(m, distorted_radius, max_radius) / distorted_radius;
+  const auto radial_at = [&](double r) { return radial(m, r); };
+  constexpr double kTolerance = 1e-6;  // only a start for the 2-D iteration
+  if (distorted_radius > 1e-12) n *= invert_radial(radial_at, distorted_radius, max_radius, kTolerance) / distorted_radius;
   Mat2 J;
   for (int i = 0; i < 20; ++i) {
     const Vec2 error = distort_unit(m, n, &J) - target;
@@ -71,15 +78,70 @@ std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, doub
   return std::nullopt;
 }
 
+/// Angle from the axis up to which the image radius grows, to 1e-4 rad.
+double widest_angle(const LensModel& model) {
+  const Vec2 centre = std::visit([](const auto& m) { return Vec2(m.cx, m.cy); }, model);
+  const auto radius_at = [&](double angle) {
+    const auto px = project_point(model, Vec3(std::sin(angle), 0, std::cos(angle)));
+    return px ? (*px - centre).norm() : -1;
+  };
+  double angle = 0, before = 0;
+  for (const double step : {1e-2, 1e-4})
+    while (angle + step < std::numbers::pi) {
+      const double radius = radius_at(angle + step);
+      if (!(radius > before)) break;
+      before = radius;
+      angle += step;
+    }
+  return angle;
+}
+
+/// Radius on the plane that Brown's distortion is of, up to which that grows; of a model without it the largest.
+template <class Model>
+double largest_plane_radius(const Model& m) {
+  if constexpr (requires { behind(m); }) return largest_radius(behind(m));
+  else return largest_radius(m);
+}
+
+/// Direction of a point of the unit plane.
+template <class Model>
+std::optional<Vec3> direction_of(const Model& m, const Vec2& uv, double widest, double largest_plane_radius) {
+  if constexpr (requires { ray_unit(m, uv); }) {
+    return ray_unit(m, uv);
+  } else if constexpr (std::is_same_v<Model, UnifiedRadtan>) {
+    const auto plane = undistort_by_newton(behind(m), uv, largest_plane_radius);
+    return plane ? std::optional<Vec3>(ray_before_distortion(m, *plane)) : std::nullopt;
+  } else if constexpr (std::is_same_v<Model, KannalaBrandt>) {
+    const double radius = uv.norm();
+    if (radius < 1e-12) return Vec3::UnitZ();
+    if (radius > radial_of_angle(m, widest).value) return std::nullopt;
+    const double angle = invert_radial([&](double a) { return radial_of_angle(m, a); }, radius, widest, 1e-14);
+    const Vec2 across = std::sin(angle) / radius * uv;
+    return Vec3(across.x(), across.y(), std::cos(angle));
+  } else {
+    const auto plane = undistort_by_newton(m, uv, largest_plane_radius);
+    return plane ? std::optional<Vec3>(plane->homogeneous()) : std::nullopt;
+  }
+}
+
 }  // namespace
 
 Camera::Camera(LensModel model, int width, int height) : model_(std::move(model)), width_(width), height_(height) {
   max_radius_ = std::visit([](const auto& m) { return largest_radius(m); }, model_);
+  max_plane_radius_ = std::visit([](const auto& m) { return largest_plane_radius(m); }, model_);
+  widest_rad_ = widest_angle(model_);
 }
 
 Camera Camera::with_lens(LensModel model) const {
   Camera out(std::move(model), width_, height_);
   out.mask_ = mask_;
+  return out;
+}
+
+Camera Camera::turned(const Mat3& R_lens) const {
+  Camera out = *this;
+  out.R_lens_ = R_lens;
+  out.is_turned_ = true;
   return out;
 }
 
@@ -101,7 +163,15 @@ double Camera::focal_px() const {
   return std::visit([](const auto& m) { return 0.5 * (m.fx + m.fy); }, model_);
 }
 
+bool Camera::in_domain(const Vec3& p_lens) const { return std::atan2(p_lens.head<2>().norm(), p_lens.z()) <= widest_rad_; }
+
 Vec2 Camera::distort(const Vec2& normalised, Mat2* J_pixel_normalised) const {
+  if (is_turned_) {
+    LensDerivatives derivatives;
+    const auto pixel = project_point(model_, R_lens_ * normalised.homogeneous(), &derivatives);
+    if (J_pixel_normalised) *J_pixel_normalised = pixel ? Mat2(derivatives.point * R_lens_.leftCols<2>()) : Mat2(Mat2::Zero());
+    return pixel.value_or(Vec2::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
   return std::visit(
       [&](const auto& m) -> Vec2 {
         const Vec2 d = distort_unit(m, normalised, J_pixel_normalised);
@@ -114,7 +184,31 @@ Vec2 Camera::distort(const Vec2& normalised, Mat2* J_pixel_normalised) const {
       model_);
 }
 
+std::optional<Vec3> Camera::ray(const Vec2& pixel) const {
+  const auto in_lens = std::visit(
+      [&](const auto& m) -> std::optional<Vec3> {
+        const Vec2 uv((pixel.x() - m.cx) / m.fx, (pixel.y() - m.cy) / m.fy);
+        return std::isfinite(uv.norm()) ? direction_of(m, uv, widest_rad_, max_plane_radius_) : std::nullopt;
+      },
+      model_);
+  if (!in_lens || !in_domain(*in_lens)) return std::nullopt;
+  const Vec3 unit = in_lens->normalized();
+  return is_turned_ ? Vec3(R_lens_.transpose() * unit) : unit;
+}
+
+std::optional<Vec2> Camera::pixel_of(const Vec3& p_C) const {
+  const Vec3 p_lens = is_turned_ ? Vec3(R_lens_ * p_C) : p_C;
+  if (!(p_lens.squaredNorm() > 1e-18) || !in_domain(p_lens)) return std::nullopt;
+  return project_point(model_, p_lens);
+}
+
 std::optional<Vec2> Camera::undistort(const Vec2& pixel) const {
+  if (is_turned_) {
+    const auto direction = ray(pixel);
+    if (!direction || !(direction->z() > 0)) return std::nullopt;
+    const Vec2 n = direction->hnormalized();
+    return n.norm() <= kLargestRadius ? std::optional<Vec2>(n) : std::nullopt;
+  }
   return std::visit(
       [&](const auto& m) -> std::optional<Vec2> {
         const Vec2 target((pixel.x() - m.cx) / m.fx, (pixel.y() - m.cy) / m.fy);
@@ -140,7 +234,7 @@ bool Camera::sees_backwards() const {
 std::optional<Vec2> Camera::project(const Vec3& p_C) const {
   if (!(p_C.z() > 1e-9)) return std::nullopt;
   const Vec2 n(p_C.x() / p_C.z(), p_C.y() / p_C.z());
-  if (!(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
+  if (is_turned_ ? !in_domain(R_lens_ * p_C) : !(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
   Mat2 J;
   const Vec2 pixel = distort(n, &J);
   // Tangential distortion can fold the plane even within the radial bound.

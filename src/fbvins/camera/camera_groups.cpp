@@ -24,8 +24,9 @@ double overlap(const StereoRig& rig, int first, int second) {
   int seen = 0, all = 0;
   for (int y = 0; y < kSamples; ++y)
     for (int x = 0; x < kSamples; ++x) {
-      const auto ray = from.undistort(Vec2((x + 0.5) * from.width() / kSamples, (y + 0.5) * from.height() / kSamples));
-      if (!ray) continue;
+      const Vec2 seen_px((x + 0.5) * from.width() / kSamples, (y + 0.5) * from.height() / kSamples);
+      const auto ray = from.undistort(seen_px);
+      if (!ray || from.hidden(seen_px, 0)) continue;
       ++all;
       const Vec3 p_from = kDistance_m * Vec3(ray->x(), ray->y(), 1).normalized();
       const auto px = to.project(T_to_from * p_from);

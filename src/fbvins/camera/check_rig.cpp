@@ -37,11 +37,6 @@ Result<void> check_camera(const Camera& camera, std::string_view side, std::stri
   if (!positive(fx) || !positive(fy) || !std::isfinite(cx) || !std::isfinite(cy) || !all_finite(camera.distortion()))
     return malformed(origin,
                      fmt::format("the {} camera's focal lengths are not positive, or a number of it is not finite", side));
-  if (camera.sees_backwards())
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: the {} camera sees more than 180 degrees from edge to edge; only what is in front of a camera "
-                             "can be used: crop the images, and subtract what is cut off at the left and the top from cx and cy",
-                             origin, side)};
   const Mask* mask = camera.mask().get();
   if (mask != nullptr && (mask->width() != camera.width() || mask->height() != camera.height()))
     return malformed(origin, fmt::format("the {} camera's mask has {} x {} pixels, its images {} x {}", side, mask->width(),

@@ -3,10 +3,12 @@
 //   radial(m, r)             distorted radius of a radius, without tangential distortion, and its derivative
 //   distort_unit(m, n, J)    (u, v) of n = (x/z, y/z), with d(u, v)/dn
 //   undistort_unit(m, uv)    the inverse, of models that have one in closed form; nullopt where the ray does not point forward
+//   ray_unit(m, uv)          a ray of (u, v), in any direction and of any length, of models that have it in closed form
 //   coefficients(m)          its parameters after fx, fy, cx, cy
 // A radially symmetric model is (u, v) = a(s) n with s = |n|^2, and its Jacobian a I + b n n^T with b = 2 da/ds.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -26,11 +28,15 @@ inline Radial radial(const PinholeRadtan& m, double r) {
   return {r * (1.0 + s * (m.k1 + s * m.k2)), 1.0 + s * (3.0 * m.k1 + s * 5.0 * m.k2)};
 }
 
-inline Radial radial(const KannalaBrandt& m, double r) {
-  const double theta = std::atan(r);
+/// Distorted radius of an angle from the axis, rad.
+inline Radial radial_of_angle(const KannalaBrandt& m, double theta) {
   const double s = theta * theta;
-  const double value = theta * (1.0 + s * (m.k1 + s * (m.k2 + s * (m.k3 + s * m.k4))));
-  const double slope = 1.0 + s * (3.0 * m.k1 + s * (5.0 * m.k2 + s * (7.0 * m.k3 + s * 9.0 * m.k4)));
+  return {theta * (1.0 + s * (m.k1 + s * (m.k2 + s * (m.k3 + s * m.k4)))),
+          1.0 + s * (3.0 * m.k1 + s * (5.0 * m.k2 + s * (7.0 * m.k3 + s * 9.0 * m.k4)))};
+}
+
+inline Radial radial(const KannalaBrandt& m, double r) {
+  const auto [value, slope] = radial_of_angle(m, std::atan(r));
   return {value, slope / (1.0 + r * r)};
 }
 
@@ -117,26 +123,51 @@ inline Vec2 distort_unit(const UnifiedRadtan& m, const Vec2& n, Mat2* J) {
   return second;
 }
 
+/// The ray (k u, k v, z) of (u, v).
+struct LiftedRay {
+  double k, z;
+};
+
 /// Usenko et al., equations 46 to 50: the ray meets the second sphere at height m_z, then the first one.
-inline std::optional<Vec2> undistort_unit(const DoubleSphere& m, const Vec2& uv) {
+inline std::optional<LiftedRay> lift(const DoubleSphere& m, const Vec2& uv) {
   const double s = uv.squaredNorm(), root = 1.0 - (2.0 * m.alpha - 1.0) * s;
   if (!(root >= 0)) return std::nullopt;
   const double height = (1.0 - m.alpha * m.alpha * s) / (m.alpha * std::sqrt(root) + 1.0 - m.alpha);
   const double square = height * height + (1.0 - m.xi * m.xi) * s;
   if (!(square >= 0)) return std::nullopt;
   const double k = (height * m.xi + std::sqrt(square)) / (height * height + s);
-  const double z = k * height - m.xi;
-  if (!(k > 0 && z > 0)) return std::nullopt;
-  return Vec2((k / z) * uv);
+  if (!(k > 0)) return std::nullopt;
+  return LiftedRay{k, k * height - m.xi};
 }
 
 /// Khomutenko et al.; in the notation of Usenko et al., equations 37 to 39.
-inline std::optional<Vec2> undistort_unit(const ExtendedUnified& m, const Vec2& uv) {
+inline std::optional<LiftedRay> lift(const ExtendedUnified& m, const Vec2& uv) {
   const double s = m.beta * uv.squaredNorm(), root = 1.0 - (2.0 * m.alpha - 1.0) * s;
   if (!(root >= 0)) return std::nullopt;
-  const double z = (1.0 - m.alpha * m.alpha * s) / (m.alpha * std::sqrt(root) + 1.0 - m.alpha);
-  if (!(z > 0)) return std::nullopt;
-  return Vec2(uv / z);
+  return LiftedRay{1, (1.0 - m.alpha * m.alpha * s) / (m.alpha * std::sqrt(root) + 1.0 - m.alpha)};
+}
+
+inline std::optional<Vec2> undistort_unit(const DoubleSphere& m, const Vec2& uv) {
+  const auto ray = lift(m, uv);
+  return ray && ray->z > 0 ? std::optional<Vec2>((ray->k / ray->z) * uv) : std::nullopt;
+}
+
+inline std::optional<Vec2> undistort_unit(const ExtendedUnified& m, const Vec2& uv) {
+  const auto ray = lift(m, uv);
+  return ray && ray->z > 0 ? std::optional<Vec2>(uv / ray->z) : std::nullopt;
+}
+
+template <class Model>
+requires requires(const Model& m, const Vec2& uv) { lift(m, uv); }
+std::optional<Vec3> ray_unit(const Model& m, const Vec2& uv) {
+  const auto ray = lift(m, uv);
+  return ray ? std::optional<Vec3>(Vec3(ray->k * uv.x(), ray->k * uv.y(), ray->z)) : std::nullopt;
+}
+
+/// Mei and Rives: the ray of a point on the plane before the distortion.
+inline Vec3 ray_before_distortion(const UnifiedRadtan& m, const Vec2& uv) {
+  const double s = uv.squaredNorm(), k = (m.xi + std::sqrt(std::max(0.0, 1.0 + (1.0 - m.xi * m.xi) * s))) / (1.0 + s);
+  return {k * uv.x(), k * uv.y(), k - m.xi};
 }
 
 inline std::vector<double> coefficients(const PinholeRadtan& m) { return {m.k1, m.k2, m.p1, m.p2}; }

@@ -197,6 +197,17 @@ void ShiTomasiDetector::search_cells(const PyramidLevel& image, int columns, boo
   accept(others_, existing, distance_px, wanted);
 }
 
+/// Once for a mask.
+void ShiTomasiDetector::find_hidden_cells(const Mask& mask, int columns, int rows) {
+  if (hidden_by_ == &mask && hidden_cells_.size() == static_cast<std::size_t>(columns) * rows) return;
+  hidden_by_ = &mask;
+  hidden_cells_.assign(static_cast<std::size_t>(columns) * rows, false);
+  for (int cell = 0; cell < columns * rows; ++cell) {
+    const int x = cell % columns * cell_px_, y = cell / columns * cell_px_;
+    hidden_cells_[static_cast<std::size_t>(cell)] = mask.hides_all(x, y, x + cell_px_, y + cell_px_, kMaskMargin_px);
+  }
+}
+
 const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted,
                                                      const Mask* mask) & {
   corners_.clear();
@@ -213,11 +224,9 @@ const std::vector<Corner>& ShiTomasiDetector::detect(const Pyramid& pyramid, std
     if (column >= 0 && row >= 0 && column < columns && row < rows) ++occupancy_[static_cast<std::size_t>(row * columns + column)];
   }
 
-  for (int cell = 0; mask != nullptr && cell < columns * rows; ++cell) {
-    const int x = cell % columns * cell_px_, y = cell / columns * cell_px_;
-    if (mask->hides_all(x, y, std::min(x + cell_px_, image.width), std::min(y + cell_px_, image.height), kMaskMargin_px))
-      occupancy_[static_cast<std::size_t>(cell)] = kHidden;
-  }
+  if (mask != nullptr) find_hidden_cells(*mask, columns, rows);
+  for (std::size_t cell = 0; mask != nullptr && cell < occupancy_.size(); ++cell)
+    if (hidden_cells_[cell]) occupancy_[cell] = kHidden;
 
   search_cells(image, columns, true, threshold, existing, wanted, mask);
   // Walls without texture leave cells empty for good; the missing corners are taken from the others.

@@ -45,6 +45,7 @@ class ShiTomasiDetector {
   double noise() const { return noise_; }
 
  private:
+  void find_hidden_cells(const Mask& mask, int columns, int rows);
   void search_cell(const PyramidLevel& image, int column, int row, float threshold, const Mask* mask);
   void search_cells(const PyramidLevel& image, int columns, bool empty, float threshold, std::span<const Vec2> existing,
                     int wanted, const Mask* mask);
@@ -59,6 +60,8 @@ class ShiTomasiDetector {
   std::vector<Corner> cell_corners_;   // of the cell being searched
   std::vector<Corner> best_, others_;  // candidates of the frame
   std::vector<int> occupancy_;         // features in each cell, or kHidden
+  const Mask* hidden_by_ = nullptr;    // the mask of hidden_cells_
+  std::vector<bool> hidden_cells_;     // of which it leaves nothing
   std::vector<float> response_;        // of the cell being searched, with one pixel around
   std::vector<std::int32_t> tensors_;  // rows of structure tensors and their running sums
 };

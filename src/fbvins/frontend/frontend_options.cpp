@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <iterator>
 #include <string_view>
 
@@ -18,11 +19,20 @@ namespace {
 
 using Made = Result<std::unique_ptr<Frontend>>;
 
-/// `lead(rig)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can. Each group of cameras has
-/// its own.
-template <class Lead>
-std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, Lead&& lead) {
+/// The tracks of a rig are twice those of one pair at most; each group of cameras has its share.
+template <class Options>
+Options shared_by(Options options, std::size_t groups) {
+  if (groups > 2) options.max_features = std::max(1, 2 * options.max_features / static_cast<int>(groups));
+  return options;
+}
+
+/// `lead(rig, options)`: the frontend for a rig whose left camera leads; with a pair, either of its cameras can. Each group of
+/// cameras has its own.
+template <class Options, class Lead>
+std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, const Options& of_rig, Lead&& lead_with) {
   const std::vector<CameraGroup> groups = camera_groups(rig);
+  const Options options = shared_by(of_rig, groups.size());
+  const auto lead = [&](const StereoRig& cameras) { return lead_with(cameras, options); };
   std::vector<std::unique_ptr<Frontend>> frontends;
   for (const CameraGroup& group : groups) {
     const StereoRig cameras = rig_of(rig, group);
@@ -34,12 +44,13 @@ std::unique_ptr<Frontend> for_each_group(const StereoRig& rig, Lead&& lead) {
 }
 
 Made make_klt(const StereoRig& rig, const FrontendOptions& options) {
-  return for_each_group(rig, [&](const StereoRig& r) { return std::make_unique<KltFrontend>(r, options.klt); });
+  return for_each_group(rig, options.klt, [](const StereoRig& r, const auto& o) { return std::make_unique<KltFrontend>(r, o); });
 }
 
 std::unique_ptr<Frontend> orb_with(const StereoRig& rig, const OrbFrontendOptions& options,
                                    const std::shared_ptr<DescriptorStage>& stage) {
-  return for_each_group(rig, [&](const StereoRig& r) { return std::make_unique<OrbFrontend>(r, options, stage); });
+  return for_each_group(rig, options,
+                        [&](const StereoRig& r, const auto& o) { return std::make_unique<OrbFrontend>(r, o, stage); });
 }
 
 Made make_orb(const StereoRig& rig, const FrontendOptions& options) { return orb_with(rig, options.orb, make_identity_stage()); }

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_definitions.hpp"
 
@@ -24,18 +23,29 @@ enum Topic : std::size_t {
   kHealth,
   kLandmarks,
   kMarks,
-  kTruth
+  kTruth,
+  kFurther,          ///< image and camera_info of each camera from number 2 on
+  kDepth = kFurther  ///< of a rig with one camera
 };
+
+std::size_t image_topic(int camera) {
+  return camera == 0 ? kLeft : camera == 1 ? kRight : kFurther + 2 * static_cast<std::size_t>(camera - 2);
+}
+std::size_t info_topic(int camera) { return camera == 0 ? kLeftInfo : camera == 1 ? kRightInfo : image_topic(camera) + 1; }
+
+std::string frame_of(int camera) {
+  return camera == 0 ? std::string(kLeftFrame) : camera == 1 ? std::string(kRightFrame) : fmt::format("camera_{}", camera);
+}
 
 constexpr std::size_t kLargeChunk_bytes = 1'000'000;
 // The camera extrinsics are repeated, for viewers that start in the middle.
 constexpr Duration kCalibrationInterval = {1'000'000'000};
 
-std::vector<McapTopic> topics() {
+std::vector<McapTopic> topics(const StereoRig& rig) {
   const auto topic = [](std::string_view name, const char* type) {
     return McapTopic{std::string(name), type, ros_definition(type)};
   };
-  return {
+  std::vector<McapTopic> out = {
       topic(kImuTopic, "sensor_msgs/msg/Imu"),
       topic(kLeftTopic, "sensor_msgs/msg/Image"),
       topic(kRightTopic, "sensor_msgs/msg/Image"),
@@ -50,6 +60,12 @@ std::vector<McapTopic> topics() {
       topic(kMarksTopic, "rcl_interfaces/msg/Log"),
       topic(kTruthTopic, "geometry_msgs/msg/PoseStamped"),
   };
+  if (rig.depth) out.push_back(topic(kDepthTopic, "sensor_msgs/msg/Image"));
+  for (int i = 2; i < rig.camera_count(); ++i) {
+    out.push_back(topic(camera_topic(i), "sensor_msgs/msg/Image"));
+    out.push_back(topic(camera_topic(i) + "/camera_info", "sensor_msgs/msg/CameraInfo"));
+  }
+  return out;
 }
 
 Result<void> check_stamp(Time t) {
@@ -86,14 +102,17 @@ RosDiagnostic diagnostic_of(const Odometry& o) {
 
 }  // namespace
 
+std::string camera_topic(int camera) {
+  return camera == 0 ? std::string(kLeftTopic) : camera == 1 ? std::string(kRightTopic) : fmt::format("/camera/{}", camera);
+}
+
 std::uint8_t health_level(const Health& health) {
   if (health.state == HealthState::good) return 0;
   return health.state == HealthState::lost ? 2 : 1;
 }
 
 Result<FlightRecord> FlightRecord::create(const std::string& path, const StereoRig& rig, const FlightRecordOptions& options) {
-  if (Result<void> pair = check_is_a_pair_at_most(rig, path); !pair) return pair.error();
-  Result<McapWriter> file = McapWriter::create(path, {"ros2", options.program}, topics());
+  Result<McapWriter> file = McapWriter::create(path, {"ros2", options.program}, topics(rig));
   if (!file) return file.error();
   const std::string yaml = "application/yaml";
   if (Result<void> done = file->attach(std::string(kCalibrationAttachment), yaml, rig_to_yaml(rig)); !done) return done.error();
@@ -125,20 +144,33 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
   if (calibration_t_.ns < 0 || frame.t < calibration_t_ || frame.t - calibration_t_ >= kCalibrationInterval)
     write_calibration(frame.t);
   if (!images_) return flush_if_large();
-  const bool left = frame.left || !frame.right, right = frame.right != nullptr;
-  const Time t = frame.t;
-  // The two images follow one another, so that a record cut off between them is recognised.
-  if (left) write(kLeft, t, [&](std::string& out) { append_image(out, t, kLeftFrame, frame.left.get()); });
-  const Time right_t = t + frame.offsets.of(1);
-  if (right) write(kRight, t, [&](std::string& out) { append_image(out, right_t, kRightFrame, frame.right.get()); });
-  if (left) write(kLeftInfo, t, [&](std::string& out) { append_camera_info(out, t, kLeftFrame, rig_.left); });
-  if (right) write(kRightInfo, t, [&](std::string& out) { append_camera_info(out, t, kRightFrame, rig_.right); });
+  std::vector<int> cameras;
+  for (int i = 0; i < rig_.camera_count(); ++i)
+    if (frame.image(i) || (i == 0 && frame.without_images())) cameras.push_back(i);
+  // The images follow one another, so that a record cut off between them is recognised.
+  for (const int i : cameras) write_image(i, frame);
+  if (frame.depth && rig_.depth)
+    write(kDepth, frame.t, [&](std::string& out) { append_depth_image(out, frame.t, kLeftFrame, *frame.depth); });
+  for (const int i : cameras) write_camera_info(i, frame.t);
   return flush_if_large();
 }
 
+void FlightRecord::write_image(int camera, const StereoFrame& frame) {
+  const Time t = frame.t + frame.offsets.of(camera);
+  write(image_topic(camera), frame.t,
+        [&](std::string& out) { append_image(out, t, frame_of(camera), frame.image(camera).get()); });
+}
+
+void FlightRecord::write_camera_info(int camera, Time t) {
+  write(info_topic(camera), t, [&](std::string& out) { append_camera_info(out, t, frame_of(camera), rig_.camera(camera)); });
+}
+
 void FlightRecord::write_calibration(Time t) {
-  const RosTransform cameras[] = {{kBodyFrame, kLeftFrame, rig_.T_BC0.q, rig_.T_BC0.p},
-                                  {kBodyFrame, kRightFrame, rig_.T_BC1.q, rig_.T_BC1.p}};
+  std::vector<std::string> names;
+  for (int i = 0; i < rig_.camera_count(); ++i) names.push_back(frame_of(i));
+  std::vector<RosTransform> cameras;
+  for (int i = 0; i < rig_.camera_count(); ++i)
+    cameras.push_back({kBodyFrame, names[static_cast<std::size_t>(i)], rig_.T_BC(i).q, rig_.T_BC(i).p});
   write(kFixedTransforms, t, [&](std::string& out) { append_transforms(out, t, cameras); });
   calibration_t_ = t;
 }

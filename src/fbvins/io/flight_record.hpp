@@ -22,7 +22,10 @@
 
 namespace fbvins {
 
-inline constexpr std::string_view kImuTopic = "/imu", kLeftTopic = "/camera/left", kRightTopic = "/camera/right";
+inline constexpr std::string_view kImuTopic = "/imu", kLeftTopic = "/camera/left", kRightTopic = "/camera/right",
+                                  kDepthTopic = "/camera/depth";
+/// Of camera 0 (left), 1 (right), or a further one: "/camera/2".
+std::string camera_topic(int camera);
 inline constexpr std::string_view kOdometryTopic = "/odometry", kHealthTopic = "/health", kLandmarksTopic = "/landmarks",
                                   kMarksTopic = "/marks", kTruthTopic = "/ground_truth";
 /// Attachments at the start.
@@ -64,6 +67,8 @@ class FlightRecord {
 
  private:
   FlightRecord(McapWriter file, const StereoRig& rig, bool images) : file_(std::move(file)), rig_(rig), images_(images) {}
+  void write_image(int camera, const StereoFrame& frame);
+  void write_camera_info(int camera, Time t);
   template <class Append>
   void write(std::size_t topic, Time t, Append&& append);
   void write_calibration(Time t);

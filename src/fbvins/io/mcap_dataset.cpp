@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <utility>
 
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
@@ -45,22 +46,28 @@ struct ImagePlace {
 class McapLoader : public FrameLoader {
  public:
   McapLoader(std::shared_ptr<const ByteSource> bytes, std::string name, const StereoRig& rig)
-      : bytes_(std::move(bytes)), name_(std::move(name)), left_(rig.left), right_(rig.right) {}
+      : bytes_(std::move(bytes)), name_(std::move(name)), rig_(rig) {}
 
   LoadedFrame load(const FrameEntry& entry) override {
     LoadedFrame out;
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
-    out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
-    out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
+    const auto load = [&]<class T>(const std::string& file, int camera, ImageCounts& counts, std::shared_ptr<const T>& image) {
+      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), rig_.camera(camera), counts, out.problem);
+    };
+    load(entry.left_file, 0, out.left, out.frame.left);
+    load(entry.right_file, 1, out.right, out.frame.right);
+    out.frame.more.resize(entry.more_files.size());
+    for (std::size_t i = 0; i < entry.more_files.size(); ++i)
+      load(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.frame.more[i]);
+    load(entry.depth_file, 0, out.depth, out.frame.depth);
     return out;
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& file, const Camera& camera, ImageCounts& counts,
-                                          std::string& problem) const {
-    if (file.empty()) return nullptr;
-    const ImagePlace place = ImagePlace::of(file);
+  template <class T>
+  std::shared_ptr<const T> load_image(const ImagePlace& place, const Camera& camera, ImageCounts& counts,
+                                      std::string& problem) const {
     const auto blame = [&](const std::string& sentence) {
       if (problem.empty()) problem = fmt::format("{}: byte {}: {}", name_, place.offset, sentence);
     };
@@ -76,15 +83,24 @@ class McapLoader : public FrameLoader {
       blame(*sentence);
       return nullptr;
     }
-    auto out = std::make_shared<Image>(camera.width(), camera.height());
+    auto out = std::make_shared<T>(blank(camera, static_cast<const T*>(nullptr)));
+    const std::size_t row = image->width * (image->is_depth() ? 2 : 1);
     for (int y = 0; y < camera.height(); ++y)
-      std::memcpy(out->row(y), image->pixels.data() + std::size_t{image->step} * static_cast<std::size_t>(y), image->width);
+      std::memcpy(row_of(*out, y), image->pixels.data() + std::size_t{image->step} * static_cast<std::size_t>(y), row);
     return out;
   }
+  static Image blank(const Camera& camera, const Image*) { return {camera.width(), camera.height()}; }
+  static DepthImage blank(const Camera& camera, const DepthImage*) {
+    DepthImage out{camera.width(), camera.height(), {}};
+    out.mm.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+    return out;
+  }
+  static std::uint8_t* row_of(Image& image, int y) { return image.row(y); }
+  static std::uint16_t* row_of(DepthImage& image, int y) { return image.mm.data() + std::ptrdiff_t{y} * image.width; }
 
   std::shared_ptr<const ByteSource> bytes_;
   std::string name_;
-  Camera left_, right_;
+  StereoRig rig_;
 };
 
 /// Reads a record step by step; each step leaves its findings in `out`.
@@ -119,6 +135,9 @@ class RecordReader {
     if (topic == kTruthTopic) take_truth(message);
     if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
     if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
+    if (topic == kDepthTopic) take_depth(message);
+    for (int i = 2; i < kMostCameras; ++i)
+      if (topic == camera_topic(i)) take_further(message, static_cast<std::size_t>(i - 2));
   }
 
   void take_imu(const McapMessage& message) {
@@ -161,16 +180,53 @@ class RecordReader {
     }
     ++camera.listed;
     ends_with_image_ = true;
-    FrameEntry& frame = frame_at(image->t, file);
+    FrameEntry& frame = frame_at(image->t, [&](const FrameEntry& f) { return (f.*file).empty(); });
     frame.*file = ImagePlace{message.offset, message.data.size()}.name();
     frame.imu_before = out_.imu.size();
   }
 
-  /// The other camera's frame of that instant, or a new one.
-  FrameEntry& frame_at(Time t, std::string FrameEntry::*file) {
+  /// Of the cameras from number 2 on: the message has the frame's time, the image its own.
+  void take_further(const McapMessage& message, std::size_t further) {
+    const auto file_of = [&](FrameEntry& frame) -> std::string& {
+      frame.more_files.resize(std::max(frame.more_files.size(), further + 1));
+      return frame.more_files[further];
+    };
+    FrameEntry* frame = take_beside(message, out_.info.more, &RosImage::is_grey, file_of);
+    if (frame == nullptr) return;
+    if (const Duration offset = read_image(message.data)->t - message.log_time; offset.ns != 0)
+      frame->offsets.set(static_cast<int>(further) + 2, offset);
+    further_cameras_ = std::max(further_cameras_, further + 1);
+  }
+  void take_depth(const McapMessage& message) {
+    has_depth_ = take_beside(message, out_.info.depth, &RosImage::is_depth,
+                             [](FrameEntry& f) -> std::string& { return f.depth_file; }) != nullptr ||
+                 has_depth_;
+  }
+
+  /// An image of the frame that has the message's time; null where it is none. `file_of(frame)`: its place.
+  template <class FileOf>
+  FrameEntry* take_beside(const McapMessage& message, CameraInfo& camera, bool (RosImage::*is_kind)() const, FileOf&& file_of) {
+    ++camera.rows.rows;
+    const std::optional<RosImage> image = read_image(message.data);
+    if (!image || !((*image).*is_kind)() || image->empty()) {
+      ++camera.rows.malformed;
+      reader_.complain(message.offset, "this is no image of its topic's kind");
+      return nullptr;
+    }
+    ++camera.listed;
+    ends_with_image_ = true;
+    FrameEntry& frame = frame_at(message.log_time, [&](FrameEntry& f) { return file_of(f).empty(); });
+    file_of(frame) = ImagePlace{message.offset, message.data.size()}.name();
+    frame.imu_before = out_.imu.size();
+    return &frame;
+  }
+
+  /// A frame of that instant whose place for the image is empty, or a new one.
+  template <class IsEmpty>
+  FrameEntry& frame_at(Time t, IsEmpty&& is_empty) {
     auto& frames = out_.frames;
     const auto last = frames.rbegin() + std::min(kPairingReach, std::ssize(frames));
-    const auto partner = std::find_if(frames.rbegin(), last, [&](const FrameEntry& f) { return f.t == t && (f.*file).empty(); });
+    const auto partner = std::find_if(frames.rbegin(), last, [&](FrameEntry& f) { return f.t == t && is_empty(f); });
     return partner != last ? *partner : frames.emplace_back(FrameEntry{t, "", "", std::nullopt});
   }
 
@@ -178,22 +234,37 @@ class RecordReader {
   void drop_half_frame() {
     if (!was_cut_off() || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();
-    if (last.left_file.empty() || last.right_file.empty()) out_.frames.pop_back();
+    const auto further = std::ranges::count_if(last.more_files, [](const std::string& file) { return !file.empty(); });
+    if (last.left_file.empty() || last.right_file.empty() || std::cmp_less(further, further_cameras_) ||
+        (has_depth_ && last.depth_file.empty()))
+      out_.frames.pop_back();
   }
 
   /// The images of cameras without a common trigger have stamps of their own: until here each is a frame.
   void join_without_trigger() {
     std::vector<ImageRow> left, right;
-    std::map<Time, std::size_t> readings_before;
+    std::map<Time, const FrameEntry*> recorded;
     for (const FrameEntry& frame : out_.frames) {
-      readings_before[frame.t] = frame.imu_before.value_or(0);
+      recorded[frame.t] = &frame;
       if (!frame.left_file.empty()) left.push_back({frame.t, frame.left_file});
       if (!frame.right_file.empty()) right.push_back({frame.t, frame.right_file});
     }
     if (!std::ranges::is_sorted(left, {}, &ImageRow::t) || !std::ranges::is_sorted(right, {}, &ImageRow::t)) return;
     PairedFrames paired = pair_frames(left, right, Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
     if (!paired.untriggered) return;
-    for (FrameEntry& frame : paired.frames) frame.imu_before = readings_before[frame.t];
+    for (FrameEntry& frame : paired.frames) {
+      const auto as_recorded = recorded.extract(frame.t);
+      if (as_recorded.empty()) continue;
+      frame.imu_before = as_recorded.mapped()->imu_before;
+      frame.more_files = as_recorded.mapped()->more_files;
+      for (std::size_t i = 0; i < frame.more_files.size(); ++i) {
+        const int camera = static_cast<int>(i) + 2;
+        frame.offsets.set(camera, as_recorded.mapped()->offsets.of(camera));
+      }
+    }
+    for (const auto& [t, frame] : recorded)
+      if (frame->left_file.empty() && frame->right_file.empty()) paired.frames.push_back(*frame);
+    std::ranges::stable_sort(paired.frames, {}, &FrameEntry::t);
     out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
   }
@@ -276,6 +347,8 @@ class RecordReader {
   McapReader reader_;
   std::string name_;
   const DatasetOptions& options_;
+  std::size_t further_cameras_ = 0;  // from number 2 on, with images
+  bool has_depth_ = false;
   bool ends_with_image_ = false;
   DatasetContents out_;
 };

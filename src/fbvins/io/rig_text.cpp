@@ -35,6 +35,23 @@ Pose<To, From> read_pose(YamlReader& yaml, const std::string& name) {
   return T;
 }
 
+/// Cameras from number 2 on.
+std::string further_cameras_text(const StereoRig& rig) {
+  std::string out;
+  for (int i = 2; i < rig.camera_count(); ++i)
+    out +=
+        camera_text(fmt::format("camera{}", i).c_str(), rig.camera(i)) + pose_text(fmt::format("T_BC{}", i).c_str(), rig.T_BC(i));
+  return out;
+}
+
+std::vector<MountedCamera> read_further_cameras(YamlReader& yaml) {
+  std::vector<MountedCamera> out;
+  for (int i = 2; i < kMostCameras && yaml.has(yaml.root(), fmt::format("camera{}", i)); ++i)
+    out.push_back({read_camera(yaml, yaml.get(yaml.root(), fmt::format("camera{}", i)), "distortion_coefficients"),
+                   read_pose<B, C0>(yaml, fmt::format("T_BC{}", i))});
+  return out;
+}
+
 }  // namespace
 
 std::string rig_to_yaml(const StereoRig& rig) {
@@ -42,7 +59,7 @@ std::string rig_to_yaml(const StereoRig& rig) {
   return "# The rig, every number exact. T_BC takes camera to body (IMU) coordinates, quaternions are Hamilton's with w first;\n"
          "# pixels, metres, seconds, radians; the IMU's stamp is the image's plus time_offset_s.\n" +
          camera_text("left", rig.left) + (rig.has_right() ? camera_text("right", rig.right) : "") +
-         pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") +
+         pose_text("T_BC0", rig.T_BC0) + (rig.has_right() ? pose_text("T_BC1", rig.T_BC1) : "") + further_cameras_text(rig) +
          fmt::format(
              "imu:\n  rate_hz: {:.17g}\n  gyroscope_noise_density: {:.17g}\n  gyroscope_random_walk: {:.17g}\n"
              "  accelerometer_noise_density: {:.17g}\n  accelerometer_random_walk: {:.17g}\n"
@@ -64,6 +81,7 @@ Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
     rig.right = read_camera(yaml, yaml.get(yaml.root(), "right"), "distortion_coefficients");
     rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
   }
+  rig.more = read_further_cameras(yaml);
   rig.imu_noise = read_imu_noise(yaml, yaml.get(yaml.root(), "imu"), "rate_hz");
   rig.image_rate_hz = yaml.positive(yaml.root(), "image_rate_hz");
   rig.time_offset_s = yaml.number(yaml.root(), "time_offset_s");

@@ -67,6 +67,20 @@ TEST(RigText, GivesBackARigOfOneCamera) {
   EXPECT_EQ(back->T_BC1.p, rig.T_BC0.p);
 }
 
+TEST(RigText, GivesBackFourCameras) {
+  Rng rng(15);
+  StereoRig rig = awkward_rig(rng, true);
+  const StereoRig others = awkward_rig(rng, false);
+  rig.more = {others.mounted(0), others.mounted(1)};
+  const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_EQ(back->camera_count(), 4);
+  for (int i = 2; i < 4; ++i) {
+    EXPECT_TRUE(same_camera(back->camera(i), rig.camera(i)));
+    EXPECT_TRUE(back->T_BC(i).q.coeffs() == rig.T_BC(i).q.coeffs() && back->T_BC(i).p == rig.T_BC(i).p);
+  }
+}
+
 TEST(RigText, GivesBackADepthSensor) {
   Rng rng(14);
   const DepthSensor sensor{.noise_at_1m_m = 0.01 / 3, .nearest_m = 0.1 / 7, .farthest_m = 20.0 / 3, .scale_sigma = 0.1 / 11};

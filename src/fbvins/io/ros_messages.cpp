@@ -74,6 +74,18 @@ void append_image(std::string& out, Time t, std::string_view frame, const Image*
   for (int y = 0; y < view.height; ++y) cdr.raw(view.row(y), static_cast<std::size_t>(view.width));
 }
 
+void append_depth_image(std::string& out, Time t, std::string_view frame, const DepthImage& depth) {
+  CdrWriter cdr(out);
+  put_header(cdr, t, frame);
+  cdr.put(static_cast<std::uint32_t>(depth.height));
+  cdr.put(static_cast<std::uint32_t>(depth.width));
+  cdr.text("16UC1");
+  cdr.put(std::uint8_t{0});  // not big-endian
+  cdr.put(static_cast<std::uint32_t>(2 * depth.width));
+  cdr.count(2 * depth.mm.size());
+  cdr.raw(depth.mm.data(), 2 * depth.mm.size());
+}
+
 RosLens ros_lens(const Camera& camera) {
   std::string name = camera.model_name();
   std::vector<double> k = camera.distortion();
@@ -279,8 +291,9 @@ std::optional<RosImage> read_image(std::string_view bytes) {
   cdr.get<std::uint8_t>();  // is_bigendian says nothing about bytes
   image.step = cdr.get<std::uint32_t>();
   image.pixels = cdr.bytes();
-  const bool fits = !image.is_grey() || image.empty() ||
-                    (image.step >= image.width && std::uint64_t{image.step} * image.height <= image.pixels.size());
+  const std::uint64_t row = std::uint64_t{image.width} * (image.is_depth() ? 2 : 1);
+  const bool fits = !(image.is_grey() || image.is_depth()) || image.empty() ||
+                    (image.step >= row && std::uint64_t{image.step} * image.height <= image.pixels.size());
   if (!cdr.ok() || !fits) return std::nullopt;
   return image;
 }

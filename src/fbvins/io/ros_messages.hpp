@@ -31,6 +31,8 @@ constexpr Time ros_time_end() { return {(std::int64_t{1} << 31) * 1'000'000'000}
 void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise);
 /// mono8. Null: an image without pixels.
 void append_image(std::string& out, Time t, std::string_view frame, const Image* image);
+/// 16UC1, millimetres.
+void append_depth_image(std::string& out, Time t, std::string_view frame, const DepthImage& depth);
 /// What camera_info calls a lens: ROS's own names where it has them, else Camera::model_name() and Camera::distortion().
 struct RosLens {
   std::string model;
@@ -115,10 +117,12 @@ struct RosImage {
   std::string_view encoding, pixels;  ///< in the bytes given
 
   bool is_grey() const { return encoding == "mono8" || encoding == "8UC1"; }
+  /// Little-endian, as all our machines are.
+  bool is_depth() const { return encoding == "16UC1"; }
   /// A frame without an image of this camera.
   bool empty() const { return width == 0 && height == 0; }
 };
-/// Nullopt also where a grey image has fewer pixels than its size needs.
+/// Nullopt also where a grey image, or one of depths, has fewer pixels than its size needs.
 std::optional<RosImage> read_image(std::string_view bytes);
 
 }  // namespace fbvins

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <sys/vfs.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -48,6 +49,8 @@ Result<StereoFrame> FrameRing::take(const SocketFrame& frame) {
   const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(frame.slot);
   if ((held_ & bit) != 0)
     return Error{ErrorCode::malformed, fmt::format("frame: slot {} again, which is not released", frame.slot)};
+  if ((frame.images >> static_cast<unsigned>(layout_.cameras)) != 0)
+    return Error{ErrorCode::malformed, fmt::format("frame: images of more than the {} cameras of the hello", layout_.cameras)};
   const bool scarce = 2 * held() >= layout_.slots;
   held_ |= bit;
   if (!scarce) return borrow(frame);
@@ -65,32 +68,41 @@ std::uint64_t FrameRing::released() {
 
 int FrameRing::held() const { return std::popcount(held_ & ~released_.load()); }
 
-const std::uint8_t* FrameRing::pixels(const SocketFrame& frame, bool right) const {
-  return memory_ + static_cast<std::size_t>(frame.slot) * layout_.slot_bytes + (right ? layout_.right_offset_bytes : 0);
+const std::uint8_t* FrameRing::pixels(const SocketFrame& frame, int camera) const {
+  return memory_ + static_cast<std::size_t>(frame.slot) * layout_.slot_bytes +
+         layout_.offset_bytes[static_cast<std::size_t>(camera)];
+}
+
+template <class ImageOf>
+StereoFrame FrameRing::with_images(const SocketFrame& frame, ImageOf&& image_of) const {
+  StereoFrame out{frame.t, nullptr, nullptr};
+  out.offsets = frame.offsets;
+  out.more.resize(static_cast<std::size_t>(std::max(0, layout_.cameras - 2)));
+  for (int i = 0; i < layout_.cameras; ++i) {
+    if ((frame.images >> static_cast<unsigned>(i) & 1U) == 0) continue;
+    std::shared_ptr<const Image>& image = i == 0 ? out.left : i == 1 ? out.right : out.more[static_cast<std::size_t>(i - 2)];
+    image = std::make_shared<const Image>(image_of(pixels(frame, i)));
+  }
+  return out;
 }
 
 StereoFrame FrameRing::borrow(const SocketFrame& frame) {
   const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(frame.slot);
-  const std::shared_ptr<const std::uint8_t> slot(pixels(frame, false), [ring = shared_from_this(), bit](const std::uint8_t*) {
+  const std::shared_ptr<const std::uint8_t> slot(pixels(frame, 0), [ring = shared_from_this(), bit](const std::uint8_t*) {
     ring->released_.fetch_or(bit);
     ring->bell_->ring();
   });
-  const auto image = [&](bool there, bool right) -> std::shared_ptr<const Image> {
-    if (!there) return nullptr;
-    return std::make_shared<const Image>(layout_.width_px, layout_.height_px,
-                                         std::shared_ptr<const std::uint8_t>(slot, pixels(frame, right)));
-  };
-  return {frame.t, image(frame.left, false), image(frame.right, true)};
+  return with_images(frame, [&](const std::uint8_t* pixels) {
+    return Image(layout_.width_px, layout_.height_px, std::shared_ptr<const std::uint8_t>(slot, pixels));
+  });
 }
 
 StereoFrame FrameRing::copy(const SocketFrame& frame) const {
-  const auto image = [&](bool there, bool right) -> std::shared_ptr<const Image> {
-    if (!there) return nullptr;
+  return with_images(frame, [&](const std::uint8_t* pixels) {
     Image own(layout_.width_px, layout_.height_px);
-    std::memcpy(own.row(0), pixels(frame, right), layout_.image_bytes());
-    return std::make_shared<const Image>(std::move(own));
-  };
-  return {frame.t, image(frame.left, false), image(frame.right, true)};
+    std::memcpy(own.row(0), pixels, layout_.image_bytes());
+    return own;
+  });
 }
 
 }  // namespace fbvins

@@ -43,7 +43,10 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
       : memory_(memory), layout_(layout), bell_(std::move(bell)) {}
   StereoFrame borrow(const SocketFrame& frame);
   StereoFrame copy(const SocketFrame& frame) const;
-  const std::uint8_t* pixels(const SocketFrame& frame, bool right) const;
+  const std::uint8_t* pixels(const SocketFrame& frame, int camera) const;
+  /// `image_of(pixels)`: of each camera that the frame has one of.
+  template <class ImageOf>
+  StereoFrame with_images(const SocketFrame& frame, ImageOf&& image_of) const;
 
   const std::uint8_t* memory_;
   FrameLayout layout_;

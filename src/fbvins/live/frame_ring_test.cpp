@@ -10,7 +10,7 @@ namespace {
 
 using test::kSlotBytes;
 
-const FrameLayout kLayout{test::kWidth, test::kHeight, test::kSlots, kSlotBytes, kSlotBytes / 2};
+const FrameLayout kLayout{test::kWidth, test::kHeight, test::kSlots, kSlotBytes, 2, {0, kSlotBytes / 2}};
 
 bool rings(const WakeEvent& bell) {
   pollfd watched{bell.fd(), POLLIN, 0};
@@ -35,7 +35,7 @@ class FrameRingTest : public testing::Test {
   std::uint8_t* slots_ = nullptr;
 };
 
-SocketFrame frame_in(int slot) { return {{1000 + slot}, 0, slot, true, true}; }
+SocketFrame frame_in(int slot) { return {{1000 + slot}, 0, slot, 0b11}; }
 
 TEST_F(FrameRingTest, FramesAreTheSendersMemory) {
   const auto frame = ring_->take(frame_in(2));
@@ -46,6 +46,27 @@ TEST_F(FrameRingTest, FramesAreTheSendersMemory) {
   EXPECT_EQ(std::memcmp(frame->right->row(0), slots_ + 2 * kSlotBytes + kSlotBytes / 2, kLayout.image_bytes()), 0);
   slots_[2 * kSlotBytes] = 123;  // the same memory, not a copy
   EXPECT_EQ(frame->left->at(0, 0), 123);
+}
+
+TEST_F(FrameRingTest, ImagesOfThreeCamerasInOneSlot) {
+  FrameLayout layout = kLayout;
+  layout.cameras = 3;
+  layout.offset_bytes[2] = kSlotBytes - layout.image_bytes();
+  auto ring = FrameRing::map(memory_, layout, bell_);
+  ASSERT_TRUE(ring);
+  SocketFrame sent = frame_in(1);
+  sent.images = 0b101;
+  sent.offsets.set(2, Duration{7});
+  const auto frame = (*ring)->take(sent);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->right, nullptr);
+  ASSERT_EQ(frame->more.size(), 1u);
+  EXPECT_EQ(std::memcmp(frame->more[0]->row(0), slots_ + 2 * kSlotBytes - layout.image_bytes(), layout.image_bytes()), 0);
+  EXPECT_EQ(frame->offsets.of(2), Duration{7});
+  sent.slot = 2, sent.images = 0b1000;
+  const auto beyond = (*ring)->take(sent);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().message, "frame: images of more than the 3 cameras of the hello");
 }
 
 TEST_F(FrameRingTest, ASlotIsFreeWhenItsLastImageIsGone) {

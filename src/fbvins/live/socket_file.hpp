@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Unix socket that listens at a path: for its owner alone, or for a group as well; removed at the end. The socket of a dead server is replaced; that of
-// a living one, or a file that is not a socket, is left alone and is an error.
+// A Unix socket that listens at a path: for its owner alone, or for a group as well; removed at the end. The socket of a dead
+// server is replaced; that of a living one, or a file that is not a socket, is left alone and is an error.
 #pragma once
 
 #include <sys/types.h>

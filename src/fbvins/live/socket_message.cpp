@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -15,8 +16,16 @@ constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
 /// Stamps beyond this (146 years) could overflow in differences.
 constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
-static_assert(sizeof(FbvinsSocketHello) == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
-static_assert(sizeof(FbvinsSocketReading) == 56 && sizeof(FbvinsSocketFrame) == 32 && sizeof(FbvinsSocketGoodbye) == 256);
+/// What the messages had in version 1.1.
+constexpr std::size_t kFirstHello_bytes = offsetof(FbvinsSocketHello, cameras);
+constexpr std::size_t kFirstFrame_bytes = offsetof(FbvinsSocketFrame, offset_ns);
+/// Images of one frame lie closer together than this.
+constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
+
+static_assert(kFirstHello_bytes == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
+static_assert(sizeof(FbvinsSocketHello) == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
+static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
+static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
 static_assert(sizeof(FbvinsSocketPosition) == 120);
 static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
 
@@ -48,11 +57,24 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
     return malformed(fmt::format("hello: images of {} x {} pixels", hello.width_px, hello.height_px));
   if (hello.slots < 2 || hello.slots > FBVINS_SOCKET_MOST_SLOTS)
     return malformed(fmt::format("hello: {} slots, not 2 to {}", hello.slots, int{FBVINS_SOCKET_MOST_SLOTS}));
-  const FrameLayout layout{static_cast<int>(hello.width_px), static_cast<int>(hello.height_px), static_cast<int>(hello.slots),
-                           hello.slot_bytes, hello.right_offset_bytes};
-  if (layout.right_offset_bytes < layout.image_bytes() || layout.slot_bytes < layout.right_offset_bytes + layout.image_bytes())
-    return malformed(fmt::format("hello: two images of {} bytes, the right one at {}, do not fit into a slot of {} bytes",
-                                 layout.image_bytes(), layout.right_offset_bytes, layout.slot_bytes));
+  FrameLayout layout{static_cast<int>(hello.width_px), static_cast<int>(hello.height_px), static_cast<int>(hello.slots),
+                     hello.slot_bytes};
+  if ((hello.flags & FBVINS_SOCKET_HAS_CAMERAS) != 0) {
+    if (hello.cameras < 1 || hello.cameras > FBVINS_SOCKET_MOST_CAMERAS)
+      return malformed(fmt::format("hello: {} cameras, not 1 to {}", hello.cameras, int{FBVINS_SOCKET_MOST_CAMERAS}));
+    layout.cameras = static_cast<int>(hello.cameras);
+  }
+  layout.offset_bytes[1] = hello.right_offset_bytes;
+  std::copy_n(hello.more_offset_bytes, kMostCameras - 2, layout.offset_bytes.begin() + 2);
+  if (layout.slot_bytes < layout.image_bytes())
+    return malformed(
+        fmt::format("hello: an image of {} bytes does not fit into a slot of {} bytes", layout.image_bytes(), layout.slot_bytes));
+  for (int i = 1; i < layout.cameras; ++i) {
+    const std::size_t at = layout.offset_bytes[static_cast<std::size_t>(i)];
+    if (at < layout.image_bytes() || layout.slot_bytes < at + layout.image_bytes())
+      return malformed(fmt::format("hello: {} images of {} bytes, that of camera {} at {}, do not fit into a slot of {} bytes",
+                                   layout.cameras, layout.image_bytes(), i, at, layout.slot_bytes));
+  }
   if (layout.bytes() > kMostMemory_bytes) return malformed(fmt::format("hello: {} bytes of images, over 1 GiB", layout.bytes()));
   return layout;
 }
@@ -68,13 +90,15 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
     return Error{ErrorCode::unsupported,
                  fmt::format("the sender speaks version {}.{} of the protocol, this program {}.{}", version->major,
                              version->minor, int{FBVINS_SOCKET_MAJOR}, int{FBVINS_SOCKET_MINOR})};
-  const auto hello = read<FbvinsSocketHello>(bytes, "hello");
+  auto hello = read<FbvinsSocketHello>(bytes, "hello", kFirstHello_bytes);
+  if (hello && (hello->flags & FBVINS_SOCKET_HAS_CAMERAS) != 0) hello = read<FbvinsSocketHello>(bytes, "hello");
   if (!hello) return hello.error();
   const auto layout = layout_of(*hello);
   if (!layout) return layout.error();
   SocketHello out{printable(hello->name), hello->minor, *layout, std::nullopt};
   if ((hello->flags & FBVINS_SOCKET_HAS_RIG) == 0) return SocketMessage(std::move(out));
-  out.rig = hello->rig;
+  out.rig = SocketRig{hello->rig, layout->cameras};
+  std::copy_n(hello->more, std::max(0, layout->cameras - 2), out.rig->more.begin());
   const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
   if (!rig) return rig.error();
   return SocketMessage(std::move(out));
@@ -100,13 +124,20 @@ Result<SocketMessage> parse_imu(std::span<const std::byte> bytes) {
 }
 
 Result<SocketMessage> parse_frame(std::span<const std::byte> bytes) {
-  const auto frame = read<FbvinsSocketFrame>(bytes, "frame");
+  const bool with_offsets = bytes.size() >= sizeof(FbvinsSocketFrame);
+  const auto frame = read<FbvinsSocketFrame>(bytes, "frame", with_offsets ? sizeof(FbvinsSocketFrame) : kFirstFrame_bytes);
   if (!frame) return frame.error();
   if (!is_stamp(frame->t_ns)) return malformed(fmt::format("frame: stamp {} ns", frame->t_ns));
   if (frame->slot >= FBVINS_SOCKET_MOST_SLOTS) return malformed(fmt::format("frame: no slot {}", frame->slot));
-  const bool left = (frame->images & FBVINS_SOCKET_LEFT) != 0, right = (frame->images & FBVINS_SOCKET_RIGHT) != 0;
-  if (!left && !right) return malformed("frame: without an image");
-  return SocketMessage(SocketFrame{{frame->t_ns}, frame->sequence, static_cast<int>(frame->slot), left, right});
+  if (frame->images == 0) return malformed("frame: without an image");
+  SocketFrame out{{frame->t_ns}, frame->sequence, static_cast<int>(frame->slot), frame->images};
+  for (int i = 0; i < kMostCameras; ++i) {
+    const std::int64_t offset_ns = frame->offset_ns[i];
+    if (offset_ns < -kLongestOffset_ns || offset_ns > kLongestOffset_ns)
+      return malformed(fmt::format("frame: camera {} took its image {} ns from the stamp", i, offset_ns));
+    if (offset_ns != 0) out.offsets.set(i, Duration{offset_ns});
+  }
+  return SocketMessage(std::move(out));
 }
 
 Result<SocketMessage> parse_position(std::span<const std::byte> bytes) {

@@ -7,6 +7,7 @@
 //   if (const auto* frame = std::get_if<SocketFrame>(&*message)) ...
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/socket_protocol.hpp"
 #include "fbvins/types/anchor.hpp"
+#include "fbvins/types/image.hpp"
 #include "fbvins/types/imu.hpp"
 
 namespace fbvins {
@@ -28,17 +30,26 @@ struct FrameLayout {
   int width_px = 0, height_px = 0;
   int slots = 0;
   std::size_t slot_bytes = 0;
-  std::size_t right_offset_bytes = 0;
+  int cameras = 2;
+  std::array<std::size_t, kMostCameras> offset_bytes{};  ///< of each camera's image in a slot
 
   std::size_t image_bytes() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
   std::size_t bytes() const { return static_cast<std::size_t>(slots) * slot_bytes; }
 };
 
+/// A hello's calibration as sent, so that two can be compared.
+struct SocketRig {
+  FbvinsSocketRig pair{};
+  int cameras = 2;
+  std::array<FbvinsSocketCamera, kMostCameras - 2> more{};  ///< zeros beyond their count
+};
+bool same(const SocketRig& a, const SocketRig& b);
+
 struct SocketHello {
   std::string name;  ///< printable
   int minor = 0;     ///< of the sender's version; its major one equals ours
   FrameLayout layout;
-  std::optional<FbvinsSocketRig> rig;  ///< as sent, so that two can be compared
+  std::optional<SocketRig> rig;
 };
 
 struct SocketImu {
@@ -49,8 +60,9 @@ struct SocketImu {
 struct SocketFrame {
   Time t;
   std::uint64_t sequence = 0;
-  int slot = 0;  ///< below FBVINS_SOCKET_MOST_SLOTS
-  bool left = false, right = false;
+  int slot = 0;              ///< below FBVINS_SOCKET_MOST_SLOTS
+  std::uint32_t images = 0;  ///< bit i: of camera i
+  ExposureOffsets offsets = {};
 };
 
 struct SocketPosition {
@@ -72,8 +84,8 @@ using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketPo
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);
 
 /// The rig of a hello, checked as calibration files are.
-Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int height_px);
+Result<StereoRig> parse_socket_rig(const SocketRig& rig, int width_px, int height_px);
 /// The reverse, for our own senders and for tests.
-FbvinsSocketRig socket_rig(const StereoRig& rig);
+SocketRig socket_rig(const StereoRig& rig);
 
 }  // namespace fbvins

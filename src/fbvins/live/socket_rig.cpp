@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
@@ -23,7 +24,7 @@ bool are_finite(const double* begin, std::size_t count) {
   return std::all_of(begin, begin + count, [](double x) { return std::isfinite(x); });
 }
 
-Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_px, const char* side) {
+Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_px, const std::string& side) {
   const double* f = c.focal_px;
   const double* m = c.centre_px;
   const double* k = c.distortion;
@@ -42,8 +43,7 @@ Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_p
   return Camera(ExtendedUnified{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
 }
 
-template <class C>
-Result<Pose<B, C>> mounting_of(const FbvinsSocketCamera& camera, const char* side) {
+Result<Pose<B, C0>> mounting_of(const FbvinsSocketCamera& camera, const std::string& side) {
   const double* m = camera.T_BC;
   Mat3 R;
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
@@ -52,7 +52,7 @@ Result<Pose<B, C>> mounting_of(const FbvinsSocketCamera& camera, const char* sid
       !are_finite(m, 12))
     return malformed(fmt::format("the {} camera's T_BC is not a rotation and a translation", side));
   if (!(p.cwiseAbs().maxCoeff() < 1e3)) return malformed(fmt::format("the {} camera is more than a kilometre away", side));
-  return Pose<B, C>{Quat(R).normalized(), p};
+  return Pose<B, C0>{Quat(R).normalized(), p};
 }
 
 Result<void> check_figures(const FbvinsSocketRig& rig) {
@@ -64,7 +64,7 @@ Result<void> check_figures(const FbvinsSocketRig& rig) {
   return {};
 }
 
-FbvinsSocketCamera camera_message(const Camera& camera, const Quat& q_BC, const Vec3& p_BC) {
+FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mounting) {
   FbvinsSocketCamera out{};
   // In the order of LensModel.
   constexpr std::uint32_t kModels[] = {FBVINS_SOCKET_RADTAN, FBVINS_SOCKET_EQUIDISTANT, FBVINS_SOCKET_DOUBLE_SPHERE,
@@ -76,26 +76,34 @@ FbvinsSocketCamera camera_message(const Camera& camera, const Quat& q_BC, const 
   out.focal_px[0] = f[0], out.focal_px[1] = f[1], out.centre_px[0] = f[2], out.centre_px[1] = f[3];
   std::copy(k.begin(), k.end(), out.distortion);
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> T_BC(out.T_BC);
-  T_BC.leftCols<3>() = q_BC.toRotationMatrix();
-  T_BC.col(3) = p_BC;
+  T_BC.leftCols<3>() = mounting.q.toRotationMatrix();
+  T_BC.col(3) = mounting.p;
   return out;
 }
 
 }  // namespace
 
-Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int height_px) {
-  const auto left = camera_of(rig.left, width_px, height_px, "left");
-  if (!left) return left.error();
-  const auto right = camera_of(rig.right, width_px, height_px, "right");
-  if (!right) return right.error();
-  const auto T_BC0 = mounting_of<C0>(rig.left, "left");
-  if (!T_BC0) return T_BC0.error();
-  const auto T_BC1 = mounting_of<C1>(rig.right, "right");
-  if (!T_BC1) return T_BC1.error();
+bool same(const SocketRig& a, const SocketRig& b) {
+  return a.cameras == b.cameras && std::memcmp(&a.pair, &b.pair, sizeof(a.pair)) == 0 &&
+         std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0;
+}
+
+Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int height_px) {
+  const FbvinsSocketRig& rig = sent.pair;
+  std::vector<MountedCamera> cameras;
+  for (int i = 0; i < sent.cameras; ++i) {
+    const FbvinsSocketCamera& camera = i == 0 ? rig.left : i == 1 ? rig.right : sent.more[static_cast<std::size_t>(i - 2)];
+    const std::string side = i == 0 ? "left" : i == 1 ? "right" : fmt::format("number {}", i);
+    const auto lens = camera_of(camera, width_px, height_px, side);
+    if (!lens) return lens.error();
+    const auto T_BC = mounting_of(camera, side);
+    if (!T_BC) return T_BC.error();
+    cameras.push_back({*lens, *T_BC});
+  }
   if (Result<void> good = check_figures(rig); !good) return good.error();
   const ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
                        rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
-  StereoRig out = with_cameras({}, {{*left, *T_BC0}, {*right, T_BC1->cast_frames<B, C0>()}});
+  StereoRig out = with_cameras({}, cameras);
   out.imu_noise = noise;
   out.image_rate_hz = rig.image_rate_hz;
   out.time_offset_s = rig.time_offset_s;
@@ -103,16 +111,14 @@ Result<StereoRig> parse_socket_rig(const FbvinsSocketRig& rig, int width_px, int
   return out;
 }
 
-FbvinsSocketRig socket_rig(const StereoRig& rig) {
-  return {camera_message(rig.left, rig.T_BC0.q, rig.T_BC0.p),
-          camera_message(rig.right, rig.T_BC1.q, rig.T_BC1.p),
-          rig.imu_noise.gyro_noise_density_radps_rthz,
-          rig.imu_noise.gyro_random_walk_radps2_rthz,
-          rig.imu_noise.accel_noise_density_mps2_rthz,
-          rig.imu_noise.accel_random_walk_mps3_rthz,
-          rig.imu_noise.rate_hz,
-          rig.image_rate_hz,
-          rig.time_offset_s};
+SocketRig socket_rig(const StereoRig& rig) {
+  const auto message = [&](int camera) { return camera_message(rig.camera(camera), rig.T_BC(camera)); };
+  SocketRig out{{message(0), rig.has_right() ? message(1) : FbvinsSocketCamera{}, rig.imu_noise.gyro_noise_density_radps_rthz,
+                 rig.imu_noise.gyro_random_walk_radps2_rthz, rig.imu_noise.accel_noise_density_mps2_rthz,
+                 rig.imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.rate_hz, rig.image_rate_hz, rig.time_offset_s},
+                rig.camera_count()};
+  for (int i = 2; i < rig.camera_count(); ++i) out.more[static_cast<std::size_t>(i - 2)] = message(i);
+  return out;
 }
 
 }  // namespace fbvins

@@ -23,8 +23,6 @@ constexpr auto kAcceptAgain = 1s;
 /// A connection is closed this long after its goodbye: closed at once, a sender that is about to send would get an error first.
 constexpr auto kGoodbyeIsRead = 1s;
 
-bool same(const FbvinsSocketRig& a, const FbvinsSocketRig& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }
-
 std::uint32_t health_number(HealthState state) {
   switch (state) {
     case HealthState::initialising: return FBVINS_SOCKET_INITIALISING;
@@ -162,10 +160,13 @@ void SocketSource::check_hello() {
     senders_rig_ = hello.rig;
     rig_known_ = true;
   }
-  for (const Camera* camera : {&rig_.left, &rig_.right})
-    if (hello.layout.width_px != camera->width() || hello.layout.height_px != camera->height())
+  if (hello.layout.cameras != rig_.camera_count())
+    return refuse(fmt::format("images of {} cameras, the calibration has {}", hello.layout.cameras, rig_.camera_count()));
+  for (int i = 0; i < rig_.camera_count(); ++i)
+    if (const Camera& camera = rig_.camera(i);
+        hello.layout.width_px != camera.width() || hello.layout.height_px != camera.height())
       return refuse(fmt::format("images of {} x {} pixels, the calibration is for {} x {}", hello.layout.width_px,
-                                hello.layout.height_px, camera->width(), camera->height()));
+                                hello.layout.height_px, camera.width(), camera.height()));
   if (senders_rig_ && hello.rig && !same(*senders_rig_, *hello.rig))
     refuse("another calibration than the first sender's, which the estimator runs with");
 }

@@ -61,7 +61,7 @@ class SocketSource final : public Source {
   SocketOptions options_;
   StereoRig rig_;
   bool rig_known_ = false;
-  std::optional<FbvinsSocketRig> senders_rig_;  ///< where rig_ was taken from a sender
+  std::optional<SocketRig> senders_rig_;  ///< where rig_ was taken from a sender
   std::shared_ptr<const WakeEvent> bell_ = std::make_shared<const WakeEvent>();
   std::shared_ptr<Report> report_;
   std::unique_ptr<SocketSession> session_;

@@ -46,7 +46,14 @@ inline FbvinsSocketHello hello_message(const StereoRig* rig) {
   hello.slots = kSlots;
   hello.slot_bytes = kSlotBytes;
   hello.right_offset_bytes = kSlotBytes / 2;
-  if (rig) hello.flags = FBVINS_SOCKET_HAS_RIG, hello.rig = socket_rig(*rig);
+  if (!rig) return hello;
+  const SocketRig sent = socket_rig(*rig);
+  hello.flags = FBVINS_SOCKET_HAS_RIG;
+  hello.rig = sent.pair;
+  if (sent.cameras == 2) return hello;
+  hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
+  hello.cameras = static_cast<std::uint32_t>(sent.cameras);
+  std::copy(sent.more.begin(), sent.more.end(), hello.more);
   return hello;
 }
 

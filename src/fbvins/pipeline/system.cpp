@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/pipeline/system.hpp"
 
+#include <fmt/format.h>
+
 #include <atomic>
 #include <optional>
 #include <utility>
 
 #include "fbvins/camera/check_rig.hpp"
+#include "fbvins/camera/lens_faces.hpp"
 #include "fbvins/core/bounded_queue.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/pipeline/feedback.hpp"
@@ -15,6 +18,22 @@
 #include "fbvins/pipeline/stage_runner.hpp"
 
 namespace fbvins {
+namespace {
+
+/// An error where lenses that see more than 180 degrees are too many, or are to be calibrated in flight.
+Result<void> check_faces(const LensFaces& lenses, const EstimatorOptions& options) {
+  if (!lenses.any()) return {};
+  if (lenses.rig().camera_count() > kMostCameras)
+    return Error{ErrorCode::unsupported,
+                 fmt::format("the rig: a lens that sees more than 180 degrees counts as up to four cameras, which makes {} here, "
+                             "more than {}",
+                             lenses.rig().camera_count(), kMostCameras)};
+  if (options.estimate_extrinsics)
+    return Error{ErrorCode::unsupported, "estimator.estimate_extrinsics: not with lenses that see more than 180 degrees"};
+  return {};
+}
+
+}  // namespace
 
 /// A step of the work with its own queue and, in the threaded mode, its own thread.
 template <class Task, class Owner>
@@ -34,6 +53,7 @@ struct System::Impl {
   };
 
   RunMode mode;
+  LensFaces lenses;  ///< the rig, and as it is flown: what the frontend and the estimator know
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
@@ -57,13 +77,14 @@ struct System::Impl {
   /// Deep enough for the keyframes of a second or two, while the mapper optimises its whole graph.
   Stage<MapTask, Impl> mapping{"the mapper", &Impl::map, BoundedQueue<MapTask>{12}};
 
-  Impl(const SystemOptions& options, const StereoRig& rig, RunMode mode_wanted, SystemParts parts)
+  Impl(const SystemOptions& options, LensFaces lenses_of_rig, RunMode mode_wanted, SystemParts parts)
       : mode(mode_wanted),
-        packet_maker(options.input, rig.imu_noise, Duration::from_seconds(rig.time_offset_s)),
+        lenses(std::move(lenses_of_rig)),
+        packet_maker(options.input, lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
         frontend(std::move(parts.frontend)),
-        estimator(rig, options.estimator, parts.imu_state),
+        estimator(lenses.rig(), options.estimator, parts.imu_state),
         mapper(parts.mapper),
-        imu_model{{}, {}, options.estimator.assumed(rig.imu_noise), options.estimator.gravity_mps2} {
+        imu_model{{}, {}, options.estimator.assumed(lenses.rig().imu_noise), options.estimator.gravity_mps2} {
     if (mode == RunMode::deterministic) return;
     start(tracking, [this] { estimation.queue.close(); });
     start(estimation, [this] { mapping.queue.close(); });
@@ -76,6 +97,8 @@ struct System::Impl {
   void track(SensorPacket packet) {
     const Feedback::Message told = feedback.for_frame(packet.id);
     for (const LandmarkUpdate& update : told.landmarks) frontend->locate(update);
+    StereoFrame images = packet.frame;
+    packet.frame = lenses.spread(std::move(packet.frame));
     TrackedFrame frame = frontend->process(packet, told.prior);
     frame.id = packet.id;
     frame.t = packet.frame.t;
@@ -83,13 +106,15 @@ struct System::Impl {
     frame.depth = packet.frame.depth;
     frame.offsets = packet.frame.offsets;
     frame.anchors = std::move(packet.anchors);
-    if (keyframes_wanted()) frame.images = std::move(packet.frame);
+    if (keyframes_wanted()) frame.images = std::move(images);
     hand_on(estimation, std::move(frame));
   }
 
   void estimate(TrackedFrame frame) {
-    if (on_tracked_frame) on_tracked_frame(frame);
+    if (on_tracked_frame) on_tracked_frame(lenses.any() ? lenses.gathered(frame) : frame);
     Estimate estimate = estimator.process(frame);
+    std::uint8_t& without_cameras = estimate.odometry.health.without_cameras;
+    without_cameras = lenses.lenses_of(without_cameras);
     frame.imu.noise = estimate.imu_noise;
     if (keyframes_wanted()) complete(estimate, frame);
     if (on_window) on_window(estimator.snapshot());
@@ -188,12 +213,14 @@ struct System::Impl {
 Result<System> System::create(const SystemOptions& options, const StereoRig& rig, RunMode mode, SystemParts parts) {
   if (Result<void> valid = validate(options); !valid) return valid.error();
   if (Result<void> good = check_rig(rig, "the rig"); !good) return good.error();
+  LensFaces lenses(rig);
+  if (Result<void> good = check_faces(lenses, options.estimator); !good) return good.error();
   if (!parts.frontend) {
-    Result<std::unique_ptr<Frontend>> frontend = make_frontend(rig, options.frontend);
+    Result<std::unique_ptr<Frontend>> frontend = make_frontend(lenses.rig(), options.frontend);
     if (!frontend) return frontend.error();
     parts.frontend = std::move(*frontend);
   }
-  return System(std::make_unique<Impl>(options, rig, mode, std::move(parts)));
+  return System(std::make_unique<Impl>(options, std::move(lenses), mode, std::move(parts)));
 }
 
 System::System(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -230,6 +257,6 @@ Result<void> System::finish() { return impl_->finish(); }
 Result<void> System::status() const { return impl_->status.get(); }
 InputCounts System::input_counts() const { return impl_->packet_maker.counts(); }
 int System::keyframes_left_out() const { return impl_->keyframes_left_out; }
-Calibration System::calibration() const { return impl_->estimator.calibration(); }
+Calibration System::calibration() const { return impl_->lenses.of_lenses(impl_->estimator.calibration()); }
 
 }  // namespace fbvins

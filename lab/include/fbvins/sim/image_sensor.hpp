@@ -91,6 +91,7 @@ class ImageSensor {
   std::uint64_t seed_;
   double exposure_ms_, gain_ = 1, log_product_;
   std::vector<float> falloff_, rows_;
+  double lit_pixels_ = 1;  // of an image
 };
 
 }  // namespace fbvins

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/camera/lens_faces.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+/// The faces around the one that looks ahead: the first looks down the image, the others up and to its sides.
+constexpr int kAround = 3;
+constexpr int kFaces = 1 + kAround;
+/// A face with a smaller share of the image is left out: the image's edges cut it off.
+constexpr double kLeastShare = 0.02;
+
+constexpr std::int8_t kNone = -1;
+
+/// Which face each pixel belongs to.
+struct Division {
+  std::vector<std::int8_t> face;  // row by row; kNone where the lens has no ray, or its mask hides it
+  std::array<Vec3, kFaces> axis;  // sum of the rays of each
+  std::array<std::size_t, kFaces> pixels{};
+};
+
+int face_of(const Vec3& ray) {
+  if (std::acos(ray.z()) <= kFrontFace_rad) return 0;
+  const double turn = std::atan2(-ray.x(), ray.y()) / (2 * std::numbers::pi);  // from down the image on, in turns
+  return 1 + (static_cast<int>(std::lround(turn * kAround)) + kAround) % kAround;
+}
+
+Division divide(const Camera& camera) {
+  Division out;
+  out.axis.fill(Vec3::Zero());
+  out.face.reserve(static_cast<std::size_t>(camera.width()) * camera.height());
+  for (int y = 0; y < camera.height(); ++y)
+    for (int x = 0; x < camera.width(); ++x) {
+      const auto ray = camera.hidden(Vec2(x, y), 0) ? std::nullopt : camera.ray(Vec2(x, y));
+      if (!ray) {
+        out.face.push_back(kNone);
+        continue;
+      }
+      const auto face = static_cast<std::size_t>(face_of(*ray));
+      out.face.push_back(static_cast<std::int8_t>(face));
+      out.axis[face] += *ray;
+      ++out.pixels[face];
+    }
+  return out;
+}
+
+/// Turns the z axis to where the face looks. The lens' own axes ahead.
+Mat3 axes_of(int face, const Vec3& axis) {
+  if (face == 0) return Mat3::Identity();
+  Mat3 R;
+  R.col(2) = axis.normalized();
+  R.col(0) = Vec3::UnitZ().cross(axis).normalized();
+  R.col(1) = R.col(2).cross(R.col(0));
+  return R;
+}
+
+/// What the face shows: its pixels, and of the others as many around them as features keep from a mask's edge.
+std::shared_ptr<const Mask> mask_of(const Camera& camera, const Division& division, int face) {
+  Image others(camera.width(), camera.height(), 255), seen(camera.width(), camera.height(), 0);
+  const auto at = [&](int x, int y) { return division.face[static_cast<std::size_t>(y) * camera.width() + x]; };
+  for (int y = 0; y < camera.height(); ++y)
+    for (int x = 0; x < camera.width(); ++x)
+      if (at(x, y) == face) others.at(x, y) = 0;
+  const Mask widened(others);
+  for (int y = 0; y < camera.height(); ++y)
+    for (int x = 0; x < camera.width(); ++x)
+      if (at(x, y) != kNone && widened.hides(Vec2(x, y), kMaskMargin_px)) seen.at(x, y) = 255;
+  return std::make_shared<const Mask>(seen);
+}
+
+}  // namespace
+
+std::vector<MountedCamera> faces_of(const MountedCamera& mounted) {
+  const Camera& camera = mounted.camera;
+  if (!camera.sees_backwards()) return {mounted};
+  const Division division = divide(camera);
+  std::vector<MountedCamera> faces;
+  for (int face = 0; face < kFaces; ++face) {
+    const auto k = static_cast<std::size_t>(face);
+    if (face > 0 && static_cast<double>(division.pixels[k]) < kLeastShare * static_cast<double>(division.face.size())) continue;
+    const Mat3 R = axes_of(face, division.axis[k]);
+    MountedCamera out{face == 0 ? camera : camera.turned(R), mounted.T_BC * Pose<C0, C0>(R, Vec3::Zero())};
+    if (face == 0) out.T_BC = mounted.T_BC;
+    out.camera.set_mask(mask_of(camera, division, face));
+    faces.push_back(std::move(out));
+  }
+  return faces;
+}
+
+LensFaces::LensFaces(const StereoRig& rig) : rig_(rig), T_BC1_(rig.T_BC1), lenses_(rig.camera_count()) {
+  std::vector<MountedCamera> ahead, around;
+  std::vector<int> lens_of_around;
+  for (int i = 0; i < lenses_; ++i) {
+    const std::vector<MountedCamera> faces = faces_of(rig.mounted(i));
+    ahead.push_back(faces.front());
+    lens_of_.push_back(i);
+    around.insert(around.end(), faces.begin() + 1, faces.end());
+    lens_of_around.resize(around.size(), i);
+  }
+  if (around.empty()) return;
+  ahead.insert(ahead.end(), around.begin(), around.end());
+  lens_of_.insert(lens_of_.end(), lens_of_around.begin(), lens_of_around.end());
+  rig_ = with_cameras(rig, ahead);
+}
+
+StereoFrame LensFaces::spread(StereoFrame frame) const {
+  if (!any()) return frame;
+  StereoFrame out{frame.t, frame.left, nullptr};
+  for (int i = 0; i < rig_.camera_count(); ++i) {
+    const std::shared_ptr<const Image> image = frame.image(lens_of(i));
+    if (i == 1) out.right = image;
+    if (i > 1) out.more.push_back(image);
+    out.offsets.set(i, frame.offsets.of(lens_of(i)));
+  }
+  return out;
+}
+
+TrackedFrame LensFaces::gathered(TrackedFrame frame) const {
+  for (TrackedFeature& feature : frame.features)
+    for (std::int8_t* camera : {&feature.cameras.left, &feature.cameras.right})
+      *camera = static_cast<std::int8_t>(lens_of(*camera));
+  frame.has_right = frame.has_right && lenses_ > 1;
+  frame.has_more.resize(std::min(frame.has_more.size(), static_cast<std::size_t>(std::max(0, lenses_ - 2))));
+  return frame;
+}
+
+Calibration LensFaces::of_lenses(Calibration calibration) const {
+  if (!any()) return calibration;
+  if (lenses_ == 1) calibration.T_BC1 = T_BC1_;
+  calibration.more.resize(static_cast<std::size_t>(std::max(0, lenses_ - 2)));
+  return calibration;
+}
+
+std::uint8_t LensFaces::lenses_of(std::uint8_t cameras) const {
+  if (!any()) return cameras;
+  unsigned out = 0;
+  for (int i = 0; i < rig_.camera_count(); ++i)
+    if ((cameras >> i & 1U) != 0) out |= 1U << lens_of(i);
+  return static_cast<std::uint8_t>(out);
+}
+
+}  // namespace fbvins

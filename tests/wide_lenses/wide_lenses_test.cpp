@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// A rendered flight with two lenses of 200 degrees side by side: what is beside and behind the lenses' planes is used, and a lens
+// without images is named as the camera that it is.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "fbvins/camera/lens_faces.hpp"
+#include "fbvins/config/config.hpp"
+#include "fbvins/eval/evaluation.hpp"
+#include "fbvins/pipeline/system.hpp"
+#include "fbvins/sim/simulation.hpp"
+
+namespace fbvins {
+namespace {
+
+constexpr double kBlindFrom_s = 3;
+
+struct Recorded {
+  StereoRig rig;
+  std::vector<SensorEvent> events;
+  Trajectory<W> truth;
+};
+
+/// Rendered once.
+const Recorded& recorded() {
+  static const Recorded recorded = [] {
+    SimulationOptions options = *simulation_preset("fisheye");
+    options.seed = 31;
+    options.flight.duration_s = 5;
+    options.camera.time_samples = 1;
+    Result<DatasetContents> contents = simulate(options);
+    EXPECT_TRUE(contents.ok());
+    Recorded out;
+    for (const TrajectoryPoint& p : contents->ground_truth) out.truth.push_back({p.t, p.T_WB});
+    Dataset data(*std::move(contents), {});
+    out.rig = data.rig();
+    while (auto event = data.next()) out.events.push_back(std::move(*event));
+    return out;
+  }();
+  return recorded;
+}
+
+struct Flown {
+  std::vector<Odometry> poses;
+  std::size_t features_of[2] = {0, 0};  ///< by camera
+  std::size_t behind = 0;               ///< whose ray looks backwards
+};
+
+/// `blind`: the right lens delivers nothing from kBlindFrom_s on.
+Flown fly(const std::string& frontend, bool blind) {
+  Config config;
+  config.frontend.kind = frontend;
+  Result<System> system = System::create(config, recorded().rig);
+  EXPECT_TRUE(system.ok());
+  Flown out;
+  system->on_odometry([&](const Odometry& o) { out.poses.push_back(o); });
+  system->on_tracked_frame([&](const TrackedFrame& frame) {
+    EXPECT_TRUE(frame.has_more.empty());
+    for (const TrackedFeature& f : frame.features) {
+      const int camera = f.cameras[!f.left];
+      ASSERT_TRUE(camera == 0 || camera == 1);
+      ++out.features_of[camera];
+      const auto ray = recorded().rig.camera(camera).ray((f.left ? f.left : f.right)->pixel);
+      ASSERT_TRUE(ray);
+      out.behind += ray->z() < 0;
+    }
+  });
+  std::optional<Time> first;
+  for (SensorEvent event : recorded().events) {
+    if (auto* frame = std::get_if<StereoFrame>(&event)) {
+      if (!first) first = frame->t;
+      if (blind && (frame->t - *first).seconds() >= kBlindFrom_s) frame->right = nullptr;
+    }
+    EXPECT_TRUE(system->push(std::move(event)).ok());
+  }
+  EXPECT_TRUE(system->finish().ok());
+  EXPECT_EQ(system->calibration().camera_count(), 2);
+  return out;
+}
+
+class WideLensFlight : public testing::TestWithParam<const char*> {};
+
+TEST_P(WideLensFlight, UsesWhatIsBehindTheLens) {
+  const Flown flown = fly(GetParam(), false);
+  EXPECT_GT(flown.behind, flown.poses.size());
+  Trajectory<W> estimate;
+  for (const Odometry& o : flown.poses)
+    if (o.health.has_pose()) estimate.push_back({o.t, o.T_WB});
+  EXPECT_GT(estimate.size(), 80U);
+  EXPECT_EQ(flown.poses.back().health.state, HealthState::good);
+  EXPECT_LT(evaluate(recorded().truth, estimate, {})->absolute_m.rmse, 0.015);
+}
+
+TEST_P(WideLensFlight, NamesTheLensThatDeliversNothing) {
+  const Flown flown = fly(GetParam(), true);
+  const Health& health = flown.poses.back().health;
+  EXPECT_EQ(health.state, HealthState::degraded);
+  EXPECT_EQ(health.reason, HealthReason::one_camera);
+  EXPECT_EQ(cameras_in(health.without_cameras), std::vector<int>{1});
+}
+
+INSTANTIATE_TEST_SUITE_P(All, WideLensFlight, testing::Values("klt", "boost"));
+
+TEST(WideLensFlight, OnlineExtrinsicsAreRefused) {
+  Config config;
+  config.estimator.estimate_extrinsics = true;
+  const Result<System> system = System::create(config, recorded().rig);
+  ASSERT_FALSE(system);
+  EXPECT_NE(system.error().message.find("more than 180 degrees"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace fbvins
