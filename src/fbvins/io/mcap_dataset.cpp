@@ -195,12 +195,9 @@ class RecordReader {
     if (frame == nullptr) return;
     if (const Duration offset = read_image(message.data)->t - message.log_time; offset.ns != 0)
       frame->offsets.set(static_cast<int>(further) + 2, offset);
-    further_cameras_ = std::max(further_cameras_, further + 1);
   }
   void take_depth(const McapMessage& message) {
-    has_depth_ = take_beside(message, out_.info.depth, &RosImage::is_depth,
-                             [](FrameEntry& f) -> std::string& { return f.depth_file; }) != nullptr ||
-                 has_depth_;
+    (void)take_beside(message, out_.info.depth, &RosImage::is_depth, [](FrameEntry& f) -> std::string& { return f.depth_file; });
   }
 
   /// An image of the frame that has the message's time; null where it is none. `file_of(frame)`: its place.
@@ -234,9 +231,11 @@ class RecordReader {
   void drop_half_frame() {
     if (!was_cut_off() || !ends_with_image_) return;
     const FrameEntry& last = out_.frames.back();
+    const std::optional<Result<StereoRig>> rig = attached_calibration();
+    const bool known = rig && *rig;
     const auto further = std::ranges::count_if(last.more_files, [](const std::string& file) { return !file.empty(); });
-    if (last.left_file.empty() || last.right_file.empty() || std::cmp_less(further, further_cameras_) ||
-        (has_depth_ && last.depth_file.empty()))
+    if (last.left_file.empty() || (last.right_file.empty() && !(known && !(*rig)->has_right())) ||
+        std::cmp_less(further, known ? (*rig)->more.size() : 0) || (last.depth_file.empty() && known && (*rig)->depth))
       out_.frames.pop_back();
   }
 
@@ -347,8 +346,6 @@ class RecordReader {
   McapReader reader_;
   std::string name_;
   const DatasetOptions& options_;
-  std::size_t further_cameras_ = 0;  // from number 2 on, with images
-  bool has_depth_ = false;
   bool ends_with_image_ = false;
   DatasetContents out_;
 };

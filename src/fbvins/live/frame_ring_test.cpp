@@ -101,7 +101,7 @@ TEST_F(FrameRingTest, WhereSlotsAreScarceImagesAreCopied) {
 }
 
 TEST_F(FrameRingTest, AMissingImageIsANullPointer) {
-  const auto frame = ring_->take({{1}, 0, 0, false, true});
+  const auto frame = ring_->take({{1}, 0, 0, 0b10});
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->left, nullptr);
   ASSERT_NE(frame->right, nullptr);
