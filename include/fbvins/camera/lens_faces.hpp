@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lenses that see more than 180 degrees. No plane shows all that such a lens sees, so it is flown as up to four cameras in one
 // place, its faces: one that looks ahead and three around it, which look to the sides and behind the lens' plane. Each has the
-// lens' image, axes of its own (Camera::turned) and a mask that hides what the others show.
+// part of the lens' image that shows it, axes of its own (Camera::turned) and a mask that hides what the others show.
 //
 //   const LensFaces faces(rig);
 //   Estimator estimator(faces.rig(), ...);
@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -24,7 +25,7 @@ namespace fbvins {
 inline constexpr double kFrontFace_rad = 55 * std::numbers::pi / 180;
 
 /// The faces of a camera, the one that looks ahead first, with the lens' own axes; neighbours overlap by the margin that features
-/// keep from a mask. The camera alone, as it is, where it does not see backwards.
+/// keep from a mask. All have the whole image. The camera alone, as it is, where it does not see backwards.
 std::vector<MountedCamera> faces_of(const MountedCamera& camera);
 
 class LensFaces {
@@ -33,24 +34,28 @@ class LensFaces {
   explicit LensFaces(const StereoRig& rig);
 
   const StereoRig& rig() const { return rig_; }
-  /// Whether a lens has more than one face.
-  bool any() const { return rig_.camera_count() > lenses_; }
+  /// Whether a lens has faces.
+  bool any() const { return any_; }
   /// The camera of the rig whose lens a camera of rig() is a face of.
   int lens_of(int camera) const { return lens_of_[static_cast<std::size_t>(camera)]; }
-  /// The same images, of each face its lens' one.
+  /// The same images, of each face its part of the lens' one.
   StereoFrame spread(StereoFrame frame) const;
-  /// The features with the numbers of their lenses; `normalised` stays in the axes of the face.
+  /// The features with the numbers and the pixels of their lenses; `normalised` stays in the axes of the face.
   TrackedFrame gathered(TrackedFrame frame) const;
+  /// Where in its lens' image the part of a camera of rig() begins, px.
+  const Vec2& origin_px(int camera) const { return origins_px_[static_cast<std::size_t>(camera)]; }
   /// The rig's own part of a calibration of rig().
   Calibration of_lenses(Calibration calibration) const;
   /// Bits of cameras of rig() as bits of their lenses (Health::without_cameras).
   std::uint8_t lenses_of(std::uint8_t cameras) const;
 
  private:
-  StereoRig rig_;
-  Pose<B, C1> T_BC1_;
-  int lenses_;
+  std::shared_ptr<const Image> part(const std::shared_ptr<const Image>& image, int camera) const;
+
+  StereoRig lenses_, rig_;
+  bool any_ = false;
   std::vector<int> lens_of_;
+  std::vector<Vec2> origins_px_;
 };
 
 }  // namespace fbvins

@@ -73,6 +73,38 @@ std::shared_ptr<const Mask> mask_of(const Camera& camera, const Division& divisi
   return std::make_shared<const Mask>(seen);
 }
 
+/// Columns x to x + width - 1 and rows y to y + height - 1 of an image.
+struct Part {
+  int x, y, width, height;
+};
+
+/// The smallest part with all that the mask leaves; with all rows where rows have times of their own.
+Part part_of(const Camera& face, bool may_leave_rows) {
+  int x0 = face.width(), x1 = 0, y0 = face.height(), y1 = 0;
+  for (int y = 0; y < face.height(); ++y)
+    for (int x = 0; x < face.width(); ++x) {
+      if (face.hidden(Vec2(x, y), 0)) continue;
+      x0 = std::min(x0, x), x1 = std::max(x1, x + 1);
+      y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+    }
+  if (!may_leave_rows) y0 = 0, y1 = face.height();
+  return {x0, y0, x1 - x0, y1 - y0};
+}
+
+/// A face with this part of its image alone. `R_lens`: its axes in the lens', null for the lens' own.
+Camera cropped(const Camera& face, const Part& part, const Mat3* R_lens) {
+  LensModel model = face.model();
+  std::visit([&](auto& m) { m.cx -= part.x, m.cy -= part.y; }, model);
+  Camera out(model, part.width, part.height);
+  if (R_lens != nullptr) out = out.turned(*R_lens);
+  Image seen(part.width, part.height, 0);
+  for (int y = 0; y < part.height; ++y)
+    for (int x = 0; x < part.width; ++x)
+      if (!face.hidden(Vec2(x + part.x, y + part.y), 0)) seen.at(x, y) = 255;
+  out.set_mask(std::make_shared<const Mask>(seen));
+  return out;
+}
+
 }  // namespace
 
 std::vector<MountedCamera> faces_of(const MountedCamera& mounted) {
@@ -92,27 +124,47 @@ std::vector<MountedCamera> faces_of(const MountedCamera& mounted) {
   return faces;
 }
 
-LensFaces::LensFaces(const StereoRig& rig) : rig_(rig), T_BC1_(rig.T_BC1), lenses_(rig.camera_count()) {
+LensFaces::LensFaces(const StereoRig& rig) : lenses_(rig), rig_(rig) {
   std::vector<MountedCamera> ahead, around;
   std::vector<int> lens_of_around;
-  for (int i = 0; i < lenses_; ++i) {
+  for (int i = 0; i < rig.camera_count(); ++i) {
     const std::vector<MountedCamera> faces = faces_of(rig.mounted(i));
+    any_ = any_ || rig.camera(i).sees_backwards();
     ahead.push_back(faces.front());
     lens_of_.push_back(i);
     around.insert(around.end(), faces.begin() + 1, faces.end());
     lens_of_around.resize(around.size(), i);
   }
-  if (around.empty()) return;
   ahead.insert(ahead.end(), around.begin(), around.end());
   lens_of_.insert(lens_of_.end(), lens_of_around.begin(), lens_of_around.end());
+  origins_px_.assign(ahead.size(), Vec2::Zero());
+  if (!any_) return;
+  for (std::size_t i = 0; i < ahead.size(); ++i) {
+    if (!rig.camera(lens_of_[i]).sees_backwards()) continue;
+    const Part part = part_of(ahead[i].camera, rig.line_delay_s == 0);
+    origins_px_[i] = Vec2(part.x, part.y);
+    const Mat3 R_lens = (rig.T_BC(lens_of_[i]).q.conjugate() * ahead[i].T_BC.q).toRotationMatrix();
+    const bool is_ahead = static_cast<int>(i) < rig.camera_count();
+    ahead[i].camera = cropped(ahead[i].camera, part, is_ahead ? nullptr : &R_lens);
+  }
   rig_ = with_cameras(rig, ahead);
+}
+
+std::shared_ptr<const Image> LensFaces::part(const std::shared_ptr<const Image>& image, int camera) const {
+  const Camera &whole = lenses_.camera(lens_of(camera)), &face = rig_.camera(camera);
+  const bool is_whole = face.width() == whole.width() && face.height() == whole.height();
+  if (is_whole || !image || image->width() != whole.width() || image->height() != whole.height()) return image;
+  const auto x = static_cast<int>(origin_px(camera).x()), y = static_cast<int>(origin_px(camera).y());
+  auto out = std::make_shared<Image>(face.width(), face.height());
+  for (int row = 0; row < face.height(); ++row) std::copy_n(image->row(y + row) + x, face.width(), out->row(row));
+  return out;
 }
 
 StereoFrame LensFaces::spread(StereoFrame frame) const {
   if (!any()) return frame;
-  StereoFrame out{frame.t, frame.left, nullptr};
+  StereoFrame out{frame.t, part(frame.left, 0), nullptr};
   for (int i = 0; i < rig_.camera_count(); ++i) {
-    const std::shared_ptr<const Image> image = frame.image(lens_of(i));
+    const std::shared_ptr<const Image> image = i == 0 ? nullptr : part(frame.image(lens_of(i)), i);
     if (i == 1) out.right = image;
     if (i > 1) out.more.push_back(image);
     out.offsets.set(i, frame.offsets.of(lens_of(i)));
@@ -121,18 +173,21 @@ StereoFrame LensFaces::spread(StereoFrame frame) const {
 }
 
 TrackedFrame LensFaces::gathered(TrackedFrame frame) const {
-  for (TrackedFeature& feature : frame.features)
+  for (TrackedFeature& feature : frame.features) {
+    if (feature.left) feature.left->pixel += origin_px(feature.cameras.left);
+    if (feature.right) feature.right->pixel += origin_px(feature.cameras.right);
     for (std::int8_t* camera : {&feature.cameras.left, &feature.cameras.right})
       *camera = static_cast<std::int8_t>(lens_of(*camera));
-  frame.has_right = frame.has_right && lenses_ > 1;
-  frame.has_more.resize(std::min(frame.has_more.size(), static_cast<std::size_t>(std::max(0, lenses_ - 2))));
+  }
+  frame.has_right = frame.has_right && lenses_.has_right();
+  frame.has_more.resize(std::min(frame.has_more.size(), lenses_.more.size()));
   return frame;
 }
 
 Calibration LensFaces::of_lenses(Calibration calibration) const {
   if (!any()) return calibration;
-  if (lenses_ == 1) calibration.T_BC1 = T_BC1_;
-  calibration.more.resize(static_cast<std::size_t>(std::max(0, lenses_ - 2)));
+  if (!lenses_.has_right()) calibration.T_BC1 = lenses_.T_BC1;
+  calibration.more.resize(lenses_.more.size());
   return calibration;
 }
 

@@ -140,17 +140,36 @@ TEST(LensFaces, KeepTheNumbersOfTheRigsCameras) {
   EXPECT_EQ(LensFaces(both).rig().camera_count(), 8);
   EXPECT_EQ(LensFaces(both).lenses_of(0b11100000), 0b10);
 
-  const auto left = std::make_shared<const Image>(512, 512), right = std::make_shared<const Image>(752, 480);
+  auto picture = std::make_shared<Image>(512, 512);
+  for (int y = 0; y < 512; ++y)
+    for (int x = 0; x < 512; ++x) picture->at(x, y) = static_cast<std::uint8_t>(3 * x + 7 * y);
+  const std::shared_ptr<const Image> left = picture, right = std::make_shared<const Image>(752, 480);
   StereoFrame frame{Time{5}, left, right};
   frame.offsets.set(0, Duration{7});
   const StereoFrame spread = faces.spread(frame);
   EXPECT_EQ(spread.image(1), right);
   for (const int i : {0, 2, 3, 4}) {
-    EXPECT_EQ(spread.image(i), left);
+    const Camera& face = faces.rig().camera(i);
+    ASSERT_EQ(spread.image(i)->width(), face.width());
+    ASSERT_EQ(spread.image(i)->height(), face.height());
+    EXPECT_LT(face.width() * face.height(), 512 * 512 / 2);
+    const auto x = static_cast<int>(faces.origin_px(i).x()), y = static_cast<int>(faces.origin_px(i).y());
+    EXPECT_EQ(spread.image(i)->at(5, 9), picture->at(x + 5, y + 9));
     EXPECT_EQ(spread.offsets.of(i), Duration{7});
+    // A direction of the face has the pixel of the lens.
+    const Vec3 p = Vec3(0.1, -0.2, 1);
+    const Vec3 in_lens = mixed.T_BC0.q.conjugate() * (faces.rig().T_BC(i).q * p);
+    EXPECT_LT((*face.project(p) + faces.origin_px(i) - *wide.pixel_of(in_lens)).norm(), 1e-8);
   }
   frame.left = nullptr;
   EXPECT_EQ(faces.spread(frame).image(3), nullptr);
+}
+
+TEST(LensFaces, KeepAllRowsOfARollingShutter) {
+  StereoRig rig = rig_of(wide_lenses()[0], wide_lenses()[0]);
+  rig.line_delay_s = 2e-5;
+  const LensFaces faces(rig);
+  for (int i = 0; i < faces.rig().camera_count(); ++i) EXPECT_EQ(faces.rig().camera(i).height(), 512);
 }
 
 TEST(LensFaces, OneLensIsSeveralCameras) {
@@ -160,10 +179,12 @@ TEST(LensFaces, OneLensIsSeveralCameras) {
   TrackedFrame frame;
   frame.features.resize(2);
   frame.features[1].cameras = {3, 3};
+  frame.features[1].left.emplace().pixel = Vec2(2, 3);
   frame.has_left = frame.has_right = true;
   frame.has_more = {true, true};
   const TrackedFrame gathered = faces.gathered(frame);
   EXPECT_EQ(gathered.features[1].cameras.left, 0);
+  EXPECT_EQ(gathered.features[1].left->pixel, faces.origin_px(3) + Vec2(2, 3));
   EXPECT_FALSE(gathered.has_right);
   EXPECT_TRUE(gathered.has_more.empty());
 }
