@@ -19,10 +19,14 @@ namespace {
 
 using Made = Result<std::unique_ptr<Frontend>>;
 
-/// The tracks of a rig are twice those of one pair at most; each group of cameras has its share.
+/// The tracks of a rig, and the keypoints extracted for them, are twice those of one pair at most; each group of cameras has its
+/// share.
 template <class Options>
 Options shared_by(Options options, std::size_t groups) {
-  if (groups > 2) options.max_features = std::max(1, 2 * options.max_features / static_cast<int>(groups));
+  const auto share = [&](int& count) { count = std::max(1, 2 * count / static_cast<int>(groups)); };
+  if (groups <= 2) return options;
+  share(options.max_features);
+  if constexpr (requires { options.max_keypoints; }) share(options.max_keypoints);
   return options;
 }
 
