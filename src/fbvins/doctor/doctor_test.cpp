@@ -153,6 +153,25 @@ TEST(Doctor, SaysWhatCannotBeJudged) {
   EXPECT_FALSE(diagnosis.not_judged.empty());
 }
 
+TEST(Doctor, TellsTheAccelerometersScaleFromTheBaselinesLength) {
+  expect_named("accelerometer's scale 5 % too large");
+  expect_named("accelerometer's scale 7 % too small");
+  expect_named("baseline 9 % too short");
+}
+
+TEST(Doctor, NamesWhatOneSensorOfTheImuHas) {
+  expect_named("gyroscope's bias 0.3 rad/s");
+  expect_named("gyroscope: z 15 % too large");
+  expect_named("accelerometer 40 ms late");
+  expect_named("accelerometer's bias 1.5 m/s^2");
+}
+
+TEST(Doctor, NamesThePlaceOfTheCamerasAndNoiseFigures) {
+  expect_named("cameras 10 cm from where they are on the IMU");
+  expect_named("IMU's noise 100 times too large");
+  expect_named("IMU's noise 100 times too small");
+}
+
 TEST(Doctor, GivesTheCorrectedLine) {
   Evidence evidence = good();
   for (ImuSample& sample : evidence.imu) sample.t = sample.t + Duration::from_seconds(0.05);
