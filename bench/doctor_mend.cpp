@@ -118,9 +118,9 @@ void mend_one(const Recorded& good, const Fault& fault, double unspoilt_m, Count
   std::string verdict = sized ? alone ? "named" : "named, others too" : named != nullptr ? "wrong size" : diagnosis.findings.empty() ? "silent" : "other name";
   if (named != nullptr) verdict += fmt::format(", {:.4g} +- {:.2g} {}", named->size, named->sigma, named->unit);
   const Mended mended = *mend(rig, diagnosis, replay, CalibrationStyle::kalibr);
-  const double spoilt_m = flown(good, fault, rig);
-  std::string flight = fmt::format("{} | not written: {}", mm(spoilt_m), mended.why_not);
+  std::string flight = fmt::format(" | not written: {}", mended.why_not);
   if (mended.rig) {
+    const double spoilt_m = flown(good, fault, rig);
     const double mended_m = flown(good, fault, *mended.rig);
     const bool worse = mended_m > 1.02 * spoilt_m + 1e-3;
     ++counts.mended, counts.as_good += mended_m <= 1.1 * unspoilt_m + 1e-3, counts.worse += worse;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
@@ -60,6 +62,12 @@ struct Agreement {
   void operator+=(const Agreement& other) { H += other.H, b += other.b, c += other.c; }
 };
 
+/// Gravity in a window's first frame, in metres of the cameras: at - by * a.
+struct WindowGravity {
+  Vec3 at = Vec3::Zero();
+  Mat3A by = Mat3A::Zero();
+};
+
 struct Window {
   std::size_t first, last;  ///< pairs [first, last)
 };
@@ -85,7 +93,7 @@ std::vector<Window> windows_of(const std::vector<FramePair>& pairs, const ImuSer
 }
 
 Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
-                       const Pose<B, C0>& T_BC0, double scale) {
+                       const Pose<B, C0>& T_BC0, double scale, WindowGravity& gravity) {
   using Mat36 = Eigen::Matrix<double, 3, 6>;
   using Mat6A = Eigen::Matrix<double, 6, kUnknowns>;
   Mat6 N = Mat6::Zero();
@@ -117,6 +125,7 @@ Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs
   out.H -= M.transpose() * inverse * M;
   out.b -= M.transpose() * inverse * m;
   out.c -= m.dot(inverse * m);
+  gravity = {(inverse * m).tail<3>(), (inverse * M).bottomRows<3>()};
   return out;
 }
 
@@ -152,13 +161,15 @@ Explained explained_by(const Mat3& axes, const Agreement& all, bool lever_free =
 struct Summed {
   Agreement all;
   std::array<Agreement, BlockFit::kStretches> stretch;
+  std::vector<WindowGravity> gravity;
 };
 
 Summed sum_up(const std::vector<Window>& windows, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
               const Pose<B, C0>& T_BC0, double scale) {
   Summed out;
   for (std::size_t w = 0; w < windows.size(); ++w) {
-    const Agreement one = agreement_of(windows[w], pairs, deltas, T_BC0, scale);
+    out.gravity.emplace_back();
+    const Agreement one = agreement_of(windows[w], pairs, deltas, T_BC0, scale, out.gravity.back());
     out.stretch[w * BlockFit::kStretches / windows.size()] += one;
     out.all += one;
   }
@@ -181,6 +192,21 @@ Eigen::Matrix<double, 7, 1> sigmas_of(const Summed& sums, const Mat3& axes, bool
   for (const Vec7& s : without) mean += s / n;
   for (const Vec7& s : without) square += (s - mean).cwiseAbs2();
   return ((n - 1) / n * square).cwiseSqrt();
+}
+
+/// Mean norm of the windows' gravity with readings as explained, and its standard deviation.
+std::pair<double, double> gravity_of(const Summed& sums, const Mat3& axes, const Explained& by) {
+  VecA a = VecA::Zero();
+  a.head<kMatrix>() = by.scale * row_by_row(axes);
+  a.segment<3>(kMatrix) = -by.scale * by.bias;
+  double sum = 0, square = 0;
+  const auto n = static_cast<double>(sums.gravity.size());
+  for (const WindowGravity& window : sums.gravity) {
+    const double norm = (window.at - window.by * a).norm();
+    sum += norm, square += norm * norm;
+  }
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(square / n - mean * mean, 0.0) / n)};
 }
 
 /// Acceleration of the seen motion, root mean square, from what a constant velocity and gravity do not explain of it.
@@ -217,6 +243,7 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
   fit.unexplained_as_named = explained_by(Mat3::Identity(), sums.all).unexplained;
   fit.scale = best.scale;
   fit.scale_sigma = sigmas_of(sums, fit.axes, false)(0);
+  std::tie(fit.gravity_mps2, fit.gravity_sigma_mps2) = gravity_of(sums, fit.axes, best);
   const Explained elsewhere = explained_by(fit.axes, sums.all, true);
   const Eigen::Matrix<double, 7, 1> sigma = sigmas_of(sums, fit.axes, true);
   fit.bias = elsewhere.bias, fit.bias_sigma = sigma.segment<3>(1);

@@ -93,9 +93,11 @@ void write_lines(std::span<Finding> findings, const StereoRig& rig, CalibrationS
   std::set<CalibrationField> written;
   for (Finding& finding : findings) {
     finding.corrected.clear();
-    for (const CalibrationField field : finding.fields)
-      if (written.insert(field).second)
-        finding.corrected += (finding.corrected.empty() ? "" : "\n") + line_of(field, rig, style);
+    for (const CalibrationField field : finding.fields) {
+      if (!written.insert(field).second) continue;
+      if (!finding.corrected.empty()) finding.corrected += '\n';
+      finding.corrected += line_of(field, rig, style);
+    }
   }
 }
 

@@ -113,6 +113,36 @@ double epipolar_error_px(const CommonMistake& mistake, const Evidence& evidence)
 
 constexpr double kDegree = std::numbers::pi / 180;
 
+/// A factor that is that of no unit.
+bool is_odd_factor(double factor) { return factor > 0.3 && factor < 3; }
+
+int open_figures(const Finding& finding) {
+  switch (finding.kind) {
+    case FindingKind::imu_camera_rotation:
+    case FindingKind::imu_camera_position:
+    case FindingKind::imu_camera_disagree:
+    case FindingKind::right_camera_turned:
+    case FindingKind::epipolar_error:
+    case FindingKind::gyro_bias:
+    case FindingKind::accel_bias: return 3;
+    case FindingKind::baseline_direction:
+    case FindingKind::principal_point:
+    case FindingKind::distortion:
+    case FindingKind::gyro_axes:
+    case FindingKind::accel_axes: return 2;
+    case FindingKind::focal_length:
+    case FindingKind::baseline_length:
+    case FindingKind::gyro_scale:
+    case FindingKind::accel_scale:
+    case FindingKind::accel_late:
+    case FindingKind::time_offset:
+    case FindingKind::rolling_shutter:
+    case FindingKind::stereo_sync: return 1;
+    case FindingKind::gyro_units: return is_odd_factor(finding.size) ? 1 : 0;
+    default: return 0;
+  }
+}
+
 }  // namespace
 
 std::vector<CommonMistake> common_mistakes(const StereoRig& rig) {
@@ -133,7 +163,7 @@ bool is_strange(const Diagnosis& as_given) {
       case FindingKind::focal_length: return size > 15;
       case FindingKind::gyro_scale: return size > 25;
       case FindingKind::principal_point: return size > 40;
-      case FindingKind::gyro_units: return f.size > 0.3 && f.size < 3;  // times, not another unit
+      case FindingKind::gyro_units: return is_odd_factor(f.size);
       case FindingKind::gyro_axes:
       case FindingKind::accel_axes:
       case FindingKind::swapped_images:
@@ -161,26 +191,10 @@ bool may_be(const CommonMistake& mistake, const Evidence& evidence, const Diagno
   return so3_log(Quat(away)).norm() < kTurned;
 }
 
-int unknowns_of(const std::vector<Finding>& findings) {
-  int unknowns = 0;
-  for (const Finding& finding : findings) {
-    switch (finding.kind) {
-      case FindingKind::imu_camera_rotation:
-      case FindingKind::imu_camera_position:
-      case FindingKind::imu_camera_disagree:
-      case FindingKind::right_camera_turned:
-      case FindingKind::epipolar_error:
-      case FindingKind::gyro_bias:
-      case FindingKind::accel_bias: unknowns += 3; break;
-      case FindingKind::baseline_direction:
-      case FindingKind::principal_point:
-      case FindingKind::distortion:
-      case FindingKind::gyro_axes:
-      case FindingKind::accel_axes: unknowns += 2; break;
-      default: unknowns += 1;
-    }
-  }
-  return unknowns;
+int cost_of(const Diagnosis& diagnosis) {
+  int cost = 2 * static_cast<int>(diagnosis.not_judged.size());
+  for (const Finding& finding : diagnosis.findings) cost += 1 + open_figures(finding);
+  return cost;
 }
 
 }  // namespace fbvins

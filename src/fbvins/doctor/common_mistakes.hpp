@@ -34,7 +34,8 @@ bool is_strange(const Diagnosis& as_given);
 /// examined.
 bool may_be(const CommonMistake& mistake, const Evidence& evidence, const Diagnosis& as_given);
 
-/// How many unknown figures the findings have: fewer explain better.
-int unknowns_of(const std::vector<Finding>& findings);
+/// What a diagnosis takes to explain the recording: one for each cause, one for each figure that it leaves open, and two for each
+/// point that cannot be judged.
+int cost_of(const Diagnosis& diagnosis);
 
 }  // namespace fbvins

@@ -43,8 +43,8 @@ Finding finding_of(const CommonMistake& mistake, const Diagnosis& as_given, cons
   Finding finding;
   finding.kind = mistake.kind;
   finding.measured = fmt::format(
-      "with {}, one cause explains what else takes {} unknown figures; epipolar error {} (as given {}), error of a predicted feature {} (as given {})",
-      mistake.what, unknowns_of(as_given.findings), px_text(without.epipolar_px), px_text(as_given.epipolar_px),
+      "with {}, one cause explains what else are {} findings and {} points that cannot be judged; epipolar error {} (as given {}), error of a predicted feature {} (as given {})",
+      mistake.what, as_given.findings.size(), as_given.not_judged.size(), px_text(without.epipolar_px), px_text(as_given.epipolar_px),
       px_text(without.predicted_px), px_text(as_given.predicted_px));
   finding.expected = "the calibration as given explains it";
   finding.advice = mistake.advice;
@@ -52,10 +52,10 @@ Finding finding_of(const CommonMistake& mistake, const Diagnosis& as_given, cons
   return finding;
 }
 
-/// As much is judged as with the calibration as given, and the cause with what is left to find has fewer unknowns.
-bool explains_better(const Diagnosis& with_it, const Diagnosis& other, int unknowns_of_other) {
+/// As much is judged as with the calibration as given, and the cause with what is left to find costs less.
+bool explains_better(const Diagnosis& with_it, const Diagnosis& other, int cost_of_other) {
   return with_it.epipolar_px && with_it.predicted_px && with_it.not_judged.size() <= other.not_judged.size() &&
-         unknowns_of(with_it.findings) + 1 < unknowns_of_other;
+         cost_of(with_it) + 1 < cost_of_other;
 }
 
 }  // namespace
@@ -72,14 +72,14 @@ Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, Calibrati
   const Diagnosis as_given = examine(*evidence, style);
   if (!is_strange(as_given)) return as_given;
   Diagnosis best = as_given;
-  int fewest = unknowns_of(as_given.findings);
+  int least = cost_of(as_given);
   for (const CommonMistake& mistake : common_mistakes(rig)) {
     if (!may_be(mistake, *evidence, as_given)) continue;
     const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip);
     if (!other) return other.error();
     Diagnosis with_it = examine(*other, style);
-    if (!explains_better(with_it, as_given, fewest)) continue;
-    fewest = unknowns_of(with_it.findings) + 1;
+    if (!explains_better(with_it, as_given, least)) continue;
+    least = cost_of(with_it) + 1;
     with_it.findings.insert(with_it.findings.begin(), finding_of(mistake, as_given, with_it));
     with_it.epipolar_px = as_given.epipolar_px, with_it.predicted_px = as_given.predicted_px;
     write_lines(with_it.findings, with_it.rig, style);

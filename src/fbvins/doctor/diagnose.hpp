@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The doctor on a recording that can be played again. Where something is very wrong, the calibration as given is compared with
 // those that common mistakes make of a right one (an inverse transform, images upside down or mirrored, lenses of another image
-// size, exchanged cameras): each is examined as a whole, and the cause with the fewest unknown figures is told. Pure functions.
+// size, exchanged cameras): each is examined as a whole, and what leaves the fewest figures open is told. Pure functions.
 //
 //   const Replay replay = [&](const TakeEvent& take) -> Result<void> { ... while (auto e = data.next()) if (!take(std::move(*e))) break; ... };
 //   Result<Diagnosis> diagnosis = diagnose(rig, replay, CalibrationStyle::euroc);

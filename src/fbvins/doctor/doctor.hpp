@@ -39,7 +39,7 @@ struct Diagnosis {
   std::vector<std::shared_ptr<const Mask>> masks;
 };
 
-/// The findings, what was not judged, and in the last line how much was measured; with `all` each measurement. No line end after
+/// The findings, what was not judged, what no recording shows, and in the last line how much was measured; with `all` each measurement. No line end after
 /// it.
 std::string to_text(const Diagnosis& diagnosis, bool all = false);
 

@@ -76,7 +76,7 @@ class Examination {
   AccelFit in_step(AccelFit as_stamped);
   void accelerations();
   void accel_axes(const AccelFit& fit);
-  void position(const AccelFit& fit);
+  bool position(const AccelFit& fit);
   void accel_bias(const AccelFit& fit);
   void accel_scale(const AccelFit& fit);
   void baseline_length(double factor, double sigma);

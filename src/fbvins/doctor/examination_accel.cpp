@@ -8,7 +8,6 @@
 #include <cmath>
 #include <string>
 
-#include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
@@ -21,8 +20,8 @@ using doctor::kSignificant;
 constexpr double kDelayStep_s = 0.02, kDelayPractical_s = 0.015, kDelayLeaves = 0.7;
 constexpr int kDelaySteps = 4;
 constexpr double kScalePractical = 0.03, kPositionPractical_m = 0.05, kBiasPractical_mps2 = 1;
-/// Gravity differs from 9.81 by less than this share for an accelerometer's bias alone.
-constexpr double kGravityByBias = 0.03;
+/// Gravity must be nearer to one cause's than to another's by this share.
+constexpr double kGravityTells = 0.01;
 /// Another place of the camera must leave less than this share of what is unexplained.
 constexpr double kElsewhereLeaves = 0.8;
 
@@ -65,11 +64,11 @@ AccelFit Examination::in_step(AccelFit as_stamped) {
 }
 
 void Examination::accelerations() {
-  const AccelFit fit = in_step(fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_}));
+  AccelFit fit = in_step(fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_}));
   measured(fmt::format(
-      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % with its axes as delivered, best: {}); scale {:.4f} +- {:.4f}",
+      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % with its axes as delivered, best: {}); scale {:.4f} +- {:.4f}, gravity {:.2f} +- {:.2f} m/s^2",
       fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
-      fit.scale_sigma));
+      fit.scale_sigma, fit.gravity_mps2, fit.gravity_sigma_mps2));
   if (!fit.seen) {
     not_judged("axes, scale, bias and delay of the accelerometer, position of the camera on the IMU, length of the baseline: the "
                "rig hardly accelerated");
@@ -83,10 +82,10 @@ void Examination::accelerations() {
   if (fit.axes != Mat3::Identity()) {
     if (!(fit.unexplained_as_named > 2 * fit.unexplained + 0.05)) return;
     accel_axes(fit);
-  } else {
-    position(fit);
-    accel_bias(fit);
+  } else if (position(fit)) {  // which changes the rest
+    fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
   }
+  if (fit.axes == Mat3::Identity()) accel_bias(fit);
   accel_scale(fit);
 }
 
@@ -99,10 +98,10 @@ void Examination::accel_axes(const AccelFit& fit) {
   finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
 }
 
-void Examination::position(const AccelFit& fit) {
+bool Examination::position(const AccelFit& fit) {
   const double away_m = fit.lever_m.norm(), sigma_m = fit.lever_sigma_m.maxCoeff();
-  if (away_m < kPositionPractical_m || away_m < kSignificant * sigma_m) return;
-  if (fit.unexplained_elsewhere > kElsewhereLeaves * fit.unexplained) return;
+  if (away_m < kPositionPractical_m || away_m < kSignificant * sigma_m) return false;
+  if (fit.unexplained_elsewhere > kElsewhereLeaves * fit.unexplained) return false;
   rig_.T_BC0.p += fit.lever_m, rig_.T_BC1.p += fit.lever_m;
   Finding& finding = found(FindingKind::imu_camera_position, 1e2 * away_m, 1e2 * sigma_m, "cm");
   finding.measured = fmt::format(
@@ -111,6 +110,7 @@ void Examination::position(const AccelFit& fit) {
   finding.expected = fmt::format("less than {:.0f} cm", 1e2 * kPositionPractical_m);
   finding.advice = "measure the distances from IMU to cameras, or calibrate them";
   finding.fields = {CalibrationField::mounting_of_left, CalibrationField::mounting_of_right};
+  return true;
 }
 
 void Examination::accel_bias(const AccelFit& fit) {
@@ -124,22 +124,23 @@ void Examination::accel_bias(const AccelFit& fit) {
   finding.advice = "calibrate the accelerometer in six positions, or subtract this from its readings";
 }
 
-/// The cameras' displacements and the accelerometer's disagree by a factor. Gravity, which the cameras do not measure, tells
-/// whose it is: an accelerometer's scale is in its gravity, too.
+/// The cameras' displacements and the accelerometer's disagree by a factor. Gravity tells whose it is: in metres of the cameras
+/// it is wrong by the baseline's error, whatever the accelerometer's scale.
 void Examination::accel_scale(const AccelFit& fit) {
   const double factor = accel_unit_ / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
   if (std::abs(factor - 1) < kScalePractical || std::abs(factor - 1) < kSignificant * sigma) return;
-  const double gravity = accel_unit_ * gravity_seen(evidence_.imu).norm_mps2 / kGravity_mps2;
-  if (std::abs(gravity - 1) < kGravityByBias || std::abs(gravity - factor) > std::abs(gravity - 1)) {
-    baseline_length(factor, sigma);
-    return;
-  }
+  const double gravity = fit.gravity_mps2 / kGravity_mps2;
+  const double by_baseline = std::abs(gravity - 1 / factor), by_accelerometer = std::abs(gravity - 1);
+  if (by_baseline + kGravityTells < by_accelerometer) return baseline_length(factor, sigma);
   Finding& finding = found(FindingKind::accel_scale, 100 * (factor - 1), 100 * sigma, "%");
   finding.measured = fmt::format(
-      "the accelerometer's readings are {:.1f} +- {:.1f} % too large for the accelerations that the images show, and gravity is {:.2f} m/s^2 by them",
-      finding.size, finding.sigma, gravity * kGravity_mps2);
+      "the accelerometer's readings are {:.1f} +- {:.1f} % too large for the accelerations that the images show, in which gravity is {:.2f} +- {:.2f} m/s^2",
+      finding.size, finding.sigma, fit.gravity_mps2, fit.gravity_sigma_mps2);
   finding.expected = "within 3 %, and gravity is 9.81 m/s^2";
   finding.advice = fmt::format("multiply the accelerometer's readings by {:.4f}, or look up its range", 1 / factor);
+  if (std::abs(by_baseline - by_accelerometer) < kGravityTells)
+    finding.advice = fmt::format("{}; or the baseline is {:.1f} mm long: gravity does not tell which here, so measure it",
+                                 finding.advice, 1e3 * rig_.T_C1C0().p.norm() * factor);
 }
 
 void Examination::baseline_length(double factor, double sigma) {

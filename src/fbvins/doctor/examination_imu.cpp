@@ -164,6 +164,11 @@ void Examination::motion_change(const MotionChange& change) {
     finding.expected = "within 1 % of the rotation that the images show";
     finding.advice =
         fmt::format("multiply the gyroscope's readings{} by {:.4f}, or look up its range", axis, std::exp(change.amount(0)));
+    Vec3 factor = Vec3::Ones();
+    for (int i = 0; i < 3; ++i)
+      if (change.axis < 0 || change.axis == i) factor(i) = std::exp(change.amount(0));
+    imu_ = imu_.with_gyro(factor.asDiagonal());
+    gyro_bias_ = factor.cwiseProduct(gyro_bias_);
   } else if (change.kind == FindingKind::rolling_shutter) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
     finding.measured =

@@ -27,7 +27,10 @@ bool concerns_calibration(const Diagnosis& diagnosis) {
 
 std::string kinds_of(const std::vector<Finding>& findings) {
   std::string text;
-  for (const Finding& finding : findings) text += (text.empty() ? "" : ", ") + std::string(to_string(finding.kind));
+  for (const Finding& finding : findings) {
+    if (!text.empty()) text += ", ";
+    text += to_string(finding.kind);
+  }
   return text.empty() ? "none" : text;
 }
 
@@ -46,7 +49,7 @@ Result<void> fits_no_worse(const std::optional<double>& before, const std::optio
 }  // namespace
 
 Result<void> is_better(const Diagnosis& before, const Diagnosis& after) {
-  if (unknowns_of(after.findings) >= unknowns_of(before.findings))
+  if (cost_of(after) >= cost_of(before))
     return no(fmt::format("as much is wrong with the corrected calibration as before (before: {}; with it: {})",
                           kinds_of(before.findings), kinds_of(after.findings)));
   if (auto same = fits_no_worse(before.epipolar_px, after.epipolar_px, "epipolar error"); !same) return same;
