@@ -115,7 +115,10 @@ void mend_one(const Recorded& good, const Fault& fault, double unspoilt_m, Count
     else alone = false;
   const bool sized = named != nullptr && (spoiler.size == 0 || std::abs(named->size - spoiler.size) <= spoiler.tolerance);
   ++counts.faults, counts.named += sized, counts.alone += sized && alone, counts.silent += diagnosis.findings.empty();
-  std::string verdict = sized ? alone ? "named" : "named, others too" : named != nullptr ? "wrong size" : diagnosis.findings.empty() ? "silent" : "other name";
+  std::string verdict = sized                        ? alone ? "named" : "named, others too"
+                        : named != nullptr           ? "wrong size"
+                        : diagnosis.findings.empty() ? "silent"
+                                                     : "other name";
   if (named != nullptr) verdict += fmt::format(", {:.4g} +- {:.2g} {}", named->size, named->sigma, named->unit);
   const Mended mended = *mend(rig, diagnosis, replay, CalibrationStyle::kalibr);
   std::string flight = fmt::format(" | not written: {}", mended.why_not);
@@ -142,12 +145,17 @@ int main(int argc, char** argv) {
   if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
   const std::string_view word = argc > 2 ? argv[2] : "";
   const std::vector<Spoiler> all = spoilers(good->rig);
-  const double unspoilt_m = flown(*good, [] { return Spoiler{}; }, good->rig);
-  fmt::print("unspoilt: {} mm\n| fault | found | verdict | ATE spoilt, mm | mended, mm |\n|---|---|---|---|---|\n", mm(unspoilt_m));
+  const double unspoilt_m = flown(
+      *good, [] { return Spoiler{}; }, good->rig);
+  fmt::print("unspoilt: {} mm\n| fault | found | verdict | ATE spoilt, mm | mended, mm |\n|---|---|---|---|---|\n",
+             mm(unspoilt_m));
   Counts counts;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i].name.find(word) != std::string::npos) mend_one(*good, [&good, i] { return spoilers(good->rig)[i]; }, unspoilt_m, counts);
-  fmt::print("{} faults: {} named with the right size, {} of them alone; {} silent; {} mended, {} of them as good as unspoilt, {} worse than spoilt\n",
-             counts.faults, counts.named, counts.alone, counts.silent, counts.mended, counts.as_good, counts.worse);
+    if (all[i].name.find(word) != std::string::npos)
+      mend_one(
+          *good, [&good, i] { return spoilers(good->rig)[i]; }, unspoilt_m, counts);
+  fmt::print(
+      "{} faults: {} named with the right size, {} of them alone; {} silent; {} mended, {} of them as good as unspoilt, {} worse than spoilt\n",
+      counts.faults, counts.named, counts.alone, counts.silent, counts.mended, counts.as_good, counts.worse);
   return counts.worse > 0;
 }

@@ -109,9 +109,8 @@ TEST(DoctorMends, SeveralFiguresAtOnce) {
 TEST(DoctorMends, NothingWhereNoCalibrationHelps) {
   EXPECT_EQ(mended("images mirrored").why_not, "no calibration describes mirrored images");
   EXPECT_FALSE(mended("gyroscope in degrees").rig);
-  const Result<Mended> good =
-      mend(handheld().rig, *diagnose(handheld().rig, handheld().replay(), CalibrationStyle::kalibr), handheld().replay(),
-           CalibrationStyle::kalibr);
+  const Result<Mended> good = mend(handheld().rig, *diagnose(handheld().rig, handheld().replay(), CalibrationStyle::kalibr),
+                                   handheld().replay(), CalibrationStyle::kalibr);
   ASSERT_TRUE(good.ok());
   EXPECT_EQ(good->why_not, "nothing is wrong");
 }

@@ -116,15 +116,16 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
 std::string to_kalibr_imu(const ImuNoise& noise) {
   const ImuNoise usual;
   std::string ranges;  // which Kalibr does not know
-  if (noise.max_gyro_radps != usual.max_gyro_radps) ranges += fmt::format("gyroscope_range: {}\n", kalibr_number(noise.max_gyro_radps));
+  if (noise.max_gyro_radps != usual.max_gyro_radps)
+    ranges += fmt::format("gyroscope_range: {}\n", kalibr_number(noise.max_gyro_radps));
   if (noise.max_accel_mps2 != usual.max_accel_mps2)
     ranges += fmt::format("accelerometer_range: {}\n", kalibr_number(noise.max_accel_mps2));
   return ranges + fmt::format(
-      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
-      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
-      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
-      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
-      kalibr_number(noise.rate_hz));
+                      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
+                      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
+                      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
+                      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
+                      kalibr_number(noise.rate_hz));
 }
 
 std::string to_kalibr_rig(const RigCalibration& rig) {

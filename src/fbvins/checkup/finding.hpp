@@ -82,10 +82,10 @@ struct Finding {
   double size = 0;   ///< how wrong, in `unit`
   double sigma = 0;  ///< standard deviation of size; 0 where it was counted
   std::string unit;
-  std::string measured;   ///< a sentence without its full stop, with the uncertainty
-  std::string expected;   ///< the same: what it should be
-  std::string advice;     ///< the same: what to do
-  std::string corrected;  ///< lines of the calibration file, corrected; empty where no line is wrong
+  std::string measured;                       ///< a sentence without its full stop, with the uncertainty
+  std::string expected;                       ///< the same: what it should be
+  std::string advice;                         ///< the same: what to do
+  std::string corrected;                      ///< lines of the calibration file, corrected; empty where no line is wrong
   std::vector<CalibrationField> fields = {};  ///< that must change; of a field with several findings the first has the line
 };
 

@@ -29,7 +29,7 @@ struct AccelFit {
   Vec3 bias = Vec3::Zero(), bias_sigma = Vec3::Zero();        ///< of the readings with these axes, in their unit
   Vec3 lever_m = Vec3::Zero(), lever_sigma_m = Vec3::Zero();  ///< to be added to p_BC0, where that is wrong
   double unexplained_elsewhere = 0;                           ///< what is unexplained with the camera there
-  double acceleration_mps2 = 0;       ///< seen, root mean square, without each window's mean
+  double acceleration_mps2 = 0;                               ///< seen, root mean square, without each window's mean
 };
 
 /// `rig`: T_BC0 as corrected.

@@ -59,7 +59,8 @@ std::string time_line(double offset_s, CalibrationStyle style) {
 }
 
 std::string rate_line(const ImuNoise& noise, CalibrationStyle style) {
-  return fmt::format("{}{}: {:.0f}", imu_file(style), style == CalibrationStyle::euroc ? "rate_hz" : "update_rate", noise.rate_hz);
+  return fmt::format("{}{}: {:.0f}", imu_file(style), style == CalibrationStyle::euroc ? "rate_hz" : "update_rate",
+                     noise.rate_hz);
 }
 
 std::string noise_lines(const ImuNoise& noise, CalibrationStyle style) {

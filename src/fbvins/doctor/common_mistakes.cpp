@@ -52,9 +52,10 @@ void add_inverted(const StereoRig& rig, std::vector<CommonMistake>& all) {
   const Pose<C0, C1> T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
   const auto add = [&](const char* what, const Pose<B, C0>& T_BC0, const Pose<B, C1>& T_BC1,
                        const std::vector<CalibrationField>& fields) {
-    all.push_back({FindingKind::extrinsics_inverted, what,
-                   "give the transform in the format's direction: EuRoC's T_BS takes camera to IMU, Kalibr's T_cam_imu IMU to camera",
-                   with_mountings(rig, T_BC0, T_BC1), ImageFlip::none, fields});
+    all.push_back(
+        {FindingKind::extrinsics_inverted, what,
+         "give the transform in the format's direction: EuRoC's T_BS takes camera to IMU, Kalibr's T_cam_imu IMU to camera",
+         with_mountings(rig, T_BC0, T_BC1), ImageFlip::none, fields});
   };
   add("both cameras' transforms to the IMU inverted", left, right, kMountings);
   add("the left camera's transform to the IMU inverted, and the right camera where it is beside it", left, left * T_C0C1,
@@ -84,12 +85,18 @@ void add_images(const StereoRig& rig, std::vector<CommonMistake>& all) {
   turned.left = half_turned(rig.left), turned.right = half_turned(rig.right);
   turned.T_BC0.q = rig.T_BC0.q * Quat(half_turn()), turned.T_BC1.q = rig.T_BC1.q * Quat(half_turn());
   all.push_back({FindingKind::images_turned, "images that are upside down",
-                 "deliver the images as they were calibrated, or take the lines below", std::move(turned), ImageFlip::none, kAll});
+                 "deliver the images as they were calibrated, or take the lines below", std::move(turned), ImageFlip::none,
+                 kAll});
   for (const auto& [flip, what, R] :
        {std::tuple{ImageFlip::left_right, "images that are mirrored left to right", Vec3(1, -1, -1)},
         std::tuple{ImageFlip::top_bottom, "images that are mirrored top to bottom", Vec3(-1, 1, -1)}})
-    all.push_back({FindingKind::images_mirrored, what, "switch off the flip in the camera's driver: no calibration describes it",
-                   rig, flip, {}, Mat3(R.asDiagonal())});
+    all.push_back({FindingKind::images_mirrored,
+                   what,
+                   "switch off the flip in the camera's driver: no calibration describes it",
+                   rig,
+                   flip,
+                   {},
+                   Mat3(R.asDiagonal())});
 }
 
 Vec2 flipped(const Vec2& px, const Camera& camera, ImageFlip flip) {
@@ -104,7 +111,8 @@ double epipolar_error_px(const CommonMistake& mistake, const Evidence& evidence)
     StereoView seen{view.t, {}};
     for (StereoPoint point : view.points) {
       if (evidence.swapped) std::swap(point.left, point.right);
-      seen.points.push_back({flipped(point.left, mistake.rig.left, mistake.flip), flipped(point.right, mistake.rig.right, mistake.flip)});
+      seen.points.push_back(
+          {flipped(point.left, mistake.rig.left, mistake.flip), flipped(point.right, mistake.rig.right, mistake.flip)});
     }
     errors.push_back(epipolar_error_px(seen, mistake.rig));
   }
@@ -182,9 +190,9 @@ bool may_be(const CommonMistake& mistake, const Evidence& evidence, const Diagno
   constexpr double kGood_px = 2, kTurned = 8 * kDegree;
   if (mistake.kind == FindingKind::calibration_size) return true;  // the matches were chosen by the lenses
   if (!evidence.stereo.empty() && epipolar_error_px(mistake, evidence) > kGood_px) return false;
-  const bool axes_known = as_given.predicted_px && std::none_of(as_given.findings.begin(), as_given.findings.end(), [](const Finding& f) {
-    return f.kind == FindingKind::gyro_axes;
-  });
+  const bool axes_known =
+      as_given.predicted_px && std::none_of(as_given.findings.begin(), as_given.findings.end(),
+                                            [](const Finding& f) { return f.kind == FindingKind::gyro_axes; });
   if (!axes_known) return true;
   // Images found exchanged were given to the other camera, with nearly the same axes.
   const Mat3 away = as_given.rig.T_BC0.R().transpose() * mistake.rig.T_BC0.R() * mistake.seen_as;

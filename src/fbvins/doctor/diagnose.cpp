@@ -44,8 +44,8 @@ Finding finding_of(const CommonMistake& mistake, const Diagnosis& as_given, cons
   finding.kind = mistake.kind;
   finding.measured = fmt::format(
       "with {}, one cause explains what else are {} findings and {} points that cannot be judged; epipolar error {} (as given {}), error of a predicted feature {} (as given {})",
-      mistake.what, as_given.findings.size(), as_given.not_judged.size(), px_text(without.epipolar_px), px_text(as_given.epipolar_px),
-      px_text(without.predicted_px), px_text(as_given.predicted_px));
+      mistake.what, as_given.findings.size(), as_given.not_judged.size(), px_text(without.epipolar_px),
+      px_text(as_given.epipolar_px), px_text(without.predicted_px), px_text(as_given.predicted_px));
   finding.expected = "the calibration as given explains it";
   finding.advice = mistake.advice;
   finding.fields = mistake.fields;

@@ -39,8 +39,8 @@ struct Diagnosis {
   std::vector<std::shared_ptr<const Mask>> masks;
 };
 
-/// The findings, what was not judged, what no recording shows, and in the last line how much was measured; with `all` each measurement. No line end after
-/// it.
+/// The findings, what was not judged, what no recording shows, and in the last line how much was measured; with `all` each
+/// measurement. No line end after it.
 std::string to_text(const Diagnosis& diagnosis, bool all = false);
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style = CalibrationStyle::euroc);

@@ -46,8 +46,8 @@ AccelFit Examination::in_step(AccelFit as_stamped) {
     if (unexplained[i] < unexplained[best]) best = i;
   }
   if (best == 0 || best + 1 == kTried) return as_stamped;
-  const double steps = static_cast<double>(best) - kDelaySteps +
-                       lowest_between(unexplained[best - 1], unexplained[best], unexplained[best + 1]);
+  const double steps =
+      static_cast<double>(best) - kDelaySteps + lowest_between(unexplained[best - 1], unexplained[best], unexplained[best + 1]);
   const double late_s = steps * kDelayStep_s;
   if (std::abs(late_s) < kDelayPractical_s) return as_stamped;
   const ImuSeries together = imu_.with_accel(later(steps));
@@ -70,8 +70,9 @@ void Examination::accelerations() {
       fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
       fit.scale_sigma, fit.gravity_mps2, fit.gravity_sigma_mps2));
   if (!fit.seen) {
-    not_judged("axes, scale, bias and delay of the accelerometer, position of the camera on the IMU, length of the baseline: the "
-               "rig hardly accelerated");
+    not_judged(
+        "axes, scale, bias and delay of the accelerometer, position of the camera on the IMU, length of the baseline: the "
+        "rig hardly accelerated");
     return;
   }
   measured(fmt::format(

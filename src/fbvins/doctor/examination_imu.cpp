@@ -160,7 +160,8 @@ void Examination::motion_change(const MotionChange& change) {
   if (change.kind == FindingKind::gyro_scale) {
     const std::string axis = change.axis < 0 ? "" : fmt::format(" about {}", "xyz"[change.axis]);
     Finding& finding = found(change.kind, 100 * (std::exp(-change.amount(0)) - 1), 100 * sigma(0), "%");
-    finding.measured = fmt::format("the gyroscope's readings{} are {:.1f} +- {:.1f} % too large", axis, finding.size, finding.sigma);
+    finding.measured =
+        fmt::format("the gyroscope's readings{} are {:.1f} +- {:.1f} % too large", axis, finding.size, finding.sigma);
     finding.expected = "within 1 % of the rotation that the images show";
     finding.advice =
         fmt::format("multiply the gyroscope's readings{} by {:.4f}, or look up its range", axis, std::exp(change.amount(0)));

@@ -22,7 +22,8 @@ bool concerns_calibration(const Finding& finding) {
 }
 
 bool concerns_calibration(const Diagnosis& diagnosis) {
-  return std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(), [](const Finding& f) { return concerns_calibration(f); });
+  return std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                     [](const Finding& f) { return concerns_calibration(f); });
 }
 
 std::string kinds_of(const std::vector<Finding>& findings) {

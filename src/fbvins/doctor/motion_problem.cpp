@@ -32,9 +32,9 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
 namespace {
 
 constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3,
-                                                      0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2};
+                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2};
 constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4,
-                                                1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
+                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
 
 constexpr int kIterations = 4;
 constexpr double kCap_px = 3, kHuberSigmas = 2, kLeastSigma_px = 0.03;

@@ -113,21 +113,27 @@ std::vector<Spoiler> of_another_kind() {
                    const LensModel left = r.left.model();
                    r.left = r.left.with_lens(r.right.model()), r.right = r.right.with_lens(left);
                  }),
-      changed_by("cameras 10 cm from where they are on the IMU", FindingKind::imu_camera_position,
-                 [](StereoRig& r) { r.T_BC0.p += Vec3(0.06, 0, 0.08), r.T_BC1.p += Vec3(0.06, 0, 0.08); }, 10, 3),
-      changed_by("time offset of the calibration 50 ms off", FindingKind::time_offset,
-                 [](StereoRig& r) { r.time_offset_s += 0.05; }, -50, kTimeTolerance_ms),
+      changed_by(
+          "cameras 10 cm from where they are on the IMU", FindingKind::imu_camera_position,
+          [](StereoRig& r) { r.T_BC0.p += Vec3(0.06, 0, 0.08), r.T_BC1.p += Vec3(0.06, 0, 0.08); }, 10, 3),
+      changed_by(
+          "time offset of the calibration 50 ms off", FindingKind::time_offset, [](StereoRig& r) { r.time_offset_s += 0.05; },
+          -50, kTimeTolerance_ms),
       changed_by("IMU's noise 100 times too large", FindingKind::imu_noise, noise(100)),
       changed_by("IMU's noise 100 times too small", FindingKind::imu_noise, noise(0.01)),
-      changed_by("left principal point off by (-25, 10)", FindingKind::principal_point,
-                 [](StereoRig& r) {
-                   r.left = changed(r.left, {.centre_px = {-25, 10}});
-                 }, std::hypot(25, 10), kTenth * std::hypot(25, 10)),
-      changed_by("mounting wrong by 4 degrees and baseline 12 % too long", FindingKind::imu_camera_rotation,
-                 [](StereoRig& r) {
-                   calibration_turned("", Vec3::UnitX(), 4).rig(r);
-                   r.T_BC1.p = r.T_BC0.p + 1.12 * (r.T_BC1.p - r.T_BC0.p);
-                 }, 4, kRotationTolerance_deg),
+      changed_by(
+          "left principal point off by (-25, 10)", FindingKind::principal_point,
+          [](StereoRig& r) {
+            r.left = changed(r.left, {.centre_px = {-25, 10}});
+          },
+          std::hypot(25, 10), kTenth * std::hypot(25, 10)),
+      changed_by(
+          "mounting wrong by 4 degrees and baseline 12 % too long", FindingKind::imu_camera_rotation,
+          [](StereoRig& r) {
+            calibration_turned("", Vec3::UnitX(), 4).rig(r);
+            r.T_BC1.p = r.T_BC0.p + 1.12 * (r.T_BC1.p - r.T_BC0.p);
+          },
+          4, kRotationTolerance_deg),
   };
 }
 
