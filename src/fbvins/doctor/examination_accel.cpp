@@ -25,6 +25,13 @@ constexpr double kGravityTells = 0.01;
 /// Another place of the camera must leave less than this share of what is unexplained.
 constexpr double kElsewhereLeaves = 0.8;
 
+/// The readings with the specific force in m/s^2.
+ImuSeries in_unit(const ImuSeries& imu, double unit_mps2) {
+  std::vector<ImuSample> changed = imu.samples();
+  for (ImuSample& sample : changed) sample.accel_mps2 *= unit_mps2;
+  return ImuSeries(changed);
+}
+
 /// Of a parabola through three values a step apart, from the middle one, in steps.
 double lowest_between(double before, double at, double after) {
   const double bend = before - 2 * at + after;
@@ -64,6 +71,7 @@ AccelFit Examination::in_step(AccelFit as_stamped) {
 }
 
 void Examination::accelerations() {
+  imu_ = in_unit(imu_, accel_unit_);  // the cameras' place on the IMU is in metres
   AccelFit fit = in_step(fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_}));
   measured(fmt::format(
       "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % with its axes as delivered, best: {}); scale {:.4f} +- {:.4f}, gravity {:.2f} +- {:.2f} m/s^2",
@@ -115,8 +123,8 @@ bool Examination::position(const AccelFit& fit) {
 }
 
 void Examination::accel_bias(const AccelFit& fit) {
-  const Vec3 bias = accel_unit_ * fit.bias;
-  const double sigma = accel_unit_ * fit.bias_sigma.maxCoeff();
+  const Vec3& bias = fit.bias;
+  const double sigma = fit.bias_sigma.maxCoeff();
   if (bias.norm() < kBiasPractical_mps2 || bias.norm() < kSignificant * sigma) return;
   Finding& finding = found(FindingKind::accel_bias, bias.norm(), sigma, "m/s^2");
   finding.measured = fmt::format("the accelerometer's bias is ({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", bias.x(), bias.y(),
@@ -128,7 +136,7 @@ void Examination::accel_bias(const AccelFit& fit) {
 /// The cameras' displacements and the accelerometer's disagree by a factor. Gravity tells whose it is: in metres of the cameras
 /// it is wrong by the baseline's error, whatever the accelerometer's scale.
 void Examination::accel_scale(const AccelFit& fit) {
-  const double factor = accel_unit_ / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
+  const double factor = 1 / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
   if (std::abs(factor - 1) < kScalePractical || std::abs(factor - 1) < kSignificant * sigma) return;
   const double gravity = fit.gravity_mps2 / kGravity_mps2;
   const double by_baseline = std::abs(gravity - 1 / factor), by_accelerometer = std::abs(gravity - 1);

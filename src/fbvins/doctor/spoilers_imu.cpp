@@ -104,7 +104,7 @@ std::vector<Spoiler> of_the_imu() {
       accel("accelerometer's scale 5 % too large", FindingKind::accel_scale, 5, 1.5, 1.05 * one),
       accel("accelerometer's scale 7 % too small", FindingKind::accel_scale, -7, 1.5, 0.93 * one),
       gyro("gyroscope: z 15 % too large", FindingKind::gyro_scale, 15, 1.5, Vec3(1, 1, 1.15).asDiagonal()),
-      offset_by("gyroscope's bias 0.3 rad/s", FindingKind::gyro_bias, 0.3, 0.03, Vec3(0.2, -0.2, 0.1), Vec3::Zero()),
+      offset_by("gyroscope's bias 0.3 rad/s", FindingKind::gyro_bias, 0.3, 0.06, Vec3(0.2, -0.2, 0.1), Vec3::Zero()),
       offset_by("accelerometer's bias 1.5 m/s^2", FindingKind::accel_bias, 1.5, 0.5, Vec3::Zero(), Vec3(1, -1, 0.5)),
       accel_late(8, 40),
   };
