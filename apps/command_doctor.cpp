@@ -10,9 +10,11 @@
 #include "apps/commands.hpp"
 #include "apps/evaluation_report.hpp"
 #include "apps/open_recording.hpp"
+#include "apps/run_output.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/doctor/doctor.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/calibration/calibration_files.hpp"
+#include "fbvins/doctor/mend.hpp"
+#include "fbvins/io/calibration.hpp"
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/io/png_encode.hpp"
 
@@ -31,13 +33,15 @@ examples:
   fbvins doctor flight.mcap --all                all measurements, right or wrong
   fbvins doctor flight --json
   fbvins doctor flight --out masks               writes mask0.png, mask1.png of what is fixed in view, if anything is
+  fbvins doctor flight --fix fixed.yaml          writes a corrected calibration, after examining the recording again with it;
+                                                 fly with it: fbvins run flight --calibration fixed.yaml
 
-exit codes: 0 nothing wrong in what was judged, 1 something is wrong, 2 wrong usage or bad input
+exit codes: 0 nothing wrong in what was judged (with --fix: nothing wrong any more), 1 something is wrong, 2 wrong usage or bad input
 )";
 
 struct Arguments {
   RecordingArguments recording;
-  std::string out;
+  std::string out, fix;
   bool all = false, json = false;
 };
 
@@ -69,27 +73,92 @@ Result<void> write_masks(const Diagnosis& diagnosis, const std::string& folder) 
   return {};
 }
 
-int examine_recording(const Arguments& arguments) {
-  const auto data = open_recording(arguments.recording, {});
-  if (!data) return fail(data.error().message);
-  RecordingWarnings warnings;
-  warnings.print((*data)->info());
-  if (!(*data)->rig().has_right())
-    return fail(fmt::format("{}: has one camera; the doctor judges a pair", arguments.recording.path));
-  EvidenceGatherer gatherer((*data)->rig());
-  while (auto event = (*data)->next())
-    if (!gatherer.push(*event)) break;
-  warnings.print_at_end((*data)->info());
-  const bool kalibr = !arguments.recording.calibration.empty();
-  const Diagnosis diagnosis = examine(gatherer.finish(), kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
-  if (!arguments.out.empty())
-    if (Result<void> written = write_masks(diagnosis, arguments.out); !written) return fail(written.error().message);
-  if (arguments.json) {
-    fmt::print("{}\n", to_json(diagnosis).dump(2));
-  } else {
-    fmt::print("{}\n", to_text(diagnosis, arguments.all));
+/// The recording, played from its start as often as asked. Warnings are printed once.
+class PlayedRecording {
+ public:
+  explicit PlayedRecording(const RecordingArguments& arguments) : arguments_(arguments) {}
+
+  Result<void> open() {
+    Result<std::unique_ptr<Dataset>> opened = open_recording(arguments_, {});
+    if (!opened) return opened.error();
+    data_ = *std::move(opened);
+    if (!played_) warnings_.print(data_->info());
+    return {};
   }
-  return diagnosis.findings.empty() ? kOk : kSensorsWrong;
+  const StereoRig& rig() const { return data_->rig(); }
+  Result<void> play(const TakeEvent& take) {
+    if (played_)
+      if (Result<void> opened = open(); !opened) return opened;
+    while (auto event = data_->next())
+      if (!take(*std::move(event))) break;
+    if (!played_) warnings_.print_at_end(data_->info());
+    played_ = true;
+    return {};
+  }
+
+ private:
+  const RecordingArguments& arguments_;
+  RecordingWarnings warnings_;
+  std::unique_ptr<Dataset> data_;
+  bool played_ = false;
+};
+
+/// Writes the corrected calibration; `mended` loses its rig where the file would not be read back.
+Result<void> write_calibration(Mended& mended, const std::string& file) {
+  const std::string text = to_kalibr_rig(rig_calibration(*mended.rig));
+  if (Result<StereoRig> read = parse_kalibr_camchain({file, text}); !read) {
+    mended.rig.reset();
+    mended.why_not = read.error().message;
+    return {};
+  }
+  return write_text(file, text);
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return !a.empty() && !b.empty() && std::filesystem::equivalent(a, b, ignored);
+}
+
+void print(const Diagnosis& diagnosis, const Mended* mended, const Arguments& arguments) {
+  const std::string why_not =
+      mended == nullptr || mended->rig ? "" : fmt::format("{} is not written: {}", arguments.fix, mended->why_not);
+  if (arguments.json) {
+    Json out = to_json(diagnosis);
+    if (mended != nullptr)
+      out["fix"] = {{"written", mended->rig.has_value()}, {"why_not", why_not}, {"after", to_json(mended->after)}};
+    fmt::print("{}\n", out.dump(2));
+    return;
+  }
+  fmt::print("{}\n", to_text(diagnosis, arguments.all));
+  if (mended != nullptr && mended->rig)
+    fmt::print("\n{}: the corrected calibration. Examined again with it:\n{}\n", arguments.fix,
+               to_text(mended->after, arguments.all));
+  else if (mended != nullptr) fmt::print("{}\n", why_not);
+}
+
+int examine_recording(const Arguments& arguments) {
+  if (same_file(arguments.fix, arguments.recording.calibration))
+    return fail(arguments.fix + ": is the calibration as given; --fix writes to another file");
+  PlayedRecording recording(arguments.recording);
+  if (Result<void> opened = recording.open(); !opened) return fail(opened.error().message);
+  const StereoRig rig = recording.rig();
+  if (!rig.has_right()) return fail(fmt::format("{}: has one camera; the doctor judges a pair", arguments.recording.path));
+  const Replay replay = [&](const TakeEvent& take) { return recording.play(take); };
+  const CalibrationStyle style = arguments.recording.calibration.empty() ? CalibrationStyle::euroc : CalibrationStyle::kalibr;
+  const Result<Diagnosis> diagnosis = diagnose(rig, replay, style);
+  if (!diagnosis) return fail(diagnosis.error().message);
+  if (!arguments.out.empty())
+    if (Result<void> written = write_masks(*diagnosis, arguments.out); !written) return fail(written.error().message);
+  if (arguments.fix.empty()) {
+    print(*diagnosis, nullptr, arguments);
+    return diagnosis->findings.empty() ? kOk : kSensorsWrong;
+  }
+  Result<Mended> mended = mend(rig, *diagnosis, replay, style);
+  if (!mended) return fail(mended.error().message);
+  if (mended->rig)
+    if (Result<void> written = write_calibration(*mended, arguments.fix); !written) return fail(written.error().message);
+  print(*diagnosis, &*mended, arguments);
+  return mended->after.findings.empty() && (mended->rig || diagnosis->findings.empty()) ? kOk : kSensorsWrong;
 }
 
 }  // namespace
@@ -100,6 +169,9 @@ void add_doctor_command(CLI::App& program, int& exit_code) {
   command->footer(kExamples);
   arguments->recording.add_to(*command);
   command->add_option("--out", arguments->out, "folder for the masks of what is fixed in view: mask0.png, mask1.png");
+  command->add_option("--fix", arguments->fix,
+                      "file for a corrected calibration (Kalibr's camchain, with the IMU's noise): written where the recording, "
+                      "examined again with it, is judged better");
   command->add_flag("--all", arguments->all, "print all measurements, too");
   command->add_flag("--json", arguments->json, "print JSON");
   command->callback([arguments, &exit_code] { exit_code = examine_recording(*arguments); });

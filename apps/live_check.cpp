@@ -12,8 +12,7 @@
 #include "apps/commands.hpp"
 #include "apps/stop_signal.hpp"
 #include "apps/terminal.hpp"
-#include "fbvins/doctor/doctor.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/diagnose.hpp"
 #include "fbvins/live/sensor_check.hpp"
 #include "fbvins/types/owned_images.hpp"
 
@@ -40,10 +39,15 @@ class CheckedInput final : public SensorInput {
   }
   /// After the source has ended.
   Diagnosis diagnosis(const StereoRig& rig) const {
-    if (!rig.has_right()) return {};  // the doctor judges a pair
-    EvidenceGatherer gatherer(rig);
-    for (const SensorEvent& event : events_) gatherer.push(event);
-    return examine(gatherer.finish(), CalibrationStyle::kalibr);
+    Diagnosis none;
+    none.not_judged = {"the calibration: there is one camera, and the doctor judges a pair"};
+    if (!rig.has_right()) return none;
+    const Replay replay = [&](const TakeEvent& take) -> Result<void> {
+      for (const SensorEvent& event : events_)
+        if (!take(event)) break;
+      return {};
+    };
+    return *diagnose(rig, replay, CalibrationStyle::kalibr);  // a replay from memory does not fail
   }
 
  private:
@@ -81,10 +85,10 @@ int check_sensors(Source& source, double seconds) {
     fmt::print("{}  {}\n", finding.fine ? "ok   " : "WRONG", finding.text);
     fine = fine && finding.fine;
   }
-  for (const Finding& finding : input.diagnosis(source.rig()).findings) {
-    fmt::print("WRONG  {}\n", to_text(finding));
-    fine = false;
-  }
+  const Diagnosis diagnosis = input.diagnosis(source.rig());
+  for (const Finding& finding : diagnosis.findings) fmt::print("WRONG  {}\n", to_text(finding));
+  for (const std::string& sentence : diagnosis.not_judged) fmt::print("-      not judged: {}\n", sentence);
+  fine = fine && diagnosis.findings.empty();
   return fine ? kOk : kSensorsWrong;
 }
 

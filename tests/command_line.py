@@ -7,6 +7,7 @@ usage: command_line.py FBVINS
 import json
 import math
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -222,6 +223,38 @@ class CommandLine(unittest.TestCase):
         said = fbvins("run", flight, "--out", self.folder / "out", "--quiet").stderr
         self.assertIn("accel_units: ", said)
         self.assertIn("swapped_images: ", said)
+
+    def test_doctor_fix(self):
+        """A calibration that is wrong is mended, with which the doctor finds nothing; where no calibration helps, nothing is written."""
+        flight, fixed = self.folder / "flight", self.folder / "fixed.yaml"
+        self.assertEqual(fbvins("simulate", "handheld", "--out", flight, "--seconds", 6, "--quiet").returncode, 0)
+        done = fbvins("doctor", flight, "--fix", fixed)
+        self.assertEqual(done.returncode, 0, done)
+        self.assertIn(f"{fixed} is not written: nothing is wrong", done.stdout)
+        readings = flight / "mav0" / "imu0" / "data.csv"
+        rows = [row.split(",") for row in readings.read_text(encoding="utf-8").splitlines()]
+
+        def rewrite(change):
+            readings.write_text("\n".join(",".join(row if row[0].startswith("#") else change(row)) for row in rows) + "\n", encoding="utf-8")
+
+        rewrite(lambda row: [str(int(row[0]) + 60_000_000), *row[1:]])
+        done = fbvins("doctor", flight, "--fix", fixed)
+        self.assertEqual(done.returncode, 0, done)
+        self.assertIn("time_offset: ", done.stdout)
+        self.assertRegex(done.stdout, r"Examined again with it:\n(.*\n)*nothing wrong in ")
+        text = fixed.read_text(encoding="utf-8")
+        self.assertAlmostEqual(float(re.search(r"timeshift_cam_imu: (\S+)", text)[1]), 0.06, delta=0.001)
+        self.assertIn("imu0:\n  accelerometer_noise_density: ", text)
+        done = fbvins("doctor", flight, "--calibration", fixed)
+        self.assertEqual((done.returncode, done.stdout.splitlines()[-1][:13]), (0, "nothing wrong"), done)
+        self.assertEqual(fbvins("run", flight, "--calibration", fixed, "--out", self.folder / "out", "--quiet").returncode, 0)
+        self.assert_bad_input(fbvins("doctor", flight, "--calibration", fixed, "--fix", fixed), str(fixed), "another file")
+        fixed.unlink()
+        rewrite(lambda row: row[:4] + [str(float(a) / 9.80665) for a in row[4:]])
+        done = fbvins("doctor", flight, "--fix", fixed, "--json")
+        self.assertEqual(done.returncode, 1, done)
+        self.assertEqual(json.loads(done.stdout)["fix"]["why_not"], f"{fixed} is not written: nothing of what is wrong can be mended in a calibration")
+        self.assertFalse(fixed.exists())
 
     def test_mocap(self):
         estimate, quad, wand = [], [], []

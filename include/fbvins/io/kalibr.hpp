@@ -15,7 +15,9 @@
 
 namespace fbvins {
 
-/// cam0 is left, cam1 right; without cam1 the rig has one camera. Without imu_path the noise figures stay at their defaults.
-Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt);
+/// cam0 is left, cam1 right; without cam1 the rig has one camera. Without imu_path the noise figures are those under `imu0` in
+/// the same file, where it has that, as `fbvins doctor --fix` writes it; `otherwise` if not.
+Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path = std::nullopt,
+                              const ImuNoise& otherwise = {});
 
 }  // namespace fbvins

@@ -9,6 +9,7 @@
 
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/csv.hpp"
 
 namespace fbvins {
 namespace {
@@ -80,6 +81,19 @@ RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImu
   return out;
 }
 
+RigCalibration rig_calibration(const StereoRig& rig) {
+  RigCalibration out;
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    out.cameras.push_back(rig.camera(i));
+    out.T_CnC0.push_back((rig.T_BC(i).inverse() * rig.T_BC0).cast_frames<Cn, C0>());
+    out.T_BC.push_back(rig.T_BC(i).cast_frames<B, Cn>());
+  }
+  out.time_offset_s = rig.time_offset_s;
+  out.imu_noise = rig.imu_noise;
+  out.line_delay_s = rig.line_delay_s;
+  return out;
+}
+
 std::string to_kalibr_camchain(const RigCalibration& rig) {
   std::string out;
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
@@ -93,18 +107,32 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
         camera.model, kalibr_list(camera.coefficients), camera.distortion, kalibr_list(camera.intrinsics), rig.cameras[k].width(),
         rig.cameras[k].height(), k);
     out += mask_text(rig.cameras[k], "  ");
+    if (rig.line_delay_s != 0) out += fmt::format("  line_delay: {}\n", kalibr_number(rig.line_delay_s));
     if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {}\n", kalibr_number(rig.time_offset_s));
   }
   return out;
 }
 
 std::string to_kalibr_imu(const ImuNoise& noise) {
-  return fmt::format(
-      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
-      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
-      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
-      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
-      kalibr_number(noise.rate_hz));
+  const ImuNoise usual;
+  std::string ranges;  // which Kalibr does not know
+  if (noise.max_gyro_radps != usual.max_gyro_radps)
+    ranges += fmt::format("gyroscope_range: {}\n", kalibr_number(noise.max_gyro_radps));
+  if (noise.max_accel_mps2 != usual.max_accel_mps2)
+    ranges += fmt::format("accelerometer_range: {}\n", kalibr_number(noise.max_accel_mps2));
+  return ranges + fmt::format(
+                      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\ngyroscope_noise_density: {}\n"
+                      "gyroscope_random_walk: {}\nrostopic: /imu0\nupdate_rate: {}\n",
+                      kalibr_number(noise.accel_noise_density_mps2_rthz), kalibr_number(noise.accel_random_walk_mps3_rthz),
+                      kalibr_number(noise.gyro_noise_density_radps_rthz), kalibr_number(noise.gyro_random_walk_radps2_rthz),
+                      kalibr_number(noise.rate_hz));
+}
+
+std::string to_kalibr_rig(const RigCalibration& rig) {
+  std::string imu = "imu0:\n";
+  const std::string figures = to_kalibr_imu(rig.imu_noise);
+  for (const CsvLine& line : lines_of(figures)) imu += fmt::format("  {}\n", line.text);
+  return to_kalibr_camchain(rig) + imu;
 }
 
 Result<std::string> to_basalt(const RigCalibration& rig) {

@@ -17,15 +17,20 @@ struct RigCalibration {
   std::vector<Pose<B, Cn>> T_BC;  ///< empty: without an IMU
   double time_offset_s = 0;       ///< t_imu = t_image + time_offset_s
   ImuNoise imu_noise;
+  double line_delay_s = 0;  ///< of a rolling shutter, as in StereoRig
 };
 
 RigCalibration rig_calibration(const CameraCalibration& cameras);
 RigCalibration rig_calibration(const CameraCalibration& cameras, const CameraImuResult& imu, const ImuNoise& noise);
 
+RigCalibration rig_calibration(const StereoRig& rig);
+
 /// Kalibr's camchain.yaml; with an IMU its camchain-imucam.yaml. Numbers with 17 digits.
 std::string to_kalibr_camchain(const RigCalibration& rig);
 /// Kalibr's imu.yaml.
 std::string to_kalibr_imu(const ImuNoise& noise);
+/// Both in one file, the IMU under `imu0`: all that a rig is.
+std::string to_kalibr_rig(const RigCalibration& rig);
 /// Basalt's calibration.json; an error where a lens model is none of its own. Without an IMU cam0 is the body.
 Result<std::string> to_basalt(const RigCalibration& rig);
 /// ROS CameraInfo of one camera, as camera_calibration writes it; an error for models that ROS does not know.

@@ -17,6 +17,10 @@ enum class FindingKind {
   gyro_axes,
   accel_axes,
   gyro_scale,
+  gyro_bias,
+  accel_scale,
+  accel_bias,
+  imu_noise,
   saturation,
   vibration,
   imu_stamps,
@@ -24,7 +28,10 @@ enum class FindingKind {
   // camera and IMU
   clocks_apart,
   time_offset,
+  accel_late,
+  extrinsics_inverted,
   imu_camera_rotation,
+  imu_camera_position,
   imu_camera_disagree,
   // the pair of cameras
   swapped_images,
@@ -36,10 +43,13 @@ enum class FindingKind {
   epipolar_error,
   no_stereo,
   // a lens
+  calibration_size,
   focal_length,
   principal_point,
   distortion,
   // the images
+  images_turned,
+  images_mirrored,
   image_stamps,
   image_gaps,
   frozen_images,
@@ -52,15 +62,31 @@ enum class FindingKind {
 /// As in docs/doctor.md, which says more of each.
 std::string_view to_string(FindingKind kind);
 
+/// What of a calibration several findings may concern. Extrinsics and lenses are those of cam0 and of cam1.
+enum class CalibrationField {
+  mounting_of_left,
+  mounting_of_right,
+  lens_of_left,
+  lens_of_right,
+  distortion_of_left,
+  distortion_of_right,
+  mask_of_left,
+  mask_of_right,
+  time_offset,
+  imu_rate,
+  imu_noise,
+};
+
 struct Finding {
   FindingKind kind = FindingKind::gyro_units;
   double size = 0;   ///< how wrong, in `unit`
   double sigma = 0;  ///< standard deviation of size; 0 where it was counted
   std::string unit;
-  std::string measured;   ///< a sentence without its full stop, with the uncertainty
-  std::string expected;   ///< the same: what it should be
-  std::string advice;     ///< the same: what to do
-  std::string corrected;  ///< lines of the calibration file, corrected; empty where no line is wrong
+  std::string measured;                       ///< a sentence without its full stop, with the uncertainty
+  std::string expected;                       ///< the same: what it should be
+  std::string advice;                         ///< the same: what to do
+  std::string corrected;                      ///< lines of the calibration file, corrected; empty where no line is wrong
+  std::vector<CalibrationField> fields = {};  ///< that must change; of a field with several findings the first has the line
 };
 
 /// "KIND: measured; expected; advice" and the corrected lines, indented.

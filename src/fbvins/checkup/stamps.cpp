@@ -91,12 +91,13 @@ void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, st
     } else {
       finding.advice = "correct the rate, on which the covariance rests";
       finding.corrected = fmt::format("rate_hz: {:.0f}", rate);
+      finding.fields = {CalibrationField::imu_rate};
     }
     findings.push_back(finding);
   }
   const double share = repeated / static_cast<double>(steps.size());
   if (share > kMostRepeated) {
-    finding.size = share, finding.unit = "of the readings", finding.corrected.clear();
+    finding.size = share, finding.unit = "of the readings", finding.corrected.clear(), finding.fields.clear();
     finding.measured = fmt::format("{:.0f} % of the IMU's readings repeat the one before to the last bit", 100 * share);
     finding.expected = "noise alone makes each different";
     finding.advice = "the driver repeats readings or the IMU hangs: hand on each reading once, at the sensor's own rate";

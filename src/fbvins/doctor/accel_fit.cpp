@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/block_fit.hpp"
@@ -14,12 +16,14 @@
 namespace fbvins {
 namespace {
 
-// Unknowns: the matrix that multiplies the readings, row by row, and the accelerometer's bias.
-constexpr int kMatrix = 9, kUnknowns = 12;
+// Unknowns: the matrix that multiplies the readings, row by row, the accelerometer's bias, and what the camera's position in
+// the body must be changed by; the last two in metres of the cameras.
+constexpr int kMatrix = 9, kLever = 12, kUnknowns = 15;
 using Vec9 = Eigen::Matrix<double, kMatrix, 1>;
 using VecA = Eigen::Matrix<double, kUnknowns, 1>;
 using MatA = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 using Mat3A = Eigen::Matrix<double, 3, kUnknowns>;
+using Mat3R = Eigen::Matrix<double, 3, kLever>;
 
 constexpr double kWindow_s = 2;
 constexpr std::size_t kFewestPairs = 8, kFewestWindows = 4;
@@ -27,16 +31,16 @@ constexpr std::size_t kFewestPairs = 8, kFewestWindows = 4;
 constexpr double kMostUnexplained = 0.5;
 constexpr double kLeastAcceleration_mps2 = 0.15;
 
-/// Preintegrated readings of a pair: delta_q, and delta_v and delta_p as linear functions of the unknowns.
+/// Preintegrated readings of a pair: delta_q, and delta_v and delta_p as linear functions of matrix and bias.
 struct PairDeltas {
   Quat q;
-  Mat3A v, p;
+  Mat3R v, p;
 };
 
 PairDeltas deltas_of(const ImuSegment& segment, const ImuNoise& noise, const Vec3& gyro_bias) {
   PairDeltas out;
   out.q = integrate_gyro(segment, gyro_bias);
-  for (int k = 0; k < kUnknowns; ++k) {
+  for (int k = 0; k < kLever; ++k) {
     ImuSegment one = segment;
     for (ImuSample& sample : one.samples)
       sample.accel_mps2 = k < kMatrix ? Vec3(sample.accel_mps2(k % 3) * Vec3::Unit(k / 3)) : Vec3(Vec3::Unit(k - kMatrix));
@@ -56,6 +60,12 @@ struct Agreement {
   double c = 0;
 
   void operator+=(const Agreement& other) { H += other.H, b += other.b, c += other.c; }
+};
+
+/// Gravity in a window's first frame, in metres of the cameras: at - by * a.
+struct WindowGravity {
+  Vec3 at = Vec3::Zero();
+  Mat3A by = Mat3A::Zero();
 };
 
 struct Window {
@@ -83,7 +93,7 @@ std::vector<Window> windows_of(const std::vector<FramePair>& pairs, const ImuSer
 }
 
 Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
-                       const Pose<B, C0>& T_BC0, double scale) {
+                       const Pose<B, C0>& T_BC0, double scale, WindowGravity& gravity) {
   using Mat36 = Eigen::Matrix<double, 3, 6>;
   using Mat6A = Eigen::Matrix<double, 6, kUnknowns>;
   Mat6 N = Mat6::Zero();
@@ -91,13 +101,14 @@ Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs
   Vec6 m = Vec6::Zero();
   Agreement out;
   Quat R = Quat::Identity();       // of the pair's first frame in the window's
-  Mat3A velocity = Mat3A::Zero();  // gained so far
+  Mat3R velocity = Mat3R::Zero();  // gained so far
   double elapsed_s = 0;
   for (std::size_t k = window.first; k < window.last; ++k) {
     const double dt = pairs[k].dt_s();
     const Mat3 E = deltas[k].q.toRotationMatrix(), R_now = R.toRotationMatrix();
     const Vec3 y = R_now * (T_BC0.R() * pairs[k].p_CaCb + (T_BC0.p - E * T_BC0.p) * scale);
-    const Mat3A X = dt * velocity + R_now * deltas[k].p;
+    Mat3A X;
+    X << dt * velocity + R_now * deltas[k].p, -R_now * (Mat3::Identity() - E);
     Mat36 Z;
     Z << dt * Mat3::Identity(), (elapsed_s * dt + 0.5 * dt * dt) * Mat3::Identity();
     N += Z.transpose() * Z;
@@ -114,6 +125,7 @@ Agreement agreement_of(const Window& window, const std::vector<FramePair>& pairs
   out.H -= M.transpose() * inverse * M;
   out.b -= M.transpose() * inverse * m;
   out.c -= m.dot(inverse * m);
+  gravity = {(inverse * m).tail<3>(), (inverse * M).bottomRows<3>()};
   return out;
 }
 
@@ -126,50 +138,75 @@ Vec9 row_by_row(const Mat3& A) {
 
 struct Explained {
   double scale = 0, unexplained = 1;
+  Vec3 bias = Vec3::Zero(), lever = Vec3::Zero();  ///< in the readings' unit, and in metres
 };
-Explained explained_by(const Mat3& axes, const Agreement& all) {
-  using Mat4 = Eigen::Matrix4d;
-  using Vec4 = Eigen::Vector4d;
-  Eigen::Matrix<double, kUnknowns, 4> chosen = Eigen::Matrix<double, kUnknowns, 4>::Zero();
+
+/// By readings with these axes, a scale and a bias, and with `lever_free` a change of the camera's position.
+Explained explained_by(const Mat3& axes, const Agreement& all, bool lever_free = false) {
+  constexpr int kBias = 1, kPosition = 4, kMost = 7;
+  Eigen::Matrix<double, kUnknowns, kMost> chosen = Eigen::Matrix<double, kUnknowns, kMost>::Zero();
   chosen.block<kMatrix, 1>(0, 0) = row_by_row(axes);
-  chosen.bottomRightCorner<3, 3>().setIdentity();
-  Mat4 H = chosen.transpose() * all.H * chosen;
-  H.diagonal().tail<3>().array() += 1e-6 * H.diagonal().tail<3>().sum();  // without rotation the bias is not observable
-  const Vec4 b = chosen.transpose() * all.b, x = H.ldlt().solve(b);
+  chosen.bottomRightCorner<6, 6>().setIdentity();
+  const int n = lever_free ? kMost : kPosition;
+  Eigen::MatrixXd H = (chosen.transpose() * all.H * chosen).topLeftCorner(n, n);
+  for (int first = kBias; first < n; first += 3)  // without rotation neither bias nor position is observable
+    H.diagonal().segment<3>(first).array() += 1e-6 * H.diagonal().segment<3>(first).sum();
+  const Eigen::VectorXd b = (chosen.transpose() * all.b).head(n), x = H.ldlt().solve(b);
   if (!x.allFinite() || !(x(0) > 0)) return {};
-  return {x(0), 1 - b.dot(x) / all.c};
+  Explained out{x(0), 1 - b.dot(x) / all.c, -x.segment<3>(kBias) / x(0), Vec3::Zero()};
+  if (lever_free) out.lever = x.segment<3>(kPosition) / x(0);
+  return out;
 }
 
 struct Summed {
   Agreement all;
   std::array<Agreement, BlockFit::kStretches> stretch;
+  std::vector<WindowGravity> gravity;
 };
 
 Summed sum_up(const std::vector<Window>& windows, const std::vector<FramePair>& pairs, const std::vector<PairDeltas>& deltas,
               const Pose<B, C0>& T_BC0, double scale) {
   Summed out;
   for (std::size_t w = 0; w < windows.size(); ++w) {
-    const Agreement one = agreement_of(windows[w], pairs, deltas, T_BC0, scale);
+    out.gravity.emplace_back();
+    const Agreement one = agreement_of(windows[w], pairs, deltas, T_BC0, scale, out.gravity.back());
     out.stretch[w * BlockFit::kStretches / windows.size()] += one;
     out.all += one;
   }
   return out;
 }
 
-/// Jackknife over the stretches.
-double scale_sigma(const Summed& sums, const Mat3& axes) {
-  std::vector<double> without;
+/// Standard deviations of scale, bias and lever, by a jackknife over the stretches.
+Eigen::Matrix<double, 7, 1> sigmas_of(const Summed& sums, const Mat3& axes, bool lever_free) {
+  using Vec7 = Eigen::Matrix<double, 7, 1>;
+  std::vector<Vec7> without;
   for (const Agreement& stretch : sums.stretch) {
     if (stretch.c == 0) continue;
     Agreement rest = sums.all;
     rest.H -= stretch.H, rest.b -= stretch.b, rest.c -= stretch.c;
-    without.push_back(explained_by(axes, rest).scale);
+    const Explained one = explained_by(axes, rest, lever_free);
+    without.emplace_back((Vec7() << one.scale, one.bias, one.lever).finished());
   }
-  double mean = 0, square = 0;
+  Vec7 mean = Vec7::Zero(), square = Vec7::Zero();
   const auto n = static_cast<double>(without.size());
-  for (const double s : without) mean += s / n;
-  for (const double s : without) square += (s - mean) * (s - mean);
-  return std::sqrt((n - 1) / n * square);
+  for (const Vec7& s : without) mean += s / n;
+  for (const Vec7& s : without) square += (s - mean).cwiseAbs2();
+  return ((n - 1) / n * square).cwiseSqrt();
+}
+
+/// Mean norm of the windows' gravity with readings as explained, and its standard deviation.
+std::pair<double, double> gravity_of(const Summed& sums, const Mat3& axes, const Explained& by) {
+  VecA a = VecA::Zero();
+  a.head<kMatrix>() = by.scale * row_by_row(axes);
+  a.segment<3>(kMatrix) = -by.scale * by.bias;
+  double sum = 0, square = 0;
+  const auto n = static_cast<double>(sums.gravity.size());
+  for (const WindowGravity& window : sums.gravity) {
+    const double norm = (window.at - window.by * a).norm();
+    sum += norm, square += norm * norm;
+  }
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(square / n - mean * mean, 0.0) / n)};
 }
 
 /// Acceleration of the seen motion, root mean square, from what a constant velocity and gravity do not explain of it.
@@ -205,7 +242,13 @@ AccelFit fit_accelerations(const std::vector<FramePair>& pairs, const ImuSeries&
   fit.unexplained = best.unexplained;
   fit.unexplained_as_named = explained_by(Mat3::Identity(), sums.all).unexplained;
   fit.scale = best.scale;
-  fit.scale_sigma = scale_sigma(sums, fit.axes);
+  fit.scale_sigma = sigmas_of(sums, fit.axes, false)(0);
+  std::tie(fit.gravity_mps2, fit.gravity_sigma_mps2) = gravity_of(sums, fit.axes, best);
+  const Explained elsewhere = explained_by(fit.axes, sums.all, true);
+  const Eigen::Matrix<double, 7, 1> sigma = sigmas_of(sums, fit.axes, true);
+  fit.bias = elsewhere.bias, fit.bias_sigma = sigma.segment<3>(1);
+  fit.lever_m = elsewhere.lever, fit.lever_sigma_m = sigma.tail<3>();
+  fit.unexplained_elsewhere = elsewhere.unexplained;
   fit.acceleration_mps2 = acceleration_of(sums, windows, pairs);
   fit.seen = best.scale > 0 && fit.unexplained < kMostUnexplained && fit.acceleration_mps2 > kLeastAcceleration_mps2;
   return fit;

@@ -25,7 +25,11 @@ struct AccelFit {
   Mat3 axes = Mat3::Identity();       ///< signed permutation that fits best: f_B = axes * reading
   double unexplained = 0;             ///< share of the seen acceleration (mean square) that the readings do not explain
   double unexplained_as_named = 0;    ///< the same with the axes as delivered
-  double acceleration_mps2 = 0;       ///< seen, root mean square, without each window's mean
+  double gravity_mps2 = 0, gravity_sigma_mps2 = 0;  ///< in metres of the cameras: that of a baseline which is too long is larger
+  Vec3 bias = Vec3::Zero(), bias_sigma = Vec3::Zero();        ///< of the readings with these axes, in their unit
+  Vec3 lever_m = Vec3::Zero(), lever_sigma_m = Vec3::Zero();  ///< to be added to p_BC0, where that is wrong
+  double unexplained_elsewhere = 0;                           ///< what is unexplained with the camera there
+  double acceleration_mps2 = 0;                               ///< seen, root mean square, without each window's mean
 };
 
 /// `rig`: T_BC0 as corrected.

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <set>
+
 #include "fbvins/camera/lens_numbers.hpp"
 
 namespace fbvins {
@@ -13,6 +15,8 @@ std::string file_of(bool left, CalibrationStyle style) {
   const char* camera = left ? "cam0" : "cam1";
   return style == CalibrationStyle::euroc ? fmt::format("{}/sensor.yaml: ", camera) : fmt::format("{}: ", camera);
 }
+
+std::string imu_file(CalibrationStyle style) { return style == CalibrationStyle::euroc ? "imu0/sensor.yaml: " : "imu.yaml: "; }
 
 std::string row(const Mat3& R, const Vec3& p, int i) {
   return fmt::format("{:.9f}, {:.9f}, {:.9f}, {:.9f}", R(i, 0), R(i, 1), R(i, 2), p(i));
@@ -28,13 +32,6 @@ std::string mounting_line(const Pose<B, Cam>& T_BC, bool left, CalibrationStyle 
     return fmt::format("{}T_BS: data: [{}, {}, {}, 0, 0, 0, 1]", file_of(left, style), row(R, p, 0), row(R, p, 1), row(R, p, 2));
   return fmt::format("{}T_cam_imu: [[{}], [{}], [{}], [0, 0, 0, 1]]", file_of(left, style), row(R, p, 0), row(R, p, 1),
                      row(R, p, 2));
-}
-
-}  // namespace
-
-std::string mounting_lines(const StereoRig& rig, CalibrationStyle style, bool both) {
-  const std::string right = mounting_line(rig.T_BC1, false, style);
-  return both ? mounting_line(rig.T_BC0, true, style) + "\n" + right : right;
 }
 
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style) {
@@ -57,11 +54,52 @@ std::string mask_line(bool left, CalibrationStyle style) {
 }
 
 std::string time_line(double offset_s, CalibrationStyle style) {
-  if (style == CalibrationStyle::euroc)
-    return fmt::format(
-        "a EuRoC folder has no line for it: add {:.4f} s to the stamps of the images, or subtract it from those of the readings",
-        offset_s);
+  if (style == CalibrationStyle::euroc) return fmt::format("cam0/sensor.yaml: timeshift_cam_imu: {:.5f}", offset_s);
   return fmt::format("cam0, cam1: timeshift_cam_imu: {:.5f}", offset_s);
+}
+
+std::string rate_line(const ImuNoise& noise, CalibrationStyle style) {
+  return fmt::format("{}{}: {:.0f}", imu_file(style), style == CalibrationStyle::euroc ? "rate_hz" : "update_rate",
+                     noise.rate_hz);
+}
+
+std::string noise_lines(const ImuNoise& noise, CalibrationStyle style) {
+  return fmt::format(
+      "{0}gyroscope_noise_density: {1:.4g}\n{0}gyroscope_random_walk: {2:.4g}\n"
+      "{0}accelerometer_noise_density: {3:.4g}\n{0}accelerometer_random_walk: {4:.4g}",
+      imu_file(style), noise.gyro_noise_density_radps_rthz, noise.gyro_random_walk_radps2_rthz,
+      noise.accel_noise_density_mps2_rthz, noise.accel_random_walk_mps3_rthz);
+}
+
+}  // namespace
+
+std::string line_of(CalibrationField field, const StereoRig& rig, CalibrationStyle style) {
+  switch (field) {
+    case CalibrationField::mounting_of_left: return mounting_line(rig.T_BC0, true, style);
+    case CalibrationField::mounting_of_right: return mounting_line(rig.T_BC1, false, style);
+    case CalibrationField::lens_of_left: return intrinsics_line(rig.left, true, style);
+    case CalibrationField::lens_of_right: return intrinsics_line(rig.right, false, style);
+    case CalibrationField::distortion_of_left: return distortion_line(rig.left, true, style);
+    case CalibrationField::distortion_of_right: return distortion_line(rig.right, false, style);
+    case CalibrationField::mask_of_left: return mask_line(true, style);
+    case CalibrationField::mask_of_right: return mask_line(false, style);
+    case CalibrationField::time_offset: return time_line(rig.time_offset_s, style);
+    case CalibrationField::imu_rate: return rate_line(rig.imu_noise, style);
+    case CalibrationField::imu_noise: return noise_lines(rig.imu_noise, style);
+  }
+  return "";
+}
+
+void write_lines(std::span<Finding> findings, const StereoRig& rig, CalibrationStyle style) {
+  std::set<CalibrationField> written;
+  for (Finding& finding : findings) {
+    finding.corrected.clear();
+    for (const CalibrationField field : finding.fields) {
+      if (!written.insert(field).second) continue;
+      if (!finding.corrected.empty()) finding.corrected += '\n';
+      finding.corrected += line_of(field, rig, style);
+    }
+  }
 }
 
 }  // namespace fbvins

@@ -25,7 +25,8 @@ struct ChangeGroup {
   FindingKind kind;
   WhichLens lens;
   std::vector<int> unknowns;
-  double practical;  ///< smallest norm of the amount that is reported
+  double practical;   ///< smallest norm of the amount that is reported
+  double rarity = 1;  ///< its error counts so many times: of two causes that explain alike the common one is taken
 };
 
 inline bool is_free(std::span<const int> free, int unknown) { return std::find(free.begin(), free.end(), unknown) != free.end(); }
@@ -80,7 +81,8 @@ std::optional<Candidate<Fit>> best_candidate(const Fit& so_far, std::span<const 
     candidate.error_px = candidate.fit.capped_error();
     const std::size_t n = group.unknowns.size(), n_best = best ? best->group->unknowns.size() : n;
     const double handicap = n < n_best ? Fit::kAsGood : n > n_best ? 1 / Fit::kAsGood : 1;
-    if (!best || candidate.error_px * handicap < best->error_px) best.emplace(std::move(candidate));
+    if (!best || candidate.error_px * handicap * group.rarity < best->error_px * best->group->rarity)
+      best.emplace(std::move(candidate));
   }
   return best;
 }

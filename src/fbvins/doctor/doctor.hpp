@@ -10,6 +10,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,13 +30,17 @@ struct Diagnosis {
   std::vector<Finding> findings;
   std::vector<std::string> measured;    ///< one sentence for each measurement, whether right or wrong
   std::vector<std::string> not_judged;  ///< what the recording does not show, and why
-  StereoRig rig;                        ///< the calibration with all findings corrected
+  StereoRig rig;                        ///< the calibration with all findings corrected, of the images in their order
+  bool swapped = false;                 ///< left and right images are exchanged; `rig` is for them in their order
+  /// How well the calibration as it was given explains the recording: typical epipolar error, and error of a feature predicted
+  /// from image to image; none where it was not judged.
+  std::optional<double> epipolar_px = {}, predicted_px = {};
   /// Of each camera, the mask of what is fixed in view, and of what is masked already; null where nothing more is.
   std::vector<std::shared_ptr<const Mask>> masks;
 };
 
-/// The findings, what was not judged, and in the last line how much was measured; with `all` each measurement. No line end after
-/// it.
+/// The findings, what was not judged, what no recording shows, and in the last line how much was measured; with `all` each
+/// measurement. No line end after it.
 std::string to_text(const Diagnosis& diagnosis, bool all = false);
 
 Diagnosis examine(const Evidence& evidence, CalibrationStyle style = CalibrationStyle::euroc);

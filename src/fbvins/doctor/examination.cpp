@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fbvins/checkup/noise_figures.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
@@ -22,8 +23,7 @@ Diagnosis Examination::run() {
   images();
   if (has(FindingKind::same_image_twice)) {
     not_judged("everything that needs two cameras: left and right are the same images");
-    out_.rig = rig_;
-    return std::move(out_);
+    return done();
   }
   pairs_ = pair_frames(evidence_);
   turns();
@@ -31,7 +31,13 @@ Diagnosis Examination::run() {
   if (turns_agree_) motion();
   if (motion_agrees_) accelerations();
   blur();
+  return done();
+}
+
+Diagnosis Examination::done() {
+  write_lines(out_.findings, rig_, style_);
   out_.rig = rig_;
+  out_.swapped = evidence_.swapped;
   return std::move(out_);
 }
 
@@ -48,8 +54,15 @@ void Examination::readings() {
     // The gyroscope's unit is judged by the images, in turns().
     if (finding.kind != FindingKind::gyro_units) out_.findings.push_back(std::move(finding));
   }
-  for (Finding& finding : check_stamps(evidence_.imu, evidence_.stamps, evidence_.rig))
+  for (Finding& finding : check_stamps(evidence_.imu, evidence_.stamps, evidence_.rig)) {
+    // Only a rate is one of a calibration's figures.
+    if (!finding.fields.empty()) rig_.imu_noise.rate_hz = std::round(finding.size);
     out_.findings.push_back(std::move(finding));
+  }
+  if (auto finding = check_noise_figures(evidence_.rig.imu_noise)) {
+    rig_.imu_noise = plausible(rig_.imu_noise);
+    out_.findings.push_back(std::move(*finding));
+  }
   if (accel_unit_ == 1) {
     keep(check_saturation(evidence_.imu));
     keep(check_vibration(evidence_.imu));
@@ -106,7 +119,7 @@ bool Examination::fixed_in_view(double share_of_features) {
   for (std::size_t i = 0; i < out_.masks.size(); ++i)
     if (out_.masks[i]) {
       (i == 0 ? rig_.left : rig_.right).set_mask(out_.masks[i]);
-      finding.corrected += (finding.corrected.empty() ? "" : "\n") + mask_line(i == 0, style_);
+      finding.fields.push_back(i == 0 ? CalibrationField::mask_of_left : CalibrationField::mask_of_right);
     }
   return true;
 }

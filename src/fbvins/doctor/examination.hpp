@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to the doctor: one examination, step by step. What a step finds wrong is corrected for the steps after it.
 //   examination.cpp          order, readings by themselves, images by themselves
-//   examination_imu.cpp      the IMU against what the images show
+//   examination_imu.cpp      the gyroscope against what the images show
+//   examination_accel.cpp    the accelerometer against what the images show
 //   examination_cameras.cpp  lenses and the pair of cameras
 //   examination_focal.cpp    the focal length that both lenses have in common
 #pragma once
@@ -62,6 +63,8 @@ class Examination {
   void gyro_axes(const TurnFit& fit);
   bool accelerometer_turned_too(const Mat3& axes, const Mat3& R_CB, const TurnFit& fit) const;
   void motion();
+  void motion_change(const MotionChange& change);
+  void gyro_bias(const MotionFit& fit);
   void time_offset(const MotionFit& fit);
   void rotation(const MotionFit& fit);
   void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
@@ -70,7 +73,14 @@ class Examination {
   StereoFit pair_fit(StereoRig rig, bool focal_known);
   void stereo();
   void stereo_change(const StereoChange& change);
+  AccelFit in_step(AccelFit as_stamped);
   void accelerations();
+  void accel_axes(const AccelFit& fit);
+  bool position(const AccelFit& fit);
+  void accel_bias(const AccelFit& fit);
+  void accel_scale(const AccelFit& fit);
+  void baseline_length(double factor, double sigma);
+  Diagnosis done();
 
   Evidence evidence_;
   CalibrationStyle style_;

@@ -63,15 +63,14 @@ void Examination::lens(FindingKind kind, WhichLens which, const Eigen::VectorXd&
     finding.measured = fmt::format("the {} distortion is not the calibration's: {} {:+.3f} +- {:.3f}, {} {:+.3f} +- {:.3f}",
                                    camera, names.first, amount(0), sigma(0), names.second, amount(1), sigma(1));
   }
-  const auto line = kind == FindingKind::distortion ? distortion_line : intrinsics_line;
+  const bool bent = kind == FindingKind::distortion;
   if (which != WhichLens::right) {
     rig_.left = changed(rig_.left, change);
-    finding.corrected = line(rig_.left, true, style_);
+    finding.fields.push_back(bent ? CalibrationField::distortion_of_left : CalibrationField::lens_of_left);
   }
   if (which != WhichLens::left) {
     rig_.right = changed(rig_.right, change);
-    if (!finding.corrected.empty()) finding.corrected += '\n';
-    finding.corrected += line(rig_.right, false, style_);
+    finding.fields.push_back(bent ? CalibrationField::distortion_of_right : CalibrationField::lens_of_right);
   }
   finding.expected = fmt::format("less than the accuracy of features; this explains {:.1f} px", explained_px);
   finding.advice = "calibrate the lens again, at the size and focus that are used";
@@ -112,6 +111,7 @@ void Examination::stereo() {
     return;
   }
   pair_.judged = true;
+  out_.epipolar_px = fit.error_px;
   for (const StereoChange& change : fit.changes) stereo_change(change);
   pairs_ = pair_frames(with_depths_by(rig_, evidence_));
   if (fit.remaining_px > kMostEpipolar_px && !has(FindingKind::stereo_sync)) {
@@ -142,7 +142,7 @@ void Examination::stereo_change(const StereoChange& change) {
       T_C1C0.p = turned_baseline(T_C1C0.p, change.amount);
     }
     rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();
-    finding.corrected = mounting_lines(rig_, style_, false);
+    finding.fields = {CalibrationField::mounting_of_right};
   } else if (change.kind == FindingKind::stereo_sync) {
     Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
     finding.measured = fmt::format("the right image is exposed {:.2f} +- {:.2f} ms {} the left one of the same stamp",

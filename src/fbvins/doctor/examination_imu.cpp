@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The IMU compared with the images: rotation, motion, acceleration.
+// The gyroscope compared with the rotation that the images show.
 #include "fbvins/doctor/examination.hpp"
 
 #include <fmt/format.h>
@@ -25,7 +25,7 @@ constexpr double kLeastSecondAxis_rad = 2.5e-3;
 constexpr double kMostScale = 1.7;
 /// Share of saturated readings beyond which the rest says little about scale and axes.
 constexpr double kMostCutOff = 0.2;
-constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kBaselinePractical = 0.03;
+constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyroBiasPractical_radps = 0.1;
 
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
 
@@ -149,29 +149,50 @@ void Examination::motion() {
   rotation(fit);
   offset_s_ = fit.offset_s;
   gyro_bias_ = fit.gyro_bias_radps;
-  for (const MotionChange& change : fit.changes) {
-    const Eigen::VectorXd sigma = change.covariance.diagonal().cwiseSqrt();
-    if (change.kind == FindingKind::gyro_scale) {
-      Finding& finding = found(change.kind, 100 * (std::exp(-change.amount(0)) - 1), 100 * sigma(0), "%");
-      finding.measured = fmt::format("the gyroscope's readings are {:.1f} +- {:.1f} % too large", finding.size, finding.sigma);
-      finding.expected = "within 1 % of the rotation that the images show";
-      finding.advice =
-          fmt::format("multiply the gyroscope's readings by {:.4f}, or look up its range", std::exp(change.amount(0)));
-    } else if (change.kind == FindingKind::rolling_shutter) {
-      Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
-      finding.measured =
-          fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first", finding.size, finding.sigma);
-      finding.expected = "0: all lines at once";
-      finding.advice = "use a global shutter; rolling shutters are not modelled";
-    } else if (change.kind == FindingKind::focal_length && fit.log_focal) {
-      continue;
-    } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
-               change.kind == FindingKind::distortion) {
-      // If one lens alone were wrong, the stereo pair would show it.
-      const bool both = change.kind != FindingKind::principal_point && pair_.judged && pair_.changes.empty();
-      lens(change.kind, both ? WhichLens::both : WhichLens::left, change.amount, sigma, change.explained_px);
-    }
+  gyro_bias(fit);
+  out_.predicted_px = prediction_error_px(pairs_, imu_, {evidence_.rig, evidence_.rig.time_offset_s});
+  for (const MotionChange& change : fit.changes)
+    if (!(change.kind == FindingKind::focal_length && fit.log_focal)) motion_change(change);
+}
+
+void Examination::motion_change(const MotionChange& change) {
+  const Eigen::VectorXd sigma = change.covariance.diagonal().cwiseSqrt();
+  if (change.kind == FindingKind::gyro_scale) {
+    const std::string axis = change.axis < 0 ? "" : fmt::format(" about {}", "xyz"[change.axis]);
+    Finding& finding = found(change.kind, 100 * (std::exp(-change.amount(0)) - 1), 100 * sigma(0), "%");
+    finding.measured =
+        fmt::format("the gyroscope's readings{} are {:.1f} +- {:.1f} % too large", axis, finding.size, finding.sigma);
+    finding.expected = "within 1 % of the rotation that the images show";
+    finding.advice =
+        fmt::format("multiply the gyroscope's readings{} by {:.4f}, or look up its range", axis, std::exp(change.amount(0)));
+    Vec3 factor = Vec3::Ones();
+    for (int i = 0; i < 3; ++i)
+      if (change.axis < 0 || change.axis == i) factor(i) = std::exp(change.amount(0));
+    imu_ = imu_.with_gyro(factor.asDiagonal());
+    gyro_bias_ = factor.cwiseProduct(gyro_bias_);
+  } else if (change.kind == FindingKind::rolling_shutter) {
+    Finding& finding = found(change.kind, 1e3 * change.amount(0), 1e3 * sigma(0), "ms");
+    finding.measured =
+        fmt::format("an image's last line is exposed {:.1f} +- {:.1f} ms after its first", finding.size, finding.sigma);
+    finding.expected = "0: all lines at once";
+    finding.advice = "use a global shutter; rolling shutters are not modelled";
+  } else if (change.kind == FindingKind::focal_length || change.kind == FindingKind::principal_point ||
+             change.kind == FindingKind::distortion) {
+    // If one lens alone were wrong, the stereo pair would show it.
+    const bool both = change.kind != FindingKind::principal_point && pair_.judged && pair_.changes.empty();
+    lens(change.kind, both ? WhichLens::both : WhichLens::left, change.amount, sigma, change.explained_px);
   }
+}
+
+void Examination::gyro_bias(const MotionFit& fit) {
+  const Vec3& bias = fit.gyro_bias_radps;
+  const double sigma = fit.gyro_bias_sigma_radps.maxCoeff();
+  if (bias.norm() < kGyroBiasPractical_radps || bias.norm() < kSignificant * sigma) return;
+  Finding& finding = found(FindingKind::gyro_bias, bias.norm(), sigma, "rad/s");
+  finding.measured = fmt::format("the gyroscope's bias is ({:.3f}, {:.3f}, {:.3f}) +- {:.3f} rad/s", bias.x(), bias.y(), bias.z(),
+                                 finding.sigma);
+  finding.expected = fmt::format("less than {} rad/s", kGyroBiasPractical_radps);
+  finding.advice = "let the driver measure it at rest and subtract it, or subtract this from the readings";
 }
 
 void Examination::time_offset(const MotionFit& fit) {
@@ -183,7 +204,7 @@ void Examination::time_offset(const MotionFit& fit) {
   finding.expected = fmt::format("{:.1f} ms by the calibration (t_imu = t_image + {:.5f} s)", 1e3 * evidence_.rig.time_offset_s,
                                  evidence_.rig.time_offset_s);
   finding.advice = "stamp both at the moment of measuring, or give the offset to the calibration";
-  finding.corrected = time_line(fit.offset_s, style_);
+  finding.fields = {CalibrationField::time_offset};
   rig_.time_offset_s = fit.offset_s;
 }
 
@@ -201,42 +222,7 @@ void Examination::rotation(const MotionFit& fit) {
                   finding.size, finding.sigma, axis.x(), axis.y(), axis.z());
   finding.expected = "less than 1 deg";
   finding.advice = "correct the cameras' extrinsics (the translations are unchanged), or mount the IMU as calibrated";
-  finding.corrected = mounting_lines(rig_, style_, true);
-}
-
-void Examination::accelerations() {
-  const AccelFit fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
-  measured(fmt::format(
-      "accelerations seen: {:.2f} m/s^2, {:.1f} % unexplained by the accelerometer ({:.1f} % with its axes as delivered, best: {}); scale {:.4f} +- {:.4f}",
-      fit.acceleration_mps2, 100 * fit.unexplained, 100 * fit.unexplained_as_named, axes_text(fit.axes), fit.scale,
-      fit.scale_sigma));
-  if (!fit.seen) {
-    not_judged("axes of the accelerometer, length of the baseline: the rig hardly accelerated");
-    return;
-  }
-  if (fit.axes != Mat3::Identity() && fit.unexplained_as_named > 2 * fit.unexplained + 0.05) {
-    Finding& finding = found(FindingKind::accel_axes, 100 * fit.unexplained_as_named, 0, "% unexplained");
-    finding.measured = fmt::format(
-        "with the accelerometer's axes as delivered {:.0f} % of the acceleration that the images show is unexplained, with ({}) {:.0f} %",
-        finding.size, axes_text(fit.axes), 100 * fit.unexplained);
-    finding.expected = "(x, y, z), as the gyroscope's";
-    finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
-  } else if (fit.axes != Mat3::Identity()) {
-    return;
-  }
-  const double factor = accel_unit_ / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
-  if (std::abs(factor - 1) < kBaselinePractical || std::abs(factor - 1) < kSignificant * sigma) return;
-  const double length = rig_.T_C1C0().p.norm();
-  Finding& finding = found(FindingKind::baseline_length, 1e3 * length * (1 - factor), 1e3 * length * sigma, "mm");
-  finding.measured =
-      fmt::format("the accelerometer says that the baseline is {:.1f} +- {:.1f} mm long", 1e3 * length * factor, finding.sigma);
-  finding.expected = fmt::format("{:.1f} mm by the calibration", 1e3 * length);
-  finding.advice =
-      "correct the right camera's position (the calibration board's squares were given a wrong size, or the camera was moved)";
-  Pose<C1, C0> T_C1C0 = rig_.T_C1C0();
-  T_C1C0.p *= factor;
-  rig_.T_BC1 = rig_.T_BC0 * T_C1C0.inverse();
-  finding.corrected = mounting_lines(rig_, style_, false);
+  finding.fields = {CalibrationField::mounting_of_left, CalibrationField::mounting_of_right};
 }
 
 }  // namespace fbvins

@@ -68,4 +68,10 @@ ImuSeries ImuSeries::with_gyro(const Mat3& gyro) const {
   return ImuSeries(changed);
 }
 
+ImuSeries ImuSeries::with_accel(Duration later) const {
+  std::vector<ImuSample> changed = samples_;
+  for (ImuSample& sample : changed) sample.accel_mps2 = at(sample.t + later).accel_mps2;
+  return ImuSeries(changed);
+}
+
 }  // namespace fbvins

@@ -30,6 +30,8 @@ class ImuSeries {
   ImuSegment segment(Time a, Time b) const;
   /// The same readings with every angular rate multiplied by `gyro` (other axes or units).
   ImuSeries with_gyro(const Mat3& gyro) const;
+  /// The same angular rates, each with the specific force that was read `later` after it.
+  ImuSeries with_accel(Duration later) const;
 
  private:
   std::size_t first_after(Time t) const;

@@ -12,11 +12,17 @@ namespace {
 
 using namespace doctor::motion;
 
+/// One axis' scale must explain more than that of all, which it does not where the rig turns about that axis only.
+constexpr double kRareAxis = 1.03;
+
 const std::vector<ChangeGroup>& groups() {
   static const std::vector<ChangeGroup> all{
       {FindingKind::time_offset, WhichLens::left, {kTime}, 3e-3},
       {FindingKind::imu_camera_rotation, WhichLens::left, {kRotation, kRotation + 1, kRotation + 2}, 0.0175},
       {FindingKind::gyro_scale, WhichLens::left, {kScale}, 0.03},
+      {FindingKind::gyro_scale, WhichLens::left, {kAxis}, 0.03, kRareAxis},
+      {FindingKind::gyro_scale, WhichLens::left, {kAxis + 1}, 0.03, kRareAxis},
+      {FindingKind::gyro_scale, WhichLens::left, {kAxis + 2}, 0.03, kRareAxis},
       {FindingKind::rolling_shutter, WhichLens::left, {kRolling}, 4e-3},
       {FindingKind::focal_length, WhichLens::left, {kFocal}, 0.02},
       {FindingKind::principal_point, WhichLens::left, {kCentre, kCentre + 1}, 8},
@@ -64,6 +70,13 @@ std::vector<FoundChange> search(MotionProblem& problem, bool focal_doubted) {
 
 }  // namespace
 
+double prediction_error_px(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start) {
+  MotionProblem problem(pairs, imu, start);
+  problem.free = kAlwaysFree;
+  if (problem.pairs() >= kFewestPairs) problem.converge();
+  return problem.typical_error();
+}
+
 MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start) {
   MotionFit fit;
   MotionProblem problem(pairs, imu, start);
@@ -80,7 +93,8 @@ MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, 
   // The last solution has all changes in it: those found early are estimated better together with the later ones.
   for (const auto& [group, explained] : found) {
     const Amount amount = amount_of(*group, problem, *last);
-    fit.changes.push_back({group->kind, amount.value, amount.covariance, explained});
+    const int axis = group->unknowns.front() - kAxis;
+    fit.changes.push_back({group->kind, amount.value, amount.covariance, explained, axis >= 0 && axis < 3 ? axis : -1});
   }
   const Hypothesis at = problem.hypothesis();
   fit.remaining_px = problem.typical_error();
@@ -88,6 +102,7 @@ MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, 
   const Eigen::VectorXd sigma = last->covariance.diagonal().cwiseSqrt();
   fit.offset_sigma_s = sigma(0);
   fit.rotation_sigma_rad = sigma.segment<3>(1);
+  fit.gyro_bias_sigma_radps = sigma.segment<3>(4);
   if (!start.focal_doubted) return fit;
   const auto place = std::find(problem.free.begin(), problem.free.end(), +kFocal) - problem.free.begin();
   fit.log_focal = problem.x(kFocal), fit.log_focal_sigma = sigma(place);

@@ -27,6 +27,7 @@ struct MotionChange {
   Eigen::VectorXd amount;  ///< added to the start: s, rad (R_CB Exp(amount)), logarithm of a factor, px
   Eigen::MatrixXd covariance;
   double explained_px = 0;
+  int axis = -1;  ///< of the gyroscope, where it is the scale of one
 };
 
 struct MotionFit {
@@ -39,6 +40,7 @@ struct MotionFit {
   /// Of offset and rotation, whether they are changes or not.
   double offset_sigma_s = 0;
   Vec3 rotation_sigma_rad = Vec3::Zero();
+  Vec3 gyro_bias_sigma_radps = Vec3::Zero();
   /// Logarithm of the factor by which to multiply the focal length, where it was in doubt.
   std::optional<double> log_focal = {};
   double log_focal_sigma = 0;
@@ -46,5 +48,8 @@ struct MotionFit {
 };
 
 MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
+
+/// Typical error of a predicted feature with the start as it is, px.
+double prediction_error_px(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
 
 }  // namespace fbvins

@@ -24,15 +24,17 @@ Hypothesis::Hypothesis(const MotionStart& start, const VectorXd& x)
       R_CB(start.rig.T_BC0.R().transpose() * so3_exp(Vec3(x.segment<3>(kRotation))).toRotationMatrix()),
       offset(Duration::from_seconds(start.offset_s + x(kTime))),
       bias(x.segment<3>(kBias)),
-      scale(std::exp(x(kScale))),
+      scale((x.segment<3>(kAxis).array() + x(kScale)).exp().matrix()),
       rolling_s(x(kRolling)) {}
 
 }  // namespace doctor::motion
 
 namespace {
 
-constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.1, 0.3, 50, 50, 0.2, 0.2};
-constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
+constexpr std::array<double, kUnknowns> kPriorSigma{0.5, 0.5, 0.5, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3,
+                                                    0.3, 0.3, 0.1, 0.3, 50,  50,  0.2, 0.2};
+constexpr std::array<double, kUnknowns> kStep{1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4,
+                                              1e-4, 1e-4, 1e-5, 1e-5, 1e-2, 1e-2, 1e-4, 1e-4};
 
 constexpr int kIterations = 4;
 constexpr double kCap_px = 3, kHuberSigmas = 2, kLeastSigma_px = 0.03;
@@ -48,7 +50,7 @@ struct PredictedTurn {
 
   PredictedTurn(const Hypothesis& h, const FramePair& pair, const ImuSeries& imu) {
     const Time a = pair.a + h.offset, b = pair.b + h.offset;
-    const Vec3 turn_B = h.scale * so3_log(integrate_gyro(imu.segment(a, b), h.bias));
+    const Vec3 turn_B = h.scale.cwiseProduct(so3_log(integrate_gyro(imu.segment(a, b), h.bias)));
     R_ba = so3_exp(-(h.R_CB * turn_B)).toRotationMatrix();
     rate_a = h.R_CB * (imu.at(a).gyro_radps - h.bias);
     rate_b = h.R_CB * (imu.at(b).gyro_radps - h.bias);

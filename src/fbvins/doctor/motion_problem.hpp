@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private to the doctor: errors of features predicted from image to image with the gyroscope's rotation, as a least-squares
 // problem in changes of the setup. The unknowns: rotation (R_CB Exp(x), rad), time offset (s), gyroscope's bias (rad/s) and
-// logarithm of its scale, time from an image's first line to its last (s), and of the left lens logarithm of the focal length,
-// principal point (px), radial coefficients.
+// logarithm of its scale and of that of each axis, time from an image's first line to its last (s), and of the left lens
+// logarithm of the focal length, principal point (px), radial coefficients.
 #pragma once
 
 #include <optional>
@@ -20,11 +20,12 @@ enum : int {
   kTime = 3,
   kBias = 4,
   kScale = 7,
-  kRolling = 8,
-  kFocal = 9,
-  kCentre = 10,
-  kRadial = 12,
-  kUnknowns = 14
+  kAxis = 8,
+  kRolling = 11,
+  kFocal = 12,
+  kCentre = 13,
+  kRadial = 15,
+  kUnknowns = 17
 };
 
 /// The setup of the start, changed by x; made once for all pairs.
@@ -32,8 +33,8 @@ struct Hypothesis {
   Camera camera;
   Mat3 R_CB;
   Duration offset;
-  Vec3 bias;
-  double scale, rolling_s;
+  Vec3 bias, scale;
+  double rolling_s;
 
   Hypothesis(const MotionStart& start, const Eigen::VectorXd& x);
 };

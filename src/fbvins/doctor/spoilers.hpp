@@ -20,9 +20,9 @@ namespace fbvins {
 
 struct Spoiler {
   std::string name;
-  FindingKind kind;      ///< what the doctor should find
-  double size = 0;       ///< and how large, in that finding's unit; 0: not checked
-  double tolerance = 0;  ///< largest difference from `size`
+  FindingKind kind = FindingKind::gyro_units;  ///< what the doctor should find
+  double size = 0;                             ///< and how large, in that finding's unit; 0: not checked
+  double tolerance = 0;                        ///< largest difference from `size`
   std::function<void(StereoRig&)> rig = {};
   std::function<void(ImuSample&)> reading = {};
   std::function<void(StereoFrame&)> frame = {};

@@ -7,6 +7,7 @@
 
 #include <fstream>
 
+#include "fbvins/io/kalibr_test_files.hpp"
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
@@ -194,6 +195,21 @@ TEST(Calibration, KalibrImuWithAndWithoutItsLevel) {
     EXPECT_EQ(noise->rate_hz, 200);
   }
   EXPECT_EQ(parse_kalibr_imu({"imu.yaml", "imu0: {}\n"}).error().message, "imu.yaml: gyroscope_noise_density: is missing");
+}
+
+TEST(Calibration, KalibrsImuMayLieInTheFileOfTheCameras) {
+  StereoRig rig;
+  rig.left = rig.right = Camera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
+  rig.T_BC1.p = Vec3(0.1, 0, 0);
+  const KalibrFiles files(rig);
+  ImuNoise otherwise;
+  otherwise.rate_hz = 100;
+  EXPECT_EQ(load_kalibr(files.camchain(), std::nullopt, otherwise)->imu_noise.rate_hz, 100);
+  std::ofstream(files.camchain(), std::ios::app) << "imu0:\n  update_rate: 400\n  accelerometer_noise_density: 0.01\n"
+                                                    "  accelerometer_random_walk: 0.001\n  gyroscope_noise_density: 0.001\n"
+                                                    "  gyroscope_random_walk: 0.0001\n";
+  EXPECT_EQ(load_kalibr(files.camchain(), std::nullopt, otherwise)->imu_noise.rate_hz, 400);
+  EXPECT_EQ(load_kalibr(files.camchain(), files.imu())->imu_noise.rate_hz, rig.imu_noise.rate_hz);
 }
 
 TEST(Calibration, DeepNestingIsAnErrorNotACrash) {

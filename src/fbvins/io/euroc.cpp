@@ -141,10 +141,9 @@ class EurocReader {
 
   Result<void> read_kalibr_calibration(const ImuSensor& imu) {
     const auto& path = options_.kalibr_imu;
-    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path));
+    Result<StereoRig> rig = load_kalibr(options_.kalibr_camchain, path.empty() ? std::nullopt : std::optional(path), imu.noise);
     if (!rig) return rig.error();
     take(*rig);
-    if (path.empty()) out_.rig.imu_noise = imu.noise;
     return {};
   }
 

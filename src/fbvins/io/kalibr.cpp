@@ -73,14 +73,18 @@ Result<ImuNoise> parse_kalibr_imu(YamlReader yaml) {
   return noise;
 }
 
-Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path) {
+Result<StereoRig> load_kalibr(const std::string& camchain_path, const std::optional<std::string>& imu_path,
+                              const ImuNoise& otherwise) {
   Result<std::string> camchain = read_file(camchain_path, kLargestYaml_bytes);
   if (!camchain) return camchain.error();
-  Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *std::move(camchain)}, files_beside(camchain_path));
-  if (!rig || !imu_path) return rig;
-  Result<std::string> imu = read_file(*imu_path, kLargestYaml_bytes);
+  Result<StereoRig> rig = parse_kalibr_camchain({camchain_path, *camchain}, files_beside(camchain_path));
+  if (!rig) return rig;
+  rig->imu_noise = otherwise;
+  const YamlReader same_file(camchain_path, *camchain);
+  if (!imu_path && !same_file.has(same_file.root(), "imu0")) return rig;
+  Result<std::string> imu = imu_path ? read_file(*imu_path, kLargestYaml_bytes) : *std::move(camchain);
   if (!imu) return imu.error();
-  Result<ImuNoise> noise = parse_kalibr_imu({*imu_path, *std::move(imu)});
+  Result<ImuNoise> noise = parse_kalibr_imu({imu_path.value_or(camchain_path), *std::move(imu)});
   if (!noise) return noise.error();
   rig->imu_noise = *noise;
   return rig;

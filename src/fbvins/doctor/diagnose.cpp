@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The calibration as given against common mistakes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "fbvins/doctor/common_mistakes.hpp"
+#include "fbvins/doctor/diagnose.hpp"
+#include "fbvins/doctor/gather.hpp"
+
+namespace fbvins {
+namespace {
+
+std::shared_ptr<const Image> flipped(const std::shared_ptr<const Image>& image, ImageFlip flip) {
+  if (!image) return image;
+  const int width = image->width(), height = image->height();
+  auto out = std::make_shared<Image>(width, height);
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* from = image->row(flip == ImageFlip::top_bottom ? height - 1 - y : y);
+    if (flip == ImageFlip::left_right) std::reverse_copy(from, from + width, out->row(y));
+    else std::copy(from, from + width, out->row(y));
+  }
+  return out;
+}
+
+Result<Evidence> gather_from(const StereoRig& rig, const Replay& replay, ImageFlip flip) {
+  EvidenceGatherer gatherer(rig);
+  const Result<void> played = replay([&](SensorEvent event) {
+    if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && flip != ImageFlip::none) {
+      frame->left = flipped(frame->left, flip);
+      frame->right = flipped(frame->right, flip);
+    }
+    return gatherer.push(event);
+  });
+  if (!played) return played.error();
+  return gatherer.finish();
+}
+
+std::string px_text(const std::optional<double>& px) { return px ? fmt::format("{:.2f} px", *px) : "none"; }
+
+Finding finding_of(const CommonMistake& mistake, const Diagnosis& as_given, const Diagnosis& without) {
+  Finding finding;
+  finding.kind = mistake.kind;
+  finding.measured = fmt::format(
+      "with {}, one cause explains what else are {} findings and {} points that cannot be judged; epipolar error {} (as given {}), error of a predicted feature {} (as given {})",
+      mistake.what, as_given.findings.size(), as_given.not_judged.size(), px_text(without.epipolar_px),
+      px_text(as_given.epipolar_px), px_text(without.predicted_px), px_text(as_given.predicted_px));
+  finding.expected = "the calibration as given explains it";
+  finding.advice = mistake.advice;
+  finding.fields = mistake.fields;
+  return finding;
+}
+
+/// As much is judged as with the calibration as given, and the cause with what is left to find costs less.
+bool explains_better(const Diagnosis& with_it, const Diagnosis& other, int cost_of_other) {
+  return with_it.epipolar_px && with_it.predicted_px && with_it.not_judged.size() <= other.not_judged.size() &&
+         cost_of(with_it) + 1 < cost_of_other;
+}
+
+}  // namespace
+
+Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+  const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
+  if (!evidence) return evidence.error();
+  return examine(*evidence, style);
+}
+
+Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+  const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
+  if (!evidence) return evidence.error();
+  const Diagnosis as_given = examine(*evidence, style);
+  if (!is_strange(as_given)) return as_given;
+  Diagnosis best = as_given;
+  int least = cost_of(as_given);
+  for (const CommonMistake& mistake : common_mistakes(rig)) {
+    if (!may_be(mistake, *evidence, as_given)) continue;
+    const Result<Evidence> other = gather_from(mistake.rig, replay, mistake.flip);
+    if (!other) return other.error();
+    Diagnosis with_it = examine(*other, style);
+    if (!explains_better(with_it, as_given, least)) continue;
+    least = cost_of(with_it) + 1;
+    with_it.findings.insert(with_it.findings.begin(), finding_of(mistake, as_given, with_it));
+    with_it.epipolar_px = as_given.epipolar_px, with_it.predicted_px = as_given.predicted_px;
+    write_lines(with_it.findings, with_it.rig, style);
+    best = std::move(with_it);
+  }
+  return best;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// The doctor on a recording that can be played again. Where something is very wrong, the calibration as given is compared with
+// those that common mistakes make of a right one (an inverse transform, images upside down or mirrored, lenses of another image
+// size, exchanged cameras): each is examined as a whole, and what leaves the fewest figures open is told. Pure functions.
+//
+//   const Replay replay = [&](const TakeEvent& take) -> Result<void> { ... while (auto e = data.next()) if (!take(std::move(*e)))
+//   break; ... }; Result<Diagnosis> diagnosis = diagnose(rig, replay, CalibrationStyle::euroc);
+#pragma once
+
+#include <functional>
+
+#include "fbvins/core/result.hpp"
+#include "fbvins/doctor/doctor.hpp"
+#include "fbvins/types/sensor_event.hpp"
+
+namespace fbvins {
+
+/// False once enough has been seen.
+using TakeEvent = std::function<bool(SensorEvent)>;
+/// Plays the recording from its start.
+using Replay = std::function<Result<void>(const TakeEvent&)>;
+
+Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style);
+
+/// The calibration as given, not compared with common mistakes.
+Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style);
+
+}  // namespace fbvins

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/mend.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "fbvins/camera/check_rig.hpp"
+#include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/doctor/common_mistakes.hpp"
+
+namespace fbvins {
+namespace {
+
+/// What is hidden by a large error shows when that is mended, and is mended in the next round.
+constexpr int kRounds = 3;
+/// Errors may be larger by this, which repeated examinations of the same recording differ by.
+constexpr double kSameShare = 1.1, kSame_px = 0.1;
+
+bool concerns_calibration(const Finding& finding) {
+  return !finding.fields.empty() || finding.kind == FindingKind::swapped_images;
+}
+
+bool concerns_calibration(const Diagnosis& diagnosis) {
+  return std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                     [](const Finding& f) { return concerns_calibration(f); });
+}
+
+std::string kinds_of(const std::vector<Finding>& findings) {
+  std::string text;
+  for (const Finding& finding : findings) {
+    if (!text.empty()) text += ", ";
+    text += to_string(finding.kind);
+  }
+  return text.empty() ? "none" : text;
+}
+
+/// Of the images as they are named.
+StereoRig as_named(const Diagnosis& diagnosis) { return diagnosis.swapped ? swapped_rig(diagnosis.rig) : diagnosis.rig; }
+
+Error no(std::string why) { return {ErrorCode::malformed, std::move(why)}; }
+
+Result<void> fits_no_worse(const std::optional<double>& before, const std::optional<double>& after, const char* what) {
+  if (!before) return {};
+  if (!after) return no(fmt::format("the {} can no longer be judged", what));
+  if (*after <= kSameShare * *before + kSame_px) return {};
+  return no(fmt::format("the {} grows from {:.2f} to {:.2f} px", what, *before, *after));
+}
+
+}  // namespace
+
+Result<void> is_better(const Diagnosis& before, const Diagnosis& after) {
+  if (cost_of(after) >= cost_of(before))
+    return no(fmt::format("as much is wrong with the corrected calibration as before (before: {}; with it: {})",
+                          kinds_of(before.findings), kinds_of(after.findings)));
+  if (auto same = fits_no_worse(before.epipolar_px, after.epipolar_px, "epipolar error"); !same) return same;
+  return fits_no_worse(before.predicted_px, after.predicted_px, "error of a predicted feature");
+}
+
+Result<Mended> mend(const StereoRig& rig, const Diagnosis& before, const Replay& replay, CalibrationStyle style) {
+  Mended mended;
+  mended.after = before;
+  if (!concerns_calibration(before)) {
+    mended.why_not = before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be mended in a calibration";
+    return mended;
+  }
+  if (std::any_of(before.findings.begin(), before.findings.end(),
+                  [](const Finding& f) { return f.kind == FindingKind::images_mirrored; })) {
+    mended.why_not = "no calibration describes mirrored images";
+    return mended;
+  }
+  if (rig.camera_count() > 2) {
+    mended.why_not = "the doctor judges a pair, and there are more cameras: --camera both takes the first two";
+    return mended;
+  }
+  for (int round = 0; round < kRounds && concerns_calibration(mended.after); ++round) {
+    const StereoRig corrected = as_named(mended.after);
+    Result<void> judged = check_rig(corrected, "the corrected calibration");
+    if (judged) {
+      Result<Diagnosis> after = examine_with(corrected, replay, style);
+      if (!after) return after.error();
+      judged = is_better(mended.after, *after);
+      if (judged) mended.rig = corrected, mended.after = *std::move(after);
+    }
+    if (judged) continue;
+    if (!mended.rig) mended.why_not = judged.error().message;
+    break;
+  }
+  return mended;
+}
+
+}  // namespace fbvins
