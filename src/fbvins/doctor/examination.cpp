@@ -47,7 +47,9 @@ void Examination::readings() {
   for (Finding& finding : check_reading_units(evidence_.imu)) {
     if (finding.kind == FindingKind::accel_units) {
       const double gravity = finding.size * kGravity_mps2;
-      accel_unit_ = kGravity_mps2 / gravity;
+      // What is off by less than a factor of two is no other unit, but a scale or a bias, which the images tell.
+      may_be_bias_ = finding.size > 0.5 && finding.size < 2;
+      if (!may_be_bias_) accel_unit_ = kGravity_mps2 / gravity;
       for (const double unit : {1.0, 1000.0})
         if (std::abs(gravity / unit - 1) < kUnitTolerance) accel_unit_ = 9.80665 / unit;
     }

@@ -95,7 +95,8 @@ class Examination {
     bool judged = false;
   };
   PairShown pair_;
-  double accel_unit_ = 1;  // m/s^2 for a reading of 1
+  double accel_unit_ = 1;     // m/s^2 for a reading of 1
+  bool may_be_bias_ = false;  // a mean reading that is not gravity's
   double offset_s_ = 0;
   Vec3 gyro_bias_ = Vec3::Zero();
   bool turns_seen_ = false, turns_agree_ = false, motion_agrees_ = false;

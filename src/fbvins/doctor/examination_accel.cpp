@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -96,6 +97,11 @@ void Examination::accelerations() {
   }
   if (fit.axes == Mat3::Identity()) accel_bias(fit);
   accel_scale(fit);
+  const auto told = [&](FindingKind kind) {
+    return std::ranges::any_of(out_.findings, [&](const Finding& f) { return f.kind == kind; });
+  };
+  if (may_be_bias_ && (told(FindingKind::accel_bias) || told(FindingKind::accel_scale)))
+    std::erase_if(out_.findings, [](const Finding& f) { return f.kind == FindingKind::accel_units; });
 }
 
 void Examination::accel_axes(const AccelFit& fit) {
@@ -111,7 +117,15 @@ bool Examination::position(const AccelFit& fit) {
   const double away_m = fit.lever_m.norm(), sigma_m = fit.lever_sigma_m.maxCoeff();
   if (away_m < kPositionPractical_m || away_m < kSignificant * sigma_m) return false;
   if (fit.unexplained_elsewhere > kElsewhereLeaves * fit.unexplained) return false;
+  // An IMU that is turned sees the cameras elsewhere, too.
+  const Mat3 turn = rig_.T_BC0.R() * evidence_.rig.T_BC0.R().transpose();
+  const Vec3 with_turn = turn * rig_.T_BC0.p - rig_.T_BC0.p;
   rig_.T_BC0.p += fit.lever_m, rig_.T_BC1.p += fit.lever_m;
+  for (Finding& rotation : out_.findings)
+    if (rotation.kind == FindingKind::imu_camera_rotation && (fit.lever_m - with_turn).norm() < kPositionPractical_m) {
+      rotation.advice = "correct the cameras' poses on the IMU, their places with their rotation, or mount the IMU as calibrated";
+      return true;
+    }
   Finding& finding = found(FindingKind::imu_camera_position, 1e2 * away_m, 1e2 * sigma_m, "cm");
   finding.measured = fmt::format(
       "the cameras are ({:.1f}, {:.1f}, {:.1f}) +- {:.1f} cm, in the IMU's axes, from where the calibration has them on the IMU",

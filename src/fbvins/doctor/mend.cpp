@@ -60,13 +60,13 @@ Result<void> is_better(const Diagnosis& before, const Diagnosis& after) {
 Result<Mended> mend(const StereoRig& rig, const Diagnosis& before, const Replay& replay, CalibrationStyle style) {
   Mended mended;
   mended.after = before;
-  if (!concerns_calibration(before)) {
-    mended.why_not = before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be mended in a calibration";
-    return mended;
-  }
   if (std::any_of(before.findings.begin(), before.findings.end(),
                   [](const Finding& f) { return f.kind == FindingKind::images_mirrored; })) {
     mended.why_not = "no calibration describes mirrored images";
+    return mended;
+  }
+  if (!concerns_calibration(before)) {
+    mended.why_not = before.findings.empty() ? "nothing is wrong" : "nothing of what is wrong can be mended in a calibration";
     return mended;
   }
   if (rig.camera_count() > 2) {
