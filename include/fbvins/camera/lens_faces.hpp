@@ -12,17 +12,17 @@
 
 #include <cstdint>
 #include <memory>
-#include <numbers>
 #include <vector>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/core/angle.hpp"
 #include "fbvins/types/calibration.hpp"
 #include "fbvins/types/tracking.hpp"
 
 namespace fbvins {
 
 /// Angle from a wide lens' axis to the edge of the face that looks ahead, rad.
-inline constexpr double kFrontFace_rad = 55 * std::numbers::pi / 180;
+inline constexpr double kFrontFace_rad = 55 * kDegree;
 
 /// The faces of a camera, the one that looks ahead first, with the lens' own axes; neighbours overlap by the margin that features
 /// keep from a mask. All have the whole image. The camera alone, as it is, where it does not see backwards.

@@ -10,8 +10,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kDegrees = std::numbers::pi / 180;
-
 /// Lenses of 200 to 220 degrees of each model that has them.
 std::vector<Camera> wide_lenses() {
   return {{KannalaBrandt{150, 150, 256, 255, 0.02, -0.01, 0.003, 0}, 512, 512},
@@ -96,7 +94,7 @@ TEST(LensFaces, TheFacesShowAllOfTheImage) {
           ++shown;
           const auto n = face.camera.undistort(px);
           ASSERT_TRUE(n);
-          EXPECT_LT(n->norm(), std::tan(75 * kDegrees));
+          EXPECT_LT(n->norm(), std::tan(75 * kDegree));
           const Vec3 in_body = face.T_BC.q * n->homogeneous().normalized();
           EXPECT_LT((in_body - T_BC.q * *ray).norm(), 1e-8);
         }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -118,8 +119,6 @@ double epipolar_error_px(const CommonMistake& mistake, const Evidence& evidence)
   }
   return median(errors);
 }
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// A factor that is that of no unit.
 bool is_odd_factor(double factor) { return factor > 0.3 && factor < 3; }
