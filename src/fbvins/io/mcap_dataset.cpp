@@ -43,6 +43,14 @@ struct ImagePlace {
   }
 };
 
+/// The number, from 2 on counted from 0, of the camera whose images a topic has: camera_topic().
+std::optional<std::size_t> further_camera(std::string_view topic) {
+  constexpr std::string_view kBefore = "/camera/";
+  if (topic.size() != kBefore.size() + 1 || !topic.starts_with(kBefore)) return std::nullopt;
+  const int camera = topic.back() - '0';
+  return camera >= 2 && camera < kMostCameras ? std::optional(static_cast<std::size_t>(camera - 2)) : std::nullopt;
+}
+
 class McapLoader : public FrameLoader {
  public:
   McapLoader(std::shared_ptr<const ByteSource> bytes, std::string name, const StereoRig& rig)
@@ -136,8 +144,7 @@ class RecordReader {
     if (topic == kLeftTopic) take_image(message, out_.info.left, &FrameEntry::left_file);
     if (topic == kRightTopic) take_image(message, out_.info.right, &FrameEntry::right_file);
     if (topic == kDepthTopic) take_depth(message);
-    for (int i = 2; i < kMostCameras; ++i)
-      if (topic == camera_topic(i)) take_further(message, static_cast<std::size_t>(i - 2));
+    if (const std::optional<std::size_t> further = further_camera(topic)) take_further(message, *further);
   }
 
   void take_imu(const McapMessage& message) {
@@ -191,31 +198,31 @@ class RecordReader {
       frame.more_files.resize(std::max(frame.more_files.size(), further + 1));
       return frame.more_files[further];
     };
-    FrameEntry* frame = take_beside(message, out_.info.more, &RosImage::is_grey, file_of);
-    if (frame == nullptr) return;
-    if (const Duration offset = read_image(message.data)->t - message.log_time; offset.ns != 0)
-      frame->offsets.set(static_cast<int>(further) + 2, offset);
+    const auto [frame, t] = take_beside(message, out_.info.more, &RosImage::is_grey, file_of);
+    if (frame != nullptr && t != message.log_time) frame->offsets.set(static_cast<int>(further) + 2, t - message.log_time);
   }
   void take_depth(const McapMessage& message) {
     (void)take_beside(message, out_.info.depth, &RosImage::is_depth, [](FrameEntry& f) -> std::string& { return f.depth_file; });
   }
 
-  /// An image of the frame that has the message's time; null where it is none. `file_of(frame)`: its place.
+  /// An image of the frame that has the message's time: that frame and the image's own time; null where it is no such image.
+  /// `file_of(frame)`: its place.
   template <class FileOf>
-  FrameEntry* take_beside(const McapMessage& message, CameraInfo& camera, bool (RosImage::*is_kind)() const, FileOf&& file_of) {
+  std::pair<FrameEntry*, Time> take_beside(const McapMessage& message, CameraInfo& camera, bool (RosImage::*is_kind)() const,
+                                           FileOf&& file_of) {
     ++camera.rows.rows;
     const std::optional<RosImage> image = read_image(message.data);
     if (!image || !((*image).*is_kind)() || image->empty()) {
       ++camera.rows.malformed;
       reader_.complain(message.offset, "this is no image of its topic's kind");
-      return nullptr;
+      return {nullptr, {}};
     }
     ++camera.listed;
     ends_with_image_ = true;
     FrameEntry& frame = frame_at(message.log_time, [&](FrameEntry& f) { return file_of(f).empty(); });
     file_of(frame) = ImagePlace{message.offset, message.data.size()}.name();
     frame.imu_before = out_.imu.size();
-    return &frame;
+    return {&frame, image->t};
   }
 
   /// A frame of that instant whose place for the image is empty, or a new one.
