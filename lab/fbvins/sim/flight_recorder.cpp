@@ -49,7 +49,7 @@ void FlightRecorder::gather(Eye& eye, double t_s, double exposure_s, int samples
   for (Face& face : eye.faces) face.renderer.begin();
   for (int i = 0; i < samples; ++i) {
     const double t = t_s + exposure_s * ((i + 0.5) / samples - 0.5);
-    for (Face& face : eye.faces) add_instant(eye, face, t, i, samples);
+    add_instant(eye, t, i, samples);
   }
   eye.faces.front().renderer.radiance(eye.radiance);
   if (eye.faces.front().shown != nullptr) join_faces(eye);
@@ -70,26 +70,27 @@ void FlightRecorder::join_faces(Eye& eye) {
   }
 }
 
-/// The middle line is read at t.
-void FlightRecorder::add_instant(Eye& eye, Face& face, double t_s, int sample, int samples) {
+/// The middle line is read at t. The faces of a lens are in one place.
+void FlightRecorder::add_instant(Eye& eye, double t_s, int sample, int samples) {
   const double line_s = options_.camera.line_delay_us * 1e-6, first_line = t_s - 0.5 * line_s * eye.height_px;
   const MotionState m = motion_(line_s > 0 ? first_line : t_s);
-  Pose<W, C0> T_WC = m.T_WB * face.T_BC;
-  T_WC.p += world_from_flight_;
+  const Vec3& p_BC = eye.faces.front().T_BC.p;
+  Instant instant;
+  instant.p_WC = m.T_WB * p_BC + world_from_flight_;
+  instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(p_BC);
+  instant.line_s = line_s;
+  instant.shift_px = place_in_pixel(sample);
   const LightState lamps = light_at(options_.light, *world_, t_s, static_cast<std::uint64_t>(options_.seed));
   eye.facets = world_->facets;
   for (Facet& f : eye.facets)
     if (f.lamp_group >= 0) f.emission *= static_cast<float>(lamps.group[static_cast<std::size_t>(f.lamp_group)]);
-  append_movers(*world_, t_s, T_WC.p, eye.facets);
+  append_movers(*world_, t_s, instant.p_WC, eye.facets);
   mix_light(bake_, *world_, eye.facets, lamps, options_.world.ambient, eye.light);
-  Instant instant;
-  instant.q_WC = T_WC.q;
-  instant.p_WC = T_WC.p;
-  instant.w_WC_C = face.T_BC.q.conjugate() * m.w_WB_B;
-  instant.v_WC = m.v_WB + m.T_WB.q * m.w_WB_B.cross(face.T_BC.p);
-  instant.line_s = line_s;
-  instant.shift_px = place_in_pixel(sample);
-  face.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
+  for (Face& face : eye.faces) {
+    instant.q_WC = (m.T_WB * face.T_BC).q;
+    instant.w_WC_C = face.T_BC.q.conjugate() * m.w_WB_B;
+    face.renderer.add(instant, eye.facets, eye.light, 1.0f / static_cast<float>(samples));
+  }
 }
 
 Image FlightRecorder::render_eye(Eye& eye, double t_s, std::int64_t frame) {

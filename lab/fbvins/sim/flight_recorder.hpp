@@ -46,7 +46,7 @@ class FlightRecorder {
   };
   void gather(Eye& eye, double t_s, double exposure_s, int samples);
   static void join_faces(Eye& eye);
-  void add_instant(Eye& eye, Face& face, double t_s, int sample, int samples);
+  void add_instant(Eye& eye, double t_s, int sample, int samples);
   Image render_eye(Eye& eye, double t_s, std::int64_t frame);
   Duration offset(std::size_t camera, double t_s) const;
 
