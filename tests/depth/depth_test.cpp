@@ -11,6 +11,7 @@
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/pipeline/system.hpp"
 #include "fbvins/sim/simulation.hpp"
+#include "tests/rendered_recording.hpp"
 
 namespace fbvins {
 namespace {
@@ -24,27 +25,14 @@ std::shared_ptr<const Image> plain(const Image& like, Rng& rng) {
   return image;
 }
 
-struct Recorded {
-  StereoRig rig;
-  std::vector<SensorEvent> events;
-  Trajectory<W> truth;
-};
-
 /// Rendered once.
-const Recorded& recorded() {
-  static const Recorded recorded = [] {
+const test::RenderedRecording& recorded() {
+  static const test::RenderedRecording recorded = [] {
     SimulationOptions options = *simulation_preset("weak-texture");
     options.seed = 21;
     options.rig = "rgbd";
     options.flight.duration_s = 6;
-    Result<DatasetContents> contents = simulate(options);
-    EXPECT_TRUE(contents.ok());
-    Recorded out;
-    for (const TrajectoryPoint& p : contents->ground_truth) out.truth.push_back({p.t, p.T_WB});
-    Dataset data(*std::move(contents), {});
-    out.rig = data.rig();
-    while (auto event = data.next()) out.events.push_back(std::move(*event));
-    return out;
+    return test::rendered(options);
   }();
   return recorded;
 }

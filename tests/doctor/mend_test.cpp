@@ -6,17 +6,13 @@
 
 #include "fbvins/doctor/mend.hpp"
 #include "fbvins/doctor/spoilers.hpp"
-#include "fbvins/io/dataset.hpp"
 #include "fbvins/sim/simulation.hpp"
+#include "tests/rendered_recording.hpp"
 
 namespace fbvins {
 namespace {
 
-/// A flight in memory.
-struct Flight {
-  StereoRig rig;
-  std::vector<SensorEvent> events;
-
+struct Flight : test::RenderedRecording {
   Replay replay(const Spoiler& spoiler = {}) const {
     return [this, spoiler](const TakeEvent& take) -> Result<void> {
       for (SensorEvent event : events) {
@@ -35,12 +31,7 @@ const Flight& handheld() {
     options.seed = 2;
     options.flight.duration_s = 8;
     options.image_rate_hz = 10;
-    Result<DatasetContents> contents = simulate(options);
-    EXPECT_TRUE(contents.ok());
-    Dataset data(*std::move(contents), {});
-    Flight out{data.rig(), {}};
-    while (auto event = data.next()) out.events.push_back(*std::move(event));
-    return out;
+    return Flight{test::rendered(options)};
   }();
   return flight;
 }

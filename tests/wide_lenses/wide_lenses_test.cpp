@@ -10,17 +10,12 @@
 #include "fbvins/eval/evaluation.hpp"
 #include "fbvins/pipeline/system.hpp"
 #include "fbvins/sim/simulation.hpp"
+#include "tests/rendered_recording.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr double kBlindFrom_s = 2.5;
-
-struct Recorded {
-  StereoRig rig;
-  std::vector<SensorEvent> events;
-  Trajectory<W> truth;
-};
 
 SimulationOptions options() {
   SimulationOptions options = *simulation_preset("fisheye");
@@ -31,17 +26,8 @@ SimulationOptions options() {
 }
 
 /// Rendered once.
-const Recorded& recorded() {
-  static const Recorded recorded = [] {
-    Result<DatasetContents> contents = simulate(options());
-    EXPECT_TRUE(contents.ok());
-    Recorded out;
-    for (const TrajectoryPoint& p : contents->ground_truth) out.truth.push_back({p.t, p.T_WB});
-    Dataset data(*std::move(contents), {});
-    out.rig = data.rig();
-    while (auto event = data.next()) out.events.push_back(std::move(*event));
-    return out;
-  }();
+const test::RenderedRecording& recorded() {
+  static const test::RenderedRecording recorded = test::rendered(options());
   return recorded;
 }
 
