@@ -25,7 +25,7 @@ namespace fbvins {
 inline constexpr double kFrontFace_rad = 55 * kDegree;
 
 /// The faces of a camera, the one that looks ahead first, with the lens' own axes; neighbours overlap by the margin that features
-/// keep from a mask. All have the whole image. The camera alone, as it is, where it does not see backwards.
+/// keep from a mask. All have the whole image. A camera that does not see backwards has one, itself.
 std::vector<MountedCamera> faces_of(const MountedCamera& camera);
 
 class LensFaces {

@@ -3,8 +3,8 @@
 // those that common mistakes make of a right one (an inverse transform, images upside down or mirrored, lenses of another image
 // size, exchanged cameras): each is examined as a whole, and what leaves the fewest figures open is told. Pure functions.
 //
-//   const Replay replay = [&](const TakeEvent& take) -> Result<void> { ... while (auto e = data.next()) if (!take(std::move(*e)))
-//   break; ... }; Result<Diagnosis> diagnosis = diagnose(rig, replay, CalibrationStyle::euroc);
+//   const Replay replay = [&](const TakeEvent& take) -> Result<void> { return recording.play(take); };
+//   Result<Diagnosis> diagnosis = diagnose(rig, replay, CalibrationStyle::euroc);
 #pragma once
 
 #include <functional>

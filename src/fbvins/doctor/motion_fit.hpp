@@ -49,7 +49,7 @@ struct MotionFit {
 
 MotionFit fit_motion(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
 
-/// Typical error of a predicted feature with the start as it is, px.
+/// Typical error of a predicted feature before the fit, px.
 double prediction_error_px(const std::vector<FramePair>& pairs, const ImuSeries& imu, const MotionStart& start);
 
 }  // namespace fbvins

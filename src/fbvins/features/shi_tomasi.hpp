@@ -38,6 +38,7 @@ class ShiTomasiDetector {
   /// what occupied cells have beside. None is nearer than min_distance_px (two thirds of it for the last
   /// kind) to another or to `existing`, nor near what the mask hides. Looks into a limited number of cells, in turn from call to
   /// call.
+  /// A mask that is given must live as long as the detector: its hidden cells are found once.
   /// Valid until the next call, so a detector that ends with the expression cannot be asked.
   const std::vector<Corner>& detect(const Pyramid& pyramid, std::span<const Vec2> existing, int wanted,
                                     const Mask* mask = nullptr) &;

@@ -53,7 +53,7 @@ struct System::Impl {
   };
 
   RunMode mode;
-  LensFaces lenses;  ///< the rig, and as it is flown: what the frontend and the estimator know
+  LensFaces lenses;  ///< makes of a wide lens the cameras that the frontend and the estimator are given
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
