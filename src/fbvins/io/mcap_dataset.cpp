@@ -337,6 +337,7 @@ class RecordReader {
     const McapDamage& damage = reader_.damage();
     DatasetInfo& info = out_.info;
     for (const FrameEntry& frame : out_.frames) {
+      if (!out_.rig.has_right()) break;
       info.left.unpaired += !frame.left_file.empty() && frame.right_file.empty();
       info.right.unpaired += !frame.right_file.empty() && frame.left_file.empty();
     }

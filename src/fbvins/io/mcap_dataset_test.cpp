@@ -207,6 +207,7 @@ TEST_F(FlightRecordTest, KeepsDepths) {
   auto data = open_dataset(path_);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_TRUE((*data)->rig().depth);
+  EXPECT_EQ((*data)->info().left.unpaired, 0) << "one camera has no partner";
   const std::vector<SensorEvent> back = drain(**data);
   ASSERT_EQ(back.size(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
