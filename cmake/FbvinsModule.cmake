@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# fbvins_module(NAME [COLD] [PLAIN] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... TEST_DEPS ...)
-# One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. DEPS and TEST_DEPS name modules
-# where they can, other libraries otherwise. COLD: compiled with -O1. A cold module must not instantiate products or
+# fbvins_module(NAME [COLD] [PLAIN] DEPS ... PRIVATE_DEPS ... SOURCES ... TESTS ... RELEASE_TESTS ... TEST_DEPS ...)
+# One static library fbvins_<NAME> and one test program fbvins_<NAME>_test beside it. RELEASE_TESTS, with the label `release`, are
+# another: statistics over many flights, which sanitizers would make minutes long. DEPS and TEST_DEPS name modules where they can, other
+# libraries otherwise. COLD: compiled with -O1. A cold module must not instantiate products or
 # decompositions of Eigen: the linker could use its slow copy of a template everywhere. PLAIN: without precompiled headers.
 # Users link components (FbvinsInstall.cmake).
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
@@ -11,6 +12,31 @@ if(FBVINS_BUILD_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)
 endif()
+
+# The modules that parse or fly. `./dev test` runs their unit tests once, under sanitizers, and all others in Release.
+set(FBVINS_SANITIZED_MODULES core geometry optim types camera imu features io bags eval mocap mavlink frontend estimator pipeline loop
+  live web ros2)
+set(FBVINS_TESTS all CACHE STRING "Unit tests to build: all; sanitized, of what parses and what flies; unsanitized, the others")
+set_property(CACHE FBVINS_TESTS PROPERTY STRINGS all sanitized unsanitized)
+if(FBVINS_BUILD_TESTS)
+  add_custom_target(sanitized_tests)
+endif()
+
+# Adds a test program, or none where FBVINS_TESTS does not want it. KIND: sanitized or unsanitized. Further arguments: as
+# gtest_discover_tests' PROPERTIES.
+function(fbvins_unit_tests PROGRAM KIND)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PROPERTIES" ${ARGN})
+  if(NOT FBVINS_BUILD_TESTS OR NOT ARG_SOURCES OR NOT FBVINS_TESTS MATCHES "^(all|${KIND})$")
+    return()
+  endif()
+  add_executable(${PROGRAM} ${ARG_SOURCES})
+  target_link_libraries(${PROGRAM} PRIVATE ${ARG_DEPS} fbvins_flags GTest::gtest_main)
+  fbvins_use_precompiled(${PROGRAM} test)
+  gtest_discover_tests(${PROGRAM} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600 ${ARG_PROPERTIES})
+  if(KIND STREQUAL "sanitized")
+    add_dependencies(sanitized_tests ${PROGRAM})
+  endif()
+endfunction()
 
 add_library(fbvins_flags INTERFACE)
 # Internal headers: for the sources of this repository, not for users of its libraries.
@@ -29,7 +55,7 @@ include(cmake/FbvinsPrecompiled.cmake)
 include(cmake/FbvinsEigen.cmake)
 
 function(fbvins_module NAME)
-  cmake_parse_arguments(ARG "COLD;PLAIN" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;TEST_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "COLD;PLAIN" "" "DEPS;PRIVATE_DEPS;SOURCES;TESTS;RELEASE_TESTS;TEST_DEPS" ${ARGN})
   set(target fbvins_${NAME})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
@@ -52,10 +78,10 @@ function(fbvins_module NAME)
   endforeach()
   list(TRANSFORM ARG_DEPS PREPEND fbvins_ OUTPUT_VARIABLE deps)
   target_link_libraries(${target} ${scope} Eigen3::Eigen fmt::fmt Threads::Threads ${deps})
-  if(FBVINS_BUILD_TESTS AND ARG_TESTS)
-    add_executable(${target}_test ${ARG_TESTS})
-    target_link_libraries(${target}_test PRIVATE ${target} fbvins_flags ${ARG_TEST_DEPS} GTest::gtest_main)
-    fbvins_use_precompiled(${target}_test test)
-    gtest_discover_tests(${target}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+  set(kind unsanitized)
+  if(NAME IN_LIST FBVINS_SANITIZED_MODULES)
+    set(kind sanitized)
   endif()
+  fbvins_unit_tests(${target}_test ${kind} SOURCES ${ARG_TESTS} DEPS ${target} ${ARG_TEST_DEPS})
+  fbvins_unit_tests(${target}_release_test unsanitized SOURCES ${ARG_RELEASE_TESTS} DEPS ${target} ${ARG_TEST_DEPS} PROPERTIES LABELS release)
 endfunction()

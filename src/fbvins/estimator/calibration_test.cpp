@@ -7,21 +7,17 @@
 
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/flown.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
 namespace {
 
+using test::exact_noise;
 using test::Motion;
 using test::SimulatedFlight;
 
 constexpr int kFrames = 300;
-
-EstimatorOptions exact_noise() {
-  EstimatorOptions o;  // the simulated IMU has the calibrated noise
-  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
-  return o;
-}
 
 /// The rig as a bad calibration has it: both cameras turned and moved together, as a loose mount would.
 StereoRig loose_mount(StereoRig rig, double angle_rad, double shift_m) {

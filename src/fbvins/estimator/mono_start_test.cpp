@@ -8,11 +8,13 @@
 
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
+#include "fbvins/estimator/flown.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
 namespace {
 
+using test::exact_noise;
 using test::Motion;
 using test::SimulatedFlight;
 
@@ -68,12 +70,6 @@ TEST(MonoStart, RefusesAMotionWithoutParallaxOrTooFewTracks) {
 TEST(MonoStart, TheScalesDeviationIsThatOfTheVelocityAlongItself) {
   EXPECT_NEAR(scale_sigma_of(Vec3(2, 0, 0), Vec3(0.01, 9, 9).asDiagonal()), 0.05, 1e-12);
   EXPECT_TRUE(std::isinf(scale_sigma_of(Vec3::Zero(), Mat3::Identity())));
-}
-
-EstimatorOptions exact_noise() {
-  EstimatorOptions o;
-  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
-  return o;
 }
 
 /// Speed as estimated by that which is true, once the flight has gone on for a while; 0 without a pose.

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private to tests of the estimator: a simulated flight, estimated and compared with the truth.
+//
+//   SimulatedFlight flight(Motion(0.6, 0.3), 1);
+//   const Flown flown = fly(flight, 200);
+//   EXPECT_LT(flown.position_error(199), 0.04);
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "fbvins/estimator/estimator.hpp"
+#include "fbvins/estimator/simulated_flight.hpp"
+#include "fbvins/geometry/heading.hpp"
+#include "fbvins/geometry/so3.hpp"
+
+namespace fbvins::test {
+
+inline EstimatorOptions exact_noise() {
+  EstimatorOptions o;  // the simulated IMU has the calibrated noise
+  o.gyro_noise_scale = o.accel_noise_scale = o.gyro_walk_scale = o.accel_walk_scale = 1;
+  return o;
+}
+
+struct Flown {
+  std::vector<Odometry> odometry;
+  std::vector<NavState<W>> truth;
+  int gauge_frame = -1;  ///< the frame of the first pose, which defines W's position and heading
+  Pose<W, B> gauge_pose;
+
+  int first_pose() const {
+    for (std::size_t k = 0; k < odometry.size(); ++k)
+      if (odometry[k].health.has_pose()) return static_cast<int>(k);
+    return -1;
+  }
+  /// The truth at k in W.
+  NavState<W> truth_in_W(int k) const {
+    const Pose<W, B>& b = truth[gauge_frame].T_FB;
+    const Quat turn(Eigen::AngleAxisd(heading_between(b.q, gauge_pose.q), Vec3::UnitZ()));
+    NavState<W> s = truth[k];
+    s.T_FB = {(turn * s.T_FB.q).normalized(), Vec3(gauge_pose.p + turn * (s.T_FB.p - b.p))};
+    s.v_FB = turn * s.v_FB;
+    return s;
+  }
+  double position_error(int k) const { return (odometry[k].T_WB.p - truth_in_W(k).T_FB.p).norm(); }
+};
+
+template <class Flight>
+Flown fly(Flight& flight, int frames, const EstimatorOptions& options = exact_noise()) {
+  Estimator estimator(flight.rig, options);
+  Flown out;
+  for (int k = 0; k < frames; ++k) {
+    out.odometry.push_back(estimator.process(flight.frame(k)).odometry);
+    out.truth.push_back(flight.truth(k));
+    if (out.gauge_frame < 0 && out.odometry.back().health.has_pose()) {
+      out.gauge_frame = k;
+      out.gauge_pose = out.odometry.back().T_WB;
+    }
+  }
+  return out;
+}
+
+/// Normalised error squared of the pose.
+inline double normalised_error(const Flown& flown, int k) {
+  const Odometry& o = flown.odometry[k];
+  const NavState<W> truth = flown.truth_in_W(k);
+  Vec6 e;
+  e << o.T_WB.p - truth.T_FB.p, so3_log(truth.T_FB.q.conjugate() * o.T_WB.q);
+  return e.dot(o.pose_covariance.ldlt().solve(e));
+}
+
+}  // namespace fbvins::test
