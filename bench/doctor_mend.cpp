@@ -2,11 +2,14 @@
 // The doctor's corrected calibrations, flown (docs/doctor.md): each fault is injected into a good recording, which is diagnosed,
 // mended, and flown as spoilt and as mended. A recording with a truth.
 //
-// usage: doctor_mend RECORDING [WORD]     each injected fault, or those whose name contains the word
+// usage: doctor_mend RECORDING [WORD]          each injected fault, or those whose name contains the word
+//        doctor_mend RECORDING PART PARTS      every PARTS-th fault from the one numbered PART (from 0), for processes side by side
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <string_view>
 
@@ -140,10 +143,13 @@ void mend_one(const Recorded& good, const Fault& fault, double unspoilt_m, Count
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return fmt::print(stderr, "usage: doctor_mend RECORDING [WORD]\n"), 2;
+  if (argc < 2) return fmt::print(stderr, "usage: doctor_mend RECORDING [WORD | PART PARTS]\n"), 2;
   const Result<Recorded> good = record(argv[1]);
   if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
-  const std::string_view word = argc > 2 ? argv[2] : "";
+  const bool in_parts = argc > 3;
+  const std::string_view word = argc > 2 && !in_parts ? argv[2] : "";
+  const std::size_t part = in_parts ? std::strtoul(argv[2], nullptr, 10) : 0;
+  const std::size_t parts = in_parts ? std::max(1ul, std::strtoul(argv[3], nullptr, 10)) : 1;
   const std::vector<Spoiler> all = spoilers(good->rig);
   const double unspoilt_m = flown(
       *good, [] { return Spoiler{}; }, good->rig);
@@ -151,7 +157,7 @@ int main(int argc, char** argv) {
              mm(unspoilt_m));
   Counts counts;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i].name.find(word) != std::string::npos)
+    if (i % parts == part && all[i].name.find(word) != std::string::npos)
       mend_one(
           *good, [&good, i] { return spoilers(good->rig)[i]; }, unspoilt_m, counts);
   fmt::print(
