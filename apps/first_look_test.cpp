@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace fbvins::app {
-namespace {
+namespace first_look_test {
 
 struct Counted final : SensorInput {
   int readings = 0, frames = 0;
@@ -70,5 +70,5 @@ TEST(FirstLook, DoesNotWaitForStampsThatHardlyMove) {
   EXPECT_EQ(kinds, std::vector{FindingKind::imu_stamps});
 }
 
-}  // namespace
+}  // namespace first_look_test
 }  // namespace fbvins::app

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 namespace fbvins::app {
-namespace {
+namespace imu_state_test {
 
 Odometry with_bias() {
   Odometry o;
@@ -49,5 +49,5 @@ TEST(ImuStateOfAFlight, ComesBack) {
   EXPECT_EQ((*loaded)->biases.bias.gyro_radps, with_bias().bias.gyro_radps);
 }
 
-}  // namespace
+}  // namespace imu_state_test
 }  // namespace fbvins::app

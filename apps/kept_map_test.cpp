@@ -11,7 +11,7 @@
 #include <vector>
 
 namespace fbvins::app {
-namespace {
+namespace kept_map_test {
 
 class CountingMapper final : public Mapper {
  public:
@@ -160,5 +160,5 @@ TEST_F(MakeKeptMap, WhatIsNotTheOldFilesFaultStaysAnError) {
   EXPECT_TRUE(std::filesystem::exists(file)) << "not set aside";
 }
 
-}  // namespace
+}  // namespace kept_map_test
 }  // namespace fbvins::app

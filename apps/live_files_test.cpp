@@ -7,7 +7,7 @@
 #include "apps/test_files.hpp"
 
 namespace fbvins::app {
-namespace {
+namespace live_files_test {
 
 Odometry odometry(int k, std::uint32_t reset_counter, HealthState state = HealthState::good) {
   Odometry o;
@@ -119,5 +119,5 @@ TEST(LiveSummary, SaysCountsAndWhatSlowOutputsLost) {
   EXPECT_EQ(json.find("accuracy"), std::string::npos) << "there is no truth";
 }
 
-}  // namespace
+}  // namespace live_files_test
 }  // namespace fbvins::app

@@ -11,7 +11,7 @@
 #include "fbvins/io/imu_state_file.hpp"
 
 namespace fbvins::app {
-namespace {
+namespace live_outputs_test {
 
 namespace fs = std::filesystem;
 
@@ -118,5 +118,5 @@ TEST_F(LiveOutputs, AnImuStateThatCannotBeUsedIsSetAside) {
   EXPECT_FALSE(imu_state_for_flight("", ImuNoise{}));
 }
 
-}  // namespace
+}  // namespace live_outputs_test
 }  // namespace fbvins::app

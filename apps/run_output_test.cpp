@@ -7,7 +7,7 @@
 #include "fbvins/io/trajectory.hpp"
 
 namespace fbvins::app {
-namespace {
+namespace run_output_test {
 
 constexpr HealthState kGood = HealthState::good, kStarting = HealthState::initialising;
 
@@ -114,5 +114,5 @@ TEST(WriteText, ReplacesWhole) {
   EXPECT_FALSE(write_text(folder.path() + "/none/a.txt", "x"));
 }
 
-}  // namespace
+}  // namespace run_output_test
 }  // namespace fbvins::app

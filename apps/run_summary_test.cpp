@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins::app {
-namespace {
+namespace run_summary_test {
 
 Time at(int k) { return Time{1'000'000'000 + k * 50'000'000LL}; }
 
@@ -92,5 +92,5 @@ TEST(RunSummary, TheResultsPartHasNoTimes) {
   EXPECT_NE(to_json_text(fast), to_json_text(slow));
 }
 
-}  // namespace
+}  // namespace run_summary_test
 }  // namespace fbvins::app

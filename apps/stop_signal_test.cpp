@@ -11,7 +11,7 @@
 #include <thread>
 
 namespace fbvins::app {
-namespace {
+namespace stop_signal_test {
 
 using namespace std::chrono_literals;
 
@@ -143,5 +143,5 @@ TEST(StopSignals, SystemCallsOfOtherThreadsAreNotInterrupted) {
             0);
 }
 
-}  // namespace
+}  // namespace stop_signal_test
 }  // namespace fbvins::app

@@ -12,7 +12,7 @@
 #include "tests/broken_datasets/toy_dataset.hpp"
 
 namespace fbvins::test {
-namespace {
+namespace broken_datasets_test {
 
 using Lines = std::vector<std::string>;
 using Damage = void (*)(Files&);
@@ -681,5 +681,5 @@ TEST_F(ToyDataset, TakesAnotherCalibration) {
   EXPECT_EQ(open_dataset(path(), {.kalibr_camchain = imu}).error().message, imu + ": cam0: is missing or empty");
 }
 
-}  // namespace
+}  // namespace broken_datasets_test
 }  // namespace fbvins::test

@@ -16,7 +16,7 @@
 #include "tests/broken_datasets/toy_dataset.hpp"
 
 namespace fbvins::test {
-namespace {
+namespace broken_flight_files_test {
 
 using Read = std::string (*)(const std::string& text);
 
@@ -321,5 +321,5 @@ TEST_F(BrokenLog, OfOurOwn) {
   EXPECT_EQ(csv([](std::string&, std::string&) {}, "rate: {MC_ROLLRATE_P: much}\n").substr(0, 19), "fly/control.yaml:1:");
 }
 
-}  // namespace
+}  // namespace broken_flight_files_test
 }  // namespace fbvins::test

@@ -14,7 +14,7 @@
 #include "tests/rendered_recording.hpp"
 
 namespace fbvins {
-namespace {
+namespace depth_test {
 
 constexpr double kBlankFrom_s = 2, kBlankTo_s = 5;
 
@@ -110,5 +110,5 @@ TEST_P(DepthFlight, DepthsCarryThePoseWhereImagesShowNothing) {
 
 INSTANTIATE_TEST_SUITE_P(All, DepthFlight, testing::Values("klt", "boost"));
 
-}  // namespace
+}  // namespace depth_test
 }  // namespace fbvins

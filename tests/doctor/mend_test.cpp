@@ -10,7 +10,7 @@
 #include "tests/rendered_recording.hpp"
 
 namespace fbvins {
-namespace {
+namespace mend_test {
 
 struct Flight : test::RenderedRecording {
   Replay replay(const Spoiler& spoiler = {}) const {
@@ -123,5 +123,5 @@ TEST(DoctorMends, NothingThatIsJudgedNoBetter) {
   EXPECT_NE(refused->why_not.find("as much is wrong with the corrected calibration"), std::string::npos) << refused->why_not;
 }
 
-}  // namespace
+}  // namespace mend_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "tests/fuzz/fuzz_targets.hpp"
 
 namespace fbvins::fuzz {
-namespace {
+namespace mutation_test {
 
 /// Pieces of text that often break parsers.
 std::string nasty_piece(Rng& rng) {
@@ -89,5 +89,5 @@ TEST_P(Mutations, NoiseAndNothingAreAnswered) {
 INSTANTIATE_TEST_SUITE_P(Parsers, Mutations, testing::ValuesIn(targets()),
                          [](const auto& row) { return std::string(row.param.name); });
 
-}  // namespace
+}  // namespace mutation_test
 }  // namespace fbvins::fuzz

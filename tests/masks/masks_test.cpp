@@ -10,7 +10,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace masks_test {
 
 constexpr int kLegs = 3;
 
@@ -72,5 +72,5 @@ TEST(Masks, TheDoctorDoesNotJudgeARecordingAtRest) {
       std::ranges::any_of(diagnosis.not_judged, [](const std::string& text) { return text.find("masks") != std::string::npos; }));
 }
 
-}  // namespace
+}  // namespace masks_test
 }  // namespace fbvins

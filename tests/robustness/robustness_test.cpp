@@ -8,7 +8,7 @@
 #include "tests/robustness/altered_recording.hpp"
 
 namespace fbvins::test {
-namespace {
+namespace robustness_test {
 
 /// The recording, and when its sensors fail, in full motion.
 struct Recording {
@@ -220,5 +220,5 @@ INSTANTIATE_TEST_SUITE_P(Real, Flight, testing::Combine(testing::Values(kReal), 
 INSTANTIATE_TEST_SUITE_P(Simulated, Flight, testing::Combine(testing::Values(kSimulated), testing::Values("klt", "orb", "boost")),
                          frontend_of);
 
-}  // namespace
+}  // namespace robustness_test
 }  // namespace fbvins::test

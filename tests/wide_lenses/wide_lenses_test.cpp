@@ -13,7 +13,7 @@
 #include "tests/rendered_recording.hpp"
 
 namespace fbvins {
-namespace {
+namespace wide_lenses_test {
 
 constexpr double kBlindFrom_s = 2.5;
 
@@ -100,5 +100,5 @@ TEST(WideLensFlight, OnlineExtrinsicsAreRefused) {
   EXPECT_NE(system.error().message.find("more than 180 degrees"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace wide_lenses_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/calibration/lens_jacobian.hpp"
 
 namespace fbvins {
-namespace {
+namespace board_flight_test {
 
 #ifdef FBVINS_WITH_APRILTAG
 
@@ -72,5 +72,5 @@ TEST(BoardFlight, AnUnknownLensIsRefused) {
   EXPECT_NE(rig.error().message.find("'fov' is no lens model"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace board_flight_test
 }  // namespace fbvins

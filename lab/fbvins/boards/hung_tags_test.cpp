@@ -8,7 +8,7 @@
 #include "fbvins/calibration/tag_finder.hpp"
 
 namespace fbvins {
-namespace {
+namespace hung_tags_test {
 
 #ifdef FBVINS_WITH_APRILTAG
 
@@ -51,5 +51,5 @@ TEST(HungTags, WhereNoneCanBeSeenIsSaid) {
 
 #endif
 
-}  // namespace
+}  // namespace hung_tags_test
 }  // namespace fbvins

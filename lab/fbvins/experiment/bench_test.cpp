@@ -11,7 +11,7 @@
 #include "fbvins/experiment/bench_tables.hpp"
 
 namespace fbvins {
-namespace {
+namespace bench_test {
 
 namespace fs = std::filesystem;
 
@@ -283,5 +283,5 @@ TEST(BenchResults, AFieldThatIsNoNumberIsNotCompared) {
   EXPECT_EQ(found[0].what, "3 restarts, were 2");
 }
 
-}  // namespace
+}  // namespace bench_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <set>
 
 namespace fbvins {
-namespace {
+namespace matrix_test {
 
 TEST(Matrix, ACellForEachCombination) {
   const Result<Matrix> matrix = parse_matrix(R"(
@@ -70,5 +70,5 @@ TEST(Matrix, DuplicateNamesOfDatasetsAreRefused) {
   EXPECT_EQ(make_plan(*matrix, {}).error().message, "two datasets are called x");
 }
 
-}  // namespace
+}  // namespace matrix_test
 }  // namespace fbvins

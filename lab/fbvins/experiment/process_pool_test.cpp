@@ -10,7 +10,7 @@
 #include "fbvins/io/file_source.hpp"
 
 namespace fbvins {
-namespace {
+namespace process_pool_test {
 
 std::string log_file() { return ::testing::TempDir() + "/fbvins_process_pool_" + std::to_string(getpid()); }
 
@@ -51,5 +51,5 @@ TEST(ProcessPool, TheDestructorTerminatesRunningPrograms) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
 }
 
-}  // namespace
+}  // namespace process_pool_test
 }  // namespace fbvins

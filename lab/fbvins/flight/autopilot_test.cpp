@@ -15,7 +15,7 @@
 #include "fbvins/sim/rotor_shake.hpp"
 
 namespace fbvins {
-namespace {
+namespace autopilot_test {
 
 constexpr double kDelay_s = 0.03;
 
@@ -255,5 +255,5 @@ TEST(InertialReference, EstimatesVerticalSpeedFromBarometerAndImu) {
   EXPECT_GT((reference.estimate().T_LV.q * Vec3::UnitZ()).z(), 0.999);
 }
 
-}  // namespace
+}  // namespace autopilot_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace collision_test {
 
 World world_with(const std::vector<Facet>& facets) {
   World world;
@@ -50,5 +50,5 @@ TEST(Collision, TheFloorDoesNotCount) {
   EXPECT_FALSE(check.touched_at({0.2, 0.2, 0.05}));
 }
 
-}  // namespace
+}  // namespace collision_test
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 #include "fbvins/sim/wind.hpp"
 
 namespace fbvins {
-namespace {
+namespace controller_test {
 
 constexpr double kRate_hz = 200;
 constexpr int kStepsPerUpdate = 5;
@@ -225,5 +225,5 @@ TEST(ControlFilters, PassLowFrequenciesAndStopHighOnes) {
 
 TEST(ControlOptions, AreWithinTheirRanges) { EXPECT_TRUE(validate(ControlOptions{})); }
 
-}  // namespace
+}  // namespace controller_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace estimator_link_test {
 
 Time at_ms(std::int64_t ms) { return Time{ms * 1'000'000}; }
 
@@ -64,5 +64,5 @@ TEST(EstimatorLink, ReportsAFailureInsteadOfWaiting) {
   EXPECT_NE(known.error().message.find("no film"), std::string::npos) << known.error().message;
 }
 
-}  // namespace
+}  // namespace estimator_link_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace failsafe_test {
 
 constexpr double kDt_s = 0.005;
 
@@ -102,5 +102,5 @@ TEST(Failsafe, LandsByPlan) {
   EXPECT_EQ(failsafe.reason(), FlightReason::none);
 }
 
-}  // namespace
+}  // namespace failsafe_test
 }  // namespace fbvins

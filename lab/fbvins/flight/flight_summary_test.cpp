@@ -11,7 +11,7 @@
 #include "fbvins/io/trajectory.hpp"
 
 namespace fbvins {
-namespace {
+namespace flight_summary_test {
 
 /// Stands for 3 s, jumps to (1, 0, 1) with an error of (1, -2, 3) cm and hovers for 5 s.
 FlightLog hop() {
@@ -97,5 +97,5 @@ TEST(FlightSummary, FilesReadBack) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace flight_summary_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/flight/excitation.hpp"
 
 namespace fbvins {
-namespace {
+namespace guide_test {
 
 constexpr double kRate_hz = 200;
 
@@ -117,5 +117,5 @@ TEST(Excitation, ExcitesOneAxisAfterTheOtherAroundTheHoverSetpoint) {
   EXPECT_EQ(excitation_setpoint(hover, excitation_length_s()).p, hover.p);
 }
 
-}  // namespace
+}  // namespace guide_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace live_link_test {
 
 Time at_ms(std::int64_t ms) { return Time{ms * 1'000'000}; }
 
@@ -67,5 +67,5 @@ TEST(LiveLink, BadOptionsAreRefused) {
   EXPECT_FALSE(LiveLink::create({}, options, euroc_rig(), 1));
 }
 
-}  // namespace
+}  // namespace live_link_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <numbers>
 
 namespace fbvins {
-namespace {
+namespace mission_test {
 
 constexpr const char* kGood = R"(limits: {speed: 0.8, accel: 1.5, jerk: 6, yaw_rate: 60}
 geofence: {x: [-1, 3], y: [-1, 2], z: [-0.5, 2]}
@@ -113,5 +113,5 @@ TEST(Mission, PlannedPlacesFollowTheSteps) {
   for (std::size_t i = 1; i < places.size(); ++i) EXPECT_LE((places[i].p - places[i - 1].p).norm(), 0.25 + 1e-9);
 }
 
-}  // namespace
+}  // namespace mission_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/mavlink/vehicle_frames.hpp"
 
 namespace fbvins {
-namespace {
+namespace px4_frames_test {
 
 Quat any_rotation(Rng& rng) {
   return so3_exp(3.1 * Vec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized());
@@ -93,5 +93,5 @@ TEST(Px4Frames, ParametersHaveGainsAndRotorsAndDisableGps) {
   EXPECT_EQ(all.at("CA_ROTOR2_KM"), "-0.0150");
 }
 
-}  // namespace
+}  // namespace px4_frames_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 namespace fbvins {
-namespace {
+namespace px4_mission_test {
 
 constexpr std::uint32_t kOffboardMode = 6U << 16, kLandMode = 4U << 16 | 6U << 24;
 
@@ -124,5 +124,5 @@ TEST(Px4Mission, CountsResetsInFlight) {
   EXPECT_EQ(mission.resets_in_flight(), 1);
 }
 
-}  // namespace
+}  // namespace px4_mission_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace csv_table_test {
 
 TEST(CsvTable, FindsColumnsByNameWithoutUnits) {
   const Result<CsvTable> table = CsvTable::parse("#timestamp [ns],p_x [m],health\n10,1.5,good\n20,x,lost\n", "t.csv");
@@ -40,5 +40,5 @@ TEST(CsvTable, ErrorsNameTheLine) {
   EXPECT_EQ(CsvTable::parse("", "t.csv").error().message, "t.csv: the file is empty");
 }
 
-}  // namespace
+}  // namespace csv_table_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/report/test_run.hpp"
 
 namespace fbvins {
-namespace {
+namespace report_test {
 
 using Json = nlohmann::ordered_json;
 
@@ -94,5 +94,5 @@ TEST(Report, WithoutTruthThereAreNoErrors) {
   EXPECT_EQ(data["runs"][0]["odometry"]["t"].size(), 200u);
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/report/test_run.hpp"
 
 namespace fbvins {
-namespace {
+namespace run_errors_test {
 
 StateNees mean_of(const RunErrors& errors) {
   StateNees mean;
@@ -74,5 +74,5 @@ TEST(TruthAt, IsLinearAndHasGaps) {
   EXPECT_FALSE(truth_at({truth[0], truth[10]}, truth[5].t).has_value());
 }
 
-}  // namespace
+}  // namespace run_errors_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace depth_model_test {
 
 constexpr int kWidth = 320, kHeight = 240;
 const Camera kCamera(PinholeRadtan{.fx = 200, .fy = 200, .cx = 160, .cy = 120}, kWidth, kHeight);
@@ -62,5 +62,5 @@ TEST(DepthModel, NearThingsAreTooWideAndCastAShadow) {
   EXPECT_GT(shadow, 76 * 4);
 }
 
-}  // namespace
+}  // namespace depth_model_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace flight_test {
 
 SplineTrajectory fly(FlightOptions options, std::uint64_t seed) {
   const std::vector<Vec3> tour{{-3, -2, 1.4}, {3, -2, 1.4}, {3, 2, 1.4}, {-3, 2, 1.4}};
@@ -75,5 +75,5 @@ TEST(Flight, AnotherSeedIsAnotherFlightTheSameSeedTheSameBits) {
   EXPECT_GT((fly(options, 7).pose(12.3).p - fly(options, 8).pose(12.3).p).norm(), 0.05);
 }
 
-}  // namespace
+}  // namespace flight_test
 }  // namespace fbvins

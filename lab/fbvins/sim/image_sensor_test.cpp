@@ -8,7 +8,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace image_sensor_test {
 
 CameraModelOptions plain() {
   CameraModelOptions options;
@@ -114,5 +114,5 @@ TEST(ImageSensor, TheSameFrameHasTheSameNoiseAnotherHasOther) {
   EXPECT_FALSE(std::equal(a.row(0), a.row(480), c.row(0)));
 }
 
-}  // namespace
+}  // namespace image_sensor_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace imu_model_test {
 
 SplineTrajectory at_rest(double seconds) {
   const auto n = static_cast<std::size_t>(seconds / 10) + 6;
@@ -126,5 +126,5 @@ TEST(ImuModel, VibrationHasItsStrengthInFlightAndNoneAtRest) {
   EXPECT_NEAR(std::sqrt(squares / count), 0.5, 0.1);
 }
 
-}  // namespace
+}  // namespace imu_model_test
 }  // namespace fbvins

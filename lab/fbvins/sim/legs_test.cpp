@@ -6,7 +6,7 @@
 #include "fbvins/camera/mask.hpp"
 
 namespace fbvins {
-namespace {
+namespace legs_test {
 
 constexpr int kWidth = 376, kHeight = 240;
 
@@ -37,5 +37,5 @@ TEST(Legs, ArePaintedAtTheSamePixelsAndLitByWhatIsInView) {
     }
 }
 
-}  // namespace
+}  // namespace legs_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/sim/wind.hpp"
 
 namespace fbvins {
-namespace {
+namespace quadrotor_test {
 
 constexpr double g = kSimGravity_mps2;
 
@@ -213,5 +213,5 @@ TEST(Wind, HasTheStrengthOfItsOptions) {
   EXPECT_NE(Wind(o, 5).step(0.01, 2), Wind(o, 6).step(0.01, 2));
 }
 
-}  // namespace
+}  // namespace quadrotor_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace recorded_flight_test {
 
 struct Recording {
   SplineTrajectory flight;
@@ -87,5 +87,5 @@ TEST(RecordedFlight, TooShortIsRefused) {
   EXPECT_FALSE(fly_again({}, 1.0));
 }
 
-}  // namespace
+}  // namespace recorded_flight_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/sim/simulation.hpp"
 
 namespace fbvins {
-namespace {
+namespace renderer_test {
 
 /// A wall 3 m in front of the camera (along +x of the world) whose texture is dark left of its middle, light right of it.
 World split_wall() {
@@ -162,5 +162,5 @@ TEST(FlightRecorder, ARollingShutterBeginsHalfAnImageBeforeTheStamp) {
   }
 }
 
-}  // namespace
+}  // namespace renderer_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/sim/rotor_shake.hpp"
 
 namespace fbvins {
-namespace {
+namespace sensor_station_test {
 
 SimulationOptions quick() {
   SimulationOptions options = *simulation_preset("normal");
@@ -121,5 +121,5 @@ TEST(SensorStation, FramesGetLostAsInARecording) {
   EXPECT_NEAR(*std::min_element(intervals.begin(), intervals.end()), 0.05, 1e-9);
 }
 
-}  // namespace
+}  // namespace sensor_station_test
 }  // namespace fbvins

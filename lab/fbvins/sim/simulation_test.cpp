@@ -11,7 +11,7 @@
 #include "fbvins/sim/euroc_writer.hpp"
 
 namespace fbvins {
-namespace {
+namespace simulation_test {
 
 SimulationOptions short_flight(const std::string& preset) {
   SimulationOptions options = *simulation_preset(preset);
@@ -158,5 +158,5 @@ TEST(Simulation, TheEurocFolderReadsBackToTheSameBits) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace simulation_test
 }  // namespace fbvins

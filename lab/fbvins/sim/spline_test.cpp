@@ -6,7 +6,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace spline_test {
 
 SplineTrajectory random_flight(std::uint64_t seed) {
   Rng rng(seed);
@@ -71,5 +71,5 @@ TEST(Spline, RestReadsGravityOnly) {
   EXPECT_LT(flight.at(0.2).w_WB_B.norm(), 1e-15);
 }
 
-}  // namespace
+}  // namespace spline_test
 }  // namespace fbvins

@@ -13,7 +13,7 @@
 #include "fbvins/tuning/tune_report.hpp"
 
 namespace fbvins {
-namespace {
+namespace tuning_test {
 
 constexpr double kRate_hz = 200;
 
@@ -218,5 +218,5 @@ TEST_P(FromWrongGains, TwoRoundsLeadToGoodOnes) {
 
 INSTANTIATE_TEST_SUITE_P(Gains, FromWrongGains, testing::Values(0.4, 2.5));
 
-}  // namespace
+}  // namespace tuning_test
 }  // namespace fbvins

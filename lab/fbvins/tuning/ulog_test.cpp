@@ -9,7 +9,7 @@
 #include "fbvins/io/little_endian.hpp"
 
 namespace fbvins {
-namespace {
+namespace ulog_test {
 
 std::string message(char type, const std::string& body) {
   std::string out;
@@ -76,5 +76,5 @@ TEST(Ulog, RefusesOtherFilesInOneSentence) {
   EXPECT_EQ(other.error().message, "b.csv: this is not a PX4 log (.ulg)");
 }
 
-}  // namespace
+}  // namespace ulog_test
 }  // namespace fbvins

@@ -52,7 +52,7 @@ void take_camera(const BagMessage& message, const BagTopic& about, BagContents& 
   Result<BagCamera> camera = camera_of(message.data, about.encoding);
   if (camera && !realsense_stream(about.name).empty()) camera->frame = realsense_stream(about.name);
   if (camera) out.cameras.emplace(about.name, *std::move(camera));
-  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", quoted(about.name), camera.error().message);
+  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", fbvins::quoted(about.name), camera.error().message);
 }
 
 /// Of librealsense: .../Infrared_1/tf/0 takes coordinates of group 0's reference to those of the stream.

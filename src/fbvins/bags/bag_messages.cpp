@@ -96,7 +96,7 @@ Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compresse
 std::string encoding_of(std::string_view bytes, Encoding encoding) {
   MessageFields in(bytes, encoding);
   in.header();
-  return quoted(raw_image(in).encoding);
+  return fbvins::quoted(raw_image(in).encoding);
 }
 
 std::optional<std::uint16_t> largest_value_of(std::string_view bytes, Encoding encoding) {
@@ -126,7 +126,7 @@ Result<BagCamera> camera_of(std::string_view bytes, Encoding encoding) {
     return BagCamera{Camera(*lens, static_cast<int>(width), static_cast<int>(height)), frame};
   return Error{ErrorCode::unsupported,
                fmt::format("a camera of the model '{}' with {} coefficients, where plumb_bob and equidistant with four are known",
-                           quoted(model), d.size())};
+                           fbvins::quoted(model), d.size())};
 }
 
 std::optional<BagTransform> transform_of(std::string_view bytes, Encoding encoding) {

@@ -15,7 +15,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace bags_test {
 
 namespace fs = std::filesystem;
 
@@ -355,5 +355,5 @@ TEST(GreyImage, AMosaicOfOneColourIsOneGrey) {
   EXPECT_EQ(grey_of("bayer_rggb8", 8, 8, pixels), std::string(48, 'P'));
 }
 
-}  // namespace
+}  // namespace bags_test
 }  // namespace fbvins

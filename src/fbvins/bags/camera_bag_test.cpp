@@ -11,7 +11,7 @@
 #include "fbvins/io/flight_record.hpp"
 
 namespace fbvins {
-namespace {
+namespace camera_bag_test {
 
 namespace fs = std::filesystem;
 
@@ -119,5 +119,5 @@ TEST(CameraTopics, NineCamerasAreTooMany) {
   EXPECT_NE(question(contents).find("has 9 image topics, more than 8"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace camera_bag_test
 }  // namespace fbvins

@@ -18,7 +18,7 @@
 #include "fbvins/io/flight_record.hpp"
 
 namespace fbvins {
-namespace {
+namespace cut_bags_test {
 
 namespace fs = std::filesystem;
 
@@ -302,5 +302,5 @@ TEST(PartsOfBags, ARecordingBeginsAndEndsWhereItIsAsked) {
             files().path("long.bag") + ": no frames are left after 60 s");
 }
 
-}  // namespace
+}  // namespace cut_bags_test
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
-namespace {
+namespace foreign_calibration_test {
 
 const Pose<B, C0> kLeft(so3_exp({0.1, -0.2, 1.5}), {0.01, -0.02, 0.03});
 const Pose<B, C1> kRight(so3_exp({0.12, -0.19, 1.49}), {0.01, 0.09, 0.03});
@@ -196,5 +196,5 @@ TEST(ForeignCalibration, FilesAreToldApartByContent) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace foreign_calibration_test
 }  // namespace fbvins

@@ -86,7 +86,7 @@ Result<CheckedImage> check(const RawImage& raw) {
   const auto* format =
       std::find_if(std::begin(kFormats), std::end(kFormats), [&](const Format& f) { return f.name == raw.encoding; });
   if (format == std::end(kFormats))
-    return Error{ErrorCode::unsupported, fmt::format("images encoded as '{}' cannot be read", quoted(raw.encoding))};
+    return Error{ErrorCode::unsupported, fmt::format("images encoded as '{}' cannot be read", fbvins::quoted(raw.encoding))};
   if (raw.width < 1 || raw.height < 1 || raw.width > kLargestImageSide_px || raw.height > kLargestImageSide_px)
     return Error{ErrorCode::unsupported, fmt::format("an image of {} x {} pixels", raw.width, raw.height)};
   const std::uint64_t row_values = std::uint64_t{raw.width} * static_cast<std::uint64_t>(format->channels);

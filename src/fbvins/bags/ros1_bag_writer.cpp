@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kChunk_bytes = 768u << 10u;
 constexpr std::size_t kBagHeader_bytes = 4096;
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+constexpr std::string_view kBagBegins = "#ROSBAG V2.0\n";
 
 // Fields of messages, as ROS 1 writes them into connections.
 constexpr const char* kImuFields =
@@ -285,7 +285,7 @@ struct Ros1BagWriter::State {
       }
       write(record(header, counts));
     }
-    file.overwrite(kMagic.size(), bag_header(index_at));
+    file.overwrite(kBagBegins.size(), bag_header(index_at));
   }
 
   std::string bag_header(std::uint64_t index_at) const {
@@ -305,7 +305,7 @@ Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const Stere
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
   auto state = std::make_unique<State>(*std::move(file));
-  state->write(kMagic);
+  state->write(kBagBegins);
   state->write(state->bag_header(0));
   if (Result<void> done = state->good(); !done) return done.error();
   for (const auto& [number, message] : {std::pair{kLeftInfo, camera_message(start, kLeftFrame, rig.left)},

@@ -11,7 +11,7 @@
 #include "fbvins/calibration/target_drawing.hpp"
 
 namespace fbvins {
-namespace {
+namespace board_detector_test {
 
 const Board kBoard{.columns = 4, .rows = 3, .size_m = 0.088, .spacing = 0.3};
 
@@ -134,5 +134,5 @@ TEST(CornerRefine, ASaddleIsFoundAndAnEdgeIsNot) {
   EXPECT_FALSE(refine_corner(saddle.view(), {2, 2}, kAcross, kDown, 4));
 }
 
-}  // namespace
+}  // namespace board_detector_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/calibration/target_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace board_test {
 
 const Board kChessboard{.kind = BoardKind::chessboard, .columns = 7, .rows = 5, .size_m = 0.03, .spacing = 0};
 const Board kCharuco{.kind = BoardKind::charuco, .columns = 8, .rows = 6, .size_m = 0.04, .spacing = 0.75};
@@ -68,5 +68,5 @@ TEST(TargetFile, ComplaintsNameFileAndField) {
   EXPECT_FALSE(load_target("there/is/none.yaml"));
 }
 
-}  // namespace
+}  // namespace board_test
 }  // namespace fbvins

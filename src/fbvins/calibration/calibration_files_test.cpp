@@ -8,7 +8,7 @@
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
-namespace {
+namespace calibration_files_test {
 
 RigCalibration rig_with(const Camera& camera) {
   const SimulatedRig simulated = simulated_stereo(camera);
@@ -96,5 +96,5 @@ TEST(CalibrationFiles, ModelsThatAFormatDoesNotKnowAreRefused) {
   EXPECT_TRUE(to_ros_camera_info(rig_with(example_cameras()[1]), 0));
 }
 
-}  // namespace
+}  // namespace calibration_files_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/calibration/simulated_board.hpp"
 
 namespace fbvins {
-namespace {
+namespace camera_calibration_test {
 
 const Board kBoard{.columns = 6, .rows = 6, .size_m = 0.088, .spacing = 0.3};
 
@@ -222,5 +222,5 @@ TEST(CameraCalibration, WrongInputIsRefusedWithOneSentence) {
   EXPECT_TRUE(holds(refusal(spoilt, kBoard), "cam0 and cam1 are in one place")) << refusal(spoilt, kBoard);
 }
 
-}  // namespace
+}  // namespace camera_calibration_test
 }  // namespace fbvins

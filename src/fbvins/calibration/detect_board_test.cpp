@@ -14,7 +14,7 @@
 #include "fbvins/calibration/simulated_board.hpp"
 
 namespace fbvins {
-namespace {
+namespace detect_board_test {
 
 namespace fs = std::filesystem;
 
@@ -158,5 +158,5 @@ TEST_F(DetectBoard, TheCameraThatMirrorsIsNamed) {
 
 #endif
 
-}  // namespace
+}  // namespace detect_board_test
 }  // namespace fbvins

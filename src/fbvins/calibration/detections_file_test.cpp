@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace detections_file_test {
 
 constexpr const char* kHeader = "timestamp_ns,camera,corner,u_px,v_px\n";
 
@@ -56,5 +56,5 @@ TEST(DetectionsFile, ComplaintsNameFileLineAndField) {
   EXPECT_NE(complaint("1,0,3,7,8\n1,0,3,70,80\n").find("corner 3 is there twice in the image of camera 0"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace detections_file_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/calibration/imu_camera_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace imu_camera_problem_test {
 
 /// A short path with two cameras, everything estimated, at a state that fits nothing.
 ImuCameraProblem wild_problem() {
@@ -69,5 +69,5 @@ TEST(ImuCameraProblem, AStepLowersTheCostAsPromised) {
   EXPECT_DOUBLE_EQ(problem.linearise(), before);
 }
 
-}  // namespace
+}  // namespace imu_camera_problem_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/core/angle.hpp"
 
 namespace fbvins {
-namespace {
+namespace imu_camera_test {
 
 using test::hand_held;
 using test::HandHeldOptions;
@@ -209,5 +209,5 @@ TEST(ImuCamera, NamesWhatTheRecordingLacks) {
   expect_refusal(hand_held(o, 8).input, "hardly turned");
 }
 
-}  // namespace
+}  // namespace imu_camera_test
 }  // namespace fbvins

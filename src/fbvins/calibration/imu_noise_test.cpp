@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace imu_noise_test {
 
 constexpr double kGyro = 1.7e-4, kAccel = 2e-3;
 
@@ -94,5 +94,5 @@ TEST(ImuNoise, RefusesWhatIsNoRest) {
   EXPECT_FALSE(measure_imu_noise({}));
 }
 
-}  // namespace
+}  // namespace imu_noise_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace lens_jacobian_test {
 
 Vec3 random_direction(Rng& rng, double largest_rad) {
   const double azimuth = rng.uniform(0, 6.2831), off = rng.uniform(0.01, largest_rad), range_m = rng.uniform(0.2, 3);
@@ -85,5 +85,5 @@ TEST(LensJacobian, EveryModelHasANameAndAStart) {
   EXPECT_FALSE(plain_lens("fov", 300, {320, 240}));
 }
 
-}  // namespace
+}  // namespace lens_jacobian_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/geometry/jacobian_check.hpp"
 
 namespace fbvins {
-namespace {
+namespace pose_spline_test {
 
 constexpr double kSpacing_s = 0.1;
 
@@ -86,5 +86,5 @@ TEST(PoseSpline, JacobiansByAllControlPoints) {
   }
 }
 
-}  // namespace
+}  // namespace pose_spline_test
 }  // namespace fbvins

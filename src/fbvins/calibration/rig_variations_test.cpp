@@ -11,7 +11,7 @@
 #include "fbvins/calibration/lens_jacobian.hpp"
 
 namespace fbvins {
-namespace {
+namespace rig_variations_test {
 
 /// Lenses known to 0.1 px, the second camera's place to 0.05 mm, everything correlated.
 CameraCalibration uncertain(const std::vector<Camera>& cameras, const std::vector<Pose<Cn, C0>>& T_CnC0, Rng& rng) {
@@ -105,5 +105,5 @@ TEST(RigVariations, TheImusCalibrationInheritsThem) {
   }
 }
 
-}  // namespace
+}  // namespace rig_variations_test
 }  // namespace fbvins

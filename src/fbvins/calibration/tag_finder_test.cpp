@@ -10,7 +10,7 @@
 #include "fbvins/calibration/simulated_board.hpp"
 
 namespace fbvins {
-namespace {
+namespace tag_finder_test {
 
 #ifdef FBVINS_WITH_APRILTAG
 
@@ -103,5 +103,5 @@ TEST(TagFinder, ABuildWithoutTheLibrarySaysSo) {
 
 #endif
 
-}  // namespace
+}  // namespace tag_finder_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <numbers>
 
 namespace fbvins {
-namespace {
+namespace tag_survey_test {
 
 constexpr const char* kHead = "family: tag36h11\nsize_m: 0.16\ntags:\n";
 
@@ -54,5 +54,5 @@ TEST(TagSurvey, EveryFaultIsASentenceWithItsLine) {
   EXPECT_FALSE(load_tags("/nonexistent/tags.yaml"));
 }
 
-}  // namespace
+}  // namespace tag_survey_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace target_drawing_test {
 
 Board chessboard() { return {.kind = BoardKind::chessboard, .columns = 7, .rows = 5, .size_m = 0.02, .spacing = 0}; }
 
@@ -47,5 +47,5 @@ TEST(TargetDrawing, TheLargestSizeFitsAndTheNextDoesNot) {
   EXPECT_FALSE(draw_target(chessboard(), "B5"));
 }
 
-}  // namespace
+}  // namespace target_drawing_test
 }  // namespace fbvins

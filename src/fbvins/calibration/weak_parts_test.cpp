@@ -11,7 +11,7 @@
 #include "fbvins/calibration/simulated_board.hpp"
 
 namespace fbvins {
-namespace {
+namespace weak_parts_test {
 
 const Board kBoard{.columns = 6, .rows = 6, .size_m = 0.088, .spacing = 0.3};
 
@@ -113,5 +113,5 @@ TEST(ResidualSummary, SplitsResidualsByPlaceAngleAndTime) {
   EXPECT_LT(r.cells[static_cast<std::size_t>(r.grid.cell_of({2, 239.5}))].mean_px.x(), -0.29);
 }
 
-}  // namespace
+}  // namespace weak_parts_test
 }  // namespace fbvins

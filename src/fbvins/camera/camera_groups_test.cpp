@@ -8,7 +8,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace camera_groups_test {
 
 Camera camera() { return Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240}, 752, 480); }
 
@@ -74,5 +74,5 @@ TEST(CameraGroups, AGroupIsARigOfItsOwn) {
   EXPECT_TRUE(alone.T_BC0.p.isApprox(rig.more[1].T_BC.p));
 }
 
-}  // namespace
+}  // namespace camera_groups_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace camera_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -144,5 +144,5 @@ TEST(StereoRig, RelativePoseTakesLeftToRight) {
   EXPECT_LT((rig.T_C1C0() * Vec3(0, 0, 1) - Vec3(-0.11, 0, 1)).norm(), 1e-15);
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace fbvins

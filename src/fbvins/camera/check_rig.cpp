@@ -16,6 +16,10 @@ Error malformed(std::string_view origin, const std::string& what) {
 /// Slower than any shutter that is sold: a unit other than seconds.
 constexpr double kLongestLineDelay_s = 1e-3;
 
+/// Half way from the principal point to the edges of an image, no lens that is sold narrows a pinhole's angle to less than this
+/// share, or widens the one of a lens whose angles grow with the radius to more than this multiple.
+constexpr double kNarrowest = 0.6, kWidest = 1.6;
+
 bool positive(double x) { return x > 0 && std::isfinite(x); }
 
 template <class C>
@@ -29,6 +33,27 @@ bool all_finite(const std::vector<double>& numbers) {
   return true;
 }
 
+/// What cannot be a lens with an image of this size behind it: mostly the calibration of an image of another size, or a mistyped
+/// number. Angles are compared with those near the principal point, so that the model's parameters need not be known.
+Result<void> check_lens(const Camera& camera, std::string_view side, std::string_view origin) {
+  const double w = camera.width(), h = camera.height();
+  const auto [fx, fy, cx, cy] = camera.intrinsics();
+  if (cx < w / 3 || cx > 2 * w / 3 || cy < h / 3 || cy > 2 * h / 3)
+    return malformed(origin, fmt::format("the {} camera's principal point ({:.0f}, {:.0f}) is outside the middle third of its image of "
+                                         "{} x {} pixels: is the calibration of an image of another size?",
+                                         side, cx, cy, camera.width(), camera.height()));
+  for (const Vec2& towards : {Vec2(-cx, 0), Vec2(w - cx, 0), Vec2(0, -cy), Vec2(0, h - cy)}) {
+    const auto ray = camera.ray(Vec2(cx, cy) + 0.5 * towards), near = camera.ray(Vec2(cx, cy) + 0.01 * towards);
+    if (ray && near) {
+      const double first = near->head<2>().norm() / near->z(), angle = std::atan2(ray->head<2>().norm(), ray->z());
+      if (angle > kNarrowest * std::atan(50 * first) && angle < kWidest * 50 * first) continue;
+    }
+    return malformed(origin, fmt::format("the {} camera's distortion is impossible: half way to the edge of the image it {}", side,
+                                         ray ? "bends rays as no lens does" : "has no rays any more"));
+  }
+  return {};
+}
+
 /// `side`: which camera.
 Result<void> check_camera(const Camera& camera, std::string_view side, std::string_view origin) {
   if (camera.width() < 1 || camera.height() < 1)
@@ -37,6 +62,7 @@ Result<void> check_camera(const Camera& camera, std::string_view side, std::stri
   if (!positive(fx) || !positive(fy) || !std::isfinite(cx) || !std::isfinite(cy) || !all_finite(camera.distortion()))
     return malformed(origin,
                      fmt::format("the {} camera's focal lengths are not positive, or a number of it is not finite", side));
+  if (Result<void> good = check_lens(camera, side, origin); !good) return good;
   const Mask* mask = camera.mask().get();
   if (mask != nullptr && (mask->width() != camera.width() || mask->height() != camera.height()))
     return malformed(origin, fmt::format("the {} camera's mask has {} x {} pixels, its images {} x {}", side, mask->width(),

@@ -7,7 +7,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace check_rig_test {
 
 StereoRig good_rig() {
   StereoRig rig;
@@ -52,6 +52,14 @@ TEST(CheckRig, RefusesWithASentence) {
        "focal lengths"},
       {[&](StereoRig& r) { r.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = nan, .cy = 240}, 752, 480); },
        "not finite"},
+      {[](StereoRig& r) { r.left = Camera(PinholeRadtan{.fx = 900, .fy = 900, .cx = 752, .cy = 480}, 752, 480); },
+       "the left camera's principal point (752, 480) is outside the middle third of its image of 752 x 480 pixels"},
+      {[](StereoRig& r) { r.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 188, .cy = 120}, 752, 480); },
+       "of an image of another size?"},
+      {[](StereoRig& r) { r.left = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240, .k1 = 26}, 752, 480); },
+       "the left camera's distortion is impossible: half way to the edge of the image it bends rays as no lens does"},
+      {[](StereoRig& r) { r.right = Camera(PinholeRadtan{.fx = 450, .fy = 450, .cx = 376, .cy = 240, .k1 = -26}, 752, 480); },
+       "the right camera's distortion is impossible: half way to the edge of the image it has no rays any more"},
       {[](StereoRig& r) { r.T_BC1 = {}; }, "0 m apart"},
       {[](StereoRig& r) { r.T_BC1.p.x() = 11; }, "11 m apart"},
       {[&](StereoRig& r) { r.T_BC0.p.x() = nan; }, "pose in the body"},
@@ -80,5 +88,5 @@ TEST(CheckRig, RefusesWithASentence) {
   }
 }
 
-}  // namespace
+}  // namespace check_rig_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace depth_reader_test {
 
 constexpr int kWidth = 64, kHeight = 48;
 constexpr double kNoise_m = 0.003;
@@ -85,5 +85,5 @@ TEST(DepthReader, TakesImagesOfTheCamerasSizeOnly) {
   EXPECT_FALSE(reader().is_usable(&cut));
 }
 
-}  // namespace
+}  // namespace depth_reader_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace lens_faces_test {
 
 /// Lenses of 200 to 220 degrees of each model that has them.
 std::vector<Camera> wide_lenses() {
@@ -187,5 +187,5 @@ TEST(LensFaces, OneLensIsSeveralCameras) {
   EXPECT_TRUE(gathered.has_more.empty());
 }
 
-}  // namespace
+}  // namespace lens_faces_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace mask_test {
 
 Mask mask_of(int width, int height, const MaskRectangle& hidden) {
   Image seen(width, height, 255);
@@ -134,5 +134,5 @@ TEST(Mask, ARigIsRefusedWhoseMaskIsWrong) {
   EXPECT_EQ(check_rig(rig, "rig").error().message, "rig: the right camera's mask has 640 x 480 pixels, its images 752 x 480");
 }
 
-}  // namespace
+}  // namespace mask_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace wide_lens_test {
 
 // Numbers like those of real calibrations: fisheyes of some 150 degrees across, and a mild wide angle.
 Camera double_sphere() { return {DoubleSphere{158.3, 158.2, 254.9, 256.9, -0.172, 0.593}, 512, 512}; }
@@ -138,5 +138,5 @@ TEST(WideLens, AnImageWhoseEdgesLookBackwardsIsRecognised) {
   EXPECT_FALSE(Camera(PinholeRadtan{200, 200, 320, 240, -0.3, 0, 0, 0}, 640, 480).sees_backwards());
 }
 
-}  // namespace
+}  // namespace wide_lens_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace checkup_test {
 
 std::vector<ImuSample> readings() {
   const test::Motion motion(0.3, 0.3);
@@ -165,5 +165,5 @@ TEST(Checkup, AFindingIsOneLineAndItsCorrections) {
   EXPECT_EQ(to_text(finding), "time_offset: a; b; c\n    d: 1\n    e: 2");
 }
 
-}  // namespace
+}  // namespace checkup_test
 }  // namespace fbvins

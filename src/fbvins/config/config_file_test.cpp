@@ -14,7 +14,7 @@
 #include "fbvins/io/flight_record.hpp"
 
 namespace fbvins {
-namespace {
+namespace config_file_test {
 
 TEST(ConfigFile, DefaultsAreValidAndRoundTrip) {
   EXPECT_TRUE(validate(Config{}));
@@ -74,5 +74,5 @@ TEST(ConfigFile, AFlightRecordGivesTheFlightsConfiguration) {
   EXPECT_TRUE(refused.error().message.starts_with(path + ": config.yaml:1: ")) << refused.error().message;
 }
 
-}  // namespace
+}  // namespace config_file_test
 }  // namespace fbvins

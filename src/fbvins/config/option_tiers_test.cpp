@@ -10,7 +10,7 @@
 #include "fbvins/config/config.hpp"
 
 namespace fbvins {
-namespace {
+namespace option_tiers_test {
 
 std::vector<std::string> values_of(const std::vector<OptionField>& fields) {
   std::vector<std::string> paths;
@@ -49,5 +49,5 @@ TEST(OptionTiers, TheTutorialExplainsEachOfThem) {
     EXPECT_NE(tutorial.find("`" + std::string(path) + "`"), std::string::npos) << path;
 }
 
-}  // namespace
+}  // namespace option_tiers_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/core/options.hpp"
 
 namespace fbvins {
-namespace {
+namespace yaml_test {
 
 enum class Leaving { oldest, entropy };
 
@@ -163,5 +163,5 @@ TEST(OptionFields, EveryFieldSaysWhatItIs) {
   }
 }
 
-}  // namespace
+}  // namespace yaml_test
 }  // namespace fbvins

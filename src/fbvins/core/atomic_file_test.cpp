@@ -16,7 +16,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace atomic_file_test {
 
 namespace fs = std::filesystem;
 
@@ -171,5 +171,5 @@ TEST_F(AtomicFileTest, SetAsideNumbersWhatIsThereAlready) {
   EXPECT_FALSE(set_aside(path_)) << "nothing is there";
 }
 
-}  // namespace
+}  // namespace atomic_file_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace bounded_queue_test {
 
 TEST(BoundedQueue, KeepsOrderAndNeverHoldsMoreThanItsCapacity) {
   constexpr int kValues = 2000, kCapacity = 3;
@@ -72,5 +72,5 @@ TEST(BoundedQueue, CarriesValuesThatOnlyMove) {
   EXPECT_EQ(**value, 5);
 }
 
-}  // namespace
+}  // namespace bounded_queue_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/core/time.hpp"
 
 namespace fbvins {
-namespace {
+namespace core_test {
 
 TEST(Time, DifferenceIsExactForEpochStamps) {
   const Time a{1'403'636'584'763'555'584}, b{1'403'636'584'813'555'456};
@@ -60,5 +60,5 @@ TEST(Rng, NormalHasUnitVariance) {
   EXPECT_NEAR(sum2 / n, 1, 0.02);
 }
 
-}  // namespace
+}  // namespace core_test
 }  // namespace fbvins

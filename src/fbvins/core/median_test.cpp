@@ -6,7 +6,7 @@
 #include "fbvins/core/time.hpp"
 
 namespace fbvins {
-namespace {
+namespace median_test {
 
 TEST(Median, IsTheMiddleOrTheUpperOfTwo) {
   EXPECT_EQ(median_of(std::vector<double>{}), 0);
@@ -22,5 +22,5 @@ TEST(Median, OfACopyKeepsTheOrder) {
   EXPECT_EQ(values, (std::vector<double>{3, 1, 2}));
 }
 
-}  // namespace
+}  // namespace median_test
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace blur_test {
 
 constexpr int kWidth = 320, kHeight = 240, kImages = 80;
 constexpr double kFocal_px = 500, kRate_radps = 1.4;
@@ -107,5 +107,5 @@ TEST(Blur, NeedsImagesThatTurn) {
   EXPECT_FALSE(check_blur({}));
 }
 
-}  // namespace
+}  // namespace blur_test
 }  // namespace fbvins

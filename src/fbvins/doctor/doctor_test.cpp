@@ -11,7 +11,7 @@
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
-namespace {
+namespace doctor_test {
 
 const Evidence& good() {
   static const Evidence evidence = test::SyntheticEvidence({}).make();
@@ -184,5 +184,5 @@ TEST(Doctor, GivesTheCorrectedLine) {
   EXPECT_NEAR(std::stod(finding->corrected.substr(at + 19)), 0.05, 1e-3);
 }
 
-}  // namespace
+}  // namespace doctor_test
 }  // namespace fbvins

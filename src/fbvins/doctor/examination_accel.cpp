@@ -21,6 +21,10 @@ using doctor::kSignificant;
 constexpr double kDelayStep_s = 0.02, kDelayPractical_s = 0.015, kDelayLeaves = 0.7;
 constexpr int kDelaySteps = 4;
 constexpr double kScalePractical = 0.03, kPositionPractical_m = 0.05, kBiasPractical_mps2 = 1;
+/// Significance that the images' scale needs where gravity, as the accelerometer reads it, is off by the same factor.
+constexpr double kConfirmed = 3;
+/// Other axes must leave less than half of what the delivered ones leave, and so much less of the acceleration.
+constexpr double kAxesLeave = 0.02;
 /// Gravity must be nearer to one cause's than to another's by this share.
 constexpr double kGravityTells = 0.01;
 /// Another place of the camera must leave less than this share of what is unexplained.
@@ -90,7 +94,7 @@ void Examination::accelerations() {
       100 * fit.lever_sigma_m.x(), 100 * fit.lever_m.y(), 100 * fit.lever_sigma_m.y(), 100 * fit.lever_m.z(),
       100 * fit.lever_sigma_m.z(), 100 * fit.unexplained_elsewhere));
   if (fit.axes != Mat3::Identity()) {
-    if (!(fit.unexplained_as_named > 2 * fit.unexplained + 0.05)) return;
+    if (!(fit.unexplained_as_named > 2 * fit.unexplained + kAxesLeave)) return;
     accel_axes(fit);
   } else if (position(fit)) {  // which changes the rest
     fit = fit_accelerations(pairs_, imu_, rig_, {offset_s_, gyro_bias_});
@@ -151,7 +155,9 @@ void Examination::accel_bias(const AccelFit& fit) {
 /// it is wrong by the baseline's error, whatever the accelerometer's scale.
 void Examination::accel_scale(const AccelFit& fit) {
   const double factor = 1 / fit.scale, sigma = fit.scale_sigma / fit.scale * factor;
-  if (std::abs(factor - 1) < kScalePractical || std::abs(factor - 1) < kSignificant * sigma) return;
+  const double reads = accel_unit_ * gravity_seen(evidence_.imu).norm_mps2 / kGravity_mps2;
+  const bool confirmed = std::abs(reads - 1) > kScalePractical && std::abs(reads - factor) < kConfirmed * sigma;
+  if (std::abs(factor - 1) < kScalePractical || std::abs(factor - 1) < (confirmed ? kConfirmed : kSignificant) * sigma) return;
   const double gravity = fit.gravity_mps2 / kGravity_mps2;
   const double by_baseline = std::abs(gravity - 1 / factor), by_accelerometer = std::abs(gravity - 1);
   if (by_baseline + kGravityTells < by_accelerometer) return baseline_length(factor, sigma);

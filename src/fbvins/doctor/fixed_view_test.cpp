@@ -10,7 +10,7 @@
 #include "fbvins/features/noise_texture.hpp"
 
 namespace fbvins {
-namespace {
+namespace fixed_view_test {
 
 constexpr int kWidth = 320, kHeight = 240, kViews = 28;
 constexpr double kFocal_px = 250, kApart_s = 0.5;
@@ -146,5 +146,5 @@ TEST(FixedView, TheSamplerKeepsViewsOfTheWholeRecording) {
     EXPECT_NEAR(views[i].moved_px.x(), 20 * (views[i].t - views[i - 1].t).seconds(), 1e-6);
 }
 
-}  // namespace
+}  // namespace fixed_view_test
 }  // namespace fbvins

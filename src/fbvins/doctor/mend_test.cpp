@@ -9,7 +9,7 @@
 #include "fbvins/doctor/synthetic_evidence.hpp"
 
 namespace fbvins {
-namespace {
+namespace mend_test {
 
 Finding of(FindingKind kind, double size = 1) {
   Finding finding;
@@ -98,5 +98,5 @@ TEST(CalibrationLines, EachFieldHasOneLineAtItsFirstFinding) {
   EXPECT_EQ(findings[2].corrected, "");
 }
 
-}  // namespace
+}  // namespace mend_test
 }  // namespace fbvins

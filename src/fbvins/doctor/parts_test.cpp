@@ -17,7 +17,7 @@
 #include "fbvins/imu/propagation.hpp"
 
 namespace fbvins {
-namespace {
+namespace parts_test {
 
 std::vector<ImuSample> readings(double seconds) {
   const test::Motion motion(0.3, 0.3);
@@ -175,5 +175,5 @@ TEST(Depths, AreThoseOfTheNewCalibration) {
   });
 }
 
-}  // namespace
+}  // namespace parts_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace calibration_test {
 
 using test::exact_noise;
 using test::Motion;
@@ -158,5 +158,5 @@ TEST(OnlineCalibration, AGlobalShutterStaysOne) {
   EXPECT_NEAR(fly(flight, flight.rig, options).line_delay_s, 0, 1e-6);
 }
 
-}  // namespace
+}  // namespace calibration_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace calibration_uncertainty_test {
 
 TEST(ScaleUncertainty, IsAsLargeAsThatOfTheBaseline) {
   const Pose<B, C0> left{Quat::Identity(), Vec3(0.02, 0.055, 0.01)};
@@ -46,5 +46,5 @@ TEST(AxisUncertainty, BiasesByCrookedAxesAreAsLargeAsItSays) {
   EXPECT_NEAR(sum / kSensors, 3, 0.15);
 }
 
-}  // namespace
+}  // namespace calibration_uncertainty_test
 }  // namespace fbvins

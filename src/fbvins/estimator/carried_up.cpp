@@ -10,7 +10,6 @@
 namespace fbvins {
 namespace {
 
-constexpr double kGap_s = 0.05;
 /// A fault has to be older than this to have spoiled what is carried on.
 constexpr double kBefore_s = 2;
 constexpr double kRemembered_s = 30;
@@ -25,7 +24,7 @@ Vec3 carried(const Vec3& up_B, const ImuSegment& readings, const Vec3& gyro_bias
 
 void CarriedUp::carry(Time t, const ImuSegment& readings) {
   now_ = t;
-  if (readings.empty() || readings.longest_gap.seconds() > kGap_s) return forget();
+  if (readings.empty() || readings.longest_gap.seconds() > kReadingsGap_s) return forget();
   if (before_) before_->up_B = carried(before_->up_B, readings, before_->gyro_bias_radps);
   if (before_ && (t - since_).seconds() > kRemembered_s) before_.reset();
   if (!recent_.empty() && (t - recent_.front().t).seconds() > kRemembered_s) recent_.clear();

@@ -6,7 +6,7 @@
 #include "fbvins/core/angle.hpp"
 
 namespace fbvins {
-namespace {
+namespace carried_up_test {
 
 const Vec3 kRate(0.5, -0.2, 0.3), kBias(0.01, 0.02, -0.01);
 
@@ -78,5 +78,5 @@ TEST(CarriedUp, IsConfirmedByTwoSecondsOfGoodPoses) {
   EXPECT_FALSE(vehicle.up.contradiction(-vehicle.truth(), kBias));
 }
 
-}  // namespace
+}  // namespace carried_up_test
 }  // namespace fbvins

@@ -23,7 +23,6 @@ namespace {
 constexpr double kRestForStandstill_s = 0.5;
 /// Images with readings after a gap, until velocity and attitude are known again.
 constexpr int kFramesAfterGap = 6;
-constexpr double kGap_s = 0.05;
 /// A large correction so soon after a pose that was not good has to be confirmed by gravity.
 constexpr double kTrouble_s = 2;
 /// Otherwise so many times what a good pose may owe is made up for at once.
@@ -267,7 +266,7 @@ std::vector<TrackedFeature> Estimator::examine(const TrackedFrame& frame, ImuSeg
   wrong_cameras_ = 0;
   const Duration dt = frame.t - window_.newest().t;
   // After a gap the images have to say first how fast the vehicle is.
-  frames_with_readings_ = imu.empty() || imu.longest_gap.seconds() > kGap_s ? 0 : frames_with_readings_ + 1;
+  frames_with_readings_ = imu.empty() || imu.longest_gap.seconds() > kReadingsGap_s ? 0 : frames_with_readings_ + 1;
   if (frames_with_readings_ < kFramesAfterGap) {
     monitor_.pass(dt);
     return frame.features;

@@ -7,7 +7,7 @@
 #include "fbvins/estimator/flown.hpp"
 
 namespace fbvins {
-namespace {
+namespace estimator_consistency_test {
 
 using test::exact_noise;
 using test::Flown;
@@ -69,5 +69,5 @@ TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
   EXPECT_LT(nees / n, 12.0);
 }
 
-}  // namespace
+}  // namespace estimator_consistency_test
 }  // namespace fbvins

@@ -19,7 +19,7 @@
 #include "fbvins/types/protection.hpp"
 
 namespace fbvins {
-namespace {
+namespace estimator_test {
 
 using test::exact_noise;
 using test::Flown;
@@ -514,5 +514,5 @@ TEST(Estimator, ACorrectionWithoutTroubleIsMadeInStepsAndThePoseIsNotGoodMeanwhi
   EXPECT_GT(at_once.resets, 0);
 }
 
-}  // namespace
+}  // namespace estimator_test
 }  // namespace fbvins

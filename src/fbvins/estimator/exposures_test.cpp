@@ -6,7 +6,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace exposures_test {
 
 constexpr double kLineDelay_s = 40e-6;
 const Vec3 kGravity_B(0.3, -0.2, -9.8);
@@ -133,5 +133,5 @@ TEST(Exposures, WhatIsSeenAtTheStampKeepsEveryBit) {
   EXPECT_FALSE(exposures.at_stamp(frame));
 }
 
-}  // namespace
+}  // namespace exposures_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace frame_contract_test {
 
 using test::Motion;
 using test::SimulatedFlight;
@@ -83,5 +83,5 @@ TEST(FrameContract, AFlightGoesOnAndSaysSo) {
   EXPECT_EQ(last.health, (Health{HealthState::good, HealthReason::none}));
 }
 
-}  // namespace
+}  // namespace frame_contract_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace health_judge_test {
 
 constexpr int kManyTracks = 50;
 
@@ -195,5 +195,5 @@ TEST(HealthJudge, EachReasonInFlightIsReachedAndLeft) {
   }
 }
 
-}  // namespace
+}  // namespace health_judge_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace initial_prior_test {
 
 NavState<G> tilted() {
   NavState<G> s;
@@ -71,5 +71,5 @@ TEST(CalibrationPrior, ComesBetweenTiltAndFrame) {
   EXPECT_EQ(prior.quadratic.g.tail(15), frame.quadratic.g.tail(15));
 }
 
-}  // namespace
+}  // namespace initial_prior_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/geometry/heading.hpp"
 
 namespace fbvins {
-namespace {
+namespace initialiser_test {
 
 using test::Motion;
 using test::SimulatedFlight;
@@ -118,5 +118,5 @@ TEST(Initialiser, BeginsAnewAfterABreakInTheReadings) {
   EXPECT_GE(s.solution->frames.front().id, FrameId{6});
 }
 
-}  // namespace
+}  // namespace initialiser_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace keyframe_policy_test {
 
 /// A window in the middle of a simulated flight.
 struct MidFlight {
@@ -75,5 +75,5 @@ TEST(KeyframePolicy, StandingStillMakesNoKeyframes) {
   EXPECT_FALSE(KeyframePolicy(KeyframeOptions{}, 450).is_keyframe(m.estimator.window(), m.estimator.calibration(), true));
 }
 
-}  // namespace
+}  // namespace keyframe_policy_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 
 namespace fbvins {
-namespace {
+namespace known_landmarks_test {
 
 const Pose<G, C0> kCamera{so3_exp(Vec3(0.3, -1.0, 0.4)), Vec3(1, 2, 3)};
 const Vec3 kPoint{0.2, -0.1, 0.5};  // alpha, beta, rho: 2 m deep
@@ -97,5 +97,5 @@ TEST(KnownLandmarks, APoseHasTheUncertaintyOfTheMapThatConstrainsIt) {
   EXPECT_NEAR(known.with_map_covariance(here, window)(0, 0), 1e-8, 1e-15);
 }
 
-}  // namespace
+}  // namespace known_landmarks_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace monitor_test {
 
 const Duration kStep = Duration::from_seconds(0.05);
 const Vec3 kBias(0.02, -0.01, 0.05);
@@ -351,5 +351,5 @@ TEST(Monitor, DoubtedReadingsMayNotCarryAlone) {
   EXPECT_FALSE(believed.hopeless());
 }
 
-}  // namespace
+}  // namespace monitor_test
 }  // namespace fbvins

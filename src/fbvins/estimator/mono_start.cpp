@@ -30,7 +30,7 @@ constexpr std::size_t kFewestInPair = 15;
 constexpr int kRotationIterations = 8, kGravityIterations = 4, kDepthIterations = 3;
 /// At first all points are this far away, for the weights.
 constexpr double kFirstDepth_m = 3;
-constexpr double kHuberSigma = 2;
+constexpr double kHuber_sigmas = 2;
 /// What the solution has to be: share of the points in front of the camera, residuals in standard deviations, way
 /// of the camera as a share of the typical depth, scale.
 constexpr double kInFront = 0.9, kMaxRms_sigma = 3, kLeastParallax = 0.03, kMaxScaleSigma = 0.15;
@@ -138,7 +138,7 @@ Vec3 gyro_bias(const std::vector<FramePair>& pairs, const std::vector<Integrated
       for (const Plane& p : pair.planes) {
         const Vec3 n = p.a.cross(R_ab * p.b);
         const double r = t.dot(n) / p.sigma;
-        const double weight = huber(r * r, kHuberSigma).weight;
+        const double weight = huber(r * r, kHuber_sigmas).weight;
         const Vec3 J_bias = (-(t.cross(p.a)).transpose() * R_ab * hat(p.b) * J / p.sigma).transpose();
         const Vec2 J_direction = Vec2(e.dot(n), f.dot(n)) / p.sigma;
         U += weight * J_bias * J_bias.transpose(), u += weight * r * J_bias;

@@ -12,7 +12,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace mono_start_test {
 
 using test::exact_noise;
 using test::Motion;
@@ -97,5 +97,5 @@ TEST(EstimatorWithOneCamera, StartsInMotionAndKeepsItsScale) {
   }
 }
 
-}  // namespace
+}  // namespace mono_start_test
 }  // namespace fbvins

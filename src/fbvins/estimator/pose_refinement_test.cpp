@@ -6,7 +6,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace pose_refinement_test {
 
 /// The features of a simulated frame with the positions of their points.
 struct Seen {
@@ -63,5 +63,5 @@ TEST(PoseRefinement, WithoutFeaturesItDoesNotConverge) {
   EXPECT_EQ(found.T_GB.p, s.guess().p);
 }
 
-}  // namespace
+}  // namespace pose_refinement_test
 }  // namespace fbvins

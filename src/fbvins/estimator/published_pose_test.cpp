@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace published_pose_test {
 
 constexpr double kStep_m = 0.003;
 constexpr double kStep_rad = 0.1 * 3.14159265358979323846 / 180;
@@ -130,5 +130,5 @@ TEST(PublishedPose, ALargeCorrectionIsTooMuchToPaySlowly) {
   EXPECT_FALSE(at_once.owes_too_much());
 }
 
-}  // namespace
+}  // namespace published_pose_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/geometry/jacobian_check.hpp"
 
 namespace fbvins {
-namespace {
+namespace reprojection_test {
 
 struct Seen {
   Calibration calibration{{so3_exp(Vec3(0.1, -1.2, 0.3)), Vec3(0.02, -0.03, 0.01)},
@@ -124,5 +124,5 @@ TEST(LandmarkPrior, JacobiansAreDerivatives) {
   EXPECT_TRUE(check.ok) << check.message;
 }
 
-}  // namespace
+}  // namespace reprojection_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace rest_detector_test {
 
 /// Frame k at 20 Hz: thirty features moved by `drift_px` a frame, quiet readings.
 TrackedFrame frame(int k, double drift_px = 0, double shake_radps = 0) {
@@ -61,5 +61,5 @@ TEST(RestDetector, BeginsAnewAfterAReset) {
   EXPECT_EQ(rest.update(frame(11)), Duration{50'000'000});
 }
 
-}  // namespace
+}  // namespace rest_detector_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/estimator/window_views.hpp"
 
 namespace fbvins {
-namespace {
+namespace sliding_window_test {
 
 constexpr double kBaseline_m = 0.1, kStep_m = 0.1;
 
@@ -349,5 +349,5 @@ TEST(SlidingWindow, SnapshotKeyframeAndDistanceShowItsContents) {
   EXPECT_EQ(d.age, Duration{50'000'000});
 }
 
-}  // namespace
+}  // namespace sliding_window_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace step_contract_test {
 
 using test::Motion;
 using test::SimulatedFlight;
@@ -130,5 +130,5 @@ TEST(ImuState, BiasesOfTheFlightBeforeMakeTheStartLevel) {
   }
 }
 
-}  // namespace
+}  // namespace step_contract_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace surface_view_test {
 
 constexpr double kNoise_1pm = 0.001;
 
@@ -118,5 +118,5 @@ TEST(SurfaceFinder, WithoutDepthsThereIsNothing) {
   EXPECT_FALSE(SurfaceFinder(pair).find(frame_at(2, kThere, false), window_of(false), calibration()));
 }
 
-}  // namespace
+}  // namespace surface_view_test
 }  // namespace fbvins

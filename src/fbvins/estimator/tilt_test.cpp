@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace tilt_test {
 
 const NavState<G> kState{{so3_exp(Vec3(0.4, -1.1, 2.0)), Vec3(3, -2, 1)}, Vec3(0.5, 1.5, -0.7), {Vec3(1, 2, 3), Vec3(4, 5, 6)}};
 const Tilt kTilt{Vec2(0.2, -0.3), Vec3(1, 1, 0.5)};
@@ -45,5 +45,5 @@ TEST(Tilt, JacobiansAreThoseOfDifferences) {
   }
 }
 
-}  // namespace
+}  // namespace tilt_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/geometry/jacobian_check.hpp"
 
 namespace fbvins {
-namespace {
+namespace window_equations_test {
 
 using test::kFrames;
 
@@ -104,5 +104,5 @@ TEST(WindowEquations, ASingularLandmarkDoesNotKeepTheOthersFromBeingEliminated) 
   EXPECT_GT((singular.H - expected.H).norm(), 1e-2 * expected.H.norm());
 }
 
-}  // namespace
+}  // namespace window_equations_test
 }  // namespace fbvins

@@ -15,7 +15,7 @@
 #include "fbvins/estimator/window_test_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace window_marginalisation_test {
 
 using test::Window;
 
@@ -168,5 +168,5 @@ TEST(Marginalisation, KeepsTheStepOfTheFramesThatStay) {
       EXPECT_NEAR(step_of_rest(at_rest.row_of(f, k)), step(at.row_of(f + 1, k)), 1e-6 * size) << f << " " << k;
 }
 
-}  // namespace
+}  // namespace window_marginalisation_test
 }  // namespace fbvins

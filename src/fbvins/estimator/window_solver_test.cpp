@@ -8,7 +8,7 @@
 #include "fbvins/estimator/window_test_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace window_solver_test {
 
 TEST(WindowSolver, CovariancesAreTheInverseOfTheInformation) {
   const test::Window w = test::make_window(false);
@@ -70,5 +70,5 @@ TEST(WindowSolver, ReusedMemoryGivesTheSameBits) {
   for (int f = 0; f < test::kFrames; ++f) EXPECT_EQ(one.window.frames[f].state.T_FB.p, two.window.frames[f].state.T_FB.p);
 }
 
-}  // namespace
+}  // namespace window_solver_test
 }  // namespace fbvins

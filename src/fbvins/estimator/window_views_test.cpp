@@ -6,7 +6,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace window_views_test {
 
 FrameList turning(const Vec3& rate_B, int frames, Duration apart) {
   FrameList out;
@@ -32,5 +32,5 @@ TEST(MeanRate, OfOneFrameIsZero) {
   EXPECT_EQ(mean_rate_B(FrameList{}), Vec3::Zero());
 }
 
-}  // namespace
+}  // namespace window_views_test
 }  // namespace fbvins

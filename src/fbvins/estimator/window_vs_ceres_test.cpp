@@ -19,7 +19,7 @@
 #include "fbvins/estimator/window_test_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace window_vs_ceres_test {
 
 using namespace test;  // NOLINT: the residuals and the scene
 
@@ -288,5 +288,5 @@ TEST(WindowAtRest, IsSolvedThoughOneDepthIsHardlyObservable) {
 INSTANTIATE_TEST_SUITE_P(StatesOnlyAndWithCalibration, WindowTwins, testing::Bool(),
                          [](const auto& one) { return one.param ? "WithCalibration" : "StatesOnly"; });
 
-}  // namespace
+}  // namespace window_vs_ceres_test
 }  // namespace fbvins

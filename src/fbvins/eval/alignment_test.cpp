@@ -7,7 +7,7 @@
 #include "fbvins/eval/evaluation.hpp"
 
 namespace fbvins {
-namespace {
+namespace alignment_test {
 
 using eval_test::flight;
 using eval_test::noisy;
@@ -132,5 +132,5 @@ TEST(Alignment, NamesRoundTrip) {
   EXPECT_FALSE(alignment_from_string("SE4"));
 }
 
-}  // namespace
+}  // namespace alignment_test
 }  // namespace fbvins

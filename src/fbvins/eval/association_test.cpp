@@ -6,7 +6,7 @@
 #include "fbvins/eval/eval_test_trajectories.hpp"
 
 namespace fbvins {
-namespace {
+namespace association_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -66,5 +66,5 @@ TEST(Association, EmptyTrajectoriesGiveNoPairs) {
   EXPECT_TRUE(associate(at_ms({1}), {}, {}).empty());
 }
 
-}  // namespace
+}  // namespace association_test
 }  // namespace fbvins

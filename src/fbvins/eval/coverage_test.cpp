@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace coverage_test {
 
 std::vector<Time> every_50ms(int from, int to) {
   std::vector<Time> stamps;
@@ -43,5 +43,5 @@ TEST(Coverage, HoleAndNothing) {
   EXPECT_EQ(coverage_of({}, {}).share, 0);
 }
 
-}  // namespace
+}  // namespace coverage_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/eval/eval_test_trajectories.hpp"
 
 namespace fbvins {
-namespace {
+namespace evaluation_test {
 
 using eval_test::flight;
 using eval_test::noisy;
@@ -66,5 +66,5 @@ TEST(Evaluation, FiguresOfAKnownShift) {
   EXPECT_NEAR(e->largest_excursion_m, excursion_m, 1e-12);
 }
 
-}  // namespace
+}  // namespace evaluation_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/eval/eval_test_trajectories.hpp"
 
 namespace fbvins {
-namespace {
+namespace nees_test {
 
 Mat6 some_covariance() {
   Rng rng(11);
@@ -67,5 +67,5 @@ TEST(Nees, AnInvalidCovarianceIsCountedNotUsed) {
   EXPECT_FALSE(pose_nees(pairs[0].truth.T, pairs[0].estimate.T, -P));
 }
 
-}  // namespace
+}  // namespace nees_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/eval/eval_test_trajectories.hpp"
 
 namespace fbvins {
-namespace {
+namespace relative_error_test {
 
 /// Straight along x, 0.25 m and 0.25 s a step; the estimate is 2 % too long.
 std::vector<PosePair> straight(int n) {
@@ -77,5 +77,5 @@ TEST(RelativeError, TooShortGivesNothing) {
   EXPECT_TRUE(relative_errors({}, {}).translation_m.empty());
 }
 
-}  // namespace
+}  // namespace relative_error_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace statistics_test {
 
 TEST(Statistics, FiveFiguresOfAKnownList) {
   const ErrorStatistics s = statistics_of({4, 1, 2, 3});
@@ -37,5 +37,5 @@ TEST(Statistics, PercentileIsLinearBetweenNeighbours) {
   EXPECT_DOUBLE_EQ(percentile({1, 2, 3}, 1.0), 3);
 }
 
-}  // namespace
+}  // namespace statistics_test
 }  // namespace fbvins

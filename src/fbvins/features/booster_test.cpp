@@ -17,7 +17,7 @@
 #include "fbvins/features/safetensors.hpp"
 
 namespace fbvins {
-namespace {
+namespace booster_test {
 
 const std::string kTestData = FBVINS_SOURCE_DIR "/tests/data/";
 
@@ -164,5 +164,5 @@ TEST(BoosterWeights, ThatDoNotFitAreNamed) {
   EXPECT_NE(cut.error().message.find("the file is cut off"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace booster_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace epipolar_ransac_test {
 
 constexpr double kPixel = 1.0 / 460.0;
 
@@ -146,5 +146,5 @@ TEST(EpipolarRansac, SameSeedSameBits) {
   EXPECT_TRUE(x.E == y.E);
 }
 
-}  // namespace
+}  // namespace epipolar_ransac_test
 }  // namespace fbvins

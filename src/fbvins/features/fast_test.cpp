@@ -11,7 +11,7 @@
 #include "fbvins/features/scale_pyramid.hpp"
 
 namespace fbvins {
-namespace {
+namespace fast_test {
 
 constexpr int kCircle[16][2] = {{0, -3}, {1, -3}, {2, -2}, {3, -1}, {3, 0},  {3, 1},   {2, 2},   {1, 3},
                                 {0, 3},  {-1, 3}, {-2, 2}, {-3, 1}, {-3, 0}, {-3, -1}, {-2, -2}, {-1, -3}};
@@ -138,5 +138,5 @@ TEST(Fast, FlatAndTinyImagesHaveNone) {
   }
 }
 
-}  // namespace
+}  // namespace fast_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/features/int8_kernels.hpp"
 
 namespace fbvins {
-namespace {
+namespace int8_gemm_test {
 
 std::vector<float> random_numbers(std::size_t count, float spread, Rng& rng) {
   std::vector<float> out(count);
@@ -153,5 +153,5 @@ TEST(QuantisedRows, KeepWholeNumbersSignsAndZerosExactly) {
   EXPECT_TRUE(std::all_of(rows.values.begin(), rows.values.end(), [](std::int8_t v) { return v == 0; }));
 }
 
-}  // namespace
+}  // namespace int8_gemm_test
 }  // namespace fbvins

@@ -80,6 +80,11 @@ struct KltResult {
 
 /// Last step of a converged alignment; and of the backward check, which only asks whether the feature comes back near its start.
 inline constexpr double kConverged_px = 0.03, kConvergedCheck_px = 0.1;
+/// Largest error of an alignment there and back again, and largest disagreement between the newest patch and the reference, or anchor:
+/// a feature beyond it has drifted and is dropped.
+inline constexpr double kForwardBackward_px = 0.7, kMaxCreep_px = 0.7;
+/// Coarsest level of an alignment from a position that is known to a pixel or two.
+inline constexpr int kNearLevel = 1;
 
 /// Finds the template in `image`, starting at `start_px`, from level `coarsest` down to `finest`. A match is good where it
 /// correlates with the template, or what differs is no more than noise. `converged_px`: last step on the finest level.

@@ -7,7 +7,7 @@
 #include "fbvins/features/shi_tomasi.hpp"
 
 namespace fbvins {
-namespace {
+namespace klt_test {
 
 constexpr int kWidth = 320, kHeight = 240;
 
@@ -147,5 +147,5 @@ TEST(Klt, RefusesTemplatesWithoutTextureOrOutside) {
   EXPECT_NEAR(itself.correlation, 1, 1e-4);
 }
 
-}  // namespace
+}  // namespace klt_test
 }  // namespace fbvins

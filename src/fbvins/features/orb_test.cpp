@@ -14,7 +14,7 @@
 #include "fbvins/features/orb_pattern.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_test {
 
 using Warp = std::function<Vec2(const Vec2&)>;
 
@@ -281,5 +281,5 @@ TEST(OrbExtractor, WhatIsHiddenTakesNoPlace) {
   EXPECT_GT(static_cast<double>(visible.size()), 1.3 * static_cast<double>(count_visible(all)));
 }
 
-}  // namespace
+}  // namespace orb_test
 }  // namespace fbvins

@@ -55,10 +55,8 @@ void replicate_top_and_bottom(std::uint8_t* origin, int width, int height, std::
   }
 }
 
-std::ptrdiff_t padded_stride(int width) { return (width + 2 * kBorder + 63) / 64 * 64; }
-
 std::size_t padded_size(int width, int height) {
-  return static_cast<std::size_t>(padded_stride(width)) * static_cast<std::size_t>(height + 2 * kBorder);
+  return static_cast<std::size_t>(padded_stride(width, kBorder)) * static_cast<std::size_t>(height + 2 * kBorder);
 }
 
 }  // namespace
@@ -70,7 +68,7 @@ void Pyramid::build(const ImageView& image, int levels) {
   int width = image.width, height = image.height;
   for (int l = 0; l < std::min(levels, kMaxPyramidLevels); ++l) {
     if (l > 0 && std::min(width, height) < kSmallestLevel) break;
-    levels_.push_back({nullptr, width, height, padded_stride(width)});
+    levels_.push_back({nullptr, width, height, padded_stride(width, kBorder)});
     total += padded_size(width, height);
     width = (width + 1) / 2;
     height = (height + 1) / 2;

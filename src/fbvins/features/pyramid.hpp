@@ -21,6 +21,9 @@ namespace fbvins {
 inline constexpr int kPyramidBorder = 16;
 inline constexpr int kMaxPyramidLevels = 6;
 
+/// Bytes from row to row of a level with borders so wide.
+inline std::ptrdiff_t padded_stride(int width, int border_px) { return (width + 2 * border_px + 63) / 64 * 64; }
+
 struct PyramidLevel {
   const std::uint8_t* origin = nullptr;  ///< pixel (0, 0)
   int width = 0;

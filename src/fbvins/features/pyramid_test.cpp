@@ -6,7 +6,7 @@
 #include "fbvins/features/noise_texture.hpp"
 
 namespace fbvins {
-namespace {
+namespace pyramid_test {
 
 TEST(Pyramid, LevelsAreBinomialMeansOfEverySecondPixel) {
   const NoiseTexture texture(3);
@@ -54,5 +54,5 @@ TEST(Pyramid, SmallImagesHaveFewerLevelsAndEmptyOnesNone) {
   EXPECT_NEAR(mean_brightness(pyramid), 77, 1e-9);
 }
 
-}  // namespace
+}  // namespace pyramid_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include <cstring>
 
 namespace fbvins {
-namespace {
+namespace safetensors_test {
 
 std::string file_of(const std::string& header, const std::string& data) {
   const std::uint64_t length = header.size();
@@ -92,5 +92,5 @@ TEST(SafeTensors, TurnsHalvesIntoSingles) {
   EXPECT_TRUE(std::isinf(half_to_float(0x7c00)));
 }
 
-}  // namespace
+}  // namespace safetensors_test
 }  // namespace fbvins

@@ -11,11 +11,8 @@
 namespace fbvins {
 namespace {
 
-constexpr int kBorder = ScalePyramid::kBorder;
-constexpr int kSmallestLevel = 64;
+constexpr int kSmallestScaledLevel = 64;
 constexpr int kSmoothMargin = 8;
-
-std::ptrdiff_t padded_stride(int width) { return (width + 2 * kBorder + 63) / 64 * 64; }
 
 /// Two rows blended, weights out of 128.
 FBVINS_KERNEL
@@ -52,13 +49,13 @@ void blend_columns(const std::uint8_t* row, const ShrinkBlock* blocks, int count
 void replicate_borders(std::uint8_t* origin, int width, int height, std::ptrdiff_t stride) {
   for (int y = 0; y < height; ++y) {
     std::uint8_t* row = origin + y * stride;
-    std::memset(row - kBorder, row[0], kBorder);
-    std::memset(row + width, row[width - 1], kBorder);
+    std::memset(row - ScalePyramid::kBorder, row[0], ScalePyramid::kBorder);
+    std::memset(row + width, row[width - 1], ScalePyramid::kBorder);
   }
-  const auto bytes = static_cast<std::size_t>(width + 2 * kBorder);
-  for (int i = 1; i <= kBorder; ++i) {
-    std::memcpy(origin - kBorder - i * stride, origin - kBorder, bytes);
-    std::memcpy(origin - kBorder + (height - 1 + i) * stride, origin - kBorder + (height - 1) * stride, bytes);
+  const auto bytes = static_cast<std::size_t>(width + 2 * ScalePyramid::kBorder);
+  for (int i = 1; i <= ScalePyramid::kBorder; ++i) {
+    std::memcpy(origin - ScalePyramid::kBorder - i * stride, origin - ScalePyramid::kBorder, bytes);
+    std::memcpy(origin - ScalePyramid::kBorder + (height - 1 + i) * stride, origin - ScalePyramid::kBorder + (height - 1) * stride, bytes);
   }
 }
 
@@ -121,18 +118,18 @@ void ScalePyramid::build(const ImageView& image, int levels, double factor) {
   for (int l = 0; l < levels; ++l, scale *= factor) {
     const int width = static_cast<int>(std::lround(image.width / scale));
     const int height = static_cast<int>(std::lround(image.height / scale));
-    if (l > 0 && std::min(width, height) < kSmallestLevel) break;
-    levels_.push_back({nullptr, width, height, padded_stride(width)});
+    if (l > 0 && std::min(width, height) < kSmallestScaledLevel) break;
+    levels_.push_back({nullptr, width, height, padded_stride(width, ScalePyramid::kBorder)});
     scales_.push_back(scale);
-    total += static_cast<std::size_t>(padded_stride(width)) * static_cast<std::size_t>(height + 2 * kBorder);
+    total += static_cast<std::size_t>(padded_stride(width, ScalePyramid::kBorder)) * static_cast<std::size_t>(height + 2 * ScalePyramid::kBorder);
   }
   pixels_.resize(total + 64);
   std::uint8_t* place = pixels_.data();
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     PyramidLevel& level = levels_[l];
-    std::uint8_t* origin = place + kBorder * level.stride + kBorder;
+    std::uint8_t* origin = place + ScalePyramid::kBorder * level.stride + ScalePyramid::kBorder;
     level.origin = origin;
-    place += level.stride * (level.height + 2 * kBorder);
+    place += level.stride * (level.height + 2 * ScalePyramid::kBorder);
     if (l == 0)
       for (int y = 0; y < level.height; ++y)
         std::memcpy(origin + y * level.stride, image.row(y), static_cast<std::size_t>(level.width));

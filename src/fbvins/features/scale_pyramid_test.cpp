@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace scale_pyramid_test {
 
 TEST(ScalePyramid, KeepsALinearRampWhereItWas) {
   for (const double factor : {1.05, 1.2, 1.5, 2.0}) {
@@ -60,5 +60,5 @@ TEST(SmoothLevel, KeepsConstantsAndTheSumOfAPoint) {
   EXPECT_EQ(smooth.row(43)[50], smooth.row(37)[50]);
 }
 
-}  // namespace
+}  // namespace scale_pyramid_test
 }  // namespace fbvins

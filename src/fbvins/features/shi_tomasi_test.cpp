@@ -9,7 +9,7 @@
 #include "fbvins/features/noise_texture.hpp"
 
 namespace fbvins {
-namespace {
+namespace shi_tomasi_test {
 
 constexpr double kMinDistance_px = 22;
 constexpr auto kIdentity = [](const Vec2& p) { return p; };
@@ -114,5 +114,5 @@ TEST(ShiTomasi, KeepsItsDistanceFromWhatIsHiddenAndFillsTheRest) {
   for (const Corner& corner : corners) EXPECT_FALSE(mask.hides(corner.px, kMaskMargin_px - 1));
 }
 
-}  // namespace
+}  // namespace shi_tomasi_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace depth_image_test {
 
 StereoRig rig() { return with_depth(TestWall{}.rig(), {.noise_at_1m_m = 0.003}); }
 
@@ -74,5 +74,5 @@ TEST_P(DepthImageIn, WithoutItTracksGoOn) {
 
 INSTANTIATE_TEST_SUITE_P(All, DepthImageIn, testing::Values("klt", "orb", "boost"));
 
-}  // namespace
+}  // namespace depth_image_test
 }  // namespace fbvins

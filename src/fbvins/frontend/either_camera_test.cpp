@@ -10,7 +10,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace either_camera_test {
 
 constexpr double kSpeed_mps = 0.2, kPeriod_s = 0.05;
 
@@ -121,5 +121,5 @@ TEST_P(EitherCameraOf, TheRightCameraAloneFromTheBeginning) {
   EXPECT_GT(with_both(process(8, 11, true, true)), 20);
 }
 
-}  // namespace
+}  // namespace either_camera_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace epipolar_check_test {
 
 /// Forty points of a room, seen before and after a step to the right; every fifth has moved by itself, up.
 std::vector<TrackState> tracks_with_outliers() {
@@ -46,5 +46,5 @@ TEST(EpipolarCheck, JudgesOnlyThoseGatheredAndNoneThatHasEnded) {
   EXPECT_EQ(tracks[5].fate, Fate::out_of_view);
 }
 
-}  // namespace
+}  // namespace epipolar_check_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace frame_images_test {
 
 constexpr int kWidth = 96, kHeight = 64;
 
@@ -67,5 +67,5 @@ TEST(FrameImages, NothingCarriesOverAGapOrBackInTime) {
   }
 }
 
-}  // namespace
+}  // namespace frame_images_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/options.hpp"
 
 namespace fbvins {
-namespace {
+namespace frontend_options_test {
 
 StereoRig rig() {
   StereoRig rig;
@@ -57,5 +57,5 @@ TEST(FrontendOptions, AreValidForEveryNameAndForNoOther) {
   EXPECT_NE(validate(options).error().message.find(frontend_choices()), std::string::npos);
 }
 
-}  // namespace
+}  // namespace frontend_options_test
 }  // namespace fbvins

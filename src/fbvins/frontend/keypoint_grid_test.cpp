@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace keypoint_grid_test {
 
 TEST(KeypointGrid, FindsTheSameAsAnExhaustiveSearch) {
   Rng rng(3);
@@ -50,5 +50,5 @@ TEST(KeypointGrid, CanBeBuiltAgainAndOfNothing) {
   EXPECT_TRUE(found.empty());
 }
 
-}  // namespace
+}  // namespace keypoint_grid_test
 }  // namespace fbvins

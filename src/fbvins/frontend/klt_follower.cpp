@@ -10,10 +10,6 @@ namespace {
 constexpr double kSmallestScale = 0.65;
 /// Correlation with the anchor below which it is replaced.
 constexpr double kMinAnchorCorrelation = 0.8;
-/// A feature farther from its anchor's match has drifted and is dropped.
-constexpr double kMaxCreep_px = 0.7;
-/// Largest forward-backward error.
-constexpr double kForwardBackward_px = 0.7;
 constexpr int kTop = kKltLevels - 1;
 /// Coarsest level where motion and depth are known, and that of the backward check.
 constexpr int kWellPredictedLevel = 2, kBackLevel = 1;

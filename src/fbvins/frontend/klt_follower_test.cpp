@@ -7,7 +7,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace klt_follower_test {
 
 /// A corner of the wall, followed from one image into the next, which `second` shows.
 struct Scene {
@@ -73,5 +73,5 @@ TEST(KltFollower, UpdatesTheDepthByTheMotion) {
   EXPECT_NEAR(scene.track.depth_ratio, (TestWall::kDepth_m - 0.03) / TestWall::kDepth_m, 1e-9);
 }
 
-}  // namespace
+}  // namespace klt_follower_test
 }  // namespace fbvins

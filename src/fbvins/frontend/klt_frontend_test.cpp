@@ -9,7 +9,7 @@
 #include "fbvins/features/noise_texture.hpp"
 
 namespace fbvins {
-namespace {
+namespace klt_frontend_test {
 
 /// A stereo camera that flies past a textured wall at z = 3 m of G, looking at it and turning a little.
 class Wall {
@@ -260,5 +260,5 @@ TEST(KltFrontend, HasNoFeatureInTheMask) {
   EXPECT_GT(in_right, 100);
 }
 
-}  // namespace
+}  // namespace klt_frontend_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {
-namespace {
+namespace klt_real_test {
 
 std::filesystem::path data_folder() {
   if (const char* folder = std::getenv("FBVINS_DATA")) return folder;
@@ -90,5 +90,5 @@ TEST(KltOnRealImages, FollowsShakenImagesWithoutPrediction) {
   EXPECT_LT(median(tally.epipolar_px), 0.35);
 }
 
-}  // namespace
+}  // namespace klt_real_test
 }  // namespace fbvins

@@ -16,8 +16,6 @@ constexpr int kKnownDepthLevel = 1;
 constexpr int kMostSteps = 200;
 /// Correlation that the search must reach.
 constexpr double kMinSearchCorrelation = 0.6;
-/// Largest forward-backward error, right and back.
-constexpr double kForwardBackward_px = 0.7;
 /// Largest distance from the epipolar line in the right image.
 constexpr double kEpipolar_px = 1.5;
 /// A match may be nearer than the smallest depth searched for by this factor: noise of the disparity.

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace landmark_memory_test {
 
 constexpr int kLevels = 3;
 const Camera kCamera(PinholeRadtan{.fx = 400, .fy = 400, .cx = 320, .cy = 240}, 640, 480);
@@ -90,5 +90,5 @@ TEST(LandmarkMemory, IsBoundedAndForgetsThoseUnseenForLongest) {
   EXPECT_EQ(memory.size(), 0u);
 }
 
-}  // namespace
+}  // namespace landmark_memory_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace landmark_updates_test {
 
 using Kind = LandmarkUpdates::Kind;
 
@@ -31,5 +31,5 @@ TEST(LandmarkUpdatesDeathTest, AGapIsABug) {
   EXPECT_DEBUG_DEATH(updates.take(update(2)), "without gaps");
 }
 
-}  // namespace
+}  // namespace landmark_updates_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace motion_check_test {
 
 struct Track : TrackState {};
 struct Patches {};
@@ -140,5 +140,5 @@ TEST(MotionCheck, MeasuresInPixelsOfTheLens) {
   EXPECT_EQ(stats.lost_check, 0);
 }
 
-}  // namespace
+}  // namespace motion_check_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/frontend/track_table.hpp"
 
 namespace fbvins {
-namespace {
+namespace observe_test {
 
 const Camera kCamera(PinholeRadtan{230, 229, 160, 118, -0.28, 0.07, 2e-4, 2e-5}, 320, 240);
 
@@ -37,5 +37,5 @@ TEST(FeaturesOf, AreThoseOfTheTracksInSight) {
   EXPECT_EQ(features[1].right.value().pixel, Vec2(100, 50));
 }
 
-}  // namespace
+}  // namespace observe_test
 }  // namespace fbvins

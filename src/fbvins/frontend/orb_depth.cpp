@@ -4,13 +4,6 @@
 #include "fbvins/frontend/observe.hpp"
 
 namespace fbvins {
-namespace {
-
-/// Coarsest level of alignment from a keypoint.
-constexpr int kNearLevel = 1;
-
-}  // namespace
-
 OrbDepth::OrbDepth(const StereoRig& rig, const OrbFrontendOptions& options, double sigma_px)
     : right_camera_(rig.right),
       subpixel_(options.subpixel),

@@ -7,7 +7,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_depth_test {
 
 constexpr double kDisparity_px = TestWall::kFocal_px * TestWall::kBaseline_m / TestWall::kDepth_m;
 
@@ -61,5 +61,5 @@ TEST(OrbDepth, NothingIsFoundNearerThanLookedFor) {
   EXPECT_EQ(scene.stats.stereo, 0);
 }
 
-}  // namespace
+}  // namespace orb_depth_test
 }  // namespace fbvins

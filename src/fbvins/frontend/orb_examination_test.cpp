@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace orb_examination_test {
 
 /// How many of `images` consecutive images are examined, with `observed` tracks in each.
 int examined_of(ExaminationPolicy& policy, int images, int observed) {
@@ -47,5 +47,5 @@ TEST(ExaminationPolicy, AllWhereTracksCannotBeFollowed) {
   EXPECT_EQ(examined_of(policy, 10, 100), 10);
 }
 
-}  // namespace
+}  // namespace orb_examination_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_frontend_test {
 
 constexpr int kWidth = 376, kHeight = 240;
 constexpr double kDepth_m = 3.0, kSpeed_mps = 0.4, kFramePeriod_s = 0.05;
@@ -437,5 +437,5 @@ TEST(OrbFrontend, HasNoFeatureInTheMask) {
   }
 }
 
-}  // namespace
+}  // namespace orb_frontend_test
 }  // namespace fbvins

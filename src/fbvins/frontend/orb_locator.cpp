@@ -12,14 +12,8 @@ constexpr std::size_t kFewestForCommonMiss = 8;
 constexpr double kFillInCorrelation = 0.85;
 /// Farther than this from the prediction, alignment has found something else.
 constexpr double kFarthestFillIn_px = 50;
-/// Largest disagreement between the newest patch and the reference.
-constexpr double kMaxCreep_px = 0.7;
-/// Largest forward-backward error.
-constexpr double kForwardBackward_px = 0.7;
 /// A keypoint this near, times its scale, is the track's.
 constexpr double kSameFeature_px = 2;
-/// Coarsest level of alignment from a position that is known to a pixel or two.
-constexpr int kNearLevel = 1;
 
 const Keypoint* keypoint_of(const OrbView& view, int found) {
   return found < 0 ? nullptr : &view.features.keypoints[static_cast<std::size_t>(found)];

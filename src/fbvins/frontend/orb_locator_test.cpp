@@ -7,7 +7,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_locator_test {
 
 constexpr double kStep_m = 0.04;
 
@@ -93,5 +93,5 @@ TEST(OrbLocator, AKeypointOfSomethingElseIsNotTaken) {
   EXPECT_EQ(scene.stats.lost_check, 1);
 }
 
-}  // namespace
+}  // namespace orb_locator_test
 }  // namespace fbvins

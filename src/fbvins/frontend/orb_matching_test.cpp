@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace orb_matching_test {
 
 /// A descriptor with this many bits set.
 Descriptor bits(int count) {
@@ -57,5 +57,5 @@ TEST(GuidedMatcher, AKeypointBelongsToTheMostSimilarTrack) {
   EXPECT_EQ(scene.match({near, far}), (std::vector<int>{0, -1}));
 }
 
-}  // namespace
+}  // namespace orb_matching_test
 }  // namespace fbvins

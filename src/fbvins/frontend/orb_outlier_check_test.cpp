@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace orb_outlier_check_test {
 
 /// Sixty points of a room; the camera moves to the right by a centimetre per image. The first point slides across the epipolar
 /// lines by a third of the threshold per image.
@@ -40,5 +40,5 @@ TEST(OrbOutlierCheck, FindsASlowSlideOverSeveralImages) {
   EXPECT_EQ(tracks[0].fate, Fate::lost);
 }
 
-}  // namespace
+}  // namespace orb_outlier_check_test
 }  // namespace fbvins

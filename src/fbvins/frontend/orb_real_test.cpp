@@ -10,7 +10,7 @@
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_real_test {
 
 std::filesystem::path data_folder() {
   if (const char* folder = std::getenv("FBVINS_DATA")) return folder;
@@ -86,5 +86,5 @@ TEST(OrbFrontendOnRealImages, StereoOnKeyframesFarApart) {
   EXPECT_LT(tally.median_epipolar_px(), 0.5);
 }
 
-}  // namespace
+}  // namespace orb_real_test
 }  // namespace fbvins

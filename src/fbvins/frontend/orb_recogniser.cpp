@@ -9,10 +9,10 @@ namespace fbvins {
 namespace {
 
 /// Tracks of fewer images are not remembered.
-constexpr int kFewestFrames = 4;
+constexpr int kFewestFramesOfALandmark = 4;
 /// Search radius around the predicted position of a landmark.
 constexpr double kSearch_px = 15;
-constexpr int kMaxDistance_bits = 50;
+constexpr int kMaxLandmarkDistance_bits = 50;
 /// Fewer matches than this in one image may be chance.
 constexpr int kFewestTogether = 4;
 /// Largest deviation of one from the median prediction error.
@@ -39,7 +39,7 @@ void OrbRecogniser::clear(OrbTracks& tracks) {
 }
 
 void OrbRecogniser::remember(const OrbTrack& track, const PatchReference& reference, const OrbView& view, Time now) {
-  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth || track.age_frames < kFewestFrames) return;
+  if (!options_.enabled || !view.T_GC || !track.seen_from_G || !track.inverse_depth || track.age_frames < kFewestFramesOfALandmark) return;
   RememberedLandmark landmark;
   landmark.track = track.id;
   landmark.descriptor = track.descriptor;
@@ -60,7 +60,7 @@ void OrbRecogniser::recognise(OrbTracks& tracks, OrbView& view, const Pyramid& l
   memory_.expect(*view.T_GC, camera_, levels_, expected_);
   queries_.clear();
   for (const ExpectedLandmark& e : expected_)
-    queries_.push_back({e.px, kSearch_px, e.level, kMaxDistance_bits, e.landmark->descriptor});
+    queries_.push_back({e.px, kSearch_px, e.level, kMaxLandmarkDistance_bits, e.landmark->descriptor});
   matcher_.match(queries_, view.features, view.grid, found_);
 
   const auto miss = [&](std::size_t i) -> Vec2 {

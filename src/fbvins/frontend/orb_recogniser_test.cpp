@@ -9,7 +9,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_recogniser_test {
 
 /// Tracks of one image of the wall, remembered; then another image of the wall, from elsewhere.
 struct Scene {
@@ -98,5 +98,5 @@ TEST(OrbRecogniser, RemembersLandmarksOnly) {
   for (const OrbTrack& track : disabled.before) EXPECT_FALSE(disabled.recogniser.remembers(track.id));
 }
 
-}  // namespace
+}  // namespace orb_recogniser_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_starter_test {
 
 struct Scene {
   TestWall wall;
@@ -64,5 +64,5 @@ TEST(OrbStarter, StopsWhenTheTableIsFull) {
   EXPECT_EQ(tracks.size(), 5u);
 }
 
-}  // namespace
+}  // namespace orb_starter_test
 }  // namespace fbvins

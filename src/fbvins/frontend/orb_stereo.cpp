@@ -16,7 +16,7 @@ constexpr double kInfinity_px = 1.0;
 constexpr double kBand_px = 2.0;
 constexpr float kLargestScale = 3.0f;
 constexpr int kLevelsApart = 1;
-constexpr int kMaxDistance_bits = 64;
+constexpr int kMaxStereoDistance_bits = 64;
 /// Smallest z of a rotated (x, y, 1) that still has rectified coordinates.
 constexpr double kGrazing = 0.05;
 
@@ -73,7 +73,7 @@ int OrbStereoMatcher::candidate(const Vec2& left_normalised, int level, const De
   distance_.resize(near_.size());
   hamming_distances(descriptor, right_->descriptors, near_, distance_.data());
   int distance = 0;
-  return pick_match(near_, distance_, right_->keypoints, kMaxDistance_bits, &distance);
+  return pick_match(near_, distance_, right_->keypoints, kMaxStereoDistance_bits, &distance);
 }
 
 std::optional<double> OrbStereoMatcher::inverse_depth(const Vec2& left_normalised, const Vec2& right_normalised) const {

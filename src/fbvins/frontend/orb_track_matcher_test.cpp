@@ -7,7 +7,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_track_matcher_test {
 
 /// Makes all descriptors the same: improved ones are useless here, those as extracted are not.
 class Leveller final : public DescriptorStage {
@@ -67,5 +67,5 @@ TEST(OrbTrackMatcher, AlsoCountsMatchesOfDescriptorsAsExtracted) {
   EXPECT_LT(scene.stats.matches.found, scene.stats.raw_matches.found) << "equal descriptors fail the ratio test";
 }
 
-}  // namespace
+}  // namespace orb_track_matcher_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/frontend/test_wall.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_track_test {
 
 OrbTrack track_at(const Camera& camera, const Vec2& px, int age_frames = 5) {
   OrbTrack track;
@@ -138,5 +138,5 @@ TEST(Forget, KeepsTracksWithDepthForLonger) {
   EXPECT_EQ(fate(1.1, true, 5, true), Fate::active) << "observed";
 }
 
-}  // namespace
+}  // namespace orb_track_test
 }  // namespace fbvins

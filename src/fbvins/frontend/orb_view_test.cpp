@@ -6,7 +6,7 @@
 #include "fbvins/features/noise_texture.hpp"
 
 namespace fbvins {
-namespace {
+namespace orb_view_test {
 
 /// Inverts every bit.
 class Inverter final : public DescriptorStage {
@@ -50,5 +50,5 @@ TEST(OrbDescriber, NoKeypointOfANewImageIsUsed) {
   EXPECT_FALSE(near.empty());
 }
 
-}  // namespace
+}  // namespace orb_view_test
 }  // namespace fbvins

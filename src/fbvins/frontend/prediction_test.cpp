@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace prediction_test {
 
 const Pose<B, C0> kT_BC0(so3_exp(Vec3(0.01, -0.02, 0.3)), Vec3(0.02, -0.01, 0.03));
 
@@ -103,5 +103,5 @@ TEST(CarryPoint, TurnsAndMovesByDepth) {
   EXPECT_FALSE(carry_point(camera, motion, Vec2::Zero(), 0.25)) << "behind the camera";
 }
 
-}  // namespace
+}  // namespace prediction_test
 }  // namespace fbvins

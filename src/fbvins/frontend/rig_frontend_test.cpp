@@ -12,7 +12,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace rig_frontend_test {
 
 double x_m(int k) { return 0.01 * k; }
 
@@ -117,5 +117,5 @@ TEST(RigFrontend, APositionGoesToTheFrontendOfItsTrack) {
   EXPECT_EQ(told[1][0].landmarks[0].track, TrackId{7});
 }
 
-}  // namespace
+}  // namespace rig_frontend_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace survival_test {
 
 TrackedFrame frame_with(std::int64_t ms, const std::vector<std::int64_t>& ids) {
   TrackedFrame frame;
@@ -30,5 +30,5 @@ TEST(SurvivalMeter, ComparesWithASecondAgo) {
   EXPECT_EQ(meter.add(frame_with(2000, {})).now, 0);
 }
 
-}  // namespace
+}  // namespace survival_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <set>
 
 namespace fbvins {
-namespace {
+namespace track_table_test {
 
 struct Named {
   int name = 0;
@@ -60,5 +60,5 @@ TEST(TrackTable, TellsOfEveryTrackThatEndsAndOfNoOther) {
   EXPECT_EQ(ended, wanted);
 }
 
-}  // namespace
+}  // namespace track_table_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace typical_depth_test {
 
 TEST(TypicalDepth, IgnoresTooFewDepths) {
   TypicalDepth depth;
@@ -17,5 +17,5 @@ TEST(TypicalDepth, IgnoresTooFewDepths) {
   EXPECT_EQ(depth.inverse_depth(), 0.25);
 }
 
-}  // namespace
+}  // namespace typical_depth_test
 }  // namespace fbvins

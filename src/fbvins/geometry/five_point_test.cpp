@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace five_point_test {
 
 struct Five {
   std::array<Vec2, 5> a, b;
@@ -88,5 +88,5 @@ TEST(FivePoint, DecompositionChoosesTheSmallerRotation) {
   EXPECT_LT((decompose_essential(-hat(t_ba) * R_ba).R_ba - R_ba).norm(), 1e-8);
 }
 
-}  // namespace
+}  // namespace five_point_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace jacobian_check_test {
 
 const Vec3 kPoint(0.3, -1.2, 2.0);
 const Quat kRotation = so3_exp(Vec3(0.4, -0.2, 0.9));
@@ -62,5 +62,5 @@ TEST(JacobianCheck, RefusesNanAndWrongSizes) {
   EXPECT_FALSE(check_jacobian(residual, right_jacobian(), {{"point", 3}}, kColumns).ok);
 }
 
-}  // namespace
+}  // namespace jacobian_check_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace p3p_test {
 
 struct Triple {
   std::array<Vec3, 3> rays, points;
@@ -75,5 +75,5 @@ TEST(P3p, PointsOnALineOrOnOneAnotherGiveNothing) {
   EXPECT_EQ(solve_p3p(rays, {Vec3(1, 0, 3), Vec3(1, 0, 3), Vec3(1, 0, 3)}).count, 0);
 }
 
-}  // namespace
+}  // namespace p3p_test
 }  // namespace fbvins

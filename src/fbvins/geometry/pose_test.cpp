@@ -6,7 +6,7 @@
 #include <type_traits>
 
 namespace fbvins {
-namespace {
+namespace pose_test {
 
 template <class A, class B2>
 concept composable = requires(A a, B2 b) {
@@ -39,5 +39,5 @@ TEST(Pose, BoxplusIsWorldTranslationAndLocalRotation) {
   EXPECT_LT((so3_log(T.q.conjugate() * moved.q) - Vec3(0, 0, 0.25)).norm(), 1e-15);
 }
 
-}  // namespace
+}  // namespace pose_test
 }  // namespace fbvins

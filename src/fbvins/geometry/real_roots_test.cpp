@@ -11,7 +11,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace real_roots_test {
 
 /// Coefficients, lowest first, of the product of (x - root) and of (x^2 + 1) `pairs` times.
 std::vector<double> polynomial(const std::vector<double>& roots, int pairs = 0) {
@@ -70,5 +70,5 @@ TEST(RealRoots, NoneWhereThereIsNone) {
   EXPECT_TRUE(sorted_roots({1, std::numeric_limits<double>::infinity(), 1}).empty());
 }
 
-}  // namespace
+}  // namespace real_roots_test
 }  // namespace fbvins

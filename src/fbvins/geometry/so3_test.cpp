@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace so3_test {
 
 /// Angles where formulas switch or degenerate, and random ones.
 std::vector<Vec3> nasty_rotations(double max_angle) {
@@ -75,5 +75,5 @@ TEST(So3, InverseOfRightJacobian) {
   }
 }
 
-}  // namespace
+}  // namespace so3_test
 }  // namespace fbvins

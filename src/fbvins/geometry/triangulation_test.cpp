@@ -6,7 +6,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace triangulation_test {
 
 TEST(Triangulation, FindsTheDepthOfRandomPointsFromRandomPairsOfViews) {
   Rng rng(1);
@@ -45,5 +45,5 @@ TEST(Triangulation, NothingIsKnownWithoutABaselineOrAlongIt) {
   EXPECT_FALSE(distance_from_epipolar_line(ahead, 0.5 * ahead, ahead));
 }
 
-}  // namespace
+}  // namespace triangulation_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace aged_bias_test {
 
 const Time kEnd{1'000'000'000'000};
 
@@ -37,5 +37,5 @@ TEST(AgedBias, ItDoesNotGrowForEver) {
 
 TEST(AgedBias, AClockSetBackMeansTheLargestVariance) { EXPECT_EQ(accel_sigma(-5), accel_sigma(1e6)); }
 
-}  // namespace
+}  // namespace aged_bias_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace alignment_rotation_test {
 
 using test::Motion;
 const ImuBias kBias{Vec3(0.02, -0.03, 0.08), Vec3(0.05, -0.06, 0.04)};
@@ -60,5 +60,5 @@ TEST(AlignRotations, SaysWhenOrientationsAndGyroDisagree) {
   EXPECT_GT(align_rotations(w.poses, w.between, {}).rms, 4);
 }
 
-}  // namespace
+}  // namespace alignment_rotation_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace alignment_test {
 
 using test::Motion;
 const ImuBias kBias{Vec3(0.02, -0.03, 0.08), Vec3(0.05, -0.06, 0.04)};
@@ -200,5 +200,5 @@ TEST(Alignment, RefusesWhatCoarsePosesCannotObserve) {
   EXPECT_EQ(align_visual_inertial(w.poses, w.between, coarse).reason, AlignmentRefusal::gyro_bias_unobservable);
 }
 
-}  // namespace
+}  // namespace alignment_test
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
-namespace {
+namespace conventions_test {
 
 constexpr double kQuarter = std::numbers::pi / 2;
 
@@ -166,5 +166,5 @@ TEST(Conventions, U3_CovarianceOfAPoseIsOfPositionInWorldThenRotationInBody) {
   static_assert(std::same_as<decltype(Odometry::pose_covariance), Mat6>);
 }
 
-}  // namespace
+}  // namespace conventions_test
 }  // namespace fbvins

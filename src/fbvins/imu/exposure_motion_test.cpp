@@ -7,7 +7,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace exposure_motion_test {
 
 const Vec3 kGravity_B(0.3, -0.2, -9.8);
 
@@ -32,5 +32,5 @@ TEST(ExposureMotion, TheBodyBeforeAndAfterTheStamp) {
   }
 }
 
-}  // namespace
+}  // namespace exposure_motion_test
 }  // namespace fbvins

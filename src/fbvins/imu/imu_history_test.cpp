@@ -7,7 +7,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace imu_history_test {
 
 constexpr Time ms(double t) { return Time{static_cast<std::int64_t>(t * 1e6)}; }
 
@@ -105,5 +105,5 @@ TEST(ImuHistory, ForgetsWhatNoLaterSegmentNeeds) {
   EXPECT_FALSE(history.add(ramp(895))) << "stamps stay forward";
 }
 
-}  // namespace
+}  // namespace imu_history_test
 }  // namespace fbvins

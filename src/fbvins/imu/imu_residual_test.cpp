@@ -7,7 +7,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace imu_residual_test {
 
 using test::Motion;
 constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
@@ -94,5 +94,5 @@ TEST(ImuResidual, DoesNotSeeOriginAndHeading) {
   EXPECT_LT((imu_residual(moved(s.i), moved(s.j), s.between, level_gravity()) - r).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace imu_residual_test
 }  // namespace fbvins

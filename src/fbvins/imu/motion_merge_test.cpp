@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace motion_merge_test {
 
 Vec3 force(double t_s) { return Vec3(3 + t_s, -2 * t_s, 9.8); }
 Vec3 rate(double t_s) { return Vec3(std::sin(t_s), 0, t_s); }
@@ -64,5 +64,5 @@ TEST(MotionMerge, DropsReadingsThatGoBackAndKeepsABoundedNumber) {
   EXPECT_TRUE(all(merge).empty());
 }
 
-}  // namespace
+}  // namespace motion_merge_test
 }  // namespace fbvins

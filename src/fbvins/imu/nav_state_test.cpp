@@ -8,7 +8,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace nav_state_test {
 
 using test::Motion;
 const ImuBias kBias{Vec3(0.02, -0.03, 0.05), Vec3(0.1, -0.2, 0.15)};
@@ -37,5 +37,5 @@ TEST(NavState, PerturbationsAreLocalInRotationAndInTheWorldElsewhere) {
   EXPECT_EQ(moved.bias.gyro_radps, s.bias.gyro_radps);
 }
 
-}  // namespace
+}  // namespace nav_state_test
 }  // namespace fbvins

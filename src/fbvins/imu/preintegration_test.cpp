@@ -7,7 +7,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace preintegration_test {
 
 using test::Motion;
 constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
@@ -178,5 +178,5 @@ TEST(Preintegration, AnEmptySegmentAddsNothing) {
   EXPECT_EQ(p.sqrt_information().norm(), 0);
 }
 
-}  // namespace
+}  // namespace preintegration_test
 }  // namespace fbvins

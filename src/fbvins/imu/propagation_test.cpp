@@ -7,7 +7,7 @@
 #include "fbvins/imu/preintegration.hpp"
 
 namespace fbvins {
-namespace {
+namespace propagation_test {
 
 using test::Motion;
 constexpr Time kFrom{1'000'000'000}, kTo{1'500'000'000};
@@ -45,5 +45,5 @@ TEST(Propagation, WithoutReadingsNothingMoves) {
   EXPECT_EQ(integrate_gyro({}, kBias.gyro_radps).angularDistance(Quat::Identity()), 0);
 }
 
-}  // namespace
+}  // namespace propagation_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace reading_judge_test {
 
 constexpr Time ms(int t) { return Time{std::int64_t{t} * 1'000'000}; }
 
@@ -67,5 +67,5 @@ TEST(ReadingJudge, WhatItAcceptedItAcceptsAgain) {
   EXPECT_GT(first.counts().backward, 0);
 }
 
-}  // namespace
+}  // namespace reading_judge_test
 }  // namespace fbvins

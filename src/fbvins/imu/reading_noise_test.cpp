@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace reading_noise_test {
 
 /// Noise of readings as an estimator assumes it.
 ImuNoise assumed() {
@@ -102,5 +102,5 @@ TEST(ReadingNoise, AfterAGapItBeginsAnew) {
   EXPECT_EQ(noise.of(after).gyro, 1) << "other numbers after a gap are no blow";
 }
 
-}  // namespace
+}  // namespace reading_noise_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace reading_rate_test {
 
 std::vector<ImuSample> at(std::initializer_list<int> milliseconds) {
   std::vector<ImuSample> out;
@@ -18,5 +18,5 @@ TEST(ReadingRate, IsThatOfTheMedianIntervalWhateverIsMissing) {
   EXPECT_EQ(rate_hz_of(at({5, 5, 5})), 0);
 }
 
-}  // namespace
+}  // namespace reading_rate_test
 }  // namespace fbvins

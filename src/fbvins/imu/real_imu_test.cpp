@@ -17,7 +17,7 @@
 #include "fbvins/imu/static_initialiser.hpp"
 
 namespace fbvins {
-namespace {
+namespace real_imu_test {
 
 std::string data_folder() {
   const char* folder = std::getenv("FBVINS_DATA");
@@ -151,5 +151,5 @@ TEST(RealImu, MH01IsNotAtRestUntilItsEnd) {
   EXPECT_TRUE(rests(imu.size() - 130));
 }
 
-}  // namespace
+}  // namespace real_imu_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace static_initialiser_test {
 
 using test::Motion;
 constexpr Time kFrom{2'000'000'000}, kTo{3'000'000'000};
@@ -106,5 +106,5 @@ TEST(StaticInitialiser, AcceptsVibrationAtRest) {
   EXPECT_TRUE(r.at_rest) << to_string(r.reason) << " " << r.gyro_spread_radps << " " << r.accel_spread_mps2;
 }
 
-}  // namespace
+}  // namespace static_initialiser_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace anchor_file_test {
 
 TEST(AnchorFile, PositionsHeightsAndLeverArms) {
   const auto read = parse_anchors(
@@ -46,5 +46,5 @@ TEST(AnchorFile, EveryFaultIsASentenceWithItsLine) {
   EXPECT_FALSE(read_anchors("/nonexistent/p.csv"));
 }
 
-}  // namespace
+}  // namespace anchor_file_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/io/yaml_reader.hpp"
 
 namespace fbvins {
-namespace {
+namespace calibration_test {
 
 std::string rows_of(const Mat3& R, const Vec3& p, const char* open, const char* close, const char* between) {
   std::string out;
@@ -217,5 +217,5 @@ TEST(Calibration, DeepNestingIsAnErrorNotACrash) {
   EXPECT_FALSE(parse_kalibr_camchain({"deep.yaml", std::string(100000, '{')}));
 }
 
-}  // namespace
+}  // namespace calibration_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/io/numbers.hpp"
 
 namespace fbvins {
-namespace {
+namespace csv_test {
 
 std::vector<bool> kept(std::initializer_list<int> stamps) {
   std::vector<Time> times;
@@ -105,5 +105,5 @@ TEST(StampedRows, FirstBadIsTheFirstLineOfAnyKind) {
   EXPECT_EQ(rows->counts.bad(), 2);
 }
 
-}  // namespace
+}  // namespace csv_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 namespace fbvins {
-namespace {
+namespace dataset_test {
 
 std::string data_folder() {
   const char* set = std::getenv("FBVINS_DATA");
@@ -93,5 +93,5 @@ TEST(RealData, KeyframesAreJpegAndHaveNoImu) {
   EXPECT_EQ((*data)->info().ground_truth_poses, 2895);
 }
 
-}  // namespace
+}  // namespace dataset_test
 }  // namespace fbvins

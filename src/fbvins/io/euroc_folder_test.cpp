@@ -12,7 +12,7 @@
 #include "fbvins/io/png_encode.hpp"
 
 namespace fbvins {
-namespace {
+namespace euroc_folder_test {
 
 constexpr int kWidth = 64, kHeight = 48;
 
@@ -287,5 +287,5 @@ TEST(EurocFolder, NeverOverwritesARecording) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace euroc_folder_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace euroc_frames_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -152,5 +152,5 @@ TEST(AddCamera, FramesOfACameraAloneAreSharedByTheNext) {
   EXPECT_FALSE(frames[3].more_files[0].empty() || frames[3].more_files[1].empty());
 }
 
-}  // namespace
+}  // namespace euroc_frames_test
 }  // namespace fbvins

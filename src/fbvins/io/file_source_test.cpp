@@ -9,7 +9,7 @@
 #include <fstream>
 
 namespace fbvins {
-namespace {
+namespace file_source_test {
 
 namespace fs = std::filesystem;
 
@@ -82,5 +82,5 @@ TEST_F(FileSourceTest, SaysWhatItCannotRead) {
   EXPECT_EQ(read_file(folder_, 10).error().message, folder_ + ": not a plain file");
 }
 
-}  // namespace
+}  // namespace file_source_test
 }  // namespace fbvins

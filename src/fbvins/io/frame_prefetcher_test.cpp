@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace fbvins {
-namespace {
+namespace frame_prefetcher_test {
 
 std::vector<FrameEntry> frames(int count) {
   std::vector<FrameEntry> out;
@@ -83,5 +83,5 @@ TEST(FramePrefetcher, EndsEarlyWithoutLoadingTheRest) {
   EXPECT_LE(loader.loaded, 4);
 }
 
-}  // namespace
+}  // namespace frame_prefetcher_test
 }  // namespace fbvins

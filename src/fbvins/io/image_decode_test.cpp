@@ -9,7 +9,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace image_decode_test {
 
 void append_bytes(png_structp png, png_bytep data, size_t size) {
   static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
@@ -158,5 +158,5 @@ TEST(DecodeImage, OtherBytesAreRefused) {
   EXPECT_EQ(decode_image("GIF89a").error().message, "neither PNG nor JPEG");
 }
 
-}  // namespace
+}  // namespace image_decode_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <fstream>
 
 namespace fbvins {
-namespace {
+namespace imu_state_file_test {
 
 ImuState state() {
   ImuState s;
@@ -77,5 +77,5 @@ TEST(ImuStateFile, ThereIsNoneBeforeTheFirstFlight) {
   std::filesystem::remove(path);
 }
 
-}  // namespace
+}  // namespace imu_state_file_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/io/rig_text.hpp"
 
 namespace fbvins {
-namespace {
+namespace mask_fields_test {
 
 constexpr int kWidth = 64, kHeight = 48;
 
@@ -136,5 +136,5 @@ TEST(MaskFields, ARigAsTextKeepsItsMasks) {
   EXPECT_EQ(parse_rig(rig_to_yaml(*rig), "rig.yaml")->right.mask(), nullptr);
 }
 
-}  // namespace
+}  // namespace mask_fields_test
 }  // namespace fbvins

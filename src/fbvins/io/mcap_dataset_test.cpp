@@ -13,7 +13,7 @@
 #include "fbvins/io/kalibr_test_files.hpp"
 
 namespace fbvins {
-namespace {
+namespace mcap_dataset_test {
 
 namespace fs = std::filesystem;
 
@@ -369,5 +369,5 @@ TEST_F(FlightRecordTest, AFileThatIsNoMcapIsRefused) {
   expect_refused(": does not begin as an MCAP file does");
 }
 
-}  // namespace
+}  // namespace mcap_dataset_test
 }  // namespace fbvins

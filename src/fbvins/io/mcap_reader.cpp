@@ -141,7 +141,7 @@ void McapReader::load_chunk(std::uint64_t offset, std::uint64_t length, bool who
     loaded_offset_ = 0;
     loaded_chunk_ = offset;
     if (!records)
-      return complain(offset, fmt::format("this chunk is compressed by '{}', and {}", quoted(head->compression),
+      return complain(offset, fmt::format("this chunk is compressed by '{}', and {}", fbvins::quoted(head->compression),
                                           unpack_ ? "that cannot be read" : "only uncompressed ones are read"));
   }
   if (!whole || head->checksum == 0 || crc32_of(loaded_) == head->checksum) return;
@@ -167,7 +167,7 @@ void McapReader::load_attachment(std::uint64_t offset, std::uint64_t length) {
   const auto checksum = in.get<std::uint32_t>();
   if (!in.ok()) return complain(offset, "this attachment is not what it should be");
   if (checksum != 0 && crc32_of(std::string_view(bytes).substr(0, end)) != checksum)
-    return complain(offset, fmt::format("the checksum of the attachment '{}' is wrong", quoted(name)));
+    return complain(offset, fmt::format("the checksum of the attachment '{}' is wrong", fbvins::quoted(name)));
   attachments_.push_back({std::string(name), std::string(media_type), std::string(data)});
 }
 

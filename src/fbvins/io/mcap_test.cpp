@@ -17,7 +17,7 @@
 #include "fbvins/io/mcap_writer.hpp"
 
 namespace fbvins {
-namespace {
+namespace mcap_test {
 
 namespace fs = std::filesystem;
 
@@ -264,5 +264,5 @@ TEST_F(Mcap, AFullDiskCostsOnlyWhatDidNotFit) {
   EXPECT_EQ(reader.damage().parts, 0) << reader.damage().first;
 }
 
-}  // namespace
+}  // namespace mcap_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace numbers_test {
 
 TEST(Numbers, SecondsKeepEveryNanosecond) {
   EXPECT_EQ(parse_seconds("1403636584.763555584")->ns, 1403636584763555584);
@@ -60,5 +60,5 @@ TEST(Numbers, DoublesAreTheWholeField) {
   for (const char* text : {"", " ", "1,5", "1.5m", "0x1", "+-1", "1e999", "--1"}) EXPECT_FALSE(parse_double(text)) << text;
 }
 
-}  // namespace
+}  // namespace numbers_test
 }  // namespace fbvins

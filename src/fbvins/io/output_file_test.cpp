@@ -9,7 +9,7 @@
 #include "fbvins/io/file_source.hpp"
 
 namespace fbvins {
-namespace {
+namespace output_file_test {
 
 namespace fs = std::filesystem;
 
@@ -64,5 +64,5 @@ TEST_F(OutputFileTest, AFileThatMovedIsClosedByItsNewOwner) {
   EXPECT_EQ(*read_file(path_, 100), "x");
 }
 
-}  // namespace
+}  // namespace output_file_test
 }  // namespace fbvins

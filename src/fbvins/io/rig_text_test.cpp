@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace rig_text_test {
 
 /// Numbers whose last bits matter.
 StereoRig awkward_rig(Rng& rng, bool fisheye) {
@@ -122,5 +122,5 @@ TEST(RigText, ComplainsWithTheField) {
   }
 }
 
-}  // namespace
+}  // namespace rig_text_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/io/ros_definitions.hpp"
 
 namespace fbvins {
-namespace {
+namespace ros_messages_test {
 
 Vec3 random_vector(Rng& rng) {
   const double x = rng.normal(), y = rng.normal(), z = rng.normal();
@@ -123,5 +123,5 @@ TEST(RosDefinitions, EachTypeIsThereOnceWithAllItsParts) {
   }
 }
 
-}  // namespace
+}  // namespace ros_messages_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include <sstream>
 
 namespace fbvins {
-namespace {
+namespace trajectory_test {
 
 class TrajectoryFiles : public testing::Test {
  protected:
@@ -151,5 +151,5 @@ TEST(Trajectory, ErrorsNameTheLine) {
   EXPECT_EQ(read_trajectory("/nowhere").error().message, "/nowhere: no such file");
 }
 
-}  // namespace
+}  // namespace trajectory_test
 }  // namespace fbvins

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace yaml_reader_test {
 
 TEST(YamlReader, TheFirstComplaintStays) {
   YamlReader yaml("f.yaml", "a: 1\nb: -2\nc: [1, [2, 3]]\n");
@@ -52,5 +52,5 @@ TEST(YamlReader, AnEmptyFileIsAcceptedWhereAllowed) {
   EXPECT_TRUE(YamlReader("f.yaml", "%YAML:1.0\n---\na: 1\n").ok()) << "OpenCV's header";
 }
 
-}  // namespace
+}  // namespace yaml_reader_test
 }  // namespace fbvins

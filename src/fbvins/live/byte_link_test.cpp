@@ -10,7 +10,7 @@
 #include <array>
 
 namespace fbvins {
-namespace {
+namespace byte_link_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -120,5 +120,5 @@ TEST(ByteLink, APortInUseIsNamed) {
   EXPECT_NE(link.problem().find("UDP port " + std::to_string(other.port)), std::string::npos) << link.problem();
 }
 
-}  // namespace
+}  // namespace byte_link_test
 }  // namespace fbvins

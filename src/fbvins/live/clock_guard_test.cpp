@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace clock_guard_test {
 
 Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 
@@ -256,5 +256,5 @@ TEST(ClockGuard, ARecordingPlayedFasterIsNoLeap) {
   EXPECT_NEAR(guard.host_of(at(1040)).seconds(), 60.001, 1e-6);
 }
 
-}  // namespace
+}  // namespace clock_guard_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/live/socket_test_sender.hpp"
 
 namespace fbvins {
-namespace {
+namespace frame_ring_test {
 
 using test::kSlotBytes;
 
@@ -146,5 +146,5 @@ TEST(FrameRing, MemoryThatCouldGoAwayIsRefused) {
   EXPECT_NE(::ftruncate(good.number(), 1), 0);  // the seal holds
 }
 
-}  // namespace
+}  // namespace frame_ring_test
 }  // namespace fbvins

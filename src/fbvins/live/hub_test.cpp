@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace fbvins {
-namespace {
+namespace hub_test {
 
 struct Taken {
   std::vector<std::int64_t> stamps;
@@ -124,5 +124,5 @@ TEST(Hub, TheFirstErrorIsReportedAndLaterEventsStillCome) {
   EXPECT_EQ(hub.reports()[0].taken, 10);
 }
 
-}  // namespace
+}  // namespace hub_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace imu_order_test {
 
 Time ms(std::int64_t value) { return Time{value * 1'000'000}; }
 
@@ -72,5 +72,5 @@ TEST(ImuOrder, FlushLetsEverythingGo) {
   EXPECT_EQ(std::vector<std::int64_t>(o.out.end() - 2, o.out.end()), (std::vector<std::int64_t>{60, 70}));
 }
 
-}  // namespace
+}  // namespace imu_order_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <thread>
 
 namespace fbvins {
-namespace {
+namespace ingest_test {
 
 Time ms(std::int64_t value) { return Time{value * 1'000'000}; }
 
@@ -230,5 +230,5 @@ TEST(Ingest, NothingIsTakenAfterTheEnd) {
   EXPECT_FALSE(f.ingest.pop());
 }
 
-}  // namespace
+}  // namespace ingest_test
 }  // namespace fbvins

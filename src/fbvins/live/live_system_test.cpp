@@ -15,7 +15,7 @@
 #include "fbvins/live/pose_propagator.hpp"
 
 namespace fbvins {
-namespace {
+namespace live_system_test {
 
 using test::Motion;
 using test::SimulatedFlight;
@@ -280,5 +280,5 @@ TEST(LivePose, ErrorAtImuRateIsHardlyMoreThanAtImages) {
   }
 }
 
-}  // namespace
+}  // namespace live_system_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kHeartbeatEvery{1'000'000'000}, kRequestEvery{1'000'000'000}, kQuiet{1'000'000'000};
+constexpr Duration kRequestEvery{1'000'000'000}, kQuiet{1'000'000'000};
 /// Stamps further ahead of their arrival, or further behind, are of a clock that is not known yet. The limit behind is larger:
 /// on a busy machine readings wait in the port, and are still good.
 constexpr Duration kFarthestAhead{500'000'000}, kLatest{2'000'000'000};
@@ -18,7 +18,7 @@ constexpr Duration kLeap{20'000'000};
 constexpr double kStandardGravity_mps2 = 9.80665;
 constexpr MavlinkAddress kUs{1, 197};
 /// After this many unanswered requests for HIGHRES_IMU, SCALED_IMU is requested as well.
-constexpr int kPatience = 3;
+constexpr int kRequestsUnanswered = 3;
 
 /// Numbers on the wire are any 64 bits; a larger one is no clock's, and does not fit nanoseconds.
 constexpr std::uint64_t kLatestClock_usec = 3'800'000'000'000'000;
@@ -74,7 +74,7 @@ MavlinkImu::Frames MavlinkImu::tick(Time now) {
   if (const auto question = peer_.question(now)) say(*question, out);
   if (now - last_reading_ > kQuiet && is_due(now, kRequestEvery, next_request_)) {
     say(interval_request(HighresImuMessage::kId, *peer_.address()), out);
-    if (++requests_ > kPatience) say(interval_request(ScaledImuMessage::kId, *peer_.address()), out);
+    if (++requests_ > kRequestsUnanswered) say(interval_request(ScaledImuMessage::kId, *peer_.address()), out);
   }
   return out;
 }

@@ -7,7 +7,7 @@
 #include <functional>
 
 namespace fbvins {
-namespace {
+namespace mavlink_imu_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr MavlinkAddress kAutopilot{7, 1};
@@ -213,5 +213,5 @@ TEST(MavlinkImu, LeavesOutOthersAndHalfReadings) {
     ADD_FAILURE() << "a reading of another vehicle, " << sample.t.ns;
 }
 
-}  // namespace
+}  // namespace mavlink_imu_test
 }  // namespace fbvins

@@ -14,6 +14,9 @@
 
 namespace fbvins {
 
+/// How often a peer is told that this end lives.
+inline constexpr Duration kHeartbeatEvery{1'000'000'000};
+
 /// Times are of this machine's CLOCK_MONOTONIC.
 class MavlinkPeer {
  public:

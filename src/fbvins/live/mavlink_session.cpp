@@ -7,7 +7,7 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kHeartbeatEvery{1'000'000'000}, kTextEvery{500'000'000}, kPatience{3'000'000'000};
+constexpr Duration kTextEvery{500'000'000}, kPatience{3'000'000'000};
 
 Odometry odometry(const LivePose& pose) {
   Odometry o;

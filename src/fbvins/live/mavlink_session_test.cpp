@@ -7,7 +7,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace mavlink_session_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr MavlinkAddress kAutopilot{1, 1};
@@ -304,5 +304,5 @@ TEST(MavlinkSession, WithoutAPoseOdometrySaysSoAndVisionIsSilent) {
   EXPECT_TRUE(std::holds_alternative<VisionSpeedMessage>(both[1]));
 }
 
-}  // namespace
+}  // namespace mavlink_session_test
 }  // namespace fbvins

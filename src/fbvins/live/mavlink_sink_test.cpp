@@ -21,7 +21,7 @@
 #include "fbvins/mavlink/wire.hpp"
 
 namespace fbvins {
-namespace {
+namespace mavlink_sink_test {
 
 bool comes_true(const std::function<bool()>& fact) {
   for (int i = 0; i < 2000; ++i) {
@@ -306,5 +306,5 @@ TEST(MavlinkSink, AnAddressThatIsNoneIsSaidInASentence) {
   EXPECT_EQ(sink.error().message, "rate_hz = 0 is outside [1, 1000]");
 }
 
-}  // namespace
+}  // namespace mavlink_sink_test
 }  // namespace fbvins

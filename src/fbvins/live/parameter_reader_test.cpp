@@ -17,7 +17,7 @@
 #include "fbvins/mavlink/wire.hpp"
 
 namespace fbvins {
-namespace {
+namespace parameter_reader_test {
 
 /// Answers as PX4 does, whole numbers in the bytes of the float; loses the first request of each name.
 class SmallFlightController {
@@ -114,5 +114,5 @@ TEST(ParameterReader, ASilentFlightControllerIsOneSentence) {
   EXPECT_FALSE(read_parameters("udp:nowhere", {"A"}, {}));
 }
 
-}  // namespace
+}  // namespace parameter_reader_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace pose_propagator_test {
 
 constexpr double kPeriod_s = 0.005;
 
@@ -304,5 +304,5 @@ TEST(PosePropagator, CovarianceIsThatOfTheErrors) {
   EXPECT_LT((middle.velocity_covariance - velocity_expected).norm(), 0.02 * velocity_expected.norm());
 }
 
-}  // namespace
+}  // namespace pose_propagator_test
 }  // namespace fbvins

@@ -14,7 +14,7 @@
 #include "fbvins/io/mcap_reader.hpp"
 
 namespace fbvins {
-namespace {
+namespace record_sink_test {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -180,5 +180,5 @@ TEST_F(RecordSinkTest, EndsWholeBeforeTheDiskIsFull) {
   EXPECT_FALSE(refused);
 }
 
-}  // namespace
+}  // namespace record_sink_test
 }  // namespace fbvins

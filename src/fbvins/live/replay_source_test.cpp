@@ -10,7 +10,7 @@
 #include "fbvins/io/flight_record.hpp"
 
 namespace fbvins {
-namespace {
+namespace replay_source_test {
 
 namespace fs = std::filesystem;
 
@@ -122,5 +122,5 @@ TEST_F(ReplaySourceTest, NonsenseIsRefused) {
   EXPECT_FALSE(ReplaySource::open("/there/is/nothing", {}));
 }
 
-}  // namespace
+}  // namespace replay_source_test
 }  // namespace fbvins

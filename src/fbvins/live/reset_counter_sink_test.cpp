@@ -8,7 +8,7 @@
 #include <fstream>
 
 namespace fbvins {
-namespace {
+namespace reset_counter_sink_test {
 
 class ResetCounter : public ::testing::Test {
  protected:
@@ -59,5 +59,5 @@ TEST_F(ResetCounter, AFileThatCannotBeWrittenIsSaidOnceAndPosesGoOn) {
   EXPECT_TRUE(sink.take(pose(0)));
 }
 
-}  // namespace
+}  // namespace reset_counter_sink_test
 }  // namespace fbvins

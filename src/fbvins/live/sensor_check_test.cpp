@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace sensor_check_test {
 
 /// Five seconds of sensors at rest, with faults.
 struct Look {
@@ -67,5 +67,5 @@ TEST(SensorCheck, EachFaultIsNamedAlone) {
   expect({.imu_rate_hz = 0}, "no IMU reading came");
 }
 
-}  // namespace
+}  // namespace sensor_check_test
 }  // namespace fbvins

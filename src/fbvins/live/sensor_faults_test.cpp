@@ -9,7 +9,7 @@
 #include <variant>
 
 namespace fbvins {
-namespace {
+namespace sensor_faults_test {
 
 Time ms(std::int64_t value) { return Time{value * 1'000'000}; }
 
@@ -173,5 +173,5 @@ TEST(SensorFaults, NonsenseIsRefusedInOneSentence) {
   }
 }
 
-}  // namespace
+}  // namespace sensor_faults_test
 }  // namespace fbvins

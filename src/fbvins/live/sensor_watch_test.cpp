@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace sensor_watch_test {
 
 Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 
@@ -78,5 +78,5 @@ TEST(SensorWatch, BeforeTheFirstPoseItOnlySaysWhatIsMissing) {
   EXPECT_EQ(judged(waiting, {}, 0.05), waiting);
 }
 
-}  // namespace
+}  // namespace sensor_watch_test
 }  // namespace fbvins

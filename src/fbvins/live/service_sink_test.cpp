@@ -8,7 +8,7 @@
 #include <cstring>
 
 namespace fbvins {
-namespace {
+namespace service_sink_test {
 
 /// A service manager's end: a datagram socket of the abstract namespace.
 class Manager {
@@ -152,5 +152,5 @@ TEST(ServiceSink, AWrongAddressIsOneSentence) {
   EXPECT_FALSE(ServiceSink::create("/" + std::string(200, 'x'), stderr));
 }
 
-}  // namespace
+}  // namespace service_sink_test
 }  // namespace fbvins

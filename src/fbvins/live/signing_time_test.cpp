@@ -11,7 +11,7 @@
 #include <thread>
 
 namespace fbvins {
-namespace {
+namespace signing_time_test {
 
 std::string file_named(const std::string& name) {
   const std::string file = testing::TempDir() + name;
@@ -69,5 +69,5 @@ TEST(SigningTime, SaysWhenItCannotBeKept) {
   EXPECT_FALSE(kept);
 }
 
-}  // namespace
+}  // namespace signing_time_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/live/socket_test_sender.hpp"
 
 namespace fbvins {
-namespace {
+namespace socket_file_test {
 
 bool is_there(const std::string& path) { return std::filesystem::exists(std::filesystem::symlink_status(path)); }
 
@@ -107,5 +107,5 @@ TEST(SocketFile, PathsThatCannotBe) {
   EXPECT_FALSE(SocketFile::listen("/no/such/folder/sensors.sock"));
 }
 
-}  // namespace
+}  // namespace socket_file_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/live/socket_test_sender.hpp"
 
 namespace fbvins {
-namespace {
+namespace socket_message_test {
 
 using test::bytes_of;
 using test::hello_message;
@@ -265,5 +265,5 @@ TEST(SocketMessage, NothingAndUnknownTypes) {
   EXPECT_EQ(std::get<SocketUnknown>(*message).type, 999u);
 }
 
-}  // namespace
+}  // namespace socket_message_test
 }  // namespace fbvins

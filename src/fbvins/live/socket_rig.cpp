@@ -18,7 +18,7 @@ constexpr double kLargestOffset_s = 10;
 /// Matrices typed by hand carry three or four digits.
 constexpr double kRotationTolerance = 1e-3;
 
-Error malformed(std::string sentence) { return {ErrorCode::malformed, "calibration: " + std::move(sentence)}; }
+Error wrong_rig(std::string sentence) { return {ErrorCode::malformed, "calibration: " + std::move(sentence)}; }
 
 bool are_finite(const double* begin, std::size_t count) {
   return std::all_of(begin, begin + count, [](double x) { return std::isfinite(x); });
@@ -29,16 +29,16 @@ Result<Camera> camera_of(const FbvinsSocketCamera& c, int width_px, int height_p
   const double* m = c.centre_px;
   const double* k = c.distortion;
   if (!are_finite(f, 2) || !are_finite(m, 2) || !are_finite(k, 4) || !(f[0] > 0 && f[1] > 0))
-    return malformed(fmt::format("the {} camera's intrinsics are not finite, with positive focal lengths", side));
+    return wrong_rig(fmt::format("the {} camera's intrinsics are not finite, with positive focal lengths", side));
   if (c.model == FBVINS_SOCKET_RADTAN)
     return Camera(PinholeRadtan{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
   if (c.model == FBVINS_SOCKET_EQUIDISTANT)
     return Camera(KannalaBrandt{f[0], f[1], m[0], m[1], k[0], k[1], k[2], k[3]}, width_px, height_px);
   const bool double_sphere = c.model == FBVINS_SOCKET_DOUBLE_SPHERE;
   if (!double_sphere && c.model != FBVINS_SOCKET_EXTENDED_UNIFIED)
-    return malformed(fmt::format("the {} camera has no model {}", side, c.model));
+    return wrong_rig(fmt::format("the {} camera has no model {}", side, c.model));
   if (const std::string problem = outside_of_model(double_sphere ? "ds" : "eucm", {k[0], k[1]}); !problem.empty())
-    return malformed(fmt::format("of the {} camera {}", side, problem));
+    return wrong_rig(fmt::format("of the {} camera {}", side, problem));
   if (double_sphere) return Camera(DoubleSphere{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
   return Camera(ExtendedUnified{f[0], f[1], m[0], m[1], k[0], k[1]}, width_px, height_px);
 }
@@ -50,8 +50,8 @@ Result<Pose<B, C0>> mounting_of(const FbvinsSocketCamera& camera, const std::str
   const Vec3 p(m[3], m[7], m[11]);
   if (!((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < kRotationTolerance) || !(R.determinant() > 0) ||
       !are_finite(m, 12))
-    return malformed(fmt::format("the {} camera's T_BC is not a rotation and a translation", side));
-  if (!(p.cwiseAbs().maxCoeff() < 1e3)) return malformed(fmt::format("the {} camera is more than a kilometre away", side));
+    return wrong_rig(fmt::format("the {} camera's T_BC is not a rotation and a translation", side));
+  if (!(p.cwiseAbs().maxCoeff() < 1e3)) return wrong_rig(fmt::format("the {} camera is more than a kilometre away", side));
   return Pose<B, C0>{Quat(R).normalized(), p};
 }
 
@@ -59,8 +59,8 @@ Result<void> check_figures(const FbvinsSocketRig& rig) {
   for (const double figure :
        {rig.gyro_noise_density_radps_rthz, rig.gyro_random_walk_radps2_rthz, rig.accel_noise_density_mps2_rthz,
         rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz, rig.image_rate_hz})
-    if (!(figure > 0 && std::isfinite(figure))) return malformed("a noise density or a rate is not positive");
-  if (!(std::abs(rig.time_offset_s) <= kLargestOffset_s)) return malformed("the time offset is more than 10 s");
+    if (!(figure > 0 && std::isfinite(figure))) return wrong_rig("a noise density or a rate is not positive");
+  if (!(std::abs(rig.time_offset_s) <= kLargestOffset_s)) return wrong_rig("the time offset is more than 10 s");
   return {};
 }
 

@@ -12,7 +12,7 @@
 #include "fbvins/live/socket_test_sender.hpp"
 
 namespace fbvins {
-namespace {
+namespace socket_source_test {
 
 using namespace std::chrono_literals;
 using test::bytes_of;
@@ -396,5 +396,5 @@ TEST_F(SocketSourceWithoutRig, WaitingCanBeGivenUp) {
   EXPECT_FALSE(std::filesystem::exists(path()));
 }
 
-}  // namespace
+}  // namespace socket_source_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/types/quality.hpp"
 
 namespace fbvins {
-namespace {
+namespace status_sink_test {
 
 TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
   LiveStatus status;
@@ -75,5 +75,5 @@ TEST(LatencyHistogram, PercentilesAreWithinABin) {
   EXPECT_EQ(summary.count, 1000);
 }
 
-}  // namespace
+}  // namespace status_sink_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace stereo_pairs_test {
 
 /// "2 3L 4R": frames by tens of milliseconds, alone where a letter says so.
 class Pairs {
@@ -91,5 +91,5 @@ TEST(StereoPairs, AStampThatGoesBackIsDropped) {
   EXPECT_EQ(p.given, "3");
 }
 
-}  // namespace
+}  // namespace stereo_pairs_test
 }  // namespace fbvins

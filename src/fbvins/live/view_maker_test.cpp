@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace view_maker_test {
 
 TrackedFrame frame_with(Time t, std::initializer_list<std::int64_t> tracks) {
   TrackedFrame frame;
@@ -76,5 +76,5 @@ TEST(ViewMaker, WithoutAPoseThereAreFeaturesAlone) {
   EXPECT_TRUE(views.view_of(odometry_at(Time{8}, Vec3::Zero()), 0).features.empty());  // of another image
 }
 
-}  // namespace
+}  // namespace view_maker_test
 }  // namespace fbvins

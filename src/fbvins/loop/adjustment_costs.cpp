@@ -8,7 +8,7 @@ template <int Rows, int Columns>
 using RowMajor = Eigen::Matrix<double, Rows, Columns, Eigen::RowMajor>;
 
 /// No step leads nearer to a camera's plane than this, or behind it.
-constexpr double kNearest_m = 0.05;
+constexpr double kNearestPlane_m = 0.05;
 
 NavState<M> state_of(const Quat& start, const double* pose, const double* motion) {
   NavState<M> s;
@@ -35,7 +35,7 @@ bool ObservationCost::Evaluate(double const* const* x, double* residual, double*
   const Vec3 p_MB(x[0][0], x[0][1], x[0][2]), p_M(x[1][0], x[1][1], x[1][2]);
   const Mat3 R_BM = orientation<6>(q_MB_, x[0]).toRotationMatrix().transpose(), R_CB = T_BC0_.R().transpose();
   const Vec3 p_B = R_BM * (p_M - p_MB), p_C = R_CB * (p_B - T_BC0_.p);
-  if (p_C.z() < kNearest_m) return false;
+  if (p_C.z() < kNearestPlane_m) return false;
   const double rho = 1 / p_C.z(), by_xy = 1 / static_cast<double>(seen_.sigma_xy);
   const double by_rho = seen_.has_depth() ? 1 / static_cast<double>(seen_.sigma_inverse_depth) : 0;
   residual[0] = (p_C.x() * rho - static_cast<double>(seen_.x)) * by_xy;

@@ -7,7 +7,7 @@
 #include "fbvins/imu/imu_test_motion.hpp"
 
 namespace fbvins {
-namespace {
+namespace adjustment_costs_test {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -112,5 +112,5 @@ TEST_F(Readings, TheirJacobianIsItsDerivative) {
   check_cost(ImuCost(q_i, q_j, std::make_shared<const Preintegration>(imu), kGravity), x);
 }
 
-}  // namespace
+}  // namespace adjustment_costs_test
 }  // namespace fbvins

@@ -15,7 +15,7 @@ namespace {
 constexpr double kCertain_m = 0.1, kCertain_rad = 1.5 * kDegree;
 constexpr int kLeastAnchors = 3, kLeastKeyframes = 2;
 constexpr double kLeastShare = 0.6;
-constexpr double kOutlier_sigma = 4;
+constexpr double kUnfit_sigma = 4;
 /// Of more anchors, so many are taken, evenly: to judge hypotheses, and to make them, of every two of which there is one.
 constexpr std::size_t kMostJudges = 100, kMostInPairs = 24;
 constexpr double kShortestBase_m = 0.5;
@@ -54,7 +54,7 @@ class Judges {
     }
     return root * residual(pose->measured, q_AB, Vec3(x.p_A + arm));
   }
-  bool fits(std::size_t i, const Placement& x) const { return whitened(i, x).squaredNorm() < kOutlier_sigma * kOutlier_sigma; }
+  bool fits(std::size_t i, const Placement& x) const { return whitened(i, x).squaredNorm() < kUnfit_sigma * kUnfit_sigma; }
 
   const Vec3& centre() const { return centre_; }
 
@@ -113,7 +113,7 @@ std::vector<Placement> hypotheses(const Judges& judges) {
 /// Sum of squared residuals, none counted beyond the bound of an outlier.
 double cost_of(const Judges& judges, const std::vector<std::size_t>& asked, const Placement& x) {
   double cost = 0;
-  for (const std::size_t i : asked) cost += std::min(judges.whitened(i, x).squaredNorm(), kOutlier_sigma * kOutlier_sigma);
+  for (const std::size_t i : asked) cost += std::min(judges.whitened(i, x).squaredNorm(), kUnfit_sigma * kUnfit_sigma);
   return cost;
 }
 

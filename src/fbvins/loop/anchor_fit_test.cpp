@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace anchor_fit_test {
 
 const Quat kTurn = about_z(2.3);
 const Vec3 kShift(12, -7, 3);
@@ -110,5 +110,5 @@ TEST(FitAnchors, TheCovarianceIsThatOfTheResult) {
   EXPECT_LT(nees, 5.2);
 }
 
-}  // namespace
+}  // namespace anchor_fit_test
 }  // namespace fbvins

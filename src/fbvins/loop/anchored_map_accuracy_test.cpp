@@ -5,7 +5,7 @@
 #include "fbvins/loop/anchored_flight.hpp"
 
 namespace fbvins {
-namespace {
+namespace anchored_map_accuracy_test {
 
 using namespace test_room;
 
@@ -44,5 +44,5 @@ TEST(AnchoredMap, ThreeTagsDoSoToACentimetreWithWrongNumbersAsWell) {
   }
 }
 
-}  // namespace
+}  // namespace anchored_map_accuracy_test
 }  // namespace fbvins

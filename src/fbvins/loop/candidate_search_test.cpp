@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace candidate_search_test {
 
 constexpr int kWords = 10;
 const Pose<B, C0> kForward(so3_exp(Vec3(0, 1.5707963267948966, 0)), Vec3::Zero());  // the camera looks along the body's x
@@ -79,5 +79,5 @@ TEST_F(Search, WhatIsRemovedIsNotFound) {
   EXPECT_TRUE(search_.anywhere(map_, query(100)).empty());
 }
 
-}  // namespace
+}  // namespace candidate_search_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace feature_tracks_test {
 
 using namespace test_room;
 
@@ -76,5 +76,5 @@ TEST(FeatureTracks, KeyframesWithoutAPlaceInMAreLeftOut) {
     for (const FeatureView& v : t) EXPECT_NE(v.keyframe, 3u);
 }
 
-}  // namespace
+}  // namespace feature_tracks_test
 }  // namespace fbvins

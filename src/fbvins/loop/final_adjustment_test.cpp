@@ -10,7 +10,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace final_adjustment_test {
 
 using namespace test_room;
 
@@ -169,5 +169,5 @@ TEST(FinalAdjustment, SameBitsAndNothingToDo) {
   EXPECT_EQ(serialise_map(alone), serialise_map(before));
 }
 
-}  // namespace
+}  // namespace final_adjustment_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace flight_anchors_test {
 
 Pose<G, B> in_G(double x) { return {Quat::Identity(), Vec3(x, 0, 0)}; }
 
@@ -89,5 +89,5 @@ TEST(FlightAnchors, OfADayOlderKeyframesAreLeftOutAndTheFlightIsStillWhole) {
   EXPECT_EQ(flight.corrected(map, in_G).size(), in_G.size());
 }
 
-}  // namespace
+}  // namespace flight_anchors_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace inverted_index_test {
 
 constexpr int kWords = 50;
 
@@ -70,5 +70,5 @@ TEST(InvertedIndex, LeavesOutWhatIsNotAllowedOrNotThere) {
   EXPECT_TRUE(index.query({}, 10).empty());
 }
 
-}  // namespace
+}  // namespace inverted_index_test
 }  // namespace fbvins

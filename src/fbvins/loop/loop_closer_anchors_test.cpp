@@ -8,7 +8,7 @@
 #include "fbvins/loop/map_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace loop_closer_anchors_test {
 
 using namespace test_room;
 
@@ -151,5 +151,5 @@ TEST(AnchoredMap, ThinningHandsAnchorsToNeighbours) {
   EXPECT_LT(flown.after.m, 0.04);
 }
 
-}  // namespace
+}  // namespace loop_closer_anchors_test
 }  // namespace fbvins

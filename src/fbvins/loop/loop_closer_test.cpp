@@ -14,7 +14,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace loop_closer_test {
 
 using namespace test_room;
 
@@ -288,5 +288,5 @@ TEST(LoopCloser, PosesOfASessionWhoseKeyframesAreGoneStayWhereTheyWere) {
   EXPECT_EQ(placed, localised);
 }
 
-}  // namespace
+}  // namespace loop_closer_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace loop_map_test {
 
 namespace fs = std::filesystem;
 
@@ -82,5 +82,5 @@ TEST_F(OpenedMap, SaysWhatIsWrong) {
   EXPECT_NE(small.error().message.find("max_keyframes"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace loop_map_test
 }  // namespace fbvins

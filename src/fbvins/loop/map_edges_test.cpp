@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace map_edges_test {
 
 const Pose<B, C0> kCamera(so3_exp(Vec3(-1.2, 1.1, -1.3)), Vec3(0.05, -0.02, 0.1));
 
@@ -84,5 +84,5 @@ TEST(LoopEdge, NoLoopIsCertain) {
   EXPECT_GT(std::sqrt(covariance(5, 5)), 0.0015);
 }
 
-}  // namespace
+}  // namespace map_edges_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include "fbvins/loop/map_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace map_edit_test {
 
 /// Keyframes a metre apart along x, with odometry between neighbours and a loop from the last to the first.
 PlaceMap row_of(int keyframes) {
@@ -119,5 +119,5 @@ TEST(NamedMap, KeepsItsNameInTheFile) {
   EXPECT_EQ(serialise_map(map), without) << "maps without a name are as they were, for older programs, too";
 }
 
-}  // namespace
+}  // namespace map_edit_test
 }  // namespace fbvins

@@ -14,7 +14,7 @@
 #include "fbvins/loop/binary_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace map_file_test {
 
 namespace fs = std::filesystem;
 
@@ -184,5 +184,5 @@ TEST_F(MapFile, ExportsPointsAndKeyframes) {
   EXPECT_EQ(std::count(tum.begin(), tum.end(), '\n'), 3);
 }
 
-}  // namespace
+}  // namespace map_file_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <numbers>
 
 namespace fbvins {
-namespace {
+namespace map_frame_test {
 
 Pose<G, B> body_at(const Vec3& p) { return {Quat::Identity(), p}; }
 
@@ -123,5 +123,5 @@ TEST(MapFrameFollower, MovesByABoundedAmountASecondAndArrives) {
   EXPECT_NEAR((before - target * T_WB.p).norm(), 0, 1e-9);
 }
 
-}  // namespace
+}  // namespace map_frame_test
 }  // namespace fbvins

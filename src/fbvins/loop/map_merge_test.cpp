@@ -8,7 +8,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace map_merge_test {
 
 using namespace test_room;
 
@@ -43,5 +43,5 @@ TEST(MergeMaps, JoinsTwoFlightsOfOneRoomAndRefusesStrangers) {
   EXPECT_FALSE(merge_maps(a, boosted, {}, vocabulary()).ok()) << "descriptors of two kinds do not compare";
 }
 
-}  // namespace
+}  // namespace map_merge_test
 }  // namespace fbvins

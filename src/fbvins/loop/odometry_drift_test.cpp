@@ -8,7 +8,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace odometry_drift_test {
 
 const DriftOptions kAssumed{.position_m = 0.006, .yaw_rad = 0.001};
 
@@ -80,5 +80,5 @@ TEST(OdometryDrift, StaysWithinLimits) {
   EXPECT_DOUBLE_EQ(drift.rate().position_m, 4 * kAssumed.position_m);
 }
 
-}  // namespace
+}  // namespace odometry_drift_test
 }  // namespace fbvins

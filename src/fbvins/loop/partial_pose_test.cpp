@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace partial_pose_test {
 
 const Pose<A, B> kT_AB(so3_exp(Vec3(0.1, -0.2, 2.0)), Vec3(4, -1, 1.5));
 
@@ -106,5 +106,5 @@ TEST(PartialPose, ATiltDisplacesThePointOfALeverArm) {
   EXPECT_LT(r.dot(wide * r), 1.1);
 }
 
-}  // namespace
+}  // namespace partial_pose_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace place_extractor_test {
 
 constexpr double kDepth_m = 3;
 
@@ -136,5 +136,5 @@ TEST(PlaceExtractor, SameImagesSameBits) {
   EXPECT_EQ(used.extract(frame, Mat3::Identity()).features, fresh.extract(frame, Mat3::Identity()).features);
 }
 
-}  // namespace
+}  // namespace place_extractor_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/imu/preintegration.hpp"
 
 namespace fbvins {
-namespace {
+namespace place_map_test {
 
 /// Steps of a metre and a small turn; each is one edge of the odometry.
 PlaceMap chain(int keyframes) {
@@ -174,5 +174,5 @@ TEST(PlaceMap, AnAnchoredOneMovesToItsAnchorsAndAnotherStays) {
   }
 }
 
-}  // namespace
+}  // namespace place_map_test
 }  // namespace fbvins

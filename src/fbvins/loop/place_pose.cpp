@@ -20,11 +20,11 @@ constexpr double kInlier_px = 3.0;
 /// Standard deviation of a keypoint of the finest scale, to which others are compared.
 constexpr double kFinestKeypoint_px = 0.7;
 /// A point nearer to the camera's plane than this is behind it.
-constexpr double kNearest_m = 0.05;
+constexpr double kNearestSeen_m = 0.05;
 /// Refinement: residuals count less from here, and not at all from there.
 constexpr double kHuber_sigma = 2.0, kGross_sigma = 10;
 /// A match farther from the refined pose than this is an outlier; with depth its squared residual has a third row.
-constexpr double kOutlier_sigma = 3.4, kThreeRowsOverTwo = 1.25;
+constexpr double kPoseOutlier_sigma = 3.4, kThreeRowsOverTwo = 1.25;
 constexpr int kRefinements = 8;
 /// Keeps the normal equations solvable; far below the information of one match.
 constexpr double kDamping = 1e-6;
@@ -54,7 +54,7 @@ class MatchTerm {
   /// With the pose at hand. False when the point is behind the query's camera.
   bool evaluate(const PlaceFeature& q, const PlaceFeature& c, const Mat3& R, const Vec3& t) {
     const Vec3 ray(point.x(), point.y(), 1), P = R * ray + point.z() * t;  // the point, times its inverse depth
-    if (!(P.z() > kNearest_m * point.z())) return false;
+    if (!(P.z() > kNearestSeen_m * point.z())) return false;
     const double iz = 1 / P.z();
     const Vec3 expected(P.x() * iz, P.y() * iz, point.z() * iz);
     Mat3 J_P;  // d(x, y, inverse depth)/dP
@@ -90,7 +90,7 @@ class MatchTerm {
   Vec3 c_ = Vec3::Zero(), c_variances_ = Vec3::Zero();
 };
 
-double chi2_gate(const PlaceFeature& q) { return kOutlier_sigma * kOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0); }
+double chi2_gate(const PlaceFeature& q) { return kPoseOutlier_sigma * kPoseOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0); }
 
 struct Sampler {
   const Place& query;
@@ -102,7 +102,7 @@ struct Sampler {
     for (const DescriptorMatch& m : usable) {
       const PlaceFeature &q = at(query, m.a), &c = at(candidate, m.b);
       const Vec3 p = R * c.p_C0() + t;
-      if (!(p.z() > kNearest_m)) continue;
+      if (!(p.z() > kNearestSeen_m)) continue;
       const double dx = p.x() / p.z() - q.x, dy = p.y() / p.z() - q.y;
       const double limit =
           kInlier_px / query.focal_px * std::max(1.0, 0.5 * (1 + q.sigma_xy / (kFinestKeypoint_px / query.focal_px)));

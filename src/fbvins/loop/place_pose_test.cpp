@@ -9,7 +9,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace place_pose_test {
 
 constexpr double kFocal_px = 460, kBaseline_m = 0.11;
 
@@ -77,5 +77,5 @@ TEST(RefinePose, NearPointsAreConsistentToo) {
   EXPECT_LT(nees, 7.5);
 }
 
-}  // namespace
+}  // namespace place_pose_test
 }  // namespace fbvins

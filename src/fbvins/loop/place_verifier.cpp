@@ -10,7 +10,7 @@ namespace {
 
 /// First matching, by descriptors alone: best over second-best distance, and matches below which RANSAC is not tried.
 constexpr double kMaxRatio = 0.9;
-constexpr int kMinMatches = 12;
+constexpr int kFewestMatches = 12;
 /// Inliers of a first refinement below which RANSAC's pose is the better start.
 constexpr std::size_t kMinRefined = 6;
 /// Guided matching: radius times the scale of the keypoint, wider where the start is RANSAC's, and how often.
@@ -18,7 +18,7 @@ constexpr double kGuided_px = 8, kWidenedAfterRansac = 1.5;
 constexpr int kRounds = 2;
 /// A feature whose size differs by more than this factor from what it should look like now is another one.
 constexpr double kMaxScaleRatio = 1.8;
-constexpr double kNearest_m = 0.1;
+constexpr double kNearestPoint_m = 0.1;
 /// Inliers must lie in this many cells of the grid over the image.
 constexpr int kSpreadGrid = 4, kMinCells = 5;
 /// The other direction must find this share of the inliers needed, and the same pose to within this.
@@ -79,7 +79,7 @@ std::optional<VerifiedPose> PlaceVerifier::one_way(const Place& candidate) {
   if (query_ == nullptr || query_->size() == 0 || candidate.size() == 0) return std::nullopt;
   const auto matches = match_descriptors(query_->descriptors, candidate.descriptors,
                                          {.max_distance = options_.max_distance_bit, .max_ratio = kMaxRatio, .mutual = true});
-  if (static_cast<int>(matches.size()) < kMinMatches) return std::nullopt;
+  if (static_cast<int>(matches.size()) < kFewestMatches) return std::nullopt;
   Rng rng(kSeed);
   const auto start = ransac_pose(*query_, candidate, matches, rng);
   if (!start) return std::nullopt;
@@ -118,7 +118,7 @@ void PlaceVerifier::match_guided(const Place& candidate, const CameraFromCamera&
     const PlaceFeature& c = candidate.features[j];
     if (!c.has_point()) continue;
     const Vec3 p = R * c.p_C0() + T_qc.p;
-    if (!(p.z() > kNearest_m)) continue;
+    if (!(p.z() > kNearestPoint_m)) continue;
     const Vec2 at = p.hnormalized();
     if ((at - low_).minCoeff() < 0 || (high_ - at).minCoeff() < 0) continue;
     ++visible_;

@@ -7,7 +7,7 @@
 #include "fbvins/loop/place_verifier.hpp"
 
 namespace fbvins {
-namespace {
+namespace place_verifier_test {
 
 constexpr double kFocal = 460;
 
@@ -116,5 +116,5 @@ TEST(PlaceVerifier, SameInputSameBits) {
   EXPECT_EQ(x->pose.information, y->pose.information);
 }
 
-}  // namespace
+}  // namespace place_verifier_test
 }  // namespace fbvins

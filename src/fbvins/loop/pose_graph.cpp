@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMaxIterations = 12;  // of one solve
 /// Residual of a loop beyond which it counts little; loops that count less than this are false.
-constexpr double kOutlier_sigma = 4.0, kRejectedWeight = 0.1;
+constexpr double kLoopOutlier_sigma = 4.0, kRejectedWeight = 0.1;
 /// Factor by which each round of graduated non-convexity reduces mu.
 constexpr double kMuStep = 2.0;
 /// Anchors may be off by the size of a building: beyond this they do not make mu larger, which would cost solves.
@@ -45,7 +45,7 @@ void add_cost(ceres::Problem& problem, const PoseGraphAnchor& anchor, const std:
 
 /// Geman-McClure's weight of a squared residual (L11).
 double weight_of(double chi2, double mu) {
-  constexpr double c2 = kOutlier_sigma * kOutlier_sigma;
+  constexpr double c2 = kLoopOutlier_sigma * kLoopOutlier_sigma;
   const double s = mu * c2 / (chi2 + mu * c2);
   return s * s;
 }
@@ -155,7 +155,7 @@ PoseGraphReport PoseGraph::optimise(const PoseGraphOptions& options) {
   for (const PoseGraphAnchor& a : anchors_)
     if (!a.certain) worst = std::max(worst, std::min(kLargestChi2, chi2(a)));
   // mu large: nearly convex, every loop counts; mu = 1: Geman-McClure.
-  double mu = std::max(1.0, 2 * worst / (kOutlier_sigma * kOutlier_sigma));
+  double mu = std::max(1.0, 2 * worst / (kLoopOutlier_sigma * kLoopOutlier_sigma));
   for (;;) {
     weigh(mu, options);
     report.iterations += solve(options, report);

@@ -9,7 +9,7 @@
 #include "fbvins/loop/place_map.hpp"
 
 namespace fbvins {
-namespace {
+namespace pose_graph_test {
 
 struct Flight {
   std::vector<Pose<M, B>> truth;
@@ -192,5 +192,5 @@ TEST(PlaceMap, ThinningKeepsTheGraphTogether) {
   EXPECT_LT(std::sqrt(sum), 0.4 * std::sqrt(before));
 }
 
-}  // namespace
+}  // namespace pose_graph_test
 }  // namespace fbvins

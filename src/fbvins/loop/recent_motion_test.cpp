@@ -6,7 +6,7 @@
 #include "fbvins/loop/test_room.hpp"
 
 namespace fbvins {
-namespace {
+namespace recent_motion_test {
 
 using namespace test_room;
 
@@ -56,5 +56,5 @@ TEST(RecentMotion, ForgetsWhatIsOld) {
   EXPECT_TRUE(motion.at(at_s(8.2)));
 }
 
-}  // namespace
+}  // namespace recent_motion_test
 }  // namespace fbvins

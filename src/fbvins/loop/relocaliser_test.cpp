@@ -6,7 +6,7 @@
 #include "fbvins/loop/map_frame.hpp"
 
 namespace fbvins {
-namespace {
+namespace relocaliser_test {
 
 const Quat kLevel = Quat::Identity();
 const Pose<M, G> kTruth(about_z(1.1), Vec3(3, -2, 0.5));
@@ -82,5 +82,5 @@ TEST(Relocaliser, AGaugeThatIsNotLevelIsTurnedLevel) {
   EXPECT_LT((*T_MG * k.T_GB.p - T_MB.p).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace relocaliser_test
 }  // namespace fbvins

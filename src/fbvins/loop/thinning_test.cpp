@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace thinning_test {
 
 /// Keyframes along a line, `gap_m` apart, of the sessions given.
 PlaceMap line(const std::vector<std::uint32_t>& sessions, double gap_m = 1) {
@@ -83,5 +83,5 @@ TEST(Thinning, HeirsAreOfTheSessionElseTheLastOneWithAPlace) {
   EXPECT_EQ(successor(4), nullptr) << "nothing joins it to M";
 }
 
-}  // namespace
+}  // namespace thinning_test
 }  // namespace fbvins

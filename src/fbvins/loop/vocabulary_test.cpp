@@ -14,7 +14,7 @@
 #include "fbvins/loop/vocabulary_training.hpp"
 
 namespace fbvins {
-namespace {
+namespace vocabulary_test {
 
 Descriptor random_descriptor(Rng& rng) {
   Descriptor d;
@@ -132,5 +132,5 @@ TEST(InvertedIndex, AgreesWithComparingEveryPairAndForgetsWhatIsRemoved) {
   }
 }
 
-}  // namespace
+}  // namespace vocabulary_test
 }  // namespace fbvins

@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace clock_offset_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -102,5 +102,5 @@ TEST(ClockOffset, AnswersBeforeTheirRequestOrLongAfterAreIgnored) {
   EXPECT_FALSE(offset.known());
 }
 
-}  // namespace
+}  // namespace clock_offset_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/mavlink/messages.hpp"
 
 namespace fbvins {
-namespace {
+namespace px4_parameters_test {
 
 std::map<std::string, double> as_wanted(const Px4VisionSetup& setup) {
   std::map<std::string, double> values;
@@ -61,5 +61,5 @@ TEST(Px4Parameters, AWholeNumberIsInTheBytesOfTheFloat) {
   EXPECT_EQ(text_of(parameter_name("SHORT")), "SHORT");
 }
 
-}  // namespace
+}  // namespace px4_parameters_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/mavlink/wire.hpp"
 
 namespace fbvins {
-namespace {
+namespace signing_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -88,5 +88,5 @@ TEST(MavlinkSigningTime, CountsTensOfMicrosecondsSince2015) {
   EXPECT_EQ(mavlink_signing_time(Time{}), 0u);
 }
 
-}  // namespace
+}  // namespace signing_test
 }  // namespace fbvins

@@ -10,7 +10,7 @@
 #include "fbvins/types/quality.hpp"
 
 namespace fbvins {
-namespace {
+namespace vehicle_frames_test {
 
 constexpr Health kGood{HealthState::good, HealthReason::none};
 const Vec3 kX(1, 0, 0), kY(0, 1, 0), kZ(0, 0, 1);
@@ -226,5 +226,5 @@ TEST(VehicleMessages, HealthIsASentenceThatFits) {
   EXPECT_EQ(status_text(MavSeverity::info, std::string(80, 'x')).text[49], 'x');
 }
 
-}  // namespace
+}  // namespace vehicle_frames_test
 }  // namespace fbvins

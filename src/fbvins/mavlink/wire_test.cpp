@@ -9,7 +9,7 @@
 #include "fbvins/mavlink/payload.hpp"
 
 namespace fbvins {
-namespace {
+namespace wire_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -187,5 +187,5 @@ TEST(MavlinkWire, CutAndPastedStreamsAreAnsweredAndNothingIsMadeUp) {
   }
 }
 
-}  // namespace
+}  // namespace wire_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace axis_errors_test {
 
 /// The paper's flight: hovers for 3 s, 0.6 m forward and 0.3 m to the left in 4 s, hovers for 3 s.
 Trajectory<W> mission(const Vec3& offset, const Vec3& end_error) {
@@ -42,5 +42,5 @@ TEST(AxisErrors, NeedBothInEverySpan) {
   EXPECT_FALSE(find_hovers(moving).has_value());
 }
 
-}  // namespace
+}  // namespace axis_errors_test
 }  // namespace fbvins

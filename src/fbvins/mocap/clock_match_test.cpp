@@ -6,7 +6,7 @@
 #include "fbvins/mocap/hand_eye_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace clock_match_test {
 
 constexpr Time kStart{1'700'000'000'000'000'000};
 
@@ -33,5 +33,5 @@ TEST(ClockMatch, RefusesAnotherFlightAndShortOnes) {
   EXPECT_NE(too_short.error().message.find("both need 8 s"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace clock_match_test
 }  // namespace fbvins

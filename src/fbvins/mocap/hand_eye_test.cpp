@@ -10,7 +10,7 @@
 #include "fbvins/mocap/hand_eye_scene.hpp"
 
 namespace fbvins {
-namespace {
+namespace hand_eye_test {
 
 constexpr Time kStart{1'700'000'000'123'456'789};
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -171,5 +171,5 @@ TEST(HandEye, PosesThatDoNotFitAreLeftOutFewOrMany) {
   }
 }
 
-}  // namespace
+}  // namespace hand_eye_test
 }  // namespace fbvins

@@ -18,7 +18,7 @@ Duration median_interval(const MarkerTrack& track) {
   return median(intervals);
 }
 
-bool earlier(const MarkerPose& a, const MarkerPose& b) { return a.t < b.t; }
+bool seen_earlier(const MarkerPose& a, const MarkerPose& b) { return a.t < b.t; }
 
 }  // namespace
 
@@ -29,10 +29,10 @@ MarkerCurve::MarkerCurve(MarkerTrack track) : track_(std::move(track)) {
 }
 
 std::optional<Pose<V, K>> MarkerCurve::at(Time t) const {
-  const auto first = std::lower_bound(track_.begin(), track_.end(), MarkerPose{t - half_window_, {}}, earlier);
-  const auto end = std::upper_bound(first, track_.end(), MarkerPose{t + half_window_, {}}, earlier);
+  const auto first = std::lower_bound(track_.begin(), track_.end(), MarkerPose{t - half_window_, {}}, seen_earlier);
+  const auto end = std::upper_bound(first, track_.end(), MarkerPose{t + half_window_, {}}, seen_earlier);
   if (end - first < kFewest || first->t > t || std::prev(end)->t < t) return std::nullopt;
-  const auto after = std::lower_bound(first, end, MarkerPose{t, {}}, earlier);
+  const auto after = std::lower_bound(first, end, MarkerPose{t, {}}, seen_earlier);
   const auto nearest = after != first && (after == end || t - std::prev(after)->t < after->t - t) ? std::prev(after) : after;
   using Row6 = Eigen::Matrix<double, 1, 6>;
   Mat3 A = Mat3::Zero();

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace marker_curve_test {
 
 Pose<V, K> moving(double t) {
   return {so3_exp(Vec3(0.5 * std::sin(3 * t), 0.4 * std::cos(2 * t), 2 * t)), Vec3(std::sin(2 * t), std::cos(3 * t), 0.2 * t)};
@@ -56,5 +56,5 @@ TEST(MarkerCurve, AveragesNoise) {
   EXPECT_LT(std::sqrt(sum), 0.8e-3);
 }
 
-}  // namespace
+}  // namespace marker_curve_test
 }  // namespace fbvins

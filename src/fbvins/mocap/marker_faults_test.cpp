@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace fbvins {
-namespace {
+namespace marker_faults_test {
 
 MarkerTrack circle(int poses) {
   MarkerTrack track;
@@ -48,5 +48,5 @@ TEST(MarkerFaults, TheBodyThatIsSeenMostStays) {
   EXPECT_EQ(kept.front().t, track[400].t);
 }
 
-}  // namespace
+}  // namespace marker_faults_test
 }  // namespace fbvins

@@ -13,7 +13,7 @@
 #include "fbvins/mocap/marker_test_files.hpp"
 
 namespace fbvins {
-namespace {
+namespace motion_capture_test {
 
 using test::motive_csv;
 using test::qualisys_tsv;
@@ -219,5 +219,5 @@ TEST(MotionCapture, TopicsOfAnMcapAreBodies) {
   }
 }
 
-}  // namespace
+}  // namespace motion_capture_test
 }  // namespace fbvins

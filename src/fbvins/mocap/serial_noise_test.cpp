@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace serial_noise_test {
 
 SerialRows simulated(const SerialNoise& noise, int count, std::uint64_t seed) {
   Rng rng(seed);
@@ -73,5 +73,5 @@ TEST(SerialNoise, IsFoundFromResiduals) {
   EXPECT_NEAR(memory, 0, 0.5);
 }
 
-}  // namespace
+}  // namespace serial_noise_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace dense_system_test {
 
 /// Well conditioned; with eigenvalues of both signs where `indefinite`.
 Eigen::MatrixXd symmetric(int n, bool indefinite) {
@@ -42,5 +42,5 @@ TEST(DenseSystem, NothingFromWhatIsNotFinite) {
   EXPECT_FALSE(solve_and_invert_symmetric(H, Eigen::VectorXd::Ones(5)));
 }
 
-}  // namespace
+}  // namespace dense_system_test
 }  // namespace fbvins

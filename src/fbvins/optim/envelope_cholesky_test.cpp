@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace envelope_cholesky_test {
 
 /// Positive definite: a chain of `links` blocks of nine, then `dense` rows, each coupled to all columns from some block on.
 Eigen::MatrixXd like_a_window(int links, int dense, Rng& rng) {
@@ -65,5 +65,5 @@ TEST(EnvelopeCholesky, RefusesWhatIsNotPositiveDefinite) {
   EXPECT_TRUE(factor.compute(like_a_window(5, 20, rng))) << "usable again after a refusal";
 }
 
-}  // namespace
+}  // namespace envelope_cholesky_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace levenberg_marquardt_test {
 
 /// The Rosenbrock function as two residuals: (1 - x, 10 (y - x^2)).
 struct Rosenbrock {
@@ -68,5 +68,5 @@ TEST(LevenbergMarquardt, SaysWhenTheCostIsNotANumber) {
   EXPECT_FALSE(minimise(problem, {}).usable);
 }
 
-}  // namespace
+}  // namespace levenberg_marquardt_test
 }  // namespace fbvins

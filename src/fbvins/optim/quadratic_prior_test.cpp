@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace quadratic_prior_test {
 
 Eigen::MatrixXd random_matrix(int rows, int cols, Rng& rng) {
   Eigen::MatrixXd m(rows, cols);
@@ -53,5 +53,5 @@ TEST(Marginalise, ShiftingKeepsTheCostUpToAConstant) {
   EXPECT_NEAR(moved.cost(a - by) - moved.cost(b - by), prior.cost(a) - prior.cost(b), 1e-10);
 }
 
-}  // namespace
+}  // namespace quadratic_prior_test
 }  // namespace fbvins

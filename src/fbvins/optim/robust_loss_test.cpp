@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace robust_loss_test {
 
 TEST(Huber, IsQuadraticInsideLinearOutsideAndSmoothBetween) {
   EXPECT_DOUBLE_EQ(huber(1.0, 2.0).cost, 0.5);
@@ -16,5 +16,5 @@ TEST(Huber, IsQuadraticInsideLinearOutsideAndSmoothBetween) {
   EXPECT_NEAR(huber(4 + h, 2.0).weight, huber(4 - h, 2.0).weight, 1e-6);
 }
 
-}  // namespace
+}  // namespace robust_loss_test
 }  // namespace fbvins

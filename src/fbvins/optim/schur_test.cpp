@@ -9,7 +9,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace schur_test {
 
 Eigen::MatrixXd random_matrix(int rows, int cols, Rng& rng) {
   Eigen::MatrixXd m(rows, cols);
@@ -87,5 +87,5 @@ TEST(PointBlocks, RefusesAPointWithoutDepth) {
   EXPECT_FALSE(points.eliminate(0, H, g));
 }
 
-}  // namespace
+}  // namespace schur_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include "fbvins/core/rng.hpp"
 
 namespace fbvins {
-namespace {
+namespace skyline_system_test {
 
 constexpr int kChain = 40, kBorder = 3, kReach = 4;
 
@@ -63,5 +63,5 @@ TEST(SkylineSystem, SaysWhenNothingDeterminesAnUnknown) {
   EXPECT_FALSE(both.skyline.factorise());
 }
 
-}  // namespace
+}  // namespace skyline_system_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/page/curves.hpp"
 
 namespace fbvins {
-namespace {
+namespace page_test {
 
 TEST(Page, HoldsDataAndScriptAndFetchesNothing) {
   const std::string html = plot_page("t", R"({"title":"t"})", "drawn();\n");
@@ -28,5 +28,5 @@ TEST(Curves, AreDecimatedAndHaveNoNumbersForWhatIsNone) {
   EXPECT_EQ(curves.text(), R"({"y":[1,null]})");
 }
 
-}  // namespace
+}  // namespace page_test
 }  // namespace fbvins

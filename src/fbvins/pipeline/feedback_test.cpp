@@ -6,7 +6,7 @@
 #include <thread>
 
 namespace fbvins {
-namespace {
+namespace feedback_test {
 
 StatePrior state_after(std::int64_t frame) {
   StatePrior prior;
@@ -51,5 +51,5 @@ TEST(Feedback, StoppingEndsAWait) {
   feedback.wait_for(FrameId{9});  // and later ones
 }
 
-}  // namespace
+}  // namespace feedback_test
 }  // namespace fbvins

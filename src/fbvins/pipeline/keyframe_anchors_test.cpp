@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace keyframe_anchors_test {
 
 Anchor at(std::int64_t ns) { return PositionAnchor{.t = Time{ns}}; }
 
@@ -40,5 +40,5 @@ TEST(KeyframeAnchors, OldOnesAreDropped) {
   EXPECT_EQ(kept.back(), 2999);
 }
 
-}  // namespace
+}  // namespace keyframe_anchors_test
 }  // namespace fbvins

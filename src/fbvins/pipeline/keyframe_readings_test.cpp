@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace keyframe_readings_test {
 
 Time at(int ms) { return Time{} + Duration::from_seconds(0.001 * ms); }
 
@@ -69,5 +69,5 @@ TEST(KeyframeReadings, OldOnesAreDropped) {
   EXPECT_TRUE(readings.until(at(20'000)).empty()) << "the first ten seconds are gone";
 }
 
-}  // namespace
+}  // namespace keyframe_readings_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace fbvins {
-namespace {
+namespace packet_maker_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -104,5 +104,5 @@ TEST(PacketMaker, TheTimeOffsetMovesTheReadingsAndNotTheImage) {
   EXPECT_NEAR(packets[1].imu.samples.back().gyro_radps.x(), 0.080, 1e-12);
 }
 
-}  // namespace
+}  // namespace packet_maker_test
 }  // namespace fbvins

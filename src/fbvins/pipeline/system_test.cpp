@@ -20,7 +20,7 @@
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
-namespace {
+namespace system_test {
 
 constexpr int kWidth = 320, kHeight = 240;
 constexpr double kFocal = 200, kDepth = 2.0, kBaseline = 0.1;  // px, m, m
@@ -583,5 +583,5 @@ TEST(SystemParts, ACustomFrontendGetsStampsReadingsAndLandmarksInOrder) {
   for (std::size_t i = 0; i < updates.size(); ++i) EXPECT_EQ(updates[i], static_cast<std::int64_t>(i));
 }
 
-}  // namespace
+}  // namespace system_test
 }  // namespace fbvins

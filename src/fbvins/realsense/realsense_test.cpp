@@ -18,7 +18,7 @@
 #include "fbvins/realsense/realsense_test_device.hpp"
 
 namespace fbvins {
-namespace {
+namespace realsense_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::chrono::seconds kPatience{20};
@@ -261,5 +261,5 @@ TEST(Realsense, FliesARecordedFlight) {
   std::filesystem::remove(bag);
 }
 
-}  // namespace
+}  // namespace realsense_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/ros2/ros2_test_graph.hpp"
 
 namespace fbvins {
-namespace {
+namespace ros2_node_test {
 
 using test::Heard;
 using test::node;
@@ -94,5 +94,5 @@ TEST(Ros2Node, ATopicBeginsWithASlash) {
   EXPECT_FALSE(Ros2Publisher::create(node(), "", "tf2_msgs/msg/TFMessage"));
 }
 
-}  // namespace
+}  // namespace ros2_node_test
 }  // namespace fbvins

@@ -11,7 +11,7 @@
 #include "fbvins/ros2/ros2_test_graph.hpp"
 
 namespace fbvins {
-namespace {
+namespace ros2_sink_test {
 
 using test::Heard;
 using test::node;
@@ -187,5 +187,5 @@ TEST(Ros2Sink, DiagnosticsSayHealth) {
   EXPECT_NE(diagnostics.messages()[0].find("fbvins: live"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace ros2_sink_test
 }  // namespace fbvins

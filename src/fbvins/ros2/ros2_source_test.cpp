@@ -13,7 +13,7 @@
 #include "fbvins/ros2/ros2_test_graph.hpp"
 
 namespace fbvins {
-namespace {
+namespace ros2_source_test {
 
 namespace fs = std::filesystem;
 using test::node;
@@ -126,5 +126,5 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
   EXPECT_EQ(notes.readings.front().accel_mps2, Vec3(4, 5, 6));
 }
 
-}  // namespace
+}  // namespace ros2_source_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace anchor_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -25,5 +25,5 @@ TEST(Anchor, WhatIsUsableIsSaid) {
   EXPECT_NE(impossible(TagAnchor{.covariance = Mat6::Zero()}), "");
 }
 
-}  // namespace
+}  // namespace anchor_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include <array>
 
 namespace fbvins {
-namespace {
+namespace image_test {
 
 using Pixels = std::array<std::uint8_t, 6>;
 
@@ -53,5 +53,5 @@ TEST(Image, OwnPixelsAreCopiedWithIt) {
   EXPECT_TRUE(Image().empty());
 }
 
-}  // namespace
+}  // namespace image_test
 }  // namespace fbvins

@@ -6,7 +6,7 @@
 #include "fbvins/types/odometry.hpp"
 
 namespace fbvins {
-namespace {
+namespace motion_at_test {
 
 struct X {};
 
@@ -46,5 +46,5 @@ TEST(MotionAt, AnErrorOfTheBodyIsOneOfThePoint) {
   EXPECT_LT((at.pose_covariance - of_point * of_point.transpose()).norm(), 1e-5 * of_point.squaredNorm());
 }
 
-}  // namespace
+}  // namespace motion_at_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace odometry_test {
 
 TEST(Health, IsASentenceThatNamesTheCameras) {
   EXPECT_EQ(to_sentence({HealthState::good, HealthReason::none}), "good");
@@ -15,5 +15,5 @@ TEST(Health, IsASentenceThatNamesTheCameras) {
   EXPECT_EQ(cameras_in(0), std::vector<int>{});
 }
 
-}  // namespace
+}  // namespace odometry_test
 }  // namespace fbvins

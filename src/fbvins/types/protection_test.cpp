@@ -6,7 +6,7 @@
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
-namespace {
+namespace protection_test {
 
 constexpr Health kGood{HealthState::good, HealthReason::none};
 
@@ -24,5 +24,5 @@ TEST(Protection, IsInfiniteWithoutAPoseOrACovariance) {
   EXPECT_TRUE(std::isinf(protection_level_m(kGood, Mat6::Constant(std::numeric_limits<double>::quiet_NaN()))));
 }
 
-}  // namespace
+}  // namespace protection_test
 }  // namespace fbvins

@@ -7,7 +7,7 @@
 #include <limits>
 
 namespace fbvins {
-namespace {
+namespace quality_test {
 
 constexpr Health kGood{HealthState::good, HealthReason::none};
 
@@ -41,5 +41,5 @@ TEST(Quality, ADegradedPoseHasLowQualityWhateverItsCovariance) {
   EXPECT_LT(quality_percent(degraded, position_sigma(0.5)), kMostDegradedQuality_percent);
 }
 
-}  // namespace
+}  // namespace quality_test
 }  // namespace fbvins

@@ -26,7 +26,7 @@
 #include "fbvins/v4l2/fake_video.hpp"
 
 namespace fbvins {
-namespace {
+namespace v4l2_source_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::chrono::seconds kPatience{10};
@@ -414,5 +414,5 @@ TEST(V4l2Source, FliesWithTheFlightControllersImu) {
   EXPECT_NEAR(flown, wanted, 0.05 + 0.02 * wanted);
 }
 
-}  // namespace
+}  // namespace v4l2_source_test
 }  // namespace fbvins

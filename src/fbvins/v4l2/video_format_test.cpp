@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace video_format_test {
 
 /// Pixel (x, y) is 16 y + x, rows of `row_bytes`, each grey value followed or preceded by a colour of 200.
 std::vector<std::uint8_t> picture(int step, int first, int row_bytes) {
@@ -53,5 +53,5 @@ TEST(VideoFormat, CutsImagesSideBySide) {
 
 TEST(VideoFormat, NamesFormats) { EXPECT_EQ(fourcc_name(fourcc("MJPG")), "MJPG"); }
 
-}  // namespace
+}  // namespace video_format_test
 }  // namespace fbvins

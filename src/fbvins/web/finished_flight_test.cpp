@@ -14,7 +14,7 @@
 #include "fbvins/web/web_test_client.hpp"
 
 namespace fbvins {
-namespace {
+namespace finished_flight_test {
 
 constexpr std::int64_t kStart_ns = 1'400'000'000'000'000'000;
 
@@ -183,5 +183,5 @@ TEST(RunFolder, IsAFlightToo) {
   EXPECT_NE(none.error().message.find("trajectory.csv: cannot be read"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace finished_flight_test
 }  // namespace fbvins

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace flight_history_test {
 
 Odometry pose_at(double x, std::uint32_t reset_counter = 0) {
   Odometry o;
@@ -67,5 +67,5 @@ TEST(PointCloud, HoldsTheLastPositionsOfTheNewestTracks) {
   }
 }
 
-}  // namespace
+}  // namespace flight_history_test
 }  // namespace fbvins

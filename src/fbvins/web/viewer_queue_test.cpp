@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace viewer_queue_test {
 
 SharedMessage text(const std::string& bytes) { return std::make_shared<const WebMessage>(WebMessage{bytes}); }
 SharedMessage image(const std::string& bytes) { return std::make_shared<const WebMessage>(WebMessage{bytes, true, true}); }
@@ -30,5 +30,5 @@ TEST(ViewerQueue, DropsTheOldestImageFirstThenTheOldest) {
   EXPECT_EQ(queue.pop(), nullptr);
 }
 
-}  // namespace
+}  // namespace viewer_queue_test
 }  // namespace fbvins

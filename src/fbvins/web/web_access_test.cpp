@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace web_access_test {
 
 TEST(WebAddress, IsAPortOrAnAddressWithOne) {
   EXPECT_EQ(parse_web_address("8080")->port, 8080);
@@ -53,5 +53,5 @@ TEST(Token, IsComparedWhole) {
   EXPECT_FALSE(token_usable("with a blank"));
 }
 
-}  // namespace
+}  // namespace web_access_test
 }  // namespace fbvins

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 namespace fbvins {
-namespace {
+namespace web_messages_test {
 
 using Json = nlohmann::json;
 
@@ -86,5 +86,5 @@ TEST(Command, IsParsedOrIgnored) {
     EXPECT_FALSE(parse_command(wrong)) << wrong;
 }
 
-}  // namespace
+}  // namespace web_messages_test
 }  // namespace fbvins

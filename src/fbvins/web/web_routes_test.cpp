@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace fbvins {
-namespace {
+namespace web_routes_test {
 
 const PageFiles kFiles{{"/index.html", "text/html", "<p>", false}, {"/main.js", "text/javascript", "zipped", true}};
 
@@ -41,5 +41,5 @@ TEST(WebRoutes, TheStreamWantsTokenUpgradeAndRoom) {
   EXPECT_EQ(status(request, options), 401);
 }
 
-}  // namespace
+}  // namespace web_routes_test
 }  // namespace fbvins

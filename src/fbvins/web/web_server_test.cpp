@@ -11,7 +11,7 @@
 #include "fbvins/web/web_test_client.hpp"
 
 namespace fbvins {
-namespace {
+namespace web_server_test {
 
 using namespace std::chrono_literals;
 
@@ -267,5 +267,5 @@ TEST_F(Server, EndsWithViewersAndSendingThreads) {
   server.reset();
 }
 
-}  // namespace
+}  // namespace web_server_test
 }  // namespace fbvins

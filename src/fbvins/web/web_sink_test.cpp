@@ -12,7 +12,7 @@
 #include "fbvins/web/web_test_client.hpp"
 
 namespace fbvins {
-namespace {
+namespace web_sink_test {
 
 using Json = nlohmann::json;
 
@@ -160,5 +160,5 @@ TEST_F(Page, SaysGoodbye) {
   ASSERT_TRUE(sink->take(odometry(1)));  // nobody is there, and nothing happens
 }
 
-}  // namespace
+}  // namespace web_sink_test
 }  // namespace fbvins
