@@ -4,13 +4,13 @@
 
 #include <algorithm>
 
-#include "fbvins/estimator/flown.hpp"
+#include "fbvins/estimator/estimated_flight.hpp"
 
 namespace fbvins {
 namespace estimator_consistency_test {
 
 using test::exact_noise;
-using test::Flown;
+using test::EstimatedFlight;
 using test::fly;
 using test::Motion;
 using test::normalised_error;
@@ -24,7 +24,7 @@ double mean_normalised_error(bool known_landmarks) {
     SimulatedFlight flight(Motion(0.6, 0.3), 100 + seed);
     EstimatorOptions options = exact_noise();
     options.known_landmarks.enabled = known_landmarks;
-    const Flown flown = fly(flight, 160, options);
+    const EstimatedFlight flown = fly(flight, 160, options);
     const int first = flown.first_pose();
     EXPECT_GE(first, 0) << seed;
     for (int k = std::max(first, 0); k < 160; k += 20, ++n) sum += normalised_error(flown, k);
@@ -56,7 +56,7 @@ TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
       flight.max_features = 60;
       EstimatorOptions options = exact_noise();
       options.known_landmarks.enabled = known;
-      Flown flown = fly(flight, 600, options);
+      EstimatedFlight flown = fly(flight, 600, options);
       for (int k = 300; known && k < 600; k += 20, ++n) nees += normalised_error(flown, k);
       flown.gauge_frame = 200;  // drift after the start only
       flown.gauge_pose = flown.odometry[200].T_WB;

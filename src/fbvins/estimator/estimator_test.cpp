@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "fbvins/core/angle.hpp"
-#include "fbvins/estimator/flown.hpp"
+#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 #include "fbvins/geometry/heading.hpp"
 #include "fbvins/geometry/so3.hpp"
@@ -22,14 +22,14 @@ namespace fbvins {
 namespace estimator_test {
 
 using test::exact_noise;
-using test::Flown;
+using test::EstimatedFlight;
 using test::fly;
 using test::Motion;
 using test::SimulatedFlight;
 
 TEST(Estimator, FollowsAMotionThatNeverRests) {
   SimulatedFlight flight(Motion(0.6, 0.3), 1);
-  const Flown flown = fly(flight, 200);
+  const EstimatedFlight flown = fly(flight, 200);
   const int first = flown.first_pose();
   ASSERT_GE(first, 0);
   EXPECT_LT(first, 20);
@@ -45,7 +45,7 @@ TEST(Estimator, FollowsAMotionThatNeverRests) {
 
 TEST(Estimator, TiltIsAbsolute) {
   SimulatedFlight flight(Motion(0.6, 0.3), 2);
-  const Flown flown = fly(flight, 120);
+  const EstimatedFlight flown = fly(flight, 120);
   const Vec3 up_estimated = flown.odometry.back().T_WB.q.conjugate() * Vec3::UnitZ();
   const Vec3 up_true = flown.truth.back().T_FB.q.conjugate() * Vec3::UnitZ();
   EXPECT_LT((up_estimated - up_true).norm(), 0.006);
@@ -53,7 +53,7 @@ TEST(Estimator, TiltIsAbsolute) {
 
 TEST(Estimator, SameInputSameBits) {
   SimulatedFlight a(Motion(0.6, 0.3), 3), b(Motion(0.6, 0.3), 3);
-  const Flown one = fly(a, 100), two = fly(b, 100);
+  const EstimatedFlight one = fly(a, 100), two = fly(b, 100);
   for (int k = 0; k < 100; ++k) {
     EXPECT_EQ(one.odometry[k].T_WB.p, two.odometry[k].T_WB.p);
     EXPECT_EQ(one.odometry[k].pose_covariance, two.odometry[k].pose_covariance);
@@ -65,7 +65,7 @@ TEST(Estimator, MistakenLandmarksDoNoHarm) {
   SimulatedFlight flight(Motion(0.8, 0.8), 210);
   flight.reobserves = true;
   flight.mistaken = [](int k, int point) { return k > 120 && point % 10 == 3; };
-  const Flown flown = fly(flight, 400);
+  const EstimatedFlight flown = fly(flight, 400);
   for (int k = flown.first_pose(); k < 400; ++k) {
     EXPECT_NE(flown.odometry[k].health.reason, HealthReason::solver_failed) << k;
     EXPECT_LT(flown.position_error(k), 0.06) << k;
@@ -109,7 +109,7 @@ TEST(Estimator, PriorHasNoInformationOnPositionAndHeadingBeyondTheGauge) {
 TEST(Estimator, StartsFromRestAndStaysThere) {
   SimulatedFlight flight(Motion(0, 0), 6);
   flight.pixel_sigma_px = 0.2;
-  const Flown flown = fly(flight, 200);
+  const EstimatedFlight flown = fly(flight, 200);
   const int first = flown.first_pose();
   ASSERT_GE(first, 0);
   EXPECT_LT(first, 20);
@@ -121,7 +121,7 @@ TEST(Estimator, StartsFromRestAndStaysThere) {
 TEST(Estimator, BridgesASecondWithoutImages) {
   SimulatedFlight flight(Motion(0.6, 0.3), 7);
   flight.images = [](int k) { return k < 80 || k >= 100; };
-  const Flown flown = fly(flight, 160);
+  const EstimatedFlight flown = fly(flight, 160);
   for (int k = 80; k <= 100; ++k)  // frame 100 is the first after the gap
     EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::no_images})) << k;
   for (int k = 105; k < 160; ++k) {
@@ -166,7 +166,7 @@ TEST(Estimator, ARestartForgetsWhatWasEstimatedOfTheCalibration) {
 TEST(Estimator, BridgesHalfASecondWithoutReadings) {
   SimulatedFlight flight(Motion(0.6, 0.3), 8);
   flight.readings = [](int k) { return k < 80 || k >= 90; };
-  const Flown flown = fly(flight, 160);
+  const EstimatedFlight flown = fly(flight, 160);
   for (int k = 80; k < 90; ++k) EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::imu_gap})) << k;
   for (int k = 95; k < 160; ++k) {
     EXPECT_EQ(flown.odometry[k].health.state, HealthState::good) << k;
@@ -178,7 +178,7 @@ TEST(Estimator, BridgesHalfASecondWithoutReadings) {
 TEST(Estimator, FliesOnWithOneCamera) {
   SimulatedFlight flight(Motion(0.6, 0.3), 9);
   flight.right_camera = [](int k) { return k < 60 || k >= 120; };
-  const Flown flown = fly(flight, 180);
+  const EstimatedFlight flown = fly(flight, 180);
   const int first = flown.first_pose();
   EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera, 0b10}));
   for (int k = first; k < 180; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
@@ -187,7 +187,7 @@ TEST(Estimator, FliesOnWithOneCamera) {
 TEST(Estimator, FliesOnWithTheRightCameraAlone) {
   SimulatedFlight flight(Motion(0.6, 0.3), 9);
   flight.left_camera = [](int k) { return k < 60 || k >= 160; };
-  const Flown flown = fly(flight, 220);
+  const EstimatedFlight flown = fly(flight, 220);
   EXPECT_EQ(flown.odometry[90].health, (Health{HealthState::degraded, HealthReason::one_camera, 0b01}));
   EXPECT_GT(flown.odometry[155].stats.landmarks, 40) << "new ones, too";
   for (int k = flown.first_pose(); k < 220; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
@@ -225,7 +225,7 @@ TEST(Estimator, FourCamerasAreBetterThanTwo) {
   for (const std::uint64_t seed : {21, 22, 23}) {
     FourCameras four(Motion(0.6, 0.3), seed);
     SimulatedFlight two(Motion(0.6, 0.3), seed);
-    const Flown with_four = fly(four, 300), with_two = fly(two, 300);
+    const EstimatedFlight with_four = fly(four, 300), with_two = fly(two, 300);
     EXPECT_EQ(with_four.odometry.back().health, (Health{HealthState::good, HealthReason::none}));
     for (int k = 100; k < 300; ++k) of_four += with_four.position_error(k), of_two += with_two.position_error(k);
   }
@@ -236,7 +236,7 @@ TEST(Estimator, FliesOnWhereOneOfTwoPairsIsBlind) {
   for (const bool front : {true, false}) {
     FourCameras flight(Motion(0.6, 0.3), 9);
     (front ? flight.front : flight.back).images = [](int k) { return k < 60 || k >= 160; };
-    const Flown flown = fly(flight, 220);
+    const EstimatedFlight flown = fly(flight, 220);
     const std::uint8_t blind = front ? 0b0011 : 0b1100;
     EXPECT_EQ(flown.odometry[100].health, (Health{HealthState::degraded, HealthReason::one_camera, blind}));
     for (int k = flown.first_pose(); k < 220; ++k) {
@@ -250,7 +250,7 @@ TEST(Estimator, FliesOnWhereOneOfTwoPairsIsBlind) {
 TEST(Estimator, APairFromNumberTwoOnStartsAlone) {
   FourCameras flight(Motion(0.6, 0.3), 9);
   flight.front.images = [](int) { return false; };
-  const Flown flown = fly(flight, 120);
+  const EstimatedFlight flown = fly(flight, 120);
   ASSERT_GE(flown.first_pose(), 0);
   for (int k = flown.first_pose(); k < 120; ++k) EXPECT_LT(flown.position_error(k), 0.06) << k;
 }
@@ -260,7 +260,7 @@ TEST(Estimator, AStartNeedsBothCamerasAndSaysSo) {
     SimulatedFlight flight(Motion(0.6, 0.3), 14);
     flight.left_camera = [&](int k) { return left || k >= 30; };
     flight.right_camera = [&](int k) { return !left || k >= 30; };
-    const Flown flown = fly(flight, 60);
+    const EstimatedFlight flown = fly(flight, 60);
     const std::uint8_t missing = left ? 0b10 : 0b01;
     for (int k = 0; k < 30; ++k)
       EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::initialising, HealthReason::one_camera, missing})) << k;
@@ -273,7 +273,7 @@ TEST(Estimator, AStartDoesNotNeedEveryImageOfBothCameras) {
   for (const Motion& motion : {Motion(0.6, 0.3), Motion(0, 0)}) {
     SimulatedFlight flight(motion, 14);
     flight.left_camera = [](int k) { return k % 7 != 3; };
-    const Flown flown = fly(flight, 60);
+    const EstimatedFlight flown = fly(flight, 60);
     EXPECT_LT(flown.first_pose(), 30);
     EXPECT_TRUE(flown.odometry.back().health.has_pose());
   }
@@ -298,7 +298,7 @@ TEST(Estimator, ARefusedStartIsNotPublished) {
 TEST(Estimator, WaitsForImages) {
   SimulatedFlight flight(Motion(0.6, 0.3), 14);
   flight.images = [](int k) { return k >= 10; };
-  const Flown flown = fly(flight, 40);
+  const EstimatedFlight flown = fly(flight, 40);
   for (int k = 0; k < 10; ++k)
     EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::initialising, HealthReason::no_images})) << k;
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
@@ -355,7 +355,7 @@ TEST(Estimator, IsRobustToOutliers) {
   flight.outlier = [](int k, std::int64_t track) {  // a tenth of the tracks jumps about, each in its own way
     return track % 10 == 0 ? Vec2(20 * std::sin(0.7 * k + static_cast<double>(track)), 15 * std::cos(1.1 * k)) : Vec2(0, 0);
   };
-  const Flown flown = fly(flight, 160);
+  const EstimatedFlight flown = fly(flight, 160);
   const int first = flown.first_pose();
   ASSERT_GE(first, 0);
   for (int k = first; k < 160; ++k) EXPECT_LT(flown.position_error(k), 0.05) << k;
@@ -366,7 +366,7 @@ TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
   flight.images = [](int k) { return k < 60 || k >= 130; };
   EstimatorOptions options = exact_noise();
   options.max_blind_m = 0.03;
-  const Flown flown = fly(flight, 200, options);
+  const EstimatedFlight flown = fly(flight, 200, options);
   const auto is_lost = [](const Odometry& o) { return o.health.state == HealthState::lost; };
   const auto lost = std::find_if(flown.odometry.begin(), flown.odometry.end(), is_lost);
   ASSERT_NE(lost, flown.odometry.end());
@@ -408,7 +408,7 @@ TEST(Estimator, AGoodImuCarriesThePoseForLongerThanABadOne) {
     flight.images = [](int k) { return k < 100; };
     EstimatorOptions options = exact_noise();
     if (!good) options.accel_noise_scale = 100;
-    const Flown flown = fly(flight, 400, options);
+    const EstimatedFlight flown = fly(flight, 400, options);
     for (int k = 100; k < 400 && flown.odometry[k].health.has_pose(); ++k, ++carried[good]) {
       EXPECT_EQ(flown.odometry[k].health, (Health{HealthState::degraded, HealthReason::no_images})) << k;
       EXPECT_LT(flown.position_error(k), 0.02 + 3 * worst_sigma_m(flown.odometry[k].pose_covariance)) << k;

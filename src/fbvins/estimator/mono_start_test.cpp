@@ -8,7 +8,7 @@
 
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/flown.hpp"
+#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {

@@ -2,7 +2,7 @@
 // Private to tests of the estimator: a simulated flight, estimated and compared with the truth.
 //
 //   SimulatedFlight flight(Motion(0.6, 0.3), 1);
-//   const Flown flown = fly(flight, 200);
+//   const EstimatedFlight flown = fly(flight, 200);
 //   EXPECT_LT(flown.position_error(199), 0.04);
 #pragma once
 
@@ -24,7 +24,7 @@ inline EstimatorOptions exact_noise() {
   return o;
 }
 
-struct Flown {
+struct EstimatedFlight {
   std::vector<Odometry> odometry;
   std::vector<NavState<W>> truth;
   int gauge_frame = -1;  ///< the frame of the first pose, which defines W's position and heading
@@ -48,9 +48,9 @@ struct Flown {
 };
 
 template <class Flight>
-Flown fly(Flight& flight, int frames, const EstimatorOptions& options = exact_noise()) {
+EstimatedFlight fly(Flight& flight, int frames, const EstimatorOptions& options = exact_noise()) {
   Estimator estimator(flight.rig, options);
-  Flown out;
+  EstimatedFlight out;
   for (int k = 0; k < frames; ++k) {
     out.odometry.push_back(estimator.process(flight.frame(k)).odometry);
     out.truth.push_back(flight.truth(k));
@@ -63,7 +63,7 @@ Flown fly(Flight& flight, int frames, const EstimatorOptions& options = exact_no
 }
 
 /// Normalised error squared of the pose.
-inline double normalised_error(const Flown& flown, int k) {
+inline double normalised_error(const EstimatedFlight& flown, int k) {
   const Odometry& o = flown.odometry[k];
   const NavState<W> truth = flown.truth_in_W(k);
   Vec6 e;
