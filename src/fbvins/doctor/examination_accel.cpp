@@ -9,6 +9,7 @@
 #include <cmath>
 #include <string>
 
+#include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/imu/nav_state.hpp"
 
