@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <numbers>
 #include <vector>
 
 #include "fbvins/estimator/estimator.hpp"
@@ -70,5 +71,31 @@ inline double normalised_error(const EstimatedFlight& flown, int k) {
   e << o.T_WB.p - truth.T_FB.p, so3_log(truth.T_FB.q.conjugate() * o.T_WB.q);
   return e.dot(o.pose_covariance.ldlt().solve(e));
 }
+
+/// A second pair, cameras 2 and 3, looks backwards.
+struct FourCameras {
+  SimulatedFlight front, back;
+  StereoRig rig;
+
+  FourCameras(const Motion& motion, std::uint64_t seed) : front(motion, seed), back(motion, seed + 1000), rig(front.rig) {
+    const Pose<B, B> turned(so3_exp(Vec3(0, 0, std::numbers::pi)), Vec3::Zero());
+    back.rig.T_BC0 = turned * back.rig.T_BC0;
+    back.rig.T_BC1 = turned * back.rig.T_BC1;
+    rig.more = {back.rig.mounted(0), back.rig.mounted(1)};
+  }
+  NavState<W> truth(int k) const { return front.truth(k); }
+  TrackedFrame frame(int k) {
+    TrackedFrame out = front.frame(k);
+    const TrackedFrame other = back.frame(k);
+    out.has_more = {other.has_left, other.has_right};
+    out.stats.stereo += other.stats.stereo;
+    for (TrackedFeature feature : other.features) {
+      feature.id.value += 1'000'000;
+      feature.cameras = {2, 3};
+      out.features.push_back(feature);
+    }
+    return out;
+  }
+};
 
 }  // namespace fbvins::test

@@ -12,6 +12,7 @@ namespace estimator_consistency_test {
 using test::exact_noise;
 using test::EstimatedFlight;
 using test::fly;
+using test::FourCameras;
 using test::Motion;
 using test::normalised_error;
 using test::SimulatedFlight;
@@ -67,6 +68,18 @@ TEST(Estimator, ReobservedLandmarksReduceTheDrift) {
   // Here points are re-observed exactly; the prior allows for patches that are not quite the same (6 when consistent).
   EXPECT_GT(nees / n, 1.0);
   EXPECT_LT(nees / n, 12.0);
+}
+
+TEST(Estimator, FourCamerasAreBetterThanTwo) {
+  double of_four = 0, of_two = 0;
+  for (const std::uint64_t seed : {21, 22, 23}) {
+    FourCameras four(Motion(0.6, 0.3), seed);
+    SimulatedFlight two(Motion(0.6, 0.3), seed);
+    const EstimatedFlight with_four = fly(four, 300), with_two = fly(two, 300);
+    EXPECT_EQ(with_four.odometry.back().health, (Health{HealthState::good, HealthReason::none}));
+    for (int k = 100; k < 300; ++k) of_four += with_four.position_error(k), of_two += with_two.position_error(k);
+  }
+  EXPECT_LT(of_four, 0.9 * of_two);
 }
 
 }  // namespace estimator_consistency_test

@@ -24,6 +24,7 @@ namespace estimator_test {
 using test::exact_noise;
 using test::EstimatedFlight;
 using test::fly;
+using test::FourCameras;
 using test::Motion;
 using test::SimulatedFlight;
 
@@ -192,44 +193,6 @@ TEST(Estimator, FliesOnWithTheRightCameraAlone) {
   EXPECT_GT(flown.odometry[155].stats.landmarks, 40) << "new ones, too";
   for (int k = flown.first_pose(); k < 220; ++k) EXPECT_LT(flown.position_error(k), 0.08) << k;
   EXPECT_EQ(flown.odometry.back().health.state, HealthState::good);
-}
-
-/// A second pair, cameras 2 and 3, looks backwards.
-struct FourCameras {
-  SimulatedFlight front, back;
-  StereoRig rig;
-
-  FourCameras(const Motion& motion, std::uint64_t seed) : front(motion, seed), back(motion, seed + 1000), rig(front.rig) {
-    const Pose<B, B> turned(so3_exp(Vec3(0, 0, std::numbers::pi)), Vec3::Zero());
-    back.rig.T_BC0 = turned * back.rig.T_BC0;
-    back.rig.T_BC1 = turned * back.rig.T_BC1;
-    rig.more = {back.rig.mounted(0), back.rig.mounted(1)};
-  }
-  NavState<W> truth(int k) const { return front.truth(k); }
-  TrackedFrame frame(int k) {
-    TrackedFrame out = front.frame(k);
-    const TrackedFrame other = back.frame(k);
-    out.has_more = {other.has_left, other.has_right};
-    out.stats.stereo += other.stats.stereo;
-    for (TrackedFeature feature : other.features) {
-      feature.id.value += 1'000'000;
-      feature.cameras = {2, 3};
-      out.features.push_back(feature);
-    }
-    return out;
-  }
-};
-
-TEST(Estimator, FourCamerasAreBetterThanTwo) {
-  double of_four = 0, of_two = 0;
-  for (const std::uint64_t seed : {21, 22, 23}) {
-    FourCameras four(Motion(0.6, 0.3), seed);
-    SimulatedFlight two(Motion(0.6, 0.3), seed);
-    const EstimatedFlight with_four = fly(four, 300), with_two = fly(two, 300);
-    EXPECT_EQ(with_four.odometry.back().health, (Health{HealthState::good, HealthReason::none}));
-    for (int k = 100; k < 300; ++k) of_four += with_four.position_error(k), of_two += with_two.position_error(k);
-  }
-  EXPECT_LT(of_four, 0.9 * of_two);
 }
 
 TEST(Estimator, FliesOnWhereOneOfTwoPairsIsBlind) {
