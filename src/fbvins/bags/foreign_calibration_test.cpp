@@ -41,7 +41,7 @@ std::string numbers(const auto& pose) {
 
 std::string openvins_camera(const auto& pose) {
   return "  T_imu_cam: [" + numbers(pose) +
-         "]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0.3, 0.4]\n  distortion_model: radtan\n"
+         "]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0.003, 0.004]\n  distortion_model: radtan\n"
          "  intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\n  timeshift_cam_imu: -0.004\n";
 }
 
@@ -81,7 +81,7 @@ TEST(ForeignCalibration, OpenVinsHasCamerasInTheImu) {
       {"chain.yaml", "%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft) + "cam1:\n" + openvins_camera(kRight)});
   expect_rig(rig);
   EXPECT_EQ(rig->time_offset_s, -0.004);
-  EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.4);
+  EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.004);
 }
 
 TEST(ForeignCalibration, BasaltIsJsonWithPosesAndNoise) {

@@ -14,11 +14,11 @@ namespace rig_text_test {
 StereoRig awkward_rig(Rng& rng, bool fisheye) {
   const auto odd = [&] { return rng.normal() / 3.0; };
   StereoRig rig;
-  const double f = 400.0 + odd(), c = 100.0 + odd(), k1 = std::abs(odd()), k2 = 1e-7 * odd(), k3 = std::abs(odd()),
-               k4 = std::abs(odd());
-  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 161);
-  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 7, k1, k2, k3, k4}, 640, 161);
-  rig.right = Camera(PinholeRadtan{f / 7, f / 11, c / 3, c / 13, k2, k1, k4, k3}, 752, 480);
+  const double f = 400.0 + odd(), c = 310.0 + odd(), k1 = 0.03 * std::abs(odd()), k2 = 1e-7 * odd(), k3 = 1e-3 * odd(),
+               k4 = 1e-3 * odd();
+  if (fisheye) rig.left = Camera(KannalaBrandt{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
+  else rig.left = Camera(PinholeRadtan{f, f / 3, c, c / 4, k1, k2, k3, k4}, 640, 161);
+  rig.right = Camera(PinholeRadtan{f / 1.1, f / 1.3, c * 1.1, c / 1.3, k2, k1, k4, k3}, 752, 480);
   const double x = odd(), y = odd(), z = odd();
   rig.T_BC0 = {so3_exp(Vec3(x, y, z)), Vec3(z, x, y)};
   rig.T_BC1 = {so3_exp(Vec3(y, z, x)), Vec3(z + 0.1, x, y)};
@@ -95,10 +95,10 @@ TEST(RigText, GivesBackADepthSensor) {
 TEST(RigText, GivesBackTheBitsOfWideLenses) {
   Rng rng(12);
   StereoRig rig = awkward_rig(rng, true);
-  for (const auto& [left, right] : {std::pair<LensModel, LensModel>{DoubleSphere{300.1 / 3, 301, 250, 251, -0.1 / 3, 0.59 / 3},
-                                                                    ExtendedUnified{300, 301 / 3.0, 2, 3, 0.1 / 3, 1.04 / 3}},
-                                    {UnifiedRadtan{300.1 / 3, 301, 250, 251, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
-                                     DoubleSphere{300, 301, 250, 251, 0.3, 0.5}}}) {
+  for (const auto& [left, right] : {std::pair<LensModel, LensModel>{DoubleSphere{300.1 / 3, 301, 150, 251 / 2.1, -0.1 / 3, 0.59 / 3},
+                                                                    ExtendedUnified{300, 301 / 3.0, 160.2 / 1.1, 124, 0.1 / 3, 1.04 / 3}},
+                                    {UnifiedRadtan{300.1 / 3, 301, 150, 251 / 2.1, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
+                                     DoubleSphere{300, 301, 150, 121, 0.3, 0.5}}}) {
     rig.left = Camera(left, 320, 240), rig.right = Camera(right, 320, 240);
     const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
     ASSERT_TRUE(back) << back.error().message;
