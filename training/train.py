@@ -10,7 +10,10 @@ Writes checkpoint.pt, curve.csv, curve.png (where matplotlib is installed) and t
 same data, one thread: the same weights. A GPU is used where there is one.
 """
 import argparse
+import collections
+import concurrent.futures
 import csv
+import itertools
 import math
 import pathlib
 import subprocess
@@ -25,7 +28,7 @@ from dataset import CONDITIONS, Batch, open_pairs  # noqa: E402
 from evaluation import evaluate, gains  # noqa: E402
 from losses import contrastive, fast_ap_and_boost, hamming  # noqa: E402
 from model import SIZES, Booster, geometry_of, hard_bits  # noqa: E402
-from weights import round_weights, save_weights  # noqa: E402
+from weights import load_model, round_weights, save_weights  # noqa: E402
 
 FEWEST_KEYPOINTS = 20  # of a view used in training
 REPOSITORY = pathlib.Path(__file__).resolve().parents[1]
@@ -56,7 +59,8 @@ def arguments_of(argv):
     p.add_argument("--no-around", action="store_true", help="without the margins of the surroundings")
     p.add_argument("--head-scale", type=float, default=0.1, help="scale of the last layer's random initialisation")
     p.add_argument("--tolerance", type=float, default=3.0, help="largest distance of a correct match, px")
-    p.add_argument("--start", help="checkpoint with the initial weights")
+    p.add_argument("--start", help="checkpoint or weights (.safetensors) to start from")
+    p.add_argument("--ahead", type=int, default=0, help="steps whose pairs are prepared ahead, on as many threads: for a GPU")
     p.add_argument("--seed", type=int, default=1)
     p.add_argument("--resume", action="store_true")
     p.add_argument("--evaluate-every", type=int, default=500)
@@ -112,15 +116,39 @@ def thin_out(v, most, generator):
     return index
 
 
-def losses_of(model, batch, a, device, generator):
-    index = thin_out(batch.a, a.keypoints, generator)
-    batch.in_b = batch.in_b.gather(1, index[..., None].expand(-1, -1, 2))
-    thin_out(batch.b, a.keypoints, generator)
-    y = []
-    for v in (batch.a, batch.b):
-        geometry = geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid).to(device)
+class Prepared:
+    """The batch of a step: random pairs, keypoints and positions. A generator per step: the same whether resumed or not, prepared
+    ahead or not."""
+
+    def __init__(self, files, where, chance, a, step):
+        pick = np.random.default_rng((a.seed, step)).choice(len(where), a.batch, replace=False, p=chance)
+        generator = torch.Generator().manual_seed(a.seed * 1000003 + step)
+        self.batch = Batch(np.stack([files[f][i] for f, i in where[pick]]))
+        index = thin_out(self.batch.a, a.keypoints, generator)
+        self.batch.in_b = self.batch.in_b.gather(1, index[..., None].expand(-1, -1, 2))
+        thin_out(self.batch.b, a.keypoints, generator)
+        self.geometry = [geometry_of(as_if_moved(v, generator), v.width, v.height, v.valid) for v in (self.batch.a, self.batch.b)]
+
+
+def prepared_steps(prepare, first, ahead):
+    """Prepares steps in order, `ahead` of them on threads of their own."""
+    if ahead == 0:
+        yield from map(prepare, itertools.count(first))
+    with concurrent.futures.ThreadPoolExecutor(ahead) as pool:
+        waiting = collections.deque(pool.submit(prepare, first + i) for i in range(2 * ahead))
+        try:
+            for step in itertools.count(first + 2 * ahead):
+                yield waiting.popleft().result()
+                waiting.append(pool.submit(prepare, step))
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def losses_of(model, prepared, a, device):
+    batch, y = prepared.batch, []
+    for v, geometry in zip((batch.a, batch.b), prepared.geometry):
         with torch.autocast(device.type, torch.bfloat16, enabled=a.autocast):
-            y.append(model(v.margins.to(device), geometry, v.valid.to(device)))
+            y.append(model(v.margins.to(device), geometry.to(device), v.valid.to(device)))
     # integers up to 256 are exact in bfloat16
     half = torch.bfloat16 if a.autocast else torch.float32
     product = hard_bits(y[0].float()).to(half) @ hard_bits(y[1].float()).to(half).transpose(1, 2)
@@ -179,6 +207,12 @@ class Schedule:
         return self.a.rate * warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * self.progress(step))))
 
 
+def initial_weights(path, device):
+    if path.endswith(".safetensors"):
+        return load_model(path).state_dict()
+    return torch.load(path, map_location=device)["averaged"]
+
+
 def train(a):
     out = pathlib.Path(a.out)
     out.mkdir(parents=True, exist_ok=True)
@@ -204,7 +238,7 @@ def train(a):
         model.head.weight *= a.head_scale
         model.head.bias *= a.head_scale
     if a.start:
-        model.load_state_dict(torch.load(a.start, map_location=device)["averaged"])
+        model.load_state_dict(initial_weights(a.start, device))
     optimiser = torch.optim.AdamW(model.parameters(), lr=a.rate, weight_decay=1e-3, betas=(0.9, 0.98))
     step, spent_s, averaged = 0, 0.0, None
     if a.resume and (out / "checkpoint.pt").exists():
@@ -243,13 +277,12 @@ def train(a):
         print(f"step {step}  {schedule.spent_s() / 60:.1f} min, {left:.1f} left  loss {np.mean(recent[-200:] or [0]):.4f}  "
               + " ".join(f"{k} {v:.3f}" for k, v in terms.items()) + "  held out: " + " ".join(f"{s}%" for s in scores), flush=True)
 
-    while schedule.progress(step) < 1.0:
-        # a generator per step: the same pairs whether resumed or not
-        pick = np.random.default_rng((a.seed, step)).choice(len(where), a.batch, replace=False, p=chance)
-        batch = Batch(np.stack([files[f][i] for f, i in where[pick]]))
+    for prepared in prepared_steps(lambda number: Prepared(files, where, chance, a, number), step, a.ahead):
+        if schedule.progress(step) >= 1.0:
+            break
         for group in optimiser.param_groups:
             group["lr"] = schedule.rate(step)
-        loss, terms = losses_of(model, batch, a, device, torch.Generator().manual_seed(a.seed * 1000003 + step))
+        loss, terms = losses_of(model, prepared, a, device)
         if not torch.isfinite(loss):
             sys.exit(f"the loss of step {step} is {float(loss)}: lower --rate or check the pairs")
         optimiser.zero_grad()

@@ -8,6 +8,7 @@
 //   booster_pairs --images DIR --only "low light and blur" ...            one condition only
 //   booster_pairs --leaves 2000 --pairs 4 --seed 1 --out pairs.bin        synthetic pictures, warped
 //   booster_pairs --rooms 100 --pairs 60 --seed 1 --out pairs.bin         two views of simulated rooms, true geometry
+//   booster_pairs --changed-rooms 100 --pairs 60 --seed 1 --out p.bin     before and after other lamps, furniture, viewpoints
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -64,7 +65,7 @@ struct Arguments {
   std::vector<std::string> folders;
   std::string out, only;
   Part part = Part::all;
-  int leaves = 0, rooms = 0, pairs = 10, seed = 1, features = 500, every = 1;
+  int leaves = 0, rooms = 0, changed_rooms = 0, pairs = 10, seed = 1, features = 500, every = 1;
 };
 
 class PairWriter {
@@ -131,9 +132,7 @@ void write_warped(const Arguments& arguments, const Image& picture, int index, R
 }
 
 /// Half of the second views are degraded in addition to the simulated camera's own errors.
-Result<void> write_room(const Arguments& arguments, int index, Rng& rng, PairWriter& out) {
-  constexpr int kFrames = 40;
-  Result<RoomViews> room = RoomViews::render(1000 * arguments.seed + index, kFrames);
+Result<void> write_room(const Arguments& arguments, const Result<RoomViews>& room, int index, Rng& rng, PairWriter& out) {
   if (!room) return room.error();
   for (int k = 0; k < arguments.pairs; ++k) {
     const auto pair = room->choose(rng);
@@ -168,9 +167,12 @@ int run(const Arguments& arguments) {
     const Image picture = rng.uniform() < 0.15 ? dead_leaves(752, 480, rng) : dead_leaves(480, 320, rng);
     write_warped(arguments, picture, index, rng, out);
   }
-  for (int i = 0; i < arguments.rooms; ++i, ++index) {
+  for (int i = 0; i < arguments.rooms + arguments.changed_rooms; ++i, ++index) {
+    constexpr int kFrames = 40;
     Rng rng = rng_of(arguments, index);
-    if (Result<void> done = write_room(arguments, i, rng, out); !done) return fail(done.error().message);
+    const int seed = 1000 * arguments.seed + i;
+    const Result<RoomViews> room = i < arguments.rooms ? RoomViews::render(seed, kFrames) : RoomViews::render_changed(seed);
+    if (Result<void> done = write_room(arguments, room, index, rng, out); !done) return fail(done.error().message);
   }
   if (!out.finish()) return fail(arguments.out + ": cannot be written");
   fmt::print("{} pairs of {} pictures and rooms\n", out.written(), index);
@@ -190,6 +192,7 @@ int main(int argc, char** argv) {
           std::map<std::string, Part>{{"all", Part::all}, {"train", Part::train}, {"held-out", Part::held_out}}));
   app.add_option("--leaves", arguments.leaves, "number of synthetic pictures");
   app.add_option("--rooms", arguments.rooms, "number of simulated rooms");
+  app.add_option("--changed-rooms", arguments.changed_rooms, "number of simulated rooms that are seen again after changes");
   app.add_option("--pairs", arguments.pairs, "pairs per picture (the conditions in turn) or per room");
   app.add_option("--only", arguments.only, "pairs of pictures of this condition alone")
       ->check(CLI::IsMember(std::vector<std::string>(fbvins::kConditionNames.begin(), fbvins::kConditionNames.end())));

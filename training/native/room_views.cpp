@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cmath>
-#include <utility>
+#include <optional>
+
+#include "fbvins/sim/still_room.hpp"
 
 namespace fbvins {
 namespace {
@@ -20,7 +22,57 @@ SimulationOptions options_of(int seed, int frames) {
   return o;
 }
 
+/// Their light comes from the change.
+constexpr std::array kStillPresets = {"normal", "hall", "normal", "weak-texture"};
+constexpr double kEvery_s = 2;
+constexpr int kChanges = 5;
+
+SimulationOptions still_options(int seed) {
+  SimulationOptions o = *simulation_preset(kStillPresets[static_cast<std::size_t>(seed) % kStillPresets.size()]);
+  o.seed = seed;
+  o.camera.time_samples = 2;
+  return o;
+}
+
+/// The first is none.
+RoomChange random_change(int number, Rng& rng) {
+  RoomChange change{.seed = number};
+  if (number == 0) return change;
+  constexpr std::array kLamps = {LampChange::none, LampChange::half, LampChange::standing, LampChange::sun};
+  change.lamps = kLamps[rng.below(kLamps.size())];
+  if (rng.uniform() < 0.6) change.moved_share = rng.uniform(0.1, 0.7);
+  if (rng.uniform() < 0.4) change.level = std::exp(rng.uniform(std::log(0.03), std::log(0.5)));
+  if (rng.uniform() < 0.6) change.exposure = rng.uniform(0.3, 1.7);
+  return change;
+}
+
+/// Half of the views are nearly the same as before.
+ViewChange random_view(Rng& rng) {
+  const double strength = rng.uniform() < 0.5 ? 0.15 : 1;
+  return {strength * rng.uniform(-65, 65), strength * rng.uniform(-1, 1)};
+}
+
 }  // namespace
+
+void RoomViews::add(const RenderedFrame& rendered, const Pose<W, B>& T_WB) {
+  frames_.push_back({*rendered.frame.left, rendered.depth_left_m, T_WB * rig_.T_BC0});
+}
+
+Result<RoomViews> RoomViews::render_changed(int seed) {
+  const Result<StillRoom> still = StillRoom::build(still_options(seed), kEvery_s);
+  if (!still) return still.error();
+  RoomViews room;
+  room.rig_ = still->rig();
+  Rng rng(static_cast<std::uint64_t>(seed), 7);
+  for (int number = 0; number <= kChanges; ++number) {
+    std::vector<Pose<W, B>> poses;
+    for (const Pose<W, B>& view : still->views())
+      if (const auto pose = number == 0 ? std::optional(view) : still->seen_from(view, random_view(rng))) poses.push_back(*pose);
+    const std::vector<RenderedFrame> rendered = still->render(poses, random_change(number, rng), true);
+    for (std::size_t i = 0; i < poses.size(); ++i) room.add(rendered[i], poses[i]);
+  }
+  return room;
+}
 
 Result<RoomViews> RoomViews::render(int seed, int frames) {
   Result<Simulation> simulation = prepare_simulation(options_of(seed, frames));
@@ -28,9 +80,7 @@ Result<RoomViews> RoomViews::render(int seed, int frames) {
   RoomViews room;
   room.rig_ = simulation->rig;
   for (std::size_t i = 0; i < simulation->frames.size() && i < static_cast<std::size_t>(frames); ++i) {
-    RenderedFrame rendered = render_frame(*simulation, i, true);
-    const Pose<W, B> T_WB = simulation->flight.pose((simulation->frames[i] - simulation->start).seconds());
-    room.frames_.push_back({*rendered.frame.left, std::move(rendered.depth_left_m), T_WB * room.rig_.T_BC0});
+    room.add(render_frame(*simulation, i, true), simulation->flight.pose((simulation->frames[i] - simulation->start).seconds()));
   }
   return room;
 }

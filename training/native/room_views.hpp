@@ -4,6 +4,7 @@
 //
 //   Result<RoomViews> room = RoomViews::render(7, 40);    // a preset, a world and a flight by seed; 40 frames
 //   if (auto pair = room->choose(rng)) room->transfer(pair->from, pair->to, pixel);
+//   Result<RoomViews> later = RoomViews::render_changed(7);   // and after months: other lamps, furniture, viewpoints, exposure
 #pragma once
 
 #include <optional>
@@ -17,6 +18,8 @@ namespace fbvins {
 class RoomViews {
  public:
   static Result<RoomViews> render(int seed, int frames);
+  /// Views along a flight, and the same places seen again under random changes.
+  static Result<RoomViews> render_changed(int seed);
 
   struct Pair {
     std::size_t from = 0, to = 0;
@@ -33,6 +36,7 @@ class RoomViews {
     std::vector<float> depth_m;
     Pose<W, C0> T_WC;
   };
+  void add(const RenderedFrame& rendered, const Pose<W, B>& T_WB);
   double overlap(std::size_t from, std::size_t to) const;
   float depth_at(const Frame& frame, const Vec2& px) const;
 

@@ -341,10 +341,19 @@ void Furnisher::add_pipes(const Wall& wall) {
           what, tint(), 0.6);
 }
 
+/// Notes the facets that `add` puts into the room as one piece. Returns what it returns.
+template <class Add>
+bool Furnisher::as_piece(const Add& add) {
+  const std::size_t first = world_.facets.size();
+  const bool done = add();
+  if (world_.facets.size() > first) world_.furniture.push_back({first, world_.facets.size() - first});
+  return done;
+}
+
 void Furnisher::place_furniture() {
   for (const Wall& wall : walls_)
     for (double at = rng_.uniform(0.1, 1.0); at + 0.6 < wall.length(); at += rng_.uniform(1.2, 3.0))
-      if (rng_.uniform() < 0.2 * options_.clutter_per_m2 + 0.1) add_shelf(wall, at);
+      if (rng_.uniform() < 0.2 * options_.clutter_per_m2 + 0.1) as_piece([&] { return add_shelf(wall, at); });
   for (const FloorRect& room : world_.plan.rooms) {
     if (options_.kind == "hall")
       for (double x = room.x0 + 1.2; x < room.x1 - 1; x += 2.4)
@@ -353,13 +362,13 @@ void Furnisher::place_furniture() {
     int placed = 0;
     for (int tries = 0; placed < count && tries < 8 * count; ++tries) {
       const double x = rng_.uniform(room.x0 + 0.35, room.x1 - 0.35), y = rng_.uniform(room.y0 + 0.35, room.y1 - 0.35);
-      const bool done = rng_.uniform() < 0.22 ? add_table(Vec3(x, y, 0)) : add_box_stack(Vec3(x, y, 0));
-      placed += done ? 1 : 0;
+      const bool table = rng_.uniform() < 0.22;
+      placed += as_piece([&] { return table ? add_table(Vec3(x, y, 0)) : add_box_stack(Vec3(x, y, 0)); }) ? 1 : 0;
     }
     const int tangles = static_cast<int>(options_.tangles_per_m2 * room.area());
     for (int tries = 0, stand = 0; stand < tangles && tries < 8 * tangles; ++tries) {
       const double x = rng_.uniform(room.x0 + 0.3, room.x1 - 0.3), y = rng_.uniform(room.y0 + 0.3, room.y1 - 0.3);
-      stand += add_tangle(Vec3(x, y, 0)) ? 1 : 0;
+      stand += as_piece([&] { return add_tangle(Vec3(x, y, 0)); }) ? 1 : 0;
     }
   }
 }

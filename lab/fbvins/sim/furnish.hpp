@@ -45,6 +45,8 @@ class Furnisher {
                  float tint);
   void repeat_along(const Wall& wall);
   void add_door(const Wall& wall, double at);
+  template <class Add>
+  bool as_piece(const Add& add);
   bool add_shelf(const Wall& wall, double at);
   bool add_table(const Vec3& floor_point);
   bool add_box_stack(const Vec3& floor_point);

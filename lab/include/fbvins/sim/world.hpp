@@ -99,11 +99,17 @@ struct WorldOptions {
   }
 };
 
+/// The facets of one thing that people move: a shelf, a table with what lies on it, a stack of boxes, a tangle of rods.
+struct FurniturePiece {
+  std::size_t first = 0, count = 0;
+};
+
 struct World {
   FloorPlan plan;
   TextureAtlas atlas;
   int detail_texture = 0;
   std::vector<Facet> facets;
+  std::vector<FurniturePiece> furniture;
   std::vector<Lamp> lamps;
   std::vector<Mover> movers;
 };
