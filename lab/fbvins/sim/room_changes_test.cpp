@@ -8,7 +8,7 @@
 #include "fbvins/sim/furnish.hpp"
 
 namespace fbvins {
-namespace {
+namespace room_changes_test {
 
 /// An empty room of 8 x 6 m with one facet of its own, ten boxes and two ceiling lamps, one of each group.
 World room_with_boxes() {
@@ -88,5 +88,5 @@ TEST(RoomChanges, ACameraNeedsRoom) {
   EXPECT_FALSE(has_room_for_camera(world, Vec3(-3.2, 2, 0.4)));
 }
 
-}  // namespace
+}  // namespace room_changes_test
 }  // namespace fbvins

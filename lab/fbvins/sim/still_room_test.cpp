@@ -8,7 +8,7 @@
 #include "fbvins/core/angle.hpp"
 
 namespace fbvins {
-namespace {
+namespace still_room_test {
 
 SimulationOptions short_flight() {
   SimulationOptions options = *simulation_preset("normal");
@@ -53,5 +53,5 @@ TEST(StillRoom, ATurnedViewLooksAtTheSamePoint) {
   EXPECT_FALSE(room->seen_from(room->views()[0], {.higher_m = 20}));
 }
 
-}  // namespace
+}  // namespace still_room_test
 }  // namespace fbvins
