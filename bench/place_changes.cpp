@@ -26,6 +26,7 @@
 
 #include "bench/changed_rooms.hpp"
 #include "fbvins/core/angle.hpp"
+#include "fbvins/core/median.hpp"
 #include "fbvins/loop/candidate_search.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/place_verifier.hpp"
@@ -192,12 +193,11 @@ Table measure(int threads, const std::vector<SeenRoom>& rooms, const Setting& se
   return sum;
 }
 
-double median(std::vector<PoseError> errors, double PoseError::*part) {
+double median_part(const std::vector<PoseError>& errors, double PoseError::*part) {
   if (errors.empty()) return 0;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end(),
-                   [part](const PoseError& a, const PoseError& b) { return a.*part < b.*part; });
-  return (*middle).*part;
+  std::vector<double> values;
+  for (const PoseError& e : errors) values.push_back(e.*part);
+  return median(values);
 }
 
 std::string described(const Setting& setting) {
@@ -207,7 +207,7 @@ std::string described(const Setting& setting) {
 
 void print_row(const char* name, const Row& r) {
   const double queries = std::max(r.queries, 1);
-  const double error_mm = 1e3 * median(r.errors, &PoseError::m), error_deg = median(r.errors, &PoseError::rad) / kDegree;
+  const double error_mm = 1e3 * median_part(r.errors, &PoseError::m), error_deg = median_part(r.errors, &PoseError::rad) / kDegree;
   fmt::print("| {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.2f} | {} | {} |\n", name, r.queries, r.known,
              100 * r.known / queries, 100 * r.verifiable / queries, error_mm, error_deg, r.pairs, r.wrong());
 }

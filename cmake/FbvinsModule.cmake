@@ -22,8 +22,8 @@ if(FBVINS_BUILD_TESTS)
   add_custom_target(sanitized_tests)
 endif()
 
-# Adds a test program, or none where FBVINS_TESTS does not want it. KIND: sanitized or unsanitized. Further arguments: as
-# gtest_discover_tests' PROPERTIES.
+# fbvins_unit_tests(PROGRAM KIND SOURCES ... DEPS ... PROPERTIES ...)
+# A test program, where FBVINS_TESTS wants it. KIND: sanitized or unsanitized. DEPS: libraries; PROPERTIES: of each test.
 function(fbvins_unit_tests PROGRAM KIND)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PROPERTIES" ${ARGN})
   if(NOT FBVINS_BUILD_TESTS OR NOT ARG_SOURCES OR NOT FBVINS_TESTS MATCHES "^(all|${KIND})$")
@@ -55,8 +55,9 @@ target_compile_options(fbvins_flags INTERFACE
 include(cmake/FbvinsPrecompiled.cmake)
 include(cmake/FbvinsEigen.cmake)
 
-# Several sources compiled as one: in half of the time altogether, but all of them again after a change of one. Of the modules that parse
-# or fly, and of tests, each of which has a namespace of its own; elsewhere names in files meet.
+# CMake's unity builds: eight sources of a target are compiled as one. All together take half of the time, but a change of one compiles
+# its eight again. For the modules that parse or fly, and for tests, each of which has a namespace of its own; in other targets
+# two sources define the same local names.
 option(FBVINS_UNITY "Compile several sources of a target as one" OFF)
 if(FBVINS_UNITY)  # a source is no header, though it is included
   target_compile_options(fbvins_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)

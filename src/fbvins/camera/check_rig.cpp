@@ -16,8 +16,8 @@ Error malformed(std::string_view origin, const std::string& what) {
 /// Slower than any shutter that is sold: a unit other than seconds.
 constexpr double kLongestLineDelay_s = 1e-3;
 
-/// Half way from the principal point to the edges of an image, no lens that is sold narrows a pinhole's angle to less than this
-/// share, or widens the one of a lens whose angles grow with the radius to more than this multiple.
+/// Half way from the principal point to the edge of the image, the angle from the axis is at least this share of what a pinhole has
+/// there, and at most this multiple of what an equidistant lens has.
 constexpr double kNarrowest = 0.6, kWidest = 1.6;
 
 bool positive(double x) { return x > 0 && std::isfinite(x); }
@@ -39,14 +39,17 @@ Result<void> check_lens(const Camera& camera, std::string_view side, std::string
   const double w = camera.width(), h = camera.height();
   const auto [fx, fy, cx, cy] = camera.intrinsics();
   if (cx < w / 3 || cx > 2 * w / 3 || cy < h / 3 || cy > 2 * h / 3)
-    return malformed(origin, fmt::format("the {} camera's principal point ({:.0f}, {:.0f}) is outside the middle third of its image of "
-                                         "{} x {} pixels: is the calibration of an image of another size?",
-                                         side, cx, cy, camera.width(), camera.height()));
+    return malformed(origin,
+                     fmt::format("the {} camera's principal point ({:.0f}, {:.0f}) is outside the middle third of its image of "
+                                 "{} x {} pixels: is the calibration of an image of another size?",
+                                 side, cx, cy, camera.width(), camera.height()));
+  constexpr double kHalfWay = 0.5, kNear = 0.01;  // of the distance to the edge
   for (const Vec2& towards : {Vec2(-cx, 0), Vec2(w - cx, 0), Vec2(0, -cy), Vec2(0, h - cy)}) {
-    const auto ray = camera.ray(Vec2(cx, cy) + 0.5 * towards), near = camera.ray(Vec2(cx, cy) + 0.01 * towards);
+    const auto ray = camera.ray(Vec2(cx, cy) + kHalfWay * towards), near = camera.ray(Vec2(cx, cy) + kNear * towards);
     if (ray && near) {
-      const double first = near->head<2>().norm() / near->z(), angle = std::atan2(ray->head<2>().norm(), ray->z());
-      if (angle > kNarrowest * std::atan(50 * first) && angle < kWidest * 50 * first) continue;
+      const double angle = std::atan2(ray->head<2>().norm(), ray->z());
+      const double equidistant = kHalfWay / kNear * near->head<2>().norm() / near->z(), pinhole = std::atan(equidistant);
+      if (angle > kNarrowest * pinhole && angle < kWidest * equidistant) continue;
     }
     return malformed(origin, fmt::format("the {} camera's distortion is impossible: half way to the edge of the image it {}", side,
                                          ray ? "bends rays as no lens does" : "has no rays any more"));

@@ -11,6 +11,7 @@
 namespace fbvins {
 namespace {
 
+constexpr int kEdge = ScalePyramid::kBorder;
 constexpr int kSmallestScaledLevel = 64;
 constexpr int kSmoothMargin = 8;
 
@@ -49,13 +50,13 @@ void blend_columns(const std::uint8_t* row, const ShrinkBlock* blocks, int count
 void replicate_borders(std::uint8_t* origin, int width, int height, std::ptrdiff_t stride) {
   for (int y = 0; y < height; ++y) {
     std::uint8_t* row = origin + y * stride;
-    std::memset(row - ScalePyramid::kBorder, row[0], ScalePyramid::kBorder);
-    std::memset(row + width, row[width - 1], ScalePyramid::kBorder);
+    std::memset(row - kEdge, row[0], kEdge);
+    std::memset(row + width, row[width - 1], kEdge);
   }
-  const auto bytes = static_cast<std::size_t>(width + 2 * ScalePyramid::kBorder);
-  for (int i = 1; i <= ScalePyramid::kBorder; ++i) {
-    std::memcpy(origin - ScalePyramid::kBorder - i * stride, origin - ScalePyramid::kBorder, bytes);
-    std::memcpy(origin - ScalePyramid::kBorder + (height - 1 + i) * stride, origin - ScalePyramid::kBorder + (height - 1) * stride, bytes);
+  const auto bytes = static_cast<std::size_t>(width + 2 * kEdge);
+  for (int i = 1; i <= kEdge; ++i) {
+    std::memcpy(origin - kEdge - i * stride, origin - kEdge, bytes);
+    std::memcpy(origin - kEdge + (height - 1 + i) * stride, origin - kEdge + (height - 1) * stride, bytes);
   }
 }
 
@@ -119,17 +120,17 @@ void ScalePyramid::build(const ImageView& image, int levels, double factor) {
     const int width = static_cast<int>(std::lround(image.width / scale));
     const int height = static_cast<int>(std::lround(image.height / scale));
     if (l > 0 && std::min(width, height) < kSmallestScaledLevel) break;
-    levels_.push_back({nullptr, width, height, padded_stride(width, ScalePyramid::kBorder)});
+    levels_.push_back({nullptr, width, height, padded_stride(width, kEdge)});
     scales_.push_back(scale);
-    total += static_cast<std::size_t>(padded_stride(width, ScalePyramid::kBorder)) * static_cast<std::size_t>(height + 2 * ScalePyramid::kBorder);
+    total += static_cast<std::size_t>(padded_stride(width, kEdge)) * static_cast<std::size_t>(height + 2 * kEdge);
   }
   pixels_.resize(total + 64);
   std::uint8_t* place = pixels_.data();
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     PyramidLevel& level = levels_[l];
-    std::uint8_t* origin = place + ScalePyramid::kBorder * level.stride + ScalePyramid::kBorder;
+    std::uint8_t* origin = place + kEdge * level.stride + kEdge;
     level.origin = origin;
-    place += level.stride * (level.height + 2 * ScalePyramid::kBorder);
+    place += level.stride * (level.height + 2 * kEdge);
     if (l == 0)
       for (int y = 0; y < level.height; ++y)
         std::memcpy(origin + y * level.stride, image.row(y), static_cast<std::size_t>(level.width));
