@@ -110,6 +110,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   const TrackedFrame& frame = as_it_is ? whole : referred_;
   const Duration rest = rest_.update(frame);
   carried_up_.carry(frame.t, frame.imu);
+  carried_velocity_.carry(frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
   else initialise(frame, rest, out);
@@ -144,8 +145,9 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   out.odometry.health = judge(frame, out.odometry);
   if (start_is_good(frame, out.odometry)) {
     shrink_window(solution, out);
-    compare_up();
-    if (tilt_away_B_) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
+    compare_carried(out.odometry);
+    if (tilt_away_B_ || carried_velocity_.contradicted())
+      out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
     return;
   }
   refuse_start(out.odometry);
@@ -254,7 +256,7 @@ void Estimator::track(const TrackedFrame& frame, Duration rest, Estimate& out) {
   stats.keyframe = keyframe_policy_.is_keyframe(window_, calibration_, standstill);
   window_.make_newest_keyframe(stats.keyframe);
   monitor_.take({frame.t, window_.newest().state.bias, out.odometry.gyro_bias_covariance, out.odometry.accel_bias_covariance});
-  compare_up();
+  compare_carried(out.odometry);
   out.odometry.health = judge(frame, out.odometry);
   if (out.odometry.health.has_pose()) shrink_window(solution, out);
   stats.marginalise_ms = timer.lap_ms();
@@ -382,7 +384,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                        {.worst_sigma_m = worst_sigma_m(solved.pose_covariance),
                         .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
-                        .contradiction = monitor_.contradicted() || tilt_away_B_.has_value(),
+                        .contradiction = monitor_.contradicted() || tilt_away_B_ || carried_velocity_.contradicted(),
                         .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
                         .wrong_cameras = wrong_cameras_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
@@ -391,10 +393,17 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
 }
 
-void Estimator::compare_up() {
+/// With what was known before, up and the velocity.
+void Estimator::compare_carried(const Odometry& solved) {
   const NavState<G>& newest = window_.newest().state;
   tilt_away_B_ =
       carried_up_.contradiction(newest.T_FB.q.conjugate() * (window_.tilt().q() * Vec3::UnitZ()), newest.bias.gyro_radps);
+  if (reading_noise_.clipped()) carried_velocity_.forget();
+  if (solved.velocity_covariance.isZero(0)) return;
+  const auto sigma = [](const Mat3& covariance) { return std::sqrt(covariance.trace()); };
+  carried_velocity_.compare({newest, gravity_G(), sigma(solved.velocity_covariance), up_sigma_rad_,
+                             sigma(solved.gyro_bias_covariance), sigma(solved.accel_bias_covariance)},
+                            tracks_in_view(window_));
 }
 
 void Estimator::remember_up(const Odometry& out) {
@@ -414,6 +423,7 @@ void Estimator::begin_new_W() {
 
 void Estimator::restart() {
   carried_up_.restart();
+  carried_velocity_.restart();
   const Pose<W, B>& last = published_.T_WB();
   // The next gauge begins where this W ends, so that the pose goes on from where it was published last.
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
@@ -466,7 +476,8 @@ void Estimator::publish(Odometry& out) {
   const NavState<G>& newest = window_.newest().state;
   const NavState<W> level = window_.tilt().levelled(newest);
   carry_covariances(out);
-  if (monitor_.take_reset()) begin_new_W();
+  const bool moved_along = !monitor_.contradicted() && carried_velocity_.take_reset();
+  if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   if (out.health.state == HealthState::good && published_.owes_too_much()) settle_correction(level.T_FB, out);
   if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
@@ -474,6 +485,9 @@ void Estimator::publish(Odometry& out) {
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);
   if (tilt_away_B_) out.pose_covariance.bottomRightCorner<3, 3>() += *tilt_away_B_ * tilt_away_B_->transpose();
+  const Vec3 &shift_G = carried_velocity_.shift_G(), &velocity_G = carried_velocity_.velocity_G();
+  out.pose_covariance.topLeftCorner<3, 3>() += shift_G * shift_G.transpose();
+  out.velocity_covariance += velocity_G * velocity_G.transpose();
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

@@ -11,6 +11,7 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/estimator/carried_up.hpp"
+#include "fbvins/estimator/carried_velocity.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
@@ -67,7 +68,7 @@ class Estimator {
   bool contradicted_too_long(Time t);
   Health judge(const TrackedFrame& frame, const Odometry& solved);
   bool start_is_good(const TrackedFrame& frame, const Odometry& solved) const;
-  void compare_up();
+  void compare_carried(const Odometry& solved);
   void remember_up(const Odometry& out);
   void refuse_start(Odometry& out);
   void restart();
@@ -100,6 +101,7 @@ class Estimator {
   ReadingNoise reading_noise_;
   Monitor monitor_;
   CarriedUp carried_up_;
+  CarriedVelocity carried_velocity_;
   std::optional<Vec3> tilt_away_B_;   ///< of a new window, from what was known before it, rad
   std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row

@@ -339,7 +339,6 @@ TEST(Estimator, BlindForTooLongIsLostAndStartsAgain) {
   EXPECT_EQ(flown.odometry.back().reset_counter, 1u);
 }
 
-/// How long the IMU may carry the pose depends on the IMU, and what it says of its error is true.
 TEST(Estimator, ARestartWithAWrongAccelerometerIsNotGood) {
   for (const double wrong_mps2 : {1.9, -1.7}) {
     SimulatedFlight flight(Motion(0.5, 0.1), 3);
@@ -364,6 +363,7 @@ TEST(Estimator, ARestartWithAWrongAccelerometerIsNotGood) {
   }
 }
 
+/// How long the IMU may carry the pose depends on the IMU, and what it says of its error is true.
 TEST(Estimator, AGoodImuCarriesThePoseForLongerThanABadOne) {
   int carried[2] = {};
   for (const bool good : {true, false}) {

@@ -34,6 +34,8 @@ class SimulatedFlight {
   std::function<bool(int)> readings = [](int) { return true; };
   /// Turns an exact pixel displacement into an outlier; nullptr: none.
   std::function<Vec2(int, std::int64_t)> outlier = nullptr;
+  /// Where a thing fills the view: its points are those of the room, moved by this, and other tracks. nullptr: never.
+  std::function<std::optional<Vec3>(int)> thing = nullptr;
   /// With reobserves: whether point i, re-observed in frame k, is mistaken for point i - 1.
   std::function<bool(int, int)> mistaken = [](int, int) { return false; };
 
@@ -102,13 +104,17 @@ class SimulatedFlight {
   }
 
   void see(int k, std::unordered_map<int, TrackId>& still, TrackedFrame& out) {
+    const std::optional<Vec3> moved = thing ? thing(k) : std::nullopt;
+    if (moved.has_value() != filled_) tracks_.clear(), known_.clear();
+    filled_ = moved.has_value();
+    const auto point = [&](int i) -> Vec3 { return points_[i] + moved.value_or(Vec3::Zero()); };
     std::unordered_set<TrackId> in_use;
     // Tracks that continue first, then new ones up to the limit.
     for (const bool followed : {true, false}) {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
         const auto track = tracks_.find(i);
         if ((track != tracks_.end()) != followed || static_cast<int>(out.features.size()) >= max_features) continue;
-        const auto left = observe(rig.left, in_camera(k, points_[i], rig.left, rig.T_BC0));
+        const auto left = observe(rig.left, in_camera(k, point(i), rig.left, rig.T_BC0));
         if (!left) continue;
         TrackedFeature f;
         const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
@@ -118,7 +124,7 @@ class SimulatedFlight {
         in_use.insert(f.id);
         f.left = *left;
         if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
-        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, points_[i], rig.right, rig.T_BC1.cast_frames<B, C0>()));
+        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, point(i), rig.right, rig.T_BC1.cast_frames<B, C0>()));
         if (!left_camera(k)) f.left.reset();
         if (!f.left && !f.right) continue;
         out.stats.tracked += followed;
@@ -154,6 +160,7 @@ class SimulatedFlight {
   std::unordered_map<int, TrackId> tracks_;  ///< point -> its present track
   std::unordered_map<int, TrackId> known_;   ///< point -> its last track
   std::int64_t next_track_ = 0;
+  bool filled_ = false;  ///< by a thing
   std::optional<ImuSample> last_sample_;
   Duration late_;
 };

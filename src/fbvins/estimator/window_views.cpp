@@ -33,6 +33,13 @@ int landmarks_in_view(const SlidingWindow& window) {
   }));
 }
 
+std::vector<TrackId> tracks_in_view(const SlidingWindow& window) {
+  std::vector<TrackId> out;
+  for (const Landmark& l : window.landmarks().all())
+    if (l.triangulated && l.sightings.back().frame == window.newest().id && l.sightings.size() >= 3) out.push_back(l.track);
+  return out;
+}
+
 std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,
                                         const Calibration& calibration) {
   std::vector<PointSighting> out;

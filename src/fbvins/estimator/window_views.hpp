@@ -15,6 +15,9 @@ namespace fbvins {
 /// Number of triangulated landmarks seen in the newest frame and in another one.
 int landmarks_in_view(const SlidingWindow& window);
 
+/// The tracks of triangulated landmarks seen in the newest frame and in two other ones.
+std::vector<TrackId> tracks_in_view(const SlidingWindow& window);
+
 /// The landmarks of the window whose tracks are among these features, with their estimated positions. The features must outlive
 /// them.
 std::vector<PointSighting> sightings_of(const SlidingWindow& window, const std::vector<TrackedFeature>& features,

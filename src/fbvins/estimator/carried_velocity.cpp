@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/carried_velocity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "fbvins/estimator/carried_up.hpp"
+#include "fbvins/imu/propagation.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Landmarks that join one image to an earlier one, and how many of those in view they have to be.
+constexpr std::size_t kFewestLinked = 8;
+constexpr double kLinked = 0.5;
+/// Fewer landmarks prove nothing.
+constexpr std::size_t kFewestToJudge = 15;
+constexpr double kCarriedFor_s = 30;
+/// No good velocity is off by more; and by so many standard deviations of what is carried on.
+constexpr double kVelocity_mps = 0.3, kVelocity_sigma = 5;
+/// What scale, axes and vibration of an accelerometer add to its bias.
+constexpr double kAccel_mps2 = 0.03;
+/// As well as this a velocity is known in any case.
+constexpr double kKnown_mps = 0.1;
+constexpr double kMovedAlong_m = 0.1;
+
+}  // namespace
+
+void CarriedVelocity::Carried::carry(const ImuSegment& readings) {
+  known.state = propagate(known.state, readings, known.gravity_G);
+  seconds += (readings.samples.back().t - readings.samples.front().t).seconds();
+}
+
+bool CarriedVelocity::Carried::joins(const std::vector<TrackId>& seen) const {
+  std::vector<TrackId> both;
+  std::set_intersection(seen.begin(), seen.end(), tracks.begin(), tracks.end(), std::back_inserter(both));
+  return both.size() >= kFewestLinked && static_cast<double>(both.size()) >= kLinked * static_cast<double>(seen.size());
+}
+
+double CarriedVelocity::Carried::sigma_mps() const {
+  const double t = seconds, g = known.gravity_G.norm();
+  return std::hypot(std::hypot(known.velocity_sigma_mps, g * known.tilt_sigma_rad * t),
+                    std::hypot(g * known.gyro_bias_sigma_radps * t * t / 2, known.accel_bias_sigma_mps2 * t), kAccel_mps2 * t);
+}
+
+/// What the pose has moved by is still told.
+void CarriedVelocity::forget() {
+  const Vec3 shift_G = shift_G_;
+  *this = {};
+  shift_G_ = shift_G;
+}
+
+void CarriedVelocity::carry(const ImuSegment& readings) {
+  if (!newest_) return;
+  if (readings.empty() || readings.longest_gap.seconds() > kReadingsGap_s) return forget();
+  newest_->carry(readings);
+  if (before_) {
+    const double before_s = before_->seconds;
+    before_->carry(readings);
+    shift_G_ += (before_->seconds - before_s) * velocity_G_;
+  }
+  if ((before_ ? before_ : newest_)->seconds > kCarriedFor_s) forget();
+}
+
+void CarriedVelocity::compare(const Known& now, std::vector<TrackId> seen) {
+  std::sort(seen.begin(), seen.end());
+  if (!newest_) {
+    newest_ = Carried{now, 0, std::move(seen)};
+    return;
+  }
+  // A velocity that is known less well than the one carried on says nothing of it, and does not replace it.
+  const bool known = now.velocity_sigma_mps <= std::max(kKnown_mps, newest_->sigma_mps());
+  if (newest_->joins(seen)) {
+    if (!known) newest_->tracks = seen;
+  } else {
+    if (!known || seen.size() < kFewestToJudge) return;
+    const Vec3 jump_B = now.state.v_B() - newest_->known.state.v_B();
+    if (jump_B.norm() > std::max(kVelocity_mps, kVelocity_sigma * newest_->sigma_mps())) {
+      if (!before_) before_ = newest_, begun_mps_ = jump_B.norm();
+      const Vec3 jump_G = now.state.T_FB.q * jump_B;
+      velocity_G_ += jump_G;
+      shift_G_ += newest_->seconds * jump_G;
+    }
+  }
+  if (known) newest_ = Carried{now, 0, std::move(seen)};
+  if (before_ && over()) before_.reset(), velocity_G_.setZero();
+}
+
+bool CarriedVelocity::over() const {
+  const double small_mps = std::max(kVelocity_mps, begun_mps_ / 2);
+  const double away_mps = (newest_->known.state.v_B() - before_->known.state.v_B()).norm();
+  return velocity_G_.norm() <= small_mps || away_mps <= small_mps || before_->joins(newest_->tracks);
+}
+
+bool CarriedVelocity::take_reset() {
+  if (contradicted()) return false;
+  const bool moved = shift_G_.norm() >= kMovedAlong_m;
+  shift_G_.setZero();
+  return moved;
+}
+
+}  // namespace fbvins
