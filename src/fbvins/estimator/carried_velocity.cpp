@@ -22,6 +22,8 @@ constexpr double kCarriedFor_s = 30;
 constexpr double kVelocity_mps = 0.3, kVelocity_sigma = 5;
 /// What scale, axes and vibration of an accelerometer add to its bias.
 constexpr double kAccel_mps2 = 0.03;
+/// So long the readings are carried on while images contradict them.
+constexpr double kDisputed_s = 0.2;
 /// As well as this a velocity is known in any case.
 constexpr double kKnown_mps = 0.1;
 constexpr double kMovedAlong_m = 0.1;
@@ -64,28 +66,37 @@ void CarriedVelocity::carry(const ImuSegment& readings) {
   if ((before_ ? before_ : newest_)->seconds > kCarriedFor_s) forget();
 }
 
-void CarriedVelocity::compare(const Known& now, std::vector<TrackId> seen) {
+void CarriedVelocity::compare(const Known& now, std::vector<TrackId> seen, bool contradicted) {
   std::sort(seen.begin(), seen.end());
   if (!newest_) {
-    newest_ = Carried{now, 0, std::move(seen)};
+    if (!contradicted) newest_ = Carried{now, 0, std::move(seen)};
     return;
   }
   // A velocity that is known less well than the one carried on says nothing of it, and does not replace it.
   const bool known = now.velocity_sigma_mps <= std::max(kKnown_mps, newest_->sigma_mps());
-  if (newest_->joins(seen)) {
-    if (!known) newest_->tracks = seen;
-  } else {
+  const bool joined = newest_->joins(seen);
+  if (!joined) {
     if (!known || seen.size() < kFewestToJudge) return;
-    const Vec3 jump_B = now.state.v_B() - newest_->known.state.v_B();
-    if (jump_B.norm() > std::max(kVelocity_mps, kVelocity_sigma * newest_->sigma_mps())) {
-      if (!before_) before_ = newest_, begun_mps_ = jump_B.norm();
-      const Vec3 jump_G = now.state.T_FB.q * jump_B;
-      velocity_G_ += jump_G;
-      shift_G_ += newest_->seconds * jump_G;
-    }
+    judge(now.state);
   }
-  if (known) newest_ = Carried{now, 0, std::move(seen)};
+  // Nor does one of images that contradict the readings. Which of the two is wrong is unknown, so nothing is carried on for long.
+  const bool disputed = joined && contradicted && !before_;
+  if (disputed && newest_->seconds > kDisputed_s) {
+    newest_.reset();
+    return;
+  }
+  if (known && !disputed) newest_ = Carried{now, 0, std::move(seen)};
+  else newest_->tracks = std::move(seen);
   if (before_ && over()) before_.reset(), velocity_G_.setZero();
+}
+
+void CarriedVelocity::judge(const NavState<G>& now) {
+  const Vec3 jump_B = now.v_B() - newest_->known.state.v_B();
+  if (jump_B.norm() <= std::max(kVelocity_mps, kVelocity_sigma * newest_->sigma_mps())) return;
+  if (!before_) before_ = newest_, begun_mps_ = jump_B.norm();
+  const Vec3 jump_G = now.T_FB.q * jump_B;
+  velocity_G_ += jump_G;
+  shift_G_ += newest_->seconds * jump_G;
 }
 
 bool CarriedVelocity::over() const {

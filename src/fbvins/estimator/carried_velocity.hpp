@@ -30,8 +30,9 @@ class CarriedVelocity {
   void carry(const ImuSegment& readings);
   /// The readings cannot be relied on.
   void forget();
-  /// `seen`: tracks in the newest image that the newest state of the window, `now`, explains.
-  void compare(const Known& now, std::vector<TrackId> seen);
+  /// `seen`: tracks in the newest image that the newest state of the window, `now`, explains. `contradicted`: images and readings
+  /// contradict each other.
+  void compare(const Known& now, std::vector<TrackId> seen, bool contradicted = false);
 
   bool contradicted() const { return before_.has_value(); }
   /// By how much the velocity of the images is another one than the readings', m/s, and how far the pose has moved with it since
@@ -53,6 +54,7 @@ class CarriedVelocity {
     bool joins(const std::vector<TrackId>& seen) const;
     double sigma_mps() const;
   };
+  void judge(const NavState<G>& now);
   bool over() const;
 
   std::optional<Carried> newest_;  ///< from the newest image that is joined to the one before

@@ -16,6 +16,8 @@ class Vehicle {
   CarriedVelocity velocity;
   NavState<G> truth;
   Duration longest_gap = Duration::from_seconds(0.005);
+  bool disputed = false;  ///< images contradict the readings
+  double sigma_mps = 0.01;
 
   Vehicle() { truth.v_FB = Vec3(0.4, 0.2, 0); }
   void fly(double seconds, const Vec3& along = Vec3::Zero(), int tracks = 40) {
@@ -43,7 +45,7 @@ class Vehicle {
     seen.v_FB += along;
     std::vector<TrackId> ids;
     for (int i = tracks; i-- > 0;) ids.push_back(TrackId{first_ + i});
-    velocity.compare({.state = seen, .velocity_sigma_mps = 0.01, .tilt_sigma_rad = 0.003}, ids);
+    velocity.compare({.state = seen, .velocity_sigma_mps = sigma_mps, .tilt_sigma_rad = 0.003}, ids, disputed);
   }
   std::int64_t first_ = 0;
   double t_s_ = 0;
@@ -100,6 +102,33 @@ TEST(CarriedVelocity, AFewLandmarksProveNothing) {
   vehicle.look_elsewhere();
   vehicle.fly(1, kThing, 14);
   EXPECT_FALSE(vehicle.velocity.contradicted());
+}
+
+TEST(CarriedVelocity, NothingIsCarriedOnWhereImagesContradictTheReadingsForLong) {
+  Vehicle vehicle;
+  vehicle.fly(2);
+  vehicle.disputed = true;
+  Vehicle briefly = vehicle;
+  briefly.fly(0.1, kThing);  // it comes into view
+  briefly.look_elsewhere();
+  briefly.fly(0.05, kThing);
+  EXPECT_TRUE(briefly.velocity.contradicted());
+  vehicle.fly(1, kThing);
+  vehicle.look_elsewhere();
+  vehicle.fly(0.5, Vec3::Zero());
+  EXPECT_FALSE(vehicle.velocity.contradicted());
+}
+
+TEST(CarriedVelocity, AVelocityThatIsHardlyKnownSaysNothing) {
+  Vehicle vehicle;
+  vehicle.fly(2);
+  vehicle.look_elsewhere();
+  vehicle.sigma_mps = 2;
+  vehicle.fly(0.2, kThing);
+  EXPECT_FALSE(vehicle.velocity.contradicted());
+  vehicle.sigma_mps = 0.01;
+  vehicle.fly(0.05, kThing);
+  EXPECT_TRUE(vehicle.velocity.contradicted());
 }
 
 TEST(CarriedVelocity, EndsWhereTheReadingsCannotCarryItAndTellsWhatWasMovedBy) {

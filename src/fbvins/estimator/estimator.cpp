@@ -403,7 +403,7 @@ void Estimator::compare_carried(const Odometry& solved) {
   const auto sigma = [](const Mat3& covariance) { return std::sqrt(covariance.trace()); };
   carried_velocity_.compare({newest, gravity_G(), sigma(solved.velocity_covariance), up_sigma_rad_,
                              sigma(solved.gyro_bias_covariance), sigma(solved.accel_bias_covariance)},
-                            tracks_in_view(window_));
+                            tracks_in_view(window_), monitor_.contradicted());
 }
 
 void Estimator::remember_up(const Odometry& out) {
