@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/flight_learning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+/// A parameter counts as determined where its standard deviation is at most this part of the prior's.
+constexpr double kDetermined = 0.5;
+/// Chance with which a group of parameters that is right is taken to be wrong: 0.5 %, nearly (Wilson, Hilferty).
+constexpr double kNormalQuantile = 2.576;
+
+double largest_by_chance(double count) {
+  const double a = 2 / (9 * count), root = 1 - a + kNormalQuantile * std::sqrt(a);
+  return count * root * root * root;
+}
+
+Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior,
+                              const std::vector<Eigen::Index>& at) {
+  Eigen::MatrixXd all = information(at, at);
+  all.diagonal() += prior(at);
+  const Eigen::VectorXd scale = all.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * all * scale.asDiagonal();
+  const auto n = static_cast<Eigen::Index>(at.size());
+  return scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(n, n)) * scale.asDiagonal();
+}
+
+/// The parameters of a group of one camera, among those that are free.
+using Group = std::pair<FlightGroup, int>;
+
+class Choice {
+ public:
+  Choice(const FlightRig& given, const FlightFit& fit)
+      : parameters_(flight_parameters(given)), prior_(prior_information(given)), information_(fit.information) {
+    for (std::size_t i = 0; i < parameters_.size(); ++i) all_.push_back(static_cast<Eigen::Index>(i));
+    sigma_ = covariance_of(information_, prior_, all_).diagonal().cwiseMax(0).cwiseSqrt();
+    // The minimum with all free, from which those of fewer follow: gradient of the quadratic at `given`.
+    const Eigen::VectorXd off = step_between(given, fit.rig);
+    pull_ = information_ * off + prior_.cwiseProduct(off);
+    findings_.assign(parameters_.size(), FlightFinding::refined);
+    for (std::size_t i = 0; i < parameters_.size(); ++i)
+      if (sigma_[static_cast<Eigen::Index>(i)] > kDetermined * parameters_[i].prior_sigma)
+        findings_[i] = FlightFinding::not_determined;
+    while (drop_one()) {
+    }
+  }
+
+  const std::vector<FlightFinding>& findings() const { return findings_; }
+  const Eigen::VectorXd& sigma() const { return sigma_; }
+  /// Free in the last fit: what is refined, and the IMU's axes, that they excuse no other parameter.
+  std::vector<bool> free() const {
+    std::vector<bool> out;
+    for (std::size_t i = 0; i < parameters_.size(); ++i)
+      out.push_back(findings_[i] == FlightFinding::refined || !is_flown(parameters_[i].group));
+    return out;
+  }
+  bool changed() const {
+    for (std::size_t i = 0; i < parameters_.size(); ++i)
+      if (findings_[i] == FlightFinding::refined && is_flown(parameters_[i].group)) return true;
+    return false;
+  }
+
+ private:
+  /// Takes the group that differs least from what was given as confirmed, if chance explains it.
+  bool drop_one() {
+    const std::vector<bool> is_free = free();
+    std::vector<Eigen::Index> at;
+    for (std::size_t i = 0; i < is_free.size(); ++i)
+      if (is_free[i]) at.push_back(static_cast<Eigen::Index>(i));
+    if (at.empty()) return false;
+    const Eigen::MatrixXd P = covariance_of(information_, prior_, at);
+    const Eigen::VectorXd off = P * pull_(at);
+    std::map<Group, std::vector<Eigen::Index>> groups;
+    for (std::size_t k = 0; k < at.size(); ++k)
+      if (const auto i = static_cast<std::size_t>(at[k]); findings_[i] == FlightFinding::refined)
+        groups[{parameters_[i].group, parameters_[i].camera}].push_back(static_cast<Eigen::Index>(k));
+    double least = 1;
+    const std::vector<Eigen::Index>* dropped = nullptr;
+    for (const auto& [group, members] : groups) {
+      const Eigen::VectorXd d = off(members);
+      const double size = d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) /
+                          largest_by_chance(static_cast<double>(members.size()));
+      if (size < least) least = size, dropped = &members;
+    }
+    if (dropped == nullptr) return false;
+    for (const Eigen::Index k : *dropped)
+      findings_[static_cast<std::size_t>(at[static_cast<std::size_t>(k)])] = FlightFinding::confirmed;
+    return true;
+  }
+
+  std::vector<FlightParameter> parameters_;
+  Eigen::VectorXd prior_;
+  Eigen::MatrixXd information_;
+  std::vector<Eigen::Index> all_;
+  Eigen::VectorXd sigma_, pull_;
+  std::vector<FlightFinding> findings_;
+};
+
+}  // namespace
+
+FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given) {
+  FlightLesson out;
+  const std::vector<bool> all(static_cast<std::size_t>(values(given).size()), true);
+  (void)settled_cost(pieces, given, out.noise.sigma_px);
+  out.noise.sigma_px = sigma_px_of(pieces, given);
+  FlightFit fit = fit_calibration(pieces, given, given, all, out.noise);
+  out.noise.sigma_px = sigma_px_of(pieces, fit.rig);
+  fit = fit_calibration(pieces, given, fit.rig, all, out.noise);
+  out.noise.spread = spread_of(pieces, fit, out.noise);
+  fit = fit_calibration(pieces, given, fit.rig, all, out.noise);
+  const Choice choice(given, fit);
+  out.findings = choice.findings();
+  out.sigma = choice.sigma();
+  out.changed = choice.changed();
+  // From what was given: what is not free stays so exactly.
+  out.rig = fit_calibration(pieces, given, given, choice.free(), out.noise).rig;
+  return out;
+}
+
+}  // namespace fbvins
