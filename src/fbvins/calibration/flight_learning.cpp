@@ -11,6 +11,9 @@ namespace {
 
 /// A parameter counts as determined where its standard deviation is at most this part of the prior's.
 constexpr double kDetermined = 0.5;
+/// Changes below this part of the prior's standard deviation do not matter: a flight's own errors (features that drift, a lens
+/// that no model describes) are as large, and a good calibration is better left alone.
+constexpr double kMatters = 0.2;
 /// Chance with which a group of parameters that is right is taken to be wrong: 0.5 %, nearly (Wilson, Hilferty).
 constexpr double kNormalQuantile = 2.576;
 
@@ -34,13 +37,14 @@ using Group = std::pair<FlightGroup, int>;
 
 class Choice {
  public:
-  Choice(const FlightRig& given, const FlightFit& fit)
-      : parameters_(flight_parameters(given)), prior_(prior_information(given)), information_(fit.information) {
+  /// `fit`: of all parameters, with a spread of 1.
+  Choice(const FlightRig& given, const FlightFit& fit, double spread)
+      : parameters_(flight_parameters(given)), prior_(prior_information(given)), information_(fit.information / spread) {
     for (std::size_t i = 0; i < parameters_.size(); ++i) all_.push_back(static_cast<Eigen::Index>(i));
     sigma_ = covariance_of(information_, prior_, all_).diagonal().cwiseMax(0).cwiseSqrt();
-    // The minimum with all free, from which those of fewer follow: gradient of the quadratic at `given`.
+    // The quadratic's gradient at `given`, from its minimum; from it follow the minima of fewer free parameters.
     const Eigen::VectorXd off = step_between(given, fit.rig);
-    pull_ = information_ * off + prior_.cwiseProduct(off);
+    pull_ = information_ * off + prior_.cwiseProduct(off) / spread;
     findings_.assign(parameters_.size(), FlightFinding::refined);
     for (std::size_t i = 0; i < parameters_.size(); ++i)
       if (sigma_[static_cast<Eigen::Index>(i)] > kDetermined * parameters_[i].prior_sigma)
@@ -82,8 +86,14 @@ class Choice {
     const std::vector<Eigen::Index>* dropped = nullptr;
     for (const auto& [group, members] : groups) {
       const Eigen::VectorXd d = off(members);
-      const double size = d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) /
-                          largest_by_chance(static_cast<double>(members.size()));
+      const double by_chance = d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) /
+                               largest_by_chance(static_cast<double>(members.size()));
+      double matters = 0;
+      for (std::size_t n = 0; n < members.size(); ++n) {
+        const double part = d[static_cast<Eigen::Index>(n)] / (kMatters * parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
+        matters = std::max(matters, part * part);
+      }
+      const double size = std::min(by_chance, matters);
       if (size < least) least = size, dropped = &members;
     }
     if (dropped == nullptr) return false;
@@ -111,8 +121,7 @@ FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given) {
   out.noise.sigma_px = sigma_px_of(pieces, fit.rig);
   fit = fit_calibration(pieces, given, fit.rig, all, out.noise);
   out.noise.spread = spread_of(pieces, fit, out.noise);
-  fit = fit_calibration(pieces, given, fit.rig, all, out.noise);
-  const Choice choice(given, fit);
+  const Choice choice(given, fit, out.noise.spread);
   out.findings = choice.findings();
   out.sigma = choice.sigma();
   out.changed = choice.changed();

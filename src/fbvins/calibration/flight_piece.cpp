@@ -2,6 +2,7 @@
 #include "fbvins/calibration/flight_piece.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "fbvins/calibration/flight_points.hpp"
@@ -196,9 +197,10 @@ void FlightPiece::add_steps(const FlightRig& rig, double& cost) {
 
 namespace {
 
-/// Where a view's columns of the calibration go.
-std::vector<int> columns_of(const FlightRig& rig, int camera) {
-  std::vector<int> out(ViewDerivatives::kColumns, -1);
+/// Where a view's columns of the calibration go; -1: nowhere.
+std::array<int, ViewDerivatives::kColumns> columns_of(const FlightRig& rig, int camera) {
+  std::array<int, ViewDerivatives::kColumns> out;
+  out.fill(-1);
   for (int i = 0; i <= flight::time_offset; ++i) out[static_cast<std::size_t>(i)] = i;
   int at = flight::first_of(rig, camera);
   for (int i = 0; i < 6 && camera > 0; ++i) out[static_cast<std::size_t>(ViewDerivatives::kPair + i)] = at++;
@@ -215,7 +217,6 @@ void FlightPiece::add_point(const FlightRig& rig, double lambda, std::size_t ind
   e = {};
   e.by_calibration.setZero(3, size_);
   Mat3 H = Mat3::Zero();
-  Eigen::Matrix<double, 2, Eigen::Dynamic> J_c(2, size_);
   for (const View& view : point.views) {
     ViewDerivatives d;
     const auto pixel = view_of(rig, view.camera, place(rig, view.keyframe), point.p_W, &d);
@@ -227,29 +228,43 @@ void FlightPiece::add_point(const FlightRig& rig, double lambda, std::size_t ind
     cost += loss(r.squaredNorm());
     const double root = std::sqrt(weight(r.squaredNorm())), scale = root / sigma_px_;
     r *= root;
-    d.state *= scale, d.point *= scale;
-    J_c.setZero();
-    const std::vector<int> columns = columns_of(rig, view.camera);
-    for (int i = 0; i < ViewDerivatives::kColumns; ++i)
-      if (const int to = columns[static_cast<std::size_t>(i)]; to >= 0) J_c.col(to) = scale * d.calibration.col(i);
+    d.state *= scale, d.point *= scale, d.calibration *= scale;
     if (e.keyframes.empty() || e.keyframes.back() != view.keyframe) {
       e.keyframes.push_back(view.keyframe);
       e.by_states.push_back(Eigen::Matrix<double, 3, 9>::Zero());
     }
     const Eigen::Index at = 15 * view.keyframe;
     A_.block<9, 9>(at, at).noalias() += d.state.transpose() * d.state;
-    B_.middleRows<9>(at).noalias() += d.state.transpose() * J_c;
-    C_.noalias() += J_c.transpose() * J_c;
     gradient_.segment<9>(at) += d.state.transpose() * r;
-    calibration_gradient_ += J_c.transpose() * r;
     H += d.point.transpose() * d.point;
     e.gradient += d.point.transpose() * r;
     e.by_states.back() += d.point.transpose() * d.state;
-    e.by_calibration.noalias() += d.point.transpose() * J_c;
+    add_calibration(columns_[static_cast<std::size_t>(view.camera)], d, r, at, e);
   }
   H.diagonal() *= 1 + lambda;
   H.diagonal().array() += 1e-9;
   e.covariance = H.inverse();
+  eliminate(e);
+}
+
+void FlightPiece::add_calibration(const Columns& columns, const ViewDerivatives& d, const Vec2& r, Eigen::Index at,
+                                  PointEquations& e) {
+  const Eigen::Matrix<double, 9, ViewDerivatives::kColumns> B = d.state.transpose() * d.calibration;
+  const Eigen::Matrix<double, 3, ViewDerivatives::kColumns> P = d.point.transpose() * d.calibration;
+  const Eigen::Matrix<double, ViewDerivatives::kColumns, ViewDerivatives::kColumns> C = d.calibration.transpose() * d.calibration;
+  const Eigen::Matrix<double, ViewDerivatives::kColumns, 1> g = d.calibration.transpose() * r;
+  for (int i = 0; i < ViewDerivatives::kColumns; ++i) {
+    const int to = columns[static_cast<std::size_t>(i)];
+    if (to < 0) continue;
+    B_.block<9, 1>(at, to) += B.col(i);
+    e.by_calibration.col(to) += P.col(i);
+    calibration_gradient_[to] += g[i];
+    for (int j = 0; j < ViewDerivatives::kColumns; ++j)
+      if (const int row = columns[static_cast<std::size_t>(j)]; row >= 0) C_(row, to) += C(j, i);
+  }
+}
+
+void FlightPiece::eliminate(const PointEquations& e) {
   const Vec3 solved = e.covariance * e.gradient;
   const Eigen::Matrix<double, 3, Eigen::Dynamic> by_calibration = e.covariance * e.by_calibration;
   for (std::size_t i = 0; i < e.keyframes.size(); ++i) {
@@ -270,6 +285,8 @@ CalibrationEquations FlightPiece::linearise(const FlightRig& rig, double lambda)
   A_.setZero(n, n), B_.setZero(n, size_), C_.setZero(size_, size_);
   gradient_.setZero(n), calibration_gradient_.setZero(size_);
   eliminated_.resize(points_.size());
+  columns_.clear();
+  for (int k = 0; k < static_cast<int>(rig.cameras.size()); ++k) columns_.push_back(columns_of(rig, k));
   CalibrationEquations out;
   add_prior(out.cost);
   add_steps(rig, out.cost);

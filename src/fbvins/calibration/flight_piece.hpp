@@ -10,7 +10,7 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <memory>
+#include <array>
 #include <vector>
 
 #include "fbvins/calibration/flight_tracks.hpp"
@@ -60,6 +60,8 @@ class FlightPiece {
     Preintegration between;
     Eigen::Matrix<double, 9, 15> by_axes;  ///< of the motion measured
   };
+  /// The parameter of each column of ViewDerivatives::calibration.
+  using Columns = std::array<int, ViewDerivatives::kColumns>;
   /// A point's equations, which are eliminated.
   struct PointEquations {
     Mat3 covariance = Mat3::Zero();  ///< with states and calibration known
@@ -70,11 +72,12 @@ class FlightPiece {
   };
 
   ViewPlace place(const FlightRig& rig, int keyframe) const;
-  void choose_points(const std::vector<FlightKeyframe>& keyframes, const FlightRig& given);
   void add_prior(double& cost);
   double prior_cost() const;
   void add_steps(const FlightRig& rig, double& cost);
   void add_point(const FlightRig& rig, double lambda, std::size_t point, double& cost);
+  void add_calibration(const Columns& columns, const ViewDerivatives& d, const Vec2& r, Eigen::Index at, PointEquations& e);
+  void eliminate(const PointEquations& e);
 
   double gravity_mps2_, given_offset_s_, sigma_px_ = 0.6, duration_s_ = 0;
   std::vector<NavState<W>> states_, states_before_;
@@ -84,6 +87,7 @@ class FlightPiece {
   std::vector<Point> points_;
   std::vector<Vec3> points_before_;
   // Of the last linearisation.
+  std::vector<Columns> columns_;  ///< by camera
   int size_ = 0;  ///< parameters of the calibration
   Eigen::MatrixXd A_, B_, C_;
   Eigen::VectorXd gradient_, calibration_gradient_;
