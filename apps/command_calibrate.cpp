@@ -269,9 +269,13 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
       ->capture_default_str();
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
-  command->add_option("--from-flight", a->from_flight,
-                      "refine the calibration of recordings that `fbvins run` reads, without a board (docs/calibration.md)");
-  command->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own");
+  CLI::Option* from_flight = command->add_option(
+      "--from-flight", a->from_flight, "recordings that `fbvins run` reads, whose calibration they refine, without a board");
+  for (const char* other : {"RECORDING", "--target", "--detections", "--imu-noise"})
+    from_flight->excludes(command->get_option(other));
+  command
+      ->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own")
+      ->needs(from_flight);
   command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();
@@ -282,9 +286,10 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors");
   command->callback([a, &exit_code] {
-    exit_code = !a->from_flight.empty() ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->quiet})
-                : a->imu_noise.empty()  ? calibrate(*a)
-                                        : measure_noise(*a);
+    exit_code = !a->from_flight.empty()
+                    ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->quiet})
+                : a->imu_noise.empty() ? calibrate(*a)
+                                       : measure_noise(*a);
   });
 }
 

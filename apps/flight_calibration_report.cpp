@@ -17,9 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* word(FlightFinding finding) {
-  return finding == FlightFinding::refined     ? "refined"
-         : finding == FlightFinding::confirmed ? "confirmed"
-                                               : "not determined";
+  return finding == FlightFinding::refined ? "refined" : finding == FlightFinding::confirmed ? "confirmed" : "not determined";
 }
 
 /// For people: degrees, mm, ms and per cent.
@@ -50,14 +48,14 @@ Json part_json(const HeldOutPart& part) {
 }  // namespace
 
 std::string flight_calibration_text(const FlightCalibration& found) {
-  std::string out = fmt::format("{} pieces of flights, {:.0f} s, {} keyframes, {} points seen {} times; noise {:.2f} px, spread {:.1f}\n",
-                                found.pieces, found.duration_s, found.keyframes, found.points, found.views, found.sigma_px,
-                                found.spread);
+  std::string out =
+      fmt::format("{} pieces of flights, {:.0f} s, {} keyframes, {} points seen {} times; noise {:.2f} px, spread {:.1f}\n",
+                  found.pieces, found.duration_s, found.keyframes, found.points, found.views, found.sigma_px, found.spread);
   for (const RefinedParameter& p : found.parameters) {
     if (p.finding != FlightFinding::refined) continue;
     const ReadableUnit unit = readable(p.unit, p.flown);
-    out += fmt::format("  {:<12} {:>12.4f} {:>+11.4f} +- {:<9.4f} {}{}\n", p.name, unit.factor * p.value,
-                       unit.factor * p.change, unit.factor * p.sigma, unit.name, p.flown ? "" : " (in no file of a rig)");
+    out += fmt::format("  {:<12} {:>12.4f} {:>+11.4f} +- {:<9.4f} {}{}\n", p.name, unit.factor * p.value, unit.factor * p.change,
+                       unit.factor * p.sigma, unit.name, p.flown ? "" : " (in no file of a rig)");
   }
   if (const std::string names = names_of(found, FlightFinding::confirmed); !names.empty())
     out += fmt::format("as given, which these flights confirm: {}\n", names);
@@ -77,9 +75,14 @@ std::string flight_calibration_json(const FlightCalibration& found, const std::v
   out["noise_px"] = found.sigma_px, out["spread"] = found.spread;
   out["parameters"] = Json::object();
   for (const RefinedParameter& p : found.parameters)
-    out["parameters"][p.name] = {{"given", p.given},       {"value", p.value}, {"change", p.change},
-                                 {"sigma", p.sigma},       {"prior_sigma", p.prior_sigma},
-                                 {"finding", word(p.finding)}, {"unit", p.unit}, {"in_files", p.flown}};
+    out["parameters"][p.name] = {{"given", p.given},
+                                 {"value", p.value},
+                                 {"change", p.change},
+                                 {"sigma", p.sigma},
+                                 {"prior_sigma", p.prior_sigma},
+                                 {"finding", word(p.finding)},
+                                 {"unit", p.unit},
+                                 {"in_files", p.flown}};
   out["held_out"] = Json::array();
   for (const HeldOutPart& part : found.held_out) out["held_out"].push_back(part_json(part));
   return out.dump(1) + "\n";
@@ -91,8 +94,8 @@ Result<void> write_flight_calibration(const FlightCalibration& found, const std:
   std::filesystem::create_directories(folder, error);
   if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
   std::vector<NamedText> files = rig_files(rig_calibration(found.rig));
-  files.insert(files.end(), {{"summary.json", flight_calibration_json(found, runs)},
-                             {"calibration.txt", flight_calibration_text(found)}});
+  files.insert(files.end(),
+               {{"summary.json", flight_calibration_json(found, runs)}, {"calibration.txt", flight_calibration_text(found)}});
   for (const auto& [name, text] : files)
     if (Result<void> done = write_text(folder + "/" + name, text); !done) return done;
   return {};

@@ -71,9 +71,7 @@ std::string changes(const FlightCalibration& found) {
 struct Ratios {
   double sum = 0, largest = 0;
   int count = 0, refined = 0;
-  void add(double ratio, bool better) {
-    sum += ratio, largest = std::max(largest, ratio), ++count, refined += better;
-  }
+  void add(double ratio, bool better) { sum += ratio, largest = std::max(largest, ratio), ++count, refined += better; }
 };
 
 int as_given(const std::vector<std::string>& paths) {
@@ -133,26 +131,27 @@ void turn_mounting(StereoRig& rig, const Vec3& turn) {
 }
 
 std::vector<Spoilt> all_spoilt() {
-  return {{"baseline's direction, 0.3 degrees",
-           [](StereoRig& rig) {
-             Pose<C0, C1> T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
-             T_C0C1.q = (T_C0C1.q * so3_exp(Vec3(0.2, 0.2, 0.1) * kDegree)).normalized();
-             rig.T_BC1 = rig.T_BC0 * T_C0C1;
-           }},
-          {"camera-IMU rotation, 0.5 degrees", [](StereoRig& rig) { turn_mounting(rig, 0.5 * kDegree * Vec3(0.6, -0.64, 0.48)); }},
-          {"time offset, 3 ms", [](StereoRig& rig) { rig.time_offset_s += 3e-3; }},
-          {"focal lengths, 1 %",
-           [](StereoRig& rig) {
-             for (Camera* camera : {&rig.left, &rig.right}) {
-               LensModel lens = camera->model();
-               std::visit([](auto& m) { m.fx *= 1.01, m.fy *= 1.01; }, lens);
-               *camera = camera->with_lens(lens);
-             }
-           }},
-          {"lever arm, 2 cm", [](StereoRig& rig) {
-             const Vec3 moved(0.012, -0.012, 0.0106);
-             rig.T_BC0.p += moved, rig.T_BC1.p += moved;
-           }}};
+  return {
+      {"baseline's direction, 0.3 degrees",
+       [](StereoRig& rig) {
+         Pose<C0, C1> T_C0C1 = rig.T_BC0.inverse() * rig.T_BC1;
+         T_C0C1.q = (T_C0C1.q * so3_exp(Vec3(0.2, 0.2, 0.1) * kDegree)).normalized();
+         rig.T_BC1 = rig.T_BC0 * T_C0C1;
+       }},
+      {"camera-IMU rotation, 0.5 degrees", [](StereoRig& rig) { turn_mounting(rig, 0.5 * kDegree * Vec3(0.6, -0.64, 0.48)); }},
+      {"time offset, 3 ms", [](StereoRig& rig) { rig.time_offset_s += 3e-3; }},
+      {"focal lengths, 1 %",
+       [](StereoRig& rig) {
+         for (Camera* camera : {&rig.left, &rig.right}) {
+           LensModel lens = camera->model();
+           std::visit([](auto& m) { m.fx *= 1.01, m.fy *= 1.01; }, lens);
+           *camera = camera->with_lens(lens);
+         }
+       }},
+      {"lever arm, 2 cm", [](StereoRig& rig) {
+         const Vec3 moved(0.012, -0.012, 0.0106);
+         rig.T_BC0.p += moved, rig.T_BC1.p += moved;
+       }}};
 }
 
 int spoilt(const std::vector<std::string>& paths) {
@@ -185,7 +184,6 @@ int spoilt(const std::vector<std::string>& paths) {
 int main(int argc, char** argv) {
   const std::string_view mode = argc > 1 && argv[1][0] == '-' ? argv[1] : "";
   const std::vector<std::string> paths(argv + (mode.empty() ? 1 : 2), argv + argc);
-  if (argc < 2 || paths.empty())
-    return fmt::print(stderr, "usage: flight_calibration [--spoilt | --together] RECORDING...\n"), 2;
+  if (argc < 2 || paths.empty()) return fmt::print(stderr, "usage: flight_calibration [--spoilt | --together] RECORDING...\n"), 2;
   return mode == "--spoilt" ? spoilt(paths) : mode == "--together" ? together(paths) : as_given(paths);
 }

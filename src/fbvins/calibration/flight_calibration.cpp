@@ -22,7 +22,8 @@ constexpr double kKeyframeStep_s = 0.18;
 constexpr int kFewestKeyframes = 8, kFewestPoints = 20;
 /// Pieces of all flights together, and of each at least, that bound the work.
 constexpr std::size_t kMostPieces = 40, kFewestOfEach = 4;
-/// By how much held-out parts must be predicted better, in units of half a squared standard deviation.
+/// By how much all held-out parts together must be predicted better, in units of half a squared standard deviation; and by how
+/// much any of them may be predicted worse, which is chance.
 constexpr double kLeastGain = 3;
 
 struct OwnedPiece {
@@ -108,7 +109,7 @@ std::string verdict_of(const FlightCalibration& found, bool changed) {
   double gain = 0;
   for (const HeldOutPart& part : found.held_out) {
     gain += part.gain;
-    if (part.gain < 0)
+    if (part.gain < -kLeastGain)
       return fmt::format("{} is predicted worse by the calibration refined without it than by the one given, which stays",
                          part.name);
   }
@@ -182,7 +183,7 @@ Result<FlightCalibration> calibrate_from_flights(const std::vector<FlightTracks>
   out.better = out.verdict.empty();
   if (!out.better) return out;
   out.rig = refined_rig(rig, lesson.rig);
-  out.verdict = "every part that was held out is predicted better by the refined calibration than by the one given";
+  out.verdict = "what was held out is predicted better by the refined calibration than by the one given";
   return out;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A better calibration from flights without a board: lenses, extrinsics of both kinds, time offset and the IMU's axes, each as far
-// as the flights determine it, judged by flights or halves that it was not fitted to (docs/derivations/calibration.md). One thread;
-// the same input gives the same bytes.
+// A better calibration from flights without a board: lenses, extrinsics of both kinds, time offset and the IMU's axes, each as
+// far as the flights determine it, judged by flights or halves that it was not fitted to (docs/derivations/calibration.md). One
+// thread; the same input gives the same bytes.
 //
 //   Result<FlightCalibration> found = calibrate_from_flights({tracks}, rig, {});
 //   if (!found) report(found.error().message);          // the flights are too short
@@ -42,15 +42,15 @@ struct RefinedParameter {
 /// A part of the flights as the given calibration predicts it, and as one does that was fitted to all other parts.
 struct HeldOutPart {
   std::string name;
-  bool changed = true;      ///< the other parts change something
+  bool changed = true;            ///< the other parts change something
   double given = 0, refined = 0;  ///< half sums of squares
-  double gain = 0;          ///< their difference over `spread`; positive: the refined one predicts better
+  double gain = 0;                ///< their difference over `spread`; positive: the refined one predicts better
 };
 
 struct FlightCalibration {
-  StereoRig rig;         ///< refined where it is better, as given elsewhere
+  StereoRig rig;  ///< refined where it is better, as given elsewhere
   bool better = false;
-  std::string verdict;   ///< one sentence
+  std::string verdict;  ///< one sentence
   std::vector<RefinedParameter> parameters;
   std::vector<HeldOutPart> held_out;
   ImuTriads axes;

@@ -86,11 +86,13 @@ class Choice {
     const std::vector<Eigen::Index>* dropped = nullptr;
     for (const auto& [group, members] : groups) {
       const Eigen::VectorXd d = off(members);
-      const double by_chance = d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) /
-                               largest_by_chance(static_cast<double>(members.size()));
+      const double by_chance =
+          d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) / largest_by_chance(static_cast<double>(members.size()));
       double matters = 0;
       for (std::size_t n = 0; n < members.size(); ++n) {
-        const double part = d[static_cast<Eigen::Index>(n)] / (kMatters * parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
+        const double part =
+            d[static_cast<Eigen::Index>(n)] /
+            (kMatters * parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
         matters = std::max(matters, part * part);
       }
       const double size = std::min(by_chance, matters);

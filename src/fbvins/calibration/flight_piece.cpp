@@ -270,8 +270,7 @@ void FlightPiece::eliminate(const PointEquations& e) {
   for (std::size_t i = 0; i < e.keyframes.size(); ++i) {
     const Eigen::Index row = 15 * e.keyframes[i];
     const Eigen::Matrix<double, 9, 3> Y = e.by_states[i].transpose() * e.covariance;
-    for (std::size_t j = 0; j < e.keyframes.size(); ++j)
-      A_.block<9, 9>(row, 15 * e.keyframes[j]).noalias() -= Y * e.by_states[j];
+    for (std::size_t j = 0; j < e.keyframes.size(); ++j) A_.block<9, 9>(row, 15 * e.keyframes[j]).noalias() -= Y * e.by_states[j];
     B_.middleRows<9>(row).noalias() -= e.by_states[i].transpose() * by_calibration;
     gradient_.segment<9>(row) -= e.by_states[i].transpose() * solved;
   }

@@ -88,7 +88,7 @@ class FlightPiece {
   std::vector<Vec3> points_before_;
   // Of the last linearisation.
   std::vector<Columns> columns_;  ///< by camera
-  int size_ = 0;  ///< parameters of the calibration
+  int size_ = 0;                  ///< parameters of the calibration
   Eigen::MatrixXd A_, B_, C_;
   Eigen::VectorXd gradient_, calibration_gradient_;
   Eigen::LLT<Eigen::MatrixXd> factor_;

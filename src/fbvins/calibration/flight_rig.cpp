@@ -15,9 +15,9 @@ namespace {
 /// How far calibrations in use are from the truth: those of boards much less, those of drawings more (docs/calibration.md).
 constexpr double kLever_m = 0.02, kMounting_rad = 0.5 * kDegree, kTimeOffset_s = 3e-3;
 constexpr double kBaseline_m = 1e-3, kBetween_rad = 0.2 * kDegree;
-constexpr double kLens = 0.01;            ///< of the focal length
-constexpr double kDistortion_px = 2;      ///< root mean square over the image
-constexpr double kAxes = 5e-3;            ///< of scale, and rad
+constexpr double kLens = 0.01;        ///< of the focal length
+constexpr double kDistortion_px = 2;  ///< root mean square over the image
+constexpr double kScale = 5e-3, kAxes_rad = 1e-3;
 
 constexpr const char* kXyz = "xyz";
 
@@ -81,10 +81,10 @@ std::vector<FlightParameter> flight_parameters(const FlightRig& rig) {
   out.push_back({"time_offset", "s", FlightGroup::time_offset, 0, kTimeOffset_s});
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      out.push_back({fmt::format("gyro.{}{}", kXyz[i], kXyz[j]), "", FlightGroup::gyro_axes, 0, kAxes});
+      out.push_back({fmt::format("gyro.{}{}", kXyz[i], kXyz[j]), "", FlightGroup::gyro_axes, 0, i == j ? kScale : kAxes_rad});
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j <= i; ++j)
-      out.push_back({fmt::format("accel.{}{}", kXyz[i], kXyz[j]), "", FlightGroup::accel_axes, 0, kAxes});
+      out.push_back({fmt::format("accel.{}{}", kXyz[i], kXyz[j]), "", FlightGroup::accel_axes, 0, i == j ? kScale : kAxes_rad});
   for (int k = 0; k < static_cast<int>(rig.cameras.size()); ++k) {
     if (k > 0) add_vector(fmt::format("cam{}.p", k), "m", FlightGroup::baseline, k, kBaseline_m, out);
     if (k > 0) add_vector(fmt::format("cam{}.r", k), "rad", FlightGroup::between_cameras, k, kBetween_rad, out);

@@ -26,7 +26,18 @@ struct FlightRig {
 };
 
 /// What is kept or changed together.
-enum class FlightGroup { lever, mounting, time_offset, baseline, between_cameras, focal, centre, distortion, gyro_axes, accel_axes };
+enum class FlightGroup {
+  lever,
+  mounting,
+  time_offset,
+  baseline,
+  between_cameras,
+  focal,
+  centre,
+  distortion,
+  gyro_axes,
+  accel_axes
+};
 
 struct FlightParameter {
   std::string name, unit;

@@ -15,7 +15,7 @@
 namespace fbvins::test {
 
 struct FlightSceneOptions {
-  double duration_s = 36, keyframe_s = 0.25, noise_px = 0.3;
+  double duration_s = 18, keyframe_s = 0.25, noise_px = 0.3;
   double position_m = 0.6, rotation_rad = 0.35;  ///< amplitudes of the motion
   std::uint64_t seed = 1;
 };
@@ -35,7 +35,7 @@ namespace flight_scene {
 /// Points on the walls of a room around the motion.
 inline std::vector<Vec3> points(Rng& rng) {
   std::vector<Vec3> out;
-  while (out.size() < 700) {
+  while (out.size() < 400) {
     const Vec3 p(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
     if (p.norm() < 1 && p.norm() > 0.1) out.push_back(rng.uniform(2, 6) * p.normalized());
   }

@@ -26,17 +26,17 @@ struct FlightView {
 
 struct FlightKeyframe {
   Time t;
-  NavState<W> state;               ///< level, as estimated in flight
-  std::vector<ImuSegment> imu;     ///< since the keyframe before; empty: it is not known what was between
+  NavState<W> state;            ///< level, as estimated in flight
+  std::vector<ImuSegment> imu;  ///< since the keyframe before; empty: it is not known what was between
   std::vector<FlightView> views;
-  bool new_frame = false;          ///< W is another one than the keyframe's before
+  bool new_frame = false;  ///< W is another one than the keyframe's before
 };
 
 struct FlightTracks {
   std::vector<FlightKeyframe> keyframes;
   ImuNoise noise;
   double gravity_mps2 = kGravity_mps2;
-  bool untriggered = false;        ///< cameras took their images at different times
+  bool untriggered = false;  ///< cameras took their images at different times
 };
 
 class FlightCollector {
@@ -47,7 +47,6 @@ class FlightCollector {
   FlightTracks take();
 
  private:
-
   FlightTracks tracks_;
   std::vector<std::uint32_t> resets_;                ///< of each keyframe
   std::map<std::uint32_t, Quat> q_LG_;               ///< as known last, by reset counter
