@@ -59,6 +59,8 @@ std::string flight_calibration_text(const FlightCalibration& found) {
   }
   if (const std::string names = names_of(found, FlightFinding::confirmed); !names.empty())
     out += fmt::format("as given, which these flights confirm: {}\n", names);
+  if (const std::string names = names_of(found, FlightFinding::left); !names.empty())
+    out += fmt::format("as given, since what was held out is predicted better so: {}\n", names);
   if (const std::string names = names_of(found, FlightFinding::not_determined); !names.empty())
     out += fmt::format("as given, not determined by these flights: {}\n", names);
   for (const HeldOutPart& part : found.held_out)
@@ -83,6 +85,8 @@ std::string flight_calibration_json(const FlightCalibration& found, const std::v
                                  {"finding", word(p.finding)},
                                  {"unit", p.unit},
                                  {"in_files", p.flown}};
+  for (Eigen::Index row = 0; row < found.covariance.rows(); ++row)
+    out["covariance"].push_back(std::vector<double>(found.covariance.col(row).begin(), found.covariance.col(row).end()));
   out["held_out"] = Json::array();
   for (const HeldOutPart& part : found.held_out) out["held_out"].push_back(part_json(part));
   return out.dump(1) + "\n";

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "fbvins/calibration/flight_learning.hpp"
@@ -78,42 +79,55 @@ FlightRig as_flown(FlightRig rig) {
   return rig;
 }
 
-HeldOutPart judged(const FlightPieces& others, const FlightPieces& held_out, const FlightRig& given, std::string name) {
-  const FlightLesson lesson = learn_from(others, given);
-  HeldOutPart out{std::move(name), lesson.changed};
+/// Pieces of which one part is held out, and what the others say.
+struct Division {
+  std::string name;
+  FlightPieces others, held_out;
+  FlightSurvey survey;
+};
+
+HeldOutPart judged(const Division& division, const FlightRig& given, const std::vector<FlightGroup>& left) {
+  const FlightLesson lesson = learn_from(division.others, given, division.survey, left);
+  HeldOutPart out{division.name, lesson.changed};
   if (!lesson.changed) return out;
-  out.given = settled_cost(held_out, given, lesson.noise.sigma_px);
-  out.refined = settled_cost(held_out, as_flown(lesson.rig), lesson.noise.sigma_px);
+  out.given = settled_cost(division.held_out, given, lesson.noise.sigma_px);
+  out.refined = settled_cost(division.held_out, as_flown(lesson.rig), lesson.noise.sigma_px);
   out.gain = (out.given - out.refined) / lesson.noise.spread;
   return out;
 }
 
 void fill_parameters(const FlightLesson& lesson, const FlightRig& given, FlightCalibration& out) {
+  out.covariance = lesson.covariance;
   const std::vector<FlightParameter> parameters = flight_parameters(given);
   const Eigen::VectorXd before = values(given), after = values(lesson.rig), change = step_between(given, lesson.rig);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const FlightParameter& p = parameters[i];
     const bool keeps = lesson.findings[i] != FlightFinding::refined;
-    out.parameters.push_back({p.name, p.unit, before[k], keeps ? before[k] : after[k], keeps ? 0 : change[k], lesson.sigma[k],
-                              p.prior_sigma, lesson.findings[i], is_flown(p.group)});
+    out.parameters.push_back({p.name, p.unit, before[k], keeps ? before[k] : after[k], keeps ? 0 : change[k],
+                              std::sqrt(std::max(0.0, lesson.covariance(k, k))), p.prior_sigma, lesson.findings[i],
+                              is_flown(p.group)});
   }
 }
 
-std::string verdict_of(const FlightCalibration& found, bool changed) {
+double total_gain(const FlightCalibration& found) {
+  double sum = 0;
+  for (const HeldOutPart& part : found.held_out) sum += part.gain;
+  return sum;
+}
+
+/// Why the calibration stays as given; empty where it does not.
+std::string objection_to(const FlightCalibration& found, bool changed) {
   const bool determined = std::any_of(found.parameters.begin(), found.parameters.end(), [](const RefinedParameter& p) {
     return p.flown && p.finding != FlightFinding::not_determined;
   });
   if (!determined) return "these flights determine no parameter: the calibration stays as given";
   if (!changed) return "what these flights determine is as given: the calibration stays";
-  double gain = 0;
-  for (const HeldOutPart& part : found.held_out) {
-    gain += part.gain;
+  for (const HeldOutPart& part : found.held_out)
     if (part.gain < -kLeastGain)
       return fmt::format("{} is predicted worse by the calibration refined without it than by the one given, which stays",
                          part.name);
-  }
-  if (gain < kLeastGain)
+  if (total_gain(found) < kLeastGain)
     return "what was held out is hardly predicted better by the refined calibration than by the one given, which stays";
   return {};
 }
@@ -145,6 +159,53 @@ Result<void> check_parts(const std::vector<OwnedPiece>& pieces, const std::vecto
   return {};
 }
 
+std::vector<Division> divisions_of(const std::vector<OwnedPiece>& pieces, const std::vector<std::string>& names) {
+  std::vector<Division> out;
+  if (names.size() > 1)
+    for (const std::string& name : names) out.push_back({name, {}, {}, {}});
+  else out = {{"the first half", {}, {}, {}}, {"the second half", {}, {}, {}}};
+  const std::vector<std::size_t> parts = parts_of(pieces, names.size());
+  for (std::size_t d = 0; d < out.size(); ++d)
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+      (parts[i] == d ? out[d].held_out : out[d].others).push_back(pieces[i].piece.get());
+  return out;
+}
+
+FlightCalibration counted(const std::vector<OwnedPiece>& pieces, const StereoRig& rig, const FlightNoise& noise) {
+  FlightCalibration out;
+  out.rig = rig;
+  out.sigma_px = noise.sigma_px, out.spread = noise.spread;
+  out.pieces = static_cast<int>(pieces.size());
+  for (const OwnedPiece& p : pieces) {
+    out.keyframes += p.piece->keyframes(), out.points += p.piece->points(), out.views += p.piece->views();
+    out.duration_s += p.piece->duration_s();
+  }
+  return out;
+}
+
+/// Groups that are left as given, one after the other: what predicts best is taken. Lenses trade off against much else,
+/// distortion most of all.
+const std::vector<std::vector<FlightGroup>>& groups_left() {
+  using enum FlightGroup;
+  static const std::vector<std::vector<FlightGroup>> all = {{}, {distortion}, {distortion, centre}, {distortion, centre, focal}};
+  return all;
+}
+
+/// With these groups left as given: what all pieces say, and how the held-out parts judge it.
+FlightCalibration refined(const Division& all, const std::vector<Division>& divisions, const FlightRig& given,
+                          const std::vector<FlightGroup>& left, FlightCalibration out) {
+  for (const Division& division : divisions) out.held_out.push_back(judged(division, given, left));
+  const FlightLesson lesson = learn_from(all.others, given, all.survey, left);
+  out.axes = lesson.rig.axes;
+  fill_parameters(lesson, given, out);
+  out.verdict = objection_to(out, lesson.changed);
+  out.better = out.verdict.empty();
+  if (!out.better) return out;
+  out.rig = refined_rig(out.rig, lesson.rig);
+  out.verdict = "what was held out is predicted better by the refined calibration than by the one given";
+  return out;
+}
+
 }  // namespace
 
 Result<FlightCalibration> calibrate_from_flights(const std::vector<FlightTracks>& flights, const std::vector<std::string>& names,
@@ -156,35 +217,24 @@ Result<FlightCalibration> calibrate_from_flights(const std::vector<FlightTracks>
   const auto tell = [&](const std::string& what) {
     if (options.on_progress) options.on_progress(what);
   };
-  FlightCalibration out;
-  out.rig = rig;
-  FlightPieces all;
-  for (const OwnedPiece& p : pieces) {
-    all.push_back(p.piece.get());
-    out.keyframes += p.piece->keyframes(), out.points += p.piece->points(), out.views += p.piece->views();
-    out.duration_s += p.piece->duration_s();
-  }
-  out.pieces = static_cast<int>(pieces.size());
-  const std::vector<std::size_t> parts = parts_of(pieces, flights.size());
-  const std::size_t count = flights.size() > 1 ? flights.size() : 2;
-  for (std::size_t part = 0; part < count; ++part) {
-    const std::string name = flights.size() > 1 ? names[part] : part == 0 ? "the first half" : "the second half";
-    tell("without " + name);
-    FlightPieces others, held_out;
-    for (std::size_t i = 0; i < all.size(); ++i) (parts[i] == part ? held_out : others).push_back(all[i]);
-    out.held_out.push_back(judged(others, held_out, given, name));
+  std::vector<Division> divisions = divisions_of(pieces, names);
+  for (Division& division : divisions) {
+    tell("without " + division.name);
+    division.survey = survey_of(division.others, given);
   }
   tell("all together");
-  const FlightLesson lesson = learn_from(all, given);
-  out.sigma_px = lesson.noise.sigma_px, out.spread = lesson.noise.spread;
-  out.axes = lesson.rig.axes;
-  fill_parameters(lesson, given, out);
-  out.verdict = verdict_of(out, lesson.changed);
-  out.better = out.verdict.empty();
-  if (!out.better) return out;
-  out.rig = refined_rig(rig, lesson.rig);
-  out.verdict = "what was held out is predicted better by the refined calibration than by the one given";
-  return out;
+  Division all{"", {}, {}, {}};
+  for (const OwnedPiece& p : pieces) all.others.push_back(p.piece.get());
+  all.survey = survey_of(all.others, given);
+  std::optional<FlightCalibration> best;
+  for (const std::vector<FlightGroup>& left : groups_left()) {
+    tell(left.empty() ? "judging" : "judging with less of the lenses refined");
+    FlightCalibration found = refined(all, divisions, given, left, counted(pieces, rig, all.survey.noise));
+    const bool unchanged = std::none_of(found.held_out.begin(), found.held_out.end(), [](const auto& p) { return p.changed; });
+    if (!best || (found.better && (!best->better || total_gain(found) > total_gain(*best)))) best = std::move(found);
+    if (unchanged) break;
+  }
+  return *std::move(best);
 }
 
 }  // namespace fbvins

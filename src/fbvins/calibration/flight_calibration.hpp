@@ -26,6 +26,7 @@ struct FlightCalibrationOptions {
 enum class FlightFinding {
   refined,         ///< changed
   confirmed,       ///< determined, and as given
+  left,            ///< as given: held-out parts are predicted better so
   not_determined,  ///< by these flights: as given
 };
 
@@ -33,7 +34,7 @@ struct RefinedParameter {
   std::string name, unit;
   double given = 0, value = 0;
   double change = 0;  ///< of a rotation: of its part about this axis
-  double sigma = 0;   ///< as the flights and the prior determine it, all other parameters unknown
+  double sigma = 0;   ///< by `covariance`
   double prior_sigma = 0;
   FlightFinding finding = FlightFinding::not_determined;
   bool flown = true;  ///< false: no file of a rig has it
@@ -52,6 +53,7 @@ struct FlightCalibration {
   bool better = false;
   std::string verdict;  ///< one sentence
   std::vector<RefinedParameter> parameters;
+  Eigen::MatrixXd covariance;  ///< of `parameters`, with all of them unknown
   std::vector<HeldOutPart> held_out;
   ImuTriads axes;
   int pieces = 0, keyframes = 0, points = 0, views = 0;

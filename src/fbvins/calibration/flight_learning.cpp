@@ -37,24 +37,28 @@ using Group = std::pair<FlightGroup, int>;
 
 class Choice {
  public:
-  /// `fit`: of all parameters, with a spread of 1.
-  Choice(const FlightRig& given, const FlightFit& fit, double spread)
-      : parameters_(flight_parameters(given)), prior_(prior_information(given)), information_(fit.information / spread) {
+  Choice(const FlightRig& given, const FlightSurvey& survey, const std::vector<FlightGroup>& left)
+      : parameters_(flight_parameters(given)),
+        prior_(prior_information(given)),
+        information_(survey.fit.information / survey.noise.spread) {
     for (std::size_t i = 0; i < parameters_.size(); ++i) all_.push_back(static_cast<Eigen::Index>(i));
-    sigma_ = covariance_of(information_, prior_, all_).diagonal().cwiseMax(0).cwiseSqrt();
+    covariance_ = covariance_of(information_, prior_, all_);
     // The quadratic's gradient at `given`, from its minimum; from it follow the minima of fewer free parameters.
-    const Eigen::VectorXd off = step_between(given, fit.rig);
-    pull_ = information_ * off + prior_.cwiseProduct(off) / spread;
+    const Eigen::VectorXd off = step_between(given, survey.fit.rig);
+    pull_ = information_ * off + prior_.cwiseProduct(off) / survey.noise.spread;
     findings_.assign(parameters_.size(), FlightFinding::refined);
-    for (std::size_t i = 0; i < parameters_.size(); ++i)
-      if (sigma_[static_cast<Eigen::Index>(i)] > kDetermined * parameters_[i].prior_sigma)
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      if (std::sqrt(std::max(0.0, covariance_(k, k))) > kDetermined * parameters_[i].prior_sigma)
         findings_[i] = FlightFinding::not_determined;
+      else if (std::find(left.begin(), left.end(), parameters_[i].group) != left.end()) findings_[i] = FlightFinding::left;
+    }
     while (drop_one()) {
     }
   }
 
   const std::vector<FlightFinding>& findings() const { return findings_; }
-  const Eigen::VectorXd& sigma() const { return sigma_; }
+  const Eigen::MatrixXd& covariance() const { return covariance_; }
   /// Free in the last fit: what is refined, and the IMU's axes, that they excuse no other parameter.
   std::vector<bool> free() const {
     std::vector<bool> out;
@@ -106,29 +110,32 @@ class Choice {
 
   std::vector<FlightParameter> parameters_;
   Eigen::VectorXd prior_;
-  Eigen::MatrixXd information_;
+  Eigen::MatrixXd information_, covariance_;
   std::vector<Eigen::Index> all_;
-  Eigen::VectorXd sigma_, pull_;
+  Eigen::VectorXd pull_;
   std::vector<FlightFinding> findings_;
 };
 
 }  // namespace
 
-FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given) {
-  FlightLesson out;
+FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given) {
+  FlightSurvey out;
   const std::vector<bool> all(static_cast<std::size_t>(values(given).size()), true);
   (void)settled_cost(pieces, given, out.noise.sigma_px);
   out.noise.sigma_px = sigma_px_of(pieces, given);
-  FlightFit fit = fit_calibration(pieces, given, given, all, out.noise);
-  out.noise.sigma_px = sigma_px_of(pieces, fit.rig);
-  fit = fit_calibration(pieces, given, fit.rig, all, out.noise);
-  out.noise.spread = spread_of(pieces, fit, out.noise);
-  const Choice choice(given, fit, out.noise.spread);
-  out.findings = choice.findings();
-  out.sigma = choice.sigma();
-  out.changed = choice.changed();
+  out.fit = fit_calibration(pieces, given, given, all, out.noise);
+  out.noise.sigma_px = sigma_px_of(pieces, out.fit.rig);
+  out.fit = fit_calibration(pieces, given, out.fit.rig, all, out.noise);
+  out.noise.spread = spread_of(pieces, out.fit, out.noise);
+  return out;
+}
+
+FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
+                        const std::vector<FlightGroup>& left) {
+  const Choice choice(given, survey, left);
+  FlightLesson out{given, survey.noise, choice.findings(), choice.covariance(), choice.changed()};
   // From what was given: what is not free stays so exactly.
-  out.rig = fit_calibration(pieces, given, given, choice.free(), out.noise).rig;
+  out.rig = fit_calibration(pieces, given, given, choice.free(), survey.noise).rig;
   return out;
 }
 

@@ -10,15 +10,24 @@
 
 namespace fbvins {
 
+/// The fit of all parameters at once.
+struct FlightSurvey {
+  FlightFit fit;
+  FlightNoise noise;
+};
+
 struct FlightLesson {
   FlightRig rig;
   FlightNoise noise;
   std::vector<FlightFinding> findings;  ///< by parameter
-  Eigen::VectorXd sigma;                ///< by parameter, with all of them unknown
+  Eigen::MatrixXd covariance;           ///< of all parameters, with all of them unknown
   bool changed = false;                 ///< something that is flown
 };
 
-FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given);
+FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given);
+/// `left`: groups that stay as given, whatever the survey says of them.
+FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
+                        const std::vector<FlightGroup>& left);
 
 /// Whether a file of a rig has it.
 inline bool is_flown(FlightGroup group) { return group != FlightGroup::gyro_axes && group != FlightGroup::accel_axes; }
