@@ -154,8 +154,23 @@ std::vector<Spoilt> all_spoilt() {
        }}};
 }
 
+/// Part of what was spoilt that is undone: of the spoilt parameters, as one vector in units of their priors.
+double undone(const StereoRig& good, const StereoRig& spoilt, const StereoRig& refined) {
+  const FlightRig truth = flight_rig(good);
+  const Eigen::VectorXd before = step_between(truth, flight_rig(spoilt)), after = step_between(truth, flight_rig(refined));
+  const std::vector<FlightParameter> parameters = flight_parameters(truth);
+  double sum_before = 0, sum_after = 0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const double sigma = parameters[i].prior_sigma;
+    if (std::abs(before[k]) < 1e-3 * sigma) continue;
+    sum_before += std::pow(before[k] / sigma, 2), sum_after += std::pow(after[k] / sigma, 2);
+  }
+  return 1 - std::sqrt(sum_after / sum_before);
+}
+
 int spoilt(const std::vector<std::string>& paths) {
-  fmt::print("| flight | spoilt | ATE unspoilt, mm | spoilt, mm | refined, mm | mended | |\n|---|---|---|---|---|---|---|\n");
+  fmt::print("| flight | spoilt | undone | ATE unspoilt, mm | spoilt, mm | refined, mm | |\n|---|---|---|---|---|---|---|\n");
   for (const std::string& path : paths) {
     const Result<Flown> good = fly(path, {});
     if (!good) return fmt::print(stderr, "{}\n", good.error().message), 2;
@@ -166,13 +181,14 @@ int spoilt(const std::vector<std::string>& paths) {
       if (!flown) return fmt::print(stderr, "{}\n", flown.error().message), 2;
       const Result<FlightCalibration> found = calibrate_from_flights({flown->tracks}, {name_of(path)}, rig, {});
       if (!found) {
-        fmt::print("| {} | {} | {} | {} | | | {} |\n", name_of(path), way.name, mm(good->ate_m), mm(flown->ate_m),
+        fmt::print("| {} | {} | | {} | {} | | {} |\n", name_of(path), way.name, mm(good->ate_m), mm(flown->ate_m),
                    found.error().message);
         continue;
       }
       const double ate_m = found->better ? (*fly(path, found->rig)).ate_m : flown->ate_m;
-      fmt::print("| {} | {} | {} | {} | {} | {:.0f} % | {} |\n  {}\n", name_of(path), way.name, mm(good->ate_m), mm(flown->ate_m),
-                 mm(ate_m), 100 * (flown->ate_m - ate_m) / (flown->ate_m - good->ate_m), found->verdict, changes(*found));
+      fmt::print("| {} | {} | {:.0f} % | {} | {} | {} | {} |\n  {}\n", name_of(path), way.name,
+                 100 * undone(good->rig, rig, found->rig), mm(good->ate_m), mm(flown->ate_m), mm(ate_m), found->verdict,
+                 changes(*found));
       std::fflush(stdout);
     }
   }

@@ -17,10 +17,10 @@ namespace {
 /// Pieces of a part at least, so that there is something to judge by.
 constexpr std::size_t kFewestPieces = 2;
 /// A piece: shorter ones of short flights, so that each half has two.
-constexpr double kPiece_s = 8, kShortestPiece_s = 3;
+constexpr double kPiece_s = 8, kShortestPiece_s = 2.2;
 /// Keyframes nearer to one another add little but work.
 constexpr double kKeyframeStep_s = 0.18;
-constexpr int kFewestKeyframes = 8, kFewestPoints = 20;
+constexpr int kFewestKeyframes = 5, kFewestPoints = 20;
 /// Pieces of all flights together, and of each at least, that bound the work.
 constexpr std::size_t kMostPieces = 40, kFewestOfEach = 4;
 /// By how much all held-out parts together must be predicted better, in units of half a squared standard deviation; and by how
@@ -153,7 +153,7 @@ Result<void> check_parts(const std::vector<OwnedPiece>& pieces, const std::vecto
     const std::size_t needed = names.size() > 1 ? 1 : 2 * kFewestPieces;
     if (count < needed)
       return Error{ErrorCode::invalid_argument,
-                   fmt::format("{}: is too short: {} s with good poses, readings and features are needed", names[f],
+                   fmt::format("{}: is too short: {:.0f} s with good poses, readings and features are needed", names[f],
                                static_cast<double>(needed) * kShortestPiece_s + 1)};
   }
   return {};
