@@ -181,21 +181,25 @@ std::string calibration_summary_json(const CalibrationOutcome& outcome) {
   return out.dump(1) + "\n";
 }
 
-Result<void> write_calibration(const CalibrationOutcome& outcome, const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
-  const RigCalibration rig = rig_of(outcome);
-  std::vector<std::pair<std::string, std::string>> files = {
-      {outcome.imu ? "camchain-imucam.yaml" : "camchain.yaml", to_kalibr_camchain(rig)},
-      {"summary.json", calibration_summary_json(outcome)},
-      {"calibration.txt", calibration_text(outcome)},
-      {"calibration.html", calibration_html(outcome)}};
-  if (outcome.imu) files.push_back({"imu.yaml", to_kalibr_imu(outcome.imu_noise)});
+std::vector<NamedText> rig_files(const RigCalibration& rig) {
+  const bool with_imu = !rig.T_BC.empty();
+  std::vector<NamedText> files = {{with_imu ? "camchain-imucam.yaml" : "camchain.yaml", to_kalibr_camchain(rig)}};
+  if (with_imu) files.push_back({"imu.yaml", to_kalibr_imu(rig.imu_noise)});
   if (Result<std::string> basalt = to_basalt(rig); basalt) files.push_back({"calibration.json", *basalt});
   for (std::size_t k = 0; k < rig.cameras.size(); ++k)
     if (Result<std::string> ros = to_ros_camera_info(rig, static_cast<int>(k)); ros)
       files.push_back({fmt::format("camera_info_cam{}.yaml", k), *ros});
+  return files;
+}
+
+Result<void> write_calibration(const CalibrationOutcome& outcome, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Error{ErrorCode::unwritable, fmt::format("{}: {}", folder, error.message())};
+  std::vector<NamedText> files = rig_files(rig_of(outcome));
+  files.insert(files.end(), {{"summary.json", calibration_summary_json(outcome)},
+                             {"calibration.txt", calibration_text(outcome)},
+                             {"calibration.html", calibration_html(outcome)}});
   for (const auto& [name, text] : files)
     if (Result<void> done = write_text(folder + "/" + name, text); !done) return done;
   return {};

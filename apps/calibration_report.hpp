@@ -32,6 +32,13 @@ std::vector<std::string> all_remarks(const CalibrationOutcome& outcome);
 std::string calibration_text(const CalibrationOutcome& outcome);
 std::string calibration_summary_json(const CalibrationOutcome& outcome);
 
+/// Name and content of a file.
+struct NamedText {
+  std::string name, text;
+};
+/// A rig in all formats: camchain.yaml or camchain-imucam.yaml and imu.yaml, calibration.json, camera_info_camN.yaml.
+std::vector<NamedText> rig_files(const RigCalibration& rig);
+
 /// camchain.yaml or camchain-imucam.yaml and imu.yaml, calibration.json, camera_info_camN.yaml, summary.json, calibration.txt,
 /// calibration.html.
 Result<void> write_calibration(const CalibrationOutcome& outcome, const std::string& folder);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "apps/calibrate_from_flight.hpp"
 #include "apps/calibration_report.hpp"
 #include "apps/commands.hpp"
 #include "apps/open_cameras.hpp"
@@ -40,11 +41,12 @@ examples:
   fbvins calibrate board.bag --topics /left,/right,/imu --target april.yaml --out rig
   fbvins calibrate --detections detections.csv --imu imu0.csv --target april.yaml --out rig
   fbvins calibrate --imu-noise rest --out rig                    the IMU's noise, from a recording at rest
+  fbvins calibrate --from-flight monday tuesday --out refined    no board: what flights say of their own calibration
 )";
 
 struct Arguments {
-  std::string recording, detections, target, imu, imu_calibration, imu_noise, out = "out/calibration";
-  std::vector<std::string> models = {"pinhole-radtan"}, resolutions, topics;
+  std::string recording, detections, target, imu, calibration, imu_calibration, imu_noise, out = "out/calibration";
+  std::vector<std::string> models = {"pinhole-radtan"}, resolutions, topics, from_flight;
   int threads = 2, max_views = 600;
   bool save_detections = false, cameras_only = false, quiet = false;
   ImuCameraOptions imu_options;
@@ -267,6 +269,13 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--gravity", a->imu_options.gravity_mps2, "m/s^2, where it is known better than 9.81 +- 0.02")
       ->capture_default_str();
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
+  CLI::Option* from_flight = command->add_option(
+      "--from-flight", a->from_flight, "recordings that `fbvins run` reads, whose calibration they refine, without a board");
+  for (const char* other : {"RECORDING", "--target", "--detections", "--imu-noise"})
+    from_flight->excludes(command->get_option(other));
+  command
+      ->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own")
+      ->needs(from_flight);
   command->add_option("--max-views", a->max_views, "stamps that enter the adjustment of the cameras")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();
@@ -276,7 +285,12 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_flag("--save-detections", a->save_detections, "write detections.csv");
   command->add_option("--out", a->out, "folder for the results")->capture_default_str();
   command->add_flag("--quiet", a->quiet, "print nothing but errors");
-  command->callback([a, &exit_code] { exit_code = a->imu_noise.empty() ? calibrate(*a) : measure_noise(*a); });
+  command->callback([a, &exit_code] {
+    exit_code = !a->from_flight.empty()
+                    ? calibrate_from_flight({a->from_flight, a->calibration, a->imu_calibration, a->out, a->quiet})
+                : a->imu_noise.empty() ? calibrate(*a)
+                                       : measure_noise(*a);
+  });
 }
 
 }  // namespace fbvins::app

@@ -33,7 +33,7 @@ inline constexpr const char* kFlyDescription = "fly a mission by the odometry's 
 inline constexpr const char* kBenchDescription = "run recordings x frontends x configurations, make tables";
 inline constexpr const char* kTuneDescription = "propose a flight controller's gains from a flight's log";
 inline constexpr const char* kConvertDescription = "write a recording as ROS bag, flight record or EuRoC folder";
-inline constexpr const char* kCalibrateDescription = "calibrate cameras and IMU from a recording of a board";
+inline constexpr const char* kCalibrateDescription = "calibrate cameras and IMU from a recording of a board, or from flights";
 inline constexpr const char* kTargetDescription = "make a calibration board to print";
 inline constexpr const char* kMocapDescription = "align motion capture with an estimate, measure the flight";
 

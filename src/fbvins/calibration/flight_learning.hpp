@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Private: what pieces of flights say of a calibration: which parameters they determine, which of these differ from what was
+// given, and their values. One thread.
+#pragma once
+
+#include <vector>
+
+#include "fbvins/calibration/flight_calibration.hpp"
+#include "fbvins/calibration/flight_fit.hpp"
+
+namespace fbvins {
+
+/// The fit of all parameters at once.
+struct FlightSurvey {
+  FlightFit fit;
+  FlightNoise noise;
+};
+
+struct FlightLesson {
+  FlightRig rig;
+  FlightNoise noise;
+  std::vector<FlightFinding> findings;  ///< by parameter
+  Eigen::MatrixXd covariance;           ///< of all parameters, with all of them unknown
+  bool changed = false;                 ///< something that is flown
+};
+
+FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given);
+/// `left`: groups that stay as given, whatever the survey says of them.
+FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
+                        const std::vector<FlightGroup>& left);
+
+/// Whether a file of a rig has it.
+inline bool is_flown(FlightGroup group) { return group != FlightGroup::gyro_axes && group != FlightGroup::accel_axes; }
+
+}  // namespace fbvins
