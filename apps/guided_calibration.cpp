@@ -23,7 +23,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kFitPeriod = 1s;
+constexpr auto kFitPeriod = 1s;  // and at least as long as the last one took, for the search needs the processor, too
 constexpr auto kLookPeriod = 200ms;
 constexpr auto kLinePeriod = 500ms;  // of the line on a terminal
 
@@ -119,7 +119,8 @@ class GuidedCalibration::Session {
         source_->stop();
         return;
       }
-      changed_.wait_until(lock, begun + kFitPeriod, [&] { return over_; });
+      const auto now = Clock::now();
+      changed_.wait_until(lock, std::max(begun + kFitPeriod, now + (now - begun)), [&] { return over_; });
     }
   }
 
@@ -195,7 +196,7 @@ class GuidedCalibration::Session {
 };
 
 Result<std::unique_ptr<GuidedCalibration>> GuidedCalibration::open(GuidedOptions options) {
-  auto watch = BoardWatch::create(options.board, std::max(1, options.threads - 1));
+  auto watch = BoardWatch::create(options.board, options.threads);
   if (!watch) return watch.error();
   auto source = open_live(options);
   if (!source) return source.error();

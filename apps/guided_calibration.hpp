@@ -27,7 +27,7 @@ struct GuidedOptions {
   Board board;
   GrowingOptions growing = {};
   bool given_noise = false;        ///< growing.imu_noise is the user's
-  int threads = 2;                 ///< one of them adjusts, the others look for the board
+  int threads = 2;                 ///< that look for the board; one more adjusts
   bool quiet = false;
 };
 

@@ -14,7 +14,8 @@ namespace fbvins {
 namespace {
 
 constexpr int kFewestStamps = 40, kMostStamps = 400;
-constexpr int kImuStamps = 150;        // in the fit with the IMU
+constexpr int kFewestAtEnd = 40;       // stamps, below which the residuals do not tell the noise well
+constexpr double kImuPeriod_s = 0.09;  // between images in the fit with the IMU
 constexpr double kImuGrowth = 1.25;    // of the views until it is fitted again
 constexpr double kLittleGain = 1.05;   // below it no way of holding the board is better than another
 
@@ -35,19 +36,13 @@ Detections spread(const Detections& all, const Board& board, int stamps) {
   return out;
 }
 
-/// So many stamps, evenly.
-std::vector<BoardView> evenly(const std::vector<BoardView>& views, int stamps) {
-  std::set<std::int64_t> all;
-  for (const BoardView& view : views) all.insert(view.t.ns);
-  const double step = std::max(1.0, static_cast<double>(all.size()) / stamps);
-  std::set<std::int64_t> chosen;
-  double next = 0;
-  int index = 0;
-  for (const std::int64_t t : all)
-    if (index++ >= next) chosen.insert(t), next += step;
+/// At most about ten stamps a second: neighbours stay close enough to tell the turns between them.
+std::vector<BoardView> thinned_in_time(const std::vector<BoardView>& views) {
   std::vector<BoardView> out;
-  for (const BoardView& view : views)
-    if (chosen.contains(view.t.ns)) out.push_back(view);
+  for (const BoardView& view : views) {
+    const bool same = !out.empty() && view.t == out.back().t;
+    if (out.empty() || same || (view.t - out.back().t).seconds() >= kImuPeriod_s) out.push_back(view);
+  }
   return out;
 }
 
@@ -110,11 +105,12 @@ CalibrationProgress GrowingCalibration::judge(const GrowingInput& input) {
     models_.push_back(cameras->cameras[k].camera.model_name());
   progress.noise_px = cameras->noise_px;
   progress.parts = judged_parts(*cameras, nullptr, options_.aims);
-  progress.cameras_reached = weakest(progress.parts) == nullptr;
+  const bool known = weakest(progress.parts) == nullptr;
+  progress.cameras_reached = known && cameras->stamps >= kFewestAtEnd;
   progress.reached = progress.cameras_reached && !with_imu;
   if (progress.cameras_reached && with_imu) judge_imu(input, *cameras, progress);
   if (!progress.cameras_reached) {
-    progress.reason = why(*weakest(progress.parts));
+    progress.reason = known ? fmt::format("{} of {} views at least", cameras->stamps, kFewestAtEnd) : why(*weakest(progress.parts));
     guide(input, knowledge_of(*cameras), progress);
   }
   return progress;
@@ -133,7 +129,7 @@ std::vector<std::string> GrowingCalibration::models_for(std::size_t views) {
 void GrowingCalibration::judge_imu(const GrowingInput& input, const CameraCalibration& cameras, CalibrationProgress& progress) {
   if (static_cast<double>(input.detections.views.size()) >= kImuGrowth * static_cast<double>(imu_views_)) {
     imu_views_ = input.detections.views.size();
-    ImuCameraInput fit{board_, {}, {}, evenly(input.detections.views, kImuStamps), input.imu, options_.imu_noise,
+    ImuCameraInput fit{board_, {}, {}, thinned_in_time(input.detections.views), input.imu, options_.imu_noise,
                        rig_variations(cameras)};
     const bool joined = knowledge_of(cameras).joined.back();
     for (const CalibratedCamera& camera : cameras.cameras) {

@@ -34,7 +34,7 @@ CalibrationProgress judged(GrowingCalibration& growing, const Detections& detect
 TEST(GrowingCalibration, SaysWhatToDoUntilTheAimsAreReached) {
   const SimulatedRig rig = simulated_stereo(example_cameras()[0]);
   const Detections all = simulated_views(rig, kBoard, 200, kNoise_px, 7).detections;
-  GrowingCalibration growing(kBoard, {});
+  GrowingCalibration growing(kBoard, {.patience_s = 1000});  // whatever this machine does beside it
   const Detections nothing{{}, all.sizes};
   const CalibrationProgress before = growing.judge({nothing, {}, {}});
   EXPECT_EQ(before.action, "show the board to the cameras");
@@ -47,7 +47,9 @@ TEST(GrowingCalibration, SaysWhatToDoUntilTheAimsAreReached) {
     EXPECT_EQ(progress.cameras[0].size, (ImageSize{752, 480}));
     reached = progress.reached;
     EXPECT_NE(reached, !progress.action.empty()) << "either the aims are reached or there is something to do";
-    if (stamps == 3) EXPECT_NE(progress.reason.find("too few"), std::string::npos) << progress.reason;
+    if (stamps == 3) {
+      EXPECT_NE(progress.reason.find("too few"), std::string::npos) << progress.reason;
+    }
     if (progress.parts.empty()) continue;
     EXPECT_NEAR(progress.noise_px, kNoise_px, 0.05);
     EXPECT_LT(progress.parts[0].sigma, lens_px * 1.2) << "more views, no less is known";
@@ -59,7 +61,7 @@ TEST(GrowingCalibration, SaysWhatToDoUntilTheAimsAreReached) {
 TEST(GrowingCalibration, CountsCornersWhereTheyWere) {
   SimulatedRig rig{{example_cameras()[0]}, {{}}};
   Detections all = simulated_views(rig, kBoard, 20, kNoise_px, 8).detections;
-  for (BoardView& view : all.views) std::erase_if(view.corners, [](const BoardCorner& c) { return c.pixel.x() > 376; });
+  for (BoardView& view : all.views) std::erase_if(view.corners, [](const BoardCorner& c) { return c.pixel.x() > 370; });
   GrowingCalibration growing(kBoard, {});
   const CalibrationProgress progress = judged(growing, all);
   const ImageCoverage& seen = progress.cameras[0];
@@ -72,14 +74,14 @@ TEST(GrowingCalibration, CountsCornersWhereTheyWere) {
 }
 
 TEST(GrowingCalibration, AsksForTurnsThatTheImuNeeds) {
-  test::HandHeldOptions still, lively;
-  still.duration_s = lively.duration_s = 20, still.image_rate_hz = lively.image_rate_hz = 10;
-  still.turning = Vec3(0.03, 0.03, 0.03), still.moving = 0.05;
-  for (const auto& [options, enough] : {std::pair{still, false}, {lively, true}}) {
-    const auto recording = test::hand_held(options, 5);
-    // The cameras are not at issue here.
+  test::HandHeldOptions options;
+  options.duration_s = 12, options.image_rate_hz = 10, options.turning = Vec3(1, 0.3, 0.3);
+  const auto recording = test::hand_held(options, 5);
+  for (const bool enough : {false, true}) {
     GrowingOptions growing_options{.with_imu = true, .imu_noise = recording.input.noise};
+    // The cameras are not at issue here.
     growing_options.aims.lens_px = growing_options.aims.baseline_m = growing_options.aims.between_cameras_rad = 1e6;
+    if (!enough) growing_options.aims.lever_m = 1e-4;
     growing_options.cameras.models = {recording.input.cameras[0].model_name()};
     GrowingCalibration growing(recording.input.board, growing_options);
     Detections detections{recording.input.views, {}};
@@ -88,7 +90,10 @@ TEST(GrowingCalibration, AsksForTurnsThatTheImuNeeds) {
                              recording.input.cameras[static_cast<std::size_t>(k)].height()};
     const CalibrationProgress progress = growing.judge({detections, recording.input.imu, {}});
     EXPECT_EQ(progress.reached, enough) << progress.action << ": " << progress.reason;
-    if (!enough) EXPECT_NE(progress.action.find("turn"), std::string::npos) << progress.action << ": " << progress.reason;
+    if (!enough) {
+      EXPECT_NE(progress.action.find("turn faster, to and fro, about the IMU's y and z axes"), std::string::npos)
+          << progress.action << ": " << progress.reason;
+    }
   }
 }
 

@@ -83,7 +83,7 @@ TEST(NextView, ABoardThatIsNeverInOneHalfOfTheImageIsToComeThere) {
   std::erase_if(views.detections.views, [](const BoardView& view) { return view.corners.size() < 12; });
   const auto found = calibrate_cameras(views.detections, kBoard, {});
   ASSERT_TRUE(found) << found.error().message;
-  const NextView next = next_view(knowledge_of(*found), kBoard, {{0, 3, 0.4, 0, 0}}, {});
+  const NextView next = next_view(knowledge_of(*found), kBoard, {{0, 3, 0.7, 0, 0}}, {});
   EXPECT_NE(next.sentence.find("right"), std::string::npos) << next.sentence;
   EXPECT_EQ(next.hold.place % 3, 2) << next.sentence;
 }
