@@ -241,7 +241,10 @@ int calibrate_live(const Arguments& a, const Board& board) {
   (*live)->end("adjusting", "done with the board: everything is adjusted together now");
   const int code = conclude(a, board, *material);
   if (code == kOk) (*live)->end("done", fmt::format("the calibration is in {}", a.out));
-  else (*live)->end("failed", fmt::format("there is no calibration: what the terminal says is missing; corners and readings are kept in {}", a.out));
+  else
+    (*live)->end(
+        "failed",
+        fmt::format("there is no calibration: what the terminal says is missing; corners and readings are kept in {}", a.out));
   return code;
 }
 
@@ -306,16 +309,20 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--topics", a->topics, "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU]")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--source", a->source, "live sensors instead of a recording, as `fbvins live` names them; ends when the aims are reached");
+  command->add_option("--source", a->source,
+                      "live sensors instead of a recording, as `fbvins live` names them; ends when the aims are reached");
   command
-      ->add_option("--web", a->web, "with --source, serve a page that shows images and guidance: [ADDRESS:]PORT, or any free port of this machine")
+      ->add_option("--web", a->web,
+                   "with --source, serve a page that shows images and guidance: [ADDRESS:]PORT, or any free port of this machine")
       ->expected(0, 1)
       ->default_str("0");
   command->add_option("--target", a->target, "the board, as Kalibr describes it");
   command->add_option("--detections", a->detections,
                       "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
   command
-      ->add_option("--resolution", a->resolutions, "size of the images with --detections, or of a source without a calibration, such as 752x480; one, or one a camera")
+      ->add_option(
+          "--resolution", a->resolutions,
+          "size of the images with --detections, or of a source without a calibration, such as 752x480; one, or one a camera")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");

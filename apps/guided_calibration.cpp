@@ -177,8 +177,8 @@ class GuidedCalibration::Session {
     if (!imu) return imu.error();
     out.imu = *std::move(imu);
     if (!options_.quiet)
-      note(fmt::format("kept: {} views of the board, {} readings ({} and {})", out.detections.views.size(), out.imu.size(), corners,
-                       readings));
+      note(fmt::format("kept: {} views of the board, {} readings ({} and {})", out.detections.views.size(), out.imu.size(),
+                       corners, readings));
     return out;
   }
 
@@ -187,9 +187,9 @@ class GuidedCalibration::Session {
   std::unique_ptr<BoardWatch> watch_;
   std::unique_ptr<GuidedPage> page_;
   const bool terminal_ = !options_.quiet && stderr_is_terminal();
-  std::string said_;               ///< by the display
-  Clock::time_point line_due_{};   ///< by the display
-  std::mutex mutex_;               ///< guards what follows
+  std::string said_;              ///< by the display
+  Clock::time_point line_due_{};  ///< by the display
+  std::mutex mutex_;              ///< guards what follows
   std::condition_variable changed_;
   bool over_ = false;
   GuidedState state_;

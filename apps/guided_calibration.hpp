@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `fbvins calibrate --source`: records from live sensors and says meanwhile how to hold the board, until the aims are reached, the
-// source ends, or Ctrl-C. What it recorded is in files before anything is made of it.
+// `fbvins calibrate --source`: records from live sensors and says meanwhile how to hold the board, until the aims are reached,
+// the source ends, or Ctrl-C. What it recorded is in files before anything is made of it.
 //
 //   auto guided = GuidedCalibration::open(options);
 //   Result<GuidedRecording> recorded = (*guided)->record();
@@ -20,14 +20,14 @@
 namespace fbvins::app {
 
 struct GuidedOptions {
-  std::string source;              ///< as `fbvins live --source` has it
-  std::vector<ImageSize> sizes;    ///< of images from sources that have no calibration to tell them
-  std::string web;                 ///< [ADDRESS:]PORT; empty: no page
-  std::string out;                 ///< an existing folder
+  std::string source;            ///< as `fbvins live --source` has it
+  std::vector<ImageSize> sizes;  ///< of images from sources that have no calibration to tell them
+  std::string web;               ///< [ADDRESS:]PORT; empty: no page
+  std::string out;               ///< an existing folder
   Board board;
   GrowingOptions growing = {};
-  bool given_noise = false;        ///< growing.imu_noise is the user's
-  int threads = 2;                 ///< that look for the board; one more adjusts
+  bool given_noise = false;  ///< growing.imu_noise is the user's
+  int threads = 2;           ///< that look for the board; one more adjusts
   bool quiet = false;
 };
 

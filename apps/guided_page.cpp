@@ -41,9 +41,9 @@ PageFiles guided_files() {
 }
 
 SharedMessage state_message(const GuidedState& state) {
-  Json json{{"type", "calibration"},           {"stage", state.stage},         {"action", state.action},
-            {"reason", state.reason},          {"duration_s", state.duration_s}, {"images", state.images},
-            {"left_out", state.left_out},      {"readings", state.readings},   {"noise_px", state.progress.noise_px}};
+  Json json{{"type", "calibration"},      {"stage", state.stage},           {"action", state.action},
+            {"reason", state.reason},     {"duration_s", state.duration_s}, {"images", state.images},
+            {"left_out", state.left_out}, {"readings", state.readings},     {"noise_px", state.progress.noise_px}};
   Json& parts = json["parts"] = Json::array();
   for (const WeakPart& part : state.progress.parts)
     parts.push_back({{"what", part.what}, {"unit", part.unit}, {"sigma", part.sigma}, {"aim", part.aim}});

@@ -8,9 +8,9 @@ namespace fbvins {
 namespace {
 
 constexpr double kMemory_s = 1.5, kNow_s = 0.5;
-constexpr double kFast = 0.4;        // image widths a second: a corner moves by pixels while the shutter is open
-constexpr double kLostPart = 0.4;    // of the images that do not show the board
-constexpr std::size_t kFewest = 4;   // images to judge by
+constexpr double kFast = 0.4;       // image widths a second: a corner moves by pixels while the shutter is open
+constexpr double kLostPart = 0.4;   // of the images that do not show the board
+constexpr std::size_t kFewest = 4;  // images to judge by
 
 /// Of the corners that both views have.
 std::optional<double> shift_px(const BoardView& from, const BoardView& to) {

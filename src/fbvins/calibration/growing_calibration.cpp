@@ -91,8 +91,7 @@ CalibrationProgress GrowingCalibration::judge(const GrowingInput& input) {
   options.models = models_for(some.views.size());
   const bool with_imu = options_.with_imu && !input.imu.empty();
   const bool apart = with_imu && !cameras_connected(some, board_, options.pair_tolerance_s);
-  const auto cameras =
-      apart ? calibrate_cameras_apart(some, board_, options) : calibrate_cameras(some, board_, options);
+  const auto cameras = apart ? calibrate_cameras_apart(some, board_, options) : calibrate_cameras(some, board_, options);
   const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (took_s > options_.patience_s) most_stamps_ = std::max(kFewestStamps, most_stamps_ * 3 / 4);
   else if (took_s < 0.6 * options_.patience_s) most_stamps_ = std::min(kMostStamps, most_stamps_ * 5 / 4);
@@ -110,7 +109,8 @@ CalibrationProgress GrowingCalibration::judge(const GrowingInput& input) {
   progress.reached = progress.cameras_reached && !with_imu;
   if (progress.cameras_reached && with_imu) judge_imu(input, *cameras, progress);
   if (!progress.cameras_reached) {
-    progress.reason = known ? fmt::format("{} of {} views at least", cameras->stamps, kFewestAtEnd) : why(*weakest(progress.parts));
+    progress.reason =
+        known ? fmt::format("{} of {} views at least", cameras->stamps, kFewestAtEnd) : why(*weakest(progress.parts));
     guide(input, knowledge_of(*cameras), progress);
   }
   return progress;
@@ -129,8 +129,8 @@ std::vector<std::string> GrowingCalibration::models_for(std::size_t views) {
 void GrowingCalibration::judge_imu(const GrowingInput& input, const CameraCalibration& cameras, CalibrationProgress& progress) {
   if (static_cast<double>(input.detections.views.size()) >= kImuGrowth * static_cast<double>(imu_views_)) {
     imu_views_ = input.detections.views.size();
-    ImuCameraInput fit{board_, {}, {}, thinned_in_time(input.detections.views), input.imu, options_.imu_noise,
-                       rig_variations(cameras)};
+    ImuCameraInput fit{
+        board_, {}, {}, thinned_in_time(input.detections.views), input.imu, options_.imu_noise, rig_variations(cameras)};
     const bool joined = knowledge_of(cameras).joined.back();
     for (const CalibratedCamera& camera : cameras.cameras) {
       fit.cameras.push_back(camera.camera);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A calibration while its views still come: how far each part is from its aim, and what to do next. One thread. It only judges: the
-// calibration that is kept is made of everything at the end (calibrate_cameras(), calibrate_imu_camera()).
+// A calibration while its views still come: how far each part is from its aim, and what to do next. One thread. It only judges:
+// the calibration that is kept is made of everything at the end (calibrate_cameras(), calibrate_imu_camera()).
 //
 //   GrowingCalibration growing(board, {.cameras = {.models = {"ds"}}, .with_imu = true});
 //   const CalibrationProgress progress = growing.judge({detections, readings, newest_views});
@@ -65,12 +65,12 @@ class GrowingCalibration {
 
   Board board_;
   GrowingOptions options_;
-  int most_stamps_ = 60;           ///< in the next adjustment of the cameras
+  int most_stamps_ = 60;             ///< in the next adjustment of the cameras
   std::vector<std::string> models_;  ///< as found, where they are chosen by evidence
   std::size_t chosen_from_ = 0;      ///< views
-  std::size_t imu_views_ = 0;      ///< that the last fit had
+  std::size_t imu_views_ = 0;        ///< that the last fit had
   std::vector<WeakPart> imu_parts_;
-  std::string imu_lacks_;          ///< why there is no fit with the IMU
+  std::string imu_lacks_;  ///< why there is no fit with the IMU
 };
 
 }  // namespace fbvins

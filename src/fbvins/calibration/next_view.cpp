@@ -27,9 +27,15 @@ constexpr std::array<double, 3> kPlaces = {0.2, 0.5, 0.8};
 
 /// What a sentence says of a place in an image of `camera`.
 std::string place_name(int place, int camera) {
-  constexpr std::array<const char*, 9> kNames = {"into the upper left corner", "to the top",    "into the upper right corner",
-                                                 "to the left",                "into the middle", "to the right",
-                                                 "into the lower left corner", "to the bottom", "into the lower right corner"};
+  constexpr std::array<const char*, 9> kNames = {"into the upper left corner",
+                                                 "to the top",
+                                                 "into the upper right corner",
+                                                 "to the left",
+                                                 "into the middle",
+                                                 "to the right",
+                                                 "into the lower left corner",
+                                                 "to the bottom",
+                                                 "into the lower right corner"};
   return fmt::format("{} of cam{}'s image", kNames[static_cast<std::size_t>(place)], camera);
 }
 
@@ -55,8 +61,8 @@ std::optional<SeenBoard> seen_by(const RigKnowledge& known, const Board& board, 
   for (int index = 0; index < board.corner_count(); ++index) {
     const Vec3 p_T = board.corner(index);
     const auto pixel = known.cameras[k].project(known.T_CnC0[k] * (T_C0T * p_T));
-    if (!pixel || !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < known.cameras[k].width() &&
-                    pixel->y() < known.cameras[k].height()))
+    if (!pixel ||
+        !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < known.cameras[k].width() && pixel->y() < known.cameras[k].height()))
       continue;
     out.corners.push_back({index, p_T, *pixel});
     view.corners.push_back({index, *pixel});

@@ -16,7 +16,7 @@ namespace fbvins {
 namespace {
 
 constexpr double kUsualFocal = 0.6, kShortestFocal = 0.15, kLongestFocal = 3;  // of the image's width
-constexpr int kMostViews = 40;       // of a camera, for rough knowledge
+constexpr int kMostViews = 40;                                                 // of a camera, for rough knowledge
 constexpr std::size_t kFewestForStart = 3;
 
 std::vector<std::vector<bool>> no_cells(const std::vector<Camera>& cameras) {
@@ -34,8 +34,8 @@ Camera rough_camera(const std::string& model, const ImageSize& size, const Board
   const std::string name = model == kAutoModel ? "pinhole-radtan" : model;
   if (views.size() >= kFewestForStart)
     if (const auto start = start_camera(name, size, board, views); start && start->rms_px < largest_plausible_rms_px(size) &&
-                                                                            start->camera.focal_px() > kShortestFocal * size.width &&
-                                                                            start->camera.focal_px() < kLongestFocal * size.width)
+                                                                   start->camera.focal_px() > kShortestFocal * size.width &&
+                                                                   start->camera.focal_px() < kLongestFocal * size.width)
       return start->camera;
   const Vec2 centre(0.5 * (size.width - 1), 0.5 * (size.height - 1));
   return {*plain_lens(name, kUsualFocal * size.width, centre), size.width, size.height};

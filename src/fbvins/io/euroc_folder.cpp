@@ -198,8 +198,8 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
 Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {
   if (Result<void> done = state_->wait(); !done) return done;
   const fs::path& mav0 = state_->mav0;
-  for (const auto& [path, text] :
-       {std::pair{mav0 / "imu0/data.csv", imu_to_csv(readings)}, {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)}})
+  for (const auto& [path, text] : {std::pair{mav0 / "imu0/data.csv", imu_to_csv(readings)},
+                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)}})
     if (Result<void> done = write_file(path, text); !done) return done;
   for (std::size_t i = 0; i < state_->rows.size(); ++i)
     if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data.csv", i), state_->rows[i]); !done) return done;
