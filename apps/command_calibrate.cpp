@@ -10,6 +10,7 @@
 #include "apps/calibrate_from_flight.hpp"
 #include "apps/calibration_report.hpp"
 #include "apps/commands.hpp"
+#include "apps/guided_calibration.hpp"
 #include "apps/open_cameras.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_output.hpp"
@@ -40,12 +41,13 @@ examples:
   fbvins calibrate board --target april.yaml --model auto --cameras-only
   fbvins calibrate board.bag --topics /left,/right,/imu --target april.yaml --out rig
   fbvins calibrate --detections detections.csv --imu imu0.csv --target april.yaml --out rig
+  fbvins calibrate --source d435i --web --target april.yaml --out rig   with live sensors, told how to hold the board
   fbvins calibrate --imu-noise rest --out rig                    the IMU's noise, from a recording at rest
   fbvins calibrate --from-flight monday tuesday --out refined    no board: what flights say of their own calibration
 )";
 
 struct Arguments {
-  std::string recording, detections, target, imu, calibration, imu_calibration, imu_noise, out = "out/calibration";
+  std::string recording, source, web, detections, target, imu, calibration, imu_calibration, imu_noise, out = "out/calibration";
   std::vector<std::string> models = {"pinhole-radtan"}, resolutions, topics, from_flight;
   int threads = 2, max_views = 600;
   bool save_detections = false, cameras_only = false, quiet = false;
@@ -95,21 +97,58 @@ Result<Material> detect(const Arguments& a, const Board& board) {
 }
 
 /// "752x480": of all cameras, or one a camera.
-Result<void> set_sizes(const std::vector<std::string>& texts, Detections& detections) {
-  for (int k = 0; k < detections.camera_count() && !texts.empty(); ++k) {
-    const std::string& text = texts[texts.size() == 1 ? 0 : std::min<std::size_t>(k, texts.size() - 1)];
+Result<std::vector<ImageSize>> sizes_of(const std::vector<std::string>& texts) {
+  std::vector<ImageSize> out;
+  for (const std::string& text : texts) {
     ImageSize size;
     char behind = 0;
     if (std::sscanf(text.c_str(), "%dx%d%c", &size.width, &size.height, &behind) != 2 || size.width < 1 || size.height < 1)
       return Error{ErrorCode::invalid_argument, fmt::format("--resolution: '{}' is no size such as 752x480", text)};
-    detections.sizes[k] = size;
+    out.push_back(size);
   }
+  return out;
+}
+
+Result<void> set_sizes(const std::vector<std::string>& texts, Detections& detections) {
+  const Result<std::vector<ImageSize>> sizes = sizes_of(texts);
+  if (!sizes) return sizes.error();
+  for (int k = 0; k < detections.camera_count() && !sizes->empty(); ++k)
+    detections.sizes[k] = (*sizes)[std::min<std::size_t>(k, sizes->size() - 1)];
   return {};
 }
 
-Result<Material> gather(const Arguments& a, const Board& board) {
+/// The IMU's noise that is given, if it is.
+Result<std::optional<ImuNoise>> given_noise(const Arguments& a) {
+  if (a.imu_calibration.empty()) return std::optional<ImuNoise>();
+  Result<std::string> text = read_file(a.imu_calibration, 1u << 20u);
+  if (!text) return text.error();
+  Result<ImuNoise> noise = parse_kalibr_imu({a.imu_calibration, *text});
+  if (!noise) return noise.error();
+  return std::optional(*noise);
+}
+
+Result<std::unique_ptr<GuidedCalibration>> guided(const Arguments& a, const Board& board) {
+  const Result<std::vector<ImageSize>> sizes = sizes_of(a.resolutions);
+  if (!sizes) return sizes.error();
+  const auto noise = given_noise(a);
+  if (!noise) return noise.error();
+  GuidedOptions options{.source = a.source, .sizes = *sizes, .web = a.web, .out = a.out, .board = board};
+  options.growing = {.cameras = {.models = a.models}, .imu = a.imu_options, .with_imu = !a.cameras_only};
+  options.growing.imu_noise = noise->value_or(ImuNoise{});
+  options.given_noise = noise->has_value();
+  options.threads = a.threads, options.quiet = a.quiet;
+  return GuidedCalibration::open(std::move(options));
+}
+
+Result<Material> gather(const Arguments& a, const Board& board, GuidedCalibration* live) {
   Material out;
-  if (a.detections.empty()) {
+  if (live != nullptr) {
+    Result<GuidedRecording> recorded = live->record();
+    if (!recorded) return recorded.error();
+    out.detections = std::move(recorded->detections);
+    out.imu = std::move(recorded->imu);
+    out.imu_noise = recorded->imu_noise;
+  } else if (a.detections.empty()) {
     Result<Material> found = detect(a, board);
     if (!found) return found;
     out = *std::move(found);
@@ -124,13 +163,9 @@ Result<Material> gather(const Arguments& a, const Board& board) {
     if (!imu) return imu.error();
     out.imu = *std::move(imu);
   }
-  if (!a.imu_calibration.empty()) {
-    Result<std::string> text = read_file(a.imu_calibration, 1u << 20u);
-    if (!text) return text.error();
-    Result<ImuNoise> noise = parse_kalibr_imu({a.imu_calibration, *text});
-    if (!noise) return noise.error();
-    out.imu_noise = *noise;
-  }
+  const auto noise = given_noise(a);
+  if (!noise) return noise.error();
+  if (*noise) out.imu_noise = **noise;
   if (a.cameras_only) out.imu.clear();
   return out;
 }
@@ -184,15 +219,49 @@ Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const M
   return outcome;
 }
 
+/// From what was gathered to the files.
+int conclude(const Arguments& a, const Board& board, const Material& material) {
+  Result<CalibrationOutcome> outcome = solve(a, board, material);
+  if (!outcome) return refuse(a, outcome.error());
+  outcome->weak = weak_parts(outcome->cameras, outcome->imu ? &*outcome->imu : nullptr);
+  if (Result<void> done = write_calibration(*outcome, a.out); !done) return fail(done.error().message);
+  if (!a.recording.empty()) forget_kept_detections(kept_folder(a));
+  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(*outcome), bold(a.out));
+  return kOk;
+}
+
+/// Files are written in any case; what is missing for a calibration is said.
+int calibrate_live(const Arguments& a, const Board& board) {
+  const StopSignals signals;  // before any thread is made
+  const auto live = guided(a, board);
+  if (!live) return fail(live.error().message);
+  const Result<Material> material = gather(a, board, live->get());
+  if (!material) {
+    (*live)->end("failed", material.error().message);
+    return fail(material.error().message);
+  }
+  (*live)->end("adjusting", "done with the board: everything is adjusted together now");
+  const int code = conclude(a, board, *material);
+  if (code == kOk) (*live)->end("done", fmt::format("the calibration is in {}", a.out));
+  else
+    (*live)->end(
+        "failed",
+        fmt::format("there is no calibration: what the terminal says is missing; corners and readings are kept in {}", a.out));
+  return code;
+}
+
 int calibrate(const Arguments& a) {
-  if (a.recording.empty() == a.detections.empty()) return fail("give a recording or --detections");
+  if (!a.recording.empty() + !a.detections.empty() + !a.source.empty() != 1)
+    return fail("give a recording, --source or --detections, one of them");
+  if (!a.web.empty() && a.source.empty()) return fail("--web goes with --source");
   if (a.target.empty()) return fail("--target is missing: the board's description (`fbvins target` writes one)");
   const Result<Board> board = load_target(a.target);
   if (!board) return fail(board.error().message);
   std::error_code error;
   std::filesystem::create_directories(a.out, error);
   if (error) return fail(fmt::format("{}: {}", a.out, error.message()));
-  const Result<Material> material = gather(a, *board);
+  if (!a.source.empty()) return calibrate_live(a, *board);
+  const Result<Material> material = gather(a, *board, nullptr);
   if (!material) return fail(material.error().message);
   if (material->stopped_after >= 0) {
     fail(fmt::format("interrupted after {} images: the same command goes on from there", material->stopped_after));
@@ -201,13 +270,7 @@ int calibrate(const Arguments& a) {
   if (a.save_detections)
     if (Result<void> done = write_text(a.out + "/detections.csv", detections_to_csv(material->detections)); !done)
       return fail(done.error().message);
-  Result<CalibrationOutcome> outcome = solve(a, *board, *material);
-  if (!outcome) return refuse(a, outcome.error());
-  outcome->weak = weak_parts(outcome->cameras, outcome->imu ? &*outcome->imu : nullptr);
-  if (Result<void> done = write_calibration(*outcome, a.out); !done) return fail(done.error().message);
-  if (!a.recording.empty()) forget_kept_detections(kept_folder(a));
-  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(*outcome), bold(a.out));
-  return kOk;
+  return conclude(a, *board, *material);
 }
 
 int measure_noise(const Arguments& a) {
@@ -248,11 +311,20 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--topics", a->topics, "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU]")
       ->delimiter(',')
       ->allow_extra_args(false);
+  command->add_option("--source", a->source,
+                      "live sensors instead of a recording, as `fbvins live` names them; ends when the aims are reached");
+  command
+      ->add_option("--web", a->web,
+                   "with --source, serve a page that shows images and guidance: [ADDRESS:]PORT, or any free port of this machine")
+      ->expected(0, 1)
+      ->default_str("0");
   command->add_option("--target", a->target, "the board, as Kalibr describes it");
   command->add_option("--detections", a->detections,
                       "corners instead of a recording: CSV with timestamp_ns,camera,corner,u_px,v_px");
   command
-      ->add_option("--resolution", a->resolutions, "size of the images with --detections, such as 752x480; one, or one a camera")
+      ->add_option(
+          "--resolution", a->resolutions,
+          "size of the images with --detections, or of a source without a calibration, such as 752x480; one, or one a camera")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--imu", a->imu, "readings of the IMU: imu0/data.csv as EuRoC has it");

@@ -11,6 +11,7 @@
 #include "apps/terminal.hpp"
 
 #ifdef FBVINS_WITH_WEB
+#include "apps/web_options.hpp"
 #include "fbvins/web/finished_flight.hpp"
 #include "fbvins/web/flight_player.hpp"
 #include "fbvins/web/page_files.hpp"
@@ -25,8 +26,22 @@ namespace {
 
 constexpr std::chrono::seconds kTryAgain{2};
 
-/// For the page at `where`, [ADDRESS:]PORT. The token is random, unless FBVINS_WEB_TOKEN is set.
-Result<WebOptions> options_for(const std::string& where) {
+WebFlight described(WebFlight flight) {
+  flight.program = "fbvins " FBVINS_VERSION;
+  return flight;
+}
+
+/// Serves the page, and prints its address on stderr.
+Result<void> begin(WebSink& sink) {
+  if (Result<void> begun = sink.begin(page_files()); !begun) return begun;
+  if (const std::string problem = sink.problem(); !problem.empty()) warn(problem + "; it is tried again");
+  note(fmt::format("the page is {}", sink.url()));
+  return {};
+}
+
+}  // namespace
+
+Result<WebOptions> web_options(const std::string& where) {
   auto address = parse_web_address(where);
   if (!address) return address.error();
   if (page_files().empty())
@@ -44,26 +59,11 @@ Result<WebOptions> options_for(const std::string& where) {
   return options;
 }
 
-WebFlight described(WebFlight flight) {
-  flight.program = "fbvins " FBVINS_VERSION;
-  return flight;
-}
-
-/// Serves the page, and prints its address on stderr.
-Result<void> begin(WebSink& sink) {
-  if (Result<void> begun = sink.begin(page_files()); !begun) return begun;
-  if (const std::string problem = sink.problem(); !problem.empty()) warn(problem + "; it is tried again");
-  note(fmt::format("the page is {}", sink.url()));
-  return {};
-}
-
-}  // namespace
-
 Result<void> show_finished_flight(const std::string& path, const std::string& recording, const std::string& where) {
   const auto flight = open_finished_flight(path, recording);
   if (!flight) return flight.error();
   FlightPlayer player(**flight);
-  const auto options = options_for(where);
+  const auto options = web_options(where);
   if (!options) return options.error();
   const auto sink = WebSink::prepare(*options, described(player.description()),
                                      {.replay = [&](const WebCommand& command) { player.command(command); }});
@@ -78,7 +78,7 @@ Result<LivePage> open_live_page(LivePageOptions options) {
   flight.can_mark = true;
   flight.cannot_save_map = std::move(options.cannot_save_map);
   flight.q_B_vehicle = options.q_B_vehicle;
-  auto web = options_for(options.where);
+  auto web = web_options(options.where);
   if (!web) return web.error();
   web->try_again = kTryAgain;
   auto sink = WebSink::prepare(*web, described(std::move(flight)),

@@ -12,6 +12,7 @@ export function decode(buffer) {
   if (end > buffer.byteLength) throw new RangeError("a message ends too early");
   return {
     type: KINDS[view.getUint8(0)],
+    camera: view.getUint16(2, true),
     t_s: view.getFloat64(8, true),
     width_px: view.getUint32(16, true),
     height_px: view.getUint32(20, true),

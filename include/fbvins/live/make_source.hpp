@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "fbvins/io/dataset.hpp"
@@ -22,6 +23,8 @@ struct SourceOptions {
   std::function<void(const std::string&)> say = [](const std::string&) {};
   /// Asked repeatedly while make_source() waits for a device: true ends that with an error.
   std::function<bool()> give_up = [] { return false; };
+  /// Of sources that know none and are given no file: to calibrate, which needs the images' sizes alone.
+  std::optional<StereoRig> uncalibrated = {};
   std::string socket_group = "";  ///< that may connect to a socket; empty: this program's user alone
 };
 

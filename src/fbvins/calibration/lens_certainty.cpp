@@ -30,12 +30,8 @@ std::optional<PixelMotion> motion_at(const Camera& camera, const Vec2& pixel) {
 
 }  // namespace
 
-std::vector<double> lens_certainty(const CameraCalibration& found, int camera, const ImageCells& grid,
-                                   const std::vector<bool>& used) {
-  const Camera& lens = found.cameras[static_cast<std::size_t>(camera)].camera;
+LensMotions::LensMotions(const Camera& lens, const ImageCells& grid, const std::vector<bool>& used) {
   const int size = lens_parameter_count(lens.model());
-  const auto first = std::ranges::find(found.names, fmt::format("cam{}.fx", camera)) - found.names.begin();
-  const Eigen::MatrixXd P = found.covariance.block(first, first, size, size);
   std::vector<std::optional<PixelMotion>> motions;
   Mat3 A = 1e-12 * Mat3::Identity();
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(3, size);
@@ -46,16 +42,24 @@ std::vector<double> lens_certainty(const CameraCalibration& found, int camera, c
     B += motions.back()->turn.transpose() * motions.back()->lens;
   }
   const Eigen::MatrixXd turn_by_lens = A.ldlt().solve(B);
-  std::vector<double> out;
   for (const auto& motion : motions) {
-    if (!motion) {
-      out.push_back(std::nan(""));
-      continue;
-    }
-    const Eigen::MatrixXd J = motion->lens - motion->turn * turn_by_lens;
-    out.push_back(std::sqrt((J * P * J.transpose()).trace() / 2));
+    cells_.emplace_back();
+    if (motion) cells_.back() = motion->lens - motion->turn * turn_by_lens;
   }
+}
+
+std::vector<double> LensMotions::sigma_px(const Eigen::MatrixXd& covariance) const {
+  std::vector<double> out;
+  for (const auto& J : cells_) out.push_back(J ? std::sqrt((*J * covariance * J->transpose()).trace() / 2) : std::nan(""));
   return out;
+}
+
+std::vector<double> lens_certainty(const CameraCalibration& found, int camera, const ImageCells& grid,
+                                   const std::vector<bool>& used) {
+  const Camera& lens = found.cameras[static_cast<std::size_t>(camera)].camera;
+  const int size = lens_parameter_count(lens.model());
+  const auto first = std::ranges::find(found.names, fmt::format("cam{}.fx", camera)) - found.names.begin();
+  return LensMotions(lens, grid, used).sigma_px(found.covariance.block(first, first, size, size));
 }
 
 }  // namespace fbvins

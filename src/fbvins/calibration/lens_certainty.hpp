@@ -8,11 +8,23 @@
 // that rotation is taken out which explains most of it in the cells `used`.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "fbvins/calibration/residual_summary.hpp"
 
 namespace fbvins {
+
+/// How pixels move with a lens's parameters, at the centre of each cell, without that turn.
+class LensMotions {
+ public:
+  LensMotions(const Camera& lens, const ImageCells& grid, const std::vector<bool>& used);
+  /// By the covariance of the lens's parameters, as lens_certainty() gives it.
+  std::vector<double> sigma_px(const Eigen::MatrixXd& covariance) const;
+
+ private:
+  std::vector<std::optional<Eigen::Matrix<double, 2, Eigen::Dynamic>>> cells_;  ///< none: the lens has no ray there
+};
 
 /// Standard deviation of a coordinate, px, at the centre of each cell; not a number where the lens has no ray.
 std::vector<double> lens_certainty(const CameraCalibration& found, int camera, const ImageCells& grid,

@@ -54,9 +54,8 @@ std::vector<ViewResidual> in_views(const std::vector<const CornerResidual*>& res
 
 }  // namespace
 
-ImageCells ImageCells::of(const Camera& camera) {
-  const double width = camera.width(), height = camera.height();
-  return {kColumns, std::max(1, static_cast<int>(std::lround(kColumns * height / width))), width, height};
+ImageCells ImageCells::of(double width_px, double height_px) {
+  return {kColumns, std::max(1, static_cast<int>(std::lround(kColumns * height_px / width_px))), width_px, height_px};
 }
 
 int ImageCells::cell_of(const Vec2& pixel) const {

@@ -17,7 +17,8 @@ struct ImageCells {
   int columns = 0, rows = 0;
   double width_px = 0, height_px = 0;  ///< of the image
 
-  static ImageCells of(const Camera& camera);
+  static ImageCells of(const Camera& camera) { return of(camera.width(), camera.height()); }
+  static ImageCells of(double width_px, double height_px);
   int count() const { return columns * rows; }
   int cell_of(const Vec2& pixel) const;  ///< the nearest, where the pixel lies outside
   Vec2 centre(int cell) const;

@@ -38,15 +38,14 @@ void add_lens(const CameraCalibration& found, int camera, const CameraResiduals&
   }
   std::string places;
   double largest = 0;
-  for (std::size_t i = 0; i < worst.size(); ++i)
-    if (worst[i] > aim_px) {
-      places += (places.empty() ? "" : ", ") + std::string(kPlaces[i]);
-      largest = std::max(largest, worst[i]);
-    }
-  if (!places.empty())
-    out.push_back({fmt::format("cam{}'s lens in these parts of the image: {}", camera, places), "px",
-                   std::min(largest, kTooMany_px), aim_px,
-                   "bring the board there, near and far, tilted by 30 degrees and more to all sides"});
+  for (std::size_t i = 0; i < worst.size(); ++i) {
+    if (worst[i] > aim_px) places += (places.empty() ? "" : ", ") + std::string(kPlaces[i]);
+    largest = std::max(largest, worst[i]);
+  }
+  out.push_back({places.empty() ? fmt::format("cam{}'s lens", camera)
+                                : fmt::format("cam{}'s lens in these parts of the image: {}", camera, places),
+                 "px", std::min(largest, kTooMany_px), aim_px,
+                 "bring the board there, near and far, tilted by 30 degrees and more to all sides"});
 }
 
 void add_baseline(const CameraCalibration& found, int camera, const CertaintyAims& aims, std::vector<WeakPart>& out) {
@@ -56,11 +55,10 @@ void add_baseline(const CameraCalibration& found, int camera, const CertaintyAim
     return most;
   };
   const char* advice = "hold the board where both cameras see it, near enough to fill their common view, for more images";
-  if (const double p = worst('p'); p > aims.baseline_m)
-    out.push_back({fmt::format("the place of cam{} beside cam0", camera), "mm", 1e3 * p, 1e3 * aims.baseline_m, advice});
-  if (const double r = worst('r'); r > aims.between_cameras_rad)
-    out.push_back({fmt::format("the rotation of cam{} against cam0", camera), "degrees", r / kDegree,
-                   aims.between_cameras_rad / kDegree, advice});
+  if (std::ranges::find(found.names, fmt::format("cam{}.px", camera)) == found.names.end()) return;  // cam0, or by the IMU
+  out.push_back({fmt::format("the place of cam{} beside cam0", camera), "mm", 1e3 * worst('p'), 1e3 * aims.baseline_m, advice});
+  out.push_back({fmt::format("the rotation of cam{} against cam0", camera), "degrees", worst('r') / kDegree,
+                 aims.between_cameras_rad / kDegree, advice});
 }
 
 /// The standard deviation in the worst direction, and the axes of the IMU about which to turn: those across it.
@@ -80,35 +78,32 @@ Worst worst_direction(const Mat3& P) {
 void add_mounting(const CameraImuResult& imu, std::size_t camera, const CertaintyAims& aims, std::vector<WeakPart>& out) {
   const Mat6& P = imu.cameras[camera].covariance;
   const Worst lever = worst_direction(P.topLeftCorner<3, 3>());
-  if (lever.sigma > aims.lever_m)
-    out.push_back({fmt::format("the place of cam{} on the IMU", camera), "mm", 1e3 * lever.sigma, 1e3 * aims.lever_m,
-                   fmt::format("turn faster, to and fro, about the IMU's {} axes", lever.across)});
+  out.push_back({fmt::format("the place of cam{} on the IMU", camera), "mm", 1e3 * lever.sigma, 1e3 * aims.lever_m,
+                 fmt::format("turn faster, to and fro, about the IMU's {} axes", lever.across)});
   const Mat3 R = imu.cameras[camera].T_BC.R();
   const Worst turn = worst_direction(R * P.bottomRightCorner<3, 3>() * R.transpose());
-  if (turn.sigma > aims.mounting_rad)
-    out.push_back({fmt::format("the rotation of cam{} on the IMU", camera), "degrees", turn.sigma / kDegree,
-                   aims.mounting_rad / kDegree, fmt::format("turn more about the IMU's {} axes, and for longer", turn.across)});
+  out.push_back({fmt::format("the rotation of cam{} on the IMU", camera), "degrees", turn.sigma / kDegree,
+                 aims.mounting_rad / kDegree, fmt::format("turn more about the IMU's {} axes, and for longer", turn.across)});
 }
 
 void add_imu(const CameraImuResult& imu, const CertaintyAims& aims, std::vector<WeakPart>& out) {
   for (std::size_t k = 0; k < imu.cameras.size(); ++k) add_mounting(imu, k, aims, out);
-  if (imu.time_offset_sigma_s > aims.time_offset_s)
-    out.push_back({"the time offset", "ms", 1e3 * imu.time_offset_sigma_s, 1e3 * aims.time_offset_s,
-                   "turn faster, and change the direction more often"});
-  if (imu.line_delay_sigma_s > aims.line_delay_s)
+  out.push_back({"the time offset", "ms", 1e3 * imu.time_offset_sigma_s, 1e3 * aims.time_offset_s,
+                 "turn faster, and change the direction more often"});
+  if (imu.line_delay_sigma_s > 0)
     out.push_back({"the line delay", "us", 1e6 * imu.line_delay_sigma_s, 1e6 * aims.line_delay_s,
                    "turn faster, about the camera's x and y axes"});
   const double gyro = imu.axes_sigma.gyro.maxCoeff(), accel = imu.axes_sigma.accel.maxCoeff();
-  if (gyro > aims.imu_axes)
+  if (gyro > 0)
     out.push_back({"scale and axes of the gyroscope", "%", 100 * gyro, 100 * aims.imu_axes, "turn faster, about all three axes"});
-  if (accel > aims.imu_axes)
+  if (accel > 0)
     out.push_back({"scale and axes of the accelerometer", "%", 100 * accel, 100 * aims.imu_axes,
                    "turn the rig so far that each of its axes points up and down once"});
 }
 
 }  // namespace
 
-std::vector<WeakPart> weak_parts(const CameraCalibration& found, const CameraImuResult* imu, const CertaintyAims& aims) {
+std::vector<WeakPart> judged_parts(const CameraCalibration& found, const CameraImuResult* imu, const CertaintyAims& aims) {
   std::vector<WeakPart> out;
   const std::vector<CameraResiduals> seen = summarise_residuals(found);
   for (int k = 0; k < static_cast<int>(seen.size()); ++k) {
@@ -116,6 +111,12 @@ std::vector<WeakPart> weak_parts(const CameraCalibration& found, const CameraImu
     add_baseline(found, k, aims, out);
   }
   if (imu != nullptr) add_imu(*imu, aims, out);
+  return out;
+}
+
+std::vector<WeakPart> weak_parts(const CameraCalibration& found, const CameraImuResult* imu, const CertaintyAims& aims) {
+  std::vector<WeakPart> out = judged_parts(found, imu, aims);
+  std::erase_if(out, [](const WeakPart& part) { return part.sigma <= part.aim; });
   return out;
 }
 

@@ -27,7 +27,9 @@ struct WeakPart {
   std::string advice;         ///< what to record
 };
 
-/// `imu`: null without one.
+/// Everything that is judged, determined or not: the progress of a calibration. `imu`: null without one.
+std::vector<WeakPart> judged_parts(const CameraCalibration& found, const CameraImuResult* imu, const CertaintyAims& aims = {});
+/// Those of them that are less certain than the aims.
 std::vector<WeakPart> weak_parts(const CameraCalibration& found, const CameraImuResult* imu, const CertaintyAims& aims = {});
 
 /// "cam0's lens at the top left is known to 0.8 px, where 0.3 px are wanted: bring the board there".

@@ -13,6 +13,7 @@
 
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/calibration_fields.hpp"
+#include "fbvins/io/imu_file.hpp"
 #include "fbvins/io/mask_fields.hpp"
 #include "fbvins/io/png_encode.hpp"
 
@@ -66,15 +67,6 @@ std::string imu_yaml(const ImuNoise& n, const std::string& origin) {
              n.rate_hz, n.gyro_noise_density_radps_rthz, n.gyro_random_walk_radps2_rthz, n.accel_noise_density_mps2_rthz,
              n.accel_random_walk_mps3_rthz) +
          range;
-}
-
-std::string imu_csv(const std::vector<ImuSample>& samples) {
-  std::string text =
-      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
-  for (const ImuSample& s : samples)
-    text += fmt::format("{},{},{},{},{},{},{}\n", s.t.ns, s.gyro_radps.x(), s.gyro_radps.y(), s.gyro_radps.z(), s.accel_mps2.x(),
-                        s.accel_mps2.y(), s.accel_mps2.z());
-  return text;
 }
 
 std::string truth_csv(const std::vector<TrajectoryPoint>& truth) {
@@ -206,8 +198,8 @@ Result<void> EurocFolder::add(StereoFrame frame, Time right_stamp, std::vector<f
 Result<void> EurocFolder::finish(const std::vector<ImuSample>& readings, const std::vector<TrajectoryPoint>& truth) {
   if (Result<void> done = state_->wait(); !done) return done;
   const fs::path& mav0 = state_->mav0;
-  for (const auto& [path, text] :
-       {std::pair{mav0 / "imu0/data.csv", imu_csv(readings)}, {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)}})
+  for (const auto& [path, text] : {std::pair{mav0 / "imu0/data.csv", imu_to_csv(readings)},
+                                   {mav0 / "state_groundtruth_estimate0/data.csv", truth_csv(truth)}})
     if (Result<void> done = write_file(path, text); !done) return done;
   for (std::size_t i = 0; i < state_->rows.size(); ++i)
     if (Result<void> done = write_file(mav0 / fmt::format("cam{}/data.csv", i), state_->rows[i]); !done) return done;

@@ -14,5 +14,7 @@ namespace fbvins {
 
 /// Strictly increasing stamps; unusable rows are left out.
 Result<std::vector<ImuSample>> read_imu_csv(const std::string& path);
+/// The same, as it reads it again, to the bit.
+std::string imu_to_csv(const std::vector<ImuSample>& readings);
 
 }  // namespace fbvins

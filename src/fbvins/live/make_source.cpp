@@ -19,6 +19,8 @@ Result<std::unique_ptr<Source>> make_socket_source(const std::string& path, cons
     const auto rig = load_kalibr(options.dataset.kalibr_camchain, imu.empty() ? std::nullopt : std::optional(imu));
     if (!rig) return rig.error();
     socket.rig = *rig;
+  } else {
+    socket.rig = options.uncalibrated;
   }
   auto source = SocketSource::open(path, std::move(socket));
   if (!source) return source.error();

@@ -43,10 +43,13 @@ Result<Ros2Topics> parse_ros2_topics(const std::string& text) {
 Result<std::unique_ptr<Ros2Source>> Ros2Source::open(std::shared_ptr<Ros2Node> node, const Ros2Topics& topics,
                                                      const SourceOptions& options) {
   const DatasetOptions& files = options.dataset;
-  if (files.kalibr_camchain.empty())
+  if (files.kalibr_camchain.empty() && !options.uncalibrated)
     return Error{ErrorCode::invalid_argument,
                  "ROS 2 topics need --calibration: a Kalibr camchain of the two cameras and the IMU"};
-  const auto rig = load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
+  const Result<StereoRig> rig =
+      files.kalibr_camchain.empty()
+          ? Result<StereoRig>(*options.uncalibrated)
+          : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
   if (!rig) return rig.error();
   return std::unique_ptr<Ros2Source>(new Ros2Source(std::move(node), topics, options, *rig));
 }

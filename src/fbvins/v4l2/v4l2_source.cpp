@@ -51,10 +51,13 @@ Result<std::unique_ptr<V4l2Source>> V4l2Source::open(const std::string& text, co
   const auto devices = parse_v4l2_devices(text);
   if (!devices) return devices.error();
   const DatasetOptions& files = options.dataset;
-  if (files.kalibr_camchain.empty())
+  if (files.kalibr_camchain.empty() && !options.uncalibrated)
     return Error{ErrorCode::invalid_argument,
                  "video devices need --calibration: a Kalibr camchain of the two cameras and the IMU"};
-  const auto rig = load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
+  const Result<StereoRig> rig =
+      files.kalibr_camchain.empty()
+          ? Result<StereoRig>(*options.uncalibrated)
+          : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
   if (!rig) return rig.error();
   std::unique_ptr<V4l2Source> source(new V4l2Source(*devices, options, *rig));
   auto imu = ImuFeed::open(devices->imu, *rig, [to = source.get()](const std::string& sentence) { to->say(sentence); });

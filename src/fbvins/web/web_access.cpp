@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <sys/random.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -56,6 +57,16 @@ bool is_port(std::string_view text, std::uint16_t& port) {
 }  // namespace
 
 bool WebAddress::loopback() const { return host.starts_with("127.") || host == "::1"; }
+
+std::string page_url(const WebAddress& address, std::uint16_t port, const std::string& token) {
+  std::string host = address.host.find(':') == std::string::npos ? address.host : "[" + address.host + "]";
+  if (host == "0.0.0.0" || host == "[::]") {
+    std::array<char, 256> name{};
+    host = gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
+  }
+  // A browser does not send what follows the #: the token gets into no log.
+  return fmt::format("http://{}:{}/{}{}", host, port == 0 ? address.port : port, token.empty() ? "" : "#token=", token);
+}
 
 Result<WebAddress> parse_web_address(const std::string& text) {
   const Error wrong{ErrorCode::invalid_argument,

@@ -20,6 +20,9 @@ struct WebAddress {
   bool loopback() const;
 };
 
+/// Of the page for a browser, with the token; `port`: where the server listens.
+std::string page_url(const WebAddress& address, std::uint16_t port, const std::string& token);
+
 /// [ADDRESS:]PORT, an IPv6 address in brackets; without an address this machine alone.
 Result<WebAddress> parse_web_address(const std::string& text);
 

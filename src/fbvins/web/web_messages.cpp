@@ -40,7 +40,7 @@ Json path_json(const std::vector<PathPoint>& path) {
 struct BinaryHead {
   std::uint8_t kind;
   std::uint8_t version = 1;
-  std::uint16_t reserved = 0;
+  std::uint16_t camera = 0;  ///< of an image
   std::uint32_t count;
   double t_s;
   std::uint32_t width_px = 0, height_px = 0;
@@ -145,10 +145,11 @@ SharedMessage rewound_message() { return text({{"type", "rewound"}}); }
 SharedMessage end_message() { return text({{"type", "end"}}); }
 
 SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int height_px,
-                            const std::vector<LiveView::Feature>& features) {
+                            const std::vector<LiveView::Feature>& features, int camera) {
   WebMessage message{{}, true, true};
   message.bytes.reserve(sizeof(BinaryHead) + features.size() * 16 + jpeg.size());
   append(message.bytes, BinaryHead{.kind = kImage,
+                                   .camera = static_cast<std::uint16_t>(camera),
                                    .count = static_cast<std::uint32_t>(features.size()),
                                    .t_s = t_s,
                                    .width_px = static_cast<std::uint32_t>(width_px),

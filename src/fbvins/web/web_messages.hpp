@@ -41,7 +41,7 @@ SharedMessage end_message();
 
 /// JPEG with the features of the same image; the size is that of the image before it was scaled down.
 SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int height_px,
-                            const std::vector<LiveView::Feature>& features);
+                            const std::vector<LiveView::Feature>& features, int camera = 0);
 /// Replaces the window's landmarks, or (`cloud`) adds to those seen before.
 SharedMessage points_message(double t_s, const std::vector<LiveView::Landmark>& points, bool cloud);
 

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/web/web_sink.hpp"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
-#include <array>
 #include <utility>
 
 namespace fbvins {
@@ -52,17 +48,7 @@ Result<void> WebSink::begin(PageFiles files) {
 WebSink::WebSink(const WebOptions& options, WebFlight flight, WebActions actions)
     : options_(options), actions_(std::move(actions)), flight_(std::move(flight)) {}
 
-std::string WebSink::url() const {
-  const WebAddress& address = options_.address;
-  std::string host = address.host.find(':') == std::string::npos ? address.host : "[" + address.host + "]";
-  if (host == "0.0.0.0" || host == "[::]") {
-    std::array<char, 256> name{};
-    host = gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "localhost";
-  }
-  // A browser does not send what follows the #: the token gets into no log.
-  return fmt::format("http://{}:{}/{}{}", host, port() == 0 ? address.port : port(),
-                     options_.token.empty() ? "" : "#token=", options_.token);
-}
+std::string WebSink::url() const { return page_url(options_.address, port(), options_.token); }
 
 double WebSink::since_start_s(Time t) {
   const std::lock_guard lock(mutex_);
