@@ -203,6 +203,8 @@ FlightCalibration refined(const Division& all, const std::vector<Division>& divi
   fill_parameters(lesson, given, out);
   out.verdict = objection_to(out, lesson.changed);
   out.better = out.verdict.empty();
+  if (!out.better)
+    for (RefinedParameter& p : out.parameters) p.value = p.flown ? p.given : p.value;
   if (!out.better) return out;
   out.rig = refined_rig(out.rig, lesson.rig);
   out.verdict = "what was held out is predicted better by the refined calibration than by the one given";
