@@ -51,6 +51,7 @@ std::string flight_calibration_text(const FlightCalibration& found) {
   std::string out =
       fmt::format("{} pieces of flights, {:.0f} s, {} keyframes, {} points seen {} times; noise {:.2f} px, spread {:.1f}\n",
                   found.pieces, found.duration_s, found.keyframes, found.points, found.views, found.sigma_px, found.spread);
+  if (!found.better && !names_of(found, FlightFinding::refined).empty()) out += "what all flights ask for, which is not taken:\n";
   for (const RefinedParameter& p : found.parameters) {
     if (p.finding != FlightFinding::refined) continue;
     const ReadableUnit unit = readable(p.unit, p.flown);

@@ -33,9 +33,7 @@ struct OwnedPiece {
 };
 
 /// Stretches of keyframes with readings between them.
-std::vector<std::vector<FlightKeyframe>> stretches_of(const FlightTracks& flight) {
-  const double duration_s = (flight.keyframes.back().t - flight.keyframes.front().t).seconds();
-  const double longest_s = std::clamp(duration_s / (2 * kFewestPieces) - 0.5, kShortestPiece_s, kPiece_s);
+std::vector<std::vector<FlightKeyframe>> stretches_of(const FlightTracks& flight, double longest_s) {
   std::vector<std::vector<FlightKeyframe>> out;
   std::vector<ImuSegment> skipped;
   for (const FlightKeyframe& k : flight.keyframes) {
@@ -55,7 +53,12 @@ std::vector<std::vector<FlightKeyframe>> stretches_of(const FlightTracks& flight
 std::vector<OwnedPiece> pieces_of(const std::vector<FlightTracks>& flights, const FlightRig& given) {
   std::vector<OwnedPiece> out;
   for (std::size_t f = 0; f < flights.size(); ++f) {
-    std::vector<std::vector<FlightKeyframe>> stretches = stretches_of(flights[f]);
+    double longest_s = kPiece_s;
+    std::vector<std::vector<FlightKeyframe>> stretches = stretches_of(flights[f], longest_s);
+    while (stretches.size() < 2 * kFewestPieces && longest_s > kShortestPiece_s) {
+      longest_s = std::max(kShortestPiece_s, longest_s - 1);
+      stretches = stretches_of(flights[f], longest_s);
+    }
     const std::size_t most = std::max(kFewestOfEach, kMostPieces / flights.size());
     const std::size_t count = std::min(most, stretches.size());
     for (std::size_t i = 0; i < count; ++i) {  // evenly spread over the flight
@@ -200,6 +203,8 @@ FlightCalibration refined(const Division& all, const std::vector<Division>& divi
   fill_parameters(lesson, given, out);
   out.verdict = objection_to(out, lesson.changed);
   out.better = out.verdict.empty();
+  if (!out.better)
+    for (RefinedParameter& p : out.parameters) p.value = p.flown ? p.given : p.value;
   if (!out.better) return out;
   out.rig = refined_rig(out.rig, lesson.rig);
   out.verdict = "what was held out is predicted better by the refined calibration than by the one given";

@@ -33,7 +33,7 @@ enum class FlightFinding {
 struct RefinedParameter {
   std::string name, unit;
   double given = 0, value = 0;
-  double change = 0;  ///< of a rotation: of its part about this axis
+  double change = 0;  ///< that all flights together ask for, taken or not; of a rotation: of its part about this axis
   double sigma = 0;   ///< by `covariance`
   double prior_sigma = 0;
   FlightFinding finding = FlightFinding::not_determined;

@@ -10,6 +10,8 @@ namespace fbvins {
 namespace {
 
 constexpr int kMaxIterations = 25;
+/// Damping, which in directions that are not determined must not pass for information.
+constexpr double kLeastDamping = 1e-10;
 /// Decrease of the cost, in units of half a squared standard deviation, with which a fit has converged.
 constexpr double kConverged = 0.1;
 /// Standard deviation over the median of absolute values, of a normal distribution.
@@ -62,7 +64,7 @@ FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, co
   const Eigen::VectorXd prior = prior_information(given);
   FlightFit fit;
   fit.rig = start;
-  double lambda = 1e-5;
+  double lambda = 1e-8;
   bool converged = false;
   while (!converged && fit.iterations < kMaxIterations) {
     const CalibrationEquations e = all_of(pieces, fit.rig, lambda);
@@ -78,12 +80,11 @@ FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, co
     const Eigen::VectorXd off_next = step_between(given, next);
     const double cost = total_cost(pieces, next);
     const double after = cost / noise.spread + 0.5 * off_next.dot(prior.cwiseProduct(off_next));
-    fit.information = information;
     ++fit.iterations;
     if (after <= before) {
       fit.rig = next, fit.cost = cost;
       converged = before - after < kConverged;
-      lambda = std::max(0.1 * lambda, 1e-9);
+      lambda = std::max(0.1 * lambda, kLeastDamping);
     } else {
       for (FlightPiece* piece : pieces) piece->undo();
       fit.cost = e.cost;
@@ -91,6 +92,8 @@ FlightFit fit_calibration(const FlightPieces& pieces, const FlightRig& given, co
       lambda = std::max(10 * lambda, 1e-4);
     }
   }
+  if (std::find(free.begin(), free.end(), true) != free.end())
+    fit.information = all_of(pieces, fit.rig, kLeastDamping).information / noise.spread;
   return fit;
 }
 
@@ -121,7 +124,7 @@ double spread_of(const FlightPieces& pieces, const FlightFit& fit, const FlightN
   Eigen::MatrixXd information;
   for (FlightPiece* piece : pieces) {
     piece->set_sigma_px(noise.sigma_px);
-    const CalibrationEquations e = piece->linearise(fit.rig, 1e-9);
+    const CalibrationEquations e = piece->linearise(fit.rig, kLeastDamping);
     gradients.push_back(e.gradient);
     if (information.size() == 0) information = Eigen::MatrixXd::Zero(e.gradient.size(), e.gradient.size());
     information += e.information;

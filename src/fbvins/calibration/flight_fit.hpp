@@ -18,7 +18,7 @@ struct FlightNoise {
 
 struct FlightFit {
   FlightRig rig;
-  Eigen::MatrixXd information;  ///< of all parameters by the views and readings, `spread` regarded
+  Eigen::MatrixXd information;  ///< of all parameters by views and readings, `spread` regarded; empty if none is free
   double cost = 0;              ///< at the minimum, without the prior
   int iterations = 0;
 };
