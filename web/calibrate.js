@@ -96,7 +96,7 @@ function showParts(parts) {
   while (list.children.length < parts.length) {
     const item = add(list, "li", "");
     add(item, "span", "name");
-    add(item, "span", "figures");
+    add(item, "span", "amount");
     const meter = item.appendChild(document.createElement("meter"));
     [meter.min, meter.max, meter.low, meter.high, meter.optimum] = [0, 1, 0.5, 0.999, 1];
   }
