@@ -219,15 +219,46 @@ Result<CalibrationOutcome> solve(const Arguments& a, const Board& board, const M
   return outcome;
 }
 
+Result<void> write_outcome(const Arguments& a, CalibrationOutcome& outcome) {
+  outcome.weak = weak_parts(outcome.cameras, outcome.imu ? &*outcome.imu : nullptr);
+  if (Result<void> done = write_calibration(outcome, a.out); !done) return done;
+  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(outcome), bold(a.out));
+  return {};
+}
+
 /// From what was gathered to the files.
 int conclude(const Arguments& a, const Board& board, const Material& material) {
   Result<CalibrationOutcome> outcome = solve(a, board, material);
   if (!outcome) return refuse(a, outcome.error());
-  outcome->weak = weak_parts(outcome->cameras, outcome->imu ? &*outcome->imu : nullptr);
-  if (Result<void> done = write_calibration(*outcome, a.out); !done) return fail(done.error().message);
+  if (Result<void> done = write_outcome(a, *outcome); !done) return fail(done.error().message);
   if (!a.recording.empty()) forget_kept_detections(kept_folder(a));
-  if (!a.quiet) fmt::print("{}results in {}\n", calibration_text(*outcome), bold(a.out));
   return kOk;
+}
+
+/// The same where somebody may have stopped early: the cameras alone, if readings do not determine the rest yet. What the page
+/// says.
+int conclude_live(const Arguments& a, const Board& board, Material material, std::string& said) {
+  Result<CalibrationOutcome> outcome = solve(a, board, material);
+  int code = kOk;
+  said = fmt::format("the calibration is in {}", a.out);
+  if (!outcome && !material.imu.empty()) {
+    code = kEstimationFailed;
+    said = outcome.error().message;
+    material.imu.clear();
+    if (Result<CalibrationOutcome> cameras = solve(a, board, material); cameras) {
+      outcome = std::move(cameras);
+      said += fmt::format("; the calibration of the cameras alone is in {}", a.out);
+    }
+  }
+  if (!outcome) {
+    said = fmt::format("{}; the corners are kept in {}", outcome.error().message, a.out);
+    code = kEstimationFailed;
+  } else if (Result<void> done = write_outcome(a, *outcome); !done) {
+    said = done.error().message;
+    code = kBadInput;
+  }
+  if (code != kOk) fail(said);
+  return code;
 }
 
 /// Files are written in any case; what is missing for a calibration is said.
@@ -241,12 +272,9 @@ int calibrate_live(const Arguments& a, const Board& board) {
     return fail(material.error().message);
   }
   (*live)->end("adjusting", "done with the board: everything is adjusted together now");
-  const int code = conclude(a, board, *material);
-  if (code == kOk) (*live)->end("done", fmt::format("the calibration is in {}", a.out));
-  else
-    (*live)->end(
-        "failed",
-        fmt::format("there is no calibration: what the terminal says is missing; corners and readings are kept in {}", a.out));
+  std::string said;
+  const int code = conclude_live(a, board, *material, said);
+  (*live)->end(code == kOk ? "done" : "failed", said);
   return code;
 }
 

@@ -50,7 +50,7 @@ def check_without_tilt(folder):
     """A board that is always parallel to the image determines no focal length: guidance asks for the tilt, and nothing is answered."""
     board, out = folder / "flat", folder / "flat_out"
     fbvins("simulate", "board", "--motion", "distance,roll", "--seconds", "6", "--rate", "5", "--seed", "4", "--out", board)
-    done = subprocess.run(live(board, out, "--cameras-only"), capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run(live(board, out, "--cameras-only", speed=0.2), capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 1, done
     assert re.search("tilt the board about its (horizontal|vertical) axis, its (upper|lower|left|right) edge towards cam[01]", done.stderr), done.stderr
     assert "all aims are reached" not in done.stderr and not (out / "summary.json").exists()
@@ -78,6 +78,23 @@ def look_at_page(address, interrupt):
         interrupt()
         page.wait_for("document.getElementById('next').dataset.stage === 'done'")
         assert "The calibration is in" in page.text("action"), page.text("action")
+
+
+def check_early(board, folder):
+    """Ctrl-C before the readings determine anything: the cameras alone are calibrated."""
+    out = folder / "early"
+    with open(folder / "early_said", "w+", encoding="utf-8") as said:
+        program = subprocess.Popen(live(board, out, speed=0.1), stdout=subprocess.DEVNULL, stderr=said)
+        end = time.monotonic() + 120
+        while "mm" not in (folder / "early_said").read_text(encoding="utf-8") and time.monotonic() < end and program.poll() is None:
+            time.sleep(0.1)
+        program.send_signal(signal.SIGINT)
+        assert program.wait(timeout=120) == 1
+        text = (folder / "early_said").read_text(encoding="utf-8")
+    assert "the calibration of the cameras alone is in" in text, text
+    for name in ("detections.csv", "imu0.csv", "camchain.yaml", "summary.json"):
+        assert (out / name).stat().st_size > 100, name
+    assert not (out / "camchain-imucam.yaml").exists()
 
 
 def check_interrupted(board, folder):
@@ -109,6 +126,7 @@ def main():
         fbvins("simulate", "board", "--seconds", "20", "--rate", "5", "--seed", "3", "--out", board)
         check_end(board, folder)
         check_interrupted(board, folder)
+        check_early(board, folder)
         check_without_tilt(folder)
     print("calibrated live" + ("" if browser.PROGRAM else "; no Chromium here to open the page with"))
     return 0

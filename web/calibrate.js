@@ -87,7 +87,7 @@ function panel(index) {
   return views[index];
 }
 
-const digits = x => x >= 100 ? x.toFixed(0) : x.toPrecision(2);
+const digits = x => !Number.isFinite(x) ? "–" : x >= 100 ? x.toFixed(0) : x.toPrecision(2);
 
 function showParts(parts) {
   const list = element("parts");
@@ -96,7 +96,7 @@ function showParts(parts) {
   while (list.children.length < parts.length) {
     const item = add(list, "li", "");
     add(item, "span", "name");
-    add(item, "span", "figures");
+    add(item, "span", "amount");
     const meter = item.appendChild(document.createElement("meter"));
     [meter.min, meter.max, meter.low, meter.high, meter.optimum] = [0, 1, 0.5, 0.999, 1];
   }
@@ -104,7 +104,7 @@ function showParts(parts) {
     const [name, figures, meter] = list.children[i].children;
     name.textContent = part.what;
     figures.textContent = `${digits(part.sigma)} of ${digits(part.aim)} ${part.unit}`;
-    meter.value = Math.min(1, part.aim / Math.max(part.sigma, 1e-12));
+    meter.value = Number.isFinite(part.sigma) ? Math.min(1, part.aim / Math.max(part.sigma, 1e-12)) : 0;
     meter.title = `${part.what}: one standard deviation ${figures.textContent}`;
     list.children[i].classList.toggle("reached", part.sigma <= part.aim);
   });

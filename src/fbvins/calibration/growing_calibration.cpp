@@ -7,7 +7,6 @@
 #include <chrono>
 #include <set>
 
-#include "fbvins/calibration/next_view.hpp"
 #include "fbvins/calibration/view_choice.hpp"
 
 namespace fbvins {
@@ -17,6 +16,7 @@ constexpr int kFewestStamps = 40, kMostStamps = 400;
 constexpr int kFewestAtEnd = 40;       // stamps, below which the residuals do not tell the noise well
 constexpr double kImuPeriod_s = 0.09;  // between images in the fit with the IMU
 constexpr double kImuGrowth = 1.25;    // of the views until it is fitted again
+constexpr int kPatience = 4;           // judgements for which a sentence stays, unless it is followed earlier
 constexpr double kLittleGain = 1.05;   // below it no way of holding the board is better than another
 
 /// Views that differ most, of each camera, and all others of their stamps.
@@ -154,12 +154,16 @@ void GrowingCalibration::judge_imu(const GrowingInput& input, const CameraCalibr
   }
 }
 
-void GrowingCalibration::guide(const GrowingInput& input, const RigKnowledge& known, CalibrationProgress& progress) const {
+void GrowingCalibration::guide(const GrowingInput& input, const RigKnowledge& known, CalibrationProgress& progress) {
   std::vector<BoardHold> now;
   for (const BoardView& view : input.now)
     if (const auto hold = hold_of(known.cameras[static_cast<std::size_t>(view.camera)], board_, view)) now.push_back(*hold);
-  const NextView next = next_view(known, board_, now, options_.aims);
-  progress.action = next.gain < kLittleGain ? "move the board slowly, near and far, through all images" : next.sentence;
+  // A hand needs time to follow.
+  if (asked_.sentence.empty() || ++asked_for_ >= kPatience || followed(asked_, now)) {
+    asked_ = next_view(known, board_, now, options_.aims);
+    asked_for_ = 0;
+  }
+  progress.action = asked_.gain < kLittleGain ? "move the board slowly, near and far, through all images" : asked_.sentence;
 }
 
 }  // namespace fbvins

@@ -13,6 +13,7 @@
 
 #include "fbvins/calibration/camera_calibration.hpp"
 #include "fbvins/calibration/imu_camera.hpp"
+#include "fbvins/calibration/next_view.hpp"
 #include "fbvins/calibration/residual_summary.hpp"
 #include "fbvins/calibration/rig_knowledge.hpp"
 #include "fbvins/calibration/weak_parts.hpp"
@@ -61,11 +62,13 @@ class GrowingCalibration {
  private:
   std::vector<std::string> models_for(std::size_t views);
   void judge_imu(const GrowingInput& input, const CameraCalibration& cameras, CalibrationProgress& progress);
-  void guide(const GrowingInput& input, const RigKnowledge& known, CalibrationProgress& progress) const;
+  void guide(const GrowingInput& input, const RigKnowledge& known, CalibrationProgress& progress);
 
   Board board_;
   GrowingOptions options_;
   int most_stamps_ = 60;             ///< in the next adjustment of the cameras
+  NextView asked_;                   ///< what the hand was asked for last
+  int asked_for_ = 0;                ///< judgements since
   std::vector<std::string> models_;  ///< as found, where they are chosen by evidence
   std::size_t chosen_from_ = 0;      ///< views
   std::size_t imu_views_ = 0;        ///< that the last fit had

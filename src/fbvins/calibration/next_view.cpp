@@ -138,6 +138,7 @@ class Ignorance {
 
 struct Candidate {
   BoardHold hold;
+  HoldChange change;
   std::string sentence;
 };
 
@@ -159,24 +160,28 @@ std::vector<BoardHold> tilted(const BoardHold& hold) {
   return out;
 }
 
+bool tilted_otherwise(const BoardHold& a, const BoardHold& b) {
+  return std::hypot(a.tilt_x_rad - b.tilt_x_rad, a.tilt_y_rad - b.tilt_y_rad) > kTiltSeen_rad;
+}
+
 /// Changes of one thing about how the board is held.
 void add_changes(const BoardHold& now, std::vector<Candidate>& out) {
   for (int place = 0; place < 9; ++place) {
     if (place == now.place) continue;
     BoardHold hold = now;
     hold.place = place;
-    out.push_back({hold, "hold the board " + place_name(place, now.camera)});
+    out.push_back({hold, HoldChange::place, "hold the board " + place_name(place, now.camera)});
   }
   for (const double fill : {kFar, kNear}) {
     if (std::max(fill / now.fill, now.fill / fill) < kFillSeen) continue;
     BoardHold hold = now;
     hold.fill = fill;
-    out.push_back({hold, fill > now.fill ? fmt::format("bring the board closer to cam{}", now.camera)
-                                         : fmt::format("take the board farther away from cam{}", now.camera)});
+    out.push_back({hold, HoldChange::distance,
+                   fill > now.fill ? fmt::format("bring the board closer to cam{}", now.camera)
+                                   : fmt::format("take the board farther away from cam{}", now.camera)});
   }
   for (const BoardHold& hold : tilted(now))
-    if (std::hypot(hold.tilt_x_rad - now.tilt_x_rad, hold.tilt_y_rad - now.tilt_y_rad) > kTiltSeen_rad)
-      out.push_back({hold, tilt_sentence(hold)});
+    if (tilted_otherwise(hold, now)) out.push_back({hold, HoldChange::tilt, tilt_sentence(hold)});
 }
 
 /// A board that a camera does not see.
@@ -184,8 +189,9 @@ void add_showing(int camera, std::vector<Candidate>& out) {
   for (int place = 0; place < 9; ++place)
     for (const double fill : {kFar, kNear})
       for (const BoardHold& hold : tilted({camera, place, fill, 0, 0}))
-        out.push_back({hold, place == 4 ? fmt::format("hold the board before cam{}", camera)
-                                        : "hold the board " + place_name(place, camera)});
+        out.push_back(
+            {hold, HoldChange::camera,
+             place == 4 ? fmt::format("hold the board before cam{}", camera) : "hold the board " + place_name(place, camera)});
 }
 
 }  // namespace
@@ -219,6 +225,18 @@ std::optional<Pose<Cn, T>> pose_of(const Camera& camera, const Board& board, con
   return Pose<Cn, T>(q, Vec3(distance_m * ray - q * (0.5 * extent_of(board))));
 }
 
+bool followed(const NextView& asked, const std::vector<BoardHold>& now) {
+  const auto hold = std::ranges::find(now, asked.hold.camera, &BoardHold::camera);
+  if (hold == now.end()) return false;
+  switch (asked.change) {
+    case HoldChange::camera: return true;
+    case HoldChange::place: return hold->place == asked.hold.place;
+    case HoldChange::distance: return std::max(hold->fill / asked.hold.fill, asked.hold.fill / hold->fill) < kFillSeen;
+    case HoldChange::tilt: return !tilted_otherwise(*hold, asked.hold);
+  }
+  return true;
+}
+
 NextView next_view(const RigKnowledge& known, const Board& board, const std::vector<BoardHold>& now, const CertaintyAims& aims) {
   std::vector<Candidate> candidates;
   for (int k = 0; k < static_cast<int>(known.cameras.size()); ++k) {
@@ -231,7 +249,7 @@ NextView next_view(const RigKnowledge& known, const Board& board, const std::vec
   double least = std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : candidates) {
     const auto after = ignorance.after(board, candidate.hold);
-    if (after && *after < least) least = *after, best.hold = candidate.hold, best.sentence = candidate.sentence;
+    if (after && *after < least) least = *after, best = {candidate.hold, candidate.change, candidate.sentence, 0};
   }
   if (std::isfinite(least)) best.gain = ignorance.now() / std::max(least, 1e-12);
   return best;

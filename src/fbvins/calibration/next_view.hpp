@@ -30,11 +30,17 @@ std::optional<BoardHold> hold_of(const Camera& camera, const Board& board, const
 /// The other way round: where a board is that is held so. nullopt where the lens has no ray.
 std::optional<Pose<Cn, T>> pose_of(const Camera& camera, const Board& board, const BoardHold& hold);
 
+enum class HoldChange { camera, place, distance, tilt };
+
 struct NextView {
   BoardHold hold;
+  HoldChange change = HoldChange::camera;  ///< what the sentence asks for
   std::string sentence;
   double gain = 0;  ///< by which factor what is known worst gets better, in squares; 1: not at all
 };
+
+/// Whether the board is held as was asked, in what the sentence was about.
+bool followed(const NextView& asked, const std::vector<BoardHold>& now);
 
 /// `now`: how those cameras that see the board at this moment see it; the sentence says what to change about one of these, or
 /// which camera to show the board.

@@ -107,6 +107,8 @@ TEST(NextView, WhoDoesWhatItSaysIsDoneSooner) {
   for (int i = 0; i < 12; ++i) {
     const RigKnowledge known = rough(guided);
     const NextView next = next_view(known, kBoard, newest_hold(known, guided), {});
+    EXPECT_FALSE(followed(next, newest_hold(known, guided)));
+    EXPECT_TRUE(followed(next, {next.hold}));
     for (int image = 0; image < 2; ++image) {
       add(rig, held(rig, next.hold), rng, guided);
       add(rig, random_board_pose(rig, 0, kBoard, rng, 0.3), rng, anyhow);

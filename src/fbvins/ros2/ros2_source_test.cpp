@@ -81,6 +81,9 @@ TEST(Ros2Source, WithoutACalibrationItSaysWhatItWants) {
   const auto source = Ros2Source::open(node(), {"/left", "/right", "/imu"}, {});
   ASSERT_FALSE(source);
   EXPECT_NE(source.error().message.find("--calibration"), std::string::npos);
+  SourceOptions to_calibrate;
+  to_calibrate.uncalibrated = StereoRig{};
+  EXPECT_TRUE(Ros2Source::open(node(), {"/left", "/right", "/imu"}, to_calibrate));
 }
 
 TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {

@@ -253,6 +253,8 @@ TEST(V4l2Source, RefusesWordsItDoesNotUnderstand) {
   const KalibrFiles files(small_rig());
   SourceOptions options;
   EXPECT_FALSE(V4l2Source::open("/dev/video0,udp:127.0.0.1:9:0", options)) << "no calibration";
+  options.uncalibrated = small_rig();
+  EXPECT_TRUE(V4l2Source::open("/dev/video0,udp:127.0.0.1:9:0", options)) << "to calibrate";
   options.dataset.kalibr_camchain = files.camchain();
   EXPECT_FALSE(V4l2Source::open("/dev/video0,/dev/imu", options)) << "no kind of IMU";
 }

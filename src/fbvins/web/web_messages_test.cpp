@@ -50,6 +50,8 @@ TEST(ImageMessage, CarriesItsFeaturesBeforeTheJpeg) {
   ASSERT_EQ(bytes.size(), 24u + 16 + 4);
   EXPECT_TRUE(message->binary && message->image);
   EXPECT_EQ(bytes[0], 1);
+  EXPECT_EQ(number_at<std::uint16_t>(bytes, 2), 0u);
+  EXPECT_EQ(number_at<std::uint16_t>(image_message(1.5, "JPEG", 752, 480, {}, 3)->bytes, 2), 3u) << "of camera 3";
   EXPECT_EQ(number_at<std::uint32_t>(bytes, 4), 1u);
   EXPECT_EQ(number_at<double>(bytes, 8), 1.5);
   EXPECT_EQ(number_at<std::uint32_t>(bytes, 16), 752u);
