@@ -371,7 +371,7 @@ void add_calibrate_command(CLI::App& program, int& exit_code) {
   command->add_option("--imu-noise", a->imu_noise, "measure the IMU's noise in a recording at rest, or in imu0/data.csv");
   CLI::Option* from_flight = command->add_option(
       "--from-flight", a->from_flight, "recordings that `fbvins run` reads, whose calibration they refine, without a board");
-  for (const char* other : {"RECORDING", "--target", "--detections", "--imu-noise"})
+  for (const char* other : {"RECORDING", "--source", "--target", "--detections", "--imu-noise"})
     from_flight->excludes(command->get_option(other));
   command
       ->add_option("--calibration", a->calibration, "with --from-flight: the calibration given, instead of the recordings' own")

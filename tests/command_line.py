@@ -100,7 +100,7 @@ class CommandLine(unittest.TestCase):
             self.assertLess(found["sigma"], tolerance)
         self.assertIn("resolution: [640, 480]", (out / "camchain.yaml").read_text(encoding="utf-8"))
         self.assert_bad_input(fbvins("calibrate", "--detections", detections), "--target is missing")
-        self.assert_bad_input(fbvins("calibrate", "--target", target), "give a recording or --detections")
+        self.assert_bad_input(fbvins("calibrate", "--target", target), "give a recording, --source or --detections")
         self.assert_bad_input(fbvins("calibrate", "--target", target, "--model", "ds", self.folder), str(target), "only AprilGrids are found in images", "--detections")
         self.write("detections.csv", "\n".join(rows[:1 + 3 * 48]) + "\n")
         done = fbvins(*arguments)
