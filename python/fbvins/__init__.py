@@ -66,6 +66,14 @@ def _path(value: Optional[PathLike]) -> str:
     return "" if value is None else os.fspath(value)
 
 
+def _openable(opened_by: Callable[..., Recording], *arguments: Any) -> Recording:
+    """A recording that doctor() can open again."""
+    again = functools.partial(opened_by, *arguments)
+    recording = again()
+    recording._again = again
+    return recording
+
+
 def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,  # noqa: A001
          skip_frames: int = 0, max_frames: int = 0, topics: Tuple[str, ...] = (), start_s: float = 0.0,
          duration_s: float = 0.0) -> Recording:
@@ -74,13 +82,14 @@ def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibrat
     not found automatically: left, right and, if there are several, IMU. max_frames 0: all. start_s, duration_s: only events stamped from start_s
     seconds after the first stereo frame on, for duration_s seconds (0: to the end)."""
     left, right, imu = (tuple(topics) + ("", "", ""))[:3]
-    return _fbvins.open(os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, left, right, imu)
+    return _openable(_fbvins.open, os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, left, right,
+                     imu)
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:
     """A synthetic flight with exact ground truth, rendered image by image while it is iterated: the same events on every machine.
     `seconds` 0: the preset's length. simulation_presets() lists the presets."""
-    return _fbvins.simulate(preset, seed, seconds)
+    return _openable(_fbvins.simulate, preset, seed, seconds)
 
 
 def run(recording: Union[Recording, PathLike], frontend: Optional[str] = None, loop: bool = False, *, config: AnyConfig = None,
@@ -143,9 +152,10 @@ def info(recording: Union[Recording, PathLike], *, calibration: Optional[PathLik
 
 def doctor(recording: Union[Recording, PathLike], *, calibration: Optional[PathLike] = None, imu_calibration: Optional[PathLike] = None,
            topics: Tuple[str, ...] = ()) -> Diagnosis:
-    """What is wrong with a setup, from its recording (a path, or a Recording that has not been iterated): units, axes, clocks, calibration, images, as
-    `fbvins doctor` finds it."""
-    found = _fbvins.doctor(_opened(recording, calibration, imu_calibration, topics), calibration is not None)
+    """What is wrong with a setup, from its recording (a path, or a Recording that has not been iterated): units, axes, clocks, calibration, images,
+    common mistakes, as `fbvins doctor` finds it."""
+    opened = _opened(recording, calibration, imu_calibration, topics)
+    found = _fbvins.doctor(opened, opened._again, calibration is not None)
     return Diagnosis([Finding(**finding) for finding in found["findings"]], found["measured"], found["not_judged"], found["text"], found["rig"])
 
 

@@ -107,7 +107,8 @@ void bind_recording(nb::module_& m) {
 
   nb::class_<Dataset>(m, "Recording",
                       "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
-                      "It can be iterated once: ValueError when it is begun again after its end.")
+                      "It can be iterated once: ValueError when it is begun again after its end.",
+                      nb::dynamic_attr())
       .def_prop_ro("rig", &Dataset::rig, "the calibration")
       .def_prop_ro("name", [](const Dataset& d) { return d.info().name; })
       .def_prop_ro("format", [](const Dataset& d) { return d.info().format; })

@@ -7,8 +7,7 @@
 #include "bindings.hpp"
 #include "fbvins/bags/bag_survey.hpp"
 #include "fbvins/bags/recording.hpp"
-#include "fbvins/doctor/doctor.hpp"
-#include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/diagnose.hpp"
 #include "fbvins/report/report.hpp"
 #include "python_types.hpp"
 
@@ -39,18 +38,29 @@ std::string survey(const std::string& path, const std::string& calibration, cons
   return app::describe(*found).dump();
 }
 
-nb::dict examine_recording(Dataset& data, bool kalibr) {
-  require_fresh(data);
-  const Diagnosis diagnosis = [&] {
-    nb::gil_scoped_release released;
-    EvidenceGatherer gatherer(data.rig());
-    int frames = 0;
-    while (auto event = data.next()) {
-      if (!gatherer.push(*event)) break;
-      if (std::holds_alternative<StereoFrame>(*event)) check_signals(++frames);
+/// `again` opens the recording once more: common mistakes are each compared with all of it.
+nb::dict examine_recording(Dataset& recording, const nb::callable& again, bool kalibr) {
+  require_fresh(recording);
+  nb::object opened_again;
+  Dataset* data = &recording;
+  int frames = 0;
+  const Replay replay = [&](const TakeEvent& take) -> Result<void> {
+    if (data == nullptr) {
+      const nb::gil_scoped_acquire acquired;
+      opened_again = again();
+      data = &nb::cast<Dataset&>(opened_again);
     }
-    return examine(gatherer.finish(), kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
-  }();
+    while (auto event = data->next()) {
+      if (std::holds_alternative<StereoFrame>(*event)) check_signals(++frames);
+      if (!take(*std::move(event))) break;
+    }
+    data = nullptr;
+    return {};
+  };
+  const Diagnosis diagnosis = value_or_raise([&] {
+    nb::gil_scoped_release released;
+    return diagnose(recording.rig(), replay, kalibr ? CalibrationStyle::kalibr : CalibrationStyle::euroc);
+  }());
   nb::list findings;
   for (const Finding& f : diagnosis.findings) {
     nb::dict finding;
@@ -85,7 +95,7 @@ void bind_tools(nb::module_& m) {
   m.def(
       "info", [](const Dataset& data) { return app::describe(data).dump(); }, "recording"_a);
   m.def("survey", &survey, "path"_a, "calibration"_a, "left"_a, "right"_a, "imu"_a);
-  m.def("doctor", &examine_recording, "recording"_a, "kalibr"_a);
+  m.def("doctor", &examine_recording, "recording"_a, "again"_a, "kalibr"_a);
   m.def("convert", &convert, "recording"_a, "record"_a, "out"_a);
   m.def(
       "report",

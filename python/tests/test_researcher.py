@@ -136,6 +136,21 @@ def test_doctor(flight, tmp_path):
     assert "<pre>" in diagnosis._repr_html_()
 
 
+def test_doctor_compares_common_mistakes_as_the_command_does(program, flight, tmp_path):
+    wrong = tmp_path / "wrong"
+    subprocess.run(["cp", "-r", flight, wrong], check=True)
+    for camera in ("cam0", "cam1"):
+        file = wrong / "mav0" / camera / "sensor.yaml"
+        text = file.read_text()
+        start = text.index("data:", text.index("T_BS")) + len("data:")
+        end = text.index("]", start) + 1
+        inverse = np.linalg.inv(np.array(json.loads(text[start:end])).reshape(4, 4))
+        file.write_text(text[:start] + " " + json.dumps(inverse.ravel().tolist()) + text[end:])
+    diagnosis = fbvins.doctor(fbvins.open(wrong))
+    assert [finding.kind for finding in diagnosis.findings] == ["extrinsics_inverted"]
+    assert str(diagnosis) == subprocess.run([program, "doctor", wrong], capture_output=True, text=True).stdout.rstrip("\n")
+
+
 def test_report(run, tmp_path):
     page = pathlib.Path(fbvins.report(run, tmp_path / "report.html"))
     run.save(tmp_path / "folder") if (tmp_path / "folder").mkdir() is None else None

@@ -15,7 +15,7 @@ constexpr double kCoherent = 0.7;
 /// Above the excitation's frequencies, noise in the closed loop shows the inverse of the controller instead of the vehicle.
 constexpr double kFastest_hz = 6;
 /// Below this a window of four seconds has too few periods.
-constexpr double kSlowest_hz = 0.7;
+constexpr double kSlowestFitted_hz = 0.7;
 constexpr std::size_t kFewest = 6;
 constexpr double kDegrees = 180 / std::numbers::pi;
 
@@ -103,7 +103,7 @@ Result<RateFit> fit_rate(const std::vector<double>& torque, const std::vector<do
 Result<VelocityFit> fit_velocity(const std::vector<double>& asked, const std::vector<double>& velocity,
                                  const VelocityLoop& loop) {
   VelocityFit fit;
-  fit.points = coherent(frequency_response(asked, velocity, loop.filters.rate_hz, frequencies(kSlowest_hz, 3, 20)));
+  fit.points = coherent(frequency_response(asked, velocity, loop.filters.rate_hz, frequencies(kSlowestFitted_hz, 3, 20)));
   if (fit.points.size() < kFewest) return unseen("velocity");
   VelocityLoop model = loop;
   const auto judge = [&](const VelocityPlant& p) {

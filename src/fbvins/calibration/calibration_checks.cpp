@@ -9,6 +9,7 @@
 
 #include "fbvins/calibration/camera_start.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/calibration/refused.hpp"
 #include "fbvins/calibration/target_file.hpp"
 
 namespace fbvins {
@@ -18,8 +19,6 @@ constexpr int kFewestViews = 6;
 constexpr double kLeastBaseline_m = 1e-3;     ///< as every reader of calibrations demands it
 constexpr double kLargestFocalSigma = 5e-3;   ///< of the focal length near the axis
 constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
-
-Error refused(std::string sentence) { return {ErrorCode::invalid_argument, std::move(sentence)}; }
 
 /// Relative deviation of the focal length near the axis: of ds and omni not the parameter, but f / (1 + xi).
 double axial_focal_sigma(const CameraCalibration& found, int camera) {

@@ -13,7 +13,7 @@ namespace {
 
 /// Views of a point at least, in keyframes at least; points of a keyframe that are enough.
 constexpr std::size_t kFewestViews = 4;
-constexpr int kFewestKeyframes = 3, kEnough = 60;
+constexpr int kFewestSeeing = 3, kEnough = 60;
 constexpr double kNearest_m = 0.15;
 /// Root mean square distance from which the views are not of one point, even with a calibration that is somewhat wrong.
 constexpr double kWrong_px = 8;
@@ -63,7 +63,7 @@ std::vector<SeenPoint> seen_points(const std::vector<FlightKeyframe>& keyframes,
       tracks[view.track].views.push_back({static_cast<int>(i), view.camera, view.pixel});
   std::vector<SeenPoint> points;
   for (auto& [id, point] : tracks)
-    if (point.views.size() >= kFewestViews && keyframes_of(point) >= kFewestKeyframes) points.push_back(std::move(point));
+    if (point.views.size() >= kFewestViews && keyframes_of(point) >= kFewestSeeing) points.push_back(std::move(point));
   std::stable_sort(points.begin(), points.end(),
                    [](const SeenPoint& a, const SeenPoint& b) { return a.views.size() > b.views.size(); });
   std::vector<int> seen(keyframes.size(), 0);

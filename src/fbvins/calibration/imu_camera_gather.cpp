@@ -9,6 +9,7 @@
 
 #include "fbvins/calibration/detections_file.hpp"
 #include "fbvins/calibration/imu_camera_poses.hpp"
+#include "fbvins/calibration/refused.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/imu/reading_rate.hpp"
@@ -25,33 +26,32 @@ constexpr double kBiasNode_s = 0.5;
 constexpr double kDefaultSpacing_s = 0.02;
 constexpr int kRowGroups = 16;
 
-Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
 std::optional<Error> check_input(const ImuCameraInput& input) {
   if (input.cameras.empty() || static_cast<int>(input.cameras.size()) > kMostCameras)
-    return error(fmt::format("{} cameras are given: one to {} can be calibrated", input.cameras.size(), kMostCameras));
+    return refused(fmt::format("{} cameras are given: one to {} can be calibrated", input.cameras.size(), kMostCameras));
   if (!input.T_CnC0.empty() && input.T_CnC0.size() != input.cameras.size())
-    return error(fmt::format("{} cameras, but {} poses relative to the first one", input.cameras.size(), input.T_CnC0.size()));
+    return refused(fmt::format("{} cameras, but {} poses relative to the first one", input.cameras.size(), input.T_CnC0.size()));
   for (const BoardView& view : input.views) {
     if (view.camera < 0 || view.camera >= static_cast<int>(input.cameras.size()))
-      return error(fmt::format("a view is of camera {}, but {} are given", view.camera, input.cameras.size()));
+      return refused(fmt::format("a view is of camera {}, but {} are given", view.camera, input.cameras.size()));
     for (const BoardCorner& corner : view.corners)
       if (corner.index < 0 || corner.index >= input.board.corner_count() || !corner.pixel.allFinite())
-        return error(
+        return refused(
             fmt::format("corner {} is seen, but the board has corners 0 to {}", corner.index, input.board.corner_count() - 1));
   }
-  if (input.imu.size() < 2) return error("there are no IMU readings");
+  if (input.imu.size() < 2) return refused("there are no IMU readings");
   const double length_s = (input.imu.back().t - input.imu.front().t).seconds();
-  if (!(length_s < kLongest_s)) return error(fmt::format("the stamps of the IMU's readings span {:.0f} hours", length_s / 3600));
+  if (!(length_s < kLongest_s))
+    return refused(fmt::format("the stamps of the IMU's readings span {:.0f} hours", length_s / 3600));
   const ImuNoise& noise = input.noise;
   if (!(std::min({noise.gyro_noise_density_radps_rthz, noise.accel_noise_density_mps2_rthz, noise.gyro_random_walk_radps2_rthz,
                   noise.accel_random_walk_mps3_rthz}) > 0))
-    return error("a noise density or random walk of the IMU is not positive");
+    return refused("a noise density or random walk of the IMU is not positive");
   for (std::size_t i = 0; i < input.imu.size(); ++i) {
     if (!input.imu[i].gyro_radps.allFinite() || !input.imu[i].accel_mps2.allFinite())
-      return error(fmt::format("IMU reading {} is not a number", i));
+      return refused(fmt::format("IMU reading {} is not a number", i));
     if (i > 0 && input.imu[i].t <= input.imu[i - 1].t)
-      return error(fmt::format("IMU reading {} is not later than the one before", i));
+      return refused(fmt::format("IMU reading {} is not later than the one before", i));
   }
   return std::nullopt;
 }
@@ -59,16 +59,16 @@ std::optional<Error> check_input(const ImuCameraInput& input) {
 Result<TurnMatch> check_turns(const TurnMatch& match) {
   const double degrees = 1 / kDegree;
   if (match.gain > 0.7 * degrees && match.gain < 1.4 * degrees)
-    return error(
+    return refused(
         fmt::format("the gyroscope turns {:.1f} times as fast as the camera: it gives degrees/s, rad/s are needed", match.gain));
   if (match.gain > 1.25 || match.gain < 0.8)
-    return error(fmt::format("the gyroscope turns {:.3g} times as fast as the camera: its unit or scale is wrong", match.gain));
+    return refused(fmt::format("the gyroscope turns {:.3g} times as fast as the camera: its unit or scale is wrong", match.gain));
   if (match.spread_radps(0) < 2 * kWeakestTurning_radps)
-    return error(fmt::format(
+    return refused(fmt::format(
         "the rig was hardly turned ({:.1f}, {:.1f} and {:.1f} degrees/s about its axes): turn it quickly about all three",
         match.spread_radps(0) * degrees, match.spread_radps(1) * degrees, match.spread_radps(2) * degrees));
   if (match.spread_radps(1) < kWeakestTurning_radps)
-    return error(
+    return refused(
         fmt::format("the rig was turned about one axis only ({:.1f} degrees/s about the next one): turn it about all three",
                     match.spread_radps(1) * degrees));
   return match;
@@ -121,7 +121,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   const double begin_s = std::max(gyro.first_s(), body.front().t_s - kMargin_s);
   const double end_s = std::min(gyro.last_s(), body.back().t_s + kMargin_s);
   if (end_s - begin_s < kShortest_s)
-    return error(
+    return refused(
         fmt::format("images of the board and readings have {:.1f} s in common: {:g} s at least, better a minute, are needed",
                     std::max(0.0, end_s - begin_s), kShortest_s));
   for (BodyPose& pose : body) pose.t_s -= begin_s;
@@ -132,11 +132,11 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     if (const double t_s = (s.t - origin).seconds() - begin_s; t_s >= 0 && t_s <= end_s - begin_s)
       data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2});
   if (body.size() < kFewestBoardViews || data.readings.empty())
-    return error(
+    return refused(
         fmt::format("the board is seen in {} images while the IMU is there: {} are needed", body.size(), kFewestBoardViews));
   body = agreeing_with_gyro(body, data.readings, match->gyro_bias_radps);
   if (body.size() < kFewestBoardViews)
-    return error("the board's poses do not follow the turns of the IMU: is it the right board file?");
+    return refused("the board's poses do not follow the turns of the IMU: is it the right board file?");
 
   std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
   for (const auto& camera : *located)
@@ -152,7 +152,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
       data.views.push_back(std::move(v));
     }
   }
-  if (data.views.empty()) return error("no image of the board lies within the readings of the IMU");
+  if (data.views.empty()) return refused("no image of the board lies within the readings of the IMU");
   std::map<double, int> sharing;
   for (const CalibrationView& view : data.views) ++sharing[view.t_s];
   for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
@@ -175,7 +175,7 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
     force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
   state.gravity_T = -force_T;
   if (force_T.norm() > 0.8 && force_T.norm() < 1.2)
-    return error(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
+    return refused(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
 
   CalibrationSetup setup;
   setup.corner_sigma_px = std::max(0.02, median_of(sigmas));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/imu_camera_judge.hpp"
+#include "fbvins/calibration/refused.hpp"
 #include "fbvins/core/angle.hpp"
 
 #include <fmt/format.h>
@@ -15,8 +16,6 @@ constexpr double kNoticed = 1.3, kContradiction = 10;
 constexpr double kFreedCamera_m = 0.02, kFreedCamera_rad = 0.05;
 constexpr double kWorstScale = 0.015, kSure = 5, kUnsureScale = 0.02;  // of gravity and of the board's size: wrong, for certain
 constexpr double kWorstAxes = 0.15;
-
-Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 }  // namespace
 
@@ -48,11 +47,11 @@ std::optional<Error> check_agreement(const ImuCameraFit& fit) {
     setup.camera_sigma_m = kFreedCamera_m, setup.camera_sigma_rad = kFreedCamera_rad;
     freed.change(setup);
     if (freed.solve() && freed.judge() && freed.image_factor() < 0.5 * fit.image_factor())
-      return error(
+      return refused(
           "the cameras' poses relative to one another, as given, contradict the images: calibrate the cameras with this board first");
   }
   if (fit.image_factor() < kContradiction) return std::nullopt;
-  return error(fmt::format(
+  return refused(fmt::format(
       "the images contradict the readings: the board is off by {:.0f} times the corners' noise; a lens, the stamps of the "
       "images (or a rolling shutter) or the noise of the IMU is not as given",
       fit.image_factor()));
@@ -61,12 +60,12 @@ std::optional<Error> check_agreement(const ImuCameraFit& fit) {
 std::optional<Error> check_magnitudes(const Magnitudes& m, const Board& board, double given) {
   const double off = std::abs(m.gravity_mps2 - given);
   if (off > kWorstScale * given && off > kSure * m.gravity_sigma)
-    return error(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}",
-                             m.gravity_mps2, m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
+    return refused(fmt::format("gravity is measured as {:.3f} +- {:.3f} m/s^2: the accelerometer's scale is wrong{}",
+                               m.gravity_mps2, m.gravity_sigma, off < kWorstAxes * given ? ", or has to be estimated" : ""));
   if (m.scale < 0 && -m.scale > kSure * m.scale_sigma)
-    return error("the images move against the accelerometer: they, or the board's print, are mirrored");
+    return refused("the images move against the accelerometer: they, or the board's print, are mirrored");
   if (std::abs(m.scale - 1) > kWorstScale && std::abs(m.scale - 1) > kSure * m.scale_sigma)
-    return error(
+    return refused(
         fmt::format("the board is not as large as its file says: {:.1f} +- {:.1f} mm by the accelerometer instead of {:.1f} mm",
                     1e3 * m.scale * board.size_m, 1e3 * m.scale_sigma * board.size_m, 1e3 * board.size_m));
   return std::nullopt;
@@ -76,7 +75,7 @@ std::optional<Error> check_axes(const ImuTriads& axes) {
   const double off =
       std::max((axes.gyro - Mat3::Identity()).cwiseAbs().maxCoeff(), (axes.accel - Mat3::Identity()).cwiseAbs().maxCoeff());
   if (off < kWorstAxes) return std::nullopt;
-  return error(fmt::format(
+  return refused(fmt::format(
       "the scale or an axis of the IMU would have to be wrong by {:.0f} %: its unit is wrong, or the recording does not "
       "determine it",
       100 * off));
@@ -88,17 +87,17 @@ std::optional<Error> check_determined(const CameraImuResult& result, const Vec3&
   for (std::size_t c = 0; c < result.cameras.size(); ++c) {
     const Mat6& P = result.cameras[c].covariance;
     if (const double turn = worst(P.bottomRightCorner<3, 3>()); !(turn < kWorstTurn_rad))
-      return error(fmt::format(
+      return refused(fmt::format(
           "the rotation of camera {} on the IMU stays uncertain to {:.2f} degrees: turn about all three axes, for a minute", c,
           turn / kDegree));
     if (const double lever = worst(P.topLeftCorner<3, 3>()); !(lever < kWorstLever_m))
-      return error(fmt::format(
+      return refused(fmt::format(
           "the place of camera {} on the IMU stays uncertain to {:.1f} mm: turn faster and about all three axes (now by "
           "{:.0f}, {:.0f} and {:.0f} degrees/s)",
           c, 1e3 * lever, turning_radps(0) / kDegree, turning_radps(1) / kDegree, turning_radps(2) / kDegree));
   }
   if (!(result.time_offset_sigma_s < kWorstOffset_s))
-    return error(fmt::format("the time offset stays uncertain to {:.1f} ms: turn faster", 1e3 * result.time_offset_sigma_s));
+    return refused(fmt::format("the time offset stays uncertain to {:.1f} ms: turn faster", 1e3 * result.time_offset_sigma_s));
   return std::nullopt;
 }
 

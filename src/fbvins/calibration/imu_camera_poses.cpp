@@ -8,6 +8,7 @@
 #include <map>
 
 #include "fbvins/calibration/board_pose.hpp"
+#include "fbvins/calibration/refused.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -17,8 +18,6 @@ constexpr std::size_t kFewestCorners = 8;
 constexpr double kPoorFit = 2.5;        // of a pose, over the median
 constexpr double kWorstFit_px = 4;      // median over the images of one camera
 constexpr double kWeakestTurns = 0.75;  // correlation of a camera's turns with the IMU's
-
-Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 /// Of a camera on the first one, from images of both at the same time; nullopt without such.
 std::optional<Pose<C0, Cn>> seen_from_first(const std::vector<SeenPose>& first, const std::vector<SeenPose>& other) {
@@ -55,16 +54,16 @@ Result<CameraPoses> locate_all(const ImuCameraInput& input, Time reference) {
   }
   for (std::size_t c = 0; c < poses.size(); ++c) {
     if (seen[c] >= kFewestBoardViews && 2 * poses[c].size() < seen[c])
-      return error(fmt::format(
+      return refused(fmt::format(
           "the corners that camera {} sees do not lie as on this board: is it the right board file and the right lens?", c));
     if (poses[c].size() < kFewestBoardViews)
-      return error(fmt::format("camera {} shows the board in {} images with at least {} corners: {} are needed", c,
-                               poses[c].size(), kFewestCorners, kFewestBoardViews));
+      return refused(fmt::format("camera {} shows the board in {} images with at least {} corners: {} are needed", c,
+                                 poses[c].size(), kFewestCorners, kFewestBoardViews));
     std::sort(poses[c].begin(), poses[c].end(), [](const SeenPose& a, const SeenPose& b) { return a.t_s < b.t_s; });
     std::vector<double> fits;
     for (const SeenPose& pose : poses[c]) fits.push_back(pose.sigma_px);
     if (const double fit = median_of(fits); fit > kWorstFit_px)
-      return error(fmt::format(
+      return refused(fmt::format(
           "the corners that camera {} sees do not lie as on this board ({:.1f} px off, in the median): is it the right "
           "board file and the right lens?",
           c, fit));
@@ -94,7 +93,7 @@ Result<std::vector<Pose<B, Cn>>> first_extrinsics(const ImuCameraInput& input, c
     } else {
       const auto own = match_turns_at(poses[c], gyro, match.time_offset_s);
       if (!own || own->agreement < kWeakestTurns)
-        return error(fmt::format("camera {} does not turn as camera 0 and the IMU do: is it of the same recording?", c));
+        return refused(fmt::format("camera {} does not turn as camera 0 and the IMU do: is it of the same recording?", c));
       T_BC.push_back({own->R_BC, Vec3(Vec3::Zero())});
     }
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/calibration/imu_camera_start.hpp"
+#include "fbvins/calibration/refused.hpp"
 
 #include <fmt/format.h>
 
@@ -79,8 +80,6 @@ TurnMatch match_of(const Moments& m, double offset_s) {
   return match;
 }
 
-Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
 }  // namespace
 
 GyroIntegral::GyroIntegral(const std::vector<ImuSample>& readings, Time reference) {
@@ -132,7 +131,7 @@ Result<TurnMatch> match_turns(const std::vector<SeenPose>& poses, const GyroInte
     most = std::max(most, coarse.back().pairs);
   }
   if (most == 0)
-    return error(
+    return refused(
         fmt::format("the board is never seen in two images in a row while the IMU is there (offsets of the clocks up to {:g} s "
                     "were tried)",
                     max_offset_s));
@@ -149,16 +148,16 @@ Result<TurnMatch> match_turns(const std::vector<SeenPose>& poses, const GyroInte
   const double agreement = coarse[best].agreement;
   const bool found = agreement >= kStrong || (agreement >= kWeakest && agreement > kStandsOut * runner_up);
   if (!found && mirrored > kStrong)
-    return error(
+    return refused(
         "the IMU turns as the camera does only if its axes are left-handed: one of its axes has the wrong sign, or two are "
         "swapped");
   if (!found)
-    return error(
+    return refused(
         fmt::format("at no offset of the clocks up to {:g} s does the IMU turn as the camera does (best correlation {:.2f}): "
                     "is it the same recording, and was it turned irregularly?",
                     max_offset_s, agreement));
   if (runner_up > kAmbiguous * agreement)
-    return error(
+    return refused(
         fmt::format("the offset of the clocks is not shown, because the motion repeats itself (another offset more than {:g} s "
                     "away fits as well): turn irregularly",
                     kPeak_s));

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fbvins/calibration/allan.hpp"
+#include "fbvins/calibration/refused.hpp"
 #include "fbvins/core/median.hpp"
 
 namespace fbvins {
@@ -19,8 +20,6 @@ constexpr double kTurned_radps = 0.01, kPushed_mps2 = 0.1;           // a window
 constexpr double kShaken = 3;                                        // standard deviation within a window over a quiet one's
 constexpr double kGap_s = 0.1;
 constexpr double kWorstMisfit = 6;
-
-Error error(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 /// A second of readings.
 struct Window {
@@ -120,19 +119,19 @@ void warn(const Rest& rest, double missing_share, ImuNoiseResult& out) {
 }  // namespace
 
 Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings) {
-  if (readings.size() < 2 || readings.back().t <= readings.front().t) return error("there are no IMU readings");
+  if (readings.size() < 2 || readings.back().t <= readings.front().t) return refused("there are no IMU readings");
   std::vector<double> periods;
   for (std::size_t i = 0; i + 1 < readings.size(); ++i) periods.push_back((readings[i + 1].t - readings[i].t).seconds());
   const double period_s = median_of(periods), length_s = (readings.back().t - readings.front().t).seconds();
-  if (!(period_s > 0)) return error("the stamps of the IMU's readings do not grow");
+  if (!(period_s > 0)) return refused("the stamps of the IMU's readings do not grow");
   if (length_s < kShortest_s)
-    return error(
+    return refused(
         fmt::format("{:.1f} s of readings are too short for the IMU's noise: {:g} s of rest at least, better several minutes",
                     length_s, kShortest_s));
   const auto size = static_cast<std::size_t>(std::max(4.0, std::round(kWindow_s / period_s)));
   std::vector<Window> windows;
   for (std::size_t i = 0; i + size <= readings.size(); i += size) windows.push_back(window_of(readings, i, i + size));
-  if (windows.empty()) return error("there are too few IMU readings");
+  if (windows.empty()) return refused("there are too few IMU readings");
   const Rest rest = longest_rest(windows);
   ImuNoiseResult out;
   if (rest.end > rest.begin) {
@@ -140,14 +139,14 @@ Result<ImuNoiseResult> measure_imu_noise(const std::vector<ImuSample>& readings)
     out.duration_s = (readings[rest.end - 1].t - out.start).seconds();
   }
   if (out.duration_s < kShortest_s)
-    return error(fmt::format(
+    return refused(fmt::format(
         "the longest rest in {:.0f} s of readings is {:.1f} s: {:g} s at least are needed, on something that does not move",
         length_s, out.duration_s, kShortest_s));
   Vec3 force = Vec3::Zero();
   for (std::size_t i = rest.begin; i < rest.end; ++i)
     force += readings[i].accel_mps2 / static_cast<double>(rest.end - rest.begin);
   if (force.norm() < 9 || force.norm() > 10.6)
-    return error(
+    return refused(
         fmt::format("at rest the accelerometer reads {:.2f} m/s^2 instead of 9.8: its unit or scale is wrong", force.norm()));
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);

@@ -14,7 +14,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargest_bytes = 1u << 20u;
+constexpr std::uint64_t kLargestSurvey_bytes = 1u << 20u;
 constexpr double kSmallest_m = 0.01, kLargest_m = 3, kUnit = 1e-3;
 
 Quat orientation_of(YamlReader& yaml, const YAML::Node& tag) {
@@ -75,7 +75,7 @@ Result<TagSurvey> parse_tags(const std::string& text, const std::string& file) {
 }
 
 Result<TagSurvey> load_tags(const std::string& path) {
-  const Result<std::string> text = read_file(path, kLargest_bytes);
+  const Result<std::string> text = read_file(path, kLargestSurvey_bytes);
   if (!text) return text.error();
   return parse_tags(*text, path);
 }

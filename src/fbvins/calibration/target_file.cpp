@@ -11,7 +11,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargest_bytes = 1u << 20u;
+constexpr std::uint64_t kLargestTarget_bytes = 1u << 20u;
 constexpr double kSmallestSize_m = 1e-3, kLargestSize_m = 2;
 
 int read_count(YamlReader& yaml, const std::string& field, int least) {
@@ -85,7 +85,7 @@ Result<Board> parse_target(const std::string& text, const std::string& file) {
 }
 
 Result<Board> load_target(const std::string& path) {
-  Result<std::string> text = read_file(path, kLargest_bytes);
+  Result<std::string> text = read_file(path, kLargestTarget_bytes);
   if (!text) return text.error();
   return parse_target(*text, path);
 }
