@@ -126,21 +126,21 @@ Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosG
 
 /// From the first reading to the end of the outputs.
 Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, Source& source, const RosGraph& graph,
-                              KeptMap* kept, LiveTally& tally, Troubles& troubles) {
+                              KeptMap* kept, LoopMap* map, LiveTally& tally, Troubles& troubles) {
   std::unique_ptr<ResetCounterSink> counter;
   if (!arguments.outputs.reset_counter.empty()) counter = std::make_unique<ResetCounterSink>(arguments.outputs.reset_counter);
   if (counter && counter->was_unreadable())
     warn(fmt::format("{}: there is no reset counter in it; the first one is {}", arguments.outputs.reset_counter,
                      counter->first()));
+  LiveFlight flight{config, source, arguments.source, arguments.map, kept, map};  // before `live`, whose services use it
   SystemParts parts{.mapper = kept, .imu_state = imu_state_for_flight(arguments.imu_state, source.rig().imu_noise)};
   auto live = LiveSystem::create(config, config.live, source.rig(), source.clock_rate(), std::move(parts),
                                  counter ? counter->first() : 0);
   if (!live) return live.error();
-  const LiveFlight flight{config, source, arguments.source, arguments.map, kept};
   if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
   if (counter) live->add_sink(std::move(counter));
   if (Result<void> added = add_outputs(arguments.outputs, flight, *live, tally, troubles); !added) return added;
-  if (Result<void> added = graph.add_sink(source, config.live, *live); !added) return added;
+  if (Result<void> added = graph.add_sinks(source, config, flight_commands(flight, *live), *live); !added) return added;
   const auto faults = faults_of(arguments);
   if (!faults) return faults.error();
   if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)
@@ -184,9 +184,10 @@ int run(Arguments arguments) {
   if (*map)
     kept.emplace(
         **map, [from = map->get()] { return from->bytes(); }, kept_file);
+  if (kept) kept->save_requested_to(arguments.map.save);
   LiveTally tally;
   Troubles troubles;
-  troubles.add(fly_with_outputs(arguments, *config, **source, *graph, kept ? &*kept : nullptr, tally, troubles));
+  troubles.add(fly_with_outputs(arguments, *config, **source, *graph, kept ? &*kept : nullptr, map->get(), tally, troubles));
   if (tally.last.host_t == Time{}) return kBadInput;  // it did not fly
   save(arguments, *config, **source, map->get(), tally, troubles);
   if (troubles.any()) return kBadInput;
@@ -250,6 +251,10 @@ void add_live_command(CLI::App& program, int& exit_code) {
                    "MB of its disk that the record leaves free for maps; it ends before")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command
+      ->add_flag("--record-on-request", outputs.record_on_request,
+                 "do not begin the record with the flight, but when start_record is called (docs/ros2.md)")
+      ->needs("--record");
   command->add_flag("!--record-no-images", outputs.record_images,
                     "leave images out of the record, which cannot be run again then");
   command->add_flag("--quiet", outputs.quiet, "print nothing but errors and warnings");

@@ -26,10 +26,13 @@ KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string fi
     : map_(map), bytes_(std::move(bytes)), file_(std::move(file)), writer_(std::move(write)) {}
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
+  do_what_waits();
   MapUpdate update = map_.process(keyframe);
   if (!writer_.idle()) return update;
-  if (told_ && wanted_.exchange(false)) {
-    writer_.write(requested_file_, bytes_(), told_);
+  if (std::vector<Told> wanted = (std::lock_guard(mutex_), std::exchange(wanted_, {})); !wanted.empty()) {
+    writer_.write(requested_file_, bytes_(), [wanted = std::move(wanted)](const Result<void>& saved) {
+      for (const Told& told : wanted) told(saved);
+    });
   } else if (due(keyframe.t)) {
     writer_.write(file_, bytes_(), [this](const Result<void>& saved) {
       if (!saved && !warned_) warn(saved.error().message);
@@ -37,6 +40,33 @@ MapUpdate KeptMap::process(const Keyframe& keyframe) {
     });
   }
   return update;
+}
+
+void KeptMap::finish() {
+  wait();
+  const std::lock_guard lock(mutex_);
+  for (const Told& told : std::exchange(wanted_, {}))
+    told(Error{ErrorCode::unwritable, "the flight ended before its next keyframe"});
+  to_be_done_.clear();
+}
+
+void KeptMap::request_save(Told told) {
+  const std::lock_guard lock(mutex_);
+  wanted_.push_back(std::move(told));
+}
+
+void KeptMap::before_next_keyframe(std::function<void()> act) {
+  const std::lock_guard lock(mutex_);
+  to_be_done_.push_back(std::move(act));
+}
+
+void KeptMap::do_what_waits() {
+  std::vector<std::function<void()>> acts;
+  {
+    const std::lock_guard lock(mutex_);
+    acts.swap(to_be_done_);
+  }
+  for (const auto& act : acts) act();
 }
 
 bool KeptMap::due(Time t) {

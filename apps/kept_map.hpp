@@ -2,10 +2,11 @@
 // The map of a live flight, written periodically during the flight, so that a killed program leaves a map.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include "apps/file_writer.hpp"
 #include "apps/run_map.hpp"
@@ -24,24 +25,32 @@ class KeptMap final : public Mapper {
   KeptMap(Mapper& map, std::function<std::string()> bytes, std::string file, WriteFile write = write_file_atomically);
   MapUpdate process(const Keyframe& keyframe) override;
 
-  /// Waits until the file being written is complete. The receiver of on_request() may be destroyed afterwards.
-  void finish() const { writer_.wait(); }
-  /// The map is written after the next keyframe. From any thread.
-  void request_save() { wanted_ = true; }
-  /// To be called before the first keyframe: the file for requested maps, and who is told the result, on the writer's thread.
-  void on_request(std::string file, Told told) { requested_file_ = std::move(file), told_ = std::move(told); }
+  /// Until the file being written is complete.
+  void wait() const { writer_.wait(); }
+  /// After the last keyframe: waits until the file being written is complete, and tells those who still wait for one that none
+  /// comes. Nobody is told anything afterwards.
+  void finish();
+  /// To be called before the first keyframe: the file for requested maps.
+  void save_requested_to(std::string file) { requested_file_ = std::move(file); }
+  /// The map is written after the next keyframe, once for all who have asked until then; `told` is called on the writer's thread.
+  /// From any thread.
+  void request_save(Told told);
+  /// On the thread of loop closure, before the next keyframe. From any thread.
+  void before_next_keyframe(std::function<void()> act);
 
  private:
   bool due(Time t);
+  void do_what_waits();
 
   Mapper& map_;
   std::function<std::string()> bytes_;
   std::string file_, requested_file_;
-  Told told_;
   Time written_;         ///< keyframe's time
   bool warned_ = false;  ///< on the writer's thread
-  std::atomic<bool> wanted_{false};
-  FileWriter writer_;  ///< last: its thread uses the members above
+  std::mutex mutex_;
+  std::vector<Told> wanted_;                       ///< guarded by mutex_
+  std::vector<std::function<void()>> to_be_done_;  ///< guarded by mutex_
+  FileWriter writer_;                              ///< last: its thread uses the members above
 };
 
 /// The map of `--map FILE`: continued if the file exists. An unusable file is set aside, said, and a new map begun; where that is

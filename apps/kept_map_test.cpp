@@ -98,23 +98,52 @@ TEST_F(KeptMapTest, ASlowDiskHoldsUpNoKeyframeAndTheNewestMapIsNext) {
 TEST_F(KeptMapTest, ARequestedMapIsToldWhenItIsWritten) {
   std::vector<bool> told;
   std::mutex mutex;
-  kept.on_request("wish.fbm", [&](const Result<void>& saved) {
+  const KeptMap::Told note = [&](const Result<void>& saved) {
     const std::lock_guard lock(mutex);
     told.push_back(saved.ok());
-  });
-  kept.request_save();
+  };
+  kept.save_requested_to("wish.fbm");
+  kept.request_save(note);
   kept.process(at_s(0));
-  kept.request_save();
+  kept.request_save(note);
   disk.wait_for_begin(1);
   kept.process(at_s(1));
   EXPECT_TRUE((std::lock_guard(mutex), told.empty()));
   disk.open(Error{ErrorCode::unwritable, "full"});
-  kept.finish();
+  kept.wait();
   kept.process(at_s(2));
   kept.finish();
   EXPECT_EQ(told, (std::vector<bool>{false, false})) << "the second wish was not lost";
   EXPECT_EQ(disk.begun()[1].first, "wish.fbm");
   EXPECT_EQ(disk.begun()[1].second, "map of 3");
+}
+
+TEST_F(KeptMapTest, OneFileServesAllWhoAskedAndTheEndTellsTheRest) {
+  std::vector<std::string> told;
+  const auto note = [&](const char* who) {
+    return [&told, who](const Result<void>& saved) { told.push_back(who + std::string(saved ? ": saved" : ": not")); };
+  };
+  kept.save_requested_to("wish.fbm");
+  kept.request_save(note("page"));
+  kept.request_save(note("ROS"));
+  disk.open();
+  kept.process(at_s(0));
+  kept.finish();
+  EXPECT_EQ(told, (std::vector<std::string>{"page: saved", "ROS: saved"}));
+  EXPECT_EQ(disk.begun().size(), 1u);
+  kept.request_save(note("late"));
+  kept.finish();
+  EXPECT_EQ(told.back(), "late: not");
+}
+
+TEST_F(KeptMapTest, WhatIsAskedForIsDoneBeforeTheNextKeyframe) {
+  std::vector<int> keyframes;
+  kept.process(at_s(0));
+  kept.before_next_keyframe([&] { keyframes.push_back(mapper.keyframes); });
+  EXPECT_TRUE(keyframes.empty());
+  kept.process(at_s(1));
+  kept.process(at_s(2));
+  EXPECT_EQ(keyframes, std::vector<int>{1}) << "once";
 }
 
 class MakeKeptMap : public ::testing::Test {

@@ -14,7 +14,6 @@
 #include "apps/web_page.hpp"
 #include "fbvins/config/config_file.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
-#include "fbvins/live/record_sink.hpp"
 #include "fbvins/live/service_sink.hpp"
 #include "fbvins/live/status_sink.hpp"
 #include "fbvins/mavlink/vehicle_frames.hpp"
@@ -27,15 +26,20 @@ void go_on_without(const char* name, const Error& error, LiveSystem& live, Troub
   live.add_sink(std::make_unique<MissingOutput>(name, error.message));
 }
 
-void add_record(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, Troubles& troubles) {
-  auto record = RecordSink::create_next(
-      arguments.record, flight.source.rig(),
-      {.program = "fbvins " FBVINS_VERSION, .configuration = to_yaml(flight.config), .images = arguments.record_images},
-      {.keep_free_bytes = static_cast<std::uint64_t>(arguments.record_keep_free_mb * 1e6)});
-  if (!record) return go_on_without("record", record.error(), live, troubles);
-  if ((*record)->path() != arguments.record)
-    note(fmt::format("{} exists already; this flight's record is {}", arguments.record, (*record)->path()));
-  live.add_sink(*std::move(record));
+void add_record(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, Troubles& troubles) {
+  const FlightRecordOptions options{
+      .program = "fbvins " FBVINS_VERSION, .configuration = to_yaml(flight.config), .images = arguments.record_images};
+  const RecordSpace space{.keep_free_bytes = static_cast<std::uint64_t>(arguments.record_keep_free_mb * 1e6)};
+  auto record = std::make_unique<RecordSwitch>(
+      [=, path = arguments.record, rig = flight.source.rig()] { return RecordSink::create_next(path, rig, options, space); });
+  flight.record = record.get();
+  if (!arguments.record_on_request) {
+    const Result<std::string> begun = record->start();
+    if (!begun) troubles.add(begun.error());  // the status says it, too
+    else if (*begun != arguments.record)
+      note(fmt::format("{} exists already; this flight's record is {}", arguments.record, *begun));
+  }
+  live.add_sink(std::move(record));
 }
 
 /// It also wants to see the frontend's frames.
@@ -48,13 +52,6 @@ void add_files(const OutputArguments& arguments, const LiveFlight& flight, LiveS
   if (!files) return go_on_without("files", files.error(), live, troubles);
   live.on_tracked_frame([to = files->get()](const TrackedFrame& frame) { to->add(frame); });
   live.add_sink(std::move(*files));
-}
-
-/// Why the page's button cannot save the map; empty: it can.
-std::string cannot_save_map(const MapArguments& map) {
-  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
-  if (map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
-  return {};
 }
 
 /// How the IMU sits on the vehicle, where the configuration says so.
@@ -71,7 +68,13 @@ void Troubles::add(const Error& error) {
   any_ = true;
 }
 
-Result<void> add_outputs(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, LiveTally& tally,
+std::string cannot_save_map(const MapArguments& map) {
+  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
+  if (map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
+  return {};
+}
+
+Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTally& tally,
                          Troubles& troubles) {
   live.add_sink(tally.make_sink());
   if (!arguments.record.empty()) add_record(arguments, flight, live, troubles);
@@ -100,14 +103,13 @@ Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSy
                               .cannot_save_map = cannot_save_map(flight.map),
                               .q_B_vehicle = vehicle_axes(flight.config.live.mavlink.mounting),
                               .mark = [&live](std::string text) { live.mark(std::move(text)); },
-                              .save_map = [map] { map->request_save(); }});
+                              .save_map =
+                                  [map, file = flight.map.save](const TellPage& tell) {
+                                    map->request_save([file, tell](const Result<void>& saved) {
+                                      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
+                                    });
+                                  }});
   if (!page) return page.error();
-  if (map) {
-    const std::string& file = flight.map.save;
-    map->on_request(file, [file, tell = page->tell](const Result<void>& saved) {
-      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
-    });
-  }
   live.add_sink(std::move(page->sink));
   return page->begin();
 }

@@ -12,7 +12,9 @@
 #include "apps/kept_map.hpp"
 #include "apps/live_summary.hpp"
 #include "fbvins/config/config.hpp"
+#include "fbvins/live/flight_command.hpp"
 #include "fbvins/live/live_system.hpp"
+#include "fbvins/live/record_switch.hpp"
 
 namespace fbvins::app {
 
@@ -20,6 +22,7 @@ struct OutputArguments {
   std::string out, record, web, reset_counter;
   std::vector<std::string> mavlink;
   bool record_images = true, quiet = false;
+  bool record_on_request = false;  ///< the record does not begin by itself
   double record_keep_free_mb = 256;
 };
 
@@ -54,12 +57,18 @@ struct LiveFlight {
   const Source& source;
   std::string source_name;
   const MapArguments& map;
-  KeptMap* kept = nullptr;  ///< null: no map
+  KeptMap* kept = nullptr;         ///< null: no map
+  LoopMap* loop_map = nullptr;     ///< what is kept
+  RecordSwitch* record = nullptr;  ///< set by add_outputs(); null: no file for records was named
 };
 
 /// Adds the sinks that the command line asks for. Errors: a wrong command line, a service manager that is not there.
-Result<void> add_outputs(const OutputArguments& arguments, const LiveFlight& flight, LiveSystem& live, LiveTally& tally,
+Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTally& tally,
                          Troubles& troubles);
+/// reset, save_map, load_map, start_record and stop_record. `flight` and `live` must outlive them.
+std::vector<FlightCommand> flight_commands(const LiveFlight& flight, LiveSystem& live);
+/// Why the map cannot be saved on request; empty: it can.
+std::string cannot_save_map(const MapArguments& map);
 /// The page, which serves when all sinks are there: its viewers' commands reach them.
 Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSystem& live);
 

@@ -43,7 +43,10 @@ class LiveOutputs : public ::testing::Test {
     EXPECT_TRUE(made) << (made ? "" : made.error().message);
     return std::move(*made);
   }
-  Result<void> add_to(LiveSystem& to) { return add_outputs(arguments, {config, source, "none", map}, to, tally, troubles); }
+  Result<void> add_to(LiveSystem& to) {
+    LiveFlight flight{config, source, "none", map};
+    return add_outputs(arguments, flight, to, tally, troubles);
+  }
 
   const std::string folder = ::testing::TempDir() + "/fbvins_live_outputs_" + std::to_string(getpid());
   Config config;

@@ -1,7 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/ros_graph.hpp"
 
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "apps/terminal.hpp"
+#include "fbvins/config/option_tiers.hpp"
+
 #ifdef FBVINS_WITH_ROS2
+#include "fbvins/ros2/ros2_control.hpp"
+#include "fbvins/ros2/ros2_image_sink.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
 #include "fbvins/ros2/ros2_sink.hpp"
 #include "fbvins/ros2/ros2_source.hpp"
@@ -12,7 +21,27 @@ namespace {
 
 constexpr std::string_view kSourceKind = "ros2:";
 
+RosParameter parameter_of(const OptionField& field) {
+  RosParameter out{field.path, {}, field.meaning, field.range_text(), field.min, field.max};
+  if (!field.unit.empty()) out.description += " [" + field.unit + "]";
+  if (bool* const* yes = std::get_if<bool*>(&field.value)) out.value = **yes;
+  else if (int* const* whole = std::get_if<int*>(&field.value)) out.value = std::int64_t{**whole};
+  else if (double* const* number = std::get_if<double*>(&field.value)) out.value = **number;
+  else out.value = field.value_text();
+  return out;
+}
+
 }  // namespace
+
+std::vector<RosParameter> ros_parameters(Config config) {
+  const auto users = user_options();
+  std::vector<RosParameter> out;
+  for (const OptionField& field : fields_of(config)) {
+    const bool shown = field.path.starts_with("live.") || std::ranges::find(users, field.path) != users.end();
+    if (shown && !field.is_group()) out.push_back(parameter_of(field));
+  }
+  return out;
+}
 
 #ifdef FBVINS_WITH_ROS2
 
@@ -39,11 +68,18 @@ Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions& optio
   return std::unique_ptr<Source>(std::move(*source));
 }
 
-Result<void> RosGraph::add_sink(const Source& source, const LiveOptions& options, LiveSystem& live) const {
+Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std::vector<FlightCommand> commands,
+                                 LiveSystem& live) const {
   if (!publishes_) return {};
-  auto sink = Ros2Sink::create(node_, source.rig(), options);
+  auto sink = Ros2Sink::create(node_, source.rig(), config.live);
   if (!sink) return sink.error();
+  auto control = Ros2Control::create(node_, std::move(commands), ros_parameters(config), warn);
+  if (!control) return control.error();
+  auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);
+  if (!images) return images.error();
   live.add_sink(std::move(*sink));
+  live.add_sink(std::move(*images));
+  live.add_sink(std::move(*control));
   return {};
 }
 
@@ -56,7 +92,7 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
 Result<std::unique_ptr<Source>> RosGraph::open_source(const SourceOptions&) const {
   return Error{ErrorCode::invalid_argument, "this program was built without ROS 2 topics"};
 }
-Result<void> RosGraph::add_sink(const Source&, const LiveOptions&, LiveSystem&) const { return {}; }
+Result<void> RosGraph::add_sinks(const Source&, const Config&, std::vector<FlightCommand>, LiveSystem&) const { return {}; }
 
 #endif
 

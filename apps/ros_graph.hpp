@@ -5,9 +5,12 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "fbvins/config/config.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/live/live_options.hpp"
+#include "fbvins/io/ros_services.hpp"
+#include "fbvins/live/flight_command.hpp"
 #include "fbvins/live/live_system.hpp"
 #include "fbvins/live/make_source.hpp"
 
@@ -17,6 +20,9 @@ class Ros2Node;
 
 namespace fbvins::app {
 
+/// The options that ROS 2 shows as parameters: those for users (`fbvins config`), and all of `live`.
+std::vector<RosParameter> ros_parameters(Config config);
+
 class RosGraph {
  public:
   /// `address`: DOMAIN[:INTERFACE], empty: publish nothing. `source`: the flight's source, of any kind.
@@ -24,7 +30,8 @@ class RosGraph {
 
   bool has_source() const { return !topics_.empty(); }
   Result<std::unique_ptr<Source>> open_source(const SourceOptions& options) const;
-  Result<void> add_sink(const Source& source, const LiveOptions& options, LiveSystem& live) const;
+  /// Publishes the flight, and offers the commands as services and the configuration as parameters.
+  Result<void> add_sinks(const Source& source, const Config& config, std::vector<FlightCommand> commands, LiveSystem& live) const;
 
  private:
   std::shared_ptr<Ros2Node> node_;

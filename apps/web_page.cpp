@@ -81,11 +81,14 @@ Result<LivePage> open_live_page(LivePageOptions options) {
   auto web = web_options(options.where);
   if (!web) return web.error();
   web->try_again = kTryAgain;
-  auto sink = WebSink::prepare(*web, described(std::move(flight)),
-                               {.mark = std::move(options.mark), .save_map = std::move(options.save_map)});
+  const auto page_of = std::make_shared<WebSink*>(nullptr);  // known once the sink is there, before it serves
+  const auto save_map = [page_of, save = std::move(options.save_map)] {
+    save([page_of](const std::string& sentence, bool bad) { (*page_of)->tell(sentence, bad); });
+  };
+  auto sink = WebSink::prepare(*web, described(std::move(flight)), {.mark = std::move(options.mark), .save_map = save_map});
+  *page_of = sink.get();
   LivePage page;
   page.begin = [to = sink.get()] { return begin(*to); };
-  page.tell = [to = sink.get()](const std::string& sentence, bool bad) { to->tell(sentence, bad); };
   page.sink = std::move(sink);
   return page;
 }

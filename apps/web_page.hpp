@@ -20,19 +20,19 @@ inline constexpr const char* kWebHelp =
 Result<void> show_finished_flight(const std::string& flight, const std::string& recording, const std::string& where);
 
 /// A live flight's page as a sink. It serves from `begin` on, which is called when all sinks are there. While its address is in
-/// use it tries again every other second, and says so in the status. `tell` may be used, from any thread, as long as the sink
-/// lives.
+/// use it tries again every other second, and says so in the status.
 struct LivePage {
   std::unique_ptr<Sink> sink;
   std::function<Result<void>()> begin;
-  std::function<void(const std::string& sentence, bool bad)> tell;
 };
+/// Shows a sentence on the page; from any thread, as long as the sink lives.
+using TellPage = std::function<void(const std::string& sentence, bool bad)>;
 struct LivePageOptions {
   std::string where, source, frontend;
   std::string cannot_save_map;      ///< why not; empty: it can
   std::optional<Quat> q_B_vehicle;  ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
   std::function<void(std::string)> mark;
-  std::function<void()> save_map;
+  std::function<void(const TellPage& tell)> save_map;
 };
 Result<LivePage> open_live_page(LivePageOptions options);
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`fbvins live` in a ROS 2 graph with an independent peer: the Python package of CycloneDDS publishes a flight's images and IMU
-readings, and receives what FBVINS publishes; `rosbags` encodes the same values, and the bytes must be the same.
+readings, and receives what FBVINS publishes; `rosbags` encodes the same values, and the bytes must be the same. Meanwhile a client asks
+FBVINS's services as rmw_cyclonedds_cpp does.
 
 usage: ros2_peer.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
 Environment: FBVINS_DDS_PEER, a program that does both with another DDS instead: PEER DOMAIN MESSAGES RECEIVED TOPIC=TYPE...; `!` after
@@ -10,7 +11,6 @@ SIGTERM. Both files: topic, type (MESSAGES), stamp in ns as 64 bits (MESSAGES), 
 exit 77 (skipped) where cyclonedds and rosbags are not installed, or FBVINS was built without CycloneDDS
 """
 import csv
-import dataclasses
 import json
 import os
 import pathlib
@@ -22,15 +22,13 @@ import sys
 import tempfile
 import threading
 import time
-from types import new_class
 
 try:
-    import cyclonedds._clayer as clayer  # reads and writes encoded bytes instead of values
     import numpy as np
-    from cyclonedds import builtin, core, domain, pub, qos, sub, topic
-    from cyclonedds.idl import IdlStruct, types
+    from cyclonedds import builtin, domain, pub, qos, sub
     from mcap.reader import make_reader
-    from rosbags.typesys import Stores, get_typestore
+    from ros2_dds import DOMAIN, LOOPBACK, SERVICES, STORE, Failure, bytes_topic, reliable, require, taken, wait_until, wire_topic, wire_type, write
+    from ros2_questions import Questions
     from ruamel.yaml import YAML
 except ImportError as missing:
     if len(sys.argv) > 2 and pathlib.Path(sys.argv[2]).exists():
@@ -38,50 +36,16 @@ except ImportError as missing:
     print(f"skipped: cyclonedds and rosbags are not installed ({missing}); ./dev test installs them where PyPI can be reached")
     sys.exit(77)
 
-DOMAIN = 100 + os.getpid() % 100
-LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
-            "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>")
 IMAGE_RATE_HZ = 30
 SECONDS = 8
 TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
          "/fbvins/odometry": "nav_msgs/msg/Odometry", "/fbvins/path": "nav_msgs/msg/Path", "/tf": "tf2_msgs/msg/TFMessage",
          "/tf_static": "tf2_msgs/msg/TFMessage", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+         "/fbvins/camera0/image_raw": "sensor_msgs/msg/Image", "/fbvins/camera0/camera_info": "sensor_msgs/msg/CameraInfo",
+         "/fbvins/landmarks": "sensor_msgs/msg/PointCloud2", "/fbvins/transition_event": "lifecycle_msgs/msg/TransitionEvent",
          "ros_discovery_info": "rmw_dds_common/msg/ParticipantEntitiesInfo"}
 LATCHED = ("/tf_static", "ros_discovery_info")
-PUBLISHED = ("/fbvins/odometry", "/fbvins/path", "/tf", "/tf_static", "/diagnostics", "ros_discovery_info")
-STORE = get_typestore(Stores.ROS2_JAZZY)
-
-
-class Failure(Exception):
-    pass
-
-
-def require(fact, sentence):
-    if not fact:
-        raise Failure(sentence)
-
-
-def wire_topic(name):
-    """As ROS 2's middleware names it in DDS."""
-    return "rt" + name if name.startswith("/") else name
-
-
-def wire_type(name):
-    package, message = TYPES[name].split("/msg/")
-    return f"{package}::msg::dds_::{message}_"
-
-
-def bytes_topic(participant, name):
-    """A topic whose values are written and read as bytes."""
-    wire = wire_type(name)
-    kind = new_class(wire.split("::")[-1], (IdlStruct,), {"typename": wire.replace("::", ".")}, lambda space: space.update(__annotations__={"nothing": types.uint8}))
-    return topic.Topic(participant, wire_topic(name), dataclasses.dataclass(kind))
-
-
-def reliable(depth, latched=False):
-    durability = qos.Policy.Durability.TransientLocal if latched else qos.Policy.Durability.Volatile
-    return qos.Qos(qos.Policy.Reliability.Reliable(max_blocking_time=10**9), qos.Policy.History.KeepLast(depth), durability)
+PUBLISHED = tuple(name for name in TYPES if name not in ("/imu", "/camera/left", "/camera/right"))
 
 
 class Listener(threading.Thread):
@@ -89,15 +53,14 @@ class Listener(threading.Thread):
 
     def __init__(self, participant, names):
         super().__init__(daemon=True)
-        self.readers = {name: sub.DataReader(participant, bytes_topic(participant, name), qos=reliable(5000, name in LATCHED)) for name in names}
+        self.readers = {name: sub.DataReader(participant, bytes_topic(participant, wire_topic(name), TYPES[name]), qos=reliable(5000, name in LATCHED)) for name in names}
         self.messages = {name: [] for name in names}
         self.ended = threading.Event()
 
     def run(self):
         while not self.ended.wait(0.01):
             for name, reader in self.readers.items():
-                taken = clayer.ddspy_take(reader._ref, core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any, 1000)
-                self.messages[name] += [data for data, info in taken if info.valid_data]
+                self.messages[name] += taken(reader)
 
 
 class InThisProcess:
@@ -124,9 +87,9 @@ class AnotherProgram:
         self.received = folder / "received.bin"
         with open(folder / "messages.bin", "wb") as file:
             for name, stamp_ns, data in messages:
-                for field in (wire_topic(name).encode(), wire_type(name).encode(), stamp_ns, data):
+                for field in (wire_topic(name).encode(), wire_type(TYPES[name]).encode(), stamp_ns, data):
                     file.write(struct.pack("<q", field) if isinstance(field, int) else struct.pack("<I", len(field)) + field)
-        topics = [f"{wire_topic(name)}={wire_type(name)}{'!' if name in LATCHED else ''}" for name in PUBLISHED]
+        topics = [f"{wire_topic(name)}={wire_type(TYPES[name])}{'!' if name in LATCHED else ''}" for name in PUBLISHED]
         self.program = subprocess.Popen([os.environ["FBVINS_DDS_PEER"], str(DOMAIN), folder / "messages.bin", self.received, *topics], stdout=subprocess.PIPE, text=True)
 
     def publish(self):
@@ -170,13 +133,6 @@ def kalibr_files(flight, folder):
             YAML().dump(value, file)
 
 
-def wait_until(fact, what, seconds=60):
-    end = time.monotonic() + seconds
-    while not fact():
-        require(time.monotonic() < end, f"{what} did not happen within {seconds} s")
-        time.sleep(0.02)
-
-
 def messages_of(record):
     """Images and readings of a flight record: topic, stamp in ns, bytes."""
     with open(record, "rb") as file:
@@ -185,21 +141,21 @@ def messages_of(record):
 
 def publish(participant, messages):
     """At the times of their stamps."""
-    writers = {name: pub.DataWriter(participant, bytes_topic(participant, name), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
+    writers = {name: pub.DataWriter(participant, bytes_topic(participant, wire_topic(name), TYPES[name]), qos=reliable(1000)) for name in ("/imu", "/camera/left", "/camera/right")}
     for name, writer in writers.items():
         wait_until(lambda w=writer: len(w.get_matched_subscriptions()) > 0, f"a subscription of {name}")
     time.sleep(0.5)  # FBVINS's readers become reliable ones once they discover these writers
     start, first = time.monotonic(), messages[0][1]
     for name, stamp_ns, data in messages:
         time.sleep(max(0.0, (stamp_ns - first) * 1e-9 - (time.monotonic() - start)))
-        require(clayer.ddspy_write(writers[name]._ref, data.ljust((len(data) + 3) & ~3, b"\0")) >= 0, f"a message of {name} could not be written")
+        write(writers[name], data)
 
 
 def check_bytes(messages):
     """Decoded and encoded again by rosbags, the messages have the bytes that were sent."""
     for name, all_of_it in messages.items():
         require(all_of_it, f"nothing was received on {name}")
-        for data in random.Random(1).sample(all_of_it, min(len(all_of_it), 200)):
+        for data in random.Random(1).sample(all_of_it, min(len(all_of_it), 20 if name.endswith("image_raw") else 200)):
             value = STORE.deserialize_cdr(data, TYPES[name])
             again = bytes(STORE.serialize_cdr(value, TYPES[name]))
             require(again == bytes(data[:len(again)]) and not any(data[len(again):]), f"{name}: other bytes than rosbags writes for the same values")
@@ -222,7 +178,7 @@ def check_values(messages, out):
             break
     require(len(messages["/fbvins/odometry"]) >= 0.95 * len(poses), "odometry at IMU rate")
     transforms = STORE.deserialize_cdr(messages["/tf"][-1], TYPES["/tf"]).transforms
-    require([(t.header.frame_id, t.child_frame_id) for t in transforms] == [("odom", "base_link")], "the transform odom -> base_link")
+    require(("odom", "base_link") in [(t.header.frame_id, t.child_frame_id) for t in transforms], "the transform odom -> base_link")
     fixed = STORE.deserialize_cdr(messages["/tf_static"][-1], TYPES["/tf_static"]).transforms
     require([(t.header.frame_id, t.child_frame_id) for t in fixed] == [("base_link", "imu_link"), ("imu_link", "camera0_optical"), ("imu_link", "camera1_optical")],
             "the fixed transforms")
@@ -230,21 +186,48 @@ def check_values(messages, out):
     require(any(s.message == "good" for s in status) and all(any(v.key == "images_dropped" for v in s.values) for s in status), "diagnostics")
 
 
+def check_images(messages, sent):
+    """Those that were sent, with the stamps of their sensors, and points in the frame of the odometry."""
+    pixels = {stamp: STORE.deserialize_cdr(data, TYPES["/camera/left"]).data for name, stamp, data in sent if name == "/camera/left"}
+    images = [STORE.deserialize_cdr(data, TYPES["/camera/left"]) for data in messages["/fbvins/camera0/image_raw"]]
+    for image in images:
+        stamp = image.header.stamp.sec * 10**9 + image.header.stamp.nanosec
+        require(image.header.frame_id == "camera0_optical" and np.array_equal(image.data, pixels[stamp]), f"the image of {stamp}")
+    info = STORE.deserialize_cdr(messages["/fbvins/camera0/camera_info"][-1], TYPES["/fbvins/camera0/camera_info"])
+    require((info.width, info.height, info.header) == (images[-1].width, images[-1].height, images[-1].header), "camera_info beside the image")
+    points = STORE.deserialize_cdr(messages["/fbvins/landmarks"][-1], TYPES["/fbvins/landmarks"])
+    require(points.header.frame_id == "odom" and points.width > 20, "landmarks")
+
+
+def check_state(messages):
+    events = [STORE.deserialize_cdr(data, TYPES["/fbvins/transition_event"]) for data in messages["/fbvins/transition_event"]]
+    require((events[0].start_state.label, events[0].goal_state.label) == ("inactive", "active"), "the first transition")
+    require(all(a.goal_state == b.start_state for a, b in zip(events, events[1:])), "transitions follow one another")
+
+
 def check_node(messages, hashes):
     """What ROS's tools are told of the node: which topics it has, and the hashes of their types."""
     told = STORE.deserialize_cdr(messages["ros_discovery_info"][-1], TYPES["ros_discovery_info"]).node_entities_info_seq
-    require([(n.node_namespace, n.node_name, len(n.reader_gid_seq), len(n.writer_gid_seq)) for n in told] == [("/", "fbvins", 3, 5)],
+    require([(n.node_namespace, n.node_name, len(n.reader_gid_seq), len(n.writer_gid_seq)) for n in told] == [("/", "fbvins", 3 + len(SERVICES), len(PUBLISHED) + 1 + len(SERVICES))],
             f"the node as it is told: {told}")
     for name in PUBLISHED:
         if name.startswith("/"):
             require(hashes.get("rt" + name) == f"typehash={STORE.hash_rihs01(TYPES[name])};", f"{name}: the hash of its type is {hashes.get('rt' + name)}")
+    for name, (ros_type, _, _) in SERVICES.items():
+        for topic_name, suffix in ((f"rr/fbvins/{name}Reply", "_Response"), (f"rq/fbvins/{name}Request", "_Request")):
+            said = hashes.get(topic_name, "")
+            require(said.startswith("serviceid=") and said.endswith(f";typehash={STORE.hash_rihs01(ros_type + suffix)};"), f"{topic_name}: {said}")
 
 
 def type_hashes(participant):
-    """Of all publishers that say one, by topic."""
-    endpoints = builtin.BuiltinDataReader(participant, builtin.BuiltinTopicDcpsPublication).take(100)
-    data = {e.topic_name: e.qos[qos.Policy.Userdata] for e in endpoints if qos.Policy.Userdata in e.qos}
-    return {name: bytes(policy.data).decode() for name, policy in data.items()}
+    """Of all publishers and of services' readers that say one, by topic."""
+    said = {}
+    for kind in (builtin.BuiltinTopicDcpsPublication, builtin.BuiltinTopicDcpsSubscription):
+        for endpoint in builtin.BuiltinDataReader(participant, kind).take(500):
+            text = bytes(endpoint.qos[qos.Policy.Userdata].data).decode() if qos.Policy.Userdata in endpoint.qos else ""
+            if "typehash=" in text and (kind is builtin.BuiltinTopicDcpsPublication or text.startswith("serviceid=")):
+                said[endpoint.topic_name] = text
+    return said
 
 
 def fly(program, folder):
@@ -257,12 +240,17 @@ def fly(program, folder):
     participant = domain.DomainParticipant(DOMAIN)
     sent = messages_of(record)
     images = sum(name == "/camera/left" for name, _, _ in sent)
+    questions = Questions(participant, folder)
     peer = (AnotherProgram if "FBVINS_DDS_PEER" in os.environ else InThisProcess)(participant, sent, folder)
     with open(folder / "log.txt", "w", encoding="utf-8") as log:
         live = subprocess.Popen([program, "live", "--source", "ros2:/camera/left,/camera/right,/imu", "--ros2", str(DOMAIN), "--calibration", folder / "camchain.yaml",
-                                 "--imu-calibration", folder / "imu.yaml", "--out", out, "--quiet"], stderr=log)
+                                 "--imu-calibration", folder / "imu.yaml", "--out", out, "--save-map", folder / "flat.fbm", "--record", folder / "record.mcap",
+                                 "--record-on-request", "--quiet"], stderr=log)
         try:
+            questions.start()
             peer.publish()
+            questions.join(timeout=60)
+            require(not questions.problem, questions.problem)
             time.sleep(1)
             hashes = type_hashes(participant)
             live.send_signal(signal.SIGINT)
@@ -275,10 +263,14 @@ def fly(program, folder):
     counts = json.loads((out / "summary.json").read_text(encoding="utf-8"))["live"]
     require(counts["images"] == images, f"{images} images were sent and {counts['images']} arrived")
     require(counts["images_incomplete"] == 0, f"{counts['images_incomplete']} images arrived without their partner")
+    require(counts["resets"] >= 1, "the estimator did not start again")
+    require({name for name, _, _ in messages_of(folder / "record.mcap")} == {"/imu", "/camera/left", "/camera/right"}, "the record")
     print(f"{images} stereo images at {IMAGE_RATE_HZ} Hz: {counts['images']} arrived, {counts['images_dropped']} dropped; "
           f"{', '.join(f'{len(m)} messages on {name}' for name, m in messages.items())}")
     check_bytes(messages)
     check_values(messages, out)
+    check_images(messages, sent)
+    check_state(messages)
     check_node(messages, hashes)
 
 

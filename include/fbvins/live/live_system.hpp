@@ -45,6 +45,8 @@ class LiveSystem {
   void on_failure(std::function<void()> callback);
 
   SensorInput& input();
+  /// The estimator starts again with the next image (System::start_again). From any thread.
+  void start_again();
   /// Sends a LiveMark to the sinks. From any thread.
   void mark(std::string text);
   /// From any thread.

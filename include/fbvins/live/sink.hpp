@@ -28,7 +28,8 @@ class Sink {
   virtual std::string_view name() const = 0;
   /// The first error is reported in the status, and is the result of LiveSystem::finish(); later events still come.
   virtual Result<void> take(const LiveEvent& event) = 0;
-  /// Asked once: whether it wants a LiveView with every image. Each costs the estimator's thread some ten microseconds.
+  /// Asked with every image, on the estimator's thread: whether it wants a LiveView of it. Each costs that thread some ten
+  /// microseconds.
   virtual bool wants_views() const { return false; }
   /// A problem that may pass, such as an unplugged cable, in one sentence for the status. Empty: none. From any thread.
   virtual std::string problem() const { return {}; }

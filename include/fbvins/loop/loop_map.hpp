@@ -44,6 +44,8 @@ class LoopMap final : public Mapper {
 
   MapUpdate process(const Keyframe& keyframe) override;
 
+  /// Goes on with another map: this one is forgotten. On the thread of process(); the flight is localised anew.
+  void take_over(std::unique_ptr<LoopMap> other);
   /// Last optimisation of the pose graph, once the flight is over.
   PoseGraphReport finish();
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.

@@ -12,7 +12,8 @@
 //
 //   System::create(options, rig, RunMode::threaded, {.frontend = std::make_unique<MyFrontend>(rig), .mapper = &map});
 //
-// Threads: callbacks are set before the first push(); push() and finish() are called by one thread, status() by any.
+// Threads: callbacks are set before the first push(); push() and finish() are called by one thread, status() and start_again() by
+// any.
 // `deterministic` runs everything on the caller's thread; `threaded` runs the frontend, the estimator and the mapper each
 // on a thread of its own, where they call back. Both give the same bits. `live` is `threaded`, but a mapper that is behind
 // leaves out keyframes instead of holding up the odometry, which is the same.
@@ -64,7 +65,8 @@ class System {
   /// Keyframes as they become final, with their images.
   void on_keyframe(std::function<void(const Keyframe&)> callback);
   /// The window after every image, before its odometry, from the estimator's thread; levelled, but not smoothed as T_WB is.
-  void on_window(std::function<void(const WindowSnapshot&)> callback);
+  /// `wanted` is asked there before each; without it all are.
+  void on_window(std::function<void(const WindowSnapshot&)> callback, std::function<bool()> wanted = {});
   /// One for every image, with or without a pose (see `health`).
   void on_odometry(std::function<void(const Odometry&)> callback);
   /// After every keyframe that the mapper has processed.
@@ -76,6 +78,9 @@ class System {
   /// A measurement for the mapper, of the images' clock; between the events, best before the next image. One that comes late is
   /// used as long as the map remembers the motion then (some seconds). An error, and no change, for one that is impossible.
   Result<void> push(Anchor anchor);
+  /// From the next image on the odometry starts again, as after `lost`: a new W, placed at the last pose, and `reset_counter`
+  /// + 1. Before the first start nothing. Any thread.
+  void start_again();
   /// Processes what is waiting and ends; no callback comes afterwards. Returns the same on every call.
   Result<void> finish();
   /// The first failure of a stage, or success.

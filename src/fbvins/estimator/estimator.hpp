@@ -46,6 +46,10 @@ class Estimator {
 
   /// The state at the frame's stamp; health says whether it may be trusted.
   Estimate process(const TrackedFrame& tracked);
+  /// As after `lost`: a new start, in a W placed at the last pose. Before the first start nothing.
+  void start_again() {
+    if (running_) restart();
+  }
 
   /// For the frontend: the newest state, in G; not valid before initialisation.
   StatePrior prior() const;

@@ -177,10 +177,10 @@ constexpr std::uint32_t kLandmark_bytes = 4 * std::size(kLandmarkFields);
 
 }  // namespace
 
-void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks) {
+void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks, std::string_view frame) {
   const auto count = static_cast<std::uint32_t>(landmarks.size());
   CdrWriter cdr(out);
-  put_header(cdr, t, kOdometryFrame);
+  put_header(cdr, t, frame);
   cdr.put(std::uint32_t{1});
   cdr.put(count);
   cdr.count(std::size(kLandmarkFields));

@@ -76,7 +76,7 @@ struct RosLandmark {
   float age_frames = 0;
   float depth_m = 0;
 };
-void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks);
+void append_landmarks(std::string& out, Time t, std::span<const RosLandmark> landmarks, std::string_view frame = kOdometryFrame);
 
 /// rmw_dds_common/ParticipantEntitiesInfo: one node in a participant, with the topics that it reads and writes. DDS's identifiers
 /// have 16 bytes; Humble's message has room for 24.

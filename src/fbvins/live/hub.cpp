@@ -37,6 +37,8 @@ class Hub::Lane {
     filled_.notify_one();
   }
 
+  bool wants_views() const { return sink_->wants_views(); }
+
   SinkReport report() const {
     std::string passing = sink_->problem();
     const std::lock_guard lock(mutex_);
@@ -110,6 +112,10 @@ Hub::Hub(Limits limits) : limits_(limits) {}
 Hub::~Hub() = default;
 
 void Hub::add(std::unique_ptr<Sink> sink) { lanes_.push_back(std::make_unique<Lane>(std::move(sink), limits_)); }
+
+bool Hub::wants_views() const {
+  return std::any_of(lanes_.begin(), lanes_.end(), [](const auto& lane) { return lane->wants_views(); });
+}
 
 void Hub::publish(LiveEvent event) {
   if (lanes_.empty()) return;

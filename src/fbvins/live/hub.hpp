@@ -38,6 +38,8 @@ class Hub {
   /// Before the first publish().
   void add(std::unique_ptr<Sink> sink);
   bool empty() const { return lanes_.empty(); }
+  /// Whether any sink does now.
+  bool wants_views() const;
   void publish(LiveEvent event);
   std::vector<SinkReport> reports() const;
   /// Lets every sink take what waits for it, and ends it. Returns the first error of any.

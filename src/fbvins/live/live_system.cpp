@@ -41,6 +41,7 @@ struct LiveSystem::Impl {
         views(rig.T_BC0),
         started(host_now()) {
     system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
+    system.on_window([this](const WindowSnapshot& window) { views.add(window); }, [this] { return views_wanted; });
     system.on_odometry([this](Odometry o) { on_odometry(std::move(o)); });
     system.on_map_update([this](MapUpdate u) {
       u.reset_counter += first_reset;
@@ -68,12 +69,8 @@ struct LiveSystem::Impl {
 
   void on_frame(const TrackedFrame& frame) {
     if (on_tracked_frame) on_tracked_frame(frame);
+    views_wanted = hub.wants_views();
     if (views_wanted) views.add(frame);
-  }
-
-  void want_views() {
-    if (std::exchange(views_wanted, true)) return;
-    system.on_window([this](const WindowSnapshot& window) { views.add(window); });
   }
 
   void on_odometry(Odometry o) {
@@ -201,8 +198,8 @@ struct LiveSystem::Impl {
   std::uint32_t reset_counter = first_reset;
   std::int64_t images_estimated = 0, resets = 0;
 
-  ViewMaker views;  ///< used on the estimator's thread alone
-  bool views_wanted = false;
+  ViewMaker views;            ///< used on the estimator's thread alone
+  bool views_wanted = false;  ///< with this image; likewise
   std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void()> on_failure;
   LatencyHistogram shutter_to_pose, pose_age;
@@ -227,10 +224,7 @@ LiveSystem::~LiveSystem() = default;
 LiveSystem::LiveSystem(LiveSystem&&) noexcept = default;
 LiveSystem& LiveSystem::operator=(LiveSystem&&) noexcept = default;
 
-void LiveSystem::add_sink(std::unique_ptr<Sink> sink) {
-  if (sink->wants_views()) impl_->want_views();
-  impl_->hub.add(std::move(sink));
-}
+void LiveSystem::add_sink(std::unique_ptr<Sink> sink) { impl_->hub.add(std::move(sink)); }
 void LiveSystem::on_tracked_frame(std::function<void(const TrackedFrame&)> callback) {
   impl_->on_tracked_frame = std::move(callback);
 }
@@ -242,6 +236,7 @@ SensorInput& LiveSystem::input() {
   return impl_->ingest;
 }
 
+void LiveSystem::start_again() { impl_->system.start_again(); }
 void LiveSystem::mark(std::string text) { impl_->hub.publish(LiveMark{impl_->ingest.arrivals().newest, std::move(text)}); }
 LiveStatus LiveSystem::status() const { return impl_->status(); }
 Result<void> LiveSystem::finish() { return impl_->finish(); }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <latch>
 #include <mutex>
@@ -141,6 +143,53 @@ TEST(LiveSystem, AllOutputsBeginWithTheFirstResetCounter) {
   for (const Odometry& o : f.watcher.all<Odometry>()) ASSERT_EQ(o.reset_counter, 7u);
   EXPECT_EQ(live.status().reset_counter, 7u);
   EXPECT_EQ(live.status().counts.resets, 0);
+}
+
+/// Whoever asks for it gets a new W, which begins where the old one ended.
+TEST(LiveSystem, StartsAgainWhereItWas) {
+  Fixture f;
+  LiveSystem live = f.live();
+  f.play(live, 0, 40);
+  live.start_again();
+  f.play(live, 40, 80);
+  ASSERT_TRUE(live.finish());
+  const std::vector<Odometry> all = f.watcher.all<Odometry>();
+  ASSERT_EQ(all.size(), 80u);
+  EXPECT_EQ(all[39].reset_counter, 0u);
+  EXPECT_EQ(all[40].reset_counter, 1u);
+  EXPECT_EQ(all[40].health.state, HealthState::initialising);
+  EXPECT_EQ(all.back().reset_counter, 1u);
+  const auto again = std::find_if(all.begin() + 40, all.end(), [](const Odometry& o) { return o.health.has_pose(); });
+  ASSERT_NE(again, all.end());
+  const double flown_m = (f.motion.state(again->t.seconds()).T_FB.p - f.motion.state(all[39].t.seconds()).T_FB.p).norm();
+  EXPECT_LT((again->T_WB.p - all[39].T_WB.p).norm(), flown_m + 0.5);
+  EXPECT_EQ(live.status().counts.resets, 1);
+}
+
+TEST(LiveSystem, ViewsAreMadeForThoseWhoLook) {
+  struct Looker final : Sink {
+    explicit Looker(std::atomic<bool>& now) : looks(now) {}
+    std::string_view name() const override { return "looker"; }
+    Result<void> take(const LiveEvent&) override { return {}; }
+    bool wants_views() const override { return looks; }
+    std::atomic<bool>& looks;
+  };
+  Fixture f;
+  LiveSystem live = f.live();
+  std::atomic<bool> looks{false};
+  live.add_sink(std::make_unique<Looker>(looks));
+  f.play(live, 0, 30);
+  EXPECT_TRUE(f.watcher.all<LiveView>().empty());
+  looks = true;
+  f.play(live, 30, 40);
+  looks = false;
+  f.play(live, 40, 50);
+  ASSERT_TRUE(live.finish());
+  const std::vector<LiveView> views = f.watcher.all<LiveView>();
+  ASSERT_EQ(views.size(), 10u);
+  EXPECT_EQ(views.front().t, f.flight.stamp(30));
+  EXPECT_FALSE(views.front().landmarks.empty());
+  EXPECT_FALSE(views.front().features.empty());
 }
 
 /// Sinks get the sensor events as the estimator consumes them, so that a record can be run again.

@@ -8,11 +8,10 @@
 #include <limits>
 #include <string>
 #include <system_error>
-#include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "fbvins/live/live_diagnostic.hpp"
+#include "fbvins/live/view_landmarks.hpp"
 
 namespace fbvins {
 namespace {
@@ -32,28 +31,6 @@ std::string no_space(const RecordSpace& space) {
 std::string numbered(const std::filesystem::path& path, int number) {
   if (number == 1) return path.string();
   return (path.parent_path() / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string())).string();
-}
-
-/// Features and landmarks, with those of the same track as one.
-std::vector<RosLandmark> landmarks_of(const LiveView& view) {
-  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-  std::vector<RosLandmark> out;
-  std::unordered_map<TrackId, std::size_t> places;
-  for (const LiveView::Feature& f : view.features) {
-    places.emplace(f.track, out.size());
-    out.push_back({static_cast<std::uint32_t>(f.track.value),
-                   {kUnknown, kUnknown, kUnknown},
-                   {static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())},
-                   static_cast<float>(f.age_frames),
-                   static_cast<float>(f.depth_m)});
-  }
-  for (const LiveView::Landmark& l : view.landmarks) {
-    const auto [place, is_new] = places.emplace(l.track, out.size());
-    if (is_new) out.push_back({static_cast<std::uint32_t>(l.track.value), {}, {kUnknown, kUnknown}, kUnknown, kUnknown});
-    const Eigen::Vector3f p = l.p_W.cast<float>();
-    out[place->second].p_W = {p.x(), p.y(), p.z()};
-  }
-  return out;
 }
 
 /// Adds one event to a record.

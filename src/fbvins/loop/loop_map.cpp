@@ -31,6 +31,7 @@ LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer) : closer_(std::move(closer)
 LoopMap::~LoopMap() = default;
 
 MapUpdate LoopMap::process(const Keyframe& keyframe) { return closer_->process(keyframe); }
+void LoopMap::take_over(std::unique_ptr<LoopMap> other) { closer_ = std::move(other->closer_); }
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
 Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }

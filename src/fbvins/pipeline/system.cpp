@@ -66,11 +66,13 @@ struct System::Impl {
   std::function<void(const TrackedFrame&)> on_tracked_frame;
   std::function<void(const Keyframe&)> on_keyframe;
   std::function<void(const WindowSnapshot&)> on_window;
+  std::function<bool()> window_wanted;
   std::function<void(const Odometry&)> on_odometry;
   std::function<void(const MapUpdate&)> on_map_update;
 
   StageStatus status;
   std::atomic<int> keyframes_left_out = 0;
+  std::atomic<bool> start_again = false;
   bool finished = false;
   Stage<SensorPacket, Impl> tracking{"the frontend", &Impl::track, BoundedQueue<SensorPacket>{4}};
   Stage<TrackedFrame, Impl> estimation{"the estimator", &Impl::estimate, BoundedQueue<TrackedFrame>{4}};
@@ -112,12 +114,13 @@ struct System::Impl {
 
   void estimate(TrackedFrame frame) {
     if (on_tracked_frame) on_tracked_frame(lenses.any() ? lenses.gathered(frame) : frame);
+    if (start_again.exchange(false)) estimator.start_again();
     Estimate estimate = estimator.process(frame);
     std::uint8_t& without_cameras = estimate.odometry.health.without_cameras;
     without_cameras = lenses.lenses_of(without_cameras);
     frame.imu.noise = estimate.imu_noise;
     if (keyframes_wanted()) complete(estimate, frame);
-    if (on_window) on_window(estimator.snapshot());
+    if (on_window && (!window_wanted || window_wanted())) on_window(estimator.snapshot());
     if (on_odometry) on_odometry(estimate.odometry);
     if (on_keyframe)
       for (const Keyframe& keyframe : estimate.keyframes) on_keyframe(keyframe);
@@ -233,7 +236,10 @@ void System::on_tracked_frame(std::function<void(const TrackedFrame&)> callback)
   impl_->on_tracked_frame = std::move(callback);
 }
 void System::on_keyframe(std::function<void(const Keyframe&)> callback) { impl_->on_keyframe = std::move(callback); }
-void System::on_window(std::function<void(const WindowSnapshot&)> callback) { impl_->on_window = std::move(callback); }
+void System::on_window(std::function<void(const WindowSnapshot&)> callback, std::function<bool()> wanted) {
+  impl_->on_window = std::move(callback);
+  impl_->window_wanted = std::move(wanted);
+}
 void System::on_odometry(std::function<void(const Odometry&)> callback) { impl_->on_odometry = std::move(callback); }
 void System::on_map_update(std::function<void(const MapUpdate&)> callback) { impl_->on_map_update = std::move(callback); }
 
@@ -254,6 +260,7 @@ Result<void> System::push(Anchor anchor) {
   return impl_->status.get();
 }
 
+void System::start_again() { impl_->start_again = true; }
 Result<void> System::finish() { return impl_->finish(); }
 Result<void> System::status() const { return impl_->status.get(); }
 InputCounts System::input_counts() const { return impl_->packet_maker.counts(); }

@@ -11,29 +11,17 @@
 #include <utility>
 
 #include "fbvins/ros2/cdr_type.hpp"
+#include "fbvins/ros2/dds_wire.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr std::uint32_t kMaxDomain = 232;  // DDS derives port numbers from the domain
-constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 /// Of ROS's own discovery: not below rt/, as it is no topic of a node.
 constexpr const char* kGraphTopic = "ros_discovery_info";
 constexpr const char* kGraphType = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 /// Which security policy a participant has: ROS's default.
 constexpr std::string_view kEnclave = "enclave=/;";
-
-/// ROS's hashes of these definitions (REP 2016), which nodes since Iron compare.
-struct TypeHash {
-  std::string_view type, hash;
-};
-constexpr TypeHash kTypeHashes[] = {
-    {"nav_msgs/msg/Odometry", "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"},
-    {"nav_msgs/msg/Path", "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b"},
-    {"tf2_msgs/msg/TFMessage", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},
-    {"diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
-    {"sensor_msgs/msg/Image", "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"},
-    {"sensor_msgs/msg/Imu", "7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"}};
 
 // This machine alone; peers are contacted one by one, as the loopback has no multicast.
 constexpr const char* kLoopback =
@@ -43,60 +31,10 @@ constexpr const char* kLoopback =
 constexpr const char* kOneInterface =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"/></Interfaces></General></Domain></CycloneDDS>";
 
-Error failure(std::string_view what, dds_return_t code) {
-  return Error{ErrorCode::unwritable, fmt::format("{}: {}", what, dds_strretcode(code))};
-}
-
-/// "nav_msgs/msg/Odometry" -> "nav_msgs::msg::dds_::Odometry_"
-std::string wire_type(const std::string& type) {
-  const auto first = type.find('/'), last = type.rfind('/');
-  return fmt::format("{}::{}::dds_::{}_", type.substr(0, first), type.substr(first + 1, last - first - 1), type.substr(last + 1));
-}
-
-/// "/tf" -> "rt/tf"
-std::string wire_topic(const std::string& topic) { return "rt" + topic; }
-
-struct DeleteQos {
-  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
-};
-using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
-
-Qos make_qos(const Ros2Quality& quality, const std::string& type) {
-  Qos qos(dds_create_qos());
-  const auto* const known = std::ranges::find(kTypeHashes, type, &TypeHash::type);
-  if (known != std::end(kTypeHashes)) {
-    const std::string told = fmt::format("typehash=RIHS01_{};", known->hash);
-    dds_qset_userdata(qos.get(), told.data(), told.size());
-  }
-  dds_qset_reliability(qos.get(), quality.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, kMaxBlocking);
-  dds_qset_durability(qos.get(), quality.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, quality.depth);
-  return qos;
-}
-
-struct TopicOfBytes {
-  DdsEntity entity;
-  const ddsi_sertype* type;
-};
-
-Result<TopicOfBytes> make_wire_topic(const Ros2Node& node, const std::string& topic, const std::string& type) {
-  ddsi_sertype* bytes = make_cdr_type(wire_type(type));
-  const dds_entity_t made = dds_create_topic_sertype(node.participant(), topic.c_str(), &bytes, nullptr, nullptr, nullptr);
-  if (made >= 0) return TopicOfBytes{DdsEntity(made), bytes};
-  ddsi_sertype_unref(bytes);
-  return failure("ROS 2 topic " + topic, made);
-}
-
 Result<TopicOfBytes> make_topic(const Ros2Node& node, const std::string& topic, const std::string& type) {
   if (topic.empty() || topic[0] != '/')
     return Error{ErrorCode::invalid_argument, fmt::format("ROS 2 topic '{}': it begins with /", topic)};
-  return make_wire_topic(node, wire_topic(topic), type);
-}
-
-Result<void> write_bytes(dds_entity_t writer, const ddsi_sertype& type, std::string message, std::string_view name) {
-  const dds_return_t code = dds_writecdr(writer, make_cdr_message(type, std::move(message)));
-  if (code == DDS_RETCODE_OK || code == DDS_RETCODE_TIMEOUT) return {};  // a reader that does not read is no error
-  return failure(name, code);
+  return make_wire_topic(node.participant(), wire_topic(topic), type);
 }
 
 DdsGuid guid_of(dds_entity_t entity) {
@@ -160,20 +98,20 @@ Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, con
   const std::string where =
       fmt::format("ROS 2 domain {}{}{}", address.domain, address.interface.empty() ? "" : " on ", address.interface);
   node->domain_ = DdsEntity(dds_create_domain(address.domain, configuration.c_str()));
-  if (node->domain_.handle() < 0) return failure(where, node->domain_.handle());
+  if (node->domain_.handle() < 0) return dds_failure(where, node->domain_.handle());
   const Qos qos(dds_create_qos());
   dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
   node->participant_ = DdsEntity(dds_create_participant(address.domain, qos.get(), nullptr));
-  if (node->participant() < 0) return failure(where, node->participant());
+  if (node->participant() < 0) return dds_failure(where, node->participant());
   node->self_ = {name.name_space, name.name, {}, {}};
   node->humble_ = humble;
-  auto topic = make_wire_topic(*node, kGraphTopic, kGraphType);
+  auto topic = make_wire_topic(node->participant(), kGraphTopic, kGraphType);
   if (!topic) return topic.error();
   node->graph_topic_ = std::move(topic->entity);
   node->graph_type_ = topic->type;
   node->graph_ = DdsEntity(dds_create_writer(node->participant(), node->graph_topic_.handle(),
                                              make_qos({.latched = true, .depth = 1}, kGraphType).get(), nullptr));
-  if (node->graph_.handle() < 0) return failure(kGraphTopic, node->graph_.handle());
+  if (node->graph_.handle() < 0) return dds_failure(kGraphTopic, node->graph_.handle());
   if (Result<void> told = node->tell(); !told) return told.error();
   return node;
 }
@@ -216,13 +154,18 @@ Result<Ros2Publisher> Ros2Publisher::create(std::shared_ptr<Ros2Node> node, cons
   publisher.type_ = made->type;
   publisher.writer_ = DdsEntity(
       dds_create_writer(publisher.node_->participant(), publisher.topic_.handle(), make_qos(quality, type).get(), nullptr));
-  if (publisher.writer_.handle() < 0) return failure(publisher.name_, publisher.writer_.handle());
+  if (publisher.writer_.handle() < 0) return dds_failure(publisher.name_, publisher.writer_.handle());
   if (Result<void> told = publisher.node_->tell_of_writer(publisher.writer_.handle()); !told) return told.error();
   return publisher;
 }
 
 Result<void> Ros2Publisher::publish(std::string message) const {
   return write_bytes(writer_.handle(), *type_, std::move(message), name_);
+}
+
+int Ros2Publisher::subscribers() const {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer_.handle(), &status) < 0 ? 0 : static_cast<int>(status.current_count);
 }
 
 Result<std::unique_ptr<Ros2Subscriber>> Ros2Subscriber::create(std::shared_ptr<Ros2Node> node, const std::string& topic,
@@ -266,7 +209,7 @@ Result<void> Ros2Subscriber::listen(bool reliable) {
   reader_ = DdsEntity(dds_create_reader(node_->participant(), topic_.handle(),
                                         make_qos({.reliable = reliable, .latched = false, .depth = depth_}, type_).get(),
                                         listener.get()));
-  if (reader_.handle() < 0) return failure("ROS 2 topic " + name_, reader_.handle());
+  if (reader_.handle() < 0) return dds_failure("ROS 2 topic " + name_, reader_.handle());
   return node_->tell_of_reader(reader_.handle());
 }
 

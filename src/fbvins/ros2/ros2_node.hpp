@@ -94,6 +94,8 @@ class Ros2Publisher {
                                       const Ros2Quality& quality = {});
   /// `message` with its CDR header. A slow reliable reader blocks it for a tenth of a second at most.
   Result<void> publish(std::string message) const;
+  /// Matched now. From any thread.
+  int subscribers() const;
 
  private:
   std::shared_ptr<Ros2Node> node_;

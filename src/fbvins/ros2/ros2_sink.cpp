@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ctime>
 #include <utility>
 #include <vector>
 
@@ -21,22 +20,11 @@ constexpr Duration kPathPeriod{1'000'000'000};
 constexpr double kPathStep_m = 0.05;
 constexpr std::size_t kLongestPath = 10'000;  // poses, about 0.7 MB a message
 
-/// Range of ROS's stamps.
-bool can_be_said(Time t) { return t.ns >= 0 && t < ros_time_end(); }
-
 /// Whether a period has passed, or time has gone back, since `last`, which is then set to `now`.
 bool due(std::optional<Time>& last, Time now, Duration period) {
   if (last && now >= *last && now - *last < period) return false;
   last = now;
   return true;
-}
-
-/// How much CLOCK_REALTIME is ahead of CLOCK_MONOTONIC now: somebody may set the one.
-Duration realtime_ahead() {
-  timespec real{}, monotonic{};
-  clock_gettime(CLOCK_REALTIME, &real);
-  clock_gettime(CLOCK_MONOTONIC, &monotonic);
-  return Duration{(real.tv_sec - monotonic.tv_sec) * 1'000'000'000LL + (real.tv_nsec - monotonic.tv_nsec)};
 }
 
 Pose<B, BaseLink> base_of(const LiveOptions& options) {
@@ -66,6 +54,7 @@ Result<void> check_frames(const Ros2Options& options) {
 Ros2Sink::Ros2Sink(const LiveOptions& options, Ros2Publisher odometry, Ros2Publisher transforms, Ros2Publisher fixed,
                    Ros2Publisher path, Ros2Publisher diagnostics)
     : options_(options.ros2),
+      stamps_(options.ros2.clock),
       T_B_base_(base_of(options)),
       odometry_(std::move(odometry)),
       transforms_(std::move(transforms)),
@@ -94,10 +83,12 @@ Result<std::unique_ptr<Ros2Sink>> Ros2Sink::create(const std::shared_ptr<Ros2Nod
   return sink;
 }
 
+std::string Ros2Sink::camera_frame(int camera) { return fmt::format("camera{}_optical", camera); }
+
 /// What is latched is kept by DDS, so that once is enough.
 Result<void> Ros2Sink::publish_fixed(const StereoRig& rig) {
   std::vector<std::string> names;
-  for (int c = 0; c < rig.camera_count(); ++c) names.push_back(fmt::format("camera{}_optical", c));
+  for (int c = 0; c < rig.camera_count(); ++c) names.push_back(camera_frame(c));
   const Pose<BaseLink, B> T_base_B = T_B_base_.inverse();
   std::vector<RosTransform> transforms;
   if (!options_.base_frame.empty()) transforms.push_back({options_.base_frame, options_.imu_frame, T_base_B.q, T_base_B.p});
@@ -108,10 +99,6 @@ Result<void> Ros2Sink::publish_fixed(const StereoRig& rig) {
   std::string message;
   append_transforms(message, Time{}, transforms);
   return fixed_.publish(std::move(message));
-}
-
-Time Ros2Sink::ros_time(Time sensors, Time host) const {
-  return options_.clock == Ros2Clock::sensors ? sensors : host + realtime_ahead();
 }
 
 Result<void> Ros2Sink::take(const LiveEvent& event) {
@@ -126,9 +113,9 @@ Result<void> Ros2Sink::take(const LiveEvent& event) {
 }
 
 Result<void> Ros2Sink::take(const LivePose& pose) {
-  const Time t = ros_time(pose.t, pose.host_t);
-  ahead_ = t - pose.t;
-  if (!pose.health.has_pose() || !can_be_said(t)) return {};
+  stamps_.compare(pose.t, pose.host_t);
+  if (!pose.health.has_pose() || !stamps_.known(pose.t)) return {};
+  const Time t = stamps_.of(pose.t);
   const MotionAt<BaseLink> at = motion_at(T_B_base_, pose);
   const Mat3 R_base_B = T_B_base_.R().transpose();
   std::string message;
@@ -147,8 +134,8 @@ Result<void> Ros2Sink::take(const LivePose& pose) {
 
 Result<void> Ros2Sink::take(const Odometry& o) {
   rate_covariance_ = o.gyro_bias_covariance + reading_variance_ * Mat3::Identity();
-  const Time t = o.t + ahead_;
-  if (!o.health.has_pose() || !can_be_said(t)) return {};
+  if (!o.health.has_pose() || !stamps_.known(o.t)) return {};
+  const Time t = stamps_.of(o.t);
   const Pose<W, B> T = (o.T_WB * T_B_base_).cast_frames<W, B>();
   if (o.reset_counter != reset_counter_) way_.clear();
   reset_counter_ = o.reset_counter;
@@ -161,8 +148,8 @@ Result<void> Ros2Sink::take(const Odometry& o) {
 }
 
 Result<void> Ros2Sink::take(const LiveStatus& status) {
-  const Time t = ros_time(status.t, status.host_t);
-  if (status.t.ns == 0 || !can_be_said(t)) return {};  // no sensor data yet
+  const Time t = stamps_.of(status.t, status.host_t);
+  if (status.t.ns == 0 || t.ns < 0 || t >= ros_time_end()) return {};  // no sensor data yet
   RosDiagnostic diagnostic = diagnostic_of(status);
   diagnostic.name = "fbvins: " + diagnostic.name;
   std::string message;

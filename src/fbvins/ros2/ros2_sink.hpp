@@ -12,6 +12,7 @@
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/live/sink.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
+#include "fbvins/ros2/ros2_stamps.hpp"
 #include "fbvins/types/motion_at.hpp"
 #include "fbvins/types/trajectory.hpp"
 
@@ -24,6 +25,9 @@ class Ros2Sink final : public Sink {
   static Result<std::unique_ptr<Ros2Sink>> create(const std::shared_ptr<Ros2Node>& node, const StereoRig& rig,
                                                   const LiveOptions& options = {});
 
+  /// The name of a camera's frame: z ahead, x right.
+  static std::string camera_frame(int camera);
+
   std::string_view name() const override { return "ROS 2"; }
   Result<void> take(const LiveEvent& event) override;
 
@@ -34,10 +38,10 @@ class Ros2Sink final : public Sink {
   Result<void> take(const Odometry& odometry);
   Result<void> take(const LiveStatus& status);
   Result<void> publish_fixed(const StereoRig& rig);
-  Time ros_time(Time sensors, Time host) const;
   const std::string& base_frame() const { return options_.base_frame.empty() ? options_.imu_frame : options_.base_frame; }
 
   Ros2Options options_;
+  Ros2Stamps stamps_;
   Pose<B, BaseLink> T_B_base_;
   Ros2Publisher odometry_, transforms_, fixed_, path_, diagnostics_;
   double reading_variance_ = 0;              // of one gyroscope reading, (rad/s)^2
@@ -46,7 +50,6 @@ class Ros2Sink final : public Sink {
   Trajectory<W> way_;                        // the path of base_link, a pose every kPathStep_m
   std::uint32_t reset_counter_ = 0;          // of the path
   std::optional<Time> transformed_, shown_;  // when the last of each was sent, in the messages' time
-  Duration ahead_;                           // of the messages' time before the sensors', at the newest pose
 };
 
 }  // namespace fbvins

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "apps/live_outputs.hpp"
+
+namespace fbvins::app {
+namespace {
+
+using Told = FlightCommand::Told;
+
+Error refused(std::string sentence) { return {ErrorCode::invalid_argument, std::move(sentence)}; }
+
+/// A map changes, and is saved, with keyframes, which need a pose.
+bool has_pose(const LiveSystem& live) { return live.status().health.has_pose(); }
+
+void save_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
+  if (const std::string why = cannot_save_map(flight.map); !why.empty()) return told(refused(why));
+  if (!has_pose(live)) return told(refused("there is no pose: the map is saved with the next keyframe, which needs one"));
+  flight.kept->request_save([told, file = flight.map.save](const Result<void>& saved) {
+    if (saved) told("the map is saved in " + file);
+    else told(saved.error());
+  });
+}
+
+void load_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
+  MapArguments again = flight.map;
+  if (again.load.empty()) again.load = again.save;
+  if (!again.wanted()) return told(refused("this flight has no map: start it with --map FILE"));
+  if (again.load.empty()) return told(refused("no file of a map was named: start with --map FILE or --load-map FILE"));
+  if (!has_pose(live)) return told(refused("there is no pose: the map is loaded before the next keyframe, which needs one"));
+  flight.kept->before_next_keyframe([=, &flight] {
+    auto map = make_map(again, flight.source.rig(), flight.config.loop);
+    if (!map) return told(map.error());
+    const int keyframes = (*map)->keyframes();
+    flight.loop_map->take_over(*std::move(map));
+    told(fmt::format("{} keyframes of {}; what this flight added since that was saved is forgotten", keyframes, again.load));
+  });
+}
+
+void switch_record(const LiveFlight& flight, bool on, const Told& told) {
+  if (flight.record == nullptr) return told(refused("no file for records was named: start with --record FILE"));
+  const Result<std::string> path = on ? flight.record->start() : flight.record->stop();
+  if (path) told(fmt::format("{} {}", on ? "recording" : "the record is", *path));
+  else told(path.error());
+}
+
+}  // namespace
+
+std::vector<FlightCommand> flight_commands(const LiveFlight& flight, LiveSystem& live) {
+  return {{"reset",
+           [&live](const Told& told) {
+             live.start_again();
+             live.mark("reset");
+             told(std::string("the estimator starts again with the next image"));
+           }},
+          {"save_map", [&](const Told& told) { save_map_of(flight, live, told); }},
+          {"load_map", [&](const Told& told) { load_map_of(flight, live, told); }},
+          {"start_record", [&](const Told& told) { switch_record(flight, true, told); }},
+          {"stop_record", [&](const Told& told) { switch_record(flight, false, told); }}};
+}
+
+}  // namespace fbvins::app

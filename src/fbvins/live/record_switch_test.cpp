@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/record_switch.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "fbvins/io/dataset.hpp"
+
+namespace fbvins {
+namespace record_switch_test {
+
+namespace fs = std::filesystem;
+
+class RecordSwitchTest : public ::testing::Test {
+ protected:
+  RecordSwitchTest() {
+    fs::create_directories(folder);
+    rig.left = rig.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
+    rig.T_BC1.p = Vec3(0.1, 0, 0);
+  }
+  ~RecordSwitchTest() override { fs::remove_all(folder); }
+
+  static int readings_in(const std::string& file) {
+    auto data = open_dataset(file);
+    EXPECT_TRUE(data) << data.error().message;
+    int count = 0;
+    while (const auto event = (*data)->next()) count += std::holds_alternative<ImuSample>(*event);
+    return count;
+  }
+  void take(int readings) {
+    for (int i = 0; i < readings; ++i) {
+      ASSERT_TRUE(record.take(ImuSample{t}));
+      t = t + Duration{5'000'000};
+    }
+    const auto image = std::make_shared<const Image>(32, 24, std::uint8_t{9});
+    ASSERT_TRUE(record.take(StereoFrame{t, image, image}));
+  }
+
+  const std::string folder = ::testing::TempDir() + "/fbvins_record_switch_" + std::to_string(getpid());
+  std::string path = folder + "/flight.mcap";
+  StereoRig rig;
+  Time t{1'600'000'000'000'000'000};
+  RecordSwitch record{[this] { return RecordSink::create_next(path, rig, {}, {.keep_free_bytes = 0}); }};
+};
+
+TEST_F(RecordSwitchTest, EachStretchIsARecordOfItsOwn) {
+  take(2);
+  EXPECT_FALSE(record.wants_views());
+  EXPECT_FALSE(record.stop()) << "nothing has begun";
+  EXPECT_EQ(*record.start(), path);
+  EXPECT_TRUE(record.wants_views());
+  take(3);
+  const Result<std::string> twice = record.start();
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message.find(path), std::string::npos);
+  take(4);
+  EXPECT_EQ(*record.stop(), path);
+  EXPECT_FALSE(record.wants_views());
+  take(5);
+  EXPECT_EQ(*record.start(), folder + "/flight-2.mcap");
+  take(6);
+  EXPECT_TRUE(record.finish());
+  EXPECT_EQ(readings_in(path), 7);
+  EXPECT_EQ(readings_in(folder + "/flight-2.mcap"), 6);
+}
+
+TEST_F(RecordSwitchTest, AFolderThatIsNotThereIsAProblemUntilItIs) {
+  path = folder + "/unplugged/flight.mcap";
+  EXPECT_FALSE(record.start());
+  EXPECT_NE(record.problem().find(path), std::string::npos);
+  take(1);
+  fs::create_directories(folder + "/unplugged");
+  EXPECT_TRUE(record.start());
+  EXPECT_EQ(record.problem(), "");
+}
+
+}  // namespace record_switch_test
+}  // namespace fbvins
