@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -26,13 +27,27 @@ struct Arguments {
   bool json = false;
 };
 
+std::string lens_of(const Camera& camera) {
+  return fmt::format("{} x {}, {}, focal length {:.1f} px{}", camera.width(), camera.height(), camera.model_name(),
+                     camera.focal_px(),
+                     camera.mask() ? fmt::format(", {:.1f} % masked", 100 * camera.mask()->hidden_share()) : std::string());
+}
+
+std::string left_out_of(const CameraInfo& info) {
+  if (info.rows.bad() + info.unpaired + info.images.missing == 0) return "";
+  return fmt::format("; {} rows left out, {} without partner, {} files missing", info.rows.bad(), info.unpaired,
+                     info.images.missing);
+}
+
 void print_camera(std::string_view name, const Camera& camera, const CameraInfo& info) {
-  fmt::print("{:<14}{} images, {} x {}, {}, focal length {:.1f} px", name, info.listed, camera.width(), camera.height(),
-             camera.model_name(), camera.focal_px());
-  if (camera.mask()) fmt::print(", {:.1f} % masked", 100 * camera.mask()->hidden_share());
-  if (info.rows.bad() + info.unpaired + info.images.missing > 0)
-    fmt::print("; {} rows left out, {} without partner, {} files missing", info.rows.bad(), info.unpaired, info.images.missing);
-  fmt::print("\n");
+  fmt::print("{:<14}{} images, {}{}\n", name, info.listed, lens_of(camera), left_out_of(info));
+}
+
+/// Of the cameras from number 2 on images are counted together.
+void print_further_cameras(const StereoRig& rig, const CameraInfo& info) {
+  if (rig.more.empty()) return;
+  for (int i = 2; i < rig.camera_count(); ++i) fmt::print("{:<14}{}\n", fmt::format("camera {}", i), lens_of(rig.camera(i)));
+  fmt::print("{:<14}{} images together{}\n", "", info.listed, left_out_of(info));
 }
 
 void print_text(const Dataset& data) {
@@ -43,6 +58,7 @@ void print_text(const Dataset& data) {
   fmt::print("{:<14}first {} ns, last {} ns\n", "stamps", info.first_image.ns, info.last_image.ns);
   print_camera("left", data.rig().left, info.left);
   if (data.rig().has_right()) print_camera("right", data.rig().right, info.right);
+  print_further_cameras(data.rig(), info.more);
   if (const auto& depth = data.rig().depth)
     fmt::print("{:<14}{} images, {} to {} m, noise {:.4f} m at 1 m\n", "depth", info.depth.listed, depth->nearest_m,
                depth->farthest_m, depth->noise_at_1m_m);
@@ -59,7 +75,9 @@ void print_text(const std::string& path, const BagSurvey& bag) {
   for (const TopicSurvey& t : bag.topics)
     fmt::print("{:<34}{:>8} messages{:>9.2f} Hz  {}{}{}\n", t.name, t.messages, t.rate_hz, t.type, t.first.empty() ? "" : "  ",
                t.first);
-  if (!bag.left.empty()) fmt::print("topics to use: left {}, right {}, IMU {}\n", bag.left, bag.right, bag.imu);
+  if (bag.cameras.empty()) return;
+  fmt::print("topics to use: cameras {}, IMU {}{}\n", fmt::join(bag.cameras, ", "), bag.imu,
+             bag.depth.empty() ? "" : ", depth images " + bag.depth);
 }
 
 /// A bag is shown also where it cannot be run before a calibration or its topics are named; that is said, and is no failure here.

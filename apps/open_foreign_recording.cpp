@@ -9,13 +9,12 @@ namespace fbvins::app {
 namespace {
 
 RecordingOptions options_of(const RecordingArguments& arguments, const DatasetOptions& options) {
-  const auto topic = [&](std::size_t i) { return i < arguments.topics.size() ? arguments.topics[i] : std::string(); };
   DatasetOptions with = options;
   with.start_s = arguments.start_s;
   with.duration_s = arguments.duration_s;
   with.camera = arguments.camera;
   with.pair_tolerance_ms = arguments.pair_tolerance_ms;
-  return {with, arguments.calibration, arguments.imu_calibration, topic(0), topic(1), topic(2)};
+  return {with, arguments.calibration, arguments.imu_calibration, arguments.topics};
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ namespace fbvins::app {
 
 struct RecordingArguments {
   std::string path, calibration, imu_calibration;
-  std::vector<std::string> topics;     ///< left, right and, if it is not the only one, IMU
+  std::vector<std::string> topics;     ///< of a bag: those of the cameras, of the IMU and of depth images
   double start_s = 0, duration_s = 0;  ///< DatasetOptions
   std::string camera = "all";          ///< the same
   double pair_tolerance_ms = DatasetOptions{}.pair_tolerance_ms;

@@ -17,13 +17,8 @@ void RecordingArguments::add_to(CLI::App& command) {
   command.add_option("--imu-calibration", imu_calibration, "Kalibr imu.yaml, with --calibration");
   // One argument, so that a recording which follows it is not taken for another topic.
   command.add_option_function<std::string>(
-      "--topics",
-      [this](const std::string& text) {
-        topics = CLI::detail::split(text, ',');
-        if (topics.size() < 2 || topics.size() > 3)
-          throw CLI::ValidationError("--topics", text + ": LEFT,RIGHT or LEFT,RIGHT,IMU");
-      },
-      "topics of a bag, if they are not found: LEFT,RIGHT[,IMU]");
+      "--topics", [this](const std::string& text) { topics = CLI::detail::split(text, ','); },
+      "topics of a bag, if they are not found: CAM0[,CAM1,...][,IMU][,DEPTH]");
   command
       .add_option("--camera", camera,
                   "the cameras that are used: all (default), the first two (both), one of these, or the left "

@@ -20,17 +20,32 @@ std::vector<double> parameters_of(const Camera& camera) {
   return out;
 }
 
-Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info) {
-  return Json{{"images", info.listed},
-              {"rows_left_out", info.rows.bad()},
-              {"unpaired", info.unpaired},
-              {"missing", info.images.missing},
-              {"model", camera.model_name()},
+Json counts_json(const CameraInfo& info) {
+  return Json{
+      {"images", info.listed}, {"rows_left_out", info.rows.bad()}, {"unpaired", info.unpaired}, {"missing", info.images.missing}};
+}
+
+Json camera_json(const Camera& camera, const auto& T_BC) {
+  return Json{{"model", camera.model_name()},
               {"width", camera.width()},
               {"height", camera.height()},
               {"masked_share", camera.mask() ? camera.mask()->hidden_share() : 0.0},
               {"fx_fy_cx_cy_distortion", parameters_of(camera)},
               {"T_BC_row_major", row_major(T_BC)}};
+}
+
+Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info) {
+  Json out = counts_json(info);
+  out.update(camera_json(camera, T_BC));
+  return out;
+}
+
+/// Of the cameras from number 2 on: their counts together, and each calibration.
+Json more_json(const StereoRig& rig, const CameraInfo& info) {
+  Json out = counts_json(info);
+  out["cameras"] = Json::array();
+  for (int i = 2; i < rig.camera_count(); ++i) out["cameras"].push_back(camera_json(rig.camera(i), rig.T_BC(i)));
+  return out;
 }
 
 }  // namespace
@@ -56,6 +71,7 @@ Json describe(const Dataset& data) {
                      {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
   json["left"] = camera_json(rig.left, rig.T_BC0, info.left);
   if (rig.has_right()) json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
+  if (!rig.more.empty()) json["more"] = more_json(rig, info.more);
   if (rig.depth)
     json["depth"] = Json{{"images", info.depth.listed},
                          {"noise_at_1m_m", rig.depth->noise_at_1m_m},
@@ -73,9 +89,11 @@ Json describe(const BagSurvey& bag) {
   Json topics = Json::array();
   for (const TopicSurvey& t : bag.topics)
     topics.push_back({{"name", t.name}, {"type", t.type}, {"messages", t.messages}, {"rate_hz", t.rate_hz}, {"first", t.first}});
+  const auto camera = [&](std::size_t i) { return i < bag.cameras.size() ? bag.cameras[i] : std::string(); };
   return Json{{"format", bag.format},     {"duration_s", bag.duration_s},
-              {"topics", topics},         {"left", bag.left},
-              {"right", bag.right},       {"imu", bag.imu},
+              {"topics", topics},         {"left", camera(0)},
+              {"right", camera(1)},       {"cameras", bag.cameras},
+              {"imu", bag.imu},           {"depth", bag.depth},
               {"question", bag.question}, {"no_calibration", bag.no_calibration},
               {"warnings", bag.warnings}};
 }

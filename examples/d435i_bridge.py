@@ -42,7 +42,7 @@ def message(kind, body):
 
 
 class StereoPairs:
-    """Pairs two cameras' images by their stamps, by the rule of src/fbvins/live/stereo_pairs.hpp: an image whose partner is lost leaves
+    """Pairs two cameras' images by their stamps, by the rule of src/fbvins/live/frame_joiner.hpp: an image whose partner is lost leaves
     alone as soon as that is certain."""
 
     def __init__(self):

@@ -253,7 +253,7 @@ def check_what_cannot_be_run(program, folder, root):
                 if name not in connections:
                     connections[name] = writer.add_connection(name, kind, typestore=flight.store)
                 writer.write(connections[name], stamp, data)
-    question = "has 2 stereo pairs (/front/cam0/image_raw and /front/cam1/image_raw, /rear/cam0/image_raw and /rear/cam1/image_raw): say which with --topics LEFT,RIGHT"
+    question = "has 2 stereo pairs (/front/cam0/image_raw and /front/cam1/image_raw, /rear/cam0/image_raw and /rear/cam1/image_raw): say which are the cameras' with --topics CAM0[,CAM1,...][,IMU][,DEPTH]"
     refused(["run", root / "two_rigs.bag", "--calibration", folder], question)
     shown = subprocess.run([program, "info", root / "two_rigs.bag", "--calibration", folder, "--json"], check=False, capture_output=True, text=True)
     assert shown.returncode == 0 and json.loads(shown.stdout)["question"] == question and len(json.loads(shown.stdout)["topics"]) == 5, shown

@@ -30,7 +30,7 @@ PERIOD_NS = 33_333_000
 
 
 def given(*images):
-    """What leaves for images such as "L1" or "R2.1" (stamps in tens of milliseconds): as in stereo_pairs_test.cpp."""
+    """What leaves for images such as "L1" or "R2.1" (stamps in tens of milliseconds): as in frame_joiner_test.cpp."""
     pairs, out = bridge.StereoPairs(), []
     for image in images:
         pairs.add("LR".index(image[0]), round(float(image[1:]) * 1e7), image)

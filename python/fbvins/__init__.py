@@ -79,11 +79,9 @@ def open(path: PathLike, *, calibration: Optional[PathLike] = None, imu_calibrat
          duration_s: float = 0.0) -> Recording:
     """A recording: a EuRoC or TUM-VI folder, an EuRoC zip, a flight record, a ROS 1 or ROS 2 bag, an MCAP file of ROS messages.
     `calibration` is a file of any format that fbvins.calibration.load() knows, instead of the recording's own. `topics` of a bag, where they are
-    not found automatically: left, right and, if there are several, IMU. max_frames 0: all. start_s, duration_s: only events stamped from start_s
+    not found automatically: those of the cameras in their order, of the IMU and of depth images. max_frames 0: all. start_s, duration_s: only events stamped from start_s
     seconds after the first stereo frame on, for duration_s seconds (0: to the end)."""
-    left, right, imu = (tuple(topics) + ("", "", ""))[:3]
-    return _openable(_fbvins.open, os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, left, right,
-                     imu)
+    return _openable(_fbvins.open, os.fspath(path), _path(calibration), _path(imu_calibration), skip_frames, max_frames, start_s, duration_s, list(topics))
 
 
 def simulate(preset: str = "normal", seed: int = 1, seconds: float = 0) -> Recording:
@@ -143,8 +141,7 @@ def info(recording: Union[Recording, PathLike], *, calibration: Optional[PathLik
     except (ValueError, OSError):
         if isinstance(recording, Recording):
             raise
-        left, right, imu = (tuple(topics) + ("", "", ""))[:3]
-        survey = _fbvins.survey(os.fspath(recording), _path(calibration), left, right, imu) if not topics else ""
+        survey = _fbvins.survey(os.fspath(recording), _path(calibration)) if not topics else ""
         if not survey:
             raise
     return json.loads(survey)

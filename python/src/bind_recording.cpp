@@ -12,14 +12,11 @@ namespace fbvins::python {
 namespace {
 
 Recording open(const std::string& path, const std::string& calibration, const std::string& imu_calibration, int skip, int most,
-               double start_s, double duration_s, const std::string& left_topic, const std::string& right_topic,
-               const std::string& imu_topic) {
+               double start_s, double duration_s, const std::vector<std::string>& topics) {
   const RecordingOptions options{{.skip_frames = skip, .max_frames = most, .start_s = start_s, .duration_s = duration_s},
                                  calibration,
                                  imu_calibration,
-                                 left_topic,
-                                 right_topic,
-                                 imu_topic};
+                                 topics};
   return value_or_raise([&] {
     nb::gil_scoped_release released;
     return open_recording(path, options);
@@ -135,7 +132,7 @@ void bind_recording(nb::module_& m) {
       });
 
   m.def("open", &open, "path"_a, "calibration"_a = "", "imu_calibration"_a = "", "skip_frames"_a = 0, "max_frames"_a = 0,
-        "start_s"_a = 0.0, "duration_s"_a = 0.0, "left_topic"_a = "", "right_topic"_a = "", "imu_topic"_a = "");
+        "start_s"_a = 0.0, "duration_s"_a = 0.0, "topics"_a = std::vector<std::string>{});
   m.def("simulate", &simulate, "preset"_a = "normal", "seed"_a = 1, "seconds"_a = 0.0);
   m.def("simulation_presets", &simulation_presets, "Names of the simulator's presets.");
 }

@@ -29,10 +29,9 @@ void require_fresh(const Dataset& data) {
 
 /// What is in a bag that cannot be opened yet, as JSON; empty where the path is no bag, or nothing but its calibration or topics
 /// is missing. Raises nothing: opening it says what is wrong.
-std::string survey(const std::string& path, const std::string& calibration, const std::string& left, const std::string& right,
-                   const std::string& imu) {
+std::string survey(const std::string& path, const std::string& calibration) {
   if (!is_bag(path)) return "";
-  const RecordingOptions options{{}, calibration, "", left, right, imu};
+  const RecordingOptions options{{}, calibration, "", {}};
   const Result<BagSurvey> found = survey_bag(path, options);
   if (!found || found->topics.empty() || (found->question.empty() && found->no_calibration.empty())) return "";
   return app::describe(*found).dump();
@@ -94,7 +93,7 @@ int convert(Dataset& data, const std::string& record, const std::string& out) {
 void bind_tools(nb::module_& m) {
   m.def(
       "info", [](const Dataset& data) { return app::describe(data).dump(); }, "recording"_a);
-  m.def("survey", &survey, "path"_a, "calibration"_a, "left"_a, "right"_a, "imu"_a);
+  m.def("survey", &survey, "path"_a, "calibration"_a);
   m.def("doctor", &examine_recording, "recording"_a, "again"_a, "kalibr"_a);
   m.def("convert", &convert, "recording"_a, "record"_a, "out"_a);
   m.def(

@@ -13,11 +13,8 @@ namespace fbvins {
 
 /// An error, which begins with `origin`, where a number is not finite, a camera has no pixels or no focal length, its principal
 /// point is outside the middle third of the image, its distortion is none that a lens has, its mask has another size or hides all
-/// of the image, the cameras' centres coincide or lie apart by more than 10 m, or a figure of the IMU's noise is not positive, or a
-/// depth sensor's. A rig has one to kMostCameras cameras, one with a depth sensor.
+/// of the image, the cameras' centres coincide or lie apart by more than 10 m, or a figure of the IMU's noise is not positive, or
+/// a depth sensor's. A rig has one to kMostCameras cameras, one with a depth sensor.
 Result<void> check_rig(const StereoRig& rig, std::string_view origin);
-
-/// An error where a rig has more cameras than a format of one pair can hold, or a depth sensor.
-Result<void> check_is_a_pair_at_most(const StereoRig& rig, std::string_view origin);
 
 }  // namespace fbvins

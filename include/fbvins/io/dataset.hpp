@@ -67,6 +67,12 @@ struct FrameEntry {
   std::string depth_file = {};                 ///< of the depth sensor
   ExposureOffsets offsets = {};                ///< of cameras without a common trigger
 
+  /// Of camera i.
+  std::string file(int camera) const {
+    if (camera < 2) return camera == 0 ? left_file : right_file;
+    const auto at = static_cast<std::size_t>(camera - 2);
+    return at < more_files.size() ? more_files[at] : std::string();
+  }
   bool without_images() const {
     return left_file.empty() && right_file.empty() && std::ranges::all_of(more_files, &std::string::empty);
   }

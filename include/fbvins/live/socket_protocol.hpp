@@ -17,7 +17,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 2,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 3,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -69,17 +69,27 @@ typedef struct FbvinsSocketRig {
   double time_offset_s;  ///< t_imu = t_image + time_offset_s
 } FbvinsSocketRig;
 
+/// A depth sensor whose images are registered to the camera (docs/depth.md).
+typedef struct FbvinsSocketDepth {
+  double noise_at_1m_m;  ///< standard deviation at a distance of one metre; it grows with the square of the distance
+  double nearest_m, farthest_m;
+  double scale_sigma;  ///< relative, of what all distances have in common
+} FbvinsSocketDepth;
+
 #define FBVINS_SOCKET_MAGIC "fb-vins"  ///< with its 0: eight bytes
 
 /// FbvinsSocketHello::flags
 enum {
   FBVINS_SOCKET_HAS_RIG = 1,
-  FBVINS_SOCKET_HAS_CAMERAS = 2  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
+  FBVINS_SOCKET_HAS_CAMERAS = 2,  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
+  FBVINS_SOCKET_HAS_DEPTH =
+      4  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
 };
 
 /// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
 /// Slot k begins at k * slot_bytes: the left image, row after row, at right_offset_bytes the right one, and at
-/// more_offset_bytes[i] that of camera 2 + i. All cameras have images of one size.
+/// more_offset_bytes[i] that of camera 2 + i. All cameras have images of one size. At depth_offset_bytes, an even number, the
+/// depth image: 16 bits a pixel, millimetres along z of the camera, 0 where nothing was measured.
 typedef struct FbvinsSocketHello {
   FbvinsSocketHeader header;
   char magic[8];
@@ -97,6 +107,10 @@ typedef struct FbvinsSocketHello {
   uint32_t reserved_too;
   uint32_t more_offset_bytes[FBVINS_SOCKET_MOST_CAMERAS - 2];
   FbvinsSocketCamera more[FBVINS_SOCKET_MOST_CAMERAS - 2];  ///< of the rig: cameras 2, 3 ...
+  // Since version 1.3, with FBVINS_SOCKET_HAS_DEPTH; else 0 or left out:
+  uint32_t depth_offset_bytes;
+  uint32_t reserved_three;
+  FbvinsSocketDepth depth;  ///< of the rig
 } FbvinsSocketHello;
 
 typedef struct FbvinsSocketReading {
@@ -113,8 +127,8 @@ typedef struct FbvinsSocketImu {
   FbvinsSocketReading readings[FBVINS_SOCKET_MOST_READINGS];
 } FbvinsSocketImu;
 
-/// FbvinsSocketFrame::images; camera i has bit i.
-enum { FBVINS_SOCKET_LEFT = 1, FBVINS_SOCKET_RIGHT = 2 };
+/// FbvinsSocketFrame::images; camera i has bit i, the depth sensor the one behind those of all cameras (since version 1.3).
+enum { FBVINS_SOCKET_LEFT = 1, FBVINS_SOCKET_RIGHT = 2, FBVINS_SOCKET_DEPTH = 256 };
 
 typedef struct FbvinsSocketFrame {
   FbvinsSocketHeader header;

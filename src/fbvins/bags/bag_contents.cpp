@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <deque>
+#include <utility>
 
 #include "fbvins/bags/ros1_bag_writer.hpp"
 #include "fbvins/imu/motion_merge.hpp"
@@ -52,7 +54,8 @@ void take_camera(const BagMessage& message, const BagTopic& about, BagContents& 
   Result<BagCamera> camera = camera_of(message.data, about.encoding);
   if (camera && !realsense_stream(about.name).empty()) camera->frame = realsense_stream(about.name);
   if (camera) out.cameras.emplace(about.name, *std::move(camera));
-  else if (out.camera_problem.empty()) out.camera_problem = fmt::format("{}: {}", fbvins::quoted(about.name), camera.error().message);
+  else if (out.camera_problem.empty())
+    out.camera_problem = fmt::format("{}: {}", fbvins::quoted(about.name), camera.error().message);
 }
 
 /// Of librealsense: .../Infrared_1/tf/0 takes coordinates of group 0's reference to those of the stream.
@@ -154,30 +157,63 @@ BagContents read_contents(BagReader& bag, const std::function<void(const BagMess
 }
 
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics) {
-  if (contents.rig.empty() || topics.left != kBagLeftTopic || topics.right != kBagRightTopic) return std::nullopt;
-  return parse_rig(contents.rig, std::string(kRigTopic));
+  if (contents.rig.empty()) return std::nullopt;
+  for (std::size_t i = 0; i < topics.cameras.size(); ++i)
+    if (topics.cameras[i] != bag_camera_topic(static_cast<int>(i))) return std::nullopt;
+  Result<StereoRig> rig = parse_rig(contents.rig, std::string(kRigTopic));
+  if (rig && std::cmp_less(rig->camera_count(), topics.cameras.size())) return std::nullopt;
+  return rig;
 }
 
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics) {
-  const BagCamera *left = camera_for(contents, topics.left), *right = camera_for(contents, topics.right);
   const auto missing = [&](const std::string& what) {
     return Error{ErrorCode::not_found, fmt::format("holds no calibration ({}): give one with --calibration", printable(what))};
   };
-  if ((!left || !right) && !contents.camera_problem.empty()) return missing(contents.camera_problem);
-  if (!left || !right) return missing(fmt::format("no camera_info for {}", left ? topics.right : topics.left));
+  for (const std::string& topic : topics.cameras)
+    if (!camera_for(contents, topic))
+      return missing(contents.camera_problem.empty() ? fmt::format("no camera_info for {}", topic) : contents.camera_problem);
   const auto imu = contents.imu.find(topics.imu);
   if (imu == contents.imu.end()) return missing("without an IMU the cameras' extrinsics to it are unknown");
   const std::string& body = imu->second.frame;
-  StereoRig rig;
-  rig.left = left->camera;
-  rig.right = right->camera;
-  for (const BagCamera* camera : {left, right})
-    if (!find_transform(contents.transforms, body, camera->frame))
-      return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
-  rig.T_BC0 = find_transform(contents.transforms, body, left->frame)->cast_frames<B, C0>();
-  rig.T_BC1 = find_transform(contents.transforms, body, right->frame)->cast_frames<B, C1>();
+  std::vector<MountedCamera> cameras;
+  for (const std::string& topic : topics.cameras) {
+    const BagCamera* camera = camera_for(contents, topic);
+    const auto T_BC = find_transform(contents.transforms, body, camera->frame);
+    if (!T_BC) return missing(fmt::format("no transform from '{}' to '{}'", camera->frame, body));
+    cameras.push_back({camera->camera, T_BC->cast_frames<B, C0>()});
+  }
+  const StereoRig rig = with_cameras({}, cameras);
   if (Result<void> good = check_rig(rig, "/tf_static"); !good) return good.error();
   return rig;
+}
+
+std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics) {
+  std::vector<std::string> out = topics.cameras;
+  const auto imu = contents.imu.find(topics.imu);
+  if (out.size() <= 2 || imu == contents.imu.end()) return out;
+  const auto is_calibrated = [&](const std::string& topic) {
+    const BagCamera* camera = camera_for(contents, topic);
+    return camera != nullptr && find_transform(contents.transforms, imu->second.frame, camera->frame);
+  };
+  out.erase(std::remove_if(out.begin() + 2, out.end(), [&](const std::string& topic) { return !is_calibrated(topic); }),
+            out.end());
+  return out;
+}
+
+std::string not_registered(const BagContents& contents, const ChosenTopics& topics) {
+  constexpr double kSameFocalLength = 0.01, kSamePlace_m = 1e-3, kSameDirection = 1e-3;
+  const BagCamera *camera = camera_for(contents, topics.cameras.front()), *depth = camera_for(contents, topics.depth);
+  if (!camera || !depth) return "";
+  const Camera &a = camera->camera, &b = depth->camera;
+  if (a.width() != b.width() || a.height() != b.height() ||
+      std::abs(a.focal_px() - b.focal_px()) > kSameFocalLength * a.focal_px())
+    return fmt::format("their camera_info has {} x {} pixels and {:.1f} px of focal length, the camera's {} x {} and {:.1f} px",
+                       b.width(), b.height(), b.focal_px(), a.width(), a.height(), a.focal_px());
+  const auto between = find_transform(contents.transforms, camera->frame, depth->frame);
+  if (between && (between->p.norm() > kSamePlace_m || between->q.vec().norm() > kSameDirection))
+    return fmt::format("they are in the frame '{}', {:.1f} mm from the camera's", printable(depth->frame),
+                       1e3 * between->p.norm());
+  return "";
 }
 
 }  // namespace fbvins

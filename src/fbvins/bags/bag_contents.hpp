@@ -62,13 +62,20 @@ std::vector<Row> in_order(std::vector<Row> rows, RowCounts& counts) {
 std::vector<ImuSample> readings_on(BagContents& contents, const std::string& imu, const std::string& accel, RowCounts& counts);
 
 struct ChosenTopics {
-  std::string left, right, imu;
+  std::vector<std::string> cameras;  ///< one at least, in the order of their numbers
+  std::string imu;                   ///< empty: none
   std::string accel;  ///< of a separate accelerometer: `imu` is the gyroscope's then; found by its name, never given
+  std::string depth;  ///< images of a depth sensor, for one camera; empty: none
 };
 
-/// All of the calibration, noise figures included, where the bag has it for these topics.
+/// All of the calibration, noise figures included, where the bag has it for these topics; of cameras that are not among them,
+/// too.
 std::optional<Result<StereoRig>> own_rig(const BagContents& contents, const ChosenTopics& topics);
 /// From camera_info and transforms. The error says what is missing.
 Result<StereoRig> rig_of(const BagContents& contents, const ChosenTopics& topics);
+/// Without those from number 2 on, which nobody has calibrated: colour cameras.
+std::vector<std::string> calibrated_cameras(const BagContents& contents, const ChosenTopics& topics);
+/// Why the depth images do not lie on those of the first camera, pixel by pixel, as far as the bag tells; empty: they do.
+std::string not_registered(const BagContents& contents, const ChosenTopics& topics);
 
 }  // namespace fbvins

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/bags/depth_image.hpp"
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/image_decode.hpp"
@@ -91,6 +92,25 @@ Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compresse
   if (!in.ok()) return Error{ErrorCode::malformed, "this is no image"};
   raw.used_bits = used_bits;
   return grey_image(raw);
+}
+
+Result<DepthImage> depth_of(std::string_view bytes, Encoding encoding, bool compressed) {
+  constexpr std::size_t kBeforePng_bytes = 12;  // compressedDepth: a format, and two figures of inverse depths
+  constexpr std::string_view kPng = "\x89PNG";
+  MessageFields in(bytes, encoding);
+  in.header();
+  if (!compressed) {
+    const RawImage raw = raw_image(in);
+    if (!in.ok()) return Error{ErrorCode::malformed, "this is no image"};
+    return depth_image(raw);
+  }
+  const std::string format(in.text());
+  std::string_view file = in.bytes();
+  if (!in.ok()) return Error{ErrorCode::malformed, "this is no compressed image"};
+  if (format.starts_with("32FC1"))
+    return Error{ErrorCode::unsupported, "depths that are compressed floats cannot be read, only 16UC1 compressed as PNG"};
+  if (!file.starts_with(kPng) && file.size() > kBeforePng_bytes) file.remove_prefix(kBeforePng_bytes);
+  return decode_depth(file);
 }
 
 std::string encoding_of(std::string_view bytes, Encoding encoding) {

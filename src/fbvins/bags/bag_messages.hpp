@@ -25,6 +25,8 @@ std::optional<ImuSample> imu_of(std::string_view bytes, Encoding encoding);
 std::optional<Time> stamp_of(std::string_view bytes, Encoding encoding);
 /// The image in 8-bit grey, or a sentence why not: the encodings of grey_image.hpp; PNG and JPEG. `used_bits` is RawImage's.
 Result<Image> image_of(std::string_view bytes, Encoding encoding, bool compressed, int used_bits = 16);
+/// A depth image: of 16 bits in millimetres, or of floats in metres; PNG, plain or as image_transport's compressedDepth has it.
+Result<DepthImage> depth_of(std::string_view bytes, Encoding encoding, bool compressed);
 /// As an uncompressed image names it, printable.
 std::string encoding_of(std::string_view bytes, Encoding encoding);
 /// The largest value of an uncompressed image of 16-bit values; none for any other.

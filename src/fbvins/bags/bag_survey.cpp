@@ -58,13 +58,16 @@ BagSurvey survey_bag(BagReader& bag, const RecordingOptions& options) {
   const BagDamage& damage = bag.damage();
   if (damage.parts > 0) out.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
   if (damage.ends_early) out.warnings.emplace_back("the bag was cut off; all that is whole is read");
-  const auto chosen = choose_topics(contents, {options.left_topic, options.right_topic, options.imu_topic, {}}, true);
+  auto chosen = choose_topics(contents, options.topics, {.depth = true});
   if (!chosen) {
     out.question = chosen.error().message;
     return out;
   }
-  out.left = printable(chosen->left), out.right = printable(chosen->right), out.imu = printable(chosen->imu);
-  if (!options.calibration.empty() || own_rig(contents, *chosen)) return out;
+  const bool has_own = own_rig(contents, *chosen).has_value();
+  if (options.topics.empty() && options.calibration.empty() && !has_own) chosen->cameras = calibrated_cameras(contents, *chosen);
+  for (const std::string& topic : chosen->cameras) out.cameras.push_back(printable(topic));
+  out.imu = printable(chosen->imu), out.depth = printable(chosen->depth);
+  if (!options.calibration.empty() || has_own) return out;
   if (const auto rig = rig_of(contents, *chosen); !rig) out.no_calibration = rig.error().message;
   return out;
 }

@@ -23,11 +23,12 @@ struct TopicSurvey {
 
 struct BagSurvey {
   std::string format;
-  std::vector<TopicSurvey> topics;  ///< by name
-  double duration_s = 0;            ///< from the first message to the last
-  std::string left, right, imu;     ///< topics that would be used; empty: `question` says why
-  std::string question;             ///< "has two pairs of ...: say which with --topics"; empty: none
-  std::string no_calibration;       ///< why the bag's own calibration is none; empty: it has one, or one is given
+  std::vector<TopicSurvey> topics;   ///< by name
+  double duration_s = 0;             ///< from the first message to the last
+  std::vector<std::string> cameras;  ///< topics that would be used; empty: `question` says why
+  std::string imu, depth;            ///< likewise; no depth images: empty
+  std::string question;              ///< "has two pairs of ...: say which with --topics"; empty: none
+  std::string no_calibration;        ///< why the bag's own calibration is none; empty: it has one, or one is given
   std::vector<std::string> warnings;
 };
 

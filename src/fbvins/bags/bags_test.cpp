@@ -114,7 +114,7 @@ TEST_F(Bags, NoiseTimeOffsetAndTruthAreKept) {
   ASSERT_EQ((*data)->ground_truth().size(), 5u);
   EXPECT_LT(((*data)->ground_truth()[3].T_WB.p - Vec3(1, 2, 3)).norm(), 1e-12);
   // Of other topics, such as exchanged ones, it is not the calibration.
-  const auto swapped = open_recording(path("whole.bag"), {.left_topic = "/cam1/image_raw", .right_topic = "/cam0/image_raw"});
+  const auto swapped = open_recording(path("whole.bag"), {.topics = {"/cam1/image_raw", "/cam0/image_raw"}});
   ASSERT_TRUE(swapped) << swapped.error().message;
   EXPECT_EQ((*swapped)->rig().time_offset_s, 0);
   EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
@@ -163,11 +163,11 @@ TEST_F(Bags, BytesThatAreWrongAreLeftOutOrRefused) {
 
 TEST_F(Bags, TopicsThatCannotBeFoundAreListed) {
   write(path("flight.bag"));
-  EXPECT_EQ(open_recording(path("flight.bag"), {.left_topic = "/left", .right_topic = "/cam1/image_raw"}).error().message,
-            path("flight.bag") + ": there is no image on '/left'; there are /cam0/image_raw, /cam1/image_raw");
-  EXPECT_EQ(open_recording(path("flight.bag"), {.left_topic = "/left"}).error().message,
-            path("flight.bag") + ": one image topic is named and the other is not");
-  const auto swapped = open_recording(path("flight.bag"), {.left_topic = "/cam1/image_raw", .right_topic = "/cam0/image_raw"});
+  EXPECT_EQ(open_recording(path("flight.bag"), {.topics = {"/left", "/cam1/image_raw"}}).error().message,
+            path("flight.bag") +
+                ": there are neither images nor IMU readings on '/left'; there are images on /cam0/image_raw, "
+                "/cam1/image_raw, readings on /imu0");
+  const auto swapped = open_recording(path("flight.bag"), {.topics = {"/cam1/image_raw", "/cam0/image_raw"}});
   ASSERT_TRUE(swapped) << swapped.error().message;
   EXPECT_EQ((*swapped)->rig().left.focal_px(), 92.5);
 }
@@ -229,10 +229,9 @@ TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
     transform(stream, {-0.0055, 0.0051, 0.0117}, turned);
   }
   const BagContents contents = read_contents(bag);
-  const auto topics = choose_topics(contents, {}, true);
+  const auto topics = choose_topics(contents, {}, {});
   ASSERT_TRUE(topics) << topics.error().message;
-  EXPECT_EQ(topics->left, left + "/image/data");
-  EXPECT_EQ(topics->right, right + "/image/data");
+  EXPECT_EQ(topics->cameras, (std::vector{left + "/image/data", right + "/image/data"}));
   EXPECT_EQ(topics->imu, gyro + "/imu/data");
   EXPECT_EQ(topics->accel, accel + "/imu/data");
   const auto rig = rig_of(contents, *topics);
@@ -246,8 +245,8 @@ TEST(BagContents, StreamsOfLibrealsenseAreKnownByTheirTopics) {
 TEST(BagContents, NamesOfTopicsDoNotBreakASentence) {
   BagContents contents;
   contents.images["/a\n"], contents.images["/b"], contents.images["/c"];
-  EXPECT_EQ(choose_topics(contents, {}, true).error().message,
-            "has 3 image topics (/a?, /b, /c): say which are left and right with --topics LEFT,RIGHT");
+  EXPECT_EQ(choose_topics(contents, {}, {}).error().message,
+            "has 3 image topics (/a?, /b, /c): say which are the cameras' with --topics CAM0[,CAM1,...][,IMU][,DEPTH]");
 }
 
 TEST(BagContents, TwoRigsAreAQuestion) {
@@ -255,12 +254,14 @@ TEST(BagContents, TwoRigsAreAQuestion) {
   contents.imu["/imu"];
   for (const char* topic : {"/front/left", "/front/right", "/front/left/compressed", "/front/right/compressed", "/front/depth"})
     contents.images[topic];
-  const auto one = choose_topics(contents, {}, true);
+  const auto one = choose_topics(contents, {}, {});
   ASSERT_TRUE(one) << one.error().message;  // raw and compressed images of one rig are one pair
-  EXPECT_EQ(one->right, "/front/right");
+  EXPECT_EQ(one->cameras[1], "/front/right");
   contents.images["/rear/left"], contents.images["/rear/right"];
-  EXPECT_EQ(choose_topics(contents, {}, true).error().message,
-            "has 2 stereo pairs (/front/left and /front/right, /rear/left and /rear/right): say which with --topics LEFT,RIGHT");
+  EXPECT_EQ(
+      choose_topics(contents, {}, {}).error().message,
+      "has 2 stereo pairs (/front/left and /front/right, /rear/left and /rear/right): say which are the cameras' with --topics "
+      "CAM0[,CAM1,...][,IMU][,DEPTH]");
 }
 
 TEST(BagSurvey, SaysWhatIsThereWithoutACalibration) {
@@ -275,7 +276,8 @@ TEST(BagSurvey, SaysWhatIsThereWithoutACalibration) {
   EXPECT_EQ(survey.topics[0].first, "frame '1'");
   EXPECT_EQ(survey.topics[1].name, "/left");
   EXPECT_EQ(survey.topics[1].first, "images encoded as 'bad?red' cannot be read");
-  EXPECT_EQ(survey.left + survey.right + survey.imu, "/left/right/imu");
+  EXPECT_EQ(survey.cameras, (std::vector<std::string>{"/left", "/right"}));
+  EXPECT_EQ(survey.imu + survey.depth, "/imu");
   EXPECT_EQ(survey.question, "");
   EXPECT_EQ(survey.no_calibration, "holds no calibration (no camera_info for /left): give one with --calibration");
 }

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "fbvins/bags/foreign_calibration.hpp"
 #include "fbvins/io/calibration.hpp"
@@ -50,13 +52,14 @@ Result<StereoRig> load_vins_fusion(const std::string& path, const std::string& t
   YamlReader yaml(path, text);
   std::vector<YamlReader> cameras;
   for (const char* field : {"cam0_calib", "cam1_calib"}) {
+    if (!cameras.empty() && !yaml.has(yaml.root(), field)) break;  // num_of_cam is 1
     const std::string name = beside(path, yaml.word(yaml.root(), field));
     if (!yaml.ok()) return yaml.error();
     Result<std::string> camera = read_file(name, kLargestYaml_bytes);
     if (!camera) return camera.error();
     cameras.emplace_back(name, *std::move(camera));
   }
-  return parse_vins_fusion(std::move(yaml), cameras[0], cameras[1]);
+  return parse_vins_fusion(std::move(yaml), std::move(cameras));
 }
 
 Result<StereoRig> load_euroc(const std::string& folder) {
@@ -65,20 +68,30 @@ Result<StereoRig> load_euroc(const std::string& folder) {
   const std::vector<std::string> roots = (*files)->folders_holding("cam0/sensor.yaml");
   if (roots.size() != 1)
     return Error{ErrorCode::not_found, fmt::format("{}: holds {} files cam0/sensor.yaml, not one", folder, roots.size())};
-  const auto text = [&](const char* name) { return (*files)->read(roots[0] + name, kLargestYaml_bytes); };
-  const auto left_text = text("cam0/sensor.yaml"), right_text = text("cam1/sensor.yaml"), imu_text = text("imu0/sensor.yaml");
-  for (const auto* read : {&left_text, &right_text, &imu_text})
-    if (!*read) return read->error();
-  const auto in = [&](const char* camera) -> ReadBeside {
-    return [&, camera](const std::string& name) { return (*files)->read(roots[0] + camera + name, kLargestMask_bytes); };
+  const auto parse = [&](const std::string& name, auto parser) -> decltype(parser(std::declval<YamlReader>())) {
+    const Result<std::string> text = (*files)->read(roots[0] + name, kLargestYaml_bytes);
+    if (!text) return text.error();
+    return parser({name, *text});
   };
-  const auto left = parse_euroc_camera({"cam0/sensor.yaml", *left_text}, in("cam0/")),
-             right = parse_euroc_camera({"cam1/sensor.yaml", *right_text}, in("cam1/"));
-  const auto imu = parse_euroc_imu({"imu0/sensor.yaml", *imu_text});
-  if (!left) return left.error();
-  if (!right) return right.error();
+  std::vector<CameraSensor> cameras;
+  for (int i = 0; i < kMostCameras; ++i) {
+    const std::string camera = fmt::format("cam{}/", i);
+    if (i > 0 && !(*files)->exists(roots[0] + camera + "sensor.yaml")) break;
+    const ReadBeside beside = [&](const std::string& name) {
+      return (*files)->read(roots[0] + camera + name, kLargestMask_bytes);
+    };
+    const auto sensor =
+        parse(camera + "sensor.yaml", [&](YamlReader yaml) { return parse_euroc_camera(std::move(yaml), beside); });
+    if (!sensor) return sensor.error();
+    cameras.push_back(*sensor);
+  }
+  const auto imu = parse("imu0/sensor.yaml", parse_euroc_imu);
   if (!imu) return imu.error();
-  return join_euroc({*left, *right}, *imu, folder);
+  const Result<StereoRig> rig = join_euroc(cameras, *imu, folder);
+  if (!rig || cameras.size() > 1 || !(*files)->exists(roots[0] + "depth0/sensor.yaml")) return rig;
+  const auto depth = parse("depth0/sensor.yaml", parse_depth_sensor);
+  if (!depth) return depth.error();
+  return with_depth(*rig, *depth);
 }
 
 }  // namespace

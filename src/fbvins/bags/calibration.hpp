@@ -4,8 +4,8 @@
 //   Result<StereoRig> rig = load_calibration("calibration.json");              // Basalt
 //   Result<StereoRig> rig = load_calibration("camchain-imucam.yaml", "imu.yaml");
 //
-// Frames: B is the IMU, C0 the left and C1 the right camera; what the formats call T_cam_imu, T_imu_cam or body_T_cam0 is turned
-// to T_BC0 and T_BC1.
+// Frames: B is the IMU, C0 the left and C1 the right camera, others follow; what the formats call T_cam_imu, T_imu_cam or
+// body_T_cam0 is turned to T_BC0 and T_BC1. All cameras of a file are read, one at least.
 #pragma once
 
 #include <string>

@@ -66,7 +66,7 @@ Result<CameraRecording> open_camera_bag(const std::string& path, const std::vect
   Result<std::unique_ptr<BagReader>> bag = open_bag(path);
   if (!bag) return bag.error();
   BagContents contents = read_contents(**bag);
-  const Result<CameraTopics> chosen = choose_cameras(contents, topics);
+  const Result<ChosenTopics> chosen = choose_cameras(contents, topics);
   if (!chosen) return Error{chosen.error().code, fmt::format("{}: {}", path, chosen.error().message)};
   CameraRecording out;
   out.cameras = chosen->cameras;

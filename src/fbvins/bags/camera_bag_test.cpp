@@ -85,7 +85,7 @@ TEST_F(CameraBags, FlightRecordsAreBags) {
 }
 
 std::string question(const BagContents& contents, const std::vector<std::string>& named = {}) {
-  const Result<CameraTopics> chosen = choose_cameras(contents, named);
+  const Result<ChosenTopics> chosen = choose_cameras(contents, named);
   return chosen ? "none" : chosen.error().message;
 }
 
@@ -103,12 +103,12 @@ TEST(CameraTopics, AllCamerasAreFoundOrAskedFor) {
   contents.images["/b/image_rect"];
   EXPECT_EQ(
       question(contents),
-      "has several image topics of one camera (/a/image_raw, /b/image_raw, /b/image_rect, /c/left, /c/right): say which are "
-      "the cameras' with --topics CAM0,CAM1,...[,IMU]");
+      "has several image topics of one camera (/a/image_raw, /b/image_raw, /b/image_rect, /c/left, /c/right): say which are the "
+      "cameras' with --topics CAM0[,CAM1,...][,IMU][,DEPTH]");
   EXPECT_EQ(question(contents, {"/b/image_raw"}), "none");
   contents.imu["/imu"];
   EXPECT_EQ(question(contents, {"/b/image_raw"}),
-            "has 3 IMU topics (/accel, /gyro, /imu): say which it is with --topics CAM0,CAM1,...[,IMU]");
+            "has 3 IMU topics (/accel, /gyro, /imu): say which it is with --topics CAM0[,CAM1,...][,IMU][,DEPTH]");
   EXPECT_EQ(question(contents, {"/b/image_raw", "/imu"}), "none");
   EXPECT_EQ(question(contents, {"/imu", "/gyro", "/c/left"}), "--topics names two IMUs");
 }

@@ -39,10 +39,9 @@ Result<StereoRig> finished(const YamlReader& yaml, const StereoRig& rig) {
 
 // OpenVINS
 
-template <class C>
-Pose<B, C> mounting(YamlReader& yaml, const YAML::Node& camera) {
-  if (yaml.has(camera, "T_cam_imu")) return read_transform<C, B>(yaml, camera, "T_cam_imu").inverse();
-  return read_transform<B, C>(yaml, camera, "T_imu_cam");
+Pose<B, C0> mounting(YamlReader& yaml, const YAML::Node& camera) {
+  if (yaml.has(camera, "T_cam_imu")) return read_transform<C0, B>(yaml, camera, "T_cam_imu").inverse();
+  return read_transform<B, C0>(yaml, camera, "T_imu_cam");
 }
 
 // Basalt
@@ -79,13 +78,12 @@ Camera basalt_camera(YamlReader& yaml, const YAML::Node& root, std::size_t index
   return {};
 }
 
-template <class C>
-Pose<B, C> basalt_mounting(YamlReader& yaml, const YAML::Node& root, std::size_t index) {
+Pose<B, C0> basalt_mounting(YamlReader& yaml, const YAML::Node& root, std::size_t index) {
   const YAML::Node T = element(yaml, root, "T_imu_cam", index);
   const Quat q(yaml.number(T, "qw"), yaml.number(T, "qx"), yaml.number(T, "qy"), yaml.number(T, "qz"));
   const Vec3 p(yaml.number(T, "px"), yaml.number(T, "py"), yaml.number(T, "pz"));
   if (yaml.ok() && !(std::abs(q.norm() - 1) < 1e-3)) yaml.complain(T, "qw", "this quaternion's norm is not 1");
-  return yaml.ok() ? Pose<B, C>(q.normalized(), p) : Pose<B, C>();
+  return yaml.ok() ? Pose<B, C0>(q.normalized(), p) : Pose<B, C0>();
 }
 
 /// The largest of three.
@@ -128,10 +126,9 @@ Camera camodocal_camera(YamlReader& yaml) {
   return {};
 }
 
-template <class C>
-Pose<B, C> body_T_cam(YamlReader& yaml, const char* field) {
+Pose<B, C0> body_T_cam(YamlReader& yaml, const std::string& field) {
   const YAML::Node T = inner(yaml, yaml.root(), field);
-  return yaml.ok() ? read_transform<B, C>(yaml, T, "data") : Pose<B, C>();
+  return yaml.ok() ? read_transform<B, C0>(yaml, T, "data") : Pose<B, C0>();
 }
 
 // ROS
@@ -169,13 +166,14 @@ RosCamera ros_camera(YamlReader& yaml) {
 }  // namespace
 
 Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read) {
-  const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0"), cam1 = inner(yaml, yaml.root(), "cam1");
+  const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0");
+  std::vector<MountedCamera> cameras;
+  for (int i = 0; yaml.ok() && (i == 0 || yaml.has(yaml.root(), fmt::format("cam{}", i))); ++i) {
+    const YAML::Node camera = inner(yaml, yaml.root(), fmt::format("cam{}", i));
+    if (yaml.ok()) cameras.push_back({read_real_camera(yaml, camera, "distortion_coeffs", read), mounting(yaml, camera)});
+  }
   if (!yaml.ok()) return yaml.error();
-  StereoRig rig;
-  rig.left = read_real_camera(yaml, cam0, "distortion_coeffs", read);
-  rig.right = read_real_camera(yaml, cam1, "distortion_coeffs", read);
-  rig.T_BC0 = mounting<C0>(yaml, cam0);
-  rig.T_BC1 = mounting<C1>(yaml, cam1);
+  StereoRig rig = with_cameras({}, cameras);
   rig.time_offset_s = yaml.number_between(cam0, "timeshift_cam_imu", -10, 10, 0);
   return finished(yaml, rig);
 }
@@ -183,11 +181,12 @@ Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read
 Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML
   const YAML::Node root = inner(yaml, yaml.root(), "value0");
   if (!yaml.ok()) return yaml.error();
-  StereoRig rig;
-  rig.left = basalt_camera(yaml, root, 0);
-  rig.right = basalt_camera(yaml, root, 1);
-  rig.T_BC0 = basalt_mounting<C0>(yaml, root, 0);
-  rig.T_BC1 = basalt_mounting<C1>(yaml, root, 1);
+  const YAML::Node lenses = yaml.get(root, "intrinsics");
+  std::vector<MountedCamera> cameras;
+  for (std::size_t i = 0; yaml.ok() && i < std::max<std::size_t>(1, lenses.IsSequence() ? lenses.size() : 0); ++i)
+    cameras.push_back({basalt_camera(yaml, root, i), basalt_mounting(yaml, root, i)});
+  if (!yaml.ok()) return yaml.error();
+  StereoRig rig = with_cameras({}, cameras);
   rig.imu_noise.rate_hz = yaml.positive(root, "imu_update_rate");
   rig.imu_noise.gyro_noise_density_radps_rthz = worst_axis(yaml, root, "gyro_noise_std");
   rig.imu_noise.accel_noise_density_mps2_rthz = worst_axis(yaml, root, "accel_noise_std");
@@ -197,14 +196,15 @@ Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML
   return finished(yaml, rig);
 }
 
-Result<StereoRig> parse_vins_fusion(YamlReader yaml, YamlReader left, YamlReader right) {
-  StereoRig rig;
-  rig.left = camodocal_camera(left);
-  rig.right = camodocal_camera(right);
-  if (!left.ok()) return left.error();
-  if (!right.ok()) return right.error();
-  rig.T_BC0 = body_T_cam<C0>(yaml, "body_T_cam0");
-  rig.T_BC1 = body_T_cam<C1>(yaml, "body_T_cam1");
+Result<StereoRig> parse_vins_fusion(YamlReader yaml, std::vector<YamlReader> files) {
+  std::vector<MountedCamera> cameras;
+  for (YamlReader& file : files) {
+    const Camera camera = camodocal_camera(file);
+    if (!file.ok()) return file.error();
+    cameras.push_back({camera, body_T_cam(yaml, fmt::format("body_T_cam{}", cameras.size()))});
+  }
+  if (!yaml.ok()) return yaml.error();
+  StereoRig rig = with_cameras({}, cameras);
   constexpr double kRate_hz = 200;
   const auto density = [&](const char* field) { return yaml.positive(yaml.root(), field) / std::sqrt(kRate_hz); };
   rig.imu_noise = {density("gyr_n"), density("acc_n"), density("gyr_w"), density("acc_w"), kRate_hz};

@@ -2,6 +2,8 @@
 // Private to bags: other programs' calibration files to values, checked. Pure functions.
 #pragma once
 
+#include <vector>
+
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/mask_fields.hpp"
@@ -17,9 +19,9 @@ Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read
 /// without its higher coefficients, kb4, ds and eucm.
 Result<StereoRig> parse_basalt(YamlReader yaml);
 
-/// The estimator's configuration and its cameras' files (camodocal): PINHOLE, KANNALA_BRANDT and MEI. Its noise figures are
-/// those of single readings at 200 Hz.
-Result<StereoRig> parse_vins_fusion(YamlReader configuration, YamlReader left, YamlReader right);
+/// The estimator's configuration and its cameras' files, one or two (camodocal): PINHOLE, KANNALA_BRANDT and MEI. Its noise
+/// figures are those of single readings at 200 Hz.
+Result<StereoRig> parse_vins_fusion(YamlReader configuration, std::vector<YamlReader> cameras);
 
 /// camera_info as camera_calibration writes it: C1 against C0 comes from rectification and projection.
 Result<StereoRig> parse_camera_info(YamlReader left, YamlReader right, const Pose<B, C0>& T_BC0);

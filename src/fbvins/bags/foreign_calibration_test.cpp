@@ -84,6 +84,23 @@ TEST(ForeignCalibration, OpenVinsHasCamerasInTheImu) {
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.004);
 }
 
+TEST(ForeignCalibration, AFileMayHaveOneCameraOrMoreThanTwo) {
+  const std::string first = "%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft);
+  const auto one = parse_openvins_cameras({"chain.yaml", first});
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_EQ(one->camera_count(), 1);
+  Pose<B, C1> further = kRight;
+  further.p.z() += 0.25;
+  const auto three =
+      parse_openvins_cameras({"chain.yaml", first + "cam1:\n" + openvins_camera(kRight) + "cam2:\n" + openvins_camera(further)});
+  ASSERT_TRUE(three) << three.error().message;
+  EXPECT_EQ(three->camera_count(), 3);
+  EXPECT_NEAR(three->T_BC(2).p.z() - three->T_BC1.p.z(), 0.25, 1e-6);
+  const auto mono = parse_vins_fusion({"config.yaml", vins_fusion()}, {{"left.yaml", kPinhole}});
+  ASSERT_TRUE(mono) << mono.error().message;
+  EXPECT_FALSE(mono->has_right());
+}
+
 TEST(ForeignCalibration, BasaltIsJsonWithPosesAndNoise) {
   const auto rig = parse_basalt({"calibration.json", basalt()});
   expect_rig(rig);
@@ -130,7 +147,7 @@ TEST(ForeignCalibration, TakesALensOfMoreThan180Degrees) {
 
 TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
   const std::string text = vins_fusion(), name = "config.yaml", left = "left.yaml", right = "right.yaml";
-  const auto rig = parse_vins_fusion({name, text}, {left, kPinhole}, {right, kFisheye});
+  const auto rig = parse_vins_fusion({name, text}, {{left, kPinhole}, {right, kFisheye}});
   expect_rig(rig);
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).k1, -0.28);
   EXPECT_EQ(std::get<KannalaBrandt>(rig->right.model()).k4, 0.04);
@@ -140,12 +157,12 @@ TEST(ForeignCalibration, VinsFusionHasAFileACamera) {
       "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 752\nimage_height: 480\nmirror_parameters:\n   xi: 0.9\ndistortion_parameters:\n"
       "   k1: -0.02\n   k2: 0.06\n   p1: 0.001\n   p2: 0.002\nprojection_parameters:\n   gamma1: 830\n   gamma2: 829\n   u0: 370\n   v0: "
       "240\n";
-  const auto with_mei = parse_vins_fusion({name, text}, {left, mei}, {right, kPinhole});
+  const auto with_mei = parse_vins_fusion({name, text}, {{left, mei}, {right, kPinhole}});
   expect_rig(with_mei);
   EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).xi, 0.9);
   EXPECT_EQ(std::get<UnifiedRadtan>(with_mei->left.model()).p2, 0.002);
   const std::string other = "model_type: SCARAMUZZA\nimage_width: 752\nimage_height: 480\nprojection_parameters:\n   xi: 1\n";
-  EXPECT_EQ(parse_vins_fusion({name, text}, {left, other}, {right, other}).error().message,
+  EXPECT_EQ(parse_vins_fusion({name, text}, {{left, other}, {right, other}}).error().message,
             "left.yaml:1: model_type: 'SCARAMUZZA' is not supported, only PINHOLE, KANNALA_BRANDT and MEI");
 }
 

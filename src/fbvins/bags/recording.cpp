@@ -2,10 +2,12 @@
 #include "fbvins/bags/recording.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "fbvins/bags/bag_contents.hpp"
 #include "fbvins/bags/calibration.hpp"
@@ -34,22 +36,23 @@ constexpr Duration kForever = {std::int64_t{1} << 62};
 
 class BagLoader : public FrameLoader {
  public:
-  struct Side {
-    Camera camera;
+  struct Sensor {
+    Camera camera;  ///< of a depth sensor: that whose pixels it has
     Encoding encoding;
     bool compressed;
   };
-  BagLoader(std::unique_ptr<BagReader> bag, std::string name, Side left, Side right)
-      : bag_(std::move(bag)), name_(std::move(name)), left_(std::move(left)), right_(std::move(right)) {}
+  BagLoader(std::unique_ptr<BagReader> bag, std::string name, std::vector<Sensor> cameras, std::optional<Sensor> depth)
+      : bag_(std::move(bag)), name_(std::move(name)), cameras_(std::move(cameras)), depth_(std::move(depth)) {}
 
-  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in both
+  /// Cameras of 10 and 12 bits send these in 16, where the upper eight would be almost black: finds how many are used in all
   /// cameras together, from images spread over the recording, so that all its images are scaled alike.
   int find_used_bits(const std::vector<FrameEntry>& frames) {
     std::uint16_t largest = 0;
-    for (const auto& [side, file] : {std::pair{&left_, &FrameEntry::left_file}, {&right_, &FrameEntry::right_file}})
-      if (!side->compressed)
-        for (const FrameEntry& frame : frames_to_try(frames, file))
-          largest = std::max(largest, largest_value_of(bag_->read(place_of(frame.*file)), side->encoding).value_or(0));
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      if (cameras_[i].compressed) continue;
+      for (const std::string& place : images_to_try(frames, [&](const FrameEntry& f) { return f.file(static_cast<int>(i)); }))
+        largest = std::max(largest, largest_value_of(bag_->read(place_of(place)), cameras_[i].encoding).value_or(0));
+    }
     return used_bits_ = bits_used_for(largest);
   }
 
@@ -57,29 +60,45 @@ class BagLoader : public FrameLoader {
     LoadedFrame out;
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
-    out.frame.left = load_image(entry.left_file, left_, out.left, out.problem);
-    out.frame.right = load_image(entry.right_file, right_, out.right, out.problem);
+    out.frame.more.resize(entry.more_files.size());
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const auto read = [&](const Sensor& s, std::string_view bytes) {
+        return image_of(bytes, s.encoding, s.compressed, used_bits_);
+      };
+      ImageCounts& counts = i == 0 ? out.left : i == 1 ? out.right : out.more;
+      if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out.problem))
+        (i == 0 ? out.frame.left : i == 1 ? out.frame.right : out.frame.more[i - 2]) = std::move(image);
+    }
+    if (!depth_) return out;
+    const auto read = [](const Sensor& s, std::string_view bytes) { return depth_of(bytes, s.encoding, s.compressed); };
+    out.frame.depth = load_image<DepthImage>(entry.depth_file, *depth_, read, out.depth, out.problem);
     return out;
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& place, const Side& side, ImageCounts& counts, std::string& problem) {
+  static std::pair<int, int> size_of(const Image& image) { return {image.width(), image.height()}; }
+  static std::pair<int, int> size_of(const DepthImage& image) { return {image.width, image.height}; }
+
+  template <class T, class Read>
+  std::shared_ptr<const T> load_image(const std::string& place, const Sensor& sensor, Read&& read, ImageCounts& counts,
+                                      std::string& problem) {
     if (place.empty()) return nullptr;
     const auto blame = [&](int& count, const std::string& sentence) {
       ++count;
       if (problem.empty()) problem = fmt::format("{}: image at {}: {}", name_, place, sentence);
       return nullptr;
     };
-    Result<Image> image = image_of(bag_->read(place_of(place)), side.encoding, side.compressed, used_bits_);
+    Result<T> image = read(sensor, bag_->read(place_of(place)));
     if (!image) return blame(counts.corrupt, image.error().message);
-    if (const auto sentence = wrong_size(image->width(), image->height(), side.camera))
-      return blame(counts.wrong_size, *sentence);
-    return std::make_shared<const Image>(*std::move(image));
+    const auto [width, height] = size_of(*image);
+    if (const auto sentence = wrong_size(width, height, sensor.camera)) return blame(counts.wrong_size, *sentence);
+    return std::make_shared<const T>(*std::move(image));
   }
 
   std::unique_ptr<BagReader> bag_;
   std::string name_;
-  Side left_, right_;
+  std::vector<Sensor> cameras_;
+  std::optional<Sensor> depth_;
   int used_bits_ = 16;
 };
 
@@ -96,29 +115,24 @@ class BagRecording {
       bag->only(start - kImuLeadIn - kRecordingDelay, o.duration_s > 0 ? end + kRecordingDelay : kForever);
     }
     contents_ = read_contents(*bag);
-    for (auto step : {&BagRecording::choose, &BagRecording::calibrate, &BagRecording::pair, &BagRecording::cut})
+    for (auto step :
+         {&BagRecording::choose, &BagRecording::calibrate, &BagRecording::use_depths, &BagRecording::join, &BagRecording::cut})
       if (Result<void> done = (this->*step)(); !done)
         return Error{done.error().code, fmt::format("{}: {}", path_, done.error().message)};
     describe_bag(*bag);
-    const auto side = [&](const std::string& topic, const Camera& camera) {
-      const ImageTopic& images = contents_.images.at(topic);
-      return BagLoader::Side{camera, images.encoding, images.compressed};
-    };
-    auto loader = std::make_unique<BagLoader>(std::move(bag), path_, side(topics_.left, out_.rig.left),
-                                              side(topics_.right, out_.rig.right));
-    if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
-      out_.info.warnings.push_back(
-          fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", path_, bits, 1 << (16 - bits)));
-    out_.loader = std::move(loader);
+    make_loader(std::move(bag));
     return std::move(out_);
   }
 
  private:
   Result<void> choose() {
-    const Result<ChosenTopics> chosen = choose_topics(
-        contents_, {options_.left_topic, options_.right_topic, options_.imu_topic, {}}, options_.dataset.require_imu);
+    const std::string& camera = options_.dataset.camera;
+    const WantedTopics wanted{options_.dataset.require_imu, camera == "depth", camera == "all" || camera == "depth",
+                              rig_ ? rig_->camera_count() : kMostCameras};
+    const Result<ChosenTopics> chosen = choose_topics(contents_, options_.topics, wanted);
     if (!chosen) return chosen.error();
     topics_ = *chosen;
+    named_ = std::ranges::any_of(options_.topics, [&](const std::string& t) { return contents_.images.contains(t); });
     return {};
   }
 
@@ -129,39 +143,64 @@ class BagRecording {
       whole_calibration_ = true;
     }
     if (!rig_) {
+      if (!named_) topics_.cameras = calibrated_cameras(contents_, topics_);
       const Result<StereoRig> rig = rig_of(contents_, topics_);
       if (!rig) return rig.error();
       rig_ = *rig;
       out_.info.warnings.emplace_back("the bag has no noise figures of the IMU: defaults are used");
     }
+    if (std::cmp_greater(topics_.cameras.size(), rig_->camera_count()))
+      return Error{ErrorCode::invalid_argument, fmt::format("images of {} cameras are to be used, and the calibration has {}",
+                                                            topics_.cameras.size(), rig_->camera_count())};
+    std::vector<MountedCamera> cameras;
+    for (std::size_t i = 0; i < topics_.cameras.size(); ++i) cameras.push_back(rig_->mounted(static_cast<int>(i)));
     out_.rig = *rig_;
+    out_.rig.depth.reset();
+    out_.rig = with_cameras(out_.rig, cameras);
     return {};
   }
 
-  Result<void> pair() {
-    CameraInfo* infos[2] = {&out_.info.left, &out_.info.right};
-    std::vector<ImageRow> rows[2];
-    for (int i = 0; i < 2; ++i) {
-      ImageTopic& topic = contents_.images.at(i == 0 ? topics_.left : topics_.right);
-      infos[i]->rows.malformed = topic.malformed;
-      infos[i]->rows.rows = topic.malformed;
-      rows[i] = in_order(std::move(topic.rows), infos[i]->rows);
-      infos[i]->listed = static_cast<int>(rows[i].size());
+  /// Depth images that do not lie on the camera's are an error only where they were asked for.
+  Result<void> use_depths() {
+    if (topics_.depth.empty()) return {};
+    if (const std::string why = not_registered(contents_, topics_); !why.empty()) {
+      const std::string sentence =
+          fmt::format("the depth images on {} are not registered to {}: {}", topics_.depth, topics_.cameras.front(), why);
+      if (options_.dataset.camera == "depth" || named_) return Error{ErrorCode::unsupported, sentence};
+      out_.info.warnings.push_back(sentence + "; they are not used");
+      topics_.depth.clear();
+      return {};
     }
-    PairedFrames paired = pair_frames(rows[0], rows[1], Duration::from_seconds(1e-3 * options_.dataset.pair_tolerance_ms));
-    out_.info.left.unpaired = paired.left_only;
-    out_.info.right.unpaired = paired.right_only;
-    if (paired.left_only == out_.info.left.listed)
-      return Error{ErrorCode::malformed, fmt::format("no stamp on {} lies within {} ms of one on {}", topics_.right,
-                                                     options_.dataset.pair_tolerance_ms, topics_.left)};
-    if (paired.untriggered)
-      out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.dataset.pair_tolerance_ms));
-    else if (paired.left_only + paired.right_only > 0)
-      out_.info.warnings.push_back(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only,
-                                               paired.right_only, options_.dataset.pair_tolerance_ms));
-    out_.frames = std::move(paired.frames);
+    if (!rig_->depth) out_.info.warnings.emplace_back("there are no figures of the depth sensor: defaults are used");
+    out_.rig = with_depth(out_.rig, rig_->depth.value_or(DepthSensor{}));
+    return {};
+  }
+
+  std::vector<ImageRow> rows_of(const std::string& name, CameraInfo& info) {
+    ImageTopic& topic = contents_.images.at(name);
+    info.rows.malformed += topic.malformed;
+    info.rows.rows += topic.malformed;
+    std::vector<ImageRow> rows = in_order(std::move(topic.rows), info.rows);
+    info.listed += static_cast<int>(rows.size());
+    return rows;
+  }
+
+  Result<void> join() {
+    DatasetInfo& info = out_.info;
+    std::vector<std::vector<ImageRow>> cameras;
+    for (std::size_t i = 0; i < topics_.cameras.size(); ++i)
+      cameras.push_back(rows_of(topics_.cameras[i], i == 0 ? info.left : i == 1 ? info.right : info.more));
+    const std::vector<ImageRow> depths = topics_.depth.empty() ? std::vector<ImageRow>{} : rows_of(topics_.depth, info.depth);
+    const double tolerance_ms = options_.dataset.pair_tolerance_ms;
+    out_.frames = join_images(cameras, depths, tolerance_ms, info);
+    const auto never = [&](const std::string& topic) {
+      return Error{ErrorCode::malformed,
+                   fmt::format("no stamp on {} lies within {} ms of one on {}", topic, tolerance_ms, topics_.cameras.front())};
+    };
+    if (cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
+    if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
     if (topics_.imu.empty()) return {};
-    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, out_.info.imu_rows);
+    out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);
     return {};
   }
 
@@ -180,8 +219,9 @@ class BagRecording {
   void describe_bag(const BagReader& bag) {
     DatasetInfo& info = out_.info;
     info.name = fs::path(path_).lexically_normal().stem().string();
-    info.format = fmt::format("{}: {}, {}, {}", bag.format(), topics_.left, topics_.right, topics_.imu);
+    info.format = fmt::format("{}: {}, {}", bag.format(), fmt::join(topics_.cameras, ", "), topics_.imu);
     if (!topics_.accel.empty()) info.format += fmt::format(" with {}", topics_.accel);
+    if (!topics_.depth.empty()) info.format += fmt::format(", depth images {}", topics_.depth);
     const BagDamage& damage = bag.damage();
     if (damage.parts > 0)
       info.warnings.push_back(fmt::format("{} ({} parts of the file are left out)", damage.first, damage.parts));
@@ -197,11 +237,29 @@ class BagRecording {
       out_.rig.imu_noise.rate_hz = info.imu_rate_hz;
   }
 
+  void make_loader(std::unique_ptr<BagReader> bag) {
+    const auto sensor = [&](const std::string& topic, const Camera& camera) {
+      const ImageTopic& images = contents_.images.at(topic);
+      return BagLoader::Sensor{camera, images.encoding, images.compressed};
+    };
+    std::vector<BagLoader::Sensor> cameras;
+    for (const std::string& topic : topics_.cameras)
+      cameras.push_back(sensor(topic, out_.rig.camera(static_cast<int>(cameras.size()))));
+    std::optional<BagLoader::Sensor> depth;
+    if (!topics_.depth.empty()) depth = sensor(topics_.depth, out_.rig.left);
+    auto loader = std::make_unique<BagLoader>(std::move(bag), path_, std::move(cameras), std::move(depth));
+    if (const int bits = loader->find_used_bits(out_.frames); bits < 16)
+      out_.info.warnings.push_back(
+          fmt::format("{}: images of 16 bits have values of {} bits only, and are scaled by {}", path_, bits, 1 << (16 - bits)));
+    out_.loader = std::move(loader);
+  }
+
   std::string path_;
   const RecordingOptions& options_;
   std::optional<StereoRig> rig_;
   BagContents contents_;
   ChosenTopics topics_;
+  bool named_ = false;              ///< topics of images are given, and not found
   bool whole_calibration_ = false;  ///< the bag's own, noise and rates included
   DatasetContents out_;
 };
@@ -271,7 +329,7 @@ Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const R
   Result<DatasetContents> contents = BagRecording(path, options, options.dataset.rig).read(*std::move(reader));
   if (!contents) return contents.error();
   if (Result<void> readable = check_images(*contents); !readable) return readable.error();
-  if (options.dataset.camera == "depth") return no_depth_images(path);
+  if (options.dataset.camera == "depth" && !contents->rig.depth) return no_depth_images(path);
   return std::make_unique<Dataset>(*std::move(contents), options.dataset);
 }
 

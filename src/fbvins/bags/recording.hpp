@@ -12,6 +12,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/dataset.hpp"
@@ -22,7 +23,8 @@ struct RecordingOptions {
   DatasetOptions dataset = {};
   std::string calibration = {},
               imu_calibration = {};  ///< files of any known format (calibration.hpp), instead of the recording's own
-  std::string left_topic = {}, right_topic = {}, imu_topic = {};  ///< of a bag; empty: found
+  std::vector<std::string> topics =
+      {};  ///< of a bag: the cameras' in their order, the IMU's, depth images; those missing are found
 };
 
 /// An error where the topics or the calibration cannot be found.

@@ -7,7 +7,6 @@
 #include <map>
 #include <vector>
 
-#include "fbvins/camera/check_rig.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/io/little_endian.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -58,25 +57,48 @@ struct Topic {
 };
 
 /// In the order of their numbers.
-enum Number : std::uint32_t { kImu, kLeft, kRight, kLeftInfo, kRightInfo, kTransforms, kRig, kTruth, kOdometry };
+enum Number : std::uint32_t {
+  kImu,
+  kLeft,
+  kRight,
+  kLeftInfo,
+  kRightInfo,
+  kTransforms,
+  kRig,
+  kTruth,
+  kOdometry,
+  kFurther,          ///< image and camera_info of each camera from number 2 on
+  kDepth = kFurther  ///< of a rig with one camera
+};
 
-std::vector<Topic> topics() {
+std::uint32_t image_number(int camera) {
+  return camera == 0 ? kLeft : camera == 1 ? kRight : kFurther + 2 * static_cast<std::uint32_t>(camera - 2);
+}
+std::uint32_t info_number(int camera) { return camera == 0 ? kLeftInfo : camera == 1 ? kRightInfo : image_number(camera) + 1; }
+
+std::vector<Topic> topics(const StereoRig& rig) {
   const std::string imu = definition(kImuFields, {kHeader, kQuaternion, kVector}), image = definition(kImageFields, {kHeader}),
                     camera = definition(kCameraFields, {kHeader, kRegion}),
                     transforms = definition("geometry_msgs/TransformStamped[] transforms\n",
                                             {kTransformStamped, kHeader, kTransform, kVector, kQuaternion});
   constexpr const char *kImage = "060021388200f6f0f447d0fcd9c64743", *kCamera = "c9a58c1b0b154e0e6da7578cb991d214";
-  return {{"/imu0", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", imu},
-          {std::string(kBagLeftTopic), "sensor_msgs/Image", kImage, image},
-          {std::string(kBagRightTopic), "sensor_msgs/Image", kImage, image},
-          {"/cam0/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
-          {"/cam1/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
-          {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms},
-          {std::string(kRigTopic), "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n"},
-          {std::string(kBagTruthTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
-           definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})},
-          {std::string(kBagOdometryTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
-           definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})}};
+  std::vector<Topic> out = {{"/imu0", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", imu},
+                            {bag_camera_topic(0), "sensor_msgs/Image", kImage, image},
+                            {bag_camera_topic(1), "sensor_msgs/Image", kImage, image},
+                            {"/cam0/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
+                            {"/cam1/camera_info", "sensor_msgs/CameraInfo", kCamera, camera},
+                            {"/tf_static", "tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec", transforms},
+                            {std::string(kRigTopic), "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n"},
+                            {std::string(kBagTruthTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+                             definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})},
+                            {std::string(kBagOdometryTopic), "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+                             definition("Header header\ngeometry_msgs/Pose pose\n", {kHeader, kPose, kPoint, kQuaternion})}};
+  if (rig.depth) out.push_back({std::string(kBagDepthTopic), "sensor_msgs/Image", kImage, image});
+  for (int i = 2; i < rig.camera_count(); ++i) {
+    out.push_back({bag_camera_topic(i), "sensor_msgs/Image", kImage, image});
+    out.push_back({fmt::format("/cam{}/camera_info", i), "sensor_msgs/CameraInfo", kCamera, camera});
+  }
+  return out;
 }
 
 // Records: a header of fields, and data.
@@ -135,18 +157,29 @@ std::string imu_message(const ImuSample& sample) {
   return out;
 }
 
-std::string image_message(Time t, std::string_view frame, const Image& image) {
+/// All before the pixels, whose rows follow one another.
+std::string image_header(Time t, std::string_view frame, int width, int height, const char* encoding, int pixel_bytes) {
   std::string out;
   add_header(out, t, frame);
-  append_le(out, static_cast<std::uint32_t>(image.height()));
-  append_le(out, static_cast<std::uint32_t>(image.width()));
-  add_text(out, "mono8");
+  append_le(out, static_cast<std::uint32_t>(height));
+  append_le(out, static_cast<std::uint32_t>(width));
+  add_text(out, encoding);
   append_le(out, std::uint8_t{0});
-  append_le(out, static_cast<std::uint32_t>(image.width()));
+  append_le(out, static_cast<std::uint32_t>(width * pixel_bytes));
+  append_le(out, static_cast<std::uint32_t>(std::int64_t{width} * pixel_bytes * height));
+  return out;
+}
+
+std::string image_message(Time t, std::string_view frame, const Image& image) {
+  std::string out = image_header(t, frame, image.width(), image.height(), "mono8", 1);
   const std::size_t row = static_cast<std::size_t>(image.width());
-  append_le(out, static_cast<std::uint32_t>(row * static_cast<std::size_t>(image.height())));
   for (int y = 0; y < image.height(); ++y) out.append(reinterpret_cast<const char*>(image.row(y)), row);
   return out;
+}
+
+std::string depth_message(Time t, const DepthImage& depth) {
+  std::string out = image_header(t, kLeftFrame, depth.width, depth.height, "16UC1", 2);
+  return out.append(reinterpret_cast<const char*>(depth.mm.data()), 2 * depth.mm.size());
 }
 
 std::string camera_message(Time t, std::string_view frame, const Camera& camera) {
@@ -169,15 +202,14 @@ std::string camera_message(Time t, std::string_view frame, const Camera& camera)
 
 std::string transforms_message(Time t, const StereoRig& rig) {
   std::string out;
-  append_le(out, std::uint32_t{2});
-  const auto add = [&](std::string_view frame, const Quat& q, const Vec3& p) {
+  append_le(out, static_cast<std::uint32_t>(rig.camera_count()));
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    const Pose<B, C0> T_BC = rig.T_BC(i);
     add_header(out, t, kBodyFrame);
-    add_text(out, frame);
-    add_doubles(out, p.data(), 3);
-    add_quaternion(out, q);
-  };
-  add(kLeftFrame, rig.T_BC0.q, rig.T_BC0.p);
-  add(kRightFrame, rig.T_BC1.q, rig.T_BC1.p);
+    add_text(out, camera_frame(i));
+    add_doubles(out, T_BC.p.data(), 3);
+    add_quaternion(out, T_BC.q);
+  }
   return out;
 }
 
@@ -204,13 +236,13 @@ struct ChunkInfo {
 }  // namespace
 
 struct Ros1BagWriter::State {
-  explicit State(AtomicFile opened) : file(std::move(opened)) {}
+  State(AtomicFile opened, const StereoRig& rig) : file(std::move(opened)), all(topics(rig)) {}
 
   AtomicFile file;
   std::string chunk;
   ChunkInfo info;
   std::vector<ChunkInfo> chunks;
-  std::vector<Topic> all = topics();
+  std::vector<Topic> all;
 
   void write(std::string_view bytes) { file.write(bytes); }
   Result<void> good() const { return file.status(); }
@@ -300,18 +332,21 @@ struct Ros1BagWriter::State {
   static constexpr std::size_t kEntry_bytes = 8 + 4;
 };
 
+std::string bag_camera_topic(int camera) { return fmt::format("/cam{}/image_raw", camera); }
+
 Result<Ros1BagWriter> Ros1BagWriter::create(const std::string& path, const StereoRig& rig, Time start) {
-  if (Result<void> pair = check_is_a_pair_at_most(rig, path); !pair) return pair.error();
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
-  auto state = std::make_unique<State>(*std::move(file));
+  auto state = std::make_unique<State>(*std::move(file), rig);
   state->write(kBagBegins);
   state->write(state->bag_header(0));
   if (Result<void> done = state->good(); !done) return done.error();
-  for (const auto& [number, message] : {std::pair{kLeftInfo, camera_message(start, kLeftFrame, rig.left)},
-                                        {kRightInfo, camera_message(start, kRightFrame, rig.right)},
-                                        {kTransforms, transforms_message(start, rig)},
-                                        {kRig, text_message(rig_to_yaml(rig))}})
+  std::vector<std::pair<std::uint32_t, std::string>> messages;
+  for (int i = 0; i < rig.camera_count(); ++i)
+    messages.emplace_back(info_number(i), camera_message(start, camera_frame(i), rig.camera(i)));
+  messages.emplace_back(kTransforms, transforms_message(start, rig));
+  messages.emplace_back(kRig, text_message(rig_to_yaml(rig)));
+  for (const auto& [number, message] : messages)
     if (Result<void> done = state->add(number, start, message); !done) return done.error();
   return Ros1BagWriter(std::move(state));
 }
@@ -324,10 +359,14 @@ Ros1BagWriter& Ros1BagWriter::operator=(Ros1BagWriter&&) noexcept = default;
 Result<void> Ros1BagWriter::add(const ImuSample& sample) { return state_->add(kImu, sample.t, imu_message(sample)); }
 
 Result<void> Ros1BagWriter::add(const StereoFrame& frame) {
-  if (frame.left)
-    if (Result<void> done = state_->add(kLeft, frame.t, image_message(frame.t, kLeftFrame, *frame.left)); !done) return done;
-  if (!frame.right) return {};
-  return state_->add(kRight, frame.t, image_message(frame.t + frame.offsets.of(1), kRightFrame, *frame.right));
+  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i) {
+    const std::shared_ptr<const Image> image = frame.image(i);
+    if (!image) continue;
+    const std::string message = image_message(frame.t + frame.offsets.of(i), camera_frame(i), *image);
+    if (Result<void> done = state_->add(image_number(i), frame.t, message); !done) return done;
+  }
+  if (!frame.depth) return {};
+  return state_->add(kDepth, frame.t, depth_message(frame.t, *frame.depth));
 }
 
 Result<void> Ros1BagWriter::add_truth(Time t, const Pose<W, B>& T_WB) {

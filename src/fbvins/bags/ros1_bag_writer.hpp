@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: a recording as a ROS 1 bag, format 2.0, uncompressed, with its index. One thread.
+// Private: a recording of one or more cameras as a ROS 1 bag, format 2.0, uncompressed, with its index. One thread.
 //
 //   Result<Ros1BagWriter> bag = Ros1BagWriter::create("flight.bag", rig, first_stamp);
 //   bag->add(sample); bag->add(frame);
@@ -18,8 +18,9 @@ namespace fbvins {
 
 inline constexpr std::string_view kRigTopic = "/fbvins/calibration", kBagTruthTopic = "/ground_truth",
                                   kBagOdometryTopic = "/odometry";
-/// The image topics that the calibration on kRigTopic is of.
-inline constexpr std::string_view kBagLeftTopic = "/cam0/image_raw", kBagRightTopic = "/cam1/image_raw";
+/// The image topics that the calibration on kRigTopic is of: "/cam0/image_raw".
+std::string bag_camera_topic(int camera);
+inline constexpr std::string_view kBagDepthTopic = "/depth0/image_raw";
 
 class Ros1BagWriter {
  public:

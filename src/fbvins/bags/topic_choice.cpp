@@ -5,28 +5,20 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <span>
+#include <utility>
 
 #include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
 namespace {
 
-constexpr const char* kCameraOption = "CAM0,CAM1,...[,IMU]";
-
 template <class Map>
 std::vector<std::string> names(const Map& map) {
   std::vector<std::string> out;
   for (const auto& [name, value] : map) out.push_back(name);
   return out;
-}
-
-/// The topic named, or an error that lists those there are.
-template <class Map>
-Result<std::string> named_topic(const Map& map, const std::string& name, const char* what) {
-  if (map.contains(name)) return name;
-  return Error{ErrorCode::not_found, fmt::format("there is no {} on '{}'; there are {}", what, name,
-                                                 printable(fmt::format("{}", fmt::join(names(map), ", "))))};
 }
 
 using Words = std::pair<const char*, const char*>;
@@ -58,48 +50,69 @@ std::vector<TopicPair> pairs_by_words(const std::vector<std::string>& topics, st
   return out;
 }
 
-/// Without those that are the same images compressed.
-std::vector<std::string> image_topics(const BagContents& contents) {
+/// The topics of a pair that is numbered 0 and 1, and of 2, 3 ... as far as they go.
+std::vector<std::string> with_further(const TopicPair& pair, const std::vector<std::string>& topics) {
+  std::vector<std::string> out{pair.first, pair.second};
+  const auto [one, other] = std::ranges::mismatch(pair.first, pair.second);
+  if (*one != '0' || *other != '1') return out;
+  std::string next = pair.first;
+  char& number = next[static_cast<std::size_t>(one - pair.first.begin())];
+  for (number = '2'; number < '0' + kMostCameras && std::ranges::find(topics, next) != topics.end(); ++number)
+    out.push_back(next);
+  return out;
+}
+
+/// Of cameras, or of depth images; without those that are the same images compressed.
+std::vector<std::string> image_topics(const BagContents& contents, bool depth) {
   std::vector<std::string> out = names(contents.images);
   std::erase_if(out, [&](const std::string& topic) {
-    constexpr std::string_view kCompressed = "/compressed";
-    return topic.ends_with(kCompressed) && contents.images.contains(topic.substr(0, topic.size() - kCompressed.size()));
+    if (names_depth(topic) != depth) return true;
+    for (const std::string_view compressed : {"/compressed", "/compressedDepth"})
+      if (topic.ends_with(compressed) && contents.images.contains(topic.substr(0, topic.size() - compressed.size()))) return true;
+    return false;
   });
   return out;
 }
 
 std::string listed(const std::vector<std::string>& topics) { return printable(fmt::format("{}", fmt::join(topics, ", "))); }
 
-Result<TopicPair> find_images(const BagContents& contents) {
-  const std::vector<std::string> all = image_topics(contents);
-  if (all.size() < 2)
-    return Error{ErrorCode::unsupported, fmt::format("holds images on {} topics{}, not on two", all.size(),
-                                                     all.empty() ? "" : fmt::format(" ({})", listed(all)))};
-  const std::vector<TopicPair> pairs = pairs_by_words(all, kCameras);
-  if (pairs.size() == 1) return pairs.front();
-  if (pairs.empty() && all.size() == 2) return std::pair(all[0], all[1]);
-  if (pairs.empty())
-    return Error{
-        ErrorCode::unsupported,
-        fmt::format("has {} image topics ({}): say which are left and right with --topics LEFT,RIGHT", all.size(), listed(all))};
-  std::vector<std::string> each;
-  for (const auto& [left, right] : pairs) each.push_back(left + " and " + right);
-  return Error{ErrorCode::unsupported,
-               fmt::format("has {} stereo pairs ({}): say which with --topics LEFT,RIGHT", pairs.size(), listed(each))};
+Error ask(const std::string& what, const std::vector<std::string>& topics, const char* which) {
+  return {ErrorCode::unsupported,
+          fmt::format("{} ({}): say which {} with --topics {}", what, listed(topics), which, kTopicsOption)};
 }
 
-/// `option`: how the command line names all topics.
-Result<std::string> find_imu(const BagContents& contents, const char* option) {
+Result<std::vector<std::string>> find_rig(const BagContents& contents) {
+  const std::vector<std::string> all = image_topics(contents, false);
+  if (all.empty()) return Error{ErrorCode::unsupported, "holds no images"};
+  if (all.size() == 1) return all;
+  const std::vector<TopicPair> pairs = pairs_by_words(all, kCameras);
+  if (pairs.empty() && all.size() == 2) return all;
+  if (pairs.empty()) return ask(fmt::format("has {} image topics", all.size()), all, "are the cameras'");
+  if (pairs.size() > 1) {
+    std::vector<std::string> each;
+    for (const auto& [left, right] : pairs) each.push_back(left + " and " + right);
+    return ask(fmt::format("has {} stereo pairs", pairs.size()), each, "are the cameras'");
+  }
+  return with_further(pairs.front(), all);
+}
+
+Result<std::string> find_imu(const BagContents& contents) {
   const std::vector<std::string> all = names(contents.imu);
   if (all.empty()) return Error{ErrorCode::not_found, "holds no IMU readings"};
   if (all.size() == 1) return all.front();
   if (const auto pairs = pairs_by_words(all, kMotion); pairs.size() == 1 && all.size() == 2) return pairs.front().first;
-  return Error{ErrorCode::unsupported,
-               fmt::format("has {} IMU topics ({}): say which it is with --topics {}", all.size(), listed(all), option)};
+  return ask(fmt::format("has {} IMU topics", all.size()), all, "it is");
 }
 
-std::string accelerometer_of(const BagContents& contents, const std::string& gyroscope) {
-  return partner_by_words(gyroscope, names(contents.imu), kMotion);
+/// The IMU, where none is named, and the accelerometer beside it.
+Result<void> add_imu(const BagContents& contents, bool needed, ChosenTopics& out) {
+  if (out.imu.empty()) {
+    const Result<std::string> imu = find_imu(contents);
+    if (!imu && (needed || !contents.imu.empty())) return imu.error();
+    if (imu) out.imu = *imu;
+  }
+  if (!out.imu.empty()) out.accel = partner_by_words(out.imu, names(contents.imu), kMotion);
+  return {};
 }
 
 /// Of /cam0/image_raw /cam0: topics of one camera in different forms have it in common.
@@ -110,53 +123,31 @@ std::string camera_folder(const std::string& topic) {
   return slash != std::string::npos && plain.compare(slash + 1, 5, "image") == 0 ? plain.substr(0, slash) : plain;
 }
 
-Result<std::vector<std::string>> find_cameras(const BagContents& contents) {
-  std::vector<std::string> all = image_topics(contents);
-  std::erase_if(all, [](const std::string& topic) { return topic.find("depth") != std::string::npos; });
+Result<std::vector<std::string>> find_all_cameras(const BagContents& contents) {
+  const std::vector<std::string> all = image_topics(contents, false);
   if (all.empty()) return Error{ErrorCode::not_found, "holds no images"};
-  const auto ask = [&](const std::string& what) {
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{} ({}): say which are the cameras' with --topics {}", what, listed(all), kCameraOption)};
-  };
-  if (std::ssize(all) > kMostCameras) return ask(fmt::format("has {} image topics, more than {}", all.size(), kMostCameras));
+  if (std::ssize(all) > kMostCameras)
+    return ask(fmt::format("has {} image topics, more than {}", all.size(), kMostCameras), all, "are the cameras'");
   for (std::size_t i = 1; i < all.size(); ++i)
-    if (camera_folder(all[i]) == camera_folder(all[i - 1])) return ask("has several image topics of one camera");
+    if (camera_folder(all[i]) == camera_folder(all[i - 1]))
+      return ask("has several image topics of one camera", all, "are the cameras'");
   return all;
 }
 
-}  // namespace
-
-Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed) {
+/// What is named, by what is on it.
+Result<ChosenTopics> sorted_by_kind(const BagContents& contents, const std::vector<std::string>& named) {
   ChosenTopics out;
-  if (named.left.empty() != named.right.empty())
-    return Error{ErrorCode::invalid_argument, "one image topic is named and the other is not"};
-  if (!named.left.empty()) {
-    const auto left = named_topic(contents.images, named.left, "image"),
-               right = named_topic(contents.images, named.right, "image");
-    if (!left) return left.error();
-    if (!right) return right.error();
-    out.left = *left, out.right = *right;
-  } else {
-    const auto images = find_images(contents);
-    if (!images) return images.error();
-    out.left = images->first, out.right = images->second;
-  }
-  const auto imu = named.imu.empty() ? find_imu(contents, "LEFT,RIGHT,IMU") : named_topic(contents.imu, named.imu, "IMU");
-  if (imu) {
-    out.imu = *imu;
-    out.accel = accelerometer_of(contents, *imu);
-  } else if (imu_needed || !contents.imu.empty()) return imu.error();
-  return out;
-}
-
-Result<CameraTopics> choose_cameras(const BagContents& contents, const std::vector<std::string>& named) {
-  CameraTopics out;
+  const auto twice = [](const char* what) {
+    return Error{ErrorCode::invalid_argument, fmt::format("--topics names two {}", what)};
+  };
   for (const std::string& topic : named) {
-    if (contents.images.contains(topic)) {
+    if (contents.images.contains(topic) && !names_depth(topic)) {
+      if (std::ranges::find(out.cameras, topic) != out.cameras.end()) return twice("cameras of one name");
       out.cameras.push_back(topic);
+    } else if (contents.images.contains(topic)) {
+      if (!std::exchange(out.depth, topic).empty()) return twice("depth sensors");
     } else if (contents.imu.contains(topic)) {
-      if (!out.imu.empty()) return Error{ErrorCode::invalid_argument, "--topics names two IMUs"};
-      out.imu = topic;
+      if (!std::exchange(out.imu, topic).empty()) return twice("IMUs");
     } else {
       return Error{ErrorCode::not_found,
                    fmt::format("there are neither images nor IMU readings on '{}'; there are images on {}, "
@@ -166,17 +157,56 @@ Result<CameraTopics> choose_cameras(const BagContents& contents, const std::vect
   }
   if (std::ssize(out.cameras) > kMostCameras)
     return Error{ErrorCode::invalid_argument, fmt::format("--topics names more than {} cameras", kMostCameras)};
-  if (out.cameras.empty()) {
-    Result<std::vector<std::string>> found = find_cameras(contents);
+  return out;
+}
+
+}  // namespace
+
+bool names_depth(const std::string& topic) {
+  constexpr std::string_view kDepth = "depth";
+  if (topic.ends_with("/compressedDepth")) return true;
+  const auto is_letter = [&](std::size_t i) {
+    return i < topic.size() && std::isalpha(static_cast<unsigned char>(topic[i])) != 0;
+  };
+  const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
+  for (std::size_t i = 0; i + kDepth.size() <= topic.size(); ++i)
+    if (std::equal(kDepth.begin(), kDepth.end(), topic.begin() + static_cast<std::ptrdiff_t>(i),
+                   [&](char wanted, char is) { return same(is, wanted); }) &&
+        (i == 0 || !is_letter(i - 1)) && !is_letter(i + kDepth.size()))
+      return true;
+  return false;
+}
+
+Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vector<std::string>& named,
+                                   const WantedTopics& wanted) {
+  Result<ChosenTopics> out = sorted_by_kind(contents, named);
+  if (!out) return out;
+  if (out->cameras.empty()) {
+    Result<std::vector<std::string>> found = find_rig(contents);
     if (!found) return found.error();
-    out.cameras = *std::move(found);
+    out->cameras = *std::move(found);
+    out->cameras.resize(std::min(out->cameras.size(), static_cast<std::size_t>(wanted.most_cameras)));
   }
-  if (out.imu.empty() && !contents.imu.empty()) {
-    const Result<std::string> imu = find_imu(contents, kCameraOption);
-    if (!imu) return imu.error();
-    out.imu = *imu;
+  if (wanted.one_camera) out->cameras.resize(1);
+  const std::vector<std::string> depths = image_topics(contents, true);
+  if (!wanted.depth || out->cameras.size() > 1) out->depth.clear();
+  else if (out->depth.empty() && depths.size() == 1) out->depth = depths.front();
+  else if (out->depth.empty() && depths.size() > 1)
+    return ask(fmt::format("has {} topics of depth images", depths.size()), depths, "are registered to the camera");
+  if (Result<void> imu = add_imu(contents, wanted.imu, *out); !imu) return imu.error();
+  return out;
+}
+
+Result<ChosenTopics> choose_cameras(const BagContents& contents, const std::vector<std::string>& named) {
+  Result<ChosenTopics> out = sorted_by_kind(contents, named);
+  if (!out) return out;
+  out->depth.clear();
+  if (out->cameras.empty()) {
+    Result<std::vector<std::string>> found = find_all_cameras(contents);
+    if (!found) return found.error();
+    out->cameras = *std::move(found);
   }
-  if (!out.imu.empty()) out.accel = accelerometer_of(contents, out.imu);
+  if (Result<void> imu = add_imu(contents, false, *out); !imu) return imu.error();
   return out;
 }
 

@@ -9,16 +9,27 @@
 
 namespace fbvins {
 
-/// Those in `named`, else the only ones of their kind or those with left and right, gyroscope and accelerometer in their names.
-/// The error lists the topics there are.
-Result<ChosenTopics> choose_topics(const BagContents& contents, const ChosenTopics& named, bool imu_needed);
+/// How the command line names all topics.
+inline constexpr const char* kTopicsOption = "CAM0[,CAM1,...][,IMU][,DEPTH]";
 
-struct CameraTopics {
-  std::vector<std::string> cameras;
-  std::string imu;    ///< empty: none
-  std::string accel;  ///< as ChosenTopics has it
+/// What is asked of a recording.
+struct WantedTopics {
+  bool imu = true;                  ///< an error without
+  bool one_camera = false;          ///< the first one, to which the depth images belong
+  bool depth = false;               ///< of one camera, where there are any
+  int most_cameras = kMostCameras;  ///< where they are found, not named: as many as the calibration has
 };
-/// The same for any number of cameras: `named` are those of the cameras, in their order, and of the IMU.
-Result<CameraTopics> choose_cameras(const BagContents& contents, const std::vector<std::string>& named);
+
+/// Those in `named`, told apart by what is on them: cameras in their order, IMU, depth images. Where no camera is named: the only
+/// image topic, the two with left and right in their names, or numbered ones (cam0, cam1, cam2 ...). Where no IMU is named: the
+/// only one, or gyroscope and accelerometer by their names. The error lists the topics there are.
+Result<ChosenTopics> choose_topics(const BagContents& contents, const std::vector<std::string>& named,
+                                   const WantedTopics& wanted);
+
+/// The same for cameras that need not be a rig yet: where none is named, all there are, by their names; no depth images.
+Result<ChosenTopics> choose_cameras(const BagContents& contents, const std::vector<std::string>& named);
+
+/// Whether a word of the topic's name is "depth": there, no camera's images are.
+bool names_depth(const std::string& topic);
 
 }  // namespace fbvins

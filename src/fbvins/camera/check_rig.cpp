@@ -16,8 +16,8 @@ Error malformed(std::string_view origin, const std::string& what) {
 /// Slower than any shutter that is sold: a unit other than seconds.
 constexpr double kLongestLineDelay_s = 1e-3;
 
-/// Half way from the principal point to the edge of the image, the angle from the axis is at least this share of what a pinhole has
-/// there, and at most this multiple of what an equidistant lens has.
+/// Half way from the principal point to the edge of the image, the angle from the axis is at least this share of what a pinhole
+/// has there, and at most this multiple of what an equidistant lens has.
 constexpr double kNarrowest = 0.6, kWidest = 1.6;
 
 bool positive(double x) { return x > 0 && std::isfinite(x); }
@@ -51,8 +51,8 @@ Result<void> check_lens(const Camera& camera, std::string_view side, std::string
       const double equidistant = kHalfWay / kNear * near->head<2>().norm() / near->z(), pinhole = std::atan(equidistant);
       if (angle > kNarrowest * pinhole && angle < kWidest * equidistant) continue;
     }
-    return malformed(origin, fmt::format("the {} camera's distortion is impossible: half way to the edge of the image it {}", side,
-                                         ray ? "bends rays as no lens does" : "has no rays any more"));
+    return malformed(origin, fmt::format("the {} camera's distortion is impossible: half way to the edge of the image it {}",
+                                         side, ray ? "bends rays as no lens does" : "has no rays any more"));
   }
   return {};
 }
@@ -95,16 +95,6 @@ Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
 }
 
 }  // namespace
-
-Result<void> check_is_a_pair_at_most(const StereoRig& rig, std::string_view origin) {
-  if (rig.depth)
-    return Error{ErrorCode::unsupported,
-                 fmt::format("{}: holds no depth images: --camera left takes the camera without them", origin)};
-  if (rig.more.empty()) return {};
-  return Error{ErrorCode::unsupported,
-               fmt::format("{}: holds two cameras at most, and there are {}: --camera both takes the first two", origin,
-                           rig.camera_count())};
-}
 
 Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
   if (Result<void> good = check_camera(rig.left, "left", origin); !good) return good;

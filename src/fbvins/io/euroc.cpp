@@ -158,59 +158,37 @@ class EurocReader {
   }
 
   Result<void> read_frames() {
-    std::vector<std::vector<ImageRow>> lists(std::max<std::size_t>(2, cameras_.size()));
+    std::vector<std::vector<ImageRow>> lists(cameras_.size());
+    DatasetInfo& info = out_.info;
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      const std::string folder = folder_of(cameras_[i]);
-      CameraInfo& info = i == 0 ? out_.info.left : i == 1 ? out_.info.right : out_.info.more;
-      Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
-      if (!csv) return csv.error();
-      auto rows = read_image_rows(*csv, named(folder + "data.csv"));
-      if (!rows) return rows.error();
-      warn_about_rows(rows->counts, named(folder + "data.csv"));
-      info.rows += rows->counts;
-      info.listed += static_cast<int>(rows->rows.size());
-      lists[i] = std::move(rows->rows);
+      CameraInfo& about = i == 0 ? info.left : i == 1 ? info.right : info.more;
+      if (Result<void> read = read_rows(folder_of(cameras_[i]), about, lists[i]); !read) return read;
     }
-    const Duration tolerance = Duration::from_seconds(1e-3 * options_.pair_tolerance_ms);
-    const bool pair = cameras_.size() > 1;
-    PairedFrames paired = pair_frames(lists[0], lists[1], tolerance);
-    out_.info.left.unpaired = pair ? paired.left_only : 0;
-    out_.info.right.unpaired = paired.right_only;
-    if (pair && paired.left_only == out_.info.left.listed)
-      return Error{ErrorCode::malformed,
-                   fmt::format("{}: no stamp lies within {} ms of one of cam{}'s", named(folder_of(cameras_[1]) + "data.csv"),
-                               options_.pair_tolerance_ms, cameras_[0])};
-    if (paired.untriggered) warn(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
-    else if (pair && paired.left_only + paired.right_only > 0)
-      warn(fmt::format("{} left and {} right images have no partner within {} ms", paired.left_only, paired.right_only,
-                       options_.pair_tolerance_ms));
-    out_.frames = std::move(paired.frames);
-    if (Result<void> depths = read_depth_rows(tolerance); !depths) return depths;
-    for (std::size_t i = 2; i < lists.size(); ++i) out_.info.more.unpaired += add_camera(out_.frames, lists[i], i - 2, tolerance);
-    if (out_.info.more.unpaired > 0)
-      warn(fmt::format("{} images of further cameras have no partner within {} ms", out_.info.more.unpaired,
-                       options_.pair_tolerance_ms));
+    std::vector<ImageRow> depths;
+    if (has_depth_)
+      if (Result<void> read = read_rows(std::string(kDepthFolder), info.depth, depths); !read) return read;
+    out_.frames = join_images(lists, depths, options_.pair_tolerance_ms, info);
+    const auto never = [&](const std::string& folder) {
+      return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam{}'s",
+                                                     named(folder + "data.csv"), options_.pair_tolerance_ms, cameras_[0])};
+    };
+    if (cameras_.size() > 1 && info.left.unpaired == info.left.listed) return never(folder_of(cameras_[1]));
+    if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(std::string(kDepthFolder));
     if (Result<void> cut = cut_frames(options_, out_.frames); !cut)
       return Error{cut.error().code, fmt::format("{}: {}", named(folders().front() + "data.csv"), cut.error().message)};
     return find_images();
   }
 
-  Result<void> read_depth_rows(Duration tolerance) {
-    if (!has_depth_ || out_.frames.empty()) return {};
-    Result<std::string> csv = text(depth("data.csv"), kLargestCsv_bytes);
+  /// Of the images in a folder.
+  Result<void> read_rows(const std::string& folder, CameraInfo& info, std::vector<ImageRow>& images) {
+    Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
     if (!csv) return csv.error();
-    auto rows = read_image_rows(*csv, named(depth("data.csv")));
+    auto rows = read_image_rows(*csv, named(folder + "data.csv"));
     if (!rows) return rows.error();
-    warn_about_rows(rows->counts, named(depth("data.csv")));
-    CameraInfo& info = out_.info.depth;
-    info.rows = rows->counts;
-    info.listed = static_cast<int>(rows->rows.size());
-    info.unpaired = add_depth(out_.frames, rows->rows, tolerance);
-    if (info.listed > 0 && info.unpaired == info.listed)
-      return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam0's", named(depth("data.csv")),
-                                                     options_.pair_tolerance_ms)};
-    if (info.unpaired > 0)
-      warn(fmt::format("{} depth images have no image within {} ms", info.unpaired, options_.pair_tolerance_ms));
+    warn_about_rows(rows->counts, named(folder + "data.csv"));
+    info.rows += rows->counts;
+    info.listed += static_cast<int>(rows->rows.size());
+    images = std::move(rows->rows);
     return {};
   }
 

@@ -263,20 +263,43 @@ int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& ima
   std::vector<FrameEntry> alone;
   int unpaired = 0;
   for (const ImageRow& image : images) {
-    FrameEntry& frame = frames[nearest(stamps, image.t)];
-    const Duration distance{std::abs((image.t - frame.t).ns)};
-    if (distance <= tolerance && frame.more_files[more].empty()) {
-      frame.more_files[more] = image.file;
-      continue;
+    if (!stamps.empty()) {
+      FrameEntry& frame = frames[nearest(stamps, image.t)];
+      const Duration distance{std::abs((image.t - frame.t).ns)};
+      if (distance <= tolerance && frame.more_files[more].empty()) {
+        frame.more_files[more] = image.file;
+        continue;
+      }
+      ++unpaired;
+      if (distance <= half_interval) continue;
     }
-    ++unpaired;
-    if (distance <= half_interval) continue;
     alone.push_back({image.t, "", "", std::nullopt, std::vector<std::string>(more + 1)});
     alone.back().more_files[more] = image.file;
   }
   frames.insert(frames.end(), std::make_move_iterator(alone.begin()), std::make_move_iterator(alone.end()));
   std::ranges::stable_sort(frames, {}, &FrameEntry::t);
   return unpaired;
+}
+
+std::vector<FrameEntry> join_images(const std::vector<std::vector<ImageRow>>& cameras, const std::vector<ImageRow>& depth,
+                                    double tolerance_ms, DatasetInfo& info) {
+  const Duration tolerance = Duration::from_seconds(1e-3 * tolerance_ms);
+  const auto warn = [&](std::string sentence) { info.warnings.push_back(std::move(sentence)); };
+  const bool has_right = cameras.size() > 1;
+  PairedFrames paired = pair_frames(cameras[0], has_right ? cameras[1] : std::vector<ImageRow>{}, tolerance);
+  info.left.unpaired = has_right ? paired.left_only : 0;
+  info.right.unpaired = paired.right_only;
+  if (paired.untriggered) warn(untriggered_sentence(paired.frames, 1, tolerance_ms));
+  else if (info.left.unpaired + info.right.unpaired > 0)
+    warn(fmt::format("{} left and {} right images have no partner within {} ms", info.left.unpaired, info.right.unpaired,
+                     tolerance_ms));
+  std::vector<FrameEntry> frames = std::move(paired.frames);
+  if (!frames.empty()) info.depth.unpaired = add_depth(frames, depth, tolerance);
+  if (info.depth.unpaired > 0) warn(fmt::format("{} depth images have no image within {} ms", info.depth.unpaired, tolerance_ms));
+  for (std::size_t i = 2; i < cameras.size(); ++i) info.more.unpaired += add_camera(frames, cameras[i], i - 2, tolerance);
+  if (info.more.unpaired > 0)
+    warn(fmt::format("{} images of further cameras have no partner within {} ms", info.more.unpaired, tolerance_ms));
+  return frames;
 }
 
 Intervals measure_intervals(const std::vector<Time>& increasing) {

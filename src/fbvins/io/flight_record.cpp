@@ -33,10 +33,6 @@ std::size_t image_topic(int camera) {
 }
 std::size_t info_topic(int camera) { return camera == 0 ? kLeftInfo : camera == 1 ? kRightInfo : image_topic(camera) + 1; }
 
-std::string frame_of(int camera) {
-  return camera == 0 ? std::string(kLeftFrame) : camera == 1 ? std::string(kRightFrame) : fmt::format("camera_{}", camera);
-}
-
 constexpr std::size_t kLargeChunk_bytes = 1'000'000;
 // The camera extrinsics are repeated, for viewers that start in the middle.
 constexpr Duration kCalibrationInterval = {1'000'000'000};
@@ -158,16 +154,16 @@ Result<void> FlightRecord::add(const StereoFrame& frame) {
 void FlightRecord::write_image(int camera, const StereoFrame& frame) {
   const Time t = frame.t + frame.offsets.of(camera);
   write(image_topic(camera), frame.t,
-        [&](std::string& out) { append_image(out, t, frame_of(camera), frame.image(camera).get()); });
+        [&](std::string& out) { append_image(out, t, camera_frame(camera), frame.image(camera).get()); });
 }
 
 void FlightRecord::write_camera_info(int camera, Time t) {
-  write(info_topic(camera), t, [&](std::string& out) { append_camera_info(out, t, frame_of(camera), rig_.camera(camera)); });
+  write(info_topic(camera), t, [&](std::string& out) { append_camera_info(out, t, camera_frame(camera), rig_.camera(camera)); });
 }
 
 void FlightRecord::write_calibration(Time t) {
   std::vector<std::string> names;
-  for (int i = 0; i < rig_.camera_count(); ++i) names.push_back(frame_of(i));
+  for (int i = 0; i < rig_.camera_count(); ++i) names.push_back(camera_frame(i));
   std::vector<RosTransform> cameras;
   for (int i = 0; i < rig_.camera_count(); ++i)
     cameras.push_back({kBodyFrame, names[static_cast<std::size_t>(i)], rig_.T_BC(i).q, rig_.T_BC(i).p});

@@ -8,15 +8,20 @@
 // asked for.
 #pragma once
 
+#include <functional>
+#include <string>
+#include <vector>
+
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {
 
-/// An error where not one of up to eight images of a camera, spread over the recording, can be read: the sentence about the
-/// first.
+/// An error where not one of up to eight images of a camera or of the depth sensor, spread over the recording, can be read: the
+/// sentence about the first.
 Result<void> check_images(const DatasetContents& contents);
 
-/// Up to eight frames with an image `file`, in equal steps from the first to the last.
-std::vector<FrameEntry> frames_to_try(const std::vector<FrameEntry>& frames, std::string FrameEntry::*file);
+/// Places of up to eight images, in equal steps from the first to the last; `file` is that of a frame, empty where it has none.
+std::vector<std::string> images_to_try(const std::vector<FrameEntry>& frames,
+                                       const std::function<std::string(const FrameEntry&)>& file);
 
 }  // namespace fbvins

@@ -29,10 +29,10 @@ class KalibrFiles {
       for (int i = 0; i < 3; ++i) chain << fmt::format("  - [{}, {}, {}, {}]\n", R_CB(i, 0), R_CB(i, 1), R_CB(i, 2), p_CB(i));
       chain << "  - [0.0, 0.0, 0.0, 1.0]\n";
     };
-    const auto T_C0B = rig.T_BC0.inverse();
-    const auto T_C1B = rig.T_BC1.inverse();
-    camera("cam0", rig.left, T_C0B.R(), T_C0B.p);
-    camera("cam1", rig.right, T_C1B.R(), T_C1B.p);
+    for (int i = 0; i < rig.camera_count(); ++i) {
+      const auto T_CB = rig.T_BC(i).inverse();
+      camera(fmt::format("cam{}", i), rig.camera(i), T_CB.R(), T_CB.p);
+    }
     const ImuNoise& n = rig.imu_noise;
     std::ofstream(imu()) << fmt::format(
         "rostopic: /imu\nupdate_rate: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/ros_messages.hpp"
 
+#include <fmt/format.h>
+
 #include "fbvins/io/cdr.hpp"
 
 namespace fbvins {
@@ -47,6 +49,10 @@ std::optional<RosPose> get_pose(CdrReader& cdr, Time t) {
 RowMajor3 of_readings(double density, double rate_hz) { return density * density * rate_hz * RowMajor3::Identity(); }
 
 }  // namespace
+
+std::string camera_frame(int camera) {
+  return camera == 0 ? std::string(kLeftFrame) : camera == 1 ? std::string(kRightFrame) : fmt::format("camera_{}", camera);
+}
 
 void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise) {
   CdrWriter cdr(out);

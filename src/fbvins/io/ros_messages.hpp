@@ -26,6 +26,9 @@ namespace fbvins {
 inline constexpr std::string_view kMapFrame = "map", kOdometryFrame = "odom", kGaugeFrame = "gauge", kBodyFrame = "body",
                                   kLeftFrame = "camera_left", kRightFrame = "camera_right";
 
+/// The frame of camera 0 (left), 1 (right), or a further one: "camera_2".
+std::string camera_frame(int camera);
+
 constexpr Time ros_time_end() { return {(std::int64_t{1} << 31) * 1'000'000'000}; }
 
 void append_imu(std::string& out, const ImuSample& sample, const ImuNoise& noise);

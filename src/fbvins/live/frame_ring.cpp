@@ -49,7 +49,8 @@ Result<StereoFrame> FrameRing::take(const SocketFrame& frame) {
   const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(frame.slot);
   if ((held_ & bit) != 0)
     return Error{ErrorCode::malformed, fmt::format("frame: slot {} again, which is not released", frame.slot)};
-  if ((frame.images >> static_cast<unsigned>(layout_.cameras)) != 0)
+  const std::uint32_t depth = layout_.depth_offset_bytes > 0 ? FBVINS_SOCKET_DEPTH : 0;
+  if (((frame.images & ~depth) >> static_cast<unsigned>(layout_.cameras)) != 0)
     return Error{ErrorCode::malformed, fmt::format("frame: images of more than the {} cameras of the hello", layout_.cameras)};
   const bool scarce = 2 * held() >= layout_.slots;
   held_ |= bit;
@@ -68,15 +69,27 @@ std::uint64_t FrameRing::released() {
 
 int FrameRing::held() const { return std::popcount(held_ & ~released_.load()); }
 
+const std::uint8_t* FrameRing::slot(const SocketFrame& frame) const {
+  return memory_ + static_cast<std::size_t>(frame.slot) * layout_.slot_bytes;
+}
+
 const std::uint8_t* FrameRing::pixels(const SocketFrame& frame, int camera) const {
-  return memory_ + static_cast<std::size_t>(frame.slot) * layout_.slot_bytes +
-         layout_.offset_bytes[static_cast<std::size_t>(camera)];
+  return slot(frame) + layout_.offset_bytes[static_cast<std::size_t>(camera)];
+}
+
+std::shared_ptr<const DepthImage> FrameRing::depth(const SocketFrame& frame) const {
+  if ((frame.images & FBVINS_SOCKET_DEPTH) == 0) return nullptr;
+  auto out = std::make_shared<DepthImage>(DepthImage{layout_.width_px, layout_.height_px, {}});
+  out->mm.resize(layout_.image_bytes());
+  std::memcpy(out->mm.data(), slot(frame) + layout_.depth_offset_bytes, 2 * layout_.image_bytes());
+  return out;
 }
 
 template <class ImageOf>
 StereoFrame FrameRing::with_images(const SocketFrame& frame, ImageOf&& image_of) const {
   StereoFrame out{frame.t, nullptr, nullptr};
   out.offsets = frame.offsets;
+  out.depth = depth(frame);
   out.more.resize(static_cast<std::size_t>(std::max(0, layout_.cameras - 2)));
   for (int i = 0; i < layout_.cameras; ++i) {
     if ((frame.images >> static_cast<unsigned>(i) & 1U) == 0) continue;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sender's shared memory, mapped for reading: its slots become frames without a copy. A slot is released when the last image
-// in it is destroyed, on whatever thread that is; images may outlive the sender and its connection. But for the images'
-// destruction: one thread.
+// A sender's shared memory, mapped for reading: its slots become frames without a copy but of depth images. A slot is released
+// when the last image in it is destroyed, on whatever thread that is; images may outlive the sender and its connection. But for
+// the images' destruction: one thread.
 //
 //   Result<std::shared_ptr<FrameRing>> ring = FrameRing::map(std::move(memfd), hello.layout, bell);
 //   Result<StereoFrame> frame = (*ring)->take(message);   // an error where the sender announces a slot twice
@@ -43,7 +43,9 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
       : memory_(memory), layout_(layout), bell_(std::move(bell)) {}
   StereoFrame borrow(const SocketFrame& frame);
   StereoFrame copy(const SocketFrame& frame) const;
+  const std::uint8_t* slot(const SocketFrame& frame) const;
   const std::uint8_t* pixels(const SocketFrame& frame, int camera) const;
+  std::shared_ptr<const DepthImage> depth(const SocketFrame& frame) const;
   /// `image_of(pixels)`: of each camera that the frame has one of.
   template <class ImageOf>
   StereoFrame with_images(const SocketFrame& frame, ImageOf&& image_of) const;

@@ -69,6 +69,26 @@ TEST_F(FrameRingTest, ImagesOfThreeCamerasInOneSlot) {
   EXPECT_EQ(beyond.error().message, "frame: images of more than the 3 cameras of the hello");
 }
 
+TEST_F(FrameRingTest, ADepthImageBesideThatOfTheCamera) {
+  FrameLayout layout = kLayout;
+  layout.cameras = 1;
+  layout.slot_bytes = 2 * kSlotBytes, layout.slots = 2;
+  layout.depth_offset_bytes = kSlotBytes;
+  auto ring = FrameRing::map(memory_, layout, bell_);
+  ASSERT_TRUE(ring);
+  SocketFrame sent = frame_in(1);
+  sent.images = FBVINS_SOCKET_LEFT | FBVINS_SOCKET_DEPTH;
+  const auto frame = (*ring)->take(sent);
+  ASSERT_TRUE(frame);
+  EXPECT_NE(frame->left, nullptr);
+  ASSERT_NE(frame->depth, nullptr);
+  std::uint16_t last = 0;
+  std::memcpy(&last, slots_ + 3 * kSlotBytes + 2 * layout.image_bytes() - 2, 2);
+  EXPECT_EQ(frame->depth->row(test::kHeight - 1)[test::kWidth - 1], last);
+  sent.slot = 0, sent.images = FBVINS_SOCKET_LEFT;
+  EXPECT_EQ((*ring)->take(sent)->depth, nullptr);
+}
+
 TEST_F(FrameRingTest, ASlotIsFreeWhenItsLastImageIsGone) {
   auto frame = ring_->take(frame_in(1));
   ASSERT_TRUE(frame);

@@ -19,13 +19,16 @@ constexpr Duration kSameImage{10'000'000};
 }  // namespace
 
 Ingest::Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu,
-               Duration time_offset)
+               Duration time_offset, int cameras)
     : now_(std::move(now)),
       on_reading_(std::move(on_reading)),
       time_offset_(time_offset),
       clock_(clock_rate),
       order_(Duration::from_seconds(options.imu_reorder_wait_s)),
-      judge_(imu) {}
+      judge_(imu),
+      cameras_(static_cast<std::size_t>(cameras)) {
+  arrivals_.cameras.resize(cameras_.size());
+}
 
 void Ingest::push(const ImuSample& sample) {
   const std::lock_guard order(order_mutex_);
@@ -90,26 +93,44 @@ void Ingest::take(StereoFrame frame, Time t, Time host) {
     return;
   }
   frame.t = t;
-  if (frozen_[0].is_repeated(frame.left)) frame.left.reset();
-  if (frozen_[1].is_repeated(frame.right)) frame.right.reset();
-  if (newest_image_ && frame.left == nullptr && frame.right == nullptr && t - *newest_image_ < kSameImage) {
+  remove_frozen(frame);
+  if (newest_image_ && frame.without_images() && t - *newest_image_ < kSameImage) {
     ++counts_.images_late;
     return;
   }
   if (newest_image_) image_period_.add(frame.t - *newest_image_);
   newest_image_ = frame.t;
-  arrivals_.image_period = image_period_.median();
-  if (frame.left == nullptr || frame.right == nullptr) ++counts_.images_incomplete;
-  if (frame.left != nullptr) arrivals_.left = host;
-  if (frame.right != nullptr) arrivals_.right = host;
-  if (frame.left != nullptr || frame.right != nullptr) arrivals_.image = host;
-  arrivals_.newest = std::max(arrivals_.newest, frame.t);
+  note_arrival(frame, host);
   const std::lock_guard lock(mutex_);
   if (closed_) return;
   if (image_waits_) drop_waiting_image();
   queue_.push_back(std::move(frame));
   image_waits_ = true;
   filled_.notify_one();
+}
+
+void Ingest::remove_frozen(StereoFrame& frame) {
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    if (!cameras_[i].frozen.is_repeated(frame.image(static_cast<int>(i)))) continue;
+    (i == 0 ? frame.left : i == 1 ? frame.right : frame.more[i - 2]).reset();
+  }
+}
+
+void Ingest::note_arrival(const StereoFrame& frame, Time host) {
+  bool complete = true;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const bool came = frame.image(static_cast<int>(i)) != nullptr;
+    complete &= came;
+    if (!came) continue;
+    Watched& camera = cameras_[i];
+    if (camera.newest) camera.period.add(frame.t - *camera.newest);
+    camera.newest = frame.t;
+    arrivals_.cameras[i] = {host, camera.period.median()};
+    arrivals_.image = host;
+  }
+  if (!complete) ++counts_.images_incomplete;
+  arrivals_.image_period = image_period_.median();
+  arrivals_.newest = std::max(arrivals_.newest, frame.t);
 }
 
 void Ingest::push_anchor(Anchor anchor) {

@@ -7,7 +7,6 @@
 //   while (std::optional<SensorEvent> event = ingest.pop()) system.push(*event);   // the consumer's
 #pragma once
 
-#include <array>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -32,9 +31,9 @@ class Ingest final : public SensorInput {
   using OnReading = std::function<void(const ImuSample& sample, Time host_t)>;
 
   /// `now` is this machine's clock. `on_reading` gets each reading in order, at once, on the thread that brought it,
-  /// with its time on this machine's clock; it must not call back. time_offset: t_imu = t_image + offset.
+  /// with its time on this machine's clock; it must not call back. time_offset: t_imu = t_image + offset. `cameras`: of the rig.
   Ingest(const LiveOptions& options, double clock_rate, Clock now, OnReading on_reading, const ImuNoise& imu = {},
-         Duration time_offset = {});
+         Duration time_offset = {}, int cameras = 2);
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
@@ -51,10 +50,15 @@ class Ingest final : public SensorInput {
   std::vector<Anchor> take_anchors();
   void close();
 
+  struct Camera {
+    std::optional<Time> image;       ///< its newest one, on this machine's clock
+    std::optional<Duration> period;  ///< of the stamps of its images
+  };
   struct Arrival {
-    std::optional<Time> imu, image, left, right;  ///< newest of each, on this machine's clock
-    Time newest;                                  ///< stamp, on the images' clock
-    std::optional<Duration> image_period;         ///< of the images' stamps
+    std::optional<Time> imu, image;        ///< newest of each, on this machine's clock; `image`: of any camera
+    std::vector<Camera> cameras;           ///< of the rig, by number
+    Time newest;                           ///< stamp, on the images' clock
+    std::optional<Duration> image_period;  ///< of the frames' stamps
   };
   Arrival arrivals() const;
   /// A stamp of the images' clock on this machine's clock (ClockGuard::host_of).
@@ -66,6 +70,8 @@ class Ingest final : public SensorInput {
   void put_in_order(ImuSample sample, Time t, Time host);
   void release(const ImuSample& sample);
   void take(StereoFrame frame, Time t, Time host);
+  void remove_frozen(StereoFrame& frame);
+  void note_arrival(const StereoFrame& frame, Time host);
   void drop_waiting_image();
   std::optional<SensorEvent> take_first();
 
@@ -80,7 +86,12 @@ class Ingest final : public SensorInput {
   ReadingJudge judge_;
   SamplePeriod image_period_;
   std::optional<Time> newest_image_;
-  std::array<FrozenCamera, 2> frozen_;
+  struct Watched {
+    FrozenCamera frozen;
+    SamplePeriod period;
+    std::optional<Time> newest;  ///< stamp
+  };
+  std::vector<Watched> cameras_;
   Arrival arrivals_;
   LiveCounts counts_;
 

@@ -115,8 +115,66 @@ TEST(Ingest, AFrozenCameraGivesNoImage) {
   EXPECT_NE(frame.left, nullptr);
   EXPECT_EQ(frame.right, nullptr);
   EXPECT_EQ(f.ingest.counts().images_incomplete, 1);
-  EXPECT_EQ(*f.ingest.arrivals().left, ms(1050));
-  EXPECT_EQ(*f.ingest.arrivals().right, ms(1000));
+  EXPECT_EQ(*f.ingest.arrivals().cameras[0].image, ms(1050));
+  EXPECT_EQ(*f.ingest.arrivals().cameras[1].image, ms(1000));
+}
+
+/// Its clock is known, nothing waits.
+void begin(Ingest& ingest, Time& now) {
+  for (const std::int64_t t : {-10, -5}) {
+    now = ms(1000 + t);
+    ingest.push(reading(t));
+  }
+  while (ingest.pop_waiting()) continue;
+}
+
+/// Of cameras 0 to 3, whose last one freezes and whose third one is unplugged.
+TEST(Ingest, EveryCameraIsWatched) {
+  Time now = ms(1000);
+  Ingest ingest(
+      LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 4);
+  begin(ingest, now);
+  for (std::int64_t t = 0; t <= 400; t += 50) {
+    now = ms(1000 + t);
+    const auto n = static_cast<std::uint8_t>(t / 50);
+    StereoFrame frame{ms(t), image(n), image(static_cast<std::uint8_t>(n + 50))};
+    frame.more = {t < 200 ? image(static_cast<std::uint8_t>(n + 100)) : nullptr,
+                  image(static_cast<std::uint8_t>(150 + std::min<int>(n, 5)))};
+    ingest.push(std::move(frame));
+    const auto event = ingest.pop_waiting();
+    ASSERT_TRUE(event);
+    const auto& taken = std::get<StereoFrame>(*event);
+    EXPECT_TRUE(taken.left && taken.right);
+    EXPECT_EQ(taken.image(3) != nullptr, t <= 250) << t;
+  }
+  const Ingest::Arrival arrivals = ingest.arrivals();
+  ASSERT_EQ(arrivals.cameras.size(), 4u);
+  EXPECT_EQ(*arrivals.cameras[0].image, ms(1400));
+  EXPECT_EQ(*arrivals.cameras[2].image, ms(1150));
+  EXPECT_EQ(*arrivals.cameras[3].image, ms(1250));
+  EXPECT_EQ(arrivals.cameras[0].period->ns, 50'000'000);
+  EXPECT_EQ(ingest.counts().images_incomplete, 5);
+}
+
+/// Its frames are not incomplete, and none is taken for one without images.
+TEST(Ingest, CamerasMayDeliverAlone) {
+  Time now = ms(1000);
+  Ingest one(
+      LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 1),
+      three(
+          LiveOptions{}, 1, [&] { return now; }, {}, {}, {}, 3);
+  begin(one, now), begin(three, now);
+  for (std::int64_t t = 0; t < 60; t += 6) {  // closer together than an image that comes twice
+    now = ms(1000 + t);
+    const auto n = static_cast<std::uint8_t>(t);
+    one.push(StereoFrame{ms(t), image(n), nullptr});
+    StereoFrame frame{ms(t), nullptr, nullptr};
+    frame.more = {image(n)};
+    three.push(std::move(frame));
+    EXPECT_TRUE(one.pop_waiting() && three.pop_waiting()) << t;
+  }
+  EXPECT_EQ(one.counts().images_incomplete, 0);
+  EXPECT_EQ(three.counts().images_late, 0);
 }
 
 TEST(Ingest, AnImageThatComesTwiceIsOne) {

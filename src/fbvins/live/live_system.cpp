@@ -33,7 +33,7 @@ struct LiveSystem::Impl {
       : first_reset(first_reset_counter),
         ingest(
             options, clock_rate, host_now, [this](const ImuSample& s, Time host_t) { on_reading(s, host_t); }, rig.imu_noise,
-            Duration::from_seconds(rig.time_offset_s)),
+            Duration::from_seconds(rig.time_offset_s), rig.camera_count()),
         system(std::move(made)),
         watch(options, system_options.estimator),
         propagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),

@@ -61,15 +61,19 @@ void SensorCheck::push(const ImuSample& sample) {
 void SensorCheck::push(StereoFrame frame) {
   const std::lock_guard lock(mutex_);
   images_.add(frame.t, now_());
-  if (rig_.has_right() && (!frame.left || !frame.right)) ++alone_;
-  const auto other_size = [&](const std::shared_ptr<const Image>& image, const Camera& camera) {
-    if (!image || (image->width() == camera.width() && image->height() == camera.height())) return;
-    other_width_ = image->width(), other_height_ = image->height();
-  };
-  other_size(frame.left, rig_.left);
-  if (rig_.has_right()) other_size(frame.right, rig_.right);
-  const bool left = left_.is_repeated(frame.left), right = right_.is_repeated(frame.right);
-  if (left || right) ++frozen_;
+  for (int i = 0; i < rig_.camera_count(); ++i) {
+    Watched& camera = cameras_[static_cast<std::size_t>(i)];
+    const std::shared_ptr<const Image> image = frame.image(i);
+    if (!image) {
+      ++camera.missing;
+      continue;
+    }
+    const Camera& lens = rig_.camera(i);
+    if (image->width() != lens.width() || image->height() != lens.height())
+      camera.other_width = image->width(), camera.other_height = image->height();
+    if (camera.frozen.is_repeated(image)) ++camera.repeated;
+  }
+  if (rig_.depth && !frame.depth) ++without_depth_;
 }
 
 std::vector<SensorFinding> SensorCheck::findings() const {
@@ -87,19 +91,31 @@ void SensorCheck::check_images(std::vector<SensorFinding>& findings) const {
   const double rate = images_.period_s() > 0 ? 1 / images_.period_s() : 0;
   const bool fast_enough = rate >= kLowestImageRate_hz;
   say(fast_enough,
-      fmt::format("{} stereo images, {:.1f} a second{}", images_.stamps.size(), rate,
+      fmt::format("{} frames, {:.1f} a second{}", images_.stamps.size(), rate,
                   and_then(fast_enough, fmt::format("fewer than {} a second lose the scene in motion", kLowestImageRate_hz))));
   const bool steady = images_.largest_gap_s() < kLongGap * images_.period_s();
   say(steady, fmt::format("longest time between two images {:.0f} ms{}", 1e3 * images_.largest_gap_s(),
                           and_then(steady, "images are lost on their way: cable, USB bandwidth, a busy machine")));
   if (images_.backwards > 0)
     say(false, fmt::format("{} images have stamps that do not ascend; the driver stamps wrongly", images_.backwards));
-  if (alone_ > kMostAlone * static_cast<double>(images_.stamps.size()))
-    say(false, fmt::format("{} images came of one camera only; are both triggered together?", alone_));
-  if (frozen_ > 0) say(false, fmt::format("{} images are their predecessors to the last bit; a camera hangs", frozen_));
-  if (other_width_ > 0)
-    say(false, fmt::format("an image is {} x {}, in the calibration it is {} x {}; calibrate at the size that is used",
-                           other_width_, other_height_, rig_.left.width(), rig_.left.height()));
+  for (int i = 0; i < rig_.camera_count(); ++i) check_camera(i, findings);
+  if (without_depth_ > kMostAlone * static_cast<double>(images_.stamps.size()))
+    say(false,
+        fmt::format("{} images came without a depth image; are the depth sensor's stamps those of the camera?", without_depth_));
+}
+
+void SensorCheck::check_camera(int number, std::vector<SensorFinding>& findings) const {
+  const auto say = [&](std::string_view text) { findings.push_back({false, fmt::format("camera {}: {}", number, text)}); };
+  const Watched& camera = cameras_[static_cast<std::size_t>(number)];
+  const std::size_t frames = images_.stamps.size();
+  if (camera.missing > kMostAlone * static_cast<double>(frames))
+    say(fmt::format("{} of {} frames came without its image; is it plugged in, and are all cameras triggered together?",
+                    camera.missing, frames));
+  if (camera.repeated > 0) say(fmt::format("{} images are earlier ones to the last bit; it hangs", camera.repeated));
+  const Camera& lens = rig_.camera(number);
+  if (camera.other_width > 0)
+    say(fmt::format("an image is {} x {}, in the calibration it is {} x {}; calibrate at the size that is used",
+                    camera.other_width, camera.other_height, lens.width(), lens.height()));
 }
 
 void SensorCheck::check_readings(std::vector<SensorFinding>& findings) const {

@@ -27,7 +27,7 @@ struct SensorFinding {
 class SensorCheck final : public SensorInput {
  public:
   SensorCheck(const StereoRig& rig, double clock_rate, std::function<Time()> now = host_now)
-      : rig_(rig), clock_rate_(clock_rate), now_(std::move(now)) {}
+      : rig_(rig), clock_rate_(clock_rate), now_(std::move(now)), cameras_(static_cast<std::size_t>(rig.camera_count())) {}
 
   void push(const ImuSample& sample) override;
   void push(StereoFrame frame) override;
@@ -55,9 +55,14 @@ class SensorCheck final : public SensorInput {
   std::function<Time()> now_;
   mutable std::mutex mutex_;
   Arrivals images_, readings_;
-  int alone_ = 0, frozen_ = 0;              // frames of one camera only; frames with a repeated image
-  int other_width_ = 0, other_height_ = 0;  // of an image that is not of the calibration's size
-  FrozenCamera left_, right_;
+  struct Watched {
+    int missing = 0, repeated = 0;          ///< frames without its image, and with one that it has sent before
+    int other_width = 0, other_height = 0;  ///< of an image that is not of the calibration's size
+    FrozenCamera frozen = {};
+  };
+  void check_camera(int number, std::vector<SensorFinding>& findings) const;
+  std::vector<Watched> cameras_;
+  int without_depth_ = 0;
   double accel_sum_ = 0, gyro_sum_ = 0;  // of magnitudes, m/s^2 and rad/s
 };
 

@@ -10,11 +10,12 @@ namespace sensor_check_test {
 struct Look {
   double image_rate_hz = 20, imu_rate_hz = 200, accel = 9.81, gyro = 0.02, clock = 1, image_stamp_offset_s = 0;
   int width = 8, lose_image = -1, lose_reading = -1;
-  bool freeze = false, alone = false;
+  int freeze = -1, alone = -1;  ///< the camera that repeats its image, and the one that delivers none
 
   std::vector<SensorFinding> findings() const {
     StereoRig rig;
     rig.left = rig.right = Camera(PinholeRadtan{5, 5, 4, 3}, 8, 6);
+    rig.more.push_back({rig.left, {}});
     Time now;
     SensorCheck check(rig, 1, [&] { return now; });
     int image = 0, reading = 0;
@@ -24,8 +25,13 @@ struct Look {
       if (reading < us * 1e-6 * imu_rate_hz && reading++ != lose_reading)
         check.push(ImuSample{t, Vec3(gyro, 0, 0), Vec3(0, 0, accel)});
       if (image < us * 1e-6 * image_rate_hz && image++ != lose_image) {
-        const auto pixels = std::make_shared<Image>(width, 6, static_cast<std::uint8_t>(freeze ? 1 : image));
-        check.push(StereoFrame{t + Duration::from_seconds(image_stamp_offset_s), pixels, alone ? nullptr : pixels});
+        const auto pixels = [&](bool still, int across) {
+          return std::make_shared<Image>(across, 6, static_cast<std::uint8_t>(still ? 1 : image));
+        };
+        StereoFrame frame{t + Duration::from_seconds(image_stamp_offset_s), pixels(freeze == 0, width), nullptr};
+        if (alone != 1) frame.right = pixels(freeze == 1, 8);
+        frame.more = {alone == 2 ? nullptr : pixels(freeze == 2, 8)};
+        check.push(std::move(frame));
       }
     }
     return check.findings();
@@ -57,11 +63,13 @@ TEST(SensorCheck, EachFaultIsNamedAlone) {
   expect({.gyro = 57}, "it looks like degrees");
   expect({.clock = 1.5}, "takes 0.667 s");
   expect({.image_stamp_offset_s = 37}, "do not stamp by one clock");
-  expect({.width = 9}, "an image is 9 x 6, in the calibration it is 8 x 6");
+  expect({.width = 9}, "camera 0: an image is 9 x 6, in the calibration it is 8 x 6");
   expect({.lose_image = 50}, "longest time between two images");
   expect({.lose_reading = 50}, "longest time between two readings");
-  expect({.freeze = true}, "to the last bit");
-  expect({.alone = true}, "of one camera only");
+  expect({.freeze = 0}, "camera 0: 99 images are earlier ones to the last bit");
+  expect({.freeze = 2}, "camera 2: 99 images are earlier ones to the last bit");
+  expect({.alone = 1}, "camera 1: 100 of 100 frames came without its image");
+  expect({.alone = 2}, "camera 2: 100 of 100 frames came without its image");
   expect({.image_rate_hz = 4}, "lose the scene");
   expect({.image_rate_hz = 0}, "no image came");
   expect({.imu_rate_hz = 0}, "no IMU reading came");

@@ -18,7 +18,11 @@ Health SensorWatch::judge(const Estimated& estimated, const Ingest::Arrival& arr
       std::max(options_.camera_silence_s, kOverdue_periods * arrivals.image_period.value_or(Duration{}).seconds());
   double blind_s = silence_s(arrivals.image);
   if (said.has_pose() && estimated.image) blind_s = std::max(blind_s, silence_s(estimated.image));
-  const unsigned silent = (silence_s(arrivals.left) > silent_s ? 1u : 0u) | (silence_s(arrivals.right) > silent_s ? 2u : 0u);
+  unsigned silent = 0;  // bit c: camera c, by its own rate
+  for (std::size_t c = 0; c < arrivals.cameras.size(); ++c) {
+    const double overdue_s = kOverdue_periods * arrivals.cameras[c].period.value_or(Duration{}).seconds();
+    if (silence_s(arrivals.cameras[c].image) > std::max(silent_s, overdue_s)) silent |= 1U << c;
+  }
   HealthReason reason = HealthReason::none;
   if (silence_s(arrivals.imu) > options_.imu_silence_s) reason = HealthReason::imu_gap;
   else if (blind_s > silent_s) reason = HealthReason::no_images;

@@ -11,7 +11,7 @@ Time at(double s) { return Time{Duration::from_seconds(s).ns}; }
 const Health kGood{HealthState::good, HealthReason::none};
 
 Ingest::Arrival arrivals(double imu_s, double left_s, double right_s) {
-  return {at(imu_s), at(std::max(left_s, right_s)), at(left_s), at(right_s), {}, {}};
+  return {at(imu_s), at(std::max(left_s, right_s)), {{at(left_s), {}}, {at(right_s), {}}}, {}, {}};
 }
 
 Health judged(const Health& estimated, const Ingest::Arrival& a, double now_s) {
@@ -30,6 +30,25 @@ TEST(SensorWatch, SilenceIsSeenAndNamed) {
   EXPECT_EQ(judged(kGood, arrivals(9.99, 9.7, 9.99), 10), (Health{HealthState::degraded, one_camera, 0b01}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.99, 9.99), 10), (Health{HealthState::degraded, imu_gap}));
   EXPECT_EQ(judged(kGood, arrivals(9.8, 9.7, 9.7), 10), (Health{HealthState::degraded, imu_gap}));
+}
+
+TEST(SensorWatch, EveryCameraOfTheRigIsWatched) {
+  using enum HealthReason;
+  Ingest::Arrival four = arrivals(9.99, 9.99, 9.99);
+  four.cameras.push_back({at(9.7), {}});
+  four.cameras.push_back({at(9.95), {}});
+  EXPECT_EQ(judged(kGood, four, 10), (Health{HealthState::degraded, one_camera, 0b100}));
+  four.cameras[2].period = Duration::from_seconds(0.15);
+  EXPECT_EQ(judged(kGood, four, 10), kGood) << "it has a lower rate";
+  four.imu = four.image = four.cameras[0].image = four.cameras[1].image = four.cameras[3].image = at(10.09);
+  EXPECT_EQ(judged(kGood, four, 10.1), (Health{HealthState::degraded, one_camera, 0b100}));
+}
+
+TEST(SensorWatch, ARigOfOneCameraLacksNone) {
+  Ingest::Arrival one{at(9.99), at(9.95), {{at(9.95), {}}}, {}, {}};
+  EXPECT_EQ(judged(kGood, one, 10), kGood);
+  one.image = one.cameras[0].image = at(9.7);
+  EXPECT_EQ(judged(kGood, one, 10), (Health{HealthState::degraded, HealthReason::no_images}));
 }
 
 TEST(SensorWatch, ASlowCameraIsNotSilent) {

@@ -16,14 +16,17 @@ constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
 /// Stamps beyond this (146 years) could overflow in differences.
 constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
-/// What the messages had in version 1.1.
+/// What the messages had in versions 1.1 and 1.2.
 constexpr std::size_t kFirstHello_bytes = offsetof(FbvinsSocketHello, cameras);
+constexpr std::size_t kSecondHello_bytes = offsetof(FbvinsSocketHello, depth_offset_bytes);
 constexpr std::size_t kFirstFrame_bytes = offsetof(FbvinsSocketFrame, offset_ns);
 /// Images of one frame lie closer together than this.
 constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
 
 static_assert(kFirstHello_bytes == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
-static_assert(sizeof(FbvinsSocketHello) == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
+static_assert(kSecondHello_bytes == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
+static_assert(sizeof(FbvinsSocketHello) == kSecondHello_bytes + 8 + sizeof(FbvinsSocketDepth) && sizeof(FbvinsSocketDepth) == 32);
+static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
 static_assert(sizeof(FbvinsSocketPosition) == 120);
@@ -51,6 +54,19 @@ std::string printable(const char (&text)[size]) {
   return out;
 }
 
+/// Where there is one, the depth image has a place of its own behind the camera's image.
+Result<void> place_depth(const FbvinsSocketHello& hello, FrameLayout& layout) {
+  if ((hello.flags & FBVINS_SOCKET_HAS_DEPTH) == 0) return {};
+  if (layout.cameras != 1)
+    return malformed(fmt::format("hello: a depth sensor goes with one camera, and there are {}", layout.cameras));
+  const std::size_t at = hello.depth_offset_bytes, size = 2 * layout.image_bytes();
+  if (at < layout.image_bytes() || at % 2 != 0 || layout.slot_bytes % 2 != 0 || layout.slot_bytes < at + size)
+    return malformed(
+        fmt::format("hello: a depth image of {} bytes at {} does not fit into a slot of {} bytes", size, at, layout.slot_bytes));
+  layout.depth_offset_bytes = at;
+  return {};
+}
+
 Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
   constexpr auto kLargest = static_cast<std::uint32_t>(kLargestImageSide_px);
   if (hello.width_px < 1 || hello.height_px < 1 || hello.width_px > kLargest || hello.height_px > kLargest)
@@ -75,6 +91,7 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
       return malformed(fmt::format("hello: {} images of {} bytes, that of camera {} at {}, do not fit into a slot of {} bytes",
                                    layout.cameras, layout.image_bytes(), i, at, layout.slot_bytes));
   }
+  if (Result<void> placed = place_depth(hello, layout); !placed) return placed.error();
   if (layout.bytes() > kMostMemory_bytes) return malformed(fmt::format("hello: {} bytes of images, over 1 GiB", layout.bytes()));
   return layout;
 }
@@ -91,7 +108,9 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
                  fmt::format("the sender speaks version {}.{} of the protocol, this program {}.{}", version->major,
                              version->minor, int{FBVINS_SOCKET_MAJOR}, int{FBVINS_SOCKET_MINOR})};
   auto hello = read<FbvinsSocketHello>(bytes, "hello", kFirstHello_bytes);
-  if (hello && (hello->flags & FBVINS_SOCKET_HAS_CAMERAS) != 0) hello = read<FbvinsSocketHello>(bytes, "hello");
+  if (hello && (hello->flags & FBVINS_SOCKET_HAS_CAMERAS) != 0)
+    hello = read<FbvinsSocketHello>(bytes, "hello", kSecondHello_bytes);
+  if (hello && (hello->flags & FBVINS_SOCKET_HAS_DEPTH) != 0) hello = read<FbvinsSocketHello>(bytes, "hello");
   if (!hello) return hello.error();
   const auto layout = layout_of(*hello);
   if (!layout) return layout.error();
@@ -99,6 +118,7 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
   if ((hello->flags & FBVINS_SOCKET_HAS_RIG) == 0) return SocketMessage(std::move(out));
   out.rig = SocketRig{hello->rig, layout->cameras};
   std::copy_n(hello->more, std::max(0, layout->cameras - 2), out.rig->more.begin());
+  if (layout->depth_offset_bytes > 0) out.rig->depth = hello->depth;
   const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
   if (!rig) return rig.error();
   return SocketMessage(std::move(out));

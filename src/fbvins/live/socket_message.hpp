@@ -32,6 +32,7 @@ struct FrameLayout {
   std::size_t slot_bytes = 0;
   int cameras = 2;
   std::array<std::size_t, kMostCameras> offset_bytes{};  ///< of each camera's image in a slot
+  std::size_t depth_offset_bytes = 0;                    ///< of the depth image; 0: there is none
 
   std::size_t image_bytes() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
   std::size_t bytes() const { return static_cast<std::size_t>(slots) * slot_bytes; }
@@ -42,6 +43,7 @@ struct SocketRig {
   FbvinsSocketRig pair{};
   int cameras = 2;
   std::array<FbvinsSocketCamera, kMostCameras - 2> more{};  ///< zeros beyond their count
+  std::optional<FbvinsSocketDepth> depth = {};
 };
 bool same(const SocketRig& a, const SocketRig& b);
 
@@ -61,7 +63,7 @@ struct SocketFrame {
   Time t;
   std::uint64_t sequence = 0;
   int slot = 0;              ///< below FBVINS_SOCKET_MOST_SLOTS
-  std::uint32_t images = 0;  ///< bit i: of camera i
+  std::uint32_t images = 0;  ///< bit i: of camera i; FBVINS_SOCKET_DEPTH
   ExposureOffsets offsets = {};
 };
 

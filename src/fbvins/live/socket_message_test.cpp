@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.2 of the protocol, this program 1.2");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.3 of the protocol, this program 1.3");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -76,7 +76,7 @@ TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
   EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 0xfffff000u; }),
             "hello: 2 images of 3072 bytes, that of camera 1 at 4294963200, do not fit into a slot of 8192 bytes");
   EXPECT_EQ(with([](auto& h) { h.slots = 64, h.slot_bytes = 0x7fffffffu; }), "hello: 137438953408 bytes of images, over 1 GiB");
-  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1512 bytes says that it has 12");
+  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1552 bytes says that it has 12");
   EXPECT_EQ(with([](auto& h) { std::memset(h.name, 0x1b, sizeof(h.name)); }), "taken");
 }
 
@@ -255,6 +255,34 @@ TEST(SocketMessage, HelloOfOneToEightCameras) {
   const auto alone = parse_socket_message(bytes_of(hello));
   ASSERT_TRUE(alone) << alone.error().message;
   EXPECT_EQ(std::get<SocketHello>(*alone).layout.cameras, 1);
+}
+
+TEST(SocketMessage, HelloOfACameraWithADepthSensor) {
+  const StereoRig rig = with_depth(test::socket_test_rig(), {.noise_at_1m_m = 0.007, .farthest_m = 6});
+  FbvinsSocketHello hello = hello_message(&rig);
+  hello.slot_bytes = 3 * test::kImageBytes;
+  hello.depth_offset_bytes = test::kImageBytes;
+  const auto message = parse_socket_message(bytes_of(hello));
+  ASSERT_TRUE(message) << message.error().message;
+  const auto& taken = std::get<SocketHello>(*message);
+  EXPECT_EQ(taken.layout.depth_offset_bytes, test::kImageBytes);
+  const auto back = parse_socket_rig(*taken.rig, test::kWidth, test::kHeight);
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_TRUE(back->depth);
+  EXPECT_EQ(back->depth->noise_at_1m_m, 0.007);
+  EXPECT_EQ(back->depth->farthest_m, 6);
+  EXPECT_FALSE(same(*taken.rig, socket_rig(with_one_camera(test::socket_test_rig()))));
+
+  hello.depth_offset_bytes += 2;
+  EXPECT_EQ(refusal(bytes_of(hello)), "hello: a depth image of 6144 bytes at 3074 does not fit into a slot of 9216 bytes");
+  hello.depth_offset_bytes = test::kImageBytes;
+  hello.depth.noise_at_1m_m = 0;
+  EXPECT_EQ(refusal(bytes_of(hello)),
+            "calibration: the depth sensor's noise, range or scale is not positive, or its range is empty");
+  hello.cameras = 2, hello.right_offset_bytes = test::kImageBytes;
+  EXPECT_EQ(refusal(bytes_of(hello)), "hello: a depth sensor goes with one camera, and there are 2");
+  hello.header.size_bytes = 1512;
+  EXPECT_EQ(refusal(bytes_of(hello, 1512)), "hello of 1512 bytes where 1552 are needed");
 }
 
 TEST(SocketMessage, NothingAndUnknownTypes) {

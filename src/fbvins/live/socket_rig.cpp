@@ -85,7 +85,8 @@ FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mount
 
 bool same(const SocketRig& a, const SocketRig& b) {
   return a.cameras == b.cameras && std::memcmp(&a.pair, &b.pair, sizeof(a.pair)) == 0 &&
-         std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0;
+         std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0 && a.depth.has_value() == b.depth.has_value() &&
+         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0);
 }
 
 Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int height_px) {
@@ -107,6 +108,7 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   out.imu_noise = noise;
   out.image_rate_hz = rig.image_rate_hz;
   out.time_offset_s = rig.time_offset_s;
+  if (const auto& d = sent.depth) out = with_depth(out, {d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma});
   if (Result<void> good = check_rig(out, "calibration"); !good) return good.error();
   return out;
 }
@@ -118,6 +120,7 @@ SocketRig socket_rig(const StereoRig& rig) {
                  rig.imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.rate_hz, rig.image_rate_hz, rig.time_offset_s},
                 rig.camera_count()};
   for (int i = 2; i < rig.camera_count(); ++i) out.more[static_cast<std::size_t>(i - 2)] = message(i);
+  if (const auto& d = rig.depth) out.depth = FbvinsSocketDepth{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
   return out;
 }
 

@@ -167,6 +167,9 @@ void SocketSource::check_hello() {
         hello.layout.width_px != camera.width() || hello.layout.height_px != camera.height())
       return refuse(fmt::format("images of {} x {} pixels, the calibration is for {} x {}", hello.layout.width_px,
                                 hello.layout.height_px, camera.width(), camera.height()));
+  if ((hello.layout.depth_offset_bytes > 0) != rig_.depth.has_value())
+    return refuse(rig_.depth ? "no depth images, the calibration has a depth sensor"
+                             : "depth images, and the calibration that is given has no depth sensor: send it with the hello");
   if (senders_rig_ && hello.rig && !same(*senders_rig_, *hello.rig))
     refuse("another calibration than the first sender's, which the estimator runs with");
 }

@@ -54,6 +54,9 @@ inline FbvinsSocketHello hello_message(const StereoRig* rig) {
   hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
   hello.cameras = static_cast<std::uint32_t>(sent.cameras);
   std::copy(sent.more.begin(), sent.more.end(), hello.more);
+  if (!sent.depth) return hello;
+  hello.flags |= FBVINS_SOCKET_HAS_DEPTH;
+  hello.depth = *sent.depth;
   return hello;
 }
 

@@ -14,8 +14,8 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/imu/motion_merge.hpp"
+#include "fbvins/live/frame_joiner.hpp"
 #include "fbvins/live/source.hpp"
-#include "fbvins/live/stereo_pairs.hpp"
 
 namespace fbvins {
 
@@ -62,7 +62,7 @@ class RealsenseCamera {
   int width_px_ = 0, height_px_ = 0;
   std::vector<Stream> streams_;
   std::mutex mutex_;  // guards what follows: each sensor has a thread of its own
-  StereoPairs pairs_;
+  FrameJoiner pairs_{2};
   MotionMerge motion_;
   int clock_ = -1;  ///< the first stamp's domain (rs2_timestamp_domain); -1: none yet
   std::set<std::string> said_;

@@ -20,15 +20,15 @@ using test::node;
 
 constexpr int kWidth = 8, kHeight = 6;
 
-/// A Kalibr file of two small cameras.
+/// A Kalibr file of small cameras.
 class CameraFile {
  public:
-  CameraFile() {
+  explicit CameraFile(int cameras = 2) {
     std::ofstream file(path_);
-    for (const char* camera : {"cam0", "cam1"}) {
-      file << camera << ":\n  camera_model: pinhole\n  intrinsics: [5.0, 5.0, 4.0, 3.0]\n  distortion_model: radtan\n"
+    for (int camera = 0; camera < cameras; ++camera) {
+      file << "cam" << camera << ":\n  camera_model: pinhole\n  intrinsics: [5.0, 5.0, 4.0, 3.0]\n  distortion_model: radtan\n"
            << "  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n  resolution: [" << kWidth << ", " << kHeight << "]\n"
-           << "  T_cam_imu:\n  - [1.0, 0.0, 0.0, " << (camera[3] == '0' ? "0.0" : "-0.1")
+           << "  T_cam_imu:\n  - [1.0, 0.0, 0.0, " << -0.1 * camera
            << "]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n";
     }
   }
@@ -69,21 +69,37 @@ struct Notes final : SensorInput {
   }
 };
 
-TEST(Ros2Topics, AreThree) {
+TEST(Ros2Topics, AreThoseOfCamerasAndIMU) {
   const auto topics = parse_ros2_topics("/left,/right,/imu/data");
   ASSERT_TRUE(topics);
+  EXPECT_EQ(topics->cameras, (std::vector<std::string>{"/left", "/right"}));
   EXPECT_EQ(topics->imu, "/imu/data");
-  for (const char* wrong : {"", "/a", "/a,/b", "/a,/b,/c,/d", "/a,,/c", "/a,b,/c"})
+  EXPECT_EQ(parse_ros2_topics("/a,/b,/c,/d,/imu")->cameras.size(), 4u);
+  EXPECT_EQ(parse_ros2_topics("/a,/imu,depth=/d")->depth, "/d");
+  for (const char* wrong :
+       {"", "/a", "/a,,/c", "/a,b,/c", "/a,/b,", "/0,/1,/2,/3,/4,/5,/6,/7,/8,/imu", "/a,/b,/imu,depth=/d", "/a,/imu,depth=d"})
     EXPECT_FALSE(parse_ros2_topics(wrong)) << wrong;
 }
 
+TEST(Ros2Source, TopicsAreThoseOfTheCalibration) {
+  const CameraFile four(4);
+  EXPECT_TRUE(Ros2Source::open(node(), *parse_ros2_topics("/a,/b,/c,/d,/imu"), four.options()));
+  const auto two = Ros2Source::open(node(), *parse_ros2_topics("/a,/b,/imu"), four.options());
+  ASSERT_FALSE(two);
+  EXPECT_NE(two.error().message.find("has 4 cameras, and there are 2 ROS 2 topics"), std::string::npos) << two.error().message;
+  const CameraFile one(1);
+  const auto depth = Ros2Source::open(node(), *parse_ros2_topics("/a,/imu,depth=/d"), one.options());
+  ASSERT_TRUE(depth) << depth.error().message;
+  EXPECT_TRUE((*depth)->rig().depth);
+}
+
 TEST(Ros2Source, WithoutACalibrationItSaysWhatItWants) {
-  const auto source = Ros2Source::open(node(), {"/left", "/right", "/imu"}, {});
+  const auto source = Ros2Source::open(node(), {{"/left", "/right"}, "/imu"}, {});
   ASSERT_FALSE(source);
   EXPECT_NE(source.error().message.find("--calibration"), std::string::npos);
   SourceOptions to_calibrate;
   to_calibrate.uncalibrated = StereoRig{};
-  EXPECT_TRUE(Ros2Source::open(node(), {"/left", "/right", "/imu"}, to_calibrate));
+  EXPECT_TRUE(Ros2Source::open(node(), {{"/left", "/right"}, "/imu"}, to_calibrate));
 }
 
 TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
@@ -91,7 +107,7 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
   Notes notes;
   SourceOptions options = camera.options();
   options.say = [&](const std::string& sentence) { notes.note([&] { notes.said.push_back(sentence); }); };
-  auto source = Ros2Source::open(node(), {"/src/left", "/src/right", "/src/imu"}, options);
+  auto source = Ros2Source::open(node(), {{"/src/left", "/src/right"}, "/src/imu"}, options);
   ASSERT_TRUE(source) << source.error().message;
   std::thread runs([&] { EXPECT_TRUE((*source)->run(notes)); });
   const auto left = Ros2Publisher::create(node(), "/src/left", "sensor_msgs/msg/Image");
@@ -127,6 +143,37 @@ TEST(Ros2Source, DeliversPairsAndReadingsAndSaysWhatItCannotTake) {
   for (const auto& image : {pair()->left, pair()->right})
     EXPECT_EQ(image->at(3, 2), static_cast<std::uint8_t>(pair()->t.ns / 50'000'000));
   EXPECT_EQ(notes.readings.front().accel_mps2, Vec3(4, 5, 6));
+}
+
+TEST(Ros2Source, DepthImagesComeWithTheirCamera) {
+  const CameraFile camera(1);
+  Notes notes;
+  auto source = Ros2Source::open(node(), *parse_ros2_topics("/rgbd/grey,/rgbd/imu,depth=/rgbd/depth"), camera.options());
+  ASSERT_TRUE(source) << source.error().message;
+  std::thread runs([&] { EXPECT_TRUE((*source)->run(notes)); });
+  const auto grey = Ros2Publisher::create(node(), "/rgbd/grey", "sensor_msgs/msg/Image");
+  const auto depth = Ros2Publisher::create(node(), "/rgbd/depth", "sensor_msgs/msg/Image");
+  ASSERT_TRUE(grey && depth);
+  const auto came = [&] {
+    const std::lock_guard lock(notes.mutex);
+    return std::ranges::any_of(notes.frames, [](const StereoFrame& f) { return f.left && f.depth; });
+  };
+  for (int k = 1; !came(); ++k) {
+    const Time t{k * 50'000'000LL};
+    const Image image(kWidth, kHeight, static_cast<std::uint8_t>(k));
+    DepthImage distances{kWidth, kHeight, {}};
+    distances.mm.assign(std::size_t{kWidth} * kHeight, static_cast<std::uint16_t>(1000 + k));
+    std::string first, second;
+    append_image(first, t, kLeftFrame, &image);
+    append_depth_image(second, t, kLeftFrame, distances);
+    EXPECT_TRUE(grey->publish(std::move(first)) && depth->publish(std::move(second)));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ASSERT_LT(k, 3000);
+  }
+  (*source)->stop();
+  runs.join();
+  const auto both = std::ranges::find_if(notes.frames, [](const StereoFrame& f) { return f.left && f.depth; });
+  EXPECT_EQ(both->depth->row(5)[7], 1000 + both->t.ns / 50'000'000);
 }
 
 }  // namespace ros2_source_test

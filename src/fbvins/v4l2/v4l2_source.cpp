@@ -4,11 +4,12 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include <algorithm>
 #include <thread>
 #include <utility>
 
-#include "fbvins/io/kalibr.hpp"
 #include "fbvins/live/host_clock.hpp"
+#include "fbvins/live/source_rig.hpp"
 
 namespace fbvins {
 namespace {
@@ -25,16 +26,28 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
+/// Images side by side are of one size.
+Result<void> check_sizes(const V4l2Devices& devices, const StereoRig& rig) {
+  for (int i = 1; i < rig.camera_count() && devices.cameras.size() == 1; ++i)
+    if (rig.camera(i).width() != rig.left.width() || rig.camera(i).height() != rig.left.height())
+      return Error{
+          ErrorCode::invalid_argument,
+          fmt::format("{}: images side by side have one size, and in the calibration camera {} has another than camera 0",
+                      devices.cameras.front(), i)};
+  return {};
+}
+
 }  // namespace
 
 Result<V4l2Devices> parse_v4l2_devices(const std::string& text) {
   std::vector<std::string> parts = split(text);
   const bool filled = std::none_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
-  if (!filled || parts.size() < 2 || parts.size() > 3)
+  if (!filled || parts.size() < 2 || parts.size() > 1 + std::size_t{kMostCameras})
     return Error{
         ErrorCode::invalid_argument,
-        fmt::format("'{}': video devices are LEFT,RIGHT,IMU or SIDE_BY_SIDE,IMU, the IMU udp:..., serial:... or socket:...",
-                    text)};
+        fmt::format("'{}': video devices are CAM0[,CAM1,...],IMU or SIDE_BY_SIDE,IMU, at most {} cameras, the IMU udp:..., "
+                    "serial:... or socket:...",
+                    text, kMostCameras)};
   V4l2Devices devices;
   devices.imu = std::move(parts.back());
   parts.pop_back();
@@ -43,22 +56,17 @@ Result<V4l2Devices> parse_v4l2_devices(const std::string& text) {
 }
 
 V4l2Source::V4l2Source(V4l2Devices devices, SourceOptions options, StereoRig rig)
-    : options_(std::move(options)), rig_(std::move(rig)) {
+    : options_(std::move(options)), rig_(std::move(rig)), joiner_(rig_.camera_count()) {
   for (std::string& path : devices.cameras) cameras_.push_back({.path = std::move(path)});
 }
 
 Result<std::unique_ptr<V4l2Source>> V4l2Source::open(const std::string& text, const SourceOptions& options) {
   const auto devices = parse_v4l2_devices(text);
   if (!devices) return devices.error();
-  const DatasetOptions& files = options.dataset;
-  if (files.kalibr_camchain.empty() && !options.uncalibrated)
-    return Error{ErrorCode::invalid_argument,
-                 "video devices need --calibration: a Kalibr camchain of the two cameras and the IMU"};
-  const Result<StereoRig> rig =
-      files.kalibr_camchain.empty()
-          ? Result<StereoRig>(*options.uncalibrated)
-          : load_kalibr(files.kalibr_camchain, files.kalibr_imu.empty() ? std::nullopt : std::optional(files.kalibr_imu));
+  const int count = static_cast<int>(devices->cameras.size());
+  const Result<StereoRig> rig = rig_for_source(options, "video devices", count == 1 ? 0 : count);
   if (!rig) return rig.error();
+  if (Result<void> fits = check_sizes(*devices, *rig); !fits) return fits.error();
   std::unique_ptr<V4l2Source> source(new V4l2Source(*devices, options, *rig));
   auto imu = ImuFeed::open(devices->imu, *rig, [to = source.get()](const std::string& sentence) { to->say(sentence); });
   if (!imu) return imu.error();
@@ -107,8 +115,9 @@ void V4l2Source::keep_open(Opened& camera) {
   if (camera.device || now < camera.next_try) return;
   const bool first = camera.next_try == Time{};
   camera.next_try = now + kTryAgainAfter;
-  const int images = cameras_.size() == 1 ? 2 : 1;
-  auto device = VideoDevice::open(camera.path, images * rig_.left.width(), rig_.left.height());
+  const Camera& lens = rig_.camera(static_cast<int>(&camera - cameras_.data()));
+  const int images = is_side_by_side() ? rig_.camera_count() : 1;
+  auto device = VideoDevice::open(camera.path, images * lens.width(), lens.height());
   if (!device) {
     if (first) say(device.error().message + "; it is tried again twice a second");
     return;
@@ -133,12 +142,14 @@ void V4l2Source::take(std::size_t index, SensorInput& input) {
 }
 
 void V4l2Source::add(std::size_t index, VideoFrame frame, SensorInput& input) {
-  if (cameras_.size() == 1) {
-    auto [left, right] = split_side_by_side(frame.image);
-    return input.push(StereoFrame{frame.t, std::make_shared<Image>(std::move(left)), std::make_shared<Image>(std::move(right))});
+  if (is_side_by_side()) {
+    int camera = 0;
+    for (Image& image : split_side_by_side(frame.image, rig_.camera_count()))
+      joiner_.add(camera++, frame.t, std::make_shared<Image>(std::move(image)));
+  } else {
+    joiner_.add(static_cast<int>(index), frame.t, std::make_shared<Image>(std::move(frame.image)));
   }
-  pairs_.add(static_cast<int>(index), frame.t, std::make_shared<Image>(std::move(frame.image)));
-  while (auto pair = pairs_.next()) input.push(*std::move(pair));
+  while (auto joined = joiner_.next()) input.push(*std::move(joined));
 }
 
 }  // namespace fbvins

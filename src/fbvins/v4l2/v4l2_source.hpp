@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two Linux video devices (V4L2), or one with two images side by side, and an IMU from elsewhere (docs/v4l2.md).
+// Linux video devices (V4L2), one a camera, or one with the images of all cameras side by side, and an IMU from elsewhere
+// (docs/v4l2.md).
 //
 //   auto source = V4l2Source::open("/dev/video0,/dev/video2,serial:/dev/ttyS4:921600", options);
 //   Result<void> end = (*source)->run(live.input());    // until stop(); a device that is unplugged is waited for
@@ -14,18 +15,18 @@
 #include <vector>
 
 #include "fbvins/live/bell.hpp"
+#include "fbvins/live/frame_joiner.hpp"
 #include "fbvins/live/make_source.hpp"
-#include "fbvins/live/stereo_pairs.hpp"
 #include "fbvins/v4l2/imu_feed.hpp"
 #include "fbvins/v4l2/video_device.hpp"
 
 namespace fbvins {
 
 struct V4l2Devices {
-  std::vector<std::string> cameras;  ///< one with both images side by side, or left and right
+  std::vector<std::string> cameras;  ///< one of each camera, or one with all images side by side
   std::string imu;                   ///< for ImuFeed::open()
 };
-/// DEVICE[,DEVICE],IMU.
+/// DEVICE[,DEVICE ...],IMU.
 Result<V4l2Devices> parse_v4l2_devices(const std::string& text);
 
 class V4l2Source final : public Source {
@@ -44,6 +45,7 @@ class V4l2Source final : public Source {
     Time next_try{};
   };
   V4l2Source(V4l2Devices devices, SourceOptions options, StereoRig rig);
+  bool is_side_by_side() const { return cameras_.size() == 1 && rig_.camera_count() > 1; }
   void deliver_images(SensorInput& input);
   void keep_open(Opened& camera);
   void take(std::size_t index, SensorInput& input);
@@ -54,7 +56,7 @@ class V4l2Source final : public Source {
   StereoRig rig_;
   std::vector<Opened> cameras_;
   std::unique_ptr<ImuFeed> imu_;
-  StereoPairs pairs_;
+  FrameJoiner joiner_;
   const WakeEvent bell_;
   std::mutex say_mutex_;
   std::atomic<bool> stopped_ = false;

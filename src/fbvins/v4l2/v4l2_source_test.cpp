@@ -209,6 +209,62 @@ TEST(V4l2Source, CutsOneCameraInTwo) {
   EXPECT_EQ(got.frames[0].right->at(0, 0), 2);
 }
 
+StereoRig rig_of_three() {
+  StereoRig rig = small_rig();
+  rig.more.push_back({Camera(PinholeRadtan{50, 50, 15.5, 11.5, 0, 0, 0, 0}, 32, 24), {Quat::Identity(), Vec3(0.2, 0, 0)}});
+  return rig;
+}
+
+TEST(V4l2Source, PutsThreeCamerasTogether) {
+  FakeVideo left("/fake/left", {fourcc("GREY")}), right("/fake/right", {fourcc("GREY")}), small("/fake/small", {fourcc("GREY")});
+  Running running("/fake/left,/fake/right,/fake/small,udp:127.0.0.1:9:0", rig_of_three());
+  CollectedInput got;
+  running.start(got);
+  const Time begin = host_now();
+  for (int i = 0; i < 3; ++i) {
+    const Time t = begin + Duration{i * 33 * kMs};
+    ASSERT_TRUE(deliver(left, t, filled((64 + 32) * 48, 10 + i)));
+    ASSERT_TRUE(deliver(right, t, filled((64 + 32) * 48, 30 + i)));
+    ASSERT_TRUE(deliver(small, t, filled((32 + 32) * 24, 50 + i)));
+  }
+  ASSERT_TRUE(got.wait_for_frames(3, kPatience));
+  ASSERT_TRUE(got.frames[1].image(2));
+  EXPECT_EQ(got.frames[1].image(2)->width(), 32);
+  EXPECT_EQ(got.frames[1].image(2)->at(31, 23) - got.frames[1].left->at(0, 0), 40);
+}
+
+TEST(V4l2Source, OneDeviceMayHaveOneCameraOrSeveralSideBySide) {
+  StereoRig alike = small_rig();
+  alike.more.push_back({alike.left, {Quat::Identity(), Vec3(0.2, 0, 0)}});
+  for (const StereoRig& rig : {with_one_camera(alike), alike}) {
+    const int cameras = rig.camera_count();
+    FakeVideo device("/fake/all", {fourcc("GREY")});
+    Running running("/fake/all,udp:127.0.0.1:9:0", rig);
+    CollectedInput got;
+    running.start(got);
+    std::vector<std::uint8_t> bytes = filled(static_cast<std::size_t>(64 * cameras + 32) * 48, 1);
+    bytes[static_cast<std::size_t>(64 * cameras - 1)] = 7;
+    ASSERT_TRUE(deliver(device, Time{5}, bytes));
+    ASSERT_TRUE(got.wait_for_frames(1, kPatience));
+    EXPECT_EQ(got.frames[0].image(cameras - 1)->at(63, 0), 7);
+    EXPECT_EQ(got.frames[0].right != nullptr, cameras > 1);
+  }
+}
+
+TEST(V4l2Source, DevicesAreThoseOfTheCalibration) {
+  const KalibrFiles three(rig_of_three());
+  SourceOptions options;
+  options.dataset.kalibr_camchain = three.camchain();
+  const auto said = [&](const char* devices) { return V4l2Source::open(devices, options).error().message; };
+  EXPECT_NE(said("/a,/b,udp:127.0.0.1:9:0").find("has 3 cameras, and there are 2 video devices"), std::string::npos);
+  EXPECT_NE(said("/a,udp:127.0.0.1:9:0").find("camera 2 has another than camera 0"), std::string::npos);
+  options.dataset.kalibr_camchain = "";
+  options.uncalibrated = small_rig();
+  const auto source = V4l2Source::open("/a,/b,/c,/d,udp:127.0.0.1:9:0", options);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->rig().camera_count(), 4) << "to calibrate";
+}
+
 TEST(V4l2Source, WaitsForACameraThatIsUnplugged) {
   auto camera = std::make_unique<FakeVideo>("/fake/both", std::vector{fourcc("GREY")});
   Running running("/fake/both,udp:127.0.0.1:9:0", small_rig());
@@ -248,7 +304,7 @@ TEST(V4l2Source, SaysWhatIsWrong) {
 }
 
 TEST(V4l2Source, RefusesWordsItDoesNotUnderstand) {
-  for (const char* text : {"", "/dev/video0", "/dev/video0,,udp:127.0.0.1:9:0", "a,b,c,udp:127.0.0.1:9:0"})
+  for (const char* text : {"", "/dev/video0", "/dev/video0,,udp:127.0.0.1:9:0", "0,1,2,3,4,5,6,7,8,udp:127.0.0.1:9:0"})
     EXPECT_FALSE(parse_v4l2_devices(text)) << text;
   const KalibrFiles files(small_rig());
   SourceOptions options;

@@ -56,13 +56,14 @@ Result<Image> grey_image(const VideoFormat& format, std::span<const std::uint8_t
   return image;
 }
 
-std::array<Image, 2> split_side_by_side(const Image& both) {
-  const int width = both.width() / 2;
-  std::array<Image, 2> halves = {Image(width, both.height()), Image(width, both.height())};
-  for (int side = 0; side < 2; ++side)
-    for (int y = 0; y < both.height(); ++y)
-      std::memcpy(halves[static_cast<std::size_t>(side)].row(y), both.row(y) + side * width, static_cast<std::size_t>(width));
-  return halves;
+std::vector<Image> split_side_by_side(const Image& all, int cameras) {
+  const int width = all.width() / cameras;
+  std::vector<Image> parts;
+  for (int i = 0; i < cameras; ++i) {
+    Image& part = parts.emplace_back(width, all.height());
+    for (int y = 0; y < all.height(); ++y) std::memcpy(part.row(y), all.row(y) + i * width, static_cast<std::size_t>(width));
+  }
+  return parts;
 }
 
 }  // namespace fbvins

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/types/image.hpp"
@@ -33,7 +34,7 @@ inline constexpr std::array kVideoFormats = {fourcc("GREY"), fourcc("NV12"), fou
 /// Copies the grey values; colour is dropped. An error where there are too few bytes, or no decodable image.
 Result<Image> grey_image(const VideoFormat& format, std::span<const std::uint8_t> bytes);
 
-/// The two halves of an image of two cameras side by side.
-std::array<Image, 2> split_side_by_side(const Image& both);
+/// The images of several cameras side by side, from left to right.
+std::vector<Image> split_side_by_side(const Image& all, int cameras);
 
 }  // namespace fbvins

@@ -44,11 +44,14 @@ TEST(VideoFormat, CutsImagesSideBySide) {
   Image both(6, 2);
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 6; ++x) both.at(x, y) = static_cast<std::uint8_t>(10 * y + x);
-  const auto [left, right] = split_side_by_side(both);
-  EXPECT_EQ(left.width(), 3);
-  EXPECT_EQ(left.at(2, 1), 12);
-  EXPECT_EQ(right.at(0, 1), 13);
-  EXPECT_EQ(right.at(2, 0), 5);
+  const std::vector<Image> two = split_side_by_side(both, 2), three = split_side_by_side(both, 3);
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_EQ(two[0].width(), 3);
+  EXPECT_EQ(two[0].at(2, 1), 12);
+  EXPECT_EQ(two[1].at(0, 1), 13);
+  EXPECT_EQ(two[1].at(2, 0), 5);
+  ASSERT_EQ(three.size(), 3u);
+  EXPECT_EQ(three[2].at(1, 1), 15);
 }
 
 TEST(VideoFormat, NamesFormats) { EXPECT_EQ(fourcc_name(fourcc("MJPG")), "MJPG"); }

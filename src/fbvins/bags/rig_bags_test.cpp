@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bags of rigs other than one pair: of one camera, of more than two, with a depth sensor.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "fbvins/bags/depth_image.hpp"
+#include "fbvins/bags/recording.hpp"
+#include "fbvins/bags/ros1_bag_writer.hpp"
+#include "fbvins/bags/topic_choice.hpp"
+
+namespace fbvins {
+namespace rig_bags_test {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 80, kHeight = 60;
+
+StereoRig rig_of_cameras(int count) {
+  std::vector<MountedCamera> cameras;
+  for (int i = 0; i < count; ++i)
+    cameras.push_back({Camera(PinholeRadtan{90.0 + i, 91, 40, 30, 0.1, 0.2, 0.01, 0.02}, kWidth, kHeight),
+                       {so3_exp({0.1, 0.2 * i, 1.5}), {0.01, 0.1 * i, 0.03}}});
+  StereoRig rig = with_cameras({}, cameras);
+  rig.imu_noise.gyro_noise_density_radps_rthz = 3e-4;
+  return rig;
+}
+
+Time at(int i) { return Time{1'000'000'000 + 50'000'000 * static_cast<std::int64_t>(i)}; }
+
+std::shared_ptr<const Image> shade(int grey) {
+  return std::make_shared<const Image>(kWidth, kHeight, static_cast<std::uint8_t>(grey));
+}
+
+class RigBags : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path() const { return folder_ / "flight.bag"; }
+
+  /// Ten frames; camera 2 has none in the fourth, and takes its images 1 ms later.
+  void write(const StereoRig& rig) {
+    auto bag = Ros1BagWriter::create(path(), rig, at(0));
+    ASSERT_TRUE(bag) << bag.error().message;
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_TRUE(bag->add(ImuSample{at(i), Vec3::Zero(), Vec3(0, 0, 9.81)}));
+      StereoFrame frame{at(i), shade(i), rig.has_right() ? shade(i + 20) : nullptr};
+      for (int k = 2; k < rig.camera_count(); ++k) frame.more.push_back(i == 4 && k == 2 ? nullptr : shade(i + 20 * k));
+      frame.offsets.set(2, Duration{1'000'000});
+      if (rig.depth) {
+        auto depth = std::make_shared<DepthImage>(DepthImage{kWidth, kHeight, {}});
+        depth->mm.assign(std::size_t{kWidth} * kHeight, static_cast<std::uint16_t>(2000 + i));
+        frame.depth = std::move(depth);
+      }
+      ASSERT_TRUE(bag->add(frame));
+    }
+    ASSERT_TRUE(bag->finish());
+  }
+  std::unique_ptr<Dataset> open(const RecordingOptions& options = {}) {
+    auto data = open_recording(path(), options);
+    EXPECT_TRUE(data) << data.error().message;
+    return data ? *std::move(data) : nullptr;
+  }
+  std::vector<StereoFrame> frames(Dataset& data) {
+    std::vector<StereoFrame> out;
+    while (auto event = data.next())
+      if (auto* frame = std::get_if<StereoFrame>(&*event)) out.push_back(std::move(*frame));
+    return out;
+  }
+  fs::path folder_ = fs::temp_directory_path() / ("fbvins_rig_bags_" + std::to_string(::getpid()));
+};
+
+TEST_F(RigBags, FourCamerasAreReadAsWritten) {
+  write(rig_of_cameras(4));
+  const auto data = open();
+  ASSERT_TRUE(data);
+  ASSERT_EQ(data->rig().camera_count(), 4);
+  EXPECT_EQ(data->rig().camera(3).intrinsics()[0], 93);
+  EXPECT_EQ(data->rig().T_BC(3).p.y(), 0.1 * 3);
+  EXPECT_EQ(data->rig().imu_noise.gyro_noise_density_radps_rthz, 3e-4);
+  const std::vector<StereoFrame> read = frames(*data);
+  ASSERT_EQ(read.size(), 10u);
+  for (int i = 0; i < 10; ++i) {
+    const StereoFrame& frame = read[static_cast<std::size_t>(i)];
+    for (int k = 0; k < 4; ++k) {
+      if (i == 4 && k == 2) EXPECT_FALSE(frame.image(k));
+      else ASSERT_TRUE(frame.image(k)) << i << " " << k;
+      if (frame.image(k)) EXPECT_EQ(frame.image(k)->at(5, 6), i + 20 * k);
+    }
+  }
+  EXPECT_EQ(data->info().more.listed, 19);
+}
+
+TEST_F(RigBags, SomeOfTheCamerasMayBeChosen) {
+  write(rig_of_cameras(4));
+  EXPECT_EQ(open({.dataset = {.camera = "both"}})->rig().camera_count(), 2);
+  EXPECT_EQ(open({.topics = {"/cam0/image_raw", "/cam1/image_raw", "/cam2/image_raw"}})->rig().camera_count(), 3);
+  // Not the calibration on /fbvins/calibration, but that of camera_info and /tf_static.
+  const auto last = open({.topics = {"/cam3/image_raw", "/imu0"}});
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->rig().camera_count(), 1);
+  EXPECT_EQ(last->rig().left.intrinsics()[0], 93);
+  EXPECT_EQ(frames(*last)[7].left->at(5, 6), 67);
+  EXPECT_NE(open_recording(path(), {.dataset = {.rig = rig_of_cameras(2)},
+                                    .topics = {"/cam0/image_raw", "/cam1/image_raw", "/cam3/image_raw"}})
+                .error()
+                .message.find("images of 3 cameras are to be used, and the calibration has 2"),
+            std::string::npos);
+  EXPECT_EQ(open({.dataset = {.rig = rig_of_cameras(2)}})->rig().camera_count(), 2);
+}
+
+TEST_F(RigBags, OneCameraIsARecording) {
+  write(rig_of_cameras(1));
+  const auto data = open();
+  ASSERT_TRUE(data);
+  EXPECT_FALSE(data->rig().has_right());
+  EXPECT_EQ(frames(*data).size(), 10u);
+  EXPECT_TRUE(data->info().warnings.empty()) << data->info().warnings.front();
+}
+
+TEST_F(RigBags, DepthImagesAreOfTheCamera) {
+  write(with_depth(rig_of_cameras(1), {.noise_at_1m_m = 0.007}));
+  const auto data = open();
+  ASSERT_TRUE(data);
+  ASSERT_TRUE(data->rig().depth);
+  EXPECT_EQ(data->rig().depth->noise_at_1m_m, 0.007);
+  const std::vector<StereoFrame> read = frames(*data);
+  ASSERT_EQ(read.size(), 10u);
+  ASSERT_TRUE(read[6].depth);
+  EXPECT_EQ(read[6].depth->row(59)[79], 2006);
+  EXPECT_FALSE(open({.dataset = {.camera = "left"}})->rig().depth);
+}
+
+TEST_F(RigBags, WithoutDepthImagesTheyCannotBeAskedFor) {
+  write(rig_of_cameras(2));
+  EXPECT_NE(open_recording(path(), {.dataset = {.camera = "depth"}}).error().message.find("there are no depth images"),
+            std::string::npos);
+}
+
+TEST(RigTopics, NumberedCamerasFollowTheFirstTwo) {
+  BagContents contents;
+  contents.imu["/imu"];
+  for (const char* topic : {"/cam0/image", "/cam1/image", "/cam2/image", "/cam3/image", "/cam5/image", "/colour"})
+    contents.images[topic];
+  EXPECT_EQ(choose_topics(contents, {}, {})->cameras,
+            (std::vector<std::string>{"/cam0/image", "/cam1/image", "/cam2/image", "/cam3/image"}));
+  EXPECT_EQ(choose_topics(contents, {}, {.most_cameras = 3})->cameras.size(), 3u);
+  EXPECT_EQ(choose_topics(contents, {"/imu", "/cam5/image", "/colour"}, {})->cameras,
+            (std::vector<std::string>{"/cam5/image", "/colour"}));
+}
+
+TEST(RigTopics, CamerasThatNobodyHasCalibratedAreLeftOut) {
+  BagContents contents;
+  contents.imu["/imu"].frame = "imu";
+  for (const std::string number : {"0", "1", "2", "3"}) {
+    contents.images["/cam" + number + "/image"];
+    if (number == "2") continue;
+    contents.cameras["/cam" + number + "/camera_info"] = {rig_of_cameras(1).left, "frame" + number};
+    contents.transforms.push_back({"imu", "frame" + number, Quat::Identity(), Vec3(0, 0.1 * (number[0] - '0'), 0)});
+  }
+  auto topics = choose_topics(contents, {}, {});
+  ASSERT_TRUE(topics);
+  topics->cameras = calibrated_cameras(contents, *topics);
+  EXPECT_EQ(topics->cameras, (std::vector<std::string>{"/cam0/image", "/cam1/image", "/cam3/image"}));
+  const auto rig = rig_of(contents, *topics);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->T_BC(2).p.y(), 0.1 * 3);
+}
+
+TEST(RigTopics, DepthImagesAreNoCameras) {
+  EXPECT_TRUE(names_depth("/camera/aligned_depth_to_color/image_raw") && names_depth("/Depth_0") &&
+              names_depth("/tof/compressedDepth"));
+  EXPECT_FALSE(names_depth("/depthai/left/image_raw") || names_depth("/left"));
+  BagContents contents;
+  contents.imu["/imu"].frame = "imu";
+  contents.images["/colour/image"], contents.images["/depth/image"], contents.images["/depth/image/compressedDepth"];
+  const auto one = choose_topics(contents, {}, {.depth = true});
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_EQ(one->cameras, std::vector<std::string>{"/colour/image"});
+  EXPECT_EQ(one->depth, "/depth/image");
+  EXPECT_EQ(choose_topics(contents, {}, {})->depth, "");
+  contents.images["/aligned_depth/image"];
+  EXPECT_EQ(
+      choose_topics(contents, {}, {.depth = true}).error().message,
+      "has 2 topics of depth images (/aligned_depth/image, /depth/image): say which are registered to the camera with --topics "
+      "CAM0[,CAM1,...][,IMU][,DEPTH]");
+  EXPECT_EQ(choose_topics(contents, {"/aligned_depth/image"}, {.depth = true})->depth, "/aligned_depth/image");
+}
+
+TEST(RigTopics, DepthImagesOfAnotherCameraAreNotRegistered) {
+  BagContents contents;
+  contents.cameras["/colour/camera_info"] = {rig_of_cameras(1).left, "colour"};
+  contents.cameras["/depth/camera_info"] = {rig_of_cameras(1).left, "colour"};
+  const ChosenTopics topics{{"/colour/image"}, "", "", "/depth/image"};
+  EXPECT_EQ(not_registered(contents, topics), "");
+  contents.cameras["/depth/camera_info"].frame = "infra";
+  contents.transforms.push_back({"colour", "infra", Quat::Identity(), Vec3(0.015, 0, 0)});
+  EXPECT_EQ(not_registered(contents, topics), "they are in the frame 'infra', 15.0 mm from the camera's");
+  contents.cameras["/depth/camera_info"].camera = Camera(PinholeRadtan{70, 70, 40, 30}, kWidth, kHeight);
+  EXPECT_NE(not_registered(contents, topics).find("80 x 60 pixels and 70.0 px of focal length"), std::string::npos);
+}
+
+TEST(DepthImages, MillimetresAndMetresAreRead) {
+  const std::uint16_t mm[] = {0, 1500, 65535, 7};
+  const auto whole = depth_image({2, 2, 4, "16UC1", false, {reinterpret_cast<const char*>(mm), sizeof(mm)}});
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ(whole->mm, (std::vector<std::uint16_t>{0, 1500, 65535, 7}));
+  const float m[] = {1.5F, std::nanf(""), -1, 0.0004F, 70, 2.0005F};
+  const auto floats = depth_image({2, 2, 12, "32FC1", false, {reinterpret_cast<const char*>(m), sizeof(m)}});
+  ASSERT_TRUE(floats) << floats.error().message;
+  EXPECT_EQ(floats->mm, (std::vector<std::uint16_t>{1500, 0, 0, 0})) << "rows of 12 bytes: 1.5, nan | 0.0004, 70";
+  const auto big = depth_image({1, 1, 2, "mono16", true, std::string_view("\x05\xdc", 2)});
+  ASSERT_TRUE(big);
+  EXPECT_EQ(big->mm.front(), 1500);
+  EXPECT_EQ(depth_image({1, 1, 3, "rgb8", false, "abc"}).error().message,
+            "depth images encoded as 'rgb8' cannot be read, only 16UC1 and 32FC1");
+  EXPECT_FALSE(depth_image({2, 2, 4, "16UC1", false, "abcdefg"}));
+}
+
+}  // namespace rig_bags_test
+}  // namespace fbvins

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/frame_joiner.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+namespace fbvins {
+namespace {
+
+constexpr Duration kSameInstant{2'000'000};
+constexpr std::size_t kLongestWait = 4;  // images of one camera without any of another
+
+bool are_one_instant(Time a, Time b) { return std::abs((a - b).ns) <= kSameInstant.ns; }
+
+void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Image> image) {
+  if (camera >= 2 && frame.more.size() < camera - 1) frame.more.resize(camera - 1);
+  (camera == 0 ? frame.left : camera == 1 ? frame.right : frame.more[camera - 2]) = std::move(image);
+}
+
+}  // namespace
+
+void FrameJoiner::put(std::size_t stream, Time t, Pixels pixels) {
+  Stream& to = streams_[stream];
+  if (to.newest && t <= *to.newest) return;
+  if (to.newest) to.interval = t - *to.newest;
+  to.newest = t;
+  to.waiting.push_back({t, std::move(pixels)});
+}
+
+/// Of those with a common trigger.
+std::optional<Time> FrameJoiner::first_waiting() const {
+  std::optional<Time> first;
+  for (const Stream& stream : streams_)
+    if (!is_free(stream) && !stream.waiting.empty())
+      first = first ? std::min(*first, stream.waiting.front().t) : stream.waiting.front().t;
+  return first;
+}
+
+/// Whether no image is missing that could still come to the frame of that time.
+bool FrameJoiner::is_complete(Time first) const {
+  bool all_there = true, long_enough = false;
+  for (const Stream& stream : streams_) {
+    if (is_free(stream)) continue;
+    all_there &= !stream.waiting.empty();
+    long_enough |= stream.waiting.size() >= kLongestWait;
+  }
+  return long_enough || (all_there && free_ones_are_there(first));
+}
+
+/// Whether all images are there that could be a partner of one at `t`: a later one has come, or the next one comes too late, as
+/// far as the interval tells.
+bool FrameJoiner::free_ones_are_there(Time t) const {
+  const Duration quarter{streams_.front().interval.ns / 4};
+  return std::ranges::all_of(streams_, [&](const Stream& stream) {
+    if (!is_free(stream)) return true;
+    return stream.newest && (*stream.newest > t || *stream.newest + stream.interval > t + quarter);
+  });
+}
+
+/// Before a frame leaves: which cameras deliver images, and never at one instant with camera 0.
+void FrameJoiner::count_apart(Time first) {
+  const Stream& zero = streams_.front();
+  if (zero.waiting.empty()) return;
+  for (int i = 1; i < cameras_; ++i) {
+    Stream& stream = streams_[static_cast<std::size_t>(i)];
+    if (is_free(stream) || stream.waiting.empty()) continue;
+    const Time t0 = zero.waiting.front().t, t = stream.waiting.front().t;
+    if (are_one_instant(t0, t)) stream.apart = 0;
+    else if (are_one_instant(std::min(t0, t), first)) ++stream.apart;
+  }
+}
+
+void FrameJoiner::take_first(std::size_t stream, StereoFrame& frame) {
+  Waiting first = std::move(streams_[stream].waiting.front());
+  streams_[stream].waiting.pop_front();
+  if (auto* depth = std::get_if<std::shared_ptr<const DepthImage>>(&first.pixels)) frame.depth = std::move(*depth);
+  else put_into(frame, stream, std::get<std::shared_ptr<const Image>>(std::move(first.pixels)));
+}
+
+/// Of a camera without a common trigger: the image nearest to a quarter of an interval before the frame.
+void FrameJoiner::take_nearest(std::size_t stream, StereoFrame& frame) {
+  std::deque<Waiting>& waiting = streams_[stream].waiting;
+  const Duration interval = streams_.front().interval;
+  const Time wanted = frame.t - Duration{interval.ns / 4};
+  const auto distance = [&](const Waiting& w) { return std::abs((w.t - wanted).ns); };
+  const auto nearest = std::ranges::min_element(waiting, {}, distance);
+  if (nearest == waiting.end() || distance(*nearest) > interval.ns / 2) return;
+  waiting.erase(waiting.begin(), nearest);
+  frame.offsets.set(static_cast<int>(stream), waiting.front().t - frame.t);
+  take_first(stream, frame);
+}
+
+/// While no camera with a common trigger delivers.
+std::optional<StereoFrame> FrameJoiner::of_a_free_one() {
+  if (std::ranges::none_of(streams_, [](const Stream& s) { return s.waiting.size() >= kLongestWait; })) return std::nullopt;
+  std::size_t earliest = streams_.size();
+  for (std::size_t i = 0; i < streams_.size(); ++i)
+    if (!streams_[i].waiting.empty() &&
+        (earliest == streams_.size() || streams_[i].waiting.front().t < streams_[earliest].waiting.front().t))
+      earliest = i;
+  StereoFrame frame{streams_[earliest].waiting.front().t, nullptr, nullptr};
+  take_first(earliest, frame);
+  return frame;
+}
+
+StereoFrame FrameJoiner::join(Time first) {
+  StereoFrame frame;
+  std::optional<Time> t;  // of the camera with the lowest number
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    const std::deque<Waiting>& waiting = streams_[i].waiting;
+    if (is_free(streams_[i]) || waiting.empty() || !are_one_instant(waiting.front().t, first)) continue;
+    if (!t) t = waiting.front().t;
+    take_first(i, frame);
+  }
+  frame.t = t.value_or(first);
+  for (std::size_t i = 0; i < streams_.size(); ++i)
+    if (is_free(streams_[i])) take_nearest(i, frame);
+  return frame;
+}
+
+std::optional<StereoFrame> FrameJoiner::next() {
+  while (const std::optional<Time> first = first_waiting()) {
+    if (!is_complete(*first)) return std::nullopt;
+    count_apart(*first);
+    StereoFrame frame = join(*first);
+    if (!frame.without_images()) return frame;
+  }
+  return of_a_free_one();
+}
+
+}  // namespace fbvins

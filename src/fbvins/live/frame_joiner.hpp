@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joins the images of separate camera streams, and of a depth sensor's, to frames by their stamps.
+//
+//   FrameJoiner joiner(4);
+//   joiner.add(2, t, image);
+//   while (auto frame = joiner.next()) input.push(*std::move(frame));
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "fbvins/types/image.hpp"
+
+namespace fbvins {
+
+/// Frames leave in order of time. A frame without the image of a camera leaves as soon as it is certain that it is lost: that
+/// camera has delivered a newer one, or several of another one's have come since. A camera whose images never meet those of
+/// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
+/// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
+class FrameJoiner {
+ public:
+  explicit FrameJoiner(int cameras, bool depth = false)
+      : cameras_(cameras), streams_(static_cast<std::size_t>(cameras + depth)) {}
+
+  /// Stamps of one camera ascend; one that does not is dropped. After it, next() until that is empty.
+  void add(int camera, Time t, std::shared_ptr<const Image> image) { put(static_cast<std::size_t>(camera), t, std::move(image)); }
+  /// Of the depth sensor that is registered to camera 0.
+  void add_depth(Time t, std::shared_ptr<const DepthImage> depth) { put(streams_.size() - 1, t, std::move(depth)); }
+  std::optional<StereoFrame> next();
+  bool without_trigger(int camera) const { return is_free(streams_[static_cast<std::size_t>(camera)]); }
+
+ private:
+  static constexpr int kApart = 20;  // images in a row that leave without one of camera 0, while both deliver
+  using Pixels = std::variant<std::shared_ptr<const Image>, std::shared_ptr<const DepthImage>>;
+  struct Waiting {
+    Time t;
+    Pixels pixels;
+  };
+  struct Stream {
+    std::deque<Waiting> waiting;
+    std::optional<Time> newest = {};
+    Duration interval = {};  // the last one
+    int apart = 0;
+  };
+
+  static bool is_free(const Stream& stream) { return stream.apart >= kApart; }
+  void put(std::size_t stream, Time t, Pixels pixels);
+  std::optional<Time> first_waiting() const;
+  bool is_complete(Time first) const;
+  bool free_ones_are_there(Time t) const;
+  void count_apart(Time first);
+  void take_first(std::size_t stream, StereoFrame& frame);
+  void take_nearest(std::size_t stream, StereoFrame& frame);
+  std::optional<StereoFrame> of_a_free_one();
+  StereoFrame join(Time first);
+
+  int cameras_;
+  std::vector<Stream> streams_;  // of the cameras, and of the depth sensor at the end
+};
+
+}  // namespace fbvins

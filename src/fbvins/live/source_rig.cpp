@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/live/source_rig.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "fbvins/io/kalibr.hpp"
+
+namespace fbvins {
+namespace {
+
+/// Cameras that are missing are like the last one.
+StereoRig with_camera_count(const StereoRig& rig, int cameras) {
+  std::vector<MountedCamera> mounted;
+  for (int i = 0; i < cameras; ++i) {
+    mounted.push_back(rig.mounted(std::min(i, rig.camera_count() - 1)));
+    if (i >= rig.camera_count()) mounted.back().T_BC.p.x() += 0.1 * (i - rig.camera_count() + 1);
+  }
+  return with_cameras(rig, mounted);
+}
+
+}  // namespace
+
+Result<StereoRig> rig_for_source(const SourceOptions& options, std::string_view what, int cameras) {
+  const std::string &chain = options.dataset.kalibr_camchain, &imu = options.dataset.kalibr_imu;
+  if (chain.empty() && options.uncalibrated)
+    return cameras == 0 ? *options.uncalibrated : with_camera_count(*options.uncalibrated, cameras);
+  if (chain.empty())
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("{} need --calibration: a Kalibr camchain of the cameras and the IMU", what)};
+  Result<StereoRig> rig = load_kalibr(chain, imu.empty() ? std::nullopt : std::optional(imu));
+  if (!rig || cameras == 0 || rig->camera_count() == cameras) return rig;
+  return Error{ErrorCode::invalid_argument, fmt::format("{}: has {} camera{}, and there are {} {}", chain, rig->camera_count(),
+                                                        rig->camera_count() == 1 ? "" : "s", cameras, what)};
+}
+
+}  // namespace fbvins

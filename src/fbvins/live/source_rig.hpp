@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The calibration of sources that know none themselves. Any thread.
+//
+//   Result<StereoRig> rig = rig_for_source(options, "video devices", 4);
+#pragma once
+
+#include <string_view>
+
+#include "fbvins/live/make_source.hpp"
+
+namespace fbvins {
+
+/// Of the Kalibr files in the options; without one `options.uncalibrated`, with as many cameras. An error where there is neither,
+/// or the calibration has another number of cameras; 0 cameras: any number. `what` names the sensors in sentences.
+Result<StereoRig> rig_for_source(const SourceOptions& options, std::string_view what, int cameras);
+
+}  // namespace fbvins
