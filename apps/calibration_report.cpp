@@ -6,18 +6,16 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "apps/calibration_page.hpp"
 #include "apps/run_output.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
+#include "fbvins/core/angle.hpp"
 
 namespace fbvins::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
-constexpr double kDegrees = 180 / std::numbers::pi;
-
 Json parameters_json(const std::vector<CalibratedParameter>& parameters) {
   Json out = Json::object();
   for (const CalibratedParameter& p : parameters) out[p.name] = {{"value", p.value}, {"sigma", p.sigma}, {"unit", p.unit}};
@@ -148,7 +146,7 @@ std::string calibration_text(const CalibrationOutcome& outcome) {
   for (std::size_t k = 1; k < found.cameras.size(); ++k) {
     const Pose<Cn, C0>& T = found.cameras[k].T_CnC0;
     out += fmt::format("cam0 to cam{}: baseline {:.3f} mm, turned by {:.4f} degrees\n", k, 1e3 * T.p.norm(),
-                       kDegrees * so3_log(T.q).norm());
+                       kDegreesPerRad * so3_log(T.q).norm());
   }
   out += "cameras (cam1.p, cam1.r: T_cam1_cam0)\n" + lines_of(camera_parameters(found));
   if (outcome.imu) {

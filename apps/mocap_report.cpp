@@ -6,16 +6,14 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <numbers>
 
 #include "apps/terminal.hpp"
+#include "fbvins/core/angle.hpp"
 #include "fbvins/io/trajectory.hpp"
 #include "fbvins/mocap/motion_capture.hpp"
 
 namespace fbvins::app {
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 std::string numbers(const Vec3& v, double scale, int digits) {
   return fmt::format("{:.{}f} {:.{}f} {:.{}f}", scale * v.x(), digits, scale * v.y(), digits, scale * v.z(), digits);
@@ -74,10 +72,10 @@ std::string describe(const HandEye& found, Time start) {
   fmt::format_to(to, "{} poses of the estimate used, {} that did not fit left out\n", found.pairs, found.outliers);
   fmt::format_to(to, "markers on the IMU, m      {}   sigma {} mm\n", numbers(c.T_BK.p, 1, 4), numbers(sigmas(found, 0), 1e3, 2));
   fmt::format_to(to, "rotation, qx qy qz qw      {:.6f} {:.6f} {:.6f} {:.6f}   sigma {} deg\n", q.x(), q.y(), q.z(), q.w(),
-                 numbers(sigmas(found, 3), kDegrees, 3));
+                 numbers(sigmas(found, 3), kDegreesPerRad, 3));
   fmt::format_to(to, "origin of W in the volume  {}\n", numbers(c.T_VW.p, 1, 4));
   fmt::format_to(to, "rotation, qx qy qz qw      {:.6f} {:.6f} {:.6f} {:.6f}   sigma {} deg\n", w.x(), w.y(), w.z(), w.w(),
-                 numbers(sigmas(found, 9), kDegrees, 3));
+                 numbers(sigmas(found, 9), kDegreesPerRad, 3));
   fmt::format_to(to, "estimate's clock           {:+.6f} s to the motion capture's   sigma {:.3f} ms\n", c.offset.seconds(),
                  1e3 * std::sqrt(found.covariance(12, 12)));
   if (found.covariance(13, 13) > 0)

@@ -9,5 +9,6 @@
 namespace fbvins {
 
 inline constexpr double kDegree = std::numbers::pi / 180;  ///< rad
+inline constexpr double kDegreesPerRad = 180 / std::numbers::pi;
 
 }  // namespace fbvins

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/tuning/plant_fit.hpp"
+#include "fbvins/core/angle.hpp"
 
 #include <fmt/format.h>
 
@@ -17,8 +18,6 @@ constexpr double kFastest_hz = 6;
 /// Below this a window of four seconds has too few periods.
 constexpr double kSlowestFitted_hz = 0.7;
 constexpr std::size_t kFewest = 6;
-constexpr double kDegrees = 180 / std::numbers::pi;
-
 std::vector<FrequencyPoint> coherent(std::vector<FrequencyPoint> points) {
   std::erase_if(points, [](const FrequencyPoint& p) { return p.coherence < kCoherent; });
   return points;
@@ -41,7 +40,7 @@ Match match(const std::vector<FrequencyPoint>& points, const std::function<Compl
   mean /= weight;
   const double spread = std::max(0.0, squares / weight - mean * mean);
   return {std::exp(mean), spread + turns / weight, std::sqrt(spread) * 20 / std::numbers::ln10,
-          std::sqrt(turns / weight) * kDegrees};
+          std::sqrt(turns / weight) * kDegreesPerRad};
 }
 
 /// Grid search with refinement around the best plant.

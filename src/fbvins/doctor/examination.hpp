@@ -8,13 +8,13 @@
 #pragma once
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/doctor.hpp"
 #include "fbvins/doctor/motion_fit.hpp"
 #include "fbvins/doctor/stereo_fit.hpp"
@@ -22,7 +22,6 @@
 namespace fbvins {
 
 namespace doctor {
-inline constexpr double kDegrees = 180 / std::numbers::pi;  ///< in a radian
 /// A ratio this near to that of two units that are often confused is taken for it.
 inline constexpr double kUnitTolerance = 0.15;
 /// Standard deviations from which a difference of practical size is a finding.

@@ -9,14 +9,13 @@
 #include <string>
 #include <string_view>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/depths.hpp"
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/doctor/stereo_problem.hpp"
 
 namespace fbvins {
 namespace {
-
-using doctor::kDegrees;
 
 /// Epipolar error that no single change explains.
 constexpr double kMostEpipolar_px = 1.2;
@@ -127,7 +126,7 @@ void Examination::stereo_change(const StereoChange& change) {
   const Eigen::VectorXd sigma = change.covariance.diagonal().cwiseSqrt();
   if (change.kind == FindingKind::right_camera_turned || change.kind == FindingKind::baseline_direction) {
     const bool turned = change.kind == FindingKind::right_camera_turned;
-    Finding& finding = found(change.kind, kDegrees * change.amount.norm(), kDegrees * sigma.maxCoeff(), "deg");
+    Finding& finding = found(change.kind, kDegreesPerRad * change.amount.norm(), kDegreesPerRad * sigma.maxCoeff(), "deg");
     finding.measured =
         fmt::format("{} {:.2f} +- {:.2f} deg from the calibration's; this explains {:.1f} px of the epipolar error",
                     turned ? "the right camera is turned by" : "the direction from left to right camera is", finding.size,

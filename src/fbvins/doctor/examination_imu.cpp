@@ -7,13 +7,13 @@
 #include <cmath>
 #include <string>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/axes.hpp"
 #include "fbvins/doctor/imu_health.hpp"
 
 namespace fbvins {
 namespace {
 
-using doctor::kDegrees;
 using doctor::kSignificant;
 using doctor::kUnitTolerance;
 
@@ -84,8 +84,8 @@ void Examination::gyro_unit(const TurnFit& fit) {
   double factor = fit.scale;
   std::string advice = fmt::format("multiply the gyroscope's readings by {:.4g}", factor);
   for (const auto& [unit, name] :
-       {std::pair{1 / kDegrees, "they look like degrees: multiply the gyroscope's readings by pi / 180"},
-        std::pair{kDegrees,
+       {std::pair{1 / kDegreesPerRad, "they look like degrees: multiply the gyroscope's readings by pi / 180"},
+        std::pair{kDegreesPerRad,
                   "they were in rad/s already and were converted from degrees: multiply the gyroscope's readings by 180 / pi"}})
     if (std::abs(factor / unit - 1) < 2 * kUnitTolerance) factor = unit, advice = name;
   Finding& finding = found(FindingKind::gyro_units, 1 / fit.scale, (1 - fit.correlation) / fit.scale, "times too large");
@@ -123,7 +123,8 @@ void Examination::gyro_axes(const TurnFit& fit) {
     rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
     return;  // the motion fit tells by how much
   }
-  Finding& finding = found(FindingKind::gyro_axes, kDegrees * rest, kDegrees * (1 - fit.correlation), "deg from these axes");
+  Finding& finding =
+      found(FindingKind::gyro_axes, kDegreesPerRad * rest, kDegreesPerRad * (1 - fit.correlation), "deg from these axes");
   finding.measured =
       fmt::format("the gyroscope fits the images with its axes named ({}) (correlation {:.3f})", axes_text(P), fit.correlation);
   finding.expected = "(x, y, z), and the accelerometer's axes are the body's";
@@ -140,8 +141,8 @@ void Examination::motion() {
   motion_agrees_ = true;
   measured(fmt::format(
       "time offset {:.2f} +- {:.2f} ms; rotation from the calibration's {:.2f} deg (+- {:.2f}); error of a predicted feature {:.2f} px, after the changes {:.2f}",
-      1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegrees * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
-      kDegrees * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
+      1e3 * fit.offset_s, 1e3 * fit.offset_sigma_s, kDegreesPerRad * angle_of(evidence_.rig.T_BC0.R() * fit.R_CB),
+      kDegreesPerRad * fit.rotation_sigma_rad.maxCoeff(), fit.error_px, fit.remaining_px));
   for (const MotionChange& change : fit.changes)
     measured(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
                          change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
@@ -216,7 +217,7 @@ void Examination::rotation(const MotionFit& fit) {
   rig_.T_BC0 = {Mat3(fit.R_CB.transpose()), rig_.T_BC0.p};
   rig_.T_BC1 = rig_.T_BC0 * T_C0C1;
   const Vec3 axis = so3_log(Quat(wrong)).normalized();
-  Finding& finding = found(FindingKind::imu_camera_rotation, kDegrees * angle, kDegrees * sigma, "deg");
+  Finding& finding = found(FindingKind::imu_camera_rotation, kDegreesPerRad * angle, kDegreesPerRad * sigma, "deg");
   finding.measured =
       fmt::format("the IMU is rotated by {:.2f} +- {:.2f} deg from the calibration, about ({:.2f}, {:.2f}, {:.2f}) of the IMU",
                   finding.size, finding.sigma, axis.x(), axis.y(), axis.z());

@@ -2,15 +2,14 @@
 // Private to the spoilers: faults by where they are made. Fresh ones at each call.
 #pragma once
 
-#include <numbers>
+#include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/spoilers.hpp"
 
 namespace fbvins::spoil {
 
 inline constexpr double kTenth = 0.1;  ///< tolerance of sizes
 inline constexpr double kTimeTolerance_ms = 1, kRotationTolerance_deg = 0.5;
-inline constexpr double kDegrees = 180 / std::numbers::pi;
-inline Mat3 turn(const Vec3& axis, double degrees) { return so3_exp(degrees / kDegrees * axis).toRotationMatrix(); }
+inline Mat3 turn(const Vec3& axis, double degrees) { return so3_exp(degrees / kDegreesPerRad * axis).toRotationMatrix(); }
 
 std::vector<Spoiler> of_the_imu();
 std::vector<Spoiler> of_the_calibration(const StereoRig& rig);

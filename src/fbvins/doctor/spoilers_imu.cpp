@@ -6,6 +6,7 @@
 #include <memory>
 #include <numbers>
 
+#include "fbvins/core/angle.hpp"
 #include "fbvins/doctor/spoiler_lists.hpp"
 
 namespace fbvins::spoil {
@@ -25,7 +26,7 @@ Spoiler accel(std::string name, FindingKind kind, double size, double tolerance,
   return {std::move(name), kind, size, tolerance, {}, [by](ImuSample& s) { s.accel_mps2 = by * s.accel_mps2; }, {}};
 }
 Spoiler imu_turned(std::string name, const Mat3& by) {
-  const double angle = kDegrees * so3_log(Quat(by)).norm();
+  const double angle = kDegreesPerRad * so3_log(Quat(by)).norm();
   return {std::move(name),
           FindingKind::imu_camera_rotation,
           angle,
@@ -78,8 +79,9 @@ Spoiler clipped_gyro(double range) {
 std::vector<Spoiler> of_the_imu() {
   const Mat3 one = Mat3::Identity();
   std::vector<Spoiler> all{
-      gyro("gyroscope in degrees", FindingKind::gyro_units, kDegrees, kTenth * kDegrees, kDegrees * one),
-      gyro("gyroscope converted twice", FindingKind::gyro_units, 1 / kDegrees, kTenth / kDegrees, one / kDegrees),
+      gyro("gyroscope in degrees", FindingKind::gyro_units, kDegreesPerRad, kTenth * kDegreesPerRad, kDegreesPerRad * one),
+      gyro("gyroscope converted twice", FindingKind::gyro_units, 1 / kDegreesPerRad, kTenth / kDegreesPerRad,
+           one / kDegreesPerRad),
       gyro("gyroscope's scale 8 % too large", FindingKind::gyro_scale, 8, 0.8, 1.08 * one),
       accel("accelerometer in g", FindingKind::accel_units, 1 / 9.80665, kTenth / 9.80665, one / 9.80665),
       accel("accelerometer in thousandths of g", FindingKind::accel_units, 1000 / 9.80665, 100 / 9.80665, 1000 / 9.80665 * one),

@@ -185,8 +185,4 @@ Mat15 Preintegration::predict_covariance(const Quat& q_FB, const ImuBias& bias, 
   return F * P_i * F.transpose() + G * covariance_ * G.transpose();
 }
 
-Vec3 Preintegration::last_rate_radps(const ImuBias& bias) const {
-  return readings_.empty() ? Vec3::Zero() : Vec3(readings_.back().gyro_radps - bias.gyro_radps);
-}
-
 }  // namespace fbvins

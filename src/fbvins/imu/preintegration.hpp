@@ -98,9 +98,6 @@ class Preintegration {
   /// Covariance of predict(i), in the order of NavState, from that of the state at i, of which attitude and bias are given.
   Mat15 predict_covariance(const Quat& q_FB, const ImuBias& bias, const Mat15& P_i) const;
 
-  /// Angular rate at the end of the interval, bias removed, rad/s in B_j.
-  Vec3 last_rate_radps(const ImuBias& bias) const;
-
  private:
   struct Reading {
     Time t;

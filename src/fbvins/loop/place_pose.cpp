@@ -90,7 +90,9 @@ class MatchTerm {
   Vec3 c_ = Vec3::Zero(), c_variances_ = Vec3::Zero();
 };
 
-double chi2_gate(const PlaceFeature& q) { return kPoseOutlier_sigma * kPoseOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0); }
+double chi2_gate(const PlaceFeature& q) {
+  return kPoseOutlier_sigma * kPoseOutlier_sigma * (q.has_depth() ? kThreeRowsOverTwo : 1.0);
+}
 
 struct Sampler {
   const Place& query;
@@ -193,7 +195,6 @@ RelativePose refine_pose(const Place& query, const Place& candidate, std::span<c
     const PlaceFeature& q = at(query, m.match->a);
     if (!evaluate(m, R) || m.term.chi2 > chi2_gate(q)) continue;
     out.inliers.push_back(*m.match);
-    out.with_depth_both += q.has_depth();
     out.information += m.term.J.transpose() * m.term.information * m.term.J;
   }
   return out;

@@ -30,7 +30,6 @@ struct RelativePose {
   CameraFromCamera T_qc;
   Mat6 information = Mat6::Zero();  ///< of (dp in the query's C0, dtheta in the candidate's C0)
   std::vector<DescriptorMatch> inliers;
-  int with_depth_both = 0;  ///< inliers with depth in both views
 };
 
 /// Angle between the vertical that T_qc carries over from the candidate and the query's own, rad.

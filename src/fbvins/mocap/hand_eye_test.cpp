@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/mocap/hand_eye.hpp"
+#include "fbvins/core/angle.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +14,6 @@ namespace fbvins {
 namespace hand_eye_test {
 
 constexpr Time kStart{1'700'000'000'123'456'789};
-constexpr double kDegrees = 180 / std::numbers::pi;
-
 Result<HandEye> align_clean(const MarkerTrack& track, const Trajectory<W>& estimate, const HandEyeOptions& options = {}) {
   return align_hand_eye(inspect(track).kept(track), estimate, options);
 }
@@ -37,7 +36,7 @@ TEST(HandEye, TwentyRecordingsOfAMinute) {
     EXPECT_EQ(found->faults[0].kind, MarkerFaultKind::flip);
     EXPECT_NEAR(found->faults[0].angle_rad, std::numbers::pi, 0.05);
   }
-  EXPECT_LT(worst_rad * kDegrees, 0.1);
+  EXPECT_LT(worst_rad * kDegreesPerRad, 0.1);
   EXPECT_LT(worst_s, 0.5e-3);
   EXPECT_LT(std::sqrt(squares_m), 2e-3);
   EXPECT_LT(worst_m, 4e-3) << "two millimetres are reached in most of them, not in all";
@@ -82,7 +81,7 @@ TEST(HandEye, ALevelWorldHasOnlyAHeading) {
   const auto found = align_clean(recording.track, test::estimate_of(flight, kStart, {}, 5), {.level_world = true});
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_NEAR(std::abs((found->calibration.T_VW.q * Vec3::UnitZ()).z()), 1, 1e-12);
-  EXPECT_LT(so3_log(found->calibration.T_VW.q.conjugate() * recording.truth.T_VW.q).norm() * kDegrees, 0.3);
+  EXPECT_LT(so3_log(found->calibration.T_VW.q.conjugate() * recording.truth.T_VW.q).norm() * kDegreesPerRad, 0.3);
   EXPECT_EQ(found->covariance(9, 9), 0);
 }
 
@@ -167,7 +166,7 @@ TEST(HandEye, PosesThatDoNotFitAreLeftOutFewOrMany) {
     EXPECT_NEAR(found->outliers, share * (found->pairs + found->outliers), 0.015 * found->pairs) << share;
     const Eigen::Matrix<double, 7, 1> e = test::error_of(found->calibration, recording.truth);
     EXPECT_LT(e.head<3>().norm(), 3e-3) << share;
-    EXPECT_LT(e.segment<3>(3).norm() * kDegrees, 0.05) << share;
+    EXPECT_LT(e.segment<3>(3).norm() * kDegreesPerRad, 0.05) << share;
   }
 }
 
