@@ -62,8 +62,9 @@ include(cmake/FbvinsEigen.cmake)
 set(FBVINS_UNITY_MODULES ${FBVINS_SANITIZED_MODULES} calibration flight)
 option(FBVINS_UNITY "Compile several sources of a target as one" OFF)
 set(FBVINS_UNITY_SIZE 8)
-if(FBVINS_UNITY)  # a source is no header, though it is included
-  target_compile_options(fbvins_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+if(FBVINS_UNITY)  # a source is no header, though it is included; GCC collects garbage less often: a sixth of the time for a fifth more memory
+  target_compile_options(fbvins_flags INTERFACE
+    "$<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage;--param=ggc-min-expand=300;--param=ggc-min-heapsize=1500000>")
 endif()
 function(fbvins_use_unity TARGET)
   if(FBVINS_UNITY)  # at the end of the folder's file, when the options of its sources are known
