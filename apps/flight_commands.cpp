@@ -18,10 +18,11 @@ bool has_pose(const LiveSystem& live) { return live.status().health.has_pose(); 
 void save_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
   if (const std::string why = cannot_save_map(flight.map); !why.empty()) return told(refused(why));
   if (!has_pose(live)) return told(refused("there is no pose: the map is saved with the next keyframe, which needs one"));
-  flight.kept->request_save([told, file = flight.map.save](const Result<void>& saved) {
+  const bool waits = flight.kept->request_save([told, file = flight.map.save](const Result<void>& saved) {
     if (saved) told("the map is saved in " + file);
     else told(saved.error());
   });
+  if (!waits) told(refused("too many have asked for the map already"));
 }
 
 void load_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
@@ -30,13 +31,14 @@ void load_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& t
   if (!again.wanted()) return told(refused("this flight has no map: start it with --map FILE"));
   if (again.load.empty()) return told(refused("no file of a map was named: start with --map FILE or --load-map FILE"));
   if (!has_pose(live)) return told(refused("there is no pose: the map is loaded before the next keyframe, which needs one"));
-  flight.kept->before_next_keyframe([=, &flight] {
+  const bool waits = flight.kept->before_next_keyframe([=, &flight] {
     auto map = make_map(again, flight.source.rig(), flight.config.loop);
     if (!map) return told(map.error());
     const int keyframes = (*map)->keyframes();
     flight.loop_map->take_over(*std::move(map));
     told(fmt::format("{} keyframes of {}; what this flight added since that was saved is forgotten", keyframes, again.load));
   });
+  if (!waits) told(refused("a map is about to be loaded already"));
 }
 
 void switch_record(const LiveFlight& flight, bool on, const Told& told) {

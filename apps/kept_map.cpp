@@ -26,7 +26,7 @@ KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string fi
     : map_(map), bytes_(std::move(bytes)), file_(std::move(file)), writer_(std::move(write)) {}
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
-  do_what_waits();
+  if (const auto act = (std::lock_guard(mutex_), std::exchange(to_be_done_, nullptr))) act();
   MapUpdate update = map_.process(keyframe);
   if (!writer_.idle()) return update;
   if (std::vector<Told> wanted = (std::lock_guard(mutex_), std::exchange(wanted_, {})); !wanted.empty()) {
@@ -47,26 +47,22 @@ void KeptMap::finish() {
   const std::lock_guard lock(mutex_);
   for (const Told& told : std::exchange(wanted_, {}))
     told(Error{ErrorCode::unwritable, "the flight ended before its next keyframe"});
-  to_be_done_.clear();
+  to_be_done_ = nullptr;
 }
 
-void KeptMap::request_save(Told told) {
+bool KeptMap::request_save(Told told) {
+  constexpr std::size_t kMostWaiting = 100;
   const std::lock_guard lock(mutex_);
+  if (wanted_.size() >= kMostWaiting) return false;
   wanted_.push_back(std::move(told));
+  return true;
 }
 
-void KeptMap::before_next_keyframe(std::function<void()> act) {
+bool KeptMap::before_next_keyframe(std::function<void()> act) {
   const std::lock_guard lock(mutex_);
-  to_be_done_.push_back(std::move(act));
-}
-
-void KeptMap::do_what_waits() {
-  std::vector<std::function<void()>> acts;
-  {
-    const std::lock_guard lock(mutex_);
-    acts.swap(to_be_done_);
-  }
-  for (const auto& act : acts) act();
+  if (to_be_done_) return false;
+  to_be_done_ = std::move(act);
+  return true;
 }
 
 bool KeptMap::due(Time t) {

@@ -33,14 +33,13 @@ class KeptMap final : public Mapper {
   /// To be called before the first keyframe: the file for requested maps.
   void save_requested_to(std::string file) { requested_file_ = std::move(file); }
   /// The map is written after the next keyframe, once for all who have asked until then; `told` is called on the writer's thread.
-  /// From any thread.
-  void request_save(Told told);
-  /// On the thread of loop closure, before the next keyframe. From any thread.
-  void before_next_keyframe(std::function<void()> act);
+  /// False: too many wait already. From any thread.
+  bool request_save(Told told);
+  /// On the thread of loop closure, before the next keyframe. False: something else waits for it already. From any thread.
+  bool before_next_keyframe(std::function<void()> act);
 
  private:
   bool due(Time t);
-  void do_what_waits();
 
   Mapper& map_;
   std::function<std::string()> bytes_;
@@ -48,9 +47,9 @@ class KeptMap final : public Mapper {
   Time written_;         ///< keyframe's time
   bool warned_ = false;  ///< on the writer's thread
   std::mutex mutex_;
-  std::vector<Told> wanted_;                       ///< guarded by mutex_
-  std::vector<std::function<void()>> to_be_done_;  ///< guarded by mutex_
-  FileWriter writer_;                              ///< last: its thread uses the members above
+  std::vector<Told> wanted_;          ///< guarded by mutex_
+  std::function<void()> to_be_done_;  ///< guarded by mutex_
+  FileWriter writer_;                 ///< last: its thread uses the members above
 };
 
 /// The map of `--map FILE`: continued if the file exists. An unusable file is set aside, said, and a new map begun; where that is

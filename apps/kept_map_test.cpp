@@ -139,7 +139,9 @@ TEST_F(KeptMapTest, OneFileServesAllWhoAskedAndTheEndTellsTheRest) {
 TEST_F(KeptMapTest, WhatIsAskedForIsDoneBeforeTheNextKeyframe) {
   std::vector<int> keyframes;
   kept.process(at_s(0));
-  kept.before_next_keyframe([&] { keyframes.push_back(mapper.keyframes); });
+  const auto act = [&] { keyframes.push_back(mapper.keyframes); };
+  EXPECT_TRUE(kept.before_next_keyframe(act));
+  EXPECT_FALSE(kept.before_next_keyframe(act)) << "one at a time";
   EXPECT_TRUE(keyframes.empty());
   kept.process(at_s(1));
   kept.process(at_s(2));

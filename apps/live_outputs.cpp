@@ -105,7 +105,7 @@ Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSy
                               .mark = [&live](std::string text) { live.mark(std::move(text)); },
                               .save_map =
                                   [map, file = flight.map.save](const TellPage& tell) {
-                                    map->request_save([file, tell](const Result<void>& saved) {
+                                    (void)map->request_save([file, tell](const Result<void>& saved) {
                                       tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
                                     });
                                   }});

@@ -73,6 +73,7 @@ Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std
   if (!publishes_) return {};
   auto sink = Ros2Sink::create(node_, source.rig(), config.live);
   if (!sink) return sink.error();
+  if (!config.live.ros2.commands) commands.clear();
   auto control = Ros2Control::create(node_, std::move(commands), ros_parameters(config), warn);
   if (!control) return control.error();
   auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);

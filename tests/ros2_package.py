@@ -152,6 +152,10 @@ def check_displays(root):
         shown = topics_in(tree)
         require(len(shown) >= 4 and shown <= documented, f"{name} shows {shown - documented}, which docs/ros2.md does not list")
 
+    analyzer = YAML(typ="safe").load((root / "ros2/config/diagnostics.yaml").read_text(encoding="utf-8"))["/**"]["ros__parameters"]["fbvins"]
+    sink = (root / "src/fbvins/ros2/ros2_sink.cpp").read_text(encoding="utf-8")
+    require(re.search(r'diagnostic.name = "([a-z]+): "', sink)[1] == analyzer["startswith"][0], "diagnostics.yaml: the name of the diagnostics")
+
     def panels(node):
         return {node} if isinstance(node, str) else panels(node["first"]) | panels(node["second"])
     require(panels(layout["layout"]) == set(layout["configById"]), "fbvins.json: panels and their settings")

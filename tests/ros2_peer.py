@@ -4,11 +4,12 @@
 readings, and receives what FBVINS publishes; `rosbags` encodes the same values, and the bytes must be the same. Meanwhile a client asks
 FBVINS's services as rmw_cyclonedds_cpp does.
 
-usage: ros2_peer.py FBVINS [PYTHON]      PYTHON: an interpreter that may have them (./dev test makes one)
-Environment: FBVINS_DDS_PEER, a program that does both with another DDS instead: PEER DOMAIN MESSAGES RECEIVED TOPIC=TYPE...; `!` after
-a type: transient local. It publishes MESSAGES on the loopback, at the times of their stamps, says "published", and writes RECEIVED until
-SIGTERM. Both files: topic, type (MESSAGES), stamp in ns as 64 bits (MESSAGES), bytes; a text or bytes begin with their length as 32 bits.
-exit 77 (skipped) where cyclonedds and rosbags are not installed, or FBVINS was built without CycloneDDS
+usage: ros2_peer.py FBVINS [PYTHON [--other-dds]]      PYTHON: an interpreter that may have them (./dev test makes one)
+--other-dds: the flight's topics by the program that the environment's FBVINS_DDS_PEER names, with another DDS: PEER DOMAIN MESSAGES
+RECEIVED TOPIC=TYPE...; `!` after a type: transient local. It publishes MESSAGES on the loopback, at the times of their stamps, says
+"published", and writes RECEIVED until SIGTERM. Both files: topic, type (MESSAGES), stamp in ns as 64 bits (MESSAGES), bytes; a text or
+bytes begin with their length as 32 bits.
+exit 77 (skipped) where cyclonedds and rosbags are not installed, FBVINS was built without CycloneDDS, or no such program is named
 """
 import csv
 import json
@@ -31,11 +32,12 @@ try:
     from ros2_questions import Questions
     from ruamel.yaml import YAML
 except ImportError as missing:
-    if len(sys.argv) > 2 and pathlib.Path(sys.argv[2]).exists():
-        os.execv(sys.argv[2], [sys.argv[2], __file__, sys.argv[1]])
+    if len(sys.argv) > 2 and sys.argv[2] and pathlib.Path(sys.argv[2]).exists():
+        os.execv(sys.argv[2], [sys.argv[2], __file__, sys.argv[1], "", *sys.argv[3:]])
     print(f"skipped: cyclonedds and rosbags are not installed ({missing}); ./dev test installs them where PyPI can be reached")
     sys.exit(77)
 
+OTHER_DDS = "--other-dds" in sys.argv
 IMAGE_RATE_HZ = 30
 SECONDS = 8
 TYPES = {"/imu": "sensor_msgs/msg/Imu", "/camera/left": "sensor_msgs/msg/Image", "/camera/right": "sensor_msgs/msg/Image",
@@ -241,7 +243,7 @@ def fly(program, folder):
     sent = messages_of(record)
     images = sum(name == "/camera/left" for name, _, _ in sent)
     questions = Questions(participant, folder)
-    peer = (AnotherProgram if "FBVINS_DDS_PEER" in os.environ else InThisProcess)(participant, sent, folder)
+    peer = (AnotherProgram if OTHER_DDS else InThisProcess)(participant, sent, folder)
     with open(folder / "log.txt", "w", encoding="utf-8") as log:
         live = subprocess.Popen([program, "live", "--source", "ros2:/camera/left,/camera/right,/imu", "--ros2", str(DOMAIN), "--calibration", folder / "camchain.yaml",
                                  "--imu-calibration", folder / "imu.yaml", "--out", out, "--save-map", folder / "flat.fbm", "--record", folder / "record.mcap",
@@ -276,6 +278,9 @@ def fly(program, folder):
 
 def main():
     program = sys.argv[1]
+    if OTHER_DDS and not os.environ.get("FBVINS_DDS_PEER"):
+        print("skipped: FBVINS_DDS_PEER names no program that speaks another DDS (Fast DDS: docs/ros2.md)")
+        return 77
     probe = subprocess.run([program, "live", "--source", "ros2:/a,/b,/c"], capture_output=True, text=True, timeout=60, check=False)
     if "built without CycloneDDS" in probe.stderr:
         print("skipped: the program was built without CycloneDDS")

@@ -19,6 +19,7 @@ struct Ros2Options {
   std::string imu_frame = "imu_link";
   Ros2Clock clock = Ros2Clock::sensors;
   Ros2Distribution distribution = Ros2Distribution::iron;
+  bool commands = true;
 
   template <class V>
   void visit(V&& v) {
@@ -30,6 +31,8 @@ struct Ros2Options {
     v("imu_frame", imu_frame, "", "the IMU's frame B; those of the cameras are named camera0_optical and so on");
     v("clock", clock, "sensors|ros", "whose clock stamps are on; ros: CLOCK_REALTIME of this machine");
     v("distribution", distribution, "iron|humble", "ROS's distribution whose tools show the node; iron: that and all later ones");
+    v("commands", commands, "",
+      "whether all in the domain may reset the estimator, save and load the map, and record, by services");
   }
 };
 

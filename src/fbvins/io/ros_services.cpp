@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/ros_services.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "fbvins/io/cdr.hpp"
 
 namespace fbvins {
 namespace {
+
+/// More names in one request are those of an attacker.
+constexpr std::uint32_t kMostNames = 10'000;
 
 using Value = decltype(RosParameter::value);
 
@@ -62,7 +66,7 @@ void put_refusal(CdrWriter& cdr, std::string_view reason) {
 
 std::vector<std::string> get_texts(CdrReader& cdr) {
   std::vector<std::string> texts;
-  const auto count = cdr.get<std::uint32_t>();
+  const auto count = std::min(cdr.get<std::uint32_t>(), kMostNames + 1);
   for (std::uint32_t i = 0; i < count && cdr.ok(); ++i) texts.emplace_back(cdr.text());
   return texts;
 }
@@ -132,7 +136,7 @@ std::optional<RosListRequest> read_list_request(std::string_view bytes) {
   RosListRequest request;
   request.prefixes = get_texts(cdr);
   request.depth = cdr.get<std::uint64_t>();
-  if (!cdr.ok()) return std::nullopt;
+  if (!cdr.ok() || request.prefixes.size() > kMostNames) return std::nullopt;
   return request;
 }
 
@@ -145,7 +149,7 @@ void append_parameter_list(std::string& out, std::span<const std::string> names,
 std::optional<std::vector<std::string>> read_names(std::string_view bytes) {
   CdrReader cdr(bytes);
   std::vector<std::string> names = get_texts(cdr);
-  if (!cdr.ok()) return std::nullopt;
+  if (!cdr.ok() || names.size() > kMostNames) return std::nullopt;
   return names;
 }
 
@@ -171,6 +175,7 @@ std::optional<std::vector<std::string>> read_names_to_set(std::string_view bytes
   CdrReader cdr(bytes);
   std::vector<std::string> names;
   const auto count = cdr.get<std::uint32_t>();
+  if (count > kMostNames) return std::nullopt;
   for (std::uint32_t i = 0; i < count && cdr.ok(); ++i) {
     names.emplace_back(cdr.text());
     skip_value(cdr);

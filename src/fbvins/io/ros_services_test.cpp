@@ -36,6 +36,17 @@ TEST(RosServices, NamesAreRead) {
   EXPECT_FALSE(read_names(bytes("\0\1\0\0")));
 }
 
+TEST(RosServices, ARequestOfVeryManyNamesIsRefused) {
+  std::string out;
+  CdrWriter cdr(out);
+  constexpr int kNames = 10'001;
+  cdr.count(kNames);
+  for (int i = 0; i < kNames; ++i) cdr.text("");
+  EXPECT_FALSE(read_names(out));
+  out[4] = '\0', out[5] = '\1';  // 256 of them
+  EXPECT_TRUE(read_names(out));
+}
+
 TEST(RosServices, AListRequestHasPrefixesAndADepth) {
   const auto request = read_list_request(bytes("\0\1\0\0\1\0\0\0\2\0\0\0a\0\0\0\0\0\0\0\7\0\0\0\0\0\0\0"));
   ASSERT_TRUE(request);
