@@ -34,7 +34,8 @@ std::string numbered(const std::filesystem::path& path, int number) {
   return (path.parent_path() / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string())).string();
 }
 
-/// Features and landmarks, with those of the same track as one.
+/// Features and landmarks, with those of the same track as one. Pixels are those of camera 0: the message has no number of a
+/// camera.
 std::vector<RosLandmark> landmarks_of(const LiveView& view) {
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   std::vector<RosLandmark> out;
@@ -43,7 +44,8 @@ std::vector<RosLandmark> landmarks_of(const LiveView& view) {
     places.emplace(f.track, out.size());
     out.push_back({static_cast<std::uint32_t>(f.track.value),
                    {kUnknown, kUnknown, kUnknown},
-                   {static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())},
+                   f.camera == 0 ? std::array{static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())}
+                                 : std::array{kUnknown, kUnknown},
                    static_cast<float>(f.age_frames),
                    static_cast<float>(f.depth_m)});
   }
