@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera's newest image, with its features coloured by age or by depth.
+// The newest image of a camera, with its features coloured by age or by depth. Where there are several cameras, one is chosen.
 import { ageColour, depthColour, gradient, OLDEST_IMAGES, NEAREST_M, FARTHEST_M } from "./colours.js";
 
 const element = id => document.getElementById(id);
@@ -9,6 +9,8 @@ export class CameraView {
     this.canvas = element("image");
     this.pen = this.canvas.getContext("2d");
     this.by = "age";
+    this.camera = 0;
+    this.newest = {};  // messages, by camera
     for (const by of ["age", "depth"]) element(`by-${by}`).addEventListener("click", () => this.colourBy(by));
     this.colourBy("age");
   }
@@ -22,8 +24,43 @@ export class CameraView {
     this.draw();
   }
 
-  /// Decodes one image at a time; meanwhile only the newest one waits.
-  async show(message) {
+  /// Of the chosen camera; the newest image of each other one is kept until that is chosen.
+  show(message) {
+    if (!(message.camera in this.newest)) this.offer(message.camera);
+    this.newest[message.camera] = message;
+    if (message.camera === this.camera) this.decode(message);
+  }
+
+  /// A button for each camera, from the second one on.
+  offer(camera) {
+    const cameras = [...Object.keys(this.newest).map(Number), camera].sort((a, b) => a - b);
+    if (cameras.length < 2) {
+      this.camera = camera;
+      return;
+    }
+    element("camera-choice").hidden = false;
+    element("camera-choice").replaceChildren(...cameras.map(number => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = number;
+      button.setAttribute("aria-label", `Camera ${number}`);
+      button.dataset.camera = number;
+      button.addEventListener("click", () => this.choose(number));
+      return button;
+    }));
+    this.choose(this.camera);
+  }
+
+  choose(camera) {
+    this.camera = camera;
+    element("camera-title").textContent = `Camera ${camera}`;
+    for (const button of element("camera-choice").children)
+      button.setAttribute("aria-pressed", String(Number(button.dataset.camera) === camera));
+    if (this.newest[camera]) this.decode(this.newest[camera]);
+  }
+
+  /// One image at a time; meanwhile only the newest one waits.
+  async decode(message) {
     this.waiting = message;
     if (this.decoding) return;
     this.decoding = true;
@@ -31,7 +68,7 @@ export class CameraView {
       const newest = this.waiting;
       this.waiting = undefined;
       const picture = await createImageBitmap(new Blob([newest.rest], { type: "image/jpeg" })).catch(() => undefined);
-      if (!picture) continue;
+      if (!picture || newest.camera !== this.camera) continue;
       this.picture = picture;
       this.features = newest;
       this.draw();
@@ -41,6 +78,7 @@ export class CameraView {
 
   clear() {
     this.picture = this.waiting = undefined;
+    this.newest = {};
     this.pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }
 
@@ -60,6 +98,7 @@ export class CameraView {
       pen.stroke();
     }
     canvas.dataset.features = features.count;
-    canvas.setAttribute("aria-label", `Newest camera image with ${features.count} features, coloured by ${this.by}`);
+    canvas.dataset.camera = features.camera;
+    canvas.setAttribute("aria-label", `Newest image of camera ${features.camera} with ${features.count} features, coloured by ${this.by}`);
   }
 }

@@ -90,9 +90,10 @@ struct LiveStatus {
 struct LiveView {
   struct Feature {
     TrackId track;
-    Vec2 pixel = Vec2::Zero();  ///< in the raw left image
+    Vec2 pixel = Vec2::Zero();  ///< in the raw image of `camera`
     int age_frames = 0;         ///< 0: detected in this image
-    double depth_m = 0;         ///< along the left camera's axis; 0: not known
+    double depth_m = 0;         ///< along that camera's axis; 0: not known
+    int camera = 0;             ///< its number: of a pair the left one
   };
   struct Landmark {
     TrackId track;

@@ -38,7 +38,7 @@ struct LiveSystem::Impl {
         watch(options, system_options.estimator),
         propagator(system_options.estimator.assumed(rig.imu_noise), Duration::from_seconds(rig.time_offset_s),
                    options.smoothing_s, system_options.estimator.gravity_mps2),
-        views(rig.T_BC0),
+        views(rig),
         started(host_now()) {
     system.on_tracked_frame([this](const TrackedFrame& f) { on_frame(f); });
     system.on_window([this](const WindowSnapshot& window) { views.add(window); }, [this] { return views_wanted; });

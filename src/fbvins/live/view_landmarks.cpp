@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/view_landmarks.hpp"
 
+#include <array>
 #include <limits>
 #include <unordered_map>
 
@@ -14,7 +15,8 @@ std::vector<RosLandmark> landmarks_of(const LiveView& view) {
     places.emplace(f.track, out.size());
     out.push_back({static_cast<std::uint32_t>(f.track.value),
                    {kUnknown, kUnknown, kUnknown},
-                   {static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())},
+                   f.camera == 0 ? std::array{static_cast<float>(f.pixel.x()), static_cast<float>(f.pixel.y())}
+                                 : std::array{kUnknown, kUnknown},
                    static_cast<float>(f.age_frames),
                    static_cast<float>(f.depth_m)});
   }

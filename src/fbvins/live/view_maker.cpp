@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/view_maker.hpp"
 
+#include <algorithm>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace fbvins {
 
@@ -11,7 +13,7 @@ void ViewMaker::add(const TrackedFrame& frame) {
   features_.clear();
   features_.reserve(frame.features.size());
   for (const TrackedFeature& feature : frame.features)
-    if (feature.left) features_.push_back({feature.id, feature.left->pixel, feature.age_frames, 0});
+    if (feature.left) features_.push_back({feature.id, feature.left->pixel, feature.age_frames, 0, feature.cameras.left});
 }
 
 LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {
@@ -21,18 +23,19 @@ LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {
   const Pose<W, B>& T_WB_window = window_.frames.back().T_WB;
   // From the window's gauge to the published frame, in which poses are corrected in small steps.
   const Pose<W, W> to_published = o.T_WB * T_WB_window.inverse();
-  const Pose<C0, W> T_C0W = (T_WB_window * T_BC0_).inverse();
-  std::unordered_map<TrackId, double> depths_m;
+  std::vector<Pose<C0, W>> T_CW;
+  for (int i = 0; i < rig_.camera_count(); ++i) T_CW.push_back((T_WB_window * rig_.T_BC(i)).inverse());
+  std::unordered_map<TrackId, Vec3> positions_W;
   view.landmarks.reserve(window_.landmarks.size());
   for (const WindowSnapshot::Landmark& landmark : window_.landmarks) {
     view.landmarks.push_back({landmark.track, to_published * landmark.p_W});
-    depths_m.emplace(landmark.track, (T_C0W * landmark.p_W).z());
+    positions_W.emplace(landmark.track, landmark.p_W);
   }
   for (const WindowSnapshot::Frame& frame : window_.frames)
     if (frame.keyframe) view.keyframes_W.push_back(to_published * frame.T_WB.p);
   for (LiveView::Feature& feature : view.features)
-    if (const auto depth = depths_m.find(feature.track); depth != depths_m.end() && depth->second > 0)
-      feature.depth_m = depth->second;
+    if (const auto p_W = positions_W.find(feature.track); p_W != positions_W.end())
+      feature.depth_m = std::max(0.0, (T_CW[static_cast<std::size_t>(feature.camera)] * p_W->second).z());
   return view;
 }
 

@@ -14,7 +14,7 @@ namespace fbvins {
 
 class ViewMaker {
  public:
-  explicit ViewMaker(const Pose<B, C0>& T_BC0) : T_BC0_(T_BC0) {}
+  explicit ViewMaker(const StereoRig& rig) : rig_(rig) {}
 
   void add(const TrackedFrame& frame);
   void add(WindowSnapshot window) { window_ = std::move(window); }
@@ -22,7 +22,7 @@ class ViewMaker {
   LiveView view_of(const Odometry& odometry, double shutter_to_pose_ms);
 
  private:
-  Pose<B, C0> T_BC0_;
+  StereoRig rig_;
   Time t_;
   std::vector<LiveView::Feature> features_;
   WindowSnapshot window_;

@@ -28,10 +28,31 @@ Odometry odometry_at(Time t, const Vec3& p) {
 }
 
 /// The camera looks along x of the body: z of C0 is x of B.
-Pose<B, C0> looking_ahead() {
+StereoRig looking_ahead() {
   Mat3 R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Quat(R), Vec3(0.1, 0, 0)};
+  StereoRig rig;
+  rig.right = Camera(PinholeRadtan{100, 100, 32, 24}, 64, 48);
+  rig.T_BC0 = {Quat(R), Vec3(0.1, 0, 0)};
+  rig.more.push_back({rig.right, {Quat(R) * Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitY())), Vec3(-0.2, 0, 0)}});  // backwards
+  return rig;
+}
+
+TEST(ViewMaker, FeaturesAreThoseOfTheirCamera) {
+  ViewMaker views(looking_ahead());
+  TrackedFrame frame = frame_with(Time{7}, {1, 2});
+  frame.features[1].cameras = {2, 3};
+  views.add(frame);
+  WindowSnapshot window;
+  window.frames.push_back({FrameId{0}, Time{7}, {}, true});
+  window.landmarks = {{LandmarkId{0}, TrackId{1}, Vec3(3.1, 0, 0), 3}, {LandmarkId{1}, TrackId{2}, Vec3(-5.2, 0, 0), 3}};
+  views.add(window);
+  const LiveView view = views.view_of(odometry_at(Time{7}, Vec3::Zero()), 0);
+  ASSERT_EQ(view.features.size(), 2u);
+  EXPECT_EQ(view.features[0].camera, 0);
+  EXPECT_NEAR(view.features[0].depth_m, 3, 1e-12);
+  EXPECT_EQ(view.features[1].camera, 2);
+  EXPECT_NEAR(view.features[1].depth_m, 5, 1e-12);
 }
 
 TEST(ViewMaker, GivesFeaturesTheDepthOfTheirLandmarks) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private: a viewer's queue. When it is full the oldest image is dropped, or else the oldest message. One thread.
+// Private: a viewer's queue. When it is full the oldest image is dropped, or else the oldest message; of each camera few wait.
+// One thread.
 #pragma once
 
 #include <algorithm>
@@ -16,6 +17,7 @@ struct WebMessage {
   std::string bytes;
   bool binary = false;
   bool image = false;  ///< large, and soon followed by a newer one
+  int camera = 0;      ///< of an image
 };
 using SharedMessage = std::shared_ptr<const WebMessage>;
 
@@ -23,22 +25,25 @@ class ViewerQueue {
  public:
   struct Limits {
     std::size_t messages = 128;
-    std::size_t images = 2;
+    std::ptrdiff_t images = 2;  ///< of each camera
   };
 
   ViewerQueue() = default;
   explicit ViewerQueue(Limits limits) : limits_(limits) {}
 
   void push(SharedMessage message) {
-    if (message->image && ++images_ > limits_.images) drop(oldest_image());
-    if (queue_.size() >= limits_.messages) drop(images_ > 0 ? oldest_image() : queue_.begin());
+    const auto is_like = [&](const SharedMessage& m) { return m->image && m->camera == message->camera; };
+    if (message->image && std::ranges::count_if(queue_, is_like) >= limits_.images) drop(std::ranges::find_if(queue_, is_like));
+    if (queue_.size() >= limits_.messages) {
+      const auto image = std::ranges::find_if(queue_, [](const SharedMessage& m) { return m->image; });
+      drop(image != queue_.end() ? image : queue_.begin());
+    }
     queue_.push_back(std::move(message));
   }
   SharedMessage pop() {
     if (queue_.empty()) return nullptr;
     SharedMessage message = std::move(queue_.front());
     queue_.pop_front();
-    if (message->image) --images_;
     return message;
   }
   std::size_t size() const { return queue_.size(); }
@@ -46,19 +51,14 @@ class ViewerQueue {
 
  private:
   using Place = std::deque<SharedMessage>::iterator;
-  Place oldest_image() {
-    return std::find_if(queue_.begin(), queue_.end(), [](const SharedMessage& m) { return m->image; });
-  }
   void drop(Place place) {
     if (place == queue_.end()) return;
-    if ((*place)->image) --images_;
     queue_.erase(place);
     ++dropped_;
   }
 
   Limits limits_{};
   std::deque<SharedMessage> queue_;
-  std::size_t images_ = 0;
   std::int64_t dropped_ = 0;
 };
 

@@ -30,5 +30,14 @@ TEST(ViewerQueue, DropsTheOldestImageFirstThenTheOldest) {
   EXPECT_EQ(queue.pop(), nullptr);
 }
 
+TEST(ViewerQueue, KeepsTheNewestImagesOfEachCamera) {
+  ViewerQueue queue({.messages = 20, .images = 2});
+  for (const char* name : {"a", "b", "c"})
+    for (int camera = 0; camera < 4; ++camera)
+      queue.push(std::make_shared<const WebMessage>(WebMessage{name + std::to_string(camera), true, true, camera}));
+  EXPECT_EQ(queue.dropped(), 4);
+  EXPECT_EQ(all(queue), "b0b1b2b3c0c1c2c3");
+}
+
 }  // namespace viewer_queue_test
 }  // namespace fbvins

@@ -146,7 +146,7 @@ SharedMessage end_message() { return text({{"type", "end"}}); }
 
 SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int height_px,
                             const std::vector<LiveView::Feature>& features, int camera) {
-  WebMessage message{{}, true, true};
+  WebMessage message{{}, true, true, camera};
   message.bytes.reserve(sizeof(BinaryHead) + features.size() * 16 + jpeg.size());
   append(message.bytes, BinaryHead{.kind = kImage,
                                    .camera = static_cast<std::uint16_t>(camera),

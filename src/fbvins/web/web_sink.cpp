@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/web/web_sink.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace fbvins {
@@ -70,7 +72,10 @@ std::vector<SharedMessage> WebSink::greeting() {
 
 std::vector<SharedMessage> WebSink::flight_so_far() const {
   std::vector<SharedMessage> messages{history_message(history_), points_message(0, history_.cloud().points(), true)};
-  for (const SharedMessage& last : {last_status_, last_map_, last_points_, last_image_, last_state_, last_replay_})
+  for (const SharedMessage& last : {last_status_, last_map_, last_points_})
+    if (last) messages.push_back(last);
+  for (const auto& [camera, last] : last_images_) messages.push_back(last);
+  for (const SharedMessage& last : {last_state_, last_replay_})
     if (last) messages.push_back(last);
   return messages;
 }
@@ -103,8 +108,13 @@ Result<void> WebSink::take(const LiveEvent& event) {
 
 /// Encoded at once rather than kept, as its memory may be the sensor's. It waits for its odometry; until then no other is taken.
 void WebSink::show(const StereoFrame& frame) {
-  if (!frame.left || picture_ || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
-  picture_ = {frame.t, encoder_.encode(*frame.left), frame.left->width(), frame.left->height()};
+  if (!frame.left && frame.more.empty()) return;
+  if (!pictures_.empty() || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
+  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i) {
+    const bool shown = i != 1 || !frame.more.empty();  // of a pair the left one is enough
+    if (const std::shared_ptr<const Image> image = frame.image(i); image && shown)
+      pictures_.push_back({i, frame.t, encoder_.encode(*image), image->width(), image->height()});
+  }
 }
 
 void WebSink::show(const Odometry& o) {
@@ -118,7 +128,7 @@ void WebSink::show(const Odometry& o) {
     if (silent_) untold_ = o;
     else if (send_state) send(last_state_ = state_message(t_s, o, view, history_));
   }
-  if (picture_ && picture_->t <= o.t) send_picture(t_s);
+  if (!pictures_.empty() && pictures_.front().t <= o.t) send_pictures(t_s);
   if (view && looked_at && !silent_ && due(points_due_, kPointsPeriod)) {
     const SharedMessage points = points_message(t_s, view->landmarks, false);
     const std::lock_guard lock(mutex_);
@@ -126,14 +136,17 @@ void WebSink::show(const Odometry& o) {
   }
 }
 
-/// With the features of the same image, or none.
-void WebSink::send_picture(double t_s) {
-  const Picture picture = *std::exchange(picture_, std::nullopt);
-  const bool same = view_ && view_->t == picture.t;
-  const SharedMessage message = image_message(t_s, picture.jpeg, picture.width_px, picture.height_px,
-                                              same ? view_->features : std::vector<LiveView::Feature>{});
-  const std::lock_guard lock(mutex_);
-  send(last_image_ = message);
+/// Each with the features of the same image, or none.
+void WebSink::send_pictures(double t_s) {
+  for (const Picture& picture : std::exchange(pictures_, {})) {
+    std::vector<LiveView::Feature> features;
+    if (view_ && view_->t == picture.t)
+      std::ranges::copy_if(view_->features, std::back_inserter(features),
+                           [&](const LiveView::Feature& f) { return f.camera == picture.camera; });
+    const SharedMessage message = image_message(t_s, picture.jpeg, picture.width_px, picture.height_px, features, picture.camera);
+    const std::lock_guard lock(mutex_);
+    send(last_images_[picture.camera] = message);
+  }
 }
 
 void WebSink::show(const MapUpdate& update) {
@@ -172,8 +185,9 @@ void WebSink::begin_replay() {
   const std::lock_guard lock(mutex_);
   silent_ = true;
   history_.clear();
-  last_state_ = last_status_ = last_map_ = last_points_ = last_image_ = last_replay_ = nullptr;
-  picture_.reset();
+  last_state_ = last_status_ = last_map_ = last_points_ = last_replay_ = nullptr;
+  last_images_.clear();
+  pictures_.clear();
   view_.reset();
   loops_ = 0;
 }

@@ -73,7 +73,7 @@ class WebSink final : public Sink {
   void show(const MapUpdate& update);
   void show(const LiveStatus& status);
   void show(const LiveMark& mark);
-  void send_picture(double t_s);
+  void send_pictures(double t_s);
   double since_start_s(Time t);
 
   WebOptions options_;
@@ -84,17 +84,19 @@ class WebSink final : public Sink {
   std::optional<Time> start_;
   bool silent_ = false;
   std::optional<Odometry> untold_;  ///< the newest since begin_replay()
-  SharedMessage last_state_, last_status_, last_map_, last_points_, last_image_, last_replay_;
+  SharedMessage last_state_, last_status_, last_map_, last_points_, last_replay_;
+  std::map<int, SharedMessage> last_images_;  ///< by camera
 
   // Used by the thread that calls take().
   struct Picture {
+    int camera;
     Time t;
     std::string jpeg;
     int width_px = 0, height_px = 0;
   };
   GreyJpeg encoder_;
-  std::optional<Picture> picture_;  ///< waits for the features of its image
-  std::optional<LiveView> view_;    ///< waits for its odometry
+  std::vector<Picture> pictures_;  ///< of one instant; they wait for the features of their images
+  std::optional<LiveView> view_;   ///< waits for its odometry
   LivePose newest_;
   std::chrono::steady_clock::time_point picture_due_{}, points_due_{}, state_due_{};
   int loops_ = 0;

@@ -105,6 +105,30 @@ TEST_F(Page, ShowsImagesWithTheirOwnFeaturesWhileSomebodyLooks) {
   EXPECT_EQ(height, 48);
 }
 
+TEST_F(Page, ShowsEachCameraOfARigWithItsOwnFeatures) {
+  open();
+  TestPeer peer(sink->port());
+  peer.watch();
+  next(peer, "hello");
+  StereoFrame four = frame(3);
+  four.right = four.left;
+  four.more = {nullptr, four.left};
+  ASSERT_TRUE(sink->take(four));
+  LiveView seen = view(3);
+  seen.features.push_back({TrackId{8}, Vec2(5, 6), 77, 2, 3});
+  ASSERT_TRUE(sink->take(seen));
+  ASSERT_TRUE(sink->take(odometry(3)));
+  for (const int camera : {0, 1, 3}) {
+    const std::string image = next(peer, "1");
+    std::uint16_t number = 0;
+    std::uint32_t features = 0;
+    std::memcpy(&number, image.data() + 2, 2);
+    std::memcpy(&features, image.data() + 4, 4);
+    EXPECT_EQ(number, camera);
+    EXPECT_EQ(features, camera == 1 ? 0u : 1u);
+  }
+}
+
 TEST_F(Page, ButtonsDoWhatIsAllowed) {
   std::atomic<int> marks{0}, saves{0};
   WebFlight flight;
