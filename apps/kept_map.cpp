@@ -27,6 +27,7 @@ KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string fi
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
   MapUpdate update = map_.process(keyframe);
+  if (update.found) note("the flight knows where it is in the map");
   if (!writer_.idle()) return update;
   if (told_ && wanted_.exchange(false)) {
     writer_.write(requested_file_, bytes_(), told_);
