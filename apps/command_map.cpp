@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <ctime>
 #include <memory>
-#include <set>
 
 #include "apps/commands.hpp"
 #include "apps/map_edit_commands.hpp"
@@ -12,6 +13,7 @@
 #include "fbvins/io/output_file.hpp"
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_merge.hpp"
+#include "fbvins/loop/map_sessions.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins::app {
@@ -25,50 +27,71 @@ constexpr const char* kExamples = R"(examples:
   fbvins map align flat.fbm -o building.fbm --points 0.2,0.1,0,12,4,0  5.3,0.2,0,12,9,0  5.1,3.9,1,8,9,1
   fbvins map rename flat.fbm "Second floor"
   fbvins map diff monday.fbm tuesday.fbm
+  fbvins map forget flat.fbm --session 3 -o before.fbm      as if that session had not been flown
 )";
 
 struct Arguments {
   std::string file, output, ply, tum, vocabulary;
   std::vector<std::string> files;
+  bool leave_out = false;
 };
+
+/// Where the sensors' clock counts from 1970, as most do: the date, UTC.
+std::string when(Time t) {
+  constexpr std::int64_t k2000_s = 946'684'800, kNs = 1'000'000'000;
+  if (t.ns / kNs < k2000_s) return fmt::format("at {:.1f} s of its clock", t.seconds());
+  const std::time_t seconds = static_cast<std::time_t>(t.ns / kNs);
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(seconds));
+}
+
+void print_sessions(const PlaceMap& map) {
+  for (const SessionInMap& s : sessions_in(map))
+    fmt::print("session {}: {}, {:.0f} s, {} keyframes, {} of them still here, {} loops with other sessions\n", s.known.number,
+               when(s.known.began), (s.known.ended - s.known.began).seconds(), s.known.keyframes, s.keyframes,
+               std::max(s.known.loops, s.loops));
+}
 
 int info(const Arguments& arguments) {
   const auto map = load_map(arguments.file);
   if (!map) return fail(map.error().message);
   std::size_t features = 0, points = 0;
-  std::set<std::uint32_t> flights;
   Vec3 low = Vec3::Constant(1e9), high = Vec3::Constant(-1e9);
   for (const MapKeyframe& k : map->keyframes()) {
     features += k.place.size();
     points += static_cast<std::size_t>(
         std::count_if(k.place.features.begin(), k.place.features.end(), [](const PlaceFeature& f) { return f.has_point(); }));
-    flights.insert(k.session);
     low = low.cwiseMin(k.T_MB.p), high = high.cwiseMax(k.T_MB.p);
   }
   const auto loops =
       std::count_if(map->edges.begin(), map->edges.end(), [](const MapEdge& e) { return e.kind == MapEdge::Kind::loop; });
-  fmt::print("{}: {} keyframes of {} flights, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
-             flights.size(), loops, features, map->boosted ? "boosted " : "", points);
+  fmt::print("{}: {} keyframes of {} sessions, {} loops, {} {}features, {} with depth\n", arguments.file, map->size(),
+             map->sessions.size(), loops, features, map->boosted ? "boosted " : "", points);
   if (!map->name.empty()) fmt::print("name: {}\n", map->name);
   if (map->anchored) fmt::print("in the frame of a building, by {} anchors\n", map->anchors.size());
   if (!map->empty())
     fmt::print("keyframes span {:.1f} x {:.1f} x {:.1f} m\n", high.x() - low.x(), high.y() - low.y(), high.z() - low.z());
+  print_sessions(*map);
   return kOk;
 }
 
 int merge(const Arguments& arguments) {
-  auto all = load_map(arguments.files[0]);
-  if (!all) return fail(all.error().message);
-  const auto vocabulary = open_vocabulary(all->boosted ? kBoostedDescriptors : kRawDescriptors, arguments.vocabulary);
-  if (!vocabulary) return fail(vocabulary.error().message);
-  for (std::size_t i = 1; i < arguments.files.size(); ++i) {
-    const auto next = load_map(arguments.files[i]);
-    if (!next) return fail(next.error().message);
-    all = merge_maps(std::move(*all), *next, {}, *vocabulary);
-    if (!all) return fail(fmt::format("{}: {}", arguments.files[i], all.error().message));
+  std::vector<PlaceMap> maps;
+  for (const std::string& file : arguments.files) {
+    auto map = load_map(file);
+    if (!map) return fail(map.error().message);
+    maps.push_back(*std::move(map));
   }
-  if (auto saved = save_map(*all, arguments.output); !saved) return fail(saved.error().message);
-  fmt::print("{}: {} keyframes\n", arguments.output, all->size());
+  const auto vocabulary = open_vocabulary(maps[0].boosted ? kBoostedDescriptors : kRawDescriptors, arguments.vocabulary);
+  if (!vocabulary) return fail(vocabulary.error().message);
+  const MergedMaps merged = merge_all(std::move(maps), {}, *vocabulary);
+  for (const LeftOutMap& other : merged.left_out) {
+    const std::string why = fmt::format("{}: {}", arguments.files[other.index], other.why);
+    if (!arguments.leave_out) return fail(why);
+    warn(why + "; it is left out");
+  }
+  if (merged.left_out.size() + 1 == arguments.files.size()) return kNothingJoined;
+  if (auto saved = save_map(merged.map, arguments.output); !saved) return fail(saved.error().message);
+  fmt::print("{}: {} keyframes\n", arguments.output, merged.map.size());
   return kOk;
 }
 
@@ -104,6 +127,8 @@ void add_map_command(CLI::App& program, int& exit_code) {
   CLI::App* joining = command->add_subcommand("merge", "join maps in the frame of the first");
   joining->add_option("maps", arguments->files, "map files")->required()->expected(2, 1000);
   joining->add_option("-o,--output", arguments->output, "the file to write")->required();
+  joining->add_flag("--leave-out", arguments->leave_out,
+                    "maps that have no place in common with the others are left out, instead of being an error");
   joining->add_option("--vocabulary", arguments->vocabulary, "vocabulary file, instead of the one that ships");
   joining->callback([arguments, &exit_code] { exit_code = merge(*arguments); });
   CLI::App* exporting = command->add_subcommand("export", "points as PLY, keyframes as TUM");

@@ -15,6 +15,7 @@ enum ExitCode : int {
   kOk = 0,
   kEstimationFailed = 1,  ///< the input was fine, but no pose could be estimated
   kSensorsWrong = 1,      ///< doctor, live --check: something is wrong
+  kNothingJoined = 1,     ///< map merge --leave-out: no map belongs to the first
   kInterrupted = 130,     ///< calibrate: by a signal, and can go on
   kBadInput = 2,          ///< wrong usage, unreadable file, nothing to compare
 };

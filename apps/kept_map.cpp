@@ -28,6 +28,7 @@ KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string fi
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
   if (const auto act = (std::lock_guard(mutex_), std::exchange(to_be_done_, nullptr))) act();
   MapUpdate update = map_.process(keyframe);
+  if (update.found) note("the flight knows where it is in the map");
   if (!writer_.idle()) return update;
   if (std::vector<Told> wanted = (std::lock_guard(mutex_), std::exchange(wanted_, {})); !wanted.empty()) {
     writer_.write(requested_file_, bytes_(), [wanted = std::move(wanted)](const Result<void>& saved) {

@@ -13,6 +13,7 @@
 #include "fbvins/io/quoted.hpp"
 #include "fbvins/loop/map_edit.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_sessions.hpp"
 
 namespace fbvins::app {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 struct Edit {
   std::string file, output, name;
   std::vector<double> box, points;
+  std::vector<std::uint32_t> sessions;
   bool remove_inside = false;
 };
 
@@ -37,6 +39,14 @@ int cut(const Edit& edit) {
   const PlaceMap part = cut_map(*std::move(map), {a.cwiseMin(b), a.cwiseMax(b)}, edit.remove_inside);
   if (part.empty()) return fail(fmt::format("{}: none of its {} keyframes would be left", edit.file, before));
   return save(part, edit.output);
+}
+
+int forget(const Edit& edit) {
+  auto map = load_map(edit.file);
+  if (!map) return fail(map.error().message);
+  const auto rest = without_sessions(*std::move(map), {edit.sessions.begin(), edit.sessions.end()});
+  if (!rest) return fail(fmt::format("{}: {}", edit.file, rest.error().message));
+  return save(*rest, edit.output);
 }
 
 int rename(const Edit& edit) {
@@ -109,6 +119,9 @@ void add_map_edits(CLI::App& map, int& exit_code) {
       ->required();
   cutting->add_flag("--outside", edit->remove_inside, "keep what is outside of the box");
   cutting->callback([edit, &exit_code] { exit_code = cut(*edit); });
+  CLI::App* forgetting = add("forget", "take out what came with some sessions, as `info` numbers them", true);
+  forgetting->add_option("--session", edit->sessions, "numbers of the sessions: N,N")->delimiter(',')->required();
+  forgetting->callback([edit, &exit_code] { exit_code = forget(*edit); });
   CLI::App* naming = add("rename", "give a map a name; an empty one takes it away", false);
   naming->add_option("name", edit->name, "the name")->required();
   naming->callback([edit, &exit_code] { exit_code = rename(*edit); });

@@ -80,6 +80,20 @@ std::optional<Evaluation> evaluated(const Trajectory<W>& truth, const Trajectory
   return evaluation ? std::optional(*evaluation) : std::nullopt;
 }
 
+/// After restarts of the odometry.
+std::vector<MapSummary::Found> found_again(const MapRecord& record, const RunRecord& run) {
+  std::map<std::uint32_t, Time> began;  // first poses, by reset counter
+  for (const Odometry& o : run.odometry)
+    if (o.health.has_pose()) began.emplace(o.reset_counter, o.t);
+  std::vector<MapSummary::Found> found;
+  if (began.empty()) return found;
+  const auto& [first, t0] = *began.begin();
+  for (const MapUpdate& u : record.updates)
+    if (const auto at = began.find(u.reset_counter); u.found && at != began.end() && at->first != first)
+      found.push_back({(at->second - t0).seconds(), (u.t - at->second).seconds()});
+  return found;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<LoopMap>> make_map(const MapArguments& arguments, const StereoRig& rig, const LoopOptions& options) {
@@ -111,6 +125,7 @@ void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& ru
   record.graph = map.finish();
   record.finish_ms = timer.lap_ms();
   record.keyframes_in_map = map.keyframes();
+  record.not_joined = map.not_joined();
   record.final = corrected(map, run);
   if (!arguments.final_ba) return;
   timer.lap_ms();
@@ -155,6 +170,8 @@ MapSummary summarise(const MapRecord& record, const RunRecord& run, const Trajec
   const auto anchored = std::ranges::find_if(record.updates, [](const MapUpdate& u) { return u.anchored && u.localised; });
   if (anchored != record.updates.end() && !poses.empty()) s.anchored_after_s = (anchored->t - poses.front().t).seconds();
   if (!record.causal.empty()) s.localised_after_s = (record.causal.front().t - poses.front().t).seconds();
+  s.found_again = found_again(record, run);
+  s.not_joined = record.not_joined;
   s.causal = evaluated(truth, record.causal);
   s.bounded = evaluated(truth, record.bounded);
   s.final = evaluated(truth, record.final);

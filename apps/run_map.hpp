@@ -3,6 +3,7 @@
 // the odometry in W (written by run_output.hpp), in M as known at each moment, and in M after the run.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,7 +37,8 @@ struct MapRecord {
   PoseGraphReport graph;                ///< of the last optimisation
   double finish_ms = 0, adjust_ms = 0;  ///< CPU
   std::optional<FinalAdjustmentReport> adjustment;
-  std::string not_saved;  ///< why the map could not be written; empty: it was, or need not be
+  std::map<std::uint32_t, std::string> not_joined;  ///< sessions that are no part of the map's file, and why
+  std::string not_saved;                            ///< why the map could not be written; empty: it was, or need not be
 };
 
 /// The anchors of --positions, in order of time; none without it.
@@ -56,6 +58,11 @@ struct MapSummary {
   int anchors = 0, anchors_refused = 0, anchors_left_out = 0;
   std::optional<double> anchored_after_s;   ///< from the first pose to the first known T_MW of an anchored map
   std::optional<double> localised_after_s;  ///< from the first pose to the first known T_MW
+  struct Found {
+    double restart_s, after_s;  ///< when the odometry started again, from the first pose; until it was localised again
+  };
+  std::vector<Found> found_again;
+  std::map<std::uint32_t, std::string> not_joined;
   std::optional<Evaluation> causal, bounded, final, adjusted;
   double mean_ms = 0, finish_ms = 0, adjust_ms = 0;  ///< CPU: of a keyframe, at the end, of the bundle adjustment
   std::optional<FinalAdjustmentReport> adjustment;

@@ -69,6 +69,9 @@ Json map_json(const MapSummary& m) {
     json["anchors"] = {{"used", m.anchors}, {"refused", m.anchors_refused}, {"left_out", m.anchors_left_out}};
   if (m.anchored_after_s) json["anchored_after_s"] = *m.anchored_after_s;
   if (m.localised_after_s) json["localised_after_s"] = *m.localised_after_s;
+  for (const MapSummary::Found& f : m.found_again)
+    json["found_again"].push_back({{"restart_s", f.restart_s}, {"after_s", f.after_s}});
+  for (const auto& [session, why] : m.not_joined) json["not_joined"].push_back({{"session", session}, {"why", why}});
   if (m.causal) json["causal"] = to_json(*m.causal, Alignment::se3);
   if (m.bounded) json["bounded"] = to_json(*m.bounded, Alignment::se3);
   if (m.final) json["after_the_run"] = to_json(*m.final, Alignment::se3);
@@ -81,6 +84,9 @@ std::string map_text(const MapSummary& m) {
   std::string text = fmt::format("map: {} keyframes of {}, {} loops, {} refused by the odometry, {} left out by the graph\n",
                                  m.keyframes_in_map, m.keyframes, m.loops, m.refused, m.left_out);
   if (!m.localised_after_s) text += "map: never localised\n";
+  for (const MapSummary::Found& f : m.found_again)
+    text += fmt::format("map: found again {:.1f} s after the restart at {:.1f} s\n", f.after_s, f.restart_s);
+  for (const auto& [session, why] : m.not_joined) text += fmt::format("map: session {} is no part of it: {}\n", session, why);
   if (m.anchored_after_s)
     text += fmt::format(
         "map: in the building's frame after {:.1f} s, {} anchors, {} refused by the odometry, {} left out by the graph\n",

@@ -172,10 +172,20 @@ class CommandLine(unittest.TestCase):
         in_map = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]["map"]
         self.assertGreater(in_map["keyframes"], 2)
         self.assertEqual(fbvins("map", "info", self.folder / "a.fbm").returncode, 0)
-        self.assertEqual(fbvins(*run, "--load-map", self.folder / "a.fbm").returncode, 0)
+        self.assertEqual(fbvins(*run, "--load-map", self.folder / "a.fbm", "--save-map", self.folder / "again.fbm").returncode, 0)
         found = json.loads((out / "summary.json").read_text(encoding="utf-8"))["result"]["map"]
         self.assertGreater(found["keyframes_in_map"], in_map["keyframes_in_map"])
+        self.assertLess(found["keyframes_in_map"], 2 * in_map["keyframes_in_map"])  # what brings nothing is left out
         self.assertLess(found["localised_after_s"], 2.0)
+        sessions = [line for line in fbvins("map", "info", self.folder / "again.fbm").stdout.splitlines() if line.startswith("session")]
+        self.assertEqual(len(sessions), 2)
+        self.assertIn("session 1: 2", sessions[1])  # a date
+        forget = ["map", "forget", self.folder / "again.fbm", "-o", self.folder / "before.fbm", "--session"]
+        self.assertEqual(fbvins(*forget, 1).returncode, 0)
+        difference = json.loads(fbvins("map", "diff", self.folder / "a.fbm", self.folder / "before.fbm", "--json").stdout)
+        self.assertEqual(difference["keyframes_only_in_second"], 0)
+        self.assertLess(difference["moved_largest_m"], 0.002)
+        self.assert_bad_input(fbvins(*forget, 7), "there is no session 7 in the map")
 
         maps = {name: self.folder / f"{name}.fbm" for name in ("a", "cut", "named", "aligned")}
         self.assertEqual(fbvins("map", "rename", maps["a"], "Hall 3", "-o", maps["named"]).returncode, 0)

@@ -134,6 +134,7 @@ void bind_odometry(nb::module_& m) {
       .def_prop_ro(
           "applies_from", [](const MapUpdate& u) { return u.applies_from.value; }, "the first frame after it")
       .def_ro("localised", &MapUpdate::localised, "False: the pose of W in M is unknown")
+      .def_ro("found", &MapUpdate::found, "it is known again from this update on: after a restart, or first in a loaded map")
       .def_prop_ro(
           "T_MW", [](const MapUpdate& u) { return to_array(u.T_MW); }, "(4, 4); jumps when a place is recognised")
       .def_prop_ro(

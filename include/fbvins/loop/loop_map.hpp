@@ -13,6 +13,8 @@
 // finish(). The same keyframes give the same bytes in the file.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -46,7 +48,8 @@ class LoopMap final : public Mapper {
 
   /// Goes on with another map: this one is forgotten. On the thread of process(); the flight is localised anew.
   void take_over(std::unique_ptr<LoopMap> other);
-  /// Last optimisation of the pose graph, once the flight is over.
+  /// Last optimisation of the pose graph, once the flight is over. From a map that was continued, what the flight makes
+  /// superfluous is removed.
   PoseGraphReport finish();
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
   FinalAdjustmentReport adjust();
@@ -56,6 +59,9 @@ class LoopMap final : public Mapper {
   Trajectory<M> corrected(const Trajectory<G>& in_G) const;
   /// Keyframes in the map now.
   int keyframes() const;
+  /// Parts of the flight, between restarts, that were localised in an older map but do not fit it, and why, by
+  /// MapUpdate::map_session. They are no part of the file, and the older map is in it as it was.
+  std::map<std::uint32_t, std::string> not_joined() const;
   /// Bytes of the file that save() writes; may be called on the thread of process(), too.
   std::string bytes() const;
   /// Replaces the file atomically: there is never half of one.

@@ -46,6 +46,7 @@ struct MapUpdate {
   FrameId applies_from;  ///< the first frame that comes after this update, in data time; set by the pipeline
   Time t;
   bool localised = false;  ///< false: where W is in M is not known (a loaded map, or after a restart)
+  bool found = false;      ///< from this update on it is known again: after a restart, or for the first time in a loaded map
   Pose<M, G> T_MG;         ///< best estimate; jumps when a place is recognised. M is level
   Pose<M, W> T_MW;         ///< the same for W as it was published when the keyframe was handed on
   Pose<M, W> T_MW_smooth;  ///< follows T_MW at a bounded speed: for a controller

@@ -8,7 +8,8 @@
 
 namespace fbvins {
 
-/// Features and landmarks of a view as points of a ROS message, with those of the same track as one.
+/// Features and landmarks of a view as points of a ROS message, with those of the same track as one. Pixels are those of camera
+/// 0: the message has no number of a camera.
 std::vector<RosLandmark> landmarks_of(const LiveView& view);
 
 }  // namespace fbvins

@@ -8,6 +8,8 @@
 #include "fbvins/imu/preintegration.hpp"
 #include "fbvins/loop/final_adjustment.hpp"
 #include "fbvins/loop/map_edges.hpp"
+#include "fbvins/loop/map_sessions.hpp"
+#include "fbvins/loop/map_upkeep.hpp"
 
 namespace fbvins {
 namespace {
@@ -26,12 +28,15 @@ constexpr double kNarrowestPrediction_px = 10, kPredictionSigmas = 3, kTypicalDe
 constexpr int kOptimiseAfter = 24, kOptimiseShare = 4;
 /// A keyframe this near the newest of the map, in position and in attitude, sees what that one sees.
 constexpr double kSamePlace_m = 0.12, kSamePlace_rad = 7 * kDegree;
-/// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
-constexpr double kSameBody = 1e-9;
-
-Pose<B, B> as_body(const Pose<B, C0>& T_BC0) { return {T_BC0.q, T_BC0.p}; }
 
 double position_sigma_m(const Mat4& P) { return std::sqrt(P.topLeftCorner<3, 3>().trace()); }
+
+/// Places belong to the camera; another rig may have its body elsewhere.
+PlaceMap with_body(PlaceMap map, const Pose<B, C0>& T_BC0) {
+  change_body(map, T_BC0);
+  remember_sessions(map);
+  return map;
+}
 
 PlaceVerifierOptions verification_for(const PlaceMap& map, const PlaceVerifierOptions& options) {
   return map.boosted ? for_boosted(options) : options;
@@ -48,21 +53,16 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
       T_BC0_(rig.T_BC0),
       extractor_(rig, options.extraction, vocabulary, std::move(stage)),
       verifier_(verification_for(map, options.verification)),
-      map_(std::move(map)),
+      map_(with_body(std::move(map), rig.T_BC0)),
       search_(vocabulary.words(), rig.T_BC0, options.max_distance_m),
       drift_(options.drift),
+      join_(map_),
       follower_(options.follow_mps, options.follow_radps),
-      thinning_(options.thin_above, options.max_keyframes) {
-  // Places belong to the camera; another rig may have its body elsewhere.
-  const Pose<B, B> T_old_new = as_body(map_.T_BC0) * as_body(T_BC0_).inverse();
-  const bool moved = !map_.empty() && T_old_new.p.norm() + angle_between(T_old_new.q, Quat::Identity()) > kSameBody;
+      thinning_(options.thin_above, options.max_keyframes, map_) {
   for (MapKeyframe& k : map_.keyframes()) {
-    if (moved) k.T_MB = k.T_MB * T_old_new;
     k.place.words = vocabulary.words_of(k.place.descriptors);
     search_.add(k.id, k.place.words);
-    session_.number = std::max(session_.number, k.session);
   }
-  map_.T_BC0 = T_BC0_;
   map_.anchored = map_.anchored && !map_.empty();
 }
 
@@ -94,7 +94,7 @@ MapUpdate LoopCloser::process(const Keyframe& keyframe) {
 }
 
 void LoopCloser::begin_session(const Keyframe& keyframe) {
-  session_ = {.number = session_.number + (session_.begun || !map_.empty()),
+  session_ = {.number = session_.begun ? session_.number + 1 : join_.first_session(),
               .begun = true,
               .reset_counter = keyframe.reset_counter,
               .began_map = map_.empty(),
@@ -152,6 +152,7 @@ MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
           frame_.T_MG() * T_GB,
           session_.path_m,
           0,
+          0,
           frame_.known(),
           std::move(place),
           {keyframe.gauge.v_GB, keyframe.imu.bias}};
@@ -174,6 +175,8 @@ void LoopCloser::end_update(const Keyframe& keyframe, MapUpdate& update) {
   update.localised = frame_.known();
   update.map_session = session_.number;
   update.anchored = map_.anchored;
+  update.found = update.localised && !session_.localised && !session_.began_map;
+  session_.localised = update.localised;
   if (!update.localised) return;
   update.T_MG = frame_.T_MG();
   update.T_MW = update.T_MG * keyframe.T_WG.inverse();
@@ -240,6 +243,7 @@ void LoopCloser::close(MapKeyframe& query, const std::vector<Proposal>& proposal
     seen.covariance.diagonal().head<3>().array() += (k.T_MB.p - seen.T_MB.p).squaredNorm() * tilt_variance;
     if (frame_.mahalanobis2(seen) > gate) {
       ++update.stats.refused;
+      join_.note_refused(session_.number, 1);
       continue;
     }
     frame_.update(seen);
@@ -291,6 +295,11 @@ void LoopCloser::add(MapKeyframe query, const KeyframeImu& imu, const std::vecto
   const std::size_t size_before = map_.size();
   const Time t = query.t;
   const BowVector words = query.place.words;
+  MapSession& session = map_.session(session_.number, t);
+  session.ended = t;
+  ++session.keyframes;
+  session.loops += static_cast<int>(
+      std::ranges::count_if(found, [&](const MapEdge& e) { return map_.find(e.from)->session != session_.number; }));
   const KeyframeId id = map_.add(std::move(query));
   search_.add(id, words);
   if (odometry) odometry->to = id, map_.edges.push_back(*odometry);
@@ -320,7 +329,31 @@ void LoopCloser::optimise(MapUpdate& update) {
   for (const MapKeyframe& k : map_.keyframes()) update.corrected.push_back({k.id, k.t, k.T_MB});
 }
 
-PoseGraphReport LoopCloser::finish() { return map_.optimise({options_.degrees_of_freedom}); }
+PoseGraphReport LoopCloser::finish() {
+  const PoseGraphReport report = map_.optimise({options_.degrees_of_freedom});
+  upkeep();
+  return report;
+}
+
+/// Judges the flight's sessions. From a map that was flown in before, what those that join it make superfluous is removed.
+void LoopCloser::upkeep() {
+  if (verdict_) return;
+  verdict_ = join_.objections(map_);
+  if (join_.began_map()) return;
+  std::set<std::uint32_t> flown;
+  for (const MapKeyframe& k : map_.keyframes())
+    if (k.placed && join_.is_of_flight(k.session) && verdict_->count(k.session) == 0) flown.insert(k.session);
+  if (flown.empty()) return;
+  for (const KeyframeId id : what_leaves(map_, flown, verifier_)) take_out(id);
+  thinning_.end_flight();
+  while (const auto id = thinning_.next(map_)) take_out(*id);
+}
+
+std::optional<PlaceMap> LoopCloser::reduced() const {
+  std::set<std::uint32_t> gone;
+  for (const auto& [session, why] : objections()) gone.insert(session);
+  return gone.empty() ? std::nullopt : std::optional(join_.without(map_, gone));
+}
 
 FinalAdjustmentReport LoopCloser::adjust() { return adjust_map(map_, verification_for(map_, options_.verification)); }
 

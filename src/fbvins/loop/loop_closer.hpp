@@ -11,13 +11,16 @@
 //   Trajectory<M> in_map = closer.corrected(trajectory_in_its_gauge);
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "fbvins/loop/anchor_fit.hpp"
 #include "fbvins/loop/candidate_search.hpp"
 #include "fbvins/loop/flight_anchors.hpp"
+#include "fbvins/loop/flight_join.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_frame.hpp"
 #include "fbvins/loop/odometry_drift.hpp"
@@ -44,12 +47,17 @@ class LoopCloser final : public Mapper {
   /// The same from features already extracted (joining maps, replay); the images are not used.
   MapUpdate process(Place place, const Keyframe& keyframe);
 
-  /// Last optimisation of the pose graph.
+  /// Last optimisation of the pose graph. In an older map, what the flight makes superfluous leaves it then.
   PoseGraphReport finish();
   /// After finish(), where the best map is worth minutes: bundle adjustment over all of it.
   FinalAdjustmentReport adjust();
 
+  /// With all that was flown, also what does not join.
   const PlaceMap& map() const { return map_; }
+  /// Without the sessions of this flight that do not fit the older map, which is then as it was; empty where all of it fits.
+  std::optional<PlaceMap> reduced() const;
+  /// Those sessions, and why; after finish() as it judged them.
+  std::map<std::uint32_t, std::string> objections() const { return verdict_ ? *verdict_ : join_.objections(map_); }
   /// Poses of a flight (in its gauge) as the map has them now: exact at keyframes, interpolated between them. Frames of a
   /// session that was never localised in the map are left out.
   Trajectory<M> corrected(const Trajectory<G>& in_G) const { return flight_.corrected(map_, in_G); }
@@ -61,6 +69,7 @@ class LoopCloser final : public Mapper {
     bool begun = false;
     std::uint32_t reset_counter = 0;
     bool began_map = false;  ///< M is its gauge, aligned with gravity
+    bool localised = false;
     Quat q_LG = Quat::Identity();
     double up_sigma_rad = 0;
     KeyframeId newest = {};
@@ -97,6 +106,7 @@ class LoopCloser final : public Mapper {
   bool optimisation_due() const;
   void optimise(MapUpdate& update);
   void take_out(KeyframeId id);
+  void upkeep();
 
   LoopOptions options_;
   Pose<B, C0> T_BC0_;
@@ -105,6 +115,7 @@ class LoopCloser final : public Mapper {
   PlaceMap map_;
   CandidateSearch search_;
   OdometryDrift drift_;
+  FlightJoin join_;
   MapFrame frame_;
   MapFrameFollower follower_;
   Relocaliser relocaliser_;
@@ -112,7 +123,8 @@ class LoopCloser final : public Mapper {
   FlightAnchors flight_;
   RecentMotion motion_;
   Session session_;
-  int news_since_optimised_ = 0;  ///< loops, and keyframes with anchors
+  int news_since_optimised_ = 0;                                 ///< loops, and keyframes with anchors
+  std::optional<std::map<std::uint32_t, std::string>> verdict_;  ///< of finish()
 };
 
 }  // namespace fbvins

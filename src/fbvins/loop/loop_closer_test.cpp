@@ -228,6 +228,29 @@ TEST(LoopCloser, FindsItselfInASavedMapFromAnotherStartAndNeverInAStrangersMap) 
   }
 }
 
+TEST(LoopCloser, KidnappedAndStartedAgainItIsInTheSameMapWithinTwoSecondsAndSaysSo) {
+  const World w = room(1);
+  LoopCloser closer(rig(), {}, vocabulary());
+  for (const Frame& f : flight(w, 120, 0, 0, 2)) {
+    const MapUpdate u = closer.process(f.place, keyframe(FrameId{f.t.ns}, f.t, f.odometry));
+    EXPECT_FALSE(u.found) << "it began the map";
+  }
+  // Somewhere else in the room, in an odometry frame of its own.
+  const Pose<G, G> elsewhere(about_z(2.0), Vec3(5, -3, 1));
+  int found = 0;
+  double found_after_s = 99;
+  const std::vector<Frame> again = flight(w, 20, 0.001, 0.01, 9, 30.1);
+  for (const Frame& f : again) {
+    const Pose<G, B> T_GB = elsewhere * f.odometry;
+    const MapUpdate u = closer.process(f.place, keyframe(FrameId{f.t.ns}, f.t, T_GB, 1));
+    if (u.found) ++found, found_after_s = (f.t - again[0].t).seconds();
+    if (!u.localised) continue;
+    EXPECT_LT(((u.T_MG * T_GB).p - f.truth.p).norm(), 0.1) << "the same M";
+  }
+  EXPECT_EQ(found, 1);
+  EXPECT_LE(found_after_s, 2);
+}
+
 TEST(LoopCloser, RoundsInOneRoomDoNotGrowTheMapWithoutBound) {
   LoopOptions options;
   options.thin_above = 150;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/loop_map.hpp"
 
+#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/booster.hpp"
 #include "fbvins/loop/loop_closer.hpp"
@@ -36,7 +37,11 @@ PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
 Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }
 int LoopMap::keyframes() const { return static_cast<int>(closer_->map().size()); }
-std::string LoopMap::bytes() const { return serialise_map(closer_->map()); }
-Result<void> LoopMap::save(const std::string& path) const { return save_map(closer_->map(), path); }
+std::map<std::uint32_t, std::string> LoopMap::not_joined() const { return closer_->objections(); }
+std::string LoopMap::bytes() const {
+  const std::optional<PlaceMap> reduced = closer_->reduced();
+  return serialise_map(reduced ? *reduced : closer_->map());
+}
+Result<void> LoopMap::save(const std::string& path) const { return write_file_atomically(path, bytes()); }
 
 }  // namespace fbvins

@@ -12,6 +12,7 @@
 
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/loop/binary_file.hpp"
+#include "fbvins/loop/map_sessions.hpp"
 
 namespace fbvins {
 namespace {
@@ -181,8 +182,9 @@ MapAnchor get_anchor(Reader& r) {
   return a;
 }
 
-/// Flags, which the checksum covers: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame.
-constexpr std::uint32_t kBoosted = 1, kNamed = 2, kAnchors = 4, kAnchored = 8;
+/// Flags, which the checksum covers: descriptors are boosted; a name follows the edges, and anchors follow it; M is their frame;
+/// what is remembered of sessions comes last.
+constexpr std::uint32_t kBoosted = 1, kNamed = 2, kAnchors = 4, kAnchored = 8, kMemory = 16;
 constexpr std::size_t kLongestName = 200;
 
 std::string get_name(Reader& r) {
@@ -191,6 +193,44 @@ std::string get_name(Reader& r) {
   std::string name(r.ok() ? n : 0, '\0');
   r.raw(name.data(), name.size());
   return name;
+}
+
+/// Sessions that have a place in M, and those of which no keyframe is left.
+std::vector<MapSession> remembered(const PlaceMap& map) {
+  std::set<std::uint32_t> placed, unplaced;
+  for (const MapKeyframe& k : map.keyframes()) (k.placed ? placed : unplaced).insert(k.session);
+  std::vector<MapSession> out;
+  for (const MapSession& s : map.sessions)
+    if (placed.count(s.number) > 0 || unplaced.count(s.number) == 0) out.push_back(s);
+  return out;
+}
+
+void put_memory(Writer& w, const PlaceMap& map, const std::vector<MapSession>& sessions) {
+  w.put(static_cast<std::uint32_t>(sessions.size()));
+  for (const MapSession& s : sessions) {
+    w.put(s.number);
+    w.put(s.began.ns);
+    w.put(s.ended.ns);
+    w.put(static_cast<std::int32_t>(s.keyframes));
+    w.put(static_cast<std::int32_t>(s.loops));
+  }
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.placed) w.put(static_cast<std::int32_t>(k.missed));
+}
+
+void get_memory(Reader& r, PlaceMap& map) {
+  const auto sessions = r.get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < sessions && r.ok(); ++i) {
+    MapSession s;
+    s.number = r.get<std::uint32_t>();
+    s.began.ns = r.get<std::int64_t>();
+    s.ended.ns = r.get<std::int64_t>();
+    s.keyframes = r.get<std::int32_t>();
+    s.loops = r.get<std::int32_t>();
+    r.check(map.sessions.empty() || s.number > map.sessions.back().number);
+    map.sessions.push_back(s);
+  }
+  for (MapKeyframe& k : map.keyframes()) k.missed = r.get<std::int32_t>();
 }
 
 Error damaged(const std::string& name, const char* what) {
@@ -225,12 +265,15 @@ std::string serialise_map(const PlaceMap& map) {
     body.put(static_cast<std::uint32_t>(anchors.size()));
     for (const MapAnchor* a : anchors) put(body, *a);
   }
+  const std::vector<MapSession> sessions = remembered(map);
+  const bool memory = sessions.size() > 1;
+  if (memory) put_memory(body, map, sessions);
   const std::string bytes = body.take();
   Writer head;
   head.raw(kMagic, sizeof kMagic);
   head.put(kMapVersion);
   const std::uint32_t flags = (map.boosted ? kBoosted : 0) | (name.empty() ? 0 : kNamed) | (anchors.empty() ? 0 : kAnchors) |
-                              (map.anchored ? kAnchored : 0);
+                              (map.anchored ? kAnchored : 0) | (memory ? kMemory : 0);
   head.put(flags);
   head.put(static_cast<std::uint64_t>(bytes.size()));
   head.put(checksum64(std::as_bytes(std::span(bytes))) ^ flags);
@@ -247,7 +290,7 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
   if (version != kMapVersion)
     return Error{ErrorCode::unsupported, fmt::format("{}: map of version {}, this program reads {}", name, version, kMapVersion)};
   const auto flags = head.get<std::uint32_t>();
-  if ((flags & ~(kBoosted | kNamed | kAnchors | kAnchored)) != 0) return damaged(name, "unknown flags");
+  if ((flags & ~(kBoosted | kNamed | kAnchors | kAnchored | kMemory)) != 0) return damaged(name, "unknown flags");
   if (head.get<std::uint64_t>() != bytes.size() - kHeaderBytes) return damaged(name, "cut short or grown");
   if (head.get<std::uint64_t>() != (checksum64(bytes.subspan(kHeaderBytes)) ^ flags))
     return damaged(name, "the checksum differs");
@@ -277,7 +320,9 @@ Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& 
     r.check(map.find(a.keyframe) != nullptr);
     if (r.ok()) map.anchors.push_back(a);
   }
+  if (r.ok() && (flags & kMemory) != 0) get_memory(r, map);
   if (!r.ok() || !r.at_end()) return damaged(name, "its content makes no sense");
+  remember_sessions(map);
   return map;
 }
 

@@ -5,9 +5,23 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
+
+#include "fbvins/loop/map_consistency.hpp"
+#include "fbvins/loop/map_edges.hpp"
+#include "fbvins/loop/map_sessions.hpp"
+#include "fbvins/loop/map_upkeep.hpp"
 
 namespace fbvins {
 namespace {
+
+/// Keyframes of the second map that are looked for anywhere in the first: of more, evenly so many. So many that agree are needed;
+/// with more, no others are looked for.
+constexpr std::size_t kMostAsked = 300, kAgree = 3, kEnough = 8;
+/// Largest difference of two recognised places that agree on where the second map lies.
+constexpr double kAgree_m = 0.3, kAgree_rad = 3 * kDegree;
+/// Once that is known, places are recognised around their predicted pose, which is as uncertain as this.
+constexpr double kKnown_m = 0.3, kKnown_px = 40;
 
 /// Keyframes of `second` with a keyframe of `first` of the same image: of the same stamp, with the same features.
 std::size_t keyframes_in_both(const PlaceMap& first, const PlaceMap& second) {
@@ -21,36 +35,200 @@ std::size_t keyframes_in_both(const PlaceMap& first, const PlaceMap& second) {
   }));
 }
 
+void fill_words(PlaceMap& map, const Vocabulary& vocabulary) {
+  for (MapKeyframe& k : map.keyframes())
+    if (k.place.words.empty()) k.place.words = vocabulary.words_of(k.place.descriptors);  // a file keeps none
+}
+
+/// A place of the first map, seen by a keyframe of the second.
+struct Tie {
+  MapEdge edge;  ///< from the first's keyframe to the second's, under its number there
+  Vec3 p_M2;     ///< of the second's keyframe
+  Vec3 p_M1;     ///< where the tie puts it
+  Pose<M, M> T_M1_M2;
+
+  bool agrees(const Pose<M, M>& T) const {
+    return (T * p_M2 - p_M1).norm() < kAgree_m && angle_between(T.q, T_M1_M2.q) < kAgree_rad;
+  }
+};
+
+class Merge {
+ public:
+  /// Both in the body of the first's rig, with words.
+  Merge(const PlaceMap& first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary)
+      : first_(first),
+        second_(second),
+        verifier_(first.boosted ? for_boosted(options.verification) : options.verification),
+        search_(vocabulary.words(), first.T_BC0, options.max_distance_m) {
+    for (const MapKeyframe& k : first.keyframes()) search_.add(k.id, k.place.words);
+  }
+
+  /// Where the second map lies in the first, by the most places that agree.
+  std::optional<Pose<M, M>> find() {
+    const std::size_t count = second_.size(), asked = std::min(count, kMostAsked);
+    std::vector<Tie> ties;
+    std::size_t most = 0;
+    std::optional<Pose<M, M>> best;
+    for (std::size_t i = 0; i < asked && most < kEnough; ++i) {
+      MapKeyframe query = second_.keyframes()[i * count / asked];
+      query.session = kNoSession;
+      verifier_.set_query(query.place);
+      for (const KeyframeId id : search_.anywhere(first_, query)) {
+        const MapKeyframe& known = *first_.find(id);
+        if (const auto verified = verifier_.verify(known.place)) ties.push_back(tie_of(known, query, *verified));
+      }
+      for (const Tie& hypothesis : ties)
+        if (const std::size_t n = supporters(ties, hypothesis.T_M1_M2); n > most) most = n, best = hypothesis.T_M1_M2;
+    }
+    return most >= kAgree ? best : std::nullopt;
+  }
+
+  /// Places that both know, around where they should be.
+  std::vector<MapEdge> ties(const Pose<M, M>& T_M1_M2) {
+    std::vector<MapEdge> out;
+    for (const MapKeyframe& k : second_.keyframes()) {
+      MapKeyframe query = k;
+      query.session = kNoSession;
+      query.T_MB = T_M1_M2 * k.T_MB;
+      verifier_.set_query(query.place);
+      for (const KeyframeId id : search_.around(first_, query, kKnown_m)) {
+        const MapKeyframe& known = *first_.find(id);
+        const CameraFromCamera T_qc = (query.T_MB * first_.T_BC0).inverse() * (known.T_MB * first_.T_BC0);
+        if (const auto verified = verifier_.verify(known.place, {T_qc, kKnown_px}))
+          out.push_back(tie_of(known, query, *verified).edge);
+      }
+    }
+    return out;
+  }
+
+ private:
+  static constexpr std::uint32_t kNoSession = 0xffffffff;
+
+  Tie tie_of(const MapKeyframe& known, const MapKeyframe& query, const VerifiedPose& verified) const {
+    MapEdge edge = loop_edge(first_.T_BC0, known.id, verified.pose);
+    edge.to = query.id;
+    const Pose<M, B> seen = known.T_MB * edge.T_from_to;
+    const Quat turn = about_z(yaw_of(seen.q * query.T_MB.q.conjugate()));
+    return {edge, query.T_MB.p, seen.p, {turn, Vec3(seen.p - turn * query.T_MB.p)}};
+  }
+
+  /// Keyframes of the second map.
+  static std::size_t supporters(const std::vector<Tie>& ties, const Pose<M, M>& T) {
+    std::set<KeyframeId> agreeing;
+    for (const Tie& tie : ties)
+      if (tie.agrees(T)) agreeing.insert(tie.edge.to);
+    return agreeing.size();
+  }
+
+  const PlaceMap& first_;
+  const PlaceMap& second_;
+  PlaceVerifier verifier_;
+  CandidateSearch search_;
+};
+
+/// Adds all that is in `second`; its sessions are numbered on. Returns the new ids of its keyframes.
+std::map<KeyframeId, KeyframeId> append(PlaceMap& map, const PlaceMap& second, const Pose<M, M>& T_M1_M2,
+                                        std::uint32_t first_session) {
+  std::map<KeyframeId, KeyframeId> renamed;
+  for (MapKeyframe k : second.keyframes()) {
+    const KeyframeId old = k.id;
+    k.id = {};
+    k.session += first_session;
+    k.T_MB = T_M1_M2 * k.T_MB;
+    renamed[old] = map.add(std::move(k));
+  }
+  for (MapSession s : second.sessions) {
+    s.number += first_session;
+    map.sessions.push_back(s);
+  }
+  for (MapEdge e : second.edges) {
+    e.from = renamed.at(e.from), e.to = renamed.at(e.to);
+    map.edges.push_back(std::move(e));
+  }
+  if (map.anchored && second.anchored)
+    for (MapAnchor a : second.anchors) {
+      a.keyframe = renamed.at(a.keyframe);
+      map.anchors.push_back(std::move(a));
+    }
+  return renamed;
+}
+
+void count_loops(PlaceMap& map, const MapEdge& tie) {
+  for (const KeyframeId id : {tie.from, tie.to}) {
+    const MapKeyframe& k = *map.find(id);
+    ++map.session(k.session, k.t).loops;
+  }
+  ++map.find(tie.from)->loops_ending_here;
+}
+
+/// As after a flight, where there are more keyframes than `thin_above`.
+void thin(PlaceMap& map, std::uint32_t first_session, const LoopOptions& options) {
+  if (static_cast<int>(map.size()) <= options.thin_above) return;
+  std::set<std::uint32_t> joined;
+  for (const MapKeyframe& k : map.keyframes())
+    if (k.session >= first_session) joined.insert(k.session);
+  PlaceVerifier verifier(map.boosted ? for_boosted(options.verification) : options.verification);
+  for (const KeyframeId id : what_leaves(map, joined, verifier)) map.remove(id);
+  Thinning thinning(options.thin_above, options.max_keyframes);
+  while (const auto id = thinning.next(map)) map.remove(*id);
+}
+
 }  // namespace
 
-Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& second, const LoopOptions& options, const Vocabulary& vocabulary) {
-  if (first.boosted != second.boosted)
-    return Error{ErrorCode::invalid_argument, "one map holds boosted descriptors, the other raw ones"};
-  if (const std::size_t both = keyframes_in_both(first, second); both > 0)
-    return Error{
-        ErrorCode::invalid_argument,
-        fmt::format("{} of its {} keyframes are in the other map already: they would be there twice", both, second.size())};
-  StereoRig rig;  // only the left camera's extrinsics matter: nothing is extracted
-  rig.T_BC0 = first.T_BC0;
-  LoopOptions merging = options;
-  merging.degrees_of_freedom = 6;
-  LoopCloser closer(rig, merging, vocabulary, std::move(first));
-  bool joined = false;
-  for (const MapKeyframe& k : second.keyframes()) {
-    // The poses of its map serve as odometry, already corrected; the body may sit elsewhere on the other rig.
-    const Pose<M, C0> T_MC = k.T_MB * second.T_BC0;
-    const Pose<M, B> T_MB = T_MC * rig.T_BC0.inverse();
-    Place place = k.place;
-    place.words = vocabulary.words_of(place.descriptors);  // a file keeps none
-    Keyframe flown;
-    flown.id = FrameId{k.id.value};
-    flown.t = k.t;
-    flown.gauge.T_GB = {T_MB.q, T_MB.p};
-    joined |= closer.process(std::move(place), flown).localised;
+Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& other, const LoopOptions& options, const Vocabulary& vocabulary) {
+  const auto refuse = [](std::string why) { return Error{ErrorCode::invalid_argument, std::move(why)}; };
+  if (first.boosted != other.boosted) return refuse("one map holds boosted descriptors, the other raw ones");
+  if (const std::size_t both = keyframes_in_both(first, other); both > 0)
+    return refuse(
+        fmt::format("{} of its {} keyframes are in the other map already: they would be there twice", both, other.size()));
+  PlaceMap second = other;
+  change_body(second, first.T_BC0);
+  for (PlaceMap* map : {&first, &second}) {
+    std::erase_if(map->keyframes(), [](const MapKeyframe& k) { return !k.placed; });
+    std::erase_if(map->edges, [&](const MapEdge& e) { return map->find(e.from) == nullptr || map->find(e.to) == nullptr; });
+    fill_words(*map, vocabulary);
+    remember_sessions(*map);
   }
-  if (!joined) return Error{ErrorCode::invalid_argument, "the two maps have no place in common"};
-  closer.finish();
-  return closer.map();
+  Merge merge(first, second, options, vocabulary);
+  const std::optional<Pose<M, M>> T_M1_M2 = merge.find();
+  if (!T_M1_M2) return refuse("the two maps have no place in common");
+  const std::vector<MapEdge> ties = merge.ties(*T_M1_M2);
+  const std::uint32_t first_session = first.sessions.empty() ? 0 : first.sessions.back().number + 1;
+  const std::map<KeyframeId, KeyframeId> renamed = append(first, second, *T_M1_M2, first_session);
+  const InPart is_second = [&](std::uint32_t session) { return session >= first_session; };
+  const PartFit before = fit_of(first, is_second);
+  for (MapEdge tie : ties) {
+    tie.to = renamed.at(tie.to);
+    count_loops(first, tie);
+    first.edges.push_back(std::move(tie));
+  }
+  first.optimise({options.degrees_of_freedom});
+  if (const std::string why = objection(before, fit_of(first, is_second)); !why.empty())
+    return refuse("the two maps do not fit where they have places in common: of the second, " + why);
+  thin(first, first_session, options);
+  return first;
+}
+
+MergedMaps merge_all(std::vector<PlaceMap> maps, const LoopOptions& options, const Vocabulary& vocabulary) {
+  MergedMaps out{std::move(maps.at(0)), {}};
+  std::map<std::size_t, std::string> open;  // what was said of those that did not join yet
+  for (std::size_t i = 1; i < maps.size(); ++i) open[i];
+  for (bool progress = true; progress && !open.empty();) {
+    progress = false;
+    for (auto next = open.begin(); next != open.end();) {
+      Result<PlaceMap> both = merge_maps(out.map, maps[next->first], options, vocabulary);
+      if (both) {
+        out.map = *std::move(both);
+        progress = true;
+        next = open.erase(next);
+      } else {
+        next->second = both.error().message;
+        ++next;
+      }
+    }
+  }
+  for (auto& [index, why] : open) out.left_out.push_back({index, std::move(why)});
+  return out;
 }
 
 }  // namespace fbvins

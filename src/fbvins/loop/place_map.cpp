@@ -10,6 +10,8 @@ namespace fbvins {
 namespace {
 
 constexpr std::size_t kMostAnchors = 5000;
+/// Differences of two rigs' bodies (m and rad together) below this are rounding errors.
+constexpr double kSameBody = 1e-9;
 
 template <class Keyframes>
 auto find_in(Keyframes& keyframes, KeyframeId id) -> decltype(keyframes.data()) {
@@ -153,16 +155,33 @@ std::vector<bool> PlaceMap::in_graph() const {
   return joined;
 }
 
+PoseGraphEdge PlaceMap::edge_of(const MapEdge& e) const {
+  return {index_of(e.from), index_of(e.to), e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1};
+}
+
+std::vector<double> PlaceMap::chi2_of_edges(const PoseGraphOptions& options) const {
+  PoseGraph graph;
+  for (const MapKeyframe& k : keyframes_) graph.add_node(k.T_MB, T_BC0.q * k.place.up_C0);
+  std::vector<double> all;
+  all.reserve(edges.size());
+  for (const MapEdge& e : edges) all.push_back(graph.chi2(edge_of(e), options));
+  return all;
+}
+
+MapSession& PlaceMap::session(std::uint32_t number, Time t) {
+  const auto at = std::lower_bound(sessions.begin(), sessions.end(), number,
+                                   [](const MapSession& s, std::uint32_t n) { return s.number < n; });
+  return at != sessions.end() && at->number == number ? *at : *sessions.insert(at, {number, t, t});
+}
+
 PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
   if (keyframes_.empty()) return {};
   PoseGraph graph;
   const std::vector<bool> joined = in_graph();
   for (std::size_t i = 0; i < keyframes_.size(); ++i)
     graph.add_node(keyframes_[i].T_MB, T_BC0.q * keyframes_[i].place.up_C0, !joined[i] || (i == 0 && !anchored));
-  for (const MapEdge& e : edges) {
-    const int a = index_of(e.from), b = index_of(e.to);
-    if (joined[static_cast<std::size_t>(a)]) graph.add_edge({a, b, e.T_from_to, e.information, e.kind == MapEdge::Kind::loop, 1});
-  }
+  for (const MapEdge& e : edges)
+    if (joined[static_cast<std::size_t>(index_of(e.from))]) graph.add_edge(edge_of(e));
   if (anchored) {
     for (const MapAnchor& a : anchors)
       if (joined[static_cast<std::size_t>(index_of(a.keyframe))]) graph.add_anchor({index_of(a.keyframe), a.measured});
@@ -173,6 +192,23 @@ PoseGraphReport PlaceMap::optimise(const PoseGraphOptions& options) {
   const PoseGraphReport report = graph.optimise(options);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_MB = graph.poses()[i];
   return report;
+}
+
+void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0) {
+  const Pose<B, B> T_old_new = map.T_BC0 * T_BC0.inverse();
+  map.T_BC0 = T_BC0;
+  if (T_old_new.p.norm() + 2 * T_old_new.q.vec().norm() < kSameBody) return;
+  const Pose<B, B> T_new_old = T_old_new.inverse();
+  for (MapKeyframe& k : map.keyframes()) k.T_MB = k.T_MB * T_old_new, k.T_GB = k.T_GB * T_old_new;
+  for (MapEdge& e : map.edges) {
+    Mat6 cov = compose_covariance(T_new_old, Mat6::Zero(), e.T_from_to, e.information.inverse());
+    cov = compose_covariance(T_new_old * e.T_from_to, cov, T_old_new, Mat6::Zero());
+    const Mat6 information = cov.inverse();
+    e.T_from_to = T_new_old * e.T_from_to * T_old_new;
+    e.information = 0.5 * (information + information.transpose());
+    e.imu = nullptr;
+  }
+  for (MapAnchor& a : map.anchors) a.measured = carried(a.measured, T_new_old, Mat6::Zero());
 }
 
 }  // namespace fbvins

@@ -40,6 +40,7 @@ struct MapKeyframe {
   Pose<M, B> T_MB;
   double path_m = 0;          ///< flown in this session until here
   int loops_ending_here = 0;  ///< loops that ended here
+  int missed = 0;             ///< later sessions in a row that stood here and did not know it again
   bool placed = true;         ///< T_MB is known: its session has been localised in the map
   Place place;
   MapMotion motion;
@@ -59,6 +60,14 @@ struct MapEdge {
 struct MapAnchor {
   KeyframeId keyframe;
   PartialPose measured;
+};
+
+/// What the map remembers of a flight, or of a part of one between two restarts, though its keyframes may be gone.
+struct MapSession {
+  std::uint32_t number = 0;
+  Time began, ended;  ///< stamps of its first and last keyframe, of its sensors' clock
+  int keyframes = 0;  ///< that it brought
+  int loops = 0;      ///< that it closed with other sessions
 };
 
 class PlaceMap {
@@ -87,22 +96,32 @@ class PlaceMap {
 
   /// Optimises the keyframes that edges connect to the first one or, in an anchored map, to one with an anchor.
   PoseGraphReport optimise(const PoseGraphOptions& options);
+  /// Of each edge at the present poses: squared residual in standard deviations, six of them.
+  std::vector<double> chi2_of_edges(const PoseGraphOptions& options) const;
+
+  /// What is remembered of a session; made where nothing is.
+  MapSession& session(std::uint32_t number, Time t);
 
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
-  bool anchored = false;       ///< M is the frame A of the anchors
-  Pose<B, C0> T_BC0;           ///< of the camera that saw the places
-  double gravity_mps2 = 9.81;  ///< of the readings on its edges
-  bool boosted = false;        ///< descriptors are boosted ones, which compare with such only
-  std::string name;            ///< for people; empty: none
+  std::vector<MapSession> sessions;  ///< in order of number
+  bool anchored = false;             ///< M is the frame A of the anchors
+  Pose<B, C0> T_BC0;                 ///< of the camera that saw the places
+  double gravity_mps2 = 9.81;        ///< of the readings on its edges
+  bool boosted = false;              ///< descriptors are boosted ones, which compare with such only
+  std::string name;                  ///< for people; empty: none
 
  private:
   std::vector<bool> in_graph() const;
+  PoseGraphEdge edge_of(const MapEdge& e) const;
   int index_of(KeyframeId id) const { return static_cast<int>(find(id) - keyframes_.data()); }
 
   std::vector<MapKeyframe> keyframes_;
   std::int64_t next_id_ = 0;
 };
+
+/// Makes the body that of another rig whose camera is the same: the camera's poses stay.
+void change_body(PlaceMap& map, const Pose<B, C0>& T_BC0);
 
 /// Covariance of A * B from those of A and B, each of (dp in its left frame, dtheta in its right one).
 Mat6 compose_covariance(const Pose<B, B>& T_ab, const Mat6& cov_ab, const Pose<B, B>& T_bc, const Mat6& cov_bc);

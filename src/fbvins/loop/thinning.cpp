@@ -15,12 +15,15 @@ constexpr std::size_t kKeepNewest = 20;
 /// A place recognised from so near, and from so near a direction, adds nothing.
 constexpr double kRedundant_m = 0.20, kRedundant_rad = 12 * kDegree;
 
+/// Of `max_keyframes`, which a flight may have in a map that is full.
+constexpr int kShareOfAFlight = 5;
+
 /// The one whose neighbours in time are nearest to one another (m and rad together) adds least. Never the first, which
-/// defines M.
-KeyframeId least_of(const std::vector<MapKeyframe>& k) {
-  std::size_t least = 1;
+/// defines M, and none of the first `kept`.
+KeyframeId least_of(const std::vector<MapKeyframe>& k, std::size_t kept) {
+  std::size_t least = std::max<std::size_t>(1, kept);
   double smallest = std::numeric_limits<double>::max();
-  for (std::size_t i = 1; i + kKeepNewest < k.size(); ++i) {
+  for (std::size_t i = least; i + kKeepNewest < k.size(); ++i) {
     const double gap = (k[i + 1].T_MB.p - k[i - 1].T_MB.p).norm() + angle_between(k[i + 1].T_MB.q, k[i - 1].T_MB.q);
     if (gap < smallest) smallest = gap, least = i;
   }
@@ -28,6 +31,9 @@ KeyframeId least_of(const std::vector<MapKeyframe>& k) {
 }
 
 }  // namespace
+
+Thinning::Thinning(int thin_above, int max_keyframes, const PlaceMap& map)
+    : thin_above_(thin_above), max_keyframes_(max_keyframes), loaded_(map.size()) {}
 
 void Thinning::note(KeyframeId id, std::span<const MapEdge> loops, std::size_t size) {
   const double scale = std::max(1.0, static_cast<double>(size) / thin_above_);
@@ -45,7 +51,9 @@ std::optional<KeyframeId> Thinning::next(const PlaceMap& map) {
     redundant_.erase(redundant_.begin());
     if (map.find(id) != nullptr) return id;
   }
-  if (size > max_keyframes_ && size > 2) return least_of(map.keyframes());
+  const int own = size - static_cast<int>(loaded_);
+  const int most_own = std::max(max_keyframes_ - static_cast<int>(loaded_), loaded_ > 0 ? max_keyframes_ / kShareOfAFlight : 0);
+  if (own > most_own && size > 2) return least_of(map.keyframes(), loaded_);
   return std::nullopt;
 }
 

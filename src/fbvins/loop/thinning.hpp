@@ -2,7 +2,7 @@
 // Which keyframes are removed from a map: above `thin_above` redundant ones, above `max_keyframes` those that add least
 // (docs/derivations/loop.md, Thinning). One thread at a time.
 //
-//   Thinning thinning(600, 3000);
+//   Thinning thinning(600, 3000, map);                     // keyframes that are in it already stay until end_flight()
 //   thinning.note(id, loops, map.size());                  // every keyframe, with the loops that end there
 //   while (auto id = thinning.next(map)) map.remove(*id);  // must be removed before the next call
 #pragma once
@@ -18,6 +18,11 @@ namespace fbvins {
 class Thinning {
  public:
   Thinning(int thin_above, int max_keyframes) : thin_above_(thin_above), max_keyframes_(max_keyframes) {}
+  /// In a map that has keyframes already, a flight removes only its own, of which it may have a fifth of `max_keyframes` in any
+  /// case.
+  Thinning(int thin_above, int max_keyframes, const PlaceMap& map);
+  /// From now on all keyframes may go.
+  void end_flight() { loaded_ = 0; }
 
   /// Remembers `id` as redundant where one of the loops shows an earlier keyframe of nearly the same pose. The fuller
   /// the map (`size`, without `id`), the less is new.
@@ -27,6 +32,7 @@ class Thinning {
 
  private:
   int thin_above_, max_keyframes_;
+  std::size_t loaded_ = 0;  ///< keyframes from before the flight: the first ones
   std::vector<KeyframeId> redundant_;
 };
 
