@@ -24,7 +24,7 @@ TEST(HandEyeStatistics, TwentyRecordingsOfAMinute) {
     const test::ExactFlight flight(seed, 60);
     const test::MarkerRecording recording = test::record(flight, kStart, {}, seed);
     const auto found =
-        align_hand_eye(inspect(recording.track).kept(recording.track), test::estimate_of(flight, kStart, {}, seed));
+        align_hand_eye(inspect(recording.track).kept(recording.track), test::estimate_of(flight, kStart, {}, seed), {});
     ASSERT_TRUE(found.ok()) << seed << ": " << found.error().message;
     const Eigen::Matrix<double, 7, 1> e = test::error_of(found->calibration, recording.truth);
     nees += e.dot(test::covariance_of(*found).llt().solve(e)) / 20;
