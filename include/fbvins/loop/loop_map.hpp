@@ -16,9 +16,11 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/loop/loop_options.hpp"
 #include "fbvins/loop/map_report.hpp"
@@ -39,8 +41,9 @@ struct MapOptions {
 
 class LoopMap final : public Mapper {
  public:
-  /// An error where an option is out of range, or the map, the vocabulary or the network cannot be read or do not belong
-  /// together.
+  /// Of a rig of more than two cameras the map has the places that its first pair sees. An error where no two cameras see the
+  /// same things and there is no depth sensor, an option is out of range, or the map, the vocabulary or the network cannot be
+  /// read or do not belong together.
   static Result<std::unique_ptr<LoopMap>> create(const StereoRig& rig, const MapOptions& options = {});
   ~LoopMap() override;
 
@@ -68,9 +71,10 @@ class LoopMap final : public Mapper {
   Result<void> save(const std::string& path) const;
 
  private:
-  explicit LoopMap(std::unique_ptr<LoopCloser> closer);
+  LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair);
 
   std::unique_ptr<LoopCloser> closer_;
+  std::optional<CameraGroup> pair_;  ///< of a rig of more than two cameras
 };
 
 }  // namespace fbvins

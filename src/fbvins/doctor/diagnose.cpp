@@ -8,6 +8,7 @@
 #include "fbvins/doctor/common_mistakes.hpp"
 #include "fbvins/doctor/diagnose.hpp"
 #include "fbvins/doctor/gather.hpp"
+#include "fbvins/doctor/rig_diagnosis.hpp"
 
 namespace fbvins {
 namespace {
@@ -58,15 +59,7 @@ bool explains_better(const Diagnosis& with_it, const Diagnosis& other, int cost_
          cost_of(with_it) + 1 < cost_of_other;
 }
 
-}  // namespace
-
-Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
-  const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
-  if (!evidence) return evidence.error();
-  return examine(*evidence, style);
-}
-
-Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+Result<Diagnosis> diagnose_pair(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
   const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
   if (!evidence) return evidence.error();
   const Diagnosis as_given = examine(*evidence, style);
@@ -86,6 +79,44 @@ Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, Calibrati
     best = std::move(with_it);
   }
   return best;
+}
+
+/// Each pair of the rig.
+Result<Diagnosis> diagnose_pairs(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+  Diagnosis all;
+  all.rig = rig;
+  bool first = true;
+  for (const CameraGroup& group : camera_groups(rig)) {
+    if (!group.second) {
+      all.not_judged.push_back(
+          fmt::format("camera {}: by the calibration it overlaps with no other, and the doctor judges pairs", group.first));
+      continue;
+    }
+    const Replay of_pair = [&](const TakeEvent& take) {
+      return replay([&](SensorEvent event) {
+        const auto* frame = std::get_if<StereoFrame>(&event);
+        if (frame == nullptr) return take(std::move(event));
+        std::optional<StereoFrame> images = frame_of_pair(*frame, group);
+        return !images || take(*std::move(images));
+      });
+    };
+    const Result<Diagnosis> found = diagnose_pair(rig_of(rig, group), of_pair, style);
+    if (!found) return found;
+    add_pair(*found, group, std::exchange(first, false), all);
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+  const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
+  if (!evidence) return evidence.error();
+  return examine(*evidence, style);
+}
+
+Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
+  return rig.camera_count() > 2 ? diagnose_pairs(rig, replay, style) : diagnose_pair(rig, replay, style);
 }
 
 }  // namespace fbvins

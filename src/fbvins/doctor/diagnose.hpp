@@ -20,6 +20,7 @@ using TakeEvent = std::function<bool(SensorEvent)>;
 /// Plays the recording from its start.
 using Replay = std::function<Result<void>(const TakeEvent&)>;
 
+/// Of a rig of more than two cameras each pair is judged, in the order of their first cameras.
 Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style);
 
 /// The calibration as given, not compared with common mistakes.

@@ -4,16 +4,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "fbvins/camera/group_images.hpp"
+
 namespace fbvins {
 namespace {
 
 SensorPacket of_group(const SensorPacket& packet, const CameraGroup& group) {
-  SensorPacket out{packet.id, {packet.frame.t, packet.frame.image(group.first), nullptr}, packet.imu};
-  out.frame.offsets.set(0, packet.frame.offsets.of(group.first));
-  if (!group.second) return out;
-  out.frame.right = packet.frame.image(*group.second);
-  out.frame.offsets.set(1, packet.frame.offsets.of(*group.second));
-  return out;
+  return {packet.id, images_of(packet.frame, group), packet.imu};
 }
 
 CameraPair cameras_of(const CameraGroup& group) {

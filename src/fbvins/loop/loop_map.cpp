@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/loop/loop_map.hpp"
 
+#include "fbvins/camera/group_images.hpp"
 #include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/booster.hpp"
@@ -9,12 +10,24 @@
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
+namespace {
+
+/// The first two that see the same things.
+std::optional<CameraGroup> first_pair(const StereoRig& rig) {
+  for (const CameraGroup& group : camera_groups(rig))
+    if (group.second) return group;
+  return std::nullopt;
+}
+
+}  // namespace
 
 Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const MapOptions& options) {
   if (Result<void> valid = validate(options.loop); !valid) return valid.error();
-  if (!rig.has_right() && !rig.depth)
+  const std::optional<CameraGroup> pair = rig.more.empty() ? std::nullopt : first_pair(rig);
+  if ((!rig.has_right() || !rig.more.empty()) && !rig.depth && !pair)
     return Error{ErrorCode::unsupported,
-                 "a map needs two cameras or a depth sensor: places are recognised by the depth of what they show"};
+                 "a map needs two cameras that see the same things, or a depth sensor: places are recognised "
+                 "by the depth of what they show"};
   Result<PlaceMap> map = PlaceMap{};
   if (!options.file.empty()) map = load_map(options.file);
   if (!map) return map.error();
@@ -24,15 +37,24 @@ Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const Map
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (map->boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return stage.error();
-  return std::unique_ptr<LoopMap>(
-      new LoopMap(std::make_unique<LoopCloser>(rig, options.loop, std::move(*vocabulary), std::move(*map), std::move(*stage))));
+  auto closer = std::make_unique<LoopCloser>(pair ? rig_of(rig, *pair) : rig, options.loop, std::move(*vocabulary),
+                                             std::move(*map), std::move(*stage));
+  return std::unique_ptr<LoopMap>(new LoopMap(std::move(closer), pair));
 }
 
-LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer) : closer_(std::move(closer)) {}
+LoopMap::LoopMap(std::unique_ptr<LoopCloser> closer, std::optional<CameraGroup> pair) : closer_(std::move(closer)), pair_(pair) {}
 LoopMap::~LoopMap() = default;
 
-MapUpdate LoopMap::process(const Keyframe& keyframe) { return closer_->process(keyframe); }
-void LoopMap::take_over(std::unique_ptr<LoopMap> other) { closer_ = std::move(other->closer_); }
+MapUpdate LoopMap::process(const Keyframe& keyframe) {
+  if (!pair_) return closer_->process(keyframe);
+  Keyframe of_pair = keyframe;
+  of_pair.images = images_of(keyframe.images, *pair_);
+  return closer_->process(of_pair);
+}
+void LoopMap::take_over(std::unique_ptr<LoopMap> other) {
+  closer_ = std::move(other->closer_);
+  pair_ = other->pair_;
+}
 PoseGraphReport LoopMap::finish() { return closer_->finish(); }
 FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
 Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "fbvins/features/noise_texture.hpp"
 #include "fbvins/loop/test_room.hpp"
@@ -67,6 +68,30 @@ TEST_F(OpenedMap, IsSavedOpenedAndFoundAgain) {
     EXPECT_LT(((update.T_MG * k.gauge.T_GB).p - p_M).norm(), 0.05);
   }
   EXPECT_TRUE(localised);
+}
+
+/// Cameras 0 and 2 are the pair, camera 1 looks backwards and sees nothing.
+TEST_F(OpenedMap, IsMadeByThePairWhicheverItsNumbers) {
+  const StereoRig pair = test_room::rig();
+  MountedCamera behind = pair.mounted(0);
+  behind.T_BC.q = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitZ())) * behind.T_BC.q;
+  behind.T_BC.p.x() -= 0.1;
+  const StereoRig three = with_cameras(pair, {pair.mounted(0), behind, pair.mounted(1)});
+  const auto made = [&](const StereoRig& rig, bool of_three) {
+    auto map = LoopMap::create(rig);
+    EXPECT_TRUE(map.ok()) << map.error().message;
+    for (int i = 0; i < 2; ++i) {
+      Keyframe k = before_a_wall(i, 0.15 * i);
+      if (of_three) k.images.more = {std::exchange(k.images.right, std::make_shared<const Image>(752, 480))};
+      (*map)->process(k);
+    }
+    (*map)->finish();
+    return (*map)->bytes();
+  };
+  EXPECT_TRUE(made(three, true) == made(pair, false));
+  const StereoRig apart = with_cameras(
+      pair, {pair.mounted(0), behind, {behind.camera, {pair.T_BC0.q * Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), {}}}});
+  EXPECT_NE(LoopMap::create(apart).error().message.find("two cameras that see the same things"), std::string::npos);
 }
 
 TEST_F(OpenedMap, SaysWhatIsWrong) {

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/doctor/rig_diagnosis.hpp"
+
+#include <gtest/gtest.h>
+
+namespace fbvins {
+namespace rig_diagnosis_test {
+
+/// Cameras 0 and 2 look ahead, 1 and 3 backwards.
+StereoRig quad() {
+  const Camera camera(PinholeRadtan{300, 300, 160, 120}, 320, 240);
+  const Quat backwards(Eigen::AngleAxisd(M_PI, Vec3::UnitY()));
+  return with_cameras({}, {{camera, {}},
+                           {camera, {backwards, Vec3(0, 0, -0.1)}},
+                           {camera, {Quat::Identity(), Vec3(0.1, 0, 0)}},
+                           {camera, {backwards, Vec3(0.1, 0, -0.1)}}});
+}
+
+Diagnosis with(const StereoRig& rig, std::initializer_list<FindingKind> kinds) {
+  Diagnosis out;
+  out.rig = rig;
+  for (const FindingKind kind : kinds) {
+    Finding finding;
+    finding.kind = kind;
+    finding.measured = "it is so";
+    finding.corrected = "cam0/sensor.yaml: intrinsics: [1, 0.5]\ncam1: mask: mask1.png";
+    out.findings.push_back(finding);
+  }
+  out.masks = {nullptr, std::make_shared<const Mask>(Image(320, 240))};
+  return out;
+}
+
+TEST(RigDiagnosis, FramesOfAPairHaveItsImagesAsLeftAndRight) {
+  StereoFrame frame{Time{1000}, std::make_shared<const Image>(1, 1), nullptr};
+  frame.more = {nullptr, std::make_shared<const Image>(2, 1)};
+  frame.offsets = ExposureOffsets({Duration{0}, Duration{5}, Duration{0}, Duration{7}});
+  const auto back = frame_of_pair(frame, {1, 3});
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->t, Time{1005});
+  EXPECT_EQ(back->left, nullptr);
+  EXPECT_EQ(back->right->width(), 2);
+  EXPECT_EQ(back->offsets.of(1), Duration{2});
+  frame.more.clear();
+  EXPECT_FALSE(frame_of_pair(frame, {1, 3}));
+}
+
+TEST(RigDiagnosis, FindingsHaveTheNumbersOfTheirCamerasAndTheImuIsJudgedOnce) {
+  using enum FindingKind;
+  const StereoRig rig = quad();
+  const CameraGroup ahead{0, 2}, back{1, 3};
+  Diagnosis all;
+  all.rig = rig;
+  add_pair(with(rig_of(rig, ahead), {gyro_units, baseline_length}), ahead, true, all);
+  Diagnosis second = with(rig_of(rig, back), {gyro_units, time_offset, focal_length});
+  second.rig.right = Camera(PinholeRadtan{333, 333, 160, 120}, 320, 240);
+  add_pair(second, back, false, all);
+  ASSERT_EQ(all.findings.size(), 3u);
+  EXPECT_EQ(all.findings[0].measured, "it is so");
+  EXPECT_EQ(all.findings[1].measured, "cameras 0 and 2 as left and right: it is so");
+  EXPECT_EQ(all.findings[1].corrected, "cam0/sensor.yaml: intrinsics: [1, 0.5]\ncam2: mask: mask2.png");
+  EXPECT_EQ(all.findings[2].corrected, "cam1/sensor.yaml: intrinsics: [1, 0.5]\ncam3: mask: mask3.png");
+  EXPECT_EQ(all.rig.camera(3).focal_px(), 333);
+  EXPECT_EQ(all.rig.camera(2).focal_px(), 300);
+  ASSERT_EQ(all.masks.size(), 4u);
+  EXPECT_TRUE(!all.masks[0] && !all.masks[1] && all.masks[2] && all.masks[3]);
+}
+
+/// A recording without any event: only which pairs are examined shows.
+TEST(RigDiagnosis, EachPairIsExaminedAndCamerasWithoutAPartnerAreTold) {
+  StereoRig rig = quad();
+  rig.more.push_back({rig.left, {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())), Vec3(0.3, 0, 0)}});
+  int played = 0;
+  const Replay replay = [&](const TakeEvent&) { return ++played, Result<void>{}; };
+  const auto found = diagnose(rig, replay, CalibrationStyle::kalibr);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_GE(played, 2);
+  const auto told = [&](const std::string& what) {
+    return std::ranges::any_of(found->not_judged, [&](const std::string& s) { return s.find(what) != std::string::npos; });
+  };
+  EXPECT_TRUE(told("cameras 0 and 2 as left and right: "));
+  EXPECT_TRUE(told("cameras 1 and 3 as left and right: "));
+  EXPECT_TRUE(told("camera 4: by the calibration it overlaps with no other"));
+}
+
+}  // namespace rig_diagnosis_test
+}  // namespace fbvins
