@@ -116,7 +116,7 @@ void align_with_truth(PlaceMap& map, const Day& day) {
 }
 
 void days(const Arguments& a, const Vocabulary& vocabulary) {
-  const RoomOfDays room(a.seed, a.days, a.seconds, a.samples);
+  const RoomOfDays room(a.seed, a.seconds, a.samples);
   const StereoRig rig = room.rig();
   fmt::print("seed {}, {} days of {} s\n\n", a.seed, a.days, a.seconds);
   fmt::print(
@@ -208,7 +208,7 @@ void strangers(const Arguments& a, const Vocabulary& vocabulary) {
 
 void lost(const Arguments& a, const Vocabulary& vocabulary) {
   constexpr double kFlown_s = 10, kCarried_s = 5, kAgain_s = 5;
-  const RoomOfDays room(a.seed, 1, kFlown_s + a.days * (kCarried_s + kAgain_s), a.samples);
+  const RoomOfDays room(a.seed, kFlown_s + a.days * (kCarried_s + kAgain_s), a.samples);
   const StereoRig rig = room.rig();
   const Day day = room.day(0, 0);
   const auto off = [&](Time t) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One simulated room on several days: each day another part of one long flight, with other lamps and furniture.
+// One simulated room on several days: the first day shows all of a round, each other one a part of it, under other lamps and with
+// other furniture.
 #pragma once
 
 #include <array>
@@ -40,14 +41,17 @@ inline Time stamp_of(const SensorEvent& event) {
 }
 
 struct RoomOfDays {
-  SimulationOptions options;  ///< of all days together
-  double seconds = 12;        ///< of each
+  static constexpr double kLater_s =
+      2;  ///< a day begins so much later on the round than the one before, or where the first began
+  static constexpr int kBeginnings = 3;
+  SimulationOptions options;
+  double seconds = 12;  ///< of a day; the first one is longer
 
-  RoomOfDays(int seed, int days, double seconds_a_day, int samples) : seconds(seconds_a_day) {
+  RoomOfDays(int seed, double seconds_a_day, int samples) : seconds(seconds_a_day) {
     options = *simulation_preset("normal");
     options.seed = seed;
     options.camera.time_samples = samples;
-    options.flight.duration_s = options.flight.rest_s + days * seconds;
+    options.flight.duration_s = options.flight.rest_s + seconds + (kBeginnings - 1) * kLater_s;
   }
 
   StereoRig rig() const { return *simulated_rig(options); }
@@ -66,10 +70,9 @@ struct RoomOfDays {
     });
     if (!simulation) throw std::runtime_error(simulation.error().message);
     Simulation s = *simulation;
-    const double from_s = number == 0 ? 0 : options.flight.rest_s + number * seconds;
-    const Time from = s.start + Duration::from_seconds(from_s);
-    const Time to = s.start + Duration::from_seconds(options.flight.rest_s + (number + 1) * seconds);
-    return events_between(s, from, to);
+    if (number == 0) return events_between(s, s.start, s.start + Duration::from_seconds(options.flight.duration_s));
+    const Time from = s.start + Duration::from_seconds(options.flight.rest_s + number % kBeginnings * kLater_s);
+    return events_between(s, from, from + Duration::from_seconds(seconds));
   }
 
   static Day events_between(Simulation& s, Time from, Time to) {

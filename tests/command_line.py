@@ -162,7 +162,7 @@ class CommandLine(unittest.TestCase):
 
     def test_loop_closure(self):
         flight, out = self.folder / "flight", self.folder / "out"
-        self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 2, "--quiet").returncode, 0)
+        self.assertEqual(fbvins("simulate", "--out", flight, "--seconds", 3, "--quiet").returncode, 0)
         run = ["run", flight, "--out", out, "--quiet"]
         self.assert_bad_input(fbvins(*run, "--save-map", self.folder / "none" / "a.fbm"), "a.fbm", "there is no folder")
         self.assert_bad_input(fbvins(*run, "--load-map", self.folder / "none.fbm"), "none.fbm")

@@ -20,10 +20,10 @@ def flights(program, tmp_path_factory):
     """Two parts of one rendered flight, and a flight in another room."""
     root = tmp_path_factory.mktemp("flights")
     simulate = ["simulate", "normal", "--set", "image_rate_hz=10", "--set", "camera.time_samples=1", "--quiet"]
-    for name, seed, seconds in (("whole", 1, 9), ("stranger", 2, 4)):
+    for name, seed, seconds in (("whole", 1, 7), ("stranger", 2, 3)):
         subprocess.run([program, *simulate, "--seed", str(seed), "--seconds", str(seconds), "--out", str(root / name)], check=True)
-    for name, start in (("first", 0), ("second", 4)):
-        fbvins.convert(fbvins.open(root / "whole", start_s=start, duration_s=5), root / name)
+    for name, start in (("first", 0), ("second", 3)):
+        fbvins.convert(fbvins.open(root / "whole", start_s=start, duration_s=4), root / name)
     return [str(root / name) for name in ("first", "stranger", "second")]
 
 
