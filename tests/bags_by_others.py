@@ -244,7 +244,7 @@ def check_what_cannot_be_run(program, folder, root):
 
     done = subprocess.run([program, "info", root / "lz4.bag"], check=False, capture_output=True, text=True)
     assert done.returncode == 0 and "--calibration" in done.stderr, done
-    assert "topics to use: left /cam0/image_raw, right /cam1/image_raw, IMU /imu0" in done.stdout, done.stdout
+    assert "topics to use: cameras /cam0/image_raw, /cam1/image_raw, IMU /imu0" in done.stdout, done.stdout
     assert re.search(r"/cam0/image_raw +40 messages +20.00 Hz  sensor_msgs/Image  \d+ x \d+ mono8", done.stdout), done.stdout
     with rosbag1.Writer(root / "two_rigs.bag") as writer:
         connections = {}

@@ -35,7 +35,7 @@ export class CameraView {
   offer(camera) {
     const cameras = [...Object.keys(this.newest).map(Number), camera].sort((a, b) => a - b);
     if (cameras.length < 2) {
-      this.camera = camera;
+      if (element("camera-choice").hidden) this.camera = camera;  // what was chosen before a replay jumped stays
       return;
     }
     element("camera-choice").hidden = false;
