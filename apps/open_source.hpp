@@ -9,7 +9,7 @@
 
 namespace fbvins::app {
 
-/// d435i[:SERIAL or FILE.bag], v4l2:LEFT,RIGHT,IMU, or a source of make_source(). An error if this program was built without
+/// d435i[:SERIAL or FILE.bag], v4l2:CAM0,CAM1,...,IMU, or a source of make_source(). An error if this program was built without
 /// a library that the source needs.
 Result<std::unique_ptr<Source>> open_source(const std::string& name, const SourceOptions& options);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `fbvins live` in ROS 2's graph: what --ros2 and a source ros2:LEFT,RIGHT,IMU ask for. In a program built without
+// `fbvins live` in ROS 2's graph: what --ros2 and a source ros2:CAM0,...,IMU ask for. In a program built without
 // CycloneDDS both are an error.
 #pragma once
 
