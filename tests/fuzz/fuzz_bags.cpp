@@ -74,7 +74,7 @@ void read_all(BagReader& bag) {
       require(place_name(place) == row.file);
       require_sentence(image_of(bag.read(place), topic.encoding, topic.compressed));
     }
-  const auto topics = choose_topics(contents, {}, true);
+  const auto topics = choose_topics(contents, {}, {.depth = true});
   require_sentence(topics);
   if (topics) require_sentence(rig_of(contents, *topics));
 }
@@ -208,8 +208,8 @@ void fuzz_foreign_calibration(std::string_view bytes) {
   const YamlReader yaml("c.yaml", std::string(bytes));
   require_sentence(parse_openvins_cameras(yaml));
   require_sentence(parse_basalt(yaml));
-  require_sentence(parse_vins_fusion(vins, yaml, yaml));
-  require_sentence(parse_vins_fusion(yaml, yaml, yaml));
+  require_sentence(parse_vins_fusion(vins, {yaml, yaml}));
+  require_sentence(parse_vins_fusion(yaml, {yaml}));
   require_sentence(parse_camera_info(yaml, yaml, {}));
 }
 
