@@ -220,6 +220,7 @@ void put_memory(Writer& w, const PlaceMap& map, const std::vector<MapSession>& s
 
 void get_memory(Reader& r, PlaceMap& map) {
   const auto sessions = r.get<std::uint32_t>();
+  r.check(sessions > 1);
   for (std::uint32_t i = 0; i < sessions && r.ok(); ++i) {
     MapSession s;
     s.number = r.get<std::uint32_t>();
