@@ -8,25 +8,12 @@
 #include <optional>
 
 #include "apps/live_outputs.hpp"
+#include "apps/no_sensors.hpp"
 
 namespace fbvins::app {
 namespace flight_commands_test {
 
 namespace fs = std::filesystem;
-
-class StillSensors final : public Source {
- public:
-  StillSensors() {
-    rig_.left = rig_.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-    rig_.T_BC1.p = Vec3(0.1, 0, 0);
-  }
-  const StereoRig& rig() const override { return rig_; }
-  Result<void> run(SensorInput&) override { return {}; }
-  void stop() override {}
-
- private:
-  StereoRig rig_;
-};
 
 class FlightCommands : public ::testing::Test {
  protected:
@@ -56,7 +43,7 @@ class FlightCommands : public ::testing::Test {
 
   const std::string folder = ::testing::TempDir() + "/fbvins_flight_commands_" + std::to_string(getpid());
   Config config;
-  StillSensors source;
+  test::NoSensors source;
   MapArguments map;
   OutputArguments outputs;
   LiveTally tally;

@@ -8,26 +8,13 @@
 #include <filesystem>
 #include <fstream>
 
+#include "apps/no_sensors.hpp"
 #include "fbvins/io/imu_state_file.hpp"
 
 namespace fbvins::app {
 namespace live_outputs_test {
 
 namespace fs = std::filesystem;
-
-class NoSensors final : public Source {
- public:
-  NoSensors() {
-    rig_.left = rig_.right = Camera(PinholeRadtan{40, 41, 15, 11}, 32, 24);
-    rig_.T_BC1.p = Vec3(0.1, 0, 0);
-  }
-  const StereoRig& rig() const override { return rig_; }
-  Result<void> run(SensorInput&) override { return {}; }
-  void stop() override {}
-
- private:
-  StereoRig rig_;
-};
 
 class LiveOutputs : public ::testing::Test {
  protected:
@@ -50,7 +37,7 @@ class LiveOutputs : public ::testing::Test {
 
   const std::string folder = ::testing::TempDir() + "/fbvins_live_outputs_" + std::to_string(getpid());
   Config config;
-  NoSensors source;
+  test::NoSensors source;
   MapArguments map;
   OutputArguments arguments;
   LiveTally tally;
