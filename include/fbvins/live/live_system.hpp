@@ -38,7 +38,7 @@ class LiveSystem {
 
   /// Before the first reading.
   void add_sink(std::unique_ptr<Sink> sink);
-  /// What the frontend saw in an image, on its thread; before the first reading.
+  /// What the frontend saw in an image, on the thread of the estimator; to be set before the first reading.
   void on_tracked_frame(std::function<void(const TrackedFrame&)> callback);
   /// Once, when a stage has failed and nothing more is taken: a source can be stopped here, but not finish() be called.
   /// Before the first reading.

@@ -16,8 +16,8 @@
 
 namespace fbvins {
 
-/// Frames leave in order of time. A frame without the image of a camera leaves as soon as it is certain that it is lost: that
-/// camera has delivered a newer one, or several of another one's have come since. A camera whose images never meet those of
+/// Frames are delivered in order of time. A frame is delivered without a camera's image when that image counts as lost: that
+/// camera has delivered a newer one, or another camera has delivered several since. A camera whose images never meet those of
 /// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
 /// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
 class FrameJoiner {

@@ -144,7 +144,7 @@ TEST(LiveSystem, AllOutputsBeginWithTheFirstResetCounter) {
   EXPECT_EQ(live.status().counts.resets, 0);
 }
 
-/// Whoever asks for it gets a new W, which begins where the old one ended.
+/// A new start on request gives a new W, which begins at the last pose in the old one.
 TEST(LiveSystem, StartsAgainWhereItWas) {
   Fixture f;
   LiveSystem live = f.live();
