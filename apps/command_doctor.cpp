@@ -79,13 +79,14 @@ class PlayedRecording {
   explicit PlayedRecording(const RecordingArguments& arguments) : arguments_(arguments) {}
 
   Result<void> open() {
-    Result<std::unique_ptr<Dataset>> opened = open_recording(arguments_, {});
+    Result<std::unique_ptr<Dataset>> opened = open_recording(arguments_, {.scale_lenses = true});
     if (!opened) return opened.error();
     data_ = *std::move(opened);
     if (!played_) warnings_.print(data_->info());
     return {};
   }
   const StereoRig& rig() const { return data_->rig(); }
+  const std::vector<ScaledLens>& scaled() const { return data_->info().scaled; }
   Result<void> play(const TakeEvent& take) {
     if (played_)
       if (Result<void> opened = open(); !opened) return opened;
@@ -145,8 +146,10 @@ int examine_recording(const Arguments& arguments) {
   if (!rig.has_right()) return fail(fmt::format("{}: has one camera; the doctor judges a pair", arguments.recording.path));
   const Replay replay = [&](const TakeEvent& take) { return recording.play(take); };
   const CalibrationStyle style = arguments.recording.calibration.empty() ? CalibrationStyle::euroc : CalibrationStyle::kalibr;
-  const Result<Diagnosis> diagnosis = diagnose(rig, replay, style);
+  const std::vector<ScaledLens> scaled = recording.scaled();
+  Result<Diagnosis> diagnosis = diagnose(rig, replay, style);
   if (!diagnosis) return fail(diagnosis.error().message);
+  tell_of_scaled(scaled, style, *diagnosis);
   if (!arguments.out.empty())
     if (Result<void> written = write_masks(*diagnosis, arguments.out); !written) return fail(written.error().message);
   if (arguments.fix.empty()) {

@@ -3,7 +3,8 @@
 // mended, and flown as spoilt and as mended. A recording with a truth.
 //
 // usage: doctor_mend RECORDING [WORD]          each injected fault, or those whose name contains the word
-//        doctor_mend RECORDING PART PARTS      every PARTS-th fault from the one numbered PART (from 0), for processes side by side
+//        doctor_mend RECORDING PART PARTS      every PARTS-th fault from the one numbered PART (from 0), for processes side by
+//        side
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -52,6 +53,7 @@ using Fault = std::function<Spoiler()>;
 Result<void> play(const Recorded& good, const Fault& fault, double offset_s, const TakeEvent& take) {
   const Spoiler spoil = fault();
   std::vector<ImuSample> readings = good.readings;
+  if (spoil.lost) std::erase_if(readings, spoil.lost);
   if (spoil.reading && !spoil.frame)
     for (ImuSample& sample : readings) spoil.reading(sample);
   std::size_t next = 0;

@@ -26,8 +26,10 @@ Result<Evidence> gather(const std::string& path, const Spoiler* spoiler) {
   if (spoiler != nullptr && spoiler->rig) spoiler->rig(rig);
   EvidenceGatherer gatherer(rig);
   while (auto event = (*data)->next()) {
-    if (auto* sample = std::get_if<ImuSample>(&*event); sample && spoiler != nullptr && spoiler->reading)
-      spoiler->reading(*sample);
+    if (auto* sample = std::get_if<ImuSample>(&*event); sample && spoiler != nullptr) {
+      if (spoiler->lost && spoiler->lost(*sample)) continue;
+      if (spoiler->reading) spoiler->reading(*sample);
+    }
     if (auto* frame = std::get_if<StereoFrame>(&*event); frame && spoiler != nullptr && spoiler->frame) spoiler->frame(*frame);
     if (!gatherer.push(*event)) break;
   }
@@ -68,8 +70,11 @@ int wrong(const std::string& path, std::string_view word) {
     if (spoiler.name.find(word) == std::string::npos) continue;
     Evidence evidence = *clean;
     if (spoiler.rig || spoiler.frame) evidence = *gather(path, &spoiler);
-    else
-      for (ImuSample& sample : evidence.imu) spoiler.reading(sample);
+    if (!spoiler.rig && !spoiler.frame) {
+      if (spoiler.lost) std::erase_if(evidence.imu, spoiler.lost);
+      for (ImuSample& sample : evidence.imu)
+        if (spoiler.reading) spoiler.reading(sample);
+    }
     const Diagnosis diagnosis = examine(evidence);
     const Finding* named = nullptr;
     for (const Finding& finding : diagnosis.findings)

@@ -17,7 +17,10 @@ struct Flight : test::RenderedRecording {
     return [this, spoiler](const TakeEvent& take) -> Result<void> {
       for (SensorEvent event : events) {
         if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && spoiler.frame) spoiler.frame(*frame);
-        if (auto* sample = std::get_if<ImuSample>(&event); sample != nullptr && spoiler.reading) spoiler.reading(*sample);
+        if (auto* sample = std::get_if<ImuSample>(&event); sample != nullptr) {
+          if (spoiler.lost && spoiler.lost(*sample)) continue;
+          if (spoiler.reading) spoiler.reading(*sample);
+        }
         if (!take(std::move(event))) break;
       }
       return {};
@@ -97,6 +100,29 @@ TEST(DoctorMends, WhatIsJudgedAndSaysWhatIsNot) {
   EXPECT_LT(degrees_between(found.rig->T_BC0.R(), handheld().rig.T_BC0.R()), 0.5);
   // The rig hardly accelerates, which the length of the baseline would be seen by.
   EXPECT_NE(to_text(found.after).find("length of the baseline: the rig hardly accelerated"), std::string::npos);
+}
+
+TEST(DoctorMends, MoreAccuratelyThanItMeasures) {
+  const Mended found = mended("right camera turned 1.5 degrees about z");
+  ASSERT_TRUE(found.rig) << found.why_not;
+  EXPECT_LT(degrees_between(found.rig->T_C1C0().R(), handheld().rig.T_C1C0().R()), 0.01);
+}
+
+TEST(DoctorMends, TheLensesOfAnotherImageSize) {
+  const StereoRig& images = handheld().rig;
+  const ImageSize size{images.left.width(), images.left.height()}, twice{2 * size.width, 2 * size.height};
+  const std::vector<ScaledLens> scaled{{0, twice, size}, {1, twice, size}};
+  Diagnosis diagnosis = *diagnose(images, handheld().replay(), CalibrationStyle::kalibr);
+  tell_of_scaled(scaled, CalibrationStyle::kalibr, diagnosis);
+  ASSERT_EQ(diagnosis.findings.size(), 1u) << to_text(diagnosis);
+  EXPECT_EQ(diagnosis.findings[0].kind, FindingKind::calibration_size);
+  EXPECT_NEAR(diagnosis.findings[0].size, 0.5, 1e-12);
+  EXPECT_NE(diagnosis.findings[0].corrected.find("cam0: resolution: [752, 480]\n"), std::string::npos)
+      << diagnosis.findings[0].corrected;
+  const Result<Mended> found = mend(images, diagnosis, handheld().replay(), CalibrationStyle::kalibr);
+  ASSERT_TRUE(found && found->rig) << found->why_not;
+  EXPECT_TRUE(found->after.findings.empty()) << to_text(found->after);
+  EXPECT_EQ(found->rig->left.intrinsics(), images.left.intrinsics());
 }
 
 TEST(DoctorMends, NothingWhereNoCalibrationHelps) {

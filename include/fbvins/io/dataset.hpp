@@ -37,6 +37,7 @@ struct DatasetOptions {
   std::string kalibr_camchain = "";   ///< replaces the recording's own calibration
   std::string kalibr_imu = "";        ///< replaces its IMU noise; only with kalibr_camchain
   std::optional<StereoRig> rig = {};  ///< replaces both
+  bool scale_lenses = false;          ///< where images are larger or smaller than the calibration's, but of the same shape
   std::string camera = "all";         ///< or the first two: "both", or one of these: "left", "right"; the left one with "depth"
 
   /// Whether the recording's own calibration is replaced.
@@ -83,6 +84,7 @@ struct LoadedFrame {
   StereoFrame frame;
   ImageCounts left, right, more, depth;  ///< what happened, 0 or 1 for each image
   std::string problem;                   ///< "file: sentence" about the first image that failed
+  std::optional<ImageSize> other_size;   ///< of the last image that is not of its camera's
 };
 
 /// Where a Dataset gets its images from. Called by one thread at a time, not always the same.

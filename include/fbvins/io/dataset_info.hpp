@@ -10,6 +10,17 @@
 
 namespace fbvins {
 
+struct ImageSize {
+  int width = 0, height = 0;  ///< px
+  bool operator==(const ImageSize&) const = default;
+};
+
+/// A camera whose lens was scaled to its images (DatasetOptions::scale_lenses).
+struct ScaledLens {
+  int camera = 0;
+  ImageSize calibrated, images;
+};
+
 /// What one camera's image files turned out to be.
 struct ImageCounts {
   int missing = 0;     ///< listed, but there is no such file (known when opened)
@@ -42,6 +53,7 @@ struct DatasetInfo {
   Time longest_image_gap_start, longest_imu_gap_start;
   int frames_without_image = 0;  ///< no camera delivered: the frame is left out (counted once met)
   std::vector<std::string> warnings;
+  std::vector<ScaledLens> scaled;  ///< by camera
 };
 
 }  // namespace fbvins

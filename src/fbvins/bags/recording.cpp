@@ -66,12 +66,12 @@ class BagLoader : public FrameLoader {
         return image_of(bytes, s.encoding, s.compressed, used_bits_);
       };
       ImageCounts& counts = i == 0 ? out.left : i == 1 ? out.right : out.more;
-      if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out.problem))
+      if (auto image = load_image<Image>(entry.file(static_cast<int>(i)), cameras_[i], read, counts, out))
         (i == 0 ? out.frame.left : i == 1 ? out.frame.right : out.frame.more[i - 2]) = std::move(image);
     }
     if (!depth_) return out;
     const auto read = [](const Sensor& s, std::string_view bytes) { return depth_of(bytes, s.encoding, s.compressed); };
-    out.frame.depth = load_image<DepthImage>(entry.depth_file, *depth_, read, out.depth, out.problem);
+    out.frame.depth = load_image<DepthImage>(entry.depth_file, *depth_, read, out.depth, out);
     return out;
   }
 
@@ -81,8 +81,9 @@ class BagLoader : public FrameLoader {
 
   template <class T, class Read>
   std::shared_ptr<const T> load_image(const std::string& place, const Sensor& sensor, Read&& read, ImageCounts& counts,
-                                      std::string& problem) {
+                                      LoadedFrame& loaded) {
     if (place.empty()) return nullptr;
+    std::string& problem = loaded.problem;
     const auto blame = [&](int& count, const std::string& sentence) {
       ++count;
       if (problem.empty()) problem = fmt::format("{}: image at {}: {}", name_, place, sentence);
@@ -91,7 +92,10 @@ class BagLoader : public FrameLoader {
     Result<T> image = read(sensor, bag_->read(place_of(place)));
     if (!image) return blame(counts.corrupt, image.error().message);
     const auto [width, height] = size_of(*image);
-    if (const auto sentence = wrong_size(width, height, sensor.camera)) return blame(counts.wrong_size, *sentence);
+    if (const auto sentence = wrong_size(width, height, sensor.camera)) {
+      loaded.other_size = ImageSize{width, height};
+      return blame(counts.wrong_size, *sentence);
+    }
     return std::make_shared<const T>(*std::move(image));
   }
 
@@ -328,6 +332,13 @@ Result<std::unique_ptr<Dataset>> open_recording(const std::string& path, const R
   if (!reader) return reader.error();
   Result<DatasetContents> contents = BagRecording(path, options, options.dataset.rig).read(*std::move(reader));
   if (!contents) return contents.error();
+  if (const auto scaled = options.dataset.scale_lenses ? scaled_to_images(*contents) : std::nullopt) {
+    auto again = open_bag(path);
+    if (!again) return again.error();
+    contents = BagRecording(path, options, scaled->rig).read(*std::move(again));
+    if (!contents) return contents.error();
+    contents->info.scaled = scaled->cameras;
+  }
   if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   if (options.dataset.camera == "depth" && !contents->rig.depth) return no_depth_images(path);
   return std::make_unique<Dataset>(*std::move(contents), options.dataset);

@@ -13,13 +13,9 @@
 #include "fbvins/calibration/board_view.hpp"
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/io/dataset_info.hpp"
 
 namespace fbvins {
-
-struct ImageSize {
-  int width = 0, height = 0;  ///< px
-  bool operator==(const ImageSize&) const = default;
-};
 
 struct Detections {
   std::vector<BoardView> views;    ///< by time, then by camera; corners by index

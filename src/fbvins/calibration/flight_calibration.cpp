@@ -89,8 +89,8 @@ struct Division {
   FlightSurvey survey;
 };
 
-HeldOutPart judged(const Division& division, const FlightRig& given, const std::vector<FlightGroup>& left) {
-  const FlightLesson lesson = learn_from(division.others, given, division.survey, left);
+HeldOutPart judged(const Division& division, const FlightRig& given, const FlightQuestion& question) {
+  const FlightLesson lesson = learn_from(division.others, given, division.survey, question);
   HeldOutPart out{division.name, lesson.changed};
   if (!lesson.changed) return out;
   out.given = settled_cost(division.held_out, given, lesson.noise.sigma_px);
@@ -186,19 +186,28 @@ FlightCalibration counted(const std::vector<OwnedPiece>& pieces, const StereoRig
   return out;
 }
 
-/// Groups that are left as given, one after the other: what predicts best is taken. Lenses trade off against much else,
-/// distortion most of all.
-const std::vector<std::vector<FlightGroup>>& groups_left() {
+/// What is asked, one after the other, with fewer and fewer groups to refine: what predicts best is taken. Lenses trade off
+/// against much else, distortion most of all.
+std::vector<FlightQuestion> questions(const std::vector<FlightGroup>& rough) {
   using enum FlightGroup;
-  static const std::vector<std::vector<FlightGroup>> all = {{}, {distortion}, {distortion, centre}, {distortion, centre, focal}};
-  return all;
+  const auto may_change = [&](FlightGroup group) { return rough.empty() || std::ranges::find(rough, group) != rough.end(); };
+  FlightQuestion question{{}, rough.empty() ? FlightQuestion{}.matters : 0};
+  for (const FlightGroup group : {lever, mounting, time_offset, baseline, between_cameras, focal, centre, distortion})
+    if (!may_change(group)) question.left.push_back(group);
+  std::vector<FlightQuestion> out{question};
+  for (const FlightGroup group : {distortion, centre, focal}) {
+    if (!may_change(group)) continue;
+    question.left.push_back(group);
+    out.push_back(question);
+  }
+  return out;
 }
 
-/// With these groups left as given: what all pieces say, and how the held-out parts judge it.
+/// What all pieces answer, and how the held-out parts judge it.
 FlightCalibration refined(const Division& all, const std::vector<Division>& divisions, const FlightRig& given,
-                          const std::vector<FlightGroup>& left, FlightCalibration out) {
-  for (const Division& division : divisions) out.held_out.push_back(judged(division, given, left));
-  const FlightLesson lesson = learn_from(all.others, given, all.survey, left);
+                          const FlightQuestion& question, FlightCalibration out) {
+  for (const Division& division : divisions) out.held_out.push_back(judged(division, given, question));
+  const FlightLesson lesson = learn_from(all.others, given, all.survey, question);
   out.axes = lesson.rig.axes;
   fill_parameters(lesson, given, out);
   out.verdict = objection_to(out, lesson.changed);
@@ -232,9 +241,9 @@ Result<FlightCalibration> calibrate_from_flights(const std::vector<FlightTracks>
   for (const OwnedPiece& p : pieces) all.others.push_back(p.piece.get());
   all.survey = survey_of(all.others, given);
   std::optional<FlightCalibration> best;
-  for (const std::vector<FlightGroup>& left : groups_left()) {
-    tell(left.empty() ? "judging" : "judging with less of the lenses refined");
-    FlightCalibration found = refined(all, divisions, given, left, counted(pieces, rig, all.survey.noise));
+  for (const FlightQuestion& question : questions(options.rough)) {
+    tell(best ? "judging with less of the lenses refined" : "judging");
+    FlightCalibration found = refined(all, divisions, given, question, counted(pieces, rig, all.survey.noise));
     const bool unchanged = std::none_of(found.held_out.begin(), found.held_out.end(), [](const auto& p) { return p.changed; });
     if (!best || (found.better && (!best->better || total_gain(found) > total_gain(*best)))) best = std::move(found);
     if (unchanged) break;

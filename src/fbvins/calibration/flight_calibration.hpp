@@ -21,6 +21,8 @@ namespace fbvins {
 
 struct FlightCalibrationOptions {
   std::function<void(const std::string&)> on_progress = {};  ///< a few words
+  /// If any: these alone are refined, and changes of them matter however small they are; they are known to be rough.
+  std::vector<FlightGroup> rough = {};
 };
 
 enum class FlightFinding {

@@ -11,9 +11,6 @@ namespace {
 
 /// A parameter counts as determined where its standard deviation is at most this part of the prior's.
 constexpr double kDetermined = 0.5;
-/// Changes below this part of the prior's standard deviation do not matter: a flight's own errors (features that drift, a lens
-/// that no model describes) are as large, and a good calibration is better left alone.
-constexpr double kMatters = 0.2;
 /// Chance with which a group of parameters that is right is taken to be wrong: 0.5 %, nearly (Wilson, Hilferty).
 constexpr double kNormalQuantile = 2.576;
 
@@ -37,10 +34,11 @@ using Group = std::pair<FlightGroup, int>;
 
 class Choice {
  public:
-  Choice(const FlightRig& given, const FlightSurvey& survey, const std::vector<FlightGroup>& left)
+  Choice(const FlightRig& given, const FlightSurvey& survey, const FlightQuestion& question)
       : parameters_(flight_parameters(given)),
         prior_(prior_information(given)),
-        information_(survey.fit.information / survey.noise.spread) {
+        information_(survey.fit.information / survey.noise.spread),
+        matters_(question.matters) {
     for (std::size_t i = 0; i < parameters_.size(); ++i) all_.push_back(static_cast<Eigen::Index>(i));
     covariance_ = covariance_of(information_, prior_, all_);
     // The quadratic's gradient at `given`, from its minimum; from it follow the minima of fewer free parameters.
@@ -51,7 +49,7 @@ class Choice {
       const auto k = static_cast<Eigen::Index>(i);
       if (std::sqrt(std::max(0.0, covariance_(k, k))) > kDetermined * parameters_[i].prior_sigma)
         findings_[i] = FlightFinding::not_determined;
-      else if (std::find(left.begin(), left.end(), parameters_[i].group) != left.end()) findings_[i] = FlightFinding::left;
+      else if (std::ranges::find(question.left, parameters_[i].group) != question.left.end()) findings_[i] = FlightFinding::left;
     }
     while (drop_one()) {
     }
@@ -92,14 +90,12 @@ class Choice {
       const Eigen::VectorXd d = off(members);
       const double by_chance =
           d.dot(Eigen::MatrixXd(P(members, members)).ldlt().solve(d)) / largest_by_chance(static_cast<double>(members.size()));
-      double matters = 0;
-      for (std::size_t n = 0; n < members.size(); ++n) {
-        const double part =
-            d[static_cast<Eigen::Index>(n)] /
-            (kMatters * parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
-        matters = std::max(matters, part * part);
-      }
-      const double size = std::min(by_chance, matters);
+      double size = by_chance, largest = 0;
+      for (std::size_t n = 0; n < members.size(); ++n)
+        largest =
+            std::max(largest, std::abs(d[static_cast<Eigen::Index>(n)]) /
+                                  parameters_[static_cast<std::size_t>(at[static_cast<std::size_t>(members[n])])].prior_sigma);
+      if (matters_ > 0) size = std::min(size, largest * largest / (matters_ * matters_));
       if (size < least) least = size, dropped = &members;
     }
     if (dropped == nullptr) return false;
@@ -111,6 +107,7 @@ class Choice {
   std::vector<FlightParameter> parameters_;
   Eigen::VectorXd prior_;
   Eigen::MatrixXd information_, covariance_;
+  double matters_;
   std::vector<Eigen::Index> all_;
   Eigen::VectorXd pull_;
   std::vector<FlightFinding> findings_;
@@ -131,8 +128,8 @@ FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given) {
 }
 
 FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
-                        const std::vector<FlightGroup>& left) {
-  const Choice choice(given, survey, left);
+                        const FlightQuestion& question) {
+  const Choice choice(given, survey, question);
   FlightLesson out{given, survey.noise, choice.findings(), choice.covariance(), choice.changed()};
   // From what was given: what is not free stays so exactly.
   out.rig = fit_calibration(pieces, given, given, choice.free(), survey.noise).rig;

@@ -25,9 +25,15 @@ struct FlightLesson {
 };
 
 FlightSurvey survey_of(const FlightPieces& pieces, const FlightRig& given);
-/// `left`: groups that stay as given, whatever the survey says of them.
+/// What is asked of a survey.
+struct FlightQuestion {
+  std::vector<FlightGroup> left = {};  ///< groups that stay as given, whatever the survey says of them
+  /// Changes below this part of the prior's standard deviation do not matter: a flight's own errors (features that drift, a lens
+  /// that no model describes) are as large, and a good calibration is better left alone. 0: all matter.
+  double matters = 0.2;
+};
 FlightLesson learn_from(const FlightPieces& pieces, const FlightRig& given, const FlightSurvey& survey,
-                        const std::vector<FlightGroup>& left);
+                        const FlightQuestion& question);
 
 /// Whether a file of a rig has it.
 inline bool is_flown(FlightGroup group) { return group != FlightGroup::gyro_axes && group != FlightGroup::accel_axes; }

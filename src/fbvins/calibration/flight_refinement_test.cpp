@@ -58,6 +58,25 @@ TEST(FlightRefinement, AWrongCalibrationIsMended) {
     EXPECT_EQ(parameter(found, name).finding, FlightFinding::refined) << name;
 }
 
+TEST(FlightRefinement, WhatIsRoughAloneIsRefinedHoweverLittle) {
+  const StereoRig truth = flight_scene_rig();
+  StereoRig given = truth;
+  given.T_BC1.q = (given.T_BC1.q * so3_exp(Vec3(0.02, -0.02, 0.02) * kDegree)).normalized();
+  given.time_offset_s += 0.002;
+  const FlightTracks tracks = simulated_flight_tracks(truth, given.time_offset_s, {});
+  FlightCalibrationOptions options;
+  options.rough = {FlightGroup::between_cameras};
+  const Result<FlightCalibration> found = calibrate_from_flights({tracks}, {"flight"}, given, options);
+  ASSERT_TRUE(found.ok());
+  EXPECT_TRUE(found->better) << found->verdict;
+  const auto off = [&](const StereoRig& rig) {
+    return so3_log(Quat(Mat3(truth.T_C1C0().R().transpose() * rig.T_C1C0().R()))).norm();
+  };
+  EXPECT_LT(off(found->rig), 0.4 * off(given));
+  EXPECT_EQ(found->rig.time_offset_s, given.time_offset_s) << "is not called rough";
+  EXPECT_EQ(found->rig.T_BC0.p, given.T_BC0.p);
+}
+
 TEST(FlightRefinement, AGoodCalibrationStaysExactly) {
   const StereoRig truth = flight_scene_rig();
   for (const std::uint64_t seed : {11, 12}) {

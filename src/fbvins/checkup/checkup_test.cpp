@@ -2,10 +2,13 @@
 // Checks of the first seconds: units, stamps, left and right.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "fbvins/checkup/first_seconds.hpp"
 #include "fbvins/checkup/reading_units.hpp"
 #include "fbvins/checkup/stamps.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
+#include "fbvins/core/rng.hpp"
 #include "fbvins/features/noise_texture.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 
@@ -131,6 +134,18 @@ TEST(Checkup, NamesGaps) {
   auto single = readings();
   single.erase(single.begin() + 400);
   EXPECT_TRUE(check_stamps(single, stamps(), rig()).empty()) << "one reading is nothing";
+  const auto rest = [&](const auto& leave_out) {
+    std::vector<ImuSample> kept;
+    const std::vector<ImuSample> all = readings();
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (!leave_out(i)) kept.push_back(all[i]);
+    return check_stamps(kept, stamps(), rig());
+  };
+  const auto tenths = rest([](std::size_t i) { return i % 10 == 5; });
+  ASSERT_TRUE(only(tenths, FindingKind::imu_gaps)) << "one of ten";
+  EXPECT_NE(tenths[0].measured.find("(10.0 %)"), std::string::npos) << tenths[0].measured;
+  EXPECT_TRUE(only(rest([](std::size_t i) { return i % 40 < 2; }), FindingKind::imu_gaps)) << "two of forty";
+  EXPECT_TRUE(rest([](std::size_t i) { return i % 100 == 5; }).empty()) << "one of a hundred";
   auto short_one = readings();
   short_one.resize(short_one.size() / 2);
   EXPECT_TRUE(only(check_stamps(short_one, stamps(), rig()), FindingKind::imu_gaps)) << "the IMU ends before the images";
@@ -140,6 +155,45 @@ TEST(Checkup, NamesGaps) {
   auto pause = stamps();
   pause.erase(pause.begin() + 20, pause.begin() + 32);
   EXPECT_TRUE(only(check_stamps(readings(), pause, rig()), FindingKind::image_gaps));
+}
+
+TEST(Checkup, NamesReadingsThatWereNotMeasured) {
+  auto held = readings();
+  for (std::size_t i = 301; i < 321; ++i) held[i].gyro_radps = held[300].gyro_radps, held[i].accel_mps2 = held[300].accel_mps2;
+  const auto found = check_stamps(held, stamps(), rig());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].kind, FindingKind::imu_gaps);
+  EXPECT_NEAR(found[0].size, 0.1, 1e-9);
+  EXPECT_NE(found[0].measured.find("1 time, the longest for 0.100 s"), std::string::npos) << found[0].measured;
+  auto zeros = readings();
+  for (const std::size_t from : {200u, 500u})
+    for (std::size_t i = from; i < from + 15; ++i) zeros[i].gyro_radps.setZero(), zeros[i].accel_mps2.setZero();
+  ASSERT_TRUE(says(check_stamps(zeros, stamps(), rig()), FindingKind::imu_gaps));
+  EXPECT_NE(check_stamps(zeros, stamps(), rig())[0].measured.find("2 times"), std::string::npos);
+}
+
+TEST(Checkup, NamesReadingsStampedInBursts) {
+  const std::vector<ImuSample> all = readings();
+  std::vector<ImuSample> bursts = all;
+  for (std::size_t i = 0; i < bursts.size(); ++i)
+    bursts[i].t = all[i / 10 * 10].t + Duration{static_cast<std::int64_t>(i % 10) * 20'000};
+  const auto found = check_stamps(bursts, stamps(), rig());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].kind, FindingKind::imu_stamps);
+  EXPECT_NE(found[0].advice.find("a block of them"), std::string::npos);
+  EXPECT_EQ(found[0].corrected, "");
+}
+
+TEST(Checkup, JitterIsNoGap) {
+  Rng rng(3);
+  auto jittered = readings();
+  for (ImuSample& sample : jittered) sample.t = sample.t + Duration::from_seconds(0.002 * rng.normal());
+  std::sort(jittered.begin(), jittered.end(), [](const ImuSample& a, const ImuSample& b) { return a.t < b.t; });
+  EXPECT_FALSE(says(check_stamps(jittered, stamps(), rig()), FindingKind::imu_gaps));
+  std::vector<ImuSample> in_ms = readings();  // 225 Hz, stamped in whole milliseconds
+  for (std::size_t i = 0; i < in_ms.size(); ++i)
+    in_ms[i].t = Time{static_cast<std::int64_t>(static_cast<double>(i) * 1e3 / 225) * 1'000'000};
+  EXPECT_FALSE(says(check_stamps(in_ms, {}, rig()), FindingKind::imu_gaps));
 }
 
 TEST(Checkup, LostImagesAreNoIrregularStamps) {

@@ -21,6 +21,7 @@ std::string_view to_string(FindingKind kind) {
     case FindingKind::imu_stamps: return "imu_stamps";
     case FindingKind::imu_gaps: return "imu_gaps";
     case FindingKind::clocks_apart: return "clocks_apart";
+    case FindingKind::clocks_drift: return "clocks_drift";
     case FindingKind::time_offset: return "time_offset";
     case FindingKind::accel_late: return "accel_late";
     case FindingKind::extrinsics_inverted: return "extrinsics_inverted";

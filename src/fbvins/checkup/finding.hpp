@@ -27,6 +27,7 @@ enum class FindingKind {
   imu_gaps,
   // camera and IMU
   clocks_apart,
+  clocks_drift,
   time_offset,
   accel_late,
   extrinsics_inverted,
@@ -66,6 +67,8 @@ std::string_view to_string(FindingKind kind);
 enum class CalibrationField {
   mounting_of_left,
   mounting_of_right,
+  size_of_left,
+  size_of_right,
   lens_of_left,
   lens_of_right,
   distortion_of_left,

@@ -26,6 +26,13 @@ constexpr double kMostIrregular_s = 2e-3;
 
 /// From this multiple of the usual step on something is missing: readings are often stamped less regularly than images.
 constexpr double kReadingGap = 2.5, kImageGap = 1.5;
+/// A single reading is missing where a step is so long and its neighbours are not shorter for it.
+constexpr double kSingleGap = 1.5, kThreeStepsWithGap = 3.6;
+/// Readings come in bursts where so large a share of the steps is shorter than this part of the mean one.
+constexpr double kMostInBursts = 0.3, kBurstStep = 0.25;
+/// Readings that stay the same for so long, and at least so many of them: none were measured.
+constexpr double kLongestHeld_s = 0.05;
+constexpr std::size_t kFewestHeld = 4;
 /// What of it is reported.
 constexpr double kLongestReadingGap_s = 0.05, kMostReadingsMissing = 0.02;
 constexpr double kLongestImageGap_s = 0.5, kMostImagesMissing = 0.05;
@@ -52,6 +59,33 @@ Gaps gaps_between(std::span<const Time> stamps, double period_s, double gap_peri
   return gaps;
 }
 
+/// Single readings that are missing between two: of jitter, which shortens other steps, no time is left over.
+double singles_missing(std::span<const Time> stamps, double period_s, double missing_in_gaps) {
+  double missing = 0;
+  for (std::size_t i = 2; i + 1 < stamps.size(); ++i) {
+    const double step = (stamps[i] - stamps[i - 1]).seconds();
+    missing += step >= kSingleGap * period_s && step < kReadingGap * period_s &&
+               (stamps[i + 1] - stamps[i - 2]).seconds() > kThreeStepsWithGap * period_s;
+  }
+  const double steps = static_cast<double>(stamps.size() - 1);
+  const double left_over = (stamps.back() - stamps.front()).seconds() / period_s - steps - missing_in_gaps;
+  return std::clamp(std::round(left_over), 0.0, missing);
+}
+
+/// The longest time in which readings stay as they are to the last bit.
+Gaps longest_held(std::span<const ImuSample> samples) {
+  Gaps held;
+  std::size_t first = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    if (samples[i].gyro_radps != samples[first].gyro_radps || samples[i].accel_mps2 != samples[first].accel_mps2) first = i;
+    const double for_s = (samples[i].t - samples[first].t).seconds();
+    if (i + 1 - first < kFewestHeld || for_s < kLongestHeld_s) continue;
+    held.count += i + 1 - first == kFewestHeld || (samples[i - 1].t - samples[first].t).seconds() < kLongestHeld_s;
+    if (for_s > held.longest_s) held.longest_s = for_s, held.longest_from = samples[first].t;
+  }
+  return held;
+}
+
 std::string to_text(const Gaps& gaps, std::string_view what) {
   return fmt::format("{:.0f} {} ({:.1f} %) are missing in {} gap{}, the longest of {:.3f} s after {} ns", gaps.missing, what,
                      100 * gaps.share, gaps.count, gaps.count == 1 ? "" : "s", gaps.longest_s, gaps.longest_from.ns);
@@ -72,46 +106,94 @@ const char* unit_of_stamps(double slower) {
   return nullptr;
 }
 
-void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, std::vector<Finding>& findings) {
-  std::vector<double> steps;
-  int repeated = 0;
-  for (std::size_t i = 1; i < samples.size(); ++i) {
-    steps.push_back((samples[i].t - samples[i - 1].t).seconds());
-    repeated += samples[i].gyro_radps == samples[i - 1].gyro_radps && samples[i].accel_mps2 == samples[i - 1].accel_mps2;
-  }
-  const double rate = 1 / std::max(typical_step_s(steps), 1e-9), said = rig.imu_noise.rate_hz;
+/// The rate against the calibration's.
+void check_rate(double rate, const StereoRig& rig, std::vector<Finding>& findings) {
+  const double said = rig.imu_noise.rate_hz;
+  if (std::abs(rate / said - 1) <= kRateTolerance) return;
   Finding finding;
   finding.kind = FindingKind::imu_stamps;
-  if (std::abs(rate / said - 1) > kRateTolerance) {
-    finding.size = rate, finding.unit = "Hz";
-    finding.measured = fmt::format("the IMU gives {:.1f} readings a second", rate);
-    finding.expected = fmt::format("the calibration says {:.1f}", said);
-    if (const char* unit = unit_of_stamps(rate / said)) {
-      finding.advice = fmt::format("the stamps look like {}: give nanoseconds", unit);
-    } else {
-      finding.advice = "correct the rate, on which the covariance rests";
-      finding.corrected = fmt::format("rate_hz: {:.0f}", rate);
-      finding.fields = {CalibrationField::imu_rate};
-    }
-    findings.push_back(finding);
+  finding.size = rate, finding.unit = "Hz";
+  finding.measured = fmt::format("the IMU gives {:.1f} readings a second", rate);
+  finding.expected = fmt::format("the calibration says {:.1f}", said);
+  if (const char* unit = unit_of_stamps(rate / said)) {
+    finding.advice = fmt::format("the stamps look like {}: give nanoseconds", unit);
+  } else {
+    finding.advice = "correct the rate, on which the covariance rests";
+    finding.corrected = fmt::format("rate_hz: {:.0f}", rate);
+    finding.fields = {CalibrationField::imu_rate};
   }
-  const double share = repeated / static_cast<double>(steps.size());
+  findings.push_back(std::move(finding));
+}
+
+/// Readings that are the one before.
+void check_repeated_readings(std::span<const ImuSample> samples, std::vector<Finding>& findings) {
+  int repeated = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    repeated += samples[i].gyro_radps == samples[i - 1].gyro_radps && samples[i].accel_mps2 == samples[i - 1].accel_mps2;
+  const double share = repeated / static_cast<double>(samples.size() - 1);
   if (share > kMostRepeated) {
-    finding.size = share, finding.unit = "of the readings", finding.corrected.clear(), finding.fields.clear();
+    Finding finding;
+    finding.kind = FindingKind::imu_stamps;
+    finding.size = share, finding.unit = "of the readings";
     finding.measured = fmt::format("{:.0f} % of the IMU's readings repeat the one before to the last bit", 100 * share);
     finding.expected = "noise alone makes each different";
     finding.advice = "the driver repeats readings or the IMU hangs: hand on each reading once, at the sensor's own rate";
-    findings.push_back(finding);
+    findings.push_back(std::move(finding));
+    return;
   }
+  const Gaps held = longest_held(samples);
+  if (held.count == 0) return;
+  Finding finding = gap_of(FindingKind::imu_gaps, held.longest_s);
+  finding.measured = fmt::format("the readings stay as they are to the last bit {} time{}, the longest for {:.3f} s after {} ns",
+                                 held.count, held.count == 1 ? "" : "s", held.longest_s, held.longest_from.ns);
+  finding.expected = "noise alone makes each different";
+  finding.advice = "the driver fills what it misses with the last reading or with zeros: leave it out, and look for what is lost";
+  findings.push_back(std::move(finding));
+}
+
+/// Whether readings come in bursts, each stamped on arrival.
+bool check_bursts(std::span<const double> steps_s, double mean_s, std::vector<Finding>& findings) {
+  const auto shorter = std::count_if(steps_s.begin(), steps_s.end(), [&](double s) { return s < kBurstStep * mean_s; });
+  const double share = static_cast<double>(shorter) / static_cast<double>(steps_s.size());
+  if (share < kMostInBursts) return false;
+  Finding finding;
+  finding.kind = FindingKind::imu_stamps;
+  finding.size = share, finding.unit = "of the readings";
+  finding.measured = fmt::format(
+      "{:.0f} % of the IMU's readings come within {:.1f} ms of the one before, where {:.1f} readings come in a second",
+      100 * share, 1e3 * kBurstStep * mean_s, 1 / mean_s);
+  finding.expected = "equal intervals";
+  finding.advice =
+      "readings are stamped when a block of them arrives: stamp each when it was measured, by the sensor's own clock or its rate";
+  findings.push_back(std::move(finding));
+  return true;
+}
+
+void check_reading_gaps(std::span<const ImuSample> samples, double rate, std::vector<Finding>& findings) {
   std::vector<Time> stamps;
   for (const ImuSample& sample : samples) stamps.push_back(sample.t);
-  const Gaps gaps = gaps_between(stamps, 1 / rate, kReadingGap);
-  if (gaps.count == 0 || (gaps.longest_s < kLongestReadingGap_s && gaps.share < kMostReadingsMissing)) return;
-  finding = gap_of(FindingKind::imu_gaps, gaps.longest_s);
+  Gaps gaps = gaps_between(stamps, 1 / rate, kReadingGap);
+  const double singles = singles_missing(stamps, 1 / rate, gaps.missing);
+  gaps.count += static_cast<int>(singles), gaps.missing += singles;
+  gaps.share = gaps.missing / (gaps.missing + static_cast<double>(stamps.size()));
+  const bool long_one = gaps.longest_s >= kLongestReadingGap_s && gaps.longest_s >= kReadingGap / rate;
+  if (gaps.count == 0 || (!long_one && gaps.share < kMostReadingsMissing)) return;
+  Finding finding = gap_of(FindingKind::imu_gaps, gaps.longest_s);
   finding.measured = to_text(gaps, "readings");
   finding.expected = fmt::format("a reading every {:.1f} ms", 1e3 / rate);
   finding.advice = "look for full buffers, a bus or a disk that is too slow, and a driver that waits";
-  findings.push_back(finding);
+  findings.push_back(std::move(finding));
+}
+
+void check_readings(std::span<const ImuSample> samples, const StereoRig& rig, std::vector<Finding>& findings) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < samples.size(); ++i) steps.push_back((samples[i].t - samples[i - 1].t).seconds());
+  const double mean_s = (samples.back().t - samples.front().t).seconds() / static_cast<double>(steps.size());
+  const bool bursts = check_bursts(steps, mean_s, findings);
+  const double rate = 1 / std::max(bursts ? mean_s : typical_step_s(steps), 1e-9);
+  check_rate(rate, rig, findings);
+  check_repeated_readings(samples, findings);
+  if (!bursts) check_reading_gaps(samples, rate, findings);
 }
 
 void check_images(std::span<const Time> images, std::vector<Finding>& findings) {

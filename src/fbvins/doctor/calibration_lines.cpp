@@ -34,6 +34,10 @@ std::string mounting_line(const Pose<B, Cam>& T_BC, bool left, CalibrationStyle 
                      row(R, p, 2));
 }
 
+std::string size_line(const Camera& camera, bool left, CalibrationStyle style) {
+  return fmt::format("{}resolution: [{}, {}]", file_of(left, style), camera.width(), camera.height());
+}
+
 std::string intrinsics_line(const Camera& camera, bool left, CalibrationStyle style) {
   const std::vector<double> numbers = kalibr_camera(camera).intrinsics;
   std::string out;
@@ -77,6 +81,8 @@ std::string line_of(CalibrationField field, const StereoRig& rig, CalibrationSty
   switch (field) {
     case CalibrationField::mounting_of_left: return mounting_line(rig.T_BC0, true, style);
     case CalibrationField::mounting_of_right: return mounting_line(rig.T_BC1, false, style);
+    case CalibrationField::size_of_left: return size_line(rig.left, true, style);
+    case CalibrationField::size_of_right: return size_line(rig.right, false, style);
     case CalibrationField::lens_of_left: return intrinsics_line(rig.left, true, style);
     case CalibrationField::lens_of_right: return intrinsics_line(rig.right, false, style);
     case CalibrationField::distortion_of_left: return distortion_line(rig.left, true, style);

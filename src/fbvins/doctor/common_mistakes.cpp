@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fbvins/camera/scaled_lens.hpp"
 #include "fbvins/core/angle.hpp"
 #include "fbvins/core/median.hpp"
 
@@ -23,13 +24,6 @@ Camera with_model(const Camera& camera, Change&& change) {
   auto model = camera.model();
   std::visit(change, model);
   return camera.with_lens(model);
-}
-
-Camera scaled(const Camera& camera, double factor) {
-  return with_model(camera, [factor](auto& m) {
-    m.fx *= factor, m.fy *= factor;
-    m.cx = (m.cx + 0.5) * factor - 0.5, m.cy = (m.cy + 0.5) * factor - 0.5;
-  });
 }
 
 /// Of the same camera upside down.
@@ -71,7 +65,7 @@ void add_sizes(const StereoRig& rig, std::vector<CommonMistake>& all) {
   for (const auto& [factor, what] : {std::pair{2.0, "lenses of images of twice the calibration's size"},
                                      std::pair{0.5, "lenses of images of half the calibration's size"}}) {
     StereoRig other = rig;
-    other.left = scaled(rig.left, factor), other.right = scaled(rig.right, factor);
+    other.left = with_scaled_lens(rig.left, factor), other.right = with_scaled_lens(rig.right, factor);
     all.push_back({FindingKind::calibration_size, what, "calibrate at the size that is used, or scale focal lengths and centres",
                    std::move(other), ImageFlip::none, kLenses});
   }
@@ -179,6 +173,13 @@ bool is_strange(const Diagnosis& as_given) {
       default: return false;
     }
   };
+  // What looks like two wrong lenses may be two that are exchanged.
+  const auto concerns = [&](CalibrationField lens, CalibrationField distortion) {
+    return std::any_of(as_given.findings.begin(), as_given.findings.end(), [&](const Finding& f) {
+      return std::ranges::find(f.fields, lens) != f.fields.end() || std::ranges::find(f.fields, distortion) != f.fields.end();
+    });
+  };
+  if (concerns(lens_of_left, distortion_of_left) && concerns(lens_of_right, distortion_of_right)) return true;
   const bool unseen = std::any_of(as_given.not_judged.begin(), as_given.not_judged.end(), [](const std::string& text) {
     return text.starts_with("the pair of cameras: too few") || text.starts_with("gyroscope, axes");
   });

@@ -109,6 +109,35 @@ Result<Diagnosis> diagnose_pairs(const StereoRig& rig, const Replay& replay, Cal
 
 }  // namespace
 
+void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found) {
+  if (scaled.empty()) return;
+  using enum CalibrationField;
+  Finding finding;
+  finding.kind = FindingKind::calibration_size;
+  finding.size = static_cast<double>(scaled.front().images.width) / scaled.front().calibrated.width;
+  finding.unit = "times the calibration's size";
+  std::string cameras;
+  const ScaledLens* before = nullptr;
+  for (const ScaledLens& lens : scaled) {
+    cameras += fmt::format("{}cam{}", cameras.empty() ? "" : ", ", lens.camera);
+    if (lens.camera == 0) finding.fields.insert(finding.fields.end(), {size_of_left, lens_of_left});
+    if (lens.camera == 1) finding.fields.insert(finding.fields.end(), {size_of_right, lens_of_right});
+    if (before != nullptr && before->images == lens.images && before->calibrated == lens.calibrated) continue;
+    before = &lens;
+    const char* comma = finding.measured.empty() ? "" : ", ";
+    finding.measured += fmt::format("{}{} x {}", comma, lens.images.width, lens.images.height);
+    finding.expected += fmt::format("{}{} x {}", comma, lens.calibrated.width, lens.calibrated.height);
+  }
+  finding.measured = fmt::format("the images of {} are {} pixels", cameras, finding.measured);
+  finding.expected += " by the calibration";
+  finding.advice =
+      "calibrate at the size that is used, or scale focal lengths and centres: all else was judged with lenses scaled so";
+  const bool is_pair = found.rig.camera_count() == 2;
+  if (!is_pair) finding.fields.clear();  // lines name a pair's cameras
+  found.findings.insert(found.findings.begin(), std::move(finding));
+  if (is_pair) write_lines(found.findings, found.rig, style);
+}
+
 Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style) {
   const Result<Evidence> evidence = gather_from(rig, replay, ImageFlip::none);
   if (!evidence) return evidence.error();

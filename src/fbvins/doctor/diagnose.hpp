@@ -8,9 +8,11 @@
 #pragma once
 
 #include <functional>
+#include <span>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/doctor/doctor.hpp"
+#include "fbvins/io/dataset_info.hpp"
 #include "fbvins/types/sensor_event.hpp"
 
 namespace fbvins {
@@ -22,6 +24,10 @@ using Replay = std::function<Result<void>(const TakeEvent&)>;
 
 /// Of a rig of more than two cameras each pair is judged, in the order of their first cameras.
 Result<Diagnosis> diagnose(const StereoRig& rig, const Replay& replay, CalibrationStyle style);
+
+/// Of lenses that were scaled to the images (DatasetOptions::scale_lenses), with which `found` was found: one more finding, which
+/// they mend. With none of them nothing changes.
+void tell_of_scaled(std::span<const ScaledLens> scaled, CalibrationStyle style, Diagnosis& found);
 
 /// The calibration as given, not compared with common mistakes.
 Result<Diagnosis> examine_with(const StereoRig& rig, const Replay& replay, CalibrationStyle style);

@@ -11,7 +11,7 @@ namespace {
 /// What no recording shows, by the sizes from which findings are reported (docs/doctor.md).
 constexpr std::string_view kNotSeen =
     "not seen: errors below 3 ms, 1 degree of the mounting and 5 cm of its position, 3 % of the baseline, 5 % of both focal lengths "
-    "alike, 3 % of a scale, 0.1 rad/s or 1 m/s^2 of a bias; noise figures that some IMU has; readings missing for less than 0.05 s\n";
+    "alike, 3 % of a scale, 0.1 rad/s or 1 m/s^2 of a bias; noise figures that some IMU has; readings missing for less than 0.05 s and 2 % in all, or filled by interpolation\n";
 
 std::string counted(std::size_t n, std::string_view what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 

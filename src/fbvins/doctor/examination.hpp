@@ -64,6 +64,7 @@ class Examination {
   void motion();
   void motion_change(const MotionChange& change);
   void gyro_bias(const MotionFit& fit);
+  bool drift(const MotionFit& fit);
   void time_offset(const MotionFit& fit);
   void rotation(const MotionFit& fit);
   void lens(FindingKind kind, WhichLens which, const Eigen::VectorXd& amount, const Eigen::VectorXd& sigma, double explained_px);
@@ -75,6 +76,7 @@ class Examination {
   AccelFit in_step(AccelFit as_stamped);
   void accelerations();
   void accel_axes(const AccelFit& fit);
+  bool turned_with_imu(const AccelFit& fit);
   bool position(const AccelFit& fit);
   void accel_bias(const AccelFit& fit);
   void accel_scale(const AccelFit& fit);

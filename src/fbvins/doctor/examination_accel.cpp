@@ -28,6 +28,8 @@ constexpr double kConfirmed = 3;
 constexpr double kAxesLeave = 0.02;
 /// Gravity must be nearer to one cause's than to another's by this share.
 constexpr double kGravityTells = 0.01;
+/// How much nearer the place that turned with the IMU must be than that as given, in standard deviations, and the least of those.
+constexpr double kTurnedTells = 3, kLeverResolution_m = 0.003;
 /// Another place of the camera must leave less than this share of what is unexplained.
 constexpr double kElsewhereLeaves = 0.8;
 
@@ -118,19 +120,29 @@ void Examination::accel_axes(const AccelFit& fit) {
   finding.advice = fmt::format("hand on ({}) as (x, y, z) of the specific force", axes_text(fit.axes));
 }
 
+/// An IMU that is turned sees the cameras elsewhere, too: where the calibration has them, turned as well, which is more exact
+/// than any place that the accelerations show.
+bool Examination::turned_with_imu(const AccelFit& fit) {
+  const auto rotation = std::ranges::find(out_.findings, FindingKind::imu_camera_rotation, &Finding::kind);
+  if (rotation == out_.findings.end()) return false;
+  const Mat3 turn = rig_.T_BC0.R() * evidence_.rig.T_BC0.R().transpose();
+  const Vec3 with_turn = turn * rig_.T_BC0.p - rig_.T_BC0.p;
+  const auto sigmas_from = [&](const Vec3& place) {
+    return (fit.lever_m - place).cwiseQuotient(fit.lever_sigma_m.cwiseMax(kLeverResolution_m)).norm();
+  };
+  if (sigmas_from(with_turn) + kTurnedTells > sigmas_from(Vec3::Zero())) return false;
+  if ((fit.lever_m - with_turn).norm() > kPositionPractical_m) return false;
+  rig_.T_BC0.p += with_turn, rig_.T_BC1.p += with_turn;
+  rotation->advice = "correct the cameras' poses on the IMU, their places with their rotation, or mount the IMU as calibrated";
+  return true;
+}
+
 bool Examination::position(const AccelFit& fit) {
+  if (turned_with_imu(fit)) return true;
   const double away_m = fit.lever_m.norm(), sigma_m = fit.lever_sigma_m.maxCoeff();
   if (away_m < kPositionPractical_m || away_m < kSignificant * sigma_m) return false;
   if (fit.unexplained_elsewhere > kElsewhereLeaves * fit.unexplained) return false;
-  // An IMU that is turned sees the cameras elsewhere, too.
-  const Mat3 turn = rig_.T_BC0.R() * evidence_.rig.T_BC0.R().transpose();
-  const Vec3 with_turn = turn * rig_.T_BC0.p - rig_.T_BC0.p;
   rig_.T_BC0.p += fit.lever_m, rig_.T_BC1.p += fit.lever_m;
-  for (Finding& rotation : out_.findings)
-    if (rotation.kind == FindingKind::imu_camera_rotation && (fit.lever_m - with_turn).norm() < kPositionPractical_m) {
-      rotation.advice = "correct the cameras' poses on the IMU, their places with their rotation, or mount the IMU as calibrated";
-      return true;
-    }
   Finding& finding = found(FindingKind::imu_camera_position, 1e2 * away_m, 1e2 * sigma_m, "cm");
   finding.measured = fmt::format(
       "the cameras are ({:.1f}, {:.1f}, {:.1f}) +- {:.1f} cm, in the IMU's axes, from where the calibration has them on the IMU",

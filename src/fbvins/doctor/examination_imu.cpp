@@ -25,6 +25,9 @@ constexpr double kLeastSecondAxis_rad = 2.5e-3;
 constexpr double kMostScale = 1.7;
 /// Share of saturated readings beyond which the rest says little about scale and axes.
 constexpr double kMostCutOff = 0.2;
+/// Of a third of the recording, so that its time offset is judged by itself.
+constexpr double kAgreementOfPart = 0.95;
+constexpr std::size_t kFewestPairsOfPart = 20;
 constexpr double kTimePractical_s = 3e-3, kRotationPractical_rad = 0.0175, kGyroBiasPractical_radps = 0.1;
 
 double angle_of(const Mat3& R) { return so3_log(Quat(R)).norm(); }
@@ -146,7 +149,7 @@ void Examination::motion() {
   for (const MotionChange& change : fit.changes)
     measured(fmt::format("  motion: {} {} +- {} explains {:.2f} px", to_string(change.kind), change.amount.norm(),
                          change.covariance.diagonal().cwiseSqrt().norm(), change.explained_px));
-  time_offset(fit);
+  if (!drift(fit)) time_offset(fit);
   rotation(fit);
   offset_s_ = fit.offset_s;
   gyro_bias_ = fit.gyro_bias_radps;
@@ -194,6 +197,36 @@ void Examination::gyro_bias(const MotionFit& fit) {
                                  finding.sigma);
   finding.expected = fmt::format("less than {} rad/s", kGyroBiasPractical_radps);
   finding.advice = "let the driver measure it at rest and subtract it, or subtract this from the readings";
+}
+
+/// The time offset in the first third of the recording against that in the last one.
+bool Examination::drift(const MotionFit& fit) {
+  StereoRig rig = rig_;
+  rig.T_BC0 = {Mat3(fit.R_CB.transpose()), rig.T_BC0.p};
+  const auto part = [&](std::size_t begin, std::size_t end) -> std::optional<MotionFit> {
+    const std::vector<FramePair> pairs(pairs_.begin() + static_cast<std::ptrdiff_t>(begin),
+                                       pairs_.begin() + static_cast<std::ptrdiff_t>(end));
+    const TurnFit turns = fit_turns(pairs, imu_, rig);
+    if (!turns.seen || turns.correlation < kAgreementOfPart || turns.spread.y() < kLeastSecondAxis_rad) return std::nullopt;
+    MotionFit out = fit_motion(pairs, imu_, {rig, turns.offset_s, false});
+    return out.usable ? std::optional(std::move(out)) : std::nullopt;
+  };
+  const std::size_t third = pairs_.size() / 3;
+  if (third < kFewestPairsOfPart) return false;
+  const std::optional<MotionFit> first = part(0, third), last = part(pairs_.size() - third, pairs_.size());
+  if (!first || !last) return false;
+  const double drift_s = last->offset_s - first->offset_s, sigma_s = std::hypot(first->offset_sigma_s, last->offset_sigma_s);
+  measured(fmt::format("time offset in the first third of the recording {:.2f} +- {:.2f} ms, in the last one {:.2f} +- {:.2f}",
+                       1e3 * first->offset_s, 1e3 * first->offset_sigma_s, 1e3 * last->offset_s, 1e3 * last->offset_sigma_s));
+  if (std::abs(drift_s) < kTimePractical_s || std::abs(drift_s) < kSignificant * sigma_s) return false;
+  Finding& finding = found(FindingKind::clocks_drift, 1e3 * drift_s, 1e3 * sigma_s, "ms");
+  finding.measured = fmt::format(
+      "the IMU's stamps are {:.1f} ms late against the images' in the first third of the recording and {:.1f} ms in the last one (+- {:.1f})",
+      1e3 * first->offset_s, 1e3 * last->offset_s, finding.sigma);
+  finding.expected = "the same throughout";
+  finding.advice =
+      "readings or images are lost where stamps are counted up instead of measured, or two clocks run at different speeds: stamp both by one clock";
+  return true;
 }
 
 void Examination::time_offset(const MotionFit& fit) {

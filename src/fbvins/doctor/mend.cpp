@@ -8,6 +8,7 @@
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/doctor/common_mistakes.hpp"
+#include "fbvins/doctor/refine_mended.hpp"
 
 namespace fbvins {
 namespace {
@@ -47,6 +48,21 @@ Result<void> fits_no_worse(const std::optional<double>& before, const std::optio
   return no(fmt::format("the {} grows from {:.2f} to {:.2f} px", what, *before, *after));
 }
 
+/// Takes what a flight refines of a corrected calibration, where the recording examined again with it is explained as well.
+Result<void> refine(std::span<const Finding> corrected_for, const Replay& replay, CalibrationStyle style, Mended& mended) {
+  const Result<std::optional<StereoRig>> refined = refined_by_flight(*mended.rig, corrected_for, replay);
+  if (!refined) return refined.error();
+  if (!*refined || !check_rig(**refined, "the refined calibration")) return {};
+  Result<Diagnosis> after = examine_with(**refined, replay, style);
+  if (!after) return after.error();
+  if (cost_of(*after) > cost_of(mended.after)) return {};
+  for (const auto& [before_px, after_px] :
+       {std::pair{mended.after.epipolar_px, after->epipolar_px}, std::pair{mended.after.predicted_px, after->predicted_px}})
+    if (!fits_no_worse(before_px, after_px, "")) return {};
+  mended.rig = **refined, mended.after = *std::move(after);
+  return {};
+}
+
 }  // namespace
 
 Result<void> is_better(const Diagnosis& before, const Diagnosis& after) {
@@ -73,6 +89,7 @@ Result<Mended> mend(const StereoRig& rig, const Diagnosis& before, const Replay&
     mended.why_not = "the doctor judges a pair, and there are more cameras: --camera both takes the first two";
     return mended;
   }
+  std::vector<Finding> corrected_for;
   for (int round = 0; round < kRounds && concerns_calibration(mended.after); ++round) {
     const StereoRig corrected = as_named(mended.after);
     Result<void> judged = check_rig(corrected, "the corrected calibration");
@@ -80,12 +97,17 @@ Result<Mended> mend(const StereoRig& rig, const Diagnosis& before, const Replay&
       Result<Diagnosis> after = examine_with(corrected, replay, style);
       if (!after) return after.error();
       judged = is_better(mended.after, *after);
-      if (judged) mended.rig = corrected, mended.after = *std::move(after);
+      if (judged) {
+        corrected_for.insert(corrected_for.end(), mended.after.findings.begin(), mended.after.findings.end());
+        mended.rig = corrected, mended.after = *std::move(after);
+      }
     }
     if (judged) continue;
     if (!mended.rig) mended.why_not = judged.error().message;
     break;
   }
+  if (mended.rig)
+    if (Result<void> done = refine(corrected_for, replay, style, mended); !done) return done.error();
   return mended;
 }
 

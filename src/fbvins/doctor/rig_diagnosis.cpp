@@ -16,6 +16,7 @@ namespace {
 bool concerns_all_pairs(FindingKind kind) {
   switch (kind) {
     case FindingKind::clocks_apart:
+    case FindingKind::clocks_drift:
     case FindingKind::time_offset:
     case FindingKind::accel_late:
     case FindingKind::image_stamps:

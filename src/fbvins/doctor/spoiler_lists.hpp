@@ -12,6 +12,7 @@ inline constexpr double kTimeTolerance_ms = 1, kRotationTolerance_deg = 0.5;
 inline Mat3 turn(const Vec3& axis, double degrees) { return so3_exp(degrees / kDegreesPerRad * axis).toRotationMatrix(); }
 
 std::vector<Spoiler> of_the_imu();
+std::vector<Spoiler> of_gaps();
 std::vector<Spoiler> of_the_calibration(const StereoRig& rig);
 std::vector<Spoiler> of_the_images(const StereoRig& rig);
 

@@ -4,7 +4,8 @@
 //
 //   for (const Spoiler& spoiler : spoilers(rig)) {
 //     spoiler.rig(wrong_rig);
-//     spoiler.reading(sample); spoiler.frame(frame);      // each where it is set
+//     if (!spoiler.lost(sample)) spoiler.reading(sample);
+//     spoiler.frame(frame);                               // each where it is set
 //   }
 #pragma once
 
@@ -26,6 +27,7 @@ struct Spoiler {
   std::function<void(StereoRig&)> rig = {};
   std::function<void(ImuSample&)> reading = {};
   std::function<void(StereoFrame&)> frame = {};
+  std::function<bool(const ImuSample&)> lost = {};  ///< asked before `reading`; a lost one is not delivered
 };
 
 /// All faults, for a recording with this rig.

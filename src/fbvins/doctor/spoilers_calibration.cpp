@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "fbvins/camera/scaled_lens.hpp"
 #include "fbvins/doctor/lens_change.hpp"
 #include "fbvins/doctor/spoiler_lists.hpp"
 
@@ -61,17 +62,6 @@ void forget_distortion(Camera& camera) {
   std::visit([](auto& m) { m = {m.fx, m.fy, m.cx, m.cy}; }, model);
   camera = camera.with_lens(model);
 }
-/// Of the same camera at another size of images.
-Camera of_size(const Camera& camera, double factor) {
-  auto model = camera.model();
-  std::visit(
-      [factor](auto& m) {
-        m.fx *= factor, m.fy *= factor;
-        m.cx = (m.cx + 0.5) * factor - 0.5, m.cy = (m.cy + 0.5) * factor - 0.5;
-      },
-      model);
-  return camera.with_lens(model);
-}
 Spoiler changed_by(std::string name, FindingKind kind, std::function<void(StereoRig&)> change, double size = 0,
                    double tolerance = 0) {
   return {std::move(name), kind, size, tolerance, std::move(change), {}, {}};
@@ -97,7 +87,7 @@ std::vector<Spoiler> inverted() {
 
 std::vector<Spoiler> of_another_kind() {
   const auto sized = [](double factor) {
-    return [factor](StereoRig& r) { r.left = of_size(r.left, factor), r.right = of_size(r.right, factor); };
+    return [factor](StereoRig& r) { r.left = with_scaled_lens(r.left, factor), r.right = with_scaled_lens(r.right, factor); };
   };
   const auto noise = [](double factor) {
     return [factor](StereoRig& r) {

@@ -62,6 +62,10 @@ DatasetContents with_cameras(DatasetContents contents, const std::string& camera
   return contents;
 }
 
+Result<DatasetContents> contents_of(const std::string& path, const DatasetOptions& options) {
+  return is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
+}
+
 }  // namespace
 
 Dataset::Dataset(DatasetContents contents, const DatasetOptions& options)
@@ -129,8 +133,15 @@ Result<std::unique_ptr<Dataset>> open_dataset(const std::string& path, const Dat
   if (Result<void> valid = validate(options); !valid) return valid.error();
   if (!options.kalibr_imu.empty() && options.kalibr_camchain.empty())
     return Error{ErrorCode::invalid_argument, "kalibr_imu is given without kalibr_camchain"};
-  Result<DatasetContents> contents = is_mcap(path) ? open_mcap(path, options) : open_euroc(path, options);
+  Result<DatasetContents> contents = contents_of(path, options);
   if (!contents) return contents.error();
+  if (const auto scaled = options.scale_lenses ? scaled_to_images(*contents) : std::nullopt) {
+    DatasetOptions again = options;
+    again.rig = scaled->rig;
+    contents = contents_of(path, again);
+    if (!contents) return contents.error();
+    contents->info.scaled = scaled->cameras;
+  }
   if (options.camera == "depth" && !contents->rig.depth) return no_depth_images(path);
   if (Result<void> readable = check_images(*contents); !readable) return readable.error();
   return std::make_unique<Dataset>(*std::move(contents), options);

@@ -45,24 +45,25 @@ class EurocLoader : public FrameLoader {
     LoadedFrame out;
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
-    out.frame.left = load_image(entry.left_file, 0, out.left, out.problem);
-    out.frame.right = load_image(entry.right_file, 1, out.right, out.problem);
+    out.frame.left = load_image(entry.left_file, 0, out.left, out);
+    out.frame.right = load_image(entry.right_file, 1, out.right, out);
     for (std::size_t i = 0; i < entry.more_files.size(); ++i)
-      out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.problem));
-    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.left, out.depth, out.problem);
+      out.frame.more.push_back(load_image(entry.more_files[i], static_cast<int>(i) + 2, out.more, out));
+    out.frame.depth = load<DepthImage>(entry.depth_file, kDepthFolder, decode_depth, rig_.left, out.depth, out);
     return out;
   }
 
  private:
-  std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, std::string& problem) const {
+  std::shared_ptr<const Image> load_image(const std::string& file, int camera, ImageCounts& counts, LoadedFrame& out) const {
     if (file.empty()) return nullptr;
-    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode_image, rig_.camera(camera), counts, problem);
+    return load<Image>(file, folders_[static_cast<std::size_t>(camera)], decode_image, rig_.camera(camera), counts, out);
   }
 
   template <class T>
   std::shared_ptr<const T> load(const std::string& file, std::string_view folder, Result<T> (*decode)(std::string_view),
-                                const Camera& camera, ImageCounts& counts, std::string& problem) const {
+                                const Camera& camera, ImageCounts& counts, LoadedFrame& out) const {
     if (file.empty()) return nullptr;
+    std::string& problem = out.problem;
     const std::string path = fmt::format("{}{}data/{}", root_, folder, file);
     const auto blame = [&](const std::string& sentence) {
       if (problem.empty()) problem = fmt::format("{}: {}", files_->describe(path), sentence);
@@ -77,6 +78,7 @@ class EurocLoader : public FrameLoader {
     }
     if (const auto sentence = wrong_size(width_of(*image), height_of(*image), camera)) {
       ++counts.wrong_size;
+      out.other_size = ImageSize{width_of(*image), height_of(*image)};
       blame(*sentence);
       return nullptr;
     }

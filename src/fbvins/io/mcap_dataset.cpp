@@ -61,7 +61,7 @@ class McapLoader : public FrameLoader {
     out.frame.t = entry.t;
     out.frame.offsets = entry.offsets;
     const auto load = [&]<class T>(const std::string& file, int camera, ImageCounts& counts, std::shared_ptr<const T>& image) {
-      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), rig_.camera(camera), counts, out.problem);
+      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), rig_.camera(camera), counts, out);
     };
     load(entry.left_file, 0, out.left, out.frame.left);
     load(entry.right_file, 1, out.right, out.frame.right);
@@ -75,7 +75,8 @@ class McapLoader : public FrameLoader {
  private:
   template <class T>
   std::shared_ptr<const T> load_image(const ImagePlace& place, const Camera& camera, ImageCounts& counts,
-                                      std::string& problem) const {
+                                      LoadedFrame& loaded) const {
+    std::string& problem = loaded.problem;
     const auto blame = [&](const std::string& sentence) {
       if (problem.empty()) problem = fmt::format("{}: byte {}: {}", name_, place.offset, sentence);
     };
@@ -88,6 +89,7 @@ class McapLoader : public FrameLoader {
     }
     if (const auto sentence = wrong_size(image->width, image->height, camera)) {
       ++counts.wrong_size;
+      loaded.other_size = ImageSize{static_cast<int>(image->width), static_cast<int>(image->height)};
       blame(*sentence);
       return nullptr;
     }
