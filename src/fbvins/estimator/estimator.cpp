@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
 #include "fbvins/estimator/estimator_setup.hpp"
