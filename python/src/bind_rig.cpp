@@ -77,9 +77,7 @@ StereoRig make_rig(const Camera& left, const Camera* right, nb::handle T_BC0, nb
   return rig;
 }
 
-}  // namespace
-
-void bind_rig(nb::module_& m) {
+void bind_camera(nb::module_& m) {
   nb::class_<Camera>(m, "Camera", "A camera: image size and lens model. Lengths in pixels.")
       .def(
           nb::new_(&make_camera), "width"_a, "height"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "model"_a = "radtan",
@@ -94,7 +92,9 @@ void bind_rig(nb::module_& m) {
       .def_prop_ro("distortion", &Camera::distortion, "the model's parameters, in the order above")
       .def_prop_ro("mask", &mask_of, "uint8 (height, width): 0 where the image does not show the world; None without a mask")
       .def("__repr__", &text_of);
+}
 
+void bind_sensors(nb::module_& m) {
   nb::class_<ImuNoise>(m, "ImuNoise", "Continuous-time noise of an IMU, as in calibration files.")
       .def(
           "__init__",
@@ -128,7 +128,9 @@ void bind_rig(nb::module_& m) {
       .def_ro("nearest", &DepthSensor::nearest_m, "m")
       .def_ro("farthest", &DepthSensor::farthest_m, "m")
       .def_ro("scale_sigma", &DepthSensor::scale_sigma);
+}
 
+void bind_stereo_rig(nb::module_& m) {
   nb::class_<StereoRig>(
       m, "Rig",
       "One to eight cameras and an IMU, rigidly joined. B is the IMU, C0 and C1 are the left and right camera. A\n"
@@ -168,7 +170,14 @@ void bind_rig(nb::module_& m) {
         return fmt::format("<fbvins.Rig {} and {}, baseline {:.4f} m, IMU {:g} Hz>", text_of(rig.left), text_of(rig.right),
                            rig.T_C1C0().p.norm(), rig.imu_noise.rate_hz);
       });
+}
 
+}  // namespace
+
+void bind_rig(nb::module_& m) {
+  bind_camera(m);
+  bind_sensors(m);
+  bind_stereo_rig(m);
   m.def("_restore_rig", [](const std::string& yaml) { return value_or_raise(parse_rig(yaml, "the rig")); });
 
   m.def(

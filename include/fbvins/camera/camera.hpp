@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "fbvins/camera/lens.hpp"
 #include "fbvins/camera/lens_models.hpp"
 #include "fbvins/camera/mask.hpp"
 #include "fbvins/geometry/pose.hpp"
@@ -30,11 +31,14 @@ class Camera {
  public:
   Camera() = default;
   Camera(LensModel model, int width, int height);
+  /// Behind a lens of a model of one's own.
+  Camera(std::shared_ptr<const Lens> lens, int width, int height);
 
   int width() const { return width_; }
   int height() const { return height_; }
+  /// Of a lens of one's own the pinhole with its focal lengths and centre.
   const LensModel& model() const { return model_; }
-  /// pinhole-radtan, pinhole-equidistant, ds, eucm or omni-radtan.
+  /// pinhole-radtan, pinhole-equidistant, ds, eucm or omni-radtan; of a lens of one's own its name.
   std::string model_name() const;
   /// fx, fy, cx, cy, px.
   std::array<double, 4> intrinsics() const;
@@ -68,7 +72,8 @@ class Camera {
   /// Largest |(x/z, y/z)| at which the radial distortion still grows outwards: the model's domain.
   double max_normalised_radius() const { return max_radius_; }
   /// Whether the lens sees more than 180 degrees across or down the image: the middles of two opposite edges look backwards.
-  /// False for a polynomial that stops growing within the image, which has no rays there, either.
+  /// False for a polynomial that stops growing within the image, which has no rays there, either, and for a lens of one's own, of
+  /// which what looks backwards is not used.
   bool sees_backwards() const;
   /// Whether the pixel is in the image, at least so far from its edges and from what the mask hides. A negative border extends
   /// the image, and the mask does not count then.
@@ -81,8 +86,13 @@ class Camera {
 
  private:
   bool in_domain(const Vec3& p_lens) const;
+  /// Not by the closed forms of a model in its own axes, but by rays.
+  bool by_rays() const { return is_turned_ || lens_ != nullptr; }
+  std::optional<Vec2> project_in_lens(const Vec3& p_lens, Eigen::Matrix<double, 2, 3>* J_pixel_point = nullptr) const;
+  std::optional<Vec3> ray_in_lens(const Vec2& pixel) const;
 
   LensModel model_;
+  std::shared_ptr<const Lens> lens_;  ///< null: model_ is all of it
   int width_ = 0;
   int height_ = 0;
   double max_radius_ = 0, max_plane_radius_ = 0, widest_rad_ = 0;

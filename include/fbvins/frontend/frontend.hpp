@@ -2,8 +2,8 @@
 // StereoFrame -> TrackedFrame: follows features over time and across the stereo pair.
 // A plain synchronous stage: no thread, no clock; one instance is used by one thread at a time.
 //
-//   auto frontend = make_frontend(rig, options);
-//   TrackedFrame tracked = frontend->process(packet, prior);
+//   auto frontend = make_frontend(rig, options);   // a Result: *frontend is the unique_ptr
+//   TrackedFrame tracked = (*frontend)->process(packet, prior);
 #pragma once
 
 #include <memory>

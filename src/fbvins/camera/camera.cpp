@@ -78,11 +78,11 @@ std::optional<Vec2> undistort_by_newton(const Model& m, const Vec2& target, doub
   return std::nullopt;
 }
 
-/// Angle from the axis up to which the image radius grows, to 1e-4 rad.
-double widest_angle(const LensModel& model) {
-  const Vec2 centre = std::visit([](const auto& m) { return Vec2(m.cx, m.cy); }, model);
+/// Angle from the axis up to which the image radius grows, to 1e-4 rad. `project`: the pixel of a point, where there is one.
+template <class Project>
+double widest_angle(const Vec2& centre, const Project& project) {
   const auto radius_at = [&](double angle) {
-    const auto px = project_point(model, Vec3(std::sin(angle), 0, std::cos(angle)));
+    const std::optional<Vec2> px = project(Vec3(std::sin(angle), 0, std::cos(angle)));
     return px ? (*px - centre).norm() : -1;
   };
   double angle = 0, before = 0;
@@ -129,7 +129,16 @@ std::optional<Vec3> direction_of(const Model& m, const Vec2& uv, double widest, 
 Camera::Camera(LensModel model, int width, int height) : model_(std::move(model)), width_(width), height_(height) {
   max_radius_ = std::visit([](const auto& m) { return largest_radius(m); }, model_);
   max_plane_radius_ = std::visit([](const auto& m) { return largest_plane_radius(m); }, model_);
-  widest_rad_ = widest_angle(model_);
+  const auto f = intrinsics();
+  widest_rad_ = widest_angle({f[2], f[3]}, [this](const Vec3& p) { return project_point(model_, p); });
+}
+
+Camera::Camera(std::shared_ptr<const Lens> lens, int width, int height) : lens_(std::move(lens)), width_(width), height_(height) {
+  const auto f = lens_->intrinsics();
+  model_ = PinholeRadtan{f[0], f[1], f[2], f[3]};
+  widest_rad_ = widest_angle({f[2], f[3]}, [this](const Vec3& p) { return lens_->project(p, nullptr); });
+  max_radius_ = widest_rad_ < std::numbers::pi / 2 ? std::min(kLargestRadius, std::tan(widest_rad_)) : kLargestRadius;
+  max_plane_radius_ = max_radius_;
 }
 
 Camera Camera::with_lens(LensModel model) const {
@@ -146,6 +155,7 @@ Camera Camera::turned(const Mat3& R_lens) const {
 }
 
 std::string Camera::model_name() const {
+  if (lens_) return lens_->name();
   constexpr const char* kNames[] = {"pinhole-radtan", "pinhole-equidistant", "ds", "eucm", "omni-radtan"};
   static_assert(std::size(kNames) == std::variant_size_v<LensModel>);
   return kNames[model_.index()];
@@ -166,10 +176,10 @@ double Camera::focal_px() const {
 bool Camera::in_domain(const Vec3& p_lens) const { return std::atan2(p_lens.head<2>().norm(), p_lens.z()) <= widest_rad_; }
 
 Vec2 Camera::distort(const Vec2& normalised, Mat2* J_pixel_normalised) const {
-  if (is_turned_) {
-    LensDerivatives derivatives;
-    const auto pixel = project_point(model_, R_lens_ * normalised.homogeneous(), &derivatives);
-    if (J_pixel_normalised) *J_pixel_normalised = pixel ? Mat2(derivatives.point * R_lens_.leftCols<2>()) : Mat2(Mat2::Zero());
+  if (by_rays()) {
+    Eigen::Matrix<double, 2, 3> J_pixel_point = Eigen::Matrix<double, 2, 3>::Zero();
+    const auto pixel = project_in_lens(R_lens_ * normalised.homogeneous(), &J_pixel_point);
+    if (J_pixel_normalised) *J_pixel_normalised = pixel ? Mat2(J_pixel_point * R_lens_.leftCols<2>()) : Mat2(Mat2::Zero());
     return pixel.value_or(Vec2::Constant(std::numeric_limits<double>::quiet_NaN()));
   }
   return std::visit(
@@ -184,13 +194,27 @@ Vec2 Camera::distort(const Vec2& normalised, Mat2* J_pixel_normalised) const {
       model_);
 }
 
-std::optional<Vec3> Camera::ray(const Vec2& pixel) const {
-  const auto in_lens = std::visit(
+std::optional<Vec2> Camera::project_in_lens(const Vec3& p_lens, Eigen::Matrix<double, 2, 3>* J_pixel_point) const {
+  if (lens_) return lens_->project(p_lens, J_pixel_point);
+  if (!J_pixel_point) return project_point(model_, p_lens);
+  LensDerivatives derivatives;
+  const auto pixel = project_point(model_, p_lens, &derivatives);
+  *J_pixel_point = derivatives.point;
+  return pixel;
+}
+
+std::optional<Vec3> Camera::ray_in_lens(const Vec2& pixel) const {
+  if (lens_) return lens_->ray(pixel);
+  return std::visit(
       [&](const auto& m) -> std::optional<Vec3> {
         const Vec2 uv((pixel.x() - m.cx) / m.fx, (pixel.y() - m.cy) / m.fy);
         return std::isfinite(uv.norm()) ? direction_of(m, uv, widest_rad_, max_plane_radius_) : std::nullopt;
       },
       model_);
+}
+
+std::optional<Vec3> Camera::ray(const Vec2& pixel) const {
+  const auto in_lens = ray_in_lens(pixel);
   if (!in_lens || !in_domain(*in_lens)) return std::nullopt;
   const Vec3 unit = in_lens->normalized();
   return is_turned_ ? Vec3(R_lens_.transpose() * unit) : unit;
@@ -199,11 +223,11 @@ std::optional<Vec3> Camera::ray(const Vec2& pixel) const {
 std::optional<Vec2> Camera::pixel_of(const Vec3& p_C) const {
   const Vec3 p_lens = is_turned_ ? Vec3(R_lens_ * p_C) : p_C;
   if (!(p_lens.squaredNorm() > 1e-18) || !in_domain(p_lens)) return std::nullopt;
-  return project_point(model_, p_lens);
+  return project_in_lens(p_lens);
 }
 
 std::optional<Vec2> Camera::undistort(const Vec2& pixel) const {
-  if (is_turned_) {
+  if (by_rays()) {
     const auto direction = ray(pixel);
     if (!direction || !(direction->z() > 0)) return std::nullopt;
     const Vec2 n = direction->hnormalized();
@@ -224,7 +248,7 @@ std::optional<Vec2> Camera::undistort(const Vec2& pixel) const {
 }
 
 bool Camera::sees_backwards() const {
-  if (max_radius_ < kLargestRadius) return false;
+  if (lens_ || max_radius_ < kLargestRadius) return false;
   const double right = width_ - 1, bottom = height_ - 1;
   const auto backwards = [&](double u, double v) { return !undistort({u, v}); };
   return (backwards(0, 0.5 * bottom) && backwards(right, 0.5 * bottom)) ||
@@ -234,7 +258,7 @@ bool Camera::sees_backwards() const {
 std::optional<Vec2> Camera::project(const Vec3& p_C) const {
   if (!(p_C.z() > 1e-9)) return std::nullopt;
   const Vec2 n(p_C.x() / p_C.z(), p_C.y() / p_C.z());
-  if (is_turned_ ? !in_domain(R_lens_ * p_C) : !(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
+  if (by_rays() ? !in_domain(R_lens_ * p_C) : !(n.squaredNorm() <= max_radius_ * max_radius_)) return std::nullopt;
   Mat2 J;
   const Vec2 pixel = distort(n, &J);
   // Tangential distortion can fold the plane even within the radial bound.

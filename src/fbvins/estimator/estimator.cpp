@@ -3,18 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "fbvins/camera/camera_groups.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/estimator/calibration_uncertainty.hpp"
+#include "fbvins/estimator/estimator_setup.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/landmark_geometry.hpp"
 #include "fbvins/estimator/mono_start.hpp"
 #include "fbvins/estimator/window_views.hpp"
-#include "fbvins/imu/propagation.hpp"
 #include "fbvins/types/protection.hpp"
 
 namespace fbvins {
@@ -35,42 +33,6 @@ constexpr double kContradictedOneCamera_s = 2;
 constexpr std::ptrdiff_t kEnoughLandmarks = 25;
 /// For the first window, which is so short that tilt, velocity and biases hardly change its cost: no stop on a small decrease.
 constexpr LmOptions kThorough{.max_iterations = 30, .min_decrease = 1e-9};
-
-WindowWeights weights_of(const EstimatorOptions& o) {
-  WindowWeights w;
-  w.gravity_mps2 = o.gravity_mps2;
-  w.estimate_tilt = o.up == UpDirection::state;
-  w.estimate_extrinsics = o.estimate_extrinsics;
-  w.estimate_time_offset = o.estimate_time_offset;
-  w.estimate_line_delay = o.estimate_line_delay;
-  return w;
-}
-
-/// Where no two cameras see the same things, remembered landmarks would hold the scale at what it was thought to be when they
-/// left the window. The place of a camera that only stands for a depth sensor is none to be refined.
-EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) {
-  if (!has_stereo(rig)) options.known_landmarks.enabled = false;
-  if (rig.depth) options.estimate_extrinsics = false;
-  return options;
-}
-
-Calibration calibration_of(const StereoRig& rig) {
-  Calibration out{rig.T_BC0, rig.T_BC1, 0.0};
-  for (const MountedCamera& camera : rig.more) out.more.push_back(camera.T_BC);
-  return out;
-}
-
-/// Of the pair that was calibrated with the largest baseline, or of the depth sensor.
-double scale_sigma_of(const StereoRig& rig) {
-  if (rig.depth) return rig.depth->scale_sigma;
-  double least = 0;
-  for (const CameraGroup& group : camera_groups(rig)) {
-    if (!group.second) continue;
-    const double sigma = scale_sigma(rig.T_BC(group.first).p, rig.T_BC(*group.second).p);
-    least = least == 0 ? sigma : std::min(least, sigma);
-  }
-  return least;
-}
 
 }  // namespace
 
@@ -109,8 +71,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   if (!as_it_is) referred_ = refer_to_stamp(whole);
   const TrackedFrame& frame = as_it_is ? whole : referred_;
   const Duration rest = rest_.update(frame);
-  carried_up_.carry(frame.t, frame.imu);
-  carried_velocity_.carry(frame.imu);
+  carried_.carry(frame.t, frame.imu);
   if (!frame.imu.empty()) last_rate_ = frame.imu.samples.back().gyro_radps;
   if (running_) track(frame, rest, out);
   else initialise(frame, rest, out);
@@ -119,7 +80,7 @@ Estimate Estimator::process(const TrackedFrame& tracked) {
   odometry.t = frame.t;
   if (running_) publish(odometry);
   odometry.reset_counter = reset_counter_;
-  if (running_) remember_up(odometry);
+  if (running_) carried_.remember(window_, odometry, reading_noise_.clipped());
   if (odometry.health.state == HealthState::lost) restart();
   health_.pass(frame);
   out.landmarks = {next_update_++, reset_counter_, window_.known().take_new()};
@@ -146,8 +107,7 @@ void Estimator::initialise(const TrackedFrame& frame, Duration rest, Estimate& o
   if (start_is_good(frame, out.odometry)) {
     shrink_window(solution, out);
     compare_carried(out.odometry);
-    if (tilt_away_B_ || carried_velocity_.contradicted())
-      out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
+    if (carried_.contradicted()) out.odometry.health = {HealthState::degraded, HealthReason::contradiction};
     return;
   }
   refuse_start(out.odometry);
@@ -197,10 +157,9 @@ void Estimator::open_window(const InitialSolution& start) {
   window_.set_prior(std::move(prior));
   published_.restart();
   monitor_.restart();
-  tilt_away_B_.reset();
+  carried_.begin_window();
   frames_with_readings_ = kFramesAfterGap;
   up_sigma_rad_ = 0;
-  covariances_.reset();
 }
 
 /// From here on each observation knows when and from where it was seen (S1-S4).
@@ -384,7 +343,7 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                        {.worst_sigma_m = worst_sigma_m(solved.pose_covariance),
                         .failed_solves = failed_solves_,
                         .broken_features = contract_.broken(),
-                        .contradiction = monitor_.contradicted() || tilt_away_B_ || carried_velocity_.contradicted(),
+                        .contradiction = monitor_.contradicted() || carried_.contradicted(),
                         .hopeless = monitor_.hopeless() || contradicted_too_long(frame.t),
                         .wrong_cameras = wrong_cameras_,
                         .after_gap = frames_with_readings_ < kFramesAfterGap,
@@ -393,25 +352,8 @@ Health Estimator::judge(const TrackedFrame& frame, const Odometry& solved) {
                         .gyro_vibration_radps = reading_noise_.gyro_vibration_radps()});
 }
 
-/// With what was known before, up and the velocity.
 void Estimator::compare_carried(const Odometry& solved) {
-  const NavState<G>& newest = window_.newest().state;
-  tilt_away_B_ =
-      carried_up_.contradiction(newest.T_FB.q.conjugate() * (window_.tilt().q() * Vec3::UnitZ()), newest.bias.gyro_radps);
-  if (reading_noise_.clipped()) carried_velocity_.forget();
-  if (solved.velocity_covariance.isZero(0)) return;
-  const auto sigma = [](const Mat3& covariance) { return std::sqrt(covariance.trace()); };
-  carried_velocity_.compare({newest, gravity_G(), sigma(solved.velocity_covariance), up_sigma_rad_,
-                             sigma(solved.gyro_bias_covariance), sigma(solved.accel_bias_covariance)},
-                            tracks_in_view(window_), monitor_.contradicted());
-}
-
-void Estimator::remember_up(const Odometry& out) {
-  if (reading_noise_.clipped()) carried_up_.forget();
-  if (out.health.state != HealthState::good) return;
-  const NavState<G>& newest = window_.newest().state;
-  carried_up_.take({newest.T_FB.q.conjugate() * (window_.tilt().q() * Vec3::UnitZ()), out.tilt_sigma_rad, newest.bias.gyro_radps,
-                    std::sqrt(out.gyro_bias_covariance.trace())});
+  carried_.compare(window_, {solved, gravity_G(), up_sigma_rad_, reading_noise_.clipped(), monitor_.contradicted()});
 }
 
 /// The pose goes on, but nobody knows any more how it lies in the W of before: told by the reset counter.
@@ -422,8 +364,7 @@ void Estimator::begin_new_W() {
 }
 
 void Estimator::restart() {
-  carried_up_.restart();
-  carried_velocity_.restart();
+  carried_.restart();
   const Pose<W, B>& last = published_.T_WB();
   // The next gauge begins where this W ends, so that the pose goes on from where it was published last.
   if (last.p.allFinite() && last.q.coeffs().allFinite()) restart_pose_ = last.cast_frames<G, B>();
@@ -434,24 +375,6 @@ void Estimator::restart() {
   window_.clear();
   initialiser_.reset();
   rest_.reset();
-}
-
-/// Without a covariance from this solve, publishes the last one; position grows by the velocity's error over the time since.
-/// NaN (unknown) if there never was one.
-void Estimator::carry_covariances(Odometry& out) {
-  if (!out.pose_covariance.isZero(0)) {
-    covariances_ = {out.t, out.pose_covariance, out.velocity_covariance, out.gyro_bias_covariance, out.accel_bias_covariance};
-    return;
-  }
-  const Mat3 unknown = Mat3::Constant(std::numeric_limits<double>::quiet_NaN());
-  const StateCovariances last =
-      covariances_.value_or(StateCovariances{out.t, unknown.replicate<2, 2>(), unknown, unknown, unknown});
-  const double dt = (out.t - last.t).seconds();
-  out.pose_covariance = last.pose;
-  out.pose_covariance.topLeftCorner<3, 3>() += dt * dt * last.velocity;
-  out.velocity_covariance = last.velocity;
-  out.gyro_bias_covariance = last.gyro_bias;
-  out.accel_bias_covariance = last.accel_bias;
 }
 
 /// A large pending correction is published at once, as a new W, if the pose was not good shortly before, or if it is twice the
@@ -475,8 +398,8 @@ void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
 void Estimator::publish(Odometry& out) {
   const NavState<G>& newest = window_.newest().state;
   const NavState<W> level = window_.tilt().levelled(newest);
-  carry_covariances(out);
-  const bool moved_along = !monitor_.contradicted() && carried_velocity_.take_reset();
+  carried_.fill_covariances(out);
+  const bool moved_along = !monitor_.contradicted() && carried_.take_reset();
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
   if (out.health.state == HealthState::good && published_.owes_too_much()) settle_correction(level.T_FB, out);
@@ -484,10 +407,7 @@ void Estimator::publish(Odometry& out) {
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);
   out.velocity_covariance += monitor_.velocity_doubt(newest.v_FB);
-  if (tilt_away_B_) out.pose_covariance.bottomRightCorner<3, 3>() += *tilt_away_B_ * tilt_away_B_->transpose();
-  const Vec3 &shift_G = carried_velocity_.shift_G(), &velocity_G = carried_velocity_.velocity_G();
-  out.pose_covariance.topLeftCorner<3, 3>() += shift_G * shift_G.transpose();
-  out.velocity_covariance += velocity_G * velocity_G.transpose();
+  carried_.add_doubt(out);
   published_.fill(level, out);
   out.gauge = gauge_state_of(window_, newest);
   out.gauge.up_sigma_rad = up_sigma_rad_;

@@ -10,8 +10,7 @@
 #include <optional>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/estimator/carried_up.hpp"
-#include "fbvins/estimator/carried_velocity.hpp"
+#include "fbvins/estimator/carried_state.hpp"
 #include "fbvins/estimator/estimator_options.hpp"
 #include "fbvins/estimator/exposures.hpp"
 #include "fbvins/estimator/frame_contract.hpp"
@@ -73,21 +72,12 @@ class Estimator {
   Health judge(const TrackedFrame& frame, const Odometry& solved);
   bool start_is_good(const TrackedFrame& frame, const Odometry& solved) const;
   void compare_carried(const Odometry& solved);
-  void remember_up(const Odometry& out);
   void refuse_start(Odometry& out);
   void restart();
   void begin_new_W();
   void settle_correction(const Pose<W, B>& level, Odometry& out);
-  void carry_covariances(Odometry& out);
   void publish(Odometry& out);
   Vec3 gravity_G() const;
-
-  /// Of the newest level state that had any.
-  struct StateCovariances {
-    Time t;
-    Mat6 pose;
-    Mat3 velocity, gyro_bias, accel_bias;
-  };
 
   EstimatorOptions options_;
   ImuNoise imu_noise_;                    ///< calibrated noise times the options' factors
@@ -104,9 +94,7 @@ class Estimator {
   FrameContract contract_;
   ReadingNoise reading_noise_;
   Monitor monitor_;
-  CarriedUp carried_up_;
-  CarriedVelocity carried_velocity_;
-  std::optional<Vec3> tilt_away_B_;   ///< of a new window, from what was known before it, rad
+  CarriedState carried_;
   std::uint8_t wrong_cameras_ = 0;    ///< in the newest frame; bits, as in Health
   int frames_with_readings_ = 0;      ///< in a row
   Time agreed_;                       ///< last time without a contradiction, or with two cameras
@@ -119,7 +107,6 @@ class Estimator {
   int failed_solves_ = 0;
   Vec3 last_rate_ = Vec3::Zero();
   double up_sigma_rad_ = 0;  ///< as of the last usable solve
-  std::optional<StateCovariances> covariances_;
   PublishedPose published_;
   FrameId newest_handed_on_;
   std::int64_t next_update_ = 0;            ///< sequence number

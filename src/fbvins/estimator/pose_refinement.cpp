@@ -11,7 +11,7 @@ namespace {
 constexpr double kHuberSigma = 2.0;
 constexpr double kMinDepth_m = 0.05;
 
-struct NormalEquations {
+struct PoseEquations {
   Mat6 H = Mat6::Zero();
   Vec6 g = Vec6::Zero();
   int inliers = 0;
@@ -43,7 +43,7 @@ PoseRefinement refine_pose(const std::vector<PointSighting>& sightings, const Ca
   const CameraGeometry cameras(calibration);
   PoseRefinement out{guess, 0, false};
   for (int i = 0; i < max_iterations; ++i) {
-    NormalEquations n;
+    PoseEquations n;
     const Mat3 R_BG = out.T_GB.R().transpose();
     for (const PointSighting& s : sightings) {
       const Vec3 p_B = R_BG * (s.p_G - out.T_GB.p);

@@ -78,12 +78,75 @@ void list_blocks(const WindowLayout& at, const WindowLandmark& l, const WindowOb
   if (!host_listed) offsets.push_back(at.pose_row(l.host));
 }
 
+/// Linearises the sightings of a landmark in one frame, `o` on: one row of Jacobian and residual for each coordinate, weighed
+/// robustly. Adds to `cost`; `o` is the first of another frame afterwards. Returns how many there are.
+template <int Columns>
+int linearise_sightings(const WindowProblem& w, const CameraGeometry& cameras, const PairGeometry& pair, const WindowLandmark& l,
+                        const Vec3& x_h, const WindowObservation*& o, const WindowObservation* end, SightingRows<Columns>& rows,
+                        double& cost) {
+  const int target = o->frame;
+  int sightings = 0;
+  for (; o != end && o->frame == target; ++o) {
+    Vec3 p_C;
+    Vec2 r;
+    if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
+      cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
+      continue;
+    }
+    const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
+    cost += robust.cost;
+    double(&sighting)[2][Columns] = rows[sightings++];
+    fill_jacobian_rows<Columns>(cameras, pair, target == l.host, l, x_h, *o, p_C, r, sighting);
+    if (robust.weight < 1) {
+      const double s = std::sqrt(robust.weight);
+      for (int k = 0; k < 2; ++k)
+        for (double& x : sighting[k]) x *= s;
+    }
+  }
+  return sightings;
+}
+
+/// Where the frames of a pair and the landmark stand in the system.
+struct PairPlace {
+  int host_row, target_row, host_block, target_block;
+  bool same;  ///< host and target are one frame
+};
+
+/// Adds the Gram matrix of a landmark's sightings in one frame to the dense system and to the landmark's own block.
+template <int Columns>
+void add_gram(const Eigen::Map<const Eigen::Matrix<double, Columns, Columns>>& gram, const PairPlace& at, PointBlock& point,
+              NormalEquations& out) {
+  Eigen::MatrixXd& H = out.H;
+  Eigen::VectorXd& g = out.g;
+  point.V += gram.template block<3, 3>(kPoint, kPoint);
+  point.w += gram.template block<3, 1>(kPoint, kResidual);
+  if (!at.same) {
+    H.block<6, 6>(at.host_row, at.host_row) += gram.template block<6, 6>(kHost, kHost);
+    H.block<6, 6>(at.target_row, at.target_row) += gram.template block<6, 6>(kTarget, kTarget);
+    if (at.target_row > at.host_row) H.block<6, 6>(at.target_row, at.host_row) += gram.template block<6, 6>(kTarget, kHost);
+    else H.block<6, 6>(at.host_row, at.target_row) += gram.template block<6, 6>(kHost, kTarget);
+    g.segment<6>(at.host_row) += gram.template block<6, 1>(kHost, kResidual);
+    g.segment<6>(at.target_row) += gram.template block<6, 1>(kTarget, kResidual);
+    out.points.coupling(point, at.host_block) += gram.template block<3, 6>(kPoint, kHost);
+    out.points.coupling(point, at.target_block) += gram.template block<3, 6>(kPoint, kTarget);
+  }
+  if constexpr (Columns == 32) {
+    const int row = out.layout.calibration_row();
+    H.block<14, 14>(row, row) += gram.template block<14, 14>(kExtrinsic0, kExtrinsic0);
+    g.segment<14>(row) += gram.template block<14, 1>(kExtrinsic0, kResidual);
+    if (!at.same) {
+      H.block<6, 14>(at.host_row, row) += gram.template block<6, 14>(kHost, kExtrinsic0);
+      H.block<6, 14>(at.target_row, row) += gram.template block<6, 14>(kTarget, kExtrinsic0);
+    }
+    for (int k = 0; k < 2; ++k) out.points.coupling(point, k) += gram.template block<3, 6>(kPoint, kExtrinsic0 + 6 * k);
+    out.points.coupling(point, 2).leftCols<2>() += gram.template block<3, 2>(kPoint, kTimeOffset);
+  }
+}
+
 template <int Columns>
 double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEquations& out) {
   const CameraGeometry cameras(w.calibration);
   const WindowLayout at = out.layout;
-  Eigen::MatrixXd& H = out.H;
-  Eigen::VectorXd& g = out.g;
   double cost = 0;
   std::array<double, Columns * Columns> G;
   SightingRows<Columns> rows;
@@ -95,64 +158,18 @@ double add_landmarks_of(const WindowProblem& w, const PairTable& pairs, NormalEq
     const WindowObservation* end = begin + l.observation_count;
     list_blocks<Columns>(at, l, begin, end, offsets);
     PointBlock& point = out.points.add(offsets);
-    const int host_row = at.pose_row(l.host);
     const auto block_of = [&](int row) {
       return static_cast<int>(std::lower_bound(offsets.begin() + kFirstPoseBlock, offsets.end(), row) - offsets.begin());
     };
-    const int host_block = block_of(host_row);
+    const int host_row = at.pose_row(l.host), host_block = block_of(host_row);
     if (l.prior >= 0) cost += add_landmark_prior(w, cameras, l, host_block, point, out);
-
     for (const WindowObservation* o = begin; o != end;) {
-      const int target = o->frame;
-      const bool same = target == l.host;
-      const PairGeometry& pair = pairs(l.host, target);
-      int sightings = 0;
-      for (; o != end && o->frame == target; ++o) {
-        Vec3 p_C;
-        Vec2 r;
-        if (!reproject(cameras, pair, x_h, l.alpha_beta_rho.z(), *o, p_C, r)) {
-          cost += huber(kUnprojectableSigma * kUnprojectableSigma, w.weights.huber_sigma).cost;
-          continue;
-        }
-        const RobustValue robust = huber(r.squaredNorm(), w.weights.huber_sigma);
-        cost += robust.cost;
-        double(&sighting)[2][Columns] = rows[sightings++];
-        fill_jacobian_rows<Columns>(cameras, pair, same, l, x_h, *o, p_C, r, sighting);
-        if (robust.weight < 1) {
-          const double s = std::sqrt(robust.weight);
-          for (int k = 0; k < 2; ++k)
-            for (double& x : sighting[k]) x *= s;
-        }
-      }
+      const int target = o->frame, target_row = at.pose_row(target);
+      const int sightings = linearise_sightings<Columns>(w, cameras, pairs(l.host, target), l, x_h, o, end, rows, cost);
       if (sightings == 0) continue;
-      gram_of(rows, sightings, G.data());
-
-      using Gram = Eigen::Matrix<double, Columns, Columns>;  // exactly symmetric
-      const Eigen::Map<const Gram> gram(G.data());
-      point.V += gram.template block<3, 3>(kPoint, kPoint);
-      point.w += gram.template block<3, 1>(kPoint, kResidual);
-      if (!same) {
-        const int target_row = at.pose_row(target);
-        H.block<6, 6>(host_row, host_row) += gram.template block<6, 6>(kHost, kHost);
-        H.block<6, 6>(target_row, target_row) += gram.template block<6, 6>(kTarget, kTarget);
-        if (target_row > host_row) H.block<6, 6>(target_row, host_row) += gram.template block<6, 6>(kTarget, kHost);
-        else H.block<6, 6>(host_row, target_row) += gram.template block<6, 6>(kHost, kTarget);
-        g.segment<6>(host_row) += gram.template block<6, 1>(kHost, kResidual);
-        g.segment<6>(target_row) += gram.template block<6, 1>(kTarget, kResidual);
-        out.points.coupling(point, host_block) += gram.template block<3, 6>(kPoint, kHost);
-        out.points.coupling(point, block_of(target_row)) += gram.template block<3, 6>(kPoint, kTarget);
-      }
-      if constexpr (Columns == 32) {
-        const int row = at.calibration_row();
-        H.block<14, 14>(row, row) += gram.template block<14, 14>(kExtrinsic0, kExtrinsic0);
-        g.segment<14>(row) += gram.template block<14, 1>(kExtrinsic0, kResidual);
-        if (!same) {
-          H.block<6, 14>(host_row, row) += gram.template block<6, 14>(kHost, kExtrinsic0);
-          H.block<6, 14>(at.pose_row(target), row) += gram.template block<6, 14>(kTarget, kExtrinsic0);
-        }
-        for (int k = 0; k < 2; ++k) out.points.coupling(point, k) += gram.template block<3, 6>(kPoint, kExtrinsic0 + 6 * k);
-        out.points.coupling(point, 2).leftCols<2>() += gram.template block<3, 2>(kPoint, kTimeOffset);
-      }
+      gram_of(rows, sightings, G.data());  // exactly symmetric
+      const Eigen::Map<const Eigen::Matrix<double, Columns, Columns>> gram(G.data());
+      add_gram<Columns>(gram, {host_row, target_row, host_block, block_of(target_row), target == l.host}, point, out);
     }
   }
   return cost;

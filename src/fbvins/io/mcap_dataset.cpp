@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <map>
 #include <utility>
@@ -14,8 +12,8 @@
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/flight_record.hpp"
-#include "fbvins/io/image_decode.hpp"
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/io/mcap_images.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 #include "fbvins/io/rig_text.hpp"
 #include "fbvins/io/ros_messages.hpp"
@@ -29,20 +27,6 @@ constexpr Duration kImuLeadIn = {1'000'000'000};
 // The partner of an image is searched for among this many frames before it.
 constexpr std::ptrdiff_t kPairingReach = 8;
 
-/// Where an image's message is in the file, as a FrameEntry names it.
-struct ImagePlace {
-  std::uint64_t offset = 0, length = 0;
-
-  std::string name() const { return fmt::format("{}+{}", offset, length); }
-  static ImagePlace of(const std::string& name) {
-    ImagePlace place;
-    const char* end = name.data() + name.size();
-    const auto offset = std::from_chars(name.data(), end, place.offset);
-    if (offset.ptr != end) std::from_chars(offset.ptr + 1, end, place.length);
-    return place;
-  }
-};
-
 /// The number, from 2 on counted from 0, of the camera whose images a topic has: camera_topic().
 std::optional<std::size_t> further_camera(std::string_view topic) {
   constexpr std::string_view kBefore = "/camera/";
@@ -50,68 +34,6 @@ std::optional<std::size_t> further_camera(std::string_view topic) {
   const int camera = topic.back() - '0';
   return camera >= 2 && camera < kMostCameras ? std::optional(static_cast<std::size_t>(camera - 2)) : std::nullopt;
 }
-
-class McapLoader : public FrameLoader {
- public:
-  McapLoader(std::shared_ptr<const ByteSource> bytes, std::string name, const StereoRig& rig)
-      : bytes_(std::move(bytes)), name_(std::move(name)), rig_(rig) {}
-
-  LoadedFrame load(const FrameEntry& entry) override {
-    LoadedFrame out;
-    out.frame.t = entry.t;
-    out.frame.offsets = entry.offsets;
-    const auto load = [&]<class T>(const std::string& file, int camera, ImageCounts& counts, std::shared_ptr<const T>& image) {
-      if (!file.empty()) image = load_image<T>(ImagePlace::of(file), rig_.camera(camera), counts, out);
-    };
-    load(entry.left_file, 0, out.left, out.frame.left);
-    load(entry.right_file, 1, out.right, out.frame.right);
-    out.frame.more.resize(entry.more_files.size());
-    for (std::size_t i = 0; i < entry.more_files.size(); ++i)
-      load(entry.more_files[i], static_cast<int>(i) + 2, out.more, out.frame.more[i]);
-    load(entry.depth_file, 0, out.depth, out.frame.depth);
-    return out;
-  }
-
- private:
-  template <class T>
-  std::shared_ptr<const T> load_image(const ImagePlace& place, const Camera& camera, ImageCounts& counts,
-                                      LoadedFrame& loaded) const {
-    std::string& problem = loaded.problem;
-    const auto blame = [&](const std::string& sentence) {
-      if (problem.empty()) problem = fmt::format("{}: byte {}: {}", name_, place.offset, sentence);
-    };
-    const std::string message = bytes_->read(place.offset, place.length);
-    const std::optional<RosImage> image = read_image(message);
-    if (!image) {
-      ++counts.corrupt;
-      blame("this image cannot be read any more");
-      return nullptr;
-    }
-    if (const auto sentence = wrong_size(image->width, image->height, camera)) {
-      ++counts.wrong_size;
-      loaded.other_size = ImageSize{static_cast<int>(image->width), static_cast<int>(image->height)};
-      blame(*sentence);
-      return nullptr;
-    }
-    auto out = std::make_shared<T>(blank(camera, static_cast<const T*>(nullptr)));
-    const std::size_t row = image->width * (image->is_depth() ? 2 : 1);
-    for (int y = 0; y < camera.height(); ++y)
-      std::memcpy(row_of(*out, y), image->pixels.data() + std::size_t{image->step} * static_cast<std::size_t>(y), row);
-    return out;
-  }
-  static Image blank(const Camera& camera, const Image*) { return {camera.width(), camera.height()}; }
-  static DepthImage blank(const Camera& camera, const DepthImage*) {
-    DepthImage out{camera.width(), camera.height(), {}};
-    out.mm.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-    return out;
-  }
-  static std::uint8_t* row_of(Image& image, int y) { return image.row(y); }
-  static std::uint16_t* row_of(DepthImage& image, int y) { return image.mm.data() + std::ptrdiff_t{y} * image.width; }
-
-  std::shared_ptr<const ByteSource> bytes_;
-  std::string name_;
-  StereoRig rig_;
-};
 
 /// Reads a record step by step; each step leaves its findings in `out`.
 class RecordReader {
@@ -133,7 +55,7 @@ class RecordReader {
     out_.info.ground_truth_poses = static_cast<int>(out_.ground_truth.size());
     describe(out_);
     if (options_.brings_rig() && out_.info.image_rate_hz > 0) out_.rig.image_rate_hz = out_.info.image_rate_hz;
-    out_.loader = std::make_unique<McapLoader>(std::move(bytes_), name_, out_.rig);
+    out_.loader = make_mcap_loader(std::move(bytes_), name_, out_.rig);
     return std::move(out_);
   }
 
@@ -190,7 +112,7 @@ class RecordReader {
     ++camera.listed;
     ends_with_image_ = true;
     FrameEntry& frame = frame_at(image->t, [&](const FrameEntry& f) { return (f.*file).empty(); });
-    frame.*file = ImagePlace{message.offset, message.data.size()}.name();
+    frame.*file = mcap_image_name(message.offset, message.data.size());
     frame.imu_before = out_.imu.size();
   }
 
@@ -222,7 +144,7 @@ class RecordReader {
     ++camera.listed;
     ends_with_image_ = true;
     FrameEntry& frame = frame_at(message.log_time, [&](FrameEntry& f) { return file_of(f).empty(); });
-    file_of(frame) = ImagePlace{message.offset, message.data.size()}.name();
+    file_of(frame) = mcap_image_name(message.offset, message.data.size());
     frame.imu_before = out_.imu.size();
     return {&frame, image->t};
   }

@@ -3,7 +3,7 @@
 // largest set of anchors that agree (docs/derivations/loop.md, L24). Pure function; the same anchors give the same bits.
 //
 //   std::vector<AnchoredPose<M>> poses = ...;                        // of the keyframes that have anchors
-//   if (auto fit = fit_anchors(poses, T_MB_now)) map.move(fit->T_AX ...);
+//   if (auto fit = fit_anchors(poses, T_XB.p)) use(Pose<A, X>{fit->q_AX, fit->p_AX});
 #pragma once
 
 #include <optional>

@@ -4,7 +4,8 @@
 //
 //   PartialPose height{.T_AB = {Quat::Identity(), Vec3(0, 0, 1.2)}};
 //   height.information(2, 2) = 1 / (0.02 * 0.02);
-//   double chi2 = squared(height, T_MB);
+//   const Vec6 r = residual(height, T_MB.q, T_MB.p);
+//   double chi2 = r.dot(height.information * r);
 #pragma once
 
 #include "fbvins/geometry/pose.hpp"

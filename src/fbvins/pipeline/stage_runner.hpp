@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only owner of threads: runs one function on a thread of its own until it returns. An exception in a stage ends neither
+// The owner of the stages' threads: runs one function on a thread of its own until it returns. An exception in a stage ends neither
 // the thread nor the program; it becomes the status that the caller sees.
 #pragma once
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/estimator/estimator_setup.hpp"
+
+#include <algorithm>
+
+#include "fbvins/camera/camera_groups.hpp"
+#include "fbvins/estimator/calibration_uncertainty.hpp"
+
+namespace fbvins {
+
+WindowWeights weights_of(const EstimatorOptions& o) {
+  WindowWeights w;
+  w.gravity_mps2 = o.gravity_mps2;
+  w.estimate_tilt = o.up == UpDirection::state;
+  w.estimate_extrinsics = o.estimate_extrinsics;
+  w.estimate_time_offset = o.estimate_time_offset;
+  w.estimate_line_delay = o.estimate_line_delay;
+  return w;
+}
+
+EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options) {
+  if (!has_stereo(rig)) options.known_landmarks.enabled = false;
+  if (rig.depth) options.estimate_extrinsics = false;
+  return options;
+}
+
+Calibration calibration_of(const StereoRig& rig) {
+  Calibration out{rig.T_BC0, rig.T_BC1, 0.0};
+  for (const MountedCamera& camera : rig.more) out.more.push_back(camera.T_BC);
+  return out;
+}
+
+double scale_sigma_of(const StereoRig& rig) {
+  if (rig.depth) return rig.depth->scale_sigma;
+  double least = 0;
+  for (const CameraGroup& group : camera_groups(rig)) {
+    if (!group.second) continue;
+    const double sigma = scale_sigma(rig.T_BC(group.first).p, rig.T_BC(*group.second).p);
+    least = least == 0 ? sigma : std::min(least, sigma);
+  }
+  return least;
+}
+
+}  // namespace fbvins

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of an estimator take from the rig and the options. Pure functions.
+#pragma once
+
+#include "fbvins/camera/camera.hpp"
+#include "fbvins/estimator/estimator_options.hpp"
+#include "fbvins/estimator/window_problem.hpp"
+
+namespace fbvins {
+
+WindowWeights weights_of(const EstimatorOptions& options);
+
+/// Where no two cameras see the same things, remembered landmarks would hold the scale at what it was thought to be when they
+/// left the window. The place of a camera that only stands for a depth sensor is none to be refined.
+EstimatorOptions for_cameras_of(const StereoRig& rig, EstimatorOptions options);
+
+/// As the rig says, with a time offset of zero: stamps are on the IMU's clock already.
+Calibration calibration_of(const StereoRig& rig);
+
+/// Relative standard deviation of the calibrated scale (W21): of the pair with the largest baseline, or of the depth sensor; 0
+/// where neither is there.
+double scale_sigma_of(const StereoRig& rig);
+
+}  // namespace fbvins
