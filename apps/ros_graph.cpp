@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/ros_graph.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -56,7 +58,9 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
   if (!parsed) return parsed.error();
   const auto name = parse_ros2_node(options.node);
   if (!name) return name.error();
-  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble);
+  const auto qos = parse_ros2_qos(options.qos);
+  if (!qos) return qos.error();
+  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble, *qos);
   if (!node) return node.error();
   graph.node_ = std::move(*node);
   return graph;
@@ -78,6 +82,12 @@ Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std
   if (!control) return control.error();
   auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);
   if (!images) return images.error();
+  if (const auto heard = parse_ros2_topics(topics_); !topics_.empty() && heard) {  // the source subscribes when it runs
+    for (const std::string& topic : heard->cameras) (void)node_->quality(topic, {});
+    for (const std::string& topic : {heard->imu, heard->depth}) (void)node_->quality(topic, {});
+  }
+  if (const std::string topic = node_->unused_wish(); !topic.empty())
+    return Error{ErrorCode::invalid_argument, fmt::format("live.ros2.qos: this flight has no topic '{}'", topic)};
   live.add_sink(std::move(*sink));
   live.add_sink(std::move(*images));
   live.add_sink(std::move(*control));
