@@ -58,7 +58,7 @@ TEST(ViewMaker, FeaturesAreThoseOfTheirCamera) {
 
 TEST(ViewMaker, WhatTheRightCameraSeesIsThereAsWell) {
   StereoRig rig = looking_ahead();
-  rig.T_BC1 = rig.T_BC0;
+  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
   ViewMaker views(rig);
   TrackedFrame frame = frame_with(Time{7}, {1, 2});
   frame.features[0].right.emplace().pixel = Vec2(3, 4);
