@@ -45,6 +45,11 @@ std::vector<RosParameter> ros_parameters(Config config) {
   return out;
 }
 
+std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options) {
+  if (!options.commands) commands.clear();
+  return commands;
+}
+
 #ifdef FBVINS_WITH_ROS2
 
 Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source, const Ros2Options& options) {
@@ -77,8 +82,7 @@ Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std
   if (!publishes_) return {};
   auto sink = Ros2Sink::create(node_, source.rig(), config.live);
   if (!sink) return sink.error();
-  if (!config.live.ros2.commands) commands.clear();
-  auto control = Ros2Control::create(node_, std::move(commands), ros_parameters(config), warn);
+  auto control = Ros2Control::create(node_, ros_commands(std::move(commands), config.live.ros2), ros_parameters(config), warn);
   if (!control) return control.error();
   auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);
   if (!images) return images.error();
