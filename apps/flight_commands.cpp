@@ -15,6 +15,22 @@ Error refused(std::string sentence) { return {ErrorCode::invalid_argument, std::
 /// A map changes, and is saved, with keyframes, which need a pose.
 bool has_pose(const LiveSystem& live) { return live.status().health.has_pose(); }
 
+std::string cannot_save_map(const MapArguments& map) {
+  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
+  if (map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
+  return {};
+}
+
+std::string cannot_load_map(const MapArguments& map) {
+  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
+  if (map.load.empty() && map.save.empty()) return "no file of a map was named: start with --map FILE or --load-map FILE";
+  return {};
+}
+
+std::string cannot_record(const LiveFlight& flight) {
+  return flight.record == nullptr ? "no file for records was named: start with --record FILE" : "";
+}
+
 void save_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
   if (const std::string why = cannot_save_map(flight.map); !why.empty()) return told(refused(why));
   if (!has_pose(live)) return told(refused("there is no pose: the map is saved with the next keyframe, which needs one"));
@@ -28,8 +44,7 @@ void save_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& t
 void load_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& told) {
   MapArguments again = flight.map;
   if (again.load.empty()) again.load = again.save;
-  if (!again.wanted()) return told(refused("this flight has no map: start it with --map FILE"));
-  if (again.load.empty()) return told(refused("no file of a map was named: start with --map FILE or --load-map FILE"));
+  if (const std::string why = cannot_load_map(flight.map); !why.empty()) return told(refused(why));
   if (!has_pose(live)) return told(refused("there is no pose: the map is loaded before the next keyframe, which needs one"));
   const bool waits = flight.kept->before_next_keyframe([=, &flight] {
     auto map = make_map(again, flight.source.rig(), flight.config.loop);
@@ -42,7 +57,7 @@ void load_map_of(const LiveFlight& flight, const LiveSystem& live, const Told& t
 }
 
 void switch_record(const LiveFlight& flight, bool on, const Told& told) {
-  if (flight.record == nullptr) return told(refused("no file for records was named: start with --record FILE"));
+  if (const std::string why = cannot_record(flight); !why.empty()) return told(refused(why));
   const Result<std::string> path = on ? flight.record->start() : flight.record->stop();
   if (path) told(fmt::format("{} {}", on ? "recording" : "the record is", *path));
   else told(path.error());
@@ -57,10 +72,10 @@ std::vector<FlightCommand> flight_commands(const LiveFlight& flight, LiveSystem&
              live.mark("reset");
              told(std::string("the estimator starts again with the next image"));
            }},
-          {"save_map", [&](const Told& told) { save_map_of(flight, live, told); }},
-          {"load_map", [&](const Told& told) { load_map_of(flight, live, told); }},
-          {"start_record", [&](const Told& told) { switch_record(flight, true, told); }},
-          {"stop_record", [&](const Told& told) { switch_record(flight, false, told); }}};
+          {"save_map", [&](const Told& told) { save_map_of(flight, live, told); }, cannot_save_map(flight.map)},
+          {"load_map", [&](const Told& told) { load_map_of(flight, live, told); }, cannot_load_map(flight.map)},
+          {"start_record", [&](const Told& told) { switch_record(flight, true, told); }, cannot_record(flight)},
+          {"stop_record", [&](const Told& told) { switch_record(flight, false, told); }, cannot_record(flight)}};
 }
 
 }  // namespace fbvins::app

@@ -68,12 +68,6 @@ void Troubles::add(const Error& error) {
   any_ = true;
 }
 
-std::string cannot_save_map(const MapArguments& map) {
-  if (!map.wanted()) return "this flight has no map: start it with --map FILE";
-  if (map.save.empty()) return "no file for the map was named: start with --map FILE or --save-map FILE";
-  return {};
-}
-
 Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTally& tally,
                          Troubles& troubles) {
   live.add_sink(tally.make_sink());
@@ -96,19 +90,12 @@ Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, L
 
 Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSystem& live) {
   if (where.empty()) return {};
-  KeptMap* map = flight.kept;
   auto page = open_live_page({.where = where,
                               .source = flight.source_name,
                               .frontend = flight.config.frontend.kind,
-                              .cannot_save_map = cannot_save_map(flight.map),
                               .q_B_vehicle = vehicle_axes(flight.config.live.mavlink.mounting),
                               .mark = [&live](std::string text) { live.mark(std::move(text)); },
-                              .save_map =
-                                  [map, file = flight.map.save](const TellPage& tell) {
-                                    (void)map->request_save([file, tell](const Result<void>& saved) {
-                                      tell(saved ? "the map is saved in " + file : saved.error().message, !saved);
-                                    });
-                                  }});
+                              .commands = flight_commands(flight, live)});
   if (!page) return page.error();
   live.add_sink(std::move(page->sink));
   return page->begin();

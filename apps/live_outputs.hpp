@@ -67,8 +67,6 @@ Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, L
                          Troubles& troubles);
 /// reset, save_map, load_map, start_record and stop_record. `flight` and `live` must outlive them.
 std::vector<FlightCommand> flight_commands(const LiveFlight& flight, LiveSystem& live);
-/// Why the map cannot be saved on request; empty: it can.
-std::string cannot_save_map(const MapArguments& map);
 /// The page, which serves when all sinks are there: its viewers' commands reach them.
 Result<void> add_page(const std::string& where, const LiveFlight& flight, LiveSystem& live);
 

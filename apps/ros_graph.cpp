@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/ros_graph.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -43,6 +45,11 @@ std::vector<RosParameter> ros_parameters(Config config) {
   return out;
 }
 
+std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options) {
+  if (!options.commands) commands.clear();
+  return commands;
+}
+
 #ifdef FBVINS_WITH_ROS2
 
 Result<RosGraph> RosGraph::join(const std::string& address, const std::string& source, const Ros2Options& options) {
@@ -56,7 +63,9 @@ Result<RosGraph> RosGraph::join(const std::string& address, const std::string& s
   if (!parsed) return parsed.error();
   const auto name = parse_ros2_node(options.node);
   if (!name) return name.error();
-  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble);
+  const auto qos = parse_ros2_qos(options.qos);
+  if (!qos) return qos.error();
+  auto node = Ros2Node::join(*parsed, *name, options.distribution == Ros2Distribution::humble, *qos);
   if (!node) return node.error();
   graph.node_ = std::move(*node);
   return graph;
@@ -73,11 +82,16 @@ Result<void> RosGraph::add_sinks(const Source& source, const Config& config, std
   if (!publishes_) return {};
   auto sink = Ros2Sink::create(node_, source.rig(), config.live);
   if (!sink) return sink.error();
-  if (!config.live.ros2.commands) commands.clear();
-  auto control = Ros2Control::create(node_, std::move(commands), ros_parameters(config), warn);
+  auto control = Ros2Control::create(node_, ros_commands(std::move(commands), config.live.ros2), ros_parameters(config), warn);
   if (!control) return control.error();
   auto images = Ros2ImageSink::create(node_, source.rig(), config.live.ros2);
   if (!images) return images.error();
+  if (const auto heard = parse_ros2_topics(topics_); !topics_.empty() && heard) {  // the source subscribes when it runs
+    for (const std::string& topic : heard->cameras) (void)node_->quality(topic, {});
+    for (const std::string& topic : {heard->imu, heard->depth}) (void)node_->quality(topic, {});
+  }
+  if (const std::string topic = node_->unused_wish(); !topic.empty())
+    return Error{ErrorCode::invalid_argument, fmt::format("live.ros2.qos: this flight has no topic '{}'", topic)};
   live.add_sink(std::move(*sink));
   live.add_sink(std::move(*images));
   live.add_sink(std::move(*control));

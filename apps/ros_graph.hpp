@@ -23,6 +23,9 @@ namespace fbvins::app {
 /// The options that ROS 2 shows as parameters: those for users (`fbvins config`), and all of `live`.
 std::vector<RosParameter> ros_parameters(Config config);
 
+/// What everybody in the domain may ask of the flight: nothing where the user does not want that (live.ros2.commands).
+std::vector<FlightCommand> ros_commands(std::vector<FlightCommand> commands, const Ros2Options& options);
+
 class RosGraph {
  public:
   /// `address`: DOMAIN[:INTERFACE], empty: publish nothing. `source`: the flight's source, of any kind.

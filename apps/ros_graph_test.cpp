@@ -29,6 +29,15 @@ TEST(RosParameters, AreTheUsersOptionsAndAllOfLive) {
   EXPECT_EQ(find("estimator.max_pending_m").name, "") << "for experts";
 }
 
+TEST(RosCommands, AreNoneWhereTheUserWantsNone) {
+  Config config;
+  const std::vector<FlightCommand> all = {{"reset", [](const FlightCommand::Told&) {}},
+                                          {"save_map", [](const FlightCommand::Told&) {}}};
+  EXPECT_EQ(ros_commands(all, config.live.ros2).size(), 2u);
+  config.live.ros2.commands = false;
+  EXPECT_TRUE(ros_commands(all, config.live.ros2).empty());
+}
+
 TEST(RosGraph, WithoutAnAddressThereIsNone) {
   const auto graph = RosGraph::join("", "replay:nothing", {});
   ASSERT_TRUE(graph) << graph.error().message;

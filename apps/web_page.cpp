@@ -76,17 +76,12 @@ Result<void> show_finished_flight(const std::string& path, const std::string& re
 Result<LivePage> open_live_page(LivePageOptions options) {
   WebFlight flight{.source = std::move(options.source), .frontend = std::move(options.frontend)};
   flight.can_mark = true;
-  flight.cannot_save_map = std::move(options.cannot_save_map);
   flight.q_B_vehicle = options.q_B_vehicle;
   auto web = web_options(options.where);
   if (!web) return web.error();
   web->try_again = kTryAgain;
-  const auto page_of = std::make_shared<WebSink*>(nullptr);  // known once the sink is there, before it serves
-  const auto save_map = [page_of, save = std::move(options.save_map)] {
-    save([page_of](const std::string& sentence, bool bad) { (*page_of)->tell(sentence, bad); });
-  };
-  auto sink = WebSink::prepare(*web, described(std::move(flight)), {.mark = std::move(options.mark), .save_map = save_map});
-  *page_of = sink.get();
+  auto sink = WebSink::prepare(*web, described(std::move(flight)),
+                               {.mark = std::move(options.mark), .commands = std::move(options.commands)});
   LivePage page;
   page.begin = [to = sink.get()] { return begin(*to); };
   page.sink = std::move(sink);

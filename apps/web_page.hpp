@@ -5,9 +5,12 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "fbvins/core/result.hpp"
+#include "fbvins/live/flight_command.hpp"
 #include "fbvins/live/sink.hpp"
 
 namespace fbvins::app {
@@ -25,14 +28,11 @@ struct LivePage {
   std::unique_ptr<Sink> sink;
   std::function<Result<void>()> begin;
 };
-/// Shows a sentence on the page; from any thread, as long as the sink lives.
-using TellPage = std::function<void(const std::string& sentence, bool bad)>;
 struct LivePageOptions {
   std::string where, source, frontend;
-  std::string cannot_save_map;      ///< why not; empty: it can
   std::optional<Quat> q_B_vehicle;  ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
   std::function<void(std::string)> mark;
-  std::function<void(const TellPage& tell)> save_map;
+  std::vector<FlightCommand> commands;
 };
 Result<LivePage> open_live_page(LivePageOptions options);
 

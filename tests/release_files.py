@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""packaging/apt_repository and packaging/bill_of_materials.py, on two small packages: apt itself takes what is in the repository, and
+"""packaging/site/versions.py, and packaging/apt_repository and packaging/bill_of_materials.py on two small packages: apt itself takes what is in the repository, and
 nothing that was altered; PyPI's spdx-tools reads the bill, where they are installed.
 
 usage: release_files.py [PYTHON]     exit 77 (skipped) without GnuPG, apt-utils or dpkg-dev
@@ -111,6 +111,21 @@ def check_bill(folder, packages):
     require(run(python, "-c", code, file).stdout.strip() == "", "spdx-tools: " + run(python, "-c", code, file).stdout)
 
 
+def check_site_versions(folder):
+    site = folder / "site"
+    script = REPOSITORY / "packaging/site/versions.py"
+    site.mkdir()
+    run(sys.executable, script, site, ok=False)
+    for version in ("0.9.0", "next", "0.10.0", "assets"):
+        (site / version).mkdir()
+        if version != "assets":
+            (site / version / "index.html").write_text(version)
+    run(sys.executable, script, site)
+    listed = [v["version"] for v in json.loads((site / "versions.json").read_text(encoding="utf-8"))]
+    require(listed == ["0.10.0", "0.9.0", "next"], f"versions of the site: {listed}")
+    require("url=0.10.0/index.html" in (site / "index.html").read_text(encoding="utf-8"), "the site's first page leads to the newest release")
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -119,6 +134,7 @@ def main():
         packages = [package(built, architecture) for architecture in ("amd64", "arm64")]
         check_bill(folder, packages)
         check_repository(folder, packages)
+        check_site_versions(folder)
     return 0
 
 

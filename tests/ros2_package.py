@@ -52,7 +52,7 @@ def stand_ins():
                "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess", "IncludeLaunchDescription", "OpaqueFunction", "SetEnvironmentVariable", "Shutdown", "TimerAction"],
                "launch.conditions": ["IfCondition"], "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
                "launch.substitutions": ["EnvironmentVariable", "LaunchConfiguration", "PathJoinSubstitution", "ThisLaunchFileDir"],
-               "launch_ros": [], "launch_ros.actions": ["Node"], "launch_ros.substitutions": ["FindPackageShare"]}
+               "launch_ros": [], "launch_ros.actions": ["ComposableNodeContainer", "LoadComposableNodes", "Node"], "launch_ros.descriptions": ["ComposableNode"], "launch_ros.substitutions": ["FindPackageShare"]}
     for module, names in classes.items():
         sys.modules[module] = types.ModuleType(module)
         for name in names:
@@ -86,6 +86,8 @@ def processes(folder, name, given):
             commands += more
             require(set(passed) <= known, f"{name}: {other} has no argument {set(passed) - known}")
             declared |= known
+        elif kind in ("ComposableNodeContainer", "LoadComposableNodes"):
+            commands.append(action.named)
         else:
             require(kind in ("SetEnvironmentVariable", "Node"), f"{name}: {kind}")
     return commands, declared
@@ -100,7 +102,7 @@ def check_launch_files(root, program):
     expected = {("live.launch.py", ""): ["socket:/run/fbvins.sock"], ("d435i.launch.py", ""): ["d435i"], ("d435i.launch.py", "bridge"): ["socket:/tmp/fbvins.sock"],
                 ("topics.launch.py", ""): ["ros2:/camera/infra1/image_rect_raw,/camera/infra2/image_rect_raw,/camera/imu"],
                 ("topics.launch.py", "bag"): ["ros2:/camera/infra1/image_rect_raw,/camera/infra2/image_rect_raw,/camera/imu"]}
-    require({name for name, _ in expected} == {f.name for f in folder.glob("*")}, "a launch file that this test does not know")
+    require({name for name, _ in expected} | {"component.launch.py"} == {f.name for f in folder.glob("*")}, "a launch file that this test does not know")
     for (name, more), sources in expected.items():
         for given in ({}, full):
             commands, declared = processes(folder, name, {**given, **({more: "x.py"} if more else {})})
@@ -113,6 +115,27 @@ def check_launch_files(root, program):
             address = live[0][live[0].index("--ros2") + 1]
             require(address == ("0:eth0" if given else "0"), f"{name}: {address}")
             require(not given or live[0][-3:] == ["--map", "flat one.fbm", "--quiet"], f"{name}: {live[0]}")
+
+
+def check_component(root):
+    """What the launch file gives the component is what its source declares, and what it is built with is in package.xml."""
+    source = (root / "ros2/src/fbvins_component.cpp").read_text(encoding="utf-8")
+    known = set(re.findall(r'declare_parameter<[^(]*>\(\s*"(\w+)"', source))
+    require(len(known) == 6, f"parameters of the component: {known}")
+    for given, where, images in (({}, "name", 2), ({"container": "/camera/container", "right": ""}, "target_container", 1)):
+        loaded, = processes(root / "ros2/launch", "component.launch.py", {"calibration": "chain.yaml", **given})[0]
+        node, = loaded["composable_node_descriptions"]
+        parameters, = node.named["parameters"]
+        require(where in loaded and len(parameters["images"]) == images and parameters["calibration"] == "chain.yaml", f"component.launch.py: {parameters}")
+        require(set(parameters) <= known, f"component.launch.py: the component has no parameter {set(parameters) - known}")
+        require(node.named["extra_arguments"] == [{"use_intra_process_comms": True}], "images without a copy")
+        require(f"RCLCPP_COMPONENTS_REGISTER_NODE({node.named['plugin']})" in source, f"component.launch.py: {node.named['plugin']}")
+    build = (root / "ros2/CMakeLists.txt").read_text(encoding="utf-8")
+    used = {"rclcpp", "rclcpp_components", *re.search(r"set\(messages ([a-z0-9_ ]+)\)", build)[1].split()}
+    depends = {d.text for d in ElementTree.parse(root / "ros2/package.xml").getroot().findall("depend")}
+    require(used == depends, f"package.xml and CMakeLists.txt differ in {used ^ depends}")
+    included = set(re.findall(r"#include <(\w+)/(?:msg|srv)/", source)) - {"fbvins"}
+    require(included <= depends, f"package.xml lacks {included - depends}")
 
 
 def check_package(root):
@@ -165,6 +188,7 @@ def main():
     program, root = sys.argv[1], pathlib.Path(sys.argv[2])
     how = check_package(root)
     check_launch_files(root, program)
+    check_component(root)
     check_displays(root)
     print(f"package.xml read ({how}); launch files and displays are consistent with fbvins live")
 

@@ -173,6 +173,37 @@ class WebInBrowser(unittest.TestCase):
         self.assertEqual([f for f in page.faults() if "ERR_CONNECTION" not in f], [])
         self.check_record(record, live)
 
+    def test_record_and_reset_from_the_page_and_the_link_of_a_flight_controller(self):
+        record = self.folder / "asked.mcap"
+        program, address = self.serve("live", "--source", f"replay:{self.flight}", "--laps", "20", "--frontend", "klt", "--record", record,
+                                      "--record-on-request", "--mavlink", f"udp:127.0.0.1:{free_port()}:{free_port()}", "--quiet")
+        page = self.browser.open(address, **DESKTOP)
+        page.wait_for("document.getElementById('health').dataset.state === 'good'")
+        page.wait_for(HAS_IMAGE)
+        page.value("document.querySelector('#camera-choice [data-camera=\"1\"]').click()")
+        page.wait_for(f"document.getElementById('image').dataset.camera === '1' && {HAS_IMAGE}")
+        page.wait_for("document.getElementById('link').textContent.startsWith('not heard, 0 poses')")
+        self.assertEqual(page.text("clocks"), "not known: no poses are sent")
+        self.assertEqual(page.text("record-words"), "not being recorded")
+        self.assertFalse(record.exists())
+        page.click("record")
+        page.wait_for("document.getElementById('record').textContent === 'Stop record'")
+        page.wait_for("/^asked.mcap, \\d+\\.\\d MB; \\d+ [MG]B free$/.test(document.getElementById('record-words').textContent)")
+        page.click("record")
+        page.wait_for("document.getElementById('record').textContent === 'Record'")
+        self.assertGreater(record.stat().st_size, 1000)
+        page.click("reset")
+        page.wait_for("document.getElementById('reset-dialog').open")
+        page.value("document.querySelector('#reset-dialog [value=no]').click()")
+        time.sleep(1.5)
+        self.assertEqual(page.text("resets"), "0", "it was cancelled")
+        page.click("reset")
+        page.value("document.querySelector('#reset-dialog [value=yes]').click()")
+        page.wait_for("document.getElementById('resets').textContent === '1'")
+        self.check_alone(page, address)
+        program.send_signal(signal.SIGINT)
+        self.assertEqual(program.wait(timeout=60), 0)
+
     def check_record(self, record, live):
         program, address = self.serve("view", record)
         page = self.browser.open(address, **DESKTOP)

@@ -51,6 +51,20 @@ function seen(...names) {
   for (const name of names) for (const entry of document.querySelectorAll(`[data-key="${name}"]`)) entry.hidden = false;
 }
 
+/// A button for what the flight can be asked to do; `never` says why it cannot, and is absent where there is no such command.
+function offer(id, never, title) {
+  element(id).hidden = never === undefined;
+  element(id).disabled = never !== "";
+  element(id).title = never || title;
+}
+
+/// Whether a record is being written is in the status.
+function showRecording(outputs = []) {
+  const recording = outputs.some(output => output.recording);
+  element("record").textContent = recording ? "Stop record" : "Record";
+  element("record").dataset.does = recording ? "stop_record" : "start_record";
+}
+
 function clear() {
   for (const entry of document.querySelectorAll("[data-key]")) entry.hidden = true;
   newest_s = -Infinity;
@@ -69,9 +83,9 @@ const on = {
     element("source").title = `${message.program}: ${message.source}`;
     element("mark").disabled = !message.can_mark;
     element("mark").hidden = message.replay;
-    element("save-map").hidden = message.replay;
-    element("save-map").disabled = !message.can_save_map;
-    element("save-map").title = message.cannot_save_map || "Writes the map after the next keyframe";
+    offer("save-map", message.commands.save_map, "Writes the map after the next keyframe");
+    offer("record", message.commands.start_record, "Begins or ends a flight record");
+    offer("reset", message.commands.reset, element("reset").title);
     showHealth("none", "No image has come yet.", "Waiting");
     if (!message.replay) return;
     timeline.total_s = message.duration_s;
@@ -113,6 +127,7 @@ const on = {
   },
   status({ t_s, status }) {
     showStatus(status);
+    showRecording(status.outputs);
     // Between images health changes when sensors are silent.
     if (status.health !== element("health").dataset.state) {
       showHealth(status.health, healthSentence({ ...status, sigma_m: NaN }));
@@ -124,6 +139,7 @@ const on = {
   },
   map(message) {
     showMap(message);
+    if (message.found) note("The map is known again.", false, false);
     if (message.corrected_m) scene.showMapped(message.corrected_m);
   },
   mark({ t_s, text }) {
@@ -160,6 +176,12 @@ const player = new Player(stream);
 element("token-dialog").addEventListener("close", () => stream.useToken(element("token").value));
 element("mark").addEventListener("click", () => stream.send({ do: "mark", text: "" }));
 element("save-map").addEventListener("click", () => { stream.send({ do: "save_map" }); note("The map will be saved after the next keyframe.", false, false); });
+element("record").addEventListener("click", event => stream.send({ do: event.currentTarget.dataset.does ?? "start_record" }));
+element("reset").addEventListener("click", () => {
+  element("reset-dialog").returnValue = "";  // that of the time before
+  element("reset-dialog").showModal();
+});
+element("reset-dialog").addEventListener("close", event => { if (event.currentTarget.returnValue === "yes") stream.send({ do: "reset" }); });
 element("follow").addEventListener("click", event => {
   scene.follows = !scene.follows;
   event.currentTarget.setAttribute("aria-pressed", String(scene.follows));

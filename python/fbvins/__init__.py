@@ -37,6 +37,10 @@ __all__ = ["Booster", "Camera", "Config", "DepthSensor", "Diagnosis", "ErrorStat
            "calibration", "config", "convert", "doctor", "evaluate", "info", "load_map", "open", "orb", "report", "run", "simulate", "simulation_presets"]
 
 
+def __dir__() -> Iterable[str]:
+    return sorted(__all__)
+
+
 def _assignments(options: Mapping, prefix: str = "") -> Iterable[str]:
     for name, value in options.items():
         if isinstance(value, Mapping):

@@ -101,6 +101,8 @@ class Run:
         for name in STATISTICS:
             kept = numpy.isin(values[name]["t"], values["t"])
             values[name] = {column: numbers[kept] for column, numbers in values[name].items()}
+        whole = values["text"].split("\n", 1)[0]
+        values["text"] = f"{len(which)} images, {int(values['has_pose'].sum())} of them with a pose, out of the {len(self)} of: {whole}"
         values["name"] = f"<fbvins.Run of {len(which)} images out of {values['name'].strip('<>')}>"
         return Run(None, values)
 

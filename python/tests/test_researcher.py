@@ -53,6 +53,7 @@ def test_results_have_parts(run):
     part = run[20:40]
     assert len(run) == 60 and len(part) == 20 and same(part.p, run.p[20:40]) and list(part.t) == list(run.t[20:40])
     assert np.array_equal(part.trajectory.t, part.t[part.has_pose]) and len(part.frontend_statistics["t"]) == 20
+    assert str(part).startswith(f"20 images, {part.has_pose.sum()} of them with a pose, out of the 60 of: ") and "RMSE" not in str(part), "not the figures of the whole flight"
     assert "20 images out of" in repr(part) and np.array_equal(run[run.has_pose].p, run.trajectory.p)
     trajectory = run.trajectory
     assert np.array_equal(trajectory[::5].p, trajectory.p[::5]) and len(trajectory[trajectory.p[:, 0] > 0]) == np.sum(trajectory.p[:, 0] > 0)

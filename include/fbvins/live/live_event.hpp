@@ -74,6 +74,16 @@ struct LatencySummary {
   std::int64_t count = 0;
 };
 
+/// What people want to see of an output: {"clock_known", true}, {"round_trip_ms", 1.2}.
+struct OutputFigure {
+  std::string name;
+  std::variant<bool, std::int64_t, double, std::string> value;
+};
+struct OutputFigures {
+  std::string output;  ///< Sink::name()
+  std::vector<OutputFigure> figures;
+};
+
 /// Whenever health changes, and once a second.
 struct LiveStatus {
   Time t;       ///< newest stamp of any sensor
@@ -81,9 +91,10 @@ struct LiveStatus {
   Health health;
   std::uint32_t reset_counter = 0;
   LiveCounts counts;
-  LatencySummary shutter_to_pose;  ///< from the image's stamp to the estimator's answer
-  LatencySummary pose_age;         ///< of the newest estimate, taken at every IMU reading
-  std::string problem;             ///< of a sink or a source, in one sentence; empty: none
+  LatencySummary shutter_to_pose;           ///< from the image's stamp to the estimator's answer
+  LatencySummary pose_age;                  ///< of the newest estimate, taken at every IMU reading
+  std::string problem;                      ///< of a sink or a source, in one sentence; empty: none
+  std::vector<OutputFigures> outputs = {};  ///< of the sinks that have figures
 };
 
 /// For display: an image's features, and the window. Comes before the image's Odometry, where a sink wants_views().
@@ -99,11 +110,12 @@ struct LiveView {
     TrackId track;
     Vec3 p_W = Vec3::Zero();  ///< m, moved from the gauge to the published frame
   };
-  Time t;                           ///< of the image
-  double shutter_to_pose_ms = 0;    ///< from the image's stamp to the estimator's answer
-  std::vector<Feature> features;    ///< in the newest image
-  std::vector<Landmark> landmarks;  ///< of the window; without a pose none
-  std::vector<Vec3> keyframes_W;    ///< the window's, oldest first; likewise
+  Time t;                                    ///< of the image
+  double shutter_to_pose_ms = 0;             ///< from the image's stamp to the estimator's answer
+  std::vector<Feature> features;             ///< in the newest image
+  std::vector<Landmark> landmarks;           ///< of the window; without a pose none
+  std::vector<Vec3> keyframes_W;             ///< the window's, oldest first; likewise
+  std::vector<Feature> right_features = {};  ///< of `features`, those also seen by the right camera of their pair, there
 };
 
 /// A moment marked by the user, to find it again.

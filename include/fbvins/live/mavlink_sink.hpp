@@ -24,6 +24,7 @@ struct MavlinkLinkState {
   bool flight_controller = false;  ///< heard within the last three seconds
   bool clock_known = false;        ///< its clock is known, and was confirmed lately
   double clock_offset_s = 0;       ///< its clock less CLOCK_MONOTONIC
+  double round_trip_ms = 0;        ///< of the requests that compare the clocks, median of the newest; 0: not known
   std::int64_t poses_sent = 0, frames_sent = 0, frames_dropped = 0, frames_received = 0;
   std::int64_t poses_withheld = 0;   ///< due while the flight controller's clock was not sure
   std::int64_t frames_refused = 0;   ///< not signed with the key
@@ -42,6 +43,7 @@ class MavlinkSink final : public Sink {
   std::string_view name() const override;
   Result<void> take(const LiveEvent& event) override;
   std::string problem() const override;
+  std::vector<OutputFigure> figures() const override;
   Result<void> finish() override;
   MavlinkLinkState state() const;
 

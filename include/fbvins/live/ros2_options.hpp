@@ -20,6 +20,7 @@ struct Ros2Options {
   Ros2Clock clock = Ros2Clock::sensors;
   Ros2Distribution distribution = Ros2Distribution::iron;
   bool commands = true;
+  std::string qos = {};
 
   template <class V>
   void visit(V&& v) {
@@ -33,6 +34,9 @@ struct Ros2Options {
     v("distribution", distribution, "iron|humble", "ROS's distribution whose tools show the node; iron: that and all later ones");
     v("commands", commands, "",
       "whether all in the domain may reset the estimator, save and load the map, and record, by services");
+    v("qos", qos, "",
+      "other qualities of service: TOPIC=SETTING/SETTING..., separated by commas; settings are reliable, best_effort, transient_local, "
+      "volatile and the length of the queue");
   }
 };
 

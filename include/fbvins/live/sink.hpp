@@ -15,6 +15,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/live/live_event.hpp"
@@ -33,6 +34,8 @@ class Sink {
   virtual bool wants_views() const { return false; }
   /// A problem that may pass, such as an unplugged cable, in one sentence for the status. Empty: none. From any thread.
   virtual std::string problem() const { return {}; }
+  /// For displays, asked once a second. From any thread, and without waiting for a disk or a network.
+  virtual std::vector<OutputFigure> figures() const { return {}; }
   /// The last call: close what is open.
   virtual Result<void> finish() { return {}; }
 };

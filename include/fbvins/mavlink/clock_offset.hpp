@@ -20,6 +20,8 @@ class ClockOffset {
   bool known() const { return answers_.size() >= kEnough; }
   /// Theirs less ours; only where known().
   Duration value() const { return value_; }
+  /// Median of the newest answers; only where known().
+  Duration round_trip() const;
   /// The newest answers contradict the value: the other clock may have begun anew.
   bool in_doubt() const { return !strays_.empty(); }
   /// How often the other clock jumped, as it does when that machine restarts.

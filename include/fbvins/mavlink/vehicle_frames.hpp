@@ -16,10 +16,13 @@
 namespace fbvins {
 
 struct BodyFrd {};   ///< the vehicle: x forward, y right, z down, origin at the flight controller
+struct BaseLink {};  ///< the same vehicle as ROS has it (REP 105): x forward, y left, z up; where there is none, the IMU
 struct LocalFrd {};  ///< z down; see LocalOrigin
 
 /// Pose of the IMU on the vehicle.
 Pose<BodyFrd, B> mounting(const MountingOptions& options);
+/// The same mounting in ROS's axes.
+Pose<B, BaseLink> base_link(const MountingOptions& options);
 
 struct VehicleState {
   Pose<LocalFrd, BodyFrd> T_LF;

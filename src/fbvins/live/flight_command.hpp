@@ -14,6 +14,7 @@ struct FlightCommand {
   using Told = std::function<void(const Result<std::string>& done)>;
   std::string name;  ///< "save_map"
   std::function<void(Told told)> act;
+  std::string never = {};  ///< why this flight cannot do it at all, in one sentence; empty: it can
 };
 
 }  // namespace fbvins

@@ -41,9 +41,11 @@ class Hub::Lane {
 
   SinkReport report() const {
     std::string passing = sink_->problem();
+    std::vector<OutputFigure> figures = sink_->figures();
     const std::lock_guard lock(mutex_);
     SinkReport report = report_;
     report.passing = std::move(passing);
+    report.figures = std::move(figures);
     return report;
   }
 

@@ -29,6 +29,7 @@ class Hub {
     std::int64_t taken = 0, dropped = 0;
     std::string problem;  ///< its first error; empty: none
     std::string passing;  ///< Sink::problem()
+    std::vector<OutputFigure> figures;
   };
 
   Hub() : Hub(Limits{}) {}

@@ -157,6 +157,7 @@ struct LiveSystem::Impl {
       s.counts.events_lost += report.dropped;
       const std::string& problem = report.problem.empty() ? report.passing : report.problem;
       if (!problem.empty()) s.problem = report.name + ": " + problem;
+      if (!report.figures.empty()) s.outputs.push_back({report.name, report.figures});
     }
     if (const Result<void> state = system.status(); !state) s.problem = state.error().message;
     const std::lock_guard lock(pose_mutex);

@@ -137,6 +137,7 @@ void MavlinkSink::Impl::publish(Time now) {
   seen.flight_controller = session.flight_controller_heard(now);
   seen.clock_known = session.clock_is_sure(now);
   seen.clock_offset_s = seen.clock_known ? session.clock().value().seconds() : 0;
+  seen.round_trip_ms = session.clock().known() ? session.clock().round_trip().seconds() * 1e3 : 0;
   seen.poses_sent = session.poses();
   seen.frames_received = session.frames_received();
   seen.poses_withheld = session.poses_withheld();
@@ -201,6 +202,13 @@ Result<void> MavlinkSink::take(const LiveEvent& event) {
 }
 
 std::string MavlinkSink::problem() const { return state().problem; }
+
+std::vector<OutputFigure> MavlinkSink::figures() const {
+  const MavlinkLinkState s = state();
+  return {{"connected", s.connected},           {"flight_controller", s.flight_controller}, {"clock_known", s.clock_known},
+          {"clock_offset_s", s.clock_offset_s}, {"round_trip_ms", s.round_trip_ms},         {"poses_sent", s.poses_sent},
+          {"poses_withheld", s.poses_withheld}, {"frames_dropped", s.frames_dropped}};
+}
 
 Result<void> MavlinkSink::finish() {
   impl_->stop();

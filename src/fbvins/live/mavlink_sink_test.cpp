@@ -131,6 +131,10 @@ TEST(MavlinkSink, OverUdpPosesComeAndTheClockIsFound) {
   }));
   EXPECT_NEAR((*sink)->state().clock_offset_s, 1000, 1);
   EXPECT_TRUE((*sink)->state().flight_controller);
+  EXPECT_GE((*sink)->state().round_trip_ms, 0);
+  EXPECT_LT((*sink)->state().round_trip_ms, 200);
+  EXPECT_EQ((*sink)->figures()[2].name, "clock_known");
+  EXPECT_TRUE(std::get<bool>((*sink)->figures()[2].value));
   EXPECT_TRUE((*sink)->finish());
 }
 

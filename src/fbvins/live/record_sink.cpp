@@ -87,6 +87,7 @@ Result<std::unique_ptr<RecordSink>> RecordSink::create_next(const std::string& p
 
 RecordSink::RecordSink(std::string path, FlightRecord record, RecordSpace space)
     : path_(std::move(path)), name_("record " + path_), space_(std::move(space)), record_(std::move(record)) {
+  measure();
   flusher_ = std::thread([this] { keep_flushing(); });
 }
 
@@ -108,9 +109,21 @@ Result<void> RecordSink::finish() {
   return flushed ? done : flushed;
 }
 
+std::vector<OutputFigure> RecordSink::figures() const {
+  return {{"file", path_},
+          {"written_mb", static_cast<double>(written_bytes_) * 1e-6},
+          {"free_mb", static_cast<double>(free_bytes_) * 1e-6}};
+}
+
+void RecordSink::measure() {
+  std::error_code error;
+  free_bytes_ = space_.free_bytes(path_);
+  if (const std::uintmax_t size = std::filesystem::file_size(path_, error); !error) written_bytes_ = size;
+}
+
 /// With the mutex held. The error is that of the next call, so that the status says it.
 void RecordSink::end_if_disk_is_full() {
-  if (whole_ || space_.free_bytes(path_) >= space_.keep_free_bytes) return;
+  if (whole_ || free_bytes_ >= space_.keep_free_bytes) return;
   (void)record_.finish();
   whole_ = true;
   flushed_ = Error{ErrorCode::unwritable, "the record has ended: " + no_space(space_)};
@@ -122,6 +135,7 @@ void RecordSink::keep_flushing() {
   for (int i = 1; !ending_.wait_for(lock, kFlushPeriod, [&] { return ended_; }); ++i) {
     if (whole_) continue;
     if (Result<void> flushed = record_.flush(); !flushed) flushed_ = flushed;
+    measure();
     end_if_disk_is_full();
     if (i % kFlushesPerSync != 0) continue;
     lock.unlock();  // a slow disk does not hold up the writing

@@ -8,6 +8,7 @@
 // The record ends, whole, while there is still space on the disk for what matters more (maps, the IMU's state).
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -44,12 +45,15 @@ class RecordSink final : public Sink {
   std::string_view name() const override { return name_; }
   bool wants_views() const override { return true; }
   Result<void> take(const LiveEvent& event) override;
+  /// The file, its size, and what is free on its disk, as of the last flush.
+  std::vector<OutputFigure> figures() const override;
   Result<void> finish() override;
   const std::string& path() const { return path_; }
 
  private:
   RecordSink(std::string path, FlightRecord record, RecordSpace space);
   void keep_flushing();
+  void measure();
   void end_if_disk_is_full();
   void stop_flushing();
 
@@ -61,6 +65,7 @@ class RecordSink final : public Sink {
   Result<void> flushed_;  // guarded by mutex_
   bool ended_ = false;    // guarded by mutex_
   bool whole_ = false;    // guarded by mutex_; nothing more is taken
+  std::atomic<std::uint64_t> free_bytes_, written_bytes_{0};
   std::thread flusher_;
 };
 

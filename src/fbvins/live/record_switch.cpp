@@ -35,6 +35,14 @@ std::string RecordSwitch::problem() const {
   return problem_;
 }
 
+std::vector<OutputFigure> RecordSwitch::figures() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<OutputFigure> figures{{"recording", record_ != nullptr}};
+  if (record_)
+    for (OutputFigure& figure : record_->figures()) figures.push_back(std::move(figure));
+  return figures;
+}
+
 Result<void> RecordSwitch::finish() {
   on_ = false;
   const std::lock_guard lock(mutex_);

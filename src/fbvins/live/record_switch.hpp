@@ -6,7 +6,7 @@
 //   live->add_sink(std::move(record));
 //   Result<std::string> ended = ...->stop();
 //
-// Threads: start(), stop() and problem() from any.
+// Threads: start(), stop(), problem() and figures() from any.
 #pragma once
 
 #include <atomic>
@@ -34,6 +34,7 @@ class RecordSwitch final : public Sink {
   Result<void> take(const LiveEvent& event) override;
   /// Why no record could be begun, until one can.
   std::string problem() const override;
+  std::vector<OutputFigure> figures() const override;
   Result<void> finish() override;
 
  private:

@@ -48,10 +48,17 @@ class RecordSwitchTest : public ::testing::Test {
 TEST_F(RecordSwitchTest, EachStretchIsARecordOfItsOwn) {
   take(2);
   EXPECT_FALSE(record.wants_views());
+  ASSERT_EQ(record.figures().size(), 1u);
+  EXPECT_EQ(std::get<bool>(record.figures()[0].value), false);
   EXPECT_FALSE(record.stop()) << "nothing has begun";
   EXPECT_EQ(*record.start(), path);
   EXPECT_TRUE(record.wants_views());
   take(3);
+  const std::vector<OutputFigure> figures = record.figures();
+  ASSERT_EQ(figures.size(), 4u);
+  EXPECT_EQ(std::get<bool>(figures[0].value), true);
+  EXPECT_EQ(std::get<std::string>(figures[1].value), path);
+  EXPECT_GT(std::get<double>(figures[3].value), 0) << figures[3].name;
   const Result<std::string> twice = record.start();
   ASSERT_FALSE(twice);
   EXPECT_NE(twice.error().message.find(path), std::string::npos);

@@ -14,6 +14,13 @@ nlohmann::ordered_json to_json(const LatencySummary& s) {
   return {{"p50", s.p50_ms}, {"p99", s.p99_ms}, {"max", s.max_ms}, {"count", s.count}};
 }
 
+nlohmann::ordered_json to_json(const OutputFigures& output) {
+  nlohmann::ordered_json json{{"output", output.output}};
+  for (const OutputFigure& figure : output.figures)
+    std::visit([&](const auto& value) { json[figure.name] = value; }, figure.value);
+  return json;
+}
+
 }  // namespace
 
 std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
@@ -36,6 +43,7 @@ std::string to_json_line(const LiveStatus& status, const LivePose& newest) {
   status.counts.visit([&](const char* name, std::int64_t count) { json["counts"][name] = count; });
   json["shutter_to_pose_ms"] = to_json(status.shutter_to_pose);
   json["pose_age_ms"] = to_json(status.pose_age);
+  for (const OutputFigures& output : status.outputs) json["outputs"].push_back(to_json(output));
   if (!status.problem.empty()) json["problem"] = status.problem;
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }

@@ -26,6 +26,12 @@ TEST(StatusLine, IsJsonWithThePoseOnlyWhereThereIsOne) {
   EXPECT_EQ(without["counts"]["images_dropped"], 7);
   EXPECT_EQ(without["problem"], status.problem);
   EXPECT_FALSE(without.contains("level"));
+  EXPECT_FALSE(without.contains("outputs"));
+  status.outputs = {
+      {"mavlink udp", {{"clock_known", true}, {"round_trip_ms", 1.5}, {"poses_sent", std::int64_t{7}}, {"file", "a"}}}};
+  EXPECT_EQ(
+      nlohmann::json::parse(to_json_line(status, pose))["outputs"],
+      nlohmann::json::parse(R"([{"output":"mavlink udp","clock_known":true,"round_trip_ms":1.5,"poses_sent":7,"file":"a"}])"));
   pose.health = status.health;
   pose.tilt_sigma_rad = 0.01;
   EXPECT_EQ(nlohmann::json::parse(to_json_line(status, pose))["tilt_sigma_rad"], 0.01);

@@ -11,14 +11,22 @@ namespace fbvins {
 void ViewMaker::add(const TrackedFrame& frame) {
   t_ = frame.t;
   features_.clear();
+  right_features_.clear();
   features_.reserve(frame.features.size());
-  for (const TrackedFeature& feature : frame.features)
+  right_features_.reserve(frame.features.size());
+  for (const TrackedFeature& feature : frame.features) {
     if (feature.left) features_.push_back({feature.id, feature.left->pixel, feature.age_frames, 0, feature.cameras.left});
+    if (feature.right)
+      right_features_.push_back({feature.id, feature.right->pixel, feature.age_frames, 0, feature.cameras.right});
+  }
 }
 
 LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {
-  LiveView view{o.t, shutter_to_pose_ms, {}, {}, {}};
-  if (t_ == o.t) view.features = std::exchange(features_, {});
+  LiveView view{.t = o.t, .shutter_to_pose_ms = shutter_to_pose_ms};
+  if (t_ == o.t) {
+    view.features = std::exchange(features_, {});
+    view.right_features = std::exchange(right_features_, {});
+  }
   if (!o.health.has_pose() || window_.frames.empty()) return view;
   const Pose<W, B>& T_WB_window = window_.frames.back().T_WB;
   // From the window's gauge to the published frame, in which poses are corrected in small steps.
@@ -33,9 +41,10 @@ LiveView ViewMaker::view_of(const Odometry& o, double shutter_to_pose_ms) {
   }
   for (const WindowSnapshot::Frame& frame : window_.frames)
     if (frame.keyframe) view.keyframes_W.push_back(to_published * frame.T_WB.p);
-  for (LiveView::Feature& feature : view.features)
-    if (const auto p_W = positions_W.find(feature.track); p_W != positions_W.end())
-      feature.depth_m = std::max(0.0, (T_CW[static_cast<std::size_t>(feature.camera)] * p_W->second).z());
+  for (std::vector<LiveView::Feature>* features : {&view.features, &view.right_features})
+    for (LiveView::Feature& feature : *features)
+      if (const auto p_W = positions_W.find(feature.track); p_W != positions_W.end())
+        feature.depth_m = std::max(0.0, (T_CW[static_cast<std::size_t>(feature.camera)] * p_W->second).z());
   return view;
 }
 

@@ -24,7 +24,7 @@ class ViewMaker {
  private:
   StereoRig rig_;
   Time t_;
-  std::vector<LiveView::Feature> features_;
+  std::vector<LiveView::Feature> features_, right_features_;
   WindowSnapshot window_;
 };
 

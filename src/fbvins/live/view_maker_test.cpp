@@ -53,6 +53,26 @@ TEST(ViewMaker, FeaturesAreThoseOfTheirCamera) {
   EXPECT_NEAR(view.features[0].depth_m, 3, 1e-12);
   EXPECT_EQ(view.features[1].camera, 2);
   EXPECT_NEAR(view.features[1].depth_m, 5, 1e-12);
+  EXPECT_TRUE(view.right_features.empty());
+}
+
+TEST(ViewMaker, WhatTheRightCameraSeesIsThereAsWell) {
+  StereoRig rig = looking_ahead();
+  rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
+  ViewMaker views(rig);
+  TrackedFrame frame = frame_with(Time{7}, {1, 2});
+  frame.features[0].right.emplace().pixel = Vec2(3, 4);
+  views.add(frame);
+  WindowSnapshot window;
+  window.frames.push_back({FrameId{0}, Time{7}, {}, true});
+  window.landmarks = {{LandmarkId{0}, TrackId{1}, Vec3(3.1, 0, 0), 3}};
+  views.add(window);
+  const LiveView view = views.view_of(odometry_at(Time{7}, Vec3::Zero()), 0);
+  EXPECT_EQ(view.features.size(), 2u);
+  ASSERT_EQ(view.right_features.size(), 1u);
+  EXPECT_EQ(view.right_features[0].camera, 1);
+  EXPECT_EQ(view.right_features[0].pixel, Vec2(3, 4));
+  EXPECT_NEAR(view.right_features[0].depth_m, 3, 1e-12);
 }
 
 TEST(ViewMaker, GivesFeaturesTheDepthOfTheirLandmarks) {

@@ -47,4 +47,12 @@ void ClockOffset::add(Time asked, Time theirs, Time answered) {
   value_ = middle->offset;
 }
 
+Duration ClockOffset::round_trip() const {
+  std::vector<std::int64_t> all;
+  for (const Answer& answer : answers_) all.push_back(answer.round_trip.ns);
+  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+  std::nth_element(all.begin(), middle, all.end());
+  return {*middle};
+}
+
 }  // namespace fbvins

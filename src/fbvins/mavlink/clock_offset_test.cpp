@@ -41,6 +41,8 @@ TEST(ClockOffset, IsKnownToATenthOfAMillisecondInSpiteOfQueues) {
     EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 10);
   }
   EXPECT_EQ(offset.leaps(), 0);
+  EXPECT_GT(offset.round_trip().ns, 0);
+  EXPECT_LT(offset.round_trip().ns, 30 * kMs);
 }
 
 TEST(ClockOffset, FollowsADrift) {

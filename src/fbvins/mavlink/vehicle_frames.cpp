@@ -41,6 +41,13 @@ Pose<BodyFrd, B> mounting(const MountingOptions& options) {
   return {Quat(turn * Quat(axes(options.imu_axes))).normalized(), Vec3(options.x_m, options.y_m, options.z_m)};
 }
 
+Pose<B, BaseLink> base_link(const MountingOptions& options) {
+  const Pose<BaseLink, BodyFrd> T_base_frd{kHalfTurnAboutX, Vec3::Zero()};
+  Pose<B, BaseLink> out = (T_base_frd * mounting(options)).inverse();
+  if (out.q.w() < 0) out.q.coeffs() *= -1;  // of two that are the same rotation the usual one
+  return out;
+}
+
 VehicleFrames::VehicleFrames(const MountingOptions& options)
     : origin_(options.local_frame), T_BF_(mounting(options).inverse()), T_LW_(kHalfTurnAboutX, Vec3::Zero()) {}
 

@@ -100,6 +100,16 @@ TEST(Ros2Control, CommandsAreServices) {
   EXPECT_EQ(save.call(kEmpty, 7), reply_of(false, "the disk is full"));
 }
 
+/// As with live.ros2.commands=false.
+TEST(Ros2Control, WithoutCommandsStateAndParametersAreAnsweredAlone) {
+  const auto control = control_with({}, {{"live.rate_hz", 5.0, "", "", {}, {}}});
+  ASSERT_TRUE(control);
+  const Client reset("/fbvins/reset", "std_srvs/srv/Trigger"), state("/fbvins/get_state", "lifecycle_msgs/srv/GetState");
+  reset.ask(kEmpty, 1);
+  EXPECT_NE(state.call(kEmpty, 1), "");
+  EXPECT_EQ(reset.reply(1, std::chrono::milliseconds(300)), "");
+}
+
 /// What takes long holds up no other request; what is told when the services are gone is lost.
 TEST(Ros2Control, ACommandMayTellLater) {
   FlightCommand::Told waiting;

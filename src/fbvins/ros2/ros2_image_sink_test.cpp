@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <ctime>
 
 #include "fbvins/io/ros_messages.hpp"
@@ -56,6 +57,33 @@ TEST(Ros2ImageSink, PublishesWhatSomebodyListensTo) {
   std::string expected;
   append_camera_info(expected, Time{1'000'000'000}, "camera0_optical", test::socket_test_rig().left);
   EXPECT_EQ(info.messages()[0], expected);
+}
+
+TEST(Ros2ImageSink, DepthImagesAreThoseOfTheSensorAndThereOnlyWithOne) {
+  StereoRig rig = test::socket_test_rig();
+  rig.depth = DepthSensor{};
+  auto made = Ros2ImageSink::create(node(), rig, {});
+  ASSERT_TRUE(made) << made.error().message;
+  Heard depths;
+  const auto heard = Ros2Subscriber::create(node(), "/fbvins/depth/image_raw", "sensor_msgs/msg/Image", 10, depths.function());
+  ASSERT_TRUE(heard);
+  StereoFrame frame = frame_at(Time{1'000'000'000});
+  ASSERT_TRUE((*made)->take(LiveEvent(frame))) << "without depth image";
+  frame.depth = std::make_shared<DepthImage>(DepthImage{8, 6, std::vector<std::uint16_t>(48, 1234)});
+  ASSERT_TRUE((*made)->take(LiveEvent(frame)));
+  ASSERT_TRUE(depths.wait_for(1));
+  const std::string message = depths.messages()[0];
+  const auto image = read_image(message);
+  ASSERT_TRUE(image);
+  EXPECT_TRUE(image->is_depth()) << image->encoding;
+  EXPECT_EQ(image->t, frame.t);
+  ASSERT_EQ(image->pixels.size(), 96u);
+  std::uint16_t mm = 0;
+  std::memcpy(&mm, image->pixels.data() + 94, 2);
+  EXPECT_EQ(mm, 1234);
+  std::string expected;
+  append_depth_image(expected, frame.t, "camera0_optical", *frame.depth);
+  EXPECT_EQ(message, expected);
 }
 
 TEST(Ros2ImageSink, LandmarksAreMadeWhileSomebodyListens) {

@@ -91,7 +91,8 @@ DdsEntity::~DdsEntity() {
   if (handle_ > 0) dds_delete(handle_);
 }
 
-Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, const Ros2Name& name, bool humble) {
+Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, const Ros2Name& name, bool humble,
+                                                 const Ros2QualityWishes& wishes) {
   const std::string configuration =
       address.interface.empty() ? kLoopback : fmt::format(fmt::runtime(kOneInterface), address.interface);
   auto node = std::make_shared<Ros2Node>();
@@ -105,6 +106,7 @@ Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, con
   if (node->participant() < 0) return dds_failure(where, node->participant());
   node->self_ = {name.name_space, name.name, {}, {}};
   node->humble_ = humble;
+  node->wishes_ = wishes;
   auto topic = make_wire_topic(node->participant(), kGraphTopic, kGraphType);
   if (!topic) return topic.error();
   node->graph_topic_ = std::move(topic->entity);
@@ -118,6 +120,25 @@ Result<std::shared_ptr<Ros2Node>> Ros2Node::join(const Ros2Address& address, con
 
 std::string Ros2Node::own_topic(const std::string& name) const {
   return fmt::format("{}/{}/{}", self_.name_space == "/" ? "" : self_.name_space, self_.name, name);
+}
+
+Ros2Quality Ros2Node::quality(const std::string& topic, Ros2Quality usual) {
+  const std::lock_guard lock(mutex_);
+  topics_.insert(topic);
+  for (const auto& [name, wish] : wishes_) {
+    if (topic != name && topic != own_topic(name)) continue;
+    usual.reliable = wish.reliable.value_or(usual.reliable);
+    usual.latched = wish.latched.value_or(usual.latched);
+    usual.depth = wish.depth.value_or(usual.depth);
+  }
+  return usual;
+}
+
+std::string Ros2Node::unused_wish() const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [name, wish] : wishes_)
+    if (!topics_.contains(name) && !topics_.contains(own_topic(name))) return name;
+  return {};
 }
 
 Result<void> Ros2Node::tell_of_writer(std::int32_t writer) {
@@ -152,8 +173,8 @@ Result<Ros2Publisher> Ros2Publisher::create(std::shared_ptr<Ros2Node> node, cons
   publisher.node_ = std::move(node);
   publisher.topic_ = std::move(made->entity);
   publisher.type_ = made->type;
-  publisher.writer_ = DdsEntity(
-      dds_create_writer(publisher.node_->participant(), publisher.topic_.handle(), make_qos(quality, type).get(), nullptr));
+  const Qos qos = make_qos(publisher.node_->quality(topic, quality), type);
+  publisher.writer_ = DdsEntity(dds_create_writer(publisher.node_->participant(), publisher.topic_.handle(), qos.get(), nullptr));
   if (publisher.writer_.handle() < 0) return dds_failure(publisher.name_, publisher.writer_.handle());
   if (Result<void> told = publisher.node_->tell_of_writer(publisher.writer_.handle()); !told) return told.error();
   return publisher;
@@ -191,6 +212,7 @@ Result<void> Ros2Subscriber::listen(bool reliable) {
   if (reader_.handle() > 0) node_->forget_reader(reader_.handle());
   reader_ = DdsEntity();
   reliable_ = reliable;
+  const Qos qos = make_qos(node_->quality(name_, {.reliable = reliable, .latched = false, .depth = depth_}), type_);
   const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(dds_create_listener(this), &dds_delete_listener);
   dds_lset_data_available(listener.get(), [](dds_entity_t reader, void* self) {
     constexpr int kAtOnce = 16;
@@ -206,9 +228,7 @@ Result<void> Ros2Subscriber::listen(bool reliable) {
       if (count < kAtOnce) return;
     }
   });
-  reader_ = DdsEntity(dds_create_reader(node_->participant(), topic_.handle(),
-                                        make_qos({.reliable = reliable, .latched = false, .depth = depth_}, type_).get(),
-                                        listener.get()));
+  reader_ = DdsEntity(dds_create_reader(node_->participant(), topic_.handle(), qos.get(), listener.get()));
   if (reader_.handle() < 0) return dds_failure("ROS 2 topic " + name_, reader_.handle());
   return node_->tell_of_reader(reader_.handle());
 }

@@ -14,12 +14,14 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/ros_messages.hpp"
+#include "fbvins/ros2/ros2_quality.hpp"
 
 struct ddsi_sertype;
 
@@ -60,10 +62,16 @@ Result<Ros2Name> parse_ros2_node(const std::string& text);
 class Ros2Node {
  public:
   /// `humble`: for the tools of ROS 2 Humble, instead of those since Iron.
-  static Result<std::shared_ptr<Ros2Node>> join(const Ros2Address& address, const Ros2Name& name = {}, bool humble = false);
+  static Result<std::shared_ptr<Ros2Node>> join(const Ros2Address& address, const Ros2Name& name = {}, bool humble = false,
+                                                const Ros2QualityWishes& wishes = {});
   std::int32_t participant() const { return participant_.handle(); }
   /// "odometry" -> "/fbvins/odometry"
   std::string own_topic(const std::string& name) const;
+
+  /// As the user wants it for this topic, else `usual`.
+  Ros2Quality quality(const std::string& topic, Ros2Quality usual);
+  /// A topic with a wish for which nobody has asked, when all topics are there; empty: none.
+  std::string unused_wish() const;
 
   // Of the entities of this node, by their handles.
   Result<void> tell_of_writer(std::int32_t writer);
@@ -75,16 +83,11 @@ class Ros2Node {
 
   DdsEntity domain_, participant_, graph_topic_, graph_;
   const ddsi_sertype* graph_type_ = nullptr;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   RosNode self_;  ///< guarded by mutex_
+  Ros2QualityWishes wishes_;
+  std::set<std::string> topics_;  ///< that have a quality; guarded by mutex_
   bool humble_ = false;
-};
-
-/// Quality of service: resent until received or sent once; last values for late subscribers or none; length of the queue.
-struct Ros2Quality {
-  bool reliable = true;
-  bool latched = false;  ///< ROS's transient_local
-  int depth = 10;
 };
 
 class Ros2Publisher {
@@ -109,7 +112,7 @@ class Ros2Subscriber {
   /// The bytes stay valid as long as `keeper` lives.
   using OnMessage = std::function<void(std::string_view message, const std::shared_ptr<const void>& keeper)>;
 
-  /// With the reliability that all publishers of the topic offer; best effort until there is one.
+  /// With the reliability that all publishers of the topic offer, best effort until there is one, unless the user wants one.
   static Result<std::unique_ptr<Ros2Subscriber>> create(std::shared_ptr<Ros2Node> node, const std::string& topic,
                                                         const std::string& type, int depth, OnMessage on_message);
   ~Ros2Subscriber();

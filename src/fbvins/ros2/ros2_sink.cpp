@@ -29,10 +29,7 @@ bool due(std::optional<Time>& last, Time now, Duration period) {
 
 Pose<B, BaseLink> base_of(const LiveOptions& options) {
   if (options.ros2.base_frame.empty()) return {};
-  const Pose<BaseLink, BodyFrd> T_base_frd{Quat(0, 1, 0, 0), Vec3::Zero()};  // half a turn about the forward axis
-  Pose<B, BaseLink> out = (T_base_frd * mounting(options.mavlink.mounting)).inverse();
-  if (out.q.w() < 0) out.q.coeffs() *= -1;  // of two that are the same rotation the usual one
-  return out;
+  return base_link(options.mavlink.mounting);
 }
 
 Result<void> check_frames(const Ros2Options& options) {

@@ -11,14 +11,13 @@
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/live/sink.hpp"
+#include "fbvins/mavlink/vehicle_frames.hpp"
 #include "fbvins/ros2/ros2_node.hpp"
 #include "fbvins/ros2/ros2_stamps.hpp"
 #include "fbvins/types/motion_at.hpp"
 #include "fbvins/types/trajectory.hpp"
 
 namespace fbvins {
-
-struct BaseLink {};  ///< the vehicle as REP 105 has it: x forward, y left, z up; where there is none, the IMU
 
 class Ros2Sink final : public Sink {
  public:

@@ -18,7 +18,6 @@ std::chrono::nanoseconds seconds(double s) { return std::chrono::nanoseconds(Dur
 WebFlight FlightPlayer::description() const {
   WebFlight flight{.source = flight_.name, .frontend = flight_.frontend, .replay = true};
   flight.duration_s = end_s();
-  flight.cannot_save_map = "this flight is over";
   // Thinned out to what a screen can show.
   const std::size_t stride = flight_.path.size() / 6000 + 1;
   for (std::size_t i = 0; i < flight_.path.size(); i += stride) flight.whole_path.push_back(flight_.path[i]);

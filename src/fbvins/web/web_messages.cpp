@@ -15,7 +15,7 @@ static_assert(std::endian::native == std::endian::little, "the page reads little
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostMark_characters = 120;
+constexpr std::size_t kMostMark_characters = 120, kMostName_characters = 32;
 constexpr std::size_t kMostKeyframes = 2000;
 constexpr std::uint8_t kImage = 1, kWindowPoints = 2, kCloudPoints = 3;
 
@@ -64,8 +64,8 @@ SharedMessage hello_message(const WebFlight& flight, Time start) {
   json["start_ns"] = std::to_string(start.ns);  // a JavaScript number would lose the last digits
   if (flight.replay) json["duration_s"] = rounded(flight.duration_s);
   json["can_mark"] = flight.can_mark;
-  json["can_save_map"] = flight.cannot_save_map.empty();
-  json["cannot_save_map"] = flight.cannot_save_map;
+  json["commands"] = Json::object();
+  for (const auto& [name, never] : flight.commands) json["commands"][name] = never;
   if (const auto& q = flight.q_B_vehicle) json["vehicle_to_imu_wxyz"] = {q->w(), q->x(), q->y(), q->z()};
   if (flight.replay) json["whole_path"] = path_json(flight.whole_path);
   return text(json);
@@ -121,6 +121,7 @@ SharedMessage status_message(double t_s, const LiveStatus& status, const LivePos
 SharedMessage map_message(double t_s, const MapUpdate& update, int loops) {
   Json json{{"type", "map"}, {"t_s", rounded(t_s)}, {"keyframes", update.stats.keyframes}, {"loops", loops}};
   json["localised"] = update.localised;
+  json["found"] = update.found;
   if (update.localised) json["position_of_odometry_m"] = rounded(update.T_MW.p);
   if (!update.localised || update.corrected.empty()) return text(json);
   // The page shows W: the map's keyframes are transformed into it.
@@ -179,7 +180,6 @@ std::optional<WebCommand> parse_command(std::string_view bytes) {
   if (!json.is_object() || !json.contains("do") || !json["do"].is_string()) return std::nullopt;
   const std::string what = json["do"];
   using Kind = WebCommand::Kind;
-  if (what == "save_map") return WebCommand{Kind::save_map, {}};
   if (what == "play") return WebCommand{Kind::play, {}};
   if (what == "pause") return WebCommand{Kind::pause, {}};
   if (what == "mark") {
@@ -187,8 +187,11 @@ std::optional<WebCommand> parse_command(std::string_view bytes) {
     if (words == json.end() || !words->is_string()) return WebCommand{Kind::mark, {}};
     return WebCommand{Kind::mark, words->get<std::string>().substr(0, kMostMark_characters)};
   }
-  if (what == "seek" && json.contains("t_s") && json["t_s"].is_number()) return WebCommand{Kind::seek, {}, json["t_s"]};
-  return std::nullopt;
+  if (what == "seek")
+    return json.contains("t_s") && json["t_s"].is_number() ? std::optional(WebCommand{Kind::seek, {}, json["t_s"]})
+                                                           : std::nullopt;
+  if (what.size() > kMostName_characters) return std::nullopt;
+  return WebCommand{Kind::flight, what};
 }
 
 }  // namespace fbvins

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fbvins/live/live_event.hpp"
@@ -20,7 +21,8 @@ struct WebFlight {
   bool replay = false;    ///< a finished flight, in which a viewer may seek
   double duration_s = 0;  ///< of a replay
   bool can_mark = false;
-  std::string cannot_save_map = {};     ///< why not, in one sentence; empty: it can be saved
+  /// What viewers may ask of the flight: the command's name, and why this flight cannot do it (empty: it can).
+  std::vector<std::pair<std::string, std::string>> commands = {};
   std::vector<PathPoint> whole_path{};  ///< of a replay
   std::optional<Quat> q_B_vehicle{};  ///< takes the vehicle's axes (forward, right, down) to the IMU's; none: they are not known
 };
@@ -46,9 +48,9 @@ SharedMessage image_message(double t_s, std::string_view jpeg, int width_px, int
 SharedMessage points_message(double t_s, const std::vector<LiveView::Landmark>& points, bool cloud);
 
 struct WebCommand {
-  enum class Kind { mark, save_map, seek, play, pause };
+  enum class Kind { mark, flight, seek, play, pause };
   Kind kind;
-  std::string text = {};  ///< of a mark
+  std::string text = {};  ///< of a mark; name of a command to the flight
   double t_s = 0;         ///< of a seek
 };
 /// Nullopt for anything that is not a command.

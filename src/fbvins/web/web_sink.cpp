@@ -48,7 +48,9 @@ Result<void> WebSink::begin(PageFiles files) {
 }
 
 WebSink::WebSink(const WebOptions& options, WebFlight flight, WebActions actions)
-    : options_(options), actions_(std::move(actions)), flight_(std::move(flight)) {}
+    : options_(options), actions_(std::move(actions)), flight_(std::move(flight)) {
+  for (const FlightCommand& command : actions_.commands) flight_.commands.emplace_back(command.name, command.never);
+}
 
 std::string WebSink::url() const { return page_url(options_.address, port(), options_.token); }
 
@@ -91,8 +93,14 @@ void WebSink::on_command(std::string_view text) {
   using Kind = WebCommand::Kind;
   const bool plays = command->kind == Kind::play || command->kind == Kind::pause || command->kind == Kind::seek;
   if (command->kind == Kind::mark && flight_.can_mark) actions_.mark(command->text);
-  else if (command->kind == Kind::save_map && flight_.cannot_save_map.empty()) actions_.save_map();
+  else if (command->kind == Kind::flight) ask_flight(command->text);
   else if (flight_.replay && plays) actions_.replay(*command);
+}
+
+void WebSink::ask_flight(const std::string& name) {
+  for (const FlightCommand& command : actions_.commands)
+    if (command.name == name && command.never.empty())
+      command.act([this](const Result<std::string>& done) { tell(done ? *done : done.error().message, !done.ok()); });
 }
 
 Result<void> WebSink::take(const LiveEvent& event) {
@@ -110,11 +118,9 @@ Result<void> WebSink::take(const LiveEvent& event) {
 void WebSink::show(const StereoFrame& frame) {
   if (!frame.left && frame.more.empty()) return;
   if (!pictures_.empty() || viewers() == 0 || !due(picture_due_, kPicturePeriod)) return;
-  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i) {
-    const bool shown = i != 1 || !frame.more.empty();  // of a pair the left one is enough
-    if (const std::shared_ptr<const Image> image = frame.image(i); image && shown)
+  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i)
+    if (const std::shared_ptr<const Image> image = frame.image(i))
       pictures_.push_back({i, frame.t, encoder_.encode(*image), image->width(), image->height()});
-  }
 }
 
 void WebSink::show(const Odometry& o) {
@@ -141,8 +147,9 @@ void WebSink::send_pictures(double t_s) {
   for (const Picture& picture : std::exchange(pictures_, {})) {
     std::vector<LiveView::Feature> features;
     if (view_ && view_->t == picture.t)
-      std::ranges::copy_if(view_->features, std::back_inserter(features),
-                           [&](const LiveView::Feature& f) { return f.camera == picture.camera; });
+      for (const auto* seen : {&view_->features, &view_->right_features})
+        std::ranges::copy_if(*seen, std::back_inserter(features),
+                             [&](const LiveView::Feature& f) { return f.camera == picture.camera; });
     const SharedMessage message = image_message(t_s, picture.jpeg, picture.width_px, picture.height_px, features, picture.camera);
     const std::lock_guard lock(mutex_);
     send(last_images_[picture.camera] = message);

@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 
+#include "fbvins/live/flight_command.hpp"
 #include "fbvins/live/sink.hpp"
 #include "fbvins/web/flight_history.hpp"
 #include "fbvins/web/grey_jpeg.hpp"
@@ -25,7 +26,7 @@ namespace fbvins {
 /// A viewer's commands, called on the server's thread; none may block.
 struct WebActions {
   std::function<void(std::string)> mark = [](std::string) {};
-  std::function<void()> save_map = [] {};
+  std::vector<FlightCommand> commands = {};                                  ///< their answers are shown to all viewers
   std::function<void(const WebCommand&)> replay = [](const WebCommand&) {};  ///< seek, play, pause
 };
 
@@ -67,6 +68,7 @@ class WebSink final : public Sink {
   std::vector<SharedMessage> flight_so_far() const;
   void send(SharedMessage message);
   void on_command(std::string_view text);
+  void ask_flight(const std::string& name);
 
   void show(const StereoFrame& frame);
   void show(const Odometry& odometry);

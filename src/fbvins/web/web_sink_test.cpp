@@ -129,17 +129,40 @@ TEST_F(Page, ShowsEachCameraOfARigWithItsOwnFeatures) {
   }
 }
 
+TEST_F(Page, ShowsTheRightCameraOfAPairWithItsFeatures) {
+  open();
+  TestPeer peer(sink->port());
+  peer.watch();
+  next(peer, "hello");
+  StereoFrame pair = frame(3);
+  pair.right = pair.left;
+  ASSERT_TRUE(sink->take(pair));
+  LiveView seen = view(3);
+  for (const double u : {5., 6.}) seen.right_features.push_back({TrackId{8}, Vec2(u, 6), 77, 2, 1});
+  ASSERT_TRUE(sink->take(seen));
+  ASSERT_TRUE(sink->take(odometry(3)));
+  for (const std::uint32_t features : {1u, 2u}) {
+    const std::string image = next(peer, "1");
+    std::uint32_t count = 0;
+    std::memcpy(&count, image.data() + 4, 4);
+    EXPECT_EQ(count, features);
+  }
+}
+
 TEST_F(Page, ButtonsDoWhatIsAllowed) {
   std::atomic<int> marks{0}, saves{0};
   WebFlight flight;
   flight.can_mark = true;
-  flight.cannot_save_map = "there is none";
-  open(flight, {.mark = [&](const std::string& text) { marks += text == "here" ? 1 : 100; }, .save_map = [&] { ++saves; }});
+  const auto reset = [](const FlightCommand::Told& told) { told(Error{ErrorCode::invalid_argument, "not now"}); };
+  open(flight, {.mark = [&](const std::string& text) { marks += text == "here" ? 1 : 100; },
+                .commands = {{"save_map", [&](const FlightCommand::Told&) { ++saves; }, "there is none"}, {"reset", reset}}});
   TestPeer peer(sink->port());
   peer.watch();
-  EXPECT_EQ(Json::parse(next(peer, "hello"))["cannot_save_map"], "there is none");
+  EXPECT_EQ(Json::parse(next(peer, "hello"))["commands"], Json({{"save_map", "there is none"}, {"reset", ""}}));
   peer.say(R"({"do":"save_map"})");
   peer.say(R"({"do":"nothing"})");
+  peer.say(R"({"do":"reset"})");
+  EXPECT_EQ(Json::parse(next(peer, "note")), Json({{"type", "note"}, {"text", "not now"}, {"bad", true}}));
   peer.say(R"({"do":"mark","text":"here"})");
   for (int i = 0; i < 1000 && marks == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   EXPECT_EQ(marks, 1);
@@ -155,7 +178,6 @@ TEST_F(Page, AReplayObeysItsOwnButtonsAlone) {
   std::mutex mutex;
   std::vector<WebCommand::Kind> obeyed;
   WebFlight flight{.replay = true};
-  flight.cannot_save_map = "this flight is over";
   open(flight, {.replay = [&](const WebCommand& command) {
          const std::lock_guard lock(mutex);
          obeyed.push_back(command.kind);

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+# For the wheels of ./dev wheel: this machine's compiler, an older C library and static C++ libraries from a folder that
+# packaging/wheel_sysroot makes, named by the environment, as pip passes it on.
+set(FBVINS_SYSROOT "$ENV{FBVINS_WHEEL_SYSROOT}")
+if(NOT EXISTS "${FBVINS_SYSROOT}/usr/include")
+  message(FATAL_ERROR "FBVINS_WHEEL_SYSROOT is '${FBVINS_SYSROOT}': there is no /usr/include below it (packaging/wheel_sysroot makes one)")
+endif()
+
+set(CMAKE_SYSROOT ${FBVINS_SYSROOT})
+set(CMAKE_FIND_ROOT_PATH ${FBVINS_SYSROOT})
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+set(ENV{PKG_CONFIG_SYSROOT_DIR} ${FBVINS_SYSROOT})
+set(ENV{PKG_CONFIG_LIBDIR} ${FBVINS_SYSROOT}/usr/lib/x86_64-linux-gnu/pkgconfig:${FBVINS_SYSROOT}/usr/lib/pkgconfig:${FBVINS_SYSROOT}/usr/share/pkgconfig)
+
+# The C++ library is part of the module, and nobody else's: where the wheel is installed there may be an older one. The compiler looks for
+# libraries beside itself first, so the older ones are named before.
+set(libraries "-L${FBVINS_SYSROOT}/lib/x86_64-linux-gnu -L${FBVINS_SYSROOT}/usr/lib/x86_64-linux-gnu -L${FBVINS_SYSROOT}/usr/lib")
+set(CMAKE_C_FLAGS_INIT "-include ${CMAKE_CURRENT_LIST_DIR}/wheel_symbols.h")
+set(CMAKE_CXX_FLAGS_INIT "${CMAKE_C_FLAGS_INIT}")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "${libraries}")
+set(CMAKE_MODULE_LINKER_FLAGS_INIT "${libraries} ${FBVINS_SYSROOT}/usr/lib/wheel_shims.o -static-libstdc++ -Wl,--exclude-libs,ALL")
