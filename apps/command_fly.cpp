@@ -24,7 +24,7 @@ namespace {
 constexpr const char* kExamples =
     R"(A simulated quadrotor flies the mission by the odometry's poses, which come from rendered images and a simulated IMU;
 the true poses are only recorded (docs/flight.md). The same arguments give the same bytes, with --threaded or without, except
-with --px4 and --wall-clock.
+with --px4, --ardupilot and --wall-clock.
 Writes the files of `fbvins run`, flight.csv, flight.json, and truth, estimate and setpoint as trajectories.
 
 examples:
@@ -33,6 +33,7 @@ examples:
   fbvins fly configs/missions/tour.yaml --frontend orb --loop    several rooms, flown in the map frame
   fbvins fly paper.yaml --vehicle sih --control gains.yaml       another vehicle, other gains
   FBVINS_PX4=.../bin/px4 fbvins fly paper.yaml --px4             a real PX4 flies it, by our odometry
+  FBVINS_ARDUPILOT=.../arducopter fbvins fly paper.yaml --ardupilot
   fbvins fly paper.yaml --wall-clock 0.5                         in wall time at half speed, through the live system of `fbvins live`
   fbvins fly --identify --out f && fbvins tune f                 gains from the vehicle's response
   fbvins fly paper.yaml --record --out f && fbvins run f/recording --frontend orb
@@ -44,7 +45,7 @@ struct Arguments {
   ConfigArguments config;
   int seed = 1;
   double wind_mps = -1, wall_rate = 0;
-  bool loop = false, threaded = false, record = false, quiet = false, px4 = false, identify = false;
+  bool loop = false, threaded = false, record = false, quiet = false, px4 = false, ardupilot = false, identify = false;
 
   std::string mission_name() const { return identify ? "identify" : std::filesystem::path(mission).stem().string(); }
 };
@@ -61,6 +62,17 @@ Result<Mission> mission_of(const Arguments& a) {
   if (a.identify == !a.mission.empty())
     return Error{ErrorCode::invalid_argument, "either a mission to fly, or --identify for the one that moves every axis"};
   return a.identify ? parse_mission(kIdentify, a.mission_name()) : read_mission(a.mission);
+}
+
+/// The program that the environment names, if one is asked for.
+Result<ControllerProgram> controller_of(const Arguments& a) {
+  if (!a.px4 && !a.ardupilot) return ControllerProgram{};
+  const char* binary = std::getenv(a.px4 ? "FBVINS_PX4" : "FBVINS_ARDUPILOT");
+  if (binary == nullptr || *binary == '\0')
+    return Error{ErrorCode::invalid_argument, a.px4 ? "--px4: FBVINS_PX4 does not name bin/px4 of a px4_sitl build"
+                                                    : "--ardupilot: FBVINS_ARDUPILOT does not name arducopter of a SITL build"};
+  if (a.px4) return ControllerProgram{ControllerProgram::Kind::px4, binary, a.out + "/px4"};
+  return ControllerProgram{ControllerProgram::Kind::ardupilot, binary, a.out + "/ardupilot"};
 }
 
 Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
@@ -84,12 +96,9 @@ Result<FlightSetup> setup_of(const Arguments& a, const Config& config) {
   setup.live = config.live;
   setup.estimator.mode = a.threaded ? RunMode::threaded : RunMode::deterministic;
   if (a.record) setup.recording = a.out + "/recording";
-  if (a.px4) {
-    const char* binary = std::getenv("FBVINS_PX4");
-    if (binary == nullptr || *binary == '\0')
-      return Error{ErrorCode::invalid_argument, "--px4: FBVINS_PX4 does not name bin/px4 of a px4_sitl build"};
-    setup.px4 = {binary, a.out + "/px4"};
-  }
+  Result<ControllerProgram> controller = controller_of(a);
+  if (!controller) return controller.error();
+  setup.controller = *std::move(controller);
   return setup;
 }
 
@@ -161,7 +170,7 @@ int fly_mission(Arguments a) {
   if (!flight) return fail(flight.error().message);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const FlightSummary summary = summarise(flight->log, setup->mission);
-  const FlightFacts facts{a.mission_name(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, a.px4};
+  const FlightFacts facts{a.mission_name(), a.preset, config->frontend.kind, a.vehicle, a.seed, a.loop, setup->controller.kind};
   for (const Result<void>& done :
        {write_as_run(a, *config, *flight, wall_s), write_flight(flight->log, a.out), write_control(*setup, a.out),
         write_text(a.out + "/flight.json", flight_json_text(facts, flight->log, summary)),
@@ -195,9 +204,12 @@ void add_fly_command(CLI::App& program, int& exit_code) {
                           ->check(CLI::Range(0.05, 4.0));
   CLI::Option* px4 =
       command->add_flag("--px4", a->px4, "a real PX4 flies: FBVINS_PX4 names bin/px4 of its px4_sitl build (docs/px4.md)");
+  CLI::Option* ardupilot = command->add_flag(
+      "--ardupilot", a->ardupilot, "a real ArduPilot flies: FBVINS_ARDUPILOT names arducopter of its SITL build (docs/px4.md)");
   command->add_flag("--loop", a->loop, "loop closure: the mission is flown in the map's frame");
   command->add_flag("--record", a->record, "write images, IMU and truth as a recording to OUT/recording, too");
-  wall->excludes(px4);
+  wall->excludes(px4)->excludes(ardupilot);
+  px4->excludes(ardupilot);
   command->add_flag("--threaded", a->threaded, "frontend and estimator on threads of their own; the same result");
   command->add_flag("--quiet", a->quiet, "print nothing but errors and warnings");
   command->callback([a, &exit_code] { exit_code = fly_mission(*a); });

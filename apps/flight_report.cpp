@@ -16,6 +16,15 @@ double rounded(double x) { return std::round(1e4 * x) / 1e4; }
 
 Json to_json(const DistanceStatistics& s) { return {{"rmse", rounded(s.rmse)}, {"max", rounded(s.max)}}; }
 
+std::string name_of(ControllerProgram::Kind kind) {
+  switch (kind) {
+    case ControllerProgram::Kind::px4: return "px4";
+    case ControllerProgram::Kind::ardupilot: return "ardupilot";
+    case ControllerProgram::Kind::own: break;
+  }
+  return "own";
+}
+
 Json axes_json(const FlightSummary& summary) {
   Json axes = Json::object();
   for (std::size_t i = 0; i < 3; ++i) {
@@ -69,7 +78,8 @@ std::string flight_text(const FlightFacts& facts, const FlightLog& log, const Fl
       "estimate to truth {:.1f} / {:.1f} cm\n",
       s.flown_s, s.top_speed_mps, s.largest_tilt_deg, 100 * s.tracking.rmse, 100 * s.tracking.max, 100 * s.estimation.rmse,
       100 * s.estimation.max);
-  if (facts.px4) text += fmt::format("  PX4: {} resets of its estimator in flight\n", log.controller_resets);
+  if (facts.controller != ControllerProgram::Kind::own)
+    text += fmt::format("  {}: {} resets of its estimator in flight\n", name_of(facts.controller), log.controller_resets);
   if (log.wall_time) text += wall_text(*log.wall_time);
   text += "  ";
   for (std::size_t i = 0; i < s.modes.size(); ++i)
@@ -100,7 +110,7 @@ std::string flight_json_text(const FlightFacts& facts, const FlightLog& log, con
   json["flown_s"] = rounded(s.flown_s);
   json["least_battery_V"] = rounded(s.least_battery_V);
   json["images"] = log.images;
-  json["controller"] = facts.px4 ? "px4" : "own";
+  json["controller"] = name_of(facts.controller);
   json["controller_resets"] = log.controller_resets;
   if (log.wall_time) json["wall_clock"] = wall_json(*log.wall_time);
   json["events"] = Json::array();

@@ -13,7 +13,8 @@ namespace fbvins::app {
 struct FlightFacts {
   std::string mission, preset, frontend, vehicle;
   int seed = 0;
-  bool loop = false, px4 = false;
+  bool loop = false;
+  ControllerProgram::Kind controller = ControllerProgram::Kind::own;
 };
 
 std::string flight_text(const FlightFacts& facts, const FlightLog& log, const FlightSummary& summary);

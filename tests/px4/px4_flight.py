@@ -213,8 +213,8 @@ def outage(report, *world):
 
 
 def vision_messages(report, *world):
-    """The messages of ArduPilot's dialect. PX4 understands them, except for the velocity; they have no field for quality."""
-    flight = fly(*world, lambda pose, s: pose, {12: FLAGS}, ["live.mavlink.dialect=ardupilot"], {"EKF2_EV_QMIN": 0})
+    """VISION_POSITION_ESTIMATE and VISION_SPEED_ESTIMATE. PX4 understands them, except for the velocity; they have no field for quality."""
+    flight = fly(*world, lambda pose, s: pose, {12: FLAGS}, ["live.mavlink.dialect=vision_estimate"], {"EKF2_EV_QMIN": 0})
     report.fact("PX4 fuses position, height and yaw of vision messages",
                 all(flight.flags(FLAGS).get(aid) == "True" for aid in ("cs_ev_pos", "cs_ev_yaw", "cs_ev_hgt")))
     report.error("flight by vision messages, to truth, from the eighth second", flight.errors(8, 16.8))

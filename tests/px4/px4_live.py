@@ -60,7 +60,7 @@ def main():
     recording = Recording(sys.argv[2])
     with tempfile.TemporaryDirectory() as folder:
         # VISION_POSITION_ESTIMATE has no field for quality.
-        px4, live = Px4(os.environ["FBVINS_PX4"], folder, {"EKF2_EV_QMIN": 0} if "live.mavlink.dialect=ardupilot" in sys.argv else {}), None
+        px4, live = Px4(os.environ["FBVINS_PX4"], folder, {"EKF2_EV_QMIN": 0} if "live.mavlink.dialect=vision_estimate" in sys.argv else {}), None
         begin_ns, listener = time.monotonic_ns(), Listener(px4, recording, START_US)
         # PX4 sends its messages to the port that the sink listens on; this script reads them on the ground station's port.
         px4.link.bind(("127.0.0.1", 0))

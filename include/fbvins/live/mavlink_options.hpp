@@ -7,8 +7,9 @@
 
 namespace fbvins {
 
-/// px4: ODOMETRY; ardupilot: VISION_POSITION_ESTIMATE and VISION_SPEED_ESTIMATE.
-enum class MavlinkDialect { px4, ardupilot };
+/// px4: ODOMETRY, with NaN while there is no pose. ardupilot: ODOMETRY in LOCAL_FRD, as EKF3 takes it: nothing before the first
+/// pose, and never NaN (docs/px4.md, ArduPilot). vision_estimate: VISION_POSITION_ESTIMATE and VISION_SPEED_ESTIMATE.
+enum class MavlinkDialect { px4, ardupilot, vision_estimate };
 
 /// Of ODOMETRY's pose. local_ned: x is said to point north (docs/px4.md, LOCAL_NED).
 enum class MavlinkFrameId { local_frd, local_ned };
@@ -35,7 +36,7 @@ struct MavlinkOptions {
 
   template <class V>
   void visit(V&& v) {
-    v("dialect", dialect, "px4|ardupilot", "which messages carry the pose");
+    v("dialect", dialect, "px4|ardupilot|vision_estimate", "who takes the poses, or which messages carry them");
     v("frame", frame, "local_frd|local_ned", "frame of the pose in ODOMETRY; local_ned says that its x points north");
     v("clock", clock, "flight_controller|own",
       "whose clock stamps are on; no pose is sent before the flight controller's is known");

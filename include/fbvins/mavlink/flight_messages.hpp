@@ -10,7 +10,8 @@ namespace fbvins {
 
 /// MAV_FRAME, MAV_CMD, MAV_RESULT and MAV_LANDED_STATE, as far as used here.
 inline constexpr std::uint8_t kMavFrameLocalNed = 1;
-inline constexpr std::uint16_t kMavCmdLand = 21, kMavCmdSetMode = 176, kMavCmdArm = 400, kMavCmdSetMessageInterval = 511;
+inline constexpr std::uint16_t kMavCmdLand = 21, kMavCmdTakeOff = 22, kMavCmdSetMode = 176, kMavCmdArm = 400,
+                               kMavCmdSetMessageInterval = 511, kMavCmdSetEkfSourceSet = 42007;
 inline constexpr std::uint8_t kMavResultAccepted = 0;
 inline constexpr std::uint8_t kMavLandedOnGround = 1;
 
@@ -63,6 +64,52 @@ struct CommandAckMessage {
   template <class V>
   void wire(V&& v) {
     v(command), v(result), v(progress), v(result_param2), v(target_system), v(target_component);
+  }
+};
+
+/// LOCAL_POSITION_NED: the flight controller's own estimate.
+struct LocalPositionMessage {
+  static constexpr std::uint32_t kId = 32;
+  static constexpr std::uint8_t kCrcExtra = 185;
+
+  std::uint32_t time_boot_ms = 0;
+  float x = 0, y = 0, z = 0;     ///< m, north-east-down
+  float vx = 0, vy = 0, vz = 0;  ///< m/s
+
+  template <class V>
+  void wire(V&& v) {
+    v(time_boot_ms), v(x), v(y), v(z), v(vx), v(vy), v(vz);
+  }
+};
+
+struct AttitudeQuaternionMessage {
+  static constexpr std::uint32_t kId = 31;
+  static constexpr std::uint8_t kCrcExtra = 246;
+
+  std::uint32_t time_boot_ms = 0;
+  float q1 = 1, q2 = 0, q3 = 0, q4 = 0;               ///< w first, forward-right-down to north-east-down
+  float rollspeed = 0, pitchspeed = 0, yawspeed = 0;  ///< rad/s
+  std::array<float, 4> repr_offset_q{};
+
+  template <class V>
+  void wire(V&& v) {
+    v(time_boot_ms), v(q1), v(q2), v(q3), v(q4), v(rollspeed), v(pitchspeed), v(yawspeed), v(repr_offset_q);
+  }
+};
+
+/// SET_GPS_GLOBAL_ORIGIN: where the local frame's origin is on the Earth.
+struct GlobalOriginMessage {
+  static constexpr std::uint32_t kId = 48;
+  static constexpr std::uint8_t kCrcExtra = 41;
+
+  std::int32_t latitude = 0, longitude = 0;  ///< degrees times 1e7
+  std::int32_t altitude = 0;                 ///< mm above sea level
+  std::uint8_t target_system = 1;
+  std::uint64_t time_usec = 0;
+
+  template <class V>
+  void wire(V&& v) {
+    v(latitude), v(longitude), v(altitude), v(target_system), v(time_usec);
   }
 };
 

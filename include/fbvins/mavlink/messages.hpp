@@ -169,6 +169,7 @@ StatusTextMessage status_text(MavSeverity severity, const std::string& sentence)
 using MavlinkMessage =
     std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage, StatusTextMessage,
                  PositionTargetMessage, CommandMessage, CommandAckMessage, LandedStateMessage, HilSensorMessage,
-                 HilActuatorControlsMessage, HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
+                 HilActuatorControlsMessage, LocalPositionMessage, AttitudeQuaternionMessage, GlobalOriginMessage,
+                 HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
 
 }  // namespace fbvins

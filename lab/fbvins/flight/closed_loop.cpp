@@ -10,6 +10,7 @@
 #include "fbvins/core/options.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/flight/board_imu.hpp"
+#include "fbvins/flight/companion_controller.hpp"
 #include "fbvins/flight/live_link.hpp"
 #include "fbvins/flight/motion_history.hpp"
 #include "fbvins/sim/sensor_station.hpp"
@@ -44,9 +45,9 @@ StereoRig as_recorded(StereoRig rig) {
 
 Result<std::unique_ptr<FlightController>> controller_of(const FlightSetup& setup, const StereoRig& rig) {
   const Pose<BodyFlu, B> mounting = imu_mounting(rig, setup.simulation.flight.camera_pitch_deg);
-  if (setup.px4.binary.empty())
+  if (setup.controller.kind == ControllerProgram::Kind::own)
     return std::unique_ptr<FlightController>(std::make_unique<Autopilot>(setup.mission, setup.control, rig, mounting));
-  return Px4Controller::create(setup.px4, setup.mission, setup.control, setup.vehicle, rig, mounting);
+  return start_controller(setup.controller, setup.mission, setup.control, setup.vehicle, rig, mounting);
 }
 
 Result<std::unique_ptr<OdometryLink>> link_of(const FlightSetup& setup, const StereoRig& rig) {

@@ -5,9 +5,10 @@
 //
 //   Result<FlightLog> flight = fly(setup, [](double t_s, FlightMode mode) { ... });
 //
-// With a real PX4 behind its simulator interface simulated time waits for PX4, too, but its threads make results differ between
-// runs. With a wall rate nothing waits: sensor data go through a socket into a live system, and estimates arrive when they are
-// ready. Only the log contains the truth. In it, L is the true mission frame: the vehicle's true pose before take-off.
+// With a real flight controller behind its simulator interface simulated time waits for that, too, but PX4's threads make results
+// differ between runs. With a wall rate nothing waits: sensor data go through a socket into a live system, and estimates arrive
+// when they are ready. Only the log contains the truth. In it, L is the true mission frame: the vehicle's true pose before
+// take-off.
 #pragma once
 
 #include <functional>
@@ -17,8 +18,8 @@
 
 #include "fbvins/flight/autopilot.hpp"
 #include "fbvins/flight/collision.hpp"
+#include "fbvins/flight/controller_program.hpp"
 #include "fbvins/flight/estimator_link.hpp"
-#include "fbvins/flight/px4_controller.hpp"
 #include "fbvins/live/live_options.hpp"
 #include "fbvins/sim/barometer.hpp"
 #include "fbvins/sim/euroc_writer.hpp"
@@ -38,7 +39,7 @@ struct FlightSetup {
   double estimate_delay_s = 0.03;   ///< latency: from an image to its pose in the controller
   double mounting_error_deg = 0.2;  ///< standard deviation on each axis; unknown to the autopilot
   std::string recording;            ///< folder for a recording; empty: none
-  Px4Setup px4;                     ///< if its binary is set, PX4 flies instead of the autopilot
+  ControllerProgram controller;     ///< which one flies
   double wall_rate = 0;             ///< simulated seconds per second of wall time; 0: simulated time waits for the odometry
   LiveOptions live;                 ///< with a wall rate
 };
@@ -63,8 +64,8 @@ struct FlightLog {
   std::optional<std::string> crash;  ///< one sentence
   bool out_of_time = false;
   int images = 0;
-  std::vector<ControllerEvent> events;  ///< of PX4: its messages and what it did
-  int controller_resets = 0;            ///< of PX4's estimator, in flight
+  std::vector<ControllerEvent> events;  ///< of a real flight controller: its messages and what it did
+  int controller_resets = 0;            ///< of its estimator, in flight
   std::optional<WallTime> wall_time;    ///< with a wall rate
 };
 

@@ -32,7 +32,7 @@ enum class FlightReason {
   lost,       ///< the odometry has no pose, or has been silent for too long
   off_path,   ///< the vehicle does not follow the setpoint
   outside_fence,
-  flight_controller,  ///< PX4 left the mission by itself, or did not start it
+  flight_controller,  ///< PX4 or ArduPilot left the mission by itself, or did not start it
 };
 
 std::string_view to_string(FlightMode mode);

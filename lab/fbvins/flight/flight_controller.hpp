@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Interface of a flight controller to the closed loop: odometry, IMU and barometer in, four motor commands out, without access
-// to the true state. Implemented by Autopilot and by Px4Controller, which connects a real PX4.
+// to the true state. Implemented by Autopilot, and by Px4Controller and ArduPilotController, which
+// connect real ones.
 #pragma once
 
 #include <string>

@@ -7,14 +7,13 @@
 //   use((*px4)->controls());
 #pragma once
 
-#include <sys/types.h>
-
 #include <array>
 #include <memory>
 #include <string>
 
 #include "fbvins/core/file_descriptor.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/flight/child_process.hpp"
 #include "fbvins/flight/px4_frames.hpp"
 #include "fbvins/mavlink/wire.hpp"
 
@@ -27,7 +26,6 @@ class Px4Process {
                                                    const Px4Parameters& parameters);
   Px4Process(const Px4Process&) = delete;
   Px4Process& operator=(const Px4Process&) = delete;
-  ~Px4Process();
 
   Result<void> step(const HilSensorMessage& reading);
   /// Actuator outputs, 0 to 1; 0 while disarmed.
@@ -46,7 +44,7 @@ class Px4Process {
 
   int instance_;
   std::string folder_;
-  pid_t pid_ = -1;
+  ChildProcess child_;
   FileDescriptor simulator_;
   MavlinkDecoder decoder_;
   std::array<float, 16> controls_{};

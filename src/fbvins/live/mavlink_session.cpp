@@ -49,20 +49,43 @@ MavlinkSession::Frames MavlinkSession::take(const LivePose& pose) {
               next_pose_))
     return out;
   if (!may_send_poses(pose.host_t)) return ++withheld_, out;
-  const std::optional<VehicleState> state = frames_.state(odometry(pose));
-  const std::uint64_t t_usec = stamp_usec(pose.host_t);
-  if (options_.dialect == MavlinkDialect::ardupilot) {
-    if (!state) return out;  // this dialect has no message for a missing pose
-    say(vision_position_message(*state, t_usec), out);
-    say(vision_speed_message(*state, t_usec), out);
-  } else {
-    OdometryMessage message =
-        state ? odometry_message(*state, t_usec) : no_odometry_message(pose.health, pose.reset_counter, t_usec);
-    if (options_.frame == MavlinkFrameId::local_ned) message.frame_id = kMavFrameLocalNed;
-    say(message, out);
-  }
-  ++poses_;
+  say_pose(pose, stamp_usec(pose.host_t), out);
+  if (!out.empty()) ++poses_;
   return out;
+}
+
+void MavlinkSession::say_pose(const LivePose& pose, std::uint64_t t_usec, Frames& out) {
+  const std::optional<VehicleState> state = frames_.state(odometry(pose));
+  switch (options_.dialect) {
+    case MavlinkDialect::px4: return say(odometry_for_px4(pose, state, t_usec), out);
+    case MavlinkDialect::ardupilot:
+      if (const auto message = odometry_for_ardupilot(state, t_usec)) say(*message, out);
+      return;
+    case MavlinkDialect::vision_estimate:
+      if (!state) return;  // it has no message for a missing pose
+      say(vision_position_message(*state, t_usec), out);
+      say(vision_speed_message(*state, t_usec), out);
+  }
+}
+
+OdometryMessage MavlinkSession::odometry_for_px4(const LivePose& pose, const std::optional<VehicleState>& state,
+                                                 std::uint64_t t_usec) const {
+  OdometryMessage message =
+      state ? odometry_message(*state, t_usec) : no_odometry_message(pose.health, pose.reset_counter, t_usec);
+  if (options_.frame == MavlinkFrameId::local_ned) message.frame_id = kMavFrameLocalNed;
+  return message;
+}
+
+/// ArduPilot takes any message as a sign that vision is healthy, and with its default of VISO_QUAL_MIN, 0, a pose of unknown
+/// quality as good; only EKF3 looks whether it is a number. It ignores other frames than LOCAL_FRD.
+std::optional<OdometryMessage> MavlinkSession::odometry_for_ardupilot(const std::optional<VehicleState>& state,
+                                                                      std::uint64_t t_usec) {
+  if (state) return last_ = odometry_message(*state, t_usec);
+  if (!last_) return std::nullopt;
+  OdometryMessage failed = *last_;
+  failed.time_usec = t_usec;
+  failed.quality = -1;
+  return failed;
 }
 
 MavlinkSession::Frames MavlinkSession::take(const LiveStatus& status, Time now) {

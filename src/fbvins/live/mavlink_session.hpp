@@ -57,6 +57,9 @@ class MavlinkSession {
  private:
   void receive(const MavlinkFrame& frame, Time now, Frames& out);
   void say(const MavlinkMessage& message, Frames& out);
+  void say_pose(const LivePose& pose, std::uint64_t t_usec, Frames& out);
+  OdometryMessage odometry_for_px4(const LivePose& pose, const std::optional<VehicleState>& state, std::uint64_t t_usec) const;
+  std::optional<OdometryMessage> odometry_for_ardupilot(const std::optional<VehicleState>& state, std::uint64_t t_usec);
   HeartbeatMessage heartbeat() const;
   Time their_time(Time host_t) const;
   std::uint64_t stamp_usec(Time host_t) const;
@@ -70,6 +73,7 @@ class MavlinkSession {
   std::optional<Health> health_;  // of the newest status
   std::optional<Health> told_health_;
   bool had_pose_ = false;
+  std::optional<OdometryMessage> last_;  // with a pose, in the dialect ardupilot
   Time next_heartbeat_{}, next_text_{}, next_pose_{};
   std::optional<Time> unsure_since_;
   std::int64_t poses_ = 0, withheld_ = 0;

@@ -295,13 +295,37 @@ TEST(MavlinkSession, WithoutAPoseOdometrySaysSoAndVisionIsSilent) {
   EXPECT_EQ(none[0].quality, -1);
   EXPECT_NE(none[0].x, none[0].x);
   MavlinkOptions options = own_clock();
-  options.dialect = MavlinkDialect::ardupilot;
-  MavlinkSession ardupilot(options);
-  EXPECT_TRUE(ardupilot.take(pose_at(100, kLost)).empty());
-  const auto both = messages(ardupilot.take(pose_at(200)));
+  options.dialect = MavlinkDialect::vision_estimate;
+  MavlinkSession logger(options);
+  EXPECT_TRUE(logger.take(pose_at(100, kLost)).empty());
+  const auto both = messages(logger.take(pose_at(200)));
   ASSERT_EQ(both.size(), 2u);
   EXPECT_TRUE(std::holds_alternative<VisionPositionMessage>(both[0]));
   EXPECT_TRUE(std::holds_alternative<VisionSpeedMessage>(both[1]));
+}
+
+TEST(MavlinkSession, ArduPilotGetsNothingBeforeTheFirstPoseAndNeverNaN) {
+  MavlinkOptions options = own_clock();
+  options.dialect = MavlinkDialect::ardupilot;
+  options.frame = MavlinkFrameId::local_ned;  // ArduPilot would ignore it
+  MavlinkSession ardupilot(options);
+  EXPECT_TRUE(ardupilot.take(pose_at(100, Health{HealthState::initialising, HealthReason::none})).empty());
+  EXPECT_TRUE(ardupilot.take(pose_at(200, kLost)).empty());
+  EXPECT_EQ(ardupilot.poses(), 0);
+  const auto pose = only<OdometryMessage>(ardupilot.take(pose_at(300)));
+  ASSERT_EQ(pose.size(), 1u);
+  EXPECT_EQ(pose[0].frame_id, kMavFrameLocalFrd);
+  EXPECT_GE(pose[0].quality, 1);
+  for (const Health& without : {kLost, Health{HealthState::initialising, HealthReason::none}}) {
+    const std::int64_t now_ms = without == kLost ? 400 : 500;
+    const auto none = only<OdometryMessage>(ardupilot.take(pose_at(now_ms, without)));
+    ASSERT_EQ(none.size(), 1u);
+    EXPECT_EQ(none[0].quality, -1);
+    EXPECT_EQ(none[0].x, pose[0].x);
+    EXPECT_EQ(none[0].q, pose[0].q);
+    EXPECT_GT(none[0].time_usec, pose[0].time_usec);
+    EXPECT_EQ(none[0].reset_counter, pose[0].reset_counter);
+  }
 }
 
 }  // namespace mavlink_session_test
