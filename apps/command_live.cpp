@@ -126,7 +126,7 @@ Result<std::unique_ptr<Source>> source_of(const Arguments& arguments, const RosG
 
 /// From the first reading to the end of the outputs.
 Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, Source& source, const RosGraph& graph,
-                              KeptMap* kept, LoopMap* map, LiveTally& tally, Troubles& troubles) {
+                              KeptMap* kept, LoopMap* map, LiveTotals& totals, Troubles& troubles) {
   std::unique_ptr<ResetCounterSink> counter;
   if (!arguments.outputs.reset_counter.empty()) counter = std::make_unique<ResetCounterSink>(arguments.outputs.reset_counter);
   if (counter && counter->was_unreadable())
@@ -139,7 +139,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (!live) return live.error();
   if (auto sink = source.status_sink()) live->add_sink(std::move(sink));
   if (counter) live->add_sink(std::move(counter));
-  if (Result<void> added = add_outputs(arguments.outputs, flight, *live, tally, troubles); !added) return added;
+  if (Result<void> added = add_outputs(arguments.outputs, flight, *live, totals, troubles); !added) return added;
   if (Result<void> added = graph.add_sinks(source, config, flight_commands(flight, *live), *live); !added) return added;
   const auto faults = faults_of(arguments);
   if (!faults) return faults.error();
@@ -147,14 +147,14 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
     return added;  // last: its viewers reach the others
   const Result<void> flown = fly(source, *live, *faults);
   if (kept) kept->finish();
-  tally.last = live->status();
+  totals.last = live->status();
   return flown;
 }
 
 /// Every file is tried, whatever became of the others.
-void save(const Arguments& arguments, const Config& config, const Source& source, LoopMap* map, const LiveTally& tally,
+void save(const Arguments& arguments, const Config& config, const Source& source, LoopMap* map, const LiveTotals& totals,
           Troubles& troubles) {
-  troubles.add(save_imu_state(arguments.imu_state, tally.imu_state, source.rig().imu_noise));
+  troubles.add(save_imu_state(arguments.imu_state, totals.imu_state, source.rig().imu_noise));
   if (map) {
     troubles.add(guarded("loop closure", [&] { map->finish(); }));
     for (const auto& [session, why] : map->not_joined())
@@ -162,7 +162,7 @@ void save(const Arguments& arguments, const Config& config, const Source& source
     troubles.add(save_map(arguments.map, *map));
   }
   const std::string& folder = arguments.outputs.out;
-  const LiveSummary summary = summarise(tally, arguments.source, config.frontend.kind, source, folder);
+  const LiveSummary summary = summarise(totals, arguments.source, config.frontend.kind, source, folder);
   if (!folder.empty()) troubles.add(write_results(folder, config, source, summary));
   if (!arguments.outputs.quiet) tell(to_text(summary));
 }
@@ -187,13 +187,13 @@ int run(Arguments arguments) {
     kept.emplace(
         **map, [from = map->get()] { return from->bytes(); }, kept_file);
   if (kept) kept->save_requested_to(arguments.map.save);
-  LiveTally tally;
+  LiveTotals totals;
   Troubles troubles;
-  troubles.add(fly_with_outputs(arguments, *config, **source, *graph, kept ? &*kept : nullptr, map->get(), tally, troubles));
-  if (tally.last.host_t == Time{}) return kBadInput;  // it did not fly
-  save(arguments, *config, **source, map->get(), tally, troubles);
+  troubles.add(fly_with_outputs(arguments, *config, **source, *graph, kept ? &*kept : nullptr, map->get(), totals, troubles));
+  if (totals.last.host_t == Time{}) return kBadInput;  // it did not fly
+  save(arguments, *config, **source, map->get(), totals, troubles);
   if (troubles.any()) return kBadInput;
-  return tally.with_pose > 0 ? kOk : kEstimationFailed;
+  return totals.with_pose > 0 ? kOk : kEstimationFailed;
 }
 
 }  // namespace

@@ -39,14 +39,14 @@ class FlightCommands : public ::testing::Test {
     command->act([&](const Result<std::string>& done) { said = done ? "+" + *done : "-" + done.error().message; });
     return said;
   }
-  void add() { ASSERT_TRUE(add_outputs(outputs, flight, *live, tally, troubles)); }
+  void add() { ASSERT_TRUE(add_outputs(outputs, flight, *live, totals, troubles)); }
 
   const std::string folder = ::testing::TempDir() + "/fbvins_flight_commands_" + std::to_string(getpid());
   Config config;
   test::NoSensors source;
   MapArguments map;
   OutputArguments outputs;
-  LiveTally tally;
+  LiveTotals totals;
   Troubles troubles;
   LiveFlight flight{config, source, "none", map};
   std::optional<LiveSystem> live;

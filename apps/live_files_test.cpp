@@ -83,35 +83,35 @@ TEST(LiveFiles, InAnOldMapPosesComeOnceItIsLocalised) {
   EXPECT_EQ(rows[0].substr(0, 24), "1.100000000 11.000000000");
 }
 
-TEST(LiveTally, CountsByHealthAndKeepsTheNewestGoodBiases) {
-  LiveTally tally;
-  const auto sink = tally.make_sink();
+TEST(LiveTotals, CountsByHealthAndKeepsTheNewestGoodBiases) {
+  LiveTotals totals;
+  const auto sink = totals.make_sink();
   Odometry good = odometry(0, 0), later = odometry(1, 0), lost = odometry(2, 0, HealthState::lost);
   good.accel_bias_covariance = later.accel_bias_covariance = lost.accel_bias_covariance = Mat3::Identity();
   lost.health.reason = HealthReason::no_images;
   for (const Odometry& o : {good, later, lost}) ASSERT_TRUE(sink->take(o));
   ASSERT_TRUE(sink->take(live_pose(0)));
   ASSERT_TRUE(sink->take(live_pose(1, HealthState::initialising)));
-  EXPECT_EQ(tally.health.at("good"), 2);
-  EXPECT_EQ(tally.health.at("lost/no_images"), 1);
-  EXPECT_EQ(tally.with_pose, 2 + (lost.health.has_pose() ? 1 : 0));
-  EXPECT_EQ(tally.live_poses, 1);
-  ASSERT_TRUE(tally.imu_state);
-  EXPECT_EQ(tally.imu_state->t, later.t);
+  EXPECT_EQ(totals.health.at("good"), 2);
+  EXPECT_EQ(totals.health.at("lost/no_images"), 1);
+  EXPECT_EQ(totals.with_pose, 2 + (lost.health.has_pose() ? 1 : 0));
+  EXPECT_EQ(totals.live_poses, 1);
+  ASSERT_TRUE(totals.imu_state);
+  EXPECT_EQ(totals.imu_state->t, later.t);
 }
 
 TEST(LiveSummary, SaysCountsAndWhatSlowOutputsLost) {
   LiveSummary summary;
   summary.source = "socket:x";
   summary.frontend = "orb";
-  summary.tally.health["good"] = 9;
-  summary.tally.last.counts.images = 10;
-  summary.tally.last.counts.images_dropped = 1;
+  summary.totals.health["good"] = 9;
+  summary.totals.last.counts.images = 10;
+  summary.totals.last.counts.images_dropped = 1;
   const std::string quiet = to_text(summary);
   EXPECT_NE(quiet.find("socket:x with orb"), std::string::npos) << quiet;
   EXPECT_NE(quiet.find("images 10, with a pose 0, dropped 1"), std::string::npos) << quiet;
   EXPECT_EQ(quiet.find("slow output"), std::string::npos);
-  summary.tally.last.counts.events_lost = 3;
+  summary.totals.last.counts.events_lost = 3;
   EXPECT_NE(to_text(summary).find("events that a slow output did not get: 3"), std::string::npos);
   const std::string json = to_json_text(summary);
   for (const char* part : {"\"source\": \"socket:x\"", "\"good\": 9", "\"images_dropped\": 1", "\"events_lost\": 3"})

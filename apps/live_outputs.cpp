@@ -68,9 +68,9 @@ void Troubles::add(const Error& error) {
   any_ = true;
 }
 
-Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTally& tally,
+Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTotals& totals,
                          Troubles& troubles) {
-  live.add_sink(tally.make_sink());
+  live.add_sink(totals.make_sink());
   if (!arguments.record.empty()) add_record(arguments, flight, live, troubles);
   if (const char* address = std::getenv("NOTIFY_SOCKET")) {
     auto sink = ServiceSink::create(address, stderr);

@@ -63,7 +63,7 @@ struct LiveFlight {
 };
 
 /// Adds the sinks that the command line asks for. Errors: a wrong command line, a service manager that is not there.
-Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTally& tally,
+Result<void> add_outputs(const OutputArguments& arguments, LiveFlight& flight, LiveSystem& live, LiveTotals& totals,
                          Troubles& troubles);
 /// reset, save_map, load_map, start_record and stop_record. `flight` and `live` must outlive them.
 std::vector<FlightCommand> flight_commands(const LiveFlight& flight, LiveSystem& live);

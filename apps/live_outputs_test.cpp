@@ -32,7 +32,7 @@ class LiveOutputs : public ::testing::Test {
   }
   Result<void> add_to(LiveSystem& to) {
     LiveFlight flight{config, source, "none", map};
-    return add_outputs(arguments, flight, to, tally, troubles);
+    return add_outputs(arguments, flight, to, totals, troubles);
   }
 
   const std::string folder = ::testing::TempDir() + "/fbvins_live_outputs_" + std::to_string(getpid());
@@ -40,7 +40,7 @@ class LiveOutputs : public ::testing::Test {
   test::NoSensors source;
   MapArguments map;
   OutputArguments arguments;
-  LiveTally tally;
+  LiveTotals totals;
   Troubles troubles;
 };
 

@@ -12,22 +12,22 @@
 namespace fbvins::app {
 namespace {
 
-class TallySink final : public Sink {
+class TotalsSink final : public Sink {
  public:
-  explicit TallySink(LiveTally& tally) : tally_(tally) {}
-  std::string_view name() const override { return "tally"; }
+  explicit TotalsSink(LiveTotals& totals) : totals_(totals) {}
+  std::string_view name() const override { return "totals"; }
   Result<void> take(const LiveEvent& event) override {
-    if (const auto* pose = std::get_if<LivePose>(&event)) tally_.live_poses += pose->health.has_pose() ? 1 : 0;
+    if (const auto* pose = std::get_if<LivePose>(&event)) totals_.live_poses += pose->health.has_pose() ? 1 : 0;
     const auto* o = std::get_if<Odometry>(&event);
     if (o == nullptr) return {};
-    tally_.with_pose += o->health.has_pose() ? 1 : 0;
-    ++tally_.health[label_of(o->health)];
-    if (auto state = imu_state_of(*o)) tally_.imu_state = state;
+    totals_.with_pose += o->health.has_pose() ? 1 : 0;
+    ++totals_.health[label_of(o->health)];
+    if (auto state = imu_state_of(*o)) totals_.imu_state = state;
     return {};
   }
 
  private:
-  LiveTally& tally_;
+  LiveTotals& totals_;
 };
 
 std::optional<Evaluation> accuracy(const Trajectory<W>& truth, const std::string& path) {
@@ -47,11 +47,11 @@ std::string line(const char* what, const LatencySummary& s) {
 
 }  // namespace
 
-std::unique_ptr<Sink> LiveTally::make_sink() { return std::make_unique<TallySink>(*this); }
+std::unique_ptr<Sink> LiveTotals::make_sink() { return std::make_unique<TotalsSink>(*this); }
 
-LiveSummary summarise(const LiveTally& tally, const std::string& source_name, const std::string& frontend, const Source& source,
+LiveSummary summarise(const LiveTotals& totals, const std::string& source_name, const std::string& frontend, const Source& source,
                       const std::string& folder) {
-  LiveSummary s{tally, source_name, frontend, {}, {}, peak_memory_mb()};
+  LiveSummary s{totals, source_name, frontend, {}, {}, peak_memory_mb()};
   const auto* replay = dynamic_cast<const ReplaySource*>(&source);
   if (replay == nullptr || !replay->dataset().has_ground_truth() || folder.empty()) return s;
   const Trajectory<W> truth = truth_of(replay->dataset());
@@ -63,30 +63,30 @@ LiveSummary summarise(const LiveTally& tally, const std::string& source_name, co
 std::string to_json_text(const LiveSummary& s) {
   Json result{{"version", FBVINS_VERSION}, {"source", s.source}, {"frontend", s.frontend}};
   result["health"] = Json::object();
-  for (const auto& [name, images] : s.tally.health) result["health"][name] = images;
+  for (const auto& [name, images] : s.totals.health) result["health"][name] = images;
   if (s.at_images) result["accuracy"] = to_json(*s.at_images, Alignment::se3);
   if (s.at_imu_rate) result["accuracy_at_imu_rate"] = to_json(*s.at_imu_rate, Alignment::se3);
   Json live;
-  s.tally.last.counts.visit([&](const char* name, std::int64_t count) { live[name] = count; });
-  live["images_with_pose"] = s.tally.with_pose;
-  live["live_poses"] = s.tally.live_poses;
-  live["shutter_to_pose_ms"] = to_json(s.tally.last.shutter_to_pose);
-  live["pose_age_ms"] = to_json(s.tally.last.pose_age);
+  s.totals.last.counts.visit([&](const char* name, std::int64_t count) { live[name] = count; });
+  live["images_with_pose"] = s.totals.with_pose;
+  live["live_poses"] = s.totals.live_poses;
+  live["shutter_to_pose_ms"] = to_json(s.totals.last.shutter_to_pose);
+  live["pose_age_ms"] = to_json(s.totals.last.pose_age);
   live["peak_memory_mb"] = s.peak_memory_mb;
   return Json{{"result", result}, {"live", live}}.dump(2) + "\n";
 }
 
 std::string to_text(const LiveSummary& s) {
-  const LiveCounts& c = s.tally.last.counts;
+  const LiveCounts& c = s.totals.last.counts;
   std::string text = fmt::format("{} with {} (fbvins " FBVINS_VERSION ")\n", s.source, s.frontend);
-  text +=
-      fmt::format("images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock jumps {}, restarts {}\n",
-                  c.images, s.tally.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
+  text += fmt::format(
+      "images {}, with a pose {}, dropped {}, incomplete {}; IMU readings {}, late {}; clock jumps {}, restarts {}\n", c.images,
+      s.totals.with_pose, c.images_dropped, c.images_incomplete, c.imu, c.imu_late, c.clock_leaps, c.resets);
   if (c.events_lost > 0) text += fmt::format("events that a slow output did not get: {}\n", c.events_lost);
   text += "images by health:";
-  for (const auto& [name, images] : s.tally.health) text += fmt::format(" {} {}", name, images);
-  text += "\n" + line("from the image's stamp to its pose:", s.tally.last.shutter_to_pose);
-  text += line("age of the newest estimate:", s.tally.last.pose_age);
+  for (const auto& [name, images] : s.totals.health) text += fmt::format(" {} {}", name, images);
+  text += "\n" + line("from the image's stamp to its pose:", s.totals.last.shutter_to_pose);
+  text += line("age of the newest estimate:", s.totals.last.pose_age);
   if (s.at_images) text += "at images:\n" + to_table(*s.at_images, Alignment::se3);
   if (s.at_imu_rate) text += fmt::format("ATE RMSE at IMU rate {:.4f} m\n", s.at_imu_rate->absolute_m.rmse);
   return text + fmt::format("peak memory {:.0f} MB\n", s.peak_memory_mb);

@@ -16,7 +16,7 @@
 namespace fbvins::app {
 
 /// Counts events; must outlive its sink.
-struct LiveTally {
+struct LiveTotals {
   std::map<std::string, std::int64_t> health;  ///< images per "state" or "state/reason"
   std::int64_t with_pose = 0;                  ///< images
   std::int64_t live_poses = 0;                 ///< at IMU rate
@@ -27,14 +27,14 @@ struct LiveTally {
 };
 
 struct LiveSummary {
-  LiveTally tally;
+  LiveTotals totals;
   std::string source, frontend;
   std::optional<Evaluation> at_images, at_imu_rate;  ///< against the recording's truth
   double peak_memory_mb = 0;
 };
 
 /// `folder` holds the finished trajectories; empty: no accuracy.
-LiveSummary summarise(const LiveTally& tally, const std::string& source_name, const std::string& frontend, const Source& source,
+LiveSummary summarise(const LiveTotals& totals, const std::string& source_name, const std::string& frontend, const Source& source,
                       const std::string& folder);
 std::string to_json_text(const LiveSummary& summary);
 std::string to_text(const LiveSummary& summary);

@@ -25,7 +25,7 @@ class ClockOffset {
   /// The newest answers contradict the value: the other clock may have begun anew.
   bool in_doubt() const { return !strays_.empty(); }
   /// How often the other clock jumped, as it does when that machine restarts.
-  int leaps() const { return leaps_; }
+  int jumps() const { return jumps_; }
 
  private:
   struct Answer {
@@ -34,10 +34,10 @@ class ClockOffset {
   static constexpr std::size_t kEnough = 8, kKept = 32, kLeapAnswers = 3;
   static constexpr Duration kLongestRoundTrip{200'000'000}, kLeap{30'000'000};
 
-  bool leapt(const Answer& answer) const;
+  bool jumped(const Answer& answer) const;
   std::deque<Answer> answers_, strays_;
   Duration value_;
-  int leaps_ = 0;
+  int jumps_ = 0;
 };
 
 }  // namespace fbvins

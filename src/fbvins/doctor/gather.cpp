@@ -167,7 +167,7 @@ void EvidenceGatherer::State::look(StereoFrame frame) {
   FrontendStats stats;
   images.take(frame, stats);
   if (images.forget_before_gap(kLongestGap_s)) {
-    tracks.end_all(Fate::lost);
+    tracks.end_all(TrackStatus::lost);
     tracks.drop_ended();
   }
   if (images.left().empty()) return;
@@ -197,7 +197,7 @@ void EvidenceGatherer::State::follow() {
   FrontendStats stats;
   std::vector<double> motion_px;
   for (KltTrack& track : tracks) {
-    if (!follower.follow(track, tracks.patches(track), {}, 0, images, stats)) track.fate = Fate::lost;
+    if (!follower.follow(track, tracks.patches(track), {}, 0, images, stats)) track.status = TrackStatus::lost;
     else motion_px.push_back((track.px - track.previous_px).norm());
   }
   tracks.drop_ended();

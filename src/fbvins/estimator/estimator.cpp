@@ -382,7 +382,7 @@ void Estimator::restart() {
 /// far from its start.
 void Estimator::settle_correction(const Pose<W, B>& level, Odometry& out) {
   const bool after_trouble = last_trouble_ && (out.t - *last_trouble_).seconds() < kTrouble_s;
-  if (!after_trouble && !published_.owes_too_much(kAtOnce)) {
+  if (!after_trouble && !published_.pending_too_large(kAtOnce)) {
     out.health = {HealthState::degraded, HealthReason::correction_pending};
     return;
   }
@@ -402,7 +402,7 @@ void Estimator::publish(Odometry& out) {
   const bool moved_along = !monitor_.contradicted() && carried_.take_reset();
   if (monitor_.take_reset() || moved_along) begin_new_W();
   published_.follow(motion_of_newest(window_, gravity_G(), monitor_.follows_images()), level.T_FB);
-  if (out.health.state == HealthState::good && published_.owes_too_much()) settle_correction(level.T_FB, out);
+  if (out.health.state == HealthState::good && published_.pending_too_large()) settle_correction(level.T_FB, out);
   if (out.health.state != HealthState::good && out.health.reason != HealthReason::correction_pending) last_trouble_ = out.t;
   // These are in the axes of G; the tilt between G and W is small against a doubt.
   out.pose_covariance += monitor_.doubt(newest.T_FB);

@@ -36,7 +36,7 @@ class PublishedPose {
   void fill(const NavState<W>& level, Odometry& out);
 
   /// The pending correction is larger than a pose called good may be wrong; or so many times as large.
-  bool owes_too_much(double times = 1) const {
+  bool pending_too_large(double times = 1) const {
     const double most_m = times * max_pending_m_;
     return max_step_m_ > 0 && max_pending_m_ > 0 &&
            (pending_.head<3>().norm() > most_m || pending_.tail<3>().norm() > kRotationPending_radpm * most_m);

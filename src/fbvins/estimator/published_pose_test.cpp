@@ -121,13 +121,13 @@ TEST(PublishedPose, ALargeCorrectionIsTooMuchToPaySlowly) {
       PublishedPose published(kStep_m, kPending_m);
       published.follow({}, flown(0));
       published.follow(motion(1), Pose<W, W>{so3_exp(Vec3(0, 0, degrees * kDegree)), Vec3(shift_m, 0, 0)} * flown(1));
-      EXPECT_EQ(published.owes_too_much(), degrees > 3.1 || shift_m > 0.103) << degrees << " " << shift_m;
-      EXPECT_FALSE(published.owes_too_much(1.5));
+      EXPECT_EQ(published.pending_too_large(), degrees > 3.1 || shift_m > 0.103) << degrees << " " << shift_m;
+      EXPECT_FALSE(published.pending_too_large(1.5));
     }
   PublishedPose at_once(0, kPending_m);
   at_once.follow({}, flown(0));
   at_once.follow(motion(1), kCorrection * flown(1));
-  EXPECT_FALSE(at_once.owes_too_much());
+  EXPECT_FALSE(at_once.pending_too_large());
 }
 
 }  // namespace published_pose_test

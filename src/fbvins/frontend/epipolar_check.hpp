@@ -28,7 +28,7 @@ class EpipolarCheck {
     now_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const Vec2* position = then(tracks[i]);
-      if (position == nullptr || tracks[i].fate != Fate::active) continue;
+      if (position == nullptr || tracks[i].status != TrackStatus::active) continue;
       chosen_.push_back(i);
       then_.push_back(*position);
       now_.push_back(tracks[i].normalised);
@@ -42,7 +42,7 @@ class EpipolarCheck {
     EpipolarResult result = ransac(R_now_then, threshold_px);
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       if (result.inlier[k] != 0) continue;
-      tracks[chosen_[k]].fate = Fate::lost;
+      tracks[chosen_[k]].status = TrackStatus::lost;
       ++stats.lost_epipolar;
     }
     return result;

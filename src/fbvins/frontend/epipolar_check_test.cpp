@@ -30,20 +30,20 @@ TEST(EpipolarCheck, LosesThoseThatMovedByThemselves) {
   const EpipolarResult result = check.judge(tracks, Mat3(Mat3::Identity()), 1.0, stats);
   EXPECT_EQ(stats.lost_epipolar, 8);
   EXPECT_EQ(result.inliers, 32);
-  for (std::size_t i = 0; i < tracks.size(); ++i) EXPECT_EQ(tracks[i].fate == Fate::lost, i % 5 == 0) << i;
+  for (std::size_t i = 0; i < tracks.size(); ++i) EXPECT_EQ(tracks[i].status == TrackStatus::lost, i % 5 == 0) << i;
 }
 
 TEST(EpipolarCheck, JudgesOnlyThoseGatheredAndNoneThatHasEnded) {
   std::vector<TrackState> tracks = tracks_with_outliers();
   EpipolarCheck check(400, 1);
-  tracks[5].fate = Fate::out_of_view;
+  tracks[5].status = TrackStatus::out_of_view;
   check.gather(tracks, [&](const TrackState& track) { return &track == &tracks[0] ? nullptr : before(track); });
   EXPECT_EQ(check.gathered(), tracks.size() - 2);
   FrontendStats stats;
   (void)check.judge(tracks, Mat3(Mat3::Identity()), 1.0, stats);
   EXPECT_EQ(stats.lost_epipolar, 6);
-  EXPECT_EQ(tracks[0].fate, Fate::active);
-  EXPECT_EQ(tracks[5].fate, Fate::out_of_view);
+  EXPECT_EQ(tracks[0].status, TrackStatus::active);
+  EXPECT_EQ(tracks[5].status, TrackStatus::out_of_view);
 }
 
 }  // namespace epipolar_check_test

@@ -54,7 +54,7 @@ class LeadingFrontend : public Frontend {
 
 /// The track as the second camera sees it; nothing where it does not, or the depth is unknown.
 inline std::optional<HandedTrack> seen_by_second(const TrackState& track, const Pose<C1, C0>& T_C1C0) {
-  if (!track.observed || track.fate != Fate::active || !track.right || !track.inverse_depth) return std::nullopt;
+  if (!track.observed || track.status != TrackStatus::active || !track.right || !track.inverse_depth) return std::nullopt;
   const double rho = *track.inverse_depth;
   const double scaled_depth = (T_C1C0.q * track.normalised.homogeneous() + rho * T_C1C0.p).z();
   if (!(scaled_depth > 0)) return std::nullopt;

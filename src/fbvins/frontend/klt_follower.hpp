@@ -4,7 +4,7 @@
 // Holds scratch memory; one instance, one thread.
 //
 //   KltFollower follower(camera);
-//   if (!follower.follow(track, patches, motion, typical_inverse_depth, images, stats)) track.fate = Fate::lost;
+//   if (!follower.follow(track, patches, motion, typical_inverse_depth, images, stats)) track.status = TrackStatus::lost;
 #pragma once
 
 #include <array>

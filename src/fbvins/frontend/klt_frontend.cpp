@@ -37,7 +37,7 @@ TrackedFrame KltFrontend::process(const SensorPacket& packet, const StatePrior& 
   predictor_.add(packet.imu, prior);
   images_.take(packet.frame, stats);
   if (images_.forget_before_gap(options_.max_gap_s)) {
-    tracks_.end_all(Fate::lost);
+    tracks_.end_all(TrackStatus::lost);
     tracks_.drop_ended();
   }
   out.has_left = !images_.left().empty();
@@ -70,7 +70,7 @@ void KltFrontend::locate(const LandmarkUpdate& update) {
 void KltFrontend::follow_tracks(const CameraMotion& motion, FrontendStats& stats) {
   for (KltTrack& track : tracks_)
     if (!follower_.follow(track, tracks_.patches(track), motion, typical_depth_.inverse_depth(), images_, stats))
-      track.fate = Fate::lost;
+      track.status = TrackStatus::lost;
   tracks_.drop_ended();
   std::vector<double> motion_px;
   motion_px.reserve(tracks_.size());
@@ -143,7 +143,7 @@ Handover KltFrontend::hand_over() {
 }
 
 void KltFrontend::take_over(Handover handover) {
-  tracks_.end_all(Fate::lost);
+  tracks_.end_all(TrackStatus::lost);
   tracks_.drop_ended();
   tracks_.begin_ids_at(handover.next_id);
   std::vector<double> inverse_depths;

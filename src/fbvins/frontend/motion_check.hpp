@@ -31,7 +31,7 @@ class MotionCheck {
     points_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const Vec2* position = before(tracks[i]);
-      if (position == nullptr || tracks[i].fate != Fate::active || !tracks[i].previous_inverse_depth) continue;
+      if (position == nullptr || tracks[i].status != TrackStatus::active || !tracks[i].previous_inverse_depth) continue;
       chosen_.push_back(i);
       Point& point = points_.emplace_back(Point{*position, tracks[i].normalised, *tracks[i].previous_inverse_depth});
       camera_.distort(point.now, &point.J_pixel_normalised);
@@ -42,7 +42,7 @@ class MotionCheck {
   template <class Tracks>
   void judge(Tracks& tracks, const CameraMotion& predicted, double dt_s, FrontendStats& stats) {
     for (const std::size_t k : moving(predicted, dt_s)) {
-      tracks[chosen_[k]].fate = Fate::lost;
+      tracks[chosen_[k]].status = TrackStatus::lost;
       ++stats.lost_check;
     }
   }

@@ -48,7 +48,7 @@ struct Crowd {
     check.judge(tracks, predicted, kDt_s, stats);
     std::pair<int, int> out{0, 0};
     for (std::size_t i = 0; i < tracks.size(); ++i)
-      if (tracks[i].fate == Fate::lost) ++(static_cast<int>(i) < walking ? out.first : out.second);
+      if (tracks[i].status == TrackStatus::lost) ++(static_cast<int>(i) < walking ? out.first : out.second);
     EXPECT_EQ(stats.lost_check, out.first + out.second);
     return out;
   }

@@ -51,7 +51,7 @@ TrackedFrame OrbFrontend::process(const SensorPacket& packet, const StatePrior& 
   predictor_.add(packet.imu, prior);
   images_.take(packet.frame, stats);
   if (images_.forget_before_gap(longest_gap_s())) {
-    tracks_.end_all(Fate::out_of_view);
+    tracks_.end_all(TrackStatus::out_of_view);
     drop_ended();
   }
   out.has_left = !images_.left().empty();
@@ -161,7 +161,7 @@ Handover OrbFrontend::hand_over() {
 }
 
 void OrbFrontend::take_over(Handover handover) {
-  tracks_.end_all(Fate::out_of_view);
+  tracks_.end_all(TrackStatus::out_of_view);
   drop_ended();
   tracks_.begin_ids_at(handover.next_id);
   view_.t = handover.t;
@@ -201,7 +201,7 @@ double OrbFrontend::longest_gap_s() const { return std::clamp(options_.memory_s,
 
 void OrbFrontend::drop_ended() {
   tracks_.drop_ended([&](const OrbTrack& track, const OrbPatches& patches) {
-    if (track.fate == Fate::out_of_view) recogniser_.remember(track, patches.reference, view_, images_.t());
+    if (track.status == TrackStatus::out_of_view) recogniser_.remember(track, patches.reference, view_, images_.t());
   });
 }
 

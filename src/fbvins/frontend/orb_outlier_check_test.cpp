@@ -37,7 +37,7 @@ TEST(OrbOutlierCheck, FindsASlowSlideOverSeveralImages) {
     }
   }
   EXPECT_EQ(stats.lost_epipolar, 1);
-  EXPECT_EQ(tracks[0].fate, Fate::lost);
+  EXPECT_EQ(tracks[0].status, TrackStatus::lost);
 }
 
 }  // namespace orb_outlier_check_test

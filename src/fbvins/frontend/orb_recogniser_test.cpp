@@ -39,7 +39,7 @@ struct Scene {
     view.T_GC = Pose<G, C0>(Quat::Identity(), Vec3(x_m, 0, 0));
   }
   void end_all() {
-    tracks.end_all(Fate::out_of_view);
+    tracks.end_all(TrackStatus::out_of_view);
     tracks.drop_ended([&](const OrbTrack& t, const OrbPatches& p) { recogniser.remember(t, p.reference, view, view.t); });
   }
   /// Their positions on the wall, shifted by `off_m`.

@@ -21,14 +21,14 @@ void predict_one(OrbTrack& track, PatchReference& reference, const Camera& camer
                  double typical_inverse_depth) {
   const auto carried = carry_point(camera, motion, track.normalised, track.inverse_depth.value_or(typical_inverse_depth));
   if (!carried || !(carried->p.z() > kNearestAhead)) {
-    track.fate = Fate::lost;
+    track.status = TrackStatus::lost;
     return;
   }
   track.px += carried->b_px - carried->a_px;
   track.normalised = carried->p.hnormalized();
   if (track.inverse_depth) *track.inverse_depth /= carried->p.z();
   reference.carry(motion.R_ba, carried->p.z());
-  if (!camera.inside(track.px, -kFarOutside_px)) track.fate = Fate::out_of_view;
+  if (!camera.inside(track.px, -kFarOutside_px)) track.status = TrackStatus::out_of_view;
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ void thin_out(OrbTracks& tracks, int most, double min_distance_px) {
     if (!track.observed) continue;
     const bool crowded =
         std::any_of(kept.begin(), kept.end(), [&](const Vec2& other) { return (other - track.px).squaredNorm() < closest2; });
-    if (crowded || static_cast<int>(kept.size()) == most) track.fate = track.p_G ? Fate::out_of_view : Fate::lost;
+    if (crowded || static_cast<int>(kept.size()) == most) track.status = track.p_G ? TrackStatus::out_of_view : TrackStatus::lost;
     else kept.push_back(track.px);
   }
 }
@@ -79,7 +79,7 @@ void forget(OrbTracks& tracks, Time now, double memory_s) {
     if (track.observed) continue;
     const double patience_s = track.inverse_depth ? memory_s : kMemoryWithoutDepth * memory_s;
     const bool too_long = (now - track.last_seen).seconds() > patience_s;
-    if (too_long || track.age_frames < kFewestFrames || remembered == kMostUnobserved) track.fate = Fate::out_of_view;
+    if (too_long || track.age_frames < kFewestFrames || remembered == kMostUnobserved) track.status = TrackStatus::out_of_view;
     else ++remembered;
   }
 }
@@ -88,7 +88,7 @@ void cut_patches(OrbTracks& tracks, const Pyramid& left, const Camera& camera) {
   for (OrbTrack& track : tracks) {
     if (!track.observed) continue;
     OrbPatches& patches = tracks.patches(track);
-    if (!patches.newest.cut(left, track.px, 0, kOrbAlignmentLevels - 1)) track.fate = Fate::lost;
+    if (!patches.newest.cut(left, track.px, 0, kOrbAlignmentLevels - 1)) track.status = TrackStatus::lost;
     else if (track.renew_reference) patches.reference.take(left, track.px, camera, track.normalised);
     track.renew_reference = false;
   }

@@ -52,7 +52,7 @@ TEST(OrbTrackMatcher, FindsTracksWhereTheyAreExpected) {
   EXPECT_GT(matched, 10);
   EXPECT_EQ(scene.stats.matches.found, matched);
   EXPECT_EQ(scene.stats.raw_matches.found, matched) << "nothing was improved";
-  scene.tracks[0].fate = Fate::lost;
+  scene.tracks[0].status = TrackStatus::lost;
   scene.tracks.drop_ended();
   matcher.count_inliers(scene.tracks, scene.stats);
   EXPECT_GT(scene.stats.matches.inliers, matched / 2);

@@ -30,8 +30,8 @@ TEST(OrbTrack, IsPredictedByItsDepthAndEndsOutsideTheImage) {
   EXPECT_EQ(tracks[1].px, Vec2(100, 50));
   EXPECT_EQ(tracks[0].previous_px, Vec2(100, 90));
   EXPECT_TRUE(tracks[0].was_observed && !tracks[0].observed);
-  EXPECT_EQ(tracks[0].fate, Fate::active);
-  EXPECT_EQ(tracks[2].fate, Fate::out_of_view) << "120 px to the left of the image";
+  EXPECT_EQ(tracks[0].status, TrackStatus::active);
+  EXPECT_EQ(tracks[2].status, TrackStatus::out_of_view) << "120 px to the left of the image";
 }
 
 TEST(OrbTrack, CarriesItsDepthAndRemembersThatOfTheImageBefore) {
@@ -56,7 +56,7 @@ TEST(OrbTrack, IsLostBehindTheCamera) {
   through.has_rotation = through.has_translation = true;
   through.p_ba = Vec3(0, 0, -0.95);
   predict(tracks, wall.camera, through, 0);
-  EXPECT_EQ(tracks[0].fate, Fate::lost);
+  EXPECT_EQ(tracks[0].status, TrackStatus::lost);
 }
 
 TEST(OrbTrack, RemembersInWhichOfTheLastImagesItWasObserved) {
@@ -112,15 +112,15 @@ TEST(ThinOut, LosesNoLocatedLandmark) {
     tracks.start(track_at(wall.camera, Vec2(100 + age_frames, 90), age_frames));
   tracks[0].p_G = Vec3(1, 2, 3);
   thin_out(tracks, 5, 10);
-  EXPECT_EQ(tracks[0].fate, Fate::active) << "the oldest";
-  EXPECT_EQ(tracks[1].fate, Fate::lost);
-  EXPECT_EQ(tracks[2].fate, Fate::out_of_view);
+  EXPECT_EQ(tracks[0].status, TrackStatus::active) << "the oldest";
+  EXPECT_EQ(tracks[1].status, TrackStatus::lost);
+  EXPECT_EQ(tracks[2].status, TrackStatus::out_of_view);
 }
 
 TEST(Forget, KeepsTracksWithDepthForLonger) {
   const TestWall wall;
   const Time now{2'000'000'000};
-  const auto fate = [&](double seen_ago_s, bool depth, int age_frames, bool observed = false) {
+  const auto status = [&](double seen_ago_s, bool depth, int age_frames, bool observed = false) {
     OrbTracks tracks(1);
     OrbTrack track = track_at(wall.camera, Vec2(100, 90), age_frames);
     track.observed = observed;
@@ -128,14 +128,14 @@ TEST(Forget, KeepsTracksWithDepthForLonger) {
     if (depth) track.inverse_depth = 0.3;
     tracks.start(track);
     forget(tracks, now, 1.0);
-    return tracks[0].fate;
+    return tracks[0].status;
   };
-  EXPECT_EQ(fate(0.9, true, 5), Fate::active);
-  EXPECT_EQ(fate(1.1, true, 5), Fate::out_of_view);
-  EXPECT_EQ(fate(0.2, false, 5), Fate::active);
-  EXPECT_EQ(fate(0.4, false, 5), Fate::out_of_view);
-  EXPECT_EQ(fate(0.1, true, 1), Fate::out_of_view) << "seen once only";
-  EXPECT_EQ(fate(1.1, true, 5, true), Fate::active) << "observed";
+  EXPECT_EQ(status(0.9, true, 5), TrackStatus::active);
+  EXPECT_EQ(status(1.1, true, 5), TrackStatus::out_of_view);
+  EXPECT_EQ(status(0.2, false, 5), TrackStatus::active);
+  EXPECT_EQ(status(0.4, false, 5), TrackStatus::out_of_view);
+  EXPECT_EQ(status(0.1, true, 1), TrackStatus::out_of_view) << "seen once only";
+  EXPECT_EQ(status(1.1, true, 5, true), TrackStatus::active) << "observed";
 }
 
 }  // namespace orb_track_test

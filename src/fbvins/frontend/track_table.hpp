@@ -4,7 +4,7 @@
 //
 //   TrackTable<KltTrack, KltPatches> tracks(150);
 //   if (!tracks.full() && tracks.free_patches().newest.cut(left, px, 0, 3)) tracks.start(track);
-//   for (KltTrack& track : tracks) if (!follow(track, tracks.patches(track))) track.fate = Fate::lost;
+//   for (KltTrack& track : tracks) if (!follow(track, tracks.patches(track))) track.status = TrackStatus::lost;
 //   tracks.drop_ended();
 #pragma once
 
@@ -21,7 +21,7 @@
 namespace fbvins {
 
 /// Whether a track goes on. One whose feature went out of view may be re-observed; a lost one may not.
-enum class Fate : std::uint8_t { active, out_of_view, lost };
+enum class TrackStatus : std::uint8_t { active, out_of_view, lost };
 
 struct TrackState {
   TrackId id;
@@ -35,7 +35,7 @@ struct TrackState {
   std::optional<Observation> right;  ///< match in the newest right image
   int age_frames = 0;
   bool observed = true;  ///< has an observation in the newest image
-  Fate fate = Fate::active;
+  TrackStatus status = TrackStatus::active;
 };
 
 template <class Track, class Patches>
@@ -76,21 +76,21 @@ class TrackTable {
     return tracks_.emplace_back(std::move(track));
   }
 
-  /// Removes tracks whose fate is not to go on, after calling `on_end(track, patches)` for each.
+  /// Removes tracks that are not active, after calling `on_end(track, patches)` for each.
   template <class OnEnd>
   void drop_ended(OnEnd&& on_end) {
     for (const Track& track : tracks_) {
-      if (track.fate == Fate::active) continue;
+      if (track.status == TrackStatus::active) continue;
       on_end(track, std::as_const(patches_[track.slot]));
       free_.push_back(track.slot);
     }
-    std::erase_if(tracks_, [](const Track& track) { return track.fate != Fate::active; });
+    std::erase_if(tracks_, [](const Track& track) { return track.status != TrackStatus::active; });
   }
   void drop_ended() {
     drop_ended([](const Track&, const Patches&) {});
   }
-  void end_all(Fate fate) {
-    for (Track& track : tracks_) track.fate = fate;
+  void end_all(TrackStatus status) {
+    for (Track& track : tracks_) track.status = status;
   }
 
  private:

@@ -23,7 +23,7 @@ TEST(TrackTable, KeepsEachTracksPatchesWhileOthersComeAndGo) {
   Table table(3);
   for (const int name : {0, 1, 2}) start(table, name);
   EXPECT_TRUE(table.full());
-  table[1].fate = Fate::lost;
+  table[1].status = TrackStatus::lost;
   table.drop_ended();
   ASSERT_EQ(table.size(), 2u);
   EXPECT_FALSE(table.full());
@@ -42,7 +42,7 @@ TEST(TrackTable, ResumedTracksKeepTheirIdAndNewOnesNeverShareOne) {
   start(table, 0);
   start(table, 1);
   const TrackState old = table[0];
-  table.end_all(Fate::out_of_view);
+  table.end_all(TrackStatus::out_of_view);
   table.drop_ended();
   EXPECT_EQ(table.size(), 0u);
   EXPECT_EQ(table.resume(old).id, TrackId{0});
@@ -52,11 +52,11 @@ TEST(TrackTable, ResumedTracksKeepTheirIdAndNewOnesNeverShareOne) {
 TEST(TrackTable, TellsOfEveryTrackThatEndsAndOfNoOther) {
   Table table(4);
   for (const int name : {0, 1, 2, 3}) start(table, name);
-  table[1].fate = Fate::lost;
-  table[3].fate = Fate::out_of_view;
-  std::vector<std::pair<int, Fate>> ended;
-  table.drop_ended([&](const TrackState& track, const Named& patches) { ended.emplace_back(patches.name, track.fate); });
-  const std::vector<std::pair<int, Fate>> wanted{{1, Fate::lost}, {3, Fate::out_of_view}};
+  table[1].status = TrackStatus::lost;
+  table[3].status = TrackStatus::out_of_view;
+  std::vector<std::pair<int, TrackStatus>> ended;
+  table.drop_ended([&](const TrackState& track, const Named& patches) { ended.emplace_back(patches.name, track.status); });
+  const std::vector<std::pair<int, TrackStatus>> wanted{{1, TrackStatus::lost}, {3, TrackStatus::out_of_view}};
   EXPECT_EQ(ended, wanted);
 }
 

@@ -45,7 +45,7 @@ double ClockGuard::shortest_lateness_s() const {
   return std::min(states_[imu].lateness.value_s(), states_[camera].lateness.value_s());
 }
 
-std::optional<ClockGuard::Event> ClockGuard::mend(Stream stream, Time raw, Time host) {
+std::optional<ClockGuard::Event> ClockGuard::correct(Stream stream, Time raw, Time host) {
   State& s = states_[stream];
   if (!s.newest) return begin(stream, raw, host);
   int held_back = 0;
@@ -54,8 +54,8 @@ std::optional<ClockGuard::Event> ClockGuard::mend(Stream stream, Time raw, Time 
     const Duration before = s.correction;
     s.correction = correction_after_leap(stream, raw, host);
     s.correction_before = before;
-    s.leapt_host = host;
-    ++leaps_;
+    s.jumped_host = host;
+    ++jumps_;
     held_back = s.misfits.count - 1;
   } else if (is_early(s, raw + s.correction, host)) {
     if (++s.early < kFewestMisfits) return std::nullopt;
@@ -125,9 +125,9 @@ Duration ClockGuard::correction_after_leap(Stream stream, Time raw, Time host) c
   const double period_s = s.period.median().value_or(Duration::from_seconds(std::max(passed_s, 1e-3))).seconds();
   const double steps = std::max(1.0, std::round(passed_s / period_s));
   const Duration own = *s.newest + Duration::from_seconds(steps * period_s) - raw;
-  const bool other_leapt = (host - other.leapt_host).seconds() < kSameLeapWithin_s;
+  const bool other_jumped = (host - other.jumped_host).seconds() < kSameLeapWithin_s;
   const auto about = [&](Duration d) { return std::abs((own - d).seconds()) < kSameLeap_s; };
-  if (other_leapt && about(other.correction)) return other.correction;
+  if (other_jumped && about(other.correction)) return other.correction;
   return about(s.correction_before) ? s.correction_before : own;
 }
 

@@ -6,7 +6,7 @@
 // merely late by some constant, bunched or missing fit. A stream begins with the first two stamps that are in step, and a stamp
 // that is earlier than its stream has been delivered so far counts when two more are.
 //
-//   if (auto event = guard.mend(ClockGuard::camera, frame.t, host_now))   // event->t is frame.t as long as no clock jumps
+//   if (auto event = guard.correct(ClockGuard::camera, frame.t, host_now))   // event->t is frame.t as long as no clock jumps
 //     Time shutter = guard.host_of(event->t);                            // when that was on this machine's clock
 //
 // Threads: one owner.
@@ -30,18 +30,19 @@ class ClockGuard {
 
   struct Event {
     Time t;
-    int held_back = 0;  ///< so many events of the stream that were refused just before it are good, with the stamps of `mended`
+    int held_back =
+        0;  ///< so many events of the stream that were refused just before it are good, with the stamps of `corrected`
     bool other_too = false;  ///< and so is the last one of the other stream, which had not begun
   };
   /// The stamp of an event that arrived at `host`, on the sensors' clock as it was before any jump. Nothing where it does not
   /// fit: the event is of no use, unless the next ones say so.
-  std::optional<Event> mend(Stream stream, Time raw, Time host);
+  std::optional<Event> correct(Stream stream, Time raw, Time host);
   /// An earlier stamp of this stream, with the correction of today.
-  Time mended(Stream stream, Time raw) const { return raw + states_[stream].correction; }
+  Time corrected(Stream stream, Time raw) const { return raw + states_[stream].correction; }
   /// Converts a time of the (corrected) sensors' clock to this machine's. The offset is that of the event of the last seconds
   /// that was delivered fastest: the shortest delay of the transport is not observable and counts as zero.
   Time host_of(Time t) const;
-  int leaps() const { return leaps_; }
+  int jumps() const { return jumps_; }
 
  private:
   /// As it came.
@@ -64,9 +65,9 @@ class ClockGuard {
     Time first, first_host, newest;
   };
   struct State {
-    Duration correction, correction_before;  ///< mended = raw + correction; before the last jump
+    Duration correction, correction_before;  ///< corrected = raw + correction; before the last jump
     std::optional<Time> newest, newest_host;
-    Time leapt_host{std::numeric_limits<std::int64_t>::min() / 2};
+    Time jumped_host{std::numeric_limits<std::int64_t>::min() / 2};
     SamplePeriod period;
     ShortestLateness lateness;
     std::optional<Arrival> unconfirmed;  ///< the last one, before the stream has begun
@@ -88,7 +89,7 @@ class ClockGuard {
   double rate_;
   std::array<State, 2> states_;
   std::optional<Arrival> first_;  ///< that counts
-  int leaps_ = 0;
+  int jumps_ = 0;
 };
 
 }  // namespace fbvins

@@ -20,7 +20,7 @@ int play(ClockGuard& guard, double seconds, const Leap& leap, const Delay& delay
     const double stamp = 1000 + s * rate;
     const Time host = at(50 + s + delay(s));
     const auto give = [&](ClockGuard::Stream stream) {
-      if (const auto event = guard.mend(stream, at(stamp + leap(s)), host)) {
+      if (const auto event = guard.correct(stream, at(stamp + leap(s)), host)) {
         worst_s = std::max(worst_s, std::abs((event->t - at(stamp)).seconds()));
         refused -= event->held_back + event->other_too;
       } else {
@@ -41,7 +41,7 @@ TEST(ClockGuard, LeavesStampsAlone) {
   double worst_s = 0;
   play(guard, 20, no_leap, no_delay, worst_s);
   EXPECT_EQ(worst_s, 0);
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
 }
 
 TEST(ClockGuard, LateAndBunchedDataAreNoLeap) {
@@ -51,7 +51,7 @@ TEST(ClockGuard, LateAndBunchedDataAreNoLeap) {
   play(
       guard, 20, no_leap, [](double s) { return std::ceil(s * 2) / 2 - s; }, worst_s);
   EXPECT_EQ(worst_s, 0);
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
 }
 
 TEST(ClockGuard, AClockThatDriftsIsNoLeap) {
@@ -59,7 +59,7 @@ TEST(ClockGuard, AClockThatDriftsIsNoLeap) {
   double worst_s = 0;
   play(
       guard, 4000, no_leap, [](double s) { return 0.001 - 1e-4 * s; }, worst_s);  // 100 ppm, in all 0.4 s
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
 }
 
 TEST(ClockGuard, LeapsForwardAndBackAreMended) {
@@ -69,7 +69,7 @@ TEST(ClockGuard, LeapsForwardAndBackAreMended) {
     const int refused = play(
         guard, 30, [&](double s) { return s > 10 && s < 20 ? size_s : 0.0; }, no_delay, worst_s);
     EXPECT_LT(worst_s, 1e-6) << size_s;     // regular sensors: to the period
-    EXPECT_EQ(guard.leaps(), 4) << size_s;  // two streams, there and back
+    EXPECT_EQ(guard.jumps(), 4) << size_s;  // two streams, there and back
     EXPECT_LT(refused, 2 * 6) << size_s;    // images of a quarter of a second each
   }
 }
@@ -80,10 +80,10 @@ TEST(ClockGuard, CameraAndImuLeapByTheSame) {
   double between_s = 0;
   for (int k = 0; k < 4000; ++k) {
     const double s = k * 0.005, leap = s > 10 ? 5.0 : 0.0;
-    const auto imu = guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
+    const auto imu = guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
     if (k % 10 != 0) continue;
     const double jitter_s = 0.003 * std::sin(k);
-    const auto image = guard.mend(ClockGuard::camera, at(1000 + s + leap + jitter_s), at(50 + s));
+    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + leap + jitter_s), at(50 + s));
     if (image && imu) between_s = std::max(between_s, std::abs((image->t - imu->t).seconds() - jitter_s));
   }
   EXPECT_LT(between_s, 1e-6);
@@ -94,15 +94,15 @@ TEST(ClockGuard, ADeviceThatStartsAnewAfterASilenceGoesOnWhereTimeIs) {
   double worst_s = 0;
   play(guard, 10, no_leap, no_delay, worst_s);
   // Four seconds later, with stamps from zero.
-  std::optional<ClockGuard::Event> mended;
+  std::optional<ClockGuard::Event> corrected;
   int k = 0;
-  for (; !mended; ++k) {
+  for (; !corrected; ++k) {
     ASSERT_LT(k, 60);
-    mended = guard.mend(ClockGuard::imu, at(0.5 + 0.005 * k), at(50 + 14 + 0.001 + 0.005 * k));
+    corrected = guard.correct(ClockGuard::imu, at(0.5 + 0.005 * k), at(50 + 14 + 0.001 + 0.005 * k));
   }
-  EXPECT_NEAR((mended->t - at(1014 + 0.005 * (k - 1))).seconds(), 0, 0.006);
-  EXPECT_EQ(guard.mended(ClockGuard::imu, at(0.5)), mended->t - Duration::from_seconds(0.005 * (k - 1)));
-  EXPECT_EQ(guard.leaps(), 1);
+  EXPECT_NEAR((corrected->t - at(1014 + 0.005 * (k - 1))).seconds(), 0, 0.006);
+  EXPECT_EQ(guard.corrected(ClockGuard::imu, at(0.5)), corrected->t - Duration::from_seconds(0.005 * (k - 1)));
+  EXPECT_EQ(guard.jumps(), 1);
 }
 
 /// Stamps that are wrong alone, or data that come late, change no other stamp.
@@ -140,14 +140,14 @@ TEST(ClockGuard, LateOrWrongStampsAreNoLeap) {
       const auto give = [&](ClockGuard::Stream stream, int index) {
         const bool wrong = stream == c.stream && c.late(index);
         // Stamps that are wrong are so by different amounts.
-        const auto event = guard.mend(stream, at(1000 + s - (wrong ? c.late_s * (1 + 0.1 * (index % 5)) : 0)), at(50.001 + s));
+        const auto event = guard.correct(stream, at(1000 + s - (wrong ? c.late_s * (1 + 0.1 * (index % 5)) : 0)), at(50.001 + s));
         late += wrong, refused += event ? -event->held_back : 1;
         EXPECT_TRUE(!event || (!wrong && event->t == at(1000 + s))) << c.what;
       };
       give(ClockGuard::imu, k);
       if (k % 10 == 0) give(ClockGuard::camera, k / 10);
     }
-    EXPECT_EQ(guard.leaps(), 0) << c.what;
+    EXPECT_EQ(guard.jumps(), 0) << c.what;
     EXPECT_GE(refused, late) << c.what;
     EXPECT_LE(refused, late + 2) << c.what << ": the first right ones, before they are confirmed";
     EXPECT_NEAR(guard.host_of(at(1020)).seconds(), 70.001, 1e-3) << c.what;
@@ -160,15 +160,15 @@ TEST(ClockGuard, ACameraThatBeginsAloneMayBeginWithAWrongStamp) {
   for (int k = 0; k < 2000; ++k) {
     const double s = k * 0.005;
     if (k % 10 == 0) {
-      const auto image = guard.mend(ClockGuard::camera, at(1000 + s + (k == 0 ? 1 : 0)), at(50 + s));
+      const auto image = guard.correct(ClockGuard::camera, at(1000 + s + (k == 0 ? 1 : 0)), at(50 + s));
       EXPECT_TRUE(k <= 10 ? !image : image && image->t == at(1000 + s)) << k;
     }
     if (k > 200) {
-      const auto reading = guard.mend(ClockGuard::imu, at(1000 + s), at(50 + s));
+      const auto reading = guard.correct(ClockGuard::imu, at(1000 + s), at(50 + s));
       EXPECT_TRUE(reading && reading->t == at(1000 + s)) << k;
     }
   }
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
 }
 
 /// A camera of which nothing is known but that its clock is the IMU's begins after a jump of it.
@@ -176,9 +176,9 @@ TEST(ClockGuard, AStreamThatBeginsAfterAJumpHasJumpedToo) {
   ClockGuard guard(1);
   for (int k = 0; k < 4000; ++k) {
     const double s = k * 0.005, leap = s > 5 ? 100 : 0;
-    (void)guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
+    (void)guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50 + s));
     if (s < 10 || k % 10 != 0) continue;
-    const auto image = guard.mend(ClockGuard::camera, at(1000 + s + leap), at(50 + s));
+    const auto image = guard.correct(ClockGuard::camera, at(1000 + s + leap), at(50 + s));
     ASSERT_TRUE(image);
     EXPECT_EQ(image->t, at(1000 + s));
   }
@@ -190,7 +190,7 @@ TEST(ClockGuard, ATransportThatBecomesFasterIsNoLeap) {
   double worst_s = 0;
   const int refused = play(
       guard, 40, no_leap, [](double s) { return s < 20 ? 0.15 : 0.001; }, worst_s);
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
   EXPECT_EQ(worst_s, 0);
   EXPECT_EQ(refused, 0);
   EXPECT_NEAR(guard.host_of(at(1035)).seconds(), 85.001, 1e-6);
@@ -199,7 +199,7 @@ TEST(ClockGuard, ATransportThatBecomesFasterIsNoLeap) {
 /// Readings of 200 ms that arrive in one block, after newer ones.
 TEST(ClockGuard, ABlockOfLateReadingsIsNoLeap) {
   ClockGuard guard(1);
-  const auto give = [&](int k, int now) { return guard.mend(ClockGuard::imu, at(1000 + 0.005 * k), at(50 + 0.005 * now)); };
+  const auto give = [&](int k, int now) { return guard.correct(ClockGuard::imu, at(1000 + 0.005 * k), at(50 + 0.005 * now)); };
   for (int k = 0; k < 400; ++k) (void)give(k, k);
   for (int k = 440; k < 460; ++k) EXPECT_TRUE(give(k, k));
   for (int k = 400; k < 440; ++k) (void)give(k, 460);
@@ -207,7 +207,7 @@ TEST(ClockGuard, ABlockOfLateReadingsIsNoLeap) {
     const auto event = give(k, k);
     EXPECT_TRUE(event && event->t == at(1000 + 0.005 * k)) << k;
   }
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
 }
 
 /// A clock that jumps there and back by about the same has its old correction again, not one that is a few milliseconds off.
@@ -216,9 +216,9 @@ TEST(ClockGuard, AJumpBackIsUndoneExactly) {
   std::optional<ClockGuard::Event> last;
   for (int k = 0; k < 6000; ++k) {
     const double s = k * 0.005, leap = s > 10 && s < 20 ? 3 : 0, jitter_s = 0.002 * std::sin(7.0 * k);
-    last = guard.mend(ClockGuard::imu, at(1000 + s + leap), at(50.003 + s + jitter_s));
+    last = guard.correct(ClockGuard::imu, at(1000 + s + leap), at(50.003 + s + jitter_s));
   }
-  EXPECT_EQ(guard.leaps(), 2);
+  EXPECT_EQ(guard.jumps(), 2);
   ASSERT_TRUE(last);
   EXPECT_EQ(last->t, at(1000 + 5999 * 0.005));
 }
@@ -230,13 +230,13 @@ TEST(ClockGuard, AJumpTooSmallToBeSeenForwardsIsSeenByBothStreamsBackwards) {
     double apart_s = 0;
     for (int k = 0; k < 4000; ++k) {
       const double s = k * 0.005, stamp = 1000 + s + (s > 8 && s < 12 ? size_s : 0.0);
-      const auto imu = guard.mend(ClockGuard::imu, at(stamp), at(50 + s));
+      const auto imu = guard.correct(ClockGuard::imu, at(stamp), at(50 + s));
       if (k % 10 != 0) continue;
-      const auto image = guard.mend(ClockGuard::camera, at(stamp), at(50 + s));
+      const auto image = guard.correct(ClockGuard::camera, at(stamp), at(50 + s));
       if (image && imu) apart_s = std::max(apart_s, std::abs((image->t - imu->t).seconds()));
     }
     EXPECT_LT(apart_s, 1e-6) << size_s;
-    EXPECT_EQ(guard.leaps(), size_s > 0.1 ? 2 : 0) << size_s;
+    EXPECT_EQ(guard.jumps(), size_s > 0.1 ? 2 : 0) << size_s;
   }
 }
 
@@ -252,7 +252,7 @@ TEST(ClockGuard, ARecordingPlayedFasterIsNoLeap) {
   ClockGuard guard(4);
   double worst_s = 0;
   play(guard, 20, no_leap, no_delay, worst_s, 4);
-  EXPECT_EQ(guard.leaps(), 0);
+  EXPECT_EQ(guard.jumps(), 0);
   EXPECT_NEAR(guard.host_of(at(1040)).seconds(), 60.001, 1e-6);
 }
 

@@ -33,12 +33,12 @@ Result<void> check_memory(const FileDescriptor& memory, const FrameLayout& layou
 }  // namespace
 
 Result<std::shared_ptr<FrameRing>> FrameRing::map(const FileDescriptor& memory, const FrameLayout& layout,
-                                                  std::shared_ptr<const WakeEvent> bell) {
+                                                  std::shared_ptr<const WakeEvent> wake) {
   if (Result<void> good = check_memory(memory, layout); !good) return good.error();
   void* address = ::mmap(nullptr, layout.bytes(), PROT_READ, MAP_SHARED, memory.number(), 0);
   if (address == MAP_FAILED)
     return Error{ErrorCode::unreadable, fmt::format("the images' memory cannot be mapped: {}", std::strerror(errno))};
-  return std::shared_ptr<FrameRing>(new FrameRing(static_cast<const std::uint8_t*>(address), layout, std::move(bell)));
+  return std::shared_ptr<FrameRing>(new FrameRing(static_cast<const std::uint8_t*>(address), layout, std::move(wake)));
 }
 
 FrameRing::~FrameRing() { ::munmap(const_cast<std::uint8_t*>(memory_), layout_.bytes()); }
@@ -57,7 +57,7 @@ Result<StereoFrame> FrameRing::take(const SocketFrame& frame) {
   if (!scarce) return borrow(frame);
   StereoFrame copied = copy(frame);
   released_.fetch_or(bit);
-  bell_->ring();
+  wake_->signal();
   return copied;
 }
 
@@ -103,7 +103,7 @@ StereoFrame FrameRing::borrow(const SocketFrame& frame) {
   const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(frame.slot);
   const std::shared_ptr<const std::uint8_t> slot(pixels(frame, 0), [ring = shared_from_this(), bit](const std::uint8_t*) {
     ring->released_.fetch_or(bit);
-    ring->bell_->ring();
+    ring->wake_->signal();
   });
   return with_images(frame, [&](const std::uint8_t* pixels) {
     return Image(layout_.width_px, layout_.height_px, std::shared_ptr<const std::uint8_t>(slot, pixels));

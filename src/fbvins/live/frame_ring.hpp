@@ -3,9 +3,9 @@
 // when the last image in it is destroyed, on whatever thread that is; images may outlive the sender and its connection. But for
 // the images' destruction: one thread.
 //
-//   Result<std::shared_ptr<FrameRing>> ring = FrameRing::map(std::move(memfd), hello.layout, bell);
+//   Result<std::shared_ptr<FrameRing>> ring = FrameRing::map(std::move(memfd), hello.layout, wake);
 //   Result<StereoFrame> frame = (*ring)->take(message);   // an error where the sender announces a slot twice
-//   ...                                                   // the bell rings
+//   ...                                                   // the event is signalled
 //   std::uint64_t free_again = (*ring)->released();       // bit k: slot k
 //
 // The sender cannot take the memory away: it must be sealed against shrinking, so no read ends in SIGBUS. It may write to a
@@ -16,8 +16,8 @@
 #include <memory>
 
 #include "fbvins/core/file_descriptor.hpp"
-#include "fbvins/live/bell.hpp"
 #include "fbvins/live/socket_message.hpp"
+#include "fbvins/live/wake_event.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
@@ -25,7 +25,7 @@ namespace fbvins {
 class FrameRing : public std::enable_shared_from_this<FrameRing> {
  public:
   static Result<std::shared_ptr<FrameRing>> map(const FileDescriptor& memory, const FrameLayout& layout,
-                                                std::shared_ptr<const WakeEvent> bell);
+                                                std::shared_ptr<const WakeEvent> wake);
   FrameRing(const FrameRing&) = delete;
   FrameRing& operator=(const FrameRing&) = delete;
   ~FrameRing();
@@ -39,8 +39,8 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
   int held() const;
 
  private:
-  FrameRing(const std::uint8_t* memory, const FrameLayout& layout, std::shared_ptr<const WakeEvent> bell)
-      : memory_(memory), layout_(layout), bell_(std::move(bell)) {}
+  FrameRing(const std::uint8_t* memory, const FrameLayout& layout, std::shared_ptr<const WakeEvent> wake)
+      : memory_(memory), layout_(layout), wake_(std::move(wake)) {}
   StereoFrame borrow(const SocketFrame& frame);
   StereoFrame copy(const SocketFrame& frame) const;
   const std::uint8_t* slot(const SocketFrame& frame) const;
@@ -52,7 +52,7 @@ class FrameRing : public std::enable_shared_from_this<FrameRing> {
 
   const std::uint8_t* memory_;
   FrameLayout layout_;
-  std::shared_ptr<const WakeEvent> bell_;
+  std::shared_ptr<const WakeEvent> wake_;
   std::uint64_t held_ = 0;
   std::atomic<std::uint64_t> released_ = 0;
 };

@@ -12,8 +12,8 @@ using test::kSlotBytes;
 
 const FrameLayout kLayout{test::kWidth, test::kHeight, test::kSlots, kSlotBytes, 2, {0, kSlotBytes / 2}};
 
-bool rings(const WakeEvent& bell) {
-  pollfd watched{bell.fd(), POLLIN, 0};
+bool rings(const WakeEvent& wake) {
+  pollfd watched{wake.fd(), POLLIN, 0};
   return ::poll(&watched, 1, 0) == 1;
 }
 
@@ -23,14 +23,14 @@ class FrameRingTest : public testing::Test {
     slots_ =
         static_cast<std::uint8_t*>(::mmap(nullptr, kLayout.bytes(), PROT_READ | PROT_WRITE, MAP_SHARED, memory_.number(), 0));
     for (std::size_t i = 0; i < kLayout.bytes(); ++i) slots_[i] = static_cast<std::uint8_t>(i * 7 + i / kSlotBytes);
-    auto ring = FrameRing::map(memory_, kLayout, bell_);
+    auto ring = FrameRing::map(memory_, kLayout, wake_);
     EXPECT_TRUE(ring);
     if (ring) ring_ = *ring;
   }
   ~FrameRingTest() override { ::munmap(slots_, kLayout.bytes()); }
 
   FileDescriptor memory_ = test::test_memory();
-  std::shared_ptr<const WakeEvent> bell_ = std::make_shared<const WakeEvent>();
+  std::shared_ptr<const WakeEvent> wake_ = std::make_shared<const WakeEvent>();
   std::shared_ptr<FrameRing> ring_;
   std::uint8_t* slots_ = nullptr;
 };
@@ -52,7 +52,7 @@ TEST_F(FrameRingTest, ImagesOfThreeCamerasInOneSlot) {
   FrameLayout layout = kLayout;
   layout.cameras = 3;
   layout.offset_bytes[2] = kSlotBytes - layout.image_bytes();
-  auto ring = FrameRing::map(memory_, layout, bell_);
+  auto ring = FrameRing::map(memory_, layout, wake_);
   ASSERT_TRUE(ring);
   SocketFrame sent = frame_in(1);
   sent.images = 0b101;
@@ -74,7 +74,7 @@ TEST_F(FrameRingTest, ADepthImageBesideThatOfTheCamera) {
   layout.cameras = 1;
   layout.slot_bytes = 2 * kSlotBytes, layout.slots = 2;
   layout.depth_offset_bytes = kSlotBytes;
-  auto ring = FrameRing::map(memory_, layout, bell_);
+  auto ring = FrameRing::map(memory_, layout, wake_);
   ASSERT_TRUE(ring);
   SocketFrame sent = frame_in(1);
   sent.images = FBVINS_SOCKET_LEFT | FBVINS_SOCKET_DEPTH;
@@ -97,10 +97,10 @@ TEST_F(FrameRingTest, ASlotIsFreeWhenItsLastImageIsGone) {
   frame->left.reset();
   frame->right.reset();
   EXPECT_EQ(ring_->released(), 0u);
-  EXPECT_FALSE(rings(*bell_));
+  EXPECT_FALSE(rings(*wake_));
   EXPECT_FALSE(ring_->take(frame_in(1)));  // still held
   right.reset();
-  EXPECT_TRUE(rings(*bell_));
+  EXPECT_TRUE(rings(*wake_));
   EXPECT_FALSE(ring_->take(frame_in(1)));  // free, but the sender does not know yet
   EXPECT_EQ(ring_->held(), 0);
   EXPECT_EQ(ring_->released(), 2u);
@@ -151,9 +151,9 @@ TEST_F(FrameRingTest, NoSlotBeyondTheLast) {
 }
 
 TEST(FrameRing, MemoryThatCouldGoAwayIsRefused) {
-  const auto bell = std::make_shared<const WakeEvent>();
+  const auto wake = std::make_shared<const WakeEvent>();
   const auto refusal = [&](const FileDescriptor& memory) {
-    const auto ring = FrameRing::map(memory, kLayout, bell);
+    const auto ring = FrameRing::map(memory, kLayout, wake);
     return ring ? "taken" : ring.error().message;
   };
   EXPECT_EQ(refusal(test::test_memory(kLayout.bytes(), F_SEAL_GROW)), "the images' memory is not sealed with F_SEAL_SHRINK");

@@ -20,13 +20,13 @@ bool is_image(const SharedEvent& event) { return std::holds_alternative<StereoFr
 }  // namespace
 
 /// A sink, its queue and its thread.
-class Hub::Lane {
+class Hub::SinkQueue {
  public:
-  Lane(std::unique_ptr<Sink> sink, Limits limits) : sink_(std::move(sink)), limits_(limits) {
+  SinkQueue(std::unique_ptr<Sink> sink, Limits limits) : sink_(std::move(sink)), limits_(limits) {
     report_.name = sink_->name();
     thread_ = std::thread([this] { work(); });
   }
-  ~Lane() { finish(); }
+  ~SinkQueue() { finish(); }
 
   void put(const SharedEvent& event) {
     const std::lock_guard lock(mutex_);
@@ -113,26 +113,26 @@ class Hub::Lane {
 Hub::Hub(Limits limits) : limits_(limits) {}
 Hub::~Hub() = default;
 
-void Hub::add(std::unique_ptr<Sink> sink) { lanes_.push_back(std::make_unique<Lane>(std::move(sink), limits_)); }
+void Hub::add(std::unique_ptr<Sink> sink) { queues_.push_back(std::make_unique<SinkQueue>(std::move(sink), limits_)); }
 
 bool Hub::wants_views() const {
-  return std::any_of(lanes_.begin(), lanes_.end(), [](const auto& lane) { return lane->wants_views(); });
+  return std::any_of(queues_.begin(), queues_.end(), [](const auto& queue) { return queue->wants_views(); });
 }
 
 void Hub::publish(LiveEvent event) {
-  if (lanes_.empty()) return;
+  if (queues_.empty()) return;
   const auto shared = std::make_shared<const LiveEvent>(std::move(event));
-  for (const auto& lane : lanes_) lane->put(shared);
+  for (const auto& queue : queues_) queue->put(shared);
 }
 
 std::vector<Hub::SinkReport> Hub::reports() const {
   std::vector<SinkReport> reports;
-  for (const auto& lane : lanes_) reports.push_back(lane->report());
+  for (const auto& queue : queues_) reports.push_back(queue->report());
   return reports;
 }
 
 Result<void> Hub::finish() {
-  for (const auto& lane : lanes_) lane->finish();
+  for (const auto& queue : queues_) queue->finish();
   for (const SinkReport& report : reports())
     if (!report.problem.empty()) return Error{ErrorCode::stage_failed, report.name + ": " + report.problem};
   return {};

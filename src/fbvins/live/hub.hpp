@@ -38,7 +38,7 @@ class Hub {
 
   /// Before the first publish().
   void add(std::unique_ptr<Sink> sink);
-  bool empty() const { return lanes_.empty(); }
+  bool empty() const { return queues_.empty(); }
   /// Whether any sink does now.
   bool wants_views() const;
   void publish(LiveEvent event);
@@ -47,9 +47,9 @@ class Hub {
   Result<void> finish();
 
  private:
-  class Lane;
+  class SinkQueue;
   Limits limits_;
-  std::vector<std::unique_ptr<Lane>> lanes_;
+  std::vector<std::unique_ptr<SinkQueue>> queues_;
 };
 
 }  // namespace fbvins

@@ -38,7 +38,7 @@ void Ingest::push(const ImuSample& sample) {
     ++counts_.imu_refused;
     return;
   }
-  const std::optional<ClockGuard::Event> event = clock_.mend(ClockGuard::imu, sample.t - time_offset_, host);
+  const std::optional<ClockGuard::Event> event = clock_.correct(ClockGuard::imu, sample.t - time_offset_, host);
   if (!event) {
     misfits_.push_back(sample);
     if (misfits_.size() <= kMostMisfits) return;
@@ -49,10 +49,10 @@ void Ingest::push(const ImuSample& sample) {
   const std::size_t lost = misfits_.size() - std::min(misfits_.size(), static_cast<std::size_t>(event->held_back));
   counts_.imu_late += static_cast<std::int64_t>(lost);
   for (std::size_t k = lost; k < misfits_.size(); ++k)
-    put_in_order(misfits_[k], clock_.mended(ClockGuard::imu, misfits_[k].t - time_offset_), host);
+    put_in_order(misfits_[k], clock_.corrected(ClockGuard::imu, misfits_[k].t - time_offset_), host);
   misfits_.clear();
   if (event->other_too && held_image_) {
-    const Time t = clock_.mended(ClockGuard::camera, held_image_->t);
+    const Time t = clock_.corrected(ClockGuard::camera, held_image_->t);
     take(*std::exchange(held_image_, std::nullopt), t, host);
   }
   put_in_order(sample, event->t, host);
@@ -68,9 +68,9 @@ void Ingest::push(StereoFrame frame) {
   const std::lock_guard order(order_mutex_);
   const Time host = now_();
   ++counts_.images;
-  const std::optional<ClockGuard::Event> event = clock_.mend(ClockGuard::camera, frame.t, host);
+  const std::optional<ClockGuard::Event> event = clock_.correct(ClockGuard::camera, frame.t, host);
   if (std::optional<StereoFrame> held = std::exchange(held_image_, std::nullopt)) {
-    const Time t = clock_.mended(ClockGuard::camera, held->t);
+    const Time t = clock_.corrected(ClockGuard::camera, held->t);
     if (event && event->held_back > 0) take(std::move(*held), t, host);
     else ++counts_.images_late;
   }
@@ -80,7 +80,7 @@ void Ingest::push(StereoFrame frame) {
     return;
   }
   if (event->other_too && !misfits_.empty()) {
-    put_in_order(misfits_.back(), clock_.mended(ClockGuard::imu, misfits_.back().t - time_offset_), host);
+    put_in_order(misfits_.back(), clock_.corrected(ClockGuard::imu, misfits_.back().t - time_offset_), host);
     misfits_.pop_back();
   }
   take(std::move(frame), event->t, host);
@@ -135,7 +135,7 @@ void Ingest::note_arrival(const StereoFrame& frame, Time host) {
 
 void Ingest::push_anchor(Anchor anchor) {
   const std::lock_guard order(order_mutex_);
-  std::visit([this](auto& a) { a.t = clock_.mended(ClockGuard::camera, a.t); }, anchor);
+  std::visit([this](auto& a) { a.t = clock_.corrected(ClockGuard::camera, a.t); }, anchor);
   const std::lock_guard lock(mutex_);
   if (closed_ || anchors_.size() >= kMostAnchors) return;
   anchors_.push_back(std::move(anchor));
@@ -219,7 +219,7 @@ LiveCounts Ingest::counts() const {
   LiveCounts counts = counts_;
   counts.imu_late += order_.late();
   counts.imu_reordered = order_.reordered();
-  counts.clock_leaps = clock_.leaps();
+  counts.clock_leaps = clock_.jumps();
   const std::lock_guard lock(mutex_);
   counts.images_dropped = images_dropped_;
   return counts;

@@ -13,11 +13,11 @@
 
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/file_source.hpp"
-#include "fbvins/live/bell.hpp"
 #include "fbvins/live/byte_link.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/mavlink_session.hpp"
 #include "fbvins/live/signing_time.hpp"
+#include "fbvins/live/wake_event.hpp"
 
 namespace fbvins {
 namespace {
@@ -57,7 +57,7 @@ struct MavlinkSink::Impl {
 
   void stop() {
     ending = true;
-    bell.ring();
+    wake.signal();
     if (worker.joinable()) worker.join();
   }
   void work();
@@ -79,7 +79,7 @@ struct MavlinkSink::Impl {
   Time next_try{};
   std::optional<Time> stranger_at;
 
-  const WakeEvent bell;
+  const WakeEvent wake;
   std::atomic<bool> ending{false};
   std::mutex mutex;  // guards what follows, but for the thread
   std::deque<std::variant<LivePose, LiveStatus>> waiting;
@@ -126,10 +126,10 @@ std::string MavlinkSink::Impl::problem(Time now) {
 }
 
 void MavlinkSink::Impl::wait() {
-  std::array<pollfd, 2> fds = {{{bell.fd(), POLLIN, 0}, {link.descriptor(), POLLIN, 0}}};
+  std::array<pollfd, 2> fds = {{{wake.fd(), POLLIN, 0}, {link.descriptor(), POLLIN, 0}}};
   if (link.has_unsent()) fds[1].events |= POLLOUT;
   ::poll(fds.data(), fds.size(), kTick_ms);  // ignores a descriptor of -1
-  bell.silence();
+  wake.clear();
 }
 
 void MavlinkSink::Impl::publish(Time now) {
@@ -197,7 +197,7 @@ Result<void> MavlinkSink::take(const LiveEvent& event) {
   else if (const auto* status = std::get_if<LiveStatus>(&event)) impl_->waiting.emplace_back(*status);
   else return {};
   if (impl_->waiting.size() > kWaiting) impl_->waiting.pop_front(), ++impl_->overrun;
-  impl_->bell.ring();
+  impl_->wake.signal();
   return {};
 }
 

@@ -68,7 +68,7 @@ void SocketSession::take_hello(const Packet& packet) {
   if (!hello || packet.cut) return fail({ErrorCode::malformed, "the first message is not a hello"});
   if (packet.descriptors.size() != 1)
     return fail({ErrorCode::malformed, fmt::format("hello: {} file descriptors instead of one", packet.descriptors.size())});
-  auto ring = FrameRing::map(packet.descriptors[0], hello->layout, bell_);
+  auto ring = FrameRing::map(packet.descriptors[0], hello->layout, wake_);
   if (!ring) return fail(ring.error());
   ring_ = *std::move(ring);
   hello_ = std::move(*hello);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sender, from its hello to the end of its connection. No call blocks: the owner polls fd() and the bell. Whatever the sender
+// One sender, from its hello to the end of its connection. No call blocks: the owner polls fd() and the wake. Whatever the sender
 // does, at worst it ends its own session, with one sentence.
 //
-//   SocketSession session(accepted, bell);
+//   SocketSession session(accepted, wake);
 //   session.greet();             // until greeted() or ended(): the hello, its memory mapped
 //   session.welcome();           // the sender begins
 //   session.receive(input);      // when fd() is readable, until ended()
-//   session.send_released();     // when the bell rang
+//   session.send_released();     // when it was signalled
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ struct SocketCounts {
 
 class SocketSession {
  public:
-  SocketSession(FileDescriptor connection, std::shared_ptr<const WakeEvent> bell)
-      : connection_(std::move(connection)), bell_(std::move(bell)) {}
+  SocketSession(FileDescriptor connection, std::shared_ptr<const WakeEvent> wake)
+      : connection_(std::move(connection)), wake_(std::move(wake)) {}
 
   int fd() const { return connection_.number(); }
   /// For messages to people.
@@ -61,7 +61,7 @@ class SocketSession {
 
   FileDescriptor connection_;
   std::array<std::byte, FBVINS_SOCKET_LARGEST_MESSAGE> buffer_;
-  std::shared_ptr<const WakeEvent> bell_;
+  std::shared_ptr<const WakeEvent> wake_;
   std::optional<SocketHello> hello_;
   std::shared_ptr<FrameRing> ring_;
   std::optional<std::uint64_t> last_sequence_;

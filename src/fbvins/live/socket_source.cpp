@@ -45,8 +45,8 @@ struct SocketSource::Report {
 
 class SocketSource::StatusSink final : public Sink {
  public:
-  StatusSink(std::shared_ptr<Report> report, std::shared_ptr<const WakeEvent> bell)
-      : report_(std::move(report)), bell_(std::move(bell)) {}
+  StatusSink(std::shared_ptr<Report> report, std::shared_ptr<const WakeEvent> wake)
+      : report_(std::move(report)), wake_(std::move(wake)) {}
   std::string_view name() const override { return "status to the sender"; }
   Result<void> take(const LiveEvent& event) override {
     if (const auto* status = std::get_if<LiveStatus>(&event)) {
@@ -55,14 +55,14 @@ class SocketSource::StatusSink final : public Sink {
       report_->fresh = report_->fresh || health != report_->health || status->reset_counter != report_->reset_counter;
       report_->health = health;
       report_->reset_counter = status->reset_counter;
-      if (report_->fresh) bell_->ring();
+      if (report_->fresh) wake_->signal();
     }
     return {};
   }
 
  private:
   std::shared_ptr<Report> report_;
-  std::shared_ptr<const WakeEvent> bell_;
+  std::shared_ptr<const WakeEvent> wake_;
 };
 
 SocketSource::SocketSource(SocketFile file, SocketOptions options)
@@ -99,20 +99,20 @@ Result<void> SocketSource::run(SensorInput& input) {
 
 void SocketSource::stop() {
   stopped_ = true;
-  bell_->ring();
+  wake_->signal();
 }
 
-std::unique_ptr<Sink> SocketSource::status_sink() { return std::make_unique<StatusSink>(report_, bell_); }
+std::unique_ptr<Sink> SocketSource::status_sink() { return std::make_unique<StatusSink>(report_, wake_); }
 
 /// Waits for an event, `longest` at most, and handles it. Without an input a sender is checked, but not welcomed yet.
 void SocketSource::step(Clock::duration longest, SensorInput* input) {
   const auto now = Clock::now();
   const auto until = session_ ? std::clamp(next_, now, now + longest) : now + longest;
   const auto to_sender = static_cast<short>(backlog_ ? POLLOUT : 0);
-  std::array<pollfd, 3> watched = {pollfd{bell_->fd(), POLLIN, 0}, pollfd{now < accept_after_ ? -1 : file_.fd(), POLLIN, 0},
+  std::array<pollfd, 3> watched = {pollfd{wake_->fd(), POLLIN, 0}, pollfd{now < accept_after_ ? -1 : file_.fd(), POLLIN, 0},
                                    pollfd{session_ ? session_->fd() : -1, static_cast<short>(POLLIN | to_sender), 0}};
   ::poll(watched.data(), watched.size(), static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
-  if (watched[0].revents != 0) bell_->silence();
+  if (watched[0].revents != 0) wake_->clear();
   if (Clock::now() > leaving_until_) leaving_.reset();
   if (session_) {
     if (!session_->greeted()) greet(input != nullptr);
@@ -130,7 +130,7 @@ void SocketSource::accept() {
     accept_after_ = Clock::now() + kAcceptAgain;
     return;
   }
-  auto newcomer = std::make_unique<SocketSession>(std::move(connection), bell_);
+  auto newcomer = std::make_unique<SocketSession>(std::move(connection), wake_);
   if (session_) {
     newcomer->refuse(FBVINS_SOCKET_BUSY, fmt::format("another sender is connected: {}", session_->name()));
     return linger(std::move(newcomer));

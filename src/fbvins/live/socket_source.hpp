@@ -62,7 +62,7 @@ class SocketSource final : public Source {
   StereoRig rig_;
   bool rig_known_ = false;
   std::optional<SocketRig> senders_rig_;  ///< where rig_ was taken from a sender
-  std::shared_ptr<const WakeEvent> bell_ = std::make_shared<const WakeEvent>();
+  std::shared_ptr<const WakeEvent> wake_ = std::make_shared<const WakeEvent>();
   std::shared_ptr<Report> report_;
   std::unique_ptr<SocketSession> session_;
   std::unique_ptr<SocketSession> leaving_;  ///< the last session that ended, kept open until its goodbye has been read

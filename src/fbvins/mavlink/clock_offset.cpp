@@ -16,7 +16,7 @@ constexpr Time kLatestClock{3'800'000'000'000'000'000};
 }  // namespace
 
 /// Whether the offset differs by more than a delay on one of the two ways alone could explain.
-bool ClockOffset::leapt(const Answer& answer) const {
+bool ClockOffset::jumped(const Answer& answer) const {
   const std::int64_t off = std::abs((answer.offset - value_).ns);
   return off > answer.round_trip.ns / 2 + kLeap.ns;
 }
@@ -28,11 +28,11 @@ void ClockOffset::add(Time asked, Time theirs, Time answered) {
   if (answer.round_trip.ns < 0 || answer.round_trip > kLongestRoundTrip) return;
   answer.offset = theirs - Time{asked.ns + answer.round_trip.ns / 2};
 
-  if (!answers_.empty() && leapt(answer)) {
+  if (!answers_.empty() && jumped(answer)) {
     strays_.push_back(answer);
     if (strays_.size() < kLeapAnswers) return;
     answers_ = std::exchange(strays_, {});
-    ++leaps_;
+    ++jumps_;
   } else {
     strays_.clear();
     answers_.push_back(answer);

@@ -40,7 +40,7 @@ TEST(ClockOffset, IsKnownToATenthOfAMillisecondInSpiteOfQueues) {
     if (i < 10) continue;
     EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 10);
   }
-  EXPECT_EQ(offset.leaps(), 0);
+  EXPECT_EQ(offset.jumps(), 0);
   EXPECT_GT(offset.round_trip().ns, 0);
   EXPECT_LT(offset.round_trip().ns, 30 * kMs);
 }
@@ -62,7 +62,7 @@ TEST(ClockOffset, ALeapIsTakenAfterThreeAnswersAndIsNotKnownBeforeEnoughOfThem) 
   EXPECT_TRUE(offset.known());
   cable.ask(offset, restarted);
   EXPECT_FALSE(offset.known());
-  EXPECT_EQ(offset.leaps(), 1);
+  EXPECT_EQ(offset.jumps(), 1);
   for (int i = 0; i < 10; ++i) cable.ask(offset, restarted);
   EXPECT_TRUE(offset.known());
   EXPECT_LT(std::abs((offset.value() - restarted).ns), kMs);
@@ -80,7 +80,7 @@ TEST(ClockOffset, ATimeThatNoClockHasIsIgnored) {
   }
   EXPECT_TRUE(offset.known());
   EXPECT_FALSE(offset.in_doubt());
-  EXPECT_EQ(offset.leaps(), 0);
+  EXPECT_EQ(offset.jumps(), 0);
   EXPECT_LT(std::abs((offset.value() - ahead).ns), kMs / 10);
 }
 

@@ -7,11 +7,11 @@
 #include <array>
 #include <atomic>
 
-#include "fbvins/live/bell.hpp"
 #include "fbvins/live/byte_link.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/mavlink_imu.hpp"
 #include "fbvins/live/socket_source.hpp"
+#include "fbvins/live/wake_event.hpp"
 
 namespace fbvins {
 namespace {
@@ -29,7 +29,7 @@ class MavlinkFeed final : public ImuFeed {
       keep_open(host_now());
       for (const auto& frame : imu_.tick(host_now())) link_.send(frame);
       link_.flush();
-      std::array<pollfd, 2> watched = {{{bell_.fd(), POLLIN, 0}, {link_.descriptor(), POLLIN, 0}}};
+      std::array<pollfd, 2> watched = {{{wake_.fd(), POLLIN, 0}, {link_.descriptor(), POLLIN, 0}}};
       ::poll(watched.data(), watched.size(), kTick_ms);
       const std::vector<std::uint8_t> bytes = link_.receive();
       for (const ImuSample& sample : imu_.receive(bytes, host_now())) input.push(sample);
@@ -40,7 +40,7 @@ class MavlinkFeed final : public ImuFeed {
 
   void stop() override {
     stopped_ = true;
-    bell_.ring();
+    wake_.signal();
   }
 
  private:
@@ -68,7 +68,7 @@ class MavlinkFeed final : public ImuFeed {
   ByteLink link_;
   MavlinkImu imu_;
   Time next_try_{};
-  const WakeEvent bell_;
+  const WakeEvent wake_;
   std::atomic<bool> stopped_ = false;
 };
 

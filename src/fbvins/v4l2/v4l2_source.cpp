@@ -88,7 +88,7 @@ Result<void> V4l2Source::run(SensorInput& input) {
 
 void V4l2Source::stop() {
   stopped_ = true;
-  bell_.ring();
+  wake_.signal();
 }
 
 void V4l2Source::say(const std::string& sentence) {
@@ -98,7 +98,7 @@ void V4l2Source::say(const std::string& sentence) {
 
 void V4l2Source::deliver_images(SensorInput& input) {
   while (!stopped_) {
-    std::vector<pollfd> watched = {{bell_.fd(), POLLIN, 0}};
+    std::vector<pollfd> watched = {{wake_.fd(), POLLIN, 0}};
     for (Opened& camera : cameras_) {
       keep_open(camera);
       watched.push_back({camera.device ? camera.device->fd() : -1, POLLIN, 0});

@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "fbvins/live/bell.hpp"
 #include "fbvins/live/frame_joiner.hpp"
 #include "fbvins/live/make_source.hpp"
+#include "fbvins/live/wake_event.hpp"
 #include "fbvins/v4l2/imu_feed.hpp"
 #include "fbvins/v4l2/video_device.hpp"
 
@@ -57,7 +57,7 @@ class V4l2Source final : public Source {
   std::vector<Opened> cameras_;
   std::unique_ptr<ImuFeed> imu_;
   FrameJoiner joiner_;
-  const WakeEvent bell_;
+  const WakeEvent wake_;
   std::mutex say_mutex_;
   std::atomic<bool> stopped_ = false;
 };

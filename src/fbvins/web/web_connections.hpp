@@ -60,12 +60,12 @@ class WebWait {
 };
 
 /// Counts a connection while it lives.
-class WebPlace {
+class CountedConnection {
  public:
-  explicit WebPlace(std::shared_ptr<WebShared> shared) : shared_(std::move(shared)) { ++shared_->connections; }
-  ~WebPlace() { --shared_->connections; }
-  WebPlace(const WebPlace&) = delete;
-  WebPlace& operator=(const WebPlace&) = delete;
+  explicit CountedConnection(std::shared_ptr<WebShared> shared) : shared_(std::move(shared)) { ++shared_->connections; }
+  ~CountedConnection() { --shared_->connections; }
+  CountedConnection(const CountedConnection&) = delete;
+  CountedConnection& operator=(const CountedConnection&) = delete;
   WebShared& operator*() const { return *shared_; }
   WebShared* operator->() const { return shared_.get(); }
   const std::shared_ptr<WebShared>& shared() const { return shared_; }
@@ -88,6 +88,6 @@ class WebViewer {
 using WebViewers = std::set<std::shared_ptr<WebViewer>>;
 
 /// Answers a connection's requests until it ends or becomes one of `viewers`, which must outlive it.
-void receive_visitor(boost::asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers);
+void receive_visitor(boost::asio::ip::tcp::socket&& socket, std::shared_ptr<CountedConnection> place, WebViewers& viewers);
 
 }  // namespace fbvins

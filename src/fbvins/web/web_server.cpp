@@ -111,7 +111,7 @@ class WebServer::Impl {
       if (failure) return accept_later();
       if (shared_->connections >= shared_->options.most_connections) shared_->drop_longest_waiting();
       if (shared_->connections < shared_->options.most_connections)
-        receive_visitor(std::move(socket), std::make_shared<WebPlace>(shared_), viewers_);
+        receive_visitor(std::move(socket), std::make_shared<CountedConnection>(shared_), viewers_);
       accept();
     });
   }

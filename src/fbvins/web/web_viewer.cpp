@@ -27,7 +27,7 @@ constexpr std::chrono::seconds kIdle{30};
 /// Leaves `viewers` when it ends.
 class StreamViewer : public WebViewer, public std::enable_shared_from_this<StreamViewer> {
  public:
-  StreamViewer(beast::tcp_stream&& stream, std::shared_ptr<WebPlace> place, WebViewers& viewers)
+  StreamViewer(beast::tcp_stream&& stream, std::shared_ptr<CountedConnection> place, WebViewers& viewers)
       : socket_(std::move(stream)), place_(std::move(place)), viewers_(viewers) {}
 
   void accept(const Request& request) {
@@ -103,7 +103,7 @@ class StreamViewer : public WebViewer, public std::enable_shared_from_this<Strea
   }
 
   websocket::stream<beast::tcp_stream> socket_;
-  std::shared_ptr<WebPlace> place_;
+  std::shared_ptr<CountedConnection> place_;
   WebViewers& viewers_;
   beast::flat_buffer buffer_{kMostCommand_bytes};
   ViewerQueue queue_;
@@ -115,7 +115,8 @@ class StreamViewer : public WebViewer, public std::enable_shared_from_this<Strea
 
 }  // namespace
 
-void accept_viewer(beast::tcp_stream&& stream, const Request& request, std::shared_ptr<WebPlace> place, WebViewers& viewers) {
+void accept_viewer(beast::tcp_stream&& stream, const Request& request, std::shared_ptr<CountedConnection> place,
+                   WebViewers& viewers) {
   std::make_shared<StreamViewer>(std::move(stream), std::move(place), viewers)->accept(request);
 }
 

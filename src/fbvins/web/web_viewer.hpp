@@ -13,6 +13,6 @@ namespace fbvins {
 
 /// Completes the WebSocket handshake; then the connection is one of `viewers` until it ends.
 void accept_viewer(boost::beast::tcp_stream&& stream, const boost::beast::http::request<boost::beast::http::empty_body>& request,
-                   std::shared_ptr<WebPlace> place, WebViewers& viewers);
+                   std::shared_ptr<CountedConnection> place, WebViewers& viewers);
 
 }  // namespace fbvins

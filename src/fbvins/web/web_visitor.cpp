@@ -35,7 +35,7 @@ WebRequest seen_as(const Request& request) {
 /// Answers the requests of one connection, one after the other.
 class Visitor final : public WebVisitor, public std::enable_shared_from_this<Visitor> {
  public:
-  Visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers)
+  Visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<CountedConnection> place, WebViewers& viewers)
       : stream_(std::move(socket)), place_(std::move(place)), viewers_(viewers) {
     wait_.emplace(place_->shared(), *this);
   }
@@ -94,7 +94,7 @@ class Visitor final : public WebVisitor, public std::enable_shared_from_this<Vis
   }
 
   beast::tcp_stream stream_;
-  std::shared_ptr<WebPlace> place_;  ///< null: dropped
+  std::shared_ptr<CountedConnection> place_;  ///< null: dropped
   std::optional<WebWait> wait_;
   WebViewers& viewers_;
   beast::flat_buffer buffer_{2 * kMostHeader_bytes};
@@ -104,7 +104,7 @@ class Visitor final : public WebVisitor, public std::enable_shared_from_this<Vis
 
 }  // namespace
 
-void receive_visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<WebPlace> place, WebViewers& viewers) {
+void receive_visitor(asio::ip::tcp::socket&& socket, std::shared_ptr<CountedConnection> place, WebViewers& viewers) {
   std::make_shared<Visitor>(std::move(socket), std::move(place), viewers)->read();
 }
 

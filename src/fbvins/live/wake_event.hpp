@@ -11,19 +11,19 @@
 
 namespace fbvins {
 
-/// ring() from any thread makes poll() on fd() return until silence().
+/// signal() from any thread makes poll() on fd() return until clear().
 class WakeEvent {
  public:
   WakeEvent() : event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
   int fd() const { return event_.number(); }
-  void ring() const {
+  void signal() const {
     const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // fails only where it rings already
+    [[maybe_unused]] const auto written = ::write(fd(), &one, sizeof(one));  // fails only where it is signalled already
   }
-  void silence() const {
-    std::uint64_t rung = 0;
-    [[maybe_unused]] const auto taken = ::read(fd(), &rung, sizeof(rung));
+  void clear() const {
+    std::uint64_t count = 0;
+    [[maybe_unused]] const auto taken = ::read(fd(), &count, sizeof(count));
   }
 
  private:
