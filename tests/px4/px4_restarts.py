@@ -24,8 +24,7 @@ from pymavlink.dialects.v20 import common  # noqa: E402
 from px4_simulator import Px4  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "examples"))
-sys.modules.setdefault("pyrealsense2", type(sys)("pyrealsense2"))
-import d435i_bridge  # noqa: E402  its connection, which begins anew
+import sensor_bridge  # noqa: E402  its connection, which begins anew
 import socket_sender as world  # noqa: E402
 
 RESTARTS, BAR_M, VISION_BAR_S = 10, 0.1, 3.0
@@ -37,7 +36,7 @@ FLAGS = ["listener", "estimator_status_flags", "-n", "1"]
 class Flight:
     def __init__(self, px4, arguments, folder):
         self.px4, self.arguments, self.folder = px4, arguments, pathlib.Path(folder)
-        self.link = d435i_bridge.Link(str(self.folder / "s"), world.WIDTH, world.HEIGHT, world.rig())
+        self.link = sensor_bridge.Link(str(self.folder / "s"), world.WIDTH, world.HEIGHT, world.rig())
         self.rows, self.rng = world.wall(), np.random.default_rng(1)
         self.k, self.begin_ns, self.live = 0, time.monotonic_ns(), None
         self.odometry, self.truth, self.slowest_s = [], [], 0

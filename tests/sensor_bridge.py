@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of examples/d435i_bridge.py without a camera or librealsense: how images are paired, and a connection whose other end starts
-late, ends and starts again.
+"""Tests of what the bridges of cameras share (examples/sensor_bridge.py): how images are paired, how readings are merged, and a
+connection whose other end starts late, ends and starts again.
 
-usage: d435i_pairs.py [PYTHON]    PYTHON: one that has numpy, when this one has not
+usage: sensor_bridge.py [PYTHON]    PYTHON: one that has numpy, when this one has not
 """
 import os
 import pathlib
@@ -12,7 +12,6 @@ import struct
 import sys
 import tempfile
 import threading
-import types
 
 try:
     import numpy
@@ -22,9 +21,8 @@ except ImportError:
     print("SKIPPED: numpy is not installed; `./dev test` puts it into build/venv")
     sys.exit(77)
 
-sys.modules.setdefault("pyrealsense2", types.ModuleType("pyrealsense2"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "examples"))
-import d435i_bridge as bridge  # noqa: E402
+import sensor_bridge as bridge  # noqa: E402
 
 PERIOD_NS = 33_333_000
 
@@ -64,6 +62,21 @@ def stamps_that_differ():
         assert (report is None) == (wanted_pairs > 0), report
         if report:
             assert "5.000 ms later" in report, report
+
+
+def merging():
+    """The accelerometer's value at the gyroscope's stamps; none across a gap."""
+    imu = bridge.MergedImu()
+    got = []
+    for t_ms in range(0, 400, 5):
+        if not 100 < t_ms < 200 and t_ms % 10 == 0:
+            imu.add_accel(t_ms * 1_000_000, (t_ms, 0, 9.81))
+        imu.add_gyro(t_ms * 1_000_000, (0, 0, t_ms))
+        got += [(t_ns // 1_000_000, rate[2], accel[0]) for t_ns, rate, accel in imu.ready()]
+    assert all(t == rate and abs(t - accel) < 1e-9 for t, rate, accel in got), got
+    stamps = [t for t, _, _ in got]
+    assert stamps == sorted(stamps) and not any(100 < t < 200 for t in stamps), stamps
+    assert len(stamps) > 50, stamps
 
 
 class Estimator:
@@ -115,6 +128,6 @@ def reconnecting():
 
 
 if __name__ == "__main__":
-    for test in (pairing, stamps_that_differ, reconnecting):
+    for test in (pairing, stamps_that_differ, merging, reconnecting):
         test()
         print(f"ok {test.__name__}")
