@@ -16,7 +16,9 @@ namespace fbvins {
 inline ceres::Solver::Options repeatable_solver(ceres::LinearSolverType type, int max_iterations) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = type;
-  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  // A Ceres without SuiteSparse, as in Python's wheels, has Eigen's: other roundings, the same solutions.
+  solver.sparse_linear_algebra_library_type =
+      ceres::IsSparseLinearAlgebraLibraryTypeAvailable(ceres::SUITE_SPARSE) ? ceres::SUITE_SPARSE : ceres::EIGEN_SPARSE;
   solver.num_threads = 1;
   solver.max_num_iterations = max_iterations;
   solver.function_tolerance = 1e-5;
