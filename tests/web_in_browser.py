@@ -126,7 +126,7 @@ class WebInBrowser(unittest.TestCase):
     def test_a_stranger_is_asked_for_the_token(self):
         _, address = self.serve("view", self.run_folder, FBVINS_WEB_TOKEN="0123456789abcdef")
         page = self.browser.open(address.split("#")[0], **DESKTOP)
-        page.wait_for("document.getElementById('token-dialog').open")
+        page.wait_for("document.getElementById('token-dialog')?.open")
         self.assertEqual(page.text("position"), "–")
         page.value("document.getElementById('token').value = '0123456789abcdef'; document.querySelector('#token-dialog button').click()")
         page.wait_for("document.getElementById('position').textContent !== '–'")

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of `fbvins calibrate --source --web`: live images with corners and coverage, what to do next, and progress.
+import { PictureDecoder } from "./picture_decoder.js";
 import { Stream } from "./stream.js";
 
 const element = id => document.getElementById(id);
@@ -29,24 +30,13 @@ class CameraPanel {
     this.canvas = panel.appendChild(document.createElement("canvas"));
     this.canvas.setAttribute("role", "img");
     this.pen = this.canvas.getContext("2d");
+    this.decoder = new PictureDecoder((picture, message) => {
+      [this.picture, this.message] = [picture, message];
+      this.draw();
+    });
   }
 
-  /// Decodes one image at a time; meanwhile only the newest one waits.
-  async show(message) {
-    this.waiting = message;
-    if (this.decoding) return;
-    this.decoding = true;
-    while (this.waiting) {
-      const newest = this.waiting;
-      this.waiting = undefined;
-      const picture = await createImageBitmap(new Blob([newest.rest], { type: "image/jpeg" })).catch(() => undefined);
-      if (!picture) continue;
-      this.picture = picture;
-      this.message = newest;
-      this.draw();
-    }
-    this.decoding = false;
-  }
+  show(message) { this.decoder.decode(message); }
 
   cover(camera) {
     this.coverage = camera;
@@ -136,10 +126,8 @@ function note(text) {
   place.hidden = !text;
 }
 
-const stream = new Stream({
+new Stream({
   message: message => on[message.type]?.(message),
   open: () => note(""),
   lost: () => note(element("next").dataset.stage === "recording" ? "The connection is lost; it is tried again." : "The program has ended."),
-  refused: () => element("token-dialog").showModal(),
 });
-element("token-dialog").addEventListener("close", () => stream.useToken(element("token").value));

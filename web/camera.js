@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The newest image of a camera, with its features coloured by age or by depth. Where there are several cameras, one is chosen.
 import { ageColour, depthColour, gradient, OLDEST_IMAGES, NEAREST_M, FARTHEST_M } from "./colours.js";
+import { PictureDecoder } from "./picture_decoder.js";
 
 const element = id => document.getElementById(id);
 
@@ -11,6 +12,11 @@ export class CameraView {
     this.by = "age";
     this.camera = 0;
     this.newest = {};  // messages, by camera
+    this.decoder = new PictureDecoder((picture, message) => {
+      if (message.camera !== this.camera) return;  // another one was chosen meanwhile
+      [this.picture, this.features] = [picture, message];
+      this.draw();
+    });
     for (const by of ["age", "depth"]) element(`by-${by}`).addEventListener("click", () => this.colourBy(by));
     this.colourBy("age");
   }
@@ -28,7 +34,7 @@ export class CameraView {
   show(message) {
     if (!(message.camera in this.newest)) this.offer(message.camera);
     this.newest[message.camera] = message;
-    if (message.camera === this.camera) this.decode(message);
+    if (message.camera === this.camera) this.decoder.decode(message);
   }
 
   /// A button for each camera, from the second one on.
@@ -56,28 +62,12 @@ export class CameraView {
     element("camera-title").textContent = `Camera ${camera}`;
     for (const button of element("camera-choice").children)
       button.setAttribute("aria-pressed", String(Number(button.dataset.camera) === camera));
-    if (this.newest[camera]) this.decode(this.newest[camera]);
-  }
-
-  /// One image at a time; meanwhile only the newest one waits.
-  async decode(message) {
-    this.waiting = message;
-    if (this.decoding) return;
-    this.decoding = true;
-    while (this.waiting) {
-      const newest = this.waiting;
-      this.waiting = undefined;
-      const picture = await createImageBitmap(new Blob([newest.rest], { type: "image/jpeg" })).catch(() => undefined);
-      if (!picture || newest.camera !== this.camera) continue;
-      this.picture = picture;
-      this.features = newest;
-      this.draw();
-    }
-    this.decoding = false;
+    if (this.newest[camera]) this.decoder.decode(this.newest[camera]);
   }
 
   clear() {
-    this.picture = this.waiting = undefined;
+    this.picture = undefined;
+    this.decoder.clear();
     this.newest = {};
     this.pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }

@@ -166,14 +166,10 @@ const stream = new Stream({
     if (on.ended) return;
     showHealth("none", "No connection to the program; trying again every two seconds.", "Not connected");
   },
-  refused() {
-    showHealth("none", "The program asks for a token.", "Not connected");
-    element("token-dialog").showModal();
-  },
+  refused() { showHealth("none", "The program asks for a token.", "Not connected"); },
 });
 const player = new Player(stream);
 
-element("token-dialog").addEventListener("close", () => stream.useToken(element("token").value));
 element("mark").addEventListener("click", () => stream.send({ do: "mark", text: "" }));
 element("save-map").addEventListener("click", () => { stream.send({ do: "save_map" }); note("The map will be saved after the next keyframe.", false, false); });
 element("record").addEventListener("click", event => stream.send({ do: event.currentTarget.dataset.does ?? "start_record" }));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The connection: messages in, commands out, reconnecting when it breaks. The messages are described in docs/web.md.
+import { askForToken } from "./token_dialog.js";
 
 const HEAD_BYTES = 24;
 const KINDS = { 1: "image", 2: "points", 3: "cloud" };
@@ -24,7 +25,7 @@ export function decode(buffer) {
 }
 
 export class Stream {
-  /// `handlers`: message(message), open(), lost(), refused().
+  /// `handlers`: message(message), open(), lost(), and, if wanted, refused(), after which a token is asked for.
   constructor(handlers) {
     this.handlers = handlers;
     this.token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
@@ -60,7 +61,8 @@ export class Stream {
     const answer = await fetch(`/stream?token=${this.token}`).catch(() => undefined);
     if (answer?.status !== 401) return;
     clearTimeout(this.again);
-    this.handlers.refused();
+    this.handlers.refused?.();
+    askForToken(token => this.useToken(token));
   }
 
   useToken(token) {
