@@ -252,8 +252,6 @@ EpipolarResult ransac_epipolar(std::span<const Vec2> a, std::span<const Vec2> b,
     result.inlier[i] = std::abs(sampson_distance(result.E, a[i], b[i])) < options.threshold;
     result.inliers += result.inlier[i];
   }
-  const int turning_only = count_rotation_only(result.R_ba, m, options.threshold);
-  result.translation_determined = turning_only < 0.9 * result.inliers;
   return result;
 }
 
