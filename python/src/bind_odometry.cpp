@@ -74,9 +74,7 @@ void set_state(Odometry& self, const OdometryState& state) {
   each_number(self, [&](double& x) { x = numbers.at(k++); });
 }
 
-}  // namespace
-
-void bind_odometry(nb::module_& m) {
+void bind_pose(nb::module_& m) {
   nb::class_<Odometry>(m, "Odometry",
                        "One pose of the flight, at an image's stamp. W is gravity-aligned (z up) as far as gravity is known, and "
                        "never jumps unless reset_counter increases; B is the IMU.")
@@ -126,7 +124,9 @@ void bind_odometry(nb::module_& m) {
         return fmt::format("<fbvins.Odometry frame {} t={} ns {} p=({:.3f}, {:.3f}, {:.3f})>", o.id.value, o.t.ns,
                            to_string(o.health.state), o.T_WB.p.x(), o.T_WB.p.y(), o.T_WB.p.z());
       });
+}
 
+void bind_map_update(nb::module_& m) {
   nb::class_<MapUpdate>(m, "MapUpdate", "Result of loop closure after a keyframe: T_MB = T_MW T_WB. M is gravity-aligned.")
       .def_prop_ro(
           "t", [](const MapUpdate& u) { return u.t.ns; }, "ns, of the keyframe")
@@ -155,6 +155,13 @@ void bind_odometry(nb::module_& m) {
       .def("__repr__", [](const MapUpdate& u) {
         return fmt::format("<fbvins.MapUpdate t={} ns, {} keyframes, {} loops>", u.t.ns, u.stats.keyframes, u.loops.size());
       });
+}
+
+}  // namespace
+
+void bind_odometry(nb::module_& m) {
+  bind_pose(m);
+  bind_map_update(m);
 }
 
 }  // namespace fbvins::python

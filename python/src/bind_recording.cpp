@@ -62,9 +62,7 @@ nb::object depths(const std::shared_ptr<const DepthImage>& depth) {
   return nb::cast(to_array(depth->mm, {static_cast<std::size_t>(depth->height), static_cast<std::size_t>(depth->width)}));
 }
 
-}  // namespace
-
-void bind_recording(nb::module_& m) {
+void bind_measurements(nb::module_& m) {
   nb::class_<ImuSample>(m, "ImuSample", "One reading of the IMU, in B.")
       .def_prop_ro(
           "t", [](const ImuSample& s) { return s.t.ns; }, "ns of the sensors' clock")
@@ -101,7 +99,9 @@ void bind_recording(nb::module_& m) {
           "depth", [](const StereoFrame& f) { return depths(f.depth); },
           "uint16 (height, width), mm, 0 where nothing was measured; None: no depth image")
       .def("__repr__", [](const StereoFrame& f) { return fmt::format("<fbvins.StereoFrame t={} ns>", f.t.ns); });
+}
 
+void bind_dataset(nb::module_& m) {
   nb::class_<Dataset>(m, "Recording",
                       "A stereo-inertial recording, or a simulation: an iterator of ImuSample and StereoFrame in order of time. "
                       "It can be iterated once: ValueError when it is begun again after its end.",
@@ -130,7 +130,13 @@ void bind_recording(nb::module_& m) {
       .def("__repr__", [](const Dataset& d) {
         return fmt::format("<fbvins.Recording {} ({}), {} stereo frames>", d.info().name, d.info().format, d.frames().size());
       });
+}
 
+}  // namespace
+
+void bind_recording(nb::module_& m) {
+  bind_measurements(m);
+  bind_dataset(m);
   m.def("open", &open, "path"_a, "calibration"_a = "", "imu_calibration"_a = "", "skip_frames"_a = 0, "max_frames"_a = 0,
         "start_s"_a = 0.0, "duration_s"_a = 0.0, "topics"_a = std::vector<std::string>{});
   m.def("simulate", &simulate, "preset"_a = "normal", "seed"_a = 1, "seconds"_a = 0.0);

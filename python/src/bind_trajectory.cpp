@@ -125,9 +125,7 @@ PyEvaluation evaluate(const PyTrajectory& truth, const PyTrajectory& estimate, c
   return {value_or_raise(std::move(evaluation)), *alignment};
 }
 
-}  // namespace
-
-void bind_trajectory(nb::module_& m) {
+void bind_poses(nb::module_& m) {
   nb::class_<PyTrajectory>(m, "Trajectory", "Poses of the body in one world, in order of time.")
       .def(nb::new_(&make_trajectory), "t"_a, "p"_a, "q"_a,
            "t: int64 (N,), ns. p: float64 (N, 3), m. q: float64 (N, 4), unit quaternions, w first. Both take body to world.")
@@ -151,7 +149,9 @@ void bind_trajectory(nb::module_& m) {
       .def("__repr__", [](const PyTrajectory& s) { return fmt::format("<fbvins.Trajectory of {} poses>", s.poses.size()); });
 
   m.def("_restore_trajectory", &restored);
+}
 
+void bind_statistics(nb::module_& m) {
   nb::class_<ErrorStatistics>(m, "ErrorStatistics", "Statistics of a list of errors, as evo computes them.")
       .def_ro("count", &ErrorStatistics::count)
       .def_ro("max", &ErrorStatistics::max)
@@ -169,7 +169,9 @@ void bind_trajectory(nb::module_& m) {
         return fmt::format("<fbvins.ErrorStatistics rmse={:.6g} median={:.6g} max={:.6g} of {}>", s.rmse, s.median, s.max,
                            s.count);
       });
+}
 
+void bind_evaluation(nb::module_& m) {
   nb::class_<PyEvaluation>(m, "Evaluation",
                            "Errors of an estimate against the truth; str() is the table that `fbvins eval` prints.")
       .def_ro("pairs", &PyEvaluation::pairs, "number of poses compared")
@@ -191,7 +193,14 @@ void bind_trajectory(nb::module_& m) {
       .def("__repr__", [](const PyEvaluation& e) {
         return fmt::format("<fbvins.Evaluation RMSE {:.4f} m over {} poses>", e.absolute_m.rmse, e.pairs);
       });
+}
 
+}  // namespace
+
+void bind_trajectory(nb::module_& m) {
+  bind_poses(m);
+  bind_statistics(m);
+  bind_evaluation(m);
   m.def("evaluate", &evaluate, "truth"_a, "estimate"_a, "align"_a = "se3", "max_difference_s"_a = 0.01, "interpolate"_a = false);
 }
 

@@ -100,6 +100,92 @@ void leave_out_strays(const Camera& camera, const SeenPose& pose, CalibrationVie
   }
 }
 
+/// What readings and images have in common, in seconds from the first reading on.
+struct CommonTime {
+  double begin_s, end_s;
+  double length_s() const { return end_s - begin_s; }
+  bool holds(double t_s, double margin_s = 0) const { return t_s >= margin_s && t_s <= length_s() - margin_s; }
+};
+
+/// `body` in order of time; seconds from the first reading on.
+Result<CommonTime> common_time(const GyroIntegral& gyro, const std::vector<BodyPose>& body) {
+  const CommonTime common{std::max(gyro.first_s(), body.front().t_s - kMargin_s),
+                          std::min(gyro.last_s(), body.back().t_s + kMargin_s)};
+  if (common.length_s() < kShortest_s)
+    return refused(
+        fmt::format("images of the board and readings have {:.1f} s in common: {:g} s at least, better a minute, are needed",
+                    std::max(0.0, common.length_s()), kShortest_s));
+  return common;
+}
+
+std::vector<CalibrationReading> readings_within(const ImuCameraInput& input, const CommonTime& common) {
+  std::vector<CalibrationReading> out;
+  for (const ImuSample& s : input.imu)
+    if (const double t_s = (s.t - input.imu.front().t).seconds() - common.begin_s; common.holds(t_s))
+      out.push_back({t_s, s.gyro_radps, s.accel_mps2});
+  return out;
+}
+
+/// Views whose image has a pose and lies within the path; returns the standard deviations of their corners, px.
+std::vector<double> gather_views(const ImuCameraInput& input, const CameraPoses& located, const CommonTime& common,
+                                 double time_offset_s, bool by_rows, CalibrationData& data) {
+  std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
+  for (const auto& camera : located)
+    for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = &pose;
+  std::vector<double> sigmas;
+  for (const BoardView& view : input.views) {
+    const double t_s = (view.t - input.imu.front().t).seconds();
+    const auto fit = fits.find({view.camera, std::llround(t_s * 1e6)});
+    if (fit == fits.end() || !common.holds(t_s + time_offset_s - common.begin_s, 0.25 * kMargin_s)) continue;
+    sigmas.push_back(fit->second->sigma_px);
+    for (CalibrationView& v : views_of(input, view, t_s - common.begin_s, by_rows)) {
+      leave_out_strays(input.cameras[static_cast<std::size_t>(v.camera)], *fit->second, v);
+      data.views.push_back(std::move(v));
+    }
+  }
+  std::map<double, int> sharing;
+  for (const CalibrationView& view : data.views) ++sharing[view.t_s];
+  for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
+  return sigmas;
+}
+
+/// Readings far from every pose are not used.
+void leave_out_alone(const std::vector<BodyPose>& body, std::vector<CalibrationReading>& readings) {
+  for (CalibrationReading& r : readings) {
+    const auto next = std::lower_bound(body.begin(), body.end(), r.t_s, [](const BodyPose& p, double t) { return p.t_s < t; });
+    r.used =
+        (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
+  }
+}
+
+CalibrationState first_state(PoseSpline path, double spacing_s, const std::vector<Pose<B, Cn>>& T_BC, const TurnMatch& match,
+                             const std::vector<CalibrationReading>& readings) {
+  CalibrationState state{.path = std::move(path), .biases = {}, .T_BC = T_BC, .axes = {}};
+  state.intervals_per_bias = std::max(1, static_cast<int>(std::lround(kBiasNode_s / spacing_s)));
+  state.biases.assign(static_cast<std::size_t>((state.path.intervals() - 1) / state.intervals_per_bias + 2),
+                      {match.gyro_bias_radps, Vec3::Zero()});
+  state.time_offset_s = match.time_offset_s;
+  Vec3 force_T = Vec3::Zero();
+  for (const CalibrationReading& r : readings)
+    force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(readings.size());
+  state.gravity_T = -force_T;
+  return state;
+}
+
+CalibrationSetup setup_of(const ImuCameraInput& input, const ImuCameraOptions& options, double corner_sigma_px, double rate_hz) {
+  CalibrationSetup setup;
+  setup.corner_sigma_px = std::max(0.02, corner_sigma_px);
+  setup.gyro_sigma_radps = input.noise.gyro_noise_density_radps_rthz * std::sqrt(rate_hz);
+  setup.accel_sigma_mps2 = input.noise.accel_noise_density_mps2_rthz * std::sqrt(rate_hz);
+  setup.gyro_walk_radps2_rthz = input.noise.gyro_random_walk_radps2_rthz;
+  setup.accel_walk_mps3_rthz = input.noise.accel_random_walk_mps3_rthz;
+  setup.gravity_mps2 = options.gravity_mps2;
+  setup.T_CnC0 = input.T_CnC0;
+  setup.camera_sigma_m = options.camera_sigma_m, setup.camera_sigma_rad = options.camera_sigma_rad;
+  setup.free_axes = options.imu_axes, setup.free_line_delay = options.line_delay;
+  return setup;
+}
+
 }  // namespace
 
 Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const ImuCameraOptions& options) {
@@ -113,24 +199,15 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   if (!found) return found.error();
   const Result<TurnMatch> match = check_turns(*found);
   if (!match) return match.error();
-  auto T_BC = first_extrinsics(input, poses, gyro, *match);
+  const auto T_BC = first_extrinsics(input, poses, gyro, *match);
   if (!T_BC) return T_BC.error();
   std::vector<BodyPose> body = body_poses(*located, *T_BC, match->time_offset_s);
 
-  // The path covers what readings and images have in common; its time 0 is `begin_s` after the first reading.
-  const double begin_s = std::max(gyro.first_s(), body.front().t_s - kMargin_s);
-  const double end_s = std::min(gyro.last_s(), body.back().t_s + kMargin_s);
-  if (end_s - begin_s < kShortest_s)
-    return refused(
-        fmt::format("images of the board and readings have {:.1f} s in common: {:g} s at least, better a minute, are needed",
-                    std::max(0.0, end_s - begin_s), kShortest_s));
-  for (BodyPose& pose : body) pose.t_s -= begin_s;
-  std::erase_if(body, [&](const BodyPose& p) { return p.t_s < 0 || p.t_s > end_s - begin_s; });
-  CalibrationData data;
-  data.cameras = input.cameras;
-  for (const ImuSample& s : input.imu)
-    if (const double t_s = (s.t - origin).seconds() - begin_s; t_s >= 0 && t_s <= end_s - begin_s)
-      data.readings.push_back({t_s, s.gyro_radps, s.accel_mps2});
+  const Result<CommonTime> common = common_time(gyro, body);
+  if (!common) return common.error();
+  for (BodyPose& pose : body) pose.t_s -= common->begin_s;
+  std::erase_if(body, [&](const BodyPose& p) { return !common->holds(p.t_s); });
+  CalibrationData data{.cameras = input.cameras, .views = {}, .readings = readings_within(input, *common)};
   if (body.size() < kFewestBoardViews || data.readings.empty())
     return refused(
         fmt::format("the board is seen in {} images while the IMU is there: {} are needed", body.size(), kFewestBoardViews));
@@ -138,57 +215,20 @@ Result<CalibrationStart> gather_imu_camera(const ImuCameraInput& input, const Im
   if (body.size() < kFewestBoardViews)
     return refused("the board's poses do not follow the turns of the IMU: is it the right board file?");
 
-  std::map<std::pair<int, std::int64_t>, const SeenPose*> fits;
-  for (const auto& camera : *located)
-    for (const SeenPose& pose : camera) fits[{pose.camera, std::llround(pose.t_s * 1e6)}] = &pose;
-  std::vector<double> sigmas;
-  for (const BoardView& view : input.views) {
-    const double t_s = (view.t - origin).seconds(), at_s = t_s + match->time_offset_s - begin_s;
-    const auto fit = fits.find({view.camera, std::llround(t_s * 1e6)});
-    if (fit == fits.end() || at_s < 0.25 * kMargin_s || at_s > end_s - begin_s - 0.25 * kMargin_s) continue;
-    sigmas.push_back(fit->second->sigma_px);
-    for (CalibrationView& v : views_of(input, view, t_s - begin_s, options.line_delay)) {
-      leave_out_strays(input.cameras[static_cast<std::size_t>(v.camera)], *fit->second, v);
-      data.views.push_back(std::move(v));
-    }
-  }
+  const std::vector<double> sigmas = gather_views(input, *located, *common, match->time_offset_s, options.line_delay, data);
   if (data.views.empty()) return refused("no image of the board lies within the readings of the IMU");
-  std::map<double, int> sharing;
-  for (const CalibrationView& view : data.views) ++sharing[view.t_s];
-  for (CalibrationView& view : data.views) view.sharing = sharing[view.t_s];
-  for (CalibrationReading& r : data.readings) {
-    const auto next = std::lower_bound(body.begin(), body.end(), r.t_s, [](const BodyPose& p, double t) { return p.t_s < t; });
-    r.used =
-        (next != body.end() && next->t_s - r.t_s < kAlone_s) || (next != body.begin() && r.t_s - std::prev(next)->t_s < kAlone_s);
-  }
+  leave_out_alone(body, data.readings);
 
   const double rate_hz = rate_hz_of(input.imu);
   const double spacing_s = options.knot_spacing_s > 0 ? options.knot_spacing_s : std::max(kDefaultSpacing_s, 2.0 / rate_hz);
-  PoseSpline path = first_path(body, data.readings, match->gyro_bias_radps, spacing_s, end_s - begin_s);
-  CalibrationState state{.path = std::move(path), .biases = {}, .T_BC = *std::move(T_BC), .axes = {}};
-  state.intervals_per_bias = std::max(1, static_cast<int>(std::lround(kBiasNode_s / spacing_s)));
-  state.biases.assign(static_cast<std::size_t>((state.path.intervals() - 1) / state.intervals_per_bias + 2),
-                      {match->gyro_bias_radps, Vec3::Zero()});
-  state.time_offset_s = match->time_offset_s;
-  Vec3 force_T = Vec3::Zero();
-  for (const CalibrationReading& r : data.readings)
-    force_T += state.path.at(r.t_s).T_TB.q * r.accel_mps2 / static_cast<double>(data.readings.size());
-  state.gravity_T = -force_T;
-  if (force_T.norm() > 0.8 && force_T.norm() < 1.2)
-    return refused(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force_T.norm()));
+  CalibrationState state = first_state(first_path(body, data.readings, match->gyro_bias_radps, spacing_s, common->length_s()),
+                                       spacing_s, *T_BC, *match, data.readings);
+  if (const double force = state.gravity_T.norm(); force > 0.8 && force < 1.2)
+    return refused(fmt::format("gravity is measured as {:.2f}: the accelerometer gives g, m/s^2 are needed", force));
 
-  CalibrationSetup setup;
-  setup.corner_sigma_px = std::max(0.02, median_of(sigmas));
-  setup.gyro_sigma_radps = input.noise.gyro_noise_density_radps_rthz * std::sqrt(rate_hz);
-  setup.accel_sigma_mps2 = input.noise.accel_noise_density_mps2_rthz * std::sqrt(rate_hz);
-  setup.gyro_walk_radps2_rthz = input.noise.gyro_random_walk_radps2_rthz;
-  setup.accel_walk_mps3_rthz = input.noise.accel_random_walk_mps3_rthz;
-  setup.gravity_mps2 = options.gravity_mps2;
-  setup.T_CnC0 = input.T_CnC0;
-  setup.camera_sigma_m = options.camera_sigma_m, setup.camera_sigma_rad = options.camera_sigma_rad;
-  setup.free_axes = options.imu_axes, setup.free_line_delay = options.line_delay;
+  CalibrationSetup setup = setup_of(input, options, median_of(sigmas), rate_hz);
   const double gyro_sigma = setup.gyro_sigma_radps, accel_sigma = setup.accel_sigma_mps2;
-  return CalibrationStart{origin + Duration::from_seconds(begin_s),
+  return CalibrationStart{origin + Duration::from_seconds(common->begin_s),
                           std::move(data),
                           std::move(state),
                           std::move(setup),
