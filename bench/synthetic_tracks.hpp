@@ -107,7 +107,9 @@ class SyntheticTracks {
       drift = prior.T_GB * then.inverse();
     }
     motion_px_.clear();
-    see(T_WB, right_t == t ? T_WB : pose((right_t - flight_.start).seconds()), t_s, prior.valid ? &drift : nullptr, out);
+    const Pose<W, B> right_T_WB = right_t == t ? T_WB : pose((right_t - flight_.start).seconds());
+    see({t_s, T_WB.p, (T_WB * flight_.rig.T_BC0).inverse(), (right_T_WB * flight_.rig.T_BC1).inverse()},
+        prior.valid ? &drift : nullptr, out);
     std::sort(motion_px_.begin(), motion_px_.end());
     if (!motion_px_.empty()) out.stats.median_motion_px = motion_px_[motion_px_.size() / 2];
     return out;
@@ -200,71 +202,91 @@ class SyntheticTracks {
     return ((*drift) * p_W - known->second).norm() * 458 / now.norm() < 15;  // within the search
   }
 
-  void see(const Pose<W, B>& T_WB, const Pose<W, B>& right_T_WB, double t_s, const Pose<G, W>* drift, TrackedFrame& out) {
-    const Pose<C0, W> T_C0W = (T_WB * flight_.rig.T_BC0).inverse();
-    const Pose<C1, W> T_C1W = (right_T_WB * flight_.rig.T_BC1).inverse();
-    std::vector<std::size_t> fresh;
-    const auto add = [&](Track& track, const Observation& left, const Vec3& p_W) {
-      TrackedFeature f;
-      f.id = track.id;
-      f.age_frames = track.age;
-      f.left = left;
-      const Vec2 squint(t_s < o_.bad_start_s ? 1.0 : 0.0, 0);
-      if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, T_C1W * p_W, track.slide + squint);
-      out.stats.tracked += track.age > 0;
-      out.stats.stereo += f.right.has_value();
-      if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
-      track.seen_at = left.pixel;
-      ++track.age;
-      track.from = T_WB.p;
-      track.followed = true;
-      out.features.push_back(f);
-    };
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      const Vec3 p_W = position(corners_[i], t_s);
-      const Vec3 p_C = T_C0W * p_W;
-      const auto it = tracks_.find(i);
-      const bool followed = it != tracks_.end() && it->second.followed;
-      if (p_C.z() < 0.3 || p_C.z() > 30 || std::abs(p_C.x()) > p_C.z() || std::abs(p_C.y()) > 0.7 * p_C.z() ||
-          hidden(T_WB.p, p_W, t_s, corners_[i].mover)) {
-        if (followed) it->second.followed = false;
-        continue;
-      }
-      if (followed && rng_.uniform() > o_.lost_share) {
-        Track& track = it->second;
-        track.slide += track.step + (t_s < o_.bad_start_s ? 5 : 1) * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
-        const auto left = observe(flight_.rig.left, p_C, track.slide);
-        if (left && track.slide.norm() < 8) add(track, *left, p_W);
-        else track.followed = false;
-        continue;
-      }
-      if (followed) it->second.followed = false;
-      if (it != tracks_.end() && static_cast<int>(out.features.size()) < o_.features &&
-          known_again(it->second, p_W, T_WB.p, drift)) {
-        Track& track = it->second;
-        track.slide = 0.3 * Vec2(rng_.normal(), rng_.normal());
-        const auto left = observe(flight_.rig.left, p_C, track.slide);
-        if (left) {
-          add(track, *left, p_W);
-          ++out.stats.recognised;
-        }
-        continue;
-      }
-      fresh.push_back(i);
-    }
-    while (static_cast<int>(out.features.size()) < o_.features && !fresh.empty()) {
-      const auto n = static_cast<std::size_t>(rng_.below(static_cast<std::uint32_t>(fresh.size())));
-      const std::size_t i = fresh[n];
-      fresh[n] = fresh.back();
-      fresh.pop_back();
-      const Vec3 p_W = position(corners_[i], t_s);
-      const auto left = observe(flight_.rig.left, T_C0W * p_W, Vec2::Zero());
+  /// One instant of the cameras.
+  struct Instant {
+    double t_s;
+    Vec3 body_W;
+    Pose<C0, W> T_C0W;
+    Pose<C1, W> T_C1W;
+  };
+
+  void add(Track& track, const Observation& left, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
+    TrackedFeature f;
+    f.id = track.id;
+    f.age_frames = track.age;
+    f.left = left;
+    const Vec2 squint(now.t_s < o_.bad_start_s ? 1.0 : 0.0, 0);
+    if (rng_.uniform() < 0.9) f.right = observe(flight_.rig.right, now.T_C1W * p_W, track.slide + squint);
+    out.stats.tracked += track.age > 0;
+    out.stats.stereo += f.right.has_value();
+    if (track.age > 0) motion_px_.push_back((left.pixel - track.seen_at).norm());
+    track.seen_at = left.pixel;
+    ++track.age;
+    track.from = now.body_W;
+    track.followed = true;
+    out.features.push_back(f);
+  }
+
+  bool in_view(const Corner& corner, const Vec3& p_W, const Instant& now) const {
+    const Vec3 p_C = now.T_C0W * p_W;
+    return p_C.z() >= 0.3 && p_C.z() <= 30 && std::abs(p_C.x()) <= p_C.z() && std::abs(p_C.y()) <= 0.7 * p_C.z() &&
+           !hidden(now.body_W, p_W, now.t_s, corner.mover);
+  }
+
+  void follow(Track& track, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
+    track.slide += track.step + (now.t_s < o_.bad_start_s ? 5 : 1) * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
+    const auto left = observe(flight_.rig.left, now.T_C0W * p_W, track.slide);
+    if (left && track.slide.norm() < 8) add(track, *left, p_W, now, out);
+    else track.followed = false;
+  }
+
+  void recognise(Track& track, const Vec3& p_W, const Instant& now, TrackedFrame& out) {
+    track.slide = 0.3 * Vec2(rng_.normal(), rng_.normal());
+    const auto left = observe(flight_.rig.left, now.T_C0W * p_W, track.slide);
+    if (!left) return;
+    add(track, *left, p_W, now, out);
+    ++out.stats.recognised;
+  }
+
+  bool full(const TrackedFrame& out) const { return static_cast<int>(out.features.size()) >= o_.features; }
+
+  /// New tracks at some of these corners.
+  void start(std::vector<std::size_t> corners, const Instant& now, TrackedFrame& out) {
+    while (!full(out) && !corners.empty()) {
+      const auto n = static_cast<std::size_t>(rng_.below(static_cast<std::uint32_t>(corners.size())));
+      const std::size_t i = corners[n];
+      corners[n] = corners.back();
+      corners.pop_back();
+      const Vec3 p_W = position(corners_[i], now.t_s);
+      const auto left = observe(flight_.rig.left, now.T_C0W * p_W, Vec2::Zero());
       if (!left) continue;
       Track track;
       track.id = TrackId{next_track_++};
       if (rng_.uniform() < o_.bad_share) track.step = 10 * o_.slide_px * Vec2(rng_.normal(), rng_.normal());
-      add(tracks_[i] = track, *left, p_W);
+      add(tracks_[i] = track, *left, p_W, now, out);
     }
+  }
+
+  void see(const Instant& now, const Pose<G, W>* drift, TrackedFrame& out) {
+    std::vector<std::size_t> fresh;
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      const Vec3 p_W = position(corners_[i], now.t_s);
+      const auto it = tracks_.find(i);
+      const bool followed = it != tracks_.end() && it->second.followed;
+      if (!in_view(corners_[i], p_W, now)) {
+        if (followed) it->second.followed = false;
+        continue;
+      }
+      if (followed && rng_.uniform() > o_.lost_share) {
+        follow(it->second, p_W, now, out);
+        continue;
+      }
+      if (followed) it->second.followed = false;
+      if (it != tracks_.end() && !full(out) && known_again(it->second, p_W, now.body_W, drift))
+        recognise(it->second, p_W, now, out);
+      else fresh.push_back(i);
+    }
+    start(std::move(fresh), now, out);
   }
 
   const Simulation& flight_;
