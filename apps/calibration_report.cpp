@@ -165,6 +165,7 @@ std::string calibration_summary_json(const CalibrationOutcome& outcome) {
   const CameraCalibration& found = outcome.cameras;
   Json out = {{"version", FBVINS_VERSION}, {"board", board_json(outcome.board)}};
   out["noise_px"] = found.noise_px;
+  out["scatter"] = found.scatter;
   out["stamps"] = found.stamps;
   out["stamps_used"] = found.poses.size();
   for (const CalibratedCamera& camera : found.cameras) out["cameras"].push_back(camera_json(camera));

@@ -17,8 +17,9 @@ namespace {
 
 constexpr int kFewestViews = 6;
 constexpr double kLeastBaseline_m = 1e-3;     ///< as every reader of calibrations demands it
-constexpr double kLargestFocalSigma = 5e-3;   ///< of the focal length near the axis
+constexpr double kLargestFocalSigma = 1e-2;   ///< of the focal length near the axis
 constexpr double kLargestCentreSigma = 5e-3;  ///< of the image's width
+constexpr double kNoticedScatter = 1.5;
 
 /// Relative deviation of the focal length near the axis: of ds and omni not the parameter, but f / (1 + xi).
 double axial_focal_sigma(const CameraCalibration& found, int camera) {
@@ -27,6 +28,13 @@ double axial_focal_sigma(const CameraCalibration& found, int camera) {
   const Eigen::RowVectorXd J = straight_jacobian(lens).row(0);
   const double square = J.dot(found.covariance.block(first, first, J.size(), J.size()) * J.transpose());
   return std::sqrt(square) / straight_parameters(lens)[0];
+}
+
+std::string contradiction_of(const CameraCalibration& found) {
+  return fmt::format(
+      "the images contradict one another up to {:.1f} times as much as the noise of their corners explains, and standard deviations "
+      "are as much larger: is the board flat, do the cameras expose at the same time, does the lens model fit?",
+      found.scatter);
 }
 
 /// Another layout with which the views do make sense.
@@ -185,14 +193,18 @@ Error undetermined(const std::string& what) {
 }
 
 Result<void> check_determined(const CameraCalibration& found) {
+  const auto undetermined_by = [&](const std::string& what) {
+    return found.scatter > kNoticedScatter ? refused(what + ": " + contradiction_of(found)) : undetermined(what);
+  };
   for (std::size_t k = 0; k < found.cameras.size(); ++k) {
     const Camera& camera = found.cameras[k].camera;
     const double focal = axial_focal_sigma(found, static_cast<int>(k));
     if (!(focal <= kLargestFocalSigma))
-      return undetermined(fmt::format("the views do not determine the focal length of cam{} (to {:.1f} % only)", k, 100 * focal));
+      return undetermined_by(
+          fmt::format("the views do not determine the focal length of cam{} (to {:.1f} % only)", k, 100 * focal));
     const double centre_px = std::max(found.sigma(fmt::format("cam{}.cx", k)), found.sigma(fmt::format("cam{}.cy", k)));
     if (!(centre_px <= kLargestCentreSigma * camera.width()))
-      return undetermined(
+      return undetermined_by(
           fmt::format("the views do not determine the principal point of cam{} (to {:.1f} px only)", k, centre_px));
   }
   return {};
@@ -220,6 +232,7 @@ std::vector<std::string> remarks_on(const CameraCalibration& found) {
       out.push_back(fmt::format("corners cover {:.0f} % of cam{}'s image: hold the board into its corners, too",
                                 100 * c.statistics.coverage, k));
   }
+  if (found.scatter > kNoticedScatter) out.push_back(contradiction_of(found));
   if (found.seen_mirrored)
     out.push_back(
         "the board's x and y axes are left-handed in the images, unlike those of a board that `fbvins target` prints; lenses "

@@ -11,6 +11,7 @@
 #include "fbvins/calibration/calibration_checks.hpp"
 #include "fbvins/calibration/camera_chain.hpp"
 #include "fbvins/calibration/camera_start.hpp"
+#include "fbvins/calibration/frame_scatter.hpp"
 #include "fbvins/calibration/lens_jacobian.hpp"
 #include "fbvins/calibration/outliers.hpp"
 #include "fbvins/calibration/view_choice.hpp"
@@ -83,7 +84,7 @@ std::vector<RigFrame> chosen_frames(std::vector<RigCamera>& cameras, std::vector
   if (static_cast<int>(frames.size()) <= most) return frames;
   std::vector<RigFrame> candidates = thinned(frames, std::max(most, kMostCandidates));
   std::vector<Eigen::MatrixXd> information;
-  for (const RigFrame& frame : candidates) information.push_back(quick.information(frame));
+  for (const RigFrame& frame : candidates) information.push_back(quick.evidence(frame).information);
   std::vector<RigFrame> out;
   for (const int i : most_informative(information, most)) out.push_back(std::move(candidates[i]));
   return out;
@@ -93,7 +94,7 @@ std::vector<RigFrame> chosen_frames(std::vector<RigCamera>& cameras, std::vector
 std::optional<Eigen::MatrixXd> unit_covariance(const RigAdjustment& adjustment) {
   const int size = adjustment.parameter_count();
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
-  for (const RigFrame& frame : adjustment.frames()) sum += adjustment.information(frame);
+  for (const RigFrame& frame : adjustment.frames()) sum += adjustment.evidence(frame).information;
   const Eigen::VectorXd scale = sum.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * sum * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
@@ -159,7 +160,8 @@ CameraCalibration result_of(const RigAdjustment& adjustment, const std::vector<O
   }
   out.names = parameter_names(adjustment.cameras());
   out.noise_px = noise_px;
-  out.covariance = noise_px * noise_px * unit;
+  out.covariance = covariance_by_scatter(adjustment, unit, noise_px);
+  out.scatter = std::sqrt(out.covariance.diagonal().cwiseQuotient(unit.diagonal()).maxCoeff()) / noise_px;
   add_residuals(adjustment, out);
   return out;
 }

@@ -69,7 +69,10 @@ struct CameraCalibration {
   /// Cn) and "cam1.rx" ... (rad, R_CnC0 <- R Exp(r)).
   std::vector<std::string> names;
   Eigen::MatrixXd covariance;
-  double noise_px = 0;           ///< standard deviation of a corner's coordinate, as the residuals show it
+  double noise_px = 0;  ///< standard deviation of a corner's coordinate, as the residuals show it
+  /// Largest factor of the standard deviations for what moves all corners of an image together (frame_scatter.hpp); 1: nothing
+  /// seen.
+  double scatter = 1;
   std::vector<BoardPose> poses;  ///< of the stamps used, by time
   std::vector<CornerResidual> residuals;
   int stamps = 0;                    ///< with a usable view; poses.size() of them were used

@@ -43,6 +43,7 @@ void append(CameraCalibration&& one, int camera, CameraCalibration& out) {
   }
   out.cameras.push_back(std::move(one.cameras[0]));
   out.noise_px = std::max(out.noise_px, one.noise_px);
+  out.scatter = std::max(out.scatter, one.scatter);
   out.stamps += one.stamps;
   out.seen_mirrored = out.seen_mirrored || one.seen_mirrored;
   if (camera == 0) out.poses = std::move(one.poses);

@@ -100,7 +100,7 @@ class Ignorance {
       if (view) frame.views.push_back(*std::move(view));
     }
     if (!seen) return std::nullopt;
-    return with(kImages * adjustment_.information(frame));
+    return with(kImages * adjustment_.evidence(frame).information);
   }
 
  private:

@@ -9,7 +9,7 @@
 namespace fbvins {
 namespace {
 
-constexpr int kDegree = kSplineOrder - 1;
+constexpr int kSplineDegree = kSplineOrder - 1;
 
 /// Weights of the control points in an interval, u in [0, 1], of positions and of rotations' steps (S2, S3).
 struct Weights {
@@ -18,15 +18,15 @@ struct Weights {
 };
 
 Weights weights(double u, double spacing_s) {
-  const auto b5 = bspline_basis<kDegree>(u);
-  const auto b4 = bspline_basis<kDegree - 1>(u);
-  const auto b3 = bspline_basis<kDegree - 2>(u);
+  const auto b5 = bspline_basis<kSplineDegree>(u);
+  const auto b4 = bspline_basis<kSplineDegree - 1>(u);
+  const auto b3 = bspline_basis<kSplineDegree - 2>(u);
   const auto at = [](const auto& b, int i) {
     return i < 0 || i >= static_cast<int>(b.size()) ? 0.0 : b[static_cast<std::size_t>(i)];
   };
   Weights w;
   double sum = 0;
-  for (int j = kDegree; j >= 0; --j) {
+  for (int j = kSplineDegree; j >= 0; --j) {
     const auto k = static_cast<std::size_t>(j);
     sum += b5[k];
     w.p[k] = b5[k];
@@ -83,7 +83,7 @@ SplineMotion PoseSpline::at(double t_s, SplineJacobian* J) const {
   J->p = w.p, J->v = w.v, J->a = w.a;
   J->J_rate_delta[0].setZero();
   Mat3 after_T = Mat3::Identity();  // transpose of the product of the later steps
-  for (int j = kDegree; j > 0; --j) {
+  for (int j = kSplineDegree; j > 0; --j) {
     const auto k = static_cast<std::size_t>(j);
     const Vec3& d = turn(first + j - 1);
     const Mat3& inverse = turn_jacobian(first + j - 1);
@@ -91,7 +91,7 @@ SplineMotion PoseSpline::at(double t_s, SplineJacobian* J) const {
     const Mat3 theta_d = after_T * right;                                                             // (S5)
     const Mat3 rate_d = after_T * (w.step_rate[k] * Mat3::Identity() + hat(rate_before[k]) * right);  // (S6)
     const Mat3 theta_own = theta_d * inverse, rate_own = rate_d * inverse;                            // (S7)
-    if (j == kDegree) J->J_theta_delta[k] = theta_own, J->J_rate_delta[k] = rate_own;
+    if (j == kSplineDegree) J->J_theta_delta[k] = theta_own, J->J_rate_delta[k] = rate_own;
     else J->J_theta_delta[k] += theta_own, J->J_rate_delta[k] += rate_own;
     J->J_theta_delta[k - 1] = -theta_d * inverse.transpose();
     J->J_rate_delta[k - 1] = -rate_d * inverse.transpose();

@@ -106,12 +106,16 @@ RigAdjustment::FrameEquations RigAdjustment::linearise(const RigFrame& frame, do
   return out;
 }
 
-Eigen::MatrixXd RigAdjustment::information(const RigFrame& frame) const {
+RigAdjustment::Evidence RigAdjustment::evidence(const RigFrame& frame) const {
   const FrameEquations f = linearise(frame, 0);
-  const Eigen::MatrixXd reduced = f.G - f.C * f.A.ldlt().solve(f.C.transpose());
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size_, size_);
-  for (std::size_t i = 0; i < f.columns.size(); ++i)
-    for (std::size_t j = 0; j < f.columns.size(); ++j) out(f.columns[i], f.columns[j]) += reduced(i, j);
+  const PoseFactor factor = f.A.ldlt();
+  const Eigen::MatrixXd reduced = f.G - f.C * factor.solve(f.C.transpose());
+  const Eigen::VectorXd right = f.g - f.C * factor.solve(f.a);
+  Evidence out{Eigen::MatrixXd::Zero(size_, size_), Eigen::VectorXd::Zero(size_)};
+  for (std::size_t i = 0; i < f.columns.size(); ++i) {
+    out.gradient[f.columns[i]] += right[i];
+    for (std::size_t j = 0; j < f.columns.size(); ++j) out.information(f.columns[i], f.columns[j]) += reduced(i, j);
+  }
   return out;
 }
 

@@ -60,8 +60,12 @@ class RigAdjustment {
   /// Parameters: of each camera its lens, then (but for cam0) position and rotation of T_CnC0.
   int parameter_count() const { return size_; }
   int first_of(int camera) const { return first_[camera]; }
-  /// Information of one frame about them, its pose unknown, for a noise of 1 px.
-  Eigen::MatrixXd information(const RigFrame& frame) const;
+  /// What one frame says about them, its pose unknown, for a noise of 1 px: its part of the normal equations.
+  struct Evidence {
+    Eigen::MatrixXd information;
+    Eigen::VectorXd gradient;  ///< of the sum over all frames it is 0 where the adjustment has converged
+  };
+  Evidence evidence(const RigFrame& frame) const;
 
   /// Detected minus predicted; not finite where the lens has no such ray.
   Vec2 residual(const RigFrame& frame, const SeenBoard& view, const SeenCorner& corner) const;

@@ -112,7 +112,7 @@ RigKnowledge rough_knowledge(const Detections& detections, const Board& board, c
   out.information = Eigen::MatrixXd::Zero(adjustment.parameter_count(), adjustment.parameter_count());
   // Cameras that are not joined tell of themselves only.
   const auto frames = rig_frames(joined ? stamps : joined_by_stamp(posed, -1), out.T_CnC0, board);
-  for (const RigFrame& frame : frames) out.information += adjustment.information(frame);
+  for (const RigFrame& frame : frames) out.information += adjustment.evidence(frame).information;
   for (const PosedView& one : posed)
     for (const BoardCorner& corner : one.view.corners) mark(out, one.view.camera, corner.pixel);
   return out;

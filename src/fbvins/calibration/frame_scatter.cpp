@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fbvins/calibration/frame_scatter.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "fbvins/calibration/lens_jacobian.hpp"
+
+namespace fbvins {
+namespace {
+
+/// The largest part of what is known of a combination of parameters that one stamp is taken to have contributed.
+constexpr double kMostOfOne = 0.9;
+
+/// (C16) Covariance by leaving out each stamp, for a unit covariance L L^T, in the whitened parameters L^-1 x.
+Eigen::MatrixXd scatter_of(const RigAdjustment& adjustment, const Eigen::MatrixXd& L) {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L.cols(), L.cols());
+  for (const RigFrame& frame : adjustment.frames()) {
+    const RigAdjustment::Evidence evidence = adjustment.evidence(frame);
+    const Eigen::MatrixXd share = L.transpose() * evidence.information * L;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(share);
+    const Eigen::VectorXd others = 1 - eigen.eigenvalues().array().min(kMostOfOne);
+    const Eigen::VectorXd gradient = eigen.eigenvectors().transpose() * (L.transpose() * evidence.gradient);
+    const Eigen::VectorXd moved = eigen.eigenvectors() * gradient.cwiseQuotient(others);
+    sum.noalias() += moved * moved.transpose();
+  }
+  return sum;
+}
+
+/// What of a sample of `frames` covariances is more than chance: eigenvalues above those that the noise of corners alone gives
+/// (Marchenko and Pastur 1967) are kept, all others are their mean, at least 1.
+Eigen::MatrixXd more_than_chance(const Eigen::MatrixXd& sample, std::size_t frames) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sample);
+  const double edge = std::pow(1 + std::sqrt(static_cast<double>(sample.rows()) / static_cast<double>(frames)), 2);
+  Eigen::VectorXd values = eigen.eigenvalues();
+  double sum = 0;
+  int usual = 0;
+  for (const double value : values)
+    if (value <= edge) sum += value, ++usual;
+  const double mean = usual > 0 ? std::max(1.0, sum / usual) : 1;
+  for (double& value : values) value = value > edge ? value : mean;
+  return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+}  // namespace
+
+Eigen::MatrixXd covariance_by_scatter(const RigAdjustment& adjustment, const Eigen::MatrixXd& unit, double noise_px) {
+  const Eigen::VectorXd scale = unit.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * unit * scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd L = noise_px * (scale.asDiagonal() * correlation.llt().matrixL().toDenseMatrix());
+  return L * more_than_chance(scatter_of(adjustment, L / noise_px) / (noise_px * noise_px), adjustment.frames().size()) *
+         L.transpose();
+}
+
+}  // namespace fbvins
