@@ -9,6 +9,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -22,8 +23,10 @@ namespace fbvins {
 /// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
 class FrameJoiner {
  public:
-  explicit FrameJoiner(int cameras, bool depth = false)
-      : cameras_(cameras), streams_(static_cast<std::size_t>(cameras + depth)) {}
+  /// `own`: how long after their stamps the cameras take their images, by the calibration (own_offsets()). Images are joined by
+  /// when they were taken; the offsets of frames are of the stamps.
+  explicit FrameJoiner(int cameras, bool depth = false, ExposureOffsets own = {})
+      : cameras_(cameras), own_(std::move(own)), streams_(static_cast<std::size_t>(cameras + depth)) {}
 
   /// Stamps of one camera ascend; one that does not is dropped. After it, next() until that is empty.
   void add(int camera, Time t, std::shared_ptr<const Image> image) { put(static_cast<std::size_t>(camera), t, std::move(image)); }
@@ -47,7 +50,7 @@ class FrameJoiner {
   };
 
   static bool is_free(const Stream& stream) { return stream.apart >= kApart; }
-  void put(std::size_t stream, Time t, Pixels pixels);
+  void put(std::size_t stream, Time stamp, Pixels pixels);
   std::optional<Time> first_waiting() const;
   bool is_complete(Time first) const;
   bool free_ones_are_there(Time t) const;
@@ -56,8 +59,10 @@ class FrameJoiner {
   void take_nearest(std::size_t stream, StereoFrame& frame);
   std::optional<StereoFrame> of_a_free_one();
   StereoFrame join(Time first);
+  std::optional<StereoFrame> next_by_exposure();
 
   int cameras_;
+  ExposureOffsets own_;
   std::vector<Stream> streams_;  // of the cameras, and of the depth sensor at the end
 };
 

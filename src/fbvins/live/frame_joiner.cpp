@@ -20,8 +20,9 @@ void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Imag
 
 }  // namespace
 
-void FrameJoiner::put(std::size_t stream, Time t, Pixels pixels) {
+void FrameJoiner::put(std::size_t stream, Time stamp, Pixels pixels) {
   Stream& to = streams_[stream];
+  const Time t = stamp + own_.of(static_cast<int>(stream));
   if (to.newest && t <= *to.newest) return;
   if (to.newest) to.interval = t - *to.newest;
   to.newest = t;
@@ -119,7 +120,7 @@ StereoFrame FrameJoiner::join(Time first) {
   return frame;
 }
 
-std::optional<StereoFrame> FrameJoiner::next() {
+std::optional<StereoFrame> FrameJoiner::next_by_exposure() {
   while (const std::optional<Time> first = first_waiting()) {
     if (!is_complete(*first)) return std::nullopt;
     count_apart(*first);
@@ -127,6 +128,12 @@ std::optional<StereoFrame> FrameJoiner::next() {
     if (!frame.without_images()) return frame;
   }
   return of_a_free_one();
+}
+
+std::optional<StereoFrame> FrameJoiner::next() {
+  std::optional<StereoFrame> frame = next_by_exposure();
+  if (frame) frame->offsets -= own_;
+  return frame;
 }
 
 }  // namespace fbvins

@@ -163,5 +163,23 @@ TEST(FrameJoiner, DepthImagesGoWithTheirCamera) {
   EXPECT_EQ(s.given, "1:0d 2:0d 4:0d 5:0 6:0d");
 }
 
+TEST(FrameJoiner, StampsThatTheCalibrationExplainsAreOfOneInstant) {
+  const ExposureOffsets own({{}, Duration{-8'000'000}, Duration{3'000'000}});
+  FrameJoiner joiner(3, false, own);
+  std::string given;
+  const auto add = [&](int camera, int ms) {
+    joiner.add(camera, Time{ms * std::int64_t{1'000'000}}, std::make_shared<Image>(1, 1));
+    while (auto frame = joiner.next()) {
+      EXPECT_EQ(frame->offsets.of(1).ns, 8'000'000);
+      EXPECT_EQ(frame->offsets.of(2).ns, -3'000'000);
+      frame->offsets += own;
+      EXPECT_TRUE(frame->offsets.all_zero());
+      given += std::to_string(frame->t.ns / 1'000'000) + (frame->left && frame->right && frame->image(2) ? " " : "? ");
+    }
+  };
+  for (int k = 1; k < 5; ++k) add(2, 50 * k - 3), add(0, 50 * k), add(1, 50 * k + 8);
+  EXPECT_EQ(given, "50 100 150 200 ");
+}
+
 }  // namespace frame_joiner_test
 }  // namespace fbvins
