@@ -13,12 +13,15 @@
 #include <variant>
 #include <vector>
 
+#include "fbvins/core/sample_period.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
 
-/// Frames are delivered in order of time. A frame is delivered without a camera's image when that image counts as lost: that
-/// camera has delivered a newer one, or another camera has delivered several since. A camera whose images never meet those of
+/// Frames are delivered in order of time; an image that comes when its frame has been delivered is dropped. A frame is delivered
+/// without a camera's image when that image counts as lost: that camera has delivered a newer one, or another camera has
+/// delivered several since. For a silent camera no frame waits; with its next image but one, at the latest, it is there again.
+/// The time is that of the newest stamp. A camera whose images never meet those of
 /// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
 /// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
 class FrameJoiner {
@@ -46,11 +49,14 @@ class FrameJoiner {
     std::deque<Waiting> waiting;
     std::optional<Time> newest = {};
     Duration interval = {};  // the last one
+    SamplePeriod period = {};
+    Duration lag = {};  // how much older than others' images they are when they come: the most of late, fading
     int apart = 0;
   };
 
   static bool is_free(const Stream& stream) { return stream.apart >= kApart; }
   void put(std::size_t stream, Time stamp, Pixels pixels);
+  bool is_silent(const Stream& stream) const;
   std::optional<Time> first_waiting() const;
   bool is_complete(Time first) const;
   bool free_ones_are_there(Time t) const;
@@ -63,6 +69,7 @@ class FrameJoiner {
 
   int cameras_;
   ExposureOffsets own_;
+  std::optional<Time> began_, now_, delivered_;
   std::vector<Stream> streams_;  // of the cameras, and of the depth sensor at the end
 };
 
