@@ -50,6 +50,19 @@ void print_further_cameras(const StereoRig& rig, const CameraInfo& info) {
   fmt::print("{:<14}{} images together{}\n", "", info.listed, left_out_of(info));
 }
 
+/// Of camera 0, and of the others where they have others.
+std::string times_of(const StereoRig& rig) {
+  const auto text = [](const CameraTimes& times) {
+    const std::string rolling =
+        times.line_delay_s == 0 ? std::string() : fmt::format(", line delay {:.3f} us", 1e6 * times.line_delay_s);
+    return fmt::format("time offset {:.6f} s{}", times.time_offset_s, rolling);
+  };
+  std::string out = text(rig.times(0));
+  for (int i = 1; i < rig.camera_count(); ++i)
+    if (rig.times(i) != rig.times(0)) out += fmt::format("; camera {}: {}", i, text(rig.times(i)));
+  return out;
+}
+
 void print_text(const Dataset& data) {
   const DatasetInfo& info = data.info();
   fmt::print("{} ({})\n", bold(info.name), info.format);
@@ -64,7 +77,7 @@ void print_text(const Dataset& data) {
                depth->farthest_m, depth->noise_at_1m_m);
   const std::string baseline =
       data.rig().has_right() ? fmt::format("baseline {:.4f} m, ", data.rig().T_C1C0().p.norm()) : std::string();
-  fmt::print("{:<14}{}time offset {:.6f} s\n", "rig", baseline, data.rig().time_offset_s);
+  fmt::print("{:<14}{}{}\n", "rig", baseline, times_of(data.rig()));
   fmt::print("{:<14}{} samples at {:.1f} Hz, longest gap {:.3f} s, {} rows left out\n", "imu", info.imu_samples, info.imu_rate_hz,
              info.longest_imu_gap.seconds(), info.imu_rows.bad());
   fmt::print("{:<14}{} poses\n", "ground truth", info.ground_truth_poses);

@@ -78,11 +78,14 @@ MapArguments map_arguments(const Arguments& arguments) {
   return map;
 }
 
-Result<std::vector<SensorFault>> faults_of(const Arguments& arguments) {
+/// `cameras`: of the rig.
+Result<std::vector<SensorFault>> faults_of(const Arguments& arguments, int cameras) {
   std::vector<SensorFault> faults;
   for (const std::string& text : arguments.faults) {
     auto fault = parse_fault(text);
     if (!fault) return fault.error();
+    if (fault->camera >= cameras)
+      return Error{ErrorCode::invalid_argument, fmt::format("fault '{}': the rig's cameras are 0 to {}", text, cameras - 1)};
     faults.push_back(*fault);
   }
   return faults;
@@ -141,7 +144,7 @@ Result<void> fly_with_outputs(const Arguments& arguments, const Config& config, 
   if (counter) live->add_sink(std::move(counter));
   if (Result<void> added = add_outputs(arguments.outputs, flight, *live, totals, troubles); !added) return added;
   if (Result<void> added = graph.add_sinks(source, config, flight_commands(flight, *live), *live); !added) return added;
-  const auto faults = faults_of(arguments);
+  const auto faults = faults_of(arguments, source.rig().camera_count());
   if (!faults) return faults.error();
   if (Result<void> added = add_page(arguments.outputs.web, flight, *live); !added)
     return added;  // last: its viewers reach the others
@@ -171,7 +174,7 @@ int run(Arguments arguments) {
   const StopSignals signals;  // before any thread is made
   const auto config = arguments.config.load();
   if (!config) return fail(config.error().message);
-  if (const auto faults = faults_of(arguments); !faults) return fail(faults.error().message);
+  if (const auto faults = faults_of(arguments, kMostCameras); !faults) return fail(faults.error().message);
   const auto graph = RosGraph::join(arguments.ros2, arguments.source, config->live.ros2);
   if (!graph) return fail(graph.error().message);
   const auto source = source_of(arguments, *graph);

@@ -25,18 +25,22 @@ Json counts_json(const CameraInfo& info) {
       {"images", info.listed}, {"rows_left_out", info.rows.bad()}, {"unpaired", info.unpaired}, {"missing", info.images.missing}};
 }
 
-Json camera_json(const Camera& camera, const auto& T_BC) {
+Json camera_json(const StereoRig& rig, int number) {
+  const auto& [camera, T_BC] = rig.mounted(number);
+  const auto [time_offset_s, line_delay_s] = rig.times(number);
   return Json{{"model", camera.model_name()},
               {"width", camera.width()},
               {"height", camera.height()},
               {"masked_share", camera.mask() ? camera.mask()->hidden_share() : 0.0},
               {"fx_fy_cx_cy_distortion", parameters_of(camera)},
-              {"T_BC_row_major", row_major(T_BC)}};
+              {"T_BC_row_major", row_major(T_BC)},
+              {"time_offset_s", time_offset_s},
+              {"line_delay_s", line_delay_s}};
 }
 
-Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info) {
+Json camera_json(const StereoRig& rig, int number, const CameraInfo& info) {
   Json out = counts_json(info);
-  out.update(camera_json(camera, T_BC));
+  out.update(camera_json(rig, number));
   return out;
 }
 
@@ -44,7 +48,7 @@ Json camera_json(const Camera& camera, const auto& T_BC, const CameraInfo& info)
 Json more_json(const StereoRig& rig, const CameraInfo& info) {
   Json out = counts_json(info);
   out["cameras"] = Json::array();
-  for (int i = 2; i < rig.camera_count(); ++i) out["cameras"].push_back(camera_json(rig.camera(i), rig.T_BC(i)));
+  for (int i = 2; i < rig.camera_count(); ++i) out["cameras"].push_back(camera_json(rig, i));
   return out;
 }
 
@@ -69,8 +73,8 @@ Json describe(const Dataset& data) {
                      {"accel_noise_density_mps2_rthz", rig.imu_noise.accel_noise_density_mps2_rthz},
                      {"gyro_random_walk_radps2_rthz", rig.imu_noise.gyro_random_walk_radps2_rthz},
                      {"accel_random_walk_mps3_rthz", rig.imu_noise.accel_random_walk_mps3_rthz}};
-  json["left"] = camera_json(rig.left, rig.T_BC0, info.left);
-  if (rig.has_right()) json["right"] = camera_json(rig.right, rig.T_BC1, info.right);
+  json["left"] = camera_json(rig, 0, info.left);
+  if (rig.has_right()) json["right"] = camera_json(rig, 1, info.right);
   if (!rig.more.empty()) json["more"] = more_json(rig, info.more);
   if (rig.depth)
     json["depth"] = Json{{"images", info.depth.listed},

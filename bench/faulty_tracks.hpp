@@ -54,16 +54,13 @@ inline OnTracks on_tracks(const SensorFault& fault) {
     case ImageFault::noise:
     case ImageFault::blur:
     case ImageFault::flicker:
-    case ImageFault::right_darker:
     case ImageFault::torn:
     case ImageFault::broken_blocks:
     case ImageFault::mirrored: return OnTracks::not_on_tracks;
     case ImageFault::covered:
-    case ImageFault::right_covered:
     case ImageFault::scroll:
-    case ImageFault::right_shifted:
-    case ImageFault::right_turned:
-    case ImageFault::both_turned: return OnTracks::by_track;
+    case ImageFault::shifted:
+    case ImageFault::turned: return OnTracks::by_track;
     default: return OnTracks::by_image;
   }
 }
@@ -109,22 +106,19 @@ class FaultyTracks final : public Frontend {
       px -= Vec2(w / 2, h / 2);
       return Vec2(w / 2 + c * px.x() - s * px.y(), h / 2 + s * px.x() + c * px.y());
     };
-    switch (fault_->image) {
-      case ImageFault::covered: cover(f.left), cover(f.right); break;
-      case ImageFault::right_covered: cover(f.right); break;
-      case ImageFault::scroll: {
-        const auto shifted = [&](const Vec2& px) {
-          return Vec2(std::fmod(px.x() + w - std::fmod(amount * count_, w), w), px.y());
-        };
-        move(f.left, flight_.rig.left, shifted), move(f.right, flight_.rig.right, shifted);
-        break;
+    const auto scrolled = [&](const Vec2& px) { return Vec2(std::fmod(px.x() + w - std::fmod(amount * count_, w), w), px.y()); };
+    const auto lower = [&](const Vec2& px) { return Vec2(px.x(), px.y() + amount); };
+    for (const int camera : {0, 1}) {
+      if (fault_->camera != kAllCameras && fault_->camera != camera) continue;
+      std::optional<Observation>& o = camera == 0 ? f.left : f.right;
+      const Camera& lens = flight_.rig.camera(camera);
+      switch (fault_->image) {
+        case ImageFault::covered: cover(o); break;
+        case ImageFault::scroll: move(o, lens, scrolled); break;
+        case ImageFault::shifted: move(o, lens, lower); break;
+        case ImageFault::turned: move(o, lens, turn); break;
+        default: break;
       }
-      case ImageFault::right_shifted:
-        move(f.right, flight_.rig.right, [&](const Vec2& px) { return Vec2(px.x(), px.y() + amount); });
-        break;
-      case ImageFault::both_turned: move(f.left, flight_.rig.left, turn); [[fallthrough]];
-      case ImageFault::right_turned: move(f.right, flight_.rig.right, turn); break;
-      default: break;
     }
   }
 

@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/variant.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <variant>
 
 #include "bindings.hpp"
 #include "fbvins/bags/calibration.hpp"
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/io/rig_text.hpp"
@@ -59,9 +62,20 @@ std::string text_of(const Camera& camera) {
                      camera.width(), camera.height(), f[0], f[1], f[2], f[3]);
 }
 
+/// A number of all cameras, or one of each.
+using OneOrEach = std::variant<double, std::vector<double>>;
+
+std::vector<double> of_each(const OneOrEach& given, const char* name, std::size_t cameras) {
+  if (const double* one = std::get_if<double>(&given)) return std::vector<double>(cameras, *one);
+  const auto& each = std::get<std::vector<double>>(given);
+  if (each.size() != cameras)
+    throw nb::value_error(fmt::format("{}: the rig has {} cameras, not {}", name, cameras, each.size()).c_str());
+  return each;
+}
+
 StereoRig make_rig(const Camera& left, const Camera* right, nb::handle T_BC0, nb::handle T_BC1, const ImuNoise& imu_noise,
-                   double image_rate_hz, double time_offset_s, const DepthSensor* depth,
-                   const std::vector<std::pair<Camera, nb::object>>& more) {
+                   double image_rate_hz, const OneOrEach& time_offset_s, const DepthSensor* depth,
+                   const std::vector<std::pair<Camera, nb::object>>& more, const OneOrEach& line_delay_s) {
   if ((right == nullptr) != T_BC1.is_none()) throw nb::value_error("right and T_BC1 go together: give both, or neither");
   std::vector<MountedCamera> cameras{{left, transform<B, C0>(T_BC0, "T_BC0")}};
   if (right != nullptr) cameras.push_back({*right, transform<B, C0>(T_BC1, "T_BC1")});
@@ -69,12 +83,23 @@ StereoRig make_rig(const Camera& left, const Camera* right, nb::handle T_BC0, nb
   for (const auto& [camera, T_BC] : more) cameras.push_back({camera, transform<B, C0>(T_BC, "more")});
   if (right != nullptr && depth != nullptr) throw nb::value_error("a depth sensor goes with one camera: without a right one");
   StereoRig rig = with_cameras({}, cameras);
+  const auto count = static_cast<std::size_t>(rig.camera_count());
+  const std::vector<double> offsets_s = of_each(time_offset_s, "time_offset_s", count),
+                            delays_s = of_each(line_delay_s, "line_delay_s", count);
+  std::vector<CameraTimes> times;
+  for (std::size_t i = 0; i < count; ++i) times.push_back({offsets_s[i], delays_s[i]});
+  rig = with_times(rig, times);
   if (depth != nullptr) rig = with_depth(rig, *depth);
   rig.imu_noise = imu_noise;
   rig.image_rate_hz = image_rate_hz;
-  rig.time_offset_s = time_offset_s;
   if (const Result<void> good = check_rig(rig, "the rig"); !good) throw nb::value_error(good.error().message.c_str());
   return rig;
+}
+
+std::vector<double> each_of(const StereoRig& rig, double CameraTimes::*figure) {
+  std::vector<double> out;
+  for (int i = 0; i < rig.camera_count(); ++i) out.push_back(rig.times(i).*figure);
+  return out;
 }
 
 void bind_camera(nb::module_& m) {
@@ -138,9 +163,10 @@ void bind_stereo_rig(nb::module_& m) {
       .def(
           nb::new_(&make_rig), "left"_a, "right"_a.none() = nb::none(), "T_BC0"_a = nb::none(), "T_BC1"_a = nb::none(),
           "imu_noise"_a = ImuNoise{}, "image_rate_hz"_a = 20.0, "time_offset_s"_a = 0.0, "depth"_a.none() = nb::none(),
-          "more"_a = std::vector<std::pair<Camera, nb::object>>{},
+          "more"_a = std::vector<std::pair<Camera, nb::object>>{}, "line_delay_s"_a = 0.0,
           "T_BC0, T_BC1: float64 (4, 4), take camera to IMU coordinates, metres. time_offset_s: t_imu = t_image + offset. depth:\n"
-          "a DepthSensor, with one camera. more: the cameras from number 2 on, each (Camera, T_BC).")
+          "a DepthSensor, with one camera. more: the cameras from number 2 on, each (Camera, T_BC). line_delay_s: of a rolling\n"
+          "shutter, from row to row. time_offset_s and line_delay_s: one number, or one of each camera.")
       .def_ro("left", &StereoRig::left)
       .def_ro("right", &StereoRig::right)
       .def_prop_ro(
@@ -160,7 +186,12 @@ void bind_stereo_rig(nb::module_& m) {
           "depth", [](const StereoRig& rig) { return rig.depth; }, "the DepthSensor; None without")
       .def_ro("imu_noise", &StereoRig::imu_noise)
       .def_ro("image_rate_hz", &StereoRig::image_rate_hz)
-      .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s")
+      .def_ro("time_offset_s", &StereoRig::time_offset_s, "t_imu = t_image + time_offset_s, of camera 0")
+      .def_prop_ro(
+          "time_offsets_s", [](const StereoRig& rig) { return each_of(rig, &CameraTimes::time_offset_s); }, "of each camera")
+      .def_prop_ro(
+          "line_delays_s", [](const StereoRig& rig) { return each_of(rig, &CameraTimes::line_delay_s); },
+          "of each camera: of a rolling shutter, from row to row; 0 for a global one")
       .def("__reduce__", [](const StereoRig& rig) { return reduced("rig", nb::cast(rig_to_yaml(rig))); })
       .def("__repr__", [](const StereoRig& rig) {
         if (!rig.has_right()) return fmt::format("<fbvins.Rig {}, IMU {:g} Hz>", text_of(rig.left), rig.imu_noise.rate_hz);

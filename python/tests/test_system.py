@@ -276,6 +276,20 @@ def test_a_rig_of_ones_own(flight):
     fbvins.System(None, own).finish()
 
 
+def test_each_camera_has_its_times(flight):
+    rig = fbvins.open(flight, max_frames=1).rig
+    make = lambda **times: fbvins.Rig(rig.left, rig.right, rig.T_BC0, rig.T_BC1, **times)
+    assert make(time_offset_s=0.002, line_delay_s=3e-5).time_offsets_s == [0.002, 0.002]
+    own = make(time_offset_s=[0.002, 0.0035], line_delay_s=[0, 3e-5])
+    assert own.time_offset_s == 0.002 and own.time_offsets_s == [0.002, 0.0035] and own.line_delays_s == [0, 3e-5]
+    again = pickle.loads(pickle.dumps(own))
+    assert again.time_offsets_s == own.time_offsets_s and again.line_delays_s == own.line_delays_s
+    with pytest.raises(ValueError, match="line_delay_s: the rig has 2 cameras, not 3"):
+        make(line_delay_s=[0, 0, 0])
+    with pytest.raises(ValueError, match="the time offset of camera 1 differs from camera 0's by 300.0 ms"):
+        make(time_offset_s=[0, 0.3])
+
+
 def test_four_cameras():
     recording = fbvins.simulate("quad", seed=5, seconds=2)
     rig = recording.rig

@@ -16,6 +16,7 @@
 
 #include <builtin_interfaces/msg/time.hpp>
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
+#include <fbvins/camera/camera_times.hpp>
 #include <fbvins/config/config_file.hpp>
 #include <fbvins/io/kalibr.hpp>
 #include <fbvins/live/frame_joiner.hpp>
@@ -215,7 +216,7 @@ class FbvinsComponent final : public rclcpp::Node {
                                   std::to_string(rig_.camera_count()) + " cameras");
     live_.emplace(checked(fbvins::LiveSystem::create(config, config.live, rig_)));
     live_->add_sink(std::make_unique<Output>(*this, rig_, config));
-    joiner_.emplace(rig_.camera_count());
+    joiner_.emplace(rig_.camera_count(), false, fbvins::own_offsets(rig_));
     for (std::size_t c = 0; c < images.size(); ++c)
       images_.push_back(create_subscription<sensor_msgs::msg::Image>(
           images[c], rclcpp::SensorDataQoS(),

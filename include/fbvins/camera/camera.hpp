@@ -27,6 +27,16 @@ namespace fbvins {
 /// Cameras of a rig at most.
 inline constexpr int kMostCameras = 8;
 
+/// When a camera takes its images, s.
+struct CameraTimes {
+  /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
+  double time_offset_s = 0;
+  /// Rolling shutter: from one row of an image to the next; 0 for a global shutter. The stamp is the middle row's: row v is taken
+  /// at t_image + (v - height / 2) * line_delay_s.
+  double line_delay_s = 0;
+  bool operator==(const CameraTimes&) const = default;
+};
+
 class Camera {
  public:
   Camera() = default;
@@ -50,6 +60,9 @@ class Camera {
   /// What of the image shows something else than the world, of the camera's size (check_rig); null where all of it does.
   const std::shared_ptr<const Mask>& mask() const { return mask_; }
   void set_mask(std::shared_ptr<const Mask> mask) { mask_ = std::move(mask); }
+  /// What it has more than its rig says of all cameras (StereoRig::times). A rig's camera 0 has nothing more.
+  const CameraTimes& own_times() const { return own_times_; }
+  void set_own_times(const CameraTimes& more) { own_times_ = more; }
   /// The same camera behind another lens.
   Camera with_lens(LensModel model) const;
   /// The same camera in axes that are turned inside its lens: its frame F with p_lens = R_lens * p_F, in which all that follows
@@ -99,6 +112,7 @@ class Camera {
   Mat3 R_lens_ = Mat3::Identity();
   bool is_turned_ = false;
   std::shared_ptr<const Mask> mask_;
+  CameraTimes own_times_;
 };
 
 /// A camera and its place in the body.
@@ -129,11 +143,8 @@ struct StereoRig {
   std::optional<DepthSensor> depth;
   ImuNoise imu_noise;
   double image_rate_hz = 20;
-  /// t_imu = t_image + time_offset_s (Kalibr's timeshift_cam_imu).
-  double time_offset_s = 0;
-  /// Rolling shutter: from one row of an image to the next, in all cameras; 0 for a global shutter. The stamp is the middle
-  /// row's: row v is taken at t_image + (v - height / 2) * line_delay_s.
-  double line_delay_s = 0;
+  /// Those of camera 0, and of all others that have none of their own (CameraTimes, times()).
+  double time_offset_s = 0, line_delay_s = 0;
 
   bool has_right() const { return right.width() > 0; }
   int camera_count() const { return (has_right() ? 2 : 1) + static_cast<int>(more.size()); }
@@ -141,12 +152,24 @@ struct StereoRig {
   Pose<B, C0> T_BC(int i) const {
     return i == 0 ? T_BC0 : i == 1 ? T_BC1.cast_frames<B, C0>() : more[static_cast<std::size_t>(i - 2)].T_BC;
   }
+  CameraTimes times(int i) const {
+    const CameraTimes& own = camera(i).own_times();
+    return {time_offset_s + own.time_offset_s, line_delay_s + own.line_delay_s};
+  }
   MountedCamera mounted(int i) const { return {camera(i), T_BC(i)}; }
   Pose<C1, C0> T_C1C0() const { return T_BC1.inverse() * T_BC0; }
 };
 
-/// The rig with these cameras, one at least, in place of its own. A depth sensor stays where there is one camera.
-inline StereoRig with_cameras(StereoRig rig, const std::vector<MountedCamera>& cameras) {
+/// The rig with these cameras, one at least, in place of its own. A depth sensor stays where there is one camera. What the first
+/// one's times are more than the rig's becomes the rig's.
+inline StereoRig with_cameras(StereoRig rig, std::vector<MountedCamera> cameras) {
+  if (const CameraTimes first = cameras.front().camera.own_times(); first != CameraTimes{}) {
+    rig.time_offset_s += first.time_offset_s, rig.line_delay_s += first.line_delay_s;
+    for (MountedCamera& mounted : cameras) {
+      const CameraTimes& own = mounted.camera.own_times();
+      mounted.camera.set_own_times({own.time_offset_s - first.time_offset_s, own.line_delay_s - first.line_delay_s});
+    }
+  }
   const MountedCamera &first = cameras.front(), &second = cameras.size() > 1 ? cameras[1] : MountedCamera{{}, first.T_BC};
   rig.left = first.camera;
   rig.T_BC0 = first.T_BC;

@@ -9,21 +9,27 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "fbvins/core/sample_period.hpp"
 #include "fbvins/types/image.hpp"
 
 namespace fbvins {
 
-/// Frames are delivered in order of time. A frame is delivered without a camera's image when that image counts as lost: that
-/// camera has delivered a newer one, or another camera has delivered several since. A camera whose images never meet those of
+/// Frames are delivered in order of time; an image that comes when its frame has been delivered is dropped. A frame is delivered
+/// without a camera's image when that image counts as lost: that camera has delivered a newer one, or another camera has
+/// delivered several since. For a silent camera no frame waits; with its next image but one, at the latest, it is there again.
+/// The time is that of the newest stamp. A camera whose images never meet those of
 /// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
 /// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
 class FrameJoiner {
  public:
-  explicit FrameJoiner(int cameras, bool depth = false)
-      : cameras_(cameras), streams_(static_cast<std::size_t>(cameras + depth)) {}
+  /// `own`: how long after their stamps the cameras take their images, by the calibration (own_offsets()). Images are joined by
+  /// when they were taken; the offsets of frames are of the stamps.
+  explicit FrameJoiner(int cameras, bool depth = false, ExposureOffsets own = {})
+      : cameras_(cameras), own_(std::move(own)), streams_(static_cast<std::size_t>(cameras + depth)) {}
 
   /// Stamps of one camera ascend; one that does not is dropped. After it, next() until that is empty.
   void add(int camera, Time t, std::shared_ptr<const Image> image) { put(static_cast<std::size_t>(camera), t, std::move(image)); }
@@ -43,11 +49,14 @@ class FrameJoiner {
     std::deque<Waiting> waiting;
     std::optional<Time> newest = {};
     Duration interval = {};  // the last one
+    SamplePeriod period = {};
+    Duration lag = {};  // how much older than others' images they are when they come: the most of late, fading
     int apart = 0;
   };
 
   static bool is_free(const Stream& stream) { return stream.apart >= kApart; }
-  void put(std::size_t stream, Time t, Pixels pixels);
+  void put(std::size_t stream, Time stamp, Pixels pixels);
+  bool is_silent(const Stream& stream) const;
   std::optional<Time> first_waiting() const;
   bool is_complete(Time first) const;
   bool free_ones_are_there(Time t) const;
@@ -56,8 +65,11 @@ class FrameJoiner {
   void take_nearest(std::size_t stream, StereoFrame& frame);
   std::optional<StereoFrame> of_a_free_one();
   StereoFrame join(Time first);
+  std::optional<StereoFrame> next_by_exposure();
 
   int cameras_;
+  ExposureOffsets own_;
+  std::optional<Time> began_, now_, delivered_;
   std::vector<Stream> streams_;  // of the cameras, and of the depth sensor at the end
 };
 

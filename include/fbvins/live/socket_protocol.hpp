@@ -17,7 +17,7 @@
 
 enum {
   FBVINS_SOCKET_MAJOR = 1,  ///< raised for incompatible changes
-  FBVINS_SOCKET_MINOR = 3,  ///< raised when fields or messages are appended
+  FBVINS_SOCKET_MINOR = 4,  ///< raised when fields or messages are appended
   FBVINS_SOCKET_MOST_SLOTS = 64,
   FBVINS_SOCKET_MOST_CAMERAS = 8,
   FBVINS_SOCKET_MOST_READINGS = 512,
@@ -66,8 +66,14 @@ typedef struct FbvinsSocketRig {
   double accel_random_walk_mps3_rthz;
   double imu_rate_hz;
   double image_rate_hz;
-  double time_offset_s;  ///< t_imu = t_image + time_offset_s
+  double time_offset_s;  ///< t_imu = t_image + time_offset_s, of all cameras unless there are FbvinsSocketTimes
 } FbvinsSocketRig;
+
+/// When a camera takes its images.
+typedef struct FbvinsSocketTimes {
+  double time_offset_s;  ///< t_imu = t_image + time_offset_s
+  double line_delay_s;   ///< of a rolling shutter, from row to row; the stamp is the middle row's. 0: a global shutter
+} FbvinsSocketTimes;
 
 /// A depth sensor whose images are registered to the camera (docs/depth.md).
 typedef struct FbvinsSocketDepth {
@@ -83,7 +89,8 @@ enum {
   FBVINS_SOCKET_HAS_RIG = 1,
   FBVINS_SOCKET_HAS_CAMERAS = 2,  ///< since version 1.2: the fields from `cameras` on are filled; two cameras without it
   FBVINS_SOCKET_HAS_DEPTH =
-      4  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
+      4,  ///< since version 1.3: one camera, with a depth sensor; those from `depth_offset_bytes` on are filled
+  FBVINS_SOCKET_HAS_TIMES = 8  ///< since version 1.4: `times` is filled
 };
 
 /// The first message, with one file descriptor: a memfd of at least slots * slot_bytes, sealed with F_SEAL_SHRINK.
@@ -111,6 +118,8 @@ typedef struct FbvinsSocketHello {
   uint32_t depth_offset_bytes;
   uint32_t reserved_three;
   FbvinsSocketDepth depth;  ///< of the rig
+  // Since version 1.4, with FBVINS_SOCKET_HAS_TIMES; else 0 or left out:
+  FbvinsSocketTimes times[FBVINS_SOCKET_MOST_CAMERAS];  ///< of the rig's cameras 0, 1 ...
 } FbvinsSocketHello;
 
 typedef struct FbvinsSocketReading {

@@ -91,6 +91,19 @@ class ExposureOffsets {
     for (const Duration d : of_cameras_) out.ns = std::max(out.ns, std::abs(d.ns));
     return out;
   }
+  /// Whether two cameras took their images so far apart that it shows: 0.1 ms.
+  bool are_apart(int first, int second) const { return std::abs((of(first) - of(second)).ns) > 100'000; }
+  /// Camera by camera.
+  ExposureOffsets& operator+=(const ExposureOffsets& more) {
+    for (std::size_t i = 0; i < more.of_cameras_.size(); ++i)
+      set(static_cast<int>(i), of(static_cast<int>(i)) + more.of_cameras_[i]);
+    return *this;
+  }
+  ExposureOffsets& operator-=(const ExposureOffsets& less) {
+    for (std::size_t i = 0; i < less.of_cameras_.size(); ++i)
+      set(static_cast<int>(i), of(static_cast<int>(i)) - less.of_cameras_[i]);
+    return *this;
+  }
   bool operator==(const ExposureOffsets&) const = default;
 
  private:

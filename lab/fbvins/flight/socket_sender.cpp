@@ -68,7 +68,12 @@ Result<void> SocketSender::greet(const StereoRig& rig) {
   std::strcpy(hello.name, "simulated vehicle");
   hello.width_px = width_px_, hello.height_px = height_px_;
   hello.slots = kSlots, hello.slot_bytes = 2 * image_bytes, hello.right_offset_bytes = image_bytes;
-  hello.rig = socket_rig(rig).pair;
+  const SocketRig sent = socket_rig(rig);
+  hello.rig = sent.pair;
+  if (sent.times) {
+    hello.flags |= FBVINS_SOCKET_HAS_TIMES;
+    std::copy(sent.times->begin(), sent.times->end(), hello.times);
+  }
   iovec place{&hello, sizeof(hello)};
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   msghdr message{};

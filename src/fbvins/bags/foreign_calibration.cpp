@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/image_decode.hpp"
 
@@ -166,16 +167,16 @@ RosCamera ros_camera(YamlReader& yaml) {
 }  // namespace
 
 Result<StereoRig> parse_openvins_cameras(YamlReader yaml, const ReadBeside& read) {
-  const YAML::Node cam0 = inner(yaml, yaml.root(), "cam0");
   std::vector<MountedCamera> cameras;
+  std::vector<CameraTimes> times;
   for (int i = 0; yaml.ok() && (i == 0 || yaml.has(yaml.root(), fmt::format("cam{}", i))); ++i) {
     const YAML::Node camera = inner(yaml, yaml.root(), fmt::format("cam{}", i));
-    if (yaml.ok()) cameras.push_back({read_real_camera(yaml, camera, "distortion_coeffs", read), mounting(yaml, camera)});
+    if (!yaml.ok()) break;
+    cameras.push_back({read_real_camera(yaml, camera, "distortion_coeffs", read), mounting(yaml, camera)});
+    times.push_back(read_camera_times(yaml, camera, times.empty() ? 0 : times.front().time_offset_s));
   }
   if (!yaml.ok()) return yaml.error();
-  StereoRig rig = with_cameras({}, cameras);
-  rig.time_offset_s = yaml.number_between(cam0, "timeshift_cam_imu", -10, 10, 0);
-  return finished(yaml, rig);
+  return finished(yaml, with_times(with_cameras({}, cameras), times));
 }
 
 Result<StereoRig> parse_basalt(YamlReader yaml) {  // JSON is YAML

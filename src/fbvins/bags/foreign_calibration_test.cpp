@@ -81,6 +81,7 @@ TEST(ForeignCalibration, OpenVinsHasCamerasInTheImu) {
       {"chain.yaml", "%YAML:1.0\n\ncam0:\n" + openvins_camera(kLeft) + "cam1:\n" + openvins_camera(kRight)});
   expect_rig(rig);
   EXPECT_EQ(rig->time_offset_s, -0.004);
+  EXPECT_EQ(rig->right.own_times(), CameraTimes{});
   EXPECT_EQ(std::get<PinholeRadtan>(rig->left.model()).p2, 0.004);
 }
 

@@ -13,6 +13,7 @@
 #include "fbvins/bags/calibration.hpp"
 #include "fbvins/bags/grey_image.hpp"
 #include "fbvins/bags/topic_choice.hpp"
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/dataset_description.hpp"
@@ -196,12 +197,12 @@ class BagRecording {
       cameras.push_back(rows_of(topics_.cameras[i], i == 0 ? info.left : i == 1 ? info.right : info.more));
     const std::vector<ImageRow> depths = topics_.depth.empty() ? std::vector<ImageRow>{} : rows_of(topics_.depth, info.depth);
     const double tolerance_ms = options_.dataset.pair_tolerance_ms;
-    out_.frames = join_images(cameras, depths, tolerance_ms, info);
+    out_.frames = join_images(std::move(cameras), depths, own_offsets(out_.rig), tolerance_ms, info);
     const auto never = [&](const std::string& topic) {
       return Error{ErrorCode::malformed,
                    fmt::format("no stamp on {} lies within {} ms of one on {}", topic, tolerance_ms, topics_.cameras.front())};
     };
-    if (cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
+    if (topics_.cameras.size() > 1 && info.left.unpaired == info.left.listed) return never(topics_.cameras[1]);
     if (info.depth.listed > 0 && info.depth.unpaired == info.depth.listed) return never(topics_.depth);
     if (topics_.imu.empty()) return {};
     out_.imu = readings_on(contents_, topics_.imu, topics_.accel, info.imu_rows);

@@ -107,8 +107,10 @@ std::string to_kalibr_camchain(const RigCalibration& rig) {
         camera.model, kalibr_list(camera.coefficients), camera.distortion, kalibr_list(camera.intrinsics), rig.cameras[k].width(),
         rig.cameras[k].height(), k);
     out += mask_text(rig.cameras[k], "  ");
-    if (rig.line_delay_s != 0) out += fmt::format("  line_delay: {}\n", kalibr_number(rig.line_delay_s));
-    if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {}\n", kalibr_number(rig.time_offset_s));
+    const CameraTimes& own = rig.cameras[k].own_times();
+    if (const double delay_s = rig.line_delay_s + own.line_delay_s; delay_s != 0)
+      out += fmt::format("  line_delay: {}\n", kalibr_number(delay_s));
+    if (!rig.T_BC.empty()) out += fmt::format("  timeshift_cam_imu: {}\n", kalibr_number(rig.time_offset_s + own.time_offset_s));
   }
   return out;
 }

@@ -41,12 +41,15 @@ TEST(CalibrationFiles, ARigInOneFileIsReadBack) {
                                     {written.cameras[1], written.T_BC[1].cast_frames<B, C0>()}});
   rig.imu_noise = {1.5e-3, 2.5e-2, 3.5e-5, 4.5e-3, 400, 8, 80};
   rig.time_offset_s = -0.0123, rig.line_delay_s = 3e-5;
+  rig.right.set_own_times({0.002, 1e-5});
   const std::string text = to_kalibr_rig(rig_calibration(rig));
   const auto read = parse_kalibr_camchain({"fixed.yaml", text});
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_LT((read->T_BC0.p - rig.T_BC0.p).norm() + (read->T_BC1.p - rig.T_BC1.p).norm(), 1e-12);
   EXPECT_EQ(read->time_offset_s, rig.time_offset_s);
   EXPECT_EQ(read->line_delay_s, rig.line_delay_s);
+  EXPECT_DOUBLE_EQ(read->times(1).time_offset_s, -0.0103);
+  EXPECT_DOUBLE_EQ(read->times(1).line_delay_s, 4e-5);
   const auto noise = parse_kalibr_imu({"fixed.yaml", text});
   ASSERT_TRUE(noise) << noise.error().message;
   EXPECT_EQ(noise->gyro_noise_density_radps_rthz, 1.5e-3);

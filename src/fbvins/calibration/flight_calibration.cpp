@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "fbvins/calibration/flight_learning.hpp"
+#include "fbvins/camera/camera_times.hpp"
 
 namespace fbvins {
 namespace {
@@ -137,7 +138,7 @@ std::string objection_to(const FlightCalibration& found, bool changed) {
 
 Result<void> check(const std::vector<FlightTracks>& flights, const std::vector<std::string>& names, const StereoRig& rig) {
   if (rig.depth) return Error{ErrorCode::unsupported, "a rig with a depth sensor cannot be refined from flights yet"};
-  if (rig.line_delay_s != 0) return Error{ErrorCode::unsupported, "a rolling shutter cannot be refined from flights yet"};
+  if (has_rolling_shutter(rig)) return Error{ErrorCode::unsupported, "a rolling shutter cannot be refined from flights yet"};
   for (std::size_t i = 0; i < flights.size(); ++i) {
     if (flights[i].untriggered)
       return Error{ErrorCode::unsupported,

@@ -6,7 +6,7 @@
 namespace fbvins {
 
 void FlightCollector::add(const TrackedFrame& frame) {
-  tracks_.untriggered = tracks_.untriggered || frame.offsets.of(1) != frame.offsets.of(0);
+  tracks_.untriggered = tracks_.untriggered || frame.offsets.are_apart(0, 1);
   std::vector<FlightView>& views = seen_[frame.id];
   for (const TrackedFeature& feature : frame.features) {
     if (feature.left) views.push_back({feature.id, feature.cameras.left, feature.left->pixel});

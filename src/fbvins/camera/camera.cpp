@@ -144,6 +144,7 @@ Camera::Camera(std::shared_ptr<const Lens> lens, int width, int height) : lens_(
 Camera Camera::with_lens(LensModel model) const {
   Camera out(std::move(model), width_, height_);
   out.mask_ = mask_;
+  out.own_times_ = own_times_;
   return out;
 }
 

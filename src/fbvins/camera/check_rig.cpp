@@ -15,6 +15,8 @@ Error malformed(std::string_view origin, const std::string& what) {
 
 /// Slower than any shutter that is sold: a unit other than seconds.
 constexpr double kLongestLineDelay_s = 1e-3;
+/// More than any two drivers differ by: a unit other than seconds, or two clocks.
+constexpr double kFarthestApart_s = 0.1;
 
 /// Half way from the principal point to the edge of the image, the angle from the axis is at least this share of what a pinhole
 /// has there, and at most this multiple of what an equidistant lens has.
@@ -94,6 +96,20 @@ Result<void> check_depth(const StereoRig& rig, std::string_view origin) {
   return {};
 }
 
+Result<void> check_times(const StereoRig& rig, std::string_view origin) {
+  for (int i = 0; i < rig.camera_count(); ++i) {
+    const std::string whose = rig.camera(i).own_times() == CameraTimes{} ? std::string() : fmt::format(" of camera {}", i);
+    const auto [time_offset_s, line_delay_s] = rig.times(i);
+    if (!(std::abs(line_delay_s) <= kLongestLineDelay_s))
+      return malformed(origin,
+                       fmt::format("the line delay{} is {} s, more than {} s a row", whose, line_delay_s, kLongestLineDelay_s));
+    if (!(std::abs(time_offset_s - rig.time_offset_s) <= kFarthestApart_s))
+      return malformed(origin, fmt::format("the time offset{} differs from camera 0's by {:.1f} ms, more than {:.0f} ms", whose,
+                                           1e3 * (time_offset_s - rig.time_offset_s), 1e3 * kFarthestApart_s));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
@@ -116,8 +132,7 @@ Result<void> check_rig(const StereoRig& rig, std::string_view origin) {
     if (Result<void> good = check_depth(rig, origin); !good) return good;
   if (!positive(rig.image_rate_hz) || !std::isfinite(rig.time_offset_s))
     return malformed(origin, "the images' rate is not positive, or the time offset is not finite");
-  if (!(std::abs(rig.line_delay_s) <= kLongestLineDelay_s))
-    return malformed(origin, fmt::format("the line delay is {} s, more than {} s a row", rig.line_delay_s, kLongestLineDelay_s));
+  if (Result<void> good = check_times(rig, origin); !good) return good;
   return check_imu(rig.imu_noise, origin);
 }
 

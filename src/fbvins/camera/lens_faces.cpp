@@ -103,6 +103,7 @@ Camera cropped(const Camera& face, const Part& part, const Mat3* R_lens) {
     for (int x = 0; x < part.width; ++x)
       if (!face.hidden(Vec2(x + part.x, y + part.y), 0)) seen.at(x, y) = 255;
   out.set_mask(std::make_shared<const Mask>(seen));
+  out.set_own_times(face.own_times());
   return out;
 }
 
@@ -142,7 +143,7 @@ LensFaces::LensFaces(const StereoRig& rig) : lenses_(rig), rig_(rig) {
   if (!any_) return;
   for (std::size_t i = 0; i < ahead.size(); ++i) {
     if (!rig.camera(lens_of_[i]).sees_backwards()) continue;
-    const Part part = part_of(ahead[i].camera, rig.line_delay_s == 0);
+    const Part part = part_of(ahead[i].camera, rig.times(lens_of_[i]).line_delay_s == 0);
     origins_px_[i] = Vec2(part.x, part.y);
     const Mat3 R_lens = (rig.T_BC(lens_of_[i]).q.conjugate() * ahead[i].T_BC.q).toRotationMatrix();
     const bool is_ahead = static_cast<int>(i) < rig.camera_count();

@@ -37,6 +37,7 @@ std::optional<Camera> scaled_to(const Camera& camera, int width, int height) {
   if (std::abs(factor * camera.height() - height) > std::max(1.0, factor)) return std::nullopt;
   Camera out(scaled(camera.model(), factor), width, height);
   if (camera.mask()) out.set_mask(std::make_shared<const Mask>(resized(*camera.mask(), width, height)));
+  out.set_own_times(camera.own_times());
   return out;
 }
 

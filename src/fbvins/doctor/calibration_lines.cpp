@@ -57,9 +57,13 @@ std::string mask_line(bool left, CalibrationStyle style) {
   return fmt::format("{}mask: mask{}.png", file_of(left, style), left ? 0 : 1);
 }
 
-std::string time_line(double offset_s, CalibrationStyle style) {
-  if (style == CalibrationStyle::euroc) return fmt::format("cam0/sensor.yaml: timeshift_cam_imu: {:.5f}", offset_s);
-  return fmt::format("cam0, cam1: timeshift_cam_imu: {:.5f}", offset_s);
+std::string time_lines(const StereoRig& rig, CalibrationStyle style) {
+  const double first_s = rig.times(0).time_offset_s, second_s = rig.has_right() ? rig.times(1).time_offset_s : first_s;
+  const char* file = style == CalibrationStyle::euroc ? "/sensor.yaml" : "";
+  if (second_s != first_s)
+    return fmt::format("cam0{0}: timeshift_cam_imu: {1:.5f}\ncam1{0}: timeshift_cam_imu: {2:.5f}", file, first_s, second_s);
+  const std::string cameras = rig.has_right() ? fmt::format("cam0{0}, cam1{0}", file) : fmt::format("cam0{}", file);
+  return fmt::format("{}: timeshift_cam_imu: {:.5f}", cameras, first_s);
 }
 
 std::string rate_line(const ImuNoise& noise, CalibrationStyle style) {
@@ -89,7 +93,7 @@ std::string line_of(CalibrationField field, const StereoRig& rig, CalibrationSty
     case CalibrationField::distortion_of_right: return distortion_line(rig.right, false, style);
     case CalibrationField::mask_of_left: return mask_line(true, style);
     case CalibrationField::mask_of_right: return mask_line(false, style);
-    case CalibrationField::time_offset: return time_line(rig.time_offset_s, style);
+    case CalibrationField::time_offset: return time_lines(rig, style);
     case CalibrationField::imu_rate: return rate_line(rig.imu_noise, style);
     case CalibrationField::imu_noise: return noise_lines(rig.imu_noise, style);
   }

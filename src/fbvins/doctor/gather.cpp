@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/checkup/stereo_order.hpp"
 #include "fbvins/core/median.hpp"
 #include "fbvins/doctor/fixed_view.hpp"
@@ -269,7 +270,8 @@ bool EvidenceGatherer::push(const SensorEvent& event) {
   if (s.enough()) return false;
   StereoFrame frame = std::get<StereoFrame>(event);
   s.evidence.stamps.push_back(frame.t);
-  s.evidence.untriggered = s.evidence.untriggered || frame.offsets.of(1) != frame.offsets.of(0);
+  frame.offsets += own_offsets(s.evidence.rig);
+  s.evidence.untriggered = s.evidence.untriggered || frame.offsets.are_apart(0, 1);
   s.count_repeated(frame);
   if (!s.prelude) {
     if (s.evidence.swapped) std::swap(frame.left, frame.right);

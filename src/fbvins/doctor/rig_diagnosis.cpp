@@ -62,7 +62,8 @@ void add_pair(const Diagnosis& of_pair, const CameraGroup& pair, bool first, Dia
   for (const std::string& sentence : of_pair.measured) all.measured.push_back(who + sentence);
   for (const std::string& sentence : of_pair.not_judged) all.not_judged.push_back(who + sentence);
   if (first) {
-    all.rig.imu_noise = of_pair.rig.imu_noise, all.rig.time_offset_s = of_pair.rig.time_offset_s;
+    all.rig.imu_noise = of_pair.rig.imu_noise;
+    all.rig.time_offset_s = of_pair.rig.time_offset_s - all.rig.camera(pair.first).own_times().time_offset_s;
     all.epipolar_px = of_pair.epipolar_px, all.predicted_px = of_pair.predicted_px;
   }
   const int numbers[] = {pair.first, *pair.second};
@@ -71,8 +72,10 @@ void add_pair(const Diagnosis& of_pair, const CameraGroup& pair, bool first, Dia
     all.masks[static_cast<std::size_t>(numbers[i])] = of_pair.masks[i];
   if (of_pair.swapped) return;  // its rig is for exchanged images
   std::vector<MountedCamera> cameras;
-  for (int i = 0; i < all.rig.camera_count(); ++i)
+  for (int i = 0; i < all.rig.camera_count(); ++i) {
     cameras.push_back(i == pair.first ? of_pair.rig.mounted(0) : i == *pair.second ? of_pair.rig.mounted(1) : all.rig.mounted(i));
+    cameras.back().camera.set_own_times(all.rig.camera(i).own_times());
+  }
   all.rig = with_cameras(all.rig, cameras);
 }
 

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
+#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/estimator.hpp"
 #include "fbvins/estimator/initial_prior.hpp"
-#include "fbvins/estimator/estimated_flight.hpp"
 #include "fbvins/estimator/simulated_flight.hpp"
 
 namespace fbvins {
@@ -156,6 +156,51 @@ TEST(OnlineCalibration, AGlobalShutterStaysOne) {
   EstimatorOptions options = exact_noise();
   options.estimate_line_delay = true;
   EXPECT_NEAR(fly(flight, flight.rig, options).line_delay_s, 0, 1e-6);
+}
+
+/// A camera whose rows are 15 us apart more than the other's: the correction is common to both.
+TEST(OnlineCalibration, FindsTheLineDelayThatIsCommonToCamerasOfDifferentOnes) {
+  constexpr double kTrue_s = 40e-6, kMore_s = 15e-6;
+  SimulatedFlight flight(Motion(0.6, 0.5), 49);
+  flight.rig.right.set_own_times({.line_delay_s = kMore_s});
+  flight.line_delay_s = kTrue_s;
+  StereoRig rig = flight.rig;
+  rig.line_delay_s = 0.5 * kTrue_s;
+  EstimatorOptions options = exact_noise();
+  options.estimate_line_delay = true;
+  EXPECT_NEAR(rig.line_delay_s + fly(flight, rig, options).line_delay_s, kTrue_s, 0.05 * kTrue_s);
+}
+
+/// Images that the right camera takes 8 ms after the left one's, row by row, are as good as those of one instant; as if of one
+/// instant they are not.
+TEST(CameraTimes, ArePartOfEachObservation) {
+  const auto error_m = [](const CameraTimes& of_right, bool known) {
+    SimulatedFlight flight(Motion(0.6, 0.5), 51);
+    flight.rig.right.set_own_times(of_right);
+    StereoRig rig = flight.rig;
+    if (!known) rig.right.set_own_times({});
+    Estimator estimator(rig, exact_noise());
+    std::vector<Vec3> flown, truth;
+    for (int k = 0; k < kFrames; ++k) {
+      TrackedFrame frame = flight.frame(k);
+      if (!known) frame.offsets = {};
+      const Odometry odometry = estimator.process(frame).odometry;
+      if (!odometry.health.has_pose()) continue;
+      flown.push_back(odometry.T_WB.p), truth.push_back(flight.truth(k).T_FB.p);
+    }
+    // By the length of the way between frames a second apart: W's heading does not matter.
+    double sum_m2 = 0;
+    int count = 0;
+    for (std::size_t k = 20; k < flown.size(); ++k, ++count)
+      sum_m2 += std::pow((flown[k] - flown[k - 20]).norm() - (truth[k] - truth[k - 20]).norm(), 2);
+    EXPECT_GT(count, 40);  // with unknown times health is often lost
+    return std::sqrt(sum_m2 / count);
+  };
+  const CameraTimes late{0.008, 40e-6};
+  const double alike_m = error_m({}, true), known_m = error_m(late, true), unknown_m = error_m(late, false);
+  std::printf("one instant %.4f m, known times %.4f m, unknown %.4f m\n", alike_m, known_m, unknown_m);
+  EXPECT_LT(known_m, 1.5 * alike_m);
+  EXPECT_GT(unknown_m, 2 * known_m);
 }
 
 }  // namespace calibration_test

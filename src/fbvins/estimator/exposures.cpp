@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/estimator/exposures.hpp"
 
+#include "fbvins/camera/camera_times.hpp"
+
 namespace fbvins {
 
-Exposures::Exposures(const StereoRig& rig) : line_delay_s_(rig.line_delay_s), depth_(rig.depth.has_value()) {
-  for (int i = 0; i < rig.camera_count(); ++i) heights_px_.push_back(rig.camera(i).height());
+Exposures::Exposures(const StereoRig& rig) : rolling_(has_rolling_shutter(rig)), depth_(rig.depth.has_value()) {
+  for (int i = 0; i < rig.camera_count(); ++i) shutters_.push_back({0.5 * rig.camera(i).height(), rig.times(i).line_delay_s});
 }
 
 void Exposures::refer_to_stamp(const ExposureMotion& motion, const Calibration& calibration, TrackedFrame& frame) const {
   const auto refer = [&](Observation& o, int camera) {
     const int clock = depth_ ? 0 : camera;
-    o.rows = o.pixel.y() - 0.5 * heights_px_[static_cast<std::size_t>(clock)];
-    o.after_s = frame.offsets.of(clock).seconds() + o.rows * line_delay_s_;
+    const Shutter& shutter = shutters_[static_cast<std::size_t>(clock)];
+    o.rows = o.pixel.y() - shutter.middle_row_px;
+    o.after_s = frame.offsets.of(clock).seconds() + o.rows * shutter.line_delay_s;  // (S1)
     if (o.after_s == 0) return;
     const Pose<B, C0> T_BC = calibration.T_BC(camera);
     const Quat turn = motion.turn(o.after_s);

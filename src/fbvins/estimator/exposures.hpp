@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Says of each observation when and from where it was seen, if that was not at the frame's stamp: rows of a rolling shutter, and
 // cameras without a common trigger (docs/derivations/rolling_shutter.md, S1-S4). Row v of camera i is taken at
-// t + offsets.of(i) + (v - height / 2) * line_delay_s.
+// t + offsets.of(i) + (v - height / 2) * line_delay_s of that camera.
 //
 //   exposures.refer_to_stamp(ExposureMotion(frame.imu, bias, gravity_B), calibration, frame);
 //
@@ -22,15 +22,19 @@ class Exposures {
   explicit Exposures(const StereoRig& rig);
 
   /// Whether everything in the frame was seen at its stamp.
-  bool at_stamp(const TrackedFrame& frame) const { return line_delay_s_ == 0 && frame.offsets.all_zero(); }
+  bool at_stamp(const TrackedFrame& frame) const { return !rolling_ && frame.offsets.all_zero(); }
   /// Turns the normalised positions into the axes that the cameras have at the stamp, and fills `rows`, `after_s` and `lever_B`;
   /// pixels stay as seen.
   void refer_to_stamp(const ExposureMotion& motion, const Calibration& calibration, TrackedFrame& frame) const;
 
  private:
-  double line_delay_s_;
+  struct Shutter {
+    double middle_row_px, line_delay_s;
+  };
+
+  bool rolling_;
   bool depth_;  // a depth has its pixel's time
-  std::vector<int> heights_px_;
+  std::vector<Shutter> shutters_;
 };
 
 }  // namespace fbvins

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/geometry/so3.hpp"
 
 namespace fbvins {
@@ -58,7 +59,7 @@ TrackedFrame frame_of(const StereoRig& rig, const Motion& m, const Vec3& p_B, do
   const auto observed = [&](int camera, double row) {
     Observation o;
     o.pixel = Vec2(300, row);
-    const double after_s = offsets.of(camera).seconds() + (row - 240) * rig.line_delay_s;
+    const double after_s = offsets.of(camera).seconds() + (row - 240) * rig.times(camera).line_delay_s;
     o.normalised = seen(rig.T_BC(camera), m.body(after_s).inverse() * p_B);
     return o;
   };
@@ -131,6 +132,24 @@ TEST(Exposures, WhatIsSeenAtTheStampKeepsEveryBit) {
   EXPECT_EQ(frame.features[0].left->displacement_B(Vec3(1, 2, 3)), Vec3::Zero());
   frame.offsets.set(1, Duration{1});
   EXPECT_FALSE(exposures.at_stamp(frame));
+}
+
+/// A global and a rolling shutter side by side, and the reverse.
+TEST(Exposures, EachCameraHasItsOwnRows) {
+  for (const bool right_rolls : {true, false}) {
+    const CameraTimes global{}, rolling{.line_delay_s = kLineDelay_s};
+    const StereoRig rig = with_times(cameras(0), {right_rolls ? global : rolling, right_rolls ? rolling : global});
+    const Motion m;
+    const Vec3 p_B = rig.T_BC0 * Vec3(0.4, -0.5, 2);
+    TrackedFrame frame = frame_of(rig, m, p_B, 20, 40, {});
+    const Vec2 before = (right_rolls ? frame.features[0].left : frame.features[0].right)->normalised;
+    const Exposures exposures(rig);
+    EXPECT_FALSE(exposures.at_stamp(frame));
+    exposures.refer_to_stamp(ExposureMotion(m.readings(kBias), kBias, kGravity_B), {rig.T_BC0, rig.T_BC1, 0.0}, frame);
+    EXPECT_LT(error(*frame.features[0].left, rig.T_BC(0), m.v, p_B), 1e-4);
+    EXPECT_LT(error(*frame.features[0].right, rig.T_BC(1), m.v, p_B), 1e-4);
+    EXPECT_EQ((right_rolls ? frame.features[0].left : frame.features[0].right)->normalised, before);
+  }
 }
 
 }  // namespace exposures_test

@@ -13,7 +13,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "fbvins/camera/camera.hpp"
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/core/rng.hpp"
 #include "fbvins/imu/imu_test_motion.hpp"
 #include "fbvins/types/tracking.hpp"
@@ -64,6 +64,7 @@ class SimulatedFlight {
     TrackedFrame out;
     out.id = FrameId{k};
     out.t = stamp(k);
+    out.offsets = own_offsets(rig);
     out.has_left = images(k) && left_camera(k);
     out.has_right = images(k) && right_camera(k);
     if (k > 0 && readings(k)) {
@@ -86,19 +87,22 @@ class SimulatedFlight {
   }
 
   StereoRig rig;
-  /// Of the images; the rig may be given another one.
+  /// Of the images, beside the cameras' own times; the rig may be given another one.
   double line_delay_s = 0;
 
  private:
   /// The point in a camera at the time of the row that shows it.
-  Vec3 in_camera(int k, const Vec3& p_W, const Camera& camera, const Pose<B, C0>& T_BC) const {
-    double after_s = 0;
+  Vec3 in_camera(int k, const Vec3& p_W, int number) const {
+    const auto& [camera, T_BC] = rig.mounted(number);
+    const CameraTimes& own = camera.own_times();
+    const double delay_s = line_delay_s + own.line_delay_s;
+    double after_s = own.time_offset_s;
     Vec3 p_C = Vec3::Zero();
-    for (int i = 0; i < (line_delay_s == 0 ? 1 : 4); ++i) {
+    for (int i = 0; i < (delay_s == 0 ? 1 : 4); ++i) {
       const Pose<W, B> T_WB = motion_.state((stamp(k) - late_).seconds() + after_s, bias).T_FB;
       p_C = T_BC.inverse() * (T_WB.inverse() * p_W);
       const auto px = p_C.z() > 0.2 ? camera.project(p_C) : std::nullopt;
-      if (px) after_s = (px->y() - 0.5 * camera.height()) * line_delay_s;
+      if (px) after_s = own.time_offset_s + (px->y() - 0.5 * camera.height()) * delay_s;
     }
     return p_C;
   }
@@ -114,7 +118,7 @@ class SimulatedFlight {
       for (int i = 0; i < static_cast<int>(points_.size()); ++i) {
         const auto track = tracks_.find(i);
         if ((track != tracks_.end()) != followed || static_cast<int>(out.features.size()) >= max_features) continue;
-        const auto left = observe(rig.left, in_camera(k, point(i), rig.left, rig.T_BC0));
+        const auto left = observe(rig.left, in_camera(k, point(i), 0));
         if (!left) continue;
         TrackedFeature f;
         const auto known = known_.find(mistaken(k, i) ? i - 1 : i);
@@ -124,7 +128,7 @@ class SimulatedFlight {
         in_use.insert(f.id);
         f.left = *left;
         if (outlier) f.left = shifted(*f.left, outlier(k, f.id.value));
-        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, point(i), rig.right, rig.T_BC1.cast_frames<B, C0>()));
+        if (right_camera(k)) f.right = observe(rig.right, in_camera(k, point(i), 1));
         if (!left_camera(k)) f.left.reset();
         if (!f.left && !f.right) continue;
         out.stats.tracked += followed;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/io/calibration.hpp"
 
-#include <fmt/format.h>
-
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 
 namespace fbvins {
@@ -49,15 +48,13 @@ Result<Pose<B, B>> parse_euroc_mounting(YamlReader yaml) {
 Result<StereoRig> join_euroc(const std::vector<CameraSensor>& cameras, const ImuSensor& imu, const std::string& file) {
   std::vector<MountedCamera> mounted;
   for (const CameraSensor& camera : cameras) mounted.push_back({camera.camera, imu.T_BS.inverse() * camera.T_BS});
-  StereoRig rig = with_cameras({}, mounted);
   const CameraSensor& left = cameras.front();
+  std::vector<CameraTimes> times;
+  for (const CameraSensor& camera : cameras)
+    times.push_back({camera.time_offset_s.value_or(left.time_offset_s.value_or(0)), camera.line_delay_s});
+  StereoRig rig = with_times(with_cameras({}, mounted), times);
   rig.imu_noise = imu.noise;
   rig.image_rate_hz = left.rate_hz;
-  rig.time_offset_s = left.time_offset_s;
-  rig.line_delay_s = left.line_delay_s;
-  for (const CameraSensor& camera : cameras)
-    if (camera.line_delay_s != left.line_delay_s)
-      return Error{ErrorCode::unsupported, fmt::format("{}: the cameras have different line delays", file)};
   if (Result<void> good = check_rig(rig, file); !good) return good.error();
   return rig;
 }

@@ -6,6 +6,8 @@
 // coordinates and is inverted here. Our B is the IMU.
 #pragma once
 
+#include <optional>
+
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/io/mask_fields.hpp"
@@ -17,8 +19,9 @@ struct CameraSensor {
   Camera camera;
   Pose<B, C0> T_BS;
   double rate_hz = 20;
-  double time_offset_s = 0;  ///< timeshift_cam_imu, Kalibr's name: EuRoC has none, recordings of `fbvins convert` do
-  double line_delay_s = 0;   ///< line_delay_us of a rolling shutter
+  /// timeshift_cam_imu, Kalibr's name: EuRoC has none, recordings of `fbvins convert` do. Without it that of the first camera.
+  std::optional<double> time_offset_s;
+  double line_delay_s = 0;  ///< line_delay_us of a rolling shutter
 };
 
 /// EuRoC imu0/sensor.yaml.

@@ -124,6 +124,15 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
   return camera;
 }
 
+CameraTimes read_camera_times(YamlReader& yaml, const YAML::Node& map, double offset_of_first_s) {
+  CameraTimes out{.time_offset_s = offset_of_first_s};
+  if (yaml.has(map, "timeshift_cam_imu")) out.time_offset_s = yaml.number(map, "timeshift_cam_imu");
+  if (std::abs(out.time_offset_s) > 10)
+    yaml.complain(map, "timeshift_cam_imu", fmt::format("{} s is more than 10 s", out.time_offset_s));
+  if (yaml.has(map, "line_delay")) out.line_delay_s = yaml.number(map, "line_delay");
+  return out;
+}
+
 Camera read_real_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read) {
   Camera camera = read_camera(yaml, map, coefficients_field, read);
   if (!yaml.ok()) return camera;

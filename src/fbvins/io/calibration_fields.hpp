@@ -40,6 +40,10 @@ Camera read_camera(YamlReader& yaml, const YAML::Node& map, const std::string& c
 /// a distortion that no lens has, too.
 Camera read_real_camera(YamlReader& yaml, const YAML::Node& map, const std::string& coefficients_field, const ReadBeside& read);
 
+/// timeshift_cam_imu and, in seconds, line_delay, as in Kalibr's files. Without the first it is camera 0's, without the second
+/// the shutter is global.
+CameraTimes read_camera_times(YamlReader& yaml, const YAML::Node& map, double offset_of_first_s);
+
 /// A depth sensor; keys that are missing have their defaults.
 DepthSensor read_depth_sensor(YamlReader& yaml, const YAML::Node& map);
 /// The same as text, each line after `indent`.

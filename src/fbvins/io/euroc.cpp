@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
@@ -167,7 +168,7 @@ class EurocReader {
     std::vector<ImageRow> depths;
     if (has_depth_)
       if (Result<void> read = read_rows(std::string(kDepthFolder), info.depth, depths); !read) return read;
-    out_.frames = join_images(lists, depths, options_.pair_tolerance_ms, info);
+    out_.frames = join_images(std::move(lists), depths, own_offsets(out_.rig), options_.pair_tolerance_ms, info);
     const auto never = [&](const std::string& folder) {
       return Error{ErrorCode::malformed, fmt::format("{}: no stamp lies within {} ms of one of cam{}'s",
                                                      named(folder + "data.csv"), options_.pair_tolerance_ms, cameras_[0])};

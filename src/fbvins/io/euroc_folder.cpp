@@ -43,11 +43,14 @@ std::string matrix_text(const Quat& q, const Vec3& p) {
   return text + "0.0, 0.0, 0.0, 1.0]\n";
 }
 
-std::string camera_yaml(const Camera& camera, const Quat& q, const Vec3& p, const StereoRig& rig, const std::string& origin) {
+std::string camera_yaml(const StereoRig& rig, int number, const std::string& origin) {
+  const auto& [camera, T_BC] = rig.mounted(number);
+  const auto [time_offset_s, line_delay_s] = rig.times(number);
   const KalibrCamera c = kalibr_camera(camera);
-  const std::string offset = rig.time_offset_s == 0 ? "" : fmt::format("timeshift_cam_imu: {}\n", rig.time_offset_s);
-  const std::string rolling = rig.line_delay_s == 0 ? "" : fmt::format("line_delay_us: {}\n", 1e6 * rig.line_delay_s);
-  return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(q, p) +
+  const bool on_time = time_offset_s == 0 && rig.time_offset_s == 0;  // without the key it is camera 0's
+  const std::string offset = on_time ? "" : fmt::format("timeshift_cam_imu: {}\n", time_offset_s);
+  const std::string rolling = line_delay_s == 0 ? "" : fmt::format("line_delay_us: {}\n", 1e6 * line_delay_s);
+  return fmt::format("sensor_type: camera\ncomment: {}\n\n", origin) + matrix_text(T_BC.q, T_BC.p) +
          fmt::format(
              "\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: {}\nintrinsics: [{}]\ndistortion_model: {}\n"
              "distortion_coefficients: [{}]\n",
@@ -111,9 +114,8 @@ Result<void> write_calibrations(const StereoRig& rig, const fs::path& mav0, cons
     if (error) return cannot_write(mav0 / folder);
   }
   for (int i = 0; i < rig.camera_count(); ++i) {
-    const auto& [camera, T_BC] = rig.mounted(i);
     const fs::path path = mav0 / fmt::format("cam{}/sensor.yaml", i);
-    if (Result<void> done = write_file(path, camera_yaml(camera, T_BC.q, T_BC.p, rig, origin)); !done) return done;
+    if (Result<void> done = write_file(path, camera_yaml(rig, i, origin)); !done) return done;
   }
   if (rig.depth)
     if (Result<void> done = write_file(mav0 / "depth0/sensor.yaml", depth_yaml(*rig.depth, origin)); !done) return done;

@@ -188,18 +188,21 @@ TEST(EurocFolder, KeepsTimeOffsetAndRange) {
   StereoRig rig = small_rig();
   rig.time_offset_s = -0.0075;
   rig.line_delay_s = 41.5e-6;
+  rig.right.set_own_times({.time_offset_s = 0.0075, .line_delay_s = -41.5e-6});
   rig.imu_noise.max_gyro_radps = 8.5;
   auto recording = EurocFolder::create(folder, rig, "made by hand");
   ASSERT_TRUE(recording) << recording.error().message;
   std::vector<ImuSample> readings;
   for (int i = 0; i < 30; ++i) readings.push_back({Time{1'000'000'000 + i * 5'000'000}, Vec3::Zero(), Vec3(0, 0, 9.81)});
-  for (const Time t : {Time{1'020'000'000}, Time{1'070'000'000}}) ASSERT_TRUE(recording->add({t, pattern(0), pattern(1)}, t));
+  for (const Time t : {Time{1'020'000'000}, Time{1'070'000'000}})
+    ASSERT_TRUE(recording->add({t, pattern(0), pattern(1)}, t - Duration{7'500'000}));
   const std::vector<TrajectoryPoint> truth = {{Time{1'020'000'000}, {}, std::nullopt, std::nullopt}};
   ASSERT_TRUE(recording->finish(readings, truth));
   const auto data = open_dataset(folder);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ((*data)->rig().time_offset_s, -0.0075);
   EXPECT_DOUBLE_EQ((*data)->rig().line_delay_s, 41.5e-6);
+  EXPECT_EQ((*data)->rig().times(1), CameraTimes{}) << "a camera on time, with a global shutter";
   EXPECT_EQ((*data)->rig().imu_noise.max_gyro_radps, 8.5);
   ASSERT_EQ((*data)->ground_truth().size(), 1u);
   EXPECT_FALSE((*data)->ground_truth()[0].v_WB) << "a truth of poses alone has no velocity, also not one of zero";

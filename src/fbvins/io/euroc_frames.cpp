@@ -283,8 +283,10 @@ int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& ima
   return unpaired;
 }
 
-std::vector<FrameEntry> join_images(const std::vector<std::vector<ImageRow>>& cameras, const std::vector<ImageRow>& depth,
-                                    double tolerance_ms, DatasetInfo& info) {
+std::vector<FrameEntry> join_images(std::vector<std::vector<ImageRow>> cameras, const std::vector<ImageRow>& depth,
+                                    const ExposureOffsets& own, double tolerance_ms, DatasetInfo& info) {
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    for (ImageRow& image : cameras[i]) image.t = image.t + own.of(static_cast<int>(i));
   const Duration tolerance = Duration::from_seconds(1e-3 * tolerance_ms);
   const auto warn = [&](std::string sentence) { info.warnings.push_back(std::move(sentence)); };
   const bool has_right = cameras.size() > 1;
@@ -301,6 +303,7 @@ std::vector<FrameEntry> join_images(const std::vector<std::vector<ImageRow>>& ca
   for (std::size_t i = 2; i < cameras.size(); ++i) info.more.unpaired += add_camera(frames, cameras[i], i - 2, tolerance);
   if (info.more.unpaired > 0)
     warn(fmt::format("{} images of further cameras have no partner within {} ms", info.more.unpaired, tolerance_ms));
+  for (FrameEntry& frame : frames) frame.offsets -= own;
   return frames;
 }
 

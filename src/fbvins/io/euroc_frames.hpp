@@ -47,11 +47,12 @@ int add_camera(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& ima
 /// Gives each depth image to the nearest frame within the tolerance. Returns how many had none.
 int add_depth(std::vector<FrameEntry>& frames, const std::vector<ImageRow>& images, Duration tolerance);
 
-/// The frames of the images of one or more cameras, and of a depth sensor, if there is one; each list is in order of time. In
+/// The frames of the images of one or more cameras, and of a depth sensor, if there is one; each list is in order of time. Images
+/// are joined by when they were taken, `own` after their stamps (own_offsets()); the frames' offsets are of their stamps. In
 /// `info` it says how many are without a partner, with warnings; where no image of camera 0 has one, or no depth image has, the
 /// recording is none of these cameras.
-std::vector<FrameEntry> join_images(const std::vector<std::vector<ImageRow>>& cameras, const std::vector<ImageRow>& depth,
-                                    double tolerance_ms, DatasetInfo& info);
+std::vector<FrameEntry> join_images(std::vector<std::vector<ImageRow>> cameras, const std::vector<ImageRow>& depth,
+                                    const ExposureOffsets& own, double tolerance_ms, DatasetInfo& info);
 
 struct Intervals {
   Duration median, longest;

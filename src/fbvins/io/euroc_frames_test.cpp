@@ -152,5 +152,26 @@ TEST(AddCamera, FramesOfACameraAloneAreSharedByTheNext) {
   EXPECT_FALSE(frames[3].more_files[0].empty() || frames[3].more_files[1].empty());
 }
 
+/// The right camera's stamps are 8 ms late, as its calibration says: the images are of one instant, and the offsets say what the
+/// stamps are.
+TEST(JoinImages, OwnOffsetsOfCamerasCountBeforeTheStamps) {
+  const ExposureOffsets own({{}, Duration{-8 * kMs}});
+  DatasetInfo info;
+  const std::vector<FrameEntry> frames = join_images({at_ms({0, 50, 100, 200}), at_ms({8, 58, 108, 158, 208})}, {}, own, 3, info);
+  ASSERT_EQ(frames.size(), 5u);
+  std::string given;
+  for (FrameEntry frame : frames) {
+    given += frame.left_file + "/" + frame.right_file + " ";
+    EXPECT_EQ(frame.offsets.of(1).ns, 8 * kMs) << "of the stamp";
+    frame.offsets += own;
+    EXPECT_TRUE(frame.offsets.all_zero()) << "of the exposure";
+  }
+  EXPECT_EQ(given, "0/8 50/58 100/108 /158 200/208 ");
+  EXPECT_EQ(frames[3].t.ns, 150 * kMs);
+  const std::vector<FrameEntry> as_stamped = join_images({at_ms({0, 50, 100}), at_ms({0, 50, 100})}, {}, own, 3, info);
+  EXPECT_EQ(as_stamped[1].right_file, "50");
+  EXPECT_EQ(as_stamped[1].offsets.of(1).ns, 0) << "8 ms before the left one, which the stamps do not say";
+}
+
 }  // namespace euroc_frames_test
 }  // namespace fbvins

@@ -4,8 +4,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/calibration.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/file_source.hpp"
@@ -19,27 +18,6 @@ Pose<C0, B> read_next_camera(YamlReader& yaml, const YAML::Node& camera, const P
   return read_transform<C0, C0>(yaml, camera, "T_cn_cnm1") * T_before_B;
 }
 
-double read_time_offset_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& camera) {
-  const auto read = [&](const YAML::Node& cam, double otherwise) {
-    const double shift_s = yaml.has(cam, "timeshift_cam_imu") ? yaml.number(cam, "timeshift_cam_imu") : otherwise;
-    if (std::abs(shift_s) > 10) yaml.complain(cam, "timeshift_cam_imu", fmt::format("{} s is more than 10 s", shift_s));
-    return shift_s;
-  };
-  const double first_s = read(cam0, 0.0);
-  const double this_s = read(camera, first_s);
-  // One offset serves all cameras: they must be triggered together.
-  if (std::abs(first_s - this_s) > 3e-3)
-    yaml.complain(camera, "timeshift_cam_imu", fmt::format("differs from cam0's by {:.1f} ms", 1e3 * (this_s - first_s)));
-  return first_s;
-}
-
-double read_line_delay_s(YamlReader& yaml, const YAML::Node& cam0, const YAML::Node& camera) {
-  const auto read = [&](const YAML::Node& cam) { return yaml.has(cam, "line_delay") ? yaml.number(cam, "line_delay") : 0.0; };
-  const double first_s = read(cam0);
-  if (read(camera) != first_s) yaml.complain(camera, "line_delay", "differs from cam0's");
-  return first_s;
-}
-
 }  // namespace
 
 Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read) {
@@ -47,7 +25,7 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
   if (!cam0.IsMap()) yaml.complain(yaml.root(), "cam0", "is missing or empty");
   Pose<C0, B> T_CB = read_transform<C0, B>(yaml, cam0, "T_cam_imu");
   std::vector<MountedCamera> cameras{{read_real_camera(yaml, cam0, "distortion_coeffs", read), T_CB.inverse()}};
-  double time_offset_s = read_time_offset_s(yaml, cam0, cam0), line_delay_s = read_line_delay_s(yaml, cam0, cam0);
+  std::vector<CameraTimes> times{read_camera_times(yaml, cam0, 0)};
   for (int i = 1; yaml.get(yaml.root(), fmt::format("cam{}", i)).IsDefined(); ++i) {
     const std::string name = fmt::format("cam{}", i);
     const YAML::Node camera = yaml.get(yaml.root(), name);
@@ -55,13 +33,10 @@ Result<StereoRig> parse_kalibr_camchain(YamlReader yaml, const ReadBeside& read)
     if (!yaml.ok()) break;
     T_CB = read_next_camera(yaml, camera, T_CB);
     cameras.push_back({read_real_camera(yaml, camera, "distortion_coeffs", read), T_CB.inverse()});
-    time_offset_s = read_time_offset_s(yaml, cam0, camera);
-    line_delay_s = read_line_delay_s(yaml, cam0, camera);
+    times.push_back(read_camera_times(yaml, camera, times.front().time_offset_s));
   }
-  StereoRig rig = with_cameras({}, cameras);
-  rig.time_offset_s = time_offset_s;
-  rig.line_delay_s = line_delay_s;
   if (!yaml.ok()) return yaml.error();
+  const StereoRig rig = with_times(with_cameras({}, cameras), times);
   if (Result<void> good = check_rig(rig, yaml.file()); !good) return good.error();
   return rig;
 }

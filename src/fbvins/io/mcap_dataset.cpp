@@ -9,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/io/dataset_description.hpp"
 #include "fbvins/io/euroc_frames.hpp"
 #include "fbvins/io/flight_record.hpp"
@@ -170,20 +171,24 @@ class RecordReader {
       out_.frames.pop_back();
   }
 
-  /// The images of cameras without a common trigger have stamps of their own: until here each is a frame.
+  /// The images of cameras without a common trigger, or with time offsets of their own, have stamps of their own: until here each
+  /// is a frame.
   void join_without_trigger() {
+    const Duration own = own_offsets(out_.rig).of(1);
     std::vector<ImageRow> left, right;
     std::map<Time, const FrameEntry*> recorded;
     for (const FrameEntry& frame : out_.frames) {
       recorded[frame.t] = &frame;
       if (!frame.left_file.empty()) left.push_back({frame.t, frame.left_file});
-      if (!frame.right_file.empty()) right.push_back({frame.t, frame.right_file});
+      if (!frame.right_file.empty()) right.push_back({frame.t + own, frame.right_file});
     }
     if (!std::ranges::is_sorted(left, {}, &ImageRow::t) || !std::ranges::is_sorted(right, {}, &ImageRow::t)) return;
     PairedFrames paired = pair_frames(left, right, Duration::from_seconds(1e-3 * options_.pair_tolerance_ms));
-    if (!paired.untriggered) return;
+    if (!paired.untriggered && own.ns == 0) return;
     for (FrameEntry& frame : paired.frames) {
-      const auto as_recorded = recorded.extract(frame.t);
+      auto as_recorded = recorded.extract(frame.t);
+      if (as_recorded.empty()) as_recorded = recorded.extract(frame.t - own);
+      if (own.ns != 0) frame.offsets.set(1, frame.offsets.of(1) - own);
       if (as_recorded.empty()) continue;
       frame.imu_before = as_recorded.mapped()->imu_before;
       frame.more_files = as_recorded.mapped()->more_files;
@@ -195,7 +200,7 @@ class RecordReader {
     for (const auto& [t, frame] : recorded)
       if (frame->left_file.empty() && frame->right_file.empty()) paired.frames.push_back(*frame);
     std::ranges::stable_sort(paired.frames, {}, &FrameEntry::t);
-    out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
+    if (paired.untriggered) out_.info.warnings.push_back(untriggered_sentence(paired.frames, 1, options_.pair_tolerance_ms));
     out_.frames = std::move(paired.frames);
   }
 

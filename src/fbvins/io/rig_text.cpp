@@ -8,13 +8,32 @@
 namespace fbvins {
 namespace {
 
+// Of a camera, beyond the rig's: so the sum is the same to the last bit.
+constexpr const char *kMoreOffset = "more_time_offset_s", *kMoreDelay = "more_line_delay_s";
+
+std::string own_times_text(const Camera& camera) {
+  std::string out;
+  const auto [time_offset_s, line_delay_s] = camera.own_times();
+  if (time_offset_s != 0) out += fmt::format("  {}: {:.17g}\n", kMoreOffset, time_offset_s);
+  if (line_delay_s != 0) out += fmt::format("  {}: {:.17g}\n", kMoreDelay, line_delay_s);
+  return out;
+}
+
 std::string camera_text(const char* name, const Camera& camera) {
   const KalibrCamera c = kalibr_camera(camera);
   return fmt::format(
       "{}:\n  camera_model: {}\n  resolution: [{}, {}]\n  intrinsics: {}\n  distortion_model: {}\n"
-      "  distortion_coefficients: {}\n{}",
+      "  distortion_coefficients: {}\n{}{}",
       name, c.model, camera.width(), camera.height(), yaml_list(c.intrinsics), c.distortion, yaml_list(c.coefficients),
-      mask_text(camera, "  "));
+      own_times_text(camera), mask_text(camera, "  "));
+}
+
+Camera read_exact_camera(YamlReader& yaml, const std::string& name) {
+  const YAML::Node map = yaml.get(yaml.root(), name);
+  Camera camera = read_camera(yaml, map, "distortion_coefficients");
+  const auto number = [&](const char* field) { return yaml.has(map, field) ? yaml.number(map, field) : 0.0; };
+  camera.set_own_times({number(kMoreOffset), number(kMoreDelay)});
+  return camera;
 }
 
 template <class To, class From>
@@ -47,8 +66,7 @@ std::string further_cameras_text(const StereoRig& rig) {
 std::vector<MountedCamera> read_further_cameras(YamlReader& yaml) {
   std::vector<MountedCamera> out;
   for (int i = 2; i < kMostCameras && yaml.has(yaml.root(), fmt::format("camera{}", i)); ++i)
-    out.push_back({read_camera(yaml, yaml.get(yaml.root(), fmt::format("camera{}", i)), "distortion_coefficients"),
-                   read_pose<B, C0>(yaml, fmt::format("T_BC{}", i))});
+    out.push_back({read_exact_camera(yaml, fmt::format("camera{}", i)), read_pose<B, C0>(yaml, fmt::format("T_BC{}", i))});
   return out;
 }
 
@@ -74,11 +92,11 @@ std::string rig_to_yaml(const StereoRig& rig) {
 Result<StereoRig> parse_rig(const std::string& text, const std::string& file) {
   YamlReader yaml(file, text);
   StereoRig rig;
-  rig.left = read_camera(yaml, yaml.get(yaml.root(), "left"), "distortion_coefficients");
+  rig.left = read_exact_camera(yaml, "left");
   rig.T_BC0 = read_pose<B, C0>(yaml, "T_BC0");
   rig.T_BC1 = rig.T_BC0.cast_frames<B, C1>();
   if (yaml.has(yaml.root(), "right")) {
-    rig.right = read_camera(yaml, yaml.get(yaml.root(), "right"), "distortion_coefficients");
+    rig.right = read_exact_camera(yaml, "right");
     rig.T_BC1 = read_pose<B, C1>(yaml, "T_BC1");
   }
   rig.more = read_further_cameras(yaml);

@@ -26,6 +26,7 @@ StereoRig awkward_rig(Rng& rng, bool fisheye) {
   rig.image_rate_hz = 20.0 / 3;
   rig.time_offset_s = odd() / 100;
   rig.line_delay_s = odd() / 1e5;
+  rig.right.set_own_times({0.01 / 3, 1e-5 / 7});
   return rig;
 }
 
@@ -35,7 +36,9 @@ bool same(const Model& a, const Model& b) {
 }
 
 bool same_camera(const Camera& a, const Camera& b) {
-  if (a.width() != b.width() || a.height() != b.height() || a.model().index() != b.model().index()) return false;
+  if (a.width() != b.width() || a.height() != b.height() || a.model().index() != b.model().index() ||
+      a.own_times() != b.own_times())
+    return false;
   return std::visit([&](const auto& m) { return same(m, std::get<std::decay_t<decltype(m)>>(b.model())); }, a.model());
 }
 
@@ -95,10 +98,11 @@ TEST(RigText, GivesBackADepthSensor) {
 TEST(RigText, GivesBackTheBitsOfWideLenses) {
   Rng rng(12);
   StereoRig rig = awkward_rig(rng, true);
-  for (const auto& [left, right] : {std::pair<LensModel, LensModel>{DoubleSphere{300.1 / 3, 301, 150, 251 / 2.1, -0.1 / 3, 0.59 / 3},
-                                                                    ExtendedUnified{300, 301 / 3.0, 160.2 / 1.1, 124, 0.1 / 3, 1.04 / 3}},
-                                    {UnifiedRadtan{300.1 / 3, 301, 150, 251 / 2.1, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
-                                     DoubleSphere{300, 301, 150, 121, 0.3, 0.5}}}) {
+  for (const auto& [left, right] :
+       {std::pair<LensModel, LensModel>{DoubleSphere{300.1 / 3, 301, 150, 251 / 2.1, -0.1 / 3, 0.59 / 3},
+                                        ExtendedUnified{300, 301 / 3.0, 160.2 / 1.1, 124, 0.1 / 3, 1.04 / 3}},
+        {UnifiedRadtan{300.1 / 3, 301, 150, 251 / 2.1, 0.8 / 3, -0.3 / 7, 0.1 / 7, 1e-3 / 7, -1e-4 / 7},
+         DoubleSphere{300, 301, 150, 121, 0.3, 0.5}}}) {
     rig.left = Camera(left, 320, 240), rig.right = Camera(right, 320, 240);
     const auto back = parse_rig(rig_to_yaml(rig), "calibration.yaml");
     ASSERT_TRUE(back) << back.error().message;
@@ -111,9 +115,9 @@ TEST(RigText, ComplainsWithTheField) {
   Rng rng(3);
   const std::string good = rig_to_yaml(awkward_rig(rng, false));
   for (const auto& [from, to, sentence] :
-       {std::tuple{"T_BC1:\n  q_wxyz: [", "T_BC1:\n  q_wxyz: [2", "c.yaml:19: q_wxyz: is not a rotation"},
+       {std::tuple{"T_BC1:\n  q_wxyz: [", "T_BC1:\n  q_wxyz: [2", "c.yaml:21: q_wxyz: is not a rotation"},
         {"\ntime_offset_s", "\ntime_offset", "c.yaml: time_offset_s: is missing"},
-        {"  rate_hz: ", "  rate_hz: -", "c.yaml:22: rate_hz: "}}) {
+        {"  rate_hz: ", "  rate_hz: -", "c.yaml:24: rate_hz: "}}) {
     std::string text = good;
     text.replace(text.find(from), std::string(from).size(), to);
     const auto rig = parse_rig(text, "c.yaml");

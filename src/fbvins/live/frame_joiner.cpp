@@ -10,6 +10,11 @@ namespace {
 
 constexpr Duration kSameInstant{2'000'000};
 constexpr std::size_t kLongestWait = 4;  // images of one camera without any of another
+/// A camera is silent when none of its images came for so many of its periods, beyond its usual lag. One lost image is no
+/// silence, nor are two that come in one burst after another camera's two.
+constexpr double kSilentPeriods = 2.5;
+/// And one that never delivered, this long after the first image of another.
+constexpr Duration kLongestStart{1'000'000'000};
 
 bool are_one_instant(Time a, Time b) { return std::abs((a - b).ns) <= kSameInstant.ns; }
 
@@ -20,12 +25,25 @@ void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Imag
 
 }  // namespace
 
-void FrameJoiner::put(std::size_t stream, Time t, Pixels pixels) {
+void FrameJoiner::put(std::size_t stream, Time stamp, Pixels pixels) {
   Stream& to = streams_[stream];
+  const Time t = stamp + own_.of(static_cast<int>(stream));
   if (to.newest && t <= *to.newest) return;
   if (to.newest) to.interval = t - *to.newest;
+  to.period.add(to.interval);
   to.newest = t;
-  to.waiting.push_back({t, std::move(pixels)});
+  began_ = began_.value_or(t);
+  now_ = std::max(now_.value_or(t), t);
+  to.lag = std::max(*now_ - t, Duration{to.lag.ns - to.lag.ns / 16});
+  const bool too_late = delivered_ && t <= *delivered_ + kSameInstant;
+  if (!too_late || is_free(to)) to.waiting.push_back({t, std::move(pixels)});
+}
+
+bool FrameJoiner::is_silent(const Stream& stream) const {
+  if (!now_ || !stream.waiting.empty()) return false;
+  if (!stream.newest) return *now_ - *began_ > kLongestStart;
+  const std::optional<Duration> period = stream.period.median();
+  return period && (*now_ - *stream.newest - stream.lag).seconds() > kSilentPeriods * period->seconds();
 }
 
 /// Of those with a common trigger.
@@ -42,7 +60,7 @@ bool FrameJoiner::is_complete(Time first) const {
   bool all_there = true, long_enough = false;
   for (const Stream& stream : streams_) {
     if (is_free(stream)) continue;
-    all_there &= !stream.waiting.empty();
+    all_there &= !stream.waiting.empty() || is_silent(stream);
     long_enough |= stream.waiting.size() >= kLongestWait;
   }
   return long_enough || (all_there && free_ones_are_there(first));
@@ -53,7 +71,7 @@ bool FrameJoiner::is_complete(Time first) const {
 bool FrameJoiner::free_ones_are_there(Time t) const {
   const Duration quarter{streams_.front().interval.ns / 4};
   return std::ranges::all_of(streams_, [&](const Stream& stream) {
-    if (!is_free(stream)) return true;
+    if (!is_free(stream) || is_silent(stream)) return true;
     return stream.newest && (*stream.newest > t || *stream.newest + stream.interval > t + quarter);
   });
 }
@@ -93,12 +111,14 @@ void FrameJoiner::take_nearest(std::size_t stream, StereoFrame& frame) {
 
 /// While no camera with a common trigger delivers.
 std::optional<StereoFrame> FrameJoiner::of_a_free_one() {
-  if (std::ranges::none_of(streams_, [](const Stream& s) { return s.waiting.size() >= kLongestWait; })) return std::nullopt;
+  const bool waited = std::ranges::any_of(streams_, [](const Stream& s) { return s.waiting.size() >= kLongestWait; });
+  if (!waited && !std::ranges::all_of(streams_, [&](const Stream& s) { return is_free(s) || is_silent(s); })) return std::nullopt;
   std::size_t earliest = streams_.size();
   for (std::size_t i = 0; i < streams_.size(); ++i)
     if (!streams_[i].waiting.empty() &&
         (earliest == streams_.size() || streams_[i].waiting.front().t < streams_[earliest].waiting.front().t))
       earliest = i;
+  if (earliest == streams_.size()) return std::nullopt;
   StereoFrame frame{streams_[earliest].waiting.front().t, nullptr, nullptr};
   take_first(earliest, frame);
   return frame;
@@ -119,7 +139,7 @@ StereoFrame FrameJoiner::join(Time first) {
   return frame;
 }
 
-std::optional<StereoFrame> FrameJoiner::next() {
+std::optional<StereoFrame> FrameJoiner::next_by_exposure() {
   while (const std::optional<Time> first = first_waiting()) {
     if (!is_complete(*first)) return std::nullopt;
     count_apart(*first);
@@ -127,6 +147,14 @@ std::optional<StereoFrame> FrameJoiner::next() {
     if (!frame.without_images()) return frame;
   }
   return of_a_free_one();
+}
+
+std::optional<StereoFrame> FrameJoiner::next() {
+  std::optional<StereoFrame> frame = next_by_exposure();
+  if (!frame) return std::nullopt;
+  delivered_ = frame->t;
+  frame->offsets -= own_;
+  return frame;
 }
 
 }  // namespace fbvins

@@ -78,11 +78,50 @@ TEST(FrameJoiner, WithoutACommonTriggerASilentCameraDelaysNothingForLong) {
   Pairs p;
   for (int k = 1; k <= 12; ++k) p.right(k + 0.6), p.left(k + 1);
   p.given = "";
-  for (int k = 14; k <= 19; ++k) p.left(k);
-  EXPECT_EQ(p.given, "14L 15L 16L");
+  for (int k = 14; k <= 15; ++k) p.left(k);
+  EXPECT_EQ(p.given, "") << "it may still come";
+  for (int k = 16; k <= 19; ++k) p.left(k);
+  EXPECT_EQ(p.given, "14L 15L 16L 17L 18L 19L");
   p.given = "";
   for (int k = 20; k <= 25; ++k) p.right(k);
-  EXPECT_EQ(p.given.substr(0, 11), "17L 18L 19L");
+  EXPECT_EQ(p.given, "20R 21R 22R 23R 24R 25R");
+}
+
+TEST(FrameJoiner, ASilentCameraDelaysNothing) {
+  Pairs p;
+  for (int k = 1; k <= 10; ++k) p.left(k), p.right(k);
+  p.given = "";
+  p.left(11), p.left(12);
+  EXPECT_EQ(p.given, "") << "it may still come";
+  p.left(13);
+  EXPECT_EQ(p.given, "11L 12L 13L");
+  p.left(14);
+  EXPECT_EQ(p.given, "11L 12L 13L 14L") << "at once";
+  for (int k = 15; k <= 60; ++k) p.left(k);
+  p.given = "";
+  p.right(60.1), p.left(61), p.right(61), p.right(62), p.left(62);
+  EXPECT_EQ(p.given, "61 62") << "the image whose frame has gone is dropped, and the camera is there again";
+  p.given = "";
+  p.left(63), p.left(64), p.left(65), p.left(66);
+  EXPECT_EQ(p.given, "63L 64L 65L 66L") << "the gap before is no period";
+}
+
+/// Its images come two after the other camera's, always.
+TEST(FrameJoiner, ALateCameraIsNoSilentOne) {
+  Pairs p;
+  p.left(1), p.left(2);
+  for (int k = 3; k <= 40; ++k) p.left(k), p.right(k - 2);
+  std::string all;
+  for (int k = 1; k <= 38; ++k) all += (k > 1 ? " " : "") + std::to_string(k);
+  EXPECT_EQ(p.given, all);
+}
+
+TEST(FrameJoiner, OneLostImageCostsNoOther) {
+  Pairs p;
+  for (int k = 1; k <= 10; ++k) p.left(k), p.right(k);
+  p.given = "";
+  p.left(11), p.left(12), p.right(12), p.left(13), p.right(13);
+  EXPECT_EQ(p.given, "11L 12 13");
 }
 
 TEST(FrameJoiner, AStampThatGoesBackIsDropped) {
@@ -147,6 +186,29 @@ TEST(FrameJoiner, TheOthersGoOnWithoutACamera) {
   EXPECT_EQ(s.given, "4:013 5:013") << "it is waited for, but not for long";
 }
 
+TEST(FrameJoiner, TheOthersGoOnAtOnceWithoutASilentCameraAndItComesBack) {
+  Several s(4);
+  for (int k = 1; k <= 8; ++k) s.all(4, k);
+  for (int k = 9; k <= 11; ++k)
+    for (const int i : {0, 1, 3}) s.image(i, k);
+  s.given = "";
+  for (const int i : {3, 0}) s.image(i, 12);
+  EXPECT_EQ(s.given, "") << "the others are waited for";
+  s.image(1, 12);
+  EXPECT_EQ(s.given, "12:013");
+  s.given = "";
+  s.image(2, 13), s.image(0, 13), s.image(1, 13), s.image(3, 13);
+  EXPECT_EQ(s.given, "13:0123");
+}
+
+TEST(FrameJoiner, ACameraThatNeverDeliversDelaysNothingAfterASecond) {
+  Several s(2);
+  for (int k = 1; k <= 99; ++k) s.image(0, k);
+  EXPECT_TRUE(s.given.ends_with("95:0 96:0")) << s.given;
+  for (int k = 100; k <= 103; ++k) s.image(0, k);
+  EXPECT_TRUE(s.given.ends_with("102:0 103:0")) << s.given;
+}
+
 TEST(FrameJoiner, ACameraWithoutACommonTriggerJoinsThePair) {
   Several s(3);
   for (int k = 1; k <= 25; ++k) s.image(2, k + 0.6), s.image(0, k + 1), s.image(1, k + 1);
@@ -161,6 +223,24 @@ TEST(FrameJoiner, DepthImagesGoWithTheirCamera) {
   s.image(0, 1), s.depth(1), s.depth(2), s.image(0, 2), s.depth(3), s.depth(4), s.image(0, 4), s.image(0, 5), s.image(0, 6),
       s.depth(6);
   EXPECT_EQ(s.given, "1:0d 2:0d 4:0d 5:0 6:0d");
+}
+
+TEST(FrameJoiner, StampsThatTheCalibrationExplainsAreOfOneInstant) {
+  const ExposureOffsets own({{}, Duration{-8'000'000}, Duration{3'000'000}});
+  FrameJoiner joiner(3, false, own);
+  std::string given;
+  const auto add = [&](int camera, int ms) {
+    joiner.add(camera, Time{ms * std::int64_t{1'000'000}}, std::make_shared<Image>(1, 1));
+    while (auto frame = joiner.next()) {
+      EXPECT_EQ(frame->offsets.of(1).ns, 8'000'000);
+      EXPECT_EQ(frame->offsets.of(2).ns, -3'000'000);
+      frame->offsets += own;
+      EXPECT_TRUE(frame->offsets.all_zero());
+      given += std::to_string(frame->t.ns / 1'000'000) + (frame->left && frame->right && frame->image(2) ? " " : "? ");
+    }
+  };
+  for (int k = 1; k < 5; ++k) add(2, 50 * k - 3), add(0, 50 * k), add(1, 50 * k + 8);
+  EXPECT_EQ(given, "50 100 150 200 ");
 }
 
 }  // namespace frame_joiner_test

@@ -73,73 +73,65 @@ void ImageSpoiler::see(const StereoFrame& frame) {
   if (before_.size() > kMostInCycle + 1) before_.pop_front();
 }
 
+template <class Change>
+void ImageSpoiler::each_image(StereoFrame& frame, Change&& change) const {
+  for (int i = 0; i < 2 + static_cast<int>(frame.more.size()); ++i)
+    if (camera_ == kAllCameras || camera_ == i) change(*image_in(frame, i), i);
+}
+
 void ImageSpoiler::alter(StereoFrame& frame) {
   const bool first = count_ == 0;
   const StereoFrame& previous = before_.size() > 1 ? before_[before_.size() - 2] : before_.back();
   if (first) held_ = previous;
   ++count_;
+  const auto become = [&](const StereoFrame& other) {
+    each_image(frame, [&](Shared& image, int camera) { image = other.image(camera); });
+  };
   switch (fault_) {
-    case ImageFault::left_frozen: frame.left = held_.left; return;
-    case ImageFault::right_frozen: frame.right = held_.right; return;
-    case ImageFault::cycle: {
+    case ImageFault::frozen: return become(held_);
+    case ImageFault::cycle:
       if (first)
         for (std::size_t i = before_.size() - std::min(before_.size(), static_cast<std::size_t>(amount_) + 1);
              i + 1 < before_.size(); ++i)
           loop_.push_back(before_[i]);
-      if (loop_.empty()) return;
-      const StereoFrame& old = loop_[static_cast<std::size_t>(count_ - 1) % loop_.size()];
-      frame.left = old.left, frame.right = old.right;
+      if (!loop_.empty()) become(loop_[static_cast<std::size_t>(count_ - 1) % loop_.size()]);
       return;
-    }
     case ImageFault::each_twice:
-      if (count_ % 2 == 0) frame.left = previous.left, frame.right = previous.right;
+      if (count_ % 2 == 0) become(previous);
       return;
-    case ImageFault::left_late: frame.left = previous.left; return;
-    case ImageFault::right_late: frame.right = previous.right; return;
+    case ImageFault::late: return become(previous);
     case ImageFault::exchanged: std::swap(frame.left, frame.right); return;
     case ImageFault::same_twice: frame.right = frame.left; return;
     default: break;
   }
-  for (const bool right : {false, true}) {
-    Shared& image = right ? frame.right : frame.left;
-    if (image == nullptr) continue;
+  each_image(frame, [&](Shared& image, int camera) {
+    if (image == nullptr) return;
     Image altered = *image;
     if (fault_ == ImageFault::torn) {
-      const Shared& old = right ? previous.right : previous.left;
-      if (old != nullptr)
+      if (const Shared old = previous.image(camera))
         each_pixel(altered, [&](int x, int y, std::uint8_t v) { return 2 * y < altered.height() ? v : old->at(x, y); });
     } else {
-      alter_pixels(altered, right);
+      alter_pixels(altered);
     }
     image = std::make_shared<const Image>(std::move(altered));
-  }
+  });
 }
 
-void ImageSpoiler::alter_pixels(Image& image, bool right) {
+void ImageSpoiler::alter_pixels(Image& image) {
   const int w = image.width();
   const auto fill = [&](double value) { each_pixel(image, [=](int, int, std::uint8_t) { return grey(value); }); };
-  const auto cover = [&] {
-    each_pixel(image, [&](int x, int, std::uint8_t v) { return x < amount_ * w ? std::uint8_t{0} : v; });
-  };
   switch (fault_) {
     case ImageFault::black: fill(0); break;
     case ImageFault::white: fill(255); break;
-    case ImageFault::left_black:
-      if (!right) fill(0);
-      break;
     case ImageFault::blank: fill(120), add_noise(image, 1, kSensorNoise, rng_); break;
     case ImageFault::dark: add_noise(image, amount_, kSensorNoise, rng_); break;
     case ImageFault::noise: add_noise(image, 1, amount_, rng_); break;
     case ImageFault::blur: blur(image, std::max(1, static_cast<int>(amount_))); break;
-    case ImageFault::covered: cover(); break;
-    case ImageFault::right_covered:
-      if (right) cover();
+    case ImageFault::covered:
+      each_pixel(image, [&](int x, int, std::uint8_t v) { return x < amount_ * w ? std::uint8_t{0} : v; });
       break;
     case ImageFault::flicker:
       if (count_ % 2 == 0) add_noise(image, amount_, kSensorNoise, rng_);
-      break;
-    case ImageFault::right_darker:
-      if (right) add_noise(image, amount_, kSensorNoise, rng_);
       break;
     case ImageFault::broken_blocks: break_blocks(image, amount_, rng_); break;
     case ImageFault::scroll: {
@@ -147,13 +139,10 @@ void ImageSpoiler::alter_pixels(Image& image, bool right) {
       move_pixels(image, [=](int x, int y) { return std::pair(static_cast<double>((x + shift) % w), static_cast<double>(y)); });
       break;
     }
-    case ImageFault::right_shifted:
-      if (right) move_pixels(image, [&](int x, int y) { return std::pair(static_cast<double>(x), y - amount_); });
+    case ImageFault::shifted:
+      move_pixels(image, [&](int x, int y) { return std::pair(static_cast<double>(x), y - amount_); });
       break;
-    case ImageFault::right_turned:
-      if (right) turn(image, amount_);
-      break;
-    case ImageFault::both_turned: turn(image, amount_); break;
+    case ImageFault::turned: turn(image, amount_); break;
     case ImageFault::mirrored:
       move_pixels(image, [=](int x, int y) { return std::pair(w - 1.0 - x, static_cast<double>(y)); });
       break;

@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string_view>
 #include <utility>
+
+#include "fbvins/camera/camera.hpp"
 
 namespace fbvins {
 namespace {
@@ -18,8 +21,8 @@ using Img = ImageFault;
 
 constexpr FaultName kNames[] = {
     {"camera_off", Kind::camera_off},
-    {"left_off", Kind::left_off},
-    {"right_off", Kind::right_off},
+    {"left_off", Kind::camera_off, "", 0, 0, 0, false, {}, {}, 0},
+    {"right_off", Kind::camera_off, "", 0, 0, 0, false, {}, {}, 1},
     {"imu_off", Kind::imu_off},
     {"unplugged", Kind::unplugged},
     {"lose_images", Kind::lose_images, "of 1", 0.1, 0.9, 1},
@@ -48,33 +51,77 @@ constexpr FaultName kNames[] = {
     {"gyro_flipped", Kind::reading, "", 0, 0, 0, false, Reading::gyro_flipped},
     {"imu_axes_exchanged", Kind::reading, "", 0, 0, 0, false, Reading::axes_exchanged},
     {"imu_loose", Kind::reading, "degrees", 2, 60, 180, true, Reading::loose},
-    {"left_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::left_frozen},
-    {"right_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::right_frozen},
+    {"left_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::frozen, 0},
+    {"right_frozen", Kind::image, "", 0, 0, 0, false, {}, Img::frozen, 1},
     {"cycle", Kind::image, "frames", 2, 8, 32, false, {}, Img::cycle},
     {"each_twice", Kind::image, "", 0, 0, 0, false, {}, Img::each_twice},
-    {"left_late", Kind::image, "", 0, 0, 0, false, {}, Img::left_late},
-    {"right_late", Kind::image, "", 0, 0, 0, false, {}, Img::right_late},
+    {"left_late", Kind::image, "", 0, 0, 0, false, {}, Img::late, 0},
+    {"right_late", Kind::image, "", 0, 0, 0, false, {}, Img::late, 1},
     {"exchanged", Kind::image, "", 0, 0, 0, false, {}, Img::exchanged},
     {"same_twice", Kind::image, "", 0, 0, 0, false, {}, Img::same_twice},
     {"black", Kind::image, "", 0, 0, 0, false, {}, Img::black},
     {"white", Kind::image, "", 0, 0, 0, false, {}, Img::white},
-    {"left_black", Kind::image, "", 0, 0, 0, false, {}, Img::left_black},
+    {"left_black", Kind::image, "", 0, 0, 0, false, {}, Img::black, 0},
     {"blank", Kind::image, "", 0, 0, 0, false, {}, Img::blank},
     {"dark", Kind::image, "of 1", 0.005, 0.2, 1, false, {}, Img::dark},
     {"image_noise", Kind::image, "grey levels", 5, 60, 1e3, false, {}, Img::noise},
     {"blur", Kind::image, "px", 3, 41, 1e3, false, {}, Img::blur},
     {"covered", Kind::image, "of 1", 0.3, 0.9, 1, false, {}, Img::covered},
-    {"right_covered", Kind::image, "of 1", 0.3, 1, 1, false, {}, Img::right_covered},
+    {"right_covered", Kind::image, "of 1", 0.3, 1, 1, false, {}, Img::covered, 1},
     {"flicker", Kind::image, "of 1", 0.05, 0.7, 1, false, {}, Img::flicker},
-    {"right_darker", Kind::image, "of 1", 0.05, 0.7, 1, false, {}, Img::right_darker},
+    {"right_darker", Kind::image, "of 1", 0.05, 0.7, 1, false, {}, Img::dark, 1},
     {"torn", Kind::image, "", 0, 0, 0, false, {}, Img::torn},
     {"broken_blocks", Kind::image, "of 1", 0.02, 0.7, 1, false, {}, Img::broken_blocks},
     {"scroll", Kind::image, "px", 0.5, 12, 1e3, true, {}, Img::scroll},
-    {"right_shifted", Kind::image, "px", 1, 20, 1e3, true, {}, Img::right_shifted},
-    {"right_turned", Kind::image, "degrees", 0.3, 5, 180, true, {}, Img::right_turned},
-    {"both_turned", Kind::image, "degrees", 0.5, 20, 180, true, {}, Img::both_turned},
+    {"right_shifted", Kind::image, "px", 1, 20, 1e3, true, {}, Img::shifted, 1},
+    {"right_turned", Kind::image, "degrees", 0.3, 5, 180, true, {}, Img::turned, 1},
+    {"both_turned", Kind::image, "degrees", 0.5, 20, 180, true, {}, Img::turned},
     {"mirrored", Kind::image, "", 0, 0, 0, false, {}, Img::mirrored},
 };
+
+/// Of one camera, beside those of kNames that are of all.
+constexpr FaultName kOfOneCamera[] = {
+    {"off", Kind::camera_off},
+    {"frozen", Kind::image, "", 0, 0, 0, false, {}, Img::frozen},
+    {"late", Kind::image, "", 0, 0, 0, false, {}, Img::late},
+    {"shifted", Kind::image, "px", 1, 20, 1e3, true, {}, Img::shifted},
+    {"turned", Kind::image, "degrees", 0.3, 5, 180, true, {}, Img::turned},
+};
+
+/// What may happen to one camera alone, under its name without the camera.
+std::vector<FaultName> names_of_one_camera() {
+  std::vector<FaultName> out(std::begin(kOfOneCamera), std::end(kOfOneCamera));
+  for (const FaultName& name : kNames)
+    if (name.kind == Kind::image && name.camera == kAllCameras && name.image != Img::exchanged && name.image != Img::same_twice &&
+        name.image != Img::turned)
+      out.push_back(name);
+  return out;
+}
+
+/// "camera3_off": what "off" is, of camera 3. None where it is no such name.
+std::optional<FaultName> of_one_camera(std::string_view kind) {
+  constexpr std::string_view kBegin = "camera";
+  if (!kind.starts_with(kBegin) || kind.size() < kBegin.size() + 2 || kind[kBegin.size() + 1] != '_') return std::nullopt;
+  const int camera = kind[kBegin.size()] - '0';
+  if (camera < 0 || camera >= kMostCameras) return std::nullopt;
+  for (FaultName name : names_of_one_camera())
+    if (name.name == kind.substr(kBegin.size() + 2)) return name.camera = camera, name;
+  return std::nullopt;
+}
+
+std::optional<FaultName> name_of(std::string_view kind) {
+  for (const FaultName& name : kNames)
+    if (name.name == kind) return name;
+  return of_one_camera(kind);
+}
+
+std::string known_names() {
+  std::string out;
+  for (const FaultName& name : kNames) out += fmt::format("{}{}", out.empty() ? "" : ", ", name.name);
+  out += "; and of one camera, by its number";
+  for (const FaultName& name : names_of_one_camera()) out += fmt::format(", camera2_{}", name.name);
+  return out;
+}
 
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts(1);
@@ -100,27 +147,23 @@ Result<SensorFault> parse_fault(const std::string& text) {
     return Error{ErrorCode::invalid_argument, fmt::format("fault '{}': {}; it is KIND:START:LENGTH[:AMOUNT]", text, why)};
   };
   const std::vector<std::string> parts = split(text);
-  std::string known;
-  for (const FaultName& name : kNames) {
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", name.name);
-    if (name.name != parts[0]) continue;
-    const bool has_amount = !name.unit.empty();
-    if (parts.size() != (has_amount ? 4u : 3u))
-      return refuse(has_amount ? fmt::format("{} has an AMOUNT ({})", name.name, name.unit)
-                               : fmt::format("{} has no AMOUNT", name.name));
-    const std::optional<double> start = number(parts[1]), length = number(parts[2]);
-    const std::optional<double> amount = has_amount ? number(parts[3]) : 0.0;
-    if (!start || !length || !amount || *start < 0 || *length <= 0) return refuse("times are numbers, START >= 0, LENGTH > 0");
-    if (std::abs(*amount) > name.most) return refuse(fmt::format("AMOUNT is at most {}", name.most));
-    if (has_amount && !name.both_signs && *amount <= 0) return refuse("AMOUNT is more than 0");
-    return SensorFault{name.kind, *start, *length, *amount, name.reading, name.image};
-  }
-  return refuse(fmt::format("there are {}", known));
+  const std::optional<FaultName> name = name_of(parts[0]);
+  if (!name) return refuse(fmt::format("there are {}", known_names()));
+  const bool has_amount = !name->unit.empty();
+  if (parts.size() != (has_amount ? 4u : 3u))
+    return refuse(has_amount ? fmt::format("{} has an AMOUNT ({})", parts[0], name->unit)
+                             : fmt::format("{} has no AMOUNT", parts[0]));
+  const std::optional<double> start = number(parts[1]), length = number(parts[2]);
+  const std::optional<double> amount = has_amount ? number(parts[3]) : 0.0;
+  if (!start || !length || !amount || *start < 0 || *length <= 0) return refuse("times are numbers, START >= 0, LENGTH > 0");
+  if (std::abs(*amount) > name->most) return refuse(fmt::format("AMOUNT is at most {}", name->most));
+  if (has_amount && !name->both_signs && *amount <= 0) return refuse("AMOUNT is more than 0");
+  return SensorFault{name->kind, *start, *length, *amount, name->reading, name->image, name->camera};
 }
 
 FaultyInput::FaultyInput(SensorInput& input, std::vector<SensorFault> faults, std::uint64_t seed) : input_(input), rng_(seed) {
   for (const SensorFault& f : faults)
-    injected_.push_back({f, ReadingSpoiler(f.reading, f.amount, seed), ImageSpoiler(f.image, f.amount, seed)});
+    injected_.push_back({f, ReadingSpoiler(f.reading, f.amount, seed), ImageSpoiler(f.image, f.camera, f.amount, seed)});
 }
 
 bool FaultyInput::active(const SensorFault& fault, Time t) const {
@@ -132,6 +175,12 @@ const SensorFault* FaultyInput::active(Kind kind, Time t) const {
   for (const Injected& i : injected_)
     if (i.fault.kind == kind && active(i.fault, t)) return &i.fault;
   return nullptr;
+}
+
+bool FaultyInput::camera_is_off(int camera, Time t) const {
+  return std::ranges::any_of(injected_, [&](const Injected& i) {
+    return i.fault.kind == Kind::camera_off && i.fault.camera == camera && active(i.fault, t);
+  });
 }
 
 void FaultyInput::push(const ImuSample& sample) {
@@ -154,7 +203,7 @@ void FaultyInput::push(const ImuSample& sample) {
 void FaultyInput::push(StereoFrame frame) {
   if (!first_) first_ = frame.t;
   const Time t = frame.t;
-  if (active(Kind::camera_off, t) || active(Kind::unplugged, t)) return;
+  if (camera_is_off(kAllCameras, t) || active(Kind::unplugged, t)) return;
   if (const SensorFault* lost = active(Kind::lose_images, t))
     if (rng_.uniform() < lost->amount) return;
   for (Injected& i : injected_) {
@@ -162,8 +211,8 @@ void FaultyInput::push(StereoFrame frame) {
     i.image.see(frame);
     if (active(i.fault, t)) i.image.alter(frame);
   }
-  if (active(Kind::left_off, t)) frame.left.reset();
-  if (active(Kind::right_off, t)) frame.right.reset();
+  for (int i = 0; i < kMostCameras; ++i)
+    if (std::shared_ptr<const Image>* image = image_in(frame, i); image != nullptr && camera_is_off(i, t)) image->reset();
   frame.t = t + leap(Kind::image_leap, t);
   pass(std::move(frame), t);
 }

@@ -25,9 +25,7 @@ namespace fbvins {
 struct SensorFault {
   enum class Kind {
     // What comes, and when.
-    camera_off,   ///< no images
-    left_off,     ///< no image of the left camera
-    right_off,    ///< no image of the right camera
+    camera_off,   ///< no images, or none of one camera
     imu_off,      ///< no readings
     unplugged,    ///< nothing at all
     lose_images,  ///< each image is lost with probability `amount`
@@ -45,6 +43,7 @@ struct SensorFault {
   double amount = 0;
   ReadingFault reading = ReadingFault::frozen;
   ImageFault image = ImageFault::black;
+  int camera = kAllCameras;  ///< that alone fails, of camera_off and image
 };
 
 /// A name for parse_fault(). The amount, where there is one, is in the unit given and at most `most`; it may be negative where
@@ -57,10 +56,12 @@ struct FaultName {
   bool both_signs = false;
   ReadingFault reading = ReadingFault::frozen;
   ImageFault image = ImageFault::black;
+  int camera = kAllCameras;
 };
 std::span<const FaultName> fault_names();
 
-/// KIND:START:LENGTH[:AMOUNT], in seconds; the amount is in the unit of fault_names().
+/// KIND:START:LENGTH[:AMOUNT], in seconds; the amount is in the unit of fault_names(). Beside these names there are those of one
+/// camera, whichever: camera2_off, camera3_frozen ...
 Result<SensorFault> parse_fault(const std::string& text);
 
 /// One thread.
@@ -81,6 +82,8 @@ class FaultyInput final : public SensorInput {
   };
   bool active(const SensorFault& fault, Time t) const;
   const SensorFault* active(SensorFault::Kind kind, Time t) const;
+  /// Of all cameras, or of this one.
+  bool camera_is_off(int camera, Time t) const;
   Duration leap(SensorFault::Kind own, Time t) const;
   void pass(SensorEvent event, Time t);
   void deliver_held();

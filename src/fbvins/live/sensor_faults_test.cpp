@@ -68,6 +68,58 @@ TEST(SensorFaults, OneCameraIsOffOrFrozen) {
   }
 }
 
+/// Frames of four cameras every 100 ms, whose images have ten times the frame's number, and the camera's.
+std::vector<StereoFrame> fly_four(const std::string& text) {
+  Notes notes;
+  FaultyInput faulty(notes, {*parse_fault(text)});
+  for (int k = 0; k < 20; ++k) {
+    const auto image = [&](int camera) { return std::make_shared<Image>(2, 2, static_cast<std::uint8_t>(10 * k + camera)); };
+    faulty.push(StereoFrame{ms(100 * k), image(0), image(1), {image(2), image(3)}});
+  }
+  std::vector<StereoFrame> out;
+  for (const auto& [when, event] : notes.events) out.push_back(std::get<StereoFrame>(event));
+  return out;
+}
+
+TEST(SensorFaults, OneOfFourCamerasFails) {
+  struct Case {
+    const char* text;
+    int camera;
+    int (*value)(int k);  ///< of its image; -1: none
+  };
+  for (const Case& c :
+       {Case{"camera2_off:1:0.5", 2, [](int) { return -1; }}, Case{"camera3_off:1:0.5", 3, [](int) { return -1; }},
+        Case{"camera3_frozen:1:0.5", 3, [](int) { return 93; }}, Case{"camera2_late:1:0.5", 2, [](int k) { return 10 * k - 8; }},
+        Case{"camera2_black:1:0.5", 2, [](int) { return 0; }}, Case{"camera1_white:1:0.5", 1, [](int) { return 255; }},
+        Case{"left_off:1:0.5", 0, [](int) { return -1; }}}) {
+    const std::vector<StereoFrame> frames = fly_four(c.text);
+    ASSERT_EQ(frames.size(), 20u) << c.text;
+    for (int k = 0; k < 20; ++k)
+      for (int i = 0; i < 4; ++i) {
+        const auto image = frames[static_cast<std::size_t>(k)].image(i);
+        const bool fails = i == c.camera && k >= 10 && k < 15;
+        EXPECT_EQ(image ? image->at(0, 0) : -1, fails ? c.value(k) : 10 * k + i) << c.text << ", frame " << k << ", camera " << i;
+      }
+  }
+}
+
+TEST(SensorFaults, WhatAllCamerasHaveTheFurtherOnesHaveToo) {
+  const std::vector<StereoFrame> frames = fly_four("black:1:0.5");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(frames[12].image(i)->at(1, 1), 0) << i;
+  EXPECT_EQ(fly_four("camera_off:1:0.5").size(), 15u);
+}
+
+TEST(SensorFaults, ThereIsNoCameraBeyondTheEighth) {
+  for (const char* text : {"camera8_off:1:1", "camera_2_off:1:1", "camera2_exchanged:1:1", "camera2off:1:1", "camera2_:1:1"}) {
+    const auto fault = parse_fault(text);
+    ASSERT_FALSE(fault) << text;
+    EXPECT_NE(fault.error().message.find("and of one camera, by its number, camera2_off, camera2_frozen"), std::string::npos);
+  }
+  EXPECT_EQ(parse_fault("camera7_dark:1:1").error().message,
+            "fault 'camera7_dark:1:1': camera7_dark has an AMOUNT (of 1); it is KIND:START:LENGTH[:AMOUNT]");
+  EXPECT_EQ(parse_fault("camera7_dark:1:1:0.1")->camera, 7);
+}
+
 TEST(SensorFaults, AShareOfImagesIsLost) {
   const std::size_t left = fly({"lose_images:0:3:0.5"}).stamps<StereoFrame>().size();
   EXPECT_GT(left, 8u);

@@ -16,16 +16,18 @@ constexpr std::size_t kMostMemory_bytes = std::size_t{1} << 30U;
 /// Stamps beyond this (146 years) could overflow in differences.
 constexpr std::int64_t kLastStamp_ns = std::int64_t{1} << 62U;
 
-/// What the messages had in versions 1.1 and 1.2.
+/// What the messages had in versions 1.1, 1.2 and 1.3.
 constexpr std::size_t kFirstHello_bytes = offsetof(FbvinsSocketHello, cameras);
 constexpr std::size_t kSecondHello_bytes = offsetof(FbvinsSocketHello, depth_offset_bytes);
+constexpr std::size_t kThirdHello_bytes = offsetof(FbvinsSocketHello, times);
 constexpr std::size_t kFirstFrame_bytes = offsetof(FbvinsSocketFrame, offset_ns);
 /// Images of one frame lie closer together than this.
 constexpr std::int64_t kLongestOffset_ns = 1'000'000'000;
 
 static_assert(kFirstHello_bytes == 80 + sizeof(FbvinsSocketRig) && sizeof(FbvinsSocketRig) == 392);
 static_assert(kSecondHello_bytes == kFirstHello_bytes + 32 + 6 * sizeof(FbvinsSocketCamera));
-static_assert(sizeof(FbvinsSocketHello) == kSecondHello_bytes + 8 + sizeof(FbvinsSocketDepth) && sizeof(FbvinsSocketDepth) == 32);
+static_assert(kThirdHello_bytes == kSecondHello_bytes + 8 + sizeof(FbvinsSocketDepth) && sizeof(FbvinsSocketDepth) == 32);
+static_assert(sizeof(FbvinsSocketHello) == kThirdHello_bytes + 8 * sizeof(FbvinsSocketTimes) && sizeof(FbvinsSocketTimes) == 16);
 static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
@@ -96,6 +98,13 @@ Result<FrameLayout> layout_of(const FbvinsSocketHello& hello) {
   return layout;
 }
 
+/// Up to the last field that is filled.
+std::size_t size_of_hello(std::uint32_t flags) {
+  if ((flags & FBVINS_SOCKET_HAS_TIMES) != 0) return sizeof(FbvinsSocketHello);
+  if ((flags & FBVINS_SOCKET_HAS_DEPTH) != 0) return kThirdHello_bytes;
+  return (flags & FBVINS_SOCKET_HAS_CAMERAS) != 0 ? kSecondHello_bytes : kFirstHello_bytes;
+}
+
 Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
   // The version is at the same place in every version, and is checked before what depends on it.
   constexpr std::size_t kUpToVersion = offsetof(FbvinsSocketHello, flags);
@@ -108,9 +117,7 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
                  fmt::format("the sender speaks version {}.{} of the protocol, this program {}.{}", version->major,
                              version->minor, int{FBVINS_SOCKET_MAJOR}, int{FBVINS_SOCKET_MINOR})};
   auto hello = read<FbvinsSocketHello>(bytes, "hello", kFirstHello_bytes);
-  if (hello && (hello->flags & FBVINS_SOCKET_HAS_CAMERAS) != 0)
-    hello = read<FbvinsSocketHello>(bytes, "hello", kSecondHello_bytes);
-  if (hello && (hello->flags & FBVINS_SOCKET_HAS_DEPTH) != 0) hello = read<FbvinsSocketHello>(bytes, "hello");
+  if (hello) hello = read<FbvinsSocketHello>(bytes, "hello", size_of_hello(hello->flags));
   if (!hello) return hello.error();
   const auto layout = layout_of(*hello);
   if (!layout) return layout.error();
@@ -119,6 +126,7 @@ Result<SocketMessage> parse_hello(std::span<const std::byte> bytes) {
   out.rig = SocketRig{hello->rig, layout->cameras};
   std::copy_n(hello->more, std::max(0, layout->cameras - 2), out.rig->more.begin());
   if (layout->depth_offset_bytes > 0) out.rig->depth = hello->depth;
+  if ((hello->flags & FBVINS_SOCKET_HAS_TIMES) != 0) out.rig->times = std::to_array(hello->times);
   const auto rig = parse_socket_rig(*out.rig, layout->width_px, layout->height_px);
   if (!rig) return rig.error();
   return SocketMessage(std::move(out));

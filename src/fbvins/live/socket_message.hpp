@@ -44,6 +44,7 @@ struct SocketRig {
   int cameras = 2;
   std::array<FbvinsSocketCamera, kMostCameras - 2> more{};  ///< zeros beyond their count
   std::optional<FbvinsSocketDepth> depth = {};
+  std::optional<std::array<FbvinsSocketTimes, kMostCameras>> times = {};  ///< none: all cameras have those of `pair`
 };
 bool same(const SocketRig& a, const SocketRig& b);
 

@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.3 of the protocol, this program 1.3");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.4 of the protocol, this program 1.4");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -76,7 +76,7 @@ TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
   EXPECT_EQ(with([](auto& h) { h.right_offset_bytes = 0xfffff000u; }),
             "hello: 2 images of 3072 bytes, that of camera 1 at 4294963200, do not fit into a slot of 8192 bytes");
   EXPECT_EQ(with([](auto& h) { h.slots = 64, h.slot_bytes = 0x7fffffffu; }), "hello: 137438953408 bytes of images, over 1 GiB");
-  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1552 bytes says that it has 12");
+  EXPECT_EQ(with([](auto& h) { h.header.size_bytes = 12; }), "a message of 1680 bytes says that it has 12");
   EXPECT_EQ(with([](auto& h) { std::memset(h.name, 0x1b, sizeof(h.name)); }), "taken");
 }
 
@@ -291,6 +291,22 @@ TEST(SocketMessage, NothingAndUnknownTypes) {
   const auto message = parse_socket_message(bytes_of(unknown));
   ASSERT_TRUE(message);
   EXPECT_EQ(std::get<SocketUnknown>(*message).type, 999u);
+}
+
+TEST(SocketMessage, CamerasHaveTimesOfTheirOwnSinceVersion14) {
+  StereoRig rig = test::socket_test_rig();
+  EXPECT_FALSE(socket_rig(rig).times) << "where all are alike nothing is said of each";
+  rig.right.set_own_times({0.00390625, 0.0000152587890625});
+  FbvinsSocketHello hello = hello_message(&rig);
+  const auto message = parse_socket_message(bytes_of(hello));
+  ASSERT_TRUE(message) << message.error().message;
+  const auto sent = parse_socket_rig(*std::get<SocketHello>(*message).rig, test::kWidth, test::kHeight);
+  ASSERT_TRUE(sent) << sent.error().message;
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(sent->times(i), rig.times(i)) << i;
+  hello.times[1].time_offset_s = 11;
+  EXPECT_EQ(refusal(bytes_of(hello)), "calibration: camera 1's time offset is more than 10 s, or its line delay not finite");
+  hello.header.size_bytes = offsetof(FbvinsSocketHello, times);
+  EXPECT_EQ(refusal(bytes_of(hello, hello.header.size_bytes)), "hello of 1552 bytes where 1680 are needed");
 }
 
 }  // namespace socket_message_test

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_numbers.hpp"
 #include "fbvins/live/socket_message.hpp"
@@ -64,6 +65,19 @@ Result<void> check_figures(const FbvinsSocketRig& rig) {
   return {};
 }
 
+/// Of each camera that the rig has.
+Result<std::vector<CameraTimes>> times_of(const SocketRig& sent) {
+  std::vector<CameraTimes> out(static_cast<std::size_t>(sent.cameras), {.time_offset_s = sent.pair.time_offset_s});
+  if (!sent.times) return out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const FbvinsSocketTimes& times = (*sent.times)[i];
+    if (!(std::abs(times.time_offset_s) <= kLargestOffset_s) || !std::isfinite(times.line_delay_s))
+      return wrong_rig(fmt::format("camera {}'s time offset is more than 10 s, or its line delay not finite", i));
+    out[i] = {times.time_offset_s, times.line_delay_s};
+  }
+  return out;
+}
+
 FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mounting) {
   FbvinsSocketCamera out{};
   // In the order of LensModel.
@@ -86,7 +100,8 @@ FbvinsSocketCamera camera_message(const Camera& camera, const Pose<B, C0>& mount
 bool same(const SocketRig& a, const SocketRig& b) {
   return a.cameras == b.cameras && std::memcmp(&a.pair, &b.pair, sizeof(a.pair)) == 0 &&
          std::memcmp(a.more.data(), b.more.data(), sizeof(a.more)) == 0 && a.depth.has_value() == b.depth.has_value() &&
-         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0);
+         (!a.depth || std::memcmp(&*a.depth, &*b.depth, sizeof(*a.depth)) == 0) && a.times.has_value() == b.times.has_value() &&
+         (!a.times || std::memcmp(a.times->data(), b.times->data(), sizeof(*a.times)) == 0);
 }
 
 Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int height_px) {
@@ -104,10 +119,11 @@ Result<StereoRig> parse_socket_rig(const SocketRig& sent, int width_px, int heig
   if (Result<void> good = check_figures(rig); !good) return good.error();
   const ImuNoise noise{rig.gyro_noise_density_radps_rthz, rig.accel_noise_density_mps2_rthz, rig.gyro_random_walk_radps2_rthz,
                        rig.accel_random_walk_mps3_rthz, rig.imu_rate_hz};
-  StereoRig out = with_cameras({}, cameras);
+  const auto times = times_of(sent);
+  if (!times) return times.error();
+  StereoRig out = with_times(with_cameras({}, cameras), *times);
   out.imu_noise = noise;
   out.image_rate_hz = rig.image_rate_hz;
-  out.time_offset_s = rig.time_offset_s;
   if (const auto& d = sent.depth) out = with_depth(out, {d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma});
   if (Result<void> good = check_rig(out, "calibration"); !good) return good.error();
   return out;
@@ -120,6 +136,11 @@ SocketRig socket_rig(const StereoRig& rig) {
                  rig.imu_noise.accel_random_walk_mps3_rthz, rig.imu_noise.rate_hz, rig.image_rate_hz, rig.time_offset_s},
                 rig.camera_count()};
   for (int i = 2; i < rig.camera_count(); ++i) out.more[static_cast<std::size_t>(i - 2)] = message(i);
+  if (has_rolling_shutter(rig) || !own_offsets(rig).all_zero()) {
+    out.times.emplace();
+    for (int i = 0; i < rig.camera_count(); ++i)
+      (*out.times)[static_cast<std::size_t>(i)] = {rig.times(i).time_offset_s, rig.times(i).line_delay_s};
+  }
   if (const auto& d = rig.depth) out.depth = FbvinsSocketDepth{d->noise_at_1m_m, d->nearest_m, d->farthest_m, d->scale_sigma};
   return out;
 }

@@ -50,6 +50,10 @@ inline FbvinsSocketHello hello_message(const StereoRig* rig) {
   const SocketRig sent = socket_rig(*rig);
   hello.flags = FBVINS_SOCKET_HAS_RIG;
   hello.rig = sent.pair;
+  if (sent.times) {
+    hello.flags |= FBVINS_SOCKET_HAS_TIMES;
+    std::copy(sent.times->begin(), sent.times->end(), hello.times);
+  }
   if (sent.cameras == 2) return hello;
   hello.flags |= FBVINS_SOCKET_HAS_CAMERAS;
   hello.cameras = static_cast<std::uint32_t>(sent.cameras);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/camera/check_rig.hpp"
 #include "fbvins/camera/lens_faces.hpp"
 #include "fbvins/core/bounded_queue.hpp"
@@ -53,7 +54,8 @@ struct System::Impl {
   };
 
   RunMode mode;
-  LensFaces lenses;  ///< makes of a wide lens the cameras that the frontend and the estimator are given
+  ExposureOffsets own_offsets;  ///< of the rig's cameras
+  LensFaces lenses;             ///< makes of a wide lens the cameras that the frontend and the estimator are given
   PacketMaker packet_maker;
   std::unique_ptr<Frontend> frontend;
   Estimator estimator;
@@ -79,8 +81,9 @@ struct System::Impl {
   /// Deep enough for the keyframes of a second or two, while the mapper optimises its whole graph.
   Stage<MapTask, Impl> mapping{"the mapper", &Impl::map, BoundedQueue<MapTask>{12}};
 
-  Impl(const SystemOptions& options, LensFaces lenses_of_rig, RunMode mode_wanted, SystemParts parts)
+  Impl(const SystemOptions& options, const StereoRig& rig, LensFaces lenses_of_rig, RunMode mode_wanted, SystemParts parts)
       : mode(mode_wanted),
+        own_offsets(fbvins::own_offsets(rig)),
         lenses(std::move(lenses_of_rig)),
         packet_maker(options.input, lenses.rig().imu_noise, Duration::from_seconds(lenses.rig().time_offset_s)),
         frontend(std::move(parts.frontend)),
@@ -153,6 +156,12 @@ struct System::Impl {
 
   // The way from stage to stage.
 
+  /// From here on `offsets` are those of the exposures, not of the stamps.
+  void push(StereoFrame frame) {
+    frame.offsets += own_offsets;
+    packet_maker.push(std::move(frame));
+  }
+
   /// Sends on the packets that are ready; with `flush`, all that wait.
   void forward(bool flush) {
     while (std::optional<SensorPacket> packet = packet_maker.next(flush)) {
@@ -224,7 +233,7 @@ Result<System> System::create(const SystemOptions& options, const StereoRig& rig
     if (!frontend) return frontend.error();
     parts.frontend = std::move(*frontend);
   }
-  return System(std::make_unique<Impl>(options, std::move(lenses), mode, std::move(parts)));
+  return System(std::make_unique<Impl>(options, rig, std::move(lenses), mode, std::move(parts)));
 }
 
 System::System(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -247,7 +256,7 @@ Result<void> System::push(SensorEvent event) {
   if (impl_->finished && impl_->status.get())
     return Error{ErrorCode::invalid_argument, "push() after finish(): the system has ended"};
   if (auto* sample = std::get_if<ImuSample>(&event)) impl_->packet_maker.push(*sample);
-  else impl_->packet_maker.push(std::get<StereoFrame>(std::move(event)));
+  else impl_->push(std::get<StereoFrame>(std::move(event)));
   impl_->forward(false);
   return impl_->status.get();
 }

@@ -289,6 +289,25 @@ TEST(TimeOffset, AKnownOffsetChangesNothing) {
   }
 }
 
+/// Where one camera's stamps are late, and its calibration says so, all is as if they were not.
+TEST(TimeOffset, AKnownOffsetOfOneCameraChangesNothing) {
+  const std::vector<SensorEvent> events = sway(60);
+  const auto fly_at = [&](Duration late) {
+    StereoRig rig = small_rig();
+    rig.right.set_own_times({.time_offset_s = -late.seconds()});
+    System system = *System::create({}, rig, RunMode::deterministic);
+    std::string bytes;
+    system.on_odometry([&](const Odometry& o) { bytes += bytes_of(o); });
+    for (SensorEvent event : events) {
+      if (auto* frame = std::get_if<StereoFrame>(&event); frame != nullptr && late.ns != 0) frame->offsets.set(1, late);
+      EXPECT_TRUE(system.push(std::move(event)));
+    }
+    EXPECT_TRUE(system.finish());
+    return bytes;
+  };
+  EXPECT_EQ(fly_at(Duration{7'000'000}) == fly_at({}), true);
+}
+
 /// Takes no keyframe until it is told to go on.
 class BlockedMapper final : public Mapper {
  public:

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/live/frame_joiner.hpp"
 #include "fbvins/live/make_source.hpp"
 #include "fbvins/live/source.hpp"
@@ -44,7 +45,7 @@ class Ros2Source final : public Source {
         topics_(std::move(topics)),
         options_(std::move(options)),
         rig_(std::move(rig)),
-        joiner_(rig_.camera_count(), !topics_.depth.empty()) {}
+        joiner_(rig_.camera_count(), !topics_.depth.empty(), own_offsets(rig_)) {}
   void take_image(int camera, std::string_view bytes, const std::shared_ptr<const void>& keeper, SensorInput& input);
   void take_depth(std::string_view bytes, SensorInput& input);
   bool is_of(const RosImage& image, const std::string& topic, const Camera& camera);

@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "fbvins/camera/camera_times.hpp"
 #include "fbvins/live/host_clock.hpp"
 #include "fbvins/live/source_rig.hpp"
 
@@ -56,7 +57,7 @@ Result<V4l2Devices> parse_v4l2_devices(const std::string& text) {
 }
 
 V4l2Source::V4l2Source(V4l2Devices devices, SourceOptions options, StereoRig rig)
-    : options_(std::move(options)), rig_(std::move(rig)), joiner_(rig_.camera_count()) {
+    : options_(std::move(options)), rig_(std::move(rig)), joiner_(rig_.camera_count(), false, own_offsets(rig_)) {
   for (std::string& path : devices.cameras) cameras_.push_back({.path = std::move(path)});
 }
 
