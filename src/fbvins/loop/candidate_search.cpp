@@ -59,9 +59,8 @@ std::vector<KeyframeId> CandidateSearch::plausible(const PlaceMap& map, const Ma
   const Vec3 axis = query.T_MB.q * (T_BC0_.q * Vec3::UnitZ());
   std::vector<KeyframeId> ids;
   for (const MapKeyframe& k : map.keyframes()) {
-    if (!k.placed) continue;
+    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach || !k.placed) continue;  // the distance first: most are far
     if (k.session == query.session && seconds_between(query, k) < kMinAge_s) continue;
-    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach) continue;
     if ((k.T_MB.q * (T_BC0_.q * Vec3::UnitZ())).dot(axis) < min_cos) continue;
     ids.push_back(k.id);
   }
@@ -70,8 +69,7 @@ std::vector<KeyframeId> CandidateSearch::plausible(const PlaceMap& map, const Ma
 
 std::vector<KeyframeId> CandidateSearch::around(const PlaceMap& map, const MapKeyframe& query, double sigma_m) {
   const std::vector<KeyframeId> near = plausible(map, query, sigma_m);
-  const auto is_near = [&](KeyframeId k) { return std::binary_search(near.begin(), near.end(), k); };
-  return one_of_each_place(map, index_.query(query.place.words, kMostSimilar, is_near));
+  return one_of_each_place(map, index_.query(query.place.words, kMostSimilar, near));
 }
 
 std::vector<KeyframeId> CandidateSearch::anywhere(const PlaceMap& map, const MapKeyframe& query) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which keyframes share words with an image: for every word the keyframes that hold it. A query touches only the
-// words of the image, so its cost grows with the keyframes per word only. One thread at a time.
+// words of the image, so its cost grows with the keyframes per word only. Those of a file's keyframes are read from there. One
+// thread at a time.
 //
 //   InvertedIndex index(vocabulary.words());
 //   index.add(KeyframeId{0}, words);
@@ -8,10 +9,13 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "fbvins/core/ids.hpp"
+#include "fbvins/loop/place_store.hpp"
 #include "fbvins/loop/vocabulary.hpp"
 
 namespace fbvins {
@@ -25,10 +29,15 @@ class InvertedIndex {
  public:
   explicit InvertedIndex(int words) : postings_(static_cast<std::size_t>(words)) {}
 
+  /// Adds all keyframes of a file; before any other.
+  void add(std::shared_ptr<PlaceStore> store);
   void add(KeyframeId keyframe, const BowVector& bow);
+  /// `bow` does not matter for a keyframe of the file.
   void remove(KeyframeId keyframe, const BowVector& bow);
   /// The most similar ones first, equal ones in order of id. `allowed`, if given, leaves some out.
   std::vector<IndexHit> query(const BowVector& bow, int most, const std::function<bool(KeyframeId)>& allowed = {});
+  /// The same among a few.
+  std::vector<IndexHit> query(const BowVector& bow, int most, std::span<const KeyframeId> among);
 
  private:
   struct Posting {
@@ -36,7 +45,11 @@ class InvertedIndex {
     float weight;
   };
   std::int32_t take_slot(KeyframeId keyframe);
+  void count(std::int32_t slot, float weight);
+  void score(const BowVector& bow);
+  void forget_scores();
 
+  std::shared_ptr<PlaceStore> store_;  // its slots are the first ones here
   std::vector<std::vector<Posting>> postings_;
   std::unordered_map<KeyframeId, std::int32_t> slots_;  // dense numbers: ids come from files and may be huge
   std::vector<KeyframeId> keyframes_;                   // by slot
