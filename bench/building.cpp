@@ -30,7 +30,7 @@ using namespace fbvins;
 
 namespace {
 
-constexpr int kOfARoom = 200, kRoomsOfASession = 10, kKeyframesOfAStart = 5;
+constexpr int kPointsOfARoom = 6000, kOfARoom = 200, kRoomsOfASession = 10, kKeyframesOfAStart = 5;
 constexpr double kWrong_m = 0.3;
 
 struct Arguments {
@@ -42,7 +42,7 @@ struct Arguments {
 /// Points of a room, which look like what the vocabulary was trained on.
 test_room::World room(int number, const Vocabulary& vocabulary) {
   Rng rng(static_cast<std::uint64_t>(number) + 1);
-  test_room::World world = test_room::room(static_cast<std::uint64_t>(number) + 1);
+  test_room::World world = test_room::room(static_cast<std::uint64_t>(number) + 1, kPointsOfARoom);
   const auto centres = vocabulary.descriptors();
   for (Descriptor& look : world.looks) {
     look = centres[1 + rng.below(static_cast<std::uint32_t>(centres.size() - 1))];
