@@ -110,9 +110,12 @@ void fuzz_stored(const std::string& bytes) {
   const auto map = open_map(file.with(bytes), 0);
   require_sentence(map);
   if (!map || !map->store) return;
-  for (const MapKeyframe& k : map->keyframes()) require(map->place_of(k)->size() == map->place_of(k)->descriptors.size());
+  for (const MapKeyframe& k : map->keyframes()) {
+    require(map->place_of(k)->size() == map->place_of(k)->descriptors.size());
+    (void)map->words_of(k);
+  }
   for (const StoredWord& word : map->store->words())
-    for (const WordPosting& p : map->store->postings(word)) require(p.slot < map->size());
+    for (const WordPosting& p : map->store->keyframes_with(word)) require(p.slot < map->size());
   const auto written = map_bytes(*map);
   require_sentence(written);
   require(written.ok() == !map->store->damage());

@@ -32,6 +32,8 @@ class CandidateSearch {
 
  private:
   std::vector<KeyframeId> plausible(const PlaceMap& map, const MapKeyframe& query, double sigma_m) const;
+  std::vector<IndexHit> most_similar(const PlaceMap& map, const BowVector& words);
+  std::vector<IndexHit> most_similar(const PlaceMap& map, const BowVector& words, const std::vector<KeyframeId>& among);
 
   InvertedIndex index_;
   Pose<B, C0> T_BC0_;

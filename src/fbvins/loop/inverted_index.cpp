@@ -12,6 +12,22 @@ bool better(const IndexHit& a, const IndexHit& b) {
 
 }  // namespace
 
+float similarity_of(const BowVector& query, const BowVector& keyframe) {
+  float sum = 0;
+  for (auto i = query.begin(), j = keyframe.begin(); i != query.end() && j != keyframe.end();) {
+    if (i->word == j->word) sum += std::min((i++)->weight, (j++)->weight);
+    else if (i->word < j->word) ++i;
+    else ++j;
+  }
+  return sum;
+}
+
+void keep_best(std::vector<IndexHit>& hits, int most) {
+  const auto kept = std::min<std::size_t>(hits.size(), static_cast<std::size_t>(std::max(most, 0)));
+  std::ranges::partial_sort(hits, hits.begin() + static_cast<std::ptrdiff_t>(kept), better);
+  hits.resize(kept);
+}
+
 std::int32_t InvertedIndex::take_slot(KeyframeId keyframe) {
   const auto [known, is_new] = slots_.try_emplace(keyframe, static_cast<std::int32_t>(keyframes_.size()));
   if (!is_new) return known->second;
@@ -51,43 +67,46 @@ void InvertedIndex::remove(KeyframeId keyframe, const BowVector& bow) {
   free_.push_back(slot);
 }
 
-void InvertedIndex::count(std::int32_t slot, float weight) {
-  float& score = score_[static_cast<std::size_t>(slot)];
-  if (score == 0) touched_.push_back(slot);
-  score += weight;
+std::size_t InvertedIndex::entries(std::int32_t word) const {
+  const StoredWord* stored = store_ ? store_->find(word) : nullptr;
+  return postings_[static_cast<std::size_t>(word)].size() + (stored == nullptr ? 0 : stored->keyframes);
+}
+
+std::size_t InvertedIndex::entries(const BowVector& bow) const {
+  std::size_t sum = 0;
+  for (const BowEntry& e : bow) sum += entries(e.word);
+  return sum;
 }
 
 void InvertedIndex::score(const BowVector& bow) {
   for (const BowEntry& e : bow) {
-    if (store_)
-      for (const WordPosting& p : store_->postings(e.word))
-        count(static_cast<std::int32_t>(p.slot), std::min(e.weight, p.weight));
-    for (const Posting& p : postings_[static_cast<std::size_t>(e.word)]) count(p.slot, std::min(e.weight, p.weight));
+    if (const StoredWord* stored = store_ ? store_->find(e.word) : nullptr; stored != nullptr)
+      for (const WordPosting& p : store_->keyframes_with(*stored)) score_[p.slot] += std::min(e.weight, p.weight);
+    for (const Posting& p : postings_[static_cast<std::size_t>(e.word)])
+      score_[static_cast<std::size_t>(p.slot)] += std::min(e.weight, p.weight);
   }
 }
 
-void InvertedIndex::forget_scores() {
-  for (const std::int32_t slot : touched_) score_[static_cast<std::size_t>(slot)] = 0;
-  touched_.clear();
+/// Of the scores, which are zero afterwards. Only keyframes that are among the best so far are asked for.
+std::vector<IndexHit> InvertedIndex::best(int most, const std::function<bool(KeyframeId)>& allowed) {
+  std::vector<IndexHit> hits;  // a heap, the worst first
+  for (std::size_t slot = 0; slot < score_.size() && most > 0; ++slot) {
+    const IndexHit hit{keyframes_[slot], score_[slot]};
+    const bool full = static_cast<int>(hits.size()) == most;
+    if (hit.similarity == 0 || !hit.keyframe.valid() || (full && !better(hit, hits.front()))) continue;
+    if (allowed && !allowed(hit.keyframe)) continue;
+    if (full) std::ranges::pop_heap(hits, better), hits.pop_back();
+    hits.push_back(hit);
+    std::ranges::push_heap(hits, better);
+  }
+  std::ranges::sort_heap(hits, better);
+  std::ranges::fill(score_, 0.0f);
+  return hits;
 }
 
 std::vector<IndexHit> InvertedIndex::query(const BowVector& bow, int most, const std::function<bool(KeyframeId)>& allowed) {
   score(bow);
-  std::vector<IndexHit> found, hits;
-  found.reserve(touched_.size());
-  for (const std::int32_t slot : touched_)
-    if (const KeyframeId keyframe = keyframes_[static_cast<std::size_t>(slot)]; keyframe.valid())
-      found.push_back({keyframe, score_[static_cast<std::size_t>(slot)]});
-  forget_scores();
-  // Only the first ones are put in order, and asked for.
-  const auto worse = [](const IndexHit& a, const IndexHit& b) { return better(b, a); };
-  std::ranges::make_heap(found, worse);
-  while (!found.empty() && static_cast<int>(hits.size()) < most) {
-    std::ranges::pop_heap(found, worse);
-    if (!allowed || allowed(found.back().keyframe)) hits.push_back(found.back());
-    found.pop_back();
-  }
-  return hits;
+  return best(most, allowed);
 }
 
 std::vector<IndexHit> InvertedIndex::query(const BowVector& bow, int most, std::span<const KeyframeId> among) {
@@ -99,11 +118,25 @@ std::vector<IndexHit> InvertedIndex::query(const BowVector& bow, int most, std::
     const float similarity = slot == slots_.end() ? 0 : score_[static_cast<std::size_t>(slot->second)];
     if (similarity > 0) hits.push_back({keyframe, similarity});
   }
-  forget_scores();
-  const auto kept = std::min<std::size_t>(hits.size(), static_cast<std::size_t>(std::max(most, 0)));
-  std::ranges::partial_sort(hits, hits.begin() + static_cast<std::ptrdiff_t>(kept), better);
-  hits.resize(kept);
+  std::ranges::fill(score_, 0.0f);
+  keep_best(hits, most);
   return hits;
+}
+
+std::vector<IndexHit> InvertedIndex::shortlist(const BowVector& bow, int most, std::size_t most_entries, std::size_t fewest_words,
+                                               const std::function<bool(KeyframeId)>& allowed) {
+  std::vector<std::pair<std::size_t, BowEntry>> rarest;
+  for (const BowEntry& e : bow)
+    if (const std::size_t n = entries(e.word); n > 0) rarest.emplace_back(n, e);
+  std::ranges::stable_sort(rarest, {}, &std::pair<std::size_t, BowEntry>::first);
+  BowVector some;
+  std::size_t sum = 0;
+  for (const auto& [n, e] : rarest) {
+    sum += n;
+    if (sum > most_entries && some.size() >= fewest_words) break;
+    some.push_back(e);
+  }
+  return query(some, most, allowed);
 }
 
 }  // namespace fbvins

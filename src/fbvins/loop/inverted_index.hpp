@@ -24,6 +24,10 @@ struct IndexHit {
   KeyframeId keyframe;
   float similarity = 0;  ///< bow_similarity of the two
 };
+/// The similarity of a hit, without an index: the same to the bit.
+float similarity_of(const BowVector& query, const BowVector& keyframe);
+/// The most similar ones first, equal ones in order of id; others are dropped.
+void keep_best(std::vector<IndexHit>& hits, int most);
 
 class InvertedIndex {
  public:
@@ -38,6 +42,13 @@ class InvertedIndex {
   std::vector<IndexHit> query(const BowVector& bow, int most, const std::function<bool(KeyframeId)>& allowed = {});
   /// The same among a few.
   std::vector<IndexHit> query(const BowVector& bow, int most, std::span<const KeyframeId> among);
+  /// Those most similar by its rarest words alone: of so many that `most_entries` of the lists are looked at, and of
+  /// `fewest_words` in any case.
+  std::vector<IndexHit> shortlist(const BowVector& bow, int most, std::size_t most_entries, std::size_t fewest_words,
+                                  const std::function<bool(KeyframeId)>& allowed);
+
+  /// Entries of the lists that a query looks at.
+  std::size_t entries(const BowVector& bow) const;
 
  private:
   struct Posting {
@@ -45,9 +56,9 @@ class InvertedIndex {
     float weight;
   };
   std::int32_t take_slot(KeyframeId keyframe);
-  void count(std::int32_t slot, float weight);
+  std::size_t entries(std::int32_t word) const;
   void score(const BowVector& bow);
-  void forget_scores();
+  std::vector<IndexHit> best(int most, const std::function<bool(KeyframeId)>& allowed);
 
   std::shared_ptr<PlaceStore> store_;  // its slots are the first ones here
   std::vector<std::vector<Posting>> postings_;
@@ -55,7 +66,6 @@ class InvertedIndex {
   std::vector<KeyframeId> keyframes_;                   // by slot
   std::vector<std::int32_t> free_;                      // slots
   std::vector<float> score_;                            // by slot, zero between queries
-  std::vector<std::int32_t> touched_;                   // slots
 };
 
 }  // namespace fbvins

@@ -145,18 +145,8 @@ void LoopCloser::advance(const Keyframe& keyframe) {
 MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
   advance(keyframe);
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
-  return {{},
-          keyframe.t,
-          session_.number,
-          T_GB,
-          frame_.T_MG() * T_GB,
-          session_.path_m,
-          0,
-          0,
-          frame_.known(),
-          -1,
-          std::move(place),
-          {keyframe.gauge.v_GB, keyframe.imu.bias}};
+  return {{}, keyframe.t, session_.number, T_GB, frame_.T_MG() * T_GB, session_.path_m,
+          0,  0,          frame_.known(),  -1,   std::move(place),     {keyframe.gauge.v_GB, keyframe.imu.bias}};
 }
 
 MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {

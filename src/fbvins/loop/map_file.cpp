@@ -58,12 +58,6 @@ Result<PlaceMap> opened(std::shared_ptr<ByteSource> file, const std::string& nam
                fmt::format("{}: map of version {}, this program reads 1 and {}", name, version, kMapVersion)};
 }
 
-Result<PlaceMap> whole(Result<PlaceMap> map) {
-  if (!map) return map;
-  if (Result<void> read = read_places(*map); !read) return read.error();
-  return map;
-}
-
 }  // namespace
 
 Result<std::string> map_bytes(const PlaceMap& map) {
@@ -79,7 +73,7 @@ std::string serialise_map(const PlaceMap& map) {
 
 Result<PlaceMap> parse_map(std::span<const std::byte> bytes, const std::string& name) {
   const std::string_view view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return whole(opened(bytes_in_memory(std::string(view)), name, 0));
+  return read_whole(opened(bytes_in_memory(std::string(view)), name, 0), name);
 }
 
 Result<void> save_map(const PlaceMap& map, const std::string& path) {
@@ -95,7 +89,7 @@ Result<PlaceMap> open_map(const std::string& path, std::uint64_t most_bytes) {
   return opened(*std::move(file), path, most_bytes);
 }
 
-Result<PlaceMap> load_map(const std::string& path) { return whole(open_map(path, 0)); }
+Result<PlaceMap> load_map(const std::string& path) { return read_whole(open_map(path, 0), path); }
 
 std::string map_as_ply(const PlaceMap& map) {
   constexpr float kMaxRelativeSigma = 0.1f;  // of a depth worth looking at

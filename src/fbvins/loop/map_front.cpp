@@ -7,6 +7,7 @@
 #include "fbvins/loop/map_file.hpp"
 #include "fbvins/loop/map_records.hpp"
 #include "fbvins/loop/map_sessions.hpp"
+#include "fbvins/loop/map_writer.hpp"
 #include "fbvins/loop/place_store.hpp"
 
 namespace fbvins {
@@ -21,8 +22,11 @@ std::uint64_t get_keyframes(BytesIn& in, std::uint32_t count, PlaceMap& map, std
     place.at = at;
     MapKeyframe k = get_keyframe(in, place.features);
     place.checksum = in.get<std::uint64_t>();
+    place.words = in.get<std::uint32_t>();
+    place.words_checksum = in.get<std::uint64_t>();
     place.keyframe = k.id;
-    at += place.features * std::uint64_t{kFeatureBytes};
+    at += place.place_bytes() + place.words_bytes();
+    in.check(place.words == 0 || map.vocabulary != 0);
     in.check(k.id > last && k.id.value < (std::int64_t{1} << 31));
     last = k.id;
     k.stored = static_cast<std::int32_t>(i);
@@ -33,7 +37,7 @@ std::uint64_t get_keyframes(BytesIn& in, std::uint32_t count, PlaceMap& map, std
 }
 
 /// Where the keyframes of each word are listed, from `at` on; returns where that ends.
-std::uint64_t get_words(BytesIn& in, std::uint64_t at, std::vector<StoredWord>& words) {
+std::uint64_t get_lists(BytesIn& in, std::uint64_t at, std::vector<StoredWord>& words) {
   const auto count = in.get<std::uint32_t>();
   for (std::uint32_t i = 0; i < count && in.ok(); ++i) {
     StoredWord word;
@@ -75,7 +79,7 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
   map.T_BC0 = in.pose<Pose<B, C0>>();
   const std::uint64_t places_end = get_keyframes(in, keyframes, map, places);
   get_rest(in, edges, flags, map);
-  if (in.ok() && map.vocabulary != 0) in.check(get_words(in, places_end, words) == end.front_at);
+  if (in.ok() && map.vocabulary != 0) in.check(get_lists(in, places_end, words) == end.front_at);
   else in.check(places_end == end.front_at);
   if (!in.ok() || !in.at_end()) return damaged_map(name, "its content makes no sense");
   map.store = std::make_shared<PlaceStore>(name, std::move(file), std::move(places), std::move(words), most_bytes);
@@ -85,21 +89,25 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
 
 Result<void> read_places(PlaceMap& map) {
   if (!map.store) return {};
-  std::vector<MapKeyframe*> by_slot(map.store->size(), nullptr);
   for (MapKeyframe& k : map.keyframes()) {
     if (k.stored < 0) continue;
-    Place place = *map.store->place(static_cast<std::size_t>(k.stored));
-    place.up_C0 = k.place.up_C0, place.focal_px = k.place.focal_px;
+    Place place = *map.place_of(k);
+    place.words = *map.words_of(k);
     k.place = std::move(place);
-    by_slot[static_cast<std::size_t>(k.stored)] = &k;
   }
-  for (const StoredWord& word : map.store->words())
-    for (const WordPosting& p : map.store->postings(word))
-      if (MapKeyframe* k = by_slot[p.slot]; k != nullptr) k->place.words.push_back({word.word, p.weight});
   if (const std::optional<Error>& damage = map.store->damage()) return *damage;
   for (MapKeyframe& k : map.keyframes()) k.stored = -1;
   map.store = nullptr;
   return {};
+}
+
+Result<PlaceMap> read_whole(Result<PlaceMap> map, const std::string& name) {
+  if (!map || !map->store) return map;
+  const std::shared_ptr<PlaceStore> store = map->store;
+  for (const StoredWord& word : store->words()) (void)store->keyframes_with(word);  // finds what is damaged
+  if (Result<void> read = read_places(*map); !read) return read.error();
+  if (!lists_agree(*map, store->words())) return damaged_map(name, "its content makes no sense");
+  return map;
 }
 
 }  // namespace fbvins

@@ -19,5 +19,7 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
 
 /// Places and words into the keyframes; the file is not needed any more.
 Result<void> read_places(PlaceMap& map);
+/// The same of a map that was just opened, and all of its file is checked.
+Result<PlaceMap> read_whole(Result<PlaceMap> map, const std::string& name);
 
 }  // namespace fbvins

@@ -12,7 +12,7 @@
 namespace fbvins {
 namespace {
 
-static_assert(sizeof(PlaceFeature) == 20 && sizeof(Descriptor) == 32);
+static_assert(sizeof(PlaceFeature) == 20 && sizeof(Descriptor) == 32 && sizeof(BowEntry) == 8);
 constexpr std::size_t kLongestName = 200;
 
 void put_information(BytesOut& out, const Mat6& information) {
@@ -148,6 +148,20 @@ MapKeyframe get_keyframe(BytesIn& in, std::uint32_t& features) {
   in.check(k.place.focal_px > 1 && k.place.focal_px < 1e6);
   features = in.get<std::uint32_t>();
   return k;
+}
+
+void put_words(BytesOut& out, const BowVector& words) { out.raw(words.data(), words.size() * sizeof(BowEntry)); }
+
+void get_words(BytesIn& in, std::uint32_t count, BowVector& words) {
+  in.check(count <= in.left() / sizeof(BowEntry));
+  if (!in.ok()) return;
+  words.resize(count);
+  in.raw(words.data(), count * sizeof(BowEntry));
+  std::int64_t last = -1;
+  for (const BowEntry& e : words) {
+    in.check(e.word > last && std::isfinite(e.weight) && e.weight >= 0);
+    last = e.word;
+  }
 }
 
 void put_place(BytesOut& out, const Place& place) {

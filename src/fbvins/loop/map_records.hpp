@@ -36,6 +36,9 @@ inline constexpr std::size_t kFeatureBytes = sizeof(PlaceFeature) + sizeof(Descr
 void put_keyframe(BytesOut& out, const MapKeyframe& k, std::uint32_t features);
 MapKeyframe get_keyframe(BytesIn& in, std::uint32_t& features);
 
+void put_words(BytesOut& out, const BowVector& words);
+void get_words(BytesIn& in, std::uint32_t count, BowVector& words);
+
 void put_place(BytesOut& out, const Place& place);
 void get_place(BytesIn& in, std::uint32_t features, Place& place);
 

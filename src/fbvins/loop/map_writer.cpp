@@ -49,7 +49,7 @@ class WordLists {
   bool stored_left() const { return store_ != nullptr && stored_at_ < store_->words().size(); }
   const StoredWord& stored() const { return store_->words()[stored_at_]; }
   void take_stored() {
-    for (const WordPosting& p : store_->postings(stored()))
+    for (const WordPosting& p : store_->keyframes_with(stored()))
       if (const std::int32_t slot = renumbered_[p.slot]; slot >= 0) list_.push_back({static_cast<std::uint32_t>(slot), p.weight});
     ++stored_at_;
   }
@@ -76,11 +76,23 @@ class CountedOutput {
   std::uint64_t written_ = 0;
 };
 
-Result<std::string> bytes_of_place(const PlaceMap& map, const MapKeyframe& k) {
-  if (k.stored >= 0) return map.store->bytes_of(static_cast<std::size_t>(k.stored));
+/// A place with its words, without them where no vocabulary is known.
+struct PlaceRecord {
+  std::string bytes;
+  std::size_t features = 0, words = 0;
+};
+
+Result<PlaceRecord> record_of(const PlaceMap& map, const MapKeyframe& k) {
+  if (k.stored >= 0) {
+    const StoredPlace& stored = map.store->at(static_cast<std::size_t>(k.stored));
+    Result<std::string> bytes = map.store->bytes_of(static_cast<std::size_t>(k.stored));
+    if (!bytes) return bytes.error();
+    return PlaceRecord{*std::move(bytes), stored.features, stored.words};
+  }
   BytesOut place;
   put_place(place, k.place);
-  return place.take();
+  if (map.vocabulary != 0) put_words(place, k.place.words);
+  return PlaceRecord{place.take(), k.place.size(), map.vocabulary != 0 ? k.place.words.size() : 0};
 }
 
 /// The places go to `out`, what the front says of keyframes is the result.
@@ -88,17 +100,21 @@ Result<std::string> put_places(const PlaceMap& map, CountedOutput& out) {
   BytesOut keyframes;
   for (const MapKeyframe& k : map.keyframes()) {
     if (!k.placed) continue;
-    const Result<std::string> place = bytes_of_place(map, k);
-    if (!place) return place.error();
-    put_keyframe(keyframes, k, static_cast<std::uint32_t>(place->size() / kFeatureBytes));
-    keyframes.put(map_checksum(*place));
-    out.put(*place);
+    const Result<PlaceRecord> record = record_of(map, k);
+    if (!record) return record.error();
+    const std::string_view bytes = record->bytes;
+    const std::size_t of_place = record->features * kFeatureBytes;
+    put_keyframe(keyframes, k, static_cast<std::uint32_t>(record->features));
+    keyframes.put(map_checksum(bytes.substr(0, of_place)));
+    keyframes.put(static_cast<std::uint32_t>(record->words));
+    keyframes.put(map_checksum(bytes.substr(of_place)));
+    out.put(bytes);
   }
   return keyframes.take();
 }
 
 /// The lists go to `out`, what the front says of them is the result.
-std::string put_words(const PlaceMap& map, CountedOutput& out) {
+std::string put_lists(const PlaceMap& map, CountedOutput& out) {
   if (map.vocabulary == 0) return {};
   BytesOut words;
   std::uint32_t count = 0;
@@ -117,6 +133,16 @@ std::string put_words(const PlaceMap& map, CountedOutput& out) {
 
 }  // namespace
 
+bool lists_agree(const PlaceMap& map, const std::vector<StoredWord>& words) {
+  WordLists lists(map);
+  for (const StoredWord& w : words) {
+    const auto [word, list] = lists.next();
+    const std::string_view bytes(reinterpret_cast<const char*>(list.data()), list.size_bytes());
+    if (list.empty() || word != w.word || list.size() != w.keyframes || map_checksum(bytes) != w.checksum) return false;
+  }
+  return lists.next().second.empty();
+}
+
 Result<void> write_map(const PlaceMap& map, const std::function<void(std::string_view)>& write) {
   const MapRest rest = rest_of(map);
   const std::uint32_t flags = flags_of(map, rest);
@@ -128,7 +154,7 @@ Result<void> write_map(const PlaceMap& map, const std::function<void(std::string
   out.put(header.take());
   const Result<std::string> keyframes = put_places(map, out);
   if (!keyframes) return keyframes.error();
-  const std::string words = put_words(map, out);
+  const std::string words = put_lists(map, out);
   if (map.store && map.store->damage()) return *map.store->damage();
   const std::uint64_t front_at = out.written();
   front.put(static_cast<std::uint32_t>(std::ranges::count_if(map.keyframes(), &MapKeyframe::placed)));

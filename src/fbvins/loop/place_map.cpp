@@ -80,6 +80,11 @@ std::shared_ptr<const Place> PlaceMap::place_of(const MapKeyframe& k) const {
   return place;
 }
 
+std::shared_ptr<const BowVector> PlaceMap::words_of(const MapKeyframe& k) const {
+  if (k.stored < 0) return {std::shared_ptr<const BowVector>(), &k.place.words};
+  return store->words_of(static_cast<std::size_t>(k.stored));
+}
+
 void PlaceMap::fill_words(const Vocabulary& words) {
   const bool same = vocabulary == words.fingerprint();
   for (MapKeyframe& k : keyframes_) {

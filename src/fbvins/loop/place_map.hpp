@@ -88,6 +88,7 @@ class PlaceMap {
 
   /// Its place, wherever that is; valid while it is held and the keyframe is in the map.
   std::shared_ptr<const Place> place_of(const MapKeyframe& k) const;
+  std::shared_ptr<const BowVector> words_of(const MapKeyframe& k) const;
   /// Words by this vocabulary for all places that are in memory and have none by it.
   void fill_words(const Vocabulary& vocabulary);
 

@@ -164,7 +164,7 @@ TEST_F(StoredMap, WhatIsDamagedInTheWordsIsPassedOverInFlight) {
   bytes[front_of(bytes) - 1] ^= 1;  // of the last list
   write(bytes);
   const PlaceMap map = *open_map(path_, 0);
-  EXPECT_TRUE(map.store->postings(map.store->words().back()).empty());
+  EXPECT_TRUE(map.store->keyframes_with(map.store->words().back()).empty());
   ASSERT_TRUE(map.store->damage());
   EXPECT_NE(map.store->damage()->message.find("the keyframes with word"), std::string::npos);
   EXPECT_FALSE(map_bytes(map).ok());
