@@ -22,7 +22,7 @@ bool make_room(const std::string& file, const std::string& problem) {
 
 }  // namespace
 
-KeptMap::KeptMap(Mapper& map, std::function<std::string()> bytes, std::string file, WriteFile write)
+KeptMap::KeptMap(Mapper& map, std::function<Result<std::string>()> bytes, std::string file, WriteFile write)
     : map_(map), bytes_(std::move(bytes)), file_(std::move(file)), writer_(std::move(write)) {}
 
 MapUpdate KeptMap::process(const Keyframe& keyframe) {
@@ -31,16 +31,22 @@ MapUpdate KeptMap::process(const Keyframe& keyframe) {
   if (update.found) note("the flight knows where it is in the map");
   if (!writer_.idle()) return update;
   if (std::vector<Told> wanted = (std::lock_guard(mutex_), std::exchange(wanted_, {})); !wanted.empty()) {
-    writer_.write(requested_file_, bytes_(), [wanted = std::move(wanted)](const Result<void>& saved) {
+    write(requested_file_, [wanted = std::move(wanted)](const Result<void>& saved) {
       for (const Told& told : wanted) told(saved);
     });
   } else if (due(keyframe.t)) {
-    writer_.write(file_, bytes_(), [this](const Result<void>& saved) {
+    write(file_, [this](const Result<void>& saved) {
       if (!saved && !warned_) warn(saved.error().message);
       warned_ = !saved;
     });
   }
   return update;
+}
+
+void KeptMap::write(const std::string& file, const Told& told) {
+  Result<std::string> bytes = bytes_();
+  if (bytes) writer_.write(file, *std::move(bytes), told);
+  else told(bytes.error());
 }
 
 void KeptMap::finish() {

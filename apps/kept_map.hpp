@@ -22,7 +22,7 @@ class KeptMap final : public Mapper {
   using Told = FileWriter::Told;
 
   /// `file` empty: the map is written only on request. `map` must outlive this; `bytes` are those of its file.
-  KeptMap(Mapper& map, std::function<std::string()> bytes, std::string file, WriteFile write = write_file_atomically);
+  KeptMap(Mapper& map, std::function<Result<std::string>()> bytes, std::string file, WriteFile write = write_file_atomically);
   MapUpdate process(const Keyframe& keyframe) override;
 
   /// Until the file being written is complete.
@@ -40,9 +40,10 @@ class KeptMap final : public Mapper {
 
  private:
   bool due(Time t);
+  void write(const std::string& file, const Told& told);
 
   Mapper& map_;
-  std::function<std::string()> bytes_;
+  std::function<Result<std::string>()> bytes_;
   std::string file_, requested_file_;
   Time written_;         ///< keyframe's time
   bool warned_ = false;  ///< on the writer's thread

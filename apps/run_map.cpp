@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/terminal.hpp"
 #include "fbvins/calibration/tag_finder.hpp"
 #include "fbvins/core/stage_timer.hpp"
 #include "fbvins/io/anchor_file.hpp"
@@ -126,6 +127,7 @@ void finish_map(const MapArguments& arguments, LoopMap& map, const RunRecord& ru
   record.finish_ms = timer.lap_ms();
   record.keyframes_in_map = map.keyframes();
   record.not_joined = map.not_joined();
+  if (const std::string damage = map.damage(); !damage.empty()) warn(damage);
   record.final = corrected(map, run);
   if (!arguments.final_ba) return;
   timer.lap_ms();

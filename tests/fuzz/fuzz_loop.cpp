@@ -9,6 +9,7 @@
 #include "fbvins/io/file_source.hpp"
 #include "fbvins/loop/binary_file.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/place_store.hpp"
 #include "fbvins/loop/vocabulary_training.hpp"
 #include "tests/broken_datasets/toy_dataset.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
@@ -18,7 +19,8 @@
 namespace fbvins::fuzz {
 namespace {
 
-constexpr std::size_t kMapHeader_bytes = 32, kMapFlagsAt = 12, kMapSizeAt = 16, kMapChecksumAt = 24;
+constexpr std::size_t kMapHeader_bytes = 16, kMapFlagsAt = 12, kMapEnd_bytes = 24;
+constexpr std::size_t kMapVersionAt = 8, kMap1Header_bytes = 32, kMap1SizeAt = 16, kMap1ChecksumAt = 24;
 constexpr std::size_t kVocabularyHeader_bytes = 64, kNodesAt = 12, kVocabularyChecksumAt = 48, kNode_bytes = 48;
 
 Descriptor some_descriptor(Rng& rng) { return {{rng.next_u32(), rng.next_u32(), rng.next_u32(), rng.next_u32()}}; }
@@ -53,13 +55,70 @@ std::uint64_t checksum_from(const std::string& bytes, std::size_t at) {
   return checksum64(std::as_bytes(std::span(bytes)).subspan(at));
 }
 
+template <class T>
+T value_at(const std::string& bytes, std::size_t at) {
+  T value{};
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
 std::string with_its_checksum(std::string bytes) {
-  if (bytes.size() < kMapHeader_bytes) return bytes;
-  std::uint32_t flags = 0;
-  std::memcpy(&flags, bytes.data() + kMapFlagsAt, sizeof flags);
-  overwrite(bytes, kMapSizeAt, std::uint64_t{bytes.size() - kMapHeader_bytes});
-  overwrite(bytes, kMapChecksumAt, checksum_from(bytes, kMapHeader_bytes) ^ flags);
+  if (bytes.size() < kMap1Header_bytes + kMapEnd_bytes) return bytes;
+  const auto flags = value_at<std::uint32_t>(bytes, kMapFlagsAt);
+  if (value_at<std::uint32_t>(bytes, kMapVersionAt) == 1) {
+    overwrite(bytes, kMap1SizeAt, std::uint64_t{bytes.size() - kMap1Header_bytes});
+    overwrite(bytes, kMap1ChecksumAt, checksum_from(bytes, kMap1Header_bytes) ^ flags);
+    return bytes;
+  }
+  const std::size_t end = bytes.size() - kMapEnd_bytes;
+  const auto front = value_at<std::uint64_t>(bytes, end);
+  if (front < kMapHeader_bytes || front > end) return bytes;
+  overwrite(bytes, end + 8, std::uint64_t{end - front});
+  overwrite(bytes, end + 16, checksum64(std::as_bytes(std::span(bytes)).subspan(front, end - front)) ^ flags);
   return bytes;
+}
+
+/// A map of three flights that remembers its sessions, with words.
+std::string map_of_many_flights() {
+  Rng rng(8);
+  PlaceMap map;
+  map.vocabulary = 5;
+  for (int i = 0; i < 6; ++i) {
+    MapKeyframe k;
+    k.t = Time{1000 * i};
+    k.session = static_cast<std::uint32_t>(i / 2);
+    k.missed = i;
+    k.T_GB.p.x() = k.T_MB.p.x() = i;
+    k.place.focal_px = 400;
+    k.place.features.push_back({0.1f, 0.2f, 0.3f, 0.001f, 0.01f});
+    k.place.descriptors.push_back(some_descriptor(rng));
+    k.place.words = {{3, 0.5f}, {5 + i, 0.5f}};
+    MapSession& session = map.session(k.session, k.t);
+    session.ended = k.t;
+    ++session.keyframes;
+    map.add(std::move(k));
+    if (i > 0) map.edges.push_back({KeyframeId{i - 1}, KeyframeId{i}, {Quat::Identity(), Vec3(1, 0, 0)}, Mat6::Identity()});
+  }
+  return serialise_map(map);
+}
+
+std::string map_of_version_1() { return *read_file(FBVINS_SOURCE_DIR "/tests/data/map_version_1.fbm", 1u << 20u); }
+
+/// A map whose places stay in the file: whatever is damaged is passed over, and named where it is to be written.
+void fuzz_stored(const std::string& bytes) {
+  static const NamedFile file("fbm");
+  const auto map = open_map(file.with(bytes), 0);
+  require_sentence(map);
+  if (!map || !map->store) return;
+  for (const MapKeyframe& k : map->keyframes()) {
+    require(map->place_of(k)->size() == map->place_of(k)->descriptors.size());
+    (void)map->words_of(k);
+  }
+  for (const StoredWord& word : map->store->words())
+    for (const WordPosting& p : map->store->keyframes_with(word)) require(p.slot < map->size());
+  const auto written = map_bytes(*map);
+  require_sentence(written);
+  require(written.ok() == !map->store->damage());
 }
 
 std::string with_whole_nodes(std::string bytes) {
@@ -73,17 +132,21 @@ std::string with_whole_nodes(std::string bytes) {
 
 }  // namespace
 
-std::vector<std::string> map_seeds() { return {small_map(false), small_map(true), serialise_map(PlaceMap{})}; }
+std::vector<std::string> map_seeds() {
+  return {small_map(false), small_map(true), serialise_map(PlaceMap{}), map_of_many_flights(), map_of_version_1()};
+}
 
 /// What is read is written as the same bytes again.
 void fuzz_map(std::string_view bytes) {
   require_sentence(parse_map(std::as_bytes(std::span(bytes)), "map"));
   const std::string whole = with_its_checksum(std::string(bytes));
+  fuzz_stored(whole);
   const auto map = parse_map(std::as_bytes(std::span(whole)), "map");
   require_sentence(map);
   if (!map) return;
   const std::string written = serialise_map(*map);
-  require(written == whole || map->sessions.size() > 1);  // files of before do not list their sessions
+  // Files of before do not list their sessions.
+  require(written == whole || map->sessions.size() > 1 || value_at<std::uint32_t>(whole, kMapVersionAt) == 1);
   const auto again = parse_map(std::as_bytes(std::span(written)), "map");
   require(again.ok() && serialise_map(*again) == written);
   require(!map_as_ply(*map).empty());

@@ -10,7 +10,8 @@
 //   Result<void> saved = (*map)->save("flat.fbm");
 //
 // The pipeline calls process() from one thread; everything else is called before the first keyframe or after the system's
-// finish(). The same keyframes give the same bytes in the file.
+// finish(). The same keyframes give the same bytes in the file. Of a loaded map the places are read from the file when they are
+// needed, and at most LoopOptions::memory_mb of them are kept; adjust() reads all.
 #pragma once
 
 #include <cstdint>
@@ -65,9 +66,13 @@ class LoopMap final : public Mapper {
   /// Parts of the flight, between restarts, that were localised in an older map but do not fit it, and why, by
   /// MapUpdate::map_session. They are no part of the file, and the older map is in it as it was.
   std::map<std::uint32_t, std::string> not_joined() const;
-  /// Bytes of the file that save() writes; may be called on the thread of process(), too.
-  std::string bytes() const;
-  /// Replaces the file atomically: there is never half of one.
+  /// What of the loaded file could not be read when it was needed, and was passed over: a sentence; empty: nothing.
+  std::string damage() const;
+  /// Bytes of the file that save() writes, all of them; may be called on the thread of process(), too. An error where a part of
+  /// the loaded file is needed and cannot be read.
+  Result<std::string> bytes() const;
+  /// Replaces the file atomically, also the loaded one: there is never half of one. Errors as of bytes(), which it needs no
+  /// memory for.
   Result<void> save(const std::string& path) const;
 
  private:

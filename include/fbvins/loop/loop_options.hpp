@@ -51,11 +51,14 @@ struct LoopOptions {
   double follow_radps = 3 * kDegree;
   int thin_above = 600;
   int max_keyframes = 3000;
+  int memory_mb = 200;
   int degrees_of_freedom = 4;  ///< of a keyframe in the graph: 4, position and yaw; 6, roll and pitch as well
 
   template <class V>
   void visit(V&& v) {
     v("max_keyframes", max_keyframes, "", "keyframes of the map at most", 20, 1000000);
+    v("memory_mb", memory_mb, "MB", "features of a loaded map in memory at most; others are read from its file when needed", 0,
+      1000000);
     v("thin_above", thin_above, "", "keyframes above which redundant ones are removed", 10, 1000000);
     v("max_distance_m", max_distance_m, "m", "places farther than this from the predicted position are not tried", 0.1, 1000.0);
     v("gate_sigma", gate_sigma, "", "a recognised place farther than this from the odometry's prediction is refused", 1.0, 100.0);

@@ -20,9 +20,9 @@
 #include <vector>
 
 #include "fbvins/bags/message_fields.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
-#include "fbvins/io/byte_source.hpp"
 
 namespace fbvins {
 

@@ -6,7 +6,7 @@
 
 #include "fbvins/bags/bag_reader.hpp"
 #include "fbvins/bags/decompress.hpp"
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/mcap_reader.hpp"
 
 namespace fbvins {

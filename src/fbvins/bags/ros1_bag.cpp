@@ -8,7 +8,7 @@
 
 #include "fbvins/bags/bag_reader.hpp"
 #include "fbvins/bags/decompress.hpp"
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/quoted.hpp"
 
 namespace fbvins {
@@ -187,7 +187,8 @@ class Ros1Bag final : public BagReader {
     position_ = 0;
     if (loaded_whole_ || !head.whole) return;
     if (loaded_.empty())
-      complain_at(at, fmt::format("this chunk, compressed by '{}', cannot be read", fbvins::quoted(head.fields.text("compression"))));
+      complain_at(at,
+                  fmt::format("this chunk, compressed by '{}', cannot be read", fbvins::quoted(head.fields.text("compression"))));
     else complain_at(at, "this chunk is damaged and is read up to its last complete record");
   }
 

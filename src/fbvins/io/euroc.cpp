@@ -19,7 +19,7 @@
 namespace fbvins {
 namespace {
 
-constexpr std::uint64_t kLargestCsv_bytes = std::uint64_t{1} << 30u;
+constexpr std::uint64_t kLargestFolderCsv_bytes = std::uint64_t{1} << 30u;
 // IMU samples this long before the first frame delivered are of use for starting up.
 constexpr Duration kImuLeadIn = {1'000'000'000};
 
@@ -182,7 +182,7 @@ class EurocReader {
 
   /// Of the images in a folder.
   Result<void> read_rows(const std::string& folder, CameraInfo& info, std::vector<ImageRow>& images) {
-    Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
+    Result<std::string> csv = text(folder + "data.csv", kLargestFolderCsv_bytes);
     if (!csv) return csv.error();
     auto rows = read_image_rows(*csv, named(folder + "data.csv"));
     if (!rows) return rows.error();
@@ -223,7 +223,7 @@ class EurocReader {
 
   Result<void> read_imu() {
     if (!options_.require_imu && !exists("imu0/data.csv")) return {};
-    Result<std::string> csv = text("imu0/data.csv", kLargestCsv_bytes);
+    Result<std::string> csv = text("imu0/data.csv", kLargestFolderCsv_bytes);
     if (!csv) return csv.error();
     auto rows = read_stamped_rows<ImuSample>(*csv, named("imu0/data.csv"), ImuRowParser{});
     if (!rows) return rows.error();
@@ -255,7 +255,7 @@ class EurocReader {
       if (!mounting) return warn(fmt::format("ground truth is not used: {}", mounting.error().message));
       T_BS = *mounting;
     }
-    Result<std::string> csv = text(folder + "data.csv", kLargestCsv_bytes);
+    Result<std::string> csv = text(folder + "data.csv", kLargestFolderCsv_bytes);
     if (!csv) return warn(fmt::format("ground truth is not used: {}", csv.error().message));
     Result<TrajectoryFile> truth = parse_trajectory(*csv, named(folder + "data.csv"));
     if (!truth) return warn(fmt::format("ground truth is not used: {}", truth.error().message));

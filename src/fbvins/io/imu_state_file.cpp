@@ -7,7 +7,7 @@
 #include <charconv>
 #include <filesystem>
 
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/calibration_fields.hpp"
 #include "fbvins/io/output_file.hpp"
 

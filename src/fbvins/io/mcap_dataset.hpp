@@ -3,7 +3,7 @@
 // delivered.
 #pragma once
 
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {

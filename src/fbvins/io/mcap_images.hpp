@@ -10,7 +10,7 @@
 #include <string>
 
 #include "fbvins/camera/camera.hpp"
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/io/dataset.hpp"
 
 namespace fbvins {

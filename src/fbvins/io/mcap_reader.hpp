@@ -19,9 +19,9 @@
 #include <string_view>
 #include <vector>
 
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/result.hpp"
 #include "fbvins/core/time.hpp"
-#include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/mcap_format.hpp"
 
 namespace fbvins {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 
 namespace fbvins {
 namespace {

@@ -12,6 +12,12 @@ namespace {
 /// Candidates to verify for a keyframe, out of so many of the most similar.
 constexpr std::size_t kCandidates = 3;
 constexpr int kMostSimilar = 40;
+/// A query that would look at more entries of the index, as in maps of some ten thousand keyframes, first makes a list of so many
+/// by its rarest words, of which it needs so many.
+constexpr std::size_t kManyEntries = 100'000, kFewestWords = 40;
+constexpr int kShortlist = 200;
+/// To compare with the words of a keyframe is as much work as so many entries of the index.
+constexpr std::size_t kEntriesOfAKeyframe = 1000;
 /// Keyframes younger than this make no loop: the odometry connects them.
 constexpr double kMinAge_s = 2;
 /// Keyframes that look in a direction that differs more are no candidates.
@@ -59,24 +65,43 @@ std::vector<KeyframeId> CandidateSearch::plausible(const PlaceMap& map, const Ma
   const Vec3 axis = query.T_MB.q * (T_BC0_.q * Vec3::UnitZ());
   std::vector<KeyframeId> ids;
   for (const MapKeyframe& k : map.keyframes()) {
-    if (!k.placed) continue;
+    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach || !k.placed) continue;  // the distance first: most are far
     if (k.session == query.session && seconds_between(query, k) < kMinAge_s) continue;
-    if ((k.T_MB.p - query.T_MB.p).squaredNorm() > reach * reach) continue;
     if ((k.T_MB.q * (T_BC0_.q * Vec3::UnitZ())).dot(axis) < min_cos) continue;
     ids.push_back(k.id);
   }
   return ids;
 }
 
+/// With the words of each, or by the index, whichever is less work; the result is the same.
+std::vector<IndexHit> CandidateSearch::most_similar(const PlaceMap& map, const BowVector& words,
+                                                    const std::vector<KeyframeId>& among) {
+  if (among.size() * kEntriesOfAKeyframe > index_.entries(words)) return index_.query(words, kMostSimilar, among);
+  std::vector<IndexHit> hits;
+  for (const KeyframeId id : among)
+    if (const float similarity = similarity_of(words, *map.words_of(*map.find(id))); similarity > 0)
+      hits.push_back({id, similarity});
+  keep_best(hits, kMostSimilar);
+  return hits;
+}
+
+/// In a large map, of those that share its rarest words.
+std::vector<IndexHit> CandidateSearch::most_similar(const PlaceMap& map, const BowVector& words) {
+  const auto placed = [&](KeyframeId k) { return map.find(k)->placed; };
+  if (index_.entries(words) <= kManyEntries) return index_.query(words, kMostSimilar, placed);
+  std::vector<IndexHit> hits = index_.shortlist(words, kShortlist, kManyEntries, kFewestWords, placed);
+  for (IndexHit& hit : hits) hit.similarity = similarity_of(words, *map.words_of(*map.find(hit.keyframe)));
+  keep_best(hits, kMostSimilar);
+  return hits;
+}
+
 std::vector<KeyframeId> CandidateSearch::around(const PlaceMap& map, const MapKeyframe& query, double sigma_m) {
   const std::vector<KeyframeId> near = plausible(map, query, sigma_m);
-  const auto is_near = [&](KeyframeId k) { return std::binary_search(near.begin(), near.end(), k); };
-  return one_of_each_place(map, index_.query(query.place.words, kMostSimilar, is_near));
+  return one_of_each_place(map, most_similar(map, query.place.words, near));
 }
 
 std::vector<KeyframeId> CandidateSearch::anywhere(const PlaceMap& map, const MapKeyframe& query) {
-  const auto placed = [&](KeyframeId k) { return map.find(k)->placed; };
-  return one_of_each_place(map, supported_by_neighbours(map, index_.query(query.place.words, kMostSimilar, placed)));
+  return one_of_each_place(map, supported_by_neighbours(map, most_similar(map, query.place.words)));
 }
 
 }  // namespace fbvins

@@ -20,6 +20,8 @@ class CandidateSearch {
   CandidateSearch(int words, const Pose<B, C0>& T_BC0, double max_distance_m)
       : index_(words), T_BC0_(T_BC0), max_distance_m_(max_distance_m) {}
 
+  /// All keyframes of a file; before any other.
+  void add(std::shared_ptr<PlaceStore> store) { index_.add(std::move(store)); }
   void add(KeyframeId id, const BowVector& words) { index_.add(id, words); }
   void remove(KeyframeId id, const BowVector& words) { index_.remove(id, words); }
 
@@ -30,6 +32,8 @@ class CandidateSearch {
 
  private:
   std::vector<KeyframeId> plausible(const PlaceMap& map, const MapKeyframe& query, double sigma_m) const;
+  std::vector<IndexHit> most_similar(const PlaceMap& map, const BowVector& words);
+  std::vector<IndexHit> most_similar(const PlaceMap& map, const BowVector& words, const std::vector<KeyframeId>& among);
 
   InvertedIndex index_;
   Pose<B, C0> T_BC0_;

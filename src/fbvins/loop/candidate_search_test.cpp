@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "fbvins/core/rng.hpp"
+
 namespace fbvins {
 namespace candidate_search_test {
 
@@ -17,6 +19,7 @@ class Search : public testing::Test {
     k.session = session;
     k.T_MB = {so3_exp(Vec3(0, 0, yaw_rad)), p};
     const BowVector words{{0, similarity}, {1, 1 - similarity}};
+    k.place.words = words;
     const KeyframeId id = map_.add(std::move(k));
     search_.add(id, words);
     return id;
@@ -77,6 +80,39 @@ TEST_F(Search, WhatIsRemovedIsNotFound) {
   search_.remove(id, {{0, 0.5f}, {1, 0.5f}});
   EXPECT_TRUE(search_.around(map_, query(100), 0).empty());
   EXPECT_TRUE(search_.anywhere(map_, query(100)).empty());
+}
+
+BowVector some_words(Rng& rng, int words) {
+  BowVector bow;
+  for (std::int32_t w = 0; w < words; ++w)
+    if (rng.below(3) == 0) bow.push_back({w, static_cast<float>(rng.uniform(0.01, 0.02))});
+  return bow;
+}
+
+/// So many keyframes that a query would look at more than a hundred thousand entries.
+TEST(LargeMap, GivesTheMostSimilarOnesAsASmallOneDoes) {
+  constexpr int kManyWords = 200, kKeyframes = 6000;
+  Rng rng(1);
+  PlaceMap map;
+  CandidateSearch search(kManyWords, kForward, 4.0);
+  for (int i = 0; i < kKeyframes; ++i) {
+    MapKeyframe k;
+    k.t = Time{} + Duration::from_seconds(10.0 * i);
+    k.T_MB.p = Vec3(i, 0, 0);
+    k.place.words = some_words(rng, kManyWords);
+    const BowVector words = k.place.words;
+    search.add(map.add(std::move(k)), words);
+  }
+  for (const int i : {7, 777, 5990}) {
+    MapKeyframe query = map.keyframes()[static_cast<std::size_t>(i)];
+    query.session = 1;
+    for (std::size_t w = 0; w < query.place.words.size(); w += 4) query.place.words[w].weight = 0.001f;
+    EXPECT_EQ(search.anywhere(map, query)[0], KeyframeId{i});
+    const std::vector<KeyframeId> near = search.around(map, query, 0);
+    ASSERT_EQ(near.size(), 3u);
+    EXPECT_EQ(near[0], KeyframeId{i});
+    for (const KeyframeId id : near) EXPECT_LE(std::abs(id.value - i), 4);
+  }
 }
 
 }  // namespace candidate_search_test

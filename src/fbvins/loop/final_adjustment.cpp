@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "fbvins/loop/adjustment.hpp"
+#include "fbvins/loop/map_front.hpp"
 
 namespace fbvins {
 namespace {
@@ -49,6 +50,10 @@ std::string objection(const Plausibility& before, const Plausibility& after) {
 FinalAdjustmentReport adjust_map(PlaceMap& map, const PlaceVerifierOptions& matching) {
   FinalAdjustmentReport report;
   if (map.empty()) return report;
+  if (const Result<void> all = read_places(map); !all) {
+    report.refused = all.error().message;
+    return report;
+  }
   Adjustment adjustment(map);
   for (const FeatureTrack& track : feature_tracks(map, matching, kNeighbours, kMatchRadius_px)) adjustment.add(track);
   if (adjustment.empty()) return report;

@@ -30,10 +30,25 @@ TEST(InvertedIndex, AgreesWithComparingWithEveryImage) {
   ASSERT_EQ(hits.size(), 40u);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     EXPECT_NEAR(hits[i].similarity, bow_similarity(query, images[static_cast<std::size_t>(hits[i].keyframe.value)]), 1e-5);
+    EXPECT_EQ(hits[i].similarity, similarity_of(query, images[static_cast<std::size_t>(hits[i].keyframe.value)]));
     EXPECT_GE(hits[i == 0 ? 0 : i - 1].similarity, hits[i].similarity);
   }
   EXPECT_EQ(index.query(query, 3).size(), 3u);
   EXPECT_EQ(index.query(query, 3)[0].keyframe, hits[0].keyframe) << "a query leaves no state behind";
+}
+
+TEST(InvertedIndex, AShortlistIsOfTheRarestWords) {
+  InvertedIndex index(kWords);
+  for (int id = 0; id < 20; ++id) index.add(KeyframeId{id}, {{1, 0.5f}, {2 + id % 4, 0.5f}, {10 + id, 0.5f}});
+  const BowVector query{{1, 0.5f}, {2, 0.5f}, {13, 0.5f}};
+  EXPECT_EQ(index.entries(query), 26u);
+  const auto all = [](KeyframeId) { return true; };
+  EXPECT_EQ(index.shortlist(query, 100, 26, 1, all).size(), 20u);
+  EXPECT_EQ(index.shortlist(query, 100, 6, 1, all).size(), 6u);
+  EXPECT_EQ(index.shortlist(query, 100, 5, 1, all).size(), 1u);
+  EXPECT_EQ(index.shortlist(query, 100, 5, 2, all).size(), 6u) << "of the fewest words in any case";
+  EXPECT_EQ(index.shortlist(query, 3, 6, 1, all)[0].keyframe, KeyframeId{0});
+  EXPECT_EQ(index.shortlist(query, 100, 5, 1, [](KeyframeId k) { return k.value != 3; }).size(), 0u);
 }
 
 TEST(InvertedIndex, EqualOnesComeInOrderOfId) {

@@ -59,10 +59,10 @@ LoopCloser::LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabul
       join_(map_),
       follower_(options.follow_mps, options.follow_radps),
       thinning_(options.thin_above, options.max_keyframes, map_) {
-  for (MapKeyframe& k : map_.keyframes()) {
-    k.place.words = vocabulary.words_of(k.place.descriptors);
-    search_.add(k.id, k.place.words);
-  }
+  map_.fill_words(vocabulary);
+  if (map_.store) search_.add(map_.store);
+  for (const MapKeyframe& k : map_.keyframes())
+    if (k.stored < 0) search_.add(k.id, k.place.words);
   map_.anchored = map_.anchored && !map_.empty();
 }
 
@@ -121,8 +121,8 @@ void LoopCloser::level(const Quat& q_LG) {
     if (map_.anchored) frame_.turn(map_.turn(turned_in_M, frame_.T_MG() * session_.T_GB->p));
     else frame_.turn(map_.turn(turned, map_.keyframes()[0].T_MB.p));
   } else {
-    for (MapKeyframe& k : map_.keyframes())
-      if (k.session == session_.number) k.T_MB.q = (turned_in_M * k.T_MB.q).normalized();
+    for (auto k = map_.keyframes().rbegin(); k != map_.keyframes().rend() && k->session == session_.number; ++k)
+      k->T_MB.q = (turned_in_M * k->T_MB.q).normalized();
   }
   frame_.level(q_LG);
 }
@@ -145,17 +145,8 @@ void LoopCloser::advance(const Keyframe& keyframe) {
 MapKeyframe LoopCloser::query_of(Place place, const Keyframe& keyframe) {
   advance(keyframe);
   const Pose<G, B>& T_GB = keyframe.gauge.T_GB;
-  return {{},
-          keyframe.t,
-          session_.number,
-          T_GB,
-          frame_.T_MG() * T_GB,
-          session_.path_m,
-          0,
-          0,
-          frame_.known(),
-          std::move(place),
-          {keyframe.gauge.v_GB, keyframe.imu.bias}};
+  return {{}, keyframe.t, session_.number, T_GB, frame_.T_MG() * T_GB, session_.path_m,
+          0,  0,          frame_.known(),  -1,   std::move(place),     {keyframe.gauge.v_GB, keyframe.imu.bias}};
 }
 
 MapUpdate LoopCloser::begin_update(const Keyframe& keyframe) {
@@ -220,9 +211,9 @@ std::vector<LoopCloser::Proposal> LoopCloser::look_at(const MapKeyframe& query, 
     std::optional<VerifiedPose> verified;
     if (frame_.known() && radius_px < kWidestPrediction_px) {
       const Pose<M, C0> T_MQ = query.T_MB * T_BC0_, T_MK = k.T_MB * T_BC0_;
-      verified = verifier_.verify(k.place, {T_MQ.inverse() * T_MK, radius_px});
+      verified = verifier_.verify(*map_.place_of(k), {T_MQ.inverse() * T_MK, radius_px});
     } else {
-      verified = verifier_.verify(k.place);
+      verified = verifier_.verify(*map_.place_of(k));
     }
     if (!verified) continue;
     const MapEdge edge = loop_edge(T_BC0_, id, verified->pose);

@@ -39,7 +39,8 @@ class LoopCloser final : public Mapper {
  public:
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary);
   /// Continues an old map: M is that map's frame, and the flight must first be localised in it. With boosted descriptors, `stage`
-  /// makes them; vocabulary and map must be of the same kind.
+  /// makes them; vocabulary and map must be of the same kind. Of a map whose places are in a file, the words must be by this
+  /// vocabulary.
   LoopCloser(const StereoRig& rig, const LoopOptions& options, Vocabulary vocabulary, PlaceMap map,
              std::unique_ptr<DescriptorStage> stage = make_identity_stage());
 

@@ -2,11 +2,12 @@
 #include "fbvins/loop/loop_map.hpp"
 
 #include "fbvins/camera/group_images.hpp"
-#include "fbvins/core/atomic_file.hpp"
 #include "fbvins/core/options.hpp"
 #include "fbvins/features/booster.hpp"
 #include "fbvins/loop/loop_closer.hpp"
 #include "fbvins/loop/map_file.hpp"
+#include "fbvins/loop/map_front.hpp"
+#include "fbvins/loop/place_store.hpp"
 #include "fbvins/loop/vocabulary_file.hpp"
 
 namespace fbvins {
@@ -29,11 +30,14 @@ Result<std::unique_ptr<LoopMap>> LoopMap::create(const StereoRig& rig, const Map
                  "a map needs two cameras that see the same things, or a depth sensor: places are recognised "
                  "by the depth of what they show"};
   Result<PlaceMap> map = PlaceMap{};
-  if (!options.file.empty()) map = load_map(options.file);
+  constexpr std::uint64_t kMB = 1'000'000;
+  if (!options.file.empty()) map = open_map(options.file, kMB * static_cast<std::uint64_t>(options.loop.memory_mb));
   if (!map) return map.error();
   if (map->empty()) map->boosted = options.boosted;
   auto vocabulary = open_vocabulary(map->boosted ? kBoostedDescriptors : kRawDescriptors, options.vocabulary);
   if (!vocabulary) return vocabulary.error();
+  if (map->vocabulary != vocabulary->fingerprint())
+    if (Result<void> all = read_places(*map); !all) return all.error();
   Result<std::unique_ptr<DescriptorStage>> stage = make_identity_stage();
   if (map->boosted) stage = make_booster_stage(BoosterOptions{});
   if (!stage) return stage.error();
@@ -60,10 +64,17 @@ FinalAdjustmentReport LoopMap::adjust() { return closer_->adjust(); }
 Trajectory<M> LoopMap::corrected(const Trajectory<G>& in_G) const { return closer_->corrected(in_G); }
 int LoopMap::keyframes() const { return static_cast<int>(closer_->map().size()); }
 std::map<std::uint32_t, std::string> LoopMap::not_joined() const { return closer_->objections(); }
-std::string LoopMap::bytes() const {
+Result<std::string> LoopMap::bytes() const {
   const std::optional<PlaceMap> reduced = closer_->reduced();
-  return serialise_map(reduced ? *reduced : closer_->map());
+  return map_bytes(reduced ? *reduced : closer_->map());
 }
-Result<void> LoopMap::save(const std::string& path) const { return write_file_atomically(path, bytes()); }
+Result<void> LoopMap::save(const std::string& path) const {
+  const std::optional<PlaceMap> reduced = closer_->reduced();
+  return save_map(reduced ? *reduced : closer_->map(), path);
+}
+std::string LoopMap::damage() const {
+  const std::shared_ptr<PlaceStore>& store = closer_->map().store;
+  return store && store->damage() ? store->damage()->message : std::string();
+}
 
 }  // namespace fbvins

@@ -86,7 +86,7 @@ TEST_F(OpenedMap, IsMadeByThePairWhicheverItsNumbers) {
       (*map)->process(k);
     }
     (*map)->finish();
-    return (*map)->bytes();
+    return *(*map)->bytes();
   };
   EXPECT_TRUE(made(three, true) == made(pair, false));
   const StereoRig apart = with_cameras(

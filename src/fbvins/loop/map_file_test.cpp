@@ -52,6 +52,12 @@ PlaceMap anchored_map_of(int keyframes, std::uint64_t seed) {
   return map;
 }
 
+PlaceMap with_words(PlaceMap map) {
+  map.vocabulary = 77;
+  for (MapKeyframe& k : map.keyframes()) k.place.words = {{2, 0.25f}, {static_cast<std::int32_t>(10 + k.id.value), 0.75f}};
+  return map;
+}
+
 std::span<const std::byte> view(const std::string& s) { return std::as_bytes(std::span(s)); }
 
 class MapFile : public testing::Test {
@@ -94,6 +100,45 @@ TEST_F(MapFile, AnchorsAreKept) {
   EXPECT_FALSE(parse_map(view(serialise_map(map_of(5, 1))), "map")->anchored);
 }
 
+TEST_F(MapFile, WordsAreKeptWithTheirVocabulary) {
+  const PlaceMap map = with_words(map_of(5, 1));
+  const auto parsed = parse_map(view(serialise_map(map)), "map");
+  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
+  EXPECT_EQ(parsed->vocabulary, 77u);
+  for (std::size_t i = 0; i < map.size(); ++i) EXPECT_EQ(parsed->keyframes()[i].place.words, map.keyframes()[i].place.words);
+  EXPECT_EQ(serialise_map(*parsed), serialise_map(map));
+  EXPECT_LT(serialise_map(map_of(5, 1)).size(), serialise_map(map).size()) << "without a vocabulary none are written";
+}
+
+TEST_F(MapFile, AFileOfVersion1IsReadAndWrittenAsTheNewest) {
+  const auto old = load_map(FBVINS_SOURCE_DIR "/tests/data/map_version_1.fbm");
+  ASSERT_TRUE(old.ok()) << old.error().message;
+  EXPECT_EQ(old->name, "Hall 3");
+  EXPECT_TRUE(old->anchored);
+  ASSERT_EQ(old->size(), 4u);
+  EXPECT_EQ(old->keyframes()[3].place.size(), 6u);
+  EXPECT_EQ(old->keyframes()[3].missed, 3);
+  EXPECT_EQ(old->keyframes()[3].T_MB.p, Vec3(3, 1.1, 2));
+  ASSERT_EQ(old->edges.size(), 3u);
+  EXPECT_EQ(old->edges[1].kind, MapEdge::Kind::loop);
+  EXPECT_EQ(old->edges[1].information(5, 5), 3.0);
+  EXPECT_EQ(old->anchors.size(), 1u);
+  ASSERT_EQ(old->sessions.size(), 2u);
+  EXPECT_EQ(old->sessions[1].keyframes, 2);
+  ASSERT_TRUE(save_map(*old, path_).ok());
+  const auto now = load_map(path_);
+  ASSERT_TRUE(now.ok()) << now.error().message;
+  EXPECT_EQ(serialise_map(*now), serialise_map(*old));
+  EXPECT_EQ(now->keyframes()[3].place.features, old->keyframes()[3].place.features);
+  EXPECT_EQ(now->edges[1].information, old->edges[1].information);
+}
+
+TEST_F(MapFile, AnotherVersionIsNamed) {
+  std::string bytes = serialise_map(map_of(2, 1));
+  bytes[8] = 9;
+  EXPECT_EQ(parse_map(view(bytes), "flat.fbm").error().message, "flat.fbm: map of version 9, this program reads 1 and 2");
+}
+
 TEST_F(MapFile, PlacesWithoutAPoseAreLeftOut) {
   PlaceMap map = map_of(10, 1);
   map.keyframes()[9].placed = false;
@@ -109,7 +154,8 @@ TEST_F(MapFile, EveryDamageIsAnErrorWithASentence) {
   Rng rng(3);
   for (int i = 0; i < 2000; ++i) {
     std::string bad = good;
-    const auto at = rng.below(static_cast<std::uint32_t>(i % 2 == 0 ? 32 : good.size()));
+    const auto size = static_cast<std::uint32_t>(good.size());
+    const auto at = i % 2 == 0 ? rng.below(16) : i % 3 == 0 ? size - 1 - rng.below(24) : rng.below(size);
     if (i % 5 == 0) bad.resize(at);
     else bad[at] ^= static_cast<char>(1u << rng.below(8));
     const auto parsed = parse_map(view(bad), "flat.fbm");
@@ -120,15 +166,19 @@ TEST_F(MapFile, EveryDamageIsAnErrorWithASentence) {
 
 TEST_F(MapFile, ContentThatPassesTheChecksumIsCheckedAllTheSame) {
   // Wrong counts and values, with the checksum made right: an error, never a crash.
-  const std::string good = serialise_map(anchored_map_of(5, 2));
+  const std::string good = serialise_map(with_words(anchored_map_of(5, 2)));
+  std::uint64_t front = 0;
+  std::memcpy(&front, good.data() + good.size() - 24, sizeof front);
+  const auto front_bytes = static_cast<std::uint32_t>(good.size() - 24 - front);
   Rng rng(4);
   for (int i = 0; i < 3000; ++i) {
     std::string bad = good;
-    for (int k = 0; k < 3; ++k)
-      bad[32 + rng.below(static_cast<std::uint32_t>(good.size() - 32))] = static_cast<char>(rng.below(256));
-    if (i % 3 == 0) bad[32 + rng.below(8)] = static_cast<char>(rng.below(256));
-    const std::uint64_t sum = checksum64(view(bad).subspan(32));
-    std::memcpy(bad.data() + 24, &sum, sizeof sum);
+    for (int k = 0; k < 3; ++k) bad[front + rng.below(front_bytes)] = static_cast<char>(rng.below(256));
+    if (i % 3 == 0) bad[front + rng.below(8)] = static_cast<char>(rng.below(256));
+    std::uint32_t flags = 0;
+    std::memcpy(&flags, bad.data() + 12, sizeof flags);
+    const std::uint64_t sum = checksum64(view(bad).subspan(front, front_bytes)) ^ flags;
+    std::memcpy(bad.data() + bad.size() - 8, &sum, sizeof sum);
     const auto parsed = parse_map(view(bad), "map");
     if (parsed.ok()) {
       EXPECT_LE(parsed->size(), 5u);  // only numbers changed

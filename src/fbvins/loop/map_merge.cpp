@@ -35,11 +35,6 @@ std::size_t keyframes_in_both(const PlaceMap& first, const PlaceMap& second) {
   }));
 }
 
-void fill_words(PlaceMap& map, const Vocabulary& vocabulary) {
-  for (MapKeyframe& k : map.keyframes())
-    if (k.place.words.empty()) k.place.words = vocabulary.words_of(k.place.descriptors);  // a file keeps none
-}
-
 /// A place of the first map, seen by a keyframe of the second.
 struct Tie {
   MapEdge edge;  ///< from the first's keyframe to the second's, under its number there
@@ -186,7 +181,7 @@ Result<PlaceMap> merge_maps(PlaceMap first, const PlaceMap& other, const LoopOpt
   for (PlaceMap* map : {&first, &second}) {
     std::erase_if(map->keyframes(), [](const MapKeyframe& k) { return !k.placed; });
     std::erase_if(map->edges, [&](const MapEdge& e) { return map->find(e.from) == nullptr || map->find(e.to) == nullptr; });
-    fill_words(*map, vocabulary);
+    map->fill_words(vocabulary);
     remember_sessions(*map);
   }
   Merge merge(first, second, options, vocabulary);

@@ -81,10 +81,12 @@ class Upkeep {
   void compare() {
     for (const auto& [id, with] : pairs()) {
       const MapKeyframe& k = *map_.find(id);
-      verifier_.set_query(k.place);
+      const std::shared_ptr<const Place> place = map_.place_of(k);
+      verifier_.set_query(*place);
       for (const KeyframeId other : with) {
         const MapKeyframe& old = *map_.find(other);
-        const auto found = verifier_.verify(old.place, {(k.T_MB * map_.T_BC0).inverse() * (old.T_MB * map_.T_BC0), kSearch_px});
+        const auto found =
+            verifier_.verify(*map_.place_of(old), {(k.T_MB * map_.T_BC0).inverse() * (old.T_MB * map_.T_BC0), kSearch_px});
         if (!found) continue;
         seen_.insert(other);
         if (within(old, k, kSame_m, kSame_rad) && static_cast<double>(found->pose.inliers.size()) > kSameShare * found->visible)

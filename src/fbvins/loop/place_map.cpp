@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "fbvins/imu/preintegration.hpp"
+#include "fbvins/loop/place_store.hpp"
 
 namespace fbvins {
 namespace {
@@ -72,6 +73,27 @@ KeyframeId PlaceMap::add(MapKeyframe keyframe) {
 const MapKeyframe* PlaceMap::find(KeyframeId id) const { return find_in(keyframes_, id); }
 MapKeyframe* PlaceMap::find(KeyframeId id) { return find_in(keyframes_, id); }
 
+std::shared_ptr<const Place> PlaceMap::place_of(const MapKeyframe& k) const {
+  if (k.stored < 0) return {std::shared_ptr<const Place>(), &k.place};
+  std::shared_ptr<Place> place = store->place(static_cast<std::size_t>(k.stored));
+  place->up_C0 = k.place.up_C0, place->focal_px = k.place.focal_px;
+  return place;
+}
+
+std::shared_ptr<const BowVector> PlaceMap::words_of(const MapKeyframe& k) const {
+  if (k.stored < 0) return {std::shared_ptr<const BowVector>(), &k.place.words};
+  return store->words_of(static_cast<std::size_t>(k.stored));
+}
+
+void PlaceMap::fill_words(const Vocabulary& words) {
+  const bool same = vocabulary == words.fingerprint();
+  for (MapKeyframe& k : keyframes_) {
+    BowVector& bow = k.place.words;
+    if (k.stored < 0 && (!same || bow.empty() || bow.back().word >= words.words())) bow = words.words_of(k.place.descriptors);
+  }
+  vocabulary = words.fingerprint();
+}
+
 void PlaceMap::remove(KeyframeId id) {
   const MapKeyframe* gone = find(id);
   if (gone == nullptr) return;
@@ -128,8 +150,8 @@ void PlaceMap::add_anchor(MapAnchor anchor) {
 }
 
 void PlaceMap::level(std::uint32_t session, const Quat& q_LG) {
-  for (MapKeyframe& k : keyframes_)
-    if (k.session == session) k.place.up_C0 = (q_LG * k.T_GB.q * T_BC0.q).conjugate() * Vec3::UnitZ();
+  for (auto k = keyframes_.rbegin(); k != keyframes_.rend() && k->session >= session; ++k)
+    if (k->session == session) k->place.up_C0 = (q_LG * k->T_GB.q * T_BC0.q).conjugate() * Vec3::UnitZ();
 }
 
 /// Keyframes connected to the first one or to an anchored one; the others have no place in M yet and stay as they are.

@@ -24,6 +24,7 @@ namespace fbvins {
 /// Readings over a longer interval constrain its ends no better than the odometry's relative pose does.
 inline constexpr double kLongestImu_s = 5;
 
+class PlaceStore;
 class Preintegration;
 
 /// Velocity and biases at a keyframe as estimated in flight. Not saved.
@@ -42,7 +43,8 @@ struct MapKeyframe {
   int loops_ending_here = 0;  ///< loops that ended here
   int missed = 0;             ///< later sessions in a row that stood here and did not know it again
   bool placed = true;         ///< T_MB is known: its session has been localised in the map
-  Place place;
+  std::int32_t stored = -1;   ///< slot of its place in PlaceMap::store; -1: the place is here
+  Place place;                ///< where it is stored: vertical and focal length only
   MapMotion motion;
 };
 
@@ -84,11 +86,17 @@ class PlaceMap {
   const MapKeyframe* find(KeyframeId id) const;
   MapKeyframe* find(KeyframeId id);
 
+  /// Its place, wherever that is; valid while it is held and the keyframe is in the map.
+  std::shared_ptr<const Place> place_of(const MapKeyframe& k) const;
+  std::shared_ptr<const BowVector> words_of(const MapKeyframe& k) const;
+  /// Words by this vocabulary for all places that are in memory and have none by it.
+  void fill_words(const Vocabulary& vocabulary);
+
   /// Moves all keyframes that have a place in M.
   void move(const Pose<M, M>& T);
   /// Turns them about `pivot_M`. Returns the motion.
   Pose<M, M> turn(const Quat& rotation, const Vec3& pivot_M);
-  /// Sets the verticals of all keyframes of a session from `q_LG`, which turns its gauge level.
+  /// Sets the verticals of all keyframes of the newest session from `q_LG`, which turns its gauge level.
   void level(std::uint32_t session, const Quat& q_LG);
 
   /// A map that is longer flown in keeps every second of its older anchors, so that their number stays bounded.
@@ -104,12 +112,14 @@ class PlaceMap {
 
   std::vector<MapEdge> edges;
   std::vector<MapAnchor> anchors;
-  std::vector<MapSession> sessions;  ///< in order of number
-  bool anchored = false;             ///< M is the frame A of the anchors
-  Pose<B, C0> T_BC0;                 ///< of the camera that saw the places
-  double gravity_mps2 = 9.81;        ///< of the readings on its edges
-  bool boosted = false;              ///< descriptors are boosted ones, which compare with such only
-  std::string name;                  ///< for people; empty: none
+  std::vector<MapSession> sessions;   ///< in order of number
+  bool anchored = false;              ///< M is the frame A of the anchors
+  Pose<B, C0> T_BC0;                  ///< of the camera that saw the places
+  double gravity_mps2 = 9.81;         ///< of the readings on its edges
+  bool boosted = false;               ///< descriptors are boosted ones, which compare with such only
+  std::string name;                   ///< for people; empty: none
+  std::uint64_t vocabulary = 0;       ///< Vocabulary::fingerprint() of the words of its places; 0: they have none
+  std::shared_ptr<PlaceStore> store;  ///< file with the places of keyframes that have a slot there; shared by copies
 
  private:
   std::vector<bool> in_graph() const;

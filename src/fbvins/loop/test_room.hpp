@@ -63,7 +63,8 @@ inline StereoRig rig() {
   return r;
 }
 
-inline Place seen(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
+/// Without words.
+inline Place view(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
   const Pose<G, C0> T_GC = T_GB * rig().T_BC0;
   const Pose<C0, G> T_CG = T_GC.inverse();
   Place place;
@@ -84,6 +85,11 @@ inline Place seen(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
     for (int b = 0; b < 16; ++b) d.bits[rng.below(4)] ^= std::uint64_t{1} << rng.below(64);
     place.descriptors.push_back(d);
   }
+  return place;
+}
+
+inline Place seen(const World& w, const Pose<G, B>& T_GB, Rng& rng) {
+  Place place = view(w, T_GB, rng);
   place.words = vocabulary().words_of(place.descriptors);
   return place;
 }

@@ -82,6 +82,7 @@ Result<Vocabulary> Vocabulary::open(const std::string& path) {
   Vocabulary v;
   v.kind_.assign(header.kind, strnlen(header.kind, sizeof header.kind));
   v.words_ = static_cast<int>(header.words);
+  v.fingerprint_ = std::max<std::uint64_t>(header.checksum, 1);
   v.nodes_ = {reinterpret_cast<const VocabularyNode*>(bytes.data() + sizeof header), header.nodes};
   v.descriptors_ = {reinterpret_cast<const Descriptor*>(bytes.data() + sizeof header + node_bytes), header.nodes};
   v.owner_ = std::move(*mapped);
@@ -101,7 +102,17 @@ Vocabulary Vocabulary::from_nodes(std::string kind, std::vector<VocabularyNode> 
   v.descriptors_ = arrays->descriptors;
   v.words_ = static_cast<int>(std::count_if(v.nodes_.begin(), v.nodes_.end(), [](const auto& n) { return n.children == 0; }));
   v.owner_ = std::move(arrays);
+  const std::string body = v.body();
+  v.fingerprint_ = std::max<std::uint64_t>(checksum64(std::as_bytes(std::span(body))), 1);
   return v;
+}
+
+/// Of the file, behind its header.
+std::string Vocabulary::body() const {
+  std::string body;
+  body.append(reinterpret_cast<const char*>(nodes_.data()), nodes_.size_bytes());
+  body.append(reinterpret_cast<const char*>(descriptors_.data()), descriptors_.size_bytes());
+  return body;
 }
 
 Result<void> Vocabulary::save(const std::string& path) const {
@@ -111,9 +122,7 @@ Result<void> Vocabulary::save(const std::string& path) const {
   header.nodes = static_cast<std::uint32_t>(nodes_.size());
   std::memcpy(header.kind, kind_.data(), std::min(kind_.size(), sizeof header.kind - 1));
   header.words = static_cast<std::uint32_t>(words_);
-  std::string body;
-  body.append(reinterpret_cast<const char*>(nodes_.data()), nodes_.size_bytes());
-  body.append(reinterpret_cast<const char*>(descriptors_.data()), descriptors_.size_bytes());
+  const std::string body = this->body();
   header.checksum = checksum64(std::as_bytes(std::span(body)));
   return write_file_atomically(path, std::string(reinterpret_cast<const char*>(&header), sizeof header) + body);
 }

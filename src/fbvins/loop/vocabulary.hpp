@@ -53,6 +53,8 @@ class Vocabulary {
 
   const std::string& kind() const { return kind_; }
   int words() const { return words_; }
+  /// Of what words depend on; never 0.
+  std::uint64_t fingerprint() const { return fingerprint_; }
   std::span<const VocabularyNode> nodes() const { return nodes_; }
   std::span<const Descriptor> descriptors() const { return descriptors_; }
 
@@ -61,10 +63,12 @@ class Vocabulary {
   BowVector words_of(std::span<const Descriptor> descriptors) const;
 
  private:
+  std::string body() const;
   std::int32_t leaf_of(const Descriptor& descriptor) const;
 
   std::string kind_;
   int words_ = 0;
+  std::uint64_t fingerprint_ = 1;
   std::shared_ptr<const void> owner_;  // the mapping, or the trained arrays
   std::span<const VocabularyNode> nodes_;
   std::span<const Descriptor> descriptors_;

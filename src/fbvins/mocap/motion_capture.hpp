@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fbvins/core/byte_source.hpp"
 #include "fbvins/core/result.hpp"
-#include "fbvins/io/byte_source.hpp"
 #include "fbvins/io/row_counts.hpp"
 #include "fbvins/types/motion_capture.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fbvins/io/byte_source.hpp"
+#include "fbvins/core/byte_source.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

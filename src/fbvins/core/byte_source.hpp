@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: bytes at any place of a file, or of memory in tests. Any thread.
+// Private: bytes at any place of a file, or of memory in tests. Any thread.
 #pragma once
 
 #include <cstdint>
