@@ -57,7 +57,7 @@ TEST(SocketMessage, AnotherMajorVersionIsToldBeforeAnythingElse) {
   const auto message = parse_socket_message(bytes_of(hello, 20));
   ASSERT_FALSE(message);
   EXPECT_EQ(message.error().code, ErrorCode::unsupported);
-  EXPECT_EQ(message.error().message, "the sender speaks version 7.3 of the protocol, this program 1.3");
+  EXPECT_EQ(message.error().message, "the sender speaks version 7.4 of the protocol, this program 1.4");
 }
 
 TEST(SocketMessage, LayoutsThatDoNotFitAreRefused) {
@@ -283,6 +283,19 @@ TEST(SocketMessage, HelloOfACameraWithADepthSensor) {
   EXPECT_EQ(refusal(bytes_of(hello)), "hello: a depth sensor goes with one camera, and there are 2");
   hello.header.size_bytes = 1512;
   EXPECT_EQ(refusal(bytes_of(hello, 1512)), "hello of 1512 bytes where 1552 are needed");
+}
+
+TEST(SocketMessage, WhatADeviceSaysOfItself) {
+  FbvinsSocketDevice device{{FBVINS_SOCKET_DEVICE, sizeof(device)}, "firmware=5.13.0\nusb=2.1\nstalls=3"};
+  const auto message = parse_socket_message(bytes_of(device));
+  ASSERT_TRUE(message) << message.error().message;
+  const DeviceFacts& facts = std::get<SocketDevice>(*message).facts;
+  EXPECT_EQ(facts.firmware, "5.13.0");
+  EXPECT_EQ(facts.usb, "2.1");
+  EXPECT_EQ(facts.stalls, 3);
+  std::strcpy(device.text, "usb=3\nstalls=many");
+  EXPECT_EQ(refusal(bytes_of(device)), "device, line 2: stalls=many");
+  EXPECT_EQ(refusal(bytes_of(device, 100)), "a message of 100 bytes says that it has 2048");
 }
 
 TEST(SocketMessage, NothingAndUnknownTypes) {
