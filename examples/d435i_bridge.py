@@ -111,7 +111,8 @@ class Camera:
         self.lock, self.failure, self.image_s = threading.Lock(), None, time.monotonic()
 
     def start(self):
-        self.image_s = time.monotonic()
+        with self.lock:  # what it had before it stopped is of no use
+            self.pairs, self.imu, self.image_s = StereoPairs(), MergedImu(), time.monotonic()
         for sensor, profiles in self.sensors:
             sensor.open(profiles)
             sensor.start(self.take)
@@ -221,11 +222,13 @@ class Watch:
         print("the camera is there, and no image comes: its streams are started again", file=sys.stderr, flush=True)
         again, self.stalled_s = time.monotonic() - self.stalled_s < 10, time.monotonic()
         camera.stop(close=False)
-        if again:
+        if not again:
+            return camera.start()
+        camera.failure = "it is reset"
+        try:
             camera.device.hardware_reset()
-            camera.failure = "it is reset"
-        else:
-            camera.start()
+        except RuntimeError as error:  # unplugged, or a software device
+            camera.failure = error
 
 
 def serve(camera, over, watch):

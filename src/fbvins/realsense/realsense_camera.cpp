@@ -174,6 +174,7 @@ Result<void> RealsenseCamera::start(SensorInput& input) {
   {
     const std::lock_guard lock(mutex_);
     heard_ = host_now();
+    pairs_ = FrameJoiner(2), motion_ = MotionMerge();  // what it had before it stopped is of no use
   }
   try {
     for (Stream& stream : streams_) {

@@ -200,11 +200,14 @@ void RealsenseSource::mend_stall(SensorInput& input) {
   stalled_ = host_now();
   camera_->stop();
   try {
-    if (again) rs2::device(camera_->device()).hardware_reset();  // then it is unplugged, and comes back
-    else if (Result<void> started = camera_->start(input); !started) report(started.error().message);
+    if (Result<void> started = again ? Result<void>{} : camera_->start(input); !started) report(started.error().message);
+    if (!again) return;
+    rs2::device(camera_->device()).hardware_reset();
   } catch (const rs2::error& e) {
     report(fmt::format("RealSense: {}", e.what()));
   }
+  const std::lock_guard lock(mutex_);
+  removed_ = true;  // it is looked for as one that was unplugged
 }
 
 void RealsenseSource::keep_facts() {
