@@ -81,8 +81,10 @@ int check_sensors(Source& source, double seconds) {
   }
   if (!done) return fail(done.error().message);
   bool fine = true;
-  for (const SensorFinding& finding : check.findings()) {
-    fmt::print("{}  {}\n", finding.fine ? "ok   " : "WRONG", finding.text);
+  std::vector<SensorFinding> findings = source.device_findings();
+  for (SensorFinding& finding : check.findings()) findings.push_back(std::move(finding));
+  for (const SensorFinding& finding : findings) {
+    fmt::print("{}  {}\n", !finding.fine ? "WRONG" : finding.advice ? "note " : "ok   ", finding.text);
     fine = fine && finding.fine;
   }
   const Diagnosis diagnosis = input.diagnosis(source.rig());

@@ -86,7 +86,7 @@ class Sender:
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             self.connection.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", PATIENCE_S, 0))
         self.connection.connect(path)
-        hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 0, 1, name.encode(), width, height, SLOTS, 2 * self.size, self.size, 0)
+        hello = struct.pack("<8sHHI32s6I", b"fb-vins", 1, 4, 1, name.encode(), width, height, SLOTS, 2 * self.size, self.size, 0)
         socket.send_fds(self.connection, [message(1, hello + calibration)], [memory])
         os.close(memory)
         while self.hear(0) != 65:  # welcome
@@ -112,6 +112,13 @@ class Sender:
         with self.lock:
             self.connection.send(message(2, struct.pack("<IIq6d", 1, 0, t_ns, *gyro, *accel)))
 
+    def device(self, facts):
+        """FbvinsSocketDevice: facts by their keys (docs/socket.md); None is not known."""
+        value = {True: "yes", False: "no"}
+        lines = (f"{key}={value[fact] if isinstance(fact, bool) else fact}\n" for key, fact in facts.items() if fact is not None)
+        with self.lock:
+            self.connection.send(message(6, "".join(lines).encode("ascii", "replace")[:2039].ljust(2040, b"\0")))
+
     def frame(self, t_ns, left, right):
         with self.lock:
             while self.hear() is not None:
@@ -132,6 +139,7 @@ class Link:
 
     def __init__(self, path, *rig_and_size):
         self.path, self.arguments, self.sender, self.dropped, self.told = path, rig_and_size, None, 0, None
+        self.facts = {}
 
     def keep_open(self):
         """Tries once where there is no connection; true: there is one."""
@@ -140,6 +148,8 @@ class Link:
                 self.sender = Sender(self.path, *self.arguments)
                 self.tell(f"connected to {self.path}" + (f", {self.dropped} images were dropped" if self.dropped else ""))
                 self.dropped = 0
+                if self.facts:
+                    self.send("device", self.facts)
             except OSError as error:
                 self.tell(f"waiting for fbvins at {self.path}: {error}")
         return self.sender is not None
@@ -160,6 +170,12 @@ class Link:
             self.sender = None
             sender.connection.close()
             self.tell(f"the connection to {self.path} has ended: {error}")
+
+    def describe(self, facts):
+        """What is known of the device, for `fbvins live --check`; sent when it changes, and with each new connection."""
+        if facts != self.facts:
+            self.facts = facts
+            self.send("device", facts)
 
     def close(self):
         sender, self.sender = self.sender, None

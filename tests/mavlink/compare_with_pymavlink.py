@@ -28,7 +28,8 @@ MESSAGES = [common.MAVLink_heartbeat_message, common.MAVLink_timesync_message, c
             common.MAVLink_command_ack_message, common.MAVLink_extended_sys_state_message, common.MAVLink_hil_sensor_message,
             common.MAVLink_hil_actuator_controls_message, common.MAVLink_highres_imu_message, common.MAVLink_scaled_imu_message,
             common.MAVLink_local_position_ned_message, common.MAVLink_attitude_quaternion_message,
-            common.MAVLink_set_gps_global_origin_message, common.MAVLink_param_request_read_message, common.MAVLink_param_value_message]
+            common.MAVLink_set_gps_global_origin_message, common.MAVLink_gps_global_origin_message,
+            common.MAVLink_param_request_read_message, common.MAVLink_param_value_message]
 RANGES = {"int8_t": (-2**7, 2**7 - 1), "int16_t": (-2**15, 2**15 - 1), "uint8_t": (0, 2**8 - 1), "uint16_t": (0, 2**16 - 1), "uint32_t": (0, 2**32 - 1),
           "int32_t": (-2**31, 2**31 - 1), "int64_t": (-2**63, 2**63 - 1), "uint64_t": (0, 2**64 - 1)}
 

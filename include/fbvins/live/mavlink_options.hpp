@@ -30,6 +30,7 @@ struct MavlinkOptions {
   double rate_hz = 50;
   int system_id = 1;
   int component_id = 197;
+  std::string origin = "";
   std::string key_file = "";
   std::string key_time_file = "mavlink_signing_time";
   MountingOptions mounting = {};
@@ -45,6 +46,8 @@ struct MavlinkOptions {
     v("rate_hz", rate_hz, "Hz", "poses sent per second, no more than the IMU's rate", 1.0, 1000.0);
     v("system_id", system_id, "", "the vehicle's number (PX4 MAV_SYS_ID, ArduPilot SYSID_THISMAV)", 1, 255);
     v("component_id", component_id, "", "component of this computer; 197: visual-inertial odometry", 1, 255);
+    v("origin", origin, "",
+      "LATITUDE,LONGITUDE,ALTITUDE in degrees and metres: told a flight controller without GPS as its EKF's origin; empty: it is not told");
     v("key_file", key_file, "", "file of the 32-byte key of MAVLink signing; empty: frames are not signed");
     v("key_time_file", key_time_file, "", "with a key: file that keeps the times of signatures growing over restarts");
     v.group("mounting", mounting, "the IMU on the vehicle, and the local frame");

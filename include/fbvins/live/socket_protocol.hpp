@@ -31,6 +31,7 @@ enum {
   FBVINS_SOCKET_FRAME = 3,
   FBVINS_SOCKET_GOODBYE = 4,   ///< either way
   FBVINS_SOCKET_POSITION = 5,  ///< sender to estimator, since version 1.1
+  FBVINS_SOCKET_DEVICE = 6,    ///< sender to estimator, since version 1.4
   FBVINS_SOCKET_WELCOME = 65,  ///< estimator to sender
   FBVINS_SOCKET_RELEASED = 66,
   FBVINS_SOCKET_STATUS = 67
@@ -162,6 +163,12 @@ typedef struct FbvinsSocketPosition {
   uint32_t measured;        ///< of a height alone only z and zz count
   uint32_t reserved;
 } FbvinsSocketPosition;
+
+/// What is known of the cameras' device, for `fbvins live --check` and for people. The newest one counts.
+typedef struct FbvinsSocketDevice {
+  FbvinsSocketHeader header;
+  char text[2040];  ///< lines KEY=VALUE (docs/socket.md); ends with a 0 unless full
+} FbvinsSocketDevice;
 
 /// FbvinsSocketGoodbye::reason
 enum {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
@@ -23,6 +25,13 @@ class SensorInput {
   virtual void push_anchor(Anchor anchor) { (void)anchor; }
 };
 
+/// What a check of live sensors says: what was seen, and what to do where it is not fine, or could be better; one sentence.
+struct SensorFinding {
+  bool fine = true;
+  std::string text;
+  bool advice = false;  ///< fine, and could be better
+};
+
 class Source {
  public:
   virtual ~Source() = default;
@@ -35,6 +44,8 @@ class Source {
   virtual void stop() = 0;
   /// A sink by which the source reports the flight's state to its device; null: none. May outlive the source.
   virtual std::unique_ptr<Sink> status_sink() { return nullptr; }
+  /// After run(): what the device says of itself. None: it says nothing.
+  virtual std::vector<SensorFinding> device_findings() const { return {}; }
 };
 
 }  // namespace fbvins

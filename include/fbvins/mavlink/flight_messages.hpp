@@ -97,6 +97,21 @@ struct AttitudeQuaternionMessage {
   }
 };
 
+/// GPS_GLOBAL_ORIGIN: where the flight controller's local frame is on the Earth, as it says once it is set.
+struct KnownOriginMessage {
+  static constexpr std::uint32_t kId = 49;
+  static constexpr std::uint8_t kCrcExtra = 39;
+
+  std::int32_t latitude = 0, longitude = 0;  ///< degrees times 1e7
+  std::int32_t altitude = 0;                 ///< mm above sea level
+  std::uint64_t time_usec = 0;
+
+  template <class V>
+  void wire(V&& v) {
+    v(latitude), v(longitude), v(altitude), v(time_usec);
+  }
+};
+
 /// SET_GPS_GLOBAL_ORIGIN: where the local frame's origin is on the Earth.
 struct GlobalOriginMessage {
   static constexpr std::uint32_t kId = 48;

@@ -170,6 +170,6 @@ using MavlinkMessage =
     std::variant<HeartbeatMessage, TimesyncMessage, OdometryMessage, VisionPositionMessage, VisionSpeedMessage, StatusTextMessage,
                  PositionTargetMessage, CommandMessage, CommandAckMessage, LandedStateMessage, HilSensorMessage,
                  HilActuatorControlsMessage, LocalPositionMessage, AttitudeQuaternionMessage, GlobalOriginMessage,
-                 HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
+                 KnownOriginMessage, HighresImuMessage, ScaledImuMessage, ParameterRequestMessage, ParameterValueMessage>;
 
 }  // namespace fbvins

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Private to io: text of foreign files in error messages.
+// Private: text of strangers, of files or senders, in messages.
 #pragma once
 
 #include <algorithm>

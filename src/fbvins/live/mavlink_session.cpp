@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/mavlink_session.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <sstream>
 #include <utility>
 
 namespace fbvins {
 namespace {
 
 constexpr Duration kTextEvery{500'000'000}, kPatience{3'000'000'000};
+/// It takes an origin only when its EKF runs, ten seconds after its start.
+constexpr Duration kOriginEvery{5'000'000'000};
 
 Odometry odometry(const LivePose& pose) {
   Odometry o;
@@ -20,12 +26,31 @@ Odometry odometry(const LivePose& pose) {
 
 }  // namespace
 
+Result<std::optional<GlobalOriginMessage>> parse_mavlink_origin(const std::string& text) {
+  if (text.empty()) return std::optional<GlobalOriginMessage>();
+  std::istringstream in(text);
+  double latitude = 0, longitude = 0, altitude_m = 0;
+  char first = 0, second = 0;
+  const bool read = static_cast<bool>(in >> latitude >> first >> longitude >> second >> altitude_m) && in.peek() == EOF &&
+                    first == ',' && second == ',';
+  if (!read || !(std::abs(latitude) <= 90) || !(std::abs(longitude) <= 180) || !(std::abs(altitude_m) <= 10'000))
+    return Error{ErrorCode::invalid_argument,
+                 fmt::format("live.mavlink.origin: '{}' is not LATITUDE,LONGITUDE,ALTITUDE in degrees and metres", text)};
+  GlobalOriginMessage origin;
+  origin.latitude = static_cast<std::int32_t>(std::lround(latitude * 1e7));
+  origin.longitude = static_cast<std::int32_t>(std::lround(longitude * 1e7));
+  origin.altitude = static_cast<std::int32_t>(std::lround(altitude_m * 1e3));
+  return std::optional(origin);
+}
+
 MavlinkSession::MavlinkSession(const MavlinkOptions& options, std::unique_ptr<MavlinkSigner> signer)
     : options_(options),
       signer_(std::move(signer)),
       frames_(options.mounting),
       decoder_(signer_.get()),
-      peer_(options.system_id) {}
+      peer_(options.system_id) {
+  if (const auto origin = parse_mavlink_origin(options.origin)) origin_ = *origin;
+}
 
 void MavlinkSession::say(const MavlinkMessage& message, Frames& out) {
   const MavlinkAddress us{static_cast<std::uint8_t>(options_.system_id), static_cast<std::uint8_t>(options_.component_id)};
@@ -107,6 +132,14 @@ HeartbeatMessage MavlinkSession::heartbeat() const {
   return beat;
 }
 
+/// From the first pose on, until the flight controller says where its origin is.
+void MavlinkSession::say_origin(Time now, Frames& out) {
+  if (!origin_ || origin_is_known_ || !had_pose_ || !is_due(now, kOriginEvery, next_origin_)) return;
+  GlobalOriginMessage origin = *origin_;
+  origin.target_system = peer_.address()->system;
+  say(origin, out);
+}
+
 std::string MavlinkSession::problem(Time now) const {
   if (!unsure_since_ || now - *unsure_since_ < kPatience) return {};
   if (!flight_controller_heard(now)) return "no flight controller is heard; poses are sent once its clock is known";
@@ -122,8 +155,10 @@ MavlinkSession::Frames MavlinkSession::tick(Time now) {
   if (is_due(now, kHeartbeatEvery, next_heartbeat_)) say(heartbeat(), out);
   if (!flight_controller_heard(now)) {
     told_health_.reset();  // is sent again when it comes back
+    origin_is_known_ = false;
     return out;
   }
+  say_origin(now, out);
   if (options_.clock == MavlinkClock::flight_controller)
     if (const auto question = peer_.question(now)) say(*question, out);
   if (health_ && told_health_ != health_ && is_due(now, kTextEvery, next_text_)) {
@@ -142,6 +177,9 @@ MavlinkSession::Frames MavlinkSession::receive(std::span<const std::uint8_t> byt
 void MavlinkSession::receive(const MavlinkFrame& frame, Time now, Frames& out) {
   if (frame.from.system == options_.system_id && frame.from.component == options_.component_id) return;  // our own, sent back
   peer_.hear(frame, now);
+  if (std::holds_alternative<KnownOriginMessage>(frame.message) && peer_.address() &&
+      frame.from.system == peer_.address()->system)
+    origin_is_known_ = true;
   const auto* sync = std::get_if<TimesyncMessage>(&frame.message);
   if (sync != nullptr && sync->tc1 == 0 && may_send_poses(now)) say(TimesyncMessage{their_time(now).ns, sync->ts1}, out);
 }

@@ -8,12 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "fbvins/core/result.hpp"
 #include "fbvins/live/mavlink_peer.hpp"
 #include "fbvins/live/mavlink_sink.hpp"
 #include "fbvins/mavlink/vehicle_frames.hpp"
 #include "fbvins/mavlink/wire.hpp"
 
 namespace fbvins {
+
+/// The option `origin`: three numbers with commas between, degrees and metres; none where it is empty. An error says what it is
+/// not.
+Result<std::optional<GlobalOriginMessage>> parse_mavlink_origin(const std::string& text);
 
 /// Times are of this machine's CLOCK_MONOTONIC. Each call returns the frames to send, in order.
 ///
@@ -60,6 +65,7 @@ class MavlinkSession {
   void say_pose(const LivePose& pose, std::uint64_t t_usec, Frames& out);
   OdometryMessage odometry_for_px4(const LivePose& pose, const std::optional<VehicleState>& state, std::uint64_t t_usec) const;
   std::optional<OdometryMessage> odometry_for_ardupilot(const std::optional<VehicleState>& state, std::uint64_t t_usec);
+  void say_origin(Time now, Frames& out);
   HeartbeatMessage heartbeat() const;
   Time their_time(Time host_t) const;
   std::uint64_t stamp_usec(Time host_t) const;
@@ -73,8 +79,10 @@ class MavlinkSession {
   std::optional<Health> health_;  // of the newest status
   std::optional<Health> told_health_;
   bool had_pose_ = false;
-  std::optional<OdometryMessage> last_;  // with a pose, in the dialect ardupilot
-  Time next_heartbeat_{}, next_text_{}, next_pose_{};
+  std::optional<OdometryMessage> last_;        // with a pose, in the dialect ardupilot
+  std::optional<GlobalOriginMessage> origin_;  // that the flight controller is to be told
+  bool origin_is_known_ = false;               // as it has said
+  Time next_heartbeat_{}, next_text_{}, next_pose_{}, next_origin_{};
   std::optional<Time> unsure_since_;
   std::int64_t poses_ = 0, withheld_ = 0;
 };

@@ -86,6 +86,55 @@ TEST(MavlinkSession, BeatsOnceASecondWhoeverListens) {
   EXPECT_EQ(beats, 10);
 }
 
+TEST(MavlinkSession, TellsTheOriginUntilTheFlightControllerKnowsOne) {
+  MavlinkOptions options = own_clock();
+  options.origin = "-35.3632621,149.1652374,584.19";
+  MavlinkSession session(options);
+  FlightController ardupilot(session);
+  const auto told = [&](int seconds) {
+    ardupilot.said.clear();
+    for (int second = 0; second < seconds; ++second) {
+      ardupilot.beat();
+      for (int i = 0; i < 125; ++i) ardupilot.step();
+    }
+    return only<GlobalOriginMessage>(ardupilot.said);
+  };
+  EXPECT_TRUE(told(6).empty()) << "there is no pose yet";
+  session.take(status(kGood), Time{ardupilot.now_ms * kMs});
+  const auto origins = told(12);
+  ASSERT_GE(origins.size(), 2u) << "it is told again";
+  EXPECT_LE(origins.size(), 3u);
+  EXPECT_EQ(origins[0].latitude, -353632621);
+  EXPECT_EQ(origins[0].longitude, 1491652374);
+  EXPECT_EQ(origins[0].altitude, 584190);
+  EXPECT_EQ(origins[0].target_system, 1);
+  ardupilot.hear(KnownOriginMessage{}, {9, 1});
+  EXPECT_FALSE(told(6).empty()) << "another vehicle's";
+  ardupilot.hear(KnownOriginMessage{});
+  EXPECT_TRUE(told(12).empty());
+  ardupilot.now_ms += 60'000;  // it starts anew
+  session.tick(Time{ardupilot.now_ms * kMs});
+  EXPECT_FALSE(told(6).empty());
+  MavlinkSession silent(own_clock());
+  silent.take(status(kGood), Time{1000 * kMs});
+  FlightController px4(silent);
+  px4.beat();
+  for (int i = 0; i < 1000; ++i) px4.step();
+  EXPECT_TRUE(only<GlobalOriginMessage>(px4.said).empty()) << "it is not asked to";
+}
+
+TEST(MavlinkSession, AnOriginThatIsNone) {
+  for (const char* text :
+       {"47", "47,8", "91,8,400", "47,181,400", "47,8,20000", "47,8,400,1", "47;8;400", "a,b,c", "nan,8,400"}) {
+    const auto origin = parse_mavlink_origin(text);
+    ASSERT_FALSE(origin) << text;
+    EXPECT_EQ(origin.error().message,
+              std::string("live.mavlink.origin: '") + text + "' is not LATITUDE,LONGITUDE,ALTITUDE in degrees and metres");
+  }
+  EXPECT_FALSE(*parse_mavlink_origin(""));
+  EXPECT_EQ((*parse_mavlink_origin("47.5, 8.25, 400"))->longitude, 82500000);
+}
+
 TEST(MavlinkSession, FiftyPosesASecondOfTwoHundredOrSoReadings) {
   for (const double imu_hz : {100.0, 200.0, 400.0, 1000.0}) {
     MavlinkSession session(own_clock());

@@ -178,6 +178,7 @@ Result<std::unique_ptr<MavlinkSink>> MavlinkSink::create(const std::string& addr
   Result<LinkAddress> link = parse_link_address(address);
   if (!link) return link.error();
   if (const Result<void> valid = validate(options); !valid) return valid.error();
+  if (const auto origin = parse_mavlink_origin(options.origin); !origin) return origin.error();
   if (auto* udp = std::get_if<UdpAddress>(&*link)) udp->peer_is_learnt = options.udp_peer == MavlinkUdpPeer::first;
   SigningTime time(options.key_file.empty() ? std::string() : options.key_time_file);
   auto signer = make_signer(options.key_file, std::max(time.first(), signing_time_now()));

@@ -9,10 +9,11 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "fbvins/imu/nav_state.hpp"
+
 namespace fbvins {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
 constexpr double kLongGap = 1.7;              // in periods; one lost image or reading makes two
 constexpr double kRateTolerance = 0.1;        // of the calibration's
 constexpr double kClockRateTolerance = 0.02;  // crystals are a thousand times better

@@ -19,11 +19,6 @@
 
 namespace fbvins {
 
-struct SensorFinding {
-  bool fine = true;
-  std::string text;  ///< what was seen, and what to do where it is not fine; one sentence
-};
-
 class SensorCheck final : public SensorInput {
  public:
   SensorCheck(const StereoRig& rig, double clock_rate, std::function<Time()> now = host_now)

@@ -31,7 +31,7 @@ static_assert(sizeof(FbvinsSocketHello) == kThirdHello_bytes + 8 * sizeof(Fbvins
 static_assert(FBVINS_SOCKET_DEPTH == 1 << kMostCameras);
 static_assert(sizeof(FbvinsSocketReading) == 56 && kFirstFrame_bytes == 32 && sizeof(FbvinsSocketFrame) == 96);
 static_assert(sizeof(FbvinsSocketGoodbye) == 256 && int{FBVINS_SOCKET_MOST_CAMERAS} == kMostCameras);
-static_assert(sizeof(FbvinsSocketPosition) == 120);
+static_assert(sizeof(FbvinsSocketPosition) == 120 && sizeof(FbvinsSocketDevice) == 2048);
 static_assert(sizeof(FbvinsSocketImu) <= FBVINS_SOCKET_LARGEST_MESSAGE);
 
 Error malformed(std::string sentence) { return {ErrorCode::malformed, std::move(sentence)}; }
@@ -186,6 +186,14 @@ Result<SocketMessage> parse_position(std::span<const std::byte> bytes) {
   return SocketMessage(impossible(anchor).empty() ? SocketPosition{std::move(anchor)} : SocketPosition{});
 }
 
+Result<SocketMessage> parse_device(std::span<const std::byte> bytes) {
+  const auto device = read<FbvinsSocketDevice>(bytes, "device");
+  if (!device) return device.error();
+  auto facts = parse_device_facts(std::string_view(device->text, strnlen(device->text, sizeof(device->text))));
+  if (!facts) return facts.error();
+  return SocketMessage(SocketDevice{*std::move(facts)});
+}
+
 Result<SocketMessage> parse_goodbye(std::span<const std::byte> bytes) {
   const auto goodbye = read<FbvinsSocketGoodbye>(bytes, "goodbye");
   if (!goodbye) return goodbye.error();
@@ -205,6 +213,7 @@ Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes) {
     case FBVINS_SOCKET_FRAME: return parse_frame(bytes);
     case FBVINS_SOCKET_GOODBYE: return parse_goodbye(bytes);
     case FBVINS_SOCKET_POSITION: return parse_position(bytes);
+    case FBVINS_SOCKET_DEVICE: return parse_device(bytes);
     default: return SocketMessage(SocketUnknown{header->type});
   }
 }

@@ -18,6 +18,7 @@
 
 #include "fbvins/camera/camera.hpp"
 #include "fbvins/core/result.hpp"
+#include "fbvins/live/device_facts.hpp"
 #include "fbvins/live/socket_protocol.hpp"
 #include "fbvins/types/anchor.hpp"
 #include "fbvins/types/image.hpp"
@@ -72,6 +73,10 @@ struct SocketPosition {
   std::optional<Anchor> anchor;  ///< none: left out, being impossible
 };
 
+struct SocketDevice {
+  DeviceFacts facts;
+};
+
 struct SocketGoodbye {
   std::string text;  ///< printable
 };
@@ -81,7 +86,8 @@ struct SocketUnknown {
   std::uint32_t type = 0;
 };
 
-using SocketMessage = std::variant<SocketHello, SocketImu, SocketFrame, SocketPosition, SocketGoodbye, SocketUnknown>;
+using SocketMessage =
+    std::variant<SocketHello, SocketImu, SocketFrame, SocketPosition, SocketDevice, SocketGoodbye, SocketUnknown>;
 
 /// ErrorCode::unsupported: another major version; ErrorCode::malformed: anything else.
 Result<SocketMessage> parse_socket_message(std::span<const std::byte> bytes);

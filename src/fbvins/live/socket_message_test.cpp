@@ -285,6 +285,19 @@ TEST(SocketMessage, HelloOfACameraWithADepthSensor) {
   EXPECT_EQ(refusal(bytes_of(hello, 1512)), "hello of 1512 bytes where 1552 are needed");
 }
 
+TEST(SocketMessage, WhatADeviceSaysOfItself) {
+  FbvinsSocketDevice device{{FBVINS_SOCKET_DEVICE, sizeof(device)}, "firmware=5.13.0\nusb=2.1\nstalls=3"};
+  const auto message = parse_socket_message(bytes_of(device));
+  ASSERT_TRUE(message) << message.error().message;
+  const DeviceFacts& facts = std::get<SocketDevice>(*message).facts;
+  EXPECT_EQ(facts.firmware, "5.13.0");
+  EXPECT_EQ(facts.usb, "2.1");
+  EXPECT_EQ(facts.stalls, 3);
+  std::strcpy(device.text, "usb=3\nstalls=many");
+  EXPECT_EQ(refusal(bytes_of(device)), "device, line 2: stalls=many");
+  EXPECT_EQ(refusal(bytes_of(device, 100)), "a message of 100 bytes says that it has 2048");
+}
+
 TEST(SocketMessage, NothingAndUnknownTypes) {
   EXPECT_EQ(refusal({}), "a message of 0 bytes where 8 are needed");
   const FbvinsSocketHeader unknown{999, sizeof(unknown)};

@@ -96,6 +96,7 @@ void SocketSession::take(const SocketMessage& message, SensorInput& input) {
     counts_.readings_refused += static_cast<std::uint64_t>(imu->refused);
   } else if (const auto* frame = std::get_if<SocketFrame>(&message)) take(*frame, input);
   else if (const auto* position = std::get_if<SocketPosition>(&message)) take(*position, input);
+  else if (const auto* device = std::get_if<SocketDevice>(&message)) device_ = device->facts;
   else if (const auto* goodbye = std::get_if<SocketGoodbye>(&message))
     ended_ = goodbye->text.empty() ? "said goodbye" : fmt::format("said goodbye: {}", goodbye->text);
   else if (std::holds_alternative<SocketHello>(message)) fail({ErrorCode::malformed, "a second hello"});

@@ -37,6 +37,8 @@ class SocketSession {
   /// Why the session is over; empty while it is not.
   const std::string& ended() const { return ended_; }
   const SocketCounts& counts() const { return counts_; }
+  /// As the sender has last said.
+  const std::optional<DeviceFacts>& device() const { return device_; }
 
   void greet();
   void welcome();
@@ -63,6 +65,7 @@ class SocketSession {
   std::array<std::byte, FBVINS_SOCKET_LARGEST_MESSAGE> buffer_;
   std::shared_ptr<const WakeEvent> wake_;
   std::optional<SocketHello> hello_;
+  std::optional<DeviceFacts> device_;
   std::shared_ptr<FrameRing> ring_;
   std::optional<std::uint64_t> last_sequence_;
   std::uint64_t to_release_ = 0;

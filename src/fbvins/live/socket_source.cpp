@@ -176,6 +176,7 @@ void SocketSource::check_hello() {
 
 void SocketSource::serve(SensorInput& input) {
   session_->receive(input);
+  if (session_->device()) device_ = session_->device();
   backlog_ = session_->send_released();
   if (session_->ended().empty()) send_status();
   if (!session_->ended().empty()) let_go();

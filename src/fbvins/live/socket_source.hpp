@@ -40,6 +40,9 @@ class SocketSource final : public Source {
   Result<void> run(SensorInput& input) override;
   void stop() override;
   std::unique_ptr<Sink> status_sink() override;
+  std::vector<SensorFinding> device_findings() const override {
+    return device_ ? fbvins::device_findings(*device_, rig_) : std::vector<SensorFinding>{};
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -65,6 +68,7 @@ class SocketSource final : public Source {
   std::shared_ptr<const WakeEvent> wake_ = std::make_shared<const WakeEvent>();
   std::shared_ptr<Report> report_;
   std::unique_ptr<SocketSession> session_;
+  std::optional<DeviceFacts> device_;       ///< as a sender has last said
   std::unique_ptr<SocketSession> leaving_;  ///< the last session that ended, kept open until its goodbye has been read
   Clock::time_point leaving_until_;
   bool backlog_ = false;            ///< a message waits because the sender does not read

@@ -8,19 +8,23 @@
 #include <cstring>
 #include <optional>
 
+#include "fbvins/live/host_clock.hpp"
+
 namespace fbvins {
 namespace {
 
-constexpr int kWidth_px = 640, kHeight_px = 480, kImageRate_hz = 30;  // preferred
+constexpr RealsenseMode kPreferred{640, 480, 30};
+constexpr const char* kUsualModes[] = {"640x480@30", "848x480@30", "848x480@60"};
 
 /// The library's milliseconds in a double are exact to a microsecond.
 Time time_of(const rs2::frame& frame) { return Time{std::llround(frame.get_timestamp() * 1e3) * 1000}; }
 
-/// Distance of a stream from the preferred one; of equal ones the first is taken.
-double distance(const rs2::stream_profile& profile) {
+/// Distance of a stream from the wanted one; of equal ones the first is taken.
+double distance(const rs2::stream_profile& profile, const RealsenseMode& wanted) {
   if (!profile.is<rs2::video_stream_profile>()) return -profile.fps();  // gyroscope and accelerometer: the highest rate
   const auto video = profile.as<rs2::video_stream_profile>();
-  return std::abs(video.width() - kWidth_px) + std::abs(video.height() - kHeight_px) + std::abs(video.fps() - kImageRate_hz);
+  return std::abs(video.width() - wanted.width_px) + std::abs(video.height() - wanted.height_px) +
+         std::abs(video.fps() - wanted.rate_hz);
 }
 
 struct Wanted {
@@ -38,6 +42,16 @@ void set(const rs2::sensor& sensor, rs2_option option, float value) {
   if (sensor.supports(option) && !sensor.is_option_read_only(option)) sensor.set_option(option, value);
 }
 
+/// A lower limit that somebody has set is kept.
+void limit_exposure(const rs2::sensor& sensor) {
+  constexpr float kLimit_us = 1e3f * static_cast<float>(kLongestExposure_ms);
+  if (!sensor.supports(RS2_OPTION_AUTO_EXPOSURE_LIMIT) || sensor.get_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT) <= kLimit_us) return;
+  set(sensor, RS2_OPTION_AUTO_EXPOSURE_LIMIT, kLimit_us);
+  set(sensor, RS2_OPTION_AUTO_EXPOSURE_LIMIT_TOGGLE, 1);
+}
+
+std::string mode_text(int width_px, int height_px, int rate_hz) { return fmt::format("{}x{}@{}", width_px, height_px, rate_hz); }
+
 Vec3 vector(const rs2_vector& v) { return Vec3(v.x, v.y, v.z); }
 
 Error error_of(const std::string& who, const rs2::error& e) {
@@ -51,8 +65,8 @@ std::string realsense_name(const rs2::device& device) {
   return device.supports(RS2_CAMERA_INFO_SERIAL_NUMBER) ? device.get_info(RS2_CAMERA_INFO_SERIAL_NUMBER) : "";
 }
 
-Result<std::unique_ptr<RealsenseCamera>> RealsenseCamera::open(rs2::device device, Say say) {
-  std::unique_ptr<RealsenseCamera> camera(new RealsenseCamera(std::move(device), std::move(say)));
+Result<std::unique_ptr<RealsenseCamera>> RealsenseCamera::open(rs2::device device, Say say, RealsenseMode wanted) {
+  std::unique_ptr<RealsenseCamera> camera(new RealsenseCamera(std::move(device), std::move(say), wanted));
   try {
     if (Result<void> chosen = camera->choose(); !chosen) return chosen.error();
     camera->set_options();
@@ -62,7 +76,26 @@ Result<std::unique_ptr<RealsenseCamera>> RealsenseCamera::open(rs2::device devic
   return camera;
 }
 
+void RealsenseCamera::note_mode(const rs2::stream_profile& profile) {
+  if (profile.stream_type() != RS2_STREAM_INFRARED || profile.stream_index() != 1) return;
+  const auto video = profile.as<rs2::video_stream_profile>();
+  modes_.insert({video.width(), video.height(), video.fps()});
+}
+
+std::string RealsenseCamera::modes(bool only_usual) const {
+  std::string all;
+  for (const auto& [width, height, rate] : modes_) {
+    const std::string mode = mode_text(width, height, rate);
+    const bool usual = std::find(std::begin(kUsualModes), std::end(kUsualModes), mode) != std::end(kUsualModes);
+    if (!only_usual || (usual && mode != mode_)) all += (all.empty() ? "" : " ") + mode;
+  }
+  return all;
+}
+
 Result<void> RealsenseCamera::choose() {
+  const RealsenseMode near = wanted_.width_px == 0 ? kPreferred
+                                                   : RealsenseMode{wanted_.width_px, wanted_.height_px,
+                                                                   wanted_.rate_hz == 0 ? kPreferred.rate_hz : wanted_.rate_hz};
   std::vector<rs2::stream_profile> chosen;
   for (rs2::sensor& sensor : device_.query_sensors()) {
     Stream stream{.sensor = sensor};
@@ -72,9 +105,13 @@ Result<void> RealsenseCamera::choose() {
       for (const rs2::stream_profile& profile : profiles) {
         const bool fits = profile.stream_type() == wanted.stream && profile.format() == wanted.format &&
                           (wanted.index == 0 || profile.stream_index() == wanted.index);
-        if (fits && (!best || distance(profile) < distance(*best))) best = profile;
+        if (!fits) continue;
+        note_mode(profile);
+        if (!best || distance(profile, near) < distance(*best, near)) best = profile;
       }
-      if (best) stream.profiles.push_back(*best);
+      if (!best) continue;
+      stream.profiles.push_back(*best);
+      stream.is_stereo |= wanted.stream == RS2_STREAM_INFRARED;
     }
     chosen.insert(chosen.end(), stream.profiles.begin(), stream.profiles.end());
     if (!stream.profiles.empty()) streams_.push_back(std::move(stream));
@@ -89,6 +126,14 @@ Result<void> RealsenseCamera::choose() {
       return Error{ErrorCode::unsupported, fmt::format("the camera {} has no {}", realsense_name(device_), wanted.name)};
   const auto left = find(kWanted[0])->as<rs2::video_stream_profile>(), right = find(kWanted[1])->as<rs2::video_stream_profile>();
   width_px_ = left.width(), height_px_ = left.height();
+  mode_ = mode_text(width_px_, height_px_, left.fps());
+  if (wanted_.width_px > 0 &&
+      mode_ != mode_text(wanted_.width_px, wanted_.height_px, wanted_.rate_hz == 0 ? left.fps() : wanted_.rate_hz))
+    return Error{ErrorCode::unsupported,
+                 fmt::format("the camera {} has no mode {}x{}{}, but {}", realsense_name(device_), wanted_.width_px,
+                             wanted_.height_px, wanted_.rate_hz == 0 ? "" : fmt::format("@{}", wanted_.rate_hz), modes(false))};
+  imu_calibrated_ =
+      is_calibrated(find(kWanted[2])->as<rs2::motion_stream_profile>(), find(kWanted[3])->as<rs2::motion_stream_profile>());
   try {
     rig_ = realsense_rig(left, right, find(kWanted[2])->as<rs2::motion_stream_profile>());
   } catch (const rs2::error& e) {
@@ -100,12 +145,37 @@ Result<void> RealsenseCamera::choose() {
 void RealsenseCamera::set_options() {
   for (const Stream& stream : streams_) {
     set(stream.sensor, RS2_OPTION_EMITTER_ENABLED, 0);
+    set(stream.sensor, RS2_OPTION_EMITTER_ON_OFF, 0);
     set(stream.sensor, RS2_OPTION_GLOBAL_TIME_ENABLED, 1);
     set(stream.sensor, RS2_OPTION_ENABLE_MOTION_CORRECTION, 1);
+    limit_exposure(stream.sensor);
   }
 }
 
+Duration RealsenseCamera::silence() {
+  const std::lock_guard lock(mutex_);
+  return host_now() - heard_;
+}
+
+DeviceFacts RealsenseCamera::facts() {
+  const std::lock_guard lock(mutex_);
+  const auto stereo = std::find_if(streams_.begin(), streams_.end(), [](const Stream& stream) { return stream.is_stereo; });
+  DeviceFacts facts;
+  try {
+    facts = realsense_facts(device_, stereo->sensor, seen_);
+  } catch (const rs2::error&) {  // unplugged
+  }
+  facts.mode = mode_, facts.other_modes = modes(true), facts.set_mode = "--source d435i:MODE";
+  facts.imu_calibrated = imu_calibrated_;
+  return facts;
+}
+
 Result<void> RealsenseCamera::start(SensorInput& input) {
+  {
+    const std::lock_guard lock(mutex_);
+    heard_ = host_now();
+    pairs_ = FrameJoiner(2), motion_ = MotionMerge();  // what it had before it stopped is of no use
+  }
   try {
     for (Stream& stream : streams_) {
       stream.sensor.open(stream.profiles);
@@ -133,10 +203,10 @@ void RealsenseCamera::stop() {
 
 void RealsenseCamera::take(const rs2::frame& frame, SensorInput& input) {
   const std::lock_guard lock(mutex_);
-  if (clock_ < 0) clock_ = frame.get_frame_timestamp_domain();
-  if (frame.get_frame_timestamp_domain() != clock_)
+  if (seen_.clock < 0) seen_.clock = frame.get_frame_timestamp_domain();
+  if (frame.get_frame_timestamp_domain() != seen_.clock)
     return say_once(fmt::format("stamps are of two clocks ('{}' and '{}'): images and readings of the second are left out",
-                                rs2_timestamp_domain_to_string(static_cast<rs2_timestamp_domain>(clock_)),
+                                rs2_timestamp_domain_to_string(static_cast<rs2_timestamp_domain>(seen_.clock)),
                                 rs2_timestamp_domain_to_string(frame.get_frame_timestamp_domain())));
   const Time t = time_of(frame);
   if (frame.is<rs2::video_frame>()) take_image(frame.as<rs2::video_frame>(), t, input);
@@ -144,6 +214,11 @@ void RealsenseCamera::take(const rs2::frame& frame, SensorInput& input) {
 }
 
 void RealsenseCamera::take_image(const rs2::video_frame& frame, Time t, SensorInput& input) {
+  heard_ = host_now();
+  if (frame.supports_frame_metadata(RS2_FRAME_METADATA_ACTUAL_EXPOSURE))
+    seen_.exposure_ms = 1e-3 * static_cast<double>(frame.get_frame_metadata(RS2_FRAME_METADATA_ACTUAL_EXPOSURE));
+  if (frame.supports_frame_metadata(RS2_FRAME_METADATA_FRAME_EMITTER_MODE))
+    (frame.get_frame_metadata(RS2_FRAME_METADATA_FRAME_EMITTER_MODE) == 0 ? seen_.emitter_off : seen_.emitter_on) = true;
   auto image = std::make_shared<Image>(frame.get_width(), frame.get_height());
   const auto* pixels = static_cast<const std::uint8_t*>(frame.get_data());
   for (int y = 0; y < frame.get_height(); ++y)

@@ -4,15 +4,19 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <regex>
 #include <utility>
 #include <vector>
 
 #include "fbvins/io/kalibr.hpp"
+#include "fbvins/live/host_clock.hpp"
 
 namespace fbvins {
 namespace {
 
 constexpr double kLookEvery_s = 0.5;
+/// Without an image, though the camera is there: its streams are started again; where this happens twice in a row, the camera.
+constexpr Duration kStall{2'000'000'000}, kTwiceInARow{10'000'000'000};
 
 bool is_recording(const std::string& which) { return which.ends_with(".bag"); }
 
@@ -21,6 +25,14 @@ bool fits(const StereoRig& rig, const RealsenseCamera& camera) {
 }
 
 }  // namespace
+
+RealsenseName parse_realsense_name(const std::string& text) {
+  static const std::regex kMode(R"((?:(.*):)?(\d{1,5})x(\d{1,5})(?:@(\d{1,4}))?)");
+  std::smatch found;
+  if (!std::regex_match(text, found, kMode)) return {text, {}};
+  const auto number = [&](std::size_t i) { return found[i].matched ? std::stoi(found[i]) : 0; };
+  return {found[1].str(), {number(2), number(3), number(4)}};
+}
 
 RealsenseSource::RealsenseSource(rs2::context context, std::string which, SourceOptions options)
     : options_(std::move(options)), context_(std::move(context)), which_(std::move(which)) {}
@@ -42,7 +54,9 @@ Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(const std::string
 
 Result<std::unique_ptr<RealsenseSource>> RealsenseSource::open(rs2::context context, const std::string& which,
                                                                const SourceOptions& options) {
-  std::unique_ptr<RealsenseSource> source(new RealsenseSource(std::move(context), which, options));
+  const RealsenseName name = parse_realsense_name(which);
+  std::unique_ptr<RealsenseSource> source(new RealsenseSource(std::move(context), name.which, options));
+  source->mode_ = name.mode;
   if (Result<void> watched = source->watch(); !watched) return watched.error();
   if (Result<void> found = source->wait_for_first(); !found) return found.error();
   if (Result<void> known = source->set_rig(); !known) return known.error();
@@ -86,7 +100,7 @@ std::unique_ptr<RealsenseCamera> RealsenseSource::find() {
       for (const rs2::device& device : context_.query_devices()) devices.push_back(device);
     for (const rs2::device& device : devices) {
       if (!which_.empty() && realsense_name(device) != which_) continue;
-      auto camera = RealsenseCamera::open(device, options_.say);
+      auto camera = RealsenseCamera::open(device, options_.say, mode_);
       if (!camera) {
         report(camera.error().message);
         continue;
@@ -156,12 +170,17 @@ Result<void> RealsenseSource::run(SensorInput& input) {
       camera_ = std::move(camera);
     }
     const std::string name = realsense_name(camera_->device());
+    ++cameras_;
     if (Result<void> started = camera_->start(input); !started) {
       report(started.error().message);
     } else {
       problem_.clear();
       options_.say(fmt::format("RealSense {}: {} x {} pixels", name, camera_->width_px(), camera_->height_px()));
-      while (!over() && !gone()) wait(kLookEvery_s);
+      while (!over() && !gone()) {
+        wait(kLookEvery_s);
+        if (!gone() && !is_recording(which_)) mend_stall(input);
+      }
+      keep_facts();
       camera_->stop();
       if (gone()) options_.say(fmt::format("RealSense {}: unplugged; it is waited for", name));
     }
@@ -171,6 +190,33 @@ Result<void> RealsenseSource::run(SensorInput& input) {
   }
   return {};
 }
+
+/// Starts the streams again that have stopped though the camera is there.
+void RealsenseSource::mend_stall(SensorInput& input) {
+  if (camera_->silence() < kStall) return;
+  ++stalls_;
+  options_.say("the camera is there, and no image comes: its streams are started again");
+  const bool again = stalls_ > 1 && host_now() - stalled_ < kTwiceInARow;
+  stalled_ = host_now();
+  camera_->stop();
+  try {
+    if (Result<void> started = again ? Result<void>{} : camera_->start(input); !started) report(started.error().message);
+    if (!again) return;
+    rs2::device(camera_->device()).hardware_reset();
+  } catch (const rs2::error& e) {
+    report(fmt::format("RealSense: {}", e.what()));
+  }
+  const std::lock_guard lock(mutex_);
+  removed_ = true;  // it is looked for as one that was unplugged
+}
+
+void RealsenseSource::keep_facts() {
+  facts_ = camera_->facts();
+  facts_.resets = cameras_ - 1;
+  facts_.stalls = stalls_;
+}
+
+std::vector<SensorFinding> RealsenseSource::device_findings() const { return fbvins::device_findings(facts_, rig_); }
 
 void RealsenseSource::stop() {
   const std::lock_guard lock(mutex_);

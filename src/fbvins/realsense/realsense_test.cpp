@@ -55,7 +55,7 @@ SourceOptions calibrated_by(const KalibrFiles& files) {
 }
 
 /// A recording of the library's own, made by its recorder.
-std::string record(const std::string& name, int images) {
+std::string record(const std::string& name, int images, std::chrono::milliseconds pause = {}) {
   const std::string path = (std::filesystem::temp_directory_path() / name).string();
   std::filesystem::remove(path);
   SoftwareCamera camera(rig());
@@ -65,6 +65,10 @@ std::string record(const std::string& name, int images) {
   EXPECT_TRUE(recorded) << recorded.error().message;
   EXPECT_TRUE((*recorded)->start(collected));
   play(camera, images);
+  if (pause.count() > 0) {
+    std::this_thread::sleep_for(pause);
+    play(camera, images, kStart + Duration{images * 33 * kMs} + Duration{pause.count() * kMs});
+  }
   (*recorded)->stop();
   return path;
 }
@@ -146,6 +150,89 @@ TEST(Realsense, LeavesOutStampsOfAnotherClock) {
   EXPECT_EQ(got.frames.size(), 3u);
   ASSERT_EQ(said.size(), 1u);
   EXPECT_NE(said[0].find("two clocks"), std::string::npos);
+}
+
+TEST(Realsense, SaysWhatItIsAndHowItIsSet) {
+  SoftwareCamera device(rig());
+  CollectedInput got;
+  auto camera = RealsenseCamera::open(device.device(), [](const std::string&) {});
+  ASSERT_TRUE(camera && (*camera)->start(got));
+  device.tell(RS2_FRAME_METADATA_ACTUAL_EXPOSURE, 4500);
+  device.tell(RS2_FRAME_METADATA_FRAME_EMITTER_MODE, 0);
+  play(device, 2);
+  const DeviceFacts facts = (*camera)->facts();
+  EXPECT_EQ(facts.model, "Intel RealSense D435I");
+  EXPECT_EQ(facts.firmware, "5.12.7.100");
+  EXPECT_EQ(facts.recommended_firmware, "5.16.0.1");
+  EXPECT_EQ(facts.usb, "2.1");
+  EXPECT_EQ(facts.driver, "kernel");
+  EXPECT_EQ(facts.clock, "global");
+  EXPECT_EQ(facts.emitter, "off");
+  EXPECT_EQ(facts.mode, "640x480@30");
+  EXPECT_EQ(facts.other_modes, "848x480@60");
+  EXPECT_EQ(facts.exposure_ms, 4.5);
+  EXPECT_EQ(facts.longest_exposure_ms, kLongestExposure_ms);
+  EXPECT_EQ(device.exposure_limit_us(), 8000) << "automatic exposure is limited";
+  EXPECT_EQ(facts.imu_calibrated, false);
+  device.tell(RS2_FRAME_METADATA_FRAME_EMITTER_MODE, 1);
+  play(device, 2, kStart + Duration{100 * kMs});
+  EXPECT_EQ((*camera)->facts().emitter, "alternating");
+  (*camera)->stop();
+}
+
+TEST(Realsense, TakesTheWantedMode) {
+  SoftwareCamera device(rig());
+  const auto open = [&](RealsenseMode mode) {
+    return RealsenseCamera::open(
+        device.device(), [](const std::string&) {}, mode);
+  };
+  for (const RealsenseMode& mode : {RealsenseMode{848, 480, 60}, RealsenseMode{848, 480, 0}}) {
+    auto wide = open(mode);
+    ASSERT_TRUE(wide) << wide.error().message;
+    EXPECT_EQ((*wide)->width_px(), 848);
+    EXPECT_EQ((*wide)->rig()->image_rate_hz, 60);
+  }
+  const auto none = open({848, 480, 90});
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().message, "the camera 123456 has no mode 848x480@90, but 640x480@30 848x480@60");
+}
+
+TEST(Realsense, NamesOfCamerasAndModes) {
+  const auto parsed = [](const std::string& text) {
+    const RealsenseName name = parse_realsense_name(text);
+    return fmt::format("{} {} {} {}", name.which, name.mode.width_px, name.mode.height_px, name.mode.rate_hz);
+  };
+  EXPECT_EQ(parsed(""), " 0 0 0");
+  EXPECT_EQ(parsed("123456"), "123456 0 0 0");
+  EXPECT_EQ(parsed("848x480@60"), " 848 480 60");
+  EXPECT_EQ(parsed("848x480"), " 848 480 0");
+  EXPECT_EQ(parsed("123456:848x480@30"), "123456 848 480 30");
+  EXPECT_EQ(parsed("a/b:c.bag"), "a/b:c.bag 0 0 0");
+}
+
+/// A recorded camera whose images pause for three seconds.
+TEST(Realsense, StreamsThatStopAreStartedAgain) {
+  const std::string camera = record("fbvins_realsense_stall.bag", 10, std::chrono::milliseconds(3000)) + ".camera";
+  std::filesystem::rename(camera.substr(0, camera.size() - 7), camera);
+  rs2::context context;
+  const rs2::device plugged = context.load_device(camera);
+  const KalibrFiles files(rig());
+  SourceOptions options = calibrated_by(files);
+  std::vector<std::string> said;
+  CollectedInput got;
+  options.say = [&](const std::string& s) { said.push_back(s); };
+  auto source = RealsenseSource::open(context, camera, options);
+  ASSERT_TRUE(source) << source.error().message;
+  std::thread running([&] { EXPECT_TRUE((*source)->run(got)); });
+  EXPECT_TRUE(got.wait_for_frames(14, kPatience));
+  (*source)->stop();
+  running.join();
+  ASSERT_GE(said.size(), 2u) << "what is connected, and what stopped";
+  EXPECT_NE(said[1].find("no image comes"), std::string::npos) << said[1];
+  const auto findings = (*source)->device_findings();
+  ASSERT_FALSE(findings.empty());
+  EXPECT_NE(findings.back().text.find("0 resets of the USB device, 1 stalls"), std::string::npos) << findings.back().text;
+  std::filesystem::remove(camera);
 }
 
 TEST(Realsense, PlaysARecordingToItsEnd) {

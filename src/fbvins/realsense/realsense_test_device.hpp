@@ -19,18 +19,32 @@ class SoftwareCamera {
       : stereo_(device_.add_sensor("Stereo Module")), motion_(device_.add_sensor("Motion Module")) {
     device_.register_info(RS2_CAMERA_INFO_SERIAL_NUMBER, serial);
     stereo_.add_option(RS2_OPTION_EMITTER_ENABLED, {0, 1, 1, 1});
+    device_.register_info(RS2_CAMERA_INFO_NAME, "Intel RealSense D435I");
+    device_.register_info(RS2_CAMERA_INFO_FIRMWARE_VERSION, "5.12.7.100");
+    device_.register_info(RS2_CAMERA_INFO_RECOMMENDED_FIRMWARE_VERSION, "5.16.0.1");
+    device_.register_info(RS2_CAMERA_INFO_USB_TYPE_DESCRIPTOR, "2.1");
+    device_.register_info(RS2_CAMERA_INFO_PHYSICAL_PORT, "/sys/devices/pci0000:00/usb2/2-1/video4linux/video0");
+    stereo_.add_option(RS2_OPTION_ENABLE_AUTO_EXPOSURE, {0, 1, 1, 1});
+    stereo_.add_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT, {1, 200000, 33000, 1});
+    stereo_.add_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT_TOGGLE, {0, 1, 0, 1});
     const int rate_hz = static_cast<int>(rig.image_rate_hz), imu_rate_hz = static_cast<int>(rig.imu_noise.rate_hz);
     left_ = stereo_.add_video_stream(video_stream(1, rig.left, rate_hz));
     right_ = stereo_.add_video_stream(video_stream(2, rig.right, rate_hz));
+    for (int index : {1, 2}) wide_[index - 1] = stereo_.add_video_stream(wide_stream(index));
     gyro_ = motion_.add_motion_stream({RS2_STREAM_GYRO, 0, 3, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
     accel_ = motion_.add_motion_stream({RS2_STREAM_ACCEL, 0, 4, imu_rate_hz, RS2_FORMAT_MOTION_XYZ32F, {}});
     left_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
     right_.register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
+    wide_[0].register_extrinsics_to(gyro_, extrinsics(rig.T_BC0));
+    wide_[1].register_extrinsics_to(gyro_, extrinsics(rig.T_BC1));
     accel_.register_extrinsics_to(gyro_, extrinsics(Pose<B, B>()));
   }
 
   rs2::software_device& device() { return device_; }
   float emitter() { return stereo_.get_option(RS2_OPTION_EMITTER_ENABLED); }
+  float exposure_limit_us() { return stereo_.get_option(RS2_OPTION_AUTO_EXPOSURE_LIMIT); }
+  /// Of the images that follow.
+  void tell(rs2_frame_metadata_value what, int value) { stereo_.set_metadata(what, value); }
 
   void gyro(Time t, const Vec3& v) { motion(gyro_, t, v); }
   void accel(Time t, const Vec3& v) { motion(accel_, t, v); }
@@ -62,6 +76,12 @@ class SoftwareCamera {
     for (int i = 0; i < 4; ++i) lens.coeffs[i] = static_cast<float>(coefficients[i]);
     return {RS2_STREAM_INFRARED, index, index, lens.width, lens.height, rate_hz, 1, RS2_FORMAT_Y8, lens};
   }
+  /// Another mode of the same camera, 848 x 480 at 60 Hz.
+  static rs2_video_stream wide_stream(int index) {
+    rs2_video_stream stream = video_stream(index, Camera(PinholeRadtan{425, 425, 424, 240, 0, 0, 0, 0}, 848, 480), 60);
+    stream.uid = 10 + index;
+    return stream;
+  }
   template <class To, class From>
   static rs2_extrinsics extrinsics(const Pose<To, From>& T) {
     rs2_extrinsics e{};
@@ -79,6 +99,7 @@ class SoftwareCamera {
   rs2::software_device device_;
   rs2::software_sensor stereo_, motion_;
   rs2::stream_profile left_, right_, gyro_, accel_;
+  rs2::stream_profile wide_[2];
   int number_ = 0;
 };
 
