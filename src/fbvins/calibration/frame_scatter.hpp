@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Private: how far the images of a calibration contradict one another. The covariance of the normal equations takes the errors of
-// corners as independent; a board that bends, cameras without a common trigger and what a lens model leaves move all corners of an
-// image together. What the calibration would be without each stamp shows it (C16). Pure function.
+// corners as independent; a board that bends, cameras without a common trigger and what a lens model leaves move all corners of
+// an image together. What the calibration would be without each stamp shows it (C16). Pure function.
 #pragma once
 
 #include "fbvins/calibration/rig_adjustment.hpp"

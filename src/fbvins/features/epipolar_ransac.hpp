@@ -30,8 +30,8 @@ struct EpipolarResult {
   int inliers = 0;
   Mat3 E = Mat3::Zero();  ///< b^T E a = 0; E = [t_ba]x R_ba
   Mat3 R_ba = Mat3::Identity();
-  /// Direction, sign not decided; zero when too few matches; arbitrary where a rotation alone explains them (rotation on the spot,
-  /// standstill), and the constraint only sees errors across the epipolar lines that it gives then.
+  /// Direction, sign not decided; zero when too few matches; arbitrary where a rotation alone explains them (rotation on the
+  /// spot, standstill), and the constraint only sees errors across the epipolar lines that it gives then.
   Vec3 t_ba = Vec3::Zero();
   int iterations = 0;
 };
