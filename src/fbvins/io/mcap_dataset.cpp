@@ -47,9 +47,10 @@ class RecordReader {
     out_.info.format = "MCAP flight record";
     while (const auto message = reader_.next()) take(*message);
     drop_half_frame();
-    join_without_trigger();
-    for (auto step : {&RecordReader::check, &RecordReader::read_calibration, &RecordReader::cut})
+    for (auto step : {&RecordReader::check, &RecordReader::read_calibration})
       if (Result<void> done = (this->*step)(); !done) return done.error();
+    join_without_trigger();
+    if (Result<void> done = cut(); !done) return done.error();
     warn();
     const auto by_time = [](const TrajectoryPoint& a, const TrajectoryPoint& b) { return a.t < b.t; };
     std::stable_sort(out_.ground_truth.begin(), out_.ground_truth.end(), by_time);

@@ -158,6 +158,29 @@ TEST_F(FlightRecordTest, KeepsTheOffsetsOfCamerasWithoutACommonTrigger) {
   for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
 }
 
+/// The right camera's stamps are 8 ms late, as its calibration says: its images are those of their frames again, also where the
+/// left one's are missing.
+TEST_F(FlightRecordTest, KeepsFramesOfCamerasWithTimesOfTheirOwn) {
+  rig_.more.push_back({rig_.left, Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1, 0))});
+  rig_.right.set_own_times({.time_offset_s = -0.008});
+  std::vector<SensorEvent> events;
+  for (int k = 0; k < 8; ++k) {
+    events.emplace_back(reading(50 * k));
+    StereoFrame all = frame(50 * k, k != 3, k != 5);
+    all.more = {picture(k + 7)};
+    all.offsets.set(1, Duration{8 * kMs});
+    events.emplace_back(std::move(all));
+  }
+  write(events);
+  auto data = open_dataset(path_);
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ((*data)->rig().times(1).time_offset_s, -0.008);
+  for (const std::string& warning : (*data)->info().warnings) EXPECT_EQ(warning.find("trigger"), std::string::npos) << warning;
+  const std::vector<SensorEvent> back = drain(**data);
+  ASSERT_EQ(back.size(), events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) EXPECT_TRUE(same_event(back[i], events[i])) << "event " << i;
+}
+
 TEST_F(FlightRecordTest, KeepsFourCameras) {
   for (int i = 2; i < 4; ++i) rig_.more.push_back({rig_.left, Pose<B, C0>(Quat::Identity(), Vec3(0, 0.1 * i, 0))});
   for (const bool triggered : {true, false}) {
