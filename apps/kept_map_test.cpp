@@ -136,6 +136,21 @@ TEST_F(KeptMapTest, OneFileServesAllWhoAskedAndTheEndTellsTheRest) {
   EXPECT_EQ(told.back(), "late: not");
 }
 
+TEST_F(KeptMapTest, AMapOfWhichAPartCannotBeReadIsToldAndNotWritten) {
+  KeptMap unreadable(
+      mapper,
+      []() -> Result<std::string> {
+        return Error{ErrorCode::malformed, "flat.fbm: damaged map"};
+      },
+      "", [this](const std::string& path, std::string_view bytes) { return disk.write(path, bytes); });
+  unreadable.save_requested_to("wish.fbm");
+  std::string told;
+  unreadable.request_save([&](const Result<void>& saved) { told = saved ? "saved" : saved.error().message; });
+  unreadable.process(at_s(0));
+  EXPECT_EQ(told, "flat.fbm: damaged map");
+  EXPECT_TRUE(disk.begun().empty());
+}
+
 TEST_F(KeptMapTest, WhatIsAskedForIsDoneBeforeTheNextKeyframe) {
   std::vector<int> keyframes;
   kept.process(at_s(0));

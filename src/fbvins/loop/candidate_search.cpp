@@ -15,7 +15,7 @@ constexpr int kMostSimilar = 40;
 /// A query that would look at more entries of the index, as in maps of some ten thousand keyframes, first makes a list of so many
 /// by its rarest words, of which it needs so many.
 constexpr std::size_t kManyEntries = 100'000, kFewestWords = 40;
-constexpr int kShortlist = 200;
+constexpr int kShortlist = 120;
 /// To compare with the words of a keyframe is as much work as so many entries of the index.
 constexpr std::size_t kEntriesOfAKeyframe = 1000;
 /// Keyframes younger than this make no loop: the odometry connects them.

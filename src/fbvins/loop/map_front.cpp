@@ -62,7 +62,7 @@ Result<PlaceMap> read_front(std::shared_ptr<ByteSource> file, const std::string&
   const auto end = ending.get<MapEnd>();
   if (!beginning.ok() || !ending.ok()) return Error{ErrorCode::unreadable, fmt::format("{}: cannot be read", name)};
   if ((flags & ~kMapFlags) != 0) return damaged_map(name, "unknown flags");
-  if (end.front_bytes > file->size() || end.front_at != file->size() - sizeof(MapEnd) - end.front_bytes)
+  if (end.front_bytes > file->size() - sizeof(MapEnd) || end.front_at != file->size() - sizeof(MapEnd) - end.front_bytes)
     return damaged_map(name, "cut short or grown");
   const std::string front = file->read(end.front_at, end.front_bytes);
   if (front.size() != end.front_bytes || (map_checksum(front) ^ flags) != end.checksum)
