@@ -6,9 +6,11 @@
 //   while (auto frame = joiner.next()) input.push(*std::move(frame));
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -19,11 +21,14 @@ namespace fbvins {
 /// Frames are delivered in order of time. A frame is delivered without a camera's image when that image counts as lost: that
 /// camera has delivered a newer one, or another camera has delivered several since. A camera whose images never meet those of
 /// camera 0 has no common trigger with it: then each frame has the image of it that is nearest to a quarter of an interval
-/// before, with its offset. A depth image without any camera's is dropped. One thread at a time.
+/// before, with its offset. A depth image without any camera's is dropped, and so are images of other cameras that are too far
+/// from one of camera 0 to be its partner, and nearer than half an interval: as recordings are paired (pair_frames()). One thread
+/// at a time.
 class FrameJoiner {
  public:
-  explicit FrameJoiner(int cameras, bool depth = false)
-      : cameras_(cameras), streams_(static_cast<std::size_t>(cameras + depth)) {}
+  /// `tolerance`: by which the stamps of a frame's images may differ; the default is that of recordings.
+  explicit FrameJoiner(int cameras, bool depth = false, Duration tolerance = Duration{3'000'000})
+      : cameras_(cameras), tolerance_(tolerance), streams_(static_cast<std::size_t>(cameras + depth)) {}
 
   /// Stamps of one camera ascend; one that does not is dropped. After it, next() until that is empty.
   void add(int camera, Time t, std::shared_ptr<const Image> image) { put(static_cast<std::size_t>(camera), t, std::move(image)); }
@@ -31,6 +36,8 @@ class FrameJoiner {
   void add_depth(Time t, std::shared_ptr<const DepthImage> depth) { put(streams_.size() - 1, t, std::move(depth)); }
   std::optional<StereoFrame> next();
   bool without_trigger(int camera) const { return is_free(streams_[static_cast<std::size_t>(camera)]); }
+  /// Frames that left with the images of some cameras only, and images that were dropped, in one sentence; empty: there are none.
+  std::string report() const;
 
  private:
   static constexpr int kApart = 20;  // images in a row that leave without one of camera 0, while both deliver
@@ -42,7 +49,7 @@ class FrameJoiner {
   struct Stream {
     std::deque<Waiting> waiting;
     std::optional<Time> newest = {};
-    Duration interval = {};  // the last one
+    Duration interval = {}, before = {};  // the last one, and that before it
     int apart = 0;
   };
 
@@ -55,10 +62,16 @@ class FrameJoiner {
   void take_first(std::size_t stream, StereoFrame& frame);
   void take_nearest(std::size_t stream, StereoFrame& frame);
   std::optional<StereoFrame> of_a_free_one();
+  bool are_one_instant(Time a, Time b) const;
+  bool is_stray(const StereoFrame& frame) const;
+  StereoFrame counted(StereoFrame frame);
   StereoFrame join(Time first);
 
   int cameras_;
-  std::vector<Stream> streams_;  // of the cameras, and of the depth sensor at the end
+  Duration tolerance_;
+  std::int64_t whole_ = 0, parts_ = 0, dropped_ = 0;  // frames, and frames of images that were dropped
+  std::optional<Time> last_zero_;                     // the newest frame with an image of camera 0
+  std::vector<Stream> streams_;                       // of the cameras, and of the depth sensor at the end
 };
 
 }  // namespace fbvins

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fbvins/live/frame_joiner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -8,10 +10,7 @@
 namespace fbvins {
 namespace {
 
-constexpr Duration kSameInstant{2'000'000};
 constexpr std::size_t kLongestWait = 4;  // images of one camera without any of another
-
-bool are_one_instant(Time a, Time b) { return std::abs((a - b).ns) <= kSameInstant.ns; }
 
 void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Image> image) {
   if (camera >= 2 && frame.more.size() < camera - 1) frame.more.resize(camera - 1);
@@ -20,9 +19,12 @@ void put_into(StereoFrame& frame, std::size_t camera, std::shared_ptr<const Imag
 
 }  // namespace
 
+bool FrameJoiner::are_one_instant(Time a, Time b) const { return std::abs((a - b).ns) <= tolerance_.ns; }
+
 void FrameJoiner::put(std::size_t stream, Time t, Pixels pixels) {
   Stream& to = streams_[stream];
   if (to.newest && t <= *to.newest) return;
+  to.before = to.interval;
   if (to.newest) to.interval = t - *to.newest;
   to.newest = t;
   to.waiting.push_back({t, std::move(pixels)});
@@ -124,9 +126,37 @@ std::optional<StereoFrame> FrameJoiner::next() {
     if (!is_complete(*first)) return std::nullopt;
     count_apart(*first);
     StereoFrame frame = join(*first);
-    if (!frame.without_images()) return frame;
+    if (frame.without_images()) continue;
+    if (!is_stray(frame)) return counted(std::move(frame));
+    ++dropped_;
   }
-  return of_a_free_one();
+  if (auto frame = of_a_free_one()) return counted(*std::move(frame));
+  return std::nullopt;
+}
+
+/// Whether a frame without camera 0 is too near to one of camera 0 to be another moment.
+bool FrameJoiner::is_stray(const StereoFrame& frame) const {
+  if (frame.left) return false;
+  const Stream& zero = streams_.front();
+  // A lost image makes one interval as long as two.
+  const Duration interval = zero.before.ns > 0 ? std::min(zero.interval, zero.before) : zero.interval;
+  const auto is_near = [&](Time t) { return 2 * std::abs((t - frame.t).ns) <= interval.ns; };
+  return (last_zero_ && is_near(*last_zero_)) || (!zero.waiting.empty() && is_near(zero.waiting.front().t));
+}
+
+StereoFrame FrameJoiner::counted(StereoFrame frame) {
+  bool whole = true;
+  for (int i = 0; i < cameras_; ++i) whole &= frame.image(i) != nullptr;
+  ++(whole ? whole_ : parts_);
+  if (frame.left) last_zero_ = frame.t;
+  return frame;
+}
+
+std::string FrameJoiner::report() const {
+  if (parts_ + dropped_ == 0) return {};
+  return fmt::format(
+      "{} frames with the images of all cameras; {} with those of some, {} images dropped, without partner within {} ms", whole_,
+      parts_, dropped_, 1e3 * tolerance_.seconds());
 }
 
 }  // namespace fbvins
